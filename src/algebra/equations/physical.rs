@@ -276,16 +276,12 @@ fn scale_of(weights: &DVector<f64>, names: &CoordinateNames, unit: Option<Unit>)
 fn units(model: &ReducedModel, scales: &[Scale]) -> Result<LatentUnits, PhysicalError> {
     let (encoder, s_u) = (model.encoder()?.weights(), model.input_factors()?);
     let projection = model.input_projection()?;
-    let (d, n) = encoder.shape();
+    let input = |latent: usize| scales[latent].input.0;
     Ok(LatentUnits {
         position: scales.iter().map(|scale| scale.position.1).collect(),
         input: scales.iter().map(|scale| scale.input.1).collect(),
-        project: DMatrix::from_fn(d, n, |row, col| {
-            projection[(row, col)] * s_u[col] / scales[row].input.0
-        }),
-        lift: DMatrix::from_fn(n, d, |row, col| {
-            encoder[(col, row)] * scales[col].input.0 / s_u[row]
-        }),
+        project: projection.map_with_location(|row, col, p| p * s_u[col] / input(row)),
+        lift: (encoder.transpose()).map_with_location(|row, col, w| w * input(col) / s_u[row]),
     })
 }
 
@@ -294,23 +290,16 @@ fn in_metres(model: &ReducedModel, scales: &[Scale]) -> Result<ReducedModel, Phy
     let s_x = model.state_factors()?;
     let sigma = |row: usize| scales[row].position.0;
     let (encoder, decoder) = (model.encoder()?, model.decoder()?);
-    let weights = encoder.weights();
-    let weights = DMatrix::from_fn(weights.nrows(), weights.ncols(), |row, col| {
-        weights[(row, col)] * s_x[col] / sigma(row)
-    });
-    let bias = DVector::from_fn(encoder.output_dim(), |row, _| {
-        encoder.bias()[row] / sigma(row)
-    });
+    let scaled = |row, col, weight: f64| weight * s_x[col] / sigma(row);
+    let weights = encoder.weights().map_with_location(scaled);
+    let bias = (encoder.bias()).map_with_location(|row, _, bias| bias / sigma(row));
     let encoder = AffineMap::new("encoder", weights, bias)?;
-    let weights = decoder.weights();
-    let weights = DMatrix::from_fn(weights.nrows(), weights.ncols(), |row, col| {
-        weights[(row, col)] * sigma(col) / s_x[row]
-    });
+    let scaled = |row, col, weight: f64| weight * sigma(col) / s_x[row];
+    let weights = decoder.weights().map_with_location(scaled);
     let decoder = AffineMap::new("decoder", weights, decoder.bias().component_div(&s_x))?;
-    let input = model.scaling()?.input.clone();
     let scaling = Scaling {
         state: ScaleFactors::Uniform(1.0),
-        input,
+        input: model.scaling()?.input.clone(),
     };
     Ok(model
         .clone()

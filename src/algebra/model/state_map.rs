@@ -96,11 +96,7 @@ impl StateMap {
 
     /// Number of coordinates that leave.
     pub fn output_dim(&self) -> usize {
-        self.layers
-            .last()
-            .expect("a map has a layer")
-            .map
-            .output_dim()
+        self.layers[self.layers.len() - 1].map.output_dim()
     }
 
     /// Shape of the Jacobian, `output_dim x input_dim`.
