@@ -42,16 +42,18 @@ pub fn emit(
 ) -> Result<Vec<EmittedFile>, TypesetError> {
     let model = system.model();
     let typeset = Typeset::new(system, &options.symbols, options.rounding);
+    let robot = RobotTypeset::new(system, &options.symbols, options.rounding)?;
     let stem = model.identifier().as_str();
     let header = Header { model, options };
     let systems = &phases(model, &typeset.systems, "", options);
-    let equations = EquationsFile {
-        header: header.equations(&typeset.rounding) + &labels(systems),
-        is_introduced: false,
-        systems,
-    };
-    let is_physical = system.latent_units().is_some();
-    let robot = RobotTypeset::new(system, &options.symbols, options.rounding)?;
+    let of_all = header.equations(&typeset.rounding);
+    let mut files = vec![equations(format!("{stem}.tex"), of_all, systems, false)?];
+    for (place, system) in systems.iter().enumerate() {
+        let path = format!("{stem}_{}.tex", model.phase_identifier(place));
+        let of_phase = header.short("One phase of the equations, with the same label.");
+        let system = std::slice::from_ref(system);
+        files.push(equations(path, of_phase, system, false)?);
+    }
     let width_em = options.width_em.unwrap_or(lines::WIDTH_EM);
     let blocks = table::blocks(&typeset.table, model.name(), options.numbers, width_em);
     let packages = match blocks.iter().any(|block| block.long) {
@@ -63,15 +65,22 @@ pub fn emit(
         header: header.short(packages) + &label_list(blocks.iter().flat_map(|block| &block.labels)),
         blocks,
     };
+    files.push(file(format!("{stem}-table.tex"), &coefficients)?);
     let nomenclature = Nomenclature {
         header: header.short("A table as wide as the line; needs amsmath."),
         entries: nomenclature::entries(system, &options.symbols, options.numbers),
     };
+    files.push(file(format!("{stem}-nomenclature.tex"), &nomenclature)?);
+    let is_physical = system.latent_units().is_some();
+    if let Some(robot) = &robot {
+        let of_robot = header.robot(robot, is_physical);
+        let systems = robot_systems(model, robot, options);
+        let path = format!("{stem}-robot.tex");
+        files.push(equations(path, of_robot, &systems, true)?);
+    }
     let preview = Preview {
         header: header.short("A document of its own; the files beside it are for \\input."),
-        name: tex_text(model.name()),
-        description: tex_text(model.description()),
-        stem,
+        model,
         phases: (systems.iter().enumerate())
             .map(|(place, system)| (system.introduction.as_str(), model.phase_identifier(place)))
             .collect(),
@@ -79,46 +88,26 @@ pub fn emit(
         siunitx: options.numbers == NumberStyle::Siunitx,
         two_columns: is_narrow(width_em),
         has_robot: robot.is_some(),
-        latent: match is_physical {
-            true => "latent coordinates and inputs have the units of the list of symbols",
-            false => {
-                "latent coordinates and inputs are scaled: those of the equations above, without a unit, \
-                 accelerations per second squared"
-            }
-        },
+        is_physical,
         tables,
     };
-    let mut files = vec![file(format!("{stem}.tex"), &equations)?];
-    for (place, system) in systems.iter().enumerate() {
-        let systems = std::slice::from_ref(system);
-        let note = "One phase of the equations, with the same label.";
-        let one = EquationsFile {
-            header: header.short(note) + &labels(systems),
-            is_introduced: false,
-            systems,
-        };
-        let path = format!("{stem}_{}.tex", model.phase_identifier(place));
-        files.push(file(path, &one)?);
-    }
-    files.extend([
-        file(format!("{stem}-table.tex"), &coefficients)?,
-        file(format!("{stem}-nomenclature.tex"), &nomenclature)?,
-    ]);
-    if let Some(robot) = &robot {
-        let systems = &robot_systems(model, robot, options);
-        let latent = if is_physical { "" } else { ", scaled" };
-        let note = format!(
-            "\n% Robot coordinates q in SI units (rad, m); z, u as in the latent equations{latent}."
-        );
-        let equations = EquationsFile {
-            header: header.equations(&robot.rounding) + &note + &labels(systems),
-            is_introduced: true,
-            systems,
-        };
-        files.push(file(format!("{stem}-robot.tex"), &equations)?);
-    }
     files.push(file(format!("{stem}-preview.tex"), &preview)?);
     Ok(files)
+}
+
+/// A file of equations, its labels in the comment at the top.
+fn equations(
+    path: String,
+    header: String,
+    systems: &[System],
+    is_introduced: bool,
+) -> Result<EmittedFile, TypesetError> {
+    let equations = EquationsFile {
+        header: header + &label_list(systems.iter().map(|system| system.block.labels())),
+        is_introduced,
+        systems,
+    };
+    file(path, &equations)
 }
 
 #[derive(Template)]
@@ -170,10 +159,6 @@ fn label_list(labels: impl IntoIterator<Item = impl fmt::Display>) -> String {
     format!("\n% Labels:{}", lines.collect::<String>())
 }
 
-fn labels(systems: &[System]) -> String {
-    label_list(systems.iter().map(|system| system.block.labels()))
-}
-
 #[derive(Template)]
 #[template(
     path = "latex/table.askama",
@@ -204,9 +189,7 @@ struct Nomenclature {
 )]
 struct Preview<'a> {
     header: String,
-    name: String,
-    description: String,
-    stem: &'a str,
+    model: &'a ReducedModel,
     /// Introduction and identifier of each phase.
     phases: Vec<(&'a str, &'a Identifier)>,
     rounding: String,
@@ -214,8 +197,8 @@ struct Preview<'a> {
     two_columns: bool,
     /// Whether there is a file of the robot's equations.
     has_robot: bool,
-    /// Units of the latent quantities.
-    latent: &'static str,
+    /// Whether the latent quantities have units.
+    is_physical: bool,
     /// References to the tables of coefficients.
     tables: String,
 }
@@ -308,6 +291,14 @@ impl Header<'_> {
             ));
         }
         header
+    }
+
+    fn robot(&self, robot: &RobotTypeset, is_physical: bool) -> String {
+        let latent = if is_physical { "" } else { ", scaled" };
+        let header = self.equations(&robot.rounding);
+        format!(
+            "{header}\n% Robot coordinates q in SI units (rad, m); z, u as in the latent equations{latent}."
+        )
     }
 }
 
