@@ -244,8 +244,12 @@ impl Layout<'_> {
             }
             // The power of exp(x) without parentheses could be read as one of x.
             false => {
-                let applied = self.apply(function, argument);
-                Math::Power(Box::new(grouped_function(applied)), power)
+                let base = match self.apply(function, argument) {
+                    math @ Math::Function(..) => Math::Group(Box::new(math)),
+                    // bars and roots show themselves where they end
+                    math => math,
+                };
+                Math::Power(Box::new(base), power)
             }
         };
         (FactorKey::Function, math)
@@ -354,14 +358,6 @@ fn turn_difference(factor: &mut Math) -> bool {
             .for_each(|term| term.negative = !term.negative);
     }
     is_difference
-}
-
-/// A function in parentheses; bars and roots show themselves where they end.
-fn grouped_function(math: Math) -> Math {
-    match math {
-        Math::Function(..) => Math::Group(Box::new(math)),
-        math => math,
-    }
 }
 
 /// A numerator or denominator needs no parentheses of its own.

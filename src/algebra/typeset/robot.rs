@@ -7,7 +7,7 @@ use crate::equations::Equations;
 use crate::model::{AffineMap, LatentVariable};
 
 use super::decimal::{Decimal, Rounding};
-use super::equations::{Equation, EquationSystem, coefficients};
+use super::equations::{EquationSystem, coefficients};
 use super::error::TypesetError;
 use super::expression::terms;
 use super::rounder::{Rounder, RoundingReport};
@@ -21,7 +21,7 @@ const NEGLIGIBLE: f64 = 0.02;
 #[derive(Clone, Debug, PartialEq)]
 pub struct RobotTypeset {
     /// `z = W_e (s_x q) + b_e`, one equation a latent coordinate.
-    pub encoder: Vec<Equation>,
+    pub encoder: EquationSystem,
     /// How many weights of the encoder are too small to be printed: each below 2 % of the
     /// largest of its row.
     pub negligible_weights: usize,
@@ -89,48 +89,36 @@ fn encoder(
     factors: &DVector<f64>,
     symbols: &SymbolTable,
     coordinates: &[Symbol],
-) -> Result<(Vec<Equation>, usize), TypesetError> {
-    let one = Signed::plus(Math::Number(Decimal::integer(1)));
-    let terms: Vec<Signed> = coordinates
-        .iter()
-        .map(|symbol| Signed::plus(Math::Symbol(symbol.clone())))
-        .collect();
-    let mut rounder = Rounder::new(Rounding::Significant(3), std::iter::empty());
-    let mut left_out = 0;
-    let mut equations = Vec::new();
-    for row in 0..encoder.output_dim() {
-        let weights = encoder
-            .weights()
-            .row(row)
-            .transpose()
-            .component_mul(factors);
-        for (col, &weight) in weights.iter().enumerate() {
-            finite(
-                weight,
-                &format!("z{}", row + 1),
-                &coordinates[col].to_string(),
-            )?;
+) -> Result<(EquationSystem, usize), TypesetError> {
+    let mut terms = vec![("1", Signed::plus(Math::Number(Decimal::integer(1))))];
+    let of_symbol = |symbol: &Symbol| ("", Signed::plus(Math::Symbol(symbol.clone())));
+    terms.extend(coordinates.iter().map(of_symbol));
+    let mut printed = DMatrix::zeros(terms.len(), encoder.output_dim());
+    let mut absent = vec![0; encoder.output_dim()];
+    for (row, mut column) in printed.column_iter_mut().enumerate() {
+        let weights = encoder.weights().row(row).transpose();
+        let weights = weights.component_mul(factors);
+        for (&weight, symbol) in weights.iter().zip(coordinates) {
+            finite(weight, &format!("z{}", row + 1), &symbol.to_string())?;
         }
         let smallest = NEGLIGIBLE * weights.amax();
-        let is_printed = |weight: f64| weight.abs() >= smallest && weight != 0.0;
-        let absent = weights
-            .iter()
-            .filter(|w| **w != 0.0 && !is_printed(**w))
-            .count();
-        left_out += absent;
-        let bias = std::iter::once((encoder.bias()[row], "1", &one));
-        let entries = weights
-            .iter()
-            .zip(&terms)
-            .filter(|(weight, _)| is_printed(**weight))
-            .map(|(weight, term)| (*weight, "", term));
-        let left = symbols.symbol(LatentVariable::Z(row));
-        equations.push(Equation {
-            is_approximate: absent > 0,
-            ..rounder.equation(left, ("encoder", ""), bias.chain(entries))
-        });
+        column[0] = encoder.bias()[row];
+        for (index, &weight) in weights.iter().enumerate() {
+            if weight.abs() >= smallest {
+                column[index + 1] = weight;
+            } else if weight != 0.0 {
+                absent[row] += 1;
+            }
+        }
     }
-    Ok((equations, left_out))
+    let output = |row| (symbols.symbol(LatentVariable::Z(row)), String::new());
+    let outputs: Vec<_> = (0..encoder.output_dim()).map(output).collect();
+    let mut rounder = Rounder::new(Rounding::Significant(3), std::iter::empty());
+    let mut system = rounder.system("encoder", &outputs, &terms, &printed);
+    for (equation, absent) in system.equations.iter_mut().zip(&absent) {
+        equation.is_approximate = *absent > 0;
+    }
+    Ok((system, absent.iter().sum()))
 }
 
 /// `value`, unless folding it with weights and scale factors left the range of floats.

@@ -116,7 +116,7 @@ impl Rounder {
 
     /// `left = sum of coefficient * term`; each entry carries its term also as text, and
     /// `(phase, output)` names the equation, for the record.
-    pub(super) fn equation<'a>(
+    fn equation<'a>(
         &mut self,
         left: Symbol,
         (phase, output): (&str, &str),

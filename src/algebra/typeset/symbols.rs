@@ -153,10 +153,8 @@ pub(super) fn glyph(text: &str) -> Option<Glyph> {
     if let Some(place) = GREEK.iter().position(|(greek, _)| *greek == name) {
         return Some(Glyph::Greek(place));
     }
-    if named.is_some() || name.len() > LONGEST_WORD {
-        return None;
-    }
-    if name.is_empty() || !name.bytes().all(|byte| byte.is_ascii_alphanumeric()) {
+    let is_plain = name.bytes().all(|byte| byte.is_ascii_alphanumeric());
+    if named.is_some() || !is_plain || !(1..=LONGEST_WORD).contains(&name.len()) {
         return None;
     }
     let mut letters = name.chars();

@@ -237,10 +237,6 @@ fn robot_systems(
     options: &PrintOptions,
 ) -> Vec<System> {
     let label = format!("eq:{}-robot:encoder", label(model.name()));
-    let encoder = EquationSystem {
-        phase: "encoder".to_owned(),
-        equations: robot.encoder.clone(),
-    };
     let count = robot.negligible_weights;
     let without = match count {
         0 => String::new(),
@@ -252,7 +248,7 @@ fn robot_systems(
              their row are left out."
         ),
         introduction: format!("Latent coordinates{without}:"),
-        block: lines::block(&encoder, label, options),
+        block: lines::block(&robot.encoder, label, options),
     };
     let of_phases = phases(model, &robot.systems, "-robot", options);
     [encoder].into_iter().chain(of_phases).collect()
