@@ -44,8 +44,7 @@ impl ReducedModel {
     /// # Errors
     /// [`ModelError::Missing`] for a latent-only model, [`ModelError::Nonlinear`].
     pub fn encoder(&self) -> Result<&AffineMap, ModelError> {
-        let affine = self.encoder_map()?.as_affine();
-        affine.ok_or_else(|| self.nonlinear("encoder", "one matrix for all states"))
+        self.affine("encoder", self.encoder_map()?)
     }
 
     /// The decoder of a linear model, in scaled units: `W_d` is `state_dim x latent_dim`.
@@ -53,8 +52,7 @@ impl ReducedModel {
     /// # Errors
     /// [`ModelError::Missing`] if the model has none, [`ModelError::Nonlinear`].
     pub fn decoder(&self) -> Result<&AffineMap, ModelError> {
-        let affine = self.decoder_map()?.as_affine();
-        affine.ok_or_else(|| self.nonlinear("decoder", "one matrix for all states"))
+        self.affine("decoder", self.decoder_map()?)
     }
 
     /// `pinv(W_e^T)` of a linear model, `latent_dim x state_dim`, in scaled units.
@@ -131,12 +129,16 @@ impl ReducedModel {
         Ok(x.component_mul(&factors))
     }
 
-    fn nonlinear(&self, part: &'static str, purpose: &'static str) -> ModelError {
-        ModelError::Nonlinear {
+    fn affine<'m>(
+        &self,
+        part: &'static str,
+        map: &'m StateMap,
+    ) -> Result<&'m AffineMap, ModelError> {
+        map.as_affine().ok_or_else(|| ModelError::Nonlinear {
             model: self.parts.name.clone(),
             part,
-            purpose,
-        }
+            purpose: "one matrix for all states",
+        })
     }
 }
 

@@ -1,15 +1,12 @@
 //! Sentences that every printed form of a model carries, in a spelling that the form chooses.
 
 use crate::model::FeetRule;
-use crate::robot::ContactFlags;
+use crate::robot::{ContactFlags, Leg};
 
 use super::decimal::{Decimal, Rounding};
 use super::rounder::{Place, RoundingReport};
 use super::table::{rounded, rounded_up};
 use super::tree::{Math, Signed};
-
-/// Names of the feet in the order of contact flags.
-const FEET: [&str; 4] = ["fr", "fl", "rr", "rl"];
 
 /// How a sentence spells words from outside and mathematics.
 pub trait Spelling {
@@ -107,8 +104,8 @@ fn pairs(patterns: &[ContactFlags]) -> String {
 
 /// The feet of one pattern by name.
 fn by_name(pattern: &ContactFlags) -> String {
-    let feet = FEET.iter().zip(pattern).filter(|(_, down)| **down);
-    let feet: Vec<&str> = feet.map(|(name, _)| *name).collect();
+    let feet = Leg::ALL.iter().zip(pattern).filter(|(_, down)| **down);
+    let feet: Vec<&str> = feet.map(|(leg, _)| leg.short_name()).collect();
     match feet.as_slice() {
         [] => "no foot".to_owned(),
         [foot] => format!("{foot} alone"),

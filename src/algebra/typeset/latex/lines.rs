@@ -43,13 +43,13 @@ impl Block {
 
 /// Spells the equations of one phase; `label` is the stem of its labels.
 pub(super) fn block(system: &EquationSystem, label: String, options: &PrintOptions) -> Block {
-    let all = |start: Start| -> Vec<Vec<String>> {
+    let all = |widest: Option<f64>| -> Vec<Vec<String>> {
         let equations = system.equations.iter();
-        let sides = equations.map(|equation| right_sides(equation, start, options));
+        let sides = equations.map(|equation| right_sides(equation, widest, options));
         sides.collect()
     };
     let lines_of = |sides: &[Vec<String>]| sides.iter().map(Vec::len).sum::<usize>();
-    let in_cases = all(Start::Brace);
+    let in_cases = all(None);
     let aligned = match options.form {
         Form::Automatic => lines_of(&in_cases) > CASES_LINES,
         Form::Cases => false,
@@ -60,7 +60,7 @@ pub(super) fn block(system: &EquationSystem, label: String, options: &PrintOptio
         .iter()
         .map(|equation| symbol_width(&equation.left));
     let sides = match aligned {
-        true => all(Start::Aligned(widest.fold(0.0, f64::max))),
+        true => all(Some(widest.fold(0.0, f64::max))),
         false => in_cases,
     };
     let count = lines_of(&sides);
@@ -119,25 +119,17 @@ pub fn tex_cases(system: &EquationSystem, width_em: f64) -> String {
     format!("\\begin{{cases}}\n  {lines}\n\\end{{cases}}")
 }
 
-/// Where the lines of an equation start.
-#[derive(Clone, Copy)]
-enum Start {
-    /// Behind a brace, at the equation's own left side.
-    Brace,
-    /// Behind the widest left side, in em, continued lines too.
-    Aligned(f64),
-}
-
-/// The right side of an equation, one entry per line.
-fn right_sides(equation: &Equation, start: Start, options: &PrintOptions) -> Vec<String> {
+/// The right side of an equation, one entry per line. Lines are aligned behind the widest left side, in em,
+/// or stand behind a brace, at the equation's own left side.
+fn right_sides(equation: &Equation, aligned: Option<f64>, options: &PrintOptions) -> Vec<String> {
     let numbers = options.numbers;
     if equation.terms.is_empty() {
         return vec![tex(&equation.right(), numbers)];
     }
     let width = options.width_em.unwrap_or(WIDTH_EM);
-    let (available, first, continued) = match start {
-        Start::Brace => (width - BRACE, symbol_width(&equation.left) + EQUALS, INDENT),
-        Start::Aligned(left) => (width, left + EQUALS, left + INDENT),
+    let (available, first, continued) = match aligned {
+        None => (width - BRACE, symbol_width(&equation.left) + EQUALS, INDENT),
+        Some(left) => (width, left + EQUALS, left + INDENT),
     };
     let lines = break_lines(&equation.terms, available, first, continued).into_iter();
     let side = |(line, terms)| tex_terms(terms, numbers, line > 0);
