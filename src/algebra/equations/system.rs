@@ -20,16 +20,6 @@ pub struct Summand {
     pub term: usize,
 }
 
-/// Which form of the equations is printed and emitted.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum EquationForm {
-    /// The shortest equal form that is found.
-    #[default]
-    Simplified,
-    /// Coefficients times candidate terms as the model file has them.
-    AsLearned,
-}
-
 /// The accelerations of one phase.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PhaseEquations {
@@ -56,17 +46,10 @@ pub struct Equations<'a> {
 }
 
 impl<'a> Equations<'a> {
-    /// The equations of a model as they are printed and emitted unless asked otherwise: simplified.
+    /// The equations of a model as they are printed and emitted unless asked otherwise: in the shortest equal
+    /// form that is found.
     pub fn of(model: &'a ReducedModel) -> Self {
-        Self::in_form(model, EquationForm::Simplified)
-    }
-
-    /// The equations of a model in one of the forms.
-    pub fn in_form(model: &'a ReducedModel, form: EquationForm) -> Self {
-        match form {
-            EquationForm::Simplified => Self::as_learned(model).simplified(),
-            EquationForm::AsLearned => Self::as_learned(model),
-        }
+        Self::as_learned(model).simplified()
     }
 
     /// Coefficients times candidate terms exactly as the model has them.
