@@ -95,16 +95,12 @@ impl Random {
             feet,
             xi: DMatrix::from_fn(texts.len(), 2, |_, _| self.coefficient()),
         };
-        let (contact, flight) = (
+        let phases = vec![
             phase("contact", FeetRule::Any),
             phase("flight", FeetRule::None),
-        );
+        ];
         let builder = ReducedModel::builder("random", library);
-        builder
-            .phase(contact)
-            .phase(flight)
-            .build()
-            .expect("a model")
+        builder.phases(phases).build().expect("a model")
     }
 
     fn domain(&mut self, model: &ReducedModel) -> Domain {
@@ -337,12 +333,11 @@ fn rounding_spends_the_tolerance_where_it_saves_most_digits() {
     let made = simplified(&terms, [UNIT, (-0.1, 0.1), UNIT], 0.06);
     let equation = &made.certificate.phases[0].equations[0];
     // 0.0137 for 1.4, 0.0286 for 3 and 0.0042 for 3.24 leave nothing for 3.2, which costs 0.0358
-    let names = left(&made);
-    let names: Vec<_> = names
-        .iter()
-        .map(|(text, xi)| (text.as_str(), *xi))
-        .collect();
-    assert_eq!(names, [("z1", 3.24), ("dz1", 3.0), ("u1", 1.4)]);
+    let expected = [("z1", 3.24), ("dz1", 3.0), ("u1", 1.4)];
+    assert_eq!(
+        left(&made),
+        expected.map(|(text, xi)| (text.to_owned(), xi))
+    );
     assert_eq!(equation.digits.after, 6);
     assert!(equation.bound.magnitude() <= 0.06);
 }
