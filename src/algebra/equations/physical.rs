@@ -211,11 +211,8 @@ fn scales(model: &ReducedModel) -> Result<Vec<Scale>, PhysicalError> {
     };
     let state = model.state().ok_or_else(|| missing("state"))?;
     let input = model.input().ok_or_else(|| missing("input"))?;
-    let (weights, s_x, s_u) = (
-        model.encoder()?.weights(),
-        model.state_factors()?,
-        model.input_factors()?,
-    );
+    let weights = model.encoder()?.weights();
+    let (s_x, s_u) = (model.state_factors()?, model.input_factors()?);
     let scale = |row: usize| {
         let weights = weights.row(row).transpose();
         let unit = ruling_unit(&weights.component_mul(&s_x), state);

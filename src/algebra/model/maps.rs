@@ -1,9 +1,9 @@
 //! The maps of a model between robot and latent coordinates.
 //!
-//! With the encoder `E` and the decoder `D`, their Jacobians `J_E` at `s_x x` and `J_D` at `z`:
+//! With the encoder `E` and the decoder `D`, the Jacobian `J_E` of `E` at `s_x x`:
 //!
 //! - `z = E(s_x x)`, `ddz = J_E (s_x ddx) + dJ_E/dt (s_x dx)`;
-//! - `x = D(z) / s_x`, `ddx = (J_D ddz + dJ_D/dt dz) / s_x`.
+//! - `x = D(z) / s_x`.
 //!
 //! Velocities and inputs: [`ReducedModel::tangent`].
 

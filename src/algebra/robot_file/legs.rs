@@ -145,10 +145,8 @@ impl Reader<'_> {
     fn places(&self, legs: &[LegEntry]) -> Result<[Leg; FOOT_DIM], RobotFileError> {
         for (index, leg) in legs.iter().enumerate() {
             let (place, count) = (format!("leg[{index}].joint"), leg.joint.len());
-            let (found, expected) = (
-                format!("{count} joints"),
-                "three, from the trunk to the foot",
-            );
+            let found = format!("{count} joints");
+            let expected = "three, from the trunk to the foot";
             self.check(count == LEG_JOINT_DIM, &place, found, expected)?;
         }
         let hips: Vec<[f64; 3]> = legs.iter().map(|leg| leg.joint[0].at).collect();
