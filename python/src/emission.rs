@@ -7,12 +7,12 @@ use romc::Error;
 use romc::artifact;
 use romc::cli::args::UnitsChoice;
 use romc::deploy::{self, EmitOptions, Target};
-use romc::equations::{EquationForm, Equations};
+use romc::equations::Equations;
 use romc::files::{EmittedFile, Overwrite};
 use romc::limits::table;
 use romc::typeset::latex::tex_cases;
 use romc::typeset::words;
-use romc::typeset::{NumberStyle, PrintOptions, Rounding, SymbolTable, Typeset, TypesetError};
+use romc::typeset::{NumberStyle, PrintOptions, Rounding, SymbolTable, Typeset};
 
 use crate::errors::{choice, count_within, python_error, within};
 use crate::model::Model;
@@ -41,7 +41,7 @@ pub struct EmitArguments {
 
 /// The same as the library takes them.
 struct Emission {
-    form: EquationForm,
+    as_learned: bool,
     is_physical: bool,
     options: EmitOptions,
 }
@@ -77,10 +77,7 @@ impl EmitArguments {
             form: form.transpose()?.unwrap_or_default(),
         };
         Ok(Emission {
-            form: match self.as_learned {
-                true => EquationForm::AsLearned,
-                false => EquationForm::Simplified,
-            },
+            as_learned: self.as_learned,
             is_physical: units == UnitsChoice::Physical,
             options: EmitOptions {
                 precision: choice(py, "precision", &self.precision)?,
@@ -95,7 +92,10 @@ impl EmitArguments {
 
 impl Emission {
     fn equations<'m>(&self, model: &'m Model) -> Result<Equations<'m>, Error> {
-        let equations = Equations::in_form(&model.data, self.form);
+        let equations = match self.as_learned {
+            true => Equations::as_learned(&model.data),
+            false => Equations::of(&model.data),
+        };
         match self.is_physical {
             true => Ok(equations.in_physical_units()?),
             false => Ok(equations),
@@ -146,7 +146,6 @@ pub fn equations(
         let equations = emission.equations(model)?;
         let print = &emission.options.print;
         let typeset = Typeset::new(&equations, &print.symbols, print.rounding);
-        let typeset = typeset.map_err(TypesetError::from)?;
         let width_em = print.width_em.unwrap_or(NOTEBOOK_EM);
         let phases = typeset.systems.iter().zip(equations.phases());
         let phases = phases

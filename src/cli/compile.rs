@@ -11,7 +11,7 @@ use super::destination::{Format, Inputs};
 use super::output::{names, note_mismatches, read_recordings, refused};
 use super::simplification::{self, exact_words};
 use crate::deploy::{self, EmitOptions, PlannedJump, Target};
-use crate::equations::{EquationForm, Equations};
+use crate::equations::Equations;
 use crate::files::{EmittedFile, Overwrite, earlier_files};
 use crate::model::ReducedModel;
 use crate::typeset::{NumberStyle, PrintOptions, Rounding, SymbolTable, Table};
@@ -36,13 +36,13 @@ pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
     }
     let read = artifact::read(&arguments.model)?;
     let form = match arguments.equations.as_learned {
-        true => EquationForm::AsLearned,
-        false => EquationForm::Simplified,
+        true => Equations::as_learned,
+        false => Equations::of,
     };
-    let exact = Equations::in_form(&read, form);
+    let exact = form(&read);
     let simplified = simplification::run(&exact, &arguments.simplification)?;
     let model = simplified.as_ref().map_or(&read, |outcome| &outcome.model);
-    let approximate = simplified.as_ref().map(|_| Equations::in_form(model, form));
+    let approximate = simplified.as_ref().map(|_| form(model));
     let equations = approximate.as_ref().unwrap_or(&exact);
     let unless_given = (simplified.as_ref()).map_or(Rounding::default(), |s| s.rounding());
     let targets = (arguments.emit.as_slice(), planned(arguments, model)?);

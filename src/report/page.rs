@@ -34,7 +34,7 @@ pub struct PageOptions {
 /// The report as one HTML page: no request to anywhere, one small script for animations and for copying equations.
 ///
 /// # Errors
-/// [`TypesetError`] if a candidate term has a variable without a symbol.
+/// [`TypesetError::Template`].
 pub fn page(
     content: &Content<'_>,
     verdict: &Verdict,
@@ -43,7 +43,7 @@ pub fn page(
 ) -> Result<String, TypesetError> {
     let model = content.model;
     let equations = &Equations::of(model);
-    let typeset = Typeset::new(equations, &SymbolTable::default(), Rounding::default())?;
+    let typeset = Typeset::new(equations, &SymbolTable::default(), Rounding::default());
     let page = Page {
         model,
         version: env!("CARGO_PKG_VERSION"),

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 use super::error::SimplifyError;
 use crate::model::{LatentVariable, Library, ModelError, ReducedModel};
@@ -14,67 +14,33 @@ use crate::symbolic::Interval;
 /// range.
 pub const MARGIN: f64 = 0.1;
 
-/// Recorded samples of one phase; matrices are `latent_dim x n`, one column per sample, scaled units.
-#[derive(Clone, Debug, PartialEq)]
-pub struct PhaseSamples {
-    /// Latent positions.
-    pub z: DMatrix<f64>,
-    /// Latent velocities.
-    pub dz: DMatrix<f64>,
-    /// Latent inputs.
-    pub u_lat: DMatrix<f64>,
-}
-
 /// Recorded samples, sorted by the model's phases.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Samples {
-    /// One entry per phase of the model.
-    pub phases: Vec<PhaseSamples>,
+    /// One matrix per phase of the model, `3 latent_dim x n`: a column a sample, `z`, then `dz`, then
+    /// `u_lat` (scaled units).
+    pub phases: Vec<DMatrix<f64>>,
 }
 
 impl Samples {
     /// Sorts the samples of encoded recordings by phase.
     pub fn of(model: &ReducedModel, segments: &[&LatentSegment]) -> Self {
-        let phases = (0..model.phases().len()).map(|phase| {
-            let gather = |of: fn(&LatentSegment) -> &DMatrix<f64>| {
-                let columns: Vec<DVector<f64>> = (segments.iter())
-                    .flat_map(|segment| {
-                        (0..segment.len())
-                            .filter(move |&k| segment.phase[k] == phase)
-                            .map(move |k| of(segment).column(k).into_owned())
-                    })
-                    .collect();
-                let n = columns.len();
-                DMatrix::from_fn(model.latent_dim(), n, |row, k| columns[k][row])
-            };
-            PhaseSamples {
-                z: gather(|segment| &segment.z),
-                dz: gather(|segment| &segment.dz),
-                u_lat: gather(|segment| &segment.u_lat),
+        let rows = 3 * model.latent_dim();
+        let of_phase = |phase: usize| {
+            let mut values: Vec<f64> = Vec::new();
+            for segment in segments {
+                for k in (0..segment.len()).filter(|&k| segment.phase[k] == phase) {
+                    for block in [&segment.z, &segment.dz, &segment.u_lat] {
+                        values.extend(block.column(k).iter());
+                    }
+                }
             }
-        });
+            DMatrix::from_vec(rows, values.len() / rows, values)
+        };
+        let phases = (0..model.phases().len()).map(of_phase);
         Self {
             phases: phases.collect(),
         }
-    }
-}
-
-impl PhaseSamples {
-    /// Number of samples.
-    pub fn len(&self) -> usize {
-        self.z.ncols()
-    }
-
-    /// Whether there is no sample.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
-    /// One sample as `z`, `dz`, `u_lat` in a row.
-    fn point(&self, sample: usize) -> impl Iterator<Item = f64> + '_ {
-        let blocks = [&self.z, &self.dz, &self.u_lat];
-        (blocks.into_iter())
-            .flat_map(move |block| (0..block.nrows()).map(move |r| block[(r, sample)]))
     }
 }
 
@@ -135,8 +101,14 @@ impl Domain {
         margin: f64,
     ) -> Result<Self, SimplifyError> {
         let boxes = samples.phases.iter().map(|samples| {
-            (0..samples.len())
-                .map(|k| samples.point(k).map(Interval::point).collect::<Vec<_>>())
+            (samples.column_iter())
+                .map(|point| {
+                    point
+                        .iter()
+                        .copied()
+                        .map(Interval::point)
+                        .collect::<Vec<_>>()
+                })
                 .reduce(|all, point| all.into_iter().zip(point).map(|(a, b)| a.hull(b)).collect())
                 .map(|ranges| ranges.into_iter().map(|r| widened(r, margin)).collect())
         });
@@ -226,7 +198,7 @@ impl Domain {
     /// sample, none without samples.
     ///
     /// # Errors
-    /// [`ModelError::Dimension`] for samples of another model.
+    /// [`ModelError::Invalid`] for samples of another model.
     pub(super) fn theta(
         &self,
         phase: usize,
@@ -236,12 +208,10 @@ impl Domain {
         let Some(samples) = samples.map(|samples| &samples.phases[phase]) else {
             return Ok(DMatrix::zeros(0, library.len()));
         };
-        let inside: Vec<usize> = (0..samples.len())
-            .filter(|&k| self.contains(phase, samples.point(k)))
+        let inside: Vec<usize> = (0..samples.ncols())
+            .filter(|&k| self.contains(phase, samples.column(k).iter().copied()))
             .collect();
-        let of = |all: &DMatrix<f64>| all.select_columns(&inside);
-        let [z, dz, u_lat] = [&samples.z, &samples.dz, &samples.u_lat].map(of);
-        library.evaluate_points(&z, &dz, &u_lat)
+        library.evaluate_points(&samples.select_columns(&inside))
     }
 }
 

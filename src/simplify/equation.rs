@@ -136,11 +136,8 @@ impl Equation {
                 let Some(step) = steps.find(|step| self.fits(step, allowed)) else {
                     continue;
                 };
-                let cost = step.bound.magnitude();
-                if best
-                    .as_ref()
-                    .is_none_or(|best| cost < best.bound.magnitude())
-                {
+                let is_cheaper = |best: &Step| step.bound.magnitude() < best.bound.magnitude();
+                if best.as_ref().is_none_or(is_cheaper) {
                     best = Some(step);
                 }
             }

@@ -58,7 +58,7 @@ mod tests;
 pub use certificate::{
     BeforeAfter, Certificate, Change, ChangeKind, Effect, EquationCertificate, PhaseCertificate,
 };
-pub use domain::{Domain, MARGIN, PhaseSamples, Samples};
+pub use domain::{Domain, MARGIN, Samples};
 pub use error::SimplifyError;
 pub use json::{certificate_json, rollouts_json};
 pub use markdown::{lost_words, markdown};

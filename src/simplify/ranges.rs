@@ -51,14 +51,10 @@ impl Ranges {
     /// Centre and half width of each symbol's range that `expr` has, in floating point: where to
     /// look, not what to prove.
     pub fn sides(&self, expr: ExprId) -> Vec<(SymbolId, f64, f64)> {
-        let side = |(symbol, range): &(SymbolId, Interval)| {
-            (
-                *symbol,
-                0.5 * range.lo() + 0.5 * range.hi(),
-                0.5 * range.width(),
-            )
-        };
-        (self.restricted(expr).iter()).map(side).collect()
+        let sides = self.restricted(expr).into_iter();
+        sides
+            .map(|(symbol, range)| (symbol, middle(range), 0.5 * range.width()))
+            .collect()
     }
 
     /// All values of a term.
@@ -92,7 +88,7 @@ impl Ranges {
             }
             let mut summands = Vec::new();
             for &(row, delta) in &group {
-                let middle = 0.5 * delta.lo() + 0.5 * delta.hi();
+                let middle = middle(delta);
                 let factor = self.pool.number(middle);
                 summands.push(self.pool.mul(factor, self.terms[row]));
                 let rest = delta - Interval::point(middle);
@@ -136,10 +132,9 @@ impl Ranges {
 
     fn restricted(&self, expr: ExprId) -> Vec<(SymbolId, Interval)> {
         let symbols = self.pool.symbols_of(expr);
-        let known = self.domain.iter().copied();
-        known
-            .filter(|(symbol, _)| symbols.contains(symbol))
-            .collect()
+        let mut domain = self.domain.clone();
+        domain.retain(|(symbol, _)| symbols.contains(symbol));
+        domain
     }
 
     /// All values of an expression over the box: bounded over ever smaller parts of the box, the
@@ -194,20 +189,15 @@ impl Ranges {
 
     /// Some values of `expr` in a box, in floating point: they only decide when to stop.
     fn values(&self, expr: ExprId, cell: &[(SymbolId, Interval)]) -> Interval {
-        let ends: [fn(Interval) -> f64; 3] = [
-            |range| range.lo(),
-            |range| 0.5 * range.lo() + 0.5 * range.hi(),
-            |range| range.hi(),
-        ];
+        let ends: [fn(Interval) -> f64; 3] = [Interval::lo, middle, Interval::hi];
         let at = |end: fn(Interval) -> f64| {
             let value = self.pool.evaluate(expr, &|symbol| {
                 let range = cell.iter().find(|(known, _)| *known == symbol);
                 range.map_or(f64::NAN, |(_, range)| end(*range))
             });
-            if value.is_finite() {
-                Interval::point(value)
-            } else {
-                Interval::EMPTY
+            match value.is_finite() {
+                true => Interval::point(value),
+                false => Interval::EMPTY,
             }
         };
         ends.into_iter()
@@ -233,24 +223,25 @@ impl Ranges {
     }
 }
 
+/// The middle of an interval, in floating point.
+pub(super) fn middle(range: Interval) -> f64 {
+    0.5 * range.lo() + 0.5 * range.hi()
+}
+
 /// A box cut in the middle of its widest side, measured by the sides of the whole domain.
 fn halves(
     cell: &[(SymbolId, Interval)],
     whole: &[(SymbolId, Interval)],
 ) -> [Vec<(SymbolId, Interval)>; 2] {
-    let width = |place: &usize| {
-        let all = whole[*place].1.width();
-        if all > 0.0 {
-            cell[*place].1.width() / all
-        } else {
-            0.0
-        }
+    let width = |place: &usize| match whole[*place].1.width() {
+        all if all > 0.0 => cell[*place].1.width() / all,
+        _ => 0.0,
     };
     let widest = (0..cell.len()).max_by(|a, b| width(a).total_cmp(&width(b)));
     let mut halves = [cell.to_vec(), cell.to_vec()];
     if let Some(side) = widest {
         let range = cell[side].1;
-        let middle = 0.5 * range.lo() + 0.5 * range.hi();
+        let middle = middle(range);
         halves[0][side].1 = Interval::new(range.lo(), middle);
         halves[1][side].1 = Interval::new(middle, range.hi());
     }

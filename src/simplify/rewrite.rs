@@ -1,7 +1,7 @@
 //! Replacements of a term: nothing, a constant, a straight line, a parabola.
 
 use super::certificate::ChangeKind;
-use super::ranges::Ranges;
+use super::ranges::{Ranges, middle};
 use super::workspace::{Workspace, has_function};
 use crate::symbolic::{ExprId, Interval, SymbolId};
 
@@ -44,12 +44,12 @@ pub(super) fn rewrites(workspace: &Workspace, ranges: &mut Ranges, row: usize) -
         (ChangeKind::Quadratic, parabola),
     ] {
         let Some(parts) = parts else { continue };
-        let one = (row, Interval::point(1.0));
-        let difference = |&(row, factor): &(usize, f64)| (row, Interval::point(-factor));
-        let difference: Vec<_> = [one]
-            .into_iter()
-            .chain(parts.iter().map(difference))
-            .collect();
+        let mut difference = vec![(row, Interval::point(1.0))];
+        difference.extend(
+            parts
+                .iter()
+                .map(|&(row, factor)| (row, Interval::point(-factor))),
+        );
         let error = ranges.combination(&difference);
         if !error.magnitude().is_finite() {
             continue;
@@ -67,7 +67,7 @@ fn centred(
     mut parts: Vec<(usize, f64)>,
     error: Interval,
 ) -> Option<Rewrite> {
-    let middle = 0.5 * error.lo() + 0.5 * error.hi();
+    let middle = middle(error);
     if middle.abs() <= WORTHWHILE * error.magnitude() {
         return None;
     }
@@ -147,10 +147,9 @@ fn value(
         let place = sides.iter().position(|(known, _, _)| *known == symbol);
         place.map_or(f64::NAN, |place| {
             let (_, centre, half) = sides[place];
-            if place == moved {
-                centre + step * half
-            } else {
-                centre
+            match place == moved {
+                true => centre + step * half,
+                false => centre,
             }
         })
     })

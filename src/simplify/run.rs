@@ -74,10 +74,9 @@ pub fn simplify(
         xi.push(of_phase);
         phases.push(certificate);
     }
-    let exact = equations.steps().to_vec();
     let mut certificate = Certificate {
         tolerance,
-        exact,
+        exact: equations.steps().to_vec(),
         phases,
     };
     let mut simplified = equations.to_model()?.into_owned();
@@ -86,10 +85,8 @@ pub fn simplify(
     }
     if certificate.n_changes() > 0 || !certificate.exact.is_empty() {
         let mut provenance = original.provenance().clone();
-        provenance.insert(
-            "simplification".to_owned(),
-            provenance_of(original, &certificate),
-        );
+        let entry = provenance_of(original, &certificate);
+        provenance.insert("simplification".to_owned(), entry);
         simplified = simplified.into_builder().provenance(provenance).build()?;
     }
     let (learned, new) = (Equations::as_learned(original), Equations::of(&simplified));
@@ -110,11 +107,8 @@ pub fn simplify(
 /// What the simplified model file says about itself.
 fn provenance_of(model: &ReducedModel, certificate: &Certificate) -> Value {
     let phase = |phase: &PhaseCertificate| {
-        let equations = phase.equations.iter();
-        let bounds: Vec<f64> = equations
-            .map(|equation| equation.bound.magnitude())
-            .collect();
-        (phase.name.clone(), json!(bounds))
+        let bounds = phase.equations.iter().map(|e| e.bound.magnitude());
+        (phase.name.clone(), bounds.collect::<Value>())
     };
     let bounds: serde_json::Map<_, _> = certificate.phases.iter().map(phase).collect();
     let mut entry = json!({
@@ -163,7 +157,7 @@ impl<'a> PhaseProblem<'a> {
         phase: usize,
     ) -> Result<Self, SimplifyError> {
         let theta = domain.theta(phase, samples, workspace.library())?;
-        let recorded = samples.map_or(0, |samples| samples.phases[phase].len());
+        let recorded = samples.map_or(0, |samples| samples.phases[phase].ncols());
         Ok(Self {
             name: &equations.phases()[phase].name,
             workspace,
@@ -302,11 +296,7 @@ impl<'a> PhaseProblem<'a> {
             measured,
             terms: counts(&active),
             digits: counts(&digits),
-            changes: equation
-                .steps
-                .iter()
-                .map(|step| self.change(step))
-                .collect(),
+            changes: equation.steps.iter().map(|s| self.change(s)).collect(),
         })
     }
 

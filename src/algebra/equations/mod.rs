@@ -38,5 +38,5 @@ mod unit;
 
 pub use exact::{ExactStep, summand_words};
 pub use physical::{LatentUnits, PhysicalError};
-pub use system::{EquationForm, Equations, PhaseEquations, Summand};
+pub use system::{Equations, PhaseEquations, Summand};
 pub use unit::Unit;

@@ -11,6 +11,7 @@
 //! Substituted, `dd Z_i = 1/sigma_i sum_k xi_ki theta_k(sigma Z, sigma dZ, upsilon U)`, numeric factors taken out of
 //! every term and into its coefficient.
 
+use std::borrow::Cow;
 use std::collections::HashMap;
 
 use nalgebra::{DMatrix, DVector};
@@ -28,6 +29,7 @@ const RULES: f64 = 0.5;
 
 /// Why equations cannot be in physical units.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "each variant's message names its fields")]
 pub enum PhysicalError {
     /// The model lacks a part, or has nonlinear maps.
     #[error(
@@ -39,19 +41,13 @@ pub enum PhysicalError {
         "model `{model}`: physical units need `{part}` with names and units, which the model does not have"
     )]
     NoUnits {
-        /// Name of the model.
         model: String,
         /// Key of the model file.
         part: &'static str,
     },
     /// A row of the encoder has no weight, or a coefficient overflows.
     #[error("model `{model}`: {place} has no finite value in physical units")]
-    NotFinite {
-        /// Name of the model.
-        model: String,
-        /// Row or coefficient.
-        place: String,
-    },
+    NotFinite { model: String, place: String },
 }
 
 /// Units of latent coordinates and inputs, and the input maps in them.
@@ -151,8 +147,15 @@ impl Equations<'_> {
                 ddz: ddz.collect::<Result<_, _>>()?,
             });
         }
-        let units = units(model, &scales)?;
-        Ok(self.converted(in_metres(model, &scales)?, pool, terms, phases, units))
+        Ok(Equations {
+            model: Cow::Owned(in_metres(model, &scales)?),
+            pool,
+            terms,
+            phases,
+            steps: self.steps.clone(),
+            latent_units: Some(units(model, &scales)?),
+            scaled: Some(Box::new(self.clone().into_owned())),
+        })
     }
 
     /// Terms of scaled variables, and the numeric factor that went out of each.
@@ -208,11 +211,8 @@ fn scales(model: &ReducedModel) -> Result<Vec<Scale>, PhysicalError> {
     };
     let state = model.state().ok_or_else(|| missing("state"))?;
     let input = model.input().ok_or_else(|| missing("input"))?;
-    let (weights, s_x, s_u) = (
-        model.encoder()?.weights(),
-        model.state_factors()?,
-        model.input_factors()?,
-    );
+    let weights = model.encoder()?.weights();
+    let (s_x, s_u) = (model.state_factors()?, model.input_factors()?);
     let scale = |row: usize| {
         let weights = weights.row(row).transpose();
         let unit = ruling_unit(&weights.component_mul(&s_x), state);
@@ -273,16 +273,12 @@ fn scale_of(weights: &DVector<f64>, names: &CoordinateNames, unit: Option<Unit>)
 fn units(model: &ReducedModel, scales: &[Scale]) -> Result<LatentUnits, PhysicalError> {
     let (encoder, s_u) = (model.encoder()?.weights(), model.input_factors()?);
     let projection = model.input_projection()?;
-    let (d, n) = encoder.shape();
+    let input = |latent: usize| scales[latent].input.0;
     Ok(LatentUnits {
         position: scales.iter().map(|scale| scale.position.1).collect(),
         input: scales.iter().map(|scale| scale.input.1).collect(),
-        project: DMatrix::from_fn(d, n, |row, col| {
-            projection[(row, col)] * s_u[col] / scales[row].input.0
-        }),
-        lift: DMatrix::from_fn(n, d, |row, col| {
-            encoder[(col, row)] * scales[col].input.0 / s_u[row]
-        }),
+        project: projection.map_with_location(|row, col, p| p * s_u[col] / input(row)),
+        lift: (encoder.transpose()).map_with_location(|row, col, w| w * input(col) / s_u[row]),
     })
 }
 
@@ -291,23 +287,16 @@ fn in_metres(model: &ReducedModel, scales: &[Scale]) -> Result<ReducedModel, Phy
     let s_x = model.state_factors()?;
     let sigma = |row: usize| scales[row].position.0;
     let (encoder, decoder) = (model.encoder()?, model.decoder()?);
-    let weights = encoder.weights();
-    let weights = DMatrix::from_fn(weights.nrows(), weights.ncols(), |row, col| {
-        weights[(row, col)] * s_x[col] / sigma(row)
-    });
-    let bias = DVector::from_fn(encoder.output_dim(), |row, _| {
-        encoder.bias()[row] / sigma(row)
-    });
+    let scaled = |row, col, weight: f64| weight * s_x[col] / sigma(row);
+    let weights = encoder.weights().map_with_location(scaled);
+    let bias = (encoder.bias()).map_with_location(|row, _, bias| bias / sigma(row));
     let encoder = AffineMap::new("encoder", weights, bias)?;
-    let weights = decoder.weights();
-    let weights = DMatrix::from_fn(weights.nrows(), weights.ncols(), |row, col| {
-        weights[(row, col)] * sigma(col) / s_x[row]
-    });
+    let scaled = |row, col, weight: f64| weight * sigma(col) / s_x[row];
+    let weights = decoder.weights().map_with_location(scaled);
     let decoder = AffineMap::new("decoder", weights, decoder.bias().component_div(&s_x))?;
-    let input = model.scaling()?.input.clone();
     let scaling = Scaling {
         state: ScaleFactors::Uniform(1.0),
-        input,
+        input: model.scaling()?.input.clone(),
     };
     Ok(model
         .clone()

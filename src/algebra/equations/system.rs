@@ -7,7 +7,7 @@ use nalgebra::DMatrix;
 use super::exact::ExactStep;
 use super::physical::LatentUnits;
 use crate::model::{
-    CandidateTerm, FeetRule, LatentVariable, Library, ModelError, Phase, ReducedModel, TermId,
+    CandidateTerm, FeetRule, LatentVariable, Library, ModelError, Phase, ReducedModel,
 };
 use crate::symbolic::{ExprId, ExprPool, SymbolId};
 
@@ -18,16 +18,6 @@ pub struct Summand {
     pub coefficient: f64,
     /// Index into [`Equations::terms`].
     pub term: usize,
-}
-
-/// Which form of the equations is printed and emitted.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum EquationForm {
-    /// The shortest equal form that is found.
-    #[default]
-    Simplified,
-    /// Coefficients times candidate terms as the model file has them.
-    AsLearned,
 }
 
 /// The accelerations of one phase.
@@ -45,28 +35,21 @@ pub struct PhaseEquations {
 /// scale factors belong to it.
 #[derive(Clone)]
 pub struct Equations<'a> {
-    model: Cow<'a, ReducedModel>,
+    pub(super) model: Cow<'a, ReducedModel>,
     pub(super) pool: ExprPool,
     pub(super) terms: Vec<CandidateTerm>,
     pub(super) phases: Vec<PhaseEquations>,
     pub(super) steps: Vec<ExactStep>,
     pub(super) latent_units: Option<LatentUnits>,
     /// What equations in physical units were made from.
-    scaled: Option<Box<Equations<'static>>>,
+    pub(super) scaled: Option<Box<Equations<'static>>>,
 }
 
 impl<'a> Equations<'a> {
-    /// The equations of a model as they are printed and emitted unless asked otherwise: simplified.
+    /// The equations of a model as they are printed and emitted unless asked otherwise: in the shortest equal
+    /// form that is found.
     pub fn of(model: &'a ReducedModel) -> Self {
-        Self::in_form(model, EquationForm::Simplified)
-    }
-
-    /// The equations of a model in one of the forms.
-    pub fn in_form(model: &'a ReducedModel, form: EquationForm) -> Self {
-        match form {
-            EquationForm::Simplified => Self::as_learned(model).simplified(),
-            EquationForm::AsLearned => Self::as_learned(model),
-        }
+        Self::as_learned(model).simplified()
     }
 
     /// Coefficients times candidate terms exactly as the model has them.
@@ -75,7 +58,12 @@ impl<'a> Equations<'a> {
             name: phase.name.clone(),
             feet: phase.feet.clone(),
             ddz: (0..model.latent_dim())
-                .map(|o| summands(phase, o))
+                .map(|output| {
+                    let active = phase.active_terms(output);
+                    active
+                        .map(|(term, coefficient)| Summand { coefficient, term })
+                        .collect()
+                })
                 .collect(),
         });
         Self {
@@ -114,26 +102,6 @@ impl<'a> Equations<'a> {
         let builder = self.model.clone().into_owned().into_builder();
         let builder = builder.library(Library::from_terms(self.latent_dim(), &texts)?);
         Ok(Cow::Owned(builder.phases(phases.collect()).build()?))
-    }
-
-    /// The same equations over a converted model, pool and terms.
-    pub(super) fn converted(
-        &self,
-        model: ReducedModel,
-        pool: ExprPool,
-        terms: Vec<CandidateTerm>,
-        phases: Vec<PhaseEquations>,
-        units: LatentUnits,
-    ) -> Equations<'static> {
-        Equations {
-            model: Cow::Owned(model),
-            pool,
-            terms,
-            phases,
-            steps: self.steps.clone(),
-            latent_units: Some(units),
-            scaled: Some(Box::new(self.clone().into_owned())),
-        }
     }
 
     /// The same equations with a model of their own.
@@ -257,12 +225,4 @@ impl PhaseEquations {
     pub fn active_count(&self) -> usize {
         self.ddz.iter().map(Vec::len).sum()
     }
-}
-
-fn summands(phase: &Phase, output: usize) -> Vec<Summand> {
-    let summand = |(term, coefficient): (TermId, f64)| Summand {
-        coefficient,
-        term: term.index(),
-    };
-    phase.active_terms(output).map(summand).collect()
 }

@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use serde_json::{Map, Value};
 
+use super::affine::AffineMap;
 use super::checks::{check_map, check_robot_names, check_widths, identifier_of};
 use super::coordinate_names::CoordinateNames;
 use super::error::{ModelError, check_tensor};
@@ -130,14 +131,14 @@ impl ModelBuilder {
         self
     }
 
-    /// Sets the encoder, an [`AffineMap`](super::AffineMap) or a [`StateMap`] (scaled units,
+    /// Sets the encoder, an [`AffineMap`] or a [`StateMap`] (scaled units,
     /// `latent_dim x state_dim`).
     pub fn encoder(mut self, encoder: impl Into<StateMap>) -> Self {
         self.encoder = Some(encoder.into());
         self
     }
 
-    /// Sets the decoder, an [`AffineMap`](super::AffineMap) or a [`StateMap`] (scaled units,
+    /// Sets the decoder, an [`AffineMap`] or a [`StateMap`] (scaled units,
     /// `state_dim x latent_dim`).
     pub fn decoder(mut self, decoder: impl Into<StateMap>) -> Self {
         self.decoder = Some(decoder.into());
@@ -198,10 +199,8 @@ impl ModelBuilder {
             scaling.input.check("input", state_dim)?;
         }
         let linear = self.encoder.as_ref().and_then(StateMap::as_affine);
-        let input_projection = match linear {
-            Some(encoder) => Some(pinv_of_transpose(encoder.weights(), "`encoder.weights`")?),
-            None => None,
-        };
+        let projection = |map: &AffineMap| pinv_of_transpose(map.weights(), "`encoder.weights`");
+        let input_projection = linear.map(projection).transpose()?;
         self.check_statistics(state_dim)?;
         if let Some(prior) = &self.jump_prior {
             self.check_prior(prior)?;

@@ -69,10 +69,8 @@ pub(super) fn check_widths(encoder: &StateMap, latent_dim: usize) -> Result<(), 
         None => Ok(()),
         Some((layer, found)) => {
             let expected = format!("at least {latent_dim}, one per latent coordinate");
-            let (place, found) = (
-                format!("`encoder.layers[{layer}]`"),
-                format!("{found} units"),
-            );
+            let place = format!("`encoder.layers[{layer}]`");
+            let found = format!("{found} units");
             Err(ModelError::invalid(place, found, expected))
         }
     }

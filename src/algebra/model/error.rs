@@ -1,5 +1,7 @@
 //! Faults of models, and of calls of their functions.
 
+#![allow(missing_docs, reason = "each variant's message names its fields")]
+
 use nalgebra::{Dim, Matrix, RawStorage};
 use thiserror::Error;
 
@@ -15,9 +17,7 @@ pub enum ModelError {
     Name {
         /// `model name` or `phases[i].name`.
         what: String,
-        /// The name as given.
         name: String,
-        /// What is wrong with it.
         #[source]
         source: IdentifierError,
     },
@@ -26,31 +26,22 @@ pub enum ModelError {
     Invalid {
         /// Path in the model file, such as `` `phases[0].xi` ``.
         place: String,
-        /// What is there.
         found: String,
-        /// What could be.
         expected: String,
     },
     /// The foot rule of a phase can never be the first that matches.
     #[error(
         "phases[{phase}].feet of {name:?}: no foot pattern selects this phase, because earlier phases take all that it names"
     )]
-    UnreachablePhase {
-        /// Index of the phase.
-        phase: usize,
-        /// Its name.
-        name: String,
-    },
+    UnreachablePhase { phase: usize, name: String },
     /// A tensor holds an infinity or a NaN.
     #[error("`{tensor}`[{row}][{column}]: found {found}, expected a finite number")]
     NonFinite {
-        /// Path of the tensor in the model file.
         tensor: String,
         /// Row, from 0.
         row: usize,
         /// Column, from 0.
         column: usize,
-        /// The value.
         found: f64,
     },
     /// The rows of the encoder or of its Jacobian are (nearly) linearly dependent, so that latent
@@ -59,15 +50,10 @@ pub enum ModelError {
         "{matrix}: found singular values from {smallest:e} to {largest:e}, expected full row rank {expected} (smallest above {tolerance:e} times the largest)"
     )]
     RankDeficient {
-        /// The matrix in words.
         matrix: &'static str,
-        /// Smallest singular value.
         smallest: f64,
-        /// Largest singular value.
         largest: f64,
-        /// Number of latent coordinates.
         expected: usize,
-        /// Relative tolerance.
         tolerance: f64,
     },
     /// The library was refused.
@@ -79,49 +65,35 @@ pub enum ModelError {
     /// A part of the file makes sense only with another.
     #[error("`{part}` needs `{needs}`, which the model does not have")]
     Incomplete {
-        /// What is there.
         part: &'static str,
-        /// What is missing.
         needs: &'static str,
     },
     /// The model was asked for something it does not carry.
     #[error("model {model} has no `{part}`, needed for {purpose}")]
     Missing {
-        /// Name of the model.
         model: String,
         /// Key of the model file which is absent.
         part: &'static str,
-        /// What needs it.
         purpose: &'static str,
     },
     /// Something needs a linear encoder or decoder, and the model's has activations.
     #[error("model {model}: found a nonlinear {part}, expected a linear one, needed for {purpose}")]
     Nonlinear {
-        /// Name of the model.
         model: String,
         /// `encoder` or `decoder`.
         part: &'static str,
-        /// What needs it to be linear.
         purpose: &'static str,
     },
     /// A vector has the wrong length.
     #[error("{what}: found {found} entries, expected {expected}")]
     Dimension {
-        /// The vector.
         what: &'static str,
-        /// Its length.
         found: usize,
-        /// The length asked for.
         expected: usize,
     },
     /// There is no phase with this index.
     #[error("found phase {found}, expected one below {count}")]
-    PhaseIndex {
-        /// The index asked for.
-        found: usize,
-        /// How many phases there are.
-        count: usize,
-    },
+    PhaseIndex { found: usize, count: usize },
 }
 
 impl ModelError {

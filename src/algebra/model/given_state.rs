@@ -151,11 +151,8 @@ mod tests {
             };
             vec![part(0, 150), part(150, 250)].into_iter()
         };
-        let (whole, cut) = (
-            whole.expect("enough"),
-            InputGivenState::of_blocks(n, &shifts, cut).expect("enough"),
-        );
-        assert!((whole.mean - cut.mean).amax() < 1e-9);
+        let cut = InputGivenState::of_blocks(n, &shifts, cut).expect("enough");
+        assert!((whole.expect("enough").mean - cut.mean).amax() < 1e-9);
         assert!(InputGivenState::of_blocks(19, &shifts, || std::iter::once(samples(19))).is_none());
     }
 }

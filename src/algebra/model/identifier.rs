@@ -21,16 +21,14 @@ pub struct Identifier(String);
 
 /// Why a name cannot be an identifier.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[allow(missing_docs, reason = "each variant's message names its fields")]
 pub enum IdentifierError {
     /// The name has no character.
     #[error("it is empty")]
     Empty,
     /// The name is too long.
     #[error("it has {found} bytes, expected at most {MAX_IDENTIFIER_LEN}")]
-    TooLong {
-        /// Its length.
-        found: usize,
-    },
+    TooLong { found: usize },
     /// A character is not allowed.
     #[error(
         "found {found:?} at byte {position}, expected ASCII letters, digits, `_`, `-`, `.` or space"
@@ -38,41 +36,27 @@ pub enum IdentifierError {
     Character {
         /// Byte offset.
         position: usize,
-        /// The character.
         found: char,
     },
     /// It does not begin with a letter.
     #[error("it begins with {found:?}, expected an ASCII letter")]
-    Start {
-        /// The first character.
-        found: char,
-    },
+    Start { found: char },
     /// C and C++ reserve it for the implementation.
     #[error("`{identifier}` has two underscores in a row, which C++ reserves for itself")]
-    Reserved {
-        /// The name as an identifier.
-        identifier: String,
-    },
+    Reserved { identifier: String },
     /// Names that are made of it would have two underscores in a row.
     #[error("`{identifier}` ends with an underscore, expected a letter or digit at the end")]
-    End {
-        /// The name as an identifier.
-        identifier: String,
-    },
+    End { identifier: String },
     /// It is a keyword.
     #[error("`{identifier}` is a keyword of {language}")]
     Keyword {
-        /// The name as an identifier.
         identifier: String,
-        /// Where it is one.
         language: &'static str,
     },
     /// A header, a crate or a device file has this name already.
     #[error("`{identifier}` is the name of {owner}")]
     Taken {
-        /// The name as an identifier.
         identifier: String,
-        /// Whose name it is.
         owner: &'static str,
     },
 }
@@ -217,7 +201,12 @@ mod tests {
             identifier: word.to_owned(),
             owner: TAKEN[list].0,
         };
-        let identifier = || "a_".to_owned();
+        let reserved = Reserved {
+            identifier: "a__".to_owned(),
+        };
+        let end = || End {
+            identifier: "a_".to_owned(),
+        };
         let long = "a".repeat(41);
         for (name, expected) in [
             ("", Empty),
@@ -230,36 +219,11 @@ mod tests {
             ("../x", character(2, '/')),
             ("2d", Start { found: '2' }),
             ("_x", Start { found: '_' }),
-            (
-                "a-_",
-                Reserved {
-                    identifier: identifier() + "_",
-                },
-            ),
-            (
-                "a_",
-                End {
-                    identifier: identifier(),
-                },
-            ),
-            (
-                "a-",
-                End {
-                    identifier: identifier(),
-                },
-            ),
-            (
-                "a.",
-                End {
-                    identifier: identifier(),
-                },
-            ),
-            (
-                "a ",
-                End {
-                    identifier: identifier(),
-                },
-            ),
+            ("a-_", reserved),
+            ("a_", end()),
+            ("a-", end()),
+            ("a.", end()),
+            ("a ", end()),
             ("double", keyword("double", "C")),
             ("template", keyword("template", "C++")),
             ("and-eq", keyword("and_eq", "C++")),

@@ -19,21 +19,6 @@ pub const MAX_LIBRARY_DIM: usize = 20_000;
 /// Longest candidate term in bytes.
 pub const MAX_TERM_LEN: usize = 1_000;
 
-/// Index of a candidate term: a row of Xi.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct TermId(usize);
-
-impl TermId {
-    pub(super) fn new(index: usize) -> Self {
-        Self(index)
-    }
-
-    /// The row of Xi.
-    pub fn index(self) -> usize {
-        self.0
-    }
-}
-
 /// One column of Theta.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CandidateTerm {
@@ -188,11 +173,6 @@ impl Library {
         &self.terms
     }
 
-    /// One term.
-    pub fn term(&self, id: TermId) -> &CandidateTerm {
-        &self.terms[id.index()]
-    }
-
     /// The pool in which the terms live. Clone it to build on them: ids stay valid in the clone.
     pub fn pool(&self) -> &ExprPool {
         &self.pool
@@ -234,35 +214,19 @@ impl Library {
 
     /// Theta at many points: one row a point, one column a term.
     ///
-    /// `z`, `dz` and `u_lat` hold one point a column (`latent_dim x n`), as recordings do.
+    /// `variables` holds one point a column (`3 latent_dim x n`): `z`, then `dz`, then `u_lat`.
     ///
     /// # Errors
-    /// [`ModelError::Invalid`] if an argument has not `latent_dim` rows, or not as many columns as
-    /// `z`.
-    pub fn evaluate_points(
-        &self,
-        z: &DMatrix<f64>,
-        dz: &DMatrix<f64>,
-        u_lat: &DMatrix<f64>,
-    ) -> Result<DMatrix<f64>, ModelError> {
-        let expected = (self.latent_dim, z.ncols());
-        check_shape("z", z.shape(), expected)?;
-        check_shape("dz", dz.shape(), expected)?;
-        check_shape("u_lat", u_lat.shape(), expected)?;
-        let mut variables = vec![0.0; 3 * self.latent_dim];
+    /// [`ModelError::Invalid`] if it has another number of rows.
+    pub fn evaluate_points(&self, variables: &DMatrix<f64>) -> Result<DMatrix<f64>, ModelError> {
+        let expected = (3 * self.latent_dim, variables.ncols());
+        check_shape("z, dz, u_lat", variables.shape(), expected)?;
         let mut values = vec![0.0; self.tape.steps.len()];
         let mut theta = vec![0.0; self.len()];
-        let mut all = DMatrix::zeros(z.ncols(), self.len());
-        for point in 0..z.ncols() {
-            let blocks = [z, dz, u_lat].map(|block| block.column(point));
-            let of_point = blocks.iter().flat_map(|block| block.iter());
-            for (variable, value) in variables.iter_mut().zip(of_point) {
-                *variable = *value;
-            }
-            self.tape.run(&variables, &mut values, &mut theta);
-            for (term, value) in theta.iter().enumerate() {
-                all[(point, term)] = *value;
-            }
+        let mut all = DMatrix::zeros(variables.ncols(), self.len());
+        for (point, mut row) in variables.column_iter().zip(all.row_iter_mut()) {
+            self.tape.run(point.as_slice(), &mut values, &mut theta);
+            row.copy_from_slice(&theta);
         }
         Ok(all)
     }
@@ -396,10 +360,8 @@ mod tests {
         ];
         let library = Library::from_terms(1, &terms(&texts)).unwrap();
         let points = [[0.3, -0.7, 2.0], [-1.25, 0.5, -0.1], [2.0, 3.0, 0.0]];
-        let block = |row: usize| DMatrix::from_fn(1, 3, |_, point| points[point][row]);
-        let all = library
-            .evaluate_points(&block(0), &block(1), &block(2))
-            .unwrap();
+        let variables = DMatrix::from_fn(3, 3, |row, point| points[point][row]);
+        let all = library.evaluate_points(&variables).unwrap();
         for (point, values) in points.iter().enumerate() {
             let exprs: Vec<ExprId> = library.terms().iter().map(CandidateTerm::expr).collect();
             let expected = library

@@ -1,5 +1,7 @@
 //! Why a library was refused.
 
+#![allow(missing_docs, reason = "each variant's message names its fields")]
+
 use thiserror::Error;
 
 use super::library::{MAX_LATENT_DIM, MAX_LIBRARY_DIM, MAX_TERM_LEN};
@@ -11,25 +13,16 @@ use crate::symbolic::ParseError;
 pub enum LibraryError {
     /// Too few or too many latent coordinates.
     #[error("`latent_dim`: found {found}, expected 1 to {MAX_LATENT_DIM}")]
-    LatentDim {
-        /// The number given.
-        found: usize,
-    },
+    LatentDim { found: usize },
     /// No term at all.
     #[error("`library`: found no term, expected at least one")]
     Empty,
     /// More terms than can be handled.
     #[error("`library`: found {found} terms, expected at most {MAX_LIBRARY_DIM}")]
-    TooManyTerms {
-        /// How many there are or would be.
-        found: usize,
-    },
+    TooManyTerms { found: usize },
     /// The shorthand asks for a polynomial degree beyond the bound.
     #[error("`library.degree`: found {found}, expected at most {MAX_DEGREE}")]
-    Degree {
-        /// The degree.
-        found: u32,
-    },
+    Degree { found: u32 },
     /// A term is too long or has control characters.
     #[error(
         "`library`[{index}]: found {found} bytes or a control character, expected one line of at most {MAX_TERM_LEN} bytes"
@@ -37,7 +30,6 @@ pub enum LibraryError {
     TermText {
         /// Index of the term, from 0.
         index: usize,
-        /// Its length.
         found: usize,
     },
     /// A term is no expression over the model's variables.
@@ -45,22 +37,16 @@ pub enum LibraryError {
     Parse {
         /// Index of the term, from 0.
         index: usize,
-        /// The term.
         text: String,
-        /// Position, found, expected.
         #[source]
         source: Box<ParseError>,
     },
     /// A term equals an earlier one, which a library to be trained on must not have.
     #[error("`library`[{second}]: {text:?} equals [{first}] {earlier:?}")]
     Duplicate {
-        /// Index of the earlier term.
         first: usize,
-        /// Index of the later term.
         second: usize,
-        /// The later term.
         text: String,
-        /// The earlier term.
         earlier: String,
     },
     /// A part of a term without variables has no finite value, such as `1/0`.
@@ -68,7 +54,6 @@ pub enum LibraryError {
     NotFinite {
         /// Index of the term, from 0.
         index: usize,
-        /// The term.
         text: String,
     },
     /// A term vanishes for all arguments.
@@ -76,7 +61,6 @@ pub enum LibraryError {
     Zero {
         /// Index of the term, from 0.
         index: usize,
-        /// The term.
         text: String,
     },
 }

@@ -1,9 +1,9 @@
 //! The maps of a model between robot and latent coordinates.
 //!
-//! With the encoder `E` and the decoder `D`, their Jacobians `J_E` at `s_x x` and `J_D` at `z`:
+//! With the encoder `E` and the decoder `D`, the Jacobian `J_E` of `E` at `s_x x`:
 //!
 //! - `z = E(s_x x)`, `ddz = J_E (s_x ddx) + dJ_E/dt (s_x dx)`;
-//! - `x = D(z) / s_x`, `ddx = (J_D ddz + dJ_D/dt dz) / s_x`.
+//! - `x = D(z) / s_x`.
 //!
 //! Velocities and inputs: [`ReducedModel::tangent`].
 
@@ -44,8 +44,7 @@ impl ReducedModel {
     /// # Errors
     /// [`ModelError::Missing`] for a latent-only model, [`ModelError::Nonlinear`].
     pub fn encoder(&self) -> Result<&AffineMap, ModelError> {
-        let affine = self.encoder_map()?.as_affine();
-        affine.ok_or_else(|| self.nonlinear("encoder", "one matrix for all states"))
+        self.affine("encoder", self.encoder_map()?)
     }
 
     /// The decoder of a linear model, in scaled units: `W_d` is `state_dim x latent_dim`.
@@ -53,8 +52,7 @@ impl ReducedModel {
     /// # Errors
     /// [`ModelError::Missing`] if the model has none, [`ModelError::Nonlinear`].
     pub fn decoder(&self) -> Result<&AffineMap, ModelError> {
-        let affine = self.decoder_map()?.as_affine();
-        affine.ok_or_else(|| self.nonlinear("decoder", "one matrix for all states"))
+        self.affine("decoder", self.decoder_map()?)
     }
 
     /// `pinv(W_e^T)` of a linear model, `latent_dim x state_dim`, in scaled units.
@@ -125,32 +123,22 @@ impl ReducedModel {
         self.encoder_map()?.apply_acceleration(&x, &dx, &ddx)
     }
 
-    /// `ddx = (J_D ddz + dJ_D/dt dz) / s_x` at the latent state `z`, SI units.
-    ///
-    /// # Errors
-    /// As [`ReducedModel::decode`].
-    pub fn decode_acceleration(
-        &self,
-        z: &DVector<f64>,
-        dz: &DVector<f64>,
-        ddz: &DVector<f64>,
-    ) -> Result<DVector<f64>, ModelError> {
-        let scaled = self.decoder_map()?.apply_acceleration(z, dz, ddz)?;
-        Ok(scaled.component_div(&self.state_factors()?))
-    }
-
     pub(super) fn scaled_state(&self, x: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
         let factors = self.state_factors()?;
         ModelError::check_dimension("robot state", x.len(), factors.len())?;
         Ok(x.component_mul(&factors))
     }
 
-    fn nonlinear(&self, part: &'static str, purpose: &'static str) -> ModelError {
-        ModelError::Nonlinear {
+    fn affine<'m>(
+        &self,
+        part: &'static str,
+        map: &'m StateMap,
+    ) -> Result<&'m AffineMap, ModelError> {
+        map.as_affine().ok_or_else(|| ModelError::Nonlinear {
             model: self.parts.name.clone(),
             part,
-            purpose,
-        }
+            purpose: "one matrix for all states",
+        })
     }
 }
 

@@ -2,7 +2,6 @@
 
 use nalgebra::DMatrix;
 
-use super::library::TermId;
 use crate::robot::{ContactFlags, FeetRule};
 
 /// All foot patterns, from no foot to four feet.
@@ -32,15 +31,9 @@ impl Phase {
         self.xi.iter().filter(|&&value| value != 0.0).count()
     }
 
-    /// Terms with a coefficient other than zero for one output, in library order.
-    pub fn support(&self, output: usize) -> Vec<TermId> {
-        self.active_terms(output).map(|(term, _)| term).collect()
-    }
-
-    /// Active terms of one output with their coefficients, in library order.
-    pub fn active_terms(&self, output: usize) -> impl Iterator<Item = (TermId, f64)> + '_ {
-        (0..self.xi.nrows())
-            .map(move |row| (TermId::new(row), self.xi[(row, output)]))
-            .filter(|&(_, value)| value != 0.0)
+    /// Indices of the active terms of one output, the rows of Xi, with their coefficients, in library order.
+    pub fn active_terms(&self, output: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
+        let coefficients = self.xi.column(output).into_iter().copied();
+        (coefficients.enumerate()).filter(|&(_, value)| value != 0.0)
     }
 }

@@ -7,11 +7,6 @@ use super::error::{ModelError, check_finite};
 /// An encoder has full row rank if its smallest singular value is above this share of the largest.
 pub const RANK_TOLERANCE: f64 = 1e-10;
 
-/// `pinv(J^T)` of a nonlinear encoder's Jacobian at a state.
-pub(super) fn pinv_of_jacobian(jacobian: &DMatrix<f64>) -> Result<DMatrix<f64>, ModelError> {
-    pinv_of_transpose(jacobian, "Jacobian of the encoder at this state")
-}
-
 /// `pinv(W_e^T)`, `latent_dim x state_dim`, from the singular values of `W_e = U S V^T`:
 /// `pinv(W_e^T) = U S^-1 V^T`.
 ///

@@ -252,7 +252,7 @@ impl ReducedModel {
         }
         Ok(phase
             .active_terms(output)
-            .map(|(term, coefficient)| (coefficient, self.parts.library.term(term)))
+            .map(|(term, coefficient)| (coefficient, &self.library().terms()[term]))
             .collect())
     }
 

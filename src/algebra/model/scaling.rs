@@ -25,18 +25,11 @@ impl ScaleFactors {
 
     /// Complains unless there are `dim` positive factors (or one) with finite reciprocals.
     pub(super) fn check(&self, tensor: &'static str, dim: Option<usize>) -> Result<(), ModelError> {
-        let one;
-        let factors = match self {
-            ScaleFactors::Uniform(factor) => {
-                one = [*factor];
-                &one[..]
-            }
-            ScaleFactors::PerCoordinate(factors) => {
-                let expected = dim.unwrap_or(factors.len());
-                check_shape(&format!("scaling.{tensor}"), factors.shape(), (expected, 1))?;
-                factors.as_slice()
-            }
-        };
+        if let ScaleFactors::PerCoordinate(factors) = self {
+            let expected = dim.unwrap_or(factors.len());
+            check_shape(&format!("scaling.{tensor}"), factors.shape(), (expected, 1))?;
+        }
+        let factors = self.expand(1);
         let usable = |f: f64| f.is_finite() && f > 0.0 && (1.0 / f).is_finite();
         match factors.iter().position(|&f| !usable(f)) {
             None => Ok(()),

@@ -51,20 +51,16 @@ impl StateMap {
     pub fn new(tensor: &str, layers: Vec<Layer>) -> Result<Self, ModelError> {
         if !(1..=MAX_LAYERS).contains(&layers.len()) {
             let place = format!("`{tensor}.layers`");
-            let (found, expected) = (
-                format!("{} layers", layers.len()),
-                format!("1 to {MAX_LAYERS}"),
-            );
+            let found = format!("{} layers", layers.len());
+            let expected = format!("1 to {MAX_LAYERS}");
             return Err(ModelError::invalid(place, found, expected));
         }
         for (index, layer) in layers.iter().enumerate() {
             let (rows, columns) = layer.map.weights().shape();
             let name = format!("{tensor}.layers[{index}].weights");
             if rows > MAX_LAYER_WIDTH {
-                let (found, expected) = (
-                    format!("{rows} units"),
-                    format!("at most {MAX_LAYER_WIDTH}"),
-                );
+                let found = format!("{rows} units");
+                let expected = format!("at most {MAX_LAYER_WIDTH}");
                 return Err(ModelError::invalid(format!("`{name}`"), found, expected));
             }
             let expected = match index {
@@ -96,11 +92,7 @@ impl StateMap {
 
     /// Number of coordinates that leave.
     pub fn output_dim(&self) -> usize {
-        self.layers
-            .last()
-            .expect("a map has a layer")
-            .map
-            .output_dim()
+        self.layers[self.layers.len() - 1].map.output_dim()
     }
 
     /// Shape of the Jacobian, `output_dim x input_dim`.

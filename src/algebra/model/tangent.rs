@@ -9,7 +9,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::error::ModelError;
-use super::projection::pinv_of_jacobian;
+use super::projection::pinv_of_transpose;
 use super::rom::ReducedModel;
 
 /// Velocities and inputs between robot and latent coordinates at one state.
@@ -32,15 +32,16 @@ impl ReducedModel {
     /// rank.
     pub fn tangent(&self, x: &DVector<f64>) -> Result<Tangent, ModelError> {
         let jacobian = self.encoder_map()?.jacobian(&self.scaled_state(x)?)?;
-        let factors = self.input_factors()?;
+        let (s_x, s_u) = (self.state_factors()?, self.input_factors()?);
         let projection = match &self.input_projection {
-            Some(projection) => projection.clone(),
-            None => pinv_of_jacobian(&jacobian)?,
+            Some(projection) => projection,
+            None => &pinv_of_transpose(&jacobian, "Jacobian of the encoder at this state")?,
         };
         Ok(Tangent {
-            lift: rows_over(&jacobian.transpose(), &factors),
-            project: columns_times(&projection, &factors),
-            encode: columns_times(&jacobian, &self.state_factors()?),
+            // divided by the factors, not multiplied by inverses, which round
+            lift: (jacobian.transpose()).map_with_location(|row, _, value| value / s_u[row]),
+            project: projection.map_with_location(|_, column, value| value * s_u[column]),
+            encode: jacobian.map_with_location(|_, column, value| value * s_x[column]),
         })
     }
 
@@ -50,7 +51,8 @@ impl ReducedModel {
     /// As [`ReducedModel::encode`].
     pub fn encoder_jacobian(&self, x: &DVector<f64>) -> Result<DMatrix<f64>, ModelError> {
         let jacobian = self.encoder_map()?.jacobian(&self.scaled_state(x)?)?;
-        Ok(columns_times(&jacobian, &self.state_factors()?))
+        let s_x = self.state_factors()?;
+        Ok(jacobian.map_with_location(|_, column, value| value * s_x[column]))
     }
 
     /// `d x / d z = J_D / s_x` at the latent state `z`, `state_dim x latent_dim`, SI units.
@@ -59,23 +61,7 @@ impl ReducedModel {
     /// As [`ReducedModel::decode`].
     pub fn decoder_jacobian(&self, z: &DVector<f64>) -> Result<DMatrix<f64>, ModelError> {
         let jacobian = self.decoder_map()?.jacobian(z)?;
-        Ok(rows_over(&jacobian, &self.state_factors()?))
+        let s_x = self.state_factors()?;
+        Ok(jacobian.map_with_location(|row, _, value| value / s_x[row]))
     }
-}
-
-fn columns_times(matrix: &DMatrix<f64>, factors: &DVector<f64>) -> DMatrix<f64> {
-    let mut scaled = matrix.clone();
-    for (mut column, factor) in scaled.column_iter_mut().zip(factors.iter()) {
-        column *= *factor;
-    }
-    scaled
-}
-
-/// Rows divided by the factors, not multiplied by inverses, which round.
-fn rows_over(matrix: &DMatrix<f64>, factors: &DVector<f64>) -> DMatrix<f64> {
-    let mut scaled = matrix.clone();
-    for mut column in scaled.column_iter_mut() {
-        column.component_div_assign(factors);
-    }
-    scaled
 }

@@ -50,10 +50,8 @@ impl ActuatorsEntry {
         match arrays.into_keys().next() {
             None => Ok(entry),
             Some(name) => {
-                let (place, expected) = (
-                    format!("actuators.{name}"),
-                    "viscous, dry and armature alone",
-                );
+                let place = format!("actuators.{name}");
+                let expected = "viscous, dry and armature alone";
                 Err(RobotFileError::at("", place, "an unknown array", expected))
             }
         }

@@ -1,5 +1,7 @@
 //! Faults of robot files.
 
+#![allow(missing_docs, reason = "each variant's message names its fields")]
+
 use std::io;
 
 use thiserror::Error;
@@ -27,12 +29,7 @@ pub enum RobotFileFault {
     Syntax(String),
     /// Something else is there than what a robot needs, or nothing.
     #[error("found {found}, expected {expected}")]
-    Unexpected {
-        /// What is there.
-        found: String,
-        /// What could be.
-        expected: String,
-    },
+    Unexpected { found: String, expected: String },
 }
 
 impl RobotFileError {

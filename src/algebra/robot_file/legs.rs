@@ -24,22 +24,24 @@ struct Reader<'f> {
     file: &'f str,
 }
 
-/// The robot of an entry; equal robots are one.
-///
-/// # Errors
-/// [`RobotFileError`] with the entry that is wrong, or a name that is another robot's.
-pub(super) fn robot(file: &str, entry: &RobotEntry) -> Result<&'static Robot, RobotFileError> {
-    let robot = build(file, entry)?;
-    match Robot::by_name(&entry.name) {
-        Ok(known) if *known != robot => {
-            let found = format!("{:?} with other numbers than romc's own robot", entry.name);
-            Err(RobotFileError::at(file, "name", found, "another name"))
+impl RobotEntry {
+    /// The robot of the entry, which is `entry` of `file` in errors; equal robots are one.
+    ///
+    /// # Errors
+    /// [`RobotFileError`] with the entry that is wrong, or a name that is another robot's.
+    pub fn robot(&self, file: &str) -> Result<&'static Robot, RobotFileError> {
+        let robot = build(file, self)?;
+        match Robot::by_name(&self.name) {
+            Ok(known) if *known != robot => {
+                let found = format!("{:?} with other numbers than romc's own robot", self.name);
+                Err(RobotFileError::at(file, "name", found, "another name"))
+            }
+            Ok(_) | Err(_) => Ok(keep(robot)),
         }
-        Ok(_) | Err(_) => Ok(keep(robot)),
     }
 }
 
-/// The same, whatever its name.
+/// The robot of an entry, whatever its name.
 pub(super) fn build(file: &str, entry: &RobotEntry) -> Result<Robot, RobotFileError> {
     let reader = Reader { file };
     reader.name("name", &entry.name)?;
@@ -143,10 +145,8 @@ impl Reader<'_> {
     fn places(&self, legs: &[LegEntry]) -> Result<[Leg; FOOT_DIM], RobotFileError> {
         for (index, leg) in legs.iter().enumerate() {
             let (place, count) = (format!("leg[{index}].joint"), leg.joint.len());
-            let (found, expected) = (
-                format!("{count} joints"),
-                "three, from the trunk to the foot",
-            );
+            let found = format!("{count} joints");
+            let expected = "three, from the trunk to the foot";
             self.check(count == LEG_JOINT_DIM, &place, found, expected)?;
         }
         let hips: Vec<[f64; 3]> = legs.iter().map(|leg| leg.joint[0].at).collect();

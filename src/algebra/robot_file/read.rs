@@ -8,7 +8,7 @@ use serde::de::DeserializeOwned;
 
 use super::entry::RobotEntry;
 use super::error::{RobotFileError, RobotFileFault};
-use super::{legs, urdf};
+use super::urdf;
 use crate::files::{Located, Place};
 use crate::robot::Robot;
 
@@ -78,7 +78,7 @@ pub(super) fn text_of(path: &Path) -> Result<String, RobotFileError> {
 /// # Errors
 /// As [`read`].
 pub fn from_toml(file: &str, text: &str) -> Result<&'static Robot, RobotFileError> {
-    legs::robot(file, &from_toml_text::<RobotEntry>(file, text)?)
+    from_toml_text::<RobotEntry>(file, text)?.robot(file)
 }
 
 /// Reads a robot from URDF; `feet` names the links of its feet, empty to find them.
@@ -90,7 +90,7 @@ pub fn from_urdf(
     text: &str,
     feet: &[String],
 ) -> Result<&'static Robot, RobotFileError> {
-    legs::robot(file, &urdf::entry(file, text, feet)?)
+    urdf::entry(file, text, feet)?.robot(file)
 }
 
 pub(super) fn from_toml_text<T: DeserializeOwned>(
@@ -110,16 +110,6 @@ pub(super) fn from_toml_text<T: DeserializeOwned>(
         let fault = RobotFileFault::Syntax(error.message().to_owned());
         Located::new(file, place, fault)
     })
-}
-
-impl RobotEntry {
-    /// The robot of the entry, which is `entry` of `file` in errors.
-    ///
-    /// # Errors
-    /// [`RobotFileError`] with the entry that is wrong.
-    pub fn robot(&self, file: &str) -> Result<&'static Robot, RobotFileError> {
-        legs::robot(file, self)
-    }
 }
 
 #[cfg(test)]

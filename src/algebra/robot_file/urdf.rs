@@ -46,11 +46,8 @@ struct Tree<'x> {
     above: BTreeMap<&'x str, usize>,
 }
 
-/// A limb: its moving joints from the trunk, as far as they are a chain, and what follows.
-struct Limb {
-    joints: Vec<usize>,
-    is_chain: bool,
-}
+/// A limb: its moving joints from the trunk, as far as they are a chain, and whether nothing else follows.
+type Limb = (Vec<usize>, bool);
 
 /// The entry of a URDF.
 ///
@@ -232,20 +229,19 @@ impl<'x> Tree<'x> {
             joints.push(only);
             next = self.next_moving(self.joints[only].child);
         }
-        let is_chain = next.is_empty();
-        Limb { joints, is_chain }
+        (joints, next.is_empty())
     }
 
     /// Moving joints and foot of each leg.
     fn found_legs(&self, trunk: &'x str) -> Result<Vec<(Vec<usize>, &'x str)>, RobotFileError> {
         let limbs = self.next_moving(trunk).into_iter().map(|j| self.limb(j));
         let limbs: Vec<Limb> = limbs.collect();
-        let is_leg = |limb: &&Limb| limb.is_chain && limb.joints.len() == LEG_JOINT_DIM;
+        let is_leg = |(joints, is_chain): &&Limb| *is_chain && joints.len() == LEG_JOINT_DIM;
         let legs: Vec<&Limb> = limbs.iter().filter(is_leg).collect();
         if legs.len() != FOOT_DIM {
-            let of = |limb: &Limb| {
-                let more = if limb.is_chain { "" } else { " and branches" };
-                let (name, count) = (self.joints[limb.joints[0]].name, limb.joints.len());
+            let of = |(joints, is_chain): &Limb| {
+                let more = if *is_chain { "" } else { " and branches" };
+                let (name, count) = (self.joints[joints[0]].name, joints.len());
                 format!("{name} ({count} joints{more})")
             };
             let texts: Vec<String> = limbs.iter().map(of).collect();
@@ -258,12 +254,12 @@ impl<'x> Tree<'x> {
                             --feet (romc robot) names their feet where limbs have more joints";
             return Err(self.refused(found, expected));
         }
-        let with_foot = |limb: &Limb| Ok((limb.joints.clone(), self.foot(limb)?));
+        let with_foot = |(joints, _): &Limb| Ok((joints.clone(), self.foot(joints)?));
         legs.into_iter().map(with_foot).collect()
     }
 
-    fn foot(&self, limb: &Limb) -> Result<&'x str, RobotFileError> {
-        let last = &self.joints[limb.joints[limb.joints.len() - 1]];
+    fn foot(&self, joints: &[usize]) -> Result<&'x str, RobotFileError> {
+        let last = &self.joints[joints[joints.len() - 1]];
         let held = self.held_by(last.child);
         let says_so = |link: &&&str| {
             let name = link.to_lowercase();
@@ -272,9 +268,11 @@ impl<'x> Tree<'x> {
         let named: Vec<&&str> = held.iter().filter(says_so).collect();
         let is_end = |link: &&&str| !self.below.contains_key(**link);
         let ends: Vec<&&str> = held.iter().filter(is_end).collect();
+        let is_same_place =
+            |a: &str, b: &str| (self.along(a).0 - self.along(b).0).norm() < ROUNDING;
         match (&named[..], &ends[..]) {
             ([only], _) | ([], [only]) => Ok(only),
-            ([first, rest @ ..], _) if rest.iter().all(|link| self.is_same_place(first, link)) => {
+            ([first, rest @ ..], _) if rest.iter().all(|link| is_same_place(first, link)) => {
                 Ok(first)
             }
             _ => {
@@ -288,11 +286,6 @@ impl<'x> Tree<'x> {
                 Err(RobotFileError::at(self.file, place, found, expected))
             }
         }
-    }
-
-    fn is_same_place(&self, a: &str, b: &str) -> bool {
-        let (a, b) = (self.along(a), self.along(b));
-        (a.0 - b.0).norm() < ROUNDING
     }
 
     /// Position and attitude of a link in the root's frame.

@@ -1,11 +1,13 @@
 //! A model's latent dynamics as equations to print, and what rounding did to them.
 
-use crate::equations::{Equations, PhaseEquations, Unit};
+use nalgebra::DMatrix;
+
+use crate::equations::{Equations, Unit};
 
 use super::decimal::{Decimal, Rounding};
-use super::expression::{UnknownSymbol, terms};
+use super::expression::terms;
 use super::rounder::{Rounder, RoundingReport};
-use super::symbols::{Quantity, SymbolTable};
+use super::symbols::SymbolTable;
 use super::tree::{Math, Signed, Symbol};
 
 /// The equations of one phase, ready for a printer.
@@ -43,7 +45,7 @@ pub struct CoefficientTable {
 #[derive(Clone, Debug, PartialEq)]
 pub struct CoefficientRow {
     /// The term.
-    pub term: Signed,
+    pub term: Math,
     /// Unit of the term, for equations in physical units; that of a coefficient is the column's over this.
     pub unit: Option<Unit>,
     /// The printed coefficient, or nothing where the term is not active.
@@ -64,31 +66,22 @@ pub struct Typeset {
 impl Typeset {
     /// Lays out the equations of each phase, terms in their order, coefficients rounded by
     /// `rounding`.
-    ///
-    /// # Errors
-    /// [`UnknownSymbol`] if a candidate term uses a variable that the latent model has not.
-    pub fn new(
-        system: &Equations<'_>,
-        symbols: &SymbolTable,
-        rounding: Rounding,
-    ) -> Result<Self, UnknownSymbol> {
-        let mut layout = Layout {
-            system,
-            symbols,
-            terms: terms(system, symbols)?,
-            rounder: Rounder::new(rounding, coefficients(system)),
-        };
-        let systems = system
-            .phases()
-            .iter()
-            .map(|phase| layout.system(phase))
-            .collect();
-        let table = layout.table();
-        Ok(Self {
-            systems,
-            table,
-            rounding: layout.rounder.into_report(),
-        })
+    pub fn new(system: &Equations<'_>, symbols: &SymbolTable, rounding: Rounding) -> Self {
+        let terms = terms(system, symbols);
+        let output = |output| (symbols.acceleration(output), format!("ddz{}", output + 1));
+        let outputs: Vec<(Symbol, String)> = (0..system.latent_dim()).map(output).collect();
+        let mut rounder = Rounder::new(rounding, coefficients(system));
+        let phases = system.phases().iter().enumerate();
+        let phases = phases.map(|(index, phase)| (&phase.name, system.coefficients(index)));
+        let phases: Vec<(&String, DMatrix<f64>)> = phases.collect();
+        let systems = phases.iter();
+        Self {
+            systems: systems
+                .map(|(phase, xi)| rounder.system(phase, &outputs, &terms, xi))
+                .collect(),
+            table: table(system, &phases, &outputs, &terms, &rounder),
+            rounding: rounder.report,
+        }
     }
 }
 
@@ -101,75 +94,40 @@ pub(super) fn coefficients(system: &Equations<'_>) -> impl Iterator<Item = f64> 
     summands.map(|summand| summand.coefficient)
 }
 
-struct Layout<'a> {
-    system: &'a Equations<'a>,
-    symbols: &'a SymbolTable,
-    terms: Vec<Signed>,
-    rounder: Rounder,
-}
-
-impl Layout<'_> {
-    fn acceleration(&self, output: usize) -> Symbol {
-        self.symbols.symbol(Quantity::Acceleration, output + 1)
-    }
-
-    fn system(&mut self, phase: &PhaseEquations) -> EquationSystem {
-        let equations = (0..self.system.latent_dim())
-            .map(|output| self.equation(phase, output))
-            .collect();
-        EquationSystem {
-            phase: phase.name.clone(),
-            equations,
-        }
-    }
-
-    fn equation(&mut self, phase: &PhaseEquations, output: usize) -> Equation {
-        let left = self.acceleration(output);
-        let texts = self.system.terms();
-        let summands = phase.ddz[output].iter().map(|summand| {
-            let term = summand.term;
-            (summand.coefficient, texts[term].text(), &self.terms[term])
-        });
-        let output = format!("ddz{}", output + 1);
-        self.rounder
-            .equation(left, (&phase.name, &output), summands)
-    }
-
-    fn table(&self) -> CoefficientTable {
-        let phases = self.system.phases();
-        let columns: Vec<(usize, usize)> = (0..phases.len())
-            .flat_map(|phase| (0..self.system.latent_dim()).map(move |output| (phase, output)))
-            .collect();
-        let xi: Vec<_> = (0..phases.len())
-            .map(|phase| self.system.coefficients(phase))
-            .collect();
-        let cell = |value: f64| Some(self.rounder.round(value)).filter(|cell| !cell.is_zero());
-        let row = |(row, term): (usize, &Signed)| CoefficientRow {
-            term: term.clone(),
-            unit: self.unit_of_term(row),
-            coefficients: (columns.iter())
-                .map(|&(phase, output)| cell(xi[phase][(row, output)]))
-                .collect(),
-        };
-        let units = self.system.latent_units().map(|units| {
-            let outputs = columns.iter().map(|(_, output)| *output);
-            outputs.map(|output| units.acceleration(output)).collect()
-        });
-        CoefficientTable {
-            rows: (self.terms.iter().enumerate().map(row))
-                .filter(|row| row.coefficients.iter().any(Option::is_some))
-                .collect(),
-            columns: (columns.iter())
-                .map(|&(phase, output)| (phases[phase].name.clone(), self.acceleration(output)))
-                .collect(),
-            units,
-        }
-    }
-
-    fn unit_of_term(&self, row: usize) -> Option<Unit> {
-        let units = self.system.latent_units()?;
-        let unit = units.of_term(self.system, self.system.terms()[row].expr());
-        Some(unit).filter(|unit| *unit != Unit::default())
+/// The coefficients of all phases beside each other.
+fn table(
+    system: &Equations<'_>,
+    phases: &[(&String, DMatrix<f64>)],
+    outputs: &[(Symbol, String)],
+    terms: &[(&str, Signed)],
+    rounder: &Rounder,
+) -> CoefficientTable {
+    let units = system.latent_units();
+    let cell = |value: &f64| Some(rounder.round(*value)).filter(|cell| !cell.is_zero());
+    let row = |(row, (_, term)): (usize, &(&str, Signed))| CoefficientRow {
+        term: term.clone().into_math(),
+        unit: units
+            .map(|units| units.of_term(system, system.terms()[row].expr()))
+            .filter(|unit| *unit != Unit::default()),
+        coefficients: (phases.iter())
+            .flat_map(|(_, xi)| xi.row(row).iter().map(cell).collect::<Vec<_>>())
+            .collect(),
+    };
+    CoefficientTable {
+        rows: (terms.iter().enumerate().map(row))
+            .filter(|row| row.coefficients.iter().any(Option::is_some))
+            .collect(),
+        columns: (phases.iter())
+            .flat_map(|(phase, _)| {
+                outputs
+                    .iter()
+                    .map(|(left, _)| ((*phase).clone(), left.clone()))
+            })
+            .collect(),
+        units: units.map(|units| {
+            let of_phase = || (0..outputs.len()).map(|output| units.acceleration(output));
+            phases.iter().flat_map(|_| of_phase()).collect()
+        }),
     }
 }
 

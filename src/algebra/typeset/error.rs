@@ -2,35 +2,19 @@
 
 #![allow(missing_docs, reason = "each variant's message names its fields")]
 
-use super::expression::UnknownSymbol;
-
 /// Why the equations of a model could not be printed.
 #[derive(Debug, thiserror::Error)]
 pub enum TypesetError {
-    /// A variable has no symbol in print.
-    #[error(transparent)]
-    Symbol(#[from] UnknownSymbol),
-    /// The model cannot be printed in robot coordinates.
-    #[error(transparent)]
-    Robot(#[from] RobotTypesetError),
-    /// A template failed to render.
-    #[error("a template failed")]
-    Template(#[from] askama::Error),
-}
-
-/// Why a model cannot be printed in robot coordinates.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum RobotTypesetError {
-    /// A variable has no symbol in print.
-    #[error(transparent)]
-    Symbol(#[from] UnknownSymbol),
-    /// A coefficient is too large once folded with weights and scale factors.
+    /// A coefficient in robot coordinates is too large once folded with weights and scale factors.
     #[error("robot coordinates, {output}: the coefficient of {term:?} is {value} in SI units")]
     NotFinite {
         output: String,
         term: String,
         value: f64,
     },
+    /// A template failed to render.
+    #[error("a template failed")]
+    Template(#[from] askama::Error),
 }
 
 /// Why a table of new names was refused.

@@ -4,83 +4,51 @@
 use std::cmp::Ordering;
 
 use crate::equations::Equations;
-use crate::symbolic::{ExprId, ExprPool, Function, Node, Number};
+use crate::model::{LatentVariable, MAX_LATENT_DIM};
+use crate::symbolic::{ExprId, ExprPool, Function, Node, Number, SymbolId};
 
 use super::decimal::Decimal;
-use super::symbols::{SymbolTable, Variable};
+use super::symbols::SymbolTable;
 use super::tree::{Glyph, Math, Signed};
 
-/// A name in an expression that no symbol is known for.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("`{name}` has no symbol: expected z1, dz1, ddz1, u1 and so on")]
-pub struct UnknownSymbol {
-    /// The name as the expression has it.
-    pub name: String,
-}
-
-/// Lays out `expr`.
-///
-/// # Errors
-/// [`UnknownSymbol`] for a variable that is none of the latent model's.
-pub fn expression(
-    pool: &ExprPool,
-    expr: ExprId,
-    symbols: &SymbolTable,
-) -> Result<Signed, UnknownSymbol> {
+/// Lays out an expression over the variables of a latent model.
+pub fn expression(pool: &ExprPool, expr: ExprId, symbols: &SymbolTable) -> Signed {
     Layout { pool, symbols }.signed(expr)
 }
 
-/// Lays out all terms of equations.
-///
-/// # Errors
-/// [`UnknownSymbol`] as [`expression`].
-pub(super) fn terms(
-    equations: &Equations<'_>,
+/// Lays out all terms of equations, each with its text.
+pub(super) fn terms<'e>(
+    equations: &'e Equations<'_>,
     symbols: &SymbolTable,
-) -> Result<Vec<Signed>, UnknownSymbol> {
+) -> Vec<(&'e str, Signed)> {
+    let layout = |expr| expression(equations.pool(), expr, symbols);
     let terms = equations.terms().iter();
     terms
-        .map(|term| expression(equations.pool(), term.expr(), symbols))
+        .map(|term| (term.text(), layout(term.expr())))
         .collect()
 }
 
 /// Puts a coefficient before a term: `0.36` and `sin(dz1)` to `0.36 sin(dz1)`.
-/// The coefficient takes the place of a term or numerator that is one;
-/// [`Leading::Omitted`] prints its sign alone.
-pub fn with_coefficient(coefficient: &Decimal, leading: Leading, term: Signed) -> Signed {
-    let is_omitted = leading == Leading::Omitted;
-    let negative = coefficient.is_negative() != term.negative;
+/// The coefficient takes the place of a term or numerator that is one; one that `is_omitted` prints its
+/// sign alone.
+pub(super) fn with_coefficient(coefficient: &Decimal, is_omitted: bool, term: Signed) -> Signed {
     let number = Math::Number(coefficient.magnitude());
     let math = match term.math {
         Math::Number(one) if one.is_one() => number,
-        Math::Fraction(top, bottom) if is_one(&top) && !is_omitted => {
-            Math::Fraction(Box::new(number), bottom)
-        }
-        Math::Sum(terms) => {
-            let group = Math::Group(Box::new(Math::Sum(terms)));
-            if is_omitted {
-                group
-            } else {
-                product(vec![number, group])
-            }
-        }
+        sum @ Math::Sum(_) if is_omitted => Math::Group(Box::new(sum)),
         math if is_omitted => math,
+        Math::Fraction(top, bottom) if is_one(&top) => Math::Fraction(Box::new(number), bottom),
+        sum @ Math::Sum(_) => product(vec![number, Math::Group(Box::new(sum))]),
         Math::Product(mut factors) => {
             factors.insert(0, number);
             product(factors)
         }
         math => product(vec![number, math]),
     };
-    Signed { negative, math }
-}
-
-/// Whether a coefficient stands before its term.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Leading {
-    /// It is printed.
-    Printed,
-    /// It is one and left out.
-    Omitted,
+    Signed {
+        negative: coefficient.is_negative() != term.negative,
+        math,
+    }
 }
 
 struct Layout<'a> {
@@ -92,7 +60,7 @@ struct Layout<'a> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum FactorKey {
     Number,
-    Variable(Variable),
+    Variable(LatentVariable),
     Group,
     Function,
 }
@@ -107,7 +75,7 @@ struct Quotient {
 }
 
 impl Layout<'_> {
-    fn signed(&self, expr: ExprId) -> Result<Signed, UnknownSymbol> {
+    fn signed(&self, expr: ExprId) -> Signed {
         match self.pool.node(expr) {
             Node::Sum(terms) => self.sum(terms),
             Node::Product(factors) => self.quotient(factors),
@@ -117,26 +85,26 @@ impl Layout<'_> {
         }
     }
 
-    fn sum(&self, terms: &[ExprId]) -> Result<Signed, UnknownSymbol> {
+    fn sum(&self, terms: &[ExprId]) -> Signed {
         let mut order: Vec<ExprId> = terms.to_vec();
         order.sort_by(|a, b| self.compare_terms(*a, *b));
         let mut terms: Vec<Signed> = order
             .into_iter()
             .map(|term| {
-                let signed = self.signed(term)?;
+                let signed = self.signed(term);
                 // A sum inside a sum does not occur in canonical form; brackets keep it right.
                 let math = match signed.math {
                     sum @ Math::Sum(_) => Math::Group(Box::new(sum)),
                     math => math,
                 };
-                Ok(Signed { math, ..signed })
+                Signed { math, ..signed }
             })
-            .collect::<Result<_, UnknownSymbol>>()?;
+            .collect();
         // z_1 - 1 rather than -1 + z_1.
         if let Some(positive) = terms.iter().position(|term| !term.negative) {
             terms[..=positive].rotate_right(1);
         }
-        Ok(Signed::plus(Math::Sum(terms)))
+        Signed::plus(Math::Sum(terms))
     }
 
     /// Constants first, then monomials by degree and variables, then the rest as the pool has it.
@@ -150,7 +118,7 @@ impl Layout<'_> {
     }
 
     /// The variables of a monomial, each as often as its exponent says.
-    fn monomial(&self, expr: ExprId) -> Option<Vec<Variable>> {
+    fn monomial(&self, expr: ExprId) -> Option<Vec<LatentVariable>> {
         let one = [expr];
         let factors: &[ExprId] = match self.pool.node(expr) {
             Node::Product(factors) => factors,
@@ -166,8 +134,7 @@ impl Layout<'_> {
             let Node::Symbol(symbol) = self.pool.node(base) else {
                 return None;
             };
-            let variable = Variable::parse(self.pool.symbol_name(*symbol))?;
-            variables.extend(std::iter::repeat_n(variable, times));
+            variables.extend(std::iter::repeat_n(self.variable(*symbol)?, times));
         }
         variables.sort();
         Some(variables)
@@ -178,20 +145,20 @@ impl Layout<'_> {
         usize::try_from(integer).ok().filter(|power| *power <= 64)
     }
 
-    fn quotient(&self, factors: &[ExprId]) -> Result<Signed, UnknownSymbol> {
+    fn quotient(&self, factors: &[ExprId]) -> Signed {
         let mut parts = Quotient::default();
         for factor in factors {
             match self.pool.node(*factor) {
                 Node::Number(number) => self.take_number(*number, &mut parts),
-                Node::Power(base, exponent) => self.take_power(*base, *exponent, &mut parts)?,
-                _other => parts.top.push(self.factor(*factor)?),
+                Node::Power(base, exponent) => self.take_power(*base, *exponent, &mut parts),
+                _other => parts.top.push(self.factor(*factor)),
             }
         }
         if parts.negative {
             let mut factors = parts.top.iter_mut().chain(&mut parts.bottom);
             parts.negative = !factors.any(|(_, factor)| turn_difference(factor));
         }
-        Ok(parts.assemble())
+        parts.assemble()
     }
 
     fn take_number(&self, number: Number, parts: &mut Quotient) {
@@ -212,53 +179,43 @@ impl Layout<'_> {
         }
     }
 
-    fn take_power(
-        &self,
-        base: ExprId,
-        exponent: ExprId,
-        parts: &mut Quotient,
-    ) -> Result<(), UnknownSymbol> {
+    fn take_power(&self, base: ExprId, exponent: ExprId, parts: &mut Quotient) {
         match self.pool.as_number(exponent) {
             Some(number) => {
-                let factor = self.numeric_power(base, number.abs())?;
+                let factor = self.numeric_power(base, number.abs());
                 match number.is_negative() {
                     true => parts.bottom.push(factor),
                     false => parts.top.push(factor),
                 }
             }
             None => {
-                let exponent = self.signed(exponent)?.into_math();
-                let (key, base) = self.base(base)?;
+                let exponent = self.signed(exponent).into_math();
+                let (key, base) = self.base(base);
                 let power = Math::Power(Box::new(base), Box::new(exponent));
                 parts.top.push((key, power));
             }
         }
-        Ok(())
     }
 
     /// `base ^ exponent` for a positive number: a root, a power on the function's
     /// name, or a plain power.
-    fn numeric_power(
-        &self,
-        base: ExprId,
-        exponent: Number,
-    ) -> Result<(FactorKey, Math), UnknownSymbol> {
+    fn numeric_power(&self, base: ExprId, exponent: Number) -> (FactorKey, Math) {
         if exponent.is_one() {
             return self.factor(base);
         }
         let exponent = match exponent.as_rational() {
             // Where a base may be negative its odd root is read as negative, its power is nothing.
             Some((1, index @ (2 | 4 | 6 | 8))) => {
-                let inner = self.signed(base)?.into_math();
+                let inner = self.signed(base).into_math();
                 let index = (index != 2).then_some(index as u32);
-                return Ok((FactorKey::Function, Math::Root(Box::new(inner), index)));
+                return (FactorKey::Function, Math::Root(Box::new(inner), index));
             }
             Some((power, 1)) => match self.pool.node(base) {
                 // The pool keeps x^(3/2) as sqrt(x)^3.
                 Node::Apply(Function::Sqrt, radicand) => {
-                    let (key, base) = self.base(*radicand)?;
+                    let (key, base) = self.base(*radicand);
                     let half = Math::Slash(Box::new(integer(power)), Box::new(integer(2)));
-                    return Ok((key, Math::Power(Box::new(base), Box::new(half))));
+                    return (key, Math::Power(Box::new(base), Box::new(half)));
                 }
                 Node::Apply(function, argument) => {
                     return self.powered_function(*function, *argument, power);
@@ -268,8 +225,8 @@ impl Layout<'_> {
             Some((top, bottom)) => Math::Slash(Box::new(integer(top)), Box::new(integer(bottom))),
             None => Math::Number(Decimal::exact(exponent.to_f64())),
         };
-        let (key, base) = self.base(base)?;
-        Ok((key, Math::Power(Box::new(base), Box::new(exponent))))
+        let (key, base) = self.base(base);
+        (key, Math::Power(Box::new(base), Box::new(exponent)))
     }
 
     /// `sin(x)^2` with the power on the name; on the whole for functions that do not allow it.
@@ -278,25 +235,29 @@ impl Layout<'_> {
         function: Function,
         argument: ExprId,
         power: i64,
-    ) -> Result<(FactorKey, Math), UnknownSymbol> {
+    ) -> (FactorKey, Math) {
         let power = Box::new(integer(power));
         let math = match has_power_on_name(function) {
             true => {
-                let argument = Box::new(self.signed(argument)?.into_math());
+                let argument = Box::new(self.signed(argument).into_math());
                 Math::Function(function, Some(power), argument)
             }
             // The power of exp(x) without parentheses could be read as one of x.
             false => {
-                let applied = self.apply(function, argument)?;
-                Math::Power(Box::new(grouped_function(applied)), power)
+                let base = match self.apply(function, argument) {
+                    math @ Math::Function(..) => Math::Group(Box::new(math)),
+                    // bars and roots show themselves where they end
+                    math => math,
+                };
+                Math::Power(Box::new(base), power)
             }
         };
-        Ok((FactorKey::Function, math))
+        (FactorKey::Function, math)
     }
 
     /// `expr` as the base of a power, in parentheses where it needs them.
-    fn base(&self, expr: ExprId) -> Result<(FactorKey, Math), UnknownSymbol> {
-        let (key, math) = self.factor(expr)?;
+    fn base(&self, expr: ExprId) -> (FactorKey, Math) {
+        let (key, math) = self.factor(expr);
         let math = match math {
             Math::Number(ref number) if number.exponent().is_some() => Math::Group(Box::new(math)),
             Math::Product(_)
@@ -310,26 +271,23 @@ impl Layout<'_> {
                 math
             }
         };
-        Ok((key, math))
+        (key, math)
     }
 
     /// One factor of a product, with parentheses around sums and signs.
-    fn factor(&self, expr: ExprId) -> Result<(FactorKey, Math), UnknownSymbol> {
-        Ok(match self.pool.node(expr) {
+    fn factor(&self, expr: ExprId) -> (FactorKey, Math) {
+        match self.pool.node(expr) {
             Node::Symbol(symbol) => {
-                let name = self.pool.symbol_name(*symbol);
-                let variable = Variable::parse(name).ok_or_else(|| UnknownSymbol {
-                    name: name.to_owned(),
-                })?;
-                let symbol = Math::Symbol(self.symbols.symbol(variable.quantity, variable.index));
-                (FactorKey::Variable(variable), symbol)
+                let variable = self.variable(*symbol);
+                let variable = variable.expect("terms mention the model's variables only");
+                let math = Math::Symbol(self.symbols.symbol(variable));
+                (FactorKey::Variable(variable), math)
             }
             Node::Apply(function, argument) => {
-                (FactorKey::Function, self.apply(*function, *argument)?)
+                (FactorKey::Function, self.apply(*function, *argument))
             }
             Node::Number(_) | Node::Sum(_) | Node::Product(_) | Node::Power(..) => {
-                let signed = self.signed(expr)?;
-                match signed {
+                match self.signed(expr) {
                     Signed {
                         negative: false,
                         math: math @ Math::Number(_),
@@ -341,16 +299,20 @@ impl Layout<'_> {
                     other => (FactorKey::Group, Math::Group(Box::new(other.into_math()))),
                 }
             }
-        })
+        }
     }
 
-    fn apply(&self, function: Function, argument: ExprId) -> Result<Math, UnknownSymbol> {
-        let argument = Box::new(self.signed(argument)?.into_math());
-        Ok(match function {
+    fn variable(&self, symbol: SymbolId) -> Option<LatentVariable> {
+        LatentVariable::from_name(self.pool.symbol_name(symbol), MAX_LATENT_DIM)
+    }
+
+    fn apply(&self, function: Function, argument: ExprId) -> Math {
+        let argument = Box::new(self.signed(argument).into_math());
+        match function {
             Function::Sqrt => Math::Root(argument, None),
             Function::Abs => Math::Absolute(argument),
             named => Math::Function(named, None, argument),
-        })
+        }
     }
 }
 
@@ -396,14 +358,6 @@ fn turn_difference(factor: &mut Math) -> bool {
             .for_each(|term| term.negative = !term.negative);
     }
     is_difference
-}
-
-/// A function in parentheses; bars and roots show themselves where they end.
-fn grouped_function(math: Math) -> Math {
-    match math {
-        Math::Function(..) => Math::Group(Box::new(math)),
-        math => math,
-    }
 }
 
 /// A numerator or denominator needs no parentheses of its own.

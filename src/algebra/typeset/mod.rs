@@ -25,13 +25,13 @@ pub mod words;
 
 pub use decimal::{Decimal, MOST_DIGITS, Rounding};
 pub use equations::{CoefficientRow, CoefficientTable, Equation, EquationSystem, Typeset};
-pub use error::{RenameError, RobotTypesetError, TypesetError};
-pub use expression::{Leading, UnknownSymbol, expression, with_coefficient};
+pub use error::{RenameError, TypesetError};
+pub use expression::expression;
 pub use options::{Form, NumberStyle, PrintOptions};
 pub use page::rendered;
 pub use robot::RobotTypeset;
 pub use rounder::{Place, RoundingReport};
-pub use symbols::{Quantity, SymbolTable, Variable};
+pub use symbols::SymbolTable;
 pub use table::{Cell, Rows, Table, rounded, rounded_up, significant};
 pub use tree::{GREEK, Glyph, Math, Signed, Symbol};
 pub use width::{EQUALS, OPERATOR, break_lines, sum_width, symbol_width, width};

@@ -4,7 +4,6 @@ use askama::Template;
 
 use super::decimal::Decimal;
 use super::equations::{EquationSystem, Typeset};
-use super::error::TypesetError;
 use super::options::PrintOptions;
 use super::tree::{Math, Symbol};
 use super::words::{self, Spelling};
@@ -50,22 +49,16 @@ pub(super) struct RowView {
 
 impl Page {
     /// The page of a model's equations.
-    ///
-    /// # Errors
-    /// [`TypesetError::Symbol`] if a candidate term has a variable without a symbol.
-    pub fn new<M: Markup>(
-        equations: &Equations<'_>,
-        options: &PrintOptions,
-    ) -> Result<Self, TypesetError> {
+    pub fn new<M: Markup>(equations: &Equations<'_>, options: &PrintOptions) -> Self {
         let model = equations.model();
         let width_em = options.width_em.unwrap_or(WIDTH_EM);
-        let typeset = Typeset::new(equations, &options.symbols, options.rounding)?;
+        let typeset = Typeset::new(equations, &options.symbols, options.rounding);
         let phases = typeset.systems.iter().zip(equations.phases());
         let table = &typeset.table;
         let unit = |column: usize| table.units.as_ref().map(|units| units[column]);
         let columns = table.columns.iter().enumerate();
         let cell = |number: &Option<Decimal>| number.as_ref().map_or(String::new(), M::number);
-        Ok(Self {
+        Self {
             name: M::text(model.name()),
             description: M::text(model.description()),
             version: env!("CARGO_PKG_VERSION"),
@@ -83,11 +76,11 @@ impl Page {
                 .collect(),
             rows: (table.rows.iter())
                 .map(|row| RowView {
-                    term: M::row_head(&row.term.clone().into_math(), row.unit),
+                    term: M::row_head(&row.term, row.unit),
                     cells: row.coefficients.iter().map(cell).collect(),
                 })
                 .collect(),
-        })
+        }
     }
 }
 

@@ -1,17 +1,17 @@
 //! The model in robot coordinates: what the latent coordinates are made of, and the
 //! accelerations of the robot that the latent dynamics mean.
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 use crate::equations::Equations;
-use crate::model::AffineMap;
+use crate::model::{AffineMap, LatentVariable};
 
 use super::decimal::{Decimal, Rounding};
-use super::equations::{Equation, EquationSystem, coefficients};
-use super::error::RobotTypesetError;
+use super::equations::{EquationSystem, coefficients};
+use super::error::TypesetError;
 use super::expression::terms;
 use super::rounder::{Rounder, RoundingReport};
-use super::symbols::{Quantity, SymbolTable, glyph};
+use super::symbols::{SymbolTable, glyph};
 use super::tree::{Glyph, Math, Signed, Symbol};
 
 /// Weights below this share of their row's largest are left out of the printed encoder.
@@ -21,7 +21,7 @@ const NEGLIGIBLE: f64 = 0.02;
 #[derive(Clone, Debug, PartialEq)]
 pub struct RobotTypeset {
     /// `z = W_e (s_x q) + b_e`, one equation a latent coordinate.
-    pub encoder: Vec<Equation>,
+    pub encoder: EquationSystem,
     /// How many weights of the encoder are too small to be printed: each below 2 % of the
     /// largest of its row.
     pub negligible_weights: usize,
@@ -36,13 +36,12 @@ impl RobotTypeset {
     /// scaling or names of its state.
     ///
     /// # Errors
-    /// [`RobotTypesetError`] if a candidate term uses a variable that the latent model has not,
-    /// or a coefficient is too large for a float in SI units.
+    /// [`TypesetError::NotFinite`] if a coefficient is too large for a float in SI units.
     pub fn new(
         system: &Equations<'_>,
         symbols: &SymbolTable,
         rounding: Rounding,
-    ) -> Result<Option<Self>, RobotTypesetError> {
+    ) -> Result<Option<Self>, TypesetError> {
         let model = system.model();
         let (Some(state), Ok(map), Ok(decoder), Ok(factors)) = (
             model.state(),
@@ -54,42 +53,32 @@ impl RobotTypeset {
         };
         let decoder = decoder.weights();
         let coordinates = coordinate_symbols(&state.names);
-        let terms = terms(system, symbols)?;
+        let terms = terms(system, symbols);
         let (encoder, negligible_weights) = encoder(map, &factors, symbols, &coordinates)?;
         let mut rounder = Rounder::new(rounding, coefficients(system));
         let mut systems = Vec::new();
+        let outputs: Vec<(Symbol, String)> = (coordinates.iter().zip(&state.names))
+            .map(|(symbol, name)| {
+                let symbol = symbol.clone();
+                (Symbol { dots: 2, ..symbol }, format!("dd({name})"))
+            })
+            .collect();
         for (index, phase) in system.phases().iter().enumerate() {
-            let xi = &system.coefficients(index);
-            let mut equations = Vec::with_capacity(coordinates.len());
-            for (row, symbol) in coordinates.iter().enumerate() {
-                let output = format!("dd({})", state.names[row]);
-                let texts = system.terms().iter().map(|term| term.text());
-                let entries = terms
-                    .iter()
-                    .zip(texts)
-                    .enumerate()
-                    .map(|(term, (math, text))| {
-                        let sum = decoder.row(row).transpose().dot(&xi.row(term).transpose());
-                        Ok((finite(sum / factors[row], &output, text)?, text, math))
-                    })
-                    .collect::<Result<Vec<_>, RobotTypesetError>>()?;
-                let left = Symbol {
-                    dots: 2,
-                    ..symbol.clone()
-                };
-                let place = (phase.name.as_str(), output.as_str());
-                equations.push(rounder.equation(left, place, entries.into_iter()));
+            let xi = system.coefficients(index);
+            let mut ddq = DMatrix::zeros(terms.len(), outputs.len());
+            for (row, (_, output)) in outputs.iter().enumerate() {
+                for (term, (text, _)) in terms.iter().enumerate() {
+                    let sum = decoder.row(row).transpose().dot(&xi.row(term).transpose());
+                    ddq[(term, row)] = finite(sum / factors[row], output, text)?;
+                }
             }
-            systems.push(EquationSystem {
-                phase: phase.name.clone(),
-                equations,
-            });
+            systems.push(rounder.system(&phase.name, &outputs, &terms, &ddq));
         }
         Ok(Some(Self {
             encoder,
             negligible_weights,
             systems,
-            rounding: rounder.into_report(),
+            rounding: rounder.report,
         }))
     }
 }
@@ -100,56 +89,44 @@ fn encoder(
     factors: &DVector<f64>,
     symbols: &SymbolTable,
     coordinates: &[Symbol],
-) -> Result<(Vec<Equation>, usize), RobotTypesetError> {
-    let one = Signed::plus(Math::Number(Decimal::integer(1)));
-    let terms: Vec<Signed> = coordinates
-        .iter()
-        .map(|symbol| Signed::plus(Math::Symbol(symbol.clone())))
-        .collect();
-    let mut rounder = Rounder::new(Rounding::Significant(3), std::iter::empty());
-    let mut left_out = 0;
-    let mut equations = Vec::new();
-    for row in 0..encoder.output_dim() {
-        let weights = encoder
-            .weights()
-            .row(row)
-            .transpose()
-            .component_mul(factors);
-        for (col, &weight) in weights.iter().enumerate() {
-            finite(
-                weight,
-                &format!("z{}", row + 1),
-                &coordinates[col].to_string(),
-            )?;
+) -> Result<(EquationSystem, usize), TypesetError> {
+    let mut terms = vec![("1", Signed::plus(Math::Number(Decimal::integer(1))))];
+    let of_symbol = |symbol: &Symbol| ("", Signed::plus(Math::Symbol(symbol.clone())));
+    terms.extend(coordinates.iter().map(of_symbol));
+    let mut printed = DMatrix::zeros(terms.len(), encoder.output_dim());
+    let mut absent = vec![0; encoder.output_dim()];
+    for (row, mut column) in printed.column_iter_mut().enumerate() {
+        let weights = encoder.weights().row(row).transpose();
+        let weights = weights.component_mul(factors);
+        for (&weight, symbol) in weights.iter().zip(coordinates) {
+            finite(weight, &format!("z{}", row + 1), &symbol.to_string())?;
         }
         let smallest = NEGLIGIBLE * weights.amax();
-        let is_printed = |weight: f64| weight.abs() >= smallest && weight != 0.0;
-        let absent = weights
-            .iter()
-            .filter(|w| **w != 0.0 && !is_printed(**w))
-            .count();
-        left_out += absent;
-        let bias = std::iter::once((encoder.bias()[row], "1", &one));
-        let entries = weights
-            .iter()
-            .zip(&terms)
-            .filter(|(weight, _)| is_printed(**weight))
-            .map(|(weight, term)| (*weight, "", term));
-        let left = symbols.symbol(Quantity::Position, row + 1);
-        equations.push(Equation {
-            is_approximate: absent > 0,
-            ..rounder.equation(left, ("encoder", ""), bias.chain(entries))
-        });
+        column[0] = encoder.bias()[row];
+        for (index, &weight) in weights.iter().enumerate() {
+            if weight.abs() >= smallest {
+                column[index + 1] = weight;
+            } else if weight != 0.0 {
+                absent[row] += 1;
+            }
+        }
     }
-    Ok((equations, left_out))
+    let output = |row| (symbols.symbol(LatentVariable::Z(row)), String::new());
+    let outputs: Vec<_> = (0..encoder.output_dim()).map(output).collect();
+    let mut rounder = Rounder::new(Rounding::Significant(3), std::iter::empty());
+    let mut system = rounder.system("encoder", &outputs, &terms, &printed);
+    for (equation, absent) in system.equations.iter_mut().zip(&absent) {
+        equation.is_approximate = *absent > 0;
+    }
+    Ok((system, absent.iter().sum()))
 }
 
 /// `value`, unless folding it with weights and scale factors left the range of floats.
-fn finite(value: f64, output: &str, term: &str) -> Result<f64, RobotTypesetError> {
+fn finite(value: f64, output: &str, term: &str) -> Result<f64, TypesetError> {
     if value.is_finite() {
         return Ok(value);
     }
-    Err(RobotTypesetError::NotFinite {
+    Err(TypesetError::NotFinite {
         output: output.to_owned(),
         term: term.to_owned(),
         value,
@@ -198,27 +175,20 @@ mod tests {
         let found = |text: &str| {
             let model = crate::artifact::read_from_bytes("huge.json", text.as_bytes())
                 .expect("all numbers are finite");
-            RobotTypeset::new(
-                &Equations::of(&model),
-                &SymbolTable::default(),
-                Rounding::Exact,
-            )
+            let (equations, symbols) = (Equations::of(&model), SymbolTable::default());
+            let refused = RobotTypeset::new(&equations, &symbols, Rounding::Exact);
+            refused.expect_err("too large").to_string()
         };
         assert_eq!(
             found(text),
-            Err(RobotTypesetError::NotFinite {
-                output: "dd(a)".to_owned(),
-                term: "z1".to_owned(),
-                value: f64::INFINITY
-            })
+            "robot coordinates, dd(a): the coefficient of \"z1\" is inf in SI units"
         );
         let large_weight = text
             .replace("1e308", "1.0")
             .replace("[[1.0, 0.0]]", "[[1e308, 0.0]]");
         let large_weight = large_weight.replace("\"state\": 0.5", "\"state\": 2.5");
-        let message = found(&large_weight).expect_err("too large").to_string();
         assert_eq!(
-            message,
+            found(&large_weight),
             "robot coordinates, z1: the coefficient of \"q_a\" is inf in SI units"
         );
     }

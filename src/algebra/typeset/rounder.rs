@@ -1,8 +1,10 @@
 //! Coefficients before terms, with a record of what rounding changed.
 
+use nalgebra::DMatrix;
+
 use super::decimal::{Decimal, Rounding};
-use super::equations::Equation;
-use super::expression::{Leading, with_coefficient};
+use super::equations::{Equation, EquationSystem};
+use super::expression::with_coefficient;
 use super::tree::{Signed, Symbol};
 
 /// A coefficient's place in the model.
@@ -40,7 +42,7 @@ pub(super) struct Rounder {
     rounding: Rounding,
     /// Whether whole numbers are printed as such, and one is left out before a term.
     is_exact: bool,
-    report: RoundingReport,
+    pub(super) report: RoundingReport,
 }
 
 /// Share of the coefficients that need every decimal from which a model counts as rounded to them.
@@ -91,9 +93,30 @@ impl Rounder {
         }
     }
 
+    /// The equations of one phase out of `xi`, a row a term, a column an output, which has a symbol and
+    /// a name for the record.
+    pub(super) fn system(
+        &mut self,
+        phase: &str,
+        outputs: &[(Symbol, String)],
+        terms: &[(&str, Signed)],
+        xi: &DMatrix<f64>,
+    ) -> EquationSystem {
+        let equations = outputs.iter().zip(xi.column_iter());
+        let equations = equations.map(|((left, output), column)| {
+            let entries = column.iter().zip(terms);
+            let entries = entries.map(|(xi, (text, term))| (*xi, *text, term));
+            self.equation(left.clone(), (phase, output), entries)
+        });
+        EquationSystem {
+            equations: equations.collect(),
+            phase: phase.to_owned(),
+        }
+    }
+
     /// `left = sum of coefficient * term`; each entry carries its term also as text, and
     /// `(phase, output)` names the equation, for the record.
-    pub(super) fn equation<'a>(
+    fn equation<'a>(
         &mut self,
         left: Symbol,
         (phase, output): (&str, &str),
@@ -123,21 +146,13 @@ impl Rounder {
             }
             report.largest_relative = report.largest_relative.max(error / coefficient.abs());
             // Only a true one: a rounded 1.00 says how well it is known.
-            let leading = if coefficient.abs() == 1.0 && self.is_exact {
-                Leading::Omitted
-            } else {
-                Leading::Printed
-            };
-            terms.push(with_coefficient(&printed, leading, term.clone()));
+            let is_omitted = coefficient.abs() == 1.0 && self.is_exact;
+            terms.push(with_coefficient(&printed, is_omitted, term.clone()));
         }
         Equation {
             left,
             terms,
             is_approximate: false,
         }
-    }
-
-    pub(super) fn into_report(self) -> RoundingReport {
-        self.report
     }
 }

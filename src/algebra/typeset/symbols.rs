@@ -4,47 +4,7 @@ use std::collections::BTreeMap;
 
 use super::error::RenameError;
 use super::tree::{GREEK, Glyph, Symbol};
-
-/// What a variable of the latent model is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Quantity {
-    /// Latent coordinate `z`.
-    Position,
-    /// Its velocity `dz`.
-    Velocity,
-    /// Latent input `u`.
-    Input,
-    /// Acceleration `ddz`, the left side of an equation.
-    Acceleration,
-}
-
-/// A variable of the latent model: what it is, and its number counted from one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Variable {
-    /// What it is.
-    pub quantity: Quantity,
-    /// Its number, from one.
-    pub index: usize,
-}
-
-impl Variable {
-    /// Reads `z3`, `dz3`, `ddz3` or `u3`; anything else is none of the model's variables.
-    pub fn parse(name: &str) -> Option<Self> {
-        let digits = name.trim_start_matches(|c: char| c.is_ascii_alphabetic());
-        let quantity = match &name[..name.len() - digits.len()] {
-            "z" => Quantity::Position,
-            "dz" => Quantity::Velocity,
-            "ddz" => Quantity::Acceleration,
-            "u" => Quantity::Input,
-            _ => return None,
-        };
-        if digits.starts_with('0') || !digits.bytes().all(|byte| byte.is_ascii_digit()) {
-            return None;
-        }
-        let index = digits.parse().ok()?;
-        Some(Self { quantity, index })
-    }
-}
+use crate::model::LatentVariable;
 
 /// New names for latent coordinates and inputs, such as `z1=x`, `u2=F_z`.
 ///
@@ -55,7 +15,7 @@ impl Variable {
 /// ```
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct SymbolTable {
-    names: BTreeMap<(Quantity, usize), Symbol>,
+    names: BTreeMap<LatentVariable, Symbol>,
 }
 
 impl SymbolTable {
@@ -72,11 +32,8 @@ impl SymbolTable {
                 entry: entry.to_owned(),
             })?;
             let (left, right) = (left.trim(), right.trim());
-            let variable = Variable::parse(left)
-                .filter(|variable| {
-                    matches!(variable.quantity, Quantity::Position | Quantity::Input)
-                        && (1..=latent_dim).contains(&variable.index)
-                })
+            let variable = LatentVariable::from_name(left, latent_dim)
+                .filter(|variable| !matches!(variable, LatentVariable::Dz(_)))
                 .ok_or_else(|| RenameError::Variable {
                     found: left.to_owned(),
                 })?;
@@ -84,8 +41,7 @@ impl SymbolTable {
                 variable: left.to_owned(),
                 found: right.to_owned(),
             })?;
-            let key = (variable.quantity, variable.index);
-            if table.names.insert(key, symbol).is_some() {
+            if table.names.insert(variable, symbol).is_some() {
                 return Err(RenameError::Twice {
                     variable: left.to_owned(),
                 });
@@ -95,40 +51,42 @@ impl SymbolTable {
         Ok(table)
     }
 
-    /// How a variable is written, its index counted from one.
-    pub fn symbol(&self, quantity: Quantity, index: usize) -> Symbol {
-        let (base, letter, dots) = match quantity {
-            Quantity::Position => (Quantity::Position, 'z', 0),
-            Quantity::Velocity => (Quantity::Position, 'z', 1),
-            Quantity::Acceleration => (Quantity::Position, 'z', 2),
-            Quantity::Input => (Quantity::Input, 'u', 0),
+    /// How a variable is written.
+    pub fn symbol(&self, variable: LatentVariable) -> Symbol {
+        let (letter, index) = match variable {
+            LatentVariable::Z(index) => ('z', index),
+            LatentVariable::U(index) => ('u', index),
+            LatentVariable::Dz(index) => return self.derivative(index, 1),
         };
-        match self.names.get(&(base, index)) {
-            Some(symbol) => Symbol {
-                dots,
-                ..symbol.clone()
-            },
-            None => Symbol {
-                glyph: Glyph::Letter(letter),
-                dots,
-                subscript: vec![Glyph::Digits(index.to_string())],
-            },
-        }
+        let new = self.names.get(&variable).cloned();
+        new.unwrap_or_else(|| Symbol {
+            glyph: Glyph::Letter(letter),
+            dots: 0,
+            subscript: vec![Glyph::Digits((index + 1).to_string())],
+        })
+    }
+
+    /// How the acceleration of a latent coordinate is written, its index counted from 0.
+    pub fn acceleration(&self, output: usize) -> Symbol {
+        self.derivative(output, 2)
+    }
+
+    fn derivative(&self, index: usize, dots: u8) -> Symbol {
+        let position = self.symbol(LatentVariable::Z(index));
+        Symbol { dots, ..position }
     }
 
     fn check_distinct(&self, latent_dim: usize) -> Result<(), RenameError> {
         let mut seen: BTreeMap<Symbol, String> = BTreeMap::new();
-        for (quantity, letter) in [(Quantity::Position, 'z'), (Quantity::Input, 'u')] {
-            for index in 1..=latent_dim {
-                let name = format!("{letter}{index}");
-                let symbol = self.symbol(quantity, index);
-                if let Some(first) = seen.insert(symbol.clone(), name.clone()) {
-                    return Err(RenameError::Collision {
-                        first,
-                        second: name,
-                        name: symbol.to_string(),
-                    });
-                }
+        for variable in LatentVariable::all(latent_dim) {
+            let (symbol, second) = (self.symbol(variable), variable.to_string());
+            if let Some(first) = seen.insert(symbol.clone(), second.clone()) {
+                let name = symbol.to_string();
+                return Err(RenameError::Collision {
+                    first,
+                    second,
+                    name,
+                });
             }
         }
         Ok(())
@@ -195,10 +153,8 @@ pub(super) fn glyph(text: &str) -> Option<Glyph> {
     if let Some(place) = GREEK.iter().position(|(greek, _)| *greek == name) {
         return Some(Glyph::Greek(place));
     }
-    if named.is_some() || name.len() > LONGEST_WORD {
-        return None;
-    }
-    if name.is_empty() || !name.bytes().all(|byte| byte.is_ascii_alphanumeric()) {
+    let is_plain = name.bytes().all(|byte| byte.is_ascii_alphanumeric());
+    if named.is_some() || !is_plain || !(1..=LONGEST_WORD).contains(&name.len()) {
         return None;
     }
     let mut letters = name.chars();
@@ -214,26 +170,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn variable_parse_accepts_only_model_variables() {
-        let Variable { quantity, index } = Variable::parse("dz12").unwrap();
-        assert_eq!((quantity, index), (Quantity::Velocity, 12));
-        for name in ["z", "z0", "z01", "x1", "z1a", "dddz1", "", "1", "z-1"] {
-            assert_eq!(Variable::parse(name), None, "{name}");
-        }
-    }
-
-    #[test]
     fn table_renames_the_coordinate_and_all_its_derivatives() {
         let table = SymbolTable::parse(&["z1 = x", "u2=F_lin,z", "z2=theta"], 2).unwrap();
-        let show = |name: &str| {
-            let Variable { quantity, index } = Variable::parse(name).unwrap();
-            table.symbol(quantity, index).to_string()
-        };
-        assert_eq!(show("z1"), "x");
-        assert_eq!(show("ddz1"), "ddx");
-        assert_eq!(show("dz2"), "dtheta");
-        assert_eq!(show("u2"), "F_lin,z");
-        assert_eq!(show("u1"), "u_1");
+        let show = |variable| table.symbol(variable).to_string();
+        assert_eq!(show(LatentVariable::Z(0)), "x");
+        assert_eq!(table.acceleration(0).to_string(), "ddx");
+        assert_eq!(show(LatentVariable::Dz(1)), "dtheta");
+        assert_eq!(show(LatentVariable::U(1)), "F_lin,z");
+        assert_eq!(show(LatentVariable::U(0)), "u_1");
     }
 
     #[test]

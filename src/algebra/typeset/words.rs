@@ -1,26 +1,23 @@
 //! Sentences that every printed form of a model carries, in a spelling that the form chooses.
 
 use crate::model::FeetRule;
-use crate::robot::ContactFlags;
+use crate::robot::{ContactFlags, Leg};
 
 use super::decimal::{Decimal, Rounding};
 use super::rounder::{Place, RoundingReport};
 use super::table::{rounded, rounded_up};
-use super::tree::{Math, Signed, Symbol};
-
-/// Names of the feet in the order of contact flags.
-const FEET: [&str; 4] = ["fr", "fl", "rr", "rl"];
+use super::tree::{Math, Signed};
 
 /// How a sentence spells words from outside and mathematics.
 pub trait Spelling {
     /// Text, so that it shows as it is.
     fn text(text: &str) -> String;
+    /// Mathematics within a line or cell, which `text` spells in the library's syntax.
+    fn math(math: &Math, text: &str) -> String;
     /// A number within a line or cell.
-    fn number(number: &Decimal) -> String;
-    /// A candidate term within a line, which `text` spells in the library's syntax.
-    fn term(math: &Math, text: &str) -> String;
-    /// The left side of an equation within a line, which `text` names.
-    fn left(symbol: &Symbol, text: &str) -> String;
+    fn number(number: &Decimal) -> String {
+        Self::math(&Math::Number(number.clone()), &number.to_string())
+    }
 }
 
 /// The spelling of comments and terminals.
@@ -32,17 +29,14 @@ impl Spelling for Plain {
         text.to_owned()
     }
 
-    fn number(number: &Decimal) -> String {
-        number.to_string()
-    }
-
-    fn term(_: &Math, text: &str) -> String {
+    fn math(_: &Math, text: &str) -> String {
         text.to_owned()
     }
+}
 
-    fn left(_: &Symbol, text: &str) -> String {
-        text.to_owned()
-    }
+/// Whether a character of a text from outside could end a line, or is another that no text shows.
+pub(super) fn ends_line(character: char) -> bool {
+    character.is_control() || matches!(character, '\u{2028}' | '\u{2029}')
 }
 
 /// `1 jump`, `2 jumps`: a count before the noun that it counts.
@@ -53,47 +47,15 @@ pub fn counted(count: usize, noun: &str) -> String {
     }
 }
 
-/// How many feet of a pair are on the ground.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Pair {
-    Any,
-    None,
-    AtLeastOne,
-    One,
-    Both,
-}
-
-impl Pair {
-    const ALL: [Self; 5] = [
-        Self::Any,
-        Self::None,
-        Self::AtLeastOne,
-        Self::One,
-        Self::Both,
-    ];
-
-    fn holds(self, feet: [bool; 2]) -> bool {
-        let count = feet.into_iter().filter(|down| *down).count();
-        match self {
-            Self::Any => true,
-            Self::None => count == 0,
-            Self::AtLeastOne => count > 0,
-            Self::One => count == 1,
-            Self::Both => count == 2,
-        }
-    }
-
-    /// Words for a front or rear pair; none where it does not matter.
-    fn words(self, name: &str) -> Option<String> {
-        match self {
-            Self::Any => None,
-            Self::None => Some(format!("no {name} foot")),
-            Self::AtLeastOne => Some(format!("a {name} foot")),
-            Self::One => Some(format!("one {name} foot alone")),
-            Self::Both => Some(format!("both {name} feet")),
-        }
-    }
-}
+/// A front or rear pair of feet: the words for how many of it are on the ground, none where it does
+/// not matter, and whether they hold of no foot, of one, of both.
+const PAIRS: [(&str, [bool; 3]); 5] = [
+    ("", [true, true, true]),
+    ("no {} foot", [true, false, false]),
+    ("a {} foot", [false, true, true]),
+    ("one {} foot alone", [false, true, false]),
+    ("both {} feet", [false, false, true]),
+];
 
 /// When a phase holds, as plain text: `a front foot on the ground`.
 pub fn feet(rule: &FeetRule) -> String {
@@ -107,24 +69,26 @@ pub fn feet(rule: &FeetRule) -> String {
 
 /// Patterns of feet by front and rear pair where that says the same, one by one otherwise.
 fn pairs(patterns: &[ContactFlags]) -> String {
-    let is_meant = |front: Pair, rear: Pair| {
+    let is_meant = |[front, rear]: [[bool; 3]; 2]| {
         (0..16u8).all(|bits| {
             let feet: ContactFlags = std::array::from_fn(|foot| bits >> foot & 1 == 1);
-            let holds = front.holds([feet[0], feet[1]]) && rear.holds([feet[2], feet[3]]);
+            let down = |pair: &[bool]| pair.iter().filter(|down| **down).count();
+            let holds = front[down(&feet[..2])] && rear[down(&feet[2..])];
             holds == patterns.contains(&feet)
         })
     };
-    let all = Pair::ALL
-        .into_iter()
-        .flat_map(|front| Pair::ALL.map(|rear| (front, rear)));
-    match all.into_iter().find(|&(front, rear)| is_meant(front, rear)) {
-        Some((Pair::Both, Pair::Both)) => "all four feet".to_owned(),
-        Some((Pair::None, Pair::None)) => "no foot".to_owned(),
-        Some((Pair::Any, Pair::Any)) => "any feet or none".to_owned(),
-        Some((front, rear)) => {
-            let mut words: Vec<String> = [front.words("front"), rear.words("rear")]
+    let mut all = PAIRS
+        .iter()
+        .flat_map(|front| PAIRS.map(|rear| (*front, rear)));
+    match all.find(|((_, front), (_, rear))| is_meant([*front, *rear])) {
+        Some(((_, [false, false, true]), (_, [false, false, true]))) => "all four feet".to_owned(),
+        Some(((_, [true, false, false]), (_, [true, false, false]))) => "no foot".to_owned(),
+        Some(((front, _), (rear, _))) => {
+            let words =
+                [(front, "front"), (rear, "rear")].map(|(words, pair)| words.replace("{}", pair));
+            let mut words: Vec<String> = words
                 .into_iter()
-                .flatten()
+                .filter(|words| !words.is_empty())
                 .collect();
             // what is there comes before what is not
             words.sort_by_key(|words| words.starts_with("no "));
@@ -140,8 +104,8 @@ fn pairs(patterns: &[ContactFlags]) -> String {
 
 /// The feet of one pattern by name.
 fn by_name(pattern: &ContactFlags) -> String {
-    let feet = FEET.iter().zip(pattern).filter(|(_, down)| **down);
-    let feet: Vec<&str> = feet.map(|(name, _)| *name).collect();
+    let feet = Leg::ALL.iter().zip(pattern).filter(|(_, down)| **down);
+    let feet: Vec<&str> = feet.map(|(leg, _)| leg.short_name()).collect();
     match feet.as_slice() {
         [] => "no foot".to_owned(),
         [foot] => format!("{foot} alone"),
@@ -171,7 +135,7 @@ pub fn rounding<S: Spelling>(rule: Rounding, report: &RoundingReport) -> String 
              coefficient is off by more than {}{}",
             S::number(&at_most(*error)),
             summand::<S>(place),
-            S::left(&place.left, &place.output),
+            S::math(&Math::Symbol(place.left.clone()), &place.output),
             S::text(&place.phase),
             S::number(&at_most(100.0 * report.largest_relative)),
             S::text(" %.")
@@ -198,7 +162,7 @@ fn summand<S: Spelling>(place: &Place) -> String {
         } if one.is_one() => number,
         term => format!(
             "{number} {}",
-            S::term(&term.clone().into_math(), &place.term)
+            S::math(&term.clone().into_math(), &place.term)
         ),
     }
 }

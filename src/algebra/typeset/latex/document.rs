@@ -6,17 +6,17 @@ use askama::Template;
 
 use crate::equations::Equations;
 use crate::files::EmittedFile;
-use crate::model::ReducedModel;
+use crate::model::{Identifier, ReducedModel};
 use crate::typeset::TypesetError;
 use crate::typeset::words::{self, Plain, Spelling};
 use crate::typeset::{
-    Decimal, EquationSystem, Form, Math, NumberStyle, PrintOptions, RobotTypeset, RoundingReport,
-    Symbol, Typeset, rendered,
+    EquationSystem, Form, Math, NumberStyle, PrintOptions, RobotTypeset, RoundingReport, Typeset,
+    rendered,
 };
 
-use super::escape::{CommentText, TexText, label};
+use super::escape::{comment_text, label, tex_text};
 use super::lines::{self, Block};
-use super::math::{TexMath, TexNumber, TexSymbol};
+use super::math::tex;
 use super::nomenclature::{self, Entry};
 use super::table::{self, TableBlock};
 
@@ -35,25 +35,27 @@ use super::table::{self, TableBlock};
 /// error that this made, and which terms vanished by it. Files with labels list them.
 ///
 /// # Errors
-/// [`TypesetError`] if a candidate term has a variable without a symbol.
+/// [`TypesetError`] if a coefficient is too large for a float in robot coordinates.
 pub fn emit(
     system: &Equations<'_>,
     options: &PrintOptions,
 ) -> Result<Vec<EmittedFile>, TypesetError> {
     let model = system.model();
-    let typeset = Typeset::new(system, &options.symbols, options.rounding)?;
+    let typeset = Typeset::new(system, &options.symbols, options.rounding);
+    let robot = RobotTypeset::new(system, &options.symbols, options.rounding)?;
     let stem = model.identifier().as_str();
     let header = Header { model, options };
-    let systems = phases(model, &typeset.systems, "", options);
-    let equations = EquationsFile {
-        header: header.equations(&typeset.rounding) + &labels(&systems),
-        systems,
-    };
-    let is_physical = system.latent_units().is_some();
-    let robot = RobotTypeset::new(system, &options.symbols, options.rounding)?;
-    let robot = robot.map(|robot| robot_equations(model, &robot, is_physical, &header));
-    let fit = Fit::to(options.width_em);
-    let blocks = table::blocks(&typeset.table, model.name(), options.numbers, &fit);
+    let systems = &phases(model, &typeset.systems, "", options);
+    let of_all = header.equations(&typeset.rounding);
+    let mut files = vec![equations(format!("{stem}.tex"), of_all, systems, false)?];
+    for (place, system) in systems.iter().enumerate() {
+        let path = format!("{stem}_{}.tex", model.phase_identifier(place));
+        let of_phase = header.short("One phase of the equations, with the same label.");
+        let system = std::slice::from_ref(system);
+        files.push(equations(path, of_phase, system, false)?);
+    }
+    let width_em = options.width_em.unwrap_or(lines::WIDTH_EM);
+    let blocks = table::blocks(&typeset.table, model.name(), options.numbers, width_em);
     let packages = match blocks.iter().any(|block| block.long) {
         true => "Needs booktabs and longtable.",
         false => "Needs booktabs.",
@@ -63,73 +65,49 @@ pub fn emit(
         header: header.short(packages) + &label_list(blocks.iter().flat_map(|block| &block.labels)),
         blocks,
     };
+    files.push(file(format!("{stem}-table.tex"), &coefficients)?);
     let nomenclature = Nomenclature {
         header: header.short("A table as wide as the line; needs amsmath."),
         entries: nomenclature::entries(system, &options.symbols, options.numbers),
     };
+    files.push(file(format!("{stem}-nomenclature.tex"), &nomenclature)?);
+    let is_physical = system.latent_units().is_some();
+    if let Some(robot) = &robot {
+        let of_robot = header.robot(robot, is_physical);
+        let systems = robot_systems(model, robot, options);
+        let path = format!("{stem}-robot.tex");
+        files.push(equations(path, of_robot, &systems, true)?);
+    }
     let preview = Preview {
         header: header.short("A document of its own; the files beside it are for \\input."),
-        name: TexText(model.name()).to_string(),
-        description: TexText(model.description()).to_string(),
-        stem: stem.to_owned(),
-        phases: (equations.systems.iter().enumerate())
-            .map(|(place, system)| {
-                (
-                    system.introduction.clone(),
-                    model.phase_identifier(place).to_string(),
-                )
-            })
+        model,
+        phases: (systems.iter().enumerate())
+            .map(|(place, system)| (system.introduction.as_str(), model.phase_identifier(place)))
             .collect(),
         rounding: words::rounding::<Tex>(options.rounding, &typeset.rounding),
         siunitx: options.numbers == NumberStyle::Siunitx,
-        two_columns: fit.is_narrow,
+        two_columns: is_narrow(width_em),
         has_robot: robot.is_some(),
-        latent: match is_physical {
-            true => "latent coordinates and inputs have the units of the list of symbols",
-            false => {
-                "latent coordinates and inputs are scaled: those of the equations above, without a unit, \
-                 accelerations per second squared"
-            }
-        },
+        is_physical,
         tables,
     };
-    let mut files = vec![file(format!("{stem}.tex"), &equations)?];
-    files.extend(phase_files(model, &equations, &header)?);
-    files.extend([
-        file(format!("{stem}-table.tex"), &coefficients)?,
-        file(format!("{stem}-nomenclature.tex"), &nomenclature)?,
-    ]);
-    if let Some(robot) = &robot {
-        files.push(file(format!("{stem}-robot.tex"), robot)?);
-    }
     files.push(file(format!("{stem}-preview.tex"), &preview)?);
     Ok(files)
 }
 
-/// The equations of each phase in a file of their own.
-fn phase_files(
-    model: &ReducedModel,
-    equations: &EquationsFile,
-    header: &Header<'_>,
-) -> Result<Vec<EmittedFile>, TypesetError> {
-    let stem = model.identifier();
-    let one_phase = |(place, system): (usize, &System)| {
-        let one = EquationsFile {
-            header: header.short("One phase of the equations, with the same label.")
-                + &labels(std::slice::from_ref(system)),
-            systems: vec![system.clone()],
-        };
-        file(
-            format!("{stem}_{}.tex", model.phase_identifier(place)),
-            &one,
-        )
+/// A file of equations, its labels in the comment at the top.
+fn equations(
+    path: String,
+    header: String,
+    systems: &[System],
+    is_introduced: bool,
+) -> Result<EmittedFile, TypesetError> {
+    let equations = EquationsFile {
+        header: header + &label_list(systems.iter().map(|system| system.block.labels())),
+        is_introduced,
+        systems,
     };
-    equations
-        .systems
-        .iter()
-        .enumerate()
-        .map(one_phase)
-        .collect()
+    file(path, &equations)
 }
 
 #[derive(Template)]
@@ -138,30 +116,19 @@ fn phase_files(
     config = "../../templates/askama.toml",
     syntax = "latex"
 )]
-struct EquationsFile {
+struct EquationsFile<'a> {
     header: String,
-    systems: Vec<System>,
+    /// Whether a sentence stands before each system: the file holds more than the equations of motion.
+    is_introduced: bool,
+    systems: &'a [System],
 }
 
 /// Widest column, in em, for which previews have two.
-pub const TWO_COLUMNS_EM: f64 = 26.0;
+const TWO_COLUMNS_EM: f64 = 26.0;
 
-/// Equations, tables and lists that are fitted to a column.
-pub(super) struct Fit {
-    /// Width of the column, in em.
-    pub width_em: f64,
-    /// Whether it is one of two, in which no table can break across pages.
-    pub is_narrow: bool,
-}
-
-impl Fit {
-    fn to(width_em: Option<f64>) -> Self {
-        let width_em = width_em.unwrap_or(lines::WIDTH_EM);
-        Self {
-            width_em,
-            is_narrow: width_em <= TWO_COLUMNS_EM,
-        }
-    }
+/// Whether a column is one of two, in which no table can break across pages.
+pub(super) fn is_narrow(width_em: f64) -> bool {
+    width_em <= TWO_COLUMNS_EM
 }
 
 /// Running text of LaTeX.
@@ -169,33 +136,20 @@ struct Tex;
 
 impl Spelling for Tex {
     fn text(text: &str) -> String {
-        TexText(text).to_string()
+        tex_text(text)
     }
 
-    fn number(number: &Decimal) -> String {
-        let numbers = NumberStyle::Plain;
-        format!("${}$", TexNumber { number, numbers })
-    }
-
-    fn term(math: &Math, _: &str) -> String {
-        let numbers = NumberStyle::Plain;
-        format!("${}$", TexMath { math, numbers })
-    }
-
-    fn left(symbol: &Symbol, _: &str) -> String {
-        format!("${}$", TexSymbol(symbol))
+    fn math(math: &Math, _: &str) -> String {
+        format!("${}$", tex(math, NumberStyle::Plain))
     }
 }
 
 /// One system of equations in the template.
-#[derive(Clone)]
 struct System {
     /// What it is, in a comment.
     comment: String,
     /// What it is, in a sentence of the running text.
     introduction: String,
-    /// The sentence before it, where its file holds more than the equations of motion.
-    words: String,
     block: Block,
 }
 
@@ -203,10 +157,6 @@ struct System {
 fn label_list(labels: impl IntoIterator<Item = impl fmt::Display>) -> String {
     let lines = labels.into_iter().map(|label| format!("\n%   {label}"));
     format!("\n% Labels:{}", lines.collect::<String>())
-}
-
-fn labels(systems: &[System]) -> String {
-    label_list(systems.iter().map(|system| system.block.labels()))
 }
 
 #[derive(Template)]
@@ -237,20 +187,18 @@ struct Nomenclature {
     config = "../../templates/askama.toml",
     syntax = "latex"
 )]
-struct Preview {
+struct Preview<'a> {
     header: String,
-    name: String,
-    description: String,
-    stem: String,
+    model: &'a ReducedModel,
     /// Introduction and identifier of each phase.
-    phases: Vec<(String, String)>,
+    phases: Vec<(&'a str, &'a Identifier)>,
     rounding: String,
     siunitx: bool,
     two_columns: bool,
     /// Whether there is a file of the robot's equations.
     has_robot: bool,
-    /// Units of the latent quantities.
-    latent: &'static str,
+    /// Whether the latent quantities have units.
+    is_physical: bool,
     /// References to the tables of coefficients.
     tables: String,
 }
@@ -274,9 +222,8 @@ fn phases(
                 false => "",
             };
             System {
-                comment: format!("Phase {}: {feet}.{tall}", CommentText(&system.phase)),
-                introduction: format!(r"Phase \emph{{{}}}, with {feet}:", TexText(&system.phase)),
-                words: String::new(),
+                comment: format!("Phase {}: {feet}.{tall}", comment_text(&system.phase)),
+                introduction: format!(r"Phase \emph{{{}}}, with {feet}:", tex_text(&system.phase)),
                 block,
             }
         })
@@ -284,53 +231,27 @@ fn phases(
 }
 
 /// The encoder's rows, then the robot's accelerations a phase.
-fn robot_equations(
+fn robot_systems(
     model: &ReducedModel,
     robot: &RobotTypeset,
-    is_physical: bool,
-    header: &Header<'_>,
-) -> EquationsFile {
+    options: &PrintOptions,
+) -> Vec<System> {
     let label = format!("eq:{}-robot:encoder", label(model.name()));
-    let encoder = EquationSystem {
-        phase: "encoder".to_owned(),
-        equations: robot.encoder.clone(),
+    let count = robot.negligible_weights;
+    let without = match count {
+        0 => String::new(),
+        _ => format!(r", without weights below 2\,\% of the largest of their row ({count})"),
     };
-    let introduction = match robot.negligible_weights {
-        0 => "Latent coordinates:".to_owned(),
-        count => format!(
-            r"Latent coordinates, without weights below 2\,\% of the largest of their row ({count}):"
-        ),
-    };
-    let mut systems = vec![System {
+    let encoder = System {
         comment: format!(
-            "Latent coordinates, 3 significant digits; {} weights below 2 % of the largest of \
-             their row are left out.",
-            robot.negligible_weights
+            "Latent coordinates, 3 significant digits; {count} weights below 2 % of the largest of \
+             their row are left out."
         ),
-        words: introduction.clone(),
-        introduction,
-        block: lines::block(&encoder, label, header.options),
-    }];
-    let of_phases = phases(model, &robot.systems, "-robot", header.options);
-    systems.extend(of_phases.into_iter().map(|system| System {
-        words: system.introduction.clone(),
-        ..system
-    }));
-    let latent = match is_physical {
-        true => "",
-        false => ", scaled",
+        introduction: format!("Latent coordinates{without}:"),
+        block: lines::block(&robot.encoder, label, options),
     };
-    let note = format!(
-        "Robot coordinates q in SI units (rad, m); z, u as in the latent equations{latent}."
-    );
-    EquationsFile {
-        header: format!(
-            "{}\n% {note}{}",
-            header.equations(&robot.rounding),
-            labels(&systems)
-        ),
-        systems,
-    }
+    let of_phases = phases(model, &robot.systems, "-robot", options);
+    [encoder].into_iter().chain(of_phases).collect()
 }
 
 /// The comments at the top of each file.
@@ -342,11 +263,10 @@ struct Header<'a> {
 impl Header<'_> {
     fn short(&self, note: &str) -> String {
         let version = env!("CARGO_PKG_VERSION");
-        let name = CommentText(self.model.name());
-        let digest = match &self.options.digest {
-            Some(digest) => format!(", digest {}", CommentText(digest)),
-            None => String::new(),
-        };
+        let name = comment_text(self.model.name());
+        let digest = self.options.digest.as_ref();
+        let digest = digest.map(|digest| format!(", digest {}", comment_text(digest)));
+        let digest = digest.unwrap_or_default();
         format!("% romc {version}, model {name}{digest}.\n% {note}")
     }
 
@@ -356,18 +276,25 @@ impl Header<'_> {
             NumberStyle::Siunitx => "amsmath and siunitx",
         };
         let mut header = self.short(&format!("For \\input; needs {packages}."));
-        header.push_str("\n% ");
         let rounding = words::rounding::<Plain>(self.options.rounding, report);
-        header.push_str(&CommentText(&rounding).to_string());
+        header.push_str(&format!("\n% {}", comment_text(&rounding)));
         for place in &report.dropped {
-            let (phase, term) = (CommentText(&place.phase), CommentText(&place.term));
+            let names = [&place.phase, &place.output, &place.term];
+            let [phase, output, term] = names.map(|name| comment_text(name));
+            let coefficient = place.coefficient;
             header.push_str(&format!(
-                "\n%   left out: {phase}, {}: {:e} * {term}",
-                CommentText(&place.output),
-                place.coefficient
+                "\n%   left out: {phase}, {output}: {coefficient:e} * {term}"
             ));
         }
         header
+    }
+
+    fn robot(&self, robot: &RobotTypeset, is_physical: bool) -> String {
+        let latent = if is_physical { "" } else { ", scaled" };
+        let header = self.equations(&robot.rounding);
+        format!(
+            "{header}\n% Robot coordinates q in SI units (rad, m); z, u as in the latent equations{latent}."
+        )
     }
 }
 

@@ -1,6 +1,6 @@
 //! The one way for text of a model file into a TeX file.
 
-use std::fmt;
+use crate::typeset::words::ends_line;
 
 /// Text from outside, printed so that TeX shows its characters and runs none of
 /// them: every special character becomes a command, control characters and line
@@ -9,45 +9,32 @@ use std::fmt;
 /// inside a comment as in the running text.
 ///
 /// ```
-/// use romc::typeset::latex::TexText;
-/// assert_eq!(TexText(r"50% \input{x}").to_string(), r"50\% \textbackslash{}input\{x\}");
+/// use romc::typeset::latex::tex_text;
+/// assert_eq!(tex_text(r"50% \input{x}"), r"50\% \textbackslash{}input\{x\}");
 /// ```
-#[derive(Clone, Copy, Debug)]
-pub struct TexText<'a>(pub &'a str);
-
-impl fmt::Display for TexText<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut previous = ' ';
-        for character in self.0.chars() {
-            // Two of these in a row are a ligature.
-            if character == previous && "-,".contains(character) {
-                f.write_str("{}")?;
-            }
-            previous = character;
-            match escaped(character) {
-                Some(text) => f.write_str(text)?,
-                None if is_plain(character) => write!(f, "{character}")?,
-                None => write!(f, "[U+{:04X}]", u32::from(character))?,
-            }
+pub fn tex_text(text: &str) -> String {
+    let mut tex = String::new();
+    let mut previous = ' ';
+    for character in text.chars() {
+        // Two of these in a row are a ligature.
+        if character == previous && "-,".contains(character) {
+            tex.push_str("{}");
         }
-        Ok(())
+        previous = character;
+        match escaped(character) {
+            Some(command) => tex.push_str(command),
+            None if is_plain(character) => tex.push(character),
+            None => tex.push_str(&format!("[U+{:04X}]", u32::from(character))),
+        }
     }
+    tex
 }
 
 /// Text from outside for a `%` comment: as it is, but on one line. TeX skips the
 /// rest of a comment's line without looking at it, so only a line end could let
 /// something out.
-#[derive(Clone, Copy, Debug)]
-pub struct CommentText<'a>(pub &'a str);
-
-impl fmt::Display for CommentText<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for character in self.0.chars() {
-            let ends_line = character.is_control() || matches!(character, '\u{2028}' | '\u{2029}');
-            write!(f, "{}", if ends_line { ' ' } else { character })?;
-        }
-        Ok(())
-    }
+pub fn comment_text(text: &str) -> String {
+    text.replace(ends_line, " ")
 }
 
 /// The command for a character that TeX would not print as it is.
@@ -103,7 +90,7 @@ fn is_plain(character: char) -> bool {
 ///
 /// ```
 /// use romc::typeset::latex::label;
-/// assert_eq!(label("rear stance_2"), "rear-stance-2");
+/// assert_eq!(label(r"rear stance_2}\b%"), "rear-stance-2--b-");
 /// ```
 pub fn label(name: &str) -> String {
     name.chars()
@@ -128,7 +115,7 @@ mod tests {
             "a\\\\b",
             "}\\end{document}",
         ] {
-            let text = TexText(hostile).to_string();
+            let text = tex_text(hostile);
             let mut previous = ' ';
             for character in text.chars() {
                 assert!(!ACTIVE.contains(character) || previous == '\\', "{text}");
@@ -150,18 +137,13 @@ mod tests {
             ("跳 ü", "[U+8DF3] ü"),
             ("a--b-c", "a-{}-b-c"),
         ] {
-            assert_eq!(TexText(text).to_string(), escaped);
+            assert_eq!(tex_text(text), escaped);
         }
     }
 
     #[test]
     fn comment_text_stays_on_its_line() {
-        let text = CommentText("a\r\\input{x}\nb\u{85}c\u{2028}d").to_string();
+        let text = comment_text("a\r\\input{x}\nb\u{85}c\u{2028}d");
         assert_eq!(text, "a \\input{x} b c d");
-    }
-
-    #[test]
-    fn label_keeps_letters_and_digits_only() {
-        assert_eq!(label(r"a}\b%c"), "a--b-c");
     }
 }

@@ -4,7 +4,7 @@ use crate::typeset::{
     EQUALS, Equation, EquationSystem, Form, PrintOptions, break_lines, symbol_width,
 };
 
-use super::math::{TexMath, TexSymbol, TexTerms};
+use super::math::{tex, tex_symbol, tex_terms};
 
 /// Longest line unless chosen, in em.
 pub(super) const WIDTH_EM: f64 = 30.5;
@@ -43,13 +43,13 @@ impl Block {
 
 /// Spells the equations of one phase; `label` is the stem of its labels.
 pub(super) fn block(system: &EquationSystem, label: String, options: &PrintOptions) -> Block {
-    let all = |start: Start| -> Vec<Vec<String>> {
+    let all = |widest: Option<f64>| -> Vec<Vec<String>> {
         let equations = system.equations.iter();
-        let sides = equations.map(|equation| right_sides(equation, start, options));
+        let sides = equations.map(|equation| right_sides(equation, widest, options));
         sides.collect()
     };
     let lines_of = |sides: &[Vec<String>]| sides.iter().map(Vec::len).sum::<usize>();
-    let in_cases = all(Start::Brace);
+    let in_cases = all(None);
     let aligned = match options.form {
         Form::Automatic => lines_of(&in_cases) > CASES_LINES,
         Form::Cases => false,
@@ -60,7 +60,7 @@ pub(super) fn block(system: &EquationSystem, label: String, options: &PrintOptio
         .iter()
         .map(|equation| symbol_width(&equation.left));
     let sides = match aligned {
-        true => all(Start::Aligned(widest.fold(0.0, f64::max))),
+        true => all(Some(widest.fold(0.0, f64::max))),
         false => in_cases,
     };
     let count = lines_of(&sides);
@@ -68,13 +68,36 @@ pub(super) fn block(system: &EquationSystem, label: String, options: &PrintOptio
     let is_spaced = count > sides.len();
     let mut lines = Vec::with_capacity(count);
     for (place, (equation, of_equation)) in system.equations.iter().zip(&sides).enumerate() {
-        let label = format!("{label}:{}", place + 1);
+        let is_tall = equation.is_tall();
+        let (style, mark) = match (aligned, is_tall) {
+            (true, _) => ("", "&"),
+            // `cases` sets its lines in text style, in which fractions shrink.
+            (false, true) => (r"\displaystyle ", ""),
+            (false, false) => ("", ""),
+        };
+        let relation = if equation.is_approximate {
+            r"\approx"
+        } else {
+            "="
+        };
+        let label = format!(r" \label{{{label}:{}}}", place + 1);
         for (line, side) in of_equation.iter().enumerate() {
+            let start = match line {
+                0 => format!("{} {mark}{relation} ", tex_symbol(&equation.left)),
+                _ => format!(r"{mark}\qquad "),
+            };
+            // whether the equation and the phase end with this line
             let ends = [line + 1 == of_equation.len(), place + 1 == sides.len()];
-            lines.push(match aligned {
-                true => align_line(equation, line, side, ends, &label),
-                false => cases_line(equation, line, side, ends, is_spaced),
-            });
+            let end = match (aligned, ends) {
+                (true, [false, _]) => r" \notag \\",
+                (true, [true, true]) => &label,
+                (true, [true, false]) => &format!(r"{label} \\"),
+                (false, [true, true]) => "",
+                (false, [true, false]) if is_tall || is_spaced => r" \\[1ex]",
+                (false, [false, _]) if is_tall => r" \\[0.5ex]",
+                (false, _) => r" \\",
+            };
+            lines.push(format!("{style}{start}{side}{end}"));
         }
     }
     Block {
@@ -96,86 +119,19 @@ pub fn tex_cases(system: &EquationSystem, width_em: f64) -> String {
     format!("\\begin{{cases}}\n  {lines}\n\\end{{cases}}")
 }
 
-/// Where the lines of an equation start.
-#[derive(Clone, Copy)]
-enum Start {
-    /// Behind a brace, at the equation's own left side.
-    Brace,
-    /// Behind the widest left side, in em, continued lines too.
-    Aligned(f64),
-}
-
-/// The right side of an equation, one entry per line.
-fn right_sides(equation: &Equation, start: Start, options: &PrintOptions) -> Vec<String> {
+/// The right side of an equation, one entry per line. Lines are aligned behind the widest left side, in em,
+/// or stand behind a brace, at the equation's own left side.
+fn right_sides(equation: &Equation, aligned: Option<f64>, options: &PrintOptions) -> Vec<String> {
     let numbers = options.numbers;
     if equation.terms.is_empty() {
-        let math = &equation.right();
-        return vec![TexMath { math, numbers }.to_string()];
+        return vec![tex(&equation.right(), numbers)];
     }
     let width = options.width_em.unwrap_or(WIDTH_EM);
-    let (available, first, continued) = match start {
-        Start::Brace => (width - BRACE, symbol_width(&equation.left) + EQUALS, INDENT),
-        Start::Aligned(left) => (width, left + EQUALS, left + INDENT),
+    let (available, first, continued) = match aligned {
+        None => (width - BRACE, symbol_width(&equation.left) + EQUALS, INDENT),
+        Some(left) => (width, left + EQUALS, left + INDENT),
     };
     let lines = break_lines(&equation.terms, available, first, continued).into_iter();
-    let side = |(line, terms)| TexTerms {
-        terms,
-        numbers,
-        continues: line > 0,
-    };
-    lines
-        .enumerate()
-        .map(|line| side(line).to_string())
-        .collect()
-}
-
-/// One line of `cases`; `ends` tells whether its equation and the phase end with it.
-fn cases_line(
-    equation: &Equation,
-    line: usize,
-    side: &str,
-    ends: [bool; 2],
-    is_spaced: bool,
-) -> String {
-    let is_tall = equation.is_tall();
-    // `cases` sets its lines in text style, in which fractions shrink.
-    let style = if is_tall { r"\displaystyle " } else { "" };
-    let start = match line {
-        0 => format!("{} {} ", TexSymbol(&equation.left), relation(equation)),
-        _ => r"\qquad ".to_owned(),
-    };
-    let end = match ends {
-        [true, true] => "",
-        [true, false] if is_tall || is_spaced => r" \\[1ex]",
-        [false, _] if is_tall => r" \\[0.5ex]",
-        [_, _] => r" \\",
-    };
-    format!("{style}{start}{side}{end}")
-}
-
-fn relation(equation: &Equation) -> &'static str {
-    match equation.is_approximate {
-        true => r"\approx",
-        false => "=",
-    }
-}
-
-/// One line of `align`; the last of an equation has its label.
-fn align_line(
-    equation: &Equation,
-    line: usize,
-    side: &str,
-    ends: [bool; 2],
-    label: &str,
-) -> String {
-    let start = match line {
-        0 => format!("{} &{} ", TexSymbol(&equation.left), relation(equation)),
-        _ => r"&\qquad ".to_owned(),
-    };
-    let end = match ends {
-        [false, _] => r" \notag \\".to_owned(),
-        [true, true] => format!(r" \label{{{label}}}"),
-        [true, false] => format!(r" \label{{{label}}} \\"),
-    };
-    format!("{start}{side}{end}")
+    let side = |(line, terms)| tex_terms(terms, numbers, line > 0);
+    lines.enumerate().map(side).collect()
 }

@@ -1,152 +1,92 @@
-//! The LaTeX spelling of the typeset tree.
-
-use std::fmt;
+//! The LaTeX spelling of the typeset tree, for math mode.
 
 use crate::equations::Unit;
 use crate::symbolic::Function;
 use crate::typeset::tree::function_name;
 use crate::typeset::{Decimal, GREEK, Glyph, Math, NumberStyle, Signed, Symbol};
 
-/// A typeset tree that displays as LaTeX, for math mode.
-#[derive(Clone, Copy, Debug)]
-pub struct TexMath<'a> {
-    /// What is printed.
-    pub math: &'a Math,
-    /// How its numbers are written.
-    pub numbers: NumberStyle,
-}
-
-/// A symbol that displays as LaTeX: `\ddot{z}_{10}`.
-#[derive(Clone, Copy, Debug)]
-pub struct TexSymbol<'a>(pub &'a Symbol);
-
-/// Signed terms one after the other: `0.36 - 0.16\dot{z}_1`.
-#[derive(Clone, Copy, Debug)]
-pub struct TexTerms<'a> {
-    /// The terms.
-    pub terms: &'a [Signed],
-    /// How their numbers are written.
-    pub numbers: NumberStyle,
-    /// Whether the first sign is a binary operator that continues a line above.
-    pub continues: bool,
-}
-
-/// A number that displays as LaTeX, with its sign.
-#[derive(Clone, Copy, Debug)]
-pub struct TexNumber<'a> {
-    /// The number.
-    pub number: &'a Decimal,
-    /// How it is written.
-    pub numbers: NumberStyle,
-}
-
-impl fmt::Display for TexMath<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let numbers = self.numbers;
-        let inner = |math| TexMath { math, numbers };
-        // Exponents are structure, not measured values: no siunitx.
-        let exponent_of = |math| {
-            script(&TexMath {
-                math,
-                numbers: NumberStyle::Plain,
-            })
-        };
-        match self.math {
-            Math::Number(number) => TexNumber { number, numbers }.fmt(f),
-            Math::Symbol(symbol) => TexSymbol(symbol).fmt(f),
-            Math::Sum(terms) => TexTerms {
-                terms,
-                numbers,
-                continues: false,
+/// A typeset tree with its numbers in one style.
+pub fn tex(math: &Math, numbers: NumberStyle) -> String {
+    let inner = |math: &Math| tex(math, numbers);
+    // Exponents are structure, not measured values: no siunitx.
+    let exponent_of = |math| script(tex(math, NumberStyle::Plain));
+    // Delimiters grow only around something tall: `\left` and `\right` would put a space after
+    // the function's name.
+    let delimited = |open: &str, close: &str, math: &Math| match math.is_tall() {
+        true => format!(r"\left{open}{}\right{}", inner(math), close.trim_start()),
+        false => format!("{open}{}{close}", inner(math)),
+    };
+    match math {
+        Math::Number(number) => tex_number(number, numbers),
+        Math::Symbol(symbol) => tex_symbol(symbol),
+        Math::Sum(terms) => tex_terms(terms, numbers, false),
+        Math::Product(factors) => {
+            let mut text = String::new();
+            for factor in factors {
+                append(&mut text, &inner(factor));
             }
-            .fmt(f),
-            Math::Product(factors) => {
-                let mut text = String::new();
-                for factor in factors {
-                    append(&mut text, &inner(factor).to_string());
-                }
-                f.write_str(&text)
-            }
-            Math::Dot => f.write_str(r" \cdot "),
-            Math::Fraction(top, bottom) => {
-                write!(f, r"\frac{{{}}}{{{}}}", inner(top), inner(bottom))
-            }
-            Math::Slash(top, bottom) => write!(f, "{}/{}", inner(top), inner(bottom)),
-            Math::Power(base, exponent) => {
-                write!(f, "{}^{}", inner(base), exponent_of(exponent))
-            }
-            Math::Root(radicand, None) => write!(f, r"\sqrt{{{}}}", inner(radicand)),
-            Math::Root(radicand, Some(index)) => {
-                write!(f, r"\sqrt[{index}]{{{}}}", inner(radicand))
-            }
-            Math::Function(name, power, argument) => {
-                f.write_str(&function(*name))?;
-                if let Some(power) = power {
-                    write!(f, "^{}", exponent_of(power))?;
-                }
-                delimited(f, "(", ")", &inner(argument))
-            }
-            Math::Absolute(argument) => delimited(f, r"\lvert ", r" \rvert", &inner(argument)),
-            Math::Group(argument) => delimited(f, "(", ")", &inner(argument)),
+            text
         }
+        Math::Dot => r" \cdot ".to_owned(),
+        Math::Fraction(top, bottom) => format!(r"\frac{{{}}}{{{}}}", inner(top), inner(bottom)),
+        Math::Slash(top, bottom) => format!("{}/{}", inner(top), inner(bottom)),
+        Math::Power(base, exponent) => format!("{}^{}", inner(base), exponent_of(exponent)),
+        Math::Root(radicand, None) => format!(r"\sqrt{{{}}}", inner(radicand)),
+        Math::Root(radicand, Some(index)) => format!(r"\sqrt[{index}]{{{}}}", inner(radicand)),
+        Math::Function(name, power, argument) => {
+            let power = (power.as_ref()).map(|power| format!("^{}", exponent_of(power)));
+            function(*name) + &power.unwrap_or_default() + &delimited("(", ")", argument)
+        }
+        Math::Absolute(argument) => delimited(r"\lvert ", r" \rvert", argument),
+        Math::Group(argument) => delimited("(", ")", argument),
     }
 }
 
-impl fmt::Display for TexTerms<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (place, term) in self.terms.iter().enumerate() {
-            let math = TexMath {
-                math: &term.math,
-                numbers: self.numbers,
-            };
-            f.write_str(match (place, term.negative, self.continues) {
-                (0, false, false) => "",
-                (0, true, false) => "-",
-                (0, false, true) => "{} + ",
-                (0, true, true) => "{} - ",
-                (_, false, _) => " + ",
-                (_, true, _) => " - ",
-            })?;
-            math.fmt(f)?;
+/// Signed terms one after the other: `0.36 - 0.16\dot{z}_1`; the first sign may be a binary operator that
+/// continues a line above.
+pub fn tex_terms(terms: &[Signed], numbers: NumberStyle, continues: bool) -> String {
+    let mut text = String::new();
+    for (place, term) in terms.iter().enumerate() {
+        text.push_str(match (place, term.negative, continues) {
+            (0, false, false) => "",
+            (0, true, false) => "-",
+            (0, false, true) => "{} + ",
+            (0, true, true) => "{} - ",
+            (_, false, _) => " + ",
+            (_, true, _) => " - ",
+        });
+        text.push_str(&tex(&term.math, numbers));
+    }
+    text
+}
+
+/// A number with its sign.
+pub fn tex_number(number: &Decimal, numbers: NumberStyle) -> String {
+    match (numbers, number.exponent()) {
+        (NumberStyle::Plain, None) => number.to_string(),
+        (NumberStyle::Plain, Some(exponent)) => {
+            let sign = if number.is_negative() { "-" } else { "" };
+            format!(r"{sign}{} \times 10^{{{exponent}}}", number.digits())
         }
-        Ok(())
+        (NumberStyle::Siunitx, _) => format!(r"\num{{{number}}}"),
     }
 }
 
-impl fmt::Display for TexNumber<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match (self.numbers, self.number.exponent()) {
-            (NumberStyle::Plain, None) => self.number.fmt(f),
-            (NumberStyle::Plain, Some(exponent)) => {
-                let sign = if self.number.is_negative() { "-" } else { "" };
-                write!(
-                    f,
-                    r"{sign}{} \times 10^{{{exponent}}}",
-                    self.number.digits()
-                )
-            }
-            (NumberStyle::Siunitx, _) => write!(f, r"\num{{{}}}", self.number),
-        }
+/// A symbol: `\ddot{z}_{10}`.
+pub fn tex_symbol(symbol: &Symbol) -> String {
+    let base = glyph(&symbol.glyph);
+    let dotted = match symbol.dots {
+        0 => base,
+        1 => format!(r"\dot{{{base}}}"),
+        2 => format!(r"\ddot{{{base}}}"),
+        // amsmath goes on to `\ddddot`; the latent model never asks for more.
+        _ => format!(r"\dddot{{{base}}}"),
+    };
+    if symbol.subscript.is_empty() {
+        return dotted;
     }
-}
-
-impl fmt::Display for TexSymbol<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let symbol = self.0;
-        let base = glyph(&symbol.glyph);
-        match symbol.dots {
-            0 => f.write_str(&base)?,
-            1 => write!(f, r"\dot{{{base}}}")?,
-            2 => write!(f, r"\ddot{{{base}}}")?,
-            // amsmath goes on to `\ddddot`; the latent model never asks for more.
-            _ => write!(f, r"\dddot{{{base}}}")?,
-        }
-        if !symbol.subscript.is_empty() {
-            let parts: Vec<String> = symbol.subscript.iter().map(glyph).collect();
-            write!(f, "_{}", script(&parts.join(",")))?;
-        }
-        Ok(())
-    }
+    let parts: Vec<String> = symbol.subscript.iter().map(glyph).collect();
+    format!("{dotted}_{}", script(parts.join(",")))
 }
 
 /// Appends `next`, with a space where a command such as `\theta` would swallow its first letter.
@@ -162,12 +102,10 @@ fn append(text: &mut String, next: &str) {
 }
 
 /// A superscript or subscript: bare for one character, in braces otherwise.
-fn script(text: &impl ToString) -> String {
-    let text = text.to_string();
-    if text.chars().count() == 1 {
-        text
-    } else {
-        format!("{{{text}}}")
+fn script(text: String) -> String {
+    match text.chars().count() {
+        1 => text,
+        _ => format!("{{{text}}}"),
     }
 }
 
@@ -187,27 +125,8 @@ fn function(function: Function) -> String {
     }
 }
 
-/// `inner` between delimiters, which grow only around something tall: `\left`
-/// and `\right` would put a space after the function's name.
-fn delimited(
-    f: &mut fmt::Formatter<'_>,
-    open: &str,
-    close: &str,
-    inner: &TexMath<'_>,
-) -> fmt::Result {
-    if inner.math.is_tall() {
-        write!(f, r"\left{open}{inner}\right{}", close.trim_start())
-    } else {
-        write!(f, "{open}{inner}{close}")
-    }
-}
-
-/// A unit as upright LaTeX: `\mathrm{m/s^{2}}`.
-pub struct TexUnit(pub Unit);
-
-impl fmt::Display for TexUnit {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let unit = self.0.spelled(r"\,", |power| format!("^{{{power}}}"));
-        write!(f, r"\mathrm{{{unit}}}")
-    }
+/// A unit in upright letters: `\mathrm{m/s^{2}}`.
+pub fn tex_unit(unit: Unit) -> String {
+    let unit = unit.spelled(r"\,", |power| format!("^{{{power}}}"));
+    format!(r"\mathrm{{{unit}}}")
 }

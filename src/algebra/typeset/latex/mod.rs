@@ -3,8 +3,8 @@
 //!
 //! Read [`document`](self::emit) first: it names the files. The layout of terms
 //! and the rounding are done by [`typeset`](crate::typeset); here it gets
-//! its spelling ([`TexMath`]), its line breaks, tables and comments. Names from a
-//! model file pass through [`TexText`] and nothing else.
+//! its spelling ([`tex`]), its line breaks, tables and comments. Names from a
+//! model file pass through [`tex_text`] and nothing else.
 //!
 //! ```
 //! use nalgebra::DMatrix;
@@ -41,6 +41,6 @@ mod nomenclature;
 mod table;
 
 pub use document::emit;
-pub use escape::{CommentText, TexText, label};
+pub use escape::{comment_text, label, tex_text};
 pub use lines::tex_cases;
-pub use math::{TexMath, TexNumber, TexSymbol, TexTerms, TexUnit};
+pub use math::{tex, tex_number, tex_symbol, tex_terms, tex_unit};

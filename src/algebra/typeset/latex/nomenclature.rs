@@ -1,11 +1,11 @@
 //! What each symbol of the equations means.
 
 use crate::equations::{Equations, LatentUnits};
-use crate::model::{Activation, ReducedModel, ScaleFactors, StateMap};
-use crate::typeset::{Decimal, NumberStyle, Quantity, Rounding, SymbolTable};
+use crate::model::{Activation, LatentVariable, ReducedModel, ScaleFactors, StateMap};
+use crate::typeset::{Decimal, NumberStyle, Rounding, SymbolTable};
 
-use super::escape::TexText;
-use super::math::{TexNumber, TexSymbol, TexUnit};
+use super::escape::tex_text;
+use super::math::{tex_number, tex_symbol, tex_unit};
 
 /// How many of an encoder row's weights are named.
 const STRONGEST: usize = 3;
@@ -41,10 +41,10 @@ pub(super) fn entries(
         return physical_entries(model, units, symbols, numbers);
     }
     let dim = model.latent_dim();
-    let mut list: Vec<Entry> = (1..=dim)
+    let mut list: Vec<Entry> = (0..dim)
         .map(|index| {
-            let symbol = symbol(symbols, Quantity::Position, index);
-            entry(symbol, coordinate(model, index - 1, numbers))
+            let symbol = symbol(symbols, LatentVariable::Z(index));
+            entry(symbol, coordinate(model, index, numbers))
         })
         .collect();
     // the map of velocities: the weights of an affine encoder, the Jacobian of another
@@ -57,7 +57,7 @@ pub(super) fn entries(
         format!(r", $\dot{{\mathbf{{z}}}} = {map} (\mathbf{{s}}_x \dot{{\mathbf{{x}}}})$")
     });
     list.push(entry(
-        range(symbols, Quantity::Velocity, dim),
+        range(symbols, LatentVariable::Dz, dim),
         format!("latent velocities{}", velocities.unwrap_or_default()),
     ));
     let inputs = map.map(|map| {
@@ -66,7 +66,7 @@ pub(super) fn entries(
         )
     });
     list.push(entry(
-        range(symbols, Quantity::Input, dim),
+        range(symbols, LatentVariable::U, dim),
         format!("latent inputs{}", inputs.unwrap_or_default()),
     ));
     if let Ok(encoder) = model.encoder_map() {
@@ -91,19 +91,20 @@ fn physical_entries(
     symbols: &SymbolTable,
     numbers: NumberStyle,
 ) -> Vec<Entry> {
-    let indices = || 1..=model.latent_dim();
+    let indices = || 0..model.latent_dim();
     let positions = indices().map(|index| {
-        let unit = TexUnit(units.position[index - 1]);
-        let meaning = format!("${unit}$; {}", coordinate(model, index - 1, numbers));
-        entry(symbol(symbols, Quantity::Position, index), meaning)
+        let unit = tex_unit(units.position[index]);
+        let meaning = format!("${unit}$; {}", coordinate(model, index, numbers));
+        entry(symbol(symbols, LatentVariable::Z(index)), meaning)
     });
     let inputs = indices().map(|index| {
-        let unit = TexUnit(units.input[index - 1]);
-        let meaning = format!("${unit}$; the input that does work along latent coordinate {index}");
-        entry(symbol(symbols, Quantity::Input, index), meaning)
+        let (unit, number) = (tex_unit(units.input[index]), index + 1);
+        let meaning =
+            format!("${unit}$; the input that does work along latent coordinate {number}");
+        entry(symbol(symbols, LatentVariable::U(index)), meaning)
     });
     let velocities = entry(
-        range(symbols, Quantity::Velocity, model.latent_dim()),
+        range(symbols, LatentVariable::Dz, model.latent_dim()),
         r"their derivatives by time, $\dot{\mathbf{z}} = \mathbf{W}_e \dot{\mathbf{x}}$, per second",
     );
     let robot = [
@@ -120,17 +121,17 @@ fn physical_entries(
     latent.chain(robot).collect()
 }
 
-fn symbol(symbols: &SymbolTable, quantity: Quantity, index: usize) -> String {
-    format!("${}$", TexSymbol(&symbols.symbol(quantity, index)))
+fn symbol(symbols: &SymbolTable, variable: LatentVariable) -> String {
+    format!("${}$", tex_symbol(&symbols.symbol(variable)))
 }
 
 /// `$z_1, \dots, z_6$`, or all of up to three.
-fn range(symbols: &SymbolTable, quantity: Quantity, dim: usize) -> String {
-    let show = |index| symbol(symbols, quantity, index);
+fn range(symbols: &SymbolTable, of: fn(usize) -> LatentVariable, dim: usize) -> String {
+    let show = |index| symbol(symbols, of(index));
     if dim <= 3 {
-        (1..=dim).map(show).collect::<Vec<_>>().join(", ")
+        (0..dim).map(show).collect::<Vec<_>>().join(", ")
     } else {
-        format!(r"{}, \dots, {}", show(1), show(dim))
+        format!(r"{}, \dots, {}", show(0), show(dim - 1))
     }
 }
 
@@ -147,9 +148,9 @@ fn coordinate(model: &ReducedModel, row: usize, numbers: NumberStyle) -> String 
     let strongest: Vec<String> = (weights.iter().take(STRONGEST))
         .filter(|(_, weight)| weight.abs() > NEGLIGIBLE * largest)
         .map(|(name, weight)| {
-            let number = &Decimal::rounded(*weight, Rounding::default());
-            let weight = TexNumber { number, numbers };
-            format!(r"\texttt{{{}}} (${weight}$)", TexText(name))
+            let weight = Decimal::rounded(*weight, Rounding::default());
+            let (name, weight) = (tex_text(name), tex_number(&weight, numbers));
+            format!(r"\texttt{{{name}}} (${weight}$)")
         })
         .collect();
     let strongest = strongest.join(", ");
@@ -185,8 +186,8 @@ fn scale_factors(model: &ReducedModel, numbers: NumberStyle) -> Vec<Entry> {
     let line = |(symbol, factors): (&str, &ScaleFactors)| {
         let value = match factors {
             ScaleFactors::Uniform(factor) => {
-                let number = &Decimal::exact(*factor);
-                format!("${}$ for all", TexNumber { number, numbers })
+                let factor = tex_number(&Decimal::exact(*factor), numbers);
+                format!("${factor}$ for all")
             }
             ScaleFactors::PerCoordinate(_) => "one per coordinate".to_owned(),
         };

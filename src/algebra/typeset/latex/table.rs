@@ -2,9 +2,9 @@
 
 use crate::typeset::{CoefficientRow, CoefficientTable, Decimal, NumberStyle, width};
 
-use super::document::Fit;
-use super::escape::{TexText, label};
-use super::math::{TexMath, TexNumber, TexSymbol, TexUnit};
+use super::document::is_narrow;
+use super::escape::{label, tex_text};
+use super::math::{tex, tex_number, tex_symbol, tex_unit};
 
 /// The word above the terms.
 const TERM_HEAD_EM: f64 = 2.31;
@@ -43,9 +43,9 @@ pub(super) fn blocks(
     table: &CoefficientTable,
     model_name: &str,
     numbers: NumberStyle,
-    fit: &Fit,
+    width_em: f64,
 ) -> Vec<TableBlock> {
-    let cuts: Vec<(Vec<usize>, Vec<&CoefficientRow>)> = (groups(table, fit.width_em).into_iter())
+    let cuts: Vec<(Vec<usize>, Vec<&CoefficientRow>)> = (groups(table, width_em).into_iter())
         .flat_map(|columns| {
             let is_shown = |row: &&CoefficientRow| {
                 columns
@@ -53,7 +53,7 @@ pub(super) fn blocks(
                     .any(|&column| row.coefficients[column].is_some())
             };
             let rows: Vec<&CoefficientRow> = table.rows.iter().filter(is_shown).collect();
-            let at_once = match fit.is_narrow {
+            let at_once = match is_narrow(width_em) {
                 true => LONGEST,
                 false => rows.len().max(1),
             };
@@ -66,7 +66,7 @@ pub(super) fn blocks(
         Some(_) => ". The unit of a coefficient is that of its column over that of its term",
         None => "",
     };
-    let name = TexText(model_name);
+    let name = tex_text(model_name);
     let stem = format!("tab:{}", label(model_name));
     let block = |(place, (columns, rows)): (usize, &(Vec<usize>, Vec<&CoefficientRow>))| {
         let part = match count {
@@ -103,7 +103,7 @@ pub(super) fn references(blocks: &[TableBlock]) -> String {
 fn groups(table: &CoefficientTable, width_em: f64) -> Vec<Vec<usize>> {
     let terms = table.rows.iter().map(|row| {
         let unit = row.unit.map_or(0.0, |_| UNIT_EM);
-        width(&row.term.clone().into_math()) + unit
+        width(&row.term) + unit
     });
     let terms = terms.fold(TERM_HEAD_EM, f64::max) + COLUMN_SPACE_EM;
     let widths: Vec<f64> = (0..table.columns.len())
@@ -165,22 +165,15 @@ impl Layout<'_> {
 
     /// Phase names, each over its columns, and the rules below them.
     fn phase_heads(&self) -> (String, String) {
-        let mut names = String::new();
-        let mut rules = String::new();
-        let mut start = 0;
-        while start < self.columns.len() {
-            let name = &self.table.columns[self.columns[start]].0;
-            let end = self.columns[start..]
-                .iter()
-                .position(|&column| self.table.columns[column].0 != *name)
-                .map_or(self.columns.len(), |length| start + length);
-            let span = end - start;
-            names.push_str(&format!(
-                r" & \multicolumn{{{span}}}{{c}}{{{}}}",
-                TexText(name)
-            ));
-            rules.push_str(&format!(r"\cmidrule(lr){{{}-{}}}", start + 2, end + 1));
-            start = end;
+        let phase = |column: &usize| &self.table.columns[*column].0;
+        let (mut names, mut rules) = (String::new(), String::new());
+        let mut start = 2;
+        for columns in self.columns.chunk_by(|a, b| phase(a) == phase(b)) {
+            let (span, name) = (columns.len(), tex_text(phase(&columns[0])));
+            let end = start + span - 1;
+            names.push_str(&format!(r" & \multicolumn{{{span}}}{{c}}{{{name}}}"));
+            rules.push_str(&format!(r"\cmidrule(lr){{{start}-{end}}}"));
+            start = end + 1;
         }
         (format!(r"{} \\", names.trim_start()), rules)
     }
@@ -190,26 +183,21 @@ impl Layout<'_> {
             NumberStyle::Plain => format!(" & ${math}$"),
             NumberStyle::Siunitx => format!(" & {{${math}$}}"),
         };
-        let symbol = |&column: &usize| cell(TexSymbol(&self.table.columns[column].1).to_string());
+        let symbol = |&column: &usize| cell(tex_symbol(&self.table.columns[column].1));
         let symbols: String = self.columns.iter().map(symbol).collect();
         let heads = format!(r"Term{symbols} \\");
         let Some(units) = &self.table.units else {
             return heads;
         };
-        let unit = |&column: &usize| cell(TexUnit(units[column]).to_string());
+        let unit = |&column: &usize| cell(tex_unit(units[column]));
         let units: String = self.columns.iter().map(unit).collect();
         format!("{heads}\n{units} \\\\")
     }
 
     fn row(&self, row: &CoefficientRow, widths: &[ColumnWidth]) -> String {
-        let term = row.term.clone().into_math();
-        let math = TexMath {
-            math: &term,
-            numbers: self.numbers,
-        };
-        let mut text = format!("${math}$");
+        let mut text = format!("${}$", tex(&row.term, self.numbers));
         if let Some(unit) = row.unit {
-            text.push_str(&format!(r"\quad${}$", TexUnit(unit)));
+            text.push_str(&format!(r"\quad${}$", tex_unit(unit)));
         }
         for (&column, width) in self.columns.iter().zip(widths) {
             text.push_str(" & ");
@@ -224,10 +212,7 @@ impl Layout<'_> {
         match self.numbers {
             NumberStyle::Siunitx => number.to_string(),
             NumberStyle::Plain => {
-                let text = TexNumber {
-                    number,
-                    numbers: self.numbers,
-                };
+                let text = tex_number(number, self.numbers);
                 let missing = width.decimals - number.places().1;
                 // Points stand below each other when the missing digits take their space.
                 let point = if missing > 0 && !number.digits().contains('.') {

@@ -1,32 +1,25 @@
 //! The one way for text of a model file into Markdown.
 
-use std::fmt;
+use crate::typeset::words::ends_line;
 
 /// Text from outside that Markdown shows as it is: punctuation is escaped, and
 /// control characters become spaces, so that a text cannot start a new line.
 ///
 /// ```
-/// use romc::typeset::markdown::MarkdownText;
-/// assert_eq!(MarkdownText("*a* <b>").to_string(), r"\*a\* \<b\>");
+/// use romc::typeset::markdown::markdown_text;
+/// assert_eq!(markdown_text("*a* <b>"), r"\*a\* \<b\>");
 /// ```
-#[derive(Clone, Copy, Debug)]
-pub struct MarkdownText<'a>(pub &'a str);
-
-impl fmt::Display for MarkdownText<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (place, character) in self.0.chars().enumerate() {
-            // A hyphen makes a list only at the start.
-            let is_harmless = ".,:;%()=+/".contains(character) || (character == '-' && place > 0);
-            if character.is_control() || matches!(character, '\u{2028}' | '\u{2029}') {
-                f.write_str(" ")?;
-            } else if character.is_ascii_punctuation() && !is_harmless {
-                write!(f, "\\{character}")?;
-            } else {
-                write!(f, "{character}")?;
-            }
+pub fn markdown_text(text: &str) -> String {
+    let mut markdown = String::new();
+    for (place, character) in text.replace(ends_line, " ").chars().enumerate() {
+        // A hyphen makes a list only at the start.
+        let is_harmless = ".,:;%()=+/".contains(character) || (character == '-' && place > 0);
+        if character.is_ascii_punctuation() && !is_harmless {
+            markdown.push('\\');
         }
-        Ok(())
+        markdown.push(character);
     }
+    markdown
 }
 
 #[cfg(test)]
@@ -35,7 +28,7 @@ mod tests {
 
     #[test]
     fn markdown_text_starts_no_link_code_html_or_mathematics() {
-        let text = MarkdownText("[a](b) `c` <i> $d$ |e| #f\n- g").to_string();
+        let text = markdown_text("[a](b) `c` <i> $d$ |e| #f\n- g");
         assert_eq!(text, r"\[a\](b) \`c\` \<i\> \$d\$ \|e\| \#f - g");
     }
 }

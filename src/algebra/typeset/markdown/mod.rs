@@ -7,4 +7,4 @@ mod document;
 mod escape;
 
 pub use document::emit;
-pub use escape::MarkdownText;
+pub use escape::markdown_text;

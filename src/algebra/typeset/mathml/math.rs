@@ -1,6 +1,4 @@
-//! The MathML spelling of the typeset tree (MathML Core).
-
-use std::fmt;
+//! The MathML spelling of the typeset tree (MathML Core), without the `math` element around it.
 
 use crate::typeset::tree::function_name;
 use crate::typeset::{Decimal, GREEK, Glyph, Math, Signed, Symbol};
@@ -11,138 +9,103 @@ const THIN_SPACE: &str = r#"<mspace width="0.167em"/>"#;
 const APPLY: &str = "<mo>\u{2061}</mo>";
 const MINUS: &str = "\u{2212}";
 
-/// A typeset tree that displays as MathML elements, without the `math` around them.
-#[derive(Clone, Copy, Debug)]
-pub struct Mathml<'a>(pub &'a Math);
-
-/// A symbol that displays as MathML.
-#[derive(Clone, Copy, Debug)]
-pub struct MathmlSymbol<'a>(pub &'a Symbol);
-
-/// A number with its sign that displays as MathML.
-#[derive(Clone, Copy, Debug)]
-pub struct MathmlNumber<'a>(pub &'a Decimal);
-
-/// Signed terms one after the other.
-#[derive(Clone, Copy, Debug)]
-pub struct MathmlTerms<'a> {
-    /// The terms.
-    pub terms: &'a [Signed],
-    /// Whether the first sign continues a line above.
-    pub continues: bool,
-}
-
-impl fmt::Display for Mathml<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.0 {
-            Math::Number(number) => MathmlNumber(number).fmt(f),
-            Math::Symbol(symbol) => MathmlSymbol(symbol).fmt(f),
-            Math::Sum(terms) => {
-                let continues = false;
-                write!(f, "<mrow>{}</mrow>", MathmlTerms { terms, continues })
-            }
-            Math::Product(factors) => {
-                f.write_str("<mrow>")?;
-                for (place, factor) in factors.iter().enumerate() {
-                    let after_dot = place > 0 && factors[place - 1] == Math::Dot;
-                    if place > 0 && !after_dot && *factor != Math::Dot {
-                        f.write_str(INVISIBLE_TIMES)?;
-                        if matches!(factor, Math::Function(..)) {
-                            f.write_str(THIN_SPACE)?;
-                        }
+/// A typeset tree.
+pub fn mathml(math: &Math) -> String {
+    match math {
+        Math::Number(number) => mathml_number(number),
+        Math::Symbol(symbol) => mathml_symbol(symbol),
+        Math::Sum(terms) => format!("<mrow>{}</mrow>", mathml_terms(terms, false)),
+        Math::Product(factors) => {
+            let mut row = String::new();
+            for (place, factor) in factors.iter().enumerate() {
+                let after_dot = place > 0 && factors[place - 1] == Math::Dot;
+                if place > 0 && !after_dot && *factor != Math::Dot {
+                    row.push_str(INVISIBLE_TIMES);
+                    if matches!(factor, Math::Function(..)) {
+                        row.push_str(THIN_SPACE);
                     }
-                    Mathml(factor).fmt(f)?;
                 }
-                f.write_str("</mrow>")
+                row.push_str(&mathml(factor));
             }
-            Math::Dot => f.write_str("<mo>\u{22C5}</mo>"),
-            Math::Fraction(top, bottom) => {
-                write!(f, "<mfrac>{}{}</mfrac>", Mathml(top), Mathml(bottom))
-            }
-            Math::Slash(top, bottom) => {
-                write!(
-                    f,
-                    "<mrow>{}<mo>/</mo>{}</mrow>",
-                    Mathml(top),
-                    Mathml(bottom)
-                )
-            }
-            Math::Power(base, exponent) => match &**base {
-                // Both scripts stand above each other.
-                Math::Symbol(symbol) if !symbol.subscript.is_empty() => {
-                    let (base, subscript) = (accented(symbol), subscript(symbol));
-                    let exponent = Mathml(exponent);
-                    write!(f, "<msubsup>{base}{subscript}{exponent}</msubsup>")
-                }
-                base => write!(f, "<msup>{}{}</msup>", Mathml(base), Mathml(exponent)),
-            },
-            Math::Root(inner, None) => write!(f, "<msqrt>{}</msqrt>", Mathml(inner)),
-            Math::Root(inner, Some(index)) => {
-                write!(f, "<mroot>{}<mn>{index}</mn></mroot>", Mathml(inner))
-            }
-            Math::Function(name, power, argument) => {
-                let name = format!("<mi>{}</mi>", function_name(*name));
-                let head = match power {
-                    Some(power) => format!("<msup>{name}{}</msup>", Mathml(power)),
-                    None => name,
-                };
-                let argument = fenced("(", ")", argument);
-                write!(f, "<mrow>{head}{APPLY}{argument}</mrow>")
-            }
-            Math::Absolute(inner) => f.write_str(&fenced("|", "|", inner)),
-            Math::Group(inner) => f.write_str(&fenced("(", ")", inner)),
+            format!("<mrow>{row}</mrow>")
         }
+        Math::Dot => "<mo>\u{22C5}</mo>".to_owned(),
+        Math::Fraction(top, bottom) => format!("<mfrac>{}{}</mfrac>", mathml(top), mathml(bottom)),
+        Math::Slash(top, bottom) => {
+            let (top, bottom) = (mathml(top), mathml(bottom));
+            format!("<mrow>{top}<mo>/</mo>{bottom}</mrow>")
+        }
+        Math::Power(base, exponent) => match &**base {
+            // Both scripts stand above each other.
+            Math::Symbol(symbol) if !symbol.subscript.is_empty() => {
+                let (base, subscript) = (accented(symbol), subscript(symbol));
+                let exponent = mathml(exponent);
+                format!("<msubsup>{base}{subscript}{exponent}</msubsup>")
+            }
+            base => format!("<msup>{}{}</msup>", mathml(base), mathml(exponent)),
+        },
+        Math::Root(inner, None) => format!("<msqrt>{}</msqrt>", mathml(inner)),
+        Math::Root(inner, Some(index)) => {
+            format!("<mroot>{}<mn>{index}</mn></mroot>", mathml(inner))
+        }
+        Math::Function(name, power, argument) => {
+            let name = format!("<mi>{}</mi>", function_name(*name));
+            let head = match power {
+                Some(power) => format!("<msup>{name}{}</msup>", mathml(power)),
+                None => name,
+            };
+            let argument = fenced("(", ")", argument);
+            format!("<mrow>{head}{APPLY}{argument}</mrow>")
+        }
+        Math::Absolute(inner) => fenced("|", "|", inner),
+        Math::Group(inner) => fenced("(", ")", inner),
     }
 }
 
-impl fmt::Display for MathmlTerms<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (place, term) in self.terms.iter().enumerate() {
-            let sign = if term.negative { MINUS } else { "+" };
-            match (place, term.negative, self.continues) {
-                (0, false, false) => {}
-                (0, true, false) => write!(f, r#"<mo form="prefix">{sign}</mo>"#)?,
-                // A sign at the start of a continued line keeps the spaces of an operator.
-                (0, _, true) => write!(f, r#"<mo form="infix">{sign}</mo>"#)?,
-                (_, _, _) => write!(f, "<mo>{sign}</mo>")?,
-            }
-            Mathml(&term.math).fmt(f)?;
-        }
-        Ok(())
-    }
-}
-
-impl fmt::Display for MathmlNumber<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let number = format!("<mn>{}</mn>", self.0.digits());
-        let size = match self.0.exponent() {
-            None => number,
-            Some(exponent) => {
-                let power = if exponent < 0 {
-                    let digits = exponent.unsigned_abs();
-                    format!("<mrow><mo>{MINUS}</mo><mn>{digits}</mn></mrow>")
-                } else {
-                    format!("<mn>{exponent}</mn>")
-                };
-                format!("<mrow>{number}<mo>\u{D7}</mo><msup><mn>10</mn>{power}</msup></mrow>")
-            }
+/// Signed terms one after the other; the first sign may continue a line above.
+pub fn mathml_terms(terms: &[Signed], continues: bool) -> String {
+    let mut text = String::new();
+    for (place, term) in terms.iter().enumerate() {
+        let sign = if term.negative { MINUS } else { "+" };
+        let sign = match (place, term.negative, continues) {
+            (0, false, false) => String::new(),
+            (0, true, false) => format!(r#"<mo form="prefix">{sign}</mo>"#),
+            // A sign at the start of a continued line keeps the spaces of an operator.
+            (0, _, true) => format!(r#"<mo form="infix">{sign}</mo>"#),
+            (_, _, _) => format!("<mo>{sign}</mo>"),
         };
-        if self.0.is_negative() {
-            write!(f, r#"<mrow><mo form="prefix">{MINUS}</mo>{size}</mrow>"#)
-        } else {
-            f.write_str(&size)
+        text += &(sign + &mathml(&term.math));
+    }
+    text
+}
+
+/// A number with its sign.
+fn mathml_number(number: &Decimal) -> String {
+    let digits = format!("<mn>{}</mn>", number.digits());
+    let size = match number.exponent() {
+        None => digits,
+        Some(exponent) => {
+            let power = if exponent < 0 {
+                let digits = exponent.unsigned_abs();
+                format!("<mrow><mo>{MINUS}</mo><mn>{digits}</mn></mrow>")
+            } else {
+                format!("<mn>{exponent}</mn>")
+            };
+            format!("<mrow>{digits}<mo>\u{D7}</mo><msup><mn>10</mn>{power}</msup></mrow>")
         }
+    };
+    match number.is_negative() {
+        true => format!(r#"<mrow><mo form="prefix">{MINUS}</mo>{size}</mrow>"#),
+        false => size,
     }
 }
 
-impl fmt::Display for MathmlSymbol<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let base = accented(self.0);
-        if self.0.subscript.is_empty() {
-            f.write_str(&base)
-        } else {
-            write!(f, "<msub>{base}{}</msub>", subscript(self.0))
-        }
+/// A symbol with its dots and subscript.
+pub fn mathml_symbol(symbol: &Symbol) -> String {
+    let base = accented(symbol);
+    match symbol.subscript.is_empty() {
+        true => base,
+        false => format!("<msub>{base}{}</msub>", subscript(symbol)),
     }
 }
 
@@ -184,5 +147,5 @@ fn fenced(open: &str, close: &str, inner: &Math) -> String {
         format!(r#"<mo fence="true" form="{form}" stretchy="{stretchy}">{text}</mo>"#)
     };
     let (open, close) = (mark("prefix", open), mark("postfix", close));
-    format!("<mrow>{open}{}{close}</mrow>", Mathml(inner))
+    format!("<mrow>{open}{}{close}</mrow>", mathml(inner))
 }

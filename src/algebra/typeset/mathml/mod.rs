@@ -10,6 +10,6 @@ mod page;
 mod prose;
 
 pub use escape::HtmlText;
-pub use math::{Mathml, MathmlNumber, MathmlSymbol, MathmlTerms};
+pub use math::{mathml, mathml_symbol, mathml_terms};
 pub use page::{Html, emit, system};
 pub use prose::HtmlProse;

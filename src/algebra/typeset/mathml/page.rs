@@ -8,12 +8,11 @@ use crate::typeset::latex::tex_cases;
 use crate::typeset::page::{Markup, Page, rendered};
 use crate::typeset::words::Spelling;
 use crate::typeset::{
-    Decimal, EQUALS, EquationSystem, Math, PrintOptions, Symbol, TypesetError, break_lines,
-    symbol_width,
+    EQUALS, EquationSystem, Math, PrintOptions, Symbol, TypesetError, break_lines, symbol_width,
 };
 
 use super::escape::HtmlText;
-use super::math::{Mathml, MathmlNumber, MathmlSymbol, MathmlTerms};
+use super::math::{mathml, mathml_symbol, mathml_terms};
 
 /// What a continued line is set in by, in em.
 const INDENT: f64 = 2.0;
@@ -24,20 +23,18 @@ const INDENT: f64 = 2.0;
 pub fn system(system: &EquationSystem, width_em: f64) -> String {
     let mut rows = String::new();
     for equation in &system.equations {
-        let left = MathmlSymbol(&equation.left);
+        let left = mathml_symbol(&equation.left);
         let first = symbol_width(&equation.left) + EQUALS;
         let lines = break_lines(&equation.terms, width_em, first, INDENT);
         let relation = if equation.is_approximate { "≈" } else { "=" };
         let mut head = format!("{left}<mo>{relation}</mo>");
         if lines.is_empty() {
-            let zero = equation.right();
-            rows.push_str(&row(&head, &Mathml(&zero).to_string(), 0.0));
+            rows.push_str(&row(&head, &mathml(&equation.right()), 0.0));
         }
         for (place, terms) in lines.into_iter().enumerate() {
             let continues = place > 0;
             let indent = if continues { INDENT } else { 0.0 };
-            let right = MathmlTerms { terms, continues }.to_string();
-            rows.push_str(&row(&head, &right, indent));
+            rows.push_str(&row(&head, &mathml_terms(terms, continues), indent));
             head.clear();
         }
     }
@@ -66,12 +63,12 @@ fn row(left: &str, right: &str, indent: f64) -> String {
 /// without scripts or anything from elsewhere.
 ///
 /// # Errors
-/// [`TypesetError`] if a candidate term has a variable without a symbol.
+/// [`TypesetError::Template`].
 pub fn emit(
     equations: &Equations<'_>,
     options: &PrintOptions,
 ) -> Result<Vec<EmittedFile>, TypesetError> {
-    let page = Page::new::<Html>(equations, options)?;
+    let page = Page::new::<Html>(equations, options);
     let path = format!("{}.html", equations.model().identifier());
     Ok(vec![EmittedFile::new(path, rendered(&Document { page })?)])
 }
@@ -91,16 +88,8 @@ impl Spelling for Html {
         HtmlText(text).to_string()
     }
 
-    fn number(number: &Decimal) -> String {
-        format!("<math>{}</math>", MathmlNumber(number))
-    }
-
-    fn term(math: &Math, _: &str) -> String {
-        format!("<math>{}</math>", Mathml(math))
-    }
-
-    fn left(symbol: &Symbol, _: &str) -> String {
-        format!("<math>{}</math>", MathmlSymbol(symbol))
+    fn math(math: &Math, _: &str) -> String {
+        format!("<math>{}</math>", mathml(math))
     }
 }
 
@@ -110,13 +99,13 @@ impl Markup for Html {
     }
 
     fn head(symbol: &Symbol, phase: &str, unit: Option<Unit>) -> String {
-        let (symbol, phase) = (MathmlSymbol(symbol), HtmlText(phase));
+        let (symbol, phase) = (mathml_symbol(symbol), HtmlText(phase));
         let unit = unit.map_or(String::new(), |unit| format!(", {unit}"));
         format!("<math>{symbol}</math><br><small>{phase}{unit}</small>")
     }
 
     fn row_head(term: &Math, unit: Option<Unit>) -> String {
         let unit = unit.map(|unit| format!("<small>, {unit}</small>"));
-        format!("<math>{}</math>{}", Mathml(term), unit.unwrap_or_default())
+        format!("<math>{}</math>{}", mathml(term), unit.unwrap_or_default())
     }
 }

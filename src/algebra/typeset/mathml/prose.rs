@@ -2,10 +2,11 @@
 
 use std::fmt;
 
-use crate::typeset::{SymbolTable, Variable};
+use crate::model::LatentVariable;
+use crate::typeset::SymbolTable;
 
 use super::escape::HtmlText;
-use super::math::MathmlSymbol;
+use super::math::mathml_symbol;
 
 /// Symbols other than the model's variables: how text spells them, and how MathML does.
 const SYMBOLS: [(&str, &str); 14] = [
@@ -82,9 +83,14 @@ fn mathematics(word: &str) -> Option<String> {
     if let Some((_, math)) = SYMBOLS.iter().find(|(text, _)| *text == word) {
         return Some((*math).to_owned());
     }
-    let Variable { quantity, index } = Variable::parse(word)?;
-    let symbol = SymbolTable::default().symbol(quantity, index);
-    Some(MathmlSymbol(&symbol).to_string())
+    let variable = |name| LatentVariable::from_name(name, usize::MAX);
+    let symbols = SymbolTable::default();
+    let symbol = match (variable(word), word.strip_prefix("dd").and_then(variable)) {
+        (Some(known), _) => symbols.symbol(known),
+        (None, Some(LatentVariable::Z(index))) => symbols.acceleration(index),
+        (None, _) => return None,
+    };
+    Some(mathml_symbol(&symbol))
 }
 
 #[cfg(test)]
