@@ -74,14 +74,10 @@ impl Aslip {
     ) -> Result<AslipRollout, SimError> {
         let stances = stances(rule, segment)?;
         let mut position_m = vec![None; segment.len()];
-        let windows = restart_windows(&segment.time_s, restart);
-        for window in &windows {
-            self.roll_window(segment, &stances, window.clone(), &mut position_m);
+        for window in restart_windows(&segment.time_s, restart) {
+            self.roll_window(segment, &stances, window, &mut position_m);
         }
-        Ok(AslipRollout {
-            windows,
-            position_m,
-        })
+        Ok(position_m)
     }
 
     fn roll_window(
@@ -163,14 +159,8 @@ impl OdeSystem for PendulumSpan<'_> {
 pub(super) const BODY_X: usize = JOINT_DIM;
 pub(super) const BODY_Z: usize = JOINT_DIM + 2;
 
-/// Positions that the pendulum predicts for one segment.
-#[derive(Debug, Clone, PartialEq)]
-pub struct AslipRollout {
-    /// Samples between restarts.
-    pub windows: Vec<Range<usize>>,
-    /// Predicted body x and z, m, a sample; none after a divergence.
-    pub position_m: Vec<Option<Vector2<f64>>>,
-}
+/// Body x and z, m, that the pendulum predicts for each sample of a segment; none after a divergence.
+pub type AslipRollout = Vec<Option<Vector2<f64>>>;
 
 /// Residuals of the pendulum.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -183,8 +173,8 @@ pub struct AslipSums {
 
 impl AslipSums {
     /// Adds the residuals of a rollout of `segment`.
-    pub fn add(&mut self, segment: &Segment, rollout: &AslipRollout) {
-        for (sample, position) in rollout.position_m.iter().enumerate() {
+    pub fn add(&mut self, segment: &Segment, rollout: &[Option<Vector2<f64>>]) {
+        for (sample, position) in rollout.iter().enumerate() {
             if let Some(position) = position {
                 self.x.add(segment.x[(BODY_X, sample)], position.x);
                 self.z.add(segment.x[(BODY_Z, sample)], position.y);

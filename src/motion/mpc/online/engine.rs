@@ -115,7 +115,7 @@ impl Engine {
                 data: stage,
                 end: horizon.end(index),
                 deviation: step.deviation,
-                input_cholesky: &step.input_cholesky[stage.phase],
+                input_cholesky: &step.phases[stage.phase].latent_root,
             };
             program.write(index, &values);
         }
@@ -153,28 +153,27 @@ impl Engine {
         }
     }
 
-    /// Latent input of a stage in the solution.
+    /// Latent input of a stage in the solution, `u_r + C_p û`.
     pub(super) fn input(&self, index: usize, step: &StepData<'_>, out: &mut [f64]) {
-        match self {
+        let scaled = match self {
             Self::Conic {
                 transcription,
                 solver,
-            } => transcription.input(index, solver.solution(), step, out),
-            Self::Structured { program, .. } => {
-                let (stage, scaled) = (&step.stages[index], program.input(index));
-                let root = &step.input_cholesky[stage.phase];
-                for (row, out) in out.iter_mut().enumerate() {
-                    let mut sum = 0.0;
-                    for (col, scaled) in scaled[..=row].iter().enumerate() {
-                        sum += root[(row, col)] * scaled;
-                    }
-                    *out = stage.input[row] + sum;
-                }
+            } => transcription.input(index, solver.solution()),
+            Self::Structured { program, .. } => program.input(index),
+        };
+        let stage = &step.stages[index];
+        let root = &step.phases[stage.phase].latent_root;
+        for (row, out) in out.iter_mut().enumerate() {
+            let mut sum = 0.0;
+            for (col, scaled) in scaled[..=row].iter().enumerate() {
+                sum += root[(row, col)] * scaled;
             }
+            *out = stage.input[row] + sum;
         }
     }
 
-    /// Latent state at a stage's end in the solution, with `reference` the reference state there.
+    /// Latent state at a stage's end in the solution, `x_r⁺ + σ x̂⁺`, with `reference` the reference state there.
     pub(super) fn state(
         &self,
         index: usize,
@@ -182,19 +181,15 @@ impl Engine {
         reference: &[f64],
         out: &mut [f64],
     ) {
-        match self {
+        let scaled = match self {
             Self::Conic {
                 transcription,
                 solver,
-            } => {
-                transcription.state(index, solver.solution(), reference, step.deviation, out);
-            }
-            Self::Structured { program, .. } => {
-                let scaled = program.state(index);
-                for (row, out) in out.iter_mut().enumerate() {
-                    *out = reference[row] + step.deviation[row] * scaled[row];
-                }
-            }
+            } => transcription.state(index, solver.solution()),
+            Self::Structured { program, .. } => program.state(index),
+        };
+        for (row, out) in out.iter_mut().enumerate() {
+            *out = reference[row] + step.deviation[row] * scaled[row];
         }
     }
 }

@@ -69,7 +69,7 @@ impl Controller {
         let (Some(contact), Some(reference)) = (prepared, &self.reference) else {
             return Status::NoReference;
         };
-        let step = step_data(&self.horizon, &self.memory, reference, &self.input_cholesky);
+        let step = step_data(&self.horizon, &self.memory, reference, self.plant.phases());
         let (outcome, iterations) = self.engine.solve(&step);
         command.iterations = iterations;
         match outcome {
