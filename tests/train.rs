@@ -159,7 +159,7 @@ fn net_torques_predict_better_and_command_what_was_recorded() {
         );
         // Simulation and control say the same of the lift as training, and commands have the losses.
         let assessed = Assessment::over(&net.model, &test, 0.1).expect("the model fits");
-        let r2 = assessed.lift.torque_r2_all().expect("samples");
+        let r2 = assessed.lift.torque.r2_all().expect("samples");
         assert!(
             (r2 - after.torque_r2).abs() < 1e-6,
             "{r2} {}",

@@ -27,9 +27,9 @@ pub fn assessment_json(model: &ReducedModel, assessment: &Assessment<'_>) -> Val
         "combined_loss": assessment.combined_loss(),
         "lift": {
             "torque_r2": {
-                "contact": lift.torque_r2().contact,
-                "flight": lift.torque_r2().flight,
-                "all": lift.torque_r2_all(),
+                "contact": lift.torque.r2().contact,
+                "flight": lift.torque.r2().flight,
+                "all": lift.torque.r2_all(),
             },
             "inconsistency": lift.inconsistency(),
         },

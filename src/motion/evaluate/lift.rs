@@ -3,7 +3,7 @@
 use nalgebra::DVector;
 
 use super::metrics::Mean;
-use super::torque::{ByContact, Comparison, is_plausible};
+use super::torque::{Comparison, is_plausible};
 use crate::model::ReducedModel;
 use crate::recording::Segment;
 use crate::robot::{InputRule, JOINT_DIM};
@@ -17,7 +17,8 @@ const SMALL_FORCE_N: f64 = 1.0;
 /// recorded velocities and accelerations is added to the lifted torques.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct LiftSums {
-    torque: Comparison,
+    /// Agreement of the torques over all joints jointly.
+    pub torque: Comparison,
     inconsistency: Mean,
 }
 
@@ -69,16 +70,6 @@ impl LiftSums {
         }
     }
 
-    /// Coefficients of determination of the torques over all joints jointly, see [`Comparison::r2`].
-    pub fn torque_r2(&self) -> ByContact {
-        self.torque.r2()
-    }
-
-    /// The same over all samples, see [`Comparison::r2_all`].
-    pub fn torque_r2_all(&self) -> Option<f64> {
-        self.torque.r2_all()
-    }
-
     /// Mean of `|F_lift - G tau_lift| / |F_lift|` over samples with a foot down: how far the lifted
     /// body wrench is from what the lifted torques produce.
     pub fn inconsistency(&self) -> Option<f64> {
@@ -124,8 +115,8 @@ mod tests {
             }
             sums
         });
-        assert!(six.torque_r2().contact > two.torque_r2().contact);
-        assert!(six.torque_r2().contact.expect("contact") > 0.9);
+        assert!(six.torque.r2().contact > two.torque.r2().contact);
+        assert!(six.torque.r2().contact.expect("contact") > 0.9);
         assert!(six.inconsistency().expect("contact") < 1.0);
     }
 }

@@ -16,7 +16,7 @@ use super::problem::{ROW_MARGIN, StageRows, row_selection};
 use super::qp::QpSolver;
 use super::reference::{Reference, ReferenceSamples};
 use super::settings::{Lift, Linearisation, MissingInput, MpcSettings, RowSelection};
-use super::transcribe::{StepData, Weights};
+use super::transcribe::StepData;
 use crate::robot::{ContactFlags, JOINT_DIM, STATE_DIM};
 
 /// Violation of a joint limit, in half ranges, from which a plan counts as softened: beyond what the
@@ -79,7 +79,8 @@ impl Controller {
         let d = plant.latent_dim();
         let rows = StageRows::new(&plant, &settings);
         let horizon = Horizon::new(d, settings.horizon);
-        let engine = Engine::new(d, &rows, None, &settings)?;
+        // Nothing is asked of it before a reference sets the weights.
+        let engine = Engine::new(d, &rows, &vec![1.0; 2 * d], &settings)?;
         let consistent = match settings.lift {
             Lift::Transpose => None,
             Lift::Consistent => Some(ConsistentLift::new(&plant, &settings)?),
@@ -170,22 +171,16 @@ impl Controller {
         }
         let d = self.plant.latent_dim();
         let deviation = reference.deviation();
-        let mut state = vec![1.0; 2 * d];
+        let mut state_weights = vec![1.0; 2 * d];
         for index in d..2 * d {
             let ratio = deviation[index] / deviation[index - d];
-            state[index] = self.settings.velocity_weight * ratio.powi(2);
+            state_weights[index] = self.settings.velocity_weight * ratio.powi(2);
         }
-        let weights = Weights {
-            state: &state,
-            terminal: self.settings.terminal_weight,
-            input: self.settings.input_weight,
-            joint_penalty: self.settings.joint_penalty,
-        };
         let rows = match row_selection(&self.plant, &self.settings) {
             RowSelection::All => self.rows.clone(),
             RowSelection::Needed => self.rows.clone().near(&reference),
         };
-        self.engine = Engine::new(d, &rows, Some(&weights), &self.settings)?;
+        self.engine = Engine::new(d, &rows, &state_weights, &self.settings)?;
         self.near_rows = rows;
         self.reference = Some(reference);
         self.reset();

@@ -6,7 +6,7 @@ use super::problem::StageRows;
 use super::qp::{Outcome, QpSolver};
 use super::settings::{MpcSettings, Solver};
 use super::structured::{MAX_STRUCTURED_DIM, StageValues, StructuredProgram, structured_program};
-use super::transcribe::{StepData, Transcription, Weights};
+use super::transcribe::{StepData, Transcription};
 
 /// A solver with the program of the present horizon.
 #[derive(Debug)]
@@ -27,7 +27,7 @@ pub(super) enum Engine {
 }
 
 impl Engine {
-    /// A solver for a problem with these rows; without weights it is one that nothing is asked of yet.
+    /// A solver for a problem with these rows and weights of the scaled states, `2 latent_dim`.
     ///
     /// # Errors
     /// [`ControlError::Solver`] if clarabel refuses the problem, [`ControlError::Setting`] if the
@@ -35,16 +35,14 @@ impl Engine {
     pub(super) fn new(
         latent_dim: usize,
         rows: &StageRows,
-        weights: Option<&Weights<'_>>,
+        state_weights: &[f64],
         settings: &MpcSettings,
     ) -> Result<Self, ControlError> {
         match settings.solver {
             Solver::Clarabel => {
                 let (transcription, mut program) =
                     Transcription::new(latent_dim, settings.horizon, rows.clone());
-                if let Some(weights) = weights {
-                    transcription.write_cost(weights, &mut program);
-                }
+                transcription.write_cost(state_weights, settings, &mut program);
                 let solver = Box::new(QpSolver::new(program, settings.qp)?);
                 Ok(Self::Conic {
                     transcription,
@@ -52,15 +50,7 @@ impl Engine {
                 })
             }
             Solver::Riccati => {
-                let ones = vec![1.0; 2 * latent_dim];
-                let neutral = Weights {
-                    state: &ones,
-                    terminal: 1.0,
-                    input: 1.0,
-                    joint_penalty: 1.0,
-                };
-                let weights = weights.unwrap_or(&neutral);
-                let program = structured_program(latent_dim, rows, weights, settings);
+                let program = structured_program(latent_dim, rows, state_weights, settings);
                 let program = program.ok_or(ControlError::StructuredDim {
                     found: latent_dim,
                     largest: MAX_STRUCTURED_DIM,

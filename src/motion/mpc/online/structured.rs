@@ -9,7 +9,7 @@ use std::fmt::Debug;
 use super::problem::{StageRows, pairs};
 use super::qp::Outcome;
 use super::settings::MpcSettings;
-use super::transcribe::{SLACK_PRICE, Stage as StageData, Weights};
+use super::transcribe::{SLACK_PRICE, Stage as StageData};
 use crate::solver::{
     self, Cost, Links, Pairs, Program, Report, RowMatrices, Settings, Shape, Stage,
 };
@@ -71,17 +71,17 @@ pub(super) trait StructuredProgram: Debug + Send {
 pub(super) fn structured_program(
     latent_dim: usize,
     rows: &StageRows,
-    weights: &Weights<'_>,
+    state_weights: &[f64],
     settings: &MpcSettings,
 ) -> Option<Box<dyn StructuredProgram>> {
     macro_rules! of_dimension {
         ($($dim:literal),*) => {
             match (latent_dim.next_multiple_of(2), rows.rate.is_empty()) {
                 $(($dim, true) => Some(Box::new(
-                    Horizon::<{ 2 * $dim }, $dim, false>::new(latent_dim, rows, weights, settings)
+                    Horizon::<{ 2 * $dim }, $dim, false>::new(latent_dim, rows, state_weights, settings)
                 )),)*
                 $(($dim, false) => Some(Box::new(
-                    Horizon::<{ 2 * $dim }, $dim, true>::new(latent_dim, rows, weights, settings)
+                    Horizon::<{ 2 * $dim }, $dim, true>::new(latent_dim, rows, state_weights, settings)
                 )),)*
                 _ => None,
             }
@@ -117,7 +117,7 @@ impl<const NX: usize, const NU: usize, const LINKED: bool> Horizon<NX, NU, LINKE
     fn new(
         latent_dim: usize,
         rows: &StageRows,
-        weights: &Weights<'_>,
+        state_weights: &[f64],
         settings: &MpcSettings,
     ) -> Self {
         let horizon = settings.horizon;
@@ -132,9 +132,9 @@ impl<const NX: usize, const NU: usize, const LINKED: bool> Horizon<NX, NU, LINKE
             },
             ..Shape::default()
         };
-        let scale = SLACK_PRICE / weights.joint_penalty;
+        let scale = SLACK_PRICE / settings.joint_penalty;
         let mut state = [0.0; NX];
-        for (entry, weight) in state.iter_mut().zip(weights.state) {
+        for (entry, weight) in state.iter_mut().zip(state_weights) {
             *entry = scale * weight;
         }
         let stage = |index: usize| {
@@ -157,8 +157,8 @@ impl<const NX: usize, const NU: usize, const LINKED: bool> Horizon<NX, NU, LINKE
             shape,
             cost: Cost {
                 state,
-                terminal: state.map(|weight| weights.terminal * weight),
-                input: [scale * weights.input; NU],
+                terminal: state.map(|weight| settings.terminal_weight * weight),
+                input: [scale * settings.input_weight; NU],
                 slack: SLACK_PRICE,
             },
             settings: Settings {

@@ -10,6 +10,7 @@ use super::layout::{Layout, block};
 use super::linearise::StageModel;
 use super::problem::{Row, StageRows};
 use super::qp::{Cone, ConeProgram};
+use super::settings::MpcSettings;
 use super::sparse::SparseColumns;
 use crate::robot::JOINT_DIM;
 
@@ -98,19 +99,6 @@ pub struct Transcription {
     work: Vec<f64>,
 }
 
-/// Weights of the transcribed cost.
-#[derive(Debug, Clone, Copy)]
-pub struct Weights<'a> {
-    /// Weight of each scaled state, `2 latent_dim`.
-    pub state: &'a [f64],
-    /// Factor on the last stage.
-    pub terminal: f64,
-    /// Weight of the scaled inputs.
-    pub input: f64,
-    /// Price of a slack.
-    pub joint_penalty: f64,
-}
-
 impl Transcription {
     /// Lays out a problem; returns it with the program that its steps will fill.
     pub fn new(latent_dim: usize, horizon: usize, rows: StageRows) -> (Self, ConeProgram) {
@@ -147,22 +135,23 @@ impl Transcription {
         (transcription, program)
     }
 
-    /// Writes the cost, which does not change from step to step.
-    pub fn write_cost(&self, weights: &Weights<'_>, program: &mut ConeProgram) {
+    /// Writes the cost, which does not change from step to step; `state` are the weights of the scaled states,
+    /// `2 latent_dim`.
+    pub fn write_cost(&self, state: &[f64], settings: &MpcSettings, program: &mut ConeProgram) {
         let d = self.layout.latent_dim;
-        let scale = SLACK_PRICE / weights.joint_penalty;
+        let scale = SLACK_PRICE / settings.joint_penalty;
         for stage in 0..self.layout.horizon {
             let factor = match stage + 1 == self.layout.horizon {
-                true => scale * weights.terminal,
+                true => scale * settings.terminal_weight,
                 false => scale,
             };
             let first = self.layout.input_column(stage);
             for input in first..first + d {
-                program.p.set(input, input, scale * weights.input);
+                program.p.set(input, input, scale * settings.input_weight);
             }
             let first = self.layout.state_column(stage);
-            for (state, weight) in (first..first + 2 * d).zip(weights.state) {
-                program.p.set(state, state, factor * weight);
+            for (column, weight) in (first..first + 2 * d).zip(state) {
+                program.p.set(column, column, factor * weight);
             }
             if self.layout.has_slack {
                 program.q[self.layout.slack_column(stage)] = SLACK_PRICE;
