@@ -96,7 +96,7 @@ impl Aslip {
             segment.dx[(z, start)],
         ];
         let down = |sample: usize| stances[sample].is_some();
-        let found = integrate_stretches(
+        let (states, _) = integrate_stretches(
             &initial,
             &segment.time_s,
             window,
@@ -110,7 +110,7 @@ impl Aslip {
                 integrate(&mut span, state, times, &IntegrationOptions::default())
             },
         );
-        for (state, position) in found.states.column_iter().zip(&mut position_m[start..]) {
+        for (state, position) in states.column_iter().zip(&mut position_m[start..]) {
             *position = Some(Vector2::new(state[0], state[1]));
         }
     }
