@@ -67,11 +67,6 @@ impl CompiledModel {
         self.phases.len()
     }
 
-    /// Where the Jacobian of a phase is not structurally zero.
-    pub fn pattern(&self, phase: usize) -> &JacobianPattern {
-        &self.phases[phase].pattern
-    }
-
     /// `ddz = Xi^T Theta(z, dz, u_lat)`.
     ///
     /// # Panics
@@ -173,7 +168,7 @@ mod tests {
         }
         compiled.jacobian(1, &[0.7], &[-1.5], &[0.25], &mut ddz, &mut jacobian);
         assert_eq!((ddz[0], jacobian.as_slice()), (-9.81, [0.0; 3].as_slice()));
-        assert!(compiled.pattern(1).is_empty());
+        assert!(compiled.phases[1].pattern.is_empty());
     }
 
     #[test]
