@@ -4,11 +4,8 @@
 use super::figures::{Figure, Motion, Panel, Role, Series, film_strip, floor_m};
 use crate::model::JumpPrior;
 use crate::plan::{Plan, Reach};
-use crate::robot::{JOINT_DIM, Robot};
+use crate::robot::{BODY_X, BODY_Z, JOINT_DIM, Robot};
 
-/// Body coordinates that are drawn, by place in the state.
-const BODY_X: usize = 12;
-const BODY_Z: usize = 14;
 /// Postures in the film strip.
 const FRAMES: usize = 8;
 /// Half the size of the cross of a recorded jump, m.

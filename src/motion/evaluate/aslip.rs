@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, Rotation3, Vector2, Vector3};
 use super::metrics::FitSums;
 use crate::recording::segment::between;
 use crate::recording::{RecordingError, Segment};
-use crate::robot::{InputRule, JOINT_DIM, Leg, Robot, WrenchFrame};
+use crate::robot::{BODY_X, BODY_Z, InputRule, JOINT_DIM, Leg, Robot, WrenchFrame};
 use crate::sim::{
     IntegrationOptions, OdeSystem, Restart, SimError, integrate, integrate_stretches,
     restart_windows,
@@ -155,9 +155,6 @@ impl OdeSystem for PendulumSpan<'_> {
         }
     }
 }
-
-pub(super) const BODY_X: usize = JOINT_DIM;
-pub(super) const BODY_Z: usize = JOINT_DIM + 2;
 
 /// Body x and z, m, that the pendulum predicts for each sample of a segment; none after a divergence.
 pub type AslipRollout = Vec<Option<Vector2<f64>>>;

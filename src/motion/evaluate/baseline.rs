@@ -4,9 +4,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::aslip::{Aslip, AslipRollout, AslipSums, BODY_X, BODY_Z, stances};
+use super::aslip::{Aslip, AslipRollout, AslipSums, stances};
 use crate::recording::{RecordingError, Segment};
-use crate::robot::InputRule;
+use crate::robot::{BODY_X, BODY_Z, InputRule};
 use crate::sim::{Restart, SimError};
 
 /// A template, where its constants come from, and its residuals.

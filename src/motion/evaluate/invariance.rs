@@ -8,11 +8,8 @@ use nalgebra::{DMatrix, DVector, SVector, SymmetricEigen};
 use serde::Serialize;
 
 use crate::model::{ModelError, ReducedModel};
-use crate::robot::{ContactFlags, JOINT_DIM, Leg, STATE_DIM};
+use crate::robot::{BODY_X, BODY_Z, ContactFlags, JOINT_DIM, Leg, STATE_DIM};
 
-/// Rows of body x and of body z.
-const FORWARD: usize = JOINT_DIM;
-const UP: usize = JOINT_DIM + 2;
 /// By how much the robot is moved, m.
 const SHIFT_M: f64 = 0.3;
 /// By how much a joint is off for its mirror image, rad.
@@ -70,7 +67,7 @@ impl Invariance {
         let phases = phases.map(|phase| PhaseInvariance::of(model, phase, &rest));
         let [gravity_m_s2, mass_kg] = by_height(model, &rest)?;
         let mut moved = rest.clone();
-        moved[FORWARD] += SHIFT_M;
+        moved[BODY_X] += SHIFT_M;
         let decoded = |x: &DVector<f64>| model.decode(&model.encode(x)?);
         let change = decoded(&moved)? - decoded(&rest)?;
         Ok(Self {
@@ -93,7 +90,7 @@ impl PhaseInvariance {
             let here = accelerated(rest, &velocity, &input)?;
             for (axis, shift) in shifts.iter_mut().enumerate() {
                 let mut moved = rest.clone();
-                moved[FORWARD + axis] += SHIFT_M;
+                moved[BODY_X + axis] += SHIFT_M;
                 let there = accelerated(&moved, &velocity, &input)?;
                 *shift = larger(*shift, (there - &here).norm() / SHIFT_M);
             }
@@ -135,7 +132,7 @@ fn velocities() -> [DVector<f64>; 4] {
     std::array::from_fn(|index| {
         let mut dx = DVector::zeros(STATE_DIM);
         if let Some(axis) = index.checked_sub(1) {
-            dx[FORWARD + axis] = 1.0;
+            dx[BODY_X + axis] = 1.0;
         }
         dx
     })
@@ -179,7 +176,7 @@ impl Instant<'_> {
     ) -> Result<DVector<f64>, ModelError> {
         let ddz = self.latent_acceleration(model, phase)?;
         let decoder = model.decoder_jacobian(&model.encode(self.x)?)?;
-        Ok(decoder.rows(FORWARD, 3) * ddz)
+        Ok(decoder.rows(BODY_X, 3) * ddz)
     }
 }
 
@@ -194,7 +191,7 @@ fn mirrored(vector: &DVector<f64>) -> DVector<f64> {
             image[3 * leg.index() + joint] = sign * vector[3 * other.index() + joint];
         }
     }
-    for row in [FORWARD + 1, FORWARD + 3, FORWARD + 5] {
+    for row in [BODY_X + 1, BODY_X + 3, BODY_X + 5] {
         image[row] = -vector[row];
     }
     image
@@ -206,7 +203,7 @@ fn by_height(model: &ReducedModel, rest: &DVector<f64>) -> Result<[Option<f64>; 
     let encode = model.tangent(rest)?.encode;
     let body = encode.columns(JOINT_DIM, body_dim).transpose();
     let mut up = DVector::zeros(body_dim);
-    up[UP - JOINT_DIM] = 1.0;
+    up[BODY_Z - JOINT_DIM] = 1.0;
     let Ok(inverse) = body.clone().pseudo_inverse(1e-9 * body.amax()) else {
         return Ok([None; 2]);
     };

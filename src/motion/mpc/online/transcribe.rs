@@ -9,7 +9,7 @@ use super::control_model::ControlPhase;
 use super::layout::{Layout, block};
 use super::linearise::StageModel;
 use super::problem::{Row, StageRows};
-use super::qp::{Cone, ConeProgram};
+use super::qp::{Cone, ConeProgram, dot};
 use super::settings::MpcSettings;
 use super::sparse::SparseColumns;
 use crate::robot::JOINT_DIM;
@@ -328,8 +328,4 @@ fn scatter(from: &[f64], positions: &[usize], values: &mut [f64]) {
     for (value, &position) in from.iter().zip(positions) {
         values[position] = *value;
     }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
