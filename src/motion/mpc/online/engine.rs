@@ -5,7 +5,7 @@ use super::horizon::Horizon;
 use super::problem::StageRows;
 use super::qp::{Outcome, QpSolver};
 use super::settings::{MpcSettings, Solver};
-use super::structured::{MAX_STRUCTURED_DIM, StageValues, StructuredProgram, structured_program};
+use super::structured::{MAX_STRUCTURED_DIM, StructuredProgram, structured_program};
 use super::transcribe::{StepData, Transcription};
 
 /// A solver with the program of the present horizon.
@@ -21,8 +21,6 @@ pub(super) enum Engine {
         program: Box<dyn StructuredProgram>,
         /// Whether its gains are those of its stages; solves with active rows overwrite them.
         has_gains: bool,
-        /// Scaled measurement.
-        start: Vec<f64>,
     },
 }
 
@@ -58,7 +56,6 @@ impl Engine {
                 Ok(Self::Structured {
                     program,
                     has_gains: false,
-                    start: vec![0.0; 2 * latent_dim],
                 })
             }
         }
@@ -74,10 +71,7 @@ impl Engine {
 
     /// Forgets the last solution.
     pub(super) fn forget(&mut self) {
-        if let Self::Structured {
-            program, has_gains, ..
-        } = self
-        {
+        if let Self::Structured { program, has_gains } = self {
             program.forget();
             *has_gains = false;
         }
@@ -86,10 +80,7 @@ impl Engine {
     /// Takes over what the horizon's last preparation changed, as far as it does not depend on the
     /// measurement.
     pub(super) fn prepare(&mut self, step: &StepData<'_>, horizon: &Horizon) {
-        let Self::Structured {
-            program, has_gains, ..
-        } = self
-        else {
+        let Self::Structured { program, has_gains } = self else {
             return;
         };
         for _ in 0..horizon.shift() {
@@ -99,15 +90,8 @@ impl Engine {
         if horizon.shift() > 0 || new.contains(&true) {
             *has_gains = false;
         }
-        let stages = step.stages.iter().enumerate();
-        for (index, stage) in stages.filter(|(index, _)| new[*index]) {
-            let values = StageValues {
-                data: stage,
-                end: horizon.end(index),
-                deviation: step.deviation,
-                input_cholesky: &step.phases[stage.phase].latent_root,
-            };
-            program.write(index, &values);
+        for index in (0..new.len()).filter(|&index| new[index]) {
+            program.write(index, step, horizon.end(index));
         }
         if !*has_gains {
             *has_gains = program.prepare();
@@ -124,19 +108,11 @@ impl Engine {
                 transcription.write(step, solver.program_mut());
                 (solver.solve(), solver.iterations())
             }
-            Self::Structured {
-                program,
-                has_gains,
-                start,
-            } => {
+            Self::Structured { program, has_gains } => {
                 if !*has_gains {
                     return (Outcome::NumericalFailure, 0);
                 }
-                let reference = &step.stages[0].state;
-                for (index, start) in start.iter_mut().enumerate() {
-                    *start = (step.measured[index] - reference[index]) / step.deviation[index];
-                }
-                let (outcome, iterations) = program.solve(start, &step.stages[0], step.last_input);
+                let (outcome, iterations) = program.solve(step);
                 *has_gains = iterations == 0;
                 (outcome, iterations)
             }

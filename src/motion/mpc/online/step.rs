@@ -160,20 +160,20 @@ impl Controller {
         command.losses_nm = stance.losses_nm;
         self.memory.feed_forward_nm = command.torque_nm;
         self.memory.joint_position = Some(command.joint_position_rad);
-        let lifted = self.local_plant().lift(&command.u_lat);
-        command.inconsistency = self.inconsistency(&lifted, &command.net_torque_nm());
+        command.inconsistency = self.inconsistency(command);
         true
     }
 
-    /// `|F_lift − G τ| / |F_lift|` of torques at the links, with force and moment as they are lifted.
-    fn inconsistency(&self, lifted: &[f64; STATE_DIM], net_nm: &[f64; JOINT_DIM]) -> Option<f64> {
+    /// `|F_lift − G τ| / |F_lift|` of a command's torques at the links, with force and moment as they are lifted.
+    fn inconsistency(&self, command: &Command) -> Option<f64> {
         let stance = self.memory.stance.as_ref()?;
         if !stance.feet.contains(&true) {
             return None;
         }
         let rule = self.plant.input_rule();
         let map = rule.wrench_map(&stance.joints_rad, stance.attitude_rad, stance.feet);
-        let produced = map.ok()? * SVector::<f64, JOINT_DIM>::from(*net_nm);
+        let produced = map.ok()? * SVector::<f64, JOINT_DIM>::from(command.net_torque_nm());
+        let lifted = self.local_plant().lift(&command.u_lat);
         let force = SVector::<f64, 6>::from_fn(|axis, _| lifted[JOINT_DIM + axis]);
         (force.norm() > SMALL_FORCE_N).then(|| (force - produced).norm() / force.norm())
     }

@@ -9,7 +9,7 @@ use std::fmt::Debug;
 use super::problem::{StageRows, pairs};
 use super::qp::Outcome;
 use super::settings::MpcSettings;
-use super::transcribe::{SLACK_PRICE, Stage as StageData};
+use super::transcribe::{SLACK_PRICE, Stage as StageData, StepData};
 use crate::solver::{
     self, Cost, Links, Pairs, Program, Report, RowMatrices, Settings, Shape, Stage,
 };
@@ -28,26 +28,13 @@ pub(super) const PYRAMID_ROWS: usize = 4;
 /// Most latent coordinates that the solver is compiled for.
 pub const MAX_STRUCTURED_DIM: usize = 8;
 
-/// One stage's numbers, in latent units.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct StageValues<'a> {
-    /// Dynamics, reference and rows of its own.
-    pub data: &'a StageData,
-    /// Reference state at its end, `2 latent_dim`.
-    pub end: &'a [f64],
-    /// Scale `σ` of the states.
-    pub deviation: &'a [f64],
-    /// Scale `C_p` of the inputs in its phase.
-    pub input_cholesky: &'a nalgebra::DMatrix<f64>,
-}
-
 /// The horizon's program for one latent dimension or another.
 pub(super) trait StructuredProgram: Debug + Send {
     /// Moves the horizon on by a stage; the last has to be written then.
     fn shift(&mut self);
 
-    /// Overwrites a stage.
-    fn write(&mut self, stage: usize, values: &StageValues<'_>);
+    /// Overwrites a stage, with the reference state at its end.
+    fn write(&mut self, stage: usize, step: &StepData<'_>, end: &[f64]);
 
     /// Forgets the last solution.
     fn forget(&mut self);
@@ -55,9 +42,8 @@ pub(super) trait StructuredProgram: Debug + Send {
     /// Gains of all stages, for the next [`StructuredProgram::solve`]; false if there are none.
     fn prepare(&mut self) -> bool;
 
-    /// Solves from a scaled state, after a latent input that the rates of the first stage count from; the iterations
-    /// that it took.
-    fn solve(&mut self, x0: &[f64], first: &StageData, last_input: &[f64]) -> (Outcome, u32);
+    /// Solves from the measurement; how it ended, and iterations.
+    fn solve(&mut self, step: &StepData<'_>) -> (Outcome, u32);
 
     /// Scaled input of a stage.
     fn input(&self, stage: usize) -> &[f64];
@@ -195,8 +181,9 @@ impl<const NX: usize, const NU: usize, const LINKED: bool> Horizon<NX, NU, LINKE
         (self.first + stage) % self.stages.len()
     }
 
-    fn write_dynamics(&mut self, place: usize, values: &StageValues<'_>) {
-        let (model, deviation) = (&values.data.model, values.deviation);
+    fn write_dynamics(&mut self, place: usize, data: &StageData, step: &StepData<'_>) {
+        let (model, deviation) = (&data.model, step.deviation);
+        let root = &step.phases[data.phase].latent_root;
         let stage = &mut self.stages[place];
         let dim = self.latent_dim;
         for row in 0..2 * dim {
@@ -204,27 +191,26 @@ impl<const NX: usize, const NU: usize, const LINKED: bool> Horizon<NX, NU, LINKE
             for col in 0..dim {
                 let mut sum = 0.0;
                 for k in col..dim {
-                    sum += model.b[(row, k)] * values.input_cholesky[(k, col)];
+                    sum += model.b[(row, k)] * root[(k, col)];
                 }
                 stage.b[row][col] = scale * sum;
             }
             for col in 0..2 * dim {
                 stage.a[row][col] = scale * model.a[(row, col)] * deviation[col];
             }
-            stage.c[row] = scale * values.data.defect[row];
+            stage.c[row] = scale * data.defect[row];
         }
     }
 
-    fn write_rows(&mut self, place: usize, values: &StageValues<'_>) {
-        let (data, deviation) = (values.data, values.deviation);
-        let (end, input_cholesky) = (values.end, values.input_cholesky);
+    fn write_rows(&mut self, place: usize, data: &StageData, step: &StepData<'_>, end: &[f64]) {
+        let (root, deviation) = (&step.phases[data.phase].latent_root, step.deviation);
         let own = data.rows.as_ref().unwrap_or(&self.rows);
         let dim = self.latent_dim;
         let (count, memory) = (self.shape.rows(), self.shape.memory());
         let bounds = &mut self.memory[place * memory..][..count];
         let matrix = &mut self.input_rows[place * self.shape.input..][..self.shape.input];
         for (number, row) in own.torque.iter().enumerate() {
-            let (scaled, at_reference) = scaled(&row.row, input_cholesky, &data.input);
+            let (scaled, at_reference) = scaled(&row.row, root, &data.input);
             matrix[number] = scaled;
             bounds[number] = row.bound - row.per_loss * data.losses_nm[row.joint] - at_reference;
         }
@@ -236,7 +222,7 @@ impl<const NX: usize, const NU: usize, const LINKED: bool> Horizon<NX, NU, LINKE
                     true => sign * data.force[axis * dim + j] - pull * data.force[j],
                     false => 0.0,
                 });
-                let (scaled, at_reference) = scaled(&row[..dim], input_cholesky, &data.input);
+                let (scaled, at_reference) = scaled(&row[..dim], root, &data.input);
                 let number = own.torque.len() + side;
                 matrix[number] = scaled;
                 // Without contact nothing is asked for.
@@ -249,7 +235,7 @@ impl<const NX: usize, const NU: usize, const LINKED: bool> Horizon<NX, NU, LINKE
             (
                 self.rate_rows[first + number],
                 self.rate_at_reference[first + number],
-            ) = scaled(&row.row, input_cholesky, &data.input);
+            ) = scaled(&row.row, root, &data.input);
         }
         let matrix = &mut self.soft_rows[place * self.shape.soft..][..self.shape.soft];
         let bounds = &mut bounds[self.shape.input..];
@@ -347,10 +333,10 @@ impl<const NX: usize, const NU: usize, const LINKED: bool> StructuredProgram
         self.first = program.first;
     }
 
-    fn write(&mut self, stage: usize, values: &StageValues<'_>) {
-        let place = self.place(stage);
-        self.write_dynamics(place, values);
-        self.write_rows(place, values);
+    fn write(&mut self, stage: usize, step: &StepData<'_>, end: &[f64]) {
+        let (place, data) = (self.place(stage), &step.stages[stage]);
+        self.write_dynamics(place, data, step);
+        self.write_rows(place, data, step, end);
     }
 
     fn forget(&mut self) {
@@ -361,9 +347,13 @@ impl<const NX: usize, const NU: usize, const LINKED: bool> StructuredProgram
         prepare(&mut self.program())
     }
 
-    fn solve(&mut self, x0: &[f64], first: &StageData, last_input: &[f64]) -> (Outcome, u32) {
-        self.write_rate_bounds(first, last_input);
-        let x0 = std::array::from_fn(|i| x0.get(i).copied().unwrap_or(0.0));
+    fn solve(&mut self, step: &StepData<'_>) -> (Outcome, u32) {
+        let first = &step.stages[0];
+        self.write_rate_bounds(first, step.last_input);
+        let x0 = std::array::from_fn(|i| match i < 2 * self.latent_dim {
+            true => (step.measured[i] - first.state[i]) / step.deviation[i],
+            false => 0.0,
+        });
         let (is_warm, settings) = (self.is_warm, self.settings);
         let report = solve(&mut self.program(), &x0, is_warm, &settings);
         let outcome = outcome_of(report.outcome);
