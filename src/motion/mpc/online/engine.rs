@@ -17,11 +17,7 @@ pub(super) enum Engine {
         solver: Box<QpSolver>,
     },
     /// Stage by stage.
-    Structured {
-        program: Box<dyn StructuredProgram>,
-        /// Whether its gains are those of its stages; solves with active rows overwrite them.
-        has_gains: bool,
-    },
+    Structured(Box<dyn StructuredProgram>),
 }
 
 impl Engine {
@@ -53,10 +49,7 @@ impl Engine {
                     found: latent_dim,
                     largest: MAX_STRUCTURED_DIM,
                 })?;
-                Ok(Self::Structured {
-                    program,
-                    has_gains: false,
-                })
+                Ok(Self::Structured(program))
             }
         }
     }
@@ -65,37 +58,31 @@ impl Engine {
     pub(super) fn conic(&self) -> Option<&QpSolver> {
         match self {
             Self::Conic { solver, .. } => Some(solver),
-            Self::Structured { .. } => None,
+            Self::Structured(_) => None,
         }
     }
 
     /// Forgets the last solution.
     pub(super) fn forget(&mut self) {
-        if let Self::Structured { program, has_gains } = self {
+        if let Self::Structured(program) = self {
             program.forget();
-            *has_gains = false;
         }
     }
 
     /// Takes over what the horizon's last preparation changed, as far as it does not depend on the
     /// measurement.
     pub(super) fn prepare(&mut self, step: &StepData<'_>, horizon: &Horizon) {
-        let Self::Structured { program, has_gains } = self else {
+        let Self::Structured(program) = self else {
             return;
         };
         for _ in 0..horizon.shift() {
             program.shift();
         }
         let new = horizon.is_new();
-        if horizon.shift() > 0 || new.contains(&true) {
-            *has_gains = false;
-        }
         for index in (0..new.len()).filter(|&index| new[index]) {
             program.write(index, step, horizon.end(index));
         }
-        if !*has_gains {
-            *has_gains = program.prepare();
-        }
+        program.prepare();
     }
 
     /// Solves the prepared program from the measurement; how it ended, and iterations.
@@ -108,14 +95,7 @@ impl Engine {
                 transcription.write(step, solver.program_mut());
                 (solver.solve(), solver.iterations())
             }
-            Self::Structured { program, has_gains } => {
-                if !*has_gains {
-                    return (Outcome::NumericalFailure, 0);
-                }
-                let (outcome, iterations) = program.solve(step);
-                *has_gains = iterations == 0;
-                (outcome, iterations)
-            }
+            Self::Structured(program) => program.solve(step),
         }
     }
 
@@ -126,7 +106,7 @@ impl Engine {
                 transcription,
                 solver,
             } => transcription.input(index, solver.solution()),
-            Self::Structured { program, .. } => program.input(index),
+            Self::Structured(program) => program.input(index),
         };
         let stage = &step.stages[index];
         let root = &step.phases[stage.phase].latent_root;
@@ -152,7 +132,7 @@ impl Engine {
                 transcription,
                 solver,
             } => transcription.state(index, solver.solution()),
-            Self::Structured { program, .. } => program.state(index),
+            Self::Structured(program) => program.state(index),
         };
         for (row, out) in out.iter_mut().enumerate() {
             *out = reference[row] + step.deviation[row] * scaled[row];

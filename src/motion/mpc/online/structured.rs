@@ -39,8 +39,8 @@ pub(super) trait StructuredProgram: Debug + Send {
     /// Forgets the last solution.
     fn forget(&mut self);
 
-    /// Gains of all stages, for the next [`StructuredProgram::solve`]; false if there are none.
-    fn prepare(&mut self) -> bool;
+    /// Computes the gains of all stages for the next [`StructuredProgram::solve`], if they are not those of its stages.
+    fn prepare(&mut self);
 
     /// Solves from the measurement; how it ended, and iterations.
     fn solve(&mut self, step: &StepData<'_>) -> (Outcome, u32);
@@ -97,6 +97,8 @@ struct Horizon<const NX: usize, const NU: usize, const LINKED: bool> {
     settings: Settings<f64>,
     /// Whether the stages hold a solution, to start from.
     is_warm: bool,
+    /// Whether the gains are those of the stages; solves with active rows overwrite them.
+    has_gains: bool,
 }
 
 impl<const NX: usize, const NU: usize, const LINKED: bool> Horizon<NX, NU, LINKED> {
@@ -154,6 +156,7 @@ impl<const NX: usize, const NU: usize, const LINKED: bool> Horizon<NX, NU, LINKE
                 accepted_residual: settings.qp.accepted_residual,
             },
             is_warm: false,
+            has_gains: false,
         }
     }
 
@@ -331,23 +334,28 @@ impl<const NX: usize, const NU: usize, const LINKED: bool> StructuredProgram
         let mut program = self.program();
         program.shift();
         self.first = program.first;
+        self.has_gains = false;
     }
 
     fn write(&mut self, stage: usize, step: &StepData<'_>, end: &[f64]) {
         let (place, data) = (self.place(stage), &step.stages[stage]);
         self.write_dynamics(place, data, step);
         self.write_rows(place, data, step, end);
+        self.has_gains = false;
     }
 
     fn forget(&mut self) {
-        self.is_warm = false;
+        (self.is_warm, self.has_gains) = (false, false);
     }
 
-    fn prepare(&mut self) -> bool {
-        prepare(&mut self.program())
+    fn prepare(&mut self) {
+        self.has_gains = self.has_gains || prepare(&mut self.program());
     }
 
     fn solve(&mut self, step: &StepData<'_>) -> (Outcome, u32) {
+        if !self.has_gains {
+            return (Outcome::NumericalFailure, 0);
+        }
         let first = &step.stages[0];
         self.write_rate_bounds(first, step.last_input);
         let x0 = std::array::from_fn(|i| match i < 2 * self.latent_dim {
@@ -358,6 +366,7 @@ impl<const NX: usize, const NU: usize, const LINKED: bool> StructuredProgram
         let report = solve(&mut self.program(), &x0, is_warm, &settings);
         let outcome = outcome_of(report.outcome);
         self.is_warm = outcome == Outcome::Solved;
+        self.has_gains = report.iterations == 0;
         (outcome, report.iterations)
     }
 
