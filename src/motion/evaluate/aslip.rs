@@ -1,7 +1,5 @@
 //! The baseline: the actuated spring-loaded inverted pendulum, equations (27) and (28).
 
-use std::ops::Range;
-
 use nalgebra::{DMatrix, Rotation3, Vector2, Vector3};
 
 use super::metrics::FitSums;
@@ -74,45 +72,30 @@ impl Aslip {
     ) -> Result<AslipRollout, SimError> {
         let stances = stances(rule, segment)?;
         let mut position_m = vec![None; segment.len()];
+        let down = |sample: usize| stances[sample].is_some();
         for window in restart_windows(&segment.time_s, restart) {
-            self.roll_window(segment, &stances, window, &mut position_m);
+            let start = window.start;
+            let at = |rows: &DMatrix<f64>| [BODY_X, BODY_Z].map(|row| rows[(row, start)]);
+            let initial = [at(&segment.x), at(&segment.dx)].concat();
+            let (states, _) = integrate_stretches(
+                &initial,
+                &segment.time_s,
+                window,
+                |a, b| down(a) == down(b),
+                |stretch, state, times| {
+                    let mut span = PendulumSpan {
+                        pendulum: self,
+                        stances: &stances[stretch],
+                        times,
+                    };
+                    integrate(&mut span, state, times, &IntegrationOptions::default())
+                },
+            );
+            for (state, position) in states.column_iter().zip(&mut position_m[start..]) {
+                *position = Some(Vector2::new(state[0], state[1]));
+            }
         }
         Ok(position_m)
-    }
-
-    fn roll_window(
-        &self,
-        segment: &Segment,
-        stances: &[Option<Stance>],
-        window: Range<usize>,
-        position_m: &mut [Option<Vector2<f64>>],
-    ) {
-        let (x, z) = (BODY_X, BODY_Z);
-        let start = window.start;
-        let initial = [
-            segment.x[(x, start)],
-            segment.x[(z, start)],
-            segment.dx[(x, start)],
-            segment.dx[(z, start)],
-        ];
-        let down = |sample: usize| stances[sample].is_some();
-        let (states, _) = integrate_stretches(
-            &initial,
-            &segment.time_s,
-            window,
-            |a, b| down(a) == down(b),
-            |stretch, state, times| {
-                let mut span = PendulumSpan {
-                    pendulum: self,
-                    stances: &stances[stretch],
-                    times,
-                };
-                integrate(&mut span, state, times, &IntegrationOptions::default())
-            },
-        );
-        for (state, position) in states.column_iter().zip(&mut position_m[start..]) {
-            *position = Some(Vector2::new(state[0], state[1]));
-        }
     }
 }
 
