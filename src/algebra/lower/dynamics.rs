@@ -79,7 +79,8 @@ pub fn dynamics_jacobian(
         rows: Vec::new(),
         cols: Vec::new(),
     };
-    let columns = columns(system);
+    let variables = LatentVariable::all(system.latent_dim());
+    let columns: Vec<SymbolId> = variables.map(|variable| system.symbol(variable)).collect();
     for (row, equation) in equations.iter().enumerate() {
         for (col, &variable) in columns.iter().enumerate() {
             let derivative = equation.derivative(&mut pool, variable);
@@ -95,7 +96,12 @@ pub fn dynamics_jacobian(
     let n_terms = n_terms.sum();
     let gradient = Gradient::new(form, &mut pool, &equations, &columns, n_terms);
     let (mut builder, ddz, jacobian) = if let Some(gradient) = gradient {
-        polynomial_jacobian(system, &pool, &gradient, &pattern)
+        let mut lowering = start(system, &pool, "dynamics_jacobian");
+        lowering.prepare(gradient.expressions());
+        let (ddz, slopes) = gradient.lower(&mut lowering, system.latent_dim());
+        let places = pattern.rows.iter().zip(&pattern.cols);
+        let jacobian = places.map(|(&row, &col)| slopes[&(row, col)]).collect();
+        (lowering.builder, ddz, jacobian)
     } else if form.uses_tables(&equations) {
         dense_jacobian(system, &mut pool, &equations, &columns, &pattern)
     } else {
@@ -136,28 +142,6 @@ fn nested_jacobian(
         sums.push(sum);
     }
     sums
-}
-
-/// Accelerations and the entries of the pattern by sums of vectors.
-fn polynomial_jacobian(
-    system: &Equations<'_>,
-    pool: &ExprPool,
-    gradient: &Gradient,
-    pattern: &JacobianPattern,
-) -> (ProgramBuilder, Vec<ValueId>, Vec<ValueId>) {
-    let mut lowering = start(system, pool, "dynamics_jacobian");
-    lowering.prepare(gradient.expressions());
-    let (ddz, slopes) = gradient.lower(&mut lowering, system.latent_dim());
-    let places = pattern.rows.iter().zip(&pattern.cols);
-    let jacobian = places.map(|(&row, &col)| slopes[&(row, col)]).collect();
-    (lowering.builder, ddz, jacobian)
-}
-
-/// The variables in the order of the Jacobian's columns.
-fn columns(system: &Equations<'_>) -> Vec<SymbolId> {
-    LatentVariable::all(system.latent_dim())
-        .map(|variable| system.symbol(variable))
-        .collect()
 }
 
 /// Accelerations and the entries of the pattern by tables.
