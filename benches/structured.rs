@@ -18,8 +18,9 @@
 
 use std::io::Write as _;
 
+use romc::mpc::problem::Row;
 use romc::mpc::widest::{prepare, solve};
-use romc::mpc::{Cone, ConeProgram, QpSettings, QpSolver, SparseColumns, needed_rows_of};
+use romc::mpc::{Cone, ConeProgram, QpSettings, QpSolver, SparseColumns, needed_rows};
 use romc::solver::{Cost, Links, Outcome, Pairs, Program, RowMatrices, Settings, Shape, Stage};
 
 #[path = "shared/clock.rs"]
@@ -140,9 +141,14 @@ fn read_loop<const NU: usize>(reader: &mut Reader, horizon: usize) -> Loop<NU> {
 
 /// The rows without those that the others imply; opposite rows come first, in pairs.
 fn needed<const NU: usize>(rows: Vec<([f64; NU], f64)>) -> Vec<([f64; NU], f64)> {
-    let all: Vec<(Vec<f64>, f64)> = rows.iter().map(|(row, b)| (row.to_vec(), *b)).collect();
-    let kept: Vec<_> = (needed_rows_of(&all, 0.0).into_iter())
-        .map(|index| rows[index])
+    let numbered = rows.iter().enumerate().map(|(joint, (row, bound))| Row {
+        joint,
+        row: row.to_vec(),
+        bound: *bound,
+        per_loss: 0.0,
+    });
+    let kept: Vec<_> = (needed_rows(numbered.collect(), 0.0).iter())
+        .map(|row| rows[row.joint])
         .collect();
     let is_paired = |(row, _): &&([f64; NU], f64)| {
         let opposite = row.map(|entry| -entry);

@@ -29,7 +29,7 @@ use nalgebra::DVector;
 use romc::equations::Equations;
 use romc::ir::{Interpreter, Statement};
 use romc::lower::CompiledModel;
-use romc::lower::{self, Form, LowerOptions, dynamics_jacobian};
+use romc::lower::{self, Form, dynamics_jacobian};
 use romc::model::{LatentVariable, ReducedModel};
 
 /// Random models of tests that compile nothing.
@@ -60,15 +60,14 @@ struct Case {
     model_of: Vec<usize>,
     points: Vec<Vec<f64>>,
     expected: Vec<Vec<f64>>,
-    options: LowerOptions,
+    form: Form,
 }
 
 impl Case {
     fn new(models: Vec<ReducedModel>, n_points: usize, form: Form) -> Self {
-        let options = LowerOptions { form };
         let (mut functions, mut model_of) = (Vec::new(), Vec::new());
         for (index, model) in models.iter().enumerate() {
-            functions.extend(functions_of(model, n_points, &options));
+            functions.extend(functions_of(model, n_points, form));
             model_of.resize(functions.len(), index);
         }
         let mut random = Random(7);
@@ -79,7 +78,7 @@ impl Case {
             model_of,
             points,
             expected: Vec::new(),
-            options,
+            form,
         };
         case.interpret();
         case
@@ -91,7 +90,7 @@ impl Case {
     }
 
     fn workshop(&self) -> Workshop {
-        Workshop::new(&self.models, &self.options)
+        Workshop::new(&self.models, self.form)
     }
 
     /// Runs the functions as `build` compiles them and compares every result.
@@ -218,7 +217,7 @@ fn random_models_have_all_shapes() {
     };
     some("sums of vectors", &|model| {
         let system = Equations::of(model);
-        let lowered = dynamics_jacobian(&system, 0, &LowerOptions::default());
+        let lowered = dynamics_jacobian(&system, 0, Form::default());
         let (program, _) = lowered.expect("lowers");
         let mut statements = program.statements().iter();
         statements.any(|statement| matches!(statement, Statement::Quads { .. }))
@@ -312,8 +311,8 @@ fn tables_and_straight_lines_agree() {
         .into_iter()
         .chain((0..SOME_MODELS).map(models::random))
     {
-        let [lines, tables] = [Form::StraightLine, Form::Tables]
-            .map(|form| functions_of(&model, 50, &LowerOptions { form }));
+        let [lines, tables] =
+            [Form::StraightLine, Form::Tables].map(|form| functions_of(&model, 50, form));
         for (lines, tables) in lines.iter().zip(&tables) {
             let points = lines.points(&mut Random(5));
             let (found, expected) = (tables.interpret(&points), lines.interpret(&points));
@@ -347,7 +346,7 @@ fn generated_code_beyond_the_reduction_limit_equals_the_interpreter() {
 #[test]
 fn selftests_of_generated_code_pass() {
     let models = models::shipped();
-    let workshop = Workshop::new(&models, &LowerOptions::default());
+    let workshop = Workshop::new(&models, Form::default());
     for model in &models {
         workshop.run_c_selftest(&Build::c_plain(), model.identifier().as_str());
     }
@@ -360,8 +359,8 @@ fn selftests_of_generated_code_pass() {
 fn emission_twice_gives_identical_bytes() {
     let models: Vec<ReducedModel> = models::shipped();
     let (first, second) = (
-        Workshop::new(&models, &LowerOptions::default()),
-        Workshop::new(&models, &LowerOptions::default()),
+        Workshop::new(&models, Form::default()),
+        Workshop::new(&models, Form::default()),
     );
     let (first, second) = (contents(first.path()), contents(second.path()));
     assert!(first.len() >= 7 * models.len());
@@ -477,9 +476,9 @@ fn check_jacobian(model: &ReducedModel, phase: usize) {
 fn jacobian_pattern_lists_each_entry_once_in_row_major_order() {
     for model in models::shipped() {
         for phase in 0..model.phases().len() {
-            let options = LowerOptions::default();
+            let form = Form::default();
             let (program, pattern) =
-                dynamics_jacobian(&Equations::of(&model), phase, &options).expect("lowers");
+                dynamics_jacobian(&Equations::of(&model), phase, form).expect("lowers");
             let places: Vec<(usize, usize)> = pattern
                 .rows
                 .iter()

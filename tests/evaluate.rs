@@ -5,7 +5,7 @@ use std::path::Path;
 use nalgebra::DVector;
 use romc::evaluate::{CoordinateSums, PointwiseSums};
 use romc::lower::CompiledModel;
-use romc::sim::{IntegrationOptions, LatentSegment, Restart, rollout};
+use romc::sim::{LatentSegment, Restart, rollout};
 use romc::{artifact, recording};
 
 const MODEL: &str = "models/go1-d4.json";
@@ -51,8 +51,7 @@ fn restarting_at_every_sample_leaves_only_the_decoders_error() {
     let segment = &recording::read(Path::new(JUMP)).expect("shipped").segments[0];
     let latent = LatentSegment::encode(&model, segment).expect("encodes");
     let compiled = CompiledModel::new(&model).expect("lowers");
-    let options = IntegrationOptions::default();
-    let restarted = rollout(&compiled, &latent, Restart::Every(0.002), &options);
+    let restarted = rollout(&compiled, &latent, Restart::Every(0.002));
     let mut sums = CoordinateSums::new(&model).expect("a decoder");
     sums.add_rollout(&model, segment, &latent, &restarted)
         .expect("decodes");
@@ -83,8 +82,7 @@ fn whole_rollouts_of_shipped_models_stay_finite_on_every_test_jump() {
             let path = format!("examples/recordings/go1/test_{jump:02}.csv.gz");
             for segment in &recording::read(Path::new(&path)).expect("shipped").segments {
                 let latent = LatentSegment::encode(&model, segment).expect("encodes");
-                let options = IntegrationOptions::default();
-                let whole = rollout(&compiled, &latent, Restart::Never, &options);
+                let whole = rollout(&compiled, &latent, Restart::Never);
                 assert_eq!(whole.diverged_at_s(), None, "{name} on {path}");
                 assert_eq!(whole.windows[0].z.ncols(), segment.len());
             }

@@ -10,7 +10,7 @@ use flate2::write::GzEncoder;
 use nalgebra::DMatrix;
 use romc::equations::Equations;
 use romc::ir::Interpreter;
-use romc::lower::{LowerOptions, dynamics_jacobian};
+use romc::lower::{Form, dynamics_jacobian};
 use romc::model::{FeetRule, Library, Phase, ReducedModel};
 use serde_json::Value;
 
@@ -253,7 +253,7 @@ fn the_derivative_of_a_power_of_a_product_has_a_value_where_the_product_is_zero(
         let model = ReducedModel::builder("m", library).phase(phase).build();
         let model = model.expect("a valid model");
         let equations = Equations::of(&model);
-        let lowered = dynamics_jacobian(&equations, 0, &LowerOptions::default());
+        let lowered = dynamics_jacobian(&equations, 0, Form::default());
         let (program, _) = lowered.expect("lowers");
         let lens = program.outputs().iter().map(|slot| slot.len);
         let mut outputs: Vec<Vec<f64>> = lens.map(|len| vec![f64::NAN; len]).collect();

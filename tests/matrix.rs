@@ -30,7 +30,7 @@ use romc::codegen::Precision;
 use romc::deploy::{EmitError, EmitOptions, Target, emit};
 use romc::equations::Equations;
 use romc::files::{EmittedFile, Overwrite, write_files};
-use romc::lower::{Form, LowerOptions};
+use romc::lower::Form;
 use romc::model::ReducedModel;
 
 /// Functions without a point at which all results are finite.
@@ -62,7 +62,7 @@ fn self_tests_of_c_and_rust_compile_and_pass_in_both_precisions() {
             }
             let name = model.identifier().to_string();
             let one = std::slice::from_ref(&model);
-            let workshop = Workshop::in_precision(one, &LowerOptions::default(), precision);
+            let workshop = Workshop::in_precision(one, Form::default(), precision);
             workshop.run_c_selftest(&Build::c(), &name);
             // A crate takes seconds to compile.
             if precision == Precision::Double || tools::is_thorough() {

@@ -7,7 +7,7 @@ use nalgebra::DMatrix;
 use romc::deploy::{EmitOptions, Target, emit};
 use romc::equations::{Equations, PhaseEquations};
 use romc::ir::Interpreter;
-use romc::lower::{self, LowerOptions};
+use romc::lower::{self, Form};
 use romc::model::{FeetRule, Library, LibrarySource, Phase, ReducedModel, StandardLibrary};
 use romc::symbolic::{ExprId, ExprPool, Function, Node, Number, SymbolId};
 use romc::typeset::PrintOptions;
@@ -97,7 +97,7 @@ fn latex(equations: &Equations<'_>) -> String {
 
 /// Values of `ddz1` at a point, by the program that code is emitted from.
 fn value(equations: &Equations<'_>, point: &[f64]) -> f64 {
-    let program = lower::dynamics(equations, 0, &LowerOptions::default()).expect("lowers");
+    let program = lower::dynamics(equations, 0, Form::default()).expect("lowers");
     let mut ddz = vec![0.0; LATENT_DIM];
     let inputs = [&point[..2], &point[2..4], &point[4..]];
     Interpreter::new(&program).run(&inputs, &mut [&mut ddz]);

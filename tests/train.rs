@@ -13,7 +13,7 @@ use romc::model::{Activation, StandardLibrary};
 use romc::mpc::{Controller, MpcSettings};
 use romc::recording::{self, Recording};
 use romc::robot::{Actuators, Robot, WrenchFrame};
-use romc::sim::{IntegrationOptions, LatentSegment, Restart, rollout};
+use romc::sim::{LatentSegment, Restart, rollout};
 use romc::train::{
     self, Coordinates, EncoderOptions, LibraryChoice, Origin, Progress, Recordings, ScaleOptions,
     SetMetrics, TrainError, TrainOptions, Trained, Transfer, Watch,
@@ -159,7 +159,7 @@ fn net_torques_predict_better_and_command_what_was_recorded() {
         );
         // Simulation and control say the same of the lift as training, and commands have the losses.
         let assessed = Assessment::over(&net.model, &test, 0.1).expect("the model fits");
-        let r2 = assessed.lift.torque_r2_all().expect("samples");
+        let r2 = assessed.lift.torque.r2_all().expect("samples");
         assert!(
             (r2 - after.torque_r2).abs() < 1e-6,
             "{r2} {}",
@@ -491,8 +491,7 @@ fn joint_training_of_networks_lowers_the_loss_and_gives_a_model_that_simulates()
 
         let compiled = CompiledModel::new(&read).expect("compiles");
         let latent = LatentSegment::encode(&read, &training[0].segments[0]).expect("encodes");
-        let options = IntegrationOptions::default();
-        let predicted = rollout(&compiled, &latent, Restart::Every(0.1), &options);
+        let predicted = rollout(&compiled, &latent, Restart::Every(0.1));
         assert_eq!(predicted.diverged_at_s(), None);
     }
 }

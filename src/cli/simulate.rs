@@ -95,9 +95,9 @@ fn metrics_text(model: &ReducedModel, assessment: &Assessment<'_>) -> String {
          plain lift of exactly projected inputs: torque R^2 {} in contact, {} in flight, {} over all samples; inconsistency {}",
         assessment.active_terms,
         shown(assessment.combined_loss()),
-        shown(lift.torque_r2().contact),
-        shown(lift.torque_r2().flight),
-        shown(lift.torque_r2_all()),
+        shown(lift.torque.r2().contact),
+        shown(lift.torque.r2().flight),
+        shown(lift.torque.r2_all()),
         shown(lift.inconsistency())
     );
     for remark in &assessment.remarks {

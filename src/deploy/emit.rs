@@ -10,7 +10,7 @@ use crate::codegen::script::{matlab, python};
 use crate::codegen::{Precision, SineCosine, Units, c, interface::ModelInterface, rust};
 use crate::equations::Equations;
 use crate::files::EmittedFile;
-use crate::lower::LowerOptions;
+use crate::lower::Form;
 use crate::model::ReducedModel;
 use crate::typeset::{PrintOptions, latex, markdown, mathml};
 
@@ -56,7 +56,7 @@ impl Target {
 #[derive(Clone, Debug, Default)]
 pub struct EmitOptions {
     /// How programs are made.
-    pub lower: LowerOptions,
+    pub form: Form,
     /// How equations are printed, with the digest of the model file for the first lines of files.
     pub print: PrintOptions,
     /// Floating-point numbers of C and Rust.
@@ -86,10 +86,10 @@ pub fn emit(
 ) -> Result<Vec<EmittedFile>, EmitError> {
     let provenance = provenance(equations.model(), options.print.digest.as_deref());
     let (precision, sines) = (options.precision, options.sines);
-    let (lower, units) = (&options.lower, options.units);
+    let (form, units) = (options.form, options.units);
     let for_compilers = || compiled(equations, options, units);
     // Languages that compute in double precision alone.
-    let for_scripts = || Ok(ModelInterface::new(equations, lower, units)?);
+    let for_scripts = || Ok(ModelInterface::new(equations, form, units)?);
     let (mut in_precision, mut scripts) = (None, None);
     let control = equations.in_scaled_units();
     let mut files = Vec::new();
@@ -113,7 +113,7 @@ pub fn emit(
             Target::Markdown => markdown::emit(equations, &options.print)?,
             Target::Mathml => mathml::emit(equations, &options.print)?,
             Target::Controller => {
-                controller::emit(control, lower, &provenance, options.plan.as_ref())?
+                controller::emit(control, form, &provenance, options.plan.as_ref())?
             }
             Target::ControllerC => controller_c::emit(control, options, &provenance)?,
         });
@@ -127,7 +127,7 @@ pub(super) fn compiled(
     options: &EmitOptions,
     units: Units,
 ) -> Result<ModelInterface, EmitError> {
-    let mut entries = ModelInterface::new(equations, &options.lower, units)?;
+    let mut entries = ModelInterface::new(equations, options.form, units)?;
     options.precision.check(&entries)?;
     if options.precision == Precision::Single {
         entries.state_bounds();

@@ -64,9 +64,8 @@ fn panel(title: &str, rows: &[DimensionSummary], bar: impl Fn(&DimensionSummary)
         means.push((x, Some(mean)));
         bars.extend([(x, Some(low)), (x, Some(high)), (x, None)]);
     }
-    let series = |role, points| Series { role, points };
-    let bars = series(Role::SecondBaseline, bars);
-    Panel::lines(title, vec![bars, series(Role::Recorded, means)])
+    let bars = Series::through(Role::SecondBaseline, bars);
+    Panel::lines(title, vec![bars, Series::through(Role::Recorded, means)])
 }
 
 #[cfg(test)]

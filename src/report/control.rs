@@ -38,8 +38,7 @@ pub fn without_statistics(model: &ReducedModel) -> Option<&str> {
 /// A line over the steps of a run.
 fn line(run: &Run, role: Role, value: impl Fn(&StepRow) -> Option<f64>) -> Series {
     let points = run.rows.iter().map(|row| (row.time_s, value(row)));
-    let points = points.collect();
-    Series { role, points }
+    Series::through(role, points)
 }
 
 /// Commanded torques beside the recorded ones, between the limits.
@@ -106,11 +105,7 @@ fn latent_tracking(
             let end = row.z_planned.as_ref().map(|z| z[latent]);
             (row.time_s + horizon_s, end)
         });
-        let points = planned.collect();
-        let planned = Series {
-            role: Role::Full,
-            points,
-        };
+        let planned = Series::through(Role::Full, planned);
         let reference = line(run, Role::Recorded, |row| Some(row.z_reference[latent]));
         Panel::lines(format!("z{}", latent + 1), vec![reference, planned])
     };

@@ -27,9 +27,9 @@ pub fn assessment_json(model: &ReducedModel, assessment: &Assessment<'_>) -> Val
         "combined_loss": assessment.combined_loss(),
         "lift": {
             "torque_r2": {
-                "contact": lift.torque_r2().contact,
-                "flight": lift.torque_r2().flight,
-                "all": lift.torque_r2_all(),
+                "contact": lift.torque.r2().contact,
+                "flight": lift.torque.r2().flight,
+                "all": lift.torque.r2_all(),
             },
             "inconsistency": lift.inconsistency(),
         },
@@ -92,7 +92,6 @@ pub fn plan_json(planned: &Plan) -> Value {
     let durations: Map<String, Value> = parts
         .map(|part| (part.name.clone(), json!(part.duration_s)))
         .collect();
-    let margins = &planned.margins;
     json!({
         "distance_m": planned.reached_m[0],
         "apex_m": planned.reached_m[1],
@@ -103,13 +102,7 @@ pub fn plan_json(planned: &Plan) -> Value {
         "input_deviation": planned.input_deviation,
         "extrapolates": planned.verdict != Verdict::Trusted,
         "reasons": planned.verdict.reasons(),
-        "margins": {
-            "torque_share": margins.torque_share,
-            "beyond_joint_limit_rad": margins.beyond_joint_limit_rad,
-            "beyond_friction_n": margins.beyond_friction_n,
-            "foot_slip_m": margins.foot_slip_m,
-            "foot_drift_m": margins.foot_drift_m,
-        },
+        "margins": planned.margins,
         "programs": planned.programs,
         "solve_ms": planned.solve_ms,
         "status": planned.verdict.word(),

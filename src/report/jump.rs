@@ -247,7 +247,7 @@ impl Jump<'_> {
                 self.series(Role::Full, |k| full[k].as_ref().map(|x| x[row])),
             ];
             for (role, rollout) in roles.into_iter().zip(&run.baselines) {
-                lines.push(self.series(role, |k| rollout.position_m[k].map(|at| at[axis])));
+                lines.push(self.series(role, |k| rollout[k].map(|at| at[axis])));
             }
             self.panel(title, lines)
         };

@@ -4,11 +4,8 @@
 use super::figures::{Figure, Motion, Panel, Role, Series, film_strip, floor_m};
 use crate::model::JumpPrior;
 use crate::plan::{Plan, Reach};
-use crate::robot::{JOINT_DIM, Robot};
+use crate::robot::{BODY_X, BODY_Z, JOINT_DIM, Robot};
 
-/// Body coordinates that are drawn, by place in the state.
-const BODY_X: usize = 12;
-const BODY_Z: usize = 14;
 /// Postures in the film strip.
 const FRAMES: usize = 8;
 /// Half the size of the cross of a recorded jump, m.
@@ -64,11 +61,7 @@ fn panel(plan: &Plan, title: String, series: Vec<Series>) -> Panel {
 fn path(plan: &Plan, goal: &str) -> Figure {
     let x = &plan.motion.x;
     let points = (0..plan.motion.len()).map(|k| (x[(BODY_X, k)], Some(x[(BODY_Z, k)])));
-    let points = points.collect();
-    let body = Series {
-        role: Role::Full,
-        points,
-    };
+    let body = Series::through(Role::Full, points);
     let panels = vec![Panel::lines("body z, m", vec![body])];
     let caption = format!("Path of the body in {goal}.");
     Figure {
@@ -141,9 +134,8 @@ pub fn reach_figure(reach: &Reach, prior: &JumpPrior) -> Figure {
             (distance, None),
         ]
     });
-    let (role, points) = (Role::Recorded, crosses.collect());
     let series = vec![
-        Series { role, points },
+        Series::through(Role::Recorded, crosses),
         border(reach, Role::Full, &["trusted"]),
         border(reach, Role::Restarted, &["trusted", "extrapolates"]),
     ];

@@ -68,7 +68,7 @@ pub(super) fn tiles(content: &Content<'_>) -> Vec<(String, String)> {
         format!("{x}, {z} mm")
     };
     let restarted = format!("body x, z: rms error, restarted every {every} s");
-    let torque_r2 = shown(assessment.lift.torque_r2().contact);
+    let torque_r2 = shown(assessment.lift.torque.r2().contact);
     let loss = shown(assessment.combined_loss());
     let tiles = [
         ("latent coordinates", model.latent_dim().to_string()),

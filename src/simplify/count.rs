@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use super::error::SimplifyError;
 use crate::equations::Equations;
 use crate::ir::{Program, Statement};
-use crate::lower::{self, Form, LowerOptions};
+use crate::lower::{self, Form};
 use crate::model::LatentVariable;
 use crate::symbolic::SymbolId;
 
@@ -22,10 +22,7 @@ pub(super) fn digits(xi: &[f64]) -> usize {
 
 /// Operations of the straight-line code of `ddz`.
 pub(super) fn operations(system: &Equations<'_>, phase: usize) -> Result<usize, SimplifyError> {
-    let options = LowerOptions {
-        form: Form::StraightLine,
-    };
-    let program: Program = lower::dynamics(system, phase, &options)?;
+    let program: Program = lower::dynamics(system, phase, Form::StraightLine)?;
     let counted = program.statements().iter().enumerate();
     Ok(counted
         .map(|(index, statement)| match statement {

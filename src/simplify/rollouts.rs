@@ -6,7 +6,7 @@ use crate::evaluate::EvaluateError;
 use crate::lower::CompiledModel;
 use crate::model::ReducedModel;
 use crate::recording::Segment;
-use crate::sim::{IntegrationOptions, LatentSegment, Restart, Rollout, Window, rollout};
+use crate::sim::{LatentSegment, Restart, Rollout, Window, rollout};
 
 /// Names of the coordinates in which rollouts are compared.
 const BODY: &str = "body.";
@@ -88,7 +88,7 @@ impl RolloutBasis<'_> {
             let mut sums = CoordinateSums::new(model)?;
             let (mut outside, mut predicted) = (0usize, 0usize);
             for (&segment, &latent) in self.segments.iter().zip(&self.latent) {
-                let run = rollout(&compiled, latent, restart, &IntegrationOptions::default());
+                let run = rollout(&compiled, latent, restart);
                 sums.add_rollout(model, segment, latent, &run)?;
                 outside += self.outside(latent, &run);
                 predicted += run.predictions().count();

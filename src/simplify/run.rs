@@ -16,14 +16,12 @@ use super::workspace::Workspace;
 use crate::artifact;
 use crate::equations::Equations;
 use crate::model::{LatentVariable, ReducedModel};
-use crate::robot::{GRAVITY_M_S2, JOINT_DIM};
+use crate::robot::{BODY_Z, GRAVITY_M_S2};
 use crate::symbolic::Interval;
 
 /// What the search may use is lowered to this share of itself until the final evaluation confirms
 /// the tolerance.
 const RETREAT: f64 = 0.8;
-/// Row of the body's height among the coordinates of a robot.
-const BODY_Z: usize = JOINT_DIM + 2;
 const MAX_RETREATS: usize = 40;
 /// Relative error of evaluating a sample in floating point, with room to spare.
 const EVALUATION: f64 = 1e-9;

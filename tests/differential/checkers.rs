@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::process::Command;
 
 use romc::codegen::Precision;
-use romc::lower::{Form, LowerOptions};
+use romc::lower::Form;
 use romc::model::ReducedModel;
 
 use super::drivers::{Build, Workshop, contents, is_installed, succeed};
@@ -41,9 +41,9 @@ fn sanitizers_and_valgrind_are_silent_on_generated_functions() {
 #[test]
 fn sanitizers_and_valgrind_are_silent_on_selftests() {
     let models = models::shipped();
-    let options = LowerOptions::default();
-    let double = Workshop::new(&models, &options);
-    let single = Workshop::in_precision(&models, &options, Precision::Single);
+    let form = Form::default();
+    let double = Workshop::new(&models, form);
+    let single = Workshop::in_precision(&models, form, Precision::Single);
     let mut runs: Vec<(&Workshop, Build)> = Vec::new();
     runs.extend(memory_checkers().into_iter().map(|build| (&double, build)));
     runs.extend(Build::sanitized().map(|build| (&single, build)));
@@ -58,12 +58,12 @@ fn sanitizers_and_valgrind_are_silent_on_selftests() {
 fn emitted() -> Vec<Workshop> {
     let mut random: Vec<ReducedModel> = (0..SOME_MODELS / 4).map(models::random).collect();
     random.extend((0..2).map(models::random_nonlinear));
-    let tables = LowerOptions { form: Form::Tables };
-    let automatic = LowerOptions::default();
+    let tables = Form::Tables;
+    let automatic = Form::default();
     vec![
-        Workshop::new(&models::shipped(), &automatic),
-        Workshop::in_precision(&models::shipped(), &automatic, Precision::Single),
-        Workshop::new(&random, &tables),
+        Workshop::new(&models::shipped(), automatic),
+        Workshop::in_precision(&models::shipped(), automatic, Precision::Single),
+        Workshop::new(&random, tables),
     ]
 }
 

@@ -13,7 +13,7 @@ use romc::deploy::{EmitOptions, Target, emit};
 use romc::equations::Equations;
 use romc::files::Overwrite;
 use romc::files::write_files;
-use romc::lower::LowerOptions;
+use romc::lower::Form;
 use romc::model::ReducedModel;
 
 use super::agreement::Rule;
@@ -29,17 +29,13 @@ pub struct Workshop {
 }
 
 impl Workshop {
-    pub fn new(models: &[ReducedModel], lower: &LowerOptions) -> Self {
-        Self::in_precision(models, lower, Precision::Double)
+    pub fn new(models: &[ReducedModel], form: Form) -> Self {
+        Self::in_precision(models, form, Precision::Double)
     }
 
-    pub fn in_precision(
-        models: &[ReducedModel],
-        lower: &LowerOptions,
-        precision: Precision,
-    ) -> Self {
+    pub fn in_precision(models: &[ReducedModel], form: Form, precision: Precision) -> Self {
         let options = EmitOptions {
-            lower: *lower,
+            form,
             precision,
             ..EmitOptions::default()
         };

@@ -2,7 +2,7 @@
 
 use romc::equations::Equations;
 use romc::ir::{Interpreter, Program};
-use romc::lower::{self, JacobianPattern, LowerOptions};
+use romc::lower::{self, Form, JacobianPattern};
 use romc::model::{ModelError, ReducedModel, StateMap};
 
 /// A generated function: its name after the model's, and the program it must equal.
@@ -102,7 +102,7 @@ impl Function {
 }
 
 /// All functions that are generated for a model.
-pub fn functions(model: &ReducedModel, n_points: usize, options: &LowerOptions) -> Vec<Function> {
+pub fn functions(model: &ReducedModel, n_points: usize, form: Form) -> Vec<Function> {
     let name = model.identifier().as_str();
     let function = |name_of: String, program: Program, kind: Kind, n_points: usize| Function {
         model: name.to_owned(),
@@ -144,7 +144,7 @@ pub fn functions(model: &ReducedModel, n_points: usize, options: &LowerOptions) 
     for phase in 0..model.phases().len() {
         let phase_name = model.phase_identifier(phase);
         let named = |what: &str| format!("{phase_name}_{what}");
-        let program = lower::dynamics(&Equations::of(model), phase, options).expect("lowers");
+        let program = lower::dynamics(&Equations::of(model), phase, form).expect("lowers");
         let batch = (named("dynamics_batch"), program.clone());
         list.push(function(
             named("dynamics"),
@@ -154,7 +154,7 @@ pub fn functions(model: &ReducedModel, n_points: usize, options: &LowerOptions) 
         ));
         list.push(function(batch.0, batch.1, Kind::Batch(phase), BATCH_POINTS));
         let (program, pattern) =
-            lower::dynamics_jacobian(&Equations::of(model), phase, options).expect("lowers");
+            lower::dynamics_jacobian(&Equations::of(model), phase, form).expect("lowers");
         let kind = Kind::Jacobian(phase, pattern);
         list.push(function(
             named("dynamics_jacobian"),
@@ -162,7 +162,7 @@ pub fn functions(model: &ReducedModel, n_points: usize, options: &LowerOptions) 
             kind,
             n_points,
         ));
-        let program = lower::rk4_step(&Equations::of(model), phase, options).expect("lowers");
+        let program = lower::rk4_step(&Equations::of(model), phase, form).expect("lowers");
         list.push(function(
             named("step"),
             program,

@@ -2,7 +2,7 @@
 
 use romc::codegen::{Precision, worst_errors};
 use romc::ir::{Interpreter, Range};
-use romc::lower::{Form, LowerOptions};
+use romc::lower::Form;
 use romc::model::ReducedModel;
 
 use super::drivers::{Build, Workshop};
@@ -87,12 +87,11 @@ fn assert_within_bound(function: &Function, points: &[f64], found: &[f64], by: &
 }
 
 fn check(models: &[ReducedModel], form: Form, n_points: usize) {
-    let options = LowerOptions { form };
     let functions: Vec<Function> = models
         .iter()
-        .flat_map(|model| functions_of(model, n_points, &options))
+        .flat_map(|model| functions_of(model, n_points, form))
         .collect();
-    let workshop = Workshop::in_precision(models, &options, Precision::Single);
+    let workshop = Workshop::in_precision(models, form, Precision::Single);
     let mut random = Random(23);
     let points: Vec<Vec<f64>> = functions
         .iter()
@@ -148,7 +147,7 @@ fn single_precision_with_tables_equals_the_interpreter_and_stays_within_its_boun
 #[test]
 fn stated_bound_of_shipped_accelerations_is_within_two_orders_of_what_is_measured() {
     for model in models::shipped() {
-        for function in functions_of(&model, 2000, &LowerOptions::default()) {
+        for function in functions_of(&model, 2000, Form::default()) {
             if !function.name.ends_with("_dynamics") {
                 continue;
             }
@@ -168,8 +167,8 @@ fn stated_bound_of_shipped_accelerations_is_within_two_orders_of_what_is_measure
 #[test]
 fn selftests_in_single_precision_pass() {
     let models = models::shipped();
-    let options = LowerOptions::default();
-    let workshop = Workshop::in_precision(&models, &options, Precision::Single);
+    let form = Form::default();
+    let workshop = Workshop::in_precision(&models, form, Precision::Single);
     for model in &models {
         workshop.run_c_selftest(&Build::c_plain(), model.identifier().as_str());
     }

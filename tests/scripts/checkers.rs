@@ -7,7 +7,7 @@ use std::process::Command;
 use romc::deploy::{EmitOptions, Target, emit};
 use romc::equations::Equations;
 use romc::files::{Overwrite, write_files};
-use romc::lower::{Form, LowerOptions};
+use romc::lower::Form;
 use romc::model::ReducedModel;
 use serde_json::{Value, json};
 
@@ -75,7 +75,7 @@ fn cases(
     let (mut cases, mut left_out) = (Vec::new(), Vec::new());
     for (model, form) in models {
         let options = EmitOptions {
-            lower: LowerOptions { form },
+            form,
             ..EmitOptions::default()
         };
         let files = emit(&Equations::of(&model), &[target], &options).expect("emits");
@@ -83,7 +83,7 @@ fn cases(
         let own = folder.join(name);
         write_files(&own, &files, Overwrite::Refuse).expect("written");
         let file = own.join(format!("{name}{ending}"));
-        let functions = functions_of(&model, N_POINTS, &options.lower);
+        let functions = functions_of(&model, N_POINTS, options.form);
         // Arrays of points are the caller's loop in these languages.
         for function in functions.into_iter().filter(|f| !f.is_batch()) {
             let full_name = format!("{name}_{}", function.name);

@@ -6,7 +6,7 @@ use super::precision::{Precision, stated_bounds};
 use super::units::Units;
 use crate::equations::{Equations, LatentUnits, Unit, summand_words};
 use crate::ir::{Program, Slot, Statement, Unary};
-use crate::lower::{self, JacobianPattern, LowerError, LowerOptions};
+use crate::lower::{self, Form, JacobianPattern, LowerError};
 use crate::model::{CandidateTerm, CoordinateNames, ModelError, ReducedModel};
 use crate::robot::WrenchFrame;
 use crate::robot::kinematics::{LEAST_HEIGHT, LEAST_SPAN};
@@ -86,14 +86,10 @@ impl ModelInterface {
     ///
     /// # Errors
     /// [`LowerError`] if a phase cannot be lowered.
-    pub fn new(
-        system: &Equations<'_>,
-        options: &LowerOptions,
-        units: Units,
-    ) -> Result<Self, LowerError> {
+    pub fn new(system: &Equations<'_>, form: Form, units: Units) -> Result<Self, LowerError> {
         let model = &units.convert(system.model())?;
         let phases = (0..model.phases().len())
-            .map(|phase| phase_entries(system, phase, options))
+            .map(|phase| phase_entries(system, phase, form))
             .collect::<Result<_, _>>()?;
         Ok(Self {
             identifier: model.identifier().to_string(),
@@ -296,13 +292,13 @@ fn in_units(array: &str, units: Option<&Vec<Unit>>) -> String {
 fn phase_entries(
     system: &Equations<'_>,
     phase: usize,
-    options: &LowerOptions,
+    form: Form,
 ) -> Result<PhaseInterface, LowerError> {
     let identifier = system.model().phase_identifier(phase).to_string();
     let equations = equations(system, phase)?;
     let name = &system.phase(phase)?.name;
 
-    let program = lower::dynamics(system, phase, options)?;
+    let program = lower::dynamics(system, phase, form)?;
     let mut docs = vec![format!(
         "Latent accelerations of phase `{name}`: ddz = Xi^T Theta(z, dz, u_lat), {}.",
         match system.latent_units() {
@@ -313,7 +309,7 @@ fn phase_entries(
     docs.extend(equations);
     let dynamics = entry(format!("{identifier}_dynamics"), program, docs);
 
-    let (program, pattern) = lower::dynamics_jacobian(system, phase, options)?;
+    let (program, pattern) = lower::dynamics_jacobian(system, phase, form)?;
     let docs = vec![format!(
         "Latent accelerations of phase `{name}` and the structural nonzeros of their \
          Jacobian d ddz / d (z, dz, u_lat), row-major."
@@ -327,7 +323,7 @@ fn phase_entries(
         });
     }
 
-    let program = lower::rk4_step(system, phase, options)?;
+    let program = lower::rk4_step(system, phase, form)?;
     let docs = vec![format!(
         "Advances the latent state of phase `{name}` by h seconds: one step of the classical \
          Runge-Kutta method with u_lat held."

@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::{JacobianPattern, LowerError, LowerOptions};
+use super::{Form, JacobianPattern, LowerError};
 use crate::equations::Equations;
 use crate::ir::Interpreter;
 use crate::lower;
@@ -37,16 +37,16 @@ impl CompiledModel {
     /// As [`lower::dynamics_jacobian`].
     pub fn new(model: &ReducedModel) -> Result<Self, LowerError> {
         let system = &Equations::of(model);
-        let options = LowerOptions::default();
+        let form = Form::default();
         let phases = (0..model.phases().len())
             .map(|phase| {
-                let (jacobian, pattern) = lower::dynamics_jacobian(system, phase, &options)?;
+                let (jacobian, pattern) = lower::dynamics_jacobian(system, phase, form)?;
                 Ok(CompiledPhase {
-                    dynamics: Interpreter::new(&lower::dynamics(system, phase, &options)?),
+                    dynamics: Interpreter::new(&lower::dynamics(system, phase, form)?),
                     jacobian: Interpreter::new(&jacobian),
                     entries: vec![0.0; pattern.len()],
                     pattern,
-                    step: Interpreter::new(&lower::rk4_step(system, phase, &options)?),
+                    step: Interpreter::new(&lower::rk4_step(system, phase, form)?),
                     next: vec![0.0; 2 * model.latent_dim()],
                 })
             })
@@ -65,11 +65,6 @@ impl CompiledModel {
     /// Number of phases, in the order of the model's.
     pub fn n_phases(&self) -> usize {
         self.phases.len()
-    }
-
-    /// Where the Jacobian of a phase is not structurally zero.
-    pub fn pattern(&self, phase: usize) -> &JacobianPattern {
-        &self.phases[phase].pattern
     }
 
     /// `ddz = Xi^T Theta(z, dz, u_lat)`.
@@ -173,7 +168,7 @@ mod tests {
         }
         compiled.jacobian(1, &[0.7], &[-1.5], &[0.25], &mut ddz, &mut jacobian);
         assert_eq!((ddz[0], jacobian.as_slice()), (-9.81, [0.0; 3].as_slice()));
-        assert!(compiled.pattern(1).is_empty());
+        assert!(compiled.phases[1].pattern.is_empty());
     }
 
     #[test]

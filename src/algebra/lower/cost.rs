@@ -3,13 +3,6 @@
 use super::combination::Combination;
 use super::dense::n_weights;
 
-/// How programs are made from a model.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct LowerOptions {
-    /// Form of the accelerations and their Jacobian.
-    pub form: Form,
-}
-
 /// Form of the code that adds coefficients times candidate terms.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Form {
@@ -34,13 +27,13 @@ const LEAST_FILL_OF_FEW: f64 = 0.45;
 /// Fewer equations than these are few.
 const MANY_EQUATIONS: usize = 8;
 
-impl LowerOptions {
+impl Form {
     /// Whether the equations should become loops over tables.
-    pub(super) fn uses_tables(&self, equations: &[Combination]) -> bool {
-        match self.form {
-            Form::StraightLine => false,
-            Form::Tables => true,
-            Form::Automatic => {
+    pub(super) fn uses_tables(self, equations: &[Combination]) -> bool {
+        match self {
+            Self::StraightLine => false,
+            Self::Tables => true,
+            Self::Automatic => {
                 let active: usize = equations.iter().map(|e| e.items.len()).sum();
                 let entries = equations.len() * n_weights(equations);
                 let least_fill = match equations.len() < MANY_EQUATIONS {

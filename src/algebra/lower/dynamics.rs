@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use super::combination::Combination;
-use super::cost::LowerOptions;
+use super::cost::Form;
 use super::dense::{self, DenseJacobian};
 use super::error::LowerError;
 use super::expression::ExpressionLowering;
@@ -41,14 +41,10 @@ impl JacobianPattern {
 /// # Errors
 /// [`LowerError::Model`] if there is no such phase, [`LowerError::NonFinite`] if a
 /// coefficient overflows when folded.
-pub fn dynamics(
-    system: &Equations<'_>,
-    phase: usize,
-    options: &LowerOptions,
-) -> Result<Program, LowerError> {
+pub fn dynamics(system: &Equations<'_>, phase: usize, form: Form) -> Result<Program, LowerError> {
     let equations = accelerations(system, phase)?;
     let mut pool = system.pool().clone();
-    let (mut builder, ddz) = if options.uses_tables(&equations) {
+    let (mut builder, ddz) = if form.uses_tables(&equations) {
         let mut lowering = start(system, &pool, "dynamics");
         lowering.prepare(&expressions(&equations));
         let ddz = dense::matrix_vector(&mut lowering, &equations);
@@ -74,7 +70,7 @@ pub fn dynamics(
 pub fn dynamics_jacobian(
     system: &Equations<'_>,
     phase: usize,
-    options: &LowerOptions,
+    form: Form,
 ) -> Result<(Program, JacobianPattern), LowerError> {
     let equations = accelerations(system, phase)?;
     let mut pool = system.pool().clone();
@@ -83,7 +79,8 @@ pub fn dynamics_jacobian(
         rows: Vec::new(),
         cols: Vec::new(),
     };
-    let columns = columns(system);
+    let variables = LatentVariable::all(system.latent_dim());
+    let columns: Vec<SymbolId> = variables.map(|variable| system.symbol(variable)).collect();
     for (row, equation) in equations.iter().enumerate() {
         for (col, &variable) in columns.iter().enumerate() {
             let derivative = equation.derivative(&mut pool, variable);
@@ -97,10 +94,15 @@ pub fn dynamics_jacobian(
     }
     let n_terms = equations.iter().chain(&entries).map(|sum| sum.items.len());
     let n_terms = n_terms.sum();
-    let gradient = Gradient::new(options, &mut pool, &equations, &columns, n_terms);
+    let gradient = Gradient::new(form, &mut pool, &equations, &columns, n_terms);
     let (mut builder, ddz, jacobian) = if let Some(gradient) = gradient {
-        polynomial_jacobian(system, &pool, &gradient, &pattern)
-    } else if options.uses_tables(&equations) {
+        let mut lowering = start(system, &pool, "dynamics_jacobian");
+        lowering.prepare(gradient.expressions());
+        let (ddz, slopes) = gradient.lower(&mut lowering, system.latent_dim());
+        let places = pattern.rows.iter().zip(&pattern.cols);
+        let jacobian = places.map(|(&row, &col)| slopes[&(row, col)]).collect();
+        (lowering.builder, ddz, jacobian)
+    } else if form.uses_tables(&equations) {
         dense_jacobian(system, &mut pool, &equations, &columns, &pattern)
     } else {
         let sums = nested_jacobian(&mut pool, &equations, &columns, entries, &pattern);
@@ -140,28 +142,6 @@ fn nested_jacobian(
         sums.push(sum);
     }
     sums
-}
-
-/// Accelerations and the entries of the pattern by sums of vectors.
-fn polynomial_jacobian(
-    system: &Equations<'_>,
-    pool: &ExprPool,
-    gradient: &Gradient,
-    pattern: &JacobianPattern,
-) -> (ProgramBuilder, Vec<ValueId>, Vec<ValueId>) {
-    let mut lowering = start(system, pool, "dynamics_jacobian");
-    lowering.prepare(gradient.expressions());
-    let (ddz, slopes) = gradient.lower(&mut lowering, system.latent_dim());
-    let places = pattern.rows.iter().zip(&pattern.cols);
-    let jacobian = places.map(|(&row, &col)| slopes[&(row, col)]).collect();
-    (lowering.builder, ddz, jacobian)
-}
-
-/// The variables in the order of the Jacobian's columns.
-fn columns(system: &Equations<'_>) -> Vec<SymbolId> {
-    LatentVariable::all(system.latent_dim())
-        .map(|variable| system.symbol(variable))
-        .collect()
 }
 
 /// Accelerations and the entries of the pattern by tables.

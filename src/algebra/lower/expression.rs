@@ -264,10 +264,8 @@ impl<'a> ExpressionLowering<'a> {
     }
 
     fn angle(&mut self, argument: ExprId) -> (ValueId, ValueId) {
-        if !self.angles.contains_key(&argument) {
-            self.sines_and_cosines(&[argument]);
-        }
-        self.angles[&argument]
+        let (sines, cosines) = self.angles(&[argument]);
+        (sines[0], cosines[0])
     }
 }
 

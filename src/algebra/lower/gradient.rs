@@ -10,7 +10,7 @@
 use std::collections::{BTreeMap, HashMap};
 
 use super::combination::Combination;
-use super::cost::{Form, LowerOptions};
+use super::cost::Form;
 use super::expression::ExpressionLowering;
 use crate::ir::{QUAD, Quad, QuadSum, Table, ValueId};
 use crate::symbolic::{ExprId, ExprPool, Node, SymbolId};
@@ -43,13 +43,13 @@ impl Gradient {
     /// Divides the equations; nothing if another form is asked for or expected to run faster. `n_terms` is
     /// the number of coefficients of equations and derivatives.
     pub fn new(
-        options: &LowerOptions,
+        form: Form,
         pool: &mut ExprPool,
         equations: &[Combination],
         columns: &[SymbolId],
         n_terms: usize,
     ) -> Option<Self> {
-        if options.form != Form::Automatic || n_terms < FEWEST_TERMS {
+        if form != Form::Automatic || n_terms < FEWEST_TERMS {
             return None;
         }
         let terms = Terms::new(pool, equations, columns);
@@ -359,7 +359,7 @@ mod tests {
 
     use crate::equations::Equations;
     use crate::ir::{Interpreter, Program, Statement};
-    use crate::lower::{Form, LowerOptions, dynamics_jacobian};
+    use crate::lower::{Form, dynamics_jacobian};
     use crate::model::{FeetRule, Library, Phase, ReducedModel};
 
     /// Five equations with about every third of all monomials up to degree 3 in four of the coordinates, a
@@ -395,8 +395,7 @@ mod tests {
     fn lowered(form: Form) -> (Program, Vec<f64>) {
         let model = cubic();
         let system = Equations::of(&model);
-        let (program, pattern) =
-            dynamics_jacobian(&system, 0, &LowerOptions { form }).expect("lowers");
+        let (program, pattern) = dynamics_jacobian(&system, 0, form).expect("lowers");
         let point =
             |shift: f64| -> Vec<f64> { (0..5).map(|k| shift - 0.4 * f64::from(k)).collect() };
         let (mut ddz, mut entries) = (vec![0.0; 5], vec![0.0; pattern.len()]);

@@ -24,7 +24,7 @@ mod sums;
 mod wrench;
 
 pub use compiled::CompiledModel;
-pub use cost::{Form, LowerOptions};
+pub use cost::Form;
 pub use dynamics::{JacobianPattern, dynamics, dynamics_jacobian};
 pub use error::LowerError;
 pub use maps::{

@@ -230,12 +230,9 @@ fn activation(
     activation: Activation,
     a: ValueId,
 ) -> (ValueId, Option<ValueId>) {
-    if activation == Activation::Linear {
-        return (a, None);
-    }
     let mut steps = Steps(builder);
     let (value, slope) = match activation {
-        Activation::Linear => unreachable!("returned above"),
+        Activation::Linear => return (a, None),
         Activation::Elu => {
             let below = steps.negative_part(a);
             let above = steps.positive_part(a);

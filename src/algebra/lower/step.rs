@@ -1,6 +1,6 @@
 //! One step of the classical Runge-Kutta method, with the input held.
 
-use super::cost::LowerOptions;
+use super::cost::Form;
 use super::dynamics::dynamics;
 use super::error::LowerError;
 use crate::equations::Equations;
@@ -12,12 +12,8 @@ use crate::ir::{Program, ProgramBuilder, ValueId};
 ///
 /// # Errors
 /// As [`dynamics`].
-pub fn rk4_step(
-    system: &Equations<'_>,
-    phase: usize,
-    options: &LowerOptions,
-) -> Result<Program, LowerError> {
-    let accelerations = dynamics(system, phase, options)?;
+pub fn rk4_step(system: &Equations<'_>, phase: usize, form: Form) -> Result<Program, LowerError> {
+    let accelerations = dynamics(system, phase, form)?;
     let d = system.latent_dim();
     let mut builder = ProgramBuilder::new("step");
     let z = builder.input("z", d);

@@ -12,6 +12,10 @@ pub const JOINT_DIM: usize = 12;
 pub const BODY_DIM: usize = 6;
 /// Number of coordinates of the state `x`, and of entries of the input `u`.
 pub const STATE_DIM: usize = JOINT_DIM + BODY_DIM;
+/// Row of the body's position along x in the state; y and z follow.
+pub const BODY_X: usize = JOINT_DIM;
+/// Row of the body's height in the state.
+pub const BODY_Z: usize = JOINT_DIM + 2;
 /// Number of feet.
 pub const FOOT_DIM: usize = 4;
 /// Number of joints of a leg.

@@ -16,7 +16,7 @@ use crate::codegen::{Precision, SineCosine, Units, rust};
 use crate::deploy::{EmitError, PlannedJump};
 use crate::equations::Equations;
 use crate::files::EmittedFile;
-use crate::lower::LowerOptions;
+use crate::lower::Form;
 use crate::model::ReducedModel;
 use crate::mpc::ControlModel;
 use crate::mpc::interface::{Settings, TEXTS};
@@ -70,12 +70,12 @@ templates! {
 /// [`EmitError::Lower`] and [`EmitError::Template`].
 pub fn emit(
     equations: &Equations<'_>,
-    options: &LowerOptions,
+    form: Form,
     provenance: &str,
     plan: Option<&PlannedJump>,
 ) -> Result<Vec<EmittedFile>, EmitError> {
     let plant = plant(equations.model())?;
-    let entries = &ModelInterface::new(equations, options, Units::Si)?;
+    let entries = &ModelInterface::new(equations, form, Units::Si)?;
     let name = entries.identifier.as_str();
     let folder = format!("{name}-controller");
     let mut files = Vec::new();

@@ -264,17 +264,17 @@ fn one_step(
         Some(recorded) if is_plausible(controller.plant().robot(), &recorded) => {
             tally.torque.add(feet, &command.torque_nm, &recorded);
         }
-        Some(_) | None => tally.implausible += 1,
+        Some(_) | None => tally.summary.implausible += 1,
     }
     let limits = controller.plant().robot().torque_limit_nm();
-    tally.limit_violations += usize::from(exceeds(&command.torque_nm, limits, 1.0));
+    tally.summary.limit_violations += usize::from(exceeds(&command.torque_nm, limits, 1.0));
     if command.status.has_plan() {
         let planned = controller.planned_deviations();
         planned.for_each(|deviation| tally.tracking.add(deviation * deviation));
     }
     let stance = stance(controller, segment, sample);
     if let Some(violated) = friction_violated(controller, &command, stance.as_ref()) {
-        *tally.friction_violations.get_or_insert(0) += usize::from(violated);
+        *tally.summary.friction_violations.get_or_insert(0) += usize::from(violated);
     }
     StepRow {
         segment: number,

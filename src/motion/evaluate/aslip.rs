@@ -1,13 +1,11 @@
 //! The baseline: the actuated spring-loaded inverted pendulum, equations (27) and (28).
 
-use std::ops::Range;
-
 use nalgebra::{DMatrix, Rotation3, Vector2, Vector3};
 
 use super::metrics::FitSums;
 use crate::recording::segment::between;
 use crate::recording::{RecordingError, Segment};
-use crate::robot::{InputRule, JOINT_DIM, Leg, Robot, WrenchFrame};
+use crate::robot::{BODY_X, BODY_Z, InputRule, JOINT_DIM, Leg, Robot, WrenchFrame};
 use crate::sim::{
     IntegrationOptions, OdeSystem, Restart, SimError, integrate, integrate_stretches,
     restart_windows,
@@ -74,49 +72,30 @@ impl Aslip {
     ) -> Result<AslipRollout, SimError> {
         let stances = stances(rule, segment)?;
         let mut position_m = vec![None; segment.len()];
-        let windows = restart_windows(&segment.time_s, restart);
-        for window in &windows {
-            self.roll_window(segment, &stances, window.clone(), &mut position_m);
-        }
-        Ok(AslipRollout {
-            windows,
-            position_m,
-        })
-    }
-
-    fn roll_window(
-        &self,
-        segment: &Segment,
-        stances: &[Option<Stance>],
-        window: Range<usize>,
-        position_m: &mut [Option<Vector2<f64>>],
-    ) {
-        let (x, z) = (BODY_X, BODY_Z);
-        let start = window.start;
-        let initial = [
-            segment.x[(x, start)],
-            segment.x[(z, start)],
-            segment.dx[(x, start)],
-            segment.dx[(z, start)],
-        ];
         let down = |sample: usize| stances[sample].is_some();
-        let found = integrate_stretches(
-            &initial,
-            &segment.time_s,
-            window,
-            |a, b| down(a) == down(b),
-            |stretch, state, times| {
-                let mut span = PendulumSpan {
-                    pendulum: self,
-                    stances: &stances[stretch],
-                    times,
-                };
-                integrate(&mut span, state, times, &IntegrationOptions::default())
-            },
-        );
-        for (state, position) in found.states.column_iter().zip(&mut position_m[start..]) {
-            *position = Some(Vector2::new(state[0], state[1]));
+        for window in restart_windows(&segment.time_s, restart) {
+            let start = window.start;
+            let at = |rows: &DMatrix<f64>| [BODY_X, BODY_Z].map(|row| rows[(row, start)]);
+            let initial = [at(&segment.x), at(&segment.dx)].concat();
+            let (states, _) = integrate_stretches(
+                &initial,
+                &segment.time_s,
+                window,
+                |a, b| down(a) == down(b),
+                |stretch, state, times| {
+                    let mut span = PendulumSpan {
+                        pendulum: self,
+                        stances: &stances[stretch],
+                        times,
+                    };
+                    integrate(&mut span, state, times, &IntegrationOptions::default())
+                },
+            );
+            for (state, position) in states.column_iter().zip(&mut position_m[start..]) {
+                *position = Some(Vector2::new(state[0], state[1]));
+            }
         }
+        Ok(position_m)
     }
 }
 
@@ -160,17 +139,8 @@ impl OdeSystem for PendulumSpan<'_> {
     }
 }
 
-pub(super) const BODY_X: usize = JOINT_DIM;
-pub(super) const BODY_Z: usize = JOINT_DIM + 2;
-
-/// Positions that the pendulum predicts for one segment.
-#[derive(Debug, Clone, PartialEq)]
-pub struct AslipRollout {
-    /// Samples between restarts.
-    pub windows: Vec<Range<usize>>,
-    /// Predicted body x and z, m, a sample; none after a divergence.
-    pub position_m: Vec<Option<Vector2<f64>>>,
-}
+/// Body x and z, m, that the pendulum predicts for each sample of a segment; none after a divergence.
+pub type AslipRollout = Vec<Option<Vector2<f64>>>;
 
 /// Residuals of the pendulum.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -183,8 +153,8 @@ pub struct AslipSums {
 
 impl AslipSums {
     /// Adds the residuals of a rollout of `segment`.
-    pub fn add(&mut self, segment: &Segment, rollout: &AslipRollout) {
-        for (sample, position) in rollout.position_m.iter().enumerate() {
+    pub fn add(&mut self, segment: &Segment, rollout: &[Option<Vector2<f64>>]) {
+        for (sample, position) in rollout.iter().enumerate() {
             if let Some(position) = position {
                 self.x.add(segment.x[(BODY_X, sample)], position.x);
                 self.z.add(segment.x[(BODY_Z, sample)], position.y);

@@ -12,7 +12,7 @@ use crate::lower::CompiledModel;
 use crate::model::ReducedModel;
 use crate::recording::{Recording, Segment};
 use crate::robot::Robot;
-use crate::sim::{IntegrationOptions, LatentSegment, Restart, Rollout, rollout};
+use crate::sim::{LatentSegment, Restart, Rollout, rollout};
 
 /// What was recorded and predicted for one segment.
 #[derive(Debug, Clone)]
@@ -107,9 +107,8 @@ impl<'a> Assessment<'a> {
     ) -> Result<(), EvaluateError> {
         let restart = Restart::Every(self.restart_every_s);
         let latent = LatentSegment::encode(model, segment)?;
-        let options = IntegrationOptions::default();
-        let full = rollout(compiled, &latent, Restart::Never, &options);
-        let restarted = rollout(compiled, &latent, restart, &options);
+        let full = rollout(compiled, &latent, Restart::Never);
+        let restarted = rollout(compiled, &latent, restart);
         self.full.add_rollout(model, segment, &latent, &full)?;
         (self.restarted).add_rollout(model, segment, &latent, &restarted)?;
         self.pointwise.add(model, segment, &latent)?;

@@ -4,9 +4,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::aslip::{Aslip, AslipRollout, AslipSums, BODY_X, BODY_Z, stances};
+use super::aslip::{Aslip, AslipRollout, AslipSums, stances};
 use crate::recording::{RecordingError, Segment};
-use crate::robot::InputRule;
+use crate::robot::{BODY_X, BODY_Z, InputRule};
 use crate::sim::{Restart, SimError};
 
 /// A template, where its constants come from, and its residuals.
@@ -23,26 +23,21 @@ pub struct Baseline {
 }
 
 impl Baseline {
-    /// A template without residuals yet.
-    pub fn new(name: &'static str, template: Aslip) -> Self {
-        Self {
-            name,
-            template,
-            full: AslipSums::default(),
-            restarted: AslipSums::default(),
-        }
-    }
-
     /// The pendulum with the published constants, and with those that `segments` fit best.
     ///
     /// # Errors
     /// [`RecordingFault::Wrench`](crate::recording::RecordingFault::Wrench) if an angle or torque is not finite.
     pub fn all(rule: &InputRule, segments: &[&Segment]) -> Result<Vec<Self>, RecordingError> {
-        let mut baselines = vec![Self::new("ASLIP, published constants", Aslip::PUBLISHED)];
-        if let Some(fitted) = fit_aslip(rule, segments)? {
-            baselines.push(Self::new("ASLIP, fitted constants", fitted));
-        }
-        Ok(baselines)
+        let published = ("ASLIP, published constants", Aslip::PUBLISHED);
+        let fitted = fit_aslip(rule, segments)?.map(|fitted| ("ASLIP, fitted constants", fitted));
+        let templates = [published].into_iter().chain(fitted);
+        let baselines = templates.map(|(name, template)| Self {
+            name,
+            template,
+            full: AslipSums::default(),
+            restarted: AslipSums::default(),
+        });
+        Ok(baselines.collect())
     }
 
     /// Adds the residuals over one segment; the rollout over the whole of it is returned.

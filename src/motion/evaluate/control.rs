@@ -18,7 +18,7 @@ pub struct StepTimes {
 }
 
 /// Summary of a run along a recording.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Summary {
     /// Control steps.
     pub steps: usize,
@@ -58,9 +58,8 @@ pub struct Summary {
 /// Everything that a summary is made of.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Tally {
-    solved: usize,
-    softened: usize,
-    failed: usize,
+    /// The counts.
+    pub(super) summary: Summary,
     times_us: Vec<f64>,
     pub(super) preparations_us: Vec<f64>,
     inconsistency: Mean,
@@ -68,17 +67,16 @@ pub(super) struct Tally {
     pub(super) lift: Comparison,
     /// Squares of planned minus reference positions.
     pub(super) tracking: Mean,
-    pub(super) limit_violations: usize,
-    pub(super) friction_violations: Option<usize>,
-    pub(super) implausible: usize,
 }
 
 impl Tally {
     pub(super) fn count(&mut self, command: &Command) {
+        let counts = &mut self.summary;
+        counts.steps += 1;
         match command.status {
-            Status::Softened => self.softened += 1,
-            status if status.has_plan() => self.solved += 1,
-            _ => self.failed += 1,
+            Status::Softened => counts.softened += 1,
+            status if status.has_plan() => counts.solved += 1,
+            _ => counts.failed += 1,
         }
         self.times_us.push(command.solve_us);
         if let Some(value) = command.inconsistency {
@@ -90,20 +88,14 @@ impl Tally {
         self.times_us.sort_by(f64::total_cmp);
         self.preparations_us.sort_by(f64::total_cmp);
         Summary {
-            steps: self.times_us.len(),
-            solved: self.solved,
-            softened: self.softened,
-            failed: self.failed,
             step_us: step_times(&self.times_us),
             prepare_us: step_times(&self.preparations_us),
             torque_r2: self.torque.r2(),
             lift_r2: self.lift.r2(),
             torque_rms_nm: self.torque.rms(),
             tracking_rms: self.tracking.get().map(f64::sqrt),
-            limit_violations: self.limit_violations,
-            friction_violations: self.friction_violations,
             inconsistency: self.inconsistency.get(),
-            implausible: self.implausible,
+            ..self.summary
         }
     }
 }

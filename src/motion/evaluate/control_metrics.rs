@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::along_recording::{ReferenceInput, along_recording};
 use super::error::EvaluateError;
-use super::prediction::{PredictionError, Predictor, prediction_error, recorded_stages};
+use super::prediction::{PredictionError, prediction_error, recorded_stages};
 use super::recovery::{Driver, Recovery, recovery};
 use super::torque::ByContact;
 use super::uninformed::uninformed;
@@ -99,7 +99,7 @@ pub fn control_metrics(
         ..settings
     };
     let stages = recorded_stages(model, recording, settings.step_s)?;
-    let predicted = |predictor: &Predictor<'_>| prediction_error(model, predictor, &stages);
+    let predicted = |dynamics: Option<&ReducedModel>| prediction_error(model, dynamics, &stages);
     let blind = uninformed(model, &stages)?;
     let mut controller = Controller::new(model, settings)?;
     let mut blind_controller = Controller::new(&blind, settings)?;
@@ -114,7 +114,7 @@ pub fn control_metrics(
         recovery_rms_m: recovery.rms_m(),
     };
     let metrics = ControlMetrics {
-        prediction_rms: predicted(&Predictor::Model(model))?,
+        prediction_rms: predicted(Some(model))?,
         torque_r2: run.torque_r2,
         torque_rms_nm: run.torque_rms_nm,
         inconsistency: run.inconsistency,
@@ -122,7 +122,7 @@ pub fn control_metrics(
         tracking_rms: feedback.tracking_rms(),
         baseline: Baselines {
             knows_nothing: KnowsNothing {
-                prediction_rms: predicted(&Predictor::Model(&blind))?,
+                prediction_rms: predicted(Some(&blind))?,
                 torque_r2: blind_run.torque_r2,
                 torque_rms_nm: blind_run.torque_rms_nm,
                 recovery_rms_m: pushed(&mut blind_controller, Driver::Feedback)?.rms_m(),
@@ -130,7 +130,7 @@ pub fn control_metrics(
             feedback_off: off(pushed(&mut controller, Driver::NoFeedback)?),
             replay: off(pushed(&mut controller, Driver::Replay)?),
             constant_velocity: ConstantVelocity {
-                prediction_rms: predicted(&Predictor::ConstantVelocity)?,
+                prediction_rms: predicted(None)?,
             },
         },
         failure: None,

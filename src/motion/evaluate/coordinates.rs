@@ -1,7 +1,5 @@
 //! Rollouts against the recording, coordinate by coordinate, in SI units.
 
-use nalgebra::DVector;
-
 use super::metrics::{Fit, FitSums};
 use crate::model::{ModelError, ReducedModel};
 use crate::recording::Segment;
@@ -47,23 +45,19 @@ impl CoordinateSums {
     ) -> Result<(), ModelError> {
         for (sample, window, column) in rollout.predictions() {
             let x = model.decode(&window.z.column(column).into_owned())?;
-            let phase = latent.phase[sample];
-            self.add_sample(phase, &segment.x.column(sample).into_owned(), &x);
+            let of_phase = &mut self.by_phase[latent.phase[sample]];
+            let sums = self.sums.iter_mut().zip(of_phase);
+            let recorded = segment.x.column(sample);
+            for (((sums, of_phase), &y), &y_hat) in sums.zip(recorded.iter()).zip(&x) {
+                sums.add(y, y_hat);
+                of_phase.add(y, y_hat);
+            }
         }
         self.windows += rollout.windows.len();
         self.diverged += (rollout.windows.iter())
             .filter(|window| window.diverged_at_s.is_some())
             .count();
         Ok(())
-    }
-
-    fn add_sample(&mut self, phase: usize, recorded: &DVector<f64>, predicted: &DVector<f64>) {
-        let of_phase = &mut self.by_phase[phase];
-        let sums = self.sums.iter_mut().zip(of_phase);
-        for (((sums, of_phase), &y), &y_hat) in sums.zip(recorded).zip(predicted) {
-            sums.add(y, y_hat);
-            of_phase.add(y, y_hat);
-        }
     }
 
     /// Fit of each coordinate, in the order of the state; `None` before the first sample.

@@ -8,11 +8,8 @@ use nalgebra::{DMatrix, DVector, SVector, SymmetricEigen};
 use serde::Serialize;
 
 use crate::model::{ModelError, ReducedModel};
-use crate::robot::{ContactFlags, JOINT_DIM, Leg, STATE_DIM};
+use crate::robot::{BODY_X, BODY_Z, ContactFlags, JOINT_DIM, Leg, STATE_DIM};
 
-/// Rows of body x and of body z.
-const FORWARD: usize = JOINT_DIM;
-const UP: usize = JOINT_DIM + 2;
 /// By how much the robot is moved, m.
 const SHIFT_M: f64 = 0.3;
 /// By how much a joint is off for its mirror image, rad.
@@ -68,15 +65,15 @@ impl Invariance {
         model.robot()?;
         let phases = 0..model.phases().len();
         let phases = phases.map(|phase| PhaseInvariance::of(model, phase, &rest));
-        let height = Height::of(model, &rest)?;
+        let [gravity_m_s2, mass_kg] = by_height(model, &rest)?;
         let mut moved = rest.clone();
-        moved[FORWARD] += SHIFT_M;
+        moved[BODY_X] += SHIFT_M;
         let decoded = |x: &DVector<f64>| model.decode(&model.encode(x)?);
         let change = decoded(&moved)? - decoded(&rest)?;
         Ok(Self {
             joint_shift_rad_m: change.rows(0, JOINT_DIM).amax() / SHIFT_M,
-            gravity_m_s2: height.as_ref().and_then(|height| height.gravity_m_s2),
-            mass_kg: height.and_then(|height| height.mass_kg),
+            gravity_m_s2,
+            mass_kg,
             phases: phases.collect::<Result<_, _>>()?,
         })
     }
@@ -93,7 +90,7 @@ impl PhaseInvariance {
             let here = accelerated(rest, &velocity, &input)?;
             for (axis, shift) in shifts.iter_mut().enumerate() {
                 let mut moved = rest.clone();
-                moved[FORWARD + axis] += SHIFT_M;
+                moved[BODY_X + axis] += SHIFT_M;
                 let there = accelerated(&moved, &velocity, &input)?;
                 *shift = larger(*shift, (there - &here).norm() / SHIFT_M);
             }
@@ -135,7 +132,7 @@ fn velocities() -> [DVector<f64>; 4] {
     std::array::from_fn(|index| {
         let mut dx = DVector::zeros(STATE_DIM);
         if let Some(axis) = index.checked_sub(1) {
-            dx[FORWARD + axis] = 1.0;
+            dx[BODY_X + axis] = 1.0;
         }
         dx
     })
@@ -179,7 +176,7 @@ impl Instant<'_> {
     ) -> Result<DVector<f64>, ModelError> {
         let ddz = self.latent_acceleration(model, phase)?;
         let decoder = model.decoder_jacobian(&model.encode(self.x)?)?;
-        Ok(decoder.rows(FORWARD, 3) * ddz)
+        Ok(decoder.rows(BODY_X, 3) * ddz)
     }
 }
 
@@ -194,77 +191,52 @@ fn mirrored(vector: &DVector<f64>) -> DVector<f64> {
             image[3 * leg.index() + joint] = sign * vector[3 * other.index() + joint];
         }
     }
-    for row in [FORWARD + 1, FORWARD + 3, FORWARD + 5] {
+    for row in [BODY_X + 1, BODY_X + 3, BODY_X + 5] {
         image[row] = -vector[row];
     }
     image
 }
 
-/// What the latent combination that is body z and joints alone says.
-struct Height {
-    gravity_m_s2: Option<f64>,
-    mass_kg: Option<f64>,
-}
-
-impl Height {
-    fn of(model: &ReducedModel, rest: &DVector<f64>) -> Result<Option<Self>, ModelError> {
-        let tangent = model.tangent(rest)?;
-        let body = tangent
-            .encode
-            .columns(JOINT_DIM, STATE_DIM - JOINT_DIM)
-            .transpose();
-        let mut up = DVector::zeros(STATE_DIM - JOINT_DIM);
-        up[UP - JOINT_DIM] = 1.0;
-        let Ok(inverse) = body.clone().pseudo_inverse(1e-9 * body.amax()) else {
-            return Ok(None);
-        };
-        let particular = &inverse * &up;
-        if (&body * &particular - up).amax() > PURE {
-            return Ok(None);
-        }
-        let d = model.latent_dim();
-        let projector = SymmetricEigen::new(DMatrix::identity(d, d) - &inverse * &body);
-        let free: Vec<usize> = (0..d).filter(|&i| projector.eigenvalues[i] > 0.5).collect();
-        let others = projector.eigenvectors.select_columns(&free);
-        let still = DVector::zeros(STATE_DIM);
-        let flight = model.phase_for([false; 4]);
-        let of_flight = |phase| -> Result<(DMatrix<f64>, DVector<f64>), ModelError> {
-            let input = mean_input(model, phase);
-            let at = Instant {
-                x: rest,
-                dx: &still,
-                u: &input,
-            };
-            let ddz = at.latent_acceleration(model, phase)?;
-            Ok((gain(model, phase, rest, &input, &ddz)?, ddz))
-        };
-        let (combination, gravity_m_s2) = match flight {
-            None => (particular, None),
-            Some(phase) => {
-                let (change, ddz) = of_flight(phase)?;
-                let change = change.transpose();
-                let combination = match free.is_empty() {
-                    true => particular,
-                    false => {
-                        let inside = &change * &others;
-                        let least = 1e-9 * change.amax();
-                        match inside.pseudo_inverse(least) {
-                            Ok(inverse) => {
-                                &particular - &others * (inverse * (&change * &particular))
-                            }
-                            Err(_) => particular,
-                        }
-                    }
-                };
-                let gravity_m_s2 = -combination.dot(&ddz);
-                (combination, Some(gravity_m_s2))
-            }
-        };
-        Ok(Some(Self {
-            gravity_m_s2: gravity_m_s2.filter(|value| value.is_finite()),
-            mass_kg: mass_kg(model, rest, &combination)?,
-        }))
+/// Gravity and mass, by the latent combination that is body z and joints alone.
+fn by_height(model: &ReducedModel, rest: &DVector<f64>) -> Result<[Option<f64>; 2], ModelError> {
+    let body_dim = STATE_DIM - JOINT_DIM;
+    let encode = model.tangent(rest)?.encode;
+    let body = encode.columns(JOINT_DIM, body_dim).transpose();
+    let mut up = DVector::zeros(body_dim);
+    up[BODY_Z - JOINT_DIM] = 1.0;
+    let Ok(inverse) = body.clone().pseudo_inverse(1e-9 * body.amax()) else {
+        return Ok([None; 2]);
+    };
+    let particular = &inverse * &up;
+    if (&body * &particular - up).amax() > PURE {
+        return Ok([None; 2]);
     }
+    let Some(phase) = model.phase_for([false; 4]) else {
+        return Ok([None, mass_kg(model, rest, &particular)?]);
+    };
+    let d = model.latent_dim();
+    let projector = SymmetricEigen::new(DMatrix::identity(d, d) - &inverse * &body);
+    let free: Vec<usize> = (0..d).filter(|&i| projector.eigenvalues[i] > 0.5).collect();
+    let others = projector.eigenvectors.select_columns(&free);
+    let input = mean_input(model, phase);
+    let flight = Instant {
+        x: rest,
+        dx: &DVector::zeros(STATE_DIM),
+        u: &input,
+    };
+    let ddz = flight.latent_acceleration(model, phase)?;
+    let change = gain(model, phase, rest, &input, &ddz)?.transpose();
+    let inverse = || (&change * &others).pseudo_inverse(1e-9 * change.amax());
+    let combination = match (!free.is_empty()).then(inverse) {
+        Some(Ok(inverse)) => &particular - &others * (inverse * (&change * &particular)),
+        Some(Err(_)) | None => particular,
+    };
+    let gravity_m_s2 = -combination.dot(&ddz);
+    let mass_kg = mass_kg(model, rest, &combination)?;
+    Ok([
+        Some(gravity_m_s2).filter(|value| value.is_finite()),
+        mass_kg,
+    ])
 }
 
 /// By how much `ddz` changes with each of `(z, dz, u_lat)`, `latent_dim x 3 latent_dim`, by differences over a unit.

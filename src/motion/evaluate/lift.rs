@@ -1,23 +1,23 @@
 //! What the plain lift `u = W_e^T u_lat` alone loses, without any controller.
 
-use nalgebra::DVector;
-
 use super::metrics::Mean;
-use super::torque::{ByContact, Comparison, is_plausible};
+use super::torque::{Comparison, is_plausible};
 use crate::model::ReducedModel;
 use crate::recording::Segment;
-use crate::robot::{InputRule, JOINT_DIM};
+use crate::robot::JOINT_DIM;
 use crate::sim::SimError;
 
 /// Lifted force and moment, in N and N m together, below which their inconsistency means nothing.
 const SMALL_FORCE_N: f64 = 1.0;
+
 /// Torques of exactly projected and lifted inputs against the recorded ones.
 ///
 /// Per sample `u_lat = pinv(W_e^T) s_u u`, `u_lift = W_e^T u_lat / s_u`; what the joints take at the
 /// recorded velocities and accelerations is added to the lifted torques.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct LiftSums {
-    torque: Comparison,
+    /// Agreement of the torques over all joints jointly.
+    pub torque: Comparison,
     inconsistency: Mean,
 }
 
@@ -44,39 +44,17 @@ impl LiftSums {
             let of_joints = std::array::from_fn(|joint| lifted[joint] + losses[(joint, sample)]);
             self.torque.add(feet, &of_joints, &torque);
             if feet.contains(&true) {
-                self.add_inconsistency(&rule, segment, sample, &lifted);
+                let torque = std::array::from_fn(|joint| lifted[joint]);
+                let force = lifted.rows(JOINT_DIM, 6).into_owned();
+                if let Ok(produced) = rule.wrench(&segment.state(sample), &torque, feet)
+                    && force.norm() > SMALL_FORCE_N
+                {
+                    let off = (&force - produced).norm() / force.norm();
+                    self.inconsistency.add(off);
+                }
             }
         }
         Ok(())
-    }
-
-    fn add_inconsistency(
-        &mut self,
-        rule: &InputRule,
-        segment: &Segment,
-        sample: usize,
-        lifted: &DVector<f64>,
-    ) {
-        let torque = std::array::from_fn(|joint| lifted[joint]);
-        let feet = segment.feet[sample];
-        let Ok(produced) = rule.wrench(&segment.state(sample), &torque, feet) else {
-            return;
-        };
-        let force = lifted.rows(JOINT_DIM, 6).into_owned();
-        if force.norm() > SMALL_FORCE_N {
-            self.inconsistency
-                .add((&force - produced).norm() / force.norm());
-        }
-    }
-
-    /// Coefficients of determination of the torques over all joints jointly, see [`Comparison::r2`].
-    pub fn torque_r2(&self) -> ByContact {
-        self.torque.r2()
-    }
-
-    /// The same over all samples, see [`Comparison::r2_all`].
-    pub fn torque_r2_all(&self) -> Option<f64> {
-        self.torque.r2_all()
     }
 
     /// Mean of `|F_lift - G tau_lift| / |F_lift|` over samples with a foot down: how far the lifted
@@ -124,8 +102,8 @@ mod tests {
             }
             sums
         });
-        assert!(six.torque_r2().contact > two.torque_r2().contact);
-        assert!(six.torque_r2().contact.expect("contact") > 0.9);
+        assert!(six.torque.r2().contact > two.torque.r2().contact);
+        assert!(six.torque.r2().contact.expect("contact") > 0.9);
         assert!(six.inconsistency().expect("contact") < 1.0);
     }
 }

@@ -99,28 +99,17 @@ mod tests {
     }
 
     #[test]
-    fn fit_of_exact_prediction_is_perfect() {
-        let fit = sums(&[(1.0, 1.0), (2.0, 2.0), (4.0, 4.0)]).fit();
-        assert_eq!(
-            fit,
-            Some(Fit {
-                rms: 0.0,
-                r2: Some(1.0)
-            })
-        );
-    }
-
-    #[test]
-    fn fit_by_the_mean_explains_nothing() {
-        let fit = sums(&[(1.0, 2.0), (3.0, 2.0)]).fit().expect("two pairs");
-        assert_eq!(fit.r2, Some(0.0));
-        assert_eq!(fit.rms, 1.0);
-    }
-
-    #[test]
-    fn fit_of_a_record_that_does_not_move_has_no_r2() {
-        assert_eq!(sums(&[(2.0, 2.5)]).fit().expect("one pair").r2, None);
-        assert_eq!(FitSums::default().fit(), None);
+    fn exact_prediction_is_perfect_the_mean_explains_nothing_and_a_still_record_has_no_r2() {
+        let fit = |rms, r2| Some(Fit { rms, r2 });
+        let exact: &[(f64, f64)] = &[(1.0, 1.0), (2.0, 2.0), (4.0, 4.0)];
+        for (pairs, expected) in [
+            (exact, fit(0.0, Some(1.0))),
+            (&[(1.0, 2.0), (3.0, 2.0)], fit(1.0, Some(0.0))),
+            (&[(2.0, 2.5)], fit(0.5, None)),
+            (&[], None),
+        ] {
+            assert_eq!(sums(pairs).fit(), expected, "{pairs:?}");
+        }
     }
 
     #[test]

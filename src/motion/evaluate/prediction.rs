@@ -92,27 +92,17 @@ pub(super) fn recorded_stages(
     Ok(stages)
 }
 
-/// How a stage's end is predicted from its beginning.
-pub(super) enum Predictor<'a> {
-    /// By a model's dynamics, the input held at its mean.
-    Model(&'a ReducedModel),
-    /// The velocity stays what it is.
-    ConstantVelocity,
-}
-
-/// The error of predictions over all stages, decoded by `maps`; none without stages.
+/// The error of predictions over all stages, decoded by `maps`; none without stages. A stage's end is predicted from its
+/// beginning by a model's dynamics with the input held at its mean, or, without a model, by a constant velocity.
 ///
 /// # Errors
 /// [`EvaluateError::Lower`] if the dynamics do not compile, [`EvaluateError::Model`] for a latent-only model.
 pub(super) fn prediction_error(
     maps: &ReducedModel,
-    predictor: &Predictor<'_>,
+    dynamics: Option<&ReducedModel>,
     stages: &[RecordedStage],
 ) -> Result<Option<PredictionError>, EvaluateError> {
-    let mut compiled = match predictor {
-        Predictor::Model(model) => Some(CompiledModel::new(model)?),
-        Predictor::ConstantVelocity => None,
-    };
+    let mut compiled = dynamics.map(CompiledModel::new).transpose()?;
     let mut squares = DVector::zeros(maps.decoder_map()?.output_dim());
     let mut latent = DVector::zeros(maps.latent_dim());
     for stage in stages {
@@ -159,12 +149,12 @@ mod tests {
         let jump = root.join("examples/recordings/go1-other/jump_04.csv.gz");
         let jump = recording::read(&jump).expect("shipped");
         let stages = recorded_stages(&model, &jump, 0.01).expect("of its robot");
-        let error = |predictor| {
-            let error = prediction_error(&model, &predictor, &stages);
+        let error = |dynamics| {
+            let error = prediction_error(&model, dynamics, &stages);
             error.expect("complete").expect("stages")
         };
-        let own = error(Predictor::Model(&model));
-        let constant = error(Predictor::ConstantVelocity);
+        let own = error(Some(&model));
+        let constant = error(None);
         assert!(own.pitch_rad > 2.0 * constant.pitch_rad, "{own:?}");
         assert_eq!(own.latent.len(), 6);
         let share = own.share_of(&constant);

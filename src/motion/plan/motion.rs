@@ -16,7 +16,7 @@ use crate::robot::{JOINT_DIM, Leg, Robot, STATE_DIM};
 const SOURCE: &str = "plan";
 
 /// How close a motion comes to its bounds, over all its samples.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Margins {
     /// Largest torque, as a share of its limit.
     pub torque_share: f64,

@@ -9,10 +9,8 @@ use crate::lower::CompiledModel;
 use crate::model::{JumpPart, JumpPrior, ReducedModel};
 use crate::robot::{BODY_NAMES, InputRule, JOINT_DIM, JOINT_NAMES, STATE_DIM};
 
-/// Position of the body in the state.
-pub const BODY_X: usize = 12;
-/// Height of the body in the state.
-pub const BODY_Z: usize = 14;
+pub use crate::robot::{BODY_X, BODY_Z};
+
 /// Pitch of the body in the state.
 pub const PITCH: usize = 16;
 

@@ -1,7 +1,5 @@
 //! What can go wrong in a rollout.
 
-#![allow(missing_docs, reason = "each variant's message names its fields")]
-
 use crate::model::ModelError;
 use crate::recording::RecordingError;
 

@@ -10,7 +10,7 @@ mod latent;
 mod rollout;
 
 pub use error::SimError;
-pub use inputs::{input_statistics, with_input_statistics};
+pub use inputs::with_input_statistics;
 pub use integrate::{Integration, IntegrationMethod, IntegrationOptions, OdeSystem, integrate};
 pub use latent::{LatentSegment, phase_rule};
 pub use rollout::{Restart, Rollout, Window, integrate_stretches, restart_windows, rollout};

@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::integrate::{Integration, IntegrationMethod, IntegrationOptions, OdeSystem, integrate};
+use super::integrate::{Integration, IntegrationOptions, OdeSystem, integrate};
 use super::latent::LatentSegment;
 use crate::lower::CompiledModel;
 use crate::recording::segment::stretches;
@@ -32,8 +32,6 @@ pub struct Window {
     pub dz: DMatrix<f64>,
     /// Time at which the state left every bound, if it did; later samples have no prediction.
     pub diverged_at_s: Option<f64>,
-    /// Whether the stiff method was needed.
-    pub stiff: bool,
 }
 
 /// A segment's rollout: windows in the order of time.
@@ -68,12 +66,7 @@ impl Rollout {
 }
 
 /// Rolls the model out over a segment, from its recorded latent state at each start.
-pub fn rollout(
-    model: &CompiledModel,
-    recorded: &LatentSegment,
-    restart: Restart,
-    options: &IntegrationOptions,
-) -> Rollout {
+pub fn rollout(model: &CompiledModel, recorded: &LatentSegment, restart: Restart) -> Rollout {
     let mut dynamics = PhaseDynamics {
         model: model.clone(),
         recorded,
@@ -83,7 +76,7 @@ pub fn rollout(
         partials: DMatrix::zeros(model.latent_dim(), 3 * model.latent_dim()),
     };
     let windows = restart_windows(&recorded.time_s, restart).into_iter();
-    let options = &at_scale(options, recorded);
+    let options = &at_scale(recorded);
     Rollout {
         windows: windows
             .map(|samples| roll_window(&mut dynamics, samples, options))
@@ -91,21 +84,22 @@ pub fn rollout(
     }
 }
 
-/// The options with tolerance and bound moved for a model whose scaled coordinates are far from one, so that
+/// The default options with tolerance and bound moved for a model whose scaled coordinates are far from one, so that
 /// rollouts do not depend on its scale factors.
-fn at_scale(options: &IntegrationOptions, recorded: &LatentSegment) -> IntegrationOptions {
+fn at_scale(recorded: &LatentSegment) -> IntegrationOptions {
     /// Largest coordinates between which the options are taken as they are.
     const USUAL: [f64; 2] = [1e-3, 1e3];
+    let options = IntegrationOptions::default();
     match recorded.z.amax() {
         largest if largest > 0.0 && largest < USUAL[0] => IntegrationOptions {
             absolute_tolerance: options.absolute_tolerance * (largest / USUAL[0]),
-            ..*options
+            ..options
         },
         largest if largest > USUAL[1] => IntegrationOptions {
             divergence_bound: options.divergence_bound * (largest / USUAL[1]),
-            ..*options
+            ..options
         },
-        _ => *options,
+        _ => options,
     }
 }
 
@@ -140,7 +134,7 @@ fn roll_window(
         .copied()
         .collect();
     let phase = &recorded.phase;
-    let found = integrate_stretches(
+    let (states, diverged_at_s) = integrate_stretches(
         &initial,
         &recorded.time_s,
         samples.clone(),
@@ -152,15 +146,14 @@ fn roll_window(
     );
     Window {
         samples,
-        z: found.states.rows(0, d).into_owned(),
-        dz: found.states.rows(d, d).into_owned(),
-        diverged_at_s: found.diverged_at_s,
-        stiff: found.method == IntegrationMethod::Implicit,
+        z: states.rows(0, d).into_owned(),
+        dz: states.rows(d, d).into_owned(),
+        diverged_at_s,
     }
 }
 
-/// States of a window of samples from `initial` at its first one, stretch after stretch of like samples; implicit if
-/// any stretch is.
+/// States of a window of samples from `initial` at its first one, stretch after stretch of like samples, as far as they
+/// are reached, and when they left every bound, if they did.
 ///
 /// `of_stretch` integrates one from a state over its times, which end at the first sample of the next.
 pub fn integrate_stretches(
@@ -169,32 +162,24 @@ pub fn integrate_stretches(
     window: Range<usize>,
     alike: impl Fn(usize, usize) -> bool,
     mut of_stretch: impl FnMut(Range<usize>, &[f64], &[f64]) -> Integration,
-) -> Integration {
-    let mut found = Integration {
-        states: DMatrix::zeros(initial.len(), window.len()),
-        diverged_at_s: None,
-        method: IntegrationMethod::Explicit,
-    };
-    found.states.column_mut(0).copy_from_slice(initial);
-    let mut reached = 1;
+) -> (DMatrix<f64>, Option<f64>) {
+    let mut states = DMatrix::zeros(initial.len(), window.len());
+    states.column_mut(0).copy_from_slice(initial);
+    let (mut reached, mut diverged_at_s) = (1, None);
     for stretch in stretches(window.clone(), alike) {
         let times = &time_s[stretch.start..(stretch.end + 1).min(window.end)];
         let first = stretch.start - window.start;
-        let state = found.states.column(first).into_owned();
+        let state = states.column(first).into_owned();
         let part = of_stretch(stretch, state.as_slice(), times);
         reached = first + part.states.ncols();
-        let mut to = found.states.columns_mut(first, part.states.ncols());
+        let mut to = states.columns_mut(first, part.states.ncols());
         to.copy_from(&part.states);
-        if part.method == IntegrationMethod::Implicit {
-            found.method = part.method;
-        }
-        found.diverged_at_s = part.diverged_at_s;
-        if found.diverged_at_s.is_some() {
+        diverged_at_s = part.diverged_at_s;
+        if diverged_at_s.is_some() {
             break;
         }
     }
-    found.states = found.states.columns(0, reached).into_owned();
-    found
+    (states.columns(0, reached).into_owned(), diverged_at_s)
 }
 
 /// `y = [z; dz]` under one phase and the recorded input.
@@ -266,8 +251,7 @@ mod tests {
     #[test]
     fn rollout_in_flight_is_the_parabola_from_the_switch() {
         let recorded = recorded(101);
-        let options = IntegrationOptions::default();
-        let whole = rollout(&compiled(), &recorded, Restart::Never, &options);
+        let whole = rollout(&compiled(), &recorded, Restart::Never);
         let window = &whole.windows[0];
         assert_eq!((whole.windows.len(), window.z.ncols()), (1, 101));
         let (z, dz) = (window.z[(0, 40)], window.dz[(0, 40)]);
@@ -282,12 +266,7 @@ mod tests {
     fn rollout_in_contact_agrees_with_fine_runge_kutta_steps() {
         let recorded = recorded(41);
         let mut model = compiled();
-        let whole = rollout(
-            &model,
-            &recorded,
-            Restart::Never,
-            &IntegrationOptions::default(),
-        );
+        let whole = rollout(&model, &recorded, Restart::Never);
         let window = &whole.windows[0];
         let (mut z, mut dz, mut u) = ([recorded.z[(0, 0)]], [recorded.dz[(0, 0)]], [0.0]);
         let h = 1e-6;
@@ -308,8 +287,7 @@ mod tests {
     #[test]
     fn restarts_begin_at_the_recorded_state_and_cover_every_sample_once() {
         let recorded = recorded(101);
-        let options = IntegrationOptions::default();
-        let restarted = rollout(&compiled(), &recorded, Restart::Every(0.05), &options);
+        let restarted = rollout(&compiled(), &recorded, Restart::Every(0.05));
         let starts: Vec<usize> = restarted.windows.iter().map(|w| w.samples.start).collect();
         assert_eq!(starts, [0, 25, 50, 75, 100]);
         for window in &restarted.windows {

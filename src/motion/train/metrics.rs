@@ -13,10 +13,8 @@ use crate::recording::Source;
 use crate::robot::JOINT_DIM;
 use crate::sim::phase_rule;
 
-/// Row of body x in the state; y and z follow.
-pub(super) const BODY_X: usize = JOINT_DIM;
-/// Row of body z in the state.
-pub(super) const BODY_Z: usize = JOINT_DIM + 2;
+pub(super) use crate::robot::{BODY_X, BODY_Z};
+
 /// Rows of the state that say where the robot is on the floor and which way it looks: x, y, yaw.
 pub(super) const PLACE: [usize; 3] = [BODY_X, BODY_X + 1, JOINT_DIM + 5];
 /// Length of the short predictions.

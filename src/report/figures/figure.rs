@@ -78,7 +78,12 @@ impl Series {
     /// A value of every sample over its time.
     pub fn over(role: Role, time_s: &[f64], value: impl Fn(usize) -> Option<f64>) -> Self {
         let times = time_s.iter().enumerate();
-        let points = times.map(|(sample, &time)| (time, value(sample))).collect();
+        Self::through(role, times.map(|(sample, &time)| (time, value(sample))))
+    }
+
+    /// A line through points.
+    pub fn through(role: Role, points: impl IntoIterator<Item = (f64, Option<f64>)>) -> Self {
+        let points = points.into_iter().collect();
         Self { role, points }
     }
 }

@@ -60,10 +60,9 @@ pub fn film(
     let chosen: Vec<usize> = (0..time_s.len()).step_by(stride).collect();
     let sticks: Vec<Vec<Option<Sticks>>> = (motions.iter())
         .map(|motion| {
-            let all = motion.sticks(robot, heading_rad);
-            (chosen.iter())
-                .map(|&sample| all.get(sample).cloned().flatten())
-                .collect()
+            let samples = chosen.iter();
+            let sticks = samples.map(|&sample| motion.sticks(robot, heading_rad, sample));
+            sticks.collect()
         })
         .collect();
     let height = |sticks: &Option<Sticks>| sticks.as_ref().map_or(f64::MIN, |s| middle(s).1);
@@ -91,9 +90,7 @@ pub fn film(
         shown,
         count: chosen.len(),
         shown_s: times.get(shown).copied().unwrap_or(0.0),
-        legend: (motions.iter())
-            .map(|motion| (motion.role, motion.words.clone()))
-            .collect(),
+        legend: Motion::legend(motions),
     }
 }
 

@@ -136,11 +136,18 @@ impl Motion {
         }
     }
 
-    /// The robot at each time, for drawing.
-    pub fn sticks(&self, robot: &Robot, heading_rad: f64) -> Vec<Option<Sticks>> {
-        let sticks = |x: &DVector<f64>| Sticks::of(robot, x.as_slice(), heading_rad);
-        let states = self.states.iter();
-        states.map(|state| state.as_ref().map(sticks)).collect()
+    /// The robot at a sample, for drawing.
+    pub fn sticks(&self, robot: &Robot, heading_rad: f64, sample: usize) -> Option<Sticks> {
+        let state = self.states.get(sample)?.as_ref()?;
+        Some(Sticks::of(robot, state.as_slice(), heading_rad))
+    }
+
+    /// What each motion's lines mean.
+    pub(super) fn legend(motions: &[Self]) -> Vec<(Role, String)> {
+        let entries = motions
+            .iter()
+            .map(|motion| (motion.role, motion.words.clone()));
+        entries.collect()
     }
 }
 
@@ -175,12 +182,11 @@ pub fn film_strip(
     let of_frame = |frame: usize| frame * last / n_frames.saturating_sub(1).max(1);
     let chosen: Vec<usize> = (0..n_frames.min(time_s.len())).map(of_frame).collect();
     let sticks_at = |sample: usize| {
-        let each = motions.iter().filter_map(move |motion| {
-            let state = motion.states.get(sample)?.as_ref()?;
-            let sticks = Sticks::of(robot, state.as_slice(), heading_rad);
-            Some((motion.role, sticks))
-        });
-        each.collect::<Vec<_>>()
+        let sticks = |motion: &Motion| {
+            let sticks = motion.sticks(robot, heading_rad, sample);
+            sticks.map(|sticks| (motion.role, sticks))
+        };
+        motions.iter().filter_map(sticks).collect::<Vec<_>>()
     };
     let frames: Vec<_> = chosen.iter().map(|&sample| sticks_at(sample)).collect();
     let extent = Extent::around(frames.iter().flatten().map(|(_, sticks)| sticks), floor_m);
@@ -202,9 +208,7 @@ pub fn film_strip(
         panel_size: (width, (slope * width + 18.0).clamp(60.0, 300.0)),
         columns: 5,
         panels: panels.collect(),
-        legend: (motions.iter())
-            .map(|motion| (motion.role, motion.words.clone()))
-            .collect(),
+        legend: Motion::legend(motions),
     }
 }
 

@@ -15,7 +15,6 @@ use crate::robot::{ContactFlags, InputRule, JOINT_DIM, Robot, STATE_DIM};
 /// Maps, limits and input statistics of a model on its robot.
 #[derive(Debug, Clone)]
 pub struct ControlModel {
-    latent_dim: usize,
     parts: ControlModelParts,
     /// The maps of which the matrices are those at one state, if they are not the same at all.
     nonlinear: Option<Arc<dyn NonlinearMaps>>,
@@ -72,7 +71,6 @@ impl ControlModel {
     pub fn from_parts(parts: ControlModelParts) -> Result<Self, ControlError> {
         parts.check()?;
         Ok(Self {
-            latent_dim: parts.encoder.nrows(),
             parts,
             nonlinear: None,
         })
@@ -97,14 +95,13 @@ impl ControlModel {
     pub fn tangent_at(&self, x: &[f64], z: &[f64]) -> Option<Self> {
         let maps = self.nonlinear.as_ref()?;
         let (encoder, decoder) = (maps.encoder_jacobian(x), maps.decoder_jacobian(z));
-        let mut value = vec![0.0; self.latent_dim];
+        let mut value = vec![0.0; self.latent_dim()];
         maps.encode(x, &mut value);
         let encoder_bias = DVector::from_vec(value) - &encoder * DVector::from_column_slice(x);
         let decoded = DVector::from_column_slice(&maps.decode(z));
         let decoder_bias = decoded - &decoder * DVector::from_column_slice(z);
         let InputMaps { lift, projection } = maps.inputs(x)?;
         Some(Self {
-            latent_dim: self.latent_dim,
             parts: ControlModelParts {
                 encoder,
                 encoder_bias,
@@ -143,7 +140,7 @@ impl ControlModel {
 
     /// Number of latent coordinates.
     pub fn latent_dim(&self) -> usize {
-        self.latent_dim
+        self.parts.encoder.nrows()
     }
 
     /// All phases, in the model's order.
@@ -202,7 +199,7 @@ impl ControlModel {
             return [0.0; JOINT_DIM];
         }
         let [before, after] = [start, end].map(|state| {
-            let (z, dz) = state.split_at(self.latent_dim);
+            let (z, dz) = state.split_at(self.latent_dim());
             self.decode_joint_velocities(z, dz)
         });
         let dq = std::array::from_fn(|joint| 0.5 * (before[joint] + after[joint]));
@@ -222,26 +219,6 @@ impl ControlModel {
     /// `u = W_eᵀ u_lat / s_u` in SI units: 12 torques, force, moment.
     pub fn lift(&self, u_lat: &[f64]) -> [f64; STATE_DIM] {
         std::array::from_fn(|input| row_product(&self.parts.lift, input, u_lat))
-    }
-
-    /// The matrix of [`ControlModel::lift`], `18 × latent_dim`.
-    pub fn lift_matrix(&self) -> &DMatrix<f64> {
-        &self.parts.lift
-    }
-
-    /// The matrix of [`ControlModel::project`], `latent_dim × 18`.
-    pub fn projection_matrix(&self) -> &DMatrix<f64> {
-        &self.parts.projection
-    }
-
-    /// The matrix of the decoder in SI units, `18 × latent_dim`.
-    pub fn decoder_matrix(&self) -> &DMatrix<f64> {
-        &self.parts.decoder
-    }
-
-    /// The bias of the decoder in SI units, 18.
-    pub fn decoder_bias(&self) -> &DVector<f64> {
-        &self.parts.decoder_bias
     }
 
     /// The torques within the robot's limits that are nearest to these; zero for what is not a

@@ -2,10 +2,8 @@
 
 use std::time::Instant;
 
-use nalgebra::DMatrix;
-
 use super::command::Command;
-use super::control_model::ControlModel;
+use super::control_model::{ControlModel, ControlPhase};
 use super::dynamics::LatentDynamics;
 use super::effectiveness::Effectiveness;
 use super::engine::Engine;
@@ -18,7 +16,7 @@ use super::problem::{ROW_MARGIN, StageRows, row_selection};
 use super::qp::QpSolver;
 use super::reference::{Reference, ReferenceSamples};
 use super::settings::{Lift, Linearisation, MissingInput, MpcSettings, RowSelection};
-use super::transcribe::{StepData, Weights};
+use super::transcribe::StepData;
 use crate::robot::{ContactFlags, JOINT_DIM, STATE_DIM};
 
 /// Violation of a joint limit, in half ranges, from which a plan counts as softened: beyond what the
@@ -43,7 +41,6 @@ pub struct Controller {
     rows: StageRows,
     near_rows: StageRows,
     pub(super) engine: Engine,
-    pub(super) input_cholesky: Vec<DMatrix<f64>>,
     pub(super) horizon: Horizon,
     pub(super) consistent: Option<ConsistentLift>,
     pub(super) reference: Option<Reference>,
@@ -81,8 +78,9 @@ impl Controller {
         settings.check()?;
         let d = plant.latent_dim();
         let rows = StageRows::new(&plant, &settings);
-        let horizon = Horizon::new(d, settings.horizon, rows.friction.clone());
-        let engine = Engine::new(d, &rows, None, &settings)?;
+        let horizon = Horizon::new(d, settings.horizon);
+        // Nothing is asked of it before a reference sets the weights.
+        let engine = Engine::new(d, &rows, &vec![1.0; 2 * d], &settings)?;
         let consistent = match settings.lift {
             Lift::Transpose => None,
             Lift::Consistent => Some(ConsistentLift::new(&plant, &settings)?),
@@ -90,7 +88,6 @@ impl Controller {
         Ok(Self {
             dynamics,
             engine,
-            input_cholesky: input_cholesky(&plant),
             plan: Plan::new(d, settings.horizon, settings.step_s),
             posture: vec![0.0; 2 * d],
             memory: Memory::new(d),
@@ -168,29 +165,22 @@ impl Controller {
         let mut reference = Reference::new(&self.plant, samples)?;
         if self.plant.is_nonlinear() {
             self.plant.take_statistics_at(&mean_state(samples.x));
-            self.input_cholesky = input_cholesky(&self.plant);
         }
         if !reference.has_input() && self.settings.missing_input == MissingInput::Estimate {
             reference.estimate_input(&self.plant, self.dynamics.as_mut());
         }
         let d = self.plant.latent_dim();
         let deviation = reference.deviation();
-        let mut state = vec![1.0; 2 * d];
+        let mut state_weights = vec![1.0; 2 * d];
         for index in d..2 * d {
             let ratio = deviation[index] / deviation[index - d];
-            state[index] = self.settings.velocity_weight * ratio.powi(2);
+            state_weights[index] = self.settings.velocity_weight * ratio.powi(2);
         }
-        let weights = Weights {
-            state: &state,
-            terminal: self.settings.terminal_weight,
-            input: self.settings.input_weight,
-            joint_penalty: self.settings.joint_penalty,
-        };
         let rows = match row_selection(&self.plant, &self.settings) {
             RowSelection::All => self.rows.clone(),
             RowSelection::Needed => self.rows.clone().near(&reference),
         };
-        self.engine = Engine::new(d, &rows, Some(&weights), &self.settings)?;
+        self.engine = Engine::new(d, &rows, &state_weights, &self.settings)?;
         self.near_rows = rows;
         self.reference = Some(reference);
         self.reset();
@@ -269,7 +259,7 @@ impl Controller {
         let dynamics = self.dynamics.as_mut();
         let contact = self.horizon.prepare(&inputs, dynamics, time_s, feet);
         let (horizon, memory) = (&self.horizon, &self.memory);
-        let step = step_data(horizon, memory, inputs.reference, &self.input_cholesky);
+        let step = step_data(horizon, memory, inputs.reference, self.plant.phases());
         self.engine.prepare(&step, &self.horizon);
         Some(contact)
     }
@@ -314,7 +304,7 @@ pub(super) fn step_data<'a>(
     horizon: &'a Horizon,
     memory: &'a Memory,
     reference: &'a Reference,
-    input_cholesky: &'a [DMatrix<f64>],
+    phases: &'a [ControlPhase],
 ) -> StepData<'a> {
     let stages = horizon.stages();
     let latent_dim = memory.input.len();
@@ -324,14 +314,8 @@ pub(super) fn step_data<'a>(
         measured: &memory.measured,
         last_input: &memory.input,
         deviation: reference.deviation(),
-        input_cholesky,
+        phases,
     }
-}
-
-/// Scales of the inputs by phase.
-fn input_cholesky(plant: &ControlModel) -> Vec<DMatrix<f64>> {
-    let phases = plant.phases().iter();
-    phases.map(|phase| phase.latent_root.clone()).collect()
 }
 
 /// Mean of states, 18 values per sample.

@@ -5,8 +5,8 @@ use super::horizon::Horizon;
 use super::problem::StageRows;
 use super::qp::{Outcome, QpSolver};
 use super::settings::{MpcSettings, Solver};
-use super::structured::{MAX_STRUCTURED_DIM, StageValues, StructuredProgram, structured_program};
-use super::transcribe::{StepData, Transcription, Weights};
+use super::structured::{MAX_STRUCTURED_DIM, StructuredProgram, structured_program};
+use super::transcribe::{StepData, Transcription};
 
 /// A solver with the program of the present horizon.
 #[derive(Debug)]
@@ -17,17 +17,11 @@ pub(super) enum Engine {
         solver: Box<QpSolver>,
     },
     /// Stage by stage.
-    Structured {
-        program: Box<dyn StructuredProgram>,
-        /// Whether its gains are those of its stages; solves with active rows overwrite them.
-        has_gains: bool,
-        /// Scaled measurement.
-        start: Vec<f64>,
-    },
+    Structured(Box<dyn StructuredProgram>),
 }
 
 impl Engine {
-    /// A solver for a problem with these rows; without weights it is one that nothing is asked of yet.
+    /// A solver for a problem with these rows and weights of the scaled states, `2 latent_dim`.
     ///
     /// # Errors
     /// [`ControlError::Solver`] if clarabel refuses the problem, [`ControlError::Setting`] if the
@@ -35,16 +29,14 @@ impl Engine {
     pub(super) fn new(
         latent_dim: usize,
         rows: &StageRows,
-        weights: Option<&Weights<'_>>,
+        state_weights: &[f64],
         settings: &MpcSettings,
     ) -> Result<Self, ControlError> {
         match settings.solver {
             Solver::Clarabel => {
                 let (transcription, mut program) =
                     Transcription::new(latent_dim, settings.horizon, rows.clone());
-                if let Some(weights) = weights {
-                    transcription.write_cost(weights, &mut program);
-                }
+                transcription.write_cost(state_weights, settings, &mut program);
                 let solver = Box::new(QpSolver::new(program, settings.qp)?);
                 Ok(Self::Conic {
                     transcription,
@@ -52,24 +44,12 @@ impl Engine {
                 })
             }
             Solver::Riccati => {
-                let ones = vec![1.0; 2 * latent_dim];
-                let neutral = Weights {
-                    state: &ones,
-                    terminal: 1.0,
-                    input: 1.0,
-                    joint_penalty: 1.0,
-                };
-                let weights = weights.unwrap_or(&neutral);
-                let program = structured_program(latent_dim, rows, weights, settings);
+                let program = structured_program(latent_dim, rows, state_weights, settings);
                 let program = program.ok_or(ControlError::StructuredDim {
                     found: latent_dim,
                     largest: MAX_STRUCTURED_DIM,
                 })?;
-                Ok(Self::Structured {
-                    program,
-                    has_gains: false,
-                    start: vec![0.0; 2 * latent_dim],
-                })
+                Ok(Self::Structured(program))
             }
         }
     }
@@ -78,50 +58,31 @@ impl Engine {
     pub(super) fn conic(&self) -> Option<&QpSolver> {
         match self {
             Self::Conic { solver, .. } => Some(solver),
-            Self::Structured { .. } => None,
+            Self::Structured(_) => None,
         }
     }
 
     /// Forgets the last solution.
     pub(super) fn forget(&mut self) {
-        if let Self::Structured {
-            program, has_gains, ..
-        } = self
-        {
+        if let Self::Structured(program) = self {
             program.forget();
-            *has_gains = false;
         }
     }
 
     /// Takes over what the horizon's last preparation changed, as far as it does not depend on the
     /// measurement.
     pub(super) fn prepare(&mut self, step: &StepData<'_>, horizon: &Horizon) {
-        let Self::Structured {
-            program, has_gains, ..
-        } = self
-        else {
+        let Self::Structured(program) = self else {
             return;
         };
         for _ in 0..horizon.shift() {
             program.shift();
         }
         let new = horizon.is_new();
-        if horizon.shift() > 0 || new.contains(&true) {
-            *has_gains = false;
+        for index in (0..new.len()).filter(|&index| new[index]) {
+            program.write(index, step, horizon.end(index));
         }
-        let stages = step.stages.iter().enumerate();
-        for (index, stage) in stages.filter(|(index, _)| new[*index]) {
-            let values = StageValues {
-                data: stage,
-                end: horizon.end(index),
-                deviation: step.deviation,
-                input_cholesky: &step.input_cholesky[stage.phase],
-            };
-            program.write(index, &values);
-        }
-        if !*has_gains {
-            *has_gains = program.prepare();
-        }
+        program.prepare();
     }
 
     /// Solves the prepared program from the measurement; how it ended, and iterations.
@@ -134,47 +95,31 @@ impl Engine {
                 transcription.write(step, solver.program_mut());
                 (solver.solve(), solver.iterations())
             }
-            Self::Structured {
-                program,
-                has_gains,
-                start,
-            } => {
-                if !*has_gains {
-                    return (Outcome::NumericalFailure, 0);
-                }
-                let reference = &step.stages[0].state;
-                for (index, start) in start.iter_mut().enumerate() {
-                    *start = (step.measured[index] - reference[index]) / step.deviation[index];
-                }
-                let (outcome, iterations) = program.solve(start, &step.stages[0], step.last_input);
-                *has_gains = iterations == 0;
-                (outcome, iterations)
-            }
+            Self::Structured(program) => program.solve(step),
         }
     }
 
-    /// Latent input of a stage in the solution.
+    /// Latent input of a stage in the solution, `u_r + C_p û`.
     pub(super) fn input(&self, index: usize, step: &StepData<'_>, out: &mut [f64]) {
-        match self {
+        let scaled = match self {
             Self::Conic {
                 transcription,
                 solver,
-            } => transcription.input(index, solver.solution(), step, out),
-            Self::Structured { program, .. } => {
-                let (stage, scaled) = (&step.stages[index], program.input(index));
-                let root = &step.input_cholesky[stage.phase];
-                for (row, out) in out.iter_mut().enumerate() {
-                    let mut sum = 0.0;
-                    for (col, scaled) in scaled[..=row].iter().enumerate() {
-                        sum += root[(row, col)] * scaled;
-                    }
-                    *out = stage.input[row] + sum;
-                }
+            } => transcription.input(index, solver.solution()),
+            Self::Structured(program) => program.input(index),
+        };
+        let stage = &step.stages[index];
+        let root = &step.phases[stage.phase].latent_root;
+        for (row, out) in out.iter_mut().enumerate() {
+            let mut sum = 0.0;
+            for (col, scaled) in scaled[..=row].iter().enumerate() {
+                sum += root[(row, col)] * scaled;
             }
+            *out = stage.input[row] + sum;
         }
     }
 
-    /// Latent state at a stage's end in the solution, with `reference` the reference state there.
+    /// Latent state at a stage's end in the solution, `x_r⁺ + σ x̂⁺`, with `reference` the reference state there.
     pub(super) fn state(
         &self,
         index: usize,
@@ -182,19 +127,15 @@ impl Engine {
         reference: &[f64],
         out: &mut [f64],
     ) {
-        match self {
+        let scaled = match self {
             Self::Conic {
                 transcription,
                 solver,
-            } => {
-                transcription.state(index, solver.solution(), reference, step.deviation, out);
-            }
-            Self::Structured { program, .. } => {
-                let scaled = program.state(index);
-                for (row, out) in out.iter_mut().enumerate() {
-                    *out = reference[row] + step.deviation[row] * scaled[row];
-                }
-            }
+            } => transcription.state(index, solver.solution()),
+            Self::Structured(program) => program.state(index),
+        };
+        for (row, out) in out.iter_mut().enumerate() {
+            *out = reference[row] + step.deviation[row] * scaled[row];
         }
     }
 }

@@ -4,7 +4,7 @@ use super::control_model::ControlModel;
 use super::dynamics::LatentDynamics;
 use super::linearise::{Lineariser, StageModel};
 use super::plan::Plan;
-use super::problem::{BodyFriction, StageRows};
+use super::problem::StageRows;
 use super::reference::Reference;
 use super::settings::{Drift, Linearisation, MpcSettings};
 use super::transcribe::Stage;
@@ -37,7 +37,6 @@ pub struct Horizon {
     is_new: Vec<bool>,
     lineariser: Lineariser,
     nominal: StageModel,
-    friction: Option<BodyFriction>,
 }
 
 /// What the stages are prepared from.
@@ -60,7 +59,7 @@ const TIME_TOLERANCE_S: f64 = 1e-9;
 
 impl Horizon {
     /// Memory for a horizon.
-    pub fn new(latent_dim: usize, length: usize, friction: Option<BodyFriction>) -> Self {
+    pub fn new(latent_dim: usize, length: usize) -> Self {
         Self {
             stages: vec![Stage::zeros(latent_dim); length],
             made_for: vec![None; length],
@@ -70,7 +69,6 @@ impl Horizon {
             is_new: vec![true; length],
             lineariser: Lineariser::new(latent_dim),
             nominal: StageModel::zeros(latent_dim),
-            friction,
         }
     }
 
@@ -196,8 +194,8 @@ impl Horizon {
             let local = plant.tangent_at(&x, z)?;
             inputs.rows.with_maps_of(&local, settings)
         });
-        let local = stage.rows.as_ref().and_then(|rows| rows.friction.as_ref());
-        if let Some(friction) = local.or(self.friction.as_ref()) {
+        let rows = stage.rows.as_ref().unwrap_or(inputs.rows);
+        if let Some(friction) = &rows.friction {
             let middle_s = start_s + 0.5 * settings.step_s;
             if plant.phases()[stage.phase].is_grounded {
                 friction.turned(reference.attitude_at(middle_s), &mut stage.force);

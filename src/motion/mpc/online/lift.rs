@@ -30,10 +30,8 @@ use super::lift_pyramids::PyramidLift;
 use super::problem::upright;
 use super::qp::{Outcome, QpSettings};
 use super::settings::{MpcSettings, Solver};
-use crate::robot::{ContactFlags, FOOT_DIM, JOINT_DIM, Leg};
+use crate::robot::{ContactFlags, FOOT_DIM, GRAVITY_M_S2, JOINT_DIM, Leg};
 
-/// Gravity, m/s², for the weight that scales rows of forces.
-const GRAVITY: f64 = 9.81;
 /// Cap on the interior-point iterations of a lift.
 pub const LIFT_ITERATIONS: u32 = 60;
 
@@ -147,7 +145,7 @@ impl ConsistentLift {
             map: vec![[0.0; JOINT_DIM]; d],
             rules: LiftRules {
                 limit_nm: *plant.robot().torque_limit_nm(),
-                weight_n: plant.robot().mass_kg() * GRAVITY,
+                weight_n: plant.robot().mass_kg() * GRAVITY_M_S2,
                 friction: settings.foot_friction,
                 prior_weight: settings.lift_prior_weight,
             },
@@ -159,8 +157,7 @@ impl ConsistentLift {
 
     /// Takes the projection of another plant: that at the measured state, where it depends on it.
     pub fn take_projection(&mut self, plant: &ControlModel) {
-        let projection = plant.projection_matrix();
-        for (latent, row) in projection.row_iter().enumerate() {
+        for (latent, row) in plant.parts().projection.row_iter().enumerate() {
             self.by_torque[latent] = std::array::from_fn(|joint| row[joint]);
             self.by_wrench[latent] = std::array::from_fn(|axis| row[JOINT_DIM + axis]);
         }

@@ -65,7 +65,7 @@ pub use lift::{ConsistentLift, LiftFailure, StanceState, foot_forces};
 pub use nonlinear::{InputMaps, NonlinearMaps};
 pub use plan::Plan;
 pub use problem::{to_upright, upright};
-pub use prune::needed_rows_of;
+pub use prune::needed_rows;
 pub use qp::{Cone, ConeProgram, Outcome, QpSettings, QpSolver, Residuals, SolverProfile};
 pub use reference::{Reference, ReferenceSamples};
 pub use settings::{

@@ -45,10 +45,7 @@ use super::control_model::ControlModel;
 use super::prune::needed_rows;
 use super::reference::Reference;
 use super::settings::{Lift, MpcSettings, RowSelection};
-use crate::robot::{JOINT_DIM, WrenchFrame};
-
-/// Gravity, m/s², for the weight that scales rows of forces.
-const GRAVITY: f64 = 9.81;
+use crate::robot::{GRAVITY_M_S2, JOINT_DIM, WrenchFrame};
 
 /// Distance from the reference, in its standard deviations, within which joint limits matter.
 pub const STATE_REACH: f64 = 4.0;
@@ -100,8 +97,8 @@ pub struct BodyFriction {
 
 impl BodyFriction {
     fn new(plant: &ControlModel, coefficient: f64) -> Self {
-        let weight = plant.robot().mass_kg() * GRAVITY;
-        let lift = plant.lift_matrix();
+        let weight = plant.robot().mass_kg() * GRAVITY_M_S2;
+        let lift = &plant.parts().lift;
         let rows = JOINT_DIM..JOINT_DIM + 3;
         let force =
             rows.flat_map(|row| lift.row(row).iter().map(|e| e / weight).collect::<Vec<_>>());
@@ -253,7 +250,7 @@ pub(super) fn torque_rows(plant: &ControlModel) -> Vec<Row> {
 
 /// Both sides of a limit (N m) on the torque of each joint, from which losses take `loss_share`.
 fn both_sides(plant: &ControlModel, limit: impl Fn(usize) -> f64, loss_share: f64) -> Vec<Row> {
-    let lift = plant.lift_matrix();
+    let lift = &plant.parts().lift;
     let mut rows = Vec::new();
     for joint in 0..JOINT_DIM {
         for sign in [1.0, -1.0] {
@@ -272,16 +269,16 @@ fn both_sides(plant: &ControlModel, limit: impl Fn(usize) -> f64, loss_share: f6
 
 /// Both sides of every joint limit, divided by half the joint's range.
 pub(super) fn joint_rows(plant: &ControlModel) -> Vec<Row> {
-    let (decoder, bias) = (plant.decoder_matrix(), plant.decoder_bias());
+    let parts = plant.parts();
     let mut rows = Vec::new();
     for (joint, (lower, upper)) in plant.robot().joint_limit_rad().iter().enumerate() {
         let half = 0.5 * (upper - lower);
         for (sign, limit) in [(1.0, upper), (-1.0, lower)] {
-            let row = decoder.row(joint);
+            let row = parts.decoder.row(joint);
             rows.push(Row {
                 joint,
                 row: row.iter().map(|entry| sign * entry / half).collect(),
-                bound: sign * (limit - bias[joint]) / half,
+                bound: sign * (limit - parts.decoder_bias[joint]) / half,
                 per_loss: 0.0,
             });
         }

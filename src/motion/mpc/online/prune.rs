@@ -15,7 +15,7 @@ use super::sparse::SparseColumns;
 /// earlier decisions loosen; at the end each dropped row is tried against those that stayed and
 /// comes back if they no longer imply it. A row also stays whenever its linear program is not solved
 /// beyond doubt.
-pub(super) fn needed_rows(rows: Vec<Row>, margin: f64) -> Vec<Row> {
+pub fn needed_rows(rows: Vec<Row>, margin: f64) -> Vec<Row> {
     let mut is_kept = vec![true; rows.len()];
     for index in (0..rows.len()).rev() {
         is_kept[index] = !is_implied(&rows, &is_kept, index, margin);
@@ -30,18 +30,6 @@ pub(super) fn needed_rows(rows: Vec<Row>, margin: f64) -> Vec<Row> {
     let rows = rows.into_iter().zip(is_kept);
     rows.filter_map(|(row, is_kept)| is_kept.then_some(row))
         .collect()
-}
-
-/// Positions of the rows `row · v <= bound` that do not follow from the others to within `margin`.
-pub fn needed_rows_of(rows: &[(Vec<f64>, f64)], margin: f64) -> Vec<usize> {
-    let numbered = rows.iter().enumerate().map(|(number, (row, bound))| Row {
-        joint: number,
-        row: row.clone(),
-        bound: *bound,
-        per_loss: 0.0,
-    });
-    let kept = needed_rows(numbered.collect(), margin);
-    kept.into_iter().map(|row| row.joint).collect()
 }
 
 /// Whether the rows kept besides `index` imply it to within `margin`.

@@ -343,7 +343,7 @@ fn norm_inf(values: &[f64]) -> f64 {
     sizes.fold(0.0, larger)
 }
 
-fn dot(a: &[f64], b: &[f64]) -> f64 {
+pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 

@@ -243,7 +243,7 @@ fn still_deviations(plant: &ControlModel) -> Vec<f64> {
     let limits = plant.robot().joint_limit_rad();
     let positions = (0..d).map(|latent| {
         let shares = limits.iter().enumerate().map(|(joint, (lower, upper))| {
-            plant.decoder_matrix()[(joint, latent)].abs() / (0.5 * (upper - lower))
+            plant.parts().decoder[(joint, latent)].abs() / (0.5 * (upper - lower))
         });
         let largest = shares.fold(0.0, f64::max);
         match largest > 0.0 {

@@ -3,25 +3,25 @@
 use super::error::ControlError;
 use super::qp::QpSettings;
 
-/// How a latent input becomes joint torques.
+/// How a latent input becomes joint torques, each way with its number for interfaces without enumerations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Lift {
     /// The paper's `u = W_eᵀ u_lat`: the torques are its leading entries, the body force that it
     /// holds as well need not be the one that these torques produce.
-    Transpose,
+    Transpose = 0,
     /// The torques whose own ground reaction forces come closest to the latent input, within
     /// torque limits and the friction cones of the feet in contact; see
     /// [`ConsistentLift`](super::ConsistentLift).
-    Consistent,
+    Consistent = 1,
 }
 
-/// About what trajectory the dynamics are linearised.
+/// About what trajectory the dynamics are linearised, numbered as [`Lift`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Linearisation {
     /// The reference: each stage is linearised once and reused while the horizon passes over it.
-    Reference,
+    Reference = 0,
     /// The last plan, shifted by one stage (real-time iteration).
-    LastPlan,
+    LastPlan = 1,
 }
 
 /// What stands for the dynamics of the reference itself.
@@ -55,15 +55,15 @@ pub enum RowSelection {
     All,
 }
 
-/// What solves the quadratic program of a step.
+/// What solves the quadratic program of a step, numbered as [`Lift`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Solver {
     /// clarabel, for all rows and cones.
-    Clarabel,
+    Clarabel = 0,
     /// The structured [`solver`](crate::solver): Riccati's recursion where no row is active, else an
     /// interior point of it; for at most [`MAX_STRUCTURED_DIM`](super::MAX_STRUCTURED_DIM) latent
     /// coordinates, with friction pyramids inside the cones.
-    Riccati,
+    Riccati = 1,
 }
 
 /// What the controller does while it has no plan to trust.

@@ -132,40 +132,15 @@ impl SparseColumns {
 mod tests {
     use super::*;
 
-    fn sample() -> SparseColumns {
+    #[test]
+    fn pattern_with_repeated_entries_stores_each_once_in_column_order() {
         let mut matrix = SparseColumns::from_pattern(2, 3, &[(1, 2), (0, 0), (1, 0), (0, 0)]);
         matrix.set(0, 0, 2.0);
         matrix.set(1, 0, -1.0);
         matrix.set(1, 2, 5.0);
-        matrix
-    }
-
-    #[test]
-    fn pattern_with_repeated_entries_stores_each_once_in_column_order() {
-        let matrix = sample();
         assert_eq!(matrix.column_start(), [0, 2, 2, 3]);
         assert_eq!(matrix.row_index(), [0, 1, 1]);
         assert_eq!(matrix.values(), [2.0, -1.0, 5.0]);
         assert_eq!(matrix.position(0, 1), None);
-    }
-
-    #[test]
-    fn products_match_the_dense_matrix() {
-        let matrix = sample();
-        let mut forward = [1.0, 0.0];
-        matrix.multiply_add(&[3.0, 100.0, 2.0], &mut forward);
-        assert_eq!(forward, [7.0, 7.0]);
-        let mut backward = [0.0; 3];
-        matrix.transpose_multiply_add(&[1.0, 2.0], &mut backward);
-        assert_eq!(backward, [0.0, 0.0, 10.0]);
-    }
-
-    #[test]
-    fn symmetric_product_mirrors_the_upper_triangle() {
-        let mut matrix = SparseColumns::from_pattern(2, 2, &[(0, 0), (0, 1), (1, 1)]);
-        matrix.values_mut().copy_from_slice(&[2.0, 3.0, 4.0]);
-        let mut out = [0.0; 2];
-        matrix.symmetric_multiply_add(&[1.0, 10.0], &mut out);
-        assert_eq!(out, [32.0, 43.0]);
     }
 }

@@ -69,7 +69,7 @@ impl Controller {
         let (Some(contact), Some(reference)) = (prepared, &self.reference) else {
             return Status::NoReference;
         };
-        let step = step_data(&self.horizon, &self.memory, reference, &self.input_cholesky);
+        let step = step_data(&self.horizon, &self.memory, reference, self.plant.phases());
         let (outcome, iterations) = self.engine.solve(&step);
         command.iterations = iterations;
         match outcome {
@@ -127,7 +127,11 @@ impl Controller {
 
     /// Writes a stage of the plan into the command; false if its input cannot be lifted.
     pub(super) fn write_plan(&mut self, stage: usize, command: &mut Command) -> bool {
-        let (Some(reference), Some(time_s)) = (&self.reference, self.plan.posture_s(stage)) else {
+        let (Some(reference), Some(stance), Some(time_s)) = (
+            &self.reference,
+            &mut self.memory.stance,
+            self.plan.posture_s(stage),
+        ) else {
             return false;
         };
         reference.state_at(time_s, &mut self.posture);
@@ -136,52 +140,40 @@ impl Controller {
         for input in &mut command.u_lat {
             *input /= self.effectiveness.estimate();
         }
-        let input = command.u_lat.as_slice();
         command.phase = Some(self.plan.phase());
         let mut joints = self.plant.decode_joints(z);
         let in_flight = !self.plant.phases()[self.plan.phase()].is_grounded;
-        if let (true, Some(stance)) = (
-            in_flight && self.settings.swing_turn > 0.0,
-            &self.memory.stance,
-        ) {
+        if in_flight && self.settings.swing_turn > 0.0 {
             let error = stance.attitude_rad[1] - reference.attitude_at(time_s)[1];
             let turn_rad = self.settings.swing_turn * error;
             joints = self.plant.turned_legs(&joints, turn_rad);
         }
         command.joint_position_rad = self.plant.clamp_joints(joints);
         command.joint_velocity_rad_s = self.plant.decode_joint_velocities(z, dz);
-        let lifted = self.local_plant().lift(input);
         let (start, end) = (self.plan.start(stage), self.plan.end(stage));
-        let losses = self.plant.planned_losses(start, end, self.settings.step_s);
-        if let Some(stance) = &mut self.memory.stance {
-            stance.losses_nm = losses;
-        }
-        let net: [f64; JOINT_DIM] = match (&mut self.consistent, &self.memory.stance) {
-            (None, _) => std::array::from_fn(|joint| lifted[joint]),
-            (Some(lift), Some(stance)) => match lift.lift(&self.plant, input, stance) {
-                Ok(torque) => torque,
-                Err(_) => return false,
-            },
-            (Some(_), None) => return false,
+        stance.losses_nm = self.plant.planned_losses(start, end, self.settings.step_s);
+        let stance = *stance;
+        let Ok(torque) = self.lift(&command.u_lat, &stance) else {
+            return false;
         };
-        let torque = std::array::from_fn(|joint| net[joint] + losses[joint]);
         command.torque_nm = self.plant.clamp_torque(torque);
-        command.losses_nm = losses;
+        command.losses_nm = stance.losses_nm;
         self.memory.feed_forward_nm = command.torque_nm;
         self.memory.joint_position = Some(command.joint_position_rad);
-        command.inconsistency = self.inconsistency(&lifted, &command.net_torque_nm());
+        command.inconsistency = self.inconsistency(command);
         true
     }
 
-    /// `|F_lift − G τ| / |F_lift|` of torques at the links, with force and moment as they are lifted.
-    fn inconsistency(&self, lifted: &[f64; STATE_DIM], net_nm: &[f64; JOINT_DIM]) -> Option<f64> {
+    /// `|F_lift − G τ| / |F_lift|` of a command's torques at the links, with force and moment as they are lifted.
+    fn inconsistency(&self, command: &Command) -> Option<f64> {
         let stance = self.memory.stance.as_ref()?;
         if !stance.feet.contains(&true) {
             return None;
         }
         let rule = self.plant.input_rule();
         let map = rule.wrench_map(&stance.joints_rad, stance.attitude_rad, stance.feet);
-        let produced = map.ok()? * SVector::<f64, JOINT_DIM>::from(*net_nm);
+        let produced = map.ok()? * SVector::<f64, JOINT_DIM>::from(command.net_torque_nm());
+        let lifted = self.local_plant().lift(&command.u_lat);
         let force = SVector::<f64, 6>::from_fn(|axis, _| lifted[JOINT_DIM + axis]);
         (force.norm() > SMALL_FORCE_N).then(|| (force - produced).norm() / force.norm())
     }

@@ -9,7 +9,7 @@ use std::fmt::Debug;
 use super::problem::{StageRows, pairs};
 use super::qp::Outcome;
 use super::settings::MpcSettings;
-use super::transcribe::{SLACK_PRICE, Stage as StageData, Weights};
+use super::transcribe::{SLACK_PRICE, Stage as StageData, StepData};
 use crate::solver::{
     self, Cost, Links, Pairs, Program, Report, RowMatrices, Settings, Shape, Stage,
 };
@@ -28,36 +28,22 @@ pub(super) const PYRAMID_ROWS: usize = 4;
 /// Most latent coordinates that the solver is compiled for.
 pub const MAX_STRUCTURED_DIM: usize = 8;
 
-/// One stage's numbers, in latent units.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct StageValues<'a> {
-    /// Dynamics, reference and rows of its own.
-    pub data: &'a StageData,
-    /// Reference state at its end, `2 latent_dim`.
-    pub end: &'a [f64],
-    /// Scale `σ` of the states.
-    pub deviation: &'a [f64],
-    /// Scale `C_p` of the inputs in its phase.
-    pub input_cholesky: &'a nalgebra::DMatrix<f64>,
-}
-
 /// The horizon's program for one latent dimension or another.
 pub(super) trait StructuredProgram: Debug + Send {
     /// Moves the horizon on by a stage; the last has to be written then.
     fn shift(&mut self);
 
-    /// Overwrites a stage.
-    fn write(&mut self, stage: usize, values: &StageValues<'_>);
+    /// Overwrites a stage, with the reference state at its end.
+    fn write(&mut self, stage: usize, step: &StepData<'_>, end: &[f64]);
 
     /// Forgets the last solution.
     fn forget(&mut self);
 
-    /// Gains of all stages, for the next [`StructuredProgram::solve`]; false if there are none.
-    fn prepare(&mut self) -> bool;
+    /// Computes the gains of all stages for the next [`StructuredProgram::solve`], if they are not those of its stages.
+    fn prepare(&mut self);
 
-    /// Solves from a scaled state, after a latent input that the rates of the first stage count from; the iterations
-    /// that it took.
-    fn solve(&mut self, x0: &[f64], first: &StageData, last_input: &[f64]) -> (Outcome, u32);
+    /// Solves from the measurement; how it ended, and iterations.
+    fn solve(&mut self, step: &StepData<'_>) -> (Outcome, u32);
 
     /// Scaled input of a stage.
     fn input(&self, stage: usize) -> &[f64];
@@ -71,17 +57,17 @@ pub(super) trait StructuredProgram: Debug + Send {
 pub(super) fn structured_program(
     latent_dim: usize,
     rows: &StageRows,
-    weights: &Weights<'_>,
+    state_weights: &[f64],
     settings: &MpcSettings,
 ) -> Option<Box<dyn StructuredProgram>> {
     macro_rules! of_dimension {
         ($($dim:literal),*) => {
             match (latent_dim.next_multiple_of(2), rows.rate.is_empty()) {
                 $(($dim, true) => Some(Box::new(
-                    Horizon::<{ 2 * $dim }, $dim, false>::new(latent_dim, rows, weights, settings)
+                    Horizon::<{ 2 * $dim }, $dim, false>::new(latent_dim, rows, state_weights, settings)
                 )),)*
                 $(($dim, false) => Some(Box::new(
-                    Horizon::<{ 2 * $dim }, $dim, true>::new(latent_dim, rows, weights, settings)
+                    Horizon::<{ 2 * $dim }, $dim, true>::new(latent_dim, rows, state_weights, settings)
                 )),)*
                 _ => None,
             }
@@ -111,13 +97,15 @@ struct Horizon<const NX: usize, const NU: usize, const LINKED: bool> {
     settings: Settings<f64>,
     /// Whether the stages hold a solution, to start from.
     is_warm: bool,
+    /// Whether the gains are those of the stages; solves with active rows overwrite them.
+    has_gains: bool,
 }
 
 impl<const NX: usize, const NU: usize, const LINKED: bool> Horizon<NX, NU, LINKED> {
     fn new(
         latent_dim: usize,
         rows: &StageRows,
-        weights: &Weights<'_>,
+        state_weights: &[f64],
         settings: &MpcSettings,
     ) -> Self {
         let horizon = settings.horizon;
@@ -132,9 +120,9 @@ impl<const NX: usize, const NU: usize, const LINKED: bool> Horizon<NX, NU, LINKE
             },
             ..Shape::default()
         };
-        let scale = SLACK_PRICE / weights.joint_penalty;
+        let scale = SLACK_PRICE / settings.joint_penalty;
         let mut state = [0.0; NX];
-        for (entry, weight) in state.iter_mut().zip(weights.state) {
+        for (entry, weight) in state.iter_mut().zip(state_weights) {
             *entry = scale * weight;
         }
         let stage = |index: usize| {
@@ -157,8 +145,8 @@ impl<const NX: usize, const NU: usize, const LINKED: bool> Horizon<NX, NU, LINKE
             shape,
             cost: Cost {
                 state,
-                terminal: state.map(|weight| weights.terminal * weight),
-                input: [scale * weights.input; NU],
+                terminal: state.map(|weight| settings.terminal_weight * weight),
+                input: [scale * settings.input_weight; NU],
                 slack: SLACK_PRICE,
             },
             settings: Settings {
@@ -168,6 +156,7 @@ impl<const NX: usize, const NU: usize, const LINKED: bool> Horizon<NX, NU, LINKE
                 accepted_residual: settings.qp.accepted_residual,
             },
             is_warm: false,
+            has_gains: false,
         }
     }
 
@@ -195,8 +184,9 @@ impl<const NX: usize, const NU: usize, const LINKED: bool> Horizon<NX, NU, LINKE
         (self.first + stage) % self.stages.len()
     }
 
-    fn write_dynamics(&mut self, place: usize, values: &StageValues<'_>) {
-        let (model, deviation) = (&values.data.model, values.deviation);
+    fn write_dynamics(&mut self, place: usize, data: &StageData, step: &StepData<'_>) {
+        let (model, deviation) = (&data.model, step.deviation);
+        let root = &step.phases[data.phase].latent_root;
         let stage = &mut self.stages[place];
         let dim = self.latent_dim;
         for row in 0..2 * dim {
@@ -204,27 +194,26 @@ impl<const NX: usize, const NU: usize, const LINKED: bool> Horizon<NX, NU, LINKE
             for col in 0..dim {
                 let mut sum = 0.0;
                 for k in col..dim {
-                    sum += model.b[(row, k)] * values.input_cholesky[(k, col)];
+                    sum += model.b[(row, k)] * root[(k, col)];
                 }
                 stage.b[row][col] = scale * sum;
             }
             for col in 0..2 * dim {
                 stage.a[row][col] = scale * model.a[(row, col)] * deviation[col];
             }
-            stage.c[row] = scale * values.data.defect[row];
+            stage.c[row] = scale * data.defect[row];
         }
     }
 
-    fn write_rows(&mut self, place: usize, values: &StageValues<'_>) {
-        let (data, deviation) = (values.data, values.deviation);
-        let (end, input_cholesky) = (values.end, values.input_cholesky);
+    fn write_rows(&mut self, place: usize, data: &StageData, step: &StepData<'_>, end: &[f64]) {
+        let (root, deviation) = (&step.phases[data.phase].latent_root, step.deviation);
         let own = data.rows.as_ref().unwrap_or(&self.rows);
         let dim = self.latent_dim;
         let (count, memory) = (self.shape.rows(), self.shape.memory());
         let bounds = &mut self.memory[place * memory..][..count];
         let matrix = &mut self.input_rows[place * self.shape.input..][..self.shape.input];
         for (number, row) in own.torque.iter().enumerate() {
-            let (scaled, at_reference) = scaled(&row.row, input_cholesky, &data.input);
+            let (scaled, at_reference) = scaled(&row.row, root, &data.input);
             matrix[number] = scaled;
             bounds[number] = row.bound - row.per_loss * data.losses_nm[row.joint] - at_reference;
         }
@@ -236,7 +225,7 @@ impl<const NX: usize, const NU: usize, const LINKED: bool> Horizon<NX, NU, LINKE
                     true => sign * data.force[axis * dim + j] - pull * data.force[j],
                     false => 0.0,
                 });
-                let (scaled, at_reference) = scaled(&row[..dim], input_cholesky, &data.input);
+                let (scaled, at_reference) = scaled(&row[..dim], root, &data.input);
                 let number = own.torque.len() + side;
                 matrix[number] = scaled;
                 // Without contact nothing is asked for.
@@ -249,7 +238,7 @@ impl<const NX: usize, const NU: usize, const LINKED: bool> Horizon<NX, NU, LINKE
             (
                 self.rate_rows[first + number],
                 self.rate_at_reference[first + number],
-            ) = scaled(&row.row, input_cholesky, &data.input);
+            ) = scaled(&row.row, root, &data.input);
         }
         let matrix = &mut self.soft_rows[place * self.shape.soft..][..self.shape.soft];
         let bounds = &mut bounds[self.shape.input..];
@@ -345,29 +334,39 @@ impl<const NX: usize, const NU: usize, const LINKED: bool> StructuredProgram
         let mut program = self.program();
         program.shift();
         self.first = program.first;
+        self.has_gains = false;
     }
 
-    fn write(&mut self, stage: usize, values: &StageValues<'_>) {
-        let place = self.place(stage);
-        self.write_dynamics(place, values);
-        self.write_rows(place, values);
+    fn write(&mut self, stage: usize, step: &StepData<'_>, end: &[f64]) {
+        let (place, data) = (self.place(stage), &step.stages[stage]);
+        self.write_dynamics(place, data, step);
+        self.write_rows(place, data, step, end);
+        self.has_gains = false;
     }
 
     fn forget(&mut self) {
-        self.is_warm = false;
+        (self.is_warm, self.has_gains) = (false, false);
     }
 
-    fn prepare(&mut self) -> bool {
-        prepare(&mut self.program())
+    fn prepare(&mut self) {
+        self.has_gains = self.has_gains || prepare(&mut self.program());
     }
 
-    fn solve(&mut self, x0: &[f64], first: &StageData, last_input: &[f64]) -> (Outcome, u32) {
-        self.write_rate_bounds(first, last_input);
-        let x0 = std::array::from_fn(|i| x0.get(i).copied().unwrap_or(0.0));
+    fn solve(&mut self, step: &StepData<'_>) -> (Outcome, u32) {
+        if !self.has_gains {
+            return (Outcome::NumericalFailure, 0);
+        }
+        let first = &step.stages[0];
+        self.write_rate_bounds(first, step.last_input);
+        let x0 = std::array::from_fn(|i| match i < 2 * self.latent_dim {
+            true => (step.measured[i] - first.state[i]) / step.deviation[i],
+            false => 0.0,
+        });
         let (is_warm, settings) = (self.is_warm, self.settings);
         let report = solve(&mut self.program(), &x0, is_warm, &settings);
         let outcome = outcome_of(report.outcome);
         self.is_warm = outcome == Outcome::Solved;
+        self.has_gains = report.iterations == 0;
         (outcome, report.iterations)
     }
 

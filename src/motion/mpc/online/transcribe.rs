@@ -5,10 +5,12 @@
 
 use nalgebra::DMatrix;
 
+use super::control_model::ControlPhase;
 use super::layout::{Layout, block};
 use super::linearise::StageModel;
 use super::problem::{Row, StageRows};
-use super::qp::{Cone, ConeProgram};
+use super::qp::{Cone, ConeProgram, dot};
+use super::settings::MpcSettings;
 use super::sparse::SparseColumns;
 use crate::robot::JOINT_DIM;
 
@@ -66,8 +68,8 @@ pub struct StepData<'a> {
     pub last_input: &'a [f64],
     /// Scale `σ` of the states, `2 latent_dim`.
     pub deviation: &'a [f64],
-    /// Scale `C_p` of the inputs by phase.
-    pub input_cholesky: &'a [DMatrix<f64>],
+    /// The model's phases, whose `latent_root` is the scale `C_p` of their inputs.
+    pub phases: &'a [ControlPhase],
 }
 
 /// Positions of one stage's entries in the values of `A`.
@@ -93,21 +95,8 @@ struct StagePositions {
 pub struct Transcription {
     layout: Layout,
     positions: Vec<StagePositions>,
-    /// `T C_p` and the like, by phase, for the current input_cholesky.
+    /// `T C_p` and the like, for the current phase.
     work: Vec<f64>,
-}
-
-/// Weights of the transcribed cost.
-#[derive(Debug, Clone, Copy)]
-pub struct Weights<'a> {
-    /// Weight of each scaled state, `2 latent_dim`.
-    pub state: &'a [f64],
-    /// Factor on the last stage.
-    pub terminal: f64,
-    /// Weight of the scaled inputs.
-    pub input: f64,
-    /// Price of a slack.
-    pub joint_penalty: f64,
 }
 
 impl Transcription {
@@ -146,22 +135,23 @@ impl Transcription {
         (transcription, program)
     }
 
-    /// Writes the cost, which does not change from step to step.
-    pub fn write_cost(&self, weights: &Weights<'_>, program: &mut ConeProgram) {
+    /// Writes the cost, which does not change from step to step; `state` are the weights of the scaled states,
+    /// `2 latent_dim`.
+    pub fn write_cost(&self, state: &[f64], settings: &MpcSettings, program: &mut ConeProgram) {
         let d = self.layout.latent_dim;
-        let scale = SLACK_PRICE / weights.joint_penalty;
+        let scale = SLACK_PRICE / settings.joint_penalty;
         for stage in 0..self.layout.horizon {
             let factor = match stage + 1 == self.layout.horizon {
-                true => scale * weights.terminal,
+                true => scale * settings.terminal_weight,
                 false => scale,
             };
             let first = self.layout.input_column(stage);
             for input in first..first + d {
-                program.p.set(input, input, scale * weights.input);
+                program.p.set(input, input, scale * settings.input_weight);
             }
             let first = self.layout.state_column(stage);
-            for (state, weight) in (first..first + 2 * d).zip(weights.state) {
-                program.p.set(state, state, factor * weight);
+            for (column, weight) in (first..first + 2 * d).zip(state) {
+                program.p.set(column, column, factor * weight);
             }
             if self.layout.has_slack {
                 program.q[self.layout.slack_column(stage)] = SLACK_PRICE;
@@ -178,33 +168,14 @@ impl Transcription {
         }
     }
 
-    /// Latent input of a stage in a solution: `u_r + C_p û`.
-    pub fn input(&self, index: usize, solution: &[f64], step: &StepData<'_>, out: &mut [f64]) {
-        let (d, stage) = (self.layout.latent_dim, &step.stages[index]);
-        let scaled = &solution[self.layout.input_column(index)..][..d];
-        for (row, out) in out.iter_mut().enumerate() {
-            let root = &step.input_cholesky[stage.phase];
-            let terms = (0..=row).map(|col| root[(row, col)] * scaled[col]);
-            *out = stage.input[row] + terms.sum::<f64>();
-        }
+    /// `û` of a stage in a solution.
+    pub fn input<'a>(&self, index: usize, solution: &'a [f64]) -> &'a [f64] {
+        &solution[self.layout.input_column(index)..][..self.layout.latent_dim]
     }
 
-    /// Latent state at the end of a stage in a solution: `x_r⁺ + σ x̂⁺`, with `reference` the
-    /// reference state there.
-    pub fn state(
-        &self,
-        index: usize,
-        solution: &[f64],
-        reference: &[f64],
-        deviation: &[f64],
-        out: &mut [f64],
-    ) {
-        let scaled = &solution[self.layout.state_column(index)..][..2 * self.layout.latent_dim];
-        for (((out, reference), scale), value) in
-            out.iter_mut().zip(reference).zip(deviation).zip(scaled)
-        {
-            *out = reference + scale * value;
-        }
+    /// `x̂⁺` at the end of a stage in a solution.
+    pub fn state<'a>(&self, index: usize, solution: &'a [f64]) -> &'a [f64] {
+        &solution[self.layout.state_column(index)..][..2 * self.layout.latent_dim]
     }
 
     fn stage_positions(&self, stage: usize, a: &SparseColumns) -> StagePositions {
@@ -256,7 +227,7 @@ impl Transcription {
     fn write_dynamics(&self, index: usize, step: &StepData<'_>, program: &mut ConeProgram) {
         let (d, stage) = (self.layout.latent_dim, &step.stages[index]);
         let positions = &self.positions[index];
-        let (root, deviation) = (&step.input_cholesky[stage.phase], step.deviation);
+        let (root, deviation) = (&step.phases[stage.phase].latent_root, step.deviation);
         let values = program.a.values_mut();
         for row in 0..2 * d {
             let scale = 1.0 / deviation[row];
@@ -281,7 +252,7 @@ impl Transcription {
     fn write_inputs(&mut self, index: usize, step: &StepData<'_>, program: &mut ConeProgram) {
         let d = self.layout.latent_dim;
         let stage = &step.stages[index];
-        let root = &step.input_cholesky[stage.phase];
+        let root = &step.phases[stage.phase].latent_root;
         let rows = stage.rows.as_ref().unwrap_or(&self.layout.rows);
         for (number, row) in rows.torque.iter().enumerate() {
             let positions = &self.positions[index].torque[number * d..][..d];
@@ -299,7 +270,10 @@ impl Transcription {
             } else {
                 let earlier = &step.stages[index - 1];
                 let rows = earlier.rows.as_ref().unwrap_or(&self.layout.rows);
-                let (row, root) = (&rows.rate[number].row, &step.input_cholesky[earlier.phase]);
+                let (row, root) = (
+                    &rows.rate[number].row,
+                    &step.phases[earlier.phase].latent_root,
+                );
                 let before = scaled_row(row, root, &earlier.input, &mut self.work);
                 self.work.iter_mut().for_each(|entry| *entry = -*entry);
                 let positions = &self.positions[index].rate_before[number * d..][..d];
@@ -354,8 +328,4 @@ fn scatter(from: &[f64], positions: &[usize], values: &mut [f64]) {
     for (value, &position) in from.iter().zip(positions) {
         values[position] = *value;
     }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }

@@ -46,39 +46,7 @@ impl<const D: usize> Handle<D> {
     /// Takes a trajectory to follow; 0, or a code with a message for [`last_error`](super::last_error). A refused
     /// trajectory leaves the old one.
     pub fn set_reference(&mut self, raw: &RawReference<'_>) -> i32 {
-        let is_missing = |name: &str| {
-            report(&format!("reference: `{name}` is null or not aligned"));
-            BAD_POINTER
-        };
-        let Some(time_s) = raw.time_s else {
-            return is_missing("time_s");
-        };
-        let Some(x) = raw.x else {
-            return is_missing("x");
-        };
-        let Some(dx) = raw.dx else {
-            return is_missing("dx");
-        };
-        let Some(feet) = raw.feet else {
-            return is_missing("feet");
-        };
-        let u = match raw.u {
-            None => None,
-            Some(Some(u)) => Some(u),
-            Some(None) => return is_missing("u"),
-        };
-        let controller = &mut self.controller;
-        let taken = guarded(|| {
-            let feet: Vec<ContactFlags> = feet.chunks_exact(FOOT_DIM).map(contact).collect();
-            controller.set_reference(ReferenceSamples {
-                time_s,
-                x,
-                dx,
-                u,
-                feet: &feet,
-            })
-        });
-        match taken {
+        match self.take_reference(raw) {
             Ok(()) => {
                 self.is_broken = false;
                 Status::Solved.code()
@@ -88,6 +56,22 @@ impl<const D: usize> Handle<D> {
                 code
             }
         }
+    }
+
+    fn take_reference(&mut self, raw: &RawReference<'_>) -> Result<(), i32> {
+        let (time_s, x) = (present("time_s", raw.time_s)?, present("x", raw.x)?);
+        let (dx, feet) = (present("dx", raw.dx)?, present("feet", raw.feet)?);
+        let u = raw.u.map(|u| present("u", u)).transpose()?;
+        guarded(|| {
+            let feet: Vec<ContactFlags> = feet.chunks_exact(FOOT_DIM).map(contact).collect();
+            self.controller.set_reference(ReferenceSamples {
+                time_s,
+                x,
+                dx,
+                u,
+                feet: &feet,
+            })
+        })
     }
 
     /// Computes the command for a measurement; returns its status.
@@ -149,6 +133,14 @@ impl<const D: usize> Handle<D> {
             ..self.last
         }
     }
+}
+
+/// An array of a reference, or the code for one whose pointer cannot be used.
+fn present<T>(name: &str, array: Option<T>) -> Result<T, i32> {
+    array.ok_or_else(|| {
+        report(&format!("reference: `{name}` is null or not aligned"));
+        BAD_POINTER
+    })
 }
 
 /// Feet in contact of four flags; zero is in the air.

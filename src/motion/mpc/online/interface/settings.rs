@@ -52,18 +52,9 @@ impl Default for Settings {
         Self {
             horizon: settings.horizon as i32,
             max_iterations: settings.qp.max_iterations as i32,
-            lift: match settings.lift {
-                Lift::Transpose => 0,
-                Lift::Consistent => 1,
-            },
-            linearisation: match settings.linearisation {
-                Linearisation::Reference => 0,
-                Linearisation::LastPlan => 1,
-            },
-            solver: match settings.solver {
-                Solver::Clarabel => 0,
-                Solver::Riccati => 1,
-            },
+            lift: settings.lift as i32,
+            linearisation: settings.linearisation as i32,
+            solver: settings.solver as i32,
             step_s: settings.step_s,
             input_weight: settings.input_weight,
             velocity_weight: settings.velocity_weight,
@@ -88,33 +79,22 @@ impl Settings {
     /// [`ControlError::Setting`] for a choice or a count that does not exist; other ranges are
     /// checked when the controller is built.
     pub fn to_mpc(&self) -> Result<MpcSettings, ControlError> {
-        let refuse = |name, found: i32, expected| ControlError::Setting {
-            name,
-            found: f64::from(found),
-            expected,
-        };
+        let lifts = [Lift::Transpose, Lift::Consistent];
+        let points = [Linearisation::Reference, Linearisation::LastPlan];
+        let about = "0 (the reference) or 1 (the last plan)";
+        let solvers = [Solver::Clarabel, Solver::Riccati];
         let mut settings = MpcSettings {
             horizon: usize::try_from(self.horizon)
-                .map_err(|_| refuse("horizon", self.horizon, "1 to 500 stages"))?,
+                .map_err(|_| refused("horizon", self.horizon, "1 to 500 stages"))?,
             step_s: self.step_s,
-            lift: match self.lift {
-                0 => Lift::Transpose,
-                1 => Lift::Consistent,
-                found => return Err(refuse("lift", found, "0 (transpose) or 1 (consistent)")),
-            },
-            linearisation: match self.linearisation {
-                0 => Linearisation::Reference,
-                1 => Linearisation::LastPlan,
-                found => {
-                    let expected = "0 (the reference) or 1 (the last plan)";
-                    return Err(refuse("linearisation", found, expected));
-                }
-            },
-            solver: match self.solver {
-                0 => Solver::Clarabel,
-                1 => Solver::Riccati,
-                found => return Err(refuse("solver", found, "0 (clarabel) or 1 (Riccati)")),
-            },
+            lift: chosen("lift", self.lift, lifts, "0 (transpose) or 1 (consistent)")?,
+            linearisation: chosen("linearisation", self.linearisation, points, about)?,
+            solver: chosen(
+                "solver",
+                self.solver,
+                solvers,
+                "0 (clarabel) or 1 (Riccati)",
+            )?,
             input_weight: self.input_weight,
             velocity_weight: self.velocity_weight,
             terminal_weight: self.terminal_weight,
@@ -132,9 +112,29 @@ impl Settings {
             ..MpcSettings::default()
         };
         settings.qp.max_iterations = u32::try_from(self.max_iterations)
-            .map_err(|_| refuse("max_iterations", self.max_iterations, "a positive number"))?;
+            .map_err(|_| refused("max_iterations", self.max_iterations, "a positive number"))?;
         Ok(settings)
     }
+}
+
+fn refused(name: &'static str, found: i32, expected: &'static str) -> ControlError {
+    ControlError::Setting {
+        name,
+        found: f64::from(found),
+        expected,
+    }
+}
+
+/// The choice with a number.
+fn chosen<T: Copy>(
+    name: &'static str,
+    found: i32,
+    choices: [T; 2],
+    expected: &'static str,
+) -> Result<T, ControlError> {
+    let place = usize::try_from(found).ok();
+    let choice = place.and_then(|place| choices.get(place));
+    choice.copied().ok_or(refused(name, found, expected))
 }
 
 #[cfg(test)]
