@@ -9,14 +9,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use romc::artifact;
 use romc::evaluate::{Assessment, ReferenceInput, along_recording};
 use romc::lower::CompiledModel;
-use romc::model::{Activation, StandardLibrary};
+use romc::model::{Activation, LibraryChoice, StandardLibrary};
 use romc::mpc::{Controller, MpcSettings};
 use romc::recording::{self, Recording};
 use romc::robot::{Actuators, Robot, WrenchFrame};
 use romc::sim::{IntegrationOptions, LatentSegment, Restart, rollout};
 use romc::train::{
-    self, Coordinates, EncoderOptions, LibraryChoice, Origin, Progress, Recordings, ScaleOptions,
-    SetMetrics, TrainError, TrainOptions, Trained, Transfer, Watch,
+    self, Coordinates, EncoderOptions, Origin, Progress, Recordings, ScaleOptions, SetMetrics,
+    TrainError, TrainOptions, Trained, Transfer, Watch,
 };
 
 fn jumps(set: &str, count: usize) -> Vec<Recording> {

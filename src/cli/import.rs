@@ -11,10 +11,8 @@ use super::output::{named, read_recordings};
 use super::robot;
 use crate::evaluate::RoundTrip;
 use crate::files::Overwrite;
-use crate::import::{
-    Chosen, ImportOptions, ImportReport, LibraryChoice, SymbolNames, import, read_terms,
-};
-use crate::model::ReducedModel;
+use crate::import::{Chosen, ImportOptions, ImportReport, SymbolNames, import, read_terms};
+use crate::model::{LibraryChoice, ReducedModel};
 use crate::recording::Segment;
 use crate::robot_file::read_actuators;
 use crate::sim::with_input_statistics;

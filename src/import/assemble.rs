@@ -8,12 +8,12 @@ use nalgebra::{DMatrix, DVector};
 use super::assign::{Assigned, Assignment, assign};
 use super::error::{ImportError, ImportFault, shape_text};
 use super::library;
-use super::options::{ImportOptions, LibraryChoice, PhaseRule, XiLayout};
+use super::options::{ImportOptions, PhaseRule, XiLayout};
 use super::report::{Layout, Note, ReadEquation, UnusedTensor, UsedTensor};
 use super::role::Role;
 use super::tensors::{Array, Element, TensorFile};
 use crate::files::Place;
-use crate::model::{InputStatistics, Library, ModelError, Phase, Scaling, StateMap};
+use crate::model::{InputStatistics, Library, LibraryChoice, ModelError, Phase, Scaling, StateMap};
 use crate::robot::STATE_DIM;
 
 /// The parts of a model that a file has.

@@ -69,8 +69,9 @@ pub(super) fn digest(tensors: &[Tensor<'_>]) -> Output<Sha256> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{ImportOptions, LibraryChoice, import_tensors};
+    use super::super::{ImportOptions, import_tensors};
     use super::*;
+    use crate::model::LibraryChoice;
 
     fn options() -> ImportOptions {
         let terms = ["1", "z1", "dz2"].map(str::to_owned);

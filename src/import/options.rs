@@ -12,7 +12,9 @@ use super::latex::SymbolNames;
 use super::report::Note;
 use super::role::{Mapping, ONLY_PHASE};
 use crate::files::Place;
-use crate::model::{Activation, CoordinateOrder, FeetRule, ScaleFactors, Scaling, StandardLibrary};
+use crate::model::{
+    Activation, CoordinateOrder, FeetRule, LibraryChoice, ScaleFactors, Scaling, StandardLibrary,
+};
 use crate::robot::{Actuators, ContactFlags, Robot, WrenchFrame};
 
 /// The kinds of files that can be imported.
@@ -96,15 +98,6 @@ pub enum XiLayout {
     TermsByLatent,
     /// One row per latent coordinate (PySINDy)
     LatentByTerms,
-}
-
-/// The candidate terms that the rows of Xi belong to.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum LibraryChoice {
-    /// The shorthand.
-    Standard(StandardLibrary),
-    /// A list of terms in the file's order.
-    Terms(Vec<String>),
 }
 
 /// Reads `degree=2,trigonometric,inputs`.
@@ -214,7 +207,7 @@ pub struct ImportOptions {
     pub xi_layout: Option<XiLayout>,
     /// How LaTeX writes the variables.
     pub symbols: SymbolNames,
-    /// The candidate terms; equations bring their own.
+    /// The candidate terms in the order of Xi's rows; equations bring their own.
     pub library: Option<LibraryChoice>,
     /// Number of latent coordinates: needed if shapes leave it open, else checked.
     pub latent_dim: Option<usize>,

@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 use romc::import::*;
-use romc::model::ReducedModel;
+use romc::model::{LibraryChoice, ReducedModel};
 use zip::CompressionMethod;
 
 use crate::store::*;

@@ -13,7 +13,9 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Map, Value};
 
 use super::jump_prior::{LandmarksEntry, PriorEntry};
-use crate::model::{Activation, CoordinateNames, FeetRule, ScaleFactors, Scaling, StandardLibrary};
+use crate::model::{
+    Activation, CoordinateNames, FeetRule, LibraryChoice, ScaleFactors, Scaling, StandardLibrary,
+};
 use crate::robot::{Actuators, JOINT_DIM, WrenchFrame};
 use crate::robot_file::RobotEntry;
 
@@ -46,7 +48,7 @@ pub(super) struct Manifest {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub decoder: Option<MapEntry>,
     pub latent_dim: usize,
-    pub library: LibraryEntry,
+    pub library: LibraryChoice,
     pub phases: Vec<PhaseEntry>,
     #[serde(default, skip_serializing_if = "Pairs::is_empty")]
     pub input_statistics: Pairs<StatisticsEntry>,
@@ -203,14 +205,6 @@ pub(super) struct GivenStateEntry {
     pub acceleration_error: Rows,
 }
 
-/// A list of terms, or the shorthand.
-#[derive(Serialize)]
-#[serde(untagged)]
-pub(super) enum LibraryEntry {
-    Terms(Vec<String>),
-    Standard(StandardLibrary),
-}
-
 /// A number for all coordinates, or one number per coordinate.
 impl Serialize for ScaleFactors {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
@@ -247,20 +241,21 @@ impl<'de> Deserialize<'de> for ScaleFactors {
     }
 }
 
-impl<'de> Deserialize<'de> for LibraryEntry {
+/// A list of terms, or the shorthand.
+impl<'de> Deserialize<'de> for LibraryChoice {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         struct Terms;
         impl<'de> Visitor<'de> for Terms {
-            type Value = LibraryEntry;
+            type Value = LibraryChoice;
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
                 f.write_str("a list of terms, or an object with degree, trigonometric and inputs")
             }
-            fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<LibraryEntry, A::Error> {
-                Vec::deserialize(SeqAccessDeserializer::new(seq)).map(LibraryEntry::Terms)
+            fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<LibraryChoice, A::Error> {
+                Vec::deserialize(SeqAccessDeserializer::new(seq)).map(LibraryChoice::Terms)
             }
-            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<LibraryEntry, A::Error> {
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<LibraryChoice, A::Error> {
                 StandardLibrary::deserialize(MapAccessDeserializer::new(map))
-                    .map(LibraryEntry::Standard)
+                    .map(LibraryChoice::Standard)
             }
         }
         deserializer.deserialize_any(Terms)

@@ -10,8 +10,8 @@ use serde_json::Value;
 use super::error::{ArtifactError, ArtifactFault, refused};
 use super::jump_prior::prior_of;
 use super::manifest::{
-    GivenStateEntry, LibraryEntry, Manifest, MapEntry, PhaseEntry, RobotValue, Rows, SCHEMA,
-    SCHEMA_2, SchemaProbe, StatisticsEntry,
+    GivenStateEntry, Manifest, MapEntry, PhaseEntry, RobotValue, Rows, SCHEMA, SCHEMA_2,
+    SchemaProbe, StatisticsEntry,
 };
 use super::matrices::from_rows;
 use crate::model::{
@@ -120,10 +120,7 @@ fn check_schema(file: &str, bytes: &[u8]) -> Result<(), ArtifactError> {
 
 fn to_model(file: &str, manifest: Manifest) -> Result<ReducedModel, ArtifactError> {
     let latent_dim = manifest.latent_dim;
-    let library = match manifest.library {
-        LibraryEntry::Terms(texts) => Library::from_terms(latent_dim, &texts),
-        LibraryEntry::Standard(standard) => Library::standard(latent_dim, standard),
-    };
+    let library = Library::of(latent_dim, &manifest.library);
     let library = library.map_err(|source| refused(file, source))?;
     let mut builder = ReducedModel::builder(manifest.name, library)
         .description(manifest.description)
