@@ -261,7 +261,7 @@ fn import_of_square_weights_follows_the_option() {
             imported
                 .report
                 .notes
-                .contains(&Note::ZeroBias { part: "encoder" })
+                .contains(&Note::ZeroBias(Part::Encoder))
         );
     }
 }
