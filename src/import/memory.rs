@@ -105,16 +105,6 @@ mod tests {
     }
 
     #[test]
-    fn number_that_is_not_finite_is_named_with_its_index() {
-        let tensors = [xi(&[1.0, 2.0, f64::NAN, 4.0, 5.0, 6.0], false)];
-        let error = import_tensors("arrays", &tensors, &options()).expect_err("a NaN");
-        assert_eq!(
-            error.to_string(),
-            "arrays: `xi.contact`[1, 0] as xi.contact: found NaN, expected a finite number"
-        );
-    }
-
-    #[test]
     fn numbers_that_do_not_fit_the_dimensions_are_refused() {
         let error = import_tensors("arrays", &[xi(&[1.0], false)], &options());
         let error = error.expect_err("too few numbers").to_string();

@@ -3,9 +3,8 @@
 use super::jump_prior::entries_of;
 use super::manifest::{
     GivenStateEntry, LayerEntry, Manifest, MapEntry, Pairs, PhaseEntry, RobotValue, SCHEMA,
-    SCHEMA_2, StatisticsEntry,
+    SCHEMA_2, StatisticsEntry, to_rows,
 };
-use super::matrices::to_rows;
 use crate::model::{InputStatistics, Phase, ReducedModel, StateMap};
 use crate::robot::{Robot, WrenchFrame};
 use crate::robot_file::RobotEntry;

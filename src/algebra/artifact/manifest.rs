@@ -6,13 +6,15 @@
 use std::fmt;
 use std::marker::PhantomData;
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
 use serde::de::{Error as _, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Map, Value};
 
+use super::error::{ArtifactError, ArtifactFault};
 use super::jump_prior::{LandmarksEntry, PriorEntry};
+use crate::files::{Located, Place};
 use crate::model::{
     Activation, CoordinateNames, FeetRule, LibraryChoice, ScaleFactors, Scaling, StandardLibrary,
 };
@@ -28,6 +30,37 @@ pub const SCHEMA_2: &str = "romc-model/2";
 
 /// Rows of a matrix.
 pub(super) type Rows = Vec<Vec<f64>>;
+
+/// The matrix with these rows; every row must have `expected` numbers, or as many as the first.
+pub(super) fn from_rows(
+    file: &str,
+    tensor: &str,
+    rows: &Rows,
+    expected: Option<usize>,
+) -> Result<DMatrix<f64>, ArtifactError> {
+    let expected = expected.or(rows.first().map(Vec::len)).unwrap_or(0);
+    for (row, numbers) in rows.iter().enumerate() {
+        if numbers.len() != expected {
+            let found = numbers.len();
+            let place = Place::Entry(format!("`{tensor}`[{row}]").into());
+            let fault = ArtifactFault::RowLength { found, expected };
+            return Err(Located::new(file, place, fault));
+        }
+    }
+    Ok(DMatrix::from_row_iterator(
+        rows.len(),
+        expected,
+        rows.iter().flatten().copied(),
+    ))
+}
+
+/// The rows of a matrix.
+pub(super) fn to_rows(matrix: &DMatrix<f64>) -> Rows {
+    matrix
+        .row_iter()
+        .map(|row| row.iter().copied().collect())
+        .collect()
+}
 
 /// The whole file.
 #[derive(Serialize, Deserialize)]

@@ -11,9 +11,8 @@ use super::error::{ArtifactError, ArtifactFault, refused};
 use super::jump_prior::prior_of;
 use super::manifest::{
     GivenStateEntry, Manifest, MapEntry, PhaseEntry, RobotValue, Rows, SCHEMA, SCHEMA_2,
-    SchemaProbe, StatisticsEntry,
+    SchemaProbe, StatisticsEntry, from_rows,
 };
-use super::matrices::from_rows;
 use crate::model::{
     Activation, AffineMap, InputGivenState, InputStatistics, Layer, Library, ModelError, Phase,
     ReducedModel, StateMap,

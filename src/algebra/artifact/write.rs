@@ -1,12 +1,15 @@
-//! From a model to a file that appears whole or not at all.
+//! From a model to a file that appears whole or not at all, and to the digest by which generated
+//! files name the model that they come from.
 
-use std::fs;
 use std::path::Path;
+use std::{fmt, fs};
+
+use sha2::{Digest as _, Sha256};
 
 use super::error::{ArtifactError, ArtifactFault};
 use super::export::manifest_of;
 use super::print::print;
-use crate::files::{Overwrite, write_whole};
+use crate::files::{Overwrite, hex, write_whole};
 use crate::model::ReducedModel;
 
 /// The model file as text: equal for equal models, numbers in the shortest form that reads back to
@@ -61,4 +64,29 @@ pub fn write_with(
         let action = "write";
         ArtifactFault::Io { action, source }.of(&path.display().to_string())
     })
+}
+
+/// SHA-256 of a model in the form in which [`write()`] writes it.
+///
+/// The layout of the file that was read does not matter. For a file that romc wrote the digest is
+/// what `sha256sum` prints.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Digest([u8; 32]);
+
+impl Digest {
+    /// The first 16 hexadecimal digits, for headers of generated files.
+    pub fn short(&self) -> String {
+        self.to_string()[..16].to_owned()
+    }
+}
+
+impl fmt::Display for Digest {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&hex(&self.0))
+    }
+}
+
+/// The digest of a model.
+pub fn digest(model: &ReducedModel) -> Digest {
+    Digest(Sha256::digest(to_text(model)).into())
 }

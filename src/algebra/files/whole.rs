@@ -5,6 +5,25 @@ use std::path::Path;
 
 use super::part::{Part, remove_left_in};
 
+/// A generated file, not yet on disk.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct EmittedFile {
+    /// Path relative to the output folder, with `/` between its parts.
+    pub path: String,
+    /// What the file holds.
+    pub contents: String,
+}
+
+impl EmittedFile {
+    /// A file at `path` with `contents`.
+    pub fn new(path: impl Into<String>, contents: impl Into<String>) -> Self {
+        Self {
+            path: path.into(),
+            contents: contents.into(),
+        }
+    }
+}
+
 /// Whether a file that is there already may be replaced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Overwrite {
