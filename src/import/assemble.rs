@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector};
 use super::assign::{Assigned, Assignment, assign};
 use super::error::{ImportError, ImportFault, shape_text};
 use super::library;
-use super::options::{ImportOptions, PhaseRule, XiLayout};
+use super::options::{ImportOptions, PhaseRule, XiLayout, standard_text};
 use super::report::{ImportReport, Layout, Note, UnusedTensor, UsedTensor};
 use super::role::Role;
 use super::tensors::{Element, TensorFile};
@@ -262,13 +262,19 @@ impl<'a> Assembly<'a, '_> {
     }
 
     fn expected_xi(&self, choice: &LibraryChoice) -> String {
-        let latent = self.known.latent.map_or("d".to_owned(), |d| d.to_string());
-        let terms = match (choice, self.known.latent) {
-            (LibraryChoice::Terms(terms), _) => Some(terms.len()),
-            (LibraryChoice::Standard(_), latent) => latent.and_then(|d| library::dim(choice, d)),
+        let latent = self.known.latent;
+        let (terms, source) = match choice {
+            LibraryChoice::Terms(terms) => {
+                let count = terms.len();
+                (Some(count), format!("a list of {count} terms"))
+            }
+            LibraryChoice::Standard(standard) => {
+                let count = latent.and_then(|d| standard.term_count(d));
+                (count, standard_text(*standard))
+            }
         };
+        let latent = latent.map_or("d".to_owned(), |d| d.to_string());
         let terms = terms.map_or("terms".to_owned(), |count| count.to_string());
-        let source = library::describe(choice);
         format!("{terms} x {latent} or {latent} x {terms} (library: {source})")
     }
 
@@ -276,12 +282,8 @@ impl<'a> Assembly<'a, '_> {
         let shape = &first.info.shape;
         let latent = self.known.latent.or(shape.iter().copied().min());
         let suggestions = match (latent, shape.as_slice()) {
-            (Some(latent), &[rows, columns]) if latent == columns => {
-                library::standards_with(rows, latent)
-            }
-            (Some(latent), &[rows, columns]) if latent == rows => {
-                library::standards_with(columns, latent)
-            }
+            (Some(d), &[terms, columns]) if d == columns => library::standards_with(terms, d),
+            (Some(d), &[rows, terms]) if d == rows => library::standards_with(terms, d),
             _ => Vec::new(),
         };
         let mut expected =

@@ -8,7 +8,7 @@ use super::assemble::Parts;
 use super::equations::{Equation, Section, Sections, refused};
 use super::error::{ImportError, ImportFault};
 use super::library;
-use super::options::{ImportOptions, PhaseRule, no_feet};
+use super::options::{ImportOptions, PhaseRule};
 use super::report::{ImportReport, ReadEquation};
 use super::terms::{self, Coefficients};
 use crate::model::{Library, Phase};
@@ -94,15 +94,13 @@ struct Row {
 
 /// Refuses options that only tensors can follow, and another dimension.
 fn check_options(latent_dim: usize, options: &ImportOptions) -> Result<(), ImportError> {
-    match options.latent_dim {
-        Some(expected) if expected != latent_dim => {
-            let (found, expected) = (
-                expected.to_string(),
-                format!("{latent_dim}, as the equations have"),
-            );
-            return Err(ImportFault::option("--latent-dim", found, expected));
-        }
-        _ => {}
+    if let Some(given) = options.latent_dim.filter(|given| *given != latent_dim) {
+        let expected = format!("{latent_dim}, as the equations have");
+        return Err(ImportFault::option(
+            "--latent-dim",
+            given.to_string(),
+            expected,
+        ));
     }
     let given = [
         ("--map", !options.mapping.is_empty()),
@@ -137,9 +135,8 @@ fn phases_in_order<'s>(
                 return Err(refused(file, (section.line, 1), found, expected));
             }
         };
-        let feet = options
-            .feet_of(&name)
-            .ok_or_else(|| no_feet(file, &name, &format!("equations (line {})", section.line)))?;
+        let found = format!("equations (line {})", section.line);
+        let feet = options.feet_of(file, &name, &found)?;
         ordered.push((PhaseRule { name, feet }, section));
     }
     for PhaseRule { name, .. } in &options.phases {

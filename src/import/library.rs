@@ -32,14 +32,6 @@ pub(super) fn build(choice: &LibraryChoice, latent_dim: usize) -> Result<Library
     }
 }
 
-/// In words for messages: `15 terms (degree=1,trigonometric,inputs)`.
-pub(super) fn describe(choice: &LibraryChoice) -> String {
-    match choice {
-        LibraryChoice::Standard(standard) => standard_text(*standard),
-        LibraryChoice::Terms(terms) => format!("a list of {} terms", terms.len()),
-    }
-}
-
 /// The shorthands that have this many terms.
 pub(super) fn standards_with(term_count: usize, latent_dim: usize) -> Vec<String> {
     let mut texts = Vec::new();

@@ -2,8 +2,8 @@
 
 use super::jump_prior::entries_of;
 use super::manifest::{
-    GivenStateEntry, LayerEntry, Manifest, MapEntry, Pairs, PhaseEntry, RobotValue, SCHEMA,
-    SCHEMA_2, StatisticsEntry, to_rows,
+    GivenStateEntry, LayerEntry, Manifest, MapEntry, PhaseEntry, RobotValue, SCHEMA, SCHEMA_2,
+    Statistics, StatisticsEntry, to_rows,
 };
 use crate::model::{InputStatistics, Phase, ReducedModel, StateMap};
 use crate::robot::{Robot, WrenchFrame};
@@ -30,7 +30,7 @@ pub(super) fn manifest_of(model: &ReducedModel) -> Manifest {
         latent_dim: model.latent_dim(),
         library: model.library().choice(),
         phases: model.phases().iter().map(phase_entry).collect(),
-        input_statistics: Pairs(statistics.collect()),
+        input_statistics: Statistics(statistics.collect()),
         robot: model.robot().ok().map(robot_value),
         actuators: model.actuators().cloned(),
         wrench_frame: (frame != WrenchFrame::Body).then_some(frame),

@@ -4,7 +4,6 @@
 //! become a [`ReducedModel`](crate::model::ReducedModel).
 
 use std::fmt;
-use std::marker::PhantomData;
 
 use nalgebra::{DMatrix, DVector};
 use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
@@ -83,8 +82,8 @@ pub(super) struct Manifest {
     pub latent_dim: usize,
     pub library: LibraryChoice,
     pub phases: Vec<PhaseEntry>,
-    #[serde(default, skip_serializing_if = "Pairs::is_empty")]
-    pub input_statistics: Pairs<StatisticsEntry>,
+    #[serde(default, skip_serializing_if = "Statistics::is_empty")]
+    pub input_statistics: Statistics,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub robot: Option<RobotValue>,
     #[serde(default, deserialize_with = "present")]
@@ -388,46 +387,41 @@ impl<'de> Deserialize<'de> for Flag {
     }
 }
 
-/// A JSON object as pairs in the order of the file, in which no key comes twice.
-pub(super) struct Pairs<T>(pub Vec<(String, T)>);
+/// Statistics by phase: a JSON object as pairs in the order of the file, in which no key comes twice.
+#[derive(Default)]
+pub(super) struct Statistics(pub Vec<(String, StatisticsEntry)>);
 
-impl<T> Default for Pairs<T> {
-    fn default() -> Self {
-        Pairs(Vec::new())
-    }
-}
-
-impl<T> Pairs<T> {
+impl Statistics {
     fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 }
 
-impl<T: Serialize> Serialize for Pairs<T> {
+impl Serialize for Statistics {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_map(self.0.iter().map(|(key, value)| (key, value)))
     }
 }
 
-impl<'de, T: Deserialize<'de>> Deserialize<'de> for Pairs<T> {
+impl<'de> Deserialize<'de> for Statistics {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Object<T>(PhantomData<T>);
-        impl<'de, T: Deserialize<'de>> Visitor<'de> for Object<T> {
-            type Value = Pairs<T>;
+        struct Object;
+        impl<'de> Visitor<'de> for Object {
+            type Value = Statistics;
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
                 f.write_str("an object with one entry per phase")
             }
-            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Pairs<T>, A::Error> {
-                let mut pairs: Vec<(String, T)> = Vec::new();
+            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Statistics, A::Error> {
+                let mut pairs: Vec<(String, StatisticsEntry)> = Vec::new();
                 while let Some(key) = map.next_key::<String>()? {
                     if pairs.iter().any(|(earlier, _)| *earlier == key) {
                         return Err(A::Error::custom(format_args!("duplicate key {key:?}")));
                     }
                     pairs.push((key, map.next_value()?));
                 }
-                Ok(Pairs(pairs))
+                Ok(Statistics(pairs))
             }
         }
-        deserializer.deserialize_map(Object(PhantomData))
+        deserializer.deserialize_map(Object)
     }
 }
