@@ -20,15 +20,7 @@ pub fn to_text(model: &ReducedModel) -> String {
     print(&value)
 }
 
-/// Writes a model file; refuses to replace a different one.
-///
-/// # Errors
-/// [`ArtifactFault::Exists`], [`ArtifactFault::Io`].
-pub fn write(path: &Path, model: &ReducedModel) -> Result<(), ArtifactError> {
-    write_with(path, model, Overwrite::Refuse)
-}
-
-/// Checks whether [`write_with`] would refuse.
+/// Checks whether [`write()`] would refuse.
 ///
 /// # Errors
 /// [`ArtifactFault::Exists`] if a different file is there and `overwrite` refuses.
@@ -53,11 +45,7 @@ fn check_text(path: &Path, text: &str, overwrite: Overwrite) -> Result<(), Artif
 /// # Errors
 /// [`ArtifactFault::Exists`] if a different file is there and `overwrite` refuses,
 /// [`ArtifactFault::Io`].
-pub fn write_with(
-    path: &Path,
-    model: &ReducedModel,
-    overwrite: Overwrite,
-) -> Result<(), ArtifactError> {
+pub fn write(path: &Path, model: &ReducedModel, overwrite: Overwrite) -> Result<(), ArtifactError> {
     let text = to_text(model);
     check_text(path, &text, overwrite)?;
     write_whole(path, |out| out.write_all(text.as_bytes())).map_err(|source| {
