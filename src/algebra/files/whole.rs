@@ -111,14 +111,4 @@ mod tests {
         let left = fs::read_dir(folder.path()).expect("readable");
         assert_eq!(left.count(), 1, "no part stays behind");
     }
-
-    #[test]
-    fn refuse_allows_only_what_is_not_there() {
-        let folder = tempfile::tempdir().expect("a temporary folder");
-        let path = folder.path().join("out.csv");
-        assert!(Overwrite::Refuse.allows(&path));
-        fs::write(&path, "x").expect("writable");
-        assert!(!Overwrite::when_forced(false).allows(&path));
-        assert!(Overwrite::when_forced(true).allows(&path));
-    }
 }
