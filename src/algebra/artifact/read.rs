@@ -151,7 +151,11 @@ fn to_model(file: &str, manifest: Manifest) -> Result<ReducedModel, ArtifactErro
     }
     let phases = manifest.phases.into_iter().enumerate();
     let phases = phases
-        .map(|(index, entry)| phase_of(file, index, entry, latent_dim))
+        .map(|(index, PhaseEntry { name, feet, xi })| {
+            let tensor = format!("phases[{index}].xi");
+            let xi = from_rows(file, &tensor, &xi, Some(latent_dim))?;
+            Ok(Phase { name, feet, xi })
+        })
         .collect::<Result<Vec<_>, _>>()?;
     let prior = prior_of(file, (manifest.landmarks, manifest.prior), &phases)?;
     builder = builder.phases(phases).jump_prior(prior);
@@ -198,20 +202,6 @@ fn affine_of(
     let weights = from_rows(file, &format!("{tensor}.weights"), weights, columns)?;
     let bias = DVector::from_column_slice(bias);
     AffineMap::new(tensor, weights, bias).map_err(|source| refused(file, source))
-}
-
-fn phase_of(
-    file: &str,
-    index: usize,
-    entry: PhaseEntry,
-    latent_dim: usize,
-) -> Result<Phase, ArtifactError> {
-    let tensor = format!("phases[{index}].xi");
-    Ok(Phase {
-        xi: from_rows(file, &tensor, &entry.xi, Some(latent_dim))?,
-        name: entry.name,
-        feet: entry.feet,
-    })
 }
 
 fn statistics_of(
