@@ -513,7 +513,7 @@ fn actuators_and_frame_that_are_wrong_are_refused_at_their_place() {
             value.as_object_mut().expect("an object").remove(other);
         });
         assert!(
-            matches!(error.kind, ArtifactFault::LaterKey { key: found } if found == key),
+            matches!(error.kind, ArtifactFault::LaterKey(found) if found == key),
             "{error:?}"
         );
     }

@@ -387,7 +387,7 @@ impl<'de> Deserialize<'de> for Flag {
     }
 }
 
-/// Statistics by phase: a JSON object as pairs in the order of the file, in which no key comes twice.
+/// Statistics by phase: a JSON object as pairs in the file's order, in which no key comes twice.
 #[derive(Default)]
 pub(super) struct Statistics(pub Vec<(String, StatisticsEntry)>);
 

@@ -62,7 +62,7 @@ pub fn read_from_bytes(file: &str, bytes: &[u8]) -> Result<ReducedModel, Artifac
     check_schema(file, bytes)?;
     let manifest: Manifest = parse(file, bytes)?;
     match manifest.later_key().filter(|_| manifest.schema == SCHEMA) {
-        Some(key) => Err(ArtifactFault::LaterKey { key }.of(file)),
+        Some(key) => Err(ArtifactFault::LaterKey(key).of(file)),
         None => to_model(file, manifest),
     }
 }
