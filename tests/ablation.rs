@@ -135,7 +135,7 @@ fn every_figure_of_mpc_differs_for_a_wrong_model_and_the_run_says_that_it_failed
         }
         for (what, wrong) in ablations(&model) {
             let path = folder.path().join("wrong.json");
-            artifact::write_with(&path, &wrong, Overwrite::Replace).expect("writable");
+            artifact::write(&path, &wrong, Overwrite::Replace).expect("writable");
             for (right, wrong) in right.iter().zip(runs(&path, &JUMPS)) {
                 let [mut expected, mut found] = [BTreeMap::new(), BTreeMap::new()];
                 figures(right, "", &mut expected);

@@ -513,7 +513,7 @@ fn actuators_and_frame_that_are_wrong_are_refused_at_their_place() {
             value.as_object_mut().expect("an object").remove(other);
         });
         assert!(
-            matches!(error.kind, ArtifactFault::LaterKey { key: found } if found == key),
+            matches!(error.kind, ArtifactFault::LaterKey(found) if found == key),
             "{error:?}"
         );
     }
@@ -1150,7 +1150,7 @@ fn written_file_is_whole_and_leaves_nothing_beside_it() {
     let folder = tempfile::tempdir().expect("temporary folder");
     let path = folder.path().join("model.json");
     let model = read_value(&fixture("robot-degree-2")).expect("fixture");
-    artifact::write(&path, &model).expect("written");
+    artifact::write(&path, &model, Overwrite::Refuse).expect("written");
     assert_eq!(artifact::read(&path).expect("readable"), model);
     assert_eq!(fs::read_dir(folder.path()).expect("folder").count(), 1);
     // The digest is that of the file's bytes, whatever the layout of the file that was read.
@@ -1167,11 +1167,11 @@ fn different_file_is_replaced_only_when_asked() {
     let path = folder.path().join("model.json");
     fs::write(&path, "notes").expect("written");
     let model = read_value(&fixture("degree-3")).expect("fixture");
-    let error = artifact::write(&path, &model).unwrap_err();
+    let error = artifact::write(&path, &model, Overwrite::Refuse).unwrap_err();
     assert!(matches!(error.kind, ArtifactFault::Exists));
     assert_eq!(fs::read_to_string(&path).expect("readable"), "notes");
-    artifact::write_with(&path, &model, Overwrite::Replace).expect("replaced");
-    artifact::write(&path, &model).expect("the same bytes are no conflict");
+    artifact::write(&path, &model, Overwrite::Replace).expect("replaced");
+    artifact::write(&path, &model, Overwrite::Refuse).expect("the same bytes are no conflict");
     assert_eq!(artifact::read(&path).expect("readable"), model);
 }
 
@@ -1180,7 +1180,7 @@ fn file_in_a_missing_folder_is_refused_and_leaves_nothing() {
     let folder = tempfile::tempdir().expect("temporary folder");
     let path = folder.path().join("no/model.json");
     let model = read_value(&fixture("degree-3")).expect("fixture");
-    let error = artifact::write(&path, &model).unwrap_err();
+    let error = artifact::write(&path, &model, Overwrite::Refuse).unwrap_err();
     assert!(matches!(
         error.kind,
         ArtifactFault::Io {

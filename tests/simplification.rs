@@ -8,7 +8,7 @@ use romc::deploy::{EmitOptions, Target, emit};
 use romc::equations::{Equations, PhaseEquations};
 use romc::ir::Interpreter;
 use romc::lower::{self, Form};
-use romc::model::{FeetRule, Library, LibrarySource, Phase, ReducedModel, StandardLibrary};
+use romc::model::{FeetRule, Library, LibraryChoice, Phase, ReducedModel, StandardLibrary};
 use romc::symbolic::{ExprId, ExprPool, Function, Node, Number, SymbolId};
 use romc::typeset::PrintOptions;
 
@@ -326,7 +326,7 @@ fn large_models_of_plain_terms_keep_every_bit() {
         inputs: true,
     };
     let library = Library::standard(8, standard).expect("a library");
-    assert!(matches!(library.source(), LibrarySource::Standard(_)));
+    assert!(matches!(library.choice(), LibraryChoice::Standard(_)));
     let mut random = Random(3);
     let xi = DMatrix::from_fn(library.len(), 8, |_, _| random.unit() - 0.5);
     let n_coefficients = xi.len();

@@ -8,15 +8,16 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use romc::artifact;
 use romc::evaluate::{Assessment, ReferenceInput, along_recording};
+use romc::files::Overwrite;
 use romc::lower::CompiledModel;
-use romc::model::{Activation, StandardLibrary};
+use romc::model::{Activation, LibraryChoice, StandardLibrary};
 use romc::mpc::{Controller, MpcSettings};
 use romc::recording::{self, Recording};
 use romc::robot::{Actuators, Robot, WrenchFrame};
 use romc::sim::{LatentSegment, Restart, rollout};
 use romc::train::{
-    self, Coordinates, EncoderOptions, LibraryChoice, Origin, Progress, Recordings, ScaleOptions,
-    SetMetrics, TrainError, TrainOptions, Trained, Transfer, Watch,
+    self, Coordinates, EncoderOptions, Origin, Progress, Recordings, ScaleOptions, SetMetrics,
+    TrainError, TrainOptions, Trained, Transfer, Watch,
 };
 
 fn jumps(set: &str, count: usize) -> Vec<Recording> {
@@ -477,7 +478,7 @@ fn joint_training_of_networks_lowers_the_loss_and_gives_a_model_that_simulates()
 
         let folder = tempfile::tempdir().expect("a temporary folder");
         let path = folder.path().join("curved.json");
-        artifact::write(&path, &model).expect("writable");
+        artifact::write(&path, &model, Overwrite::Refuse).expect("writable");
         let read = artifact::read(&path).expect("a model file");
         let encoder = read.encoder_map().expect("trained");
         assert_eq!(

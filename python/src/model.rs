@@ -117,7 +117,7 @@ impl Model {
 
     fn save(&self, py: Python<'_>, path: PathBuf, force: bool) -> PyResult<()> {
         let overwrite = Overwrite::when_forced(force);
-        let written = py.detach(|| artifact::write_with(&path, &self.data, overwrite));
+        let written = py.detach(|| artifact::write(&path, &self.data, overwrite));
         written.map_err(|error| python_error(py, error))
     }
 

@@ -44,9 +44,4 @@ impl CheckDomain {
     pub fn range(&self, phase: &str, variable: &str) -> Option<[f64; 2]> {
         self.phases.get(phase)?.get(variable).copied()
     }
-
-    /// Names of the phases with ranges.
-    pub fn phases(&self) -> impl Iterator<Item = &str> {
-        self.phases.keys().map(String::as_str)
-    }
 }

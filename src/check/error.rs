@@ -24,10 +24,10 @@ pub enum CheckError {
     Kind { file: String, found: String },
     /// A model that cannot be read.
     #[error(transparent)]
-    Model(Box<ArtifactError>),
+    Model(#[from] ArtifactError),
     /// Equations that cannot be read.
     #[error(transparent)]
-    Equations(Box<ImportError>),
+    Equations(#[from] ImportError),
     /// An equation that is too large once its numbers are kept as they are written.
     #[error("{file}:{line}: not a usable equation")]
     Expression {
@@ -43,16 +43,4 @@ pub enum CheckError {
         /// Table, key, what was found and expected.
         message: String,
     },
-}
-
-impl From<ArtifactError> for CheckError {
-    fn from(error: ArtifactError) -> Self {
-        Self::Model(Box::new(error))
-    }
-}
-
-impl From<ImportError> for CheckError {
-    fn from(error: ImportError) -> Self {
-        Self::Equations(Box::new(error))
-    }
 }

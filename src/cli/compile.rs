@@ -62,7 +62,7 @@ pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
     let written = write(&arguments.out_dir, &files, &inputs, overwrite)?;
     let earlier = earlier_files(&arguments.out_dir, &files)?;
     if let Some(path) = save_model {
-        artifact::write_with(path, model, overwrite)?;
+        artifact::write(path, model, overwrite)?;
     }
     Ok(Answer {
         text: exact_words(&exact)

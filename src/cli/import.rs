@@ -11,10 +11,8 @@ use super::output::{named, read_recordings};
 use super::robot;
 use crate::evaluate::RoundTrip;
 use crate::files::Overwrite;
-use crate::import::{
-    Chosen, ImportOptions, ImportReport, LibraryChoice, SymbolNames, import, read_terms,
-};
-use crate::model::ReducedModel;
+use crate::import::{Chosen, ImportOptions, ImportReport, SymbolNames, import, read_terms};
+use crate::model::{LibraryChoice, ReducedModel};
 use crate::recording::Segment;
 use crate::robot_file::read_actuators;
 use crate::sim::with_input_statistics;
@@ -44,7 +42,7 @@ pub fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
         false => with_input_statistics(imported.model, &segments)?,
     };
     let check = checked(&model, &segments, arguments)?;
-    artifact::write_with(&arguments.output, &model, overwrite)?;
+    artifact::write(&arguments.output, &model, overwrite)?;
     let mut text = describe(&imported.report);
     let has_axes = model.robot().is_ok() && model.encoder_map().is_ok();
     let axes = (has_axes && arguments.wrench_frame.is_none()).then(|| {

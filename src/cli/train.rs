@@ -82,7 +82,7 @@ pub fn run(arguments: &TrainArguments) -> Result<(Answer, u8), Error> {
             "interrupted: this is the best model so far; its provenance says so, its command does not repeat it",
         );
     }
-    artifact::write_with(&arguments.output, &trained.model, overwrite)?;
+    artifact::write(&arguments.output, &trained.model, overwrite)?;
     let tested = match test.is_empty() {
         true => None,
         false => Some(train::assess(&trained.model, test)?),

@@ -12,13 +12,12 @@ use crate::Error;
 use crate::identify::identify;
 use crate::limits::of_training;
 use crate::limits::table::LAYER_WIDTH;
-use crate::model::{Activation, StandardLibrary};
+use crate::model::{Activation, LibraryChoice, StandardLibrary};
 use crate::recording::{ConditionOptions, ImplausibleSamples, PhaseRule, RecordingFiles};
 use crate::robot::{Actuators, Robot};
 use crate::robot_file::read_actuators;
 use crate::train::{
-    Coordinates, LibraryChoice, MIN_SAMPLES, MapOptions, Method, ScaleOptions, TrainError,
-    TrainOptions,
+    Coordinates, MIN_SAMPLES, MapOptions, Method, ScaleOptions, TrainError, TrainOptions,
 };
 
 /// The word for actuators that stands for no file.

@@ -8,12 +8,12 @@ use nalgebra::{DMatrix, DVector};
 use super::assign::{Assigned, Assignment, assign};
 use super::error::{ImportError, ImportFault, shape_text};
 use super::library;
-use super::options::{ImportOptions, LibraryChoice, PhaseRule, XiLayout};
-use super::report::{Layout, Note, ReadEquation, UnusedTensor, UsedTensor};
+use super::options::{ImportOptions, PhaseRule, XiLayout, standard_text};
+use super::report::{ImportReport, Layout, Note, UnusedTensor, UsedTensor};
 use super::role::Role;
-use super::tensors::{Array, Element, TensorFile};
+use super::tensors::{Element, TensorFile};
 use crate::files::Place;
-use crate::model::{InputStatistics, Library, ModelError, Phase, Scaling, StateMap};
+use crate::model::{InputStatistics, Library, LibraryChoice, ModelError, Phase, Scaling, StateMap};
 use crate::robot::STATE_DIM;
 
 /// The parts of a model that a file has.
@@ -27,13 +27,12 @@ pub(super) struct Parts {
     pub(super) statistics: Vec<(String, InputStatistics)>,
 }
 
-/// The decisions about a file.
-#[derive(Debug, Default)]
-pub(super) struct ImportNotes {
-    pub(super) used: Vec<UsedTensor>,
-    pub(super) unused: Vec<UnusedTensor>,
-    pub(super) equations: Vec<ReadEquation>,
-    pub(super) notes: Vec<Note>,
+impl Parts {
+    /// Number of robot coordinates, if there is an encoder or decoder.
+    pub(super) fn state_dim(&self) -> Option<usize> {
+        (self.encoder.as_ref().map(StateMap::input_dim))
+            .or(self.decoder.as_ref().map(StateMap::output_dim))
+    }
 }
 
 /// Dimensions as far as they are known before a tensor is looked at.
@@ -45,11 +44,11 @@ struct Known {
     state: Option<usize>,
 }
 
-/// Makes the parts of a model out of a file of tensors.
+/// Makes the parts of a model out of a file of tensors, with the decisions about each.
 pub(super) fn parts(
     tensors: &TensorFile<'_>,
     options: &ImportOptions,
-) -> Result<(Parts, ImportNotes), ImportError> {
+) -> Result<(Parts, ImportReport), ImportError> {
     let assignment = assign(tensors, options)?;
     let mut assembly = Assembly {
         tensors,
@@ -59,7 +58,7 @@ pub(super) fn parts(
             latent: options.latent_dim,
             state: options.robot.map(|_| STATE_DIM),
         },
-        notes: ImportNotes::default(),
+        report: ImportReport::default(),
     };
     let (encoder, decoder) = assembly.maps()?;
     let (library, phases) = assembly.coefficients()?;
@@ -74,13 +73,13 @@ pub(super) fn parts(
     };
     assembly.fold_mean(&mut parts)?;
     assembly.sort(&mut parts)?;
-    let mut notes = assembly.notes;
+    let mut report = assembly.report;
     let unused = assignment.unused.iter().map(|info| UnusedTensor {
         tensor: info.name.clone(),
         shape: info.shape.clone(),
     });
-    notes.unused = unused.collect();
-    Ok((parts, notes))
+    report.unused = unused.collect();
+    Ok((parts, report))
 }
 
 struct Assembly<'a, 'f> {
@@ -88,7 +87,7 @@ struct Assembly<'a, 'f> {
     options: &'a ImportOptions,
     assignment: &'a Assignment<'a>,
     known: Known,
-    notes: ImportNotes,
+    report: ImportReport,
 }
 
 impl<'a> Assembly<'a, '_> {
@@ -136,16 +135,20 @@ impl<'a> Assembly<'a, '_> {
         }
     }
 
-    /// Reads a tensor for its role.
-    fn read(&self, assigned: &Assigned<'_>) -> Result<Array, ImportError> {
+    /// Reads a tensor for its role, as a matrix of `rows x columns`.
+    fn read(
+        &self,
+        assigned: &Assigned<'_>,
+        shape: (usize, usize),
+    ) -> Result<DMatrix<f64>, ImportError> {
         if assigned.info.element == Element::Bool && !matches!(assigned.role, Role::Mask(_)) {
             return Err(self.refused(assigned, "numbers of type bool", "f32 or f64"));
         }
-        (self.tensors).read(assigned.info, |index| assigned.place(index))
+        (self.tensors).read(assigned.info, shape, |index| assigned.place(index))
     }
 
     fn note_used(&mut self, assigned: &Assigned<'_>, layout: Layout) {
-        self.notes.used.push(UsedTensor {
+        self.report.used.push(UsedTensor {
             role: assigned.role.to_string(),
             tensor: assigned.info.name.clone(),
             shape: assigned.info.shape.clone(),
@@ -169,9 +172,9 @@ impl<'a> Assembly<'a, '_> {
         if !is_list {
             return Err(self.wrong_shape(assigned, format!("{length} numbers")));
         }
-        let values = self.read(assigned)?.values;
+        let values = self.read(assigned, (length, 1))?;
         self.note_used(assigned, Layout::Plain);
-        Ok(DVector::from_vec(values))
+        Ok(values.column(0).into_owned())
     }
 
     /// Library and phases.
@@ -184,7 +187,7 @@ impl<'a> Assembly<'a, '_> {
         for rule in &self.assignment.phases {
             let xi = self.xi(&rule.name, choice)?;
             let PhaseRule { name, feet } = rule.clone();
-            self.notes.notes.extend(options.usual_feet(&name, &feet));
+            self.report.notes.extend(options.usual_feet(&name, &feet));
             phases.push(Phase { name, feet, xi });
         }
         let latent_dim = phases[0].xi.ncols();
@@ -214,7 +217,7 @@ impl<'a> Assembly<'a, '_> {
         }
         self.note_used(assigned, layout);
         let off = |(value, flag): &(&f64, &f64)| **flag == 0.0 && **value != 0.0;
-        self.notes.notes.push(Note::Masked {
+        self.report.notes.push(Note::Masked {
             phase: phase.to_owned(),
             count: xi.iter().zip(&mask).filter(off).count(),
         });
@@ -251,22 +254,27 @@ impl<'a> Assembly<'a, '_> {
             _ => self.expected_xi(choice),
         };
         let (layout, (terms, latent)) = self.only_way(assigned, &ways, expected, option)?;
-        let array = self.read(assigned)?;
         let matrix = match layout {
-            Layout::LatentByTerms => array.matrix((latent, terms)).transpose(),
-            _ => array.matrix((terms, latent)),
+            Layout::LatentByTerms => self.read(assigned, (latent, terms))?.transpose(),
+            _ => self.read(assigned, (terms, latent))?,
         };
         Ok((matrix, layout))
     }
 
     fn expected_xi(&self, choice: &LibraryChoice) -> String {
-        let latent = self.known.latent.map_or("d".to_owned(), |d| d.to_string());
-        let terms = match (choice, self.known.latent) {
-            (LibraryChoice::Terms(terms), _) => Some(terms.len()),
-            (LibraryChoice::Standard(_), latent) => latent.and_then(|d| library::dim(choice, d)),
+        let latent = self.known.latent;
+        let (terms, source) = match choice {
+            LibraryChoice::Terms(terms) => {
+                let count = terms.len();
+                (Some(count), format!("a list of {count} terms"))
+            }
+            LibraryChoice::Standard(standard) => {
+                let count = latent.and_then(|d| standard.term_count(d));
+                (count, standard_text(*standard))
+            }
         };
+        let latent = latent.map_or("d".to_owned(), |d| d.to_string());
         let terms = terms.map_or("terms".to_owned(), |count| count.to_string());
-        let source = library::describe(choice);
         format!("{terms} x {latent} or {latent} x {terms} (library: {source})")
     }
 
@@ -274,12 +282,8 @@ impl<'a> Assembly<'a, '_> {
         let shape = &first.info.shape;
         let latent = self.known.latent.or(shape.iter().copied().min());
         let suggestions = match (latent, shape.as_slice()) {
-            (Some(latent), &[rows, columns]) if latent == columns => {
-                library::standards_with(rows, latent)
-            }
-            (Some(latent), &[rows, columns]) if latent == rows => {
-                library::standards_with(columns, latent)
-            }
+            (Some(d), &[terms, columns]) if d == columns => library::standards_with(terms, d),
+            (Some(d), &[rows, terms]) if d == rows => library::standards_with(terms, d),
             _ => Vec::new(),
         };
         let mut expected =
@@ -323,7 +327,7 @@ impl<'a> Assembly<'a, '_> {
             }
             let statistics = InputStatistics {
                 mean,
-                covariance: self.read(covariance)?.matrix((dim, dim)),
+                covariance: self.read(covariance, (dim, dim))?,
                 given_state: None,
             };
             self.note_used(covariance, Layout::Plain);

@@ -1,7 +1,7 @@
 //! The use of each tensor: as mapped, else by its name.
 
 use super::error::{ImportError, ImportFault};
-use super::options::{ImportOptions, PhaseRule, no_feet};
+use super::options::{ImportOptions, PhaseRule};
 use super::report::Chosen;
 use super::role::{ONLY_PHASE, Role};
 use super::tensors::{TensorFile, TensorInfo};
@@ -136,8 +136,7 @@ fn phases(
             && options.given(name).is_none()
         {
             let found = format!("the coefficients {}", assigned.info.describe());
-            let feet = options.feet_of(name);
-            let feet = feet.ok_or_else(|| no_feet(tensors.file(), name, &found))?;
+            let feet = options.feet_of(tensors.file(), name, &found)?;
             let name = name.clone();
             rules.push(PhaseRule { name, feet });
         }

@@ -32,6 +32,18 @@ pub struct Section {
     pub equations: Vec<Equation>,
 }
 
+impl Section {
+    /// A section without equations so far.
+    pub(super) fn new(phase: Option<String>, line: usize) -> Self {
+        let equations = Vec::new();
+        Self {
+            phase,
+            line,
+            equations,
+        }
+    }
+}
+
 /// The right side of one equation and where it came from.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Equation {
@@ -148,11 +160,8 @@ impl Reader<'_> {
                 return Err(refused(found, "each phase once"));
             }
         }
-        self.sections.push(Section {
-            phase: Some(name.to_owned()),
-            line: place.0,
-            equations: Vec::new(),
-        });
+        self.sections
+            .push(Section::new(Some(name.to_owned()), place.0));
         Ok(())
     }
 
@@ -170,11 +179,7 @@ impl Reader<'_> {
             return Err(refused(quote(left), &expected));
         };
         if self.sections.is_empty() {
-            self.sections.push(Section {
-                phase: None,
-                line: place.0,
-                equations: Vec::new(),
-            });
+            self.sections.push(Section::new(None, place.0));
         }
         let section = self.sections.last_mut();
         let section = section.expect("one was just made if there was none");
@@ -235,15 +240,15 @@ impl Equation {
         let known = |name: &str| LatentVariable::from_name(name, latent_dim).is_some();
         pool.parse(&self.text(), &known).map_err(|error| {
             let place = self.place(error.position);
-            match (error.kind, latent_dim) {
-                (ParseErrorKind::UnknownName(name), 1) => {
-                    refused(file, place, quote(&name), "z1, dz1 or u1")
-                }
-                (ParseErrorKind::UnknownName(name), d) => {
-                    let expected = format!("z1 to z{d}, dz1 to dz{d} or u1 to u{d}");
+            match error.kind {
+                ParseErrorKind::UnknownName(name) => {
+                    let expected = match latent_dim {
+                        1 => "z1, dz1 or u1".to_owned(),
+                        d => format!("z1 to z{d}, dz1 to dz{d} or u1 to u{d}"),
+                    };
                     refused(file, place, quote(&name), expected)
                 }
-                (kind, _) => Located::new(file, Place::Character(place.0, place.1), kind),
+                kind => Located::new(file, Place::Character(place.0, place.1), kind),
             }
         })
     }

@@ -4,24 +4,24 @@ use std::collections::HashMap;
 
 use nalgebra::DMatrix;
 
-use super::assemble::ImportNotes;
+use super::assemble::Parts;
 use super::equations::{Equation, Section, Sections, refused};
 use super::error::{ImportError, ImportFault};
 use super::library;
-use super::options::{ImportOptions, PhaseRule, no_feet};
-use super::report::ReadEquation;
+use super::options::{ImportOptions, PhaseRule};
+use super::report::{ImportReport, ReadEquation};
 use super::terms::{self, Coefficients};
 use crate::model::{Library, Phase};
 use crate::symbolic::{ExprId, ExprPool};
 
-/// Makes library and phases out of equations, with the notes of both.
+/// Makes the parts of a model out of equations, with the decisions about each.
 ///
 /// Without a library in the options, the library is the union of the terms found.
-pub(super) fn latent(
+pub(super) fn parts(
     file: &str,
     sections: &Sections,
     options: &ImportOptions,
-) -> Result<(Library, Vec<Phase>, ImportNotes), ImportError> {
+) -> Result<(Parts, ImportReport), ImportError> {
     let latent_dim = sections.latent_dim;
     check_options(latent_dim, options)?;
     let ordered = phases_in_order(file, sections, options)?;
@@ -44,12 +44,12 @@ pub(super) fn latent(
         Some(library) => (library, separation.given),
         None => union(file, latent_dim, &separation.pool, &separated)?,
     };
-    let (mut phases, mut notes) = (Vec::new(), ImportNotes::default());
+    let (mut phases, mut report) = (Vec::new(), ImportReport::default());
     for ((rule, section), columns) in ordered.into_iter().zip(&separated) {
         let PhaseRule { name, feet } = rule;
-        notes.notes.extend(options.usual_feet(&name, &feet));
+        report.notes.extend(options.usual_feet(&name, &feet));
         for (equation, coefficients) in section.equations.iter().zip(columns) {
-            notes.equations.push(ReadEquation {
+            report.equations.push(ReadEquation {
                 phase: name.clone(),
                 output: format!("ddz{}", equation.output + 1),
                 line: equation.line,
@@ -59,7 +59,15 @@ pub(super) fn latent(
         let xi = xi(&library, columns, &rows);
         phases.push(Phase { name, feet, xi });
     }
-    Ok((library, phases, notes))
+    let parts = Parts {
+        library,
+        phases,
+        encoder: None,
+        decoder: None,
+        scaling: options.scaling.clone(),
+        statistics: Vec::new(),
+    };
+    Ok((parts, report))
 }
 
 /// The coefficients of a phase's equations in the rows of their terms.
@@ -86,15 +94,13 @@ struct Row {
 
 /// Refuses options that only tensors can follow, and another dimension.
 fn check_options(latent_dim: usize, options: &ImportOptions) -> Result<(), ImportError> {
-    match options.latent_dim {
-        Some(expected) if expected != latent_dim => {
-            let (found, expected) = (
-                expected.to_string(),
-                format!("{latent_dim}, as the equations have"),
-            );
-            return Err(ImportFault::option("--latent-dim", found, expected));
-        }
-        _ => {}
+    if let Some(given) = options.latent_dim.filter(|given| *given != latent_dim) {
+        let expected = format!("{latent_dim}, as the equations have");
+        return Err(ImportFault::option(
+            "--latent-dim",
+            given.to_string(),
+            expected,
+        ));
     }
     let given = [
         ("--map", !options.mapping.is_empty()),
@@ -129,9 +135,8 @@ fn phases_in_order<'s>(
                 return Err(refused(file, (section.line, 1), found, expected));
             }
         };
-        let feet = options
-            .feet_of(&name)
-            .ok_or_else(|| no_feet(file, &name, &format!("equations (line {})", section.line)))?;
+        let found = format!("equations (line {})", section.line);
+        let feet = options.feet_of(file, &name, &found)?;
         ordered.push((PhaseRule { name, feet }, section));
     }
     for PhaseRule { name, .. } in &options.phases {

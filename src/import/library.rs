@@ -6,10 +6,10 @@ use std::{fs, io};
 use serde_json::Value;
 
 use super::error::{ImportError, ImportFault};
-use super::options::{LibraryChoice, standard_text};
+use super::options::standard_text;
 use super::pysindy;
 use crate::files::{Located, Place};
-use crate::model::{Library, LibraryError, StandardLibrary};
+use crate::model::{Library, LibraryChoice, LibraryError, StandardLibrary};
 
 /// Largest file with a list of terms.
 const MAX_TERMS_BYTES: u64 = 32 << 20;
@@ -25,18 +25,10 @@ pub(super) fn dim(choice: &LibraryChoice, latent_dim: usize) -> Option<usize> {
 /// The library at a latent dimension.
 pub(super) fn build(choice: &LibraryChoice, latent_dim: usize) -> Result<Library, LibraryError> {
     match choice {
-        LibraryChoice::Standard(standard) => Library::standard(latent_dim, *standard),
         LibraryChoice::Terms(terms) => {
             Library::from_terms(latent_dim, &pysindy::readable(terms, latent_dim))
         }
-    }
-}
-
-/// In words for messages: `15 terms (degree=1,trigonometric,inputs)`.
-pub(super) fn describe(choice: &LibraryChoice) -> String {
-    match choice {
-        LibraryChoice::Standard(standard) => standard_text(*standard),
-        LibraryChoice::Terms(terms) => format!("a list of {} terms", terms.len()),
+        LibraryChoice::Standard(_) => Library::of(latent_dim, choice),
     }
 }
 

@@ -5,19 +5,19 @@ use std::str::FromStr;
 
 use clap::ValueEnum;
 use nalgebra::DVector;
-use serde::Serialize;
 
 use super::error::{ImportError, ImportFault};
 use super::latex::SymbolNames;
 use super::report::Note;
 use super::role::{Mapping, ONLY_PHASE};
 use crate::files::Place;
-use crate::model::{Activation, CoordinateOrder, FeetRule, ScaleFactors, Scaling, StandardLibrary};
+use crate::model::{
+    Activation, CoordinateOrder, FeetRule, LibraryChoice, ScaleFactors, Scaling, StandardLibrary,
+};
 use crate::robot::{Actuators, ContactFlags, Robot, WrenchFrame};
 
 /// The kinds of files that can be imported.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, ValueEnum)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Format {
     /// Tensors in a safetensors file, such as a PyTorch state dict
     Safetensors,
@@ -96,15 +96,6 @@ pub enum XiLayout {
     TermsByLatent,
     /// One row per latent coordinate (PySINDy)
     LatentByTerms,
-}
-
-/// The candidate terms that the rows of Xi belong to.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum LibraryChoice {
-    /// The shorthand.
-    Standard(StandardLibrary),
-    /// A list of terms in the file's order.
-    Terms(Vec<String>),
 }
 
 /// Reads `degree=2,trigonometric,inputs`.
@@ -214,7 +205,7 @@ pub struct ImportOptions {
     pub xi_layout: Option<XiLayout>,
     /// How LaTeX writes the variables.
     pub symbols: SymbolNames,
-    /// The candidate terms; equations bring their own.
+    /// The candidate terms in the order of Xi's rows; equations bring their own.
     pub library: Option<LibraryChoice>,
     /// Number of latent coordinates: needed if shapes leave it open, else checked.
     pub latent_dim: Option<usize>,
@@ -265,16 +256,27 @@ impl ImportOptions {
         self.phases.iter().position(|rule| rule.name == phase)
     }
 
-    /// The rule of a phase: as given, or for `contact` and `flight` as usual.
-    pub(super) fn feet_of(&self, phase: &str) -> Option<FeetRule> {
-        if let Some(place) = self.given(phase) {
-            return Some(self.phases[place].feet.clone());
-        }
-        match phase {
-            "contact" => Some(FeetRule::Any),
-            "flight" => Some(FeetRule::None),
-            ONLY_PHASE if self.phases.is_empty() => Some(FeetRule::always()),
-            _ => None,
+    /// The rule of a phase: as given, or for `contact` and `flight` as usual. `found` is what of
+    /// the file belongs to it.
+    pub(super) fn feet_of(
+        &self,
+        file: &str,
+        phase: &str,
+        found: &str,
+    ) -> Result<FeetRule, ImportError> {
+        match (self.given(phase), phase) {
+            (Some(place), _) => Ok(self.phases[place].feet.clone()),
+            (None, "contact") => Ok(FeetRule::Any),
+            (None, "flight") => Ok(FeetRule::None),
+            (None, ONLY_PHASE) if self.phases.is_empty() => Ok(FeetRule::always()),
+            (None, _) => {
+                let found = format!("{found} of phase `{phase}`");
+                let expected = format!(
+                    "--phase {phase}=any (or none, always, or patterns such as 0011 in the order fr \
+                     fl rr rl)"
+                );
+                Err(ImportFault::at(file, Place::Whole, found, expected))
+            }
         }
     }
 
@@ -285,19 +287,6 @@ impl ImportOptions {
             feet: feet.to_string(),
         })
     }
-}
-
-/// A phase without a rule; `found` is what belongs to it.
-pub(super) fn no_feet(file: &str, phase: &str, found: &str) -> ImportError {
-    let expected = format!(
-        "--phase {phase}=any (or none, always, or patterns such as 0011 in the order fr fl rr rl)"
-    );
-    ImportFault::at(
-        file,
-        Place::Whole,
-        format!("{found} of phase `{phase}`"),
-        expected,
-    )
 }
 
 #[cfg(test)]

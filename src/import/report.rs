@@ -4,8 +4,10 @@ use std::fmt;
 
 use serde::{Serialize, Serializer};
 
+use super::role::Part;
+
 /// Everything that was decided on the way from a foreign file to a model.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ImportReport {
     /// The file.
     pub file: String,
@@ -115,31 +117,17 @@ pub enum Note {
         feet: String,
     },
     /// A map came without bias.
-    ZeroBias {
-        /// `encoder` or `decoder`.
-        part: &'static str,
-    },
-    /// A map has several layers.
-    Layers {
-        /// `encoder` or `decoder`.
-        part: &'static str,
-        /// Widths and activations.
-        layers: String,
-    },
+    ZeroBias(Part),
+    /// A map has several layers: their widths and activations.
+    Layers(Part, String),
     /// There is no encoder, or no decoder.
-    NoMap {
-        /// `encoder` or `decoder`.
-        part: &'static str,
-    },
+    NoMap(Part),
     /// Encoder and decoder are stored in different ways.
     MixedWeights,
     /// A mean that the training took off states went into the biases.
     FoldedMean,
-    /// Coordinates were brought into romc's order.
-    Sorted {
-        /// Their order in the file.
-        order: String,
-    },
+    /// Coordinates were brought into romc's order from this order of the file.
+    Sorted(String),
     /// A mask switched coefficients off.
     Masked {
         /// The phase.
@@ -151,45 +139,30 @@ pub enum Note {
 
 impl fmt::Display for Note {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
+        f.write_str(&match self {
             Note::UsualFeet { phase, feet } => {
-                write!(
-                    f,
-                    "phase {phase} holds for feet `{feet}`, the usual rule of its name"
-                )
+                format!("phase {phase} holds for feet `{feet}`, the usual rule of its name")
             }
-            Note::ZeroBias { part } => write!(f, "the {part} has no bias: zero"),
-            Note::Layers { part, layers } => write!(f, "the {part} has layers {layers}"),
-            Note::NoMap { part } => {
-                let lost = match *part {
-                    "encoder" => "the model has latent coordinates only",
-                    _ => "latent states cannot be mapped back",
+            Note::ZeroBias(part) => format!("the {} has no bias: zero", part.name()),
+            Note::Layers(part, layers) => format!("the {} has layers {layers}", part.name()),
+            Note::NoMap(part) => {
+                let (part, lost) = match part {
+                    Part::Encoder => ("encoder", "the model has latent coordinates only"),
+                    Part::Decoder => ("decoder", "latent states cannot be mapped back"),
                 };
-                write!(
-                    f,
-                    "no tensor {part}.weight, and no --map {part}.weight=TENSOR: {lost}"
-                )
+                format!("no tensor {part}.weight, and no --map {part}.weight=TENSOR: {lost}")
             }
-            Note::MixedWeights => f.write_str(
-                "encoder and decoder are stored in different ways, one for row and one for column \
-                 vectors",
-            ),
-            Note::FoldedMean => {
-                f.write_str("the mean of the training's states went into the biases")
-            }
-            Note::Sorted { order } => {
-                write!(
-                    f,
-                    "coordinates were in the order {order}; the model has romc's"
-                )
+            Note::MixedWeights => "encoder and decoder are stored in different ways, one for row \
+                                   and one for column vectors"
+                .to_owned(),
+            Note::FoldedMean => "the mean of the training's states went into the biases".to_owned(),
+            Note::Sorted(order) => {
+                format!("coordinates were in the order {order}; the model has romc's")
             }
             Note::Masked { phase, count } => {
-                write!(
-                    f,
-                    "the mask of phase {phase} switched {count} coefficients off"
-                )
+                format!("the mask of phase {phase} switched {count} coefficients off")
             }
-        }
+        })
     }
 }
 

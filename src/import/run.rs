@@ -7,7 +7,7 @@ use std::path::Path;
 use serde_json::{Map, Value, json};
 use sha2::{Digest as _, Sha256};
 
-use super::assemble::{self, ImportNotes, Parts};
+use super::assemble::{self, Parts};
 use super::equations::{self, Sections};
 use super::error::{ImportError, ImportFault};
 use super::latent;
@@ -18,7 +18,7 @@ use super::options::{Format, ImportOptions};
 use super::report::ImportReport;
 use super::safetensors;
 use crate::files::{Located, Place, hex};
-use crate::model::{CoordinateNames, ReducedModel, StateMap};
+use crate::model::{CoordinateNames, ReducedModel};
 use crate::symbolic::ExprPool;
 
 /// Largest file that is read.
@@ -61,7 +61,7 @@ pub fn import_from_bytes(
     bytes: &[u8],
     options: &ImportOptions,
 ) -> Result<Imported, ImportError> {
-    let (parts, notes) = match format {
+    let (parts, mut report) = match format {
         Format::Safetensors | Format::Npz => {
             check_size(file, bytes, MAX_FILE_BYTES)?;
             let tensors = match format {
@@ -75,15 +75,11 @@ pub fn import_from_bytes(
             let given = options.phases.iter().map(|rule| rule.name.clone());
             let known: Vec<String> = given.chain(usual).collect();
             let sections = sections(file, format, bytes, &options.symbols, &known)?;
-            of_equations(file, &sections, options)?
+            latent::parts(file, &sections, options)?
         }
     };
-    let source = Source {
-        file,
-        format: format.name(),
-        digest: Sha256::digest(bytes),
-    };
-    finish(&source, parts, notes, options)
+    (report.file, report.format) = (file.to_owned(), format.name());
+    finish(parts, report, &Sha256::digest(bytes), options)
 }
 
 /// Imports a model whose tensors are in memory, by their names as those of a file; `source` names them in errors.
@@ -95,13 +91,9 @@ pub fn import_tensors(
     tensors: &[Tensor<'_>],
     options: &ImportOptions,
 ) -> Result<Imported, ImportError> {
-    let (parts, notes) = assemble::parts(&memory::open(source, tensors)?, options)?;
-    let source = Source {
-        file: source,
-        format: "arrays",
-        digest: memory::digest(tensors),
-    };
-    finish(&source, parts, notes, options)
+    let (parts, mut report) = assemble::parts(&memory::open(source, tensors)?, options)?;
+    (report.file, report.format) = (source.to_owned(), "arrays");
+    finish(parts, report, &memory::digest(tensors), options)
 }
 
 fn check_size(file: &str, bytes: &[u8], max: u64) -> Result<(), ImportError> {
@@ -146,73 +138,41 @@ pub fn read_equations(
     Ok(read)
 }
 
-/// Where a model comes from.
-struct Source<'s> {
-    file: &'s str,
-    /// The kind of file, or `arrays`.
-    format: &'static str,
-    /// Of the bytes.
-    digest: sha2::digest::Output<Sha256>,
-}
-
-/// From the parts to the model and the report.
+/// From the parts to the model; the report has the file, its kind and the decisions.
 fn finish(
-    source: &Source<'_>,
     parts: Parts,
-    notes: ImportNotes,
+    report: ImportReport,
+    digest: &[u8],
     options: &ImportOptions,
 ) -> Result<Imported, ImportError> {
-    let provenance = provenance(source, &notes);
-    let state_dim = (parts.encoder.as_ref().map(StateMap::input_dim))
-        .or(parts.decoder.as_ref().map(StateMap::output_dim));
-    let model = build(source.file, parts, provenance, options)?;
+    let provenance = provenance(&report, digest);
+    let state_dim = parts.state_dim();
+    let model = build(&report.file, parts, provenance, options)?;
     let report = ImportReport {
-        file: source.file.to_owned(),
-        format: source.format,
         latent_dim: model.latent_dim(),
         state_dim,
         library_dim: model.library().len(),
-        used: notes.used,
-        unused: notes.unused,
-        equations: notes.equations,
-        notes: notes.notes,
+        ..report
     };
     Ok(Imported { model, report })
 }
 
-fn of_equations(
-    file: &str,
-    sections: &Sections,
-    options: &ImportOptions,
-) -> Result<(Parts, ImportNotes), ImportError> {
-    let (library, phases, notes) = latent::latent(file, sections, options)?;
-    let parts = Parts {
-        library,
-        phases,
-        encoder: None,
-        decoder: None,
-        scaling: options.scaling.clone(),
-        statistics: Vec::new(),
-    };
-    Ok((parts, notes))
-}
-
 /// The origin as the model file keeps it: no folders, no time.
-fn provenance(source: &Source<'_>, notes: &ImportNotes) -> Map<String, Value> {
-    let name = Path::new(source.file).file_name();
-    let name = name.map_or(source.file.into(), |name| name.to_string_lossy());
+fn provenance(report: &ImportReport, digest: &[u8]) -> Map<String, Value> {
+    let name = Path::new(&report.file).file_name();
+    let name = name.map_or(report.file.as_str().into(), |name| name.to_string_lossy());
     let entries = [
         ("imported_from", json!(name)),
-        ("format", json!(source.format)),
-        ("sha256", json!(hex(&source.digest))),
+        ("format", json!(report.format)),
+        ("sha256", json!(hex(digest))),
         ("romc", json!(env!("CARGO_PKG_VERSION"))),
     ];
     let mut entries: Map<_, _> = entries
         .map(|(key, value)| (key.to_owned(), value))
         .into_iter()
         .collect();
-    if !notes.used.is_empty() {
-        let tensors = notes.used.iter().map(|used| {
+    if !report.used.is_empty() {
+        let tensors = report.used.iter().map(|used| {
             let value = json!({ "tensor": used.tensor, "layout": used.layout });
             (used.role.clone(), value)
         });

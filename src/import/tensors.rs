@@ -61,26 +61,16 @@ impl TensorInfo {
     pub(super) fn describe(&self) -> String {
         format!("`{}` ({})", self.name, shape_text(&self.shape))
     }
-}
 
-/// The numbers of a tensor.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Array {
-    pub(super) shape: Vec<usize>,
-    pub(super) is_column_major: bool,
-    pub(super) values: Vec<f64>,
-}
-
-impl Array {
-    /// The array as a matrix of `rows x columns`, laid out as its indices say.
-    pub(super) fn matrix(&self, (rows, columns): (usize, usize)) -> DMatrix<f64> {
+    /// Its numbers as a matrix of `rows x columns`, laid out as their indices say.
+    fn matrix(&self, (rows, columns): (usize, usize), values: &[f64]) -> DMatrix<f64> {
         match self.is_column_major {
-            false => DMatrix::from_row_slice(rows, columns, &self.values),
-            true => DMatrix::from_column_slice(rows, columns, &self.values),
+            false => DMatrix::from_row_slice(rows, columns, values),
+            true => DMatrix::from_column_slice(rows, columns, values),
         }
     }
 
-    /// The index of the number at a position of `values`.
+    /// The index of the number at a position of the file.
     fn index_of(&self, position: usize) -> Vec<usize> {
         let mut rest = position;
         let mut index = vec![0; self.shape.len()];
@@ -163,12 +153,14 @@ impl<'b> TensorFile<'b> {
         self.refused(Place::Whole, found, expected)
     }
 
-    /// The numbers of a tensor for one use, which `place` names in errors; all are finite.
+    /// The numbers of a tensor for one use, which `place` names in errors; all are finite, and as
+    /// many as the matrix has.
     pub(super) fn read(
         &self,
         info: &TensorInfo,
+        matrix: (usize, usize),
         place: impl Fn(&[usize]) -> Place,
-    ) -> Result<Array, ImportError> {
+    ) -> Result<DMatrix<f64>, ImportError> {
         let Some(size) = info.element.size() else {
             let found = format!("numbers of type {}", info.element.name());
             return Err(self.refused(place(&[]), found, "f32 or f64"));
@@ -181,17 +173,12 @@ impl<'b> TensorFile<'b> {
         };
         let bytes = (self.bytes)(info, size * count)?;
         let numbers = bytes.chunks_exact(size);
-        let array = Array {
-            shape: info.shape.clone(),
-            is_column_major: info.is_column_major,
-            values: numbers.map(|number| decode(info, number)).collect(),
-        };
-        match array.values.iter().position(|value| !value.is_finite()) {
-            None => Ok(array),
+        let values: Vec<f64> = numbers.map(|number| decode(info, number)).collect();
+        match values.iter().position(|value| !value.is_finite()) {
+            None => Ok(info.matrix(matrix, &values)),
             Some(position) => {
-                let found = array.values[position].to_string();
-                let place = place(&array.index_of(position));
-                Err(self.refused(place, found, "a finite number"))
+                let place = place(&info.index_of(position));
+                Err(self.refused(place, values[position].to_string(), "a finite number"))
             }
         }
     }
@@ -216,43 +203,40 @@ fn decode(info: &TensorInfo, number: &[u8]) -> f64 {
 mod tests {
     use super::*;
 
+    fn info(is_column_major: bool, is_big_endian: bool) -> TensorInfo {
+        TensorInfo {
+            name: "x".to_owned(),
+            shape: vec![2, 3],
+            element: Element::F64,
+            is_column_major,
+            is_big_endian,
+            member: 0,
+            start: 0,
+        }
+    }
+
     #[test]
     fn array_index_follows_its_order() {
-        for is_column_major in [false, true] {
-            let array = Array {
-                shape: vec![2, 3],
-                is_column_major,
-                values: (0..6).map(f64::from).collect(),
-            };
-            let matrix = array.matrix((2, 3));
-            for position in 0..6 {
-                let index = array.index_of(position);
-                assert_eq!(matrix[(index[0], index[1])], array.values[position]);
+        let values = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0];
+        for (is_column_major, expected) in [(false, [1, 1]), (true, [0, 2])] {
+            let info = info(is_column_major, false);
+            let matrix = info.matrix((2, 3), &values);
+            for (position, value) in values.iter().enumerate() {
+                let index = info.index_of(position);
+                assert_eq!(matrix[(index[0], index[1])], *value);
             }
-            let expected = if is_column_major { [0, 2] } else { [1, 1] };
-            assert_eq!(array.index_of(4), expected);
+            assert_eq!(info.index_of(4), expected);
         }
     }
 
     #[test]
     fn numbers_decode_from_either_byte_order() {
-        let info = |is_big_endian| TensorInfo {
-            name: "x".to_owned(),
-            shape: vec![1],
-            element: Element::F64,
-            is_column_major: false,
-            is_big_endian,
-            member: 0,
-            start: 0,
-        };
+        let [little, big] = [false, true].map(|is_big_endian| info(false, is_big_endian));
         let (value, single) = (-0.1f64, 0.3f32);
-        assert_eq!(decode(&info(false), &value.to_le_bytes()), value);
-        assert_eq!(decode(&info(true), &value.to_be_bytes()), value);
-        assert_eq!(
-            decode(&info(true), &single.to_be_bytes()),
-            f64::from(single)
-        );
-        assert_eq!(decode(&info(false), &[1]), 1.0);
-        assert_eq!(decode(&info(false), &[0]), 0.0);
+        assert_eq!(decode(&little, &value.to_le_bytes()), value);
+        assert_eq!(decode(&big, &value.to_be_bytes()), value);
+        assert_eq!(decode(&big, &single.to_be_bytes()), f64::from(single));
+        assert_eq!(decode(&little, &[1]), 1.0);
+        assert_eq!(decode(&little, &[0]), 0.0);
     }
 }

@@ -6,7 +6,7 @@ use nalgebra::DVector;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use romc::import::*;
-use romc::model::{ReducedModel, StandardLibrary};
+use romc::model::{LibraryChoice, ReducedModel, StandardLibrary};
 
 use crate::store::*;
 

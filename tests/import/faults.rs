@@ -4,7 +4,7 @@ use std::path::Path;
 
 use nalgebra::{DMatrix, DVector};
 use romc::import::*;
-use romc::model::{Activation, ModelError, Scaling};
+use romc::model::{Activation, LibraryChoice, ModelError, Scaling};
 use zip::CompressionMethod;
 
 use crate::store::*;

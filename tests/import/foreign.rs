@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::{DMatrix, DVector};
 use romc::import::*;
-use romc::model::{Scaling, StandardLibrary};
+use romc::model::{LibraryChoice, Scaling, StandardLibrary};
 use romc::robot::Robot;
 use serde_json::Value;
 

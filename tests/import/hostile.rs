@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use romc::import::*;
-use romc::model::Scaling;
+use romc::model::{LibraryChoice, Scaling};
 use zip::CompressionMethod;
 
 use crate::store::*;

@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 use romc::import::*;
-use romc::model::ReducedModel;
+use romc::model::{LibraryChoice, ReducedModel};
 use zip::CompressionMethod;
 
 use crate::store::*;
@@ -261,7 +261,7 @@ fn import_of_square_weights_follows_the_option() {
             imported
                 .report
                 .notes
-                .contains(&Note::ZeroBias { part: "encoder" })
+                .contains(&Note::ZeroBias(Part::Encoder))
         );
     }
 }

@@ -6,7 +6,7 @@ use std::path::Path;
 use nalgebra::DMatrix;
 use romc::artifact;
 use romc::import::*;
-use romc::model::{LibrarySource, ReducedModel};
+use romc::model::ReducedModel;
 use safetensors::tensor::{Dtype, TensorView};
 use serde_json::Value;
 use zip::write::SimpleFileOptions;
@@ -157,13 +157,6 @@ pub fn model(path: &str) -> ReducedModel {
 
 /// All that tensors do not carry about a model.
 pub fn options_of(model: &ReducedModel) -> ImportOptions {
-    let library = match model.library().source() {
-        LibrarySource::Standard(standard) => LibraryChoice::Standard(standard),
-        LibrarySource::Terms => {
-            let terms = model.library().terms().iter();
-            LibraryChoice::Terms(terms.map(|term| term.text().to_owned()).collect())
-        }
-    };
     let phases = model.phases().iter().map(|phase| PhaseRule {
         name: phase.name.clone(),
         feet: phase.feet.clone(),
@@ -171,7 +164,7 @@ pub fn options_of(model: &ReducedModel) -> ImportOptions {
     ImportOptions {
         name: model.name().to_owned(),
         description: model.description().to_owned(),
-        library: Some(library),
+        library: Some(model.library().choice()),
         phases: phases.collect(),
         scaling: model.scaling().ok().cloned(),
         robot: model.robot().ok(),

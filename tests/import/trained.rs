@@ -8,8 +8,8 @@ use std::process::Output;
 
 use nalgebra::{DMatrix, DVector};
 use romc::artifact;
-use romc::import::{Format, ImportOptions, Imported, LibraryChoice, import_from_bytes};
-use romc::model::{Activation, CoordinateOrder, ReducedModel};
+use romc::import::{Format, ImportOptions, Imported, import_from_bytes};
+use romc::model::{Activation, CoordinateOrder, LibraryChoice, ReducedModel};
 use zip::CompressionMethod;
 
 use crate::command_line::{romc, text};

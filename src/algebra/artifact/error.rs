@@ -43,11 +43,8 @@ pub enum ArtifactFault {
     #[error("`schema`: found {0}, expected \"{SCHEMA}\" or \"{SCHEMA_2}\"")]
     Schema(String),
     /// A key that the file's schema does not have.
-    #[error("`{key}`: found in a file of \"{SCHEMA}\", expected only from \"{SCHEMA_2}\" on")]
-    LaterKey {
-        /// The key.
-        key: &'static str,
-    },
+    #[error("`{0}`: found in a file of \"{SCHEMA}\", expected only from \"{SCHEMA_2}\" on")]
+    LaterKey(&'static str),
     /// A row of a matrix has the wrong length.
     #[error("found {found} numbers, expected {expected}")]
     RowLength {

@@ -2,11 +2,10 @@
 
 use super::jump_prior::entries_of;
 use super::manifest::{
-    GivenStateEntry, LayerEntry, LibraryEntry, Manifest, MapEntry, Pairs, PhaseEntry, RobotValue,
-    SCHEMA, SCHEMA_2, StatisticsEntry,
+    GivenStateEntry, LayerEntry, Manifest, MapEntry, PhaseEntry, RobotValue, SCHEMA, SCHEMA_2,
+    Statistics, StatisticsEntry, to_rows,
 };
-use super::matrices::to_rows;
-use crate::model::{InputStatistics, Library, LibrarySource, Phase, ReducedModel, StateMap};
+use crate::model::{InputStatistics, Phase, ReducedModel, StateMap};
 use crate::robot::{Robot, WrenchFrame};
 use crate::robot_file::RobotEntry;
 
@@ -29,9 +28,9 @@ pub(super) fn manifest_of(model: &ReducedModel) -> Manifest {
         encoder: model.encoder_map().ok().map(map_entry),
         decoder: model.decoder_map().ok().map(map_entry),
         latent_dim: model.latent_dim(),
-        library: library_entry(model.library()),
+        library: model.library().choice(),
         phases: model.phases().iter().map(phase_entry).collect(),
-        input_statistics: Pairs(statistics.collect()),
+        input_statistics: Statistics(statistics.collect()),
         robot: model.robot().ok().map(robot_value),
         actuators: model.actuators().cloned(),
         wrench_frame: (frame != WrenchFrame::Body).then_some(frame),
@@ -67,16 +66,6 @@ fn map_entry(map: &StateMap) -> MapEntry {
     });
     MapEntry::Layers {
         layers: layers.collect(),
-    }
-}
-
-fn library_entry(library: &Library) -> LibraryEntry {
-    match library.source() {
-        LibrarySource::Terms => {
-            let texts = library.terms().iter().map(|term| term.text().to_owned());
-            LibraryEntry::Terms(texts.collect())
-        }
-        LibrarySource::Standard(standard) => LibraryEntry::Standard(standard),
     }
 }
 

@@ -4,8 +4,7 @@ use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
 use super::error::{ArtifactError, refused};
-use super::manifest::Rows;
-use super::matrices::{from_rows, to_rows};
+use super::manifest::{Rows, from_rows, to_rows};
 use crate::model::{FEATURE_DIM, GOAL_DIM, JumpPart, JumpPrior, ModelError, Phase, ReducedModel};
 use crate::robot::FOOT_DIM;
 

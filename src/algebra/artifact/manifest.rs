@@ -4,16 +4,19 @@
 //! become a [`ReducedModel`](crate::model::ReducedModel).
 
 use std::fmt;
-use std::marker::PhantomData;
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
 use serde::de::{Error as _, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Map, Value};
 
+use super::error::{ArtifactError, ArtifactFault};
 use super::jump_prior::{LandmarksEntry, PriorEntry};
-use crate::model::{Activation, CoordinateNames, FeetRule, ScaleFactors, Scaling, StandardLibrary};
+use crate::files::{Located, Place};
+use crate::model::{
+    Activation, CoordinateNames, FeetRule, LibraryChoice, ScaleFactors, Scaling, StandardLibrary,
+};
 use crate::robot::{Actuators, JOINT_DIM, WrenchFrame};
 use crate::robot_file::RobotEntry;
 
@@ -26,6 +29,37 @@ pub const SCHEMA_2: &str = "romc-model/2";
 
 /// Rows of a matrix.
 pub(super) type Rows = Vec<Vec<f64>>;
+
+/// The matrix with these rows; every row must have `expected` numbers, or as many as the first.
+pub(super) fn from_rows(
+    file: &str,
+    tensor: &str,
+    rows: &Rows,
+    expected: Option<usize>,
+) -> Result<DMatrix<f64>, ArtifactError> {
+    let expected = expected.or(rows.first().map(Vec::len)).unwrap_or(0);
+    for (row, numbers) in rows.iter().enumerate() {
+        if numbers.len() != expected {
+            let found = numbers.len();
+            let place = Place::Entry(format!("`{tensor}`[{row}]").into());
+            let fault = ArtifactFault::RowLength { found, expected };
+            return Err(Located::new(file, place, fault));
+        }
+    }
+    Ok(DMatrix::from_row_iterator(
+        rows.len(),
+        expected,
+        rows.iter().flatten().copied(),
+    ))
+}
+
+/// The rows of a matrix.
+pub(super) fn to_rows(matrix: &DMatrix<f64>) -> Rows {
+    matrix
+        .row_iter()
+        .map(|row| row.iter().copied().collect())
+        .collect()
+}
 
 /// The whole file.
 #[derive(Serialize, Deserialize)]
@@ -46,10 +80,10 @@ pub(super) struct Manifest {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub decoder: Option<MapEntry>,
     pub latent_dim: usize,
-    pub library: LibraryEntry,
+    pub library: LibraryChoice,
     pub phases: Vec<PhaseEntry>,
-    #[serde(default, skip_serializing_if = "Pairs::is_empty")]
-    pub input_statistics: Pairs<StatisticsEntry>,
+    #[serde(default, skip_serializing_if = "Statistics::is_empty")]
+    pub input_statistics: Statistics,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub robot: Option<RobotValue>,
     #[serde(default, deserialize_with = "present")]
@@ -203,14 +237,6 @@ pub(super) struct GivenStateEntry {
     pub acceleration_error: Rows,
 }
 
-/// A list of terms, or the shorthand.
-#[derive(Serialize)]
-#[serde(untagged)]
-pub(super) enum LibraryEntry {
-    Terms(Vec<String>),
-    Standard(StandardLibrary),
-}
-
 /// A number for all coordinates, or one number per coordinate.
 impl Serialize for ScaleFactors {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
@@ -247,20 +273,21 @@ impl<'de> Deserialize<'de> for ScaleFactors {
     }
 }
 
-impl<'de> Deserialize<'de> for LibraryEntry {
+/// A list of terms, or the shorthand.
+impl<'de> Deserialize<'de> for LibraryChoice {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         struct Terms;
         impl<'de> Visitor<'de> for Terms {
-            type Value = LibraryEntry;
+            type Value = LibraryChoice;
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
                 f.write_str("a list of terms, or an object with degree, trigonometric and inputs")
             }
-            fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<LibraryEntry, A::Error> {
-                Vec::deserialize(SeqAccessDeserializer::new(seq)).map(LibraryEntry::Terms)
+            fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<LibraryChoice, A::Error> {
+                Vec::deserialize(SeqAccessDeserializer::new(seq)).map(LibraryChoice::Terms)
             }
-            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<LibraryEntry, A::Error> {
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<LibraryChoice, A::Error> {
                 StandardLibrary::deserialize(MapAccessDeserializer::new(map))
-                    .map(LibraryEntry::Standard)
+                    .map(LibraryChoice::Standard)
             }
         }
         deserializer.deserialize_any(Terms)
@@ -360,46 +387,41 @@ impl<'de> Deserialize<'de> for Flag {
     }
 }
 
-/// A JSON object as pairs in the order of the file, in which no key comes twice.
-pub(super) struct Pairs<T>(pub Vec<(String, T)>);
+/// Statistics by phase: a JSON object as pairs in the file's order, in which no key comes twice.
+#[derive(Default)]
+pub(super) struct Statistics(pub Vec<(String, StatisticsEntry)>);
 
-impl<T> Default for Pairs<T> {
-    fn default() -> Self {
-        Pairs(Vec::new())
-    }
-}
-
-impl<T> Pairs<T> {
+impl Statistics {
     fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 }
 
-impl<T: Serialize> Serialize for Pairs<T> {
+impl Serialize for Statistics {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_map(self.0.iter().map(|(key, value)| (key, value)))
     }
 }
 
-impl<'de, T: Deserialize<'de>> Deserialize<'de> for Pairs<T> {
+impl<'de> Deserialize<'de> for Statistics {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Object<T>(PhantomData<T>);
-        impl<'de, T: Deserialize<'de>> Visitor<'de> for Object<T> {
-            type Value = Pairs<T>;
+        struct Object;
+        impl<'de> Visitor<'de> for Object {
+            type Value = Statistics;
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
                 f.write_str("an object with one entry per phase")
             }
-            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Pairs<T>, A::Error> {
-                let mut pairs: Vec<(String, T)> = Vec::new();
+            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Statistics, A::Error> {
+                let mut pairs: Vec<(String, StatisticsEntry)> = Vec::new();
                 while let Some(key) = map.next_key::<String>()? {
                     if pairs.iter().any(|(earlier, _)| *earlier == key) {
                         return Err(A::Error::custom(format_args!("duplicate key {key:?}")));
                     }
                     pairs.push((key, map.next_value()?));
                 }
-                Ok(Pairs(pairs))
+                Ok(Statistics(pairs))
             }
         }
-        deserializer.deserialize_map(Object(PhantomData))
+        deserializer.deserialize_map(Object)
     }
 }

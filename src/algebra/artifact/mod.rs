@@ -32,18 +32,15 @@
 //!
 //! [`ReducedModel`]: crate::model::ReducedModel
 
-mod digest;
 mod error;
 mod export;
 mod jump_prior;
 mod manifest;
-mod matrices;
 mod print;
 mod read;
 mod write;
 
-pub use digest::{Digest, digest};
 pub use error::{ArtifactError, ArtifactFault, describe};
 pub use manifest::{SCHEMA, SCHEMA_2};
 pub use read::{MAX_FILE_BYTES, is_standard_input, read, read_from_bytes};
-pub use write::{check_place, to_text, write, write_with};
+pub use write::{Digest, check_place, digest, to_text, write};

@@ -10,10 +10,9 @@ use serde_json::Value;
 use super::error::{ArtifactError, ArtifactFault, refused};
 use super::jump_prior::prior_of;
 use super::manifest::{
-    GivenStateEntry, LibraryEntry, Manifest, MapEntry, PhaseEntry, RobotValue, Rows, SCHEMA,
-    SCHEMA_2, SchemaProbe, StatisticsEntry,
+    GivenStateEntry, Manifest, MapEntry, PhaseEntry, RobotValue, Rows, SCHEMA, SCHEMA_2,
+    SchemaProbe, StatisticsEntry, from_rows,
 };
-use super::matrices::from_rows;
 use crate::model::{
     Activation, AffineMap, InputGivenState, InputStatistics, Layer, Library, ModelError, Phase,
     ReducedModel, StateMap,
@@ -63,7 +62,7 @@ pub fn read_from_bytes(file: &str, bytes: &[u8]) -> Result<ReducedModel, Artifac
     check_schema(file, bytes)?;
     let manifest: Manifest = parse(file, bytes)?;
     match manifest.later_key().filter(|_| manifest.schema == SCHEMA) {
-        Some(key) => Err(ArtifactFault::LaterKey { key }.of(file)),
+        Some(key) => Err(ArtifactFault::LaterKey(key).of(file)),
         None => to_model(file, manifest),
     }
 }
@@ -120,10 +119,7 @@ fn check_schema(file: &str, bytes: &[u8]) -> Result<(), ArtifactError> {
 
 fn to_model(file: &str, manifest: Manifest) -> Result<ReducedModel, ArtifactError> {
     let latent_dim = manifest.latent_dim;
-    let library = match manifest.library {
-        LibraryEntry::Terms(texts) => Library::from_terms(latent_dim, &texts),
-        LibraryEntry::Standard(standard) => Library::standard(latent_dim, standard),
-    };
+    let library = Library::of(latent_dim, &manifest.library);
     let library = library.map_err(|source| refused(file, source))?;
     let mut builder = ReducedModel::builder(manifest.name, library)
         .description(manifest.description)
@@ -155,7 +151,11 @@ fn to_model(file: &str, manifest: Manifest) -> Result<ReducedModel, ArtifactErro
     }
     let phases = manifest.phases.into_iter().enumerate();
     let phases = phases
-        .map(|(index, entry)| phase_of(file, index, entry, latent_dim))
+        .map(|(index, PhaseEntry { name, feet, xi })| {
+            let tensor = format!("phases[{index}].xi");
+            let xi = from_rows(file, &tensor, &xi, Some(latent_dim))?;
+            Ok(Phase { name, feet, xi })
+        })
         .collect::<Result<Vec<_>, _>>()?;
     let prior = prior_of(file, (manifest.landmarks, manifest.prior), &phases)?;
     builder = builder.phases(phases).jump_prior(prior);
@@ -202,20 +202,6 @@ fn affine_of(
     let weights = from_rows(file, &format!("{tensor}.weights"), weights, columns)?;
     let bias = DVector::from_column_slice(bias);
     AffineMap::new(tensor, weights, bias).map_err(|source| refused(file, source))
-}
-
-fn phase_of(
-    file: &str,
-    index: usize,
-    entry: PhaseEntry,
-    latent_dim: usize,
-) -> Result<Phase, ArtifactError> {
-    let tensor = format!("phases[{index}].xi");
-    Ok(Phase {
-        xi: from_rows(file, &tensor, &entry.xi, Some(latent_dim))?,
-        name: entry.name,
-        feet: entry.feet,
-    })
 }
 
 fn statistics_of(

@@ -1,12 +1,15 @@
-//! From a model to a file that appears whole or not at all.
+//! From a model to a file that appears whole or not at all, and to the digest by which generated
+//! files name the model that they come from.
 
-use std::fs;
 use std::path::Path;
+use std::{fmt, fs};
+
+use sha2::{Digest as _, Sha256};
 
 use super::error::{ArtifactError, ArtifactFault};
 use super::export::manifest_of;
 use super::print::print;
-use crate::files::{Overwrite, write_whole};
+use crate::files::{Overwrite, hex, write_whole};
 use crate::model::ReducedModel;
 
 /// The model file as text: equal for equal models, numbers in the shortest form that reads back to
@@ -17,15 +20,7 @@ pub fn to_text(model: &ReducedModel) -> String {
     print(&value)
 }
 
-/// Writes a model file; refuses to replace a different one.
-///
-/// # Errors
-/// [`ArtifactFault::Exists`], [`ArtifactFault::Io`].
-pub fn write(path: &Path, model: &ReducedModel) -> Result<(), ArtifactError> {
-    write_with(path, model, Overwrite::Refuse)
-}
-
-/// Checks whether [`write_with`] would refuse.
+/// Checks whether [`write()`] would refuse.
 ///
 /// # Errors
 /// [`ArtifactFault::Exists`] if a different file is there and `overwrite` refuses.
@@ -50,15 +45,36 @@ fn check_text(path: &Path, text: &str, overwrite: Overwrite) -> Result<(), Artif
 /// # Errors
 /// [`ArtifactFault::Exists`] if a different file is there and `overwrite` refuses,
 /// [`ArtifactFault::Io`].
-pub fn write_with(
-    path: &Path,
-    model: &ReducedModel,
-    overwrite: Overwrite,
-) -> Result<(), ArtifactError> {
+pub fn write(path: &Path, model: &ReducedModel, overwrite: Overwrite) -> Result<(), ArtifactError> {
     let text = to_text(model);
     check_text(path, &text, overwrite)?;
     write_whole(path, |out| out.write_all(text.as_bytes())).map_err(|source| {
         let action = "write";
         ArtifactFault::Io { action, source }.of(&path.display().to_string())
     })
+}
+
+/// SHA-256 of a model in the form in which [`write()`] writes it.
+///
+/// The layout of the file that was read does not matter. For a file that romc wrote the digest is
+/// what `sha256sum` prints.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Digest([u8; 32]);
+
+impl Digest {
+    /// The first 16 hexadecimal digits, for headers of generated files.
+    pub fn short(&self) -> String {
+        self.to_string()[..16].to_owned()
+    }
+}
+
+impl fmt::Display for Digest {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&hex(&self.0))
+    }
+}
+
+/// The digest of a model.
+pub fn digest(model: &ReducedModel) -> Digest {
+    Digest(Sha256::digest(to_text(model)).into())
 }

@@ -8,9 +8,8 @@ use std::{fs, io};
 
 use sha2::{Digest as _, Sha256};
 
-use super::emitted::EmittedFile;
 use super::part::{Part, remove_left_in};
-use super::whole::Overwrite;
+use super::whole::{EmittedFile, Overwrite};
 
 /// Lists what romc wrote into the folder.
 const LIST: &str = ".romc-emitted";

@@ -5,13 +5,11 @@
 //! so that only what romc wrote is replaced. Stages that
 //! read state the place of a fault with [`Located`].
 
-mod emitted;
 mod folder;
 mod located;
 mod part;
 mod whole;
 
-pub use emitted::EmittedFile;
 pub use folder::{FolderError, check_folder, earlier_files, hex, write_files};
 pub use located::{Located, Place};
-pub use whole::{Overwrite, write_whole};
+pub use whole::{EmittedFile, Overwrite, write_whole};

@@ -5,6 +5,25 @@ use std::path::Path;
 
 use super::part::{Part, remove_left_in};
 
+/// A generated file, not yet on disk.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct EmittedFile {
+    /// Path relative to the output folder, with `/` between its parts.
+    pub path: String,
+    /// What the file holds.
+    pub contents: String,
+}
+
+impl EmittedFile {
+    /// A file at `path` with `contents`.
+    pub fn new(path: impl Into<String>, contents: impl Into<String>) -> Self {
+        Self {
+            path: path.into(),
+            contents: contents.into(),
+        }
+    }
+}
+
 /// Whether a file that is there already may be replaced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Overwrite {
@@ -91,15 +110,5 @@ mod tests {
         assert_eq!(fs::read(&path).expect("still there"), b"first");
         let left = fs::read_dir(folder.path()).expect("readable");
         assert_eq!(left.count(), 1, "no part stays behind");
-    }
-
-    #[test]
-    fn refuse_allows_only_what_is_not_there() {
-        let folder = tempfile::tempdir().expect("a temporary folder");
-        let path = folder.path().join("out.csv");
-        assert!(Overwrite::Refuse.allows(&path));
-        fs::write(&path, "x").expect("writable");
-        assert!(!Overwrite::when_forced(false).allows(&path));
-        assert!(Overwrite::when_forced(true).allows(&path));
     }
 }

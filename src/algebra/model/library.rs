@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::fmt;
 
 use nalgebra::{DMatrix, DVector};
+use serde::Serialize;
 
 use super::error::{ModelError, check_shape};
 use super::evaluation::Tape;
@@ -43,12 +44,13 @@ impl CandidateTerm {
     }
 }
 
-/// How a library was given; the model file keeps the form.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LibrarySource {
-    /// A list of terms.
-    Terms,
-    /// The shorthand.
+/// The terms of a library as they are given; the model file keeps the form.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[serde(untagged)]
+pub enum LibraryChoice {
+    /// A list of expressions over `z1..zd`, `dz1..dzd`, `u1..ud`.
+    Terms(Vec<String>),
+    /// The shorthand: polynomials, sines and cosines, inputs.
     Standard(StandardLibrary),
 }
 
@@ -56,7 +58,8 @@ pub enum LibrarySource {
 #[derive(Clone)]
 pub struct Library {
     latent_dim: usize,
-    source: LibrarySource,
+    /// The shorthand, if the library was given by it.
+    standard: Option<StandardLibrary>,
     pool: ExprPool,
     symbols: Vec<SymbolId>,
     terms: Vec<CandidateTerm>,
@@ -70,7 +73,7 @@ impl Library {
     /// Each variant of [`LibraryError`] except [`LibraryError::Degree`] and
     /// [`LibraryError::Duplicate`].
     pub fn from_terms(latent_dim: usize, texts: &[String]) -> Result<Self, LibraryError> {
-        Self::build(latent_dim, texts.to_vec(), LibrarySource::Terms)
+        Self::build(latent_dim, texts.to_vec(), None)
     }
 
     /// The standard library, in the order of the published arrays.
@@ -80,13 +83,24 @@ impl Library {
     pub fn standard(latent_dim: usize, standard: StandardLibrary) -> Result<Self, LibraryError> {
         check_latent_dim(latent_dim)?;
         let texts = standard.texts(latent_dim)?;
-        Self::build(latent_dim, texts, LibrarySource::Standard(standard))
+        Self::build(latent_dim, texts, Some(standard))
+    }
+
+    /// The library with the terms that were chosen.
+    ///
+    /// # Errors
+    /// As [`Self::from_terms`] and [`Self::standard`].
+    pub fn of(latent_dim: usize, choice: &LibraryChoice) -> Result<Self, LibraryError> {
+        match choice {
+            LibraryChoice::Terms(texts) => Self::from_terms(latent_dim, texts),
+            LibraryChoice::Standard(standard) => Self::standard(latent_dim, *standard),
+        }
     }
 
     fn build(
         latent_dim: usize,
         texts: Vec<String>,
-        source: LibrarySource,
+        standard: Option<StandardLibrary>,
     ) -> Result<Self, LibraryError> {
         check_latent_dim(latent_dim)?;
         if texts.is_empty() {
@@ -115,7 +129,7 @@ impl Library {
         let tape = Tape::new(&pool, &exprs, &symbols);
         Ok(Self {
             latent_dim,
-            source,
+            standard,
             pool,
             symbols,
             terms,
@@ -163,9 +177,15 @@ impl Library {
         self.terms.is_empty()
     }
 
-    /// Whether the library was given as a list or by the shorthand.
-    pub fn source(&self) -> LibrarySource {
-        self.source
+    /// The terms in the form in which they were given.
+    pub fn choice(&self) -> LibraryChoice {
+        match self.standard {
+            Some(standard) => LibraryChoice::Standard(standard),
+            None => {
+                let texts = self.terms.iter().map(|term| term.text.clone());
+                LibraryChoice::Terms(texts.collect())
+            }
+        }
     }
 
     /// The terms in order.
@@ -236,7 +256,7 @@ impl PartialEq for Library {
     /// Equal as given: same dimension, form and texts.
     fn eq(&self, other: &Self) -> bool {
         self.latent_dim == other.latent_dim
-            && self.source == other.source
+            && self.standard == other.standard
             && (self.terms.iter().map(CandidateTerm::text))
                 .eq(other.terms.iter().map(CandidateTerm::text))
     }
@@ -246,7 +266,7 @@ impl fmt::Debug for Library {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Library")
             .field("latent_dim", &self.latent_dim)
-            .field("source", &self.source)
+            .field("standard", &self.standard)
             .field("terms", &self.terms)
             .finish_non_exhaustive()
     }

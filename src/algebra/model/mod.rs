@@ -72,7 +72,7 @@ pub use given_state::InputGivenState;
 pub use identifier::{Identifier, IdentifierError, MAX_IDENTIFIER_LEN};
 pub use jump_prior::{FEATURE_DIM, GOAL_DIM, GoalFeatures, GoalRange, JumpPart, JumpPrior};
 pub use library::{
-    CandidateTerm, Library, LibrarySource, MAX_LATENT_DIM, MAX_LIBRARY_DIM, MAX_TERM_LEN,
+    CandidateTerm, Library, LibraryChoice, MAX_LATENT_DIM, MAX_LIBRARY_DIM, MAX_TERM_LEN,
 };
 pub use library_error::LibraryError;
 pub use normal::{DENSITY_AT_ZERO, TAIL};

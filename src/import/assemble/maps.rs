@@ -27,11 +27,11 @@ impl<'a> Assembly<'a, '_> {
             return Err(ImportFault::option("--activation", found, expected));
         }
         let has = |layout| {
-            let mut used = self.notes.used.iter();
+            let mut used = self.report.used.iter();
             used.any(|used| used.layout == layout && used.role.ends_with(".weight"))
         };
         if has(Layout::Row) && has(Layout::Column) {
-            self.notes.notes.push(Note::MixedWeights);
+            self.report.notes.push(Note::MixedWeights);
         }
         Ok(maps)
     }
@@ -72,7 +72,7 @@ impl<'a> Assembly<'a, '_> {
         let tensors = self.layers(part)?;
         let part_name = part.name();
         let Some(last) = tensors.len().checked_sub(1) else {
-            self.notes.notes.push(Note::NoMap { part: part_name });
+            self.report.notes.push(Note::NoMap(part));
             return Ok(None);
         };
         let is_deep = last > 0;
@@ -80,7 +80,7 @@ impl<'a> Assembly<'a, '_> {
         let mut layers = Vec::with_capacity(tensors.len());
         for (place, &(assigned, bias)) in tensors.iter().enumerate() {
             let shape = shape_of(part, assigned).expect("the orientation is of matrices");
-            let stored = self.read(assigned)?.matrix(shape);
+            let stored = self.read(assigned, shape)?;
             let matrix = match layout {
                 Layout::Row => stored.transpose(),
                 _ => stored,
@@ -89,7 +89,7 @@ impl<'a> Assembly<'a, '_> {
             let bias = match bias {
                 Some(bias) => self.list(bias, matrix.nrows())?,
                 None => {
-                    self.notes.notes.push(Note::ZeroBias { part: part_name });
+                    self.report.notes.push(Note::ZeroBias(part));
                     DVector::zeros(matrix.nrows())
                 }
             };
@@ -107,8 +107,7 @@ impl<'a> Assembly<'a, '_> {
         }
         let map = StateMap::new(part_name, layers).map_err(|source| self.unusable(source))?;
         if is_deep {
-            let (part, layers) = (part_name, map.summary());
-            self.notes.notes.push(Note::Layers { part, layers });
+            self.report.notes.push(Note::Layers(part, map.summary()));
         }
         Ok(Some(map))
     }

@@ -112,7 +112,7 @@ impl<'a> Assembly<'a, '_> {
             },
             |last| (last.weights().clone(), last.bias() + &offset),
         )?;
-        self.notes.notes.push(Note::FoldedMean);
+        self.report.notes.push(Note::FoldedMean);
         Ok(())
     }
 
@@ -141,10 +141,9 @@ impl<'a> Assembly<'a, '_> {
         let Some(order) = &self.options.order else {
             return Ok(());
         };
-        let maps = (parts.encoder.as_ref().map(StateMap::input_dim))
-            .or(parts.decoder.as_ref().map(StateMap::output_dim));
-        if maps != Some(STATE_DIM) {
-            let found = match maps {
+        let dim = parts.state_dim();
+        if dim != Some(STATE_DIM) {
+            let found = match dim {
                 None => "no encoder or decoder".to_owned(),
                 Some(dim) => format!("an encoder or decoder of {dim} coordinates"),
             };
@@ -171,8 +170,7 @@ impl<'a> Assembly<'a, '_> {
         for (_, statistics) in &mut parts.statistics {
             *statistics = sorted_statistics(statistics, order);
         }
-        let order = order.to_string();
-        self.notes.notes.push(Note::Sorted { order });
+        self.report.notes.push(Note::Sorted(order.to_string()));
         Ok(())
     }
 }

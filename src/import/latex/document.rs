@@ -174,15 +174,10 @@ impl<'t> Scanner<'t> {
         if self.peek() == Some(&Kind::Character('*')) {
             self.at += 1;
         }
-        let Some(
-            [
-                Token {
-                    kind: Kind::Command(name),
-                    ..
-                },
-            ],
-        ) = self.argument()
-        else {
+        let Some([token]) = self.argument() else {
+            return;
+        };
+        let Kind::Command(name) = &token.kind else {
             return;
         };
         let parameters = if is_new {

@@ -9,14 +9,12 @@
 //! Read `token.rs` (characters to tokens), `document.rs` (displays and macros), `derivatives.rs`
 //! (dots for other ways to write a derivative), `sections.rs` (displays to equations and phases), `reader.rs` and `expression.rs` (one right side) in this order.
 
-mod ambiguity;
 mod derivatives;
 mod document;
 mod expression;
 mod names;
 mod numbers;
 mod reader;
-mod roots;
 mod sections;
 mod token;
 mod variables;

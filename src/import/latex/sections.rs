@@ -332,11 +332,7 @@ impl Document<'_> {
                 let found = format!("phase `{name}` again, as in line {}", earlier.line);
                 return Err(refused(self.file, token.place, found, "each phase once"));
             }
-            self.sections.push(Section {
-                phase: named,
-                line: token.place.0,
-                equations: Vec::new(),
-            });
+            self.sections.push(Section::new(named, token.place.0));
         }
         let section = (self.sections.last_mut()).expect("one was just made if there was none");
         let is_known = |name: &String| self.known.contains(name);

@@ -174,25 +174,24 @@ impl Reader<'_> {
     /// Reads a variable with dots and subscript; nothing if there is none.
     pub(super) fn symbol(&mut self) -> Read<Option<Symbol>> {
         let place = self.here();
-        let Some((name, dots)) = self.glyph(0)? else {
+        let Some((mut name, dots)) = self.glyph(0)? else {
             return Ok(None);
         };
-        let mut symbol = Symbol { name, dots, place };
-        self.subscript(&mut symbol)?;
+        self.subscript(&mut name)?;
         // A power may stand before the subscript: both follow the same letter.
         let power = self.at;
-        if !symbol.name.contains('_') && self.is_next(&Kind::Superscript) {
+        if !name.contains('_') && self.is_next(&Kind::Superscript) {
             let behind = self.after_argument(self.at + 1);
             if self.kind(behind) == Some(&Kind::Subscript) {
                 self.at = behind;
-                self.subscript(&mut symbol)?;
+                self.subscript(&mut name)?;
                 let end = self.at;
                 self.tokens[power..end].rotate_left(behind - power);
                 self.link(power..end);
                 self.at = power + (end - behind);
             }
         }
-        Ok(Some(symbol))
+        Ok(Some(Symbol { name, dots, place }))
     }
 
     /// A letter, a Greek letter or a word, with dots above it.
@@ -214,19 +213,14 @@ impl Reader<'_> {
                 self.at += 1;
                 let more = name.len() - 2;
                 let inner = self.inside(|reader| {
-                    let Some((name, dots)) = reader.glyph(depth + 1)? else {
+                    let Some((mut name, dots)) = reader.glyph(depth + 1)? else {
                         return Ok(None);
                     };
-                    let mut symbol = Symbol {
-                        name,
-                        dots,
-                        place: (0, 0),
-                    };
-                    reader.subscript(&mut symbol)?;
-                    Ok(reader.peek().is_none().then_some(symbol))
+                    reader.subscript(&mut name)?;
+                    Ok(reader.peek().is_none().then_some((name, dots)))
                 });
                 match inner.ok().flatten() {
-                    Some(symbol) => Ok(Some((symbol.name, symbol.dots + more))),
+                    Some((name, dots)) => Ok(Some((name, dots + more))),
                     None => {
                         self.at = at + 1;
                         self.unexpected("a variable under the dots")
@@ -255,7 +249,7 @@ impl Reader<'_> {
     }
 
     /// Reads `_1`, `_{10}`, `_{\mathrm{lat},1}` behind a variable.
-    pub(super) fn subscript(&mut self, symbol: &mut Symbol) -> Read<()> {
+    pub(super) fn subscript(&mut self, name: &mut String) -> Read<()> {
         if !self.is_next(&Kind::Subscript) {
             return Ok(());
         }
@@ -267,10 +261,10 @@ impl Reader<'_> {
             }
             None => reader.unexpected("a subscript of letters, digits and commas"),
         })?;
-        if symbol.name.contains('_') {
+        if name.contains('_') {
             return self.unexpected("one subscript");
         }
-        symbol.name = format!("{}_{parts}", symbol.name);
+        *name += &format!("_{parts}");
         Ok(())
     }
 

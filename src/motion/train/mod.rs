@@ -54,8 +54,7 @@ pub use joint::{Integrator, Unroll, joint};
 pub use map_options::MapOptions;
 pub use metrics::{SetMetrics, assess};
 pub use options::{
-    Coordinates, EncoderOptions, JointOptions, LibraryChoice, Method, RegressionOptions,
-    TrainOptions, Transfer,
+    Coordinates, EncoderOptions, JointOptions, Method, RegressionOptions, TrainOptions, Transfer,
 };
 pub use progress::{Progress, Watch};
 pub use report::{PartScore, PhaseTerms, SeedReport, TrainReport, Trained};

@@ -16,19 +16,10 @@ use super::metrics::{BODY_X, BODY_Z};
 use super::progress::Watch;
 use super::report::Trained;
 use crate::limits::table;
-use crate::model::{Library, ModelError, StandardLibrary, check_name};
+use crate::model::{Library, LibraryChoice, ModelError, StandardLibrary, check_name};
 use crate::recording::PhaseRule;
 use crate::recording::phases::CHATTER_SAMPLES;
 use crate::robot::{Actuators, InputRule, JOINT_NAMES, Robot, STATE_DIM, WrenchFrame};
-
-/// Candidate terms to choose from.
-#[derive(Clone, Debug, PartialEq)]
-pub enum LibraryChoice {
-    /// Polynomials, sines and cosines, inputs.
-    Standard(StandardLibrary),
-    /// Expressions over `z1..zd`, `dz1..dzd`, `u1..ud`.
-    Terms(Vec<String>),
-}
 
 /// How a model is learned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
@@ -241,11 +232,7 @@ impl TrainOptions {
     /// # Errors
     /// [`TrainError::Model`] for a term that does not parse or a latent dimension out of range.
     pub fn library(&self) -> Result<Library, TrainError> {
-        let library = match &self.library {
-            LibraryChoice::Standard(standard) => Library::standard(self.latent_dim, *standard),
-            LibraryChoice::Terms(terms) => Library::from_terms(self.latent_dim, terms),
-        };
-        let library = library.map_err(ModelError::from)?;
+        let library = Library::of(self.latent_dim, &self.library).map_err(ModelError::from)?;
         library.check_distinct().map_err(ModelError::from)?;
         Ok(library)
     }
