@@ -844,6 +844,27 @@ fn study_in_parts_and_resumed_equals_the_whole() {
 }
 
 #[test]
+fn the_command_in_the_provenance_quotes_paths_that_a_shell_would_divide() {
+    let folder = folder();
+    let (jump, model) = (path(&folder, "a jump.csv.gz"), path(&folder, "m.json"));
+    fs::copy("examples/recordings/go1/train_01.csv.gz", &jump).expect("copied");
+    done(&[
+        "train",
+        &jump,
+        "--latent-dim",
+        "2",
+        "--refinements",
+        "0",
+        "--output",
+        &model,
+    ]);
+    let written = romc::artifact::read(Path::new(&model)).expect("a model");
+    let command = written.provenance()["command"].as_str().expect("a command");
+    let wanted = format!("romc train '{jump}' --method");
+    assert!(command.starts_with(&wanted), "{command}");
+}
+
+#[test]
 fn shipped_models_come_from_the_command_in_their_provenance() {
     let folder = folder();
     for name in ["go1-d2", "go1-d4", "go1-d6", "go2-async-d4"] {

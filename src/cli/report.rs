@@ -1,7 +1,7 @@
 //! `romc report`: a one-page assessment of a model, and its figures as files.
 
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use serde_json::json;
 
@@ -9,7 +9,7 @@ use super::Answer;
 use super::args::ReportArguments;
 use super::destination::{Format, Inputs};
 use super::mpc::run_with_both_lifts;
-use super::output::{names, note_mismatches, read_recordings, spinner, write_file};
+use super::output::{names, note_mismatches, quoted, read_recordings, spinner, write_file};
 use super::simplification;
 use crate::evaluate::{Assessment, LAMBDA};
 use crate::files::{EmittedFile, Overwrite};
@@ -200,15 +200,4 @@ fn commands(arguments: &ReportArguments, has_control: bool) -> Vec<String> {
         ),
     ]);
     commands
-}
-
-/// A path as a shell takes it.
-fn quoted(path: &Path) -> String {
-    let text = path.display().to_string();
-    let plain = |letter: char| letter.is_alphanumeric() || "-_./".contains(letter);
-    if text.chars().all(plain) {
-        text
-    } else {
-        format!("'{}'", text.replace('\'', r"'\''"))
-    }
 }

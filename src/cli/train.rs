@@ -9,7 +9,7 @@ use serde_json::json;
 use super::Answer;
 use super::args::{TrainArguments, TrainSettings};
 use super::destination::{Format, Inputs};
-use super::output::{named, names, note, note_repeated, spinner};
+use super::output::{named, note, note_repeated, quoted, spinner};
 use super::prepared_recordings::{RecordedSets, read_all};
 use super::train_settings;
 use crate::files::Overwrite;
@@ -159,7 +159,10 @@ fn command_line(
     method: Method,
     options: &TrainOptions,
 ) -> String {
-    let paths = |paths: &[PathBuf]| names(paths).join(" ");
+    let paths = |paths: &[PathBuf]| {
+        let paths: Vec<String> = paths.iter().map(|path| quoted(path)).collect();
+        paths.join(" ")
+    };
     let mut line = format!("romc train {}", paths(&arguments.recordings));
     if !arguments.validation.is_empty() {
         let _ = write!(line, " --validation {}", paths(&arguments.validation));
@@ -176,7 +179,7 @@ fn command_line(
     };
     line += &train_settings::as_flags(&settings);
     line += &arguments.reading.as_flags();
-    let _ = write!(line, " --output {}", arguments.output.display());
+    let _ = write!(line, " --output {}", quoted(&arguments.output));
     line
 }
 

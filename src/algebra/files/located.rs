@@ -21,6 +21,14 @@ pub enum Place {
 }
 
 impl Place {
+    /// The character of a text that begins at a byte.
+    pub fn of_byte(text: &str, byte: usize) -> Place {
+        let before = text.get(..byte).unwrap_or(text);
+        let line = before.matches('\n').count() + 1;
+        let last = before.rsplit('\n').next().unwrap_or("");
+        Place::Character(line, last.chars().count() + 1)
+    }
+
     /// The row of a table that the place is in.
     pub fn row(&self) -> Option<usize> {
         match self {
@@ -85,5 +93,18 @@ impl<E: fmt::Display> fmt::Display for Located<E> {
 impl<E: Error> Error for Located<E> {
     fn source(&self) -> Option<&(dyn Error + 'static)> {
         self.kind.source()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_count_letters_not_bytes() {
+        let text = "a = 1\nµ = x";
+        let byte = text.find('x').expect("it is there");
+        assert_eq!(Place::of_byte(text, byte), Place::Character(2, 5));
+        assert_eq!(Place::of_byte(text, 0), Place::Character(1, 1));
     }
 }

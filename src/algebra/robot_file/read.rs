@@ -100,12 +100,7 @@ pub(super) fn from_toml_text<T: DeserializeOwned>(
     toml::from_str(text).map_err(|error| {
         let place = match error.span() {
             None => Place::Whole,
-            Some(span) => {
-                let before = &text[..span.start];
-                let line = before.matches('\n').count() + 1;
-                let column = before.len() - before.rfind('\n').map_or(0, |at| at + 1) + 1;
-                Place::Character(line, column)
-            }
+            Some(span) => Place::of_byte(text, span.start),
         };
         let fault = RobotFileFault::Syntax(error.message().to_owned());
         Located::new(file, place, fault)

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use crate::cli::output::quoted;
 use crate::recording::Clocks;
 
 /// How recordings are read.
@@ -23,7 +24,7 @@ impl ReadingArguments {
     /// The flags as typed, with a blank before each.
     pub fn as_flags(&self) -> String {
         let columns = self.columns.iter();
-        let columns = columns.map(|path| format!(" --columns {}", path.display()));
+        let columns = columns.map(|path| format!(" --columns {}", quoted(path)));
         let clock = self.clock.iter().map(|clock| match clock {
             Clocks::Recorded => " --clock recorded".to_owned(),
             Clocks::Repaired => " --clock repaired".to_owned(),

@@ -79,7 +79,7 @@ impl Identification {
         let found: Self = toml::from_str(text).map_err(|error| {
             let place = match error.span() {
                 None => Place::Whole,
-                Some(span) => character(text, span.start),
+                Some(span) => Place::of_byte(text, span.start),
             };
             let fault = IdentifyFault::Syntax(error.message().to_owned());
             at(file, place, fault)
@@ -161,12 +161,4 @@ fn number(value: f64) -> String {
     } else {
         format!("{value:?}").to_lowercase()
     }
-}
-
-/// Line and column of a byte of a text, from 1.
-fn character(text: &str, byte: usize) -> Place {
-    let before = text.get(..byte).unwrap_or(text);
-    let line = before.matches('\n').count() + 1;
-    let column = before.rsplit('\n').next().unwrap_or("").chars().count() + 1;
-    Place::Character(line, column)
 }

@@ -150,7 +150,7 @@ impl Trainer<'_> {
             ..options.weights
         };
         let mut parameters = self.start(seed);
-        let mut loss = self.loss(weights, &parameters).with_unroll(options.unroll);
+        let mut loss = self.loss(weights, &parameters);
         let mut listener = |epoch: usize, losses: &Losses, active: usize| {
             // Nobody listens any more if the training is being dropped; that ends soon by itself.
             let _ = news.send(format!(
@@ -198,7 +198,8 @@ impl Trainer<'_> {
             true => Box::new(LinearMaps::new(coordinate_weights, self.mask())),
             false => Box::new(NonlinearMaps::new(coordinate_weights, self.frame.clone())),
         };
-        JointLoss::new(&self.task.features, maps, weights, parameters)
+        let loss = JointLoss::new(&self.task.features, maps, weights, parameters);
+        loss.with_unroll(self.task.options.joint.unroll)
     }
 
     fn is_linear(&self) -> bool {
