@@ -860,7 +860,7 @@ fn the_command_in_the_provenance_quotes_paths_that_a_shell_would_divide() {
     ]);
     let written = romc::artifact::read(Path::new(&model)).expect("a model");
     let command = written.provenance()["command"].as_str().expect("a command");
-    let wanted = format!("romc train '{jump}' --method");
+    let wanted = format!("romc train '{jump}' --latent-dim 2");
     assert!(command.starts_with(&wanted), "{command}");
 }
 
