@@ -15,7 +15,7 @@ use super::train_settings;
 use crate::files::Overwrite;
 use crate::model::ReducedModel;
 use crate::recording::Source;
-use crate::robot::JOINT_DIM;
+use crate::robot::{BODY_X, BODY_Z};
 use crate::train::{
     Method, Origin, Progress, Recordings, SetMetrics, TrainOptions, TrainReport, Trained, Watch,
 };
@@ -278,7 +278,7 @@ fn seed_table(report: &TrainReport) -> String {
 }
 
 /// Rows of the body's position forwards and upwards.
-const BODY: [usize; 2] = [JOINT_DIM, JOINT_DIM + 2];
+const BODY: [usize; 2] = [BODY_X, BODY_Z];
 
 /// A note if rollouts of whole jumps end up further off than a body would be that stays where each jump starts: root mean
 /// squares over all samples of the body's error forwards and upwards, and of its way from the start.

@@ -84,10 +84,8 @@ pub(super) fn read(file: &str, bytes: &[u8]) -> Result<Sections, ImportError> {
 pub(super) fn text_of<'b>(file: &str, bytes: &'b [u8]) -> Result<&'b str, ImportError> {
     let text = std::str::from_utf8(bytes).map_err(|error| {
         let before = String::from_utf8_lossy(&bytes[..error.valid_up_to()]);
-        let line = before.matches('\n').count() + 1;
-        let last = before.rsplit('\n').next().unwrap_or("");
-        let place = (line, last.chars().count() + 1);
-        refused(file, place, "bytes that are no text", "equations in UTF-8")
+        let place = Place::of_byte(&before, before.len());
+        ImportFault::at(file, place, "bytes that are no text", "equations in UTF-8")
     })?;
     Ok(text.strip_prefix('\u{feff}').unwrap_or(text))
 }

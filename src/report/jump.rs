@@ -11,7 +11,7 @@ use super::tables::file_name;
 use crate::evaluate::{Assessment, FitSums, SegmentRun};
 use crate::model::{ModelError, ReducedModel};
 use crate::recording::Segment;
-use crate::robot::{JOINT_DIM, STATE_DIM};
+use crate::robot::{BODY_X, BODY_Z, JOINT_DIM, STATE_DIM};
 use crate::sim::Rollout;
 
 /// Instants of a film strip.
@@ -263,7 +263,7 @@ impl Jump<'_> {
         );
         let panels = vec![
             panel(JOINT_DIM, 0, "body.x, m"),
-            panel(JOINT_DIM + 2, 1, "body.z, m"),
+            panel(BODY_Z, 1, "body.z, m"),
         ];
         let id = format!("aslip_{}", self.place.suffix);
         Ok(Figure {
@@ -285,6 +285,6 @@ impl Jump<'_> {
             }
             sums.fit().map(|fit| fit.rms)
         };
-        Ok([JOINT_DIM, JOINT_DIM + 2].map(of))
+        Ok([BODY_X, BODY_Z].map(of))
     }
 }

@@ -53,7 +53,7 @@ impl Ranges {
     pub fn sides(&self, expr: ExprId) -> Vec<(SymbolId, f64, f64)> {
         let sides = self.restricted(expr).into_iter();
         sides
-            .map(|(symbol, range)| (symbol, middle(range), 0.5 * range.width()))
+            .map(|(symbol, range)| (symbol, range.middle(), 0.5 * range.width()))
             .collect()
     }
 
@@ -88,7 +88,7 @@ impl Ranges {
             }
             let mut summands = Vec::new();
             for &(row, delta) in &group {
-                let middle = middle(delta);
+                let middle = delta.middle();
                 let factor = self.pool.number(middle);
                 summands.push(self.pool.mul(factor, self.terms[row]));
                 let rest = delta - Interval::point(middle);
@@ -132,9 +132,10 @@ impl Ranges {
 
     fn restricted(&self, expr: ExprId) -> Vec<(SymbolId, Interval)> {
         let symbols = self.pool.symbols_of(expr);
-        let mut domain = self.domain.clone();
-        domain.retain(|(symbol, _)| symbols.contains(symbol));
-        domain
+        let known = self.domain.iter().copied();
+        known
+            .filter(|(symbol, _)| symbols.contains(symbol))
+            .collect()
     }
 
     /// All values of an expression over the box: bounded over ever smaller parts of the box, the
@@ -189,7 +190,7 @@ impl Ranges {
 
     /// Some values of `expr` in a box, in floating point: they only decide when to stop.
     fn values(&self, expr: ExprId, cell: &[(SymbolId, Interval)]) -> Interval {
-        let ends: [fn(Interval) -> f64; 3] = [Interval::lo, middle, Interval::hi];
+        let ends: [fn(Interval) -> f64; 3] = [Interval::lo, Interval::middle, Interval::hi];
         let at = |end: fn(Interval) -> f64| {
             let value = self.pool.evaluate(expr, &|symbol| {
                 let range = cell.iter().find(|(known, _)| *known == symbol);
@@ -223,11 +224,6 @@ impl Ranges {
     }
 }
 
-/// The middle of an interval, in floating point.
-pub(super) fn middle(range: Interval) -> f64 {
-    0.5 * range.lo() + 0.5 * range.hi()
-}
-
 /// A box cut in the middle of its widest side, measured by the sides of the whole domain.
 fn halves(
     cell: &[(SymbolId, Interval)],
@@ -241,7 +237,7 @@ fn halves(
     let mut halves = [cell.to_vec(), cell.to_vec()];
     if let Some(side) = widest {
         let range = cell[side].1;
-        let middle = middle(range);
+        let middle = range.middle();
         halves[0][side].1 = Interval::new(range.lo(), middle);
         halves[1][side].1 = Interval::new(middle, range.hi());
     }

@@ -1,7 +1,7 @@
 //! Replacements of a term: nothing, a constant, a straight line, a parabola.
 
 use super::certificate::ChangeKind;
-use super::ranges::{Ranges, middle};
+use super::ranges::Ranges;
 use super::workspace::{Workspace, has_function};
 use crate::symbolic::{ExprId, Interval, SymbolId};
 
@@ -67,7 +67,7 @@ fn centred(
     mut parts: Vec<(usize, f64)>,
     error: Interval,
 ) -> Option<Rewrite> {
-    let middle = middle(error);
+    let middle = error.middle();
     if middle.abs() <= WORTHWHILE * error.magnitude() {
         return None;
     }

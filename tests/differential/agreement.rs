@@ -112,7 +112,14 @@ fn is_transcendental(program: &Program) -> bool {
             Statement::Unary(op, _) => {
                 matches!(op, Unary::Tan | Unary::Tanh | Unary::Exp | Unary::Log)
             }
-            _ => false,
+            Statement::Constant(_)
+            | Statement::Input { .. }
+            | Statement::Binary(..)
+            | Statement::Accumulate { .. }
+            | Statement::Quads { .. }
+            | Statement::Constants { .. }
+            | Statement::Separable { .. }
+            | Statement::Call { .. } => false,
         });
     own || program.callees().iter().any(is_transcendental)
 }

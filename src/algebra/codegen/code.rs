@@ -212,7 +212,16 @@ impl Stmt {
     pub fn inner(&self) -> &[Stmt] {
         match self {
             Self::For(_, _, body) | Self::ForLanes(_, body) => body,
-            _other => &[],
+            Self::Let(..)
+            | Self::LetArray(..)
+            | Self::Declare(..)
+            | Self::Assign(..)
+            | Self::AddAssign(..)
+            | Self::SinCosLane { .. }
+            | Self::Call { .. }
+            | Self::Row(_)
+            | Self::Fours(_)
+            | Self::DeclareLanes(_) => &[],
         }
     }
 }

@@ -80,7 +80,7 @@ pub trait Dialect {
     }
 
     /// Lines that compute the sums of a block of vectors of four numbers side by side, each with its depth
-    /// of indentation; other languages take one number after the other.
+    /// of indentation: of every block, or of none in languages that take one number after the other.
     fn fours(&self, _: &Fours, _: &FourBlock) -> Option<Vec<(usize, String)>> {
         None
     }
@@ -125,7 +125,7 @@ pub trait Dialect {
     /// notes an argument beyond its limit. Blocks of lanes are for compilers: scripts run many
     /// points as columns.
     fn sin_cos_lane(&self, _: &str, _: &[String; 2], _is_used: [bool; 2]) -> Vec<String> {
-        Vec::new()
+        unreachable!("a language without blocks of lanes prints none")
     }
 
     /// The rows of a constant table: entries between `open` and `close`, with `between` after every

@@ -6,7 +6,6 @@ use super::printer::Printer;
 use super::requirements::calls_kernel;
 
 /// A phase in the templates; `F` is what they print of a function.
-#[derive(Clone)]
 pub struct PhaseText<F> {
     /// Name of the phase as an identifier.
     pub identifier: String,
@@ -18,7 +17,7 @@ pub struct PhaseText<F> {
     pub rows: String,
     /// Columns of the nonzeros.
     pub cols: String,
-    /// Accelerations, then with Jacobian, then a step.
+    /// Accelerations, then with Jacobian, then a step; of C's header also that of a batch.
     pub functions: Vec<F>,
     /// Body of the loop over the lanes of a batch.
     pub lanes: Option<String>,

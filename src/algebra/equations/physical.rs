@@ -147,13 +147,14 @@ impl Equations<'_> {
                 ddz: ddz.collect::<Result<_, _>>()?,
             });
         }
+        let units = units(model, &scales)?;
         Ok(Equations {
             model: Cow::Owned(in_metres(model, &scales)?),
             pool,
             terms,
             phases,
             steps: self.steps.clone(),
-            latent_units: Some(units(model, &scales)?),
+            latent_units: Some(units),
             scaled: Some(Box::new(self.clone().into_owned())),
         })
     }

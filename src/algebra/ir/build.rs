@@ -105,7 +105,7 @@ impl ProgramBuilder {
 
     /// A constant table for the array statements.
     pub fn table(&mut self, table: Table) -> TableId {
-        TableId(place_of(&mut self.program.tables, table) as u32)
+        TableId(place_of(&mut self.program.tables, &table) as u32)
     }
 
     /// Matrix-vector accumulation, see [`Statement::Accumulate`].
@@ -159,7 +159,7 @@ impl ProgramBuilder {
 
     /// Evaluates another program; returns the values of each of its outputs.
     pub fn call(&mut self, callee: &Program, arguments: &[ValueId]) -> Vec<Vec<ValueId>> {
-        let position = place_of(&mut self.program.callees, callee.clone());
+        let position = place_of(&mut self.program.callees, callee);
         let n = callee.outputs.iter().map(|slot| slot.len).sum();
         let statement = Statement::Call {
             callee: position,
@@ -243,10 +243,10 @@ impl ProgramBuilder {
 }
 
 /// The position of an element equal to `wanted`, which is added if there is none.
-fn place_of<T: PartialEq>(list: &mut Vec<T>, wanted: T) -> usize {
-    let known = list.iter().position(|known| *known == wanted);
+fn place_of<T: PartialEq + Clone>(list: &mut Vec<T>, wanted: &T) -> usize {
+    let known = list.iter().position(|known| known == wanted);
     known.unwrap_or_else(|| {
-        list.push(wanted);
+        list.push(wanted.clone());
         list.len() - 1
     })
 }

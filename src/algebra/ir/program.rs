@@ -281,13 +281,21 @@ impl Statement {
 
     /// The values that a separable statement reads as arrays, one a group's functions and slopes.
     pub fn arrays(&self) -> Vec<&[ValueId]> {
-        let Self::Separable { groups, .. } = self else {
-            return Vec::new();
-        };
-        groups
-            .iter()
-            .flat_map(|group| [group.values.as_slice(), group.slopes.values()])
-            .collect()
+        match self {
+            Self::Separable { groups, .. } => groups
+                .iter()
+                .flat_map(|group| [group.values.as_slice(), group.slopes.values()])
+                .collect(),
+            Self::Constant(_)
+            | Self::Input { .. }
+            | Self::Unary(..)
+            | Self::Binary(..)
+            | Self::SinCos { .. }
+            | Self::Accumulate { .. }
+            | Self::Quads { .. }
+            | Self::Constants { .. }
+            | Self::Call { .. } => Vec::new(),
+        }
     }
 }
 

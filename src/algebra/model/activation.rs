@@ -87,7 +87,15 @@ impl Activation {
     pub fn slope(self, a: f64) -> f64 {
         match self {
             Self::Elu if a <= 0.0 => a.exp(),
-            _ => self.jet(a)[1],
+            Self::Softplus => sigmoid(a),
+            Self::Linear
+            | Self::Elu
+            | Self::Tanh
+            | Self::Sigmoid
+            | Self::Relu
+            | Self::Gelu
+            | Self::GeluTanh
+            | Self::Silu => self.jet(a)[1],
         }
     }
 
@@ -147,7 +155,15 @@ impl Activation {
     pub fn curvature(self, a: f64) -> f64 {
         match self {
             Self::Elu if a <= 0.0 => a.exp(),
-            _ => self.jet(a)[2],
+            Self::Linear
+            | Self::Elu
+            | Self::Tanh
+            | Self::Sigmoid
+            | Self::Relu
+            | Self::Gelu
+            | Self::GeluTanh
+            | Self::Silu
+            | Self::Softplus => self.jet(a)[2],
         }
     }
 }

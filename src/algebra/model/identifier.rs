@@ -202,7 +202,7 @@ mod tests {
             owner: TAKEN[list].0,
         };
         let reserved = Reserved {
-            identifier: "a__".to_owned(),
+            identifier: "a__b".to_owned(),
         };
         let end = || End {
             identifier: "a_".to_owned(),
@@ -219,7 +219,7 @@ mod tests {
             ("../x", character(2, '/')),
             ("2d", Start { found: '2' }),
             ("_x", Start { found: '_' }),
-            ("a-_", reserved),
+            ("a-_b", reserved),
             ("a_", end()),
             ("a-", end()),
             ("a.", end()),

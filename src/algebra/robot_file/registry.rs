@@ -1,7 +1,7 @@
 //! The robots that romc brings, and those that were read.
 
 use std::collections::BTreeSet;
-use std::sync::{LazyLock, Mutex, PoisonError};
+use std::sync::{Mutex, OnceLock, PoisonError};
 
 use super::entry::RobotEntry;
 use super::{legs, read};
@@ -20,18 +20,18 @@ impl Robot {
     /// # Errors
     /// [`RobotError::UnknownRobot`], which lists the known names.
     pub fn by_name(name: &str) -> Result<&'static Robot, RobotError> {
-        static ROBOTS: LazyLock<[&Robot; KNOWN.len()]> = LazyLock::new(|| {
-            KNOWN.map(|(file, text)| {
-                let entry = read::from_toml_text::<RobotEntry>(file, text);
-                let robot = entry.and_then(|entry| legs::build(file, &entry));
-                keep(robot.expect("a file of romc's own, read by a test"))
-            })
-        });
-        let robot = ROBOTS.iter().find(|robot| robot.name() == name);
-        robot.copied().ok_or_else(|| RobotError::UnknownRobot {
+        static ROBOTS: [OnceLock<&Robot>; KNOWN.len()] = [const { OnceLock::new() }; KNOWN.len()];
+        let known = KNOWN.iter().position(|(known, _)| *known == name);
+        let at = known.ok_or_else(|| RobotError::UnknownRobot {
             found: name.to_owned(),
             known: Self::known_names().join(", "),
-        })
+        })?;
+        Ok(ROBOTS[at].get_or_init(|| {
+            let (file, text) = KNOWN[at];
+            let entry = read::from_toml_text::<RobotEntry>(file, text);
+            let robot = entry.and_then(|entry| legs::build(file, &entry));
+            keep(robot.expect("a file of romc's own, read by a test"))
+        }))
     }
 
     /// Names that [`Robot::by_name`] accepts.

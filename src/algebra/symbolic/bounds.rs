@@ -71,7 +71,7 @@ impl ExprPool {
         let mut centred = reduced.clone();
         let mut spread = Interval::point(0.0);
         for ((_, range), slope) in centred.iter_mut().zip(slopes) {
-            let centre = Interval::point(0.5 * range.lo() + 0.5 * range.hi());
+            let centre = Interval::point(range.middle());
             spread = spread + *slope * (*range - centre);
             *range = centre;
         }

@@ -150,7 +150,11 @@ impl ExprPool {
     fn n_terms(&self, expr: ExprId) -> u64 {
         match self.node(expr) {
             Node::Sum(terms) => terms.len() as u64,
-            _ => 1,
+            Node::Number(_)
+            | Node::Symbol(_)
+            | Node::Product(_)
+            | Node::Power(..)
+            | Node::Apply(..) => 1,
         }
     }
 }

@@ -69,6 +69,11 @@ impl Interval {
         self.lo <= value && value <= self.hi
     }
 
+    /// The middle, in floating point.
+    pub fn middle(self) -> f64 {
+        0.5 * self.lo + 0.5 * self.hi
+    }
+
     /// An upper bound of `hi - lo`; 0 for an empty interval.
     pub fn width(self) -> f64 {
         if self.is_empty() {

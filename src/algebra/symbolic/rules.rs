@@ -58,14 +58,20 @@ impl ExprPool {
 
     /// One node rewritten towards fewer function calls.
     pub(super) fn compact_rules(&mut self, expr: ExprId) -> ExprId {
-        if !matches!(self.node(expr), Node::Product(_)) {
-            return expr;
+        match self.node(expr) {
+            Node::Product(_) => {
+                let expr = self.merge_tangents(expr);
+                let expr = self.merge_double_angles(expr);
+                let expr = self.merge_hyperbolic_tangent(expr);
+                let expr = self.merge_factors(Function::Abs, expr);
+                self.abs_to_sign(expr)
+            }
+            Node::Number(_)
+            | Node::Symbol(_)
+            | Node::Sum(_)
+            | Node::Power(..)
+            | Node::Apply(..) => expr,
         }
-        let expr = self.merge_tangents(expr);
-        let expr = self.merge_double_angles(expr);
-        let expr = self.merge_hyperbolic_tangent(expr);
-        let expr = self.merge_factors(Function::Abs, expr);
-        self.abs_to_sign(expr)
     }
 
     /// `exp(n*log(a) + b) = a^n*exp(b)`.
@@ -203,10 +209,15 @@ impl ExprPool {
     }
 
     fn merge_exponentials(&mut self, expr: ExprId) -> ExprId {
-        let (exponents, mut others) = self.split_exponentials(expr);
-        if exponents.is_empty() {
+        let powers = self.factors_of(expr).iter();
+        let powers = powers.filter_map(|&factor| match self.function_power(factor) {
+            Some((Function::Exp, _, power)) => Some(power),
+            _ => None,
+        });
+        if let [] | [1] = powers.collect::<Vec<_>>()[..] {
             return expr;
         }
+        let (exponents, mut others) = self.split_exponentials(expr);
         let exponent = self.sum(&exponents);
         others.push(self.apply(Function::Exp, exponent));
         self.product(&others)

@@ -191,7 +191,10 @@ impl Decimal {
 fn parts(scientific: &str) -> (&str, i32) {
     let parts = scientific.split_once('e');
     let (digits, exponent) = parts.expect("a float's scientific form has an exponent");
-    (digits, exponent.parse().expect("which is an integer"))
+    (
+        digits,
+        exponent.parse().expect("the exponent is an integer"),
+    )
 }
 
 impl fmt::Display for Decimal {

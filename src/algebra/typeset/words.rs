@@ -34,7 +34,7 @@ impl Spelling for Plain {
     }
 }
 
-/// Whether a character of a text from outside could end a line, or is another that no text shows.
+/// Whether a character of a text from outside ends a line or is a control character.
 pub(super) fn ends_line(character: char) -> bool {
     character.is_control() || matches!(character, '\u{2028}' | '\u{2029}')
 }

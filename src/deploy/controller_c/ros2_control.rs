@@ -3,11 +3,8 @@
 use std::ops::Deref;
 
 use crate::deploy::EmitError;
-// The bounds of a plan's values are those beyond which `recording` reports a sample as implausible.
+use crate::mpc::STEP_SLACK;
 use crate::recording::check::{BODY_SPEED_M_S, JOINT_MARGIN_RAD};
-
-/// Share of a plan's step that the controller's may be, as for `romc mpc`.
-const STEP_SLACK: f64 = 0.99;
 
 /// What its files take besides the facts of the controller.
 struct Facts<'a> {

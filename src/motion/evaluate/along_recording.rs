@@ -26,8 +26,8 @@ use super::control::{Summary, Tally};
 use super::control_metrics::ControlMetrics;
 use super::torque::{Comparison, exceeds, is_plausible};
 use crate::mpc::{
-    Command, ControlError, Controller, Lift, Measurement, MpcError, ReferenceSamples, Source,
-    StanceState, Status, foot_forces, to_upright,
+    Command, ControlError, Controller, Lift, Measurement, MpcError, ReferenceSamples, STEP_SLACK,
+    Source, StanceState, Status, foot_forces, to_upright,
 };
 use crate::recording::{Recording, Segment};
 use crate::robot::{GRAVITY_M_S2, JOINT_DIM, STATE_DIM};
@@ -74,9 +74,6 @@ pub struct StepRow {
     /// Latent position that the step's own plan expects at the end of its horizon.
     pub z_planned: Option<Vec<f64>>,
 }
-
-/// A step may be shorter than the time between samples by what rounds it.
-pub const STEP_SLACK: f64 = 0.99;
 
 /// All steps along a recording, and what they come to.
 #[derive(Debug, Clone, PartialEq)]

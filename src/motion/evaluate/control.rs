@@ -58,7 +58,7 @@ pub struct Summary {
 /// Everything that a summary is made of.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Tally {
-    /// The counts.
+    /// The counts; [`Self::summary`] fills in the rest.
     pub(super) summary: Summary,
     times_us: Vec<f64>,
     pub(super) preparations_us: Vec<f64>,

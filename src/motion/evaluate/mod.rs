@@ -24,9 +24,7 @@ mod round_trip;
 mod torque;
 mod uninformed;
 
-pub use along_recording::{
-    ReferenceInput, Run, STEP_SLACK, StepRow, along_recording, lift_comparison,
-};
+pub use along_recording::{ReferenceInput, Run, StepRow, along_recording, lift_comparison};
 pub use aslip::{Aslip, AslipRollout, AslipSums};
 pub use assessment::{Assessment, SegmentRun};
 pub use baseline::{Baseline, fit_aslip};

@@ -7,7 +7,7 @@ use super::error::EvaluateError;
 use crate::lower::CompiledModel;
 use crate::model::ReducedModel;
 use crate::recording::Recording;
-use crate::robot::JOINT_DIM;
+use crate::robot::{BODY_Z, JOINT_DIM};
 use crate::sim::LatentSegment;
 
 /// Root mean squares of predicted minus recorded positions one stage ahead, in the robot's coordinates. What the
@@ -128,7 +128,7 @@ pub(super) fn prediction_error(
     };
     Ok((!stages.is_empty()).then(|| PredictionError {
         body_x_m: rms(JOINT_DIM, 1),
-        body_z_m: rms(JOINT_DIM + 2, 1),
+        body_z_m: rms(BODY_Z, 1),
         pitch_rad: rms(JOINT_DIM + 4, 1),
         joints_rad: rms(0, JOINT_DIM),
         latent: latent.iter().map(|sum| (sum / count).sqrt()).collect(),

@@ -52,8 +52,9 @@ pub(super) enum Driver {
 /// Deviations after pushes.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Recovery {
-    /// Squares of the body's deviations, and of planned minus reference positions.
+    /// Squares of the body's deviations.
     deviations: Mean,
+    /// Squares of planned minus reference positions.
     planned: Mean,
 }
 

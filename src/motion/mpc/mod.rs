@@ -18,6 +18,7 @@ mod of_model;
 mod online;
 
 pub use error::MpcError;
+pub use of_model::STEP_SLACK;
 pub use online::*;
 
 #[cfg(test)]

@@ -15,6 +15,10 @@ use crate::lower::CompiledModel;
 use crate::model::ReducedModel;
 use crate::robot::{ContactFlags, JOINT_DIM, STATE_DIM};
 
+/// Share of the time between a recording's samples below which the controller's step is too short for it: a step may be
+/// shorter by what rounds it.
+pub const STEP_SLACK: f64 = 0.99;
+
 /// Share of the mean variance that is added to every variance, so that a direction in which the
 /// training inputs never moved has a finite weight.
 const VARIANCE_FLOOR: f64 = 1e-6;

@@ -10,7 +10,7 @@ use super::costs::moved_foot;
 use super::error::PlanError;
 use super::transcribe::{NodeValues, Task};
 use crate::recording::Segment;
-use crate::robot::{JOINT_DIM, Leg, Robot, STATE_DIM};
+use crate::robot::{BODY_X, BODY_Z, JOINT_DIM, Leg, Robot, STATE_DIM};
 
 /// Name of a plan where a recording has that of its file.
 const SOURCE: &str = "plan";
@@ -113,7 +113,7 @@ fn margins(task: &Task<'_>, y: &[f64], (motion, input): (&Segment, &DMatrix<f64>
             margins.beyond_joint_limit_rad = margins.beyond_joint_limit_rad.max(beyond);
         }
         if motion.feet[sample].contains(&true) {
-            let [forwards, up] = [JOINT_DIM, JOINT_DIM + 2].map(|row| input[(row, sample)]);
+            let [forwards, up] = [BODY_X, BODY_Z].map(|row| input[(row, sample)]);
             let beyond = forwards.abs() - task.settings.friction * up;
             margins.beyond_friction_n = margins.beyond_friction_n.max(beyond);
         }

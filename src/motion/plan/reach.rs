@@ -79,7 +79,13 @@ fn point(
     let (status, input_deviation) = match made {
         Ok(plan) => (plan.verdict.word(), Some(plan.input_deviation)),
         Err(error @ (PlanError::Model(_) | PlanError::Lower(_))) => return Err(error),
-        Err(_) => ("no plan", None), // for this goal
+        Err(
+            PlanError::Goal { .. }
+            | PlanError::Unsolved { .. }
+            | PlanError::NotConverged { .. }
+            | PlanError::Control(_)
+            | PlanError::Recording(_),
+        ) => ("no plan", None),
     };
     Ok(ReachPoint {
         goal_m,

@@ -399,7 +399,7 @@ impl<'a> Task<'a> {
     }
 
     fn friction(&self, part: usize, node: usize, slack: usize, builder: &mut Builder) {
-        let [forwards, up] = [JOINT_DIM, JOINT_DIM + 2];
+        let [forwards, up] = [BODY_X, BODY_Z];
         for sign in [-1.0, 1.0] {
             let mut row = Affine::of(-self.settings.friction_slack_n / FORCE_UNIT_N);
             let force = self.input(part, node, forwards);

@@ -45,7 +45,8 @@ pub struct Timed {
 /// What was mended in a segment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mended {
-    /// Time that passed by the motion over time that passed by the stamps, where times were rebuilt.
+    /// Where times were rebuilt, time that passed by the motion over time that passed by the stamps; [`Timed`] has it
+    /// also of clocks that agree.
     pub elapsed_ratio: Option<f64>,
     /// Whether steps were uneven and the segment is resampled.
     pub resampled: bool,

@@ -70,7 +70,7 @@ pub enum RecordingFault {
         columns: Vec<String>,
         found: Vec<String>,
     },
-    /// Two columns have the same name.
+    /// Two columns have the same name; columns count from 1.
     #[error("occurs twice, as number {first} and {second}")]
     DuplicateColumn { first: usize, second: usize },
     /// A row has fewer cells than the header, or more; the place is the first column without a

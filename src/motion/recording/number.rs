@@ -1,10 +1,17 @@
 //! Cells as numbers, with a decimal point or a decimal comma.
 
+/// A decimal mark.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Mark {
+    Point,
+    Comma,
+}
+
 /// Reads cells, and learns the file's decimal mark from them.
 #[derive(Debug)]
 pub(super) struct NumberReader {
-    /// `.` or `,`: the first one met holds for the rest.
-    mark: Option<u8>,
+    /// The first one met holds for the rest.
+    mark: Option<Mark>,
     /// A cell with its comma replaced, kept to spare an allocation a cell.
     pointed: String,
 }
@@ -13,7 +20,7 @@ impl NumberReader {
     /// Of cells that are separated by this character: between commas the mark is a point.
     pub fn new(delimiter: char) -> Self {
         NumberReader {
-            mark: (delimiter == ',').then_some(b'.'),
+            mark: (delimiter == ',').then_some(Mark::Point),
             pointed: String::new(),
         }
     }
@@ -22,8 +29,8 @@ impl NumberReader {
     pub fn expected(&self) -> &'static str {
         match self.mark {
             None => "a number",
-            Some(b'.') => "a number with a decimal point",
-            Some(_) => "a number with a decimal comma",
+            Some(Mark::Point) => "a number with a decimal point",
+            Some(Mark::Comma) => "a number with a decimal comma",
         }
     }
 
@@ -33,12 +40,15 @@ impl NumberReader {
         let Some(place) = cell.bytes().position(|b| b == b'.' || b == b',') else {
             return cell.parse().ok();
         };
-        let found = cell.as_bytes()[place];
+        let found = match cell.as_bytes()[place] {
+            b'.' => Mark::Point,
+            _ => Mark::Comma,
+        };
         if self.mark.is_some_and(|mark| mark != found) {
             return None;
         }
         let value = match found {
-            b',' => {
+            Mark::Comma => {
                 // A second mark of either kind fails to parse.
                 self.pointed.clear();
                 self.pointed.push_str(&cell[..place]);
@@ -46,7 +56,7 @@ impl NumberReader {
                 self.pointed.push_str(&cell[place + 1..]);
                 self.pointed.parse().ok()?
             }
-            _ => cell.parse().ok()?,
+            Mark::Point => cell.parse().ok()?,
         };
         self.mark = Some(found);
         Some(value)

@@ -114,8 +114,21 @@ fn with_finite_coefficients(
 
 /// Whether another seed may do better.
 fn is_of_one_seed(error: &TrainError) -> bool {
-    use TrainError::{Model, NoStableModel, TermValue};
-    matches!(error, NoStableModel { .. } | TermValue { .. } | Model(_))
+    match error {
+        TrainError::NoStableModel { .. } | TrainError::TermValue { .. } | TrainError::Model(_) => {
+            true
+        }
+        TrainError::NoRecording { .. }
+        | TrainError::Split { .. }
+        | TrainError::TooFewSamples { .. }
+        | TrainError::PhaseSamples { .. }
+        | TrainError::LatentDim { .. }
+        | TrainError::Option { .. }
+        | TrainError::Range(_)
+        | TrainError::Cancelled
+        | TrainError::Recording(_)
+        | TrainError::Robot(_) => false,
+    }
 }
 
 #[cfg(test)]

@@ -20,7 +20,7 @@ use super::weak_form::{check_terms, windowed_samples};
 const WINDOWS: [usize; 3] = [0, 25, 50];
 /// Ridges on the normalised columns.
 const RIDGES: [f64; 3] = [1e-4, 1e-3, 1e-2];
-/// Eliminations share the walk that drops terms one by one.
+/// Prunings; eliminations share the walk that drops terms one by one.
 const PRUNINGS: [Pruning; 10] = [
     Pruning::Elimination(1e-3),
     Pruning::Elimination(3e-3),
@@ -74,7 +74,8 @@ pub struct Target<'a> {
     pub knowledge: &'a [Knowledge],
 }
 
-/// Fits all combinations of windows, ridges and prunings and takes, among those within the slack of the best, the sparsest.
+/// Fits all combinations of windows, ridges and prunings and takes, among those within the slack of the best, the
+/// sparsest.
 ///
 /// The best by `judge` sets the scale: from there on errors are relative to its own.
 ///
@@ -230,7 +231,7 @@ impl Attempt<'_> {
         tried
     }
 
-    /// Every such combination with the terms that are `allowed`; if cancelled, those until there are
+    /// Every combination of windows, ridges and prunings with the terms that are `allowed`; if cancelled, those until there are
     /// `enough`.
     fn fit_all(
         &self,

@@ -59,7 +59,7 @@ pub struct SubspaceOptions {
 /// Rows that the frame holds are taken as seen: `C` is then the covariance given them. The basis returned is that of
 /// the other rows. Descent along the exact gradient on the Stiefel manifold from several starting points; the best is
 /// kept.
-pub fn find_subspace(
+pub(super) fn find_subspace(
     moments: &Moments,
     frame: &Frame,
     latent_dim: usize,

@@ -199,7 +199,7 @@ fn casadi_function(
     });
     let outputs = list(&f.outputs(), |output| match output.role {
         Role::InOut => format!("\"{}_next\"", output.name),
-        _ => format!("\"{}\"", output.name),
+        Role::Output | Role::Input | Role::Scalar => format!("\"{}\"", output.name),
     });
     let pattern = match phase {
         Some(phase) if phase.jacobian.name == *name => {

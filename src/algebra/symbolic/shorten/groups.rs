@@ -13,10 +13,12 @@ use crate::symbolic::pool::ExprPool;
 
 /// Most terms that can be powers of the parts of a sum.
 const MAX_PARTS: usize = 64;
-/// In a term with the logarithm of this meet terms with logarithms, denominators of the same variables,
-/// tangents of an angle and their inverses; no model has such a term.
+/// Summands that can interact have a monomial in common. Those with logarithms are given one with the logarithm of
+/// this number, which no model has.
 const OF_LOGARITHMS: i64 = -1;
+/// The same for denominators of the same variables.
 const OF_SAME_VARIABLES: i64 = -2;
+/// The same for tangents of an angle and their inverses.
 const OF_TANGENTS: i64 = -3;
 /// Relative error of coefficients that fit a power.
 const ROUNDING: f64 = 1e-13;

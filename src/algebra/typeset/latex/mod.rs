@@ -41,6 +41,6 @@ mod nomenclature;
 mod table;
 
 pub use document::emit;
-pub use escape::{comment_text, label, tex_text};
+pub use escape::{label, tex_text};
 pub use lines::tex_cases;
-pub use math::{tex, tex_number, tex_symbol, tex_terms, tex_unit};
+pub use math::{tex, tex_symbol, tex_unit};

@@ -10,6 +10,6 @@ mod page;
 mod prose;
 
 pub use escape::HtmlText;
-pub use math::{mathml, mathml_symbol, mathml_terms};
+pub use math::{mathml, mathml_symbol};
 pub use page::{Html, emit, system};
 pub use prose::HtmlProse;

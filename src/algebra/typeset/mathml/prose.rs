@@ -104,7 +104,8 @@ mod tests {
         assert!(html("W_e^T u_lat").matches("<math>").count() == 2);
         assert!(html("ddz3").contains("<mover>"));
         for name in [
-            "test_01", "go1-d4", "a.z1", "z1.csv", "body.x", "u-1", "k_spring",
+            "test_01", "go1-d4", "a.z1", "z1.csv", "body.x", "u-1", "k_spring", "dddz1", "ddu1",
+            "x1",
         ] {
             assert_eq!(html(name), name);
         }

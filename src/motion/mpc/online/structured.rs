@@ -39,7 +39,7 @@ pub(super) trait StructuredProgram: Debug + Send {
     /// Forgets the last solution.
     fn forget(&mut self);
 
-    /// Computes the gains of all stages for the next [`StructuredProgram::solve`], if they are not those of its stages.
+    /// Computes the gains of all stages for the next [`StructuredProgram::solve`], unless the present gains are those of the stages.
     fn prepare(&mut self);
 
     /// Solves from the measurement; how it ended, and iterations.

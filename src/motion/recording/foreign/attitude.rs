@@ -61,9 +61,6 @@ pub(super) fn angle_rates(
     angular: &DMatrix<f64>,
     frame: Frame,
 ) -> Result<DMatrix<f64>, usize> {
-    if frame == Frame::Angles {
-        return Ok(angular.clone());
-    }
     let mut out = DMatrix::zeros(3, angular.ncols());
     for i in 0..angular.ncols() {
         let [roll, pitch, yaw] = [angles[(0, i)], angles[(1, i)], angles[(2, i)]];
@@ -83,7 +80,7 @@ pub(super) fn angle_rates(
                     [c_r * tangent, -s_r, c_r / c_p],
                 ])
             }
-            Frame::World | Frame::Angles => {
+            Frame::World => {
                 let (s_y, c_y) = yaw.sin_cos();
                 Matrix3::from([
                     [c_y / c_p, -s_y, c_y * s_p / c_p],
@@ -91,6 +88,7 @@ pub(super) fn angle_rates(
                     [0.0, 0.0, 1.0],
                 ])
             }
+            Frame::Angles => return Ok(angular.clone()),
         };
         out.set_column(i, &(map * omega));
     }

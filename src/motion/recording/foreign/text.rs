@@ -221,9 +221,11 @@ fn character(delimiter: Delimiter) -> char {
 fn cells(line: &str, delimiter: Delimiter) -> Vec<String> {
     match delimiter {
         Delimiter::Blank => line.split_whitespace().map(str::to_owned).collect(),
-        _ => lines::cells(line, character(delimiter))
-            .map(str::to_owned)
-            .collect(),
+        Delimiter::Tab | Delimiter::Comma | Delimiter::Semicolon => {
+            lines::cells(line, character(delimiter))
+                .map(str::to_owned)
+                .collect()
+        }
     }
 }
 

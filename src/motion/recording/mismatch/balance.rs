@@ -7,10 +7,10 @@ use crate::recording::preprocess::{differences, median};
 use crate::recording::segment::stretches;
 use crate::recording::{Recording, Segment};
 use crate::robot::input_rule::rotation;
-use crate::robot::{BODY_NAMES, FOOT_DIM, JOINT_DIM, Leg, Robot};
+use crate::robot::{BODY_NAMES, BODY_Z, FOOT_DIM, JOINT_DIM, Leg, Robot};
 
 /// Row of the body's height.
-const HEIGHT: usize = JOINT_DIM + 2;
+const HEIGHT: usize = BODY_Z;
 /// Shortest flight, and shortest time on the ground in all, that counts, s.
 const LEAST_S: f64 = 0.04;
 /// Least force of a foot that counts where a hip's torque is compared with it, as a share of the weight.

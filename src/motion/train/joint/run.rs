@@ -266,8 +266,8 @@ impl Trainer<'_> {
     fn published_score(&self, parameters: &Parameters, judged: &[Batch]) -> f64 {
         let weights = self.task.options.joint.weights;
         let mut loss = self.loss(weights, parameters);
-        let mut of = |batch| loss.evaluate(parameters, batch).total(&weights);
-        let total: f64 = judged.iter().map(&mut of).sum();
+        let totals = (judged.iter()).map(|batch| loss.evaluate(parameters, batch).total(&weights));
+        let total: f64 = totals.sum();
         total / judged.len().max(1) as f64
     }
 

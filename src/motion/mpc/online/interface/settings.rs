@@ -146,4 +146,23 @@ mod tests {
         let settings = Settings::default().to_mpc().expect("sound");
         assert_eq!(settings, MpcSettings::default());
     }
+
+    #[test]
+    fn choices_come_back_by_their_numbers() {
+        let with = |lift: Lift, linearisation: Linearisation, solver: Solver| Settings {
+            lift: lift as i32,
+            linearisation: linearisation as i32,
+            solver: solver as i32,
+            ..Settings::default()
+        };
+        for (lift, linearisation, solver) in [
+            (Lift::Transpose, Linearisation::Reference, Solver::Clarabel),
+            (Lift::Consistent, Linearisation::LastPlan, Solver::Riccati),
+        ] {
+            let read = with(lift, linearisation, solver).to_mpc().expect("sound");
+            assert_eq!(read.lift, lift);
+            assert_eq!(read.linearisation, linearisation);
+            assert_eq!(read.solver, solver);
+        }
+    }
 }

@@ -69,8 +69,16 @@ impl Draft {
             let mut lines = source.columns(group);
             match quantity {
                 Quantity::Feet => lines.extend(source.feet(group)),
-                _ if quantity.is_of_joints() => lines.extend(order_line(order, group)),
-                _ => {}
+                Quantity::JointPosition
+                | Quantity::JointVelocity
+                | Quantity::JointAcceleration
+                | Quantity::JointTorque => lines.extend(order_line(order, group)),
+                Quantity::BodyPosition
+                | Quantity::Orientation
+                | Quantity::BodyVelocity
+                | Quantity::AngularVelocity
+                | Quantity::BodyAcceleration
+                | Quantity::AngularAcceleration => {}
             }
             lines.extend(scales.get(&quantity).into_iter().flatten().cloned());
             tables.insert(quantity, lines);
@@ -366,7 +374,14 @@ impl Source<'_> {
             Quantity::JointAcceleration => Quantity::JointVelocity,
             Quantity::BodyAcceleration => Quantity::BodyVelocity,
             Quantity::AngularAcceleration => Quantity::AngularVelocity,
-            _ => return true,
+            Quantity::JointPosition
+            | Quantity::JointVelocity
+            | Quantity::JointTorque
+            | Quantity::BodyPosition
+            | Quantity::Orientation
+            | Quantity::BodyVelocity
+            | Quantity::AngularVelocity
+            | Quantity::Feet => return true,
         };
         let mut of_velocity = scales.get(&velocity).into_iter().flatten();
         let has_frame = of_velocity.any(|line| line.contains("frame"));
