@@ -855,6 +855,8 @@ fn the_command_in_the_provenance_quotes_paths_that_a_shell_would_divide() {
         "2",
         "--refinements",
         "0",
+        "--terms",
+        "1;z1;z2;dz1;dz2;u1;u2",
         "--output",
         &model,
     ]);
@@ -862,6 +864,10 @@ fn the_command_in_the_provenance_quotes_paths_that_a_shell_would_divide() {
     let command = written.provenance()["command"].as_str().expect("a command");
     let wanted = format!("romc train '{jump}' --latent-dim 2");
     assert!(command.starts_with(&wanted), "{command}");
+    assert!(
+        command.contains(" --terms '1;z1;z2;dz1;dz2;u1;u2' "),
+        "{command}"
+    );
 }
 
 #[test]
@@ -1410,7 +1416,7 @@ fn interrupted_training(model: &Path, extra: &[&str]) -> (Option<i32>, String, S
             "--latent-dim",
             "2",
         ]);
-        command.args(["--method", "joint", "--epochs", "1000000", "--force"]);
+        command.args(["--epochs", "1000000", "--force"]);
         command.args(extra).arg("--output").arg(model);
         command.current_dir(env!("CARGO_MANIFEST_DIR"));
         command.stdout(Stdio::piped()).stderr(Stdio::piped());
@@ -1446,11 +1452,13 @@ fn training_that_is_interrupted_says_so_in_text_json_exit_code_and_provenance() 
             serde_json::from_slice(&fs::read(&model).expect("a model")).expect("JSON");
         value["provenance"]["interrupted"].clone()
     };
-    let (code, said, wrong) = interrupted_training(&model, &[]);
+    let (code, said, wrong) = interrupted_training(&model, &["--method", "joint"]);
     assert_eq!(code, Some(130), "{said}{wrong}");
     assert!(said.contains("interrupted by Ctrl-C"), "{said}");
     assert_eq!(provenance(), true);
 
+    fs::remove_file(&model).expect("it was written");
+    // The number of epochs alone asks for the joint method.
     let (code, said, wrong) = interrupted_training(&model, &["--seeds", "2", "--json"]);
     assert_eq!(code, Some(130), "{said}{wrong}");
     assert!(wrong.contains("note: interrupted"), "{wrong}");

@@ -141,15 +141,14 @@ impl<'a> Inputs<'a> {
         Ok(write_files(folder, files, overwrite)?)
     }
 
-    /// Writes figures into a folder, if one is given, and says so in the answer.
+    /// Writes figures into a folder, and says so in the answer.
     pub fn write_figures(
         &self,
-        folder: Option<&Path>,
+        folder: &Path,
         figures: &[Figure],
         overwrite: Overwrite,
         answer: &mut Answer,
     ) -> Result<(), Error> {
-        let Some(folder) = folder else { return Ok(()) };
         let files: Vec<EmittedFile> = figures.iter().flat_map(figure_files).collect();
         let written = self.write_folder(folder, &files, overwrite)?;
         answer.text += &format!("{} figures: {}\n", figures.len(), folder.display());

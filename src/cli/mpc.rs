@@ -41,13 +41,10 @@ pub fn run(arguments: &MpcArguments) -> Result<(Answer, u8), Error> {
     let remarks = remarks(&model, &recordings)?;
     let failed = failed_runs(&runs);
     let mut answer = answer(arguments, &runs, &failed, &remarks);
-    let figures = control_figures(&model, &settings, &runs);
-    inputs.write_figures(
-        arguments.figures.as_deref(),
-        &figures,
-        overwrite,
-        &mut answer,
-    )?;
+    if let Some(folder) = &arguments.figures {
+        let figures = control_figures(&model, &settings, &runs);
+        inputs.write_figures(folder, &figures, overwrite, &mut answer)?;
+    }
     if let Some(path) = &arguments.output {
         let table = command_table(&model, &runs);
         write_file(path, table.csv().as_bytes(), overwrite)?;

@@ -174,10 +174,14 @@ pub fn names(paths: &[PathBuf]) -> Vec<String> {
 
 /// A path as a shell takes it.
 pub fn quoted(path: &Path) -> String {
-    let text = path.display().to_string();
-    let plain = |letter: char| letter.is_alphanumeric() || "-_./".contains(letter);
+    quoted_text(&path.display().to_string())
+}
+
+/// A word as a shell takes it.
+pub fn quoted_text(text: &str) -> String {
+    let plain = |letter: char| letter.is_alphanumeric() || "-_./,=:+%".contains(letter);
     if text.chars().all(plain) {
-        text
+        text.to_owned()
     } else {
         format!("'{}'", text.replace('\'', r"'\''"))
     }

@@ -39,7 +39,9 @@ pub fn run(arguments: &PlanArguments) -> Result<Answer, Error> {
         let reach = map(&model, &settings)?;
         let mut answer = reach_answer(arguments, &reach);
         let figure = reach_figure(&reach, model.jump_prior()?);
-        inputs.write_figures(figures, &[figure], overwrite, &mut answer)?;
+        if let Some(folder) = figures {
+            inputs.write_figures(folder, &[figure], overwrite, &mut answer)?;
+        }
         return Ok(answer);
     }
     let goal = goal(arguments, model.robot()?)?;
@@ -58,8 +60,10 @@ pub fn run(arguments: &PlanArguments) -> Result<Answer, Error> {
     }
     let mut answer = answer(arguments, &planned);
     // Figures first: a folder that is refused leaves no plan behind.
-    let drawn = plan_figures(&planned, model.robot()?);
-    inputs.write_figures(figures, &drawn, overwrite, &mut answer)?;
+    if let Some(folder) = figures {
+        let drawn = plan_figures(&planned, model.robot()?);
+        inputs.write_figures(folder, &drawn, overwrite, &mut answer)?;
+    }
     if let Some(path) = &arguments.output {
         write_recording(path, vec![planned.motion.clone()], None)?;
         let _ = writeln!(answer.text, "\nthe plan: {}", path.display());

@@ -6,7 +6,7 @@ use std::path::Path;
 use serde_json::{Map, Value};
 
 use super::args::{PhaseSet, TrainArguments, TrainSettings, Widths};
-use super::output::{note, read_settings, refused};
+use super::output::{note, quoted_text, read_settings, refused};
 use super::robot::chosen;
 use crate::Error;
 use crate::identify::identify;
@@ -222,8 +222,7 @@ pub(super) fn as_flags(settings: &TrainSettings) -> String {
                 Some(count) => format!(" {count}"),
                 None => format!(" {}", number.as_f64().unwrap_or(f64::NAN)),
             },
-            Value::String(text) if text.contains(' ') => format!(" \"{text}\""),
-            Value::String(text) => format!(" {text}"),
+            Value::String(text) => format!(" {}", quoted_text(&text)),
             Value::Array(widths) if widths.is_empty() => " linear".to_owned(),
             Value::Array(widths) => {
                 let widths: Vec<String> = widths.iter().map(Value::to_string).collect();

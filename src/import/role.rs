@@ -159,7 +159,13 @@ impl Role {
             | Role::Mask(phase)
             | Role::InputMean(phase)
             | Role::InputCovariance(phase) => Some(phase),
-            _ => None,
+            Role::Weights(..)
+            | Role::Bias(..)
+            | Role::StateScaling
+            | Role::InputScaling
+            | Role::StateMean
+            | Role::StateStd
+            | Role::InputStd => None,
         }
     }
 }

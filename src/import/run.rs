@@ -62,13 +62,13 @@ pub fn import_from_bytes(
     options: &ImportOptions,
 ) -> Result<Imported, ImportError> {
     let (parts, mut report) = match format {
-        Format::Safetensors | Format::Npz => {
+        Format::Safetensors => {
             check_size(file, bytes, MAX_FILE_BYTES)?;
-            let tensors = match format {
-                Format::Npz => npz::open(file, bytes)?,
-                _ => safetensors::open(file, bytes)?,
-            };
-            assemble::parts(&tensors, options)?
+            assemble::parts(&safetensors::open(file, bytes)?, options)?
+        }
+        Format::Npz => {
+            check_size(file, bytes, MAX_FILE_BYTES)?;
+            assemble::parts(&npz::open(file, bytes)?, options)?
         }
         Format::Equations | Format::Latex => {
             let usual = ["contact", "flight"].map(str::to_owned);

@@ -19,7 +19,7 @@ use crate::train::{Method, Origin, Recordings, TrainError, TrainOptions, Trained
 /// called for every cell. The result does not depend on the number of threads.
 ///
 /// # Errors
-/// [`StudyError::File`]. A training that refuses is an outcome, not an error.
+/// [`StudyError::File`], one of several if more than one file fails. A training that refuses is an outcome, not an error.
 pub fn run(
     store: &Store,
     shard: Shard,

@@ -12,6 +12,9 @@ use super::symbols::SymbolTable;
 use super::tree::{Glyph, Math, Signed};
 
 /// Lays out an expression over the variables of a latent model.
+///
+/// # Panics
+/// If the expression has a symbol that is no variable of a latent model, such as `x`; libraries of models refuse these.
 pub fn expression(pool: &ExprPool, expr: ExprId, symbols: &SymbolTable) -> Signed {
     Layout { pool, symbols }.signed(expr)
 }

@@ -7,7 +7,8 @@
 //! read, whatever has no meaning here is an error with line and column, never a guess.
 //!
 //! Read `token.rs` (characters to tokens), `document.rs` (displays and macros), `derivatives.rs`
-//! (dots for other ways to write a derivative), `sections.rs` (displays to equations and phases), `reader.rs` and `expression.rs` (one right side) in this order.
+//! (dots for other ways to write a derivative), `sections.rs` (displays to equations and phases), `reader.rs`,
+//! `expression.rs` and `numbers.rs` (one right side) in this order.
 
 mod derivatives;
 mod document;

@@ -70,15 +70,25 @@ impl Kind {
 
     /// Whether it ends every term that it stands behind.
     pub(super) fn ends_term(&self) -> bool {
-        matches!(
-            self,
+        match self {
             Kind::Align
-                | Kind::Break
-                | Kind::Close
-                | Kind::Label(_)
-                | Kind::Comment(_)
-                | Kind::Paragraph
-        )
+            | Kind::Break
+            | Kind::Close
+            | Kind::Label(_)
+            | Kind::Comment(_)
+            | Kind::Paragraph => true,
+            Kind::Command(_)
+            | Kind::Begin(_)
+            | Kind::End(_)
+            | Kind::Open
+            | Kind::Superscript
+            | Kind::Subscript
+            | Kind::Dollar
+            | Kind::Display
+            | Kind::Number(_)
+            | Kind::Parameter(_)
+            | Kind::Character(_) => false,
+        }
     }
 }
 
@@ -131,8 +141,8 @@ pub(super) fn of_markdown(text: &str) -> Vec<Token> {
     let mut in_display = false;
     for (index, line) in text.lines().enumerate() {
         let number = index + 1;
-        let mut push = |kind, column| {
-            let place = (number, column);
+        let mut push = |kind| {
+            let place = (number, 1);
             tokens.push(Token { kind, place });
         };
         let content = line.trim();
@@ -140,7 +150,7 @@ pub(super) fn of_markdown(text: &str) -> Vec<Token> {
             if content == "```" {
                 fence = None;
                 if is_math {
-                    push(Kind::Display, 1);
+                    push(Kind::Display);
                 }
             } else if is_math {
                 Line::new(line, number, 1).read(&mut tokens);
@@ -151,13 +161,13 @@ pub(super) fn of_markdown(text: &str) -> Vec<Token> {
             let is_math = language.trim() == "math";
             fence = Some(is_math);
             if is_math {
-                push(Kind::Display, 1);
+                push(Kind::Display);
             }
             continue;
         }
         if !in_display && content.starts_with('#') {
             let heading = content.trim_start_matches('#').trim();
-            push(Kind::Comment(unescaped(heading)), 1);
+            push(Kind::Comment(unescaped(heading)));
             continue;
         }
         let mut column = 1;
