@@ -53,32 +53,37 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
             self.start(x0, is_warm);
             let is_far = self.change_of_gains() > T::of(FAR_CHANGE);
             let mut may_restart = is_warm;
-            let mut point = self.centre(match (is_warm, is_far) {
+            let mut smallest = match (is_warm, is_far) {
                 (false, _) => COLD,
                 (true, true) => FAR,
                 (true, false) => WARM,
-            });
-            loop {
-                if !(point.infeasibility() + point.sum).is_finite_number() {
-                    return self.broken(iterations);
+            };
+            // First points and restarts are centred in one place, so that the pass is compiled once.
+            'centred: loop {
+                let mut point = self.centre(smallest);
+                loop {
+                    if !(point.infeasibility() + point.sum).is_finite_number() {
+                        return self.broken(iterations);
+                    }
+                    if point.is_optimal(settings) {
+                        break 'centred;
+                    }
+                    is_capped = iterations == settings.max_iterations;
+                    if is_capped {
+                        break 'centred;
+                    }
+                    iterations += 1;
+                    // Where rounding ends the progress the residuals decide what the point is worth.
+                    let Some(length) = self.step(&mut point, settings) else {
+                        break 'centred;
+                    };
+                    let is_poor = may_restart && length < T::of(SHORT_STEP);
+                    may_restart = false;
+                    if is_poor || iterations % PATIENCE == 0 {
+                        smallest = AGAIN;
+                        break;
+                    }
                 }
-                if point.is_optimal(settings) {
-                    break;
-                }
-                is_capped = iterations == settings.max_iterations;
-                if is_capped {
-                    break;
-                }
-                iterations += 1;
-                // Where rounding ends the progress the residuals decide what the point is worth.
-                let Some(length) = self.step(&mut point, settings) else {
-                    break;
-                };
-                let is_poor = may_restart && length < T::of(SHORT_STEP);
-                if is_poor || iterations % PATIENCE == 0 {
-                    point = self.centre(AGAIN);
-                }
-                may_restart = false;
             }
         }
         let residuals = self.residuals(x0);
