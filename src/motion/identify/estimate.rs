@@ -58,15 +58,15 @@ pub fn identify(recordings: &[Recording], robot: &Robot) -> Result<Identificatio
         }));
     }
     let mut state = State::new(robot);
-    let mut round = Round::of(&segments, robot, &state)?;
-    round.require_enough(recordings.len())?;
+    let mut windows = state.windows(&segments, robot)?;
+    require_enough(&windows, recordings.len())?;
     let mut settled = false;
     for _ in 0..MOST_ROUNDS {
-        settled = state.improve(&round.windows, robot)?;
+        settled = state.improve(&windows, robot)?;
         if settled {
             break;
         }
-        round = Round::of(&segments, robot, &state)?;
+        windows = state.windows(&segments, robot)?;
     }
     if !settled {
         notes.push(format!(
@@ -74,8 +74,8 @@ pub fn identify(recordings: &[Recording], robot: &Robot) -> Result<Identificatio
              their standard errors"
         ));
     }
-    notes.extend(round.notes());
-    let mut found = state.result(robot, &segments, &round.windows, notes);
+    notes.extend(exclusions(&windows));
+    let mut found = state.result(robot, &segments, &windows, notes);
     found.notes.extend(found.contradiction());
     found.notes.extend(found.doubts(robot.mass_kg()));
     Ok(found)
@@ -88,73 +88,52 @@ struct Prepared {
     lost: Vec<bool>,
 }
 
-/// The equations of all segments at one estimate of gravity and delay.
-struct Round {
-    windows: Windows,
-    clipped_torques: usize,
+/// Refuses windows that say too little of these many recordings.
+fn require_enough(windows: &Windows, recordings: usize) -> Result<(), IdentifyError> {
+    let (found, expected) = (windows.contact_samples, LEAST_CONTACT_SAMPLES);
+    if found < expected {
+        return Err(IdentifyError::Contact {
+            recordings,
+            found,
+            expected,
+        });
+    }
+    let is_moving = |row: &&Row| row.moving && row.group == Group::Contact(0);
+    let found = windows.rows.iter().filter(is_moving).count();
+    let expected = LEAST_WINDOWS;
+    if found < expected {
+        return Err(IdentifyError::Still {
+            recordings,
+            found,
+            expected,
+        });
+    }
+    Ok(())
 }
 
-impl Round {
-    fn of(segments: &[Prepared], robot: &Robot, state: &State) -> Result<Self, IdentifyError> {
-        let mut round = Self {
-            windows: Windows::default(),
-            clipped_torques: 0,
-        };
-        for prepared in segments {
-            let (segment, motion) = (&prepared.segment, &prepared.motion);
-            let equations =
-                SampleEquations::of(segment, motion, robot, state.gravity_m_s2, state.delay_s);
-            round.clipped_torques += equations.clipped_torques;
-            round.windows.add(segment, &equations, &prepared.lost)?;
-        }
-        Ok(round)
+/// What is clipped, left out or lacking in the windows.
+fn exclusions(windows: &Windows) -> Vec<String> {
+    let mut notes = Vec::new();
+    if windows.clipped_torques > 0 {
+        notes.push(format!(
+            "{} torques are above the robot's limits: commanded rather than measured? They \
+             count as the limit",
+            windows.clipped_torques
+        ));
     }
-
-    fn require_enough(&self, recordings: usize) -> Result<(), IdentifyError> {
-        let (found, expected) = (self.windows.contact_samples, LEAST_CONTACT_SAMPLES);
-        if found < expected {
-            return Err(IdentifyError::Contact {
-                recordings,
-                found,
-                expected,
-            });
-        }
-        let is_moving = |row: &&Row| row.moving && row.group == Group::Contact(0);
-        let found = self.windows.rows.iter().filter(is_moving).count();
-        let expected = LEAST_WINDOWS;
-        if found < expected {
-            return Err(IdentifyError::Still {
-                recordings,
-                found,
-                expected,
-            });
-        }
-        Ok(())
+    if windows.singular_samples > 0 {
+        notes.push(format!(
+            "{} samples with a leg on the ground close to a singular posture are left out",
+            windows.singular_samples
+        ));
     }
-
-    fn notes(&self) -> Vec<String> {
-        let mut notes = Vec::new();
-        if self.clipped_torques > 0 {
-            notes.push(format!(
-                "{} torques are above the robot's limits: commanded rather than measured? They \
-                 count as the limit",
-                self.clipped_torques
-            ));
-        }
-        if self.windows.singular_samples > 0 {
-            notes.push(format!(
-                "{} samples with a leg on the ground close to a singular posture are left out",
-                self.windows.singular_samples
-            ));
-        }
-        if self.windows.flight_samples == 0 {
-            notes.push(
-                "no flight of at least 70 ms: gravity and the legs' inertia rest on contact alone"
-                    .to_owned(),
-            );
-        }
-        notes
+    if windows.flight_samples == 0 {
+        notes.push(
+            "no flight of at least 70 ms: gravity and the legs' inertia rest on contact alone"
+                .to_owned(),
+        );
     }
+    notes
 }
 
 /// What the rounds improve.
@@ -177,6 +156,22 @@ impl State {
             iteration: Iteration::default(),
             rounds: 0,
         }
+    }
+
+    /// The equations of all segments at this estimate of gravity and delay.
+    fn windows(&self, segments: &[Prepared], robot: &Robot) -> Result<Windows, IdentifyError> {
+        let mut windows = Windows::default();
+        for Prepared {
+            segment,
+            motion,
+            lost,
+        } in segments
+        {
+            let equations =
+                SampleEquations::of(segment, motion, robot, self.gravity_m_s2, self.delay_s);
+            windows.add(segment, &equations, lost)?;
+        }
+        Ok(windows)
     }
 
     /// One fit; whether it changed nothing that matters.

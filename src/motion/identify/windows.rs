@@ -88,6 +88,8 @@ pub struct Windows {
     pub flight_samples: usize,
     /// Samples left out because a leg on the ground was close to a singular posture.
     pub singular_samples: usize,
+    /// Torques above the robot's limits, which count as the limit.
+    pub clipped_torques: usize,
     /// Number of segments.
     segments: usize,
 }
@@ -103,6 +105,7 @@ impl Windows {
         equations: &SampleEquations,
         lost: &[bool],
     ) -> Result<(), IdentifyError> {
+        self.clipped_torques += equations.clipped_torques;
         let step_s = segment.mean_step_s();
         let samples = |time_s: f64| (time_s / step_s).round() as usize;
         let window = (samples(WINDOW_S) | 1).max(3);
