@@ -29,7 +29,6 @@ pub fn run(arguments: &CheckArguments) -> Result<(Answer, u8), Error> {
     let answer = Answer {
         text: text(&left, &right, &comparison),
         json: json!({
-            "command": "check",
             "files": [&left.file, &right.file],
             "equal": is_equal,
             "exact": comparison.verdicts().all(|verdict| *verdict == Verdict::Equal),

@@ -70,7 +70,6 @@ pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
             + &text(arguments, equations, &written)
             + &earlier_in_words(&earlier),
         json: json!({
-            "command": "compile",
             "model": arguments.model.display().to_string(),
             "name": model.name(),
             "digest": artifact::digest(model).to_string(),

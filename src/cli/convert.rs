@@ -40,7 +40,6 @@ pub fn run(arguments: &ConvertArguments) -> Result<Answer, Error> {
     Ok(Answer {
         text: format!("{output}: {samples} samples in {count} segments\n"),
         json: json!({
-            "command": "convert",
             "recordings": names(&arguments.recordings),
             "output": output,
             "samples": samples,

@@ -10,7 +10,7 @@ use serde_json::json;
 
 use super::args::{CodeArguments, DemoArguments, EquationArguments};
 use super::destination::Inputs;
-use super::output::spinner;
+use super::output::{lines, spinner};
 use super::{Answer, DONE, FAILED};
 use super::{compile, mpc as mpc_command, report};
 use crate::deploy::Target;
@@ -102,9 +102,7 @@ pub fn run(arguments: &DemoArguments) -> Result<(Answer, u8), Error> {
         run_table(&control[0])
     );
     let failed: Vec<String> = control.iter().flat_map(|runs| failed_runs(runs)).collect();
-    for reason in failures(&control[0]).iter().chain(&failed) {
-        let _ = writeln!(text, "FAILED along {reason}");
-    }
+    text += &lines("FAILED along ", failures(&control[0]).iter().chain(&failed));
     let is_sound = failed.is_empty() && self_test.is_ok();
     let self_test = match self_test {
         Ok(words) => words.to_owned(),
@@ -118,18 +116,15 @@ pub fn run(arguments: &DemoArguments) -> Result<(Answer, u8), Error> {
     }
     let [plain, consistent] =
         (control.each_ref()).map(|runs| runs.iter().map(mpc_command::run_json).collect::<Vec<_>>());
-    let answer = Answer {
-        text,
-        json: json!({
-            "command": "demo",
-            "model": MODEL.0,
-            "rollouts": assessment_json(&model, &evaluation),
-            "mpc": { "transpose": plain, "consistent": consistent },
-            "self_test": self_test,
-            "failed": failed,
-            "files": made.iter().map(|(path, _)| path.display().to_string()).collect::<Vec<_>>(),
-        }),
-    };
+    let json = json!({
+        "model": MODEL.0,
+        "rollouts": assessment_json(&model, &evaluation),
+        "mpc": { "transpose": plain, "consistent": consistent },
+        "self_test": self_test,
+        "failed": failed,
+        "files": made.iter().map(|(path, _)| path.display().to_string()).collect::<Vec<_>>(),
+    });
+    let answer = Answer { text, json };
     Ok((answer, if is_sound { DONE } else { FAILED }))
 }
 

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use super::Answer;
 use super::args::IdentifyArguments;
 use super::destination::{Format, Inputs};
-use super::output::{names, note_repeated, read_with, reader, spinner, write_file};
+use super::output::{lines, names, note_repeated, read_with, reader, spinner, write_file};
 use super::robot;
 use crate::Error;
 use crate::files::Overwrite;
@@ -54,25 +54,21 @@ fn text(found: &Identification, robot: &Robot, recordings: usize) -> String {
         ("torque to motion", "ms", delays),
     ];
     let body = quantities("quantity", body);
-    let mut joints = Table::new(["losses of a joint", "unit", "hx", "hy", "kn"]);
-    let (viscous, dry) = (
-        [found.viscous(), error.viscous_nm_s_rad],
-        [found.dry(), error.dry_nm],
-    );
-    for (name, unit, [values, errors]) in [
+    let viscous = [found.viscous(), error.viscous_nm_s_rad];
+    let armature = [found.armature(), error.armature_kg_m2];
+    let losses = [
         ("viscous friction", "N m s/rad", viscous),
-        ("dry friction", "N m", dry),
-        (
-            "armature",
-            "kg m^2",
-            [found.armature(), error.armature_kg_m2],
-        ),
-    ] {
-        let pairs = values.to_array().into_iter().zip(errors.to_array());
-        let cells =
-            pairs.map(|(value, error)| format!("{} ± {}", significant(value), two_digits(error)));
-        joints.row([name, unit].map(str::to_owned).into_iter().chain(cells));
-    }
+        ("dry friction", "N m", [found.dry(), error.dry_nm]),
+        ("armature", "kg m^2", armature),
+    ];
+    let pair = |value, error| format!("{} ± {}", significant(value), two_digits(error));
+    let joints = Table::of(losses)
+        .column("losses of a joint", "", |(name, ..)| *name)
+        .column("unit", "", |(_, unit, _)| *unit)
+        .column("hx", "", |(.., [value, error])| pair(value.hx, error.hx))
+        .column("hy", "", |(.., [value, error])| pair(value.hy, error.hy))
+        .column("kn", "", |(.., [value, error])| pair(value.kn, error.kn))
+        .table();
     let moments: [(&str, &str, fn(&Legs) -> f64); 5] = [
         ("first moment beside the hip", "kg m", |l| l.side_kg_m),
         ("first moment of the thigh", "kg m", |l| l.thigh_kg_m),
@@ -102,17 +98,14 @@ fn text(found: &Identification, robot: &Robot, recordings: usize) -> String {
         .column("gravity", "", |(.., [gravity, _])| format!("{gravity:.2}"))
         .column("mass", "kg", |(.., [_, mass])| format!("{mass:.2}"))
         .table();
-    let mut text = format!(
+    let notes = lines("\nnote: ", &found.notes);
+    format!(
         "{} from {recordings} recordings: {} samples with feet on the ground, {} in flight\n\n\
-         {body}\n{joints}\n{links}\n{fits}",
+         {body}\n{joints}\n{links}\n{fits}{notes}",
         robot.name(),
         found.samples.contact,
         found.samples.flight
-    );
-    for note in &found.notes {
-        let _ = writeln!(text, "\nnote: {note}");
-    }
-    text
+    )
 }
 
 /// A table of values with their standard errors.
@@ -140,7 +133,6 @@ fn two_digits(value: f64) -> String {
 fn report(found: &Identification, arguments: &IdentifyArguments) -> Value {
     let alone = &found.force_alone;
     json!({
-        "command": "identify",
         "robot": found.robot,
         "recordings": names(&arguments.recordings),
         "gravity_m_s2": found.gravity_m_s2,

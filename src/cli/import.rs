@@ -7,7 +7,7 @@ use serde_json::{Map, Value, json};
 use super::Answer;
 use super::args::{ImportArguments, LibraryArgument};
 use super::destination::{Format, Inputs};
-use super::output::{named, read_recordings};
+use super::output::{lines, named, read_recordings};
 use super::robot;
 use crate::evaluate::RoundTrip;
 use crate::files::Overwrite;
@@ -64,19 +64,16 @@ pub fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
     if let Some(lacking) = lacking {
         let _ = writeln!(text, "\n{lacking}");
     }
-    Ok(Answer {
-        text,
-        json: json!({
-            "command": "import",
-            "model": output,
-            "name": name,
-            "digest": artifact::digest(&model).to_string(),
-            "report": imported.report,
-            "wrench_axes": axes,
-            "lacking": lacking,
-            "check": check.as_ref().map(check_json),
-        }),
-    })
+    let json = json!({
+        "model": output,
+        "name": name,
+        "digest": artifact::digest(&model).to_string(),
+        "report": imported.report,
+        "wrench_axes": axes,
+        "lacking": lacking,
+        "check": check.as_ref().map(check_json),
+    });
+    Ok(Answer { text, json })
 }
 
 /// Compares the model with the recordings, if there are any and it has both maps; refuses one that
@@ -182,10 +179,7 @@ fn describe(report: &ImportReport) -> String {
         let shape = shape(&unused.shape);
         let _ = writeln!(text, "not used: {} ({shape})", unused.tensor);
     }
-    for note in &report.notes {
-        let _ = writeln!(text, "note: {note}");
-    }
-    text
+    text + &lines("note: ", &report.notes)
 }
 
 fn shape(dims: &[usize]) -> String {

@@ -30,7 +30,7 @@ pub fn run(arguments: &InspectArguments) -> Result<Answer, Error> {
     }
     Ok(Answer {
         text: texts.join("\n"),
-        json: json!({ "command": "inspect", "files": files }),
+        json: json!({ "files": files }),
     })
 }
 
@@ -57,18 +57,15 @@ fn guessed(arguments: &InspectArguments, robot: &Robot) -> Result<Answer, Error>
         }
         None => note(&outcome),
     }
-    Ok(Answer {
-        text,
-        json: json!({
-            "command": "inspect",
-            "file": log.display().to_string(),
-            "map": guess.text,
-            "missing": guess.missing,
-            "samples": guess.outcome.as_ref().ok(),
-            "refused": guess.outcome.as_ref().err(),
-            "output": arguments.output.as_ref().map(|path| path.display().to_string()),
-        }),
-    })
+    let json = json!({
+        "file": log.display().to_string(),
+        "map": guess.text,
+        "missing": guess.missing,
+        "samples": guess.outcome.as_ref().ok(),
+        "refused": guess.outcome.as_ref().err(),
+        "output": arguments.output.as_ref().map(|path| path.display().to_string()),
+    });
+    Ok(Answer { text, json })
 }
 
 fn inspect(path: &Path, robot: &Robot, reader: &Reader) -> Result<Answer, Error> {

@@ -28,7 +28,7 @@ pub fn pages(arguments: &ManualArguments) -> Result<Answer, Error> {
     let paths = names(&written);
     Ok(Answer {
         text: format!("{}\n", paths.join("\n")),
-        json: json!({ "command": "manual", "files": paths }),
+        json: json!({ "files": paths }),
     })
 }
 
@@ -59,7 +59,6 @@ pub fn completions(arguments: &CompletionsArguments) -> Answer {
         String::from_utf8_lossy(&script).replace(&names, &format!("compgen -f -W \"{robots}\""));
     Answer {
         json: json!({
-            "command": "completions",
             "shell": arguments.shell.to_string(),
             "script": text,
         }),

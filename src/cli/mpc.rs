@@ -6,7 +6,9 @@ use serde_json::{Value, json};
 
 use super::args::MpcArguments;
 use super::destination::{Format, Inputs};
-use super::output::{extend, note, progress_bar, read_recordings, show_progress, write_file};
+use super::output::{
+    extend, lines, note, progress_bar, read_recordings, show_progress, write_file,
+};
 use super::{Answer, DONE, FAILED};
 use crate::evaluate::{ReferenceInput, along_recording, control_metrics, remarks};
 use crate::files::Overwrite;
@@ -119,12 +121,8 @@ fn answer(
         control_table(runs),
         run_table(runs)
     );
-    for reason in failures(runs).iter().chain(failed) {
-        let _ = writeln!(text, "FAILED along {reason}");
-    }
-    for remark in remarks {
-        let _ = writeln!(text, "note: {remark}");
-    }
+    text += &lines("FAILED along ", failures(runs).iter().chain(failed));
+    text += &lines("note: ", remarks);
     let mut rows = runs.iter().flat_map(|(_, run)| &run.rows);
     if let Some(row) = rows.find(|row| row.status.has_plan()) {
         let torques = row.torque_nm.map(|torque| format!("{torque:.2}")).join(" ");
@@ -133,19 +131,16 @@ fn answer(
     if let Some(path) = &arguments.output {
         let _ = writeln!(text, "every step: {}", path.display());
     }
-    Answer {
-        text,
-        json: json!({
-            "command": "mpc",
-            "model": arguments.model.display().to_string(),
-            "horizon": arguments.horizon,
-            "step_s": arguments.step,
-            "remarks": remarks,
-            "failed": failed,
-            "runs": runs.iter().map(run_json).collect::<Vec<_>>(),
-            "output": arguments.output.as_ref().map(|path| path.display().to_string()),
-        }),
-    }
+    let json = json!({
+        "model": arguments.model.display().to_string(),
+        "horizon": arguments.horizon,
+        "step_s": arguments.step,
+        "remarks": remarks,
+        "failed": failed,
+        "runs": runs.iter().map(run_json).collect::<Vec<_>>(),
+        "output": arguments.output.as_ref().map(|path| path.display().to_string()),
+    });
+    Answer { text, json }
 }
 
 /// One run: what the model is worth, and what happened.

@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -164,6 +165,12 @@ fn escaped(text: &str, written: impl Fn(char) -> String) -> Cow<'_, str> {
 /// Reports on stderr what reading did besides reading.
 pub fn report_reading(notes: &ReadingNotes) {
     notes.lines().iter().for_each(|line| note(line));
+}
+
+/// Each of these on a line of its own, behind the same words.
+pub fn lines<T: Display>(words: &str, items: impl IntoIterator<Item = T>) -> String {
+    let lines = items.into_iter().map(|item| format!("{words}{item}\n"));
+    lines.collect()
 }
 
 /// Paths as JSON shows them.

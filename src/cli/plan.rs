@@ -9,7 +9,8 @@ use super::args::PlanArguments;
 use super::convert::write_recording;
 use super::destination::{Format, Inputs};
 use super::output::{
-    extend, note_mismatches, progress_bar, read_settings, reader, show_progress, spinner, warn,
+    extend, lines, note_mismatches, progress_bar, read_settings, reader, show_progress, spinner,
+    warn,
 };
 use crate::files::Overwrite;
 use crate::model::ReducedModel;
@@ -122,13 +123,9 @@ fn answer(arguments: &PlanArguments, planned: &Plan) -> Answer {
         planned.programs,
         planned.solve_ms,
     );
-    for reason in planned.verdict.reasons() {
-        let _ = writeln!(text, "{}: {reason}", planned.verdict.word());
-    }
-    let mut json = json!({
-        "command": "plan",
-        "model": arguments.model.display().to_string(),
-    });
+    let word = format!("{}: ", planned.verdict.word());
+    text += &lines(&word, planned.verdict.reasons());
+    let mut json = json!({ "model": arguments.model.display().to_string() });
     extend(&mut json, plan_json(planned));
     let output = arguments.output.as_ref();
     json["output"] = json!(output.map(|path| path.display().to_string()));
@@ -175,7 +172,6 @@ fn reach_answer(arguments: &PlanArguments, reach: &Reach) -> Answer {
             arguments.model.display()
         ),
         json: json!({
-            "command": "plan",
             "model": arguments.model.display().to_string(),
             "reach": points.collect::<Vec<_>>(),
             "solve_ms": {

@@ -9,7 +9,7 @@ use super::Answer;
 use super::args::ReportArguments;
 use super::destination::{Format, Inputs};
 use super::mpc::run_with_both_lifts;
-use super::output::{names, note_mismatches, quoted, read_recordings, spinner, write_file};
+use super::output::{lines, names, note_mismatches, quoted, read_recordings, spinner, write_file};
 use super::simplification;
 use crate::evaluate::{Assessment, LAMBDA};
 use crate::files::{EmittedFile, Overwrite};
@@ -63,9 +63,7 @@ pub fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
         made.page.len() / 1000,
         made.n_figures
     );
-    for remark in &made.remarks {
-        let _ = writeln!(text, "note: {remark}");
-    }
+    text += &lines("note: ", &made.remarks);
     if let Some(folder) = &arguments.figures {
         let (folder, files) = (folder.display(), written.len());
         let _ = writeln!(
@@ -73,19 +71,16 @@ pub fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
             "{folder}: {files} files, each figure as .svg, .pdf and .csv"
         );
     }
-    Ok(Answer {
-        text,
-        json: json!({
-            "command": "report",
-            "model": arguments.model.display().to_string(),
-            "output": arguments.output.display().to_string(),
-            "bytes": made.page.len(),
-            "verdict": made.verdict.headline,
-            "reasons": made.verdict.sentences,
-            "figures": names(&written),
-            "remarks": made.remarks,
-        }),
-    })
+    let json = json!({
+        "model": arguments.model.display().to_string(),
+        "output": arguments.output.display().to_string(),
+        "bytes": made.page.len(),
+        "verdict": made.verdict.headline,
+        "reasons": made.verdict.sentences,
+        "figures": names(&written),
+        "remarks": made.remarks,
+    });
+    Ok(Answer { text, json })
 }
 
 /// A report in memory.

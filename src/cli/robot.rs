@@ -74,14 +74,11 @@ pub fn run(arguments: &RobotArguments) -> Result<Answer, Error> {
         write_file(path, robot_file::to_toml(robot).as_bytes(), overwrite)?;
         let _ = writeln!(text, "\n{}: the robot", path.display());
     }
-    Ok(Answer {
-        text,
-        json: json!({
-            "command": "robot",
-            "robot": RobotEntry::of(robot),
-            "output": arguments.output.as_ref().map(|path| path.display().to_string()),
-        }),
-    })
+    let json = json!({
+        "robot": RobotEntry::of(robot),
+        "output": arguments.output.as_ref().map(|path| path.display().to_string()),
+    });
+    Ok(Answer { text, json })
 }
 
 fn vector(vector: [f64; 3]) -> String {

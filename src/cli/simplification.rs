@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 
 use super::args::{ReadingArguments, SimplifyArguments};
-use super::output::{names, read_recordings, read_text, spinner};
+use super::output::{lines, names, read_recordings, read_text, spinner};
 use crate::equations::Equations;
 use crate::evaluate::Assessment;
 use crate::files::EmittedFile;
@@ -251,12 +251,9 @@ fn comment_marks(path: &Path) -> Option<[&'static str; 2]> {
 
 /// What exact simplification did, one line for each step; nothing if it did nothing.
 pub fn exact_words(equations: &Equations<'_>) -> String {
-    let lines: String = (equations.steps().iter())
-        .map(|step| format!("  {step}\n"))
-        .collect();
-    match lines.as_str() {
-        "" => lines,
-        _ => format!("simplified exactly:\n{lines}\n"),
+    match equations.steps() {
+        [] => String::new(),
+        steps => format!("simplified exactly:\n{}\n", lines("  ", steps)),
     }
 }
 

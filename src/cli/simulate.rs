@@ -8,7 +8,7 @@ use serde_json::json;
 use super::Answer;
 use super::args::SimulateArguments;
 use super::destination::{Format, Inputs};
-use super::output::{read_recordings, spinner, write_file};
+use super::output::{lines, read_recordings, spinner, write_file};
 use crate::evaluate::{Assessment, SegmentRun};
 use crate::files::Overwrite;
 use crate::model::ReducedModel;
@@ -45,15 +45,12 @@ pub fn run(arguments: &SimulateArguments) -> Result<Answer, Error> {
         write_file(path, table.csv().as_bytes(), overwrite)?;
         let _ = writeln!(text, "trajectories: {}", path.display());
     }
-    Ok(Answer {
-        text,
-        json: json!({
-            "command": "simulate",
-            "model": arguments.model.display().to_string(),
-            "rollouts": assessment_json(&model, &assessment),
-            "output": arguments.output.as_ref().map(|path| path.display().to_string()),
-        }),
-    })
+    let json = json!({
+        "model": arguments.model.display().to_string(),
+        "rollouts": assessment_json(&model, &assessment),
+        "output": arguments.output.as_ref().map(|path| path.display().to_string()),
+    });
+    Ok(Answer { text, json })
 }
 
 /// All metrics of an assessment as text.
@@ -100,10 +97,7 @@ fn metrics_text(model: &ReducedModel, assessment: &Assessment<'_>) -> String {
         shown(lift.torque.r2_all()),
         shown(lift.inconsistency())
     );
-    for remark in &assessment.remarks {
-        let _ = writeln!(text, "\nnote: {remark}");
-    }
-    text
+    text + &lines("\nnote: ", &assessment.remarks)
 }
 
 /// One row per sample: time, phase, recorded and predicted latent state and coordinates.

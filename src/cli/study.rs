@@ -168,15 +168,12 @@ fn answer(folder: &Path, store: &Store, summary: &Summary) -> Answer {
     if !names.is_empty() {
         text += &format!("\nnot trained yet: {}\n", names.join("; "));
     }
-    Answer {
-        text,
-        json: json!({
-            "command": "study",
-            "folder": folder.display().to_string(),
-            "plan": store.plan(),
-            "summary": summary,
-            "least_combined_loss_at": best,
-            "missing": missing,
-        }),
-    }
+    let json = json!({
+        "folder": folder.display().to_string(),
+        "plan": store.plan(),
+        "summary": summary,
+        "least_combined_loss_at": best,
+        "missing": missing,
+    });
+    Answer { text, json }
 }

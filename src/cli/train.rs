@@ -193,17 +193,14 @@ fn answer(arguments: &TrainArguments, trained: &Trained, tested: Option<&SetMetr
         metrics_table(report, tested),
         seed_table(report)
     );
-    Answer {
-        text,
-        json: json!({
-            "command": "train",
-            "model": arguments.output.display().to_string(),
-            "name": trained.model.name(),
-            "latent_dim": latent_dim,
-            "report": report,
-            "test": tested,
-        }),
-    }
+    let json = json!({
+        "model": arguments.output.display().to_string(),
+        "name": trained.model.name(),
+        "latent_dim": latent_dim,
+        "report": report,
+        "test": tested,
+    });
+    Answer { text, json }
 }
 
 const TORQUE_R2: &str = "torque R^2 of the plain lift, all samples";
