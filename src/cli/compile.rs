@@ -48,14 +48,10 @@ pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
     let targets = (arguments.emit.as_slice(), planned(arguments, model)?);
     let (code, print) = (&arguments.code, &arguments.equations);
     let mut files = emit(equations, targets, code, print, unless_given)?;
-    let (mut summary, mut certificate) = (String::new(), Value::Null);
-    if let Some(outcome) = &simplified {
-        let (file, words, value) =
-            outcome.files_and_summary(equations, rounding(print, unless_given))?;
-        outcome.comment(&mut files);
-        files.push(file);
-        (summary, certificate) = (words, value);
-    }
+    let (summary, certificate) = match &simplified {
+        Some(outcome) => outcome.add_to(&mut files, equations, rounding(print, unless_given))?,
+        None => (String::new(), Value::Null),
+    };
     if let Some(path) = save_model {
         artifact::check_place(path, model, overwrite)?;
     }

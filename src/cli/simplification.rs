@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
-use super::args::{ReadingArguments, SimplifyArguments};
+use super::args::SimplifyArguments;
 use super::output::{lines, names, read_recordings, read_text, spinner};
 use crate::equations::Equations;
 use crate::evaluate::Assessment;
@@ -25,60 +25,54 @@ use crate::{Error, artifact};
 const RESTART_S: f64 = 0.1;
 
 /// A domain with the samples that it was made from.
-pub struct Basis {
+struct Basis {
     domain: Domain,
     samples: Option<Samples>,
     recordings: Vec<Recording>,
     latent: Vec<LatentSegment>,
+    /// `None` if the ranges were given.
+    margin: Option<f64>,
 }
 
 impl Basis {
-    /// The domain that `files` give: one TOML file of ranges, or recordings.
-    pub fn read(
-        model: &ReducedModel,
-        files: &[PathBuf],
-        margin: Option<f64>,
-        reading: &ReadingArguments,
-    ) -> Result<Self, Error> {
+    /// The domain that the files of the arguments give: one TOML file of ranges, or the box around all samples of
+    /// recordings.
+    fn read(model: &ReducedModel, arguments: &SimplifyArguments) -> Result<Self, Error> {
+        let files = &arguments.domain;
         let is_table = |path: &&PathBuf| path.extension().is_some_and(|end| end == "toml");
-        match files.iter().find(is_table) {
-            None => {
-                let recordings = read_recordings(files, reading)?;
-                Self::of(model, recordings, margin.unwrap_or(MARGIN))
+        if let Some(path) = files.iter().find(is_table) {
+            if files.len() > 1 {
+                let message = "one .toml file of ranges, or recordings, but not both".to_owned();
+                let path = path.clone();
+                return Err(SimplifyError::DomainFile { path, message }.into());
             }
-            Some(path) if files.len() > 1 => Err(SimplifyError::DomainFile {
-                path: path.clone(),
-                message: "one .toml file of ranges, or recordings, but not both".to_owned(),
+            if arguments.margin.is_some() {
+                return Err(SimplifyError::Margin.into());
             }
-            .into()),
-            Some(_) if margin.is_some() => Err(SimplifyError::Margin.into()),
-            Some(path) => Ok(Self {
+            return Ok(Self {
                 domain: Domain::from_toml(model, path, &read_text(path)?)?,
                 samples: None,
                 recordings: Vec::new(),
                 latent: Vec::new(),
-            }),
+                margin: None,
+            });
         }
-    }
-
-    /// The box around all samples of `recordings`.
-    fn of(model: &ReducedModel, recordings: Vec<Recording>, margin: f64) -> Result<Self, Error> {
+        let recordings = read_recordings(files, &arguments.reading)?;
         if model.encoder_map().is_err() {
-            return Err(SimplifyError::NoEncoder {
-                model: model.name().to_owned(),
-            }
-            .into());
+            let model = model.name().to_owned();
+            return Err(SimplifyError::NoEncoder { model }.into());
         }
-        let latent = (recordings.iter())
-            .flat_map(|recording| &recording.segments)
-            .map(|segment| LatentSegment::encode(model, segment))
-            .collect::<Result<Vec<_>, _>>()?;
+        let segments = recordings.iter().flat_map(|recording| &recording.segments);
+        let latent = segments.map(|segment| LatentSegment::encode(model, segment));
+        let latent = latent.collect::<Result<Vec<_>, _>>()?;
         let samples = Samples::of(model, &latent.iter().collect::<Vec<_>>());
+        let margin = arguments.margin.unwrap_or(MARGIN);
         Ok(Self {
             domain: Domain::around(model, &samples, margin)?,
             samples: Some(samples),
             recordings,
             latent,
+            margin: Some(margin),
         })
     }
 
@@ -111,8 +105,6 @@ pub struct Outcome {
     rollouts: Option<RolloutEffect>,
     basis: Basis,
     domain_files: Vec<String>,
-    /// `None` if the ranges were given.
-    margin: Option<f64>,
 }
 
 /// Simplifies a model as typed; nothing if no domain was given.
@@ -125,14 +117,12 @@ pub fn run(
         return Ok(None);
     }
     let progress = spinner("simplifying");
-    let (files, reading) = (&arguments.domain, &arguments.reading);
-    let basis = Basis::read(model, files, arguments.margin, reading)?;
+    let basis = Basis::read(model, arguments)?;
     let tolerance = arguments.tolerance.unwrap_or(Tolerance::Absolute(0.0));
     let simplified = simplify(equations, &basis.domain, basis.samples.as_ref(), tolerance)?;
     progress.set_message("rolling out");
     let rollouts = basis.rollouts(model, &simplified.model)?;
     progress.finish_and_clear();
-    let margin = (basis.samples.as_ref()).map(|_| arguments.margin.unwrap_or(MARGIN));
     let mut outcome = Outcome {
         model: simplified.model,
         original: model.clone(),
@@ -140,7 +130,6 @@ pub fn run(
         rollouts,
         basis,
         domain_files: names(&arguments.domain),
-        margin,
     };
     outcome.record_domain()?;
     Ok(Some(outcome))
@@ -154,7 +143,7 @@ impl Outcome {
             && self.certificate.n_changes() > 0
         {
             entry.insert("domain".to_owned(), json!(self.domain_files));
-            entry.insert("margin".to_owned(), json!(self.margin));
+            entry.insert("margin".to_owned(), json!(self.basis.margin));
             let builder = self.model.clone().into_builder();
             self.model = builder.provenance(provenance).build()?;
         }
@@ -170,13 +159,14 @@ impl Outcome {
         }
     }
 
-    /// The certificate as a file beside the emitted ones, its summary, and the same as JSON;
+    /// Adds the certificate to the emitted files, and a comment to each of them; its summary, and the same as JSON.
     /// `equations` are those of the model as they are printed, `rounding` is how.
-    pub fn files_and_summary(
+    pub fn add_to(
         &self,
+        files: &mut Vec<EmittedFile>,
         equations: &Equations<'_>,
         rounding: Rounding,
-    ) -> Result<(EmittedFile, String, Value), Error> {
+    ) -> Result<(String, Value), Error> {
         let basis = &self.basis;
         let printed = match rounding {
             Rounding::Exact => Vec::new(),
@@ -188,34 +178,35 @@ impl Outcome {
         let mut value = certificate_json(&self.certificate);
         value["file"] = json!(name);
         value["domain_files"] = json!(self.domain_files);
-        value["margin"] = json!(self.margin);
-        value["rollouts"] = json!(self.rollouts.as_ref().map(rollouts_json));
+        value["margin"] = json!(basis.margin);
+        value["rollouts"] = json!(rollouts.map(rollouts_json));
         value["printed"] = printed.iter().map(printed_json).collect();
-        Ok((EmittedFile::new(name, page), self.summary(), value))
+        if self.certificate.n_changes() > 0 {
+            self.comment(files, &name);
+        }
+        files.push(EmittedFile::new(name, page));
+        Ok((self.summary(), value))
     }
 
     /// Adds a comment to each file of equations or code that names the model it was simplified from.
-    pub fn comment(&self, files: &mut [EmittedFile]) {
-        if self.certificate.n_changes() == 0 {
-            return;
-        }
+    fn comment(&self, files: &mut [EmittedFile], certificate: &str) {
         let lines = [
             format!("Simplified within {}", self.certificate.tolerance.words()),
             format!(
-                "from the model with digest {}; {}-simplification.md bounds each change.",
-                artifact::digest(&self.original).short(),
-                self.model.identifier()
+                "from the model with digest {}; {certificate} bounds each change.",
+                artifact::digest(&self.original).short()
             ),
         ];
         for file in files {
             let Some([before, after]) = comment_marks(Path::new(&file.path)) else {
                 continue;
             };
-            let comment: String = (lines.iter())
-                .map(|line| format!("{before}{line}{after}\n"))
-                .collect();
+            let comment = lines
+                .each_ref()
+                .map(|line| format!("{before}{line}{after}\n"));
             let after_first_line = file.contents.find('\n').map_or(0, |end| end + 1);
-            file.contents.insert_str(after_first_line, &comment);
+            file.contents
+                .insert_str(after_first_line, &comment.concat());
         }
     }
 
