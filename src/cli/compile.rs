@@ -19,7 +19,6 @@ use crate::{Error, artifact};
 
 /// Compiles a model into a folder.
 pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
-    let overwrite = Overwrite::when_forced(arguments.force);
     let save_model = arguments.simplification.save_model.as_deref();
     let (simplification, model) = (&arguments.simplification, &arguments.model);
     let inputs = Inputs::default()
@@ -53,12 +52,12 @@ pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
         None => (String::new(), Value::Null),
     };
     if let Some(path) = save_model {
-        artifact::check_place(path, model, overwrite)?;
+        artifact::check_place(path, model, arguments.force)?;
     }
-    let written = write(&arguments.out_dir, &files, &inputs, overwrite)?;
+    let written = write(&arguments.out_dir, &files, &inputs, arguments.force)?;
     let earlier = earlier_files(&arguments.out_dir, &files)?;
     if let Some(path) = save_model {
-        artifact::write(path, model, overwrite)?;
+        artifact::write(path, model, arguments.force)?;
     }
     Ok(Answer {
         text: exact_words(&exact)

@@ -16,7 +16,7 @@ use super::{compile, mpc as mpc_command, report};
 use crate::deploy::Target;
 use crate::equations::Equations;
 use crate::evaluate::Assessment;
-use crate::files::{EmittedFile, Overwrite};
+use crate::files::EmittedFile;
 use crate::model::ReducedModel;
 use crate::report::{
     Content, assessment_json, baseline_table, control_table, failed_runs, failures, run_table,
@@ -53,7 +53,6 @@ const REPORT_TOLERANCE: Tolerance = Tolerance::ShareOfRms(0.01);
 
 /// Runs the whole path and reports its files and metrics. The exit code is 1 if the self-test or a run fails.
 pub fn run(arguments: &DemoArguments) -> Result<(Answer, u8), Error> {
-    let overwrite = Overwrite::when_forced(arguments.force);
     let progress = spinner("reading the shipped model and recordings");
     let model = artifact::read_from_bytes(MODEL.0, MODEL.1)?;
     let jumps = (JUMPS.iter())
@@ -88,7 +87,12 @@ pub fn run(arguments: &DemoArguments) -> Result<(Answer, u8), Error> {
     };
     let report = report::page_of(&content, REPORT_TOLERANCE, vec!["romc demo".to_owned()])?;
     files.push(EmittedFile::new("report.html", report.page));
-    let made = compile::write(&arguments.out_dir, &files, &Inputs::default(), overwrite)?;
+    let made = compile::write(
+        &arguments.out_dir,
+        &files,
+        &Inputs::default(),
+        arguments.force,
+    )?;
     progress.set_message("checking the C code");
     let self_test = self_test(&model, &arguments.out_dir);
     progress.finish_and_clear();

@@ -11,7 +11,6 @@ use super::destination::{Format, Inputs};
 use super::output::{lines, names, note_repeated, read_with, reader, spinner, write_file};
 use super::robot;
 use crate::Error;
-use crate::files::Overwrite;
 use crate::identify::{Identification, Legs, identify};
 use crate::recording::Clocks;
 use crate::robot::Robot;
@@ -19,12 +18,11 @@ use crate::typeset::{Table, significant};
 
 /// Identifies the robot and writes the file, if one is asked for.
 pub fn run(arguments: &IdentifyArguments) -> Result<Answer, Error> {
-    let overwrite = Overwrite::when_forced(arguments.force);
     Inputs::default()
         .and(&arguments.recordings)
         .and(&arguments.reading.columns)
         .and_robot(Some(&arguments.robot))
-        .check_output(arguments.output.as_deref(), Format::Toml, overwrite)?;
+        .check_output(arguments.output.as_deref(), Format::Toml, arguments.force)?;
     let robot = robot::chosen(&arguments.robot)?;
     let reader = reader(&arguments.reading, Clocks::Recorded)?;
     let recordings = read_with(&reader, &arguments.recordings)?;
@@ -36,7 +34,7 @@ pub fn run(arguments: &IdentifyArguments) -> Result<Answer, Error> {
     let found = found?;
     let mut text = text(&found, robot, recordings.len());
     if let Some(path) = &arguments.output {
-        write_file(path, found.to_toml().as_bytes(), overwrite)?;
+        write_file(path, found.to_toml().as_bytes(), arguments.force)?;
         let _ = writeln!(text, "\nwritten: {}", path.display());
     }
     Ok(Answer {

@@ -10,7 +10,6 @@ use super::destination::{Format, Inputs};
 use super::output::{lines, named, read_recordings};
 use super::robot;
 use crate::evaluate::RoundTrip;
-use crate::files::Overwrite;
 use crate::import::{Chosen, ImportOptions, ImportReport, SymbolNames, import, read_terms};
 use crate::model::{LibraryChoice, ReducedModel};
 use crate::recording::Segment;
@@ -21,7 +20,6 @@ use crate::{Error, artifact};
 
 /// Imports a model and writes it.
 pub fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
-    let overwrite = Overwrite::when_forced(arguments.force);
     let library = match &arguments.library {
         Some(LibraryArgument::File(path)) => Some(path),
         Some(LibraryArgument::Shorthand(_)) | None => None,
@@ -33,7 +31,7 @@ pub fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
         .and(&arguments.inputs_from)
         .and(&arguments.reading.columns)
         .and_robot(arguments.robot.as_deref())
-        .check_output(Some(&arguments.output), Format::Model, overwrite)?;
+        .check_output(Some(&arguments.output), Format::Model, arguments.force)?;
     let imported = import(&arguments.file, &options(arguments)?)?;
     let recordings = read_recordings(&arguments.inputs_from, &arguments.reading)?;
     let segments: Vec<&Segment> = recordings.iter().flat_map(|r| &r.segments).collect();
@@ -42,7 +40,7 @@ pub fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
         false => with_input_statistics(imported.model, &segments)?,
     };
     let check = checked(&model, &segments, arguments)?;
-    artifact::write(&arguments.output, &model, overwrite)?;
+    artifact::write(&arguments.output, &model, arguments.force)?;
     let mut text = describe(&imported.report);
     let has_axes = model.robot().is_ok() && model.encoder_map().is_ok();
     let axes = (has_axes && arguments.wrench_frame.is_none()).then(|| {

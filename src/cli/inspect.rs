@@ -9,7 +9,6 @@ use super::args::InspectArguments;
 use super::destination::{Format, Inputs};
 use super::output::{note, reader, write_file};
 use super::{inspect_model, inspect_recording, robot};
-use crate::files::Overwrite;
 use crate::recording::foreign::guess::guess;
 use crate::recording::{Clocks, Reader};
 use crate::robot::Robot;
@@ -39,11 +38,10 @@ fn guessed(arguments: &InspectArguments, robot: &Robot) -> Result<Answer, Error>
     let [log] = &arguments.files[..] else {
         return Err(Error::OneLog(arguments.files.len()));
     };
-    let overwrite = Overwrite::when_forced(arguments.force);
     Inputs::default()
         .and([log])
         .and_robot(Some(&arguments.robot))
-        .check_output(arguments.output.as_deref(), Format::Toml, overwrite)?;
+        .check_output(arguments.output.as_deref(), Format::Toml, arguments.force)?;
     let guess = guess(log, robot)?;
     let outcome = match &guess.outcome {
         Ok(samples) => format!("read by this map, the log has {samples} samples"),
@@ -52,7 +50,7 @@ fn guessed(arguments: &InspectArguments, robot: &Robot) -> Result<Answer, Error>
     let mut text = guess.text.clone();
     match &arguments.output {
         Some(path) => {
-            write_file(path, guess.text.as_bytes(), overwrite)?;
+            write_file(path, guess.text.as_bytes(), arguments.force)?;
             text = format!("{}: a first map; {outcome}\n", path.display());
         }
         None => note(&outcome),

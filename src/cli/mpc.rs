@@ -7,11 +7,10 @@ use serde_json::{Value, json};
 use super::args::MpcArguments;
 use super::destination::{Format, Inputs};
 use super::output::{
-    extend, lines, note, progress_bar, read_recordings, show_progress, write_file,
+    extend, lines, note, numbered, progress_bar, read_recordings, show_progress, write_file,
 };
 use super::{Answer, DONE, FAILED};
 use crate::evaluate::{ReferenceInput, along_recording, control_metrics, remarks};
-use crate::files::Overwrite;
 use crate::model::ReducedModel;
 use crate::mpc::STEP_SLACK;
 use crate::mpc::{Controller, Lift, MpcSettings};
@@ -23,12 +22,11 @@ use crate::{Error, artifact};
 
 /// Runs the controller along each recording. The exit code is 1 if along one of them most steps have no plan.
 pub fn run(arguments: &MpcArguments) -> Result<(Answer, u8), Error> {
-    let overwrite = Overwrite::when_forced(arguments.force);
     let inputs = Inputs::default()
         .and([&arguments.model])
         .and(&arguments.recordings)
         .and(&arguments.reading.columns);
-    inputs.check_output(arguments.output.as_deref(), Format::Table, overwrite)?;
+    inputs.check_output(arguments.output.as_deref(), Format::Table, arguments.force)?;
     let model = artifact::read(&arguments.model)?;
     let settings = MpcSettings {
         horizon: arguments.horizon,
@@ -45,11 +43,11 @@ pub fn run(arguments: &MpcArguments) -> Result<(Answer, u8), Error> {
     let mut answer = answer(arguments, &runs, &failed, &remarks);
     if let Some(folder) = &arguments.figures {
         let figures = control_figures(&model, &settings, &runs);
-        inputs.write_figures(folder, &figures, overwrite, &mut answer)?;
+        inputs.write_figures(folder, &figures, arguments.force, &mut answer)?;
     }
     if let Some(path) = &arguments.output {
         let table = command_table(&model, &runs);
-        write_file(path, table.csv().as_bytes(), overwrite)?;
+        write_file(path, table.csv().as_bytes(), arguments.force)?;
     }
     Ok((answer, if failed.is_empty() { DONE } else { FAILED }))
 }
@@ -173,10 +171,7 @@ pub fn run_json((path, run): &NamedRun) -> Value {
 
 /// One row per control step, for a CSV file.
 pub fn command_table(model: &ReducedModel, runs: &[NamedRun]) -> Table {
-    let latent = |name: &str| -> Vec<String> {
-        let indices = 1..=model.latent_dim();
-        indices.map(|index| format!("{name}_{index}")).collect()
-    };
+    let latent = |name| numbered(name, model.latent_dim());
     let inputs = match model.input() {
         Some(input) => input.names.clone(),
         None => Robot::input_names().to_vec(),

@@ -13,7 +13,6 @@ use super::output::{
     warn,
 };
 use crate::files::Overwrite;
-use crate::model::ReducedModel;
 use crate::plan::{self, Goal, Plan, PlanSettings, Reach, Verdict};
 use crate::recording::Clocks;
 use crate::report::{plan_figures, plan_json, reach_figure};
@@ -23,13 +22,16 @@ use crate::{Error, artifact};
 
 /// Plans a jump and writes it unless it is not to be trusted and not forced, or maps what can be planned.
 pub fn run(arguments: &PlanArguments) -> Result<Answer, Error> {
-    let overwrite = Overwrite::when_forced(arguments.force);
     let inputs = Inputs::default()
         .and([&arguments.model])
         .and(&arguments.start)
         .and(&arguments.settings)
         .and(&arguments.reading.columns);
-    inputs.check_output(arguments.output.as_deref(), Format::Recording, overwrite)?;
+    inputs.check_output(
+        arguments.output.as_deref(),
+        Format::Recording,
+        arguments.force,
+    )?;
     let model = artifact::read(&arguments.model)?;
     let settings = match &arguments.settings {
         None => PlanSettings::default(),
@@ -37,11 +39,14 @@ pub fn run(arguments: &PlanArguments) -> Result<Answer, Error> {
     };
     let figures = arguments.figures.as_deref();
     if arguments.reach {
-        let reach = map(&model, &settings)?;
+        let bar = progress_bar("planning a grid of goals");
+        let progress = |done, total| show_progress(&bar, done, total);
+        let reach = plan::reach(&model, &settings, progress)?;
+        bar.finish_and_clear();
         let mut answer = reach_answer(arguments, &reach);
         let figure = reach_figure(&reach, model.jump_prior()?);
         if let Some(folder) = figures {
-            inputs.write_figures(folder, &[figure], overwrite, &mut answer)?;
+            inputs.write_figures(folder, &[figure], arguments.force, &mut answer)?;
         }
         return Ok(answer);
     }
@@ -51,7 +56,7 @@ pub fn run(arguments: &PlanArguments) -> Result<Answer, Error> {
     bar.finish_and_clear();
     let planned = planned?;
     match &planned.verdict {
-        Verdict::Refused(reasons) if !arguments.force => {
+        Verdict::Refused(reasons) if arguments.force == Overwrite::Refuse => {
             return Err(Error::Distrusted(reasons.join("; ")));
         }
         Verdict::Refused(reasons) | Verdict::Extrapolates(reasons) => {
@@ -63,7 +68,7 @@ pub fn run(arguments: &PlanArguments) -> Result<Answer, Error> {
     // Figures first: a folder that is refused leaves no plan behind.
     if let Some(folder) = figures {
         let drawn = plan_figures(&planned, model.robot()?);
-        inputs.write_figures(folder, &drawn, overwrite, &mut answer)?;
+        inputs.write_figures(folder, &drawn, arguments.force, &mut answer)?;
     }
     if let Some(path) = &arguments.output {
         write_recording(path, vec![planned.motion.clone()], None)?;
@@ -130,15 +135,6 @@ fn answer(arguments: &PlanArguments, planned: &Plan) -> Answer {
     let output = arguments.output.as_ref();
     json["output"] = json!(output.map(|path| path.display().to_string()));
     Answer { text, json }
-}
-
-fn map(model: &ReducedModel, settings: &PlanSettings) -> Result<Reach, Error> {
-    let bar = progress_bar("planning a grid of goals");
-    let reach = plan::reach(model, settings, |done, total| {
-        show_progress(&bar, done, total);
-    })?;
-    bar.finish_and_clear();
-    Ok(reach)
 }
 
 fn reach_answer(arguments: &PlanArguments, reach: &Reach) -> Answer {

@@ -9,10 +9,12 @@ use super::Answer;
 use super::args::ReportArguments;
 use super::destination::{Format, Inputs};
 use super::mpc::run_with_both_lifts;
-use super::output::{lines, names, note_mismatches, quoted, read_recordings, spinner, write_file};
+use super::output::{
+    lines, names, note_mismatches, quoted, quoted_all, read_recordings, spinner, write_file,
+};
 use super::simplification;
 use crate::evaluate::{Assessment, LAMBDA};
-use crate::files::{EmittedFile, Overwrite};
+use crate::files::EmittedFile;
 use crate::model::ReducedModel;
 use crate::recording::Recording;
 use crate::report::figures::figure_files;
@@ -26,13 +28,12 @@ use crate::{Error, artifact};
 
 /// Writes the page, and the figures if a folder for them is given.
 pub fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
-    let overwrite = Overwrite::when_forced(arguments.force);
     let inputs = Inputs::default()
         .and([&arguments.model])
         .and(&arguments.recordings)
         .and(&arguments.plan)
         .and(&arguments.reading.columns);
-    inputs.check_output(Some(&arguments.output), Format::Page, overwrite)?;
+    inputs.check_output(Some(&arguments.output), Format::Page, arguments.force)?;
     let model = artifact::read(&arguments.model)?;
     let recordings = read_recordings(&arguments.recordings, &arguments.reading)?;
     let study = match &arguments.study {
@@ -51,10 +52,10 @@ pub fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
     let made = make(&model, &recordings, beside, arguments)?;
     // The figures come first: files that romc did not make are refused with nothing written.
     let written = match &arguments.figures {
-        Some(folder) => inputs.write_folder(folder, &made.files, overwrite)?,
+        Some(folder) => inputs.write_folder(folder, &made.files, arguments.force)?,
         None => Vec::new(),
     };
-    write_file(&arguments.output, made.page.as_bytes(), overwrite)?;
+    write_file(&arguments.output, made.page.as_bytes(), arguments.force)?;
     let mut text = format!(
         "{}\n{}\n\n{}: {} kB, {} figures\n",
         made.verdict.headline,
@@ -164,8 +165,7 @@ const LADDER_CAPTION: &str = "Size of the equations within each tolerance: activ
 
 /// The commands that reproduce the page.
 fn commands(arguments: &ReportArguments, has_control: bool) -> Vec<String> {
-    let recordings: Vec<String> = arguments.recordings.iter().map(|p| quoted(p)).collect();
-    let (model, recordings) = (quoted(&arguments.model), recordings.join(" "));
+    let (model, recordings) = (quoted(&arguments.model), quoted_all(&arguments.recordings));
     let every = arguments.restart_every;
     let flag = |name: &str, path: &Option<PathBuf>| -> String {
         let flag = |path: &PathBuf| format!(" --{name} {}", quoted(path));

@@ -322,21 +322,17 @@ fn ladder_table(steps: &[Step], restart_every_s: f64) -> Table {
     };
     Table::of(steps)
         .column("tolerance", "", |(name, ..)| name)
-        .column("terms", "", |(_, certificate, _)| certificate.terms().after)
-        .column("digits", "", |(_, certificate, _)| {
-            certificate.digits().after
+        .column("terms", "", |(_, made, _)| made.terms().after)
+        .column("digits", "", |(_, made, _)| made.digits().after)
+        .column("operations", "", |(_, made, _)| made.operations().after)
+        .column("certified error", "", |(_, made, _)| {
+            percent(made.largest_bound_share(), bound_words)
         })
-        .column("operations", "", |(_, certificate, _)| {
-            certificate.operations().after
+        .column("measured max", "", |(_, made, _)| {
+            percent(made.largest_measured_share(), significant)
         })
-        .column("certified error", "", |(_, certificate, _)| {
-            percent(certificate.largest_bound_share(), bound_words)
-        })
-        .column("measured max", "", |(_, certificate, _)| {
-            percent(certificate.largest_measured_share(), significant)
-        })
-        .column("measured rms", "", |(_, certificate, _)| {
-            percent(certificate.largest_rms_share(), significant)
+        .column("measured rms", "", |(_, made, _)| {
+            percent(made.largest_rms_share(), significant)
         })
         .column("body.x", "m", |(.., [x, _])| x[0])
         .column("body.z", "m", |(.., [_, z])| z[0])

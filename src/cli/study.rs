@@ -11,7 +11,7 @@ use super::output::{refused, spinner};
 use super::prepared_recordings::{RecordedSets, read_all, reader_for};
 use super::train_settings;
 use crate::Error;
-use crate::files::{EmittedFile, Overwrite, check_folder};
+use crate::files::{EmittedFile, check_folder};
 use crate::recording::Recording;
 use crate::report::figures::figure_files;
 use crate::report::study_figures;
@@ -24,8 +24,7 @@ const TABLES: [&str; 2] = ["cells.csv", "summary.csv"];
 
 /// Trains what is missing, or joins parts, and writes the tables of the study.
 pub fn run(arguments: &StudyArguments) -> Result<Answer, Error> {
-    let overwrite = Overwrite::when_forced(arguments.force);
-    check_folder(&arguments.out_dir, TABLES, overwrite)?;
+    check_folder(&arguments.out_dir, TABLES, arguments.force)?;
     let store = match arguments.merge.is_empty() {
         true => trained(arguments)?,
         false => merged(arguments)?,
@@ -43,7 +42,7 @@ pub fn run(arguments: &StudyArguments) -> Result<Answer, Error> {
         .and(&arguments.config)
         .and(&arguments.reading.columns)
         .and_robot(arguments.robot.as_deref())
-        .write_folder(&arguments.out_dir, &files, overwrite)?;
+        .write_folder(&arguments.out_dir, &files, arguments.force)?;
     Ok(answer(&arguments.out_dir, &store, &summary))
 }
 

@@ -1,7 +1,6 @@
 //! `romc train`: recordings in, a model file out.
 
 use std::fmt::Write as _;
-use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use serde_json::json;
@@ -9,10 +8,9 @@ use serde_json::json;
 use super::Answer;
 use super::args::{TrainArguments, TrainSettings};
 use super::destination::{Format, Inputs};
-use super::output::{named, note, note_repeated, quoted, spinner};
+use super::output::{named, note, note_repeated, quoted, quoted_all, spinner};
 use super::prepared_recordings::{RecordedSets, read_all};
 use super::train_settings;
-use crate::files::Overwrite;
 use crate::model::ReducedModel;
 use crate::recording::Source;
 use crate::robot::{BODY_X, BODY_Z};
@@ -24,7 +22,6 @@ use crate::{Error, artifact, train};
 
 /// Learns a model and writes it.
 pub fn run(arguments: &TrainArguments) -> Result<(Answer, u8), Error> {
-    let overwrite = Overwrite::when_forced(arguments.force);
     let settings = train_settings::effective(arguments)?;
     Inputs::default()
         .and(&arguments.recordings)
@@ -34,7 +31,7 @@ pub fn run(arguments: &TrainArguments) -> Result<(Answer, u8), Error> {
         .and(&arguments.reading.columns)
         .and_robot(settings.robot.as_deref())
         .and(&settings.actuators)
-        .check_output(Some(&arguments.output), Format::Model, overwrite)?;
+        .check_output(Some(&arguments.output), Format::Model, arguments.force)?;
     let latent_dim = settings
         .latent_dim
         .expect("checked by clap, or with the file");
@@ -82,7 +79,7 @@ pub fn run(arguments: &TrainArguments) -> Result<(Answer, u8), Error> {
             "interrupted: this is the best model so far; its provenance says so, its command does not repeat it",
         );
     }
-    artifact::write(&arguments.output, &trained.model, overwrite)?;
+    artifact::write(&arguments.output, &trained.model, arguments.force)?;
     let tested = match test.is_empty() {
         true => None,
         false => Some(train::assess(&trained.model, test)?),
@@ -93,7 +90,7 @@ pub fn run(arguments: &TrainArguments) -> Result<(Answer, u8), Error> {
     answer.json["notes"] = notes.into();
     answer.json["interrupted"] = is_interrupted.into();
     answer.json["recordings"] = recorded.findings_json();
-    if let (Some(text), Some(json)) = (recorded.text(), recorded.json()) {
+    if let Some((text, json)) = recorded.division() {
         answer.json["split"] = json;
         let _ = write!(answer.text, "\n{text}");
     }
@@ -159,13 +156,9 @@ fn command_line(
     method: Method,
     options: &TrainOptions,
 ) -> String {
-    let paths = |paths: &[PathBuf]| {
-        let paths: Vec<String> = paths.iter().map(|path| quoted(path)).collect();
-        paths.join(" ")
-    };
-    let mut line = format!("romc train {}", paths(&arguments.recordings));
+    let mut line = format!("romc train {}", quoted_all(&arguments.recordings));
     if !arguments.validation.is_empty() {
-        let _ = write!(line, " --validation {}", paths(&arguments.validation));
+        let _ = write!(line, " --validation {}", quoted_all(&arguments.validation));
     }
     if let Some(split) = arguments.split {
         let _ = write!(line, " --split {split}");

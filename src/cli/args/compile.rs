@@ -2,12 +2,13 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::{ArgAction, Args, ValueEnum};
 
 use super::reading::ReadingArguments;
-use super::value::{count, real};
+use super::value::{count, overwrite, real};
 use crate::codegen::{Precision, SineCosine, Units};
 use crate::deploy::Target;
+use crate::files::Overwrite;
 use crate::limits::table::{DIGITS, MARGIN, SIGNIFICANT, WIDTH};
 use crate::simplify::Tolerance;
 use crate::typeset::Form;
@@ -44,8 +45,8 @@ pub struct CompileArguments {
     #[command(flatten)]
     pub simplification: SimplifyArguments,
     /// Write into a folder that holds files romc did not make
-    #[arg(long, help_heading = None)]
-    pub force: bool,
+    #[arg(long, help_heading = None, action = ArgAction::SetTrue, value_parser = overwrite())]
+    pub force: Overwrite,
 }
 
 /// Units of coordinates and inputs in equations and generated code.
