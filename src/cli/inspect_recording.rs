@@ -10,8 +10,8 @@ use super::Answer;
 use super::output::lines;
 use crate::Error;
 use crate::recording::check::{Finding, check};
-use crate::recording::mismatch::{Figures, Mismatch, mismatches};
-use crate::recording::{PhaseRule, PhaseSpan, Reading, ReadingNotes, Recording, Segment, Stance};
+use crate::recording::mismatch::{Figures, mismatches};
+use crate::recording::{PhaseRule, PhaseSpan, Reading, ReadingNotes, Recording, Segment};
 use crate::robot::{JOINT_DIM, Robot};
 use crate::typeset::words::counted;
 use crate::typeset::{Cell, Table, significant};
@@ -74,7 +74,7 @@ pub fn describe(reading: &Reading, robot: &Robot) -> Result<Answer, Error> {
         "ranges": ranges,
         "ignored_columns": recording.ignored_columns,
         "figures": Figures::of(recording, robot),
-        "mismatches": mismatches.iter().map(mismatch_json).collect::<Vec<_>>(),
+        "mismatches": mismatches,
         "implausible": findings.iter().map(|finding| {
             let mut value = finding_json(finding);
             value["segment"] = json!(finding.segment);
@@ -101,11 +101,7 @@ fn segment_json(segment: &Segment, spans: &[PhaseSpan], rule: &PhaseRule) -> Val
         .map(|span| {
             json!({
                 "phase": names[span.phase],
-                "stance": match span.kind {
-                    Stance::Launch => "launch",
-                    Stance::Flight => "flight",
-                    Stance::Landing => "landing",
-                },
+                "stance": span.kind,
                 "samples": span.range.len(),
                 "start_s": segment.time_s[span.range.start],
             })
@@ -175,16 +171,6 @@ fn findings_text(findings: &[Finding]) -> String {
         let _ = writeln!(text, "  and {more} more, all of them with --json");
     }
     text
-}
-
-/// A mismatch without its recording.
-pub(super) fn mismatch_json(mismatch: &Mismatch) -> Value {
-    json!({
-        "what": mismatch.kind,
-        "value": mismatch.value,
-        "bound": mismatch.bound,
-        "words": mismatch.words,
-    })
 }
 
 /// A finding without the place of its recording.

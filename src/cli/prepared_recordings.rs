@@ -6,7 +6,7 @@ use std::sync::Arc;
 use serde_json::{Map, Value, json};
 
 use super::args::{ReadingArguments, TrainArguments, TrainSettings};
-use super::inspect_recording::{finding_json, mismatch_json};
+use super::inspect_recording::finding_json;
 use super::output::{note, reader, report_reading};
 use super::train_settings;
 use crate::Error;
@@ -189,7 +189,7 @@ impl RecordedSets {
         let findings = notes.findings.iter();
         let findings = findings.map(|(file, found)| of_file(file, finding_json(found)));
         let unlike = notes.mismatches.iter();
-        let unlike = unlike.map(|(file, found)| of_file(file, mismatch_json(found)));
+        let unlike = unlike.map(|(file, found)| of_file(file, json!(found)));
         json!({
             "implausible": findings.collect::<Vec<_>>(),
             "mismatches": unlike.collect::<Vec<_>>(),

@@ -16,7 +16,7 @@ use crate::recording::Recording;
 use crate::report::figures::figure_files;
 use crate::report::study_figures;
 use crate::study::{self, Plan, Shard, Spread, Store, Summary, cell_table};
-use crate::train::{Origin, TrainOptions};
+use crate::train::Origin;
 use crate::typeset::{Cell, Table, significant};
 
 /// The tables of a study.
@@ -78,18 +78,13 @@ fn trained(arguments: &StudyArguments) -> Result<Store, Error> {
     let store = Store::create(&arguments.out_dir, plan)?;
     let bar = spinner("training");
     let total = store.plan().cells().len();
-    let options = |d: usize| TrainOptions {
-        name: format!("d{d}"),
-        latent_dim: d,
-        ..base.clone()
-    };
     let finished = |_| {
         let left = store.missing().len();
         bar.set_message(format!("{} of {total} models trained", total - left));
     };
     let shard = arguments.shard.unwrap_or(Shard::WHOLE);
     let sets = [&training[..], &validation];
-    study::run(&store, shard, sets, robot, &options, &finished)?;
+    study::run(&store, shard, sets, robot, &base, &finished)?;
     bar.finish_and_clear();
     Ok(store)
 }
