@@ -140,16 +140,17 @@ pub fn page_of(
     commands: Vec<String>,
 ) -> Result<Made, Error> {
     let figures = all_figures(content)?;
-    let ladder = simplification::ladder(content.model, content.assessment, tolerance)?;
+    let [ladder, equations, changes] =
+        simplification::ladder(content.model, content.assessment, tolerance)?;
     let errors = format!("Errors of each ddz within {tolerance}, scaled units per s²");
-    let changes = format!("Every change within {tolerance}, with its bound");
+    let bounds = format!("Every change within {tolerance}, with its bound");
     let options = PageOptions {
         commands,
         simplification: vec![
-            ladder.tolerances.captioned(LADDER_CAPTION),
-            ladder.equations.captioned(errors),
+            ladder.captioned(LADDER_CAPTION),
+            equations.captioned(errors),
         ],
-        changes: ladder.changes.captioned(changes),
+        changes: changes.captioned(bounds),
     };
     let verdict = verdict(content)?;
     Ok(Made {

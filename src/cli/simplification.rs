@@ -260,23 +260,14 @@ fn printed_json(equation: &PrintedEquation) -> Value {
 /// Tolerances that a report compares.
 const LADDER: [f64; 4] = [0.001, 0.01, 0.05, 0.1];
 
-/// The tables of a report about simplification.
-pub struct Ladder {
-    /// One row per tolerance: size, error and rollouts of the simplified equations.
-    pub tolerances: Table,
-    /// Errors of each equation at the chosen tolerance.
-    pub equations: Table,
-    /// Every change at the chosen tolerance.
-    pub changes: Table,
-}
-
-/// Simplifies a model within several tolerances over the recordings of an assessment, and lists the
-/// changes within `chosen`.
+/// Simplifies a model within several tolerances over the recordings of an assessment: a table with a row per tolerance
+/// (size, error and rollouts of the simplified equations), one of the errors of each equation within `chosen`, and one
+/// of every change within it.
 pub fn ladder(
     model: &ReducedModel,
     assessment: &Assessment<'_>,
     chosen: Tolerance,
-) -> Result<Ladder, Error> {
+) -> Result<[Table; 3], Error> {
     let latent: Vec<&LatentSegment> = assessment.runs.iter().map(|run| &run.latent).collect();
     let samples = Samples::of(model, &latent);
     let domain = Domain::around(model, &samples, MARGIN)?;
@@ -304,11 +295,11 @@ pub fn ladder(
         steps.push((tolerance.to_string(), made.certificate, body));
     }
     let certificate = simplify(equations, &domain, Some(&samples), chosen)?.certificate;
-    Ok(Ladder {
-        tolerances: ladder_table(&steps, assessment.restart_every_s),
-        equations: equation_table(&certificate),
-        changes: change_table(&certificate),
-    })
+    Ok([
+        ladder_table(&steps, assessment.restart_every_s),
+        equation_table(&certificate),
+        change_table(&certificate),
+    ])
 }
 
 /// A tolerance, its certificate, and root mean square errors of body x and z, whole and restarted.

@@ -15,9 +15,9 @@ use super::parameters::{
     THIGH_SECOND, VISCOUS, priors,
 };
 use super::windows::{Group, Row, Windows};
+use crate::recording::Recording;
 use crate::recording::check::check;
 use crate::recording::clock::{Timed, timed};
-use crate::recording::{Recording, Segment};
 use crate::robot::{Actuators, GRAVITY_M_S2, JOINT_DIM, Leg, Robot};
 
 /// Fewest samples with feet on the ground.
@@ -51,10 +51,9 @@ pub fn identify(recordings: &[Recording], robot: &Robot) -> Result<Identificatio
         let timed = recording.segments.iter().map(timed);
         let timed = timed.collect::<Result<Vec<_>, _>>()?;
         notes.extend(mended(&recording.path, &timed));
-        segments.extend(timed.into_iter().map(|timed| Prepared {
-            motion: Motion::of(&timed.segment, robot),
-            segment: timed.segment,
-            lost: timed.lost,
+        segments.extend(timed.into_iter().map(|timed| {
+            let motion = Motion::of(&timed.segment, robot);
+            (timed, motion)
         }));
     }
     let mut state = State::new(robot);
@@ -82,11 +81,7 @@ pub fn identify(recordings: &[Recording], robot: &Robot) -> Result<Identificatio
 }
 
 /// A segment ready for its equations.
-struct Prepared {
-    segment: Segment,
-    motion: Motion,
-    lost: Vec<bool>,
-}
+type Prepared = (Timed, Motion);
 
 /// Refuses windows that say too little of these many recordings.
 fn require_enough(windows: &Windows, recordings: usize) -> Result<(), IdentifyError> {
@@ -161,12 +156,7 @@ impl State {
     /// The equations of all segments at this estimate of gravity and delay.
     fn windows(&self, segments: &[Prepared], robot: &Robot) -> Result<Windows, IdentifyError> {
         let mut windows = Windows::default();
-        for Prepared {
-            segment,
-            motion,
-            lost,
-        } in segments
-        {
+        for (Timed { segment, lost, .. }, motion) in segments {
             let equations =
                 SampleEquations::of(segment, motion, robot, self.gravity_m_s2, self.delay_s);
             windows.add(segment, &equations, lost)?;
@@ -213,9 +203,10 @@ impl State {
         let priors = priors(robot.geometry(Leg::FrontLeft), self.mass_kg, &self.losses);
         let estimate = self.iteration.estimate.unwrap_or_default();
         // When within a step a torque acts is not recorded: uniform over it.
-        let longest_step =
-            |step: f64, prepared: &Prepared| step.max(prepared.segment.mean_step_s());
-        let step_s = segments.iter().fold(0.0, longest_step);
+        let steps = segments
+            .iter()
+            .map(|(timed, _)| timed.segment.mean_step_s());
+        let step_s = steps.fold(0.0, f64::max);
         let within_step_s = step_s / 12_f64.sqrt();
         let variances = self.iteration.variances(
             &windows.rows,
