@@ -11,6 +11,7 @@ use serde_json::json;
 use super::args::{CodeArguments, DemoArguments, EquationArguments};
 use super::destination::Inputs;
 use super::output::{lines, spinner};
+use super::simplification::RESTART_S;
 use super::{Answer, DONE, FAILED};
 use super::{compile, mpc as mpc_command, report};
 use crate::deploy::Target;
@@ -44,9 +45,6 @@ const JUMPS: [(&str, &[u8]); 3] = [
         include_bytes!("../../examples/recordings/go1/test_03.csv.gz"),
     ),
 ];
-
-/// Time between restarts of the short rollouts, as in the paper's second test.
-const RESTART_S: f64 = 0.1;
 
 /// The tolerance within which the report lists changes.
 const REPORT_TOLERANCE: Tolerance = Tolerance::ShareOfRms(0.01);

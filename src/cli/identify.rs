@@ -52,12 +52,12 @@ fn text(found: &Identification, robot: &Robot, recordings: usize) -> String {
         ("torque to motion", "ms", delays),
     ];
     let body = quantities("quantity", body);
-    let viscous = [found.viscous(), error.viscous_nm_s_rad];
-    let armature = [found.armature(), error.armature_kg_m2];
+    let [viscous, dry, armature] = found.losses();
+    let viscous = [viscous, error.viscous_nm_s_rad];
     let losses = [
         ("viscous friction", "N m s/rad", viscous),
-        ("dry friction", "N m", [found.dry(), error.dry_nm]),
-        ("armature", "kg m^2", armature),
+        ("dry friction", "N m", [dry, error.dry_nm]),
+        ("armature", "kg m^2", [armature, error.armature_kg_m2]),
     ];
     let pair = |value, error| format!("{} ± {}", significant(value), two_digits(error));
     let joints = Table::of(losses)
@@ -130,15 +130,16 @@ fn two_digits(value: f64) -> String {
 /// The keys that other programs rely on; see `docs/identify.md`.
 fn report(found: &Identification, arguments: &IdentifyArguments) -> Value {
     let alone = &found.force_alone;
+    let [viscous, dry, armature] = found.losses();
     json!({
         "robot": found.robot,
         "recordings": names(&arguments.recordings),
         "gravity_m_s2": found.gravity_m_s2,
         "mass_kg": found.mass_kg,
         "delay_s": found.delay_s,
-        "viscous_nm_s_rad": found.viscous(),
-        "dry_nm": found.dry(),
-        "armature_kg_m2": found.armature(),
+        "viscous_nm_s_rad": viscous,
+        "dry_nm": dry,
+        "armature_kg_m2": armature,
         "legs": found.legs,
         "standard_error": found.standard_error,
         "r2": { "force": alone.r2, "losses": found.r2 },

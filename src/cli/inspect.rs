@@ -1,7 +1,5 @@
 //! `romc inspect`: what a recording or a model holds, and what is implausible in it.
 
-use std::path::Path;
-
 use serde_json::json;
 
 use super::Answer;
@@ -9,8 +7,8 @@ use super::args::InspectArguments;
 use super::destination::{Format, Inputs};
 use super::output::{note, reader, write_file};
 use super::{inspect_model, inspect_recording, robot};
+use crate::recording::Clocks;
 use crate::recording::foreign::guess::guess;
-use crate::recording::{Clocks, Reader};
 use crate::robot::Robot;
 use crate::{Error, artifact};
 
@@ -23,7 +21,12 @@ pub fn run(arguments: &InspectArguments) -> Result<Answer, Error> {
     let reader = reader(&arguments.reading, Clocks::Recorded)?;
     let (mut texts, mut files) = (Vec::new(), Vec::new());
     for path in &arguments.files {
-        let Answer { text, json } = inspect(path, robot, &reader)?;
+        let is_model =
+            artifact::is_standard_input(path) || path.extension().is_some_and(|e| e == "json");
+        let Answer { text, json } = match is_model {
+            true => inspect_model::describe(path, &artifact::read(path)?)?,
+            false => inspect_recording::describe(&reader.read(path)?, robot)?,
+        };
         texts.push(text);
         files.push(json);
     }
@@ -64,12 +67,4 @@ fn guessed(arguments: &InspectArguments, robot: &Robot) -> Result<Answer, Error>
         "output": arguments.output.as_ref().map(|path| path.display().to_string()),
     });
     Ok(Answer { text, json })
-}
-
-fn inspect(path: &Path, robot: &Robot, reader: &Reader) -> Result<Answer, Error> {
-    if artifact::is_standard_input(path) || path.extension().is_some_and(|e| e == "json") {
-        inspect_model::describe(path, &artifact::read(path)?)
-    } else {
-        inspect_recording::describe(&reader.read(path)?, robot)
-    }
 }

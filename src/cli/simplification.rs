@@ -22,7 +22,7 @@ use crate::typeset::{Cell, Rounding, Table, significant};
 use crate::{Error, artifact};
 
 /// Time between restarts of the short rollouts, as in the paper's second test.
-const RESTART_S: f64 = 0.1;
+pub const RESTART_S: f64 = 0.1;
 
 /// A domain with the samples that it was made from.
 struct Basis {
