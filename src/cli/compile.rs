@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use super::Answer;
 use super::args::{CodeArguments, CompileArguments, EquationArguments, UnitsChoice};
 use super::destination::{Format, Inputs};
-use super::output::{names, note_mismatches, read_recordings, refused};
+use super::output::{lines, names, note_mismatches, read_recordings, refused};
 use super::simplification::{self, exact_words};
 use crate::deploy::{self, EmitOptions, PlannedJump, Target};
 use crate::equations::Equations;
@@ -100,9 +100,8 @@ fn text(
         model.latent_dim(),
         phases.join(", ")
     );
-    if let Some(path) = &arguments.simplification.save_model {
-        let _ = writeln!(text, "simplified model: {}", path.display());
-    }
+    let saved = arguments.simplification.save_model.as_deref();
+    text += &lines("simplified model: ", saved.map(Path::display));
     if arguments.emit.contains(&Target::C) {
         let name = model.identifier().as_str();
         let folder = arguments.out_dir.display();

@@ -50,18 +50,12 @@ pub fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
              (--wrench-frame says otherwise)"
         )
     });
-    if let Some(axes) = &axes {
-        let _ = writeln!(text, "note: {axes}");
-    }
-    if let Some(check) = &check {
-        text.push_str(&describe_check(check));
-    }
+    text += &lines("note: ", &axes);
+    text.extend(check.as_ref().map(describe_check));
     let (output, name) = (arguments.output.display().to_string(), model.name());
     let _ = writeln!(text, "{output}: model `{name}`");
     let lacking = lacking(&model);
-    if let Some(lacking) = lacking {
-        let _ = writeln!(text, "\n{lacking}");
-    }
+    text += &lines("\n", lacking);
     let json = json!({
         "model": output,
         "name": name,
@@ -199,12 +193,7 @@ fn describe_check(check: &RoundTrip) -> String {
             let _ = write!(text, "; R^2 of ddz in {phase} {r2:.3}");
         }
     }
-    text.push('\n');
-    if let Some(fault) = check.fault() {
-        let _ = writeln!(text, "warning: {fault}");
-    }
-    text.push('\n');
-    text
+    text + "\n" + &lines("warning: ", check.fault()) + "\n"
 }
 
 /// The same as JSON.

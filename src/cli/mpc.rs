@@ -126,9 +126,8 @@ fn answer(
         let torques = row.torque_nm.map(|torque| format!("{torque:.2}")).join(" ");
         let _ = writeln!(text, "first torque command (N m): {torques}");
     }
-    if let Some(path) = &arguments.output {
-        let _ = writeln!(text, "every step: {}", path.display());
-    }
+    let output = arguments.output.as_ref().map(|path| path.display());
+    text += &lines("every step: ", &output);
     let json = json!({
         "model": arguments.model.display().to_string(),
         "horizon": arguments.horizon,
@@ -136,7 +135,7 @@ fn answer(
         "remarks": remarks,
         "failed": failed,
         "runs": runs.iter().map(run_json).collect::<Vec<_>>(),
-        "output": arguments.output.as_ref().map(|path| path.display().to_string()),
+        "output": output.map(|path| path.to_string()),
     });
     Answer { text, json }
 }

@@ -120,17 +120,14 @@ impl RecordedSets {
     /// The files of each set, those with jumps in several in the first.
     pub fn files(&self) -> [(&'static str, Vec<&Path>); 3] {
         let mut seen: Vec<&Path> = Vec::new();
-        let mut of_set = |set: usize| {
-            let files = self.sets[set]
-                .files()
-                .iter()
-                .map(|file| file.path.as_path());
+        std::array::from_fn(|set| {
+            let files = self.sets[set].files().iter();
+            let files = files.map(|file| file.path.as_path());
             let new = files.filter(|path| self.divided.is_none() || !seen.contains(path));
             let new: Vec<&Path> = new.collect();
             seen.extend(&new);
             (SETS[set], new)
-        };
-        [of_set(0), of_set(1), of_set(2)]
+        })
     }
 
     /// The notes of all sets together, as far as files were read.
