@@ -29,9 +29,9 @@ pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
     // What would be the same file again may stay; it is compared once there is a model.
     match save_model {
         Some(path) if path.parent() == Some(&arguments.out_dir) => {
-            inputs.check_name(path, Format::Model)?;
+            inputs.check_name(path, Format::MODEL)?;
         }
-        Some(_) | None => inputs.check_output(save_model, Format::Model, Overwrite::Replace)?,
+        Some(_) | None => inputs.check_output(save_model, Format::MODEL, Overwrite::Replace)?,
     }
     let read = artifact::read(&arguments.model)?;
     let form = match arguments.equations.as_learned {

@@ -18,7 +18,7 @@ pub fn run(arguments: &ConvertArguments) -> Result<Answer, Error> {
         .and(&arguments.recordings)
         .and(&arguments.inputs_of)
         .and(&arguments.reading.columns)
-        .check_output(Some(&arguments.output), Format::Recording, arguments.force)?;
+        .check_output(Some(&arguments.output), Format::RECORDING, arguments.force)?;
     let rule = match &arguments.inputs_of {
         None => None,
         Some(path) => Some(artifact::read(path)?.input_rule()?),

@@ -22,7 +22,7 @@ pub fn run(arguments: &IdentifyArguments) -> Result<Answer, Error> {
         .and(&arguments.recordings)
         .and(&arguments.reading.columns)
         .and_robot(Some(&arguments.robot))
-        .check_output(arguments.output.as_deref(), Format::Toml, arguments.force)?;
+        .check_output(arguments.output.as_deref(), Format::TOML, arguments.force)?;
     let robot = robot::chosen(&arguments.robot)?;
     let reader = reader(&arguments.reading, Clocks::Recorded)?;
     let recordings = read_with(&reader, &arguments.recordings)?;

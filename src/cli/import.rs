@@ -31,7 +31,7 @@ pub fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
         .and(&arguments.inputs_from)
         .and(&arguments.reading.columns)
         .and_robot(arguments.robot.as_deref())
-        .check_output(Some(&arguments.output), Format::Model, arguments.force)?;
+        .check_output(Some(&arguments.output), Format::MODEL, arguments.force)?;
     let imported = import(&arguments.file, &options(arguments)?)?;
     let recordings = read_recordings(&arguments.inputs_from, &arguments.reading)?;
     let segments: Vec<&Segment> = recordings.iter().flat_map(|r| &r.segments).collect();

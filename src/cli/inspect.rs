@@ -44,7 +44,7 @@ fn guessed(arguments: &InspectArguments, robot: &Robot) -> Result<Answer, Error>
     Inputs::default()
         .and([log])
         .and_robot(Some(&arguments.robot))
-        .check_output(arguments.output.as_deref(), Format::Toml, arguments.force)?;
+        .check_output(arguments.output.as_deref(), Format::TOML, arguments.force)?;
     let guess = guess(log, robot)?;
     let outcome = match &guess.outcome {
         Ok(samples) => format!("read by this map, the log has {samples} samples"),

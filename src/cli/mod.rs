@@ -150,9 +150,8 @@ fn print(text: &str) -> u8 {
 /// Prints an error and its chain of causes to stderr.
 fn print_error(error: &Error) {
     eprintln!("error: {}", printable(&error.to_string()));
-    let mut source = std::error::Error::source(error);
-    while let Some(cause) = source {
+    let first = std::error::Error::source(error);
+    for cause in std::iter::successors(first, |cause| cause.source()) {
         eprintln!("  because: {}", printable(&cause.to_string()));
-        source = cause.source();
     }
 }

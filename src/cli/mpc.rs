@@ -26,7 +26,7 @@ pub fn run(arguments: &MpcArguments) -> Result<(Answer, u8), Error> {
         .and([&arguments.model])
         .and(&arguments.recordings)
         .and(&arguments.reading.columns);
-    inputs.check_output(arguments.output.as_deref(), Format::Table, arguments.force)?;
+    inputs.check_output(arguments.output.as_deref(), Format::TABLE, arguments.force)?;
     let model = artifact::read(&arguments.model)?;
     let settings = MpcSettings {
         horizon: arguments.horizon,

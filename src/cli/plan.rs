@@ -27,11 +27,8 @@ pub fn run(arguments: &PlanArguments) -> Result<Answer, Error> {
         .and(&arguments.start)
         .and(&arguments.settings)
         .and(&arguments.reading.columns);
-    inputs.check_output(
-        arguments.output.as_deref(),
-        Format::Recording,
-        arguments.force,
-    )?;
+    let output = arguments.output.as_deref();
+    inputs.check_output(output, Format::RECORDING, arguments.force)?;
     let model = artifact::read(&arguments.model)?;
     let settings = match &arguments.settings {
         None => PlanSettings::default(),
@@ -70,7 +67,7 @@ pub fn run(arguments: &PlanArguments) -> Result<Answer, Error> {
         let drawn = plan_figures(&planned, model.robot()?);
         inputs.write_figures(folder, &drawn, arguments.force, &mut answer)?;
     }
-    if let Some(path) = &arguments.output {
+    if let Some(path) = output {
         write_recording(path, vec![planned.motion.clone()], None)?;
         let _ = writeln!(answer.text, "\nthe plan: {}", path.display());
     }

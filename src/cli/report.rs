@@ -33,7 +33,7 @@ pub fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
         .and(&arguments.recordings)
         .and(&arguments.plan)
         .and(&arguments.reading.columns);
-    inputs.check_output(Some(&arguments.output), Format::Page, arguments.force)?;
+    inputs.check_output(Some(&arguments.output), Format::PAGE, arguments.force)?;
     let model = artifact::read(&arguments.model)?;
     let recordings = read_recordings(&arguments.recordings, &arguments.reading)?;
     let study = match &arguments.study {

@@ -32,7 +32,7 @@ pub fn chosen(name_or_file: &str) -> Result<&'static Robot, Error> {
 pub fn run(arguments: &RobotArguments) -> Result<Answer, Error> {
     Inputs::default()
         .and_robot(Some(&arguments.robot))
-        .check_output(arguments.output.as_deref(), Format::Toml, arguments.force)?;
+        .check_output(arguments.output.as_deref(), Format::TOML, arguments.force)?;
     let robot = match arguments.feet.as_slice() {
         [] => robot_file::find(&arguments.robot)?,
         feet => robot_file::read(Path::new(&arguments.robot), feet)?,

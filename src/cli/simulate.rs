@@ -24,7 +24,7 @@ pub fn run(arguments: &SimulateArguments) -> Result<Answer, Error> {
         .and([&arguments.model])
         .and(&arguments.recordings)
         .and(&arguments.reading.columns)
-        .check_output(arguments.output.as_deref(), Format::Table, arguments.force)?;
+        .check_output(arguments.output.as_deref(), Format::TABLE, arguments.force)?;
     let model = artifact::read(&arguments.model)?;
     let recordings = read_recordings(&arguments.recordings, &arguments.reading)?;
     let progress = spinner("simulating");

@@ -31,7 +31,7 @@ pub fn run(arguments: &TrainArguments) -> Result<(Answer, u8), Error> {
         .and(&arguments.reading.columns)
         .and_robot(settings.robot.as_deref())
         .and(&settings.actuators)
-        .check_output(Some(&arguments.output), Format::Model, arguments.force)?;
+        .check_output(Some(&arguments.output), Format::MODEL, arguments.force)?;
     let latent_dim = settings
         .latent_dim
         .expect("checked by clap, or with the file");
@@ -196,8 +196,6 @@ fn answer(arguments: &TrainArguments, trained: &Trained, tested: Option<&SetMetr
     Answer { text, json }
 }
 
-const TORQUE_R2: &str = "torque R^2 of the plain lift, all samples";
-
 /// Every metric on each set of recordings.
 fn metrics_table(report: &TrainReport, tested: Option<&SetMetrics>) -> Table {
     let mut sets = vec![
@@ -212,32 +210,23 @@ fn metrics_table(report: &TrainReport, tested: Option<&SetMetrics>) -> Table {
         let cells = (sets.iter()).map(|(_, set)| set.map(cell).unwrap_or_default());
         table.row([name.into(), unit.into()].into_iter().chain(cells));
     };
-    type Metric = (&'static str, &'static str, fn(&SetMetrics) -> Option<f64>);
-    let metrics: [Metric; 6] = [
-        ("decoder mean square", "scaled", |set| Some(set.decoder_mse)),
-        (TORQUE_R2, "", |set| Some(set.torque_r2)),
-        ("body x, fixed steps over 0.1 s", "m", |set| {
-            Some(set.prediction_x_m)
-        }),
-        ("body z, fixed steps over 0.1 s", "m", |set| {
-            Some(set.prediction_z_m)
-        }),
-        ("body x, fixed steps, whole jump", "m", |set| {
-            set.rollout_x_m
-        }),
-        ("body z, fixed steps, whole jump", "m", |set| {
-            set.rollout_z_m
-        }),
-    ];
-    for (name, unit, metric) in metrics {
-        row(name, unit, &metric);
-    }
+    row("decoder mean square", "scaled", &|m| Some(m.decoder_mse));
+    row("torque R^2 of the plain lift, all samples", "", &|m| {
+        Some(m.torque_r2)
+    });
+    let (short, whole) = ("fixed steps over 0.1 s", "fixed steps, whole jump");
+    row(&format!("body x, {short}"), "m", &|m| {
+        Some(m.prediction_x_m)
+    });
+    row(&format!("body z, {short}"), "m", &|m| {
+        Some(m.prediction_z_m)
+    });
+    row(&format!("body x, {whole}"), "m", &|m| m.rollout_x_m);
+    row(&format!("body z, {whole}"), "m", &|m| m.rollout_z_m);
     for (phase, terms) in report.active_terms.iter().enumerate() {
-        let name = format!(
-            "smoothed ddz R^2 in {} ({} terms)",
-            terms.phase, terms.active
-        );
-        row(&name, "", &|set| set.ddz_r2.get(phase).copied());
+        let (name, active) = (&terms.phase, terms.active);
+        let name = format!("smoothed ddz R^2 in {name} ({active} terms)");
+        row(&name, "", &|m| m.ddz_r2.get(phase).copied());
     }
     for score in &report.deviations {
         let name = format!("ddz R^2 of deviations in {}, jump left out", score.part);
