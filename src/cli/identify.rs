@@ -77,17 +77,11 @@ fn text(found: &Identification, robot: &Robot, recordings: usize) -> String {
     let moments = moments.map(|(name, unit, of)| (name, unit, [of(&found.legs), of(&error.legs)]));
     let links = quantities("one leg", moments);
     let alone = &found.force_alone;
+    let by_forces = [alone.gravity_m_s2, alone.mass_kg];
+    let by_all = [found.gravity_m_s2, found.mass_kg];
     let fits = [
-        (
-            "the feet's forces alone",
-            alone.r2,
-            [alone.gravity_m_s2, alone.mass_kg],
-        ),
-        (
-            "losses and legs too",
-            found.r2,
-            [found.gravity_m_s2, found.mass_kg],
-        ),
+        ("the feet's forces alone", alone.r2, by_forces),
+        ("losses and legs too", found.r2, by_all),
     ];
     let fits = Table::of(fits)
         .column("trunk's acceleration by", "", |(name, ..)| *name)

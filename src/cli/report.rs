@@ -172,10 +172,8 @@ fn commands(arguments: &ReportArguments, has_control: bool) -> Vec<String> {
         let flag = |path: &PathBuf| format!(" --{name} {}", quoted(path));
         path.iter().map(flag).collect()
     };
-    let (study, plan) = (
-        flag("study", &arguments.study),
-        flag("plan", &arguments.plan),
-    );
+    let study = flag("study", &arguments.study);
+    let plan = flag("plan", &arguments.plan);
     let tolerance = arguments.tolerance;
     let mut commands = vec![
         format!(
