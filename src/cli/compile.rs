@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 
 use super::Answer;
-use super::args::{CodeArguments, CompileArguments, EquationArguments, UnitsChoice};
+use super::args::{CompileArguments, UnitsChoice};
 use super::destination::{Format, Inputs};
 use super::output::{lines, names, note_mismatches, read_recordings, refused};
-use super::simplification::{self, exact_words};
+use super::simplification::{self, Outcome, exact_words};
 use crate::deploy::{self, EmitOptions, PlannedJump, Target};
 use crate::equations::Equations;
 use crate::files::{EmittedFile, Overwrite, earlier_files};
@@ -43,12 +43,14 @@ pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
     let model = simplified.as_ref().map_or(&read, |outcome| &outcome.model);
     let approximate = simplified.as_ref().map(|_| form(model));
     let equations = approximate.as_ref().unwrap_or(&exact);
-    let unless_given = (simplified.as_ref()).map_or(Rounding::default(), |s| s.rounding());
-    let targets = (arguments.emit.as_slice(), planned(arguments, model)?);
-    let (code, print) = (&arguments.code, &arguments.equations);
-    let mut files = emit(equations, targets, code, print, unless_given)?;
+    let rounding = match (arguments.equations.digits, arguments.equations.significant) {
+        (Some(places), _) => Rounding::Decimals(places),
+        (None, Some(digits)) => Rounding::Significant(digits),
+        (None, None) => (simplified.as_ref()).map_or(Rounding::default(), Outcome::rounding),
+    };
+    let mut files = emit(equations, arguments, rounding)?;
     let (summary, certificate) = match &simplified {
-        Some(outcome) => outcome.add_to(&mut files, equations, rounding(print, unless_given))?,
+        Some(outcome) => outcome.add_to(&mut files, equations, rounding)?,
         None => (String::new(), Value::Null),
     };
     if let Some(path) = save_model {
@@ -113,15 +115,6 @@ fn text(
     text
 }
 
-/// How coefficients are printed.
-fn rounding(equations: &EquationArguments, unless_given: Rounding) -> Rounding {
-    match (equations.digits, equations.significant) {
-        (Some(places), _) => Rounding::Decimals(places),
-        (None, Some(digits)) => Rounding::Significant(digits),
-        (None, None) => unless_given,
-    }
-}
-
 /// The jump of `--plan` with its inputs by the rule of the model: the one segment of the recording.
 fn planned(
     arguments: &CompileArguments,
@@ -155,40 +148,38 @@ fn planned(
     }))
 }
 
-/// The files of the targets, in memory, with the model's digest in their headers; `unless_given` is
-/// how coefficients are printed unless the arguments give it.
-pub fn emit(
-    model_equations: &Equations<'_>,
-    (targets, plan): (&[Target], Option<PlannedJump>),
-    code: &CodeArguments,
-    equations: &EquationArguments,
-    unless_given: Rounding,
+/// The files of the targets, in memory, with the model's digest in their headers.
+fn emit(
+    equations: &Equations<'_>,
+    arguments: &CompileArguments,
+    rounding: Rounding,
 ) -> Result<Vec<EmittedFile>, Error> {
-    let model = model_equations.model();
+    let model = equations.model();
+    let (code, print) = (&arguments.code, &arguments.equations);
     let options = EmitOptions {
         precision: code.precision,
         sines: code.sincos,
         units: code.units.of_interface(),
-        plan,
+        plan: planned(arguments, model)?,
         print: PrintOptions {
-            rounding: rounding(equations, unless_given),
-            width_em: equations.width,
-            symbols: SymbolTable::parse(&equations.rename, model.latent_dim())?,
+            rounding,
+            width_em: print.width,
+            symbols: SymbolTable::parse(&print.rename, model.latent_dim())?,
             digest: Some(artifact::digest(model).short()),
-            numbers: match equations.siunitx {
+            numbers: match print.siunitx {
                 true => NumberStyle::Siunitx,
                 false => NumberStyle::Plain,
             },
-            form: equations.form.unwrap_or_default(),
+            form: print.form.unwrap_or_default(),
         },
         ..EmitOptions::default()
     };
     let physical = match code.units {
         UnitsChoice::Si | UnitsChoice::Scaled => None,
-        UnitsChoice::Physical => Some(model_equations.in_physical_units()?),
+        UnitsChoice::Physical => Some(equations.in_physical_units()?),
     };
-    let equations = physical.as_ref().unwrap_or(model_equations);
-    Ok(deploy::emit(equations, targets, &options)?)
+    let equations = physical.as_ref().unwrap_or(equations);
+    Ok(deploy::emit(equations, &arguments.emit, &options)?)
 }
 
 /// Writes files into a folder; the path of each, with its size in bytes.

@@ -8,13 +8,13 @@ use std::process::Command;
 
 use serde_json::json;
 
-use super::args::{CodeArguments, DemoArguments, EquationArguments};
+use super::args::DemoArguments;
 use super::destination::Inputs;
 use super::output::{lines, spinner};
 use super::simplification::RESTART_S;
 use super::{Answer, DONE, FAILED};
 use super::{compile, mpc as mpc_command, report};
-use crate::deploy::Target;
+use crate::deploy::{self, EmitOptions, Target};
 use crate::equations::Equations;
 use crate::evaluate::Assessment;
 use crate::files::EmittedFile;
@@ -24,7 +24,6 @@ use crate::report::{
 };
 use crate::simplify::Tolerance;
 use crate::train::sha256;
-use crate::typeset::Rounding;
 use crate::{Error, artifact, recording};
 
 /// The shipped model that the demo works with.
@@ -59,13 +58,9 @@ pub fn run(arguments: &DemoArguments) -> Result<(Answer, u8), Error> {
 
     progress.set_message("compiling equations and code");
     let targets = [Target::Latex, Target::C, Target::Rust];
-    let mut files = compile::emit(
-        &Equations::of(&model),
-        (&targets, None),
-        &CodeArguments::default(),
-        &EquationArguments::default(),
-        Rounding::default(),
-    )?;
+    let mut options = EmitOptions::default();
+    options.print.digest = Some(artifact::digest(&model).short());
+    let mut files = deploy::emit(&Equations::of(&model), &targets, &options)?;
     progress.set_message("rolling the model out");
     let evaluation = Assessment::over(&model, &jumps, RESTART_S)?;
     progress.set_message("running the controller");

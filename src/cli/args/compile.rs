@@ -50,10 +50,9 @@ pub struct CompileArguments {
 }
 
 /// Units of coordinates and inputs in equations and generated code.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum UnitsChoice {
     /// rad, m, N m, N
-    #[default]
     Si,
     /// Scaled as the model was learned: the model file's factors times SI values
     Scaled,
@@ -73,7 +72,7 @@ impl UnitsChoice {
 }
 
 /// How code is generated.
-#[derive(Debug, Clone, Default, Args)]
+#[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Generated code")]
 pub struct CodeArguments {
     /// Floating-point numbers of C and Rust
@@ -88,7 +87,7 @@ pub struct CodeArguments {
 }
 
 /// How equations are printed.
-#[derive(Debug, Clone, Default, Args)]
+#[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Printed equations")]
 pub struct EquationArguments {
     /// Decimal places of coefficients; as many as each needs, at least two, unless given
