@@ -56,7 +56,9 @@ pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
     if let Some(path) = save_model {
         artifact::check_place(path, model, arguments.force)?;
     }
-    let written = write(&arguments.out_dir, &files, &inputs, arguments.force)?;
+    let paths = inputs.write_folder(&arguments.out_dir, &files, arguments.force)?;
+    let sizes = files.iter().map(|file| file.contents.len());
+    let written: Vec<(PathBuf, usize)> = paths.into_iter().zip(sizes).collect();
     let earlier = earlier_files(&arguments.out_dir, &files)?;
     if let Some(path) = save_model {
         artifact::write(path, model, arguments.force)?;
@@ -180,18 +182,6 @@ fn emit(
     };
     let equations = physical.as_ref().unwrap_or(equations);
     Ok(deploy::emit(equations, &arguments.emit, &options)?)
-}
-
-/// Writes files into a folder; the path of each, with its size in bytes.
-pub fn write(
-    folder: &Path,
-    files: &[EmittedFile],
-    inputs: &Inputs<'_>,
-    overwrite: Overwrite,
-) -> Result<Vec<(PathBuf, usize)>, Error> {
-    let paths = inputs.write_folder(folder, files, overwrite)?;
-    let sizes = files.iter().map(|file| file.contents.len());
-    Ok(paths.into_iter().zip(sizes).collect())
 }
 
 /// A note on files of the folder that this run did not write.

@@ -9,15 +9,14 @@ use std::process::Command;
 use serde_json::json;
 
 use super::args::DemoArguments;
-use super::destination::Inputs;
-use super::output::{lines, spinner};
+use super::output::{lines, names, spinner};
 use super::simplification::RESTART_S;
 use super::{Answer, DONE, FAILED};
-use super::{compile, mpc as mpc_command, report};
+use super::{mpc as mpc_command, report};
 use crate::deploy::{self, EmitOptions, Target};
 use crate::equations::Equations;
 use crate::evaluate::Assessment;
-use crate::files::EmittedFile;
+use crate::files::{EmittedFile, write_files};
 use crate::model::ReducedModel;
 use crate::report::{
     Content, assessment_json, baseline_table, control_table, failed_runs, failures, run_table,
@@ -80,12 +79,7 @@ pub fn run(arguments: &DemoArguments) -> Result<(Answer, u8), Error> {
     };
     let report = report::page_of(&content, REPORT_TOLERANCE, vec!["romc demo".to_owned()])?;
     files.push(EmittedFile::new("report.html", report.page));
-    let made = compile::write(
-        &arguments.out_dir,
-        &files,
-        &Inputs::default(),
-        arguments.force,
-    )?;
+    let made = write_files(&arguments.out_dir, &files, arguments.force)?;
     progress.set_message("checking the C code");
     let self_test = self_test(&model, &arguments.out_dir);
     progress.finish_and_clear();
@@ -107,9 +101,10 @@ pub fn run(arguments: &DemoArguments) -> Result<(Answer, u8), Error> {
     };
     let _ = writeln!(text, "\nself-test of the emitted C: {self_test}\n");
     let _ = writeln!(text, "made in {}:", arguments.out_dir.display());
-    for (path, bytes) in &made {
+    for (path, file) in made.iter().zip(&files) {
         let name = path.strip_prefix(&arguments.out_dir).unwrap_or(path);
-        let _ = writeln!(text, "  {} ({bytes} bytes)", name.display());
+        let (name, bytes) = (name.display(), file.contents.len());
+        let _ = writeln!(text, "  {name} ({bytes} bytes)");
     }
     let [plain, consistent] =
         (control.each_ref()).map(|runs| runs.iter().map(mpc_command::run_json).collect::<Vec<_>>());
@@ -119,7 +114,7 @@ pub fn run(arguments: &DemoArguments) -> Result<(Answer, u8), Error> {
         "mpc": { "transpose": plain, "consistent": consistent },
         "self_test": self_test,
         "failed": failed,
-        "files": made.iter().map(|(path, _)| path.display().to_string()).collect::<Vec<_>>(),
+        "files": names(&made),
     });
     let answer = Answer { text, json };
     Ok((answer, if is_sound { DONE } else { FAILED }))
