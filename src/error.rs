@@ -5,28 +5,11 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use crate::artifact::ArtifactError;
-use crate::check::CheckError;
-use crate::codegen::CodegenError;
-use crate::deploy::EmitError;
-use crate::equations::PhysicalError;
-use crate::evaluate::EvaluateError;
-use crate::files::{FolderError, Place};
-use crate::identify::IdentifyError;
-use crate::import::{ImportError, NameError};
-use crate::lower::LowerError;
-use crate::model::ModelError;
-use crate::mpc::MpcError;
-use crate::plan::PlanError;
-use crate::recording::RecordingError;
+use crate::files::Place;
 use crate::robot::RobotError;
 use crate::robot_file::{RobotFileError, RobotFileFault};
-use crate::sim::SimError;
 use crate::simplify::SimplifyError;
-use crate::study::StudyError;
 use crate::train::TrainError;
-use crate::typeset::RenameError;
-use crate::typeset::TypesetError;
 
 /// What can go wrong between a recording and a torque.
 #[derive(Debug, thiserror::Error)]
@@ -37,47 +20,47 @@ pub enum Error {
     #[error(transparent)]
     RobotFile(#[from] RobotFileError),
     #[error(transparent)]
-    Recording(#[from] RecordingError),
+    Recording(#[from] crate::recording::RecordingError),
     #[error(transparent)]
-    Model(#[from] ModelError),
+    Model(#[from] crate::model::ModelError),
     #[error(transparent)]
-    Artifact(#[from] ArtifactError),
+    Artifact(#[from] crate::artifact::ArtifactError),
     #[error(transparent)]
-    Import(#[from] ImportError),
+    Import(#[from] crate::import::ImportError),
     #[error(transparent)]
-    Identify(#[from] IdentifyError),
+    Identify(#[from] crate::identify::IdentifyError),
     #[error(transparent)]
-    Check(#[from] CheckError),
+    Check(#[from] crate::check::CheckError),
     #[error(transparent)]
-    Name(#[from] NameError),
+    Name(#[from] crate::import::NameError),
     #[error(transparent)]
     Train(#[from] TrainError),
     #[error(transparent)]
-    Emit(#[from] EmitError),
+    Emit(#[from] crate::deploy::EmitError),
     #[error(transparent)]
-    Typeset(#[from] TypesetError),
+    Typeset(#[from] crate::typeset::TypesetError),
     #[error(transparent)]
-    Codegen(#[from] CodegenError),
+    Codegen(#[from] crate::codegen::CodegenError),
     #[error(transparent)]
-    Rename(#[from] RenameError),
+    Rename(#[from] crate::typeset::RenameError),
     #[error(transparent)]
-    Folder(#[from] FolderError),
+    Folder(#[from] crate::files::FolderError),
     #[error(transparent)]
-    Lower(#[from] LowerError),
+    Lower(#[from] crate::lower::LowerError),
     #[error(transparent)]
-    Sim(#[from] SimError),
+    Sim(#[from] crate::sim::SimError),
     #[error(transparent)]
-    Physical(#[from] PhysicalError),
+    Physical(#[from] crate::equations::PhysicalError),
     #[error(transparent)]
-    Evaluate(#[from] EvaluateError),
+    Evaluate(#[from] crate::evaluate::EvaluateError),
     #[error(transparent)]
     Simplify(#[from] SimplifyError),
     #[error(transparent)]
-    Study(#[from] StudyError),
+    Study(#[from] crate::study::StudyError),
     #[error(transparent)]
-    Mpc(#[from] MpcError),
+    Mpc(#[from] crate::mpc::MpcError),
     #[error(transparent)]
-    Plan(#[from] PlanError),
+    Plan(#[from] crate::plan::PlanError),
     /// A plan that nothing should carry out.
     #[error("no plan to be trusted: {0} (--force writes it all the same)")]
     Distrusted(String),

@@ -31,22 +31,18 @@ fn against_the_go1(found: &Identification) -> Vec<(&'static str, f64, f64, f64)>
         ("gravity", found.gravity_m_s2, error.gravity_m_s2, 9.81),
         ("mass", found.mass_kg, error.mass_kg, 12.743),
     ];
+    let [viscous, dry, armature] = found.losses();
     for (names, values, errors, truth) in [
         (
             ["viscous hx", "viscous hy", "viscous kn"],
-            found.viscous(),
+            viscous,
             error.viscous_nm_s_rad,
             [1.0, 0.6, 0.6],
         ),
-        (
-            ["dry hx", "dry hy", "dry kn"],
-            found.dry(),
-            error.dry_nm,
-            [0.2; 3],
-        ),
+        (["dry hx", "dry hy", "dry kn"], dry, error.dry_nm, [0.2; 3]),
         (
             ["armature hx", "armature hy", "armature kn"],
-            found.armature(),
+            armature,
             error.armature_kg_m2,
             [0.01; 3],
         ),
@@ -139,8 +135,9 @@ fn noisy_sensors_and_an_unrecorded_push_widen_the_errors_and_keep_the_robot() {
         "{}",
         noisy.mass_kg
     );
-    for (found, truth) in [(noisy.viscous().hy, 0.6), (noisy.viscous().kn, 0.6)] {
-        assert!((found / truth - 1.0_f64).abs() < 0.2, "{found}");
+    let [viscous, ..] = noisy.losses();
+    for found in [viscous.hy, viscous.kn] {
+        assert!((found / 0.6 - 1.0).abs() < 0.2, "{found}");
     }
     assert!(noisy.standard_error.gravity_m_s2 > 3.0 * clean.standard_error.gravity_m_s2);
 }

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use serde::Serialize;
 
 use super::CheckOptions;
-use super::point::{Gap, Sides, search};
+use super::point::{Gap, Sides, decimals, search};
 use super::side::{Floats, RightSide, Side, SidePhase, literal};
 use crate::symbolic::{CanonicalForm, CanonicalForms, Coefficient, ExprId, ExprPool, Node, Number};
 
@@ -197,9 +197,16 @@ fn decide_with(
         [0, 1]
     };
     let proof = proof(&pool, &restrictions, rest, order);
+    let decimals = decimals(&pool, whole);
     let searched = |rest: [ExprId; 2], rows: &[&Row]| {
         let groups: Vec<ExprId> = rows.iter().map(|row| row.rest).collect();
-        let sides = Sides::new(&pool, whole, rest, &restrictions);
+        let sides = Sides {
+            pool: &pool,
+            whole,
+            rest,
+            restrictions: &restrictions,
+            decimals: &decimals,
+        };
         search(&sides, phase, &options.domain, &groups, proof.is_some())
     };
     let mut found = searched(rest, &rows);

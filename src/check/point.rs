@@ -59,31 +59,19 @@ pub(super) struct Sides<'s> {
     /// The same without the terms that both have; the difference is that of the whole sides.
     pub(super) rest: [ExprId; 2],
     /// What has to have a value where the sides are compared.
-    restrictions: &'s [ExprId],
-    /// Value and radius of each symbol that stands for a decimal.
-    literals: HashMap<SymbolId, (f64, f64)>,
+    pub(super) restrictions: &'s [ExprId],
+    /// The [`decimals`] of the whole sides.
+    pub(super) decimals: &'s HashMap<SymbolId, (f64, f64)>,
 }
 
-impl<'s> Sides<'s> {
-    pub(super) fn new(
-        pool: &'s ExprPool,
-        whole: [ExprId; 2],
-        rest: [ExprId; 2],
-        restrictions: &'s [ExprId],
-    ) -> Self {
-        let symbols = whole.iter().flat_map(|side| pool.symbols_of(*side));
-        let literals = symbols.filter_map(|symbol| {
-            let literal = literal(pool, symbol)?;
-            Some((symbol, (literal.to_f64(), literal.radius)))
-        });
-        Self {
-            pool,
-            whole,
-            rest,
-            restrictions,
-            literals: literals.collect(),
-        }
-    }
+/// Value and radius of each symbol that stands for a decimal.
+pub(super) fn decimals(pool: &ExprPool, sides: [ExprId; 2]) -> HashMap<SymbolId, (f64, f64)> {
+    let symbols = sides.iter().flat_map(|side| pool.symbols_of(*side));
+    let decimals = symbols.filter_map(|symbol| {
+        let literal = literal(pool, symbol)?;
+        Some((symbol, (literal.to_f64(), literal.radius)))
+    });
+    decimals.collect()
 }
 
 /// Tries points of a fixed sequence: all variables at once, and single groups of them with the
@@ -98,7 +86,7 @@ pub(super) fn search(
     let pool = sides.pool;
     let variables: Vec<SymbolId> = (sides.whole.iter())
         .flat_map(|side| pool.symbols_of(*side))
-        .filter(|symbol| !sides.literals.contains_key(symbol))
+        .filter(|symbol| !sides.decimals.contains_key(symbol))
         .collect::<BTreeSet<_>>()
         .into_iter()
         .collect();
@@ -170,7 +158,7 @@ fn short(value: f64) -> f64 {
 
 impl Sides<'_> {
     fn values_of(&self, exprs: &[ExprId], values: &BTreeMap<SymbolId, f64>) -> Vec<f64> {
-        let value_of = |symbol: SymbolId| match self.literals.get(&symbol) {
+        let value_of = |symbol: SymbolId| match self.decimals.get(&symbol) {
             Some((value, _)) => *value,
             None => values.get(&symbol).copied().unwrap_or(0.0),
         };
@@ -196,7 +184,7 @@ impl Sides<'_> {
 
     /// Whether the bounds of both sides, rounding of decimals included, have no number in common.
     fn are_apart(&self, values: &BTreeMap<SymbolId, f64>) -> bool {
-        let range_of = |symbol: SymbolId| match self.literals.get(&symbol) {
+        let range_of = |symbol: SymbolId| match self.decimals.get(&symbol) {
             Some((value, radius)) => {
                 Interval::new((value - radius).next_down(), (value + radius).next_up())
             }

@@ -29,7 +29,6 @@ pub fn run(arguments: &CheckArguments) -> Result<(Answer, u8), Error> {
     let answer = Answer {
         text: text(&left, &right, &comparison),
         json: json!({
-            "command": "check",
             "files": [&left.file, &right.file],
             "equal": is_equal,
             "exact": comparison.verdicts().all(|verdict| *verdict == Verdict::Equal),
@@ -62,12 +61,7 @@ fn text(left: &Side, right: &Side, comparison: &Comparison) -> String {
         for equation in &phase.equations {
             let verdict = verdict_text(&equation.verdict);
             let _ = writeln!(text, "  {}: {verdict}", equation.output);
-            for (file, side) in dropping(&equation.verdict, [left, right]) {
-                let _ = writeln!(
-                    text,
-                    "    note: {file} ({side}) has rounded decimals, and terms that round to zero are not printed"
-                );
-            }
+            text += &dropping(&equation.verdict, [left, right]);
             if let Some(gap) = &equation.one_sided {
                 let is_of_second = gap.left.is_nan();
                 let (has, lacks, at) = (side(is_of_second), side(!is_of_second), place(gap));
@@ -99,8 +93,8 @@ fn text(left: &Side, right: &Side, comparison: &Comparison) -> String {
     text
 }
 
-/// The files in print that lack a term of the other: rounding may have dropped it.
-fn dropping<'s>(verdict: &Verdict, [left, right]: [&'s Side; 2]) -> Vec<(&'static str, &'s str)> {
+/// Notes on the files in print that lack a term of the other: rounding may have dropped it.
+fn dropping(verdict: &Verdict, [left, right]: [&Side; 2]) -> String {
     let terms: &[TermDifference] = match verdict {
         Verdict::Different(difference) => &difference.terms,
         Verdict::Undecided(_, terms) => terms,
@@ -111,12 +105,14 @@ fn dropping<'s>(verdict: &Verdict, [left, right]: [&'s Side; 2]) -> Vec<(&'stati
         ("A", left, lacks(|term| term.left)),
         ("B", right, lacks(|term| term.right)),
     ];
-    let dropping = files
-        .into_iter()
-        .filter(|(_, file, lacks)| file.is_rounded && *lacks);
-    dropping
-        .map(|(side, file, _)| (side, file.file.as_str()))
-        .collect()
+    let dropping = (files.into_iter()).filter(|(_, file, lacks)| file.is_rounded && *lacks);
+    let rounded = dropping.map(|(letter, side, _)| format!("{letter} ({})", side.file));
+    let notes = rounded.map(|file| {
+        format!(
+            "    note: {file} has rounded decimals, and terms that round to zero are not printed\n"
+        )
+    });
+    notes.collect()
 }
 
 /// The letter of a file.

@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 
 use super::Answer;
-use super::args::{CodeArguments, CompileArguments, EquationArguments, UnitsChoice};
+use super::args::{CompileArguments, UnitsChoice};
 use super::destination::{Format, Inputs};
-use super::output::{names, note_mismatches, read_recordings, refused};
-use super::simplification::{self, exact_words};
+use super::output::{lines, names, note_mismatches, read_recordings, refused};
+use super::simplification::{self, Outcome, exact_words};
 use crate::deploy::{self, EmitOptions, PlannedJump, Target};
 use crate::equations::Equations;
 use crate::files::{EmittedFile, Overwrite, earlier_files};
@@ -19,7 +19,6 @@ use crate::{Error, artifact};
 
 /// Compiles a model into a folder.
 pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
-    let overwrite = Overwrite::when_forced(arguments.force);
     let save_model = arguments.simplification.save_model.as_deref();
     let (simplification, model) = (&arguments.simplification, &arguments.model);
     let inputs = Inputs::default()
@@ -30,9 +29,9 @@ pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
     // What would be the same file again may stay; it is compared once there is a model.
     match save_model {
         Some(path) if path.parent() == Some(&arguments.out_dir) => {
-            inputs.check_name(path, Format::Model)?;
+            inputs.check_name(path, Format::MODEL)?;
         }
-        Some(_) | None => inputs.check_output(save_model, Format::Model, Overwrite::Replace)?,
+        Some(_) | None => inputs.check_output(save_model, Format::MODEL, Overwrite::Replace)?,
     }
     let read = artifact::read(&arguments.model)?;
     let form = match arguments.equations.as_learned {
@@ -44,25 +43,25 @@ pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
     let model = simplified.as_ref().map_or(&read, |outcome| &outcome.model);
     let approximate = simplified.as_ref().map(|_| form(model));
     let equations = approximate.as_ref().unwrap_or(&exact);
-    let unless_given = (simplified.as_ref()).map_or(Rounding::default(), |s| s.rounding());
-    let targets = (arguments.emit.as_slice(), planned(arguments, model)?);
-    let (code, print) = (&arguments.code, &arguments.equations);
-    let mut files = emit(equations, targets, code, print, unless_given)?;
-    let (mut summary, mut certificate) = (String::new(), Value::Null);
-    if let Some(outcome) = &simplified {
-        let (file, words, value) =
-            outcome.files_and_summary(equations, rounding(print, unless_given))?;
-        outcome.comment(&mut files);
-        files.push(file);
-        (summary, certificate) = (words, value);
-    }
+    let rounding = match (arguments.equations.digits, arguments.equations.significant) {
+        (Some(places), _) => Rounding::Decimals(places),
+        (None, Some(digits)) => Rounding::Significant(digits),
+        (None, None) => (simplified.as_ref()).map_or(Rounding::default(), Outcome::rounding),
+    };
+    let mut files = emit(equations, arguments, rounding)?;
+    let (summary, certificate) = match &simplified {
+        Some(outcome) => outcome.add_to(&mut files, equations, rounding)?,
+        None => (String::new(), Value::Null),
+    };
     if let Some(path) = save_model {
-        artifact::check_place(path, model, overwrite)?;
+        artifact::check_place(path, model, arguments.force)?;
     }
-    let written = write(&arguments.out_dir, &files, &inputs, overwrite)?;
+    let paths = inputs.write_folder(&arguments.out_dir, &files, arguments.force)?;
+    let sizes = files.iter().map(|file| file.contents.len());
+    let written: Vec<(PathBuf, usize)> = paths.into_iter().zip(sizes).collect();
     let earlier = earlier_files(&arguments.out_dir, &files)?;
     if let Some(path) = save_model {
-        artifact::write(path, model, overwrite)?;
+        artifact::write(path, model, arguments.force)?;
     }
     Ok(Answer {
         text: exact_words(&exact)
@@ -70,7 +69,6 @@ pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
             + &text(arguments, equations, &written)
             + &earlier_in_words(&earlier),
         json: json!({
-            "command": "compile",
             "model": arguments.model.display().to_string(),
             "name": model.name(),
             "digest": artifact::digest(model).to_string(),
@@ -106,9 +104,8 @@ fn text(
         model.latent_dim(),
         phases.join(", ")
     );
-    if let Some(path) = &arguments.simplification.save_model {
-        let _ = writeln!(text, "simplified model: {}", path.display());
-    }
+    let saved = arguments.simplification.save_model.as_deref();
+    text += &lines("simplified model: ", saved.map(Path::display));
     if arguments.emit.contains(&Target::C) {
         let name = model.identifier().as_str();
         let folder = arguments.out_dir.display();
@@ -118,15 +115,6 @@ fn text(
         );
     }
     text
-}
-
-/// How coefficients are printed.
-fn rounding(equations: &EquationArguments, unless_given: Rounding) -> Rounding {
-    match (equations.digits, equations.significant) {
-        (Some(places), _) => Rounding::Decimals(places),
-        (None, Some(digits)) => Rounding::Significant(digits),
-        (None, None) => unless_given,
-    }
 }
 
 /// The jump of `--plan` with its inputs by the rule of the model: the one segment of the recording.
@@ -162,52 +150,38 @@ fn planned(
     }))
 }
 
-/// The files of the targets, in memory, with the model's digest in their headers; `unless_given` is
-/// how coefficients are printed unless the arguments give it.
-pub fn emit(
-    model_equations: &Equations<'_>,
-    (targets, plan): (&[Target], Option<PlannedJump>),
-    code: &CodeArguments,
-    equations: &EquationArguments,
-    unless_given: Rounding,
+/// The files of the targets, in memory, with the model's digest in their headers.
+fn emit(
+    equations: &Equations<'_>,
+    arguments: &CompileArguments,
+    rounding: Rounding,
 ) -> Result<Vec<EmittedFile>, Error> {
-    let model = model_equations.model();
+    let model = equations.model();
+    let (code, print) = (&arguments.code, &arguments.equations);
     let options = EmitOptions {
         precision: code.precision,
         sines: code.sincos,
         units: code.units.of_interface(),
-        plan,
+        plan: planned(arguments, model)?,
         print: PrintOptions {
-            rounding: rounding(equations, unless_given),
-            width_em: equations.width,
-            symbols: SymbolTable::parse(&equations.rename, model.latent_dim())?,
+            rounding,
+            width_em: print.width,
+            symbols: SymbolTable::parse(&print.rename, model.latent_dim())?,
             digest: Some(artifact::digest(model).short()),
-            numbers: match equations.siunitx {
+            numbers: match print.siunitx {
                 true => NumberStyle::Siunitx,
                 false => NumberStyle::Plain,
             },
-            form: equations.form.unwrap_or_default(),
+            form: print.form.unwrap_or_default(),
         },
         ..EmitOptions::default()
     };
     let physical = match code.units {
         UnitsChoice::Si | UnitsChoice::Scaled => None,
-        UnitsChoice::Physical => Some(model_equations.in_physical_units()?),
+        UnitsChoice::Physical => Some(equations.in_physical_units()?),
     };
-    let equations = physical.as_ref().unwrap_or(model_equations);
-    Ok(deploy::emit(equations, targets, &options)?)
-}
-
-/// Writes files into a folder; the path of each, with its size in bytes.
-pub fn write(
-    folder: &Path,
-    files: &[EmittedFile],
-    inputs: &Inputs<'_>,
-    overwrite: Overwrite,
-) -> Result<Vec<(PathBuf, usize)>, Error> {
-    let paths = inputs.write_folder(folder, files, overwrite)?;
-    let sizes = files.iter().map(|file| file.contents.len());
-    Ok(paths.into_iter().zip(sizes).collect())
+    let equations = physical.as_ref().unwrap_or(equations);
+    Ok(deploy::emit(equations, &arguments.emit, &options)?)
 }
 
 /// A note on files of the folder that this run did not write.

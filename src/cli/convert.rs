@@ -9,18 +9,16 @@ use super::Answer;
 use super::args::ConvertArguments;
 use super::destination::{Format, Inputs};
 use super::output::{names, read_with, reader};
-use crate::files::Overwrite;
 use crate::recording::{Clocks, Recording, Segment, WriteOptions, write_mcap, write_with};
 use crate::{Error, artifact};
 
 /// Reads, chains and writes.
 pub fn run(arguments: &ConvertArguments) -> Result<Answer, Error> {
-    let overwrite = Overwrite::when_forced(arguments.force);
     Inputs::default()
         .and(&arguments.recordings)
         .and(&arguments.inputs_of)
         .and(&arguments.reading.columns)
-        .check_output(Some(&arguments.output), Format::Recording, overwrite)?;
+        .check_output(Some(&arguments.output), Format::RECORDING, arguments.force)?;
     let rule = match &arguments.inputs_of {
         None => None,
         Some(path) => Some(artifact::read(path)?.input_rule()?),
@@ -40,7 +38,6 @@ pub fn run(arguments: &ConvertArguments) -> Result<Answer, Error> {
     Ok(Answer {
         text: format!("{output}: {samples} samples in {count} segments\n"),
         json: json!({
-            "command": "convert",
             "recordings": names(&arguments.recordings),
             "output": output,
             "samples": samples,

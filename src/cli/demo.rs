@@ -8,22 +8,21 @@ use std::process::Command;
 
 use serde_json::json;
 
-use super::args::{CodeArguments, DemoArguments, EquationArguments};
-use super::destination::Inputs;
-use super::output::spinner;
+use super::args::DemoArguments;
+use super::output::{lines, names, spinner};
+use super::simplification::RESTART_S;
 use super::{Answer, DONE, FAILED};
-use super::{compile, mpc as mpc_command, report};
-use crate::deploy::Target;
+use super::{mpc as mpc_command, report};
+use crate::deploy::{self, EmitOptions, Target};
 use crate::equations::Equations;
 use crate::evaluate::Assessment;
-use crate::files::{EmittedFile, Overwrite};
+use crate::files::{EmittedFile, write_files};
 use crate::model::ReducedModel;
 use crate::report::{
     Content, assessment_json, baseline_table, control_table, failed_runs, failures, run_table,
 };
 use crate::simplify::Tolerance;
 use crate::train::sha256;
-use crate::typeset::Rounding;
 use crate::{Error, artifact, recording};
 
 /// The shipped model that the demo works with.
@@ -45,15 +44,11 @@ const JUMPS: [(&str, &[u8]); 3] = [
     ),
 ];
 
-/// Time between restarts of the short rollouts, as in the paper's second test.
-const RESTART_S: f64 = 0.1;
-
 /// The tolerance within which the report lists changes.
 const REPORT_TOLERANCE: Tolerance = Tolerance::ShareOfRms(0.01);
 
 /// Runs the whole path and reports its files and metrics. The exit code is 1 if the self-test or a run fails.
 pub fn run(arguments: &DemoArguments) -> Result<(Answer, u8), Error> {
-    let overwrite = Overwrite::when_forced(arguments.force);
     let progress = spinner("reading the shipped model and recordings");
     let model = artifact::read_from_bytes(MODEL.0, MODEL.1)?;
     let jumps = (JUMPS.iter())
@@ -62,13 +57,9 @@ pub fn run(arguments: &DemoArguments) -> Result<(Answer, u8), Error> {
 
     progress.set_message("compiling equations and code");
     let targets = [Target::Latex, Target::C, Target::Rust];
-    let mut files = compile::emit(
-        &Equations::of(&model),
-        (&targets, None),
-        &CodeArguments::default(),
-        &EquationArguments::default(),
-        Rounding::default(),
-    )?;
+    let mut options = EmitOptions::default();
+    options.print.digest = Some(artifact::digest(&model).short());
+    let mut files = deploy::emit(&Equations::of(&model), &targets, &options)?;
     progress.set_message("rolling the model out");
     let evaluation = Assessment::over(&model, &jumps, RESTART_S)?;
     progress.set_message("running the controller");
@@ -88,7 +79,7 @@ pub fn run(arguments: &DemoArguments) -> Result<(Answer, u8), Error> {
     };
     let report = report::page_of(&content, REPORT_TOLERANCE, vec!["romc demo".to_owned()])?;
     files.push(EmittedFile::new("report.html", report.page));
-    let made = compile::write(&arguments.out_dir, &files, &Inputs::default(), overwrite)?;
+    let made = write_files(&arguments.out_dir, &files, arguments.force)?;
     progress.set_message("checking the C code");
     let self_test = self_test(&model, &arguments.out_dir);
     progress.finish_and_clear();
@@ -102,9 +93,7 @@ pub fn run(arguments: &DemoArguments) -> Result<(Answer, u8), Error> {
         run_table(&control[0])
     );
     let failed: Vec<String> = control.iter().flat_map(|runs| failed_runs(runs)).collect();
-    for reason in failures(&control[0]).iter().chain(&failed) {
-        let _ = writeln!(text, "FAILED along {reason}");
-    }
+    text += &lines("FAILED along ", failures(&control[0]).iter().chain(&failed));
     let is_sound = failed.is_empty() && self_test.is_ok();
     let self_test = match self_test {
         Ok(words) => words.to_owned(),
@@ -112,24 +101,22 @@ pub fn run(arguments: &DemoArguments) -> Result<(Answer, u8), Error> {
     };
     let _ = writeln!(text, "\nself-test of the emitted C: {self_test}\n");
     let _ = writeln!(text, "made in {}:", arguments.out_dir.display());
-    for (path, bytes) in &made {
+    for (path, file) in made.iter().zip(&files) {
         let name = path.strip_prefix(&arguments.out_dir).unwrap_or(path);
-        let _ = writeln!(text, "  {} ({bytes} bytes)", name.display());
+        let (name, bytes) = (name.display(), file.contents.len());
+        let _ = writeln!(text, "  {name} ({bytes} bytes)");
     }
     let [plain, consistent] =
         (control.each_ref()).map(|runs| runs.iter().map(mpc_command::run_json).collect::<Vec<_>>());
-    let answer = Answer {
-        text,
-        json: json!({
-            "command": "demo",
-            "model": MODEL.0,
-            "rollouts": assessment_json(&model, &evaluation),
-            "mpc": { "transpose": plain, "consistent": consistent },
-            "self_test": self_test,
-            "failed": failed,
-            "files": made.iter().map(|(path, _)| path.display().to_string()).collect::<Vec<_>>(),
-        }),
-    };
+    let json = json!({
+        "model": MODEL.0,
+        "rollouts": assessment_json(&model, &evaluation),
+        "mpc": { "transpose": plain, "consistent": consistent },
+        "self_test": self_test,
+        "failed": failed,
+        "files": names(&made),
+    });
+    let answer = Answer { text, json };
     Ok((answer, if is_sound { DONE } else { FAILED }))
 }
 

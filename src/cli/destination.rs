@@ -9,38 +9,28 @@ use crate::files::{EmittedFile, Overwrite, write_files};
 use crate::report::figures::{Figure, figure_files};
 use crate::robot::Robot;
 
-/// What an output file holds, which the ending of its name says.
+/// What an output file holds, which the ending of its name says: one of these.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Format {
-    /// A table as CSV.
-    Table,
-    /// A recording.
-    Recording,
-    /// A model file.
-    Model,
-    /// A robot, its actuators, a map of columns.
-    Toml,
-    /// A report.
-    Page,
-}
+pub struct Format(&'static [&'static str]);
 
 impl Format {
-    fn endings(self) -> &'static [&'static str] {
-        match self {
-            Self::Table => &[".csv"],
-            Self::Recording => &[".csv", ".csv.gz", ".mcap"],
-            Self::Model => &[".json"],
-            Self::Toml => &[".toml"],
-            Self::Page => &[".html", ".htm"],
-        }
-    }
+    /// A table as CSV.
+    pub const TABLE: Self = Self(&[".csv"]);
+    /// A recording.
+    pub const RECORDING: Self = Self(&[".csv", ".csv.gz", ".mcap"]);
+    /// A model file.
+    pub const MODEL: Self = Self(&[".json"]);
+    /// A robot, its actuators, a map of columns.
+    pub const TOML: Self = Self(&[".toml"]);
+    /// A report.
+    pub const PAGE: Self = Self(&[".html", ".htm"]);
 
     /// Refuses a name whose ending says another format. What is there and no file of a disk is refused elsewhere.
     fn check(self, path: &Path) -> Result<(), Error> {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         let name = name.to_lowercase();
         let is_device = path.exists() && !path.is_file();
-        if is_device || self.endings().iter().any(|ending| name.ends_with(ending)) {
+        if is_device || self.0.iter().any(|ending| name.ends_with(ending)) {
             return Ok(());
         }
         Err(Error::Ending {
@@ -49,7 +39,7 @@ impl Format {
                 Some(ending) => format!(".{}", ending.to_string_lossy()),
                 None => "no ending".to_owned(),
             },
-            expected: match self.endings() {
+            expected: match self.0 {
                 [all @ .., last] if !all.is_empty() => format!("{} or {last}", all.join(", ")),
                 all => all.concat(),
             },

@@ -8,10 +8,9 @@ use serde_json::{Value, json};
 use super::Answer;
 use super::args::IdentifyArguments;
 use super::destination::{Format, Inputs};
-use super::output::{names, note_repeated, read_with, reader, spinner, write_file};
+use super::output::{lines, names, note_repeated, read_with, reader, spinner, write_file};
 use super::robot;
 use crate::Error;
-use crate::files::Overwrite;
 use crate::identify::{Identification, Legs, identify};
 use crate::recording::Clocks;
 use crate::robot::Robot;
@@ -19,12 +18,11 @@ use crate::typeset::{Table, significant};
 
 /// Identifies the robot and writes the file, if one is asked for.
 pub fn run(arguments: &IdentifyArguments) -> Result<Answer, Error> {
-    let overwrite = Overwrite::when_forced(arguments.force);
     Inputs::default()
         .and(&arguments.recordings)
         .and(&arguments.reading.columns)
         .and_robot(Some(&arguments.robot))
-        .check_output(arguments.output.as_deref(), Format::Toml, overwrite)?;
+        .check_output(arguments.output.as_deref(), Format::TOML, arguments.force)?;
     let robot = robot::chosen(&arguments.robot)?;
     let reader = reader(&arguments.reading, Clocks::Recorded)?;
     let recordings = read_with(&reader, &arguments.recordings)?;
@@ -36,7 +34,7 @@ pub fn run(arguments: &IdentifyArguments) -> Result<Answer, Error> {
     let found = found?;
     let mut text = text(&found, robot, recordings.len());
     if let Some(path) = &arguments.output {
-        write_file(path, found.to_toml().as_bytes(), overwrite)?;
+        write_file(path, found.to_toml().as_bytes(), arguments.force)?;
         let _ = writeln!(text, "\nwritten: {}", path.display());
     }
     Ok(Answer {
@@ -54,25 +52,21 @@ fn text(found: &Identification, robot: &Robot, recordings: usize) -> String {
         ("torque to motion", "ms", delays),
     ];
     let body = quantities("quantity", body);
-    let mut joints = Table::new(["losses of a joint", "unit", "hx", "hy", "kn"]);
-    let (viscous, dry) = (
-        [found.viscous(), error.viscous_nm_s_rad],
-        [found.dry(), error.dry_nm],
-    );
-    for (name, unit, [values, errors]) in [
+    let [viscous, dry, armature] = found.losses();
+    let viscous = [viscous, error.viscous_nm_s_rad];
+    let losses = [
         ("viscous friction", "N m s/rad", viscous),
-        ("dry friction", "N m", dry),
-        (
-            "armature",
-            "kg m^2",
-            [found.armature(), error.armature_kg_m2],
-        ),
-    ] {
-        let pairs = values.to_array().into_iter().zip(errors.to_array());
-        let cells =
-            pairs.map(|(value, error)| format!("{} ± {}", significant(value), two_digits(error)));
-        joints.row([name, unit].map(str::to_owned).into_iter().chain(cells));
-    }
+        ("dry friction", "N m", [dry, error.dry_nm]),
+        ("armature", "kg m^2", [armature, error.armature_kg_m2]),
+    ];
+    let pair = |value, error| format!("{} ± {}", significant(value), two_digits(error));
+    let joints = Table::of(losses)
+        .column("losses of a joint", "", |(name, ..)| *name)
+        .column("unit", "", |(_, unit, _)| *unit)
+        .column("hx", "", |(.., [value, error])| pair(value.hx, error.hx))
+        .column("hy", "", |(.., [value, error])| pair(value.hy, error.hy))
+        .column("kn", "", |(.., [value, error])| pair(value.kn, error.kn))
+        .table();
     let moments: [(&str, &str, fn(&Legs) -> f64); 5] = [
         ("first moment beside the hip", "kg m", |l| l.side_kg_m),
         ("first moment of the thigh", "kg m", |l| l.thigh_kg_m),
@@ -83,17 +77,11 @@ fn text(found: &Identification, robot: &Robot, recordings: usize) -> String {
     let moments = moments.map(|(name, unit, of)| (name, unit, [of(&found.legs), of(&error.legs)]));
     let links = quantities("one leg", moments);
     let alone = &found.force_alone;
+    let by_forces = [alone.gravity_m_s2, alone.mass_kg];
+    let by_all = [found.gravity_m_s2, found.mass_kg];
     let fits = [
-        (
-            "the feet's forces alone",
-            alone.r2,
-            [alone.gravity_m_s2, alone.mass_kg],
-        ),
-        (
-            "losses and legs too",
-            found.r2,
-            [found.gravity_m_s2, found.mass_kg],
-        ),
+        ("the feet's forces alone", alone.r2, by_forces),
+        ("losses and legs too", found.r2, by_all),
     ];
     let fits = Table::of(fits)
         .column("trunk's acceleration by", "", |(name, ..)| *name)
@@ -102,17 +90,14 @@ fn text(found: &Identification, robot: &Robot, recordings: usize) -> String {
         .column("gravity", "", |(.., [gravity, _])| format!("{gravity:.2}"))
         .column("mass", "kg", |(.., [_, mass])| format!("{mass:.2}"))
         .table();
-    let mut text = format!(
+    let notes = lines("\nnote: ", &found.notes);
+    format!(
         "{} from {recordings} recordings: {} samples with feet on the ground, {} in flight\n\n\
-         {body}\n{joints}\n{links}\n{fits}",
+         {body}\n{joints}\n{links}\n{fits}{notes}",
         robot.name(),
         found.samples.contact,
         found.samples.flight
-    );
-    for note in &found.notes {
-        let _ = writeln!(text, "\nnote: {note}");
-    }
-    text
+    )
 }
 
 /// A table of values with their standard errors.
@@ -139,16 +124,16 @@ fn two_digits(value: f64) -> String {
 /// The keys that other programs rely on; see `docs/identify.md`.
 fn report(found: &Identification, arguments: &IdentifyArguments) -> Value {
     let alone = &found.force_alone;
+    let [viscous, dry, armature] = found.losses();
     json!({
-        "command": "identify",
         "robot": found.robot,
         "recordings": names(&arguments.recordings),
         "gravity_m_s2": found.gravity_m_s2,
         "mass_kg": found.mass_kg,
         "delay_s": found.delay_s,
-        "viscous_nm_s_rad": found.viscous(),
-        "dry_nm": found.dry(),
-        "armature_kg_m2": found.armature(),
+        "viscous_nm_s_rad": viscous,
+        "dry_nm": dry,
+        "armature_kg_m2": armature,
         "legs": found.legs,
         "standard_error": found.standard_error,
         "r2": { "force": alone.r2, "losses": found.r2 },

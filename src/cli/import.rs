@@ -7,10 +7,9 @@ use serde_json::{Map, Value, json};
 use super::Answer;
 use super::args::{ImportArguments, LibraryArgument};
 use super::destination::{Format, Inputs};
-use super::output::{named, read_recordings};
+use super::output::{lines, named, read_recordings};
 use super::robot;
 use crate::evaluate::RoundTrip;
-use crate::files::Overwrite;
 use crate::import::{Chosen, ImportOptions, ImportReport, SymbolNames, import, read_terms};
 use crate::model::{LibraryChoice, ReducedModel};
 use crate::recording::Segment;
@@ -21,7 +20,6 @@ use crate::{Error, artifact};
 
 /// Imports a model and writes it.
 pub fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
-    let overwrite = Overwrite::when_forced(arguments.force);
     let library = match &arguments.library {
         Some(LibraryArgument::File(path)) => Some(path),
         Some(LibraryArgument::Shorthand(_)) | None => None,
@@ -33,7 +31,7 @@ pub fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
         .and(&arguments.inputs_from)
         .and(&arguments.reading.columns)
         .and_robot(arguments.robot.as_deref())
-        .check_output(Some(&arguments.output), Format::Model, overwrite)?;
+        .check_output(Some(&arguments.output), Format::MODEL, arguments.force)?;
     let imported = import(&arguments.file, &options(arguments)?)?;
     let recordings = read_recordings(&arguments.inputs_from, &arguments.reading)?;
     let segments: Vec<&Segment> = recordings.iter().flat_map(|r| &r.segments).collect();
@@ -42,7 +40,7 @@ pub fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
         false => with_input_statistics(imported.model, &segments)?,
     };
     let check = checked(&model, &segments, arguments)?;
-    artifact::write(&arguments.output, &model, overwrite)?;
+    artifact::write(&arguments.output, &model, arguments.force)?;
     let mut text = describe(&imported.report);
     let has_axes = model.robot().is_ok() && model.encoder_map().is_ok();
     let axes = (has_axes && arguments.wrench_frame.is_none()).then(|| {
@@ -52,31 +50,22 @@ pub fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
              (--wrench-frame says otherwise)"
         )
     });
-    if let Some(axes) = &axes {
-        let _ = writeln!(text, "note: {axes}");
-    }
-    if let Some(check) = &check {
-        text.push_str(&describe_check(check));
-    }
+    text += &lines("note: ", &axes);
+    text.extend(check.as_ref().map(describe_check));
     let (output, name) = (arguments.output.display().to_string(), model.name());
     let _ = writeln!(text, "{output}: model `{name}`");
     let lacking = lacking(&model);
-    if let Some(lacking) = lacking {
-        let _ = writeln!(text, "\n{lacking}");
-    }
-    Ok(Answer {
-        text,
-        json: json!({
-            "command": "import",
-            "model": output,
-            "name": name,
-            "digest": artifact::digest(&model).to_string(),
-            "report": imported.report,
-            "wrench_axes": axes,
-            "lacking": lacking,
-            "check": check.as_ref().map(check_json),
-        }),
-    })
+    text += &lines("\n", lacking);
+    let json = json!({
+        "model": output,
+        "name": name,
+        "digest": artifact::digest(&model).to_string(),
+        "report": imported.report,
+        "wrench_axes": axes,
+        "lacking": lacking,
+        "check": check.as_ref().map(check_json),
+    });
+    Ok(Answer { text, json })
 }
 
 /// Compares the model with the recordings, if there are any and it has both maps; refuses one that
@@ -182,10 +171,7 @@ fn describe(report: &ImportReport) -> String {
         let shape = shape(&unused.shape);
         let _ = writeln!(text, "not used: {} ({shape})", unused.tensor);
     }
-    for note in &report.notes {
-        let _ = writeln!(text, "note: {note}");
-    }
-    text
+    text + &lines("note: ", &report.notes)
 }
 
 fn shape(dims: &[usize]) -> String {
@@ -207,12 +193,7 @@ fn describe_check(check: &RoundTrip) -> String {
             let _ = write!(text, "; R^2 of ddz in {phase} {r2:.3}");
         }
     }
-    text.push('\n');
-    if let Some(fault) = check.fault() {
-        let _ = writeln!(text, "warning: {fault}");
-    }
-    text.push('\n');
-    text
+    text + "\n" + &lines("warning: ", check.fault()) + "\n"
 }
 
 /// The same as JSON.

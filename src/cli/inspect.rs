@@ -1,7 +1,5 @@
 //! `romc inspect`: what a recording or a model holds, and what is implausible in it.
 
-use std::path::Path;
-
 use serde_json::json;
 
 use super::Answer;
@@ -9,9 +7,8 @@ use super::args::InspectArguments;
 use super::destination::{Format, Inputs};
 use super::output::{note, reader, write_file};
 use super::{inspect_model, inspect_recording, robot};
-use crate::files::Overwrite;
+use crate::recording::Clocks;
 use crate::recording::foreign::guess::guess;
-use crate::recording::{Clocks, Reader};
 use crate::robot::Robot;
 use crate::{Error, artifact};
 
@@ -24,13 +21,18 @@ pub fn run(arguments: &InspectArguments) -> Result<Answer, Error> {
     let reader = reader(&arguments.reading, Clocks::Recorded)?;
     let (mut texts, mut files) = (Vec::new(), Vec::new());
     for path in &arguments.files {
-        let Answer { text, json } = inspect(path, robot, &reader)?;
+        let is_model =
+            artifact::is_standard_input(path) || path.extension().is_some_and(|e| e == "json");
+        let Answer { text, json } = match is_model {
+            true => inspect_model::describe(path, &artifact::read(path)?)?,
+            false => inspect_recording::describe(&reader.read(path)?, robot)?,
+        };
         texts.push(text);
         files.push(json);
     }
     Ok(Answer {
         text: texts.join("\n"),
-        json: json!({ "command": "inspect", "files": files }),
+        json: json!({ "files": files }),
     })
 }
 
@@ -39,11 +41,10 @@ fn guessed(arguments: &InspectArguments, robot: &Robot) -> Result<Answer, Error>
     let [log] = &arguments.files[..] else {
         return Err(Error::OneLog(arguments.files.len()));
     };
-    let overwrite = Overwrite::when_forced(arguments.force);
     Inputs::default()
         .and([log])
         .and_robot(Some(&arguments.robot))
-        .check_output(arguments.output.as_deref(), Format::Toml, overwrite)?;
+        .check_output(arguments.output.as_deref(), Format::TOML, arguments.force)?;
     let guess = guess(log, robot)?;
     let outcome = match &guess.outcome {
         Ok(samples) => format!("read by this map, the log has {samples} samples"),
@@ -52,29 +53,18 @@ fn guessed(arguments: &InspectArguments, robot: &Robot) -> Result<Answer, Error>
     let mut text = guess.text.clone();
     match &arguments.output {
         Some(path) => {
-            write_file(path, guess.text.as_bytes(), overwrite)?;
+            write_file(path, guess.text.as_bytes(), arguments.force)?;
             text = format!("{}: a first map; {outcome}\n", path.display());
         }
         None => note(&outcome),
     }
-    Ok(Answer {
-        text,
-        json: json!({
-            "command": "inspect",
-            "file": log.display().to_string(),
-            "map": guess.text,
-            "missing": guess.missing,
-            "samples": guess.outcome.as_ref().ok(),
-            "refused": guess.outcome.as_ref().err(),
-            "output": arguments.output.as_ref().map(|path| path.display().to_string()),
-        }),
-    })
-}
-
-fn inspect(path: &Path, robot: &Robot, reader: &Reader) -> Result<Answer, Error> {
-    if artifact::is_standard_input(path) || path.extension().is_some_and(|e| e == "json") {
-        inspect_model::describe(path, &artifact::read(path)?)
-    } else {
-        inspect_recording::describe(&reader.read(path)?, robot)
-    }
+    let json = json!({
+        "file": log.display().to_string(),
+        "map": guess.text,
+        "missing": guess.missing,
+        "samples": guess.outcome.as_ref().ok(),
+        "refused": guess.outcome.as_ref().err(),
+        "output": arguments.output.as_ref().map(|path| path.display().to_string()),
+    });
+    Ok(Answer { text, json })
 }

@@ -81,28 +81,26 @@ pub fn describe(path: &Path, model: &ReducedModel) -> Result<Answer, Error> {
         let table = invariance_table(invariance);
         let _ = write!(text, "\n{}\n\n{table}", table.caption());
     }
-    Ok(Answer {
-        text,
-        json: json!({
-            "kind": "model",
-            "file": file,
-            "name": model.name(),
-            "description": model.description(),
-            "digest": artifact::digest(model).to_string(),
-            "latent_dim": model.latent_dim(),
-            "library_dim": model.library().len(),
-            "library": model.library().terms().iter().map(|term| term.text()).collect::<Vec<_>>(),
-            "phases": phases.collect::<Vec<_>>(),
-            "exact": equations.steps(),
-            "dominant_coordinates": dominant,
-            "encoder": model.encoder_map().ok().map(StateMap::summary),
-            "decoder": model.decoder_map().ok().map(StateMap::summary),
-            "actuators": model.actuators(),
-            "wrench_frame": model.wrench_frame(),
-            "invariance": invariance,
-            "provenance": model.provenance(),
-        }),
-    })
+    let json = json!({
+        "kind": "model",
+        "file": file,
+        "name": model.name(),
+        "description": model.description(),
+        "digest": artifact::digest(model).to_string(),
+        "latent_dim": model.latent_dim(),
+        "library_dim": model.library().len(),
+        "library": model.library().terms().iter().map(|term| term.text()).collect::<Vec<_>>(),
+        "phases": phases.collect::<Vec<_>>(),
+        "exact": equations.steps(),
+        "dominant_coordinates": dominant,
+        "encoder": model.encoder_map().ok().map(StateMap::summary),
+        "decoder": model.decoder_map().ok().map(StateMap::summary),
+        "actuators": model.actuators(),
+        "wrench_frame": model.wrench_frame(),
+        "invariance": invariance,
+        "provenance": model.provenance(),
+    });
+    Ok(Answer { text, json })
 }
 
 /// What the inputs of a model over a robot are made of.

@@ -7,10 +7,11 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::Answer;
+use super::output::lines;
 use crate::Error;
 use crate::recording::check::{Finding, check};
-use crate::recording::mismatch::{Figures, Mismatch, mismatches};
-use crate::recording::{PhaseRule, PhaseSpan, Reading, ReadingNotes, Recording, Segment, Stance};
+use crate::recording::mismatch::{Figures, mismatches};
+use crate::recording::{PhaseRule, PhaseSpan, Reading, ReadingNotes, Recording, Segment};
 use crate::robot::{JOINT_DIM, Robot};
 use crate::typeset::words::counted;
 use crate::typeset::{Cell, Table, significant};
@@ -53,9 +54,7 @@ pub fn describe(reading: &Reading, robot: &Robot) -> Result<Answer, Error> {
         let names = recording.ignored_columns.join("`, `");
         let _ = writeln!(text, "  columns not read: `{names}`");
     }
-    for note in &notes {
-        let _ = writeln!(text, "  {note}");
-    }
+    text += &lines("  ", &notes);
     text.push_str("  # a front foot is down, = only rear feet are, blank: flight\n\n");
     let ranges = ranges(recording);
     let _ = writeln!(text, "{}", range_table(&ranges));
@@ -65,28 +64,24 @@ pub fn describe(reading: &Reading, robot: &Robot) -> Result<Answer, Error> {
     } else if !findings.is_empty() {
         text.push_str(&findings_text(&findings));
     }
-    for mismatch in &mismatches {
-        let _ = writeln!(text, "note: {mismatch}");
-    }
-    Ok(Answer {
-        text,
-        json: json!({
-            "kind": "recording",
-            "file": recording.path.display().to_string(),
-            "samples": recording.sample_count(),
-            "segments": segments,
-            "notes": notes,
-            "ranges": ranges,
-            "ignored_columns": recording.ignored_columns,
-            "figures": Figures::of(recording, robot),
-            "mismatches": mismatches.iter().map(mismatch_json).collect::<Vec<_>>(),
-            "implausible": findings.iter().map(|finding| {
-                let mut value = finding_json(finding);
-                value["segment"] = json!(finding.segment);
-                value
-            }).collect::<Vec<_>>(),
-        }),
-    })
+    text += &lines("note: ", &mismatches);
+    let json = json!({
+        "kind": "recording",
+        "file": recording.path.display().to_string(),
+        "samples": recording.sample_count(),
+        "segments": segments,
+        "notes": notes,
+        "ranges": ranges,
+        "ignored_columns": recording.ignored_columns,
+        "figures": Figures::of(recording, robot),
+        "mismatches": mismatches,
+        "implausible": findings.iter().map(|finding| {
+            let mut value = finding_json(finding);
+            value["segment"] = json!(finding.segment);
+            value
+        }).collect::<Vec<_>>(),
+    });
+    Ok(Answer { text, json })
 }
 
 /// Feet on the ground over time, one character per slice of equal duration.
@@ -106,11 +101,7 @@ fn segment_json(segment: &Segment, spans: &[PhaseSpan], rule: &PhaseRule) -> Val
         .map(|span| {
             json!({
                 "phase": names[span.phase],
-                "stance": match span.kind {
-                    Stance::Launch => "launch",
-                    Stance::Flight => "flight",
-                    Stance::Landing => "landing",
-                },
+                "stance": span.kind,
                 "samples": span.range.len(),
                 "start_s": segment.time_s[span.range.start],
             })
@@ -174,24 +165,12 @@ fn range_table(ranges: &[Range]) -> Table {
 
 fn findings_text(findings: &[Finding]) -> String {
     let mut text = format!("{} implausible runs of samples\n", findings.len());
-    for finding in findings.iter().take(FINDINGS_SHOWN) {
-        let _ = writeln!(text, "  {finding}");
-    }
+    text += &lines("  ", findings.iter().take(FINDINGS_SHOWN));
     if findings.len() > FINDINGS_SHOWN {
         let more = findings.len() - FINDINGS_SHOWN;
         let _ = writeln!(text, "  and {more} more, all of them with --json");
     }
     text
-}
-
-/// A mismatch without its recording.
-pub(super) fn mismatch_json(mismatch: &Mismatch) -> Value {
-    json!({
-        "what": mismatch.kind,
-        "value": mismatch.value,
-        "bound": mismatch.bound,
-        "words": mismatch.words,
-    })
 }
 
 /// A finding without the place of its recording.

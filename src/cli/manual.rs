@@ -9,7 +9,7 @@ use super::Answer;
 use super::args::{Arguments, CompletionsArguments, ManualArguments};
 use super::output::names;
 use crate::Error;
-use crate::files::{EmittedFile, Overwrite, write_files};
+use crate::files::{EmittedFile, write_files};
 
 /// Writes `romc.1` and `romc-COMMAND.1` for each command.
 pub fn pages(arguments: &ManualArguments) -> Result<Answer, Error> {
@@ -23,12 +23,11 @@ pub fn pages(arguments: &ManualArguments) -> Result<Answer, Error> {
         let name = format!("romc-{}", command.get_name());
         files.push(file(&arguments.out_dir, &name, command.clone())?);
     }
-    let overwrite = Overwrite::when_forced(arguments.force);
-    let written = write_files(&arguments.out_dir, &files, overwrite)?;
+    let written = write_files(&arguments.out_dir, &files, arguments.force)?;
     let paths = names(&written);
     Ok(Answer {
         text: format!("{}\n", paths.join("\n")),
-        json: json!({ "command": "manual", "files": paths }),
+        json: json!({ "files": paths }),
     })
 }
 
@@ -59,7 +58,6 @@ pub fn completions(arguments: &CompletionsArguments) -> Answer {
         String::from_utf8_lossy(&script).replace(&names, &format!("compgen -f -W \"{robots}\""));
     Answer {
         json: json!({
-            "command": "completions",
             "shell": arguments.shell.to_string(),
             "script": text,
         }),

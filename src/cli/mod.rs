@@ -34,17 +34,18 @@ use std::io::{self, Write};
 use std::process::ExitCode;
 
 use clap::Parser;
+use serde_json::json;
 
 use crate::Error;
 use args::{Arguments, Command};
-use output::{printable, printable_json};
+use output::{extend, printable, printable_json};
 
 /// The result of a command, for people and for programs.
 #[derive(Debug, Clone)]
 pub struct Answer {
     /// Human text, complete with its last newline.
     pub text: String,
-    /// The same as one JSON object.
+    /// The same as one JSON object; that of a command gets the command's name before these entries.
     pub json: serde_json::Value,
 }
 
@@ -99,25 +100,37 @@ const WRONG_USAGE: u8 = 2;
 /// Runs a command; the exit code of one that ran is 0, 1 for files that `check` finds different and for an `mpc` or
 /// `demo` whose controller or self-test fails, or 130 for a training that Ctrl-C cut short.
 fn execute(command: Command) -> Result<(Answer, u8), Error> {
-    let answer = match command {
-        Command::Check(arguments) => return check::run(&arguments),
-        Command::Demo(arguments) => return demo::run(&arguments),
-        Command::Inspect(arguments) => inspect::run(&arguments),
-        Command::Train(arguments) => return train::run(&arguments),
-        Command::Study(arguments) => study::run(&arguments),
-        Command::Convert(arguments) => convert::run(&arguments),
-        Command::Identify(arguments) => identify::run(&arguments),
-        Command::Import(arguments) => import::run(&arguments),
-        Command::Robot(arguments) => robot::run(&arguments),
-        Command::Compile(arguments) => compile::run(&arguments),
-        Command::Simulate(arguments) => simulate::run(&arguments),
-        Command::Mpc(arguments) => return mpc::run(&arguments),
-        Command::Plan(arguments) => plan::run(&arguments),
-        Command::Report(arguments) => report::run(&arguments),
-        Command::Manual(arguments) => manual::pages(&arguments),
-        Command::Completions(arguments) => Ok(manual::completions(&arguments)),
+    let done = |answer: Result<Answer, Error>| answer.map(|answer| (answer, DONE));
+    let (name, ran) = match command {
+        Command::Check(arguments) => ("check", check::run(&arguments)),
+        Command::Demo(arguments) => ("demo", demo::run(&arguments)),
+        Command::Inspect(arguments) => ("inspect", done(inspect::run(&arguments))),
+        Command::Train(arguments) => ("train", train::run(&arguments)),
+        Command::Study(arguments) => ("study", done(study::run(&arguments))),
+        Command::Convert(arguments) => ("convert", done(convert::run(&arguments))),
+        Command::Identify(arguments) => ("identify", done(identify::run(&arguments))),
+        Command::Import(arguments) => ("import", done(import::run(&arguments))),
+        Command::Robot(arguments) => ("robot", done(robot::run(&arguments))),
+        Command::Compile(arguments) => ("compile", done(compile::run(&arguments))),
+        Command::Simulate(arguments) => ("simulate", done(simulate::run(&arguments))),
+        Command::Mpc(arguments) => ("mpc", mpc::run(&arguments)),
+        Command::Plan(arguments) => ("plan", done(plan::run(&arguments))),
+        Command::Report(arguments) => ("report", done(report::run(&arguments))),
+        Command::Manual(arguments) => ("manual", done(manual::pages(&arguments))),
+        Command::Completions(arguments) => {
+            ("completions", Ok((manual::completions(&arguments), DONE)))
+        }
     };
-    answer.map(|answer| (answer, DONE))
+    let (
+        Answer {
+            text,
+            json: entries,
+        },
+        code,
+    ) = ran?;
+    let mut json = json!({ "command": name });
+    extend(&mut json, entries);
+    Ok((Answer { text, json }, code))
 }
 
 /// Prints to stdout; a reader that has gone away (`| head`) is no failure.
@@ -137,9 +150,8 @@ fn print(text: &str) -> u8 {
 /// Prints an error and its chain of causes to stderr.
 fn print_error(error: &Error) {
     eprintln!("error: {}", printable(&error.to_string()));
-    let mut source = std::error::Error::source(error);
-    while let Some(cause) = source {
+    let first = std::error::Error::source(error);
+    for cause in std::iter::successors(first, |cause| cause.source()) {
         eprintln!("  because: {}", printable(&cause.to_string()));
-        source = cause.source();
     }
 }

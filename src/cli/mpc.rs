@@ -6,10 +6,11 @@ use serde_json::{Value, json};
 
 use super::args::MpcArguments;
 use super::destination::{Format, Inputs};
-use super::output::{extend, note, progress_bar, read_recordings, show_progress, write_file};
+use super::output::{
+    extend, lines, note, numbered, progress_bar, read_recordings, show_progress, write_file,
+};
 use super::{Answer, DONE, FAILED};
 use crate::evaluate::{ReferenceInput, along_recording, control_metrics, remarks};
-use crate::files::Overwrite;
 use crate::model::ReducedModel;
 use crate::mpc::STEP_SLACK;
 use crate::mpc::{Controller, Lift, MpcSettings};
@@ -21,12 +22,11 @@ use crate::{Error, artifact};
 
 /// Runs the controller along each recording. The exit code is 1 if along one of them most steps have no plan.
 pub fn run(arguments: &MpcArguments) -> Result<(Answer, u8), Error> {
-    let overwrite = Overwrite::when_forced(arguments.force);
     let inputs = Inputs::default()
         .and([&arguments.model])
         .and(&arguments.recordings)
         .and(&arguments.reading.columns);
-    inputs.check_output(arguments.output.as_deref(), Format::Table, overwrite)?;
+    inputs.check_output(arguments.output.as_deref(), Format::TABLE, arguments.force)?;
     let model = artifact::read(&arguments.model)?;
     let settings = MpcSettings {
         horizon: arguments.horizon,
@@ -43,11 +43,11 @@ pub fn run(arguments: &MpcArguments) -> Result<(Answer, u8), Error> {
     let mut answer = answer(arguments, &runs, &failed, &remarks);
     if let Some(folder) = &arguments.figures {
         let figures = control_figures(&model, &settings, &runs);
-        inputs.write_figures(folder, &figures, overwrite, &mut answer)?;
+        inputs.write_figures(folder, &figures, arguments.force, &mut answer)?;
     }
     if let Some(path) = &arguments.output {
         let table = command_table(&model, &runs);
-        write_file(path, table.csv().as_bytes(), overwrite)?;
+        write_file(path, table.csv().as_bytes(), arguments.force)?;
     }
     Ok((answer, if failed.is_empty() { DONE } else { FAILED }))
 }
@@ -119,33 +119,25 @@ fn answer(
         control_table(runs),
         run_table(runs)
     );
-    for reason in failures(runs).iter().chain(failed) {
-        let _ = writeln!(text, "FAILED along {reason}");
-    }
-    for remark in remarks {
-        let _ = writeln!(text, "note: {remark}");
-    }
+    text += &lines("FAILED along ", failures(runs).iter().chain(failed));
+    text += &lines("note: ", remarks);
     let mut rows = runs.iter().flat_map(|(_, run)| &run.rows);
     if let Some(row) = rows.find(|row| row.status.has_plan()) {
         let torques = row.torque_nm.map(|torque| format!("{torque:.2}")).join(" ");
         let _ = writeln!(text, "first torque command (N m): {torques}");
     }
-    if let Some(path) = &arguments.output {
-        let _ = writeln!(text, "every step: {}", path.display());
-    }
-    Answer {
-        text,
-        json: json!({
-            "command": "mpc",
-            "model": arguments.model.display().to_string(),
-            "horizon": arguments.horizon,
-            "step_s": arguments.step,
-            "remarks": remarks,
-            "failed": failed,
-            "runs": runs.iter().map(run_json).collect::<Vec<_>>(),
-            "output": arguments.output.as_ref().map(|path| path.display().to_string()),
-        }),
-    }
+    let output = arguments.output.as_ref().map(|path| path.display());
+    text += &lines("every step: ", &output);
+    let json = json!({
+        "model": arguments.model.display().to_string(),
+        "horizon": arguments.horizon,
+        "step_s": arguments.step,
+        "remarks": remarks,
+        "failed": failed,
+        "runs": runs.iter().map(run_json).collect::<Vec<_>>(),
+        "output": output.map(|path| path.to_string()),
+    });
+    Answer { text, json }
 }
 
 /// One run: what the model is worth, and what happened.
@@ -178,10 +170,7 @@ pub fn run_json((path, run): &NamedRun) -> Value {
 
 /// One row per control step, for a CSV file.
 pub fn command_table(model: &ReducedModel, runs: &[NamedRun]) -> Table {
-    let latent = |name: &str| -> Vec<String> {
-        let indices = 1..=model.latent_dim();
-        indices.map(|index| format!("{name}_{index}")).collect()
-    };
+    let latent = |name| numbered(name, model.latent_dim());
     let inputs = match model.input() {
         Some(input) => input.names.clone(),
         None => Robot::input_names().to_vec(),

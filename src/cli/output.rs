@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -166,6 +167,12 @@ pub fn report_reading(notes: &ReadingNotes) {
     notes.lines().iter().for_each(|line| note(line));
 }
 
+/// Each of these on a line of its own, behind the same words.
+pub fn lines<T: Display>(words: &str, items: impl IntoIterator<Item = T>) -> String {
+    let lines = items.into_iter().map(|item| format!("{words}{item}\n"));
+    lines.collect()
+}
+
 /// Paths as JSON shows them.
 pub fn names(paths: &[PathBuf]) -> Vec<String> {
     let names = paths.iter().map(|path| path.display().to_string());
@@ -177,6 +184,12 @@ pub fn quoted(path: &Path) -> String {
     quoted_text(&path.display().to_string())
 }
 
+/// Paths as a shell takes them.
+pub fn quoted_all(paths: &[PathBuf]) -> String {
+    let words: Vec<String> = paths.iter().map(|path| quoted(path)).collect();
+    words.join(" ")
+}
+
 /// A word as a shell takes it.
 pub fn quoted_text(text: &str) -> String {
     let plain = |letter: char| letter.is_alphanumeric() || "-_./,=:+%".contains(letter);
@@ -185,6 +198,11 @@ pub fn quoted_text(text: &str) -> String {
     } else {
         format!("'{}'", text.replace('\'', r"'\''"))
     }
+}
+
+/// `name_1`, `name_2` and so on.
+pub fn numbered(name: &str, count: usize) -> impl Iterator<Item = String> {
+    (1..=count).map(move |index| format!("{name}_{index}"))
 }
 
 /// Adds the entries of one object to another.
@@ -202,19 +220,23 @@ pub fn named(given: Option<&str>, output: &Path) -> String {
 
 /// A spinner on stderr, shown only when stderr is a terminal.
 pub fn spinner(message: impl Into<String>) -> ProgressBar {
-    let style = ProgressStyle::with_template("{spinner} {msg} [{elapsed}]")
-        .expect("the spinner's template is a constant");
-    let bar = ProgressBar::new_spinner().with_style(style);
-    bar.set_message(message.into());
+    let bar = styled(
+        ProgressBar::new_spinner(),
+        "{spinner} {msg} [{elapsed}]",
+        message,
+    );
     bar.enable_steady_tick(Duration::from_millis(120));
     bar
 }
 
 /// A bar on stderr for a known number of steps, shown only when stderr is a terminal.
 pub fn progress_bar(message: impl Into<String>) -> ProgressBar {
-    let style = ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len}")
-        .expect("the bar's template is a constant");
-    let bar = ProgressBar::new(0).with_style(style);
+    styled(ProgressBar::new(0), "{msg} {wide_bar} {pos}/{len}", message)
+}
+
+fn styled(bar: ProgressBar, template: &str, message: impl Into<String>) -> ProgressBar {
+    let style = ProgressStyle::with_template(template).expect("templates are constants");
+    bar.set_style(style);
     bar.set_message(message.into());
     bar
 }

@@ -9,10 +9,10 @@ use super::args::PlanArguments;
 use super::convert::write_recording;
 use super::destination::{Format, Inputs};
 use super::output::{
-    extend, note_mismatches, progress_bar, read_settings, reader, show_progress, spinner, warn,
+    extend, lines, note_mismatches, progress_bar, read_settings, reader, show_progress, spinner,
+    warn,
 };
 use crate::files::Overwrite;
-use crate::model::ReducedModel;
 use crate::plan::{self, Goal, Plan, PlanSettings, Reach, Verdict};
 use crate::recording::Clocks;
 use crate::report::{plan_figures, plan_json, reach_figure};
@@ -22,13 +22,13 @@ use crate::{Error, artifact};
 
 /// Plans a jump and writes it unless it is not to be trusted and not forced, or maps what can be planned.
 pub fn run(arguments: &PlanArguments) -> Result<Answer, Error> {
-    let overwrite = Overwrite::when_forced(arguments.force);
     let inputs = Inputs::default()
         .and([&arguments.model])
         .and(&arguments.start)
         .and(&arguments.settings)
         .and(&arguments.reading.columns);
-    inputs.check_output(arguments.output.as_deref(), Format::Recording, overwrite)?;
+    let output = arguments.output.as_deref();
+    inputs.check_output(output, Format::RECORDING, arguments.force)?;
     let model = artifact::read(&arguments.model)?;
     let settings = match &arguments.settings {
         None => PlanSettings::default(),
@@ -36,11 +36,14 @@ pub fn run(arguments: &PlanArguments) -> Result<Answer, Error> {
     };
     let figures = arguments.figures.as_deref();
     if arguments.reach {
-        let reach = map(&model, &settings)?;
+        let bar = progress_bar("planning a grid of goals");
+        let progress = |done, total| show_progress(&bar, done, total);
+        let reach = plan::reach(&model, &settings, progress)?;
+        bar.finish_and_clear();
         let mut answer = reach_answer(arguments, &reach);
         let figure = reach_figure(&reach, model.jump_prior()?);
         if let Some(folder) = figures {
-            inputs.write_figures(folder, &[figure], overwrite, &mut answer)?;
+            inputs.write_figures(folder, &[figure], arguments.force, &mut answer)?;
         }
         return Ok(answer);
     }
@@ -50,7 +53,7 @@ pub fn run(arguments: &PlanArguments) -> Result<Answer, Error> {
     bar.finish_and_clear();
     let planned = planned?;
     match &planned.verdict {
-        Verdict::Refused(reasons) if !arguments.force => {
+        Verdict::Refused(reasons) if arguments.force == Overwrite::Refuse => {
             return Err(Error::Distrusted(reasons.join("; ")));
         }
         Verdict::Refused(reasons) | Verdict::Extrapolates(reasons) => {
@@ -62,9 +65,9 @@ pub fn run(arguments: &PlanArguments) -> Result<Answer, Error> {
     // Figures first: a folder that is refused leaves no plan behind.
     if let Some(folder) = figures {
         let drawn = plan_figures(&planned, model.robot()?);
-        inputs.write_figures(folder, &drawn, overwrite, &mut answer)?;
+        inputs.write_figures(folder, &drawn, arguments.force, &mut answer)?;
     }
-    if let Some(path) = &arguments.output {
+    if let Some(path) = output {
         write_recording(path, vec![planned.motion.clone()], None)?;
         let _ = writeln!(answer.text, "\nthe plan: {}", path.display());
     }
@@ -122,26 +125,13 @@ fn answer(arguments: &PlanArguments, planned: &Plan) -> Answer {
         planned.programs,
         planned.solve_ms,
     );
-    for reason in planned.verdict.reasons() {
-        let _ = writeln!(text, "{}: {reason}", planned.verdict.word());
-    }
-    let mut json = json!({
-        "command": "plan",
-        "model": arguments.model.display().to_string(),
-    });
+    let word = format!("{}: ", planned.verdict.word());
+    text += &lines(&word, planned.verdict.reasons());
+    let mut json = json!({ "model": arguments.model.display().to_string() });
     extend(&mut json, plan_json(planned));
     let output = arguments.output.as_ref();
     json["output"] = json!(output.map(|path| path.display().to_string()));
     Answer { text, json }
-}
-
-fn map(model: &ReducedModel, settings: &PlanSettings) -> Result<Reach, Error> {
-    let bar = progress_bar("planning a grid of goals");
-    let reach = plan::reach(model, settings, |done, total| {
-        show_progress(&bar, done, total);
-    })?;
-    bar.finish_and_clear();
-    Ok(reach)
 }
 
 fn reach_answer(arguments: &PlanArguments, reach: &Reach) -> Answer {
@@ -175,7 +165,6 @@ fn reach_answer(arguments: &PlanArguments, reach: &Reach) -> Answer {
             arguments.model.display()
         ),
         json: json!({
-            "command": "plan",
             "model": arguments.model.display().to_string(),
             "reach": points.collect::<Vec<_>>(),
             "solve_ms": {

@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 use super::args::{ReadingArguments, TrainArguments, TrainSettings};
-use super::inspect_recording::{finding_json, mismatch_json};
+use super::inspect_recording::finding_json;
 use super::output::{note, reader, report_reading};
 use super::train_settings;
 use crate::Error;
@@ -93,13 +93,20 @@ impl RecordedSets {
         }
     }
 
-    /// Which jumps came into which set, file and first row of each, if they were divided.
-    pub fn json(&self) -> Option<Value> {
-        let place =
-            |(path, _, row): &Place| json!({ "file": path.display().to_string(), "row": row });
-        let sets = SETS.into_iter().zip(self.divided.as_ref()?);
-        let sets = sets.map(|(name, set)| (name.to_owned(), set.iter().map(place).collect()));
-        Some(Value::Object(sets.collect()))
+    /// Which jumps came into which set, file and first row of each, if they were divided: in words and as JSON.
+    pub fn division(&self) -> Option<(String, Value)> {
+        let (mut text, mut json) = (String::new(), Map::new());
+        for (name, places) in SETS.into_iter().zip(self.divided.as_ref()?) {
+            let places = || (places.iter()).map(|(path, _, row)| (path.display().to_string(), row));
+            let jumps: Vec<String> = places()
+                .map(|(file, row)| format!("{file} (row {row})"))
+                .collect();
+            let count = counted(jumps.len(), "jump");
+            text += &format!("{name}, {count}: {}\n", jumps.join(", "));
+            let place = |(file, row)| json!({ "file": file, "row": row });
+            json.insert(name.to_owned(), places().map(place).collect());
+        }
+        Some((text, Value::Object(json)))
     }
 
     /// The sets that the jumps of a file came into, if they were divided.
@@ -113,30 +120,14 @@ impl RecordedSets {
     /// The files of each set, those with jumps in several in the first.
     pub fn files(&self) -> [(&'static str, Vec<&Path>); 3] {
         let mut seen: Vec<&Path> = Vec::new();
-        let mut of_set = |set: usize| {
-            let files = self.sets[set]
-                .files()
-                .iter()
-                .map(|file| file.path.as_path());
+        std::array::from_fn(|set| {
+            let files = self.sets[set].files().iter();
+            let files = files.map(|file| file.path.as_path());
             let new = files.filter(|path| self.divided.is_none() || !seen.contains(path));
             let new: Vec<&Path> = new.collect();
             seen.extend(&new);
             (SETS[set], new)
-        };
-        [of_set(0), of_set(1), of_set(2)]
-    }
-
-    /// The jumps of each set in words, if they were divided.
-    pub fn text(&self) -> Option<String> {
-        let sets = SETS.into_iter().zip(self.divided.as_ref()?);
-        let lines = sets.map(|(name, places)| {
-            let jumps = places
-                .iter()
-                .map(|(path, _, row)| format!("{} (row {row})", path.display()));
-            let jumps = jumps.collect::<Vec<_>>().join(", ");
-            format!("{name}, {}: {jumps}\n", counted(places.len(), "jump"))
-        });
-        Some(lines.collect())
+        })
     }
 
     /// The notes of all sets together, as far as files were read.
@@ -154,17 +145,12 @@ impl RecordedSets {
     /// Reports on stderr which files have implausible samples, and what became of them.
     pub fn report_findings(&self) {
         report_reading(&self.sets[0].notes().reading);
-        let Notes {
-            findings,
-            mismatches,
-            left_out,
-            ..
-        } = self.notes();
-        for (file, mismatch) in &mismatches {
+        let notes = self.notes();
+        for (file, mismatch) in &notes.mismatches {
             note(&format!("{}: {mismatch}", file.display()));
         }
         let (findings, singular): (Vec<_>, Vec<_>) =
-            (findings.into_iter()).partition(|(_, finding)| finding.kind.can_be_left_out());
+            (notes.findings.into_iter()).partition(|(_, finding)| finding.kind.can_be_left_out());
         report_singular(&singular);
         let mut files: Vec<(&Path, usize, &Finding)> = Vec::new();
         for (file, finding) in &findings {
@@ -180,8 +166,8 @@ impl RecordedSets {
             ));
         }
         match self.options.implausible {
-            ImplausibleSamples::LeaveOut if left_out > 0 => {
-                note(&format!("{left_out} samples are left out"));
+            ImplausibleSamples::LeaveOut if notes.left_out > 0 => {
+                note(&format!("{} samples are left out", notes.left_out));
             }
             ImplausibleSamples::Keep if !findings.is_empty() => note(
                 "they are used; `romc inspect` lists them, --leave-out-implausible leaves them out",
@@ -192,26 +178,19 @@ impl RecordedSets {
 
     /// Every finding with its place, and how many samples were left out.
     pub fn findings_json(&self) -> Value {
-        let Notes {
-            findings,
-            mismatches,
-            left_out,
-            ..
-        } = self.notes();
+        let notes = self.notes();
         let of_file = |file: &Path, mut value: Value| {
             value["file"] = json!(file.display().to_string());
             value
         };
-        let findings = findings
-            .iter()
-            .map(|(file, found)| of_file(file, finding_json(found)));
-        let mismatches = mismatches
-            .iter()
-            .map(|(file, found)| of_file(file, mismatch_json(found)));
+        let findings = notes.findings.iter();
+        let findings = findings.map(|(file, found)| of_file(file, finding_json(found)));
+        let unlike = notes.mismatches.iter();
+        let unlike = unlike.map(|(file, found)| of_file(file, json!(found)));
         json!({
             "implausible": findings.collect::<Vec<_>>(),
-            "mismatches": mismatches.collect::<Vec<_>>(),
-            "left_out": left_out,
+            "mismatches": unlike.collect::<Vec<_>>(),
+            "left_out": notes.left_out,
         })
     }
 }

@@ -9,10 +9,12 @@ use super::Answer;
 use super::args::ReportArguments;
 use super::destination::{Format, Inputs};
 use super::mpc::run_with_both_lifts;
-use super::output::{names, note_mismatches, quoted, read_recordings, spinner, write_file};
+use super::output::{
+    lines, names, note_mismatches, quoted, quoted_all, read_recordings, spinner, write_file,
+};
 use super::simplification;
 use crate::evaluate::{Assessment, LAMBDA};
-use crate::files::{EmittedFile, Overwrite};
+use crate::files::EmittedFile;
 use crate::model::ReducedModel;
 use crate::recording::Recording;
 use crate::report::figures::figure_files;
@@ -26,13 +28,12 @@ use crate::{Error, artifact};
 
 /// Writes the page, and the figures if a folder for them is given.
 pub fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
-    let overwrite = Overwrite::when_forced(arguments.force);
     let inputs = Inputs::default()
         .and([&arguments.model])
         .and(&arguments.recordings)
         .and(&arguments.plan)
         .and(&arguments.reading.columns);
-    inputs.check_output(Some(&arguments.output), Format::Page, overwrite)?;
+    inputs.check_output(Some(&arguments.output), Format::PAGE, arguments.force)?;
     let model = artifact::read(&arguments.model)?;
     let recordings = read_recordings(&arguments.recordings, &arguments.reading)?;
     let study = match &arguments.study {
@@ -51,10 +52,10 @@ pub fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
     let made = make(&model, &recordings, beside, arguments)?;
     // The figures come first: files that romc did not make are refused with nothing written.
     let written = match &arguments.figures {
-        Some(folder) => inputs.write_folder(folder, &made.files, overwrite)?,
+        Some(folder) => inputs.write_folder(folder, &made.files, arguments.force)?,
         None => Vec::new(),
     };
-    write_file(&arguments.output, made.page.as_bytes(), overwrite)?;
+    write_file(&arguments.output, made.page.as_bytes(), arguments.force)?;
     let mut text = format!(
         "{}\n{}\n\n{}: {} kB, {} figures\n",
         made.verdict.headline,
@@ -63,9 +64,7 @@ pub fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
         made.page.len() / 1000,
         made.n_figures
     );
-    for remark in &made.remarks {
-        let _ = writeln!(text, "note: {remark}");
-    }
+    text += &lines("note: ", &made.remarks);
     if let Some(folder) = &arguments.figures {
         let (folder, files) = (folder.display(), written.len());
         let _ = writeln!(
@@ -73,19 +72,16 @@ pub fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
             "{folder}: {files} files, each figure as .svg, .pdf and .csv"
         );
     }
-    Ok(Answer {
-        text,
-        json: json!({
-            "command": "report",
-            "model": arguments.model.display().to_string(),
-            "output": arguments.output.display().to_string(),
-            "bytes": made.page.len(),
-            "verdict": made.verdict.headline,
-            "reasons": made.verdict.sentences,
-            "figures": names(&written),
-            "remarks": made.remarks,
-        }),
-    })
+    let json = json!({
+        "model": arguments.model.display().to_string(),
+        "output": arguments.output.display().to_string(),
+        "bytes": made.page.len(),
+        "verdict": made.verdict.headline,
+        "reasons": made.verdict.sentences,
+        "figures": names(&written),
+        "remarks": made.remarks,
+    });
+    Ok(Answer { text, json })
 }
 
 /// A report in memory.
@@ -144,16 +140,17 @@ pub fn page_of(
     commands: Vec<String>,
 ) -> Result<Made, Error> {
     let figures = all_figures(content)?;
-    let ladder = simplification::ladder(content.model, content.assessment, tolerance)?;
+    let [ladder, equations, changes] =
+        simplification::ladder(content.model, content.assessment, tolerance)?;
     let errors = format!("Errors of each ddz within {tolerance}, scaled units per s²");
-    let changes = format!("Every change within {tolerance}, with its bound");
+    let bounds = format!("Every change within {tolerance}, with its bound");
     let options = PageOptions {
         commands,
         simplification: vec![
-            ladder.tolerances.captioned(LADDER_CAPTION),
-            ladder.equations.captioned(errors),
+            ladder.captioned(LADDER_CAPTION),
+            equations.captioned(errors),
         ],
-        changes: ladder.changes.captioned(changes),
+        changes: changes.captioned(bounds),
     };
     let verdict = verdict(content)?;
     Ok(Made {
@@ -169,17 +166,14 @@ const LADDER_CAPTION: &str = "Size of the equations within each tolerance: activ
 
 /// The commands that reproduce the page.
 fn commands(arguments: &ReportArguments, has_control: bool) -> Vec<String> {
-    let recordings: Vec<String> = arguments.recordings.iter().map(|p| quoted(p)).collect();
-    let (model, recordings) = (quoted(&arguments.model), recordings.join(" "));
+    let (model, recordings) = (quoted(&arguments.model), quoted_all(&arguments.recordings));
     let every = arguments.restart_every;
     let flag = |name: &str, path: &Option<PathBuf>| -> String {
         let flag = |path: &PathBuf| format!(" --{name} {}", quoted(path));
         path.iter().map(flag).collect()
     };
-    let (study, plan) = (
-        flag("study", &arguments.study),
-        flag("plan", &arguments.plan),
-    );
+    let study = flag("study", &arguments.study);
+    let plan = flag("plan", &arguments.plan);
     let tolerance = arguments.tolerance;
     let mut commands = vec![
         format!(

@@ -10,7 +10,6 @@ use super::args::RobotArguments;
 use super::destination::{Format, Inputs};
 use super::output::{note, write_file};
 use crate::Error;
-use crate::files::Overwrite;
 use crate::robot::{JOINT_NAMES, Leg, Robot};
 use crate::robot_file::{self, RobotEntry};
 use crate::typeset::Table;
@@ -31,39 +30,29 @@ pub fn chosen(name_or_file: &str) -> Result<&'static Robot, Error> {
 
 /// Shows a robot, and writes its TOML.
 pub fn run(arguments: &RobotArguments) -> Result<Answer, Error> {
-    let overwrite = Overwrite::when_forced(arguments.force);
     Inputs::default()
         .and_robot(Some(&arguments.robot))
-        .check_output(arguments.output.as_deref(), Format::Toml, overwrite)?;
+        .check_output(arguments.output.as_deref(), Format::TOML, arguments.force)?;
     let robot = match arguments.feet.as_slice() {
         [] => robot_file::find(&arguments.robot)?,
         feet => robot_file::read(Path::new(&arguments.robot), feet)?,
     };
     let mut text = format!("{}: {} kg\n\n", robot.name(), number(robot.mass_kg()));
-    let joints: Vec<usize> = (0..JOINT_NAMES.len()).collect();
     let geometry = |joint: usize| robot.geometry(Leg::ALL[joint / 3]).chain();
-    let table = Table::of(&joints)
-        .column("romc", "", |&&joint| JOINT_NAMES[joint])
-        .column("joint", "", |&&joint| robot.joint_names()[joint])
-        .column("at", "m", |&&joint| match joint % 3 {
-            0 => vector(robot.hip_position(Leg::ALL[joint / 3]).into()),
-            _ => vector(geometry(joint).links[joint % 3 - 1]),
+    let limits = robot.joint_limit_rad();
+    let (torques, speeds) = (robot.torque_limit_nm(), robot.joint_speed_limit_rad_s());
+    let table = Table::of(0..JOINT_NAMES.len())
+        .column("romc", "", |&i| JOINT_NAMES[i])
+        .column("joint", "", |&i| robot.joint_names()[i])
+        .column("at", "m", |&i| match i % 3 {
+            0 => vector(robot.hip_position(Leg::ALL[i / 3]).into()),
+            _ => vector(geometry(i).links[i % 3 - 1]),
         })
-        .column("axis", "", |&&joint| {
-            vector(geometry(joint).axes[joint % 3])
-        })
-        .column("lowest", "rad", |&&joint| {
-            number(robot.joint_limit_rad()[joint].0)
-        })
-        .column("highest", "rad", |&&joint| {
-            number(robot.joint_limit_rad()[joint].1)
-        })
-        .column("torque", "N m", |&&joint| {
-            number(robot.torque_limit_nm()[joint])
-        })
-        .column("speed", "rad/s", |&&joint| {
-            number(robot.joint_speed_limit_rad_s()[joint])
-        })
+        .column("axis", "", |&i| vector(geometry(i).axes[i % 3]))
+        .column("lowest", "rad", |&i| number(limits[i].0))
+        .column("highest", "rad", |&i| number(limits[i].1))
+        .column("torque", "N m", |&i| number(torques[i]))
+        .column("speed", "rad/s", |&i| number(speeds[i]))
         .table();
     let _ = writeln!(text, "{table}");
     for leg in Leg::ALL {
@@ -71,17 +60,14 @@ pub fn run(arguments: &RobotArguments) -> Result<Answer, Error> {
         let _ = writeln!(text, "foot {leg}: {foot} m from its last joint");
     }
     if let Some(path) = &arguments.output {
-        write_file(path, robot_file::to_toml(robot).as_bytes(), overwrite)?;
+        write_file(path, robot_file::to_toml(robot).as_bytes(), arguments.force)?;
         let _ = writeln!(text, "\n{}: the robot", path.display());
     }
-    Ok(Answer {
-        text,
-        json: json!({
-            "command": "robot",
-            "robot": RobotEntry::of(robot),
-            "output": arguments.output.as_ref().map(|path| path.display().to_string()),
-        }),
-    })
+    let json = json!({
+        "robot": RobotEntry::of(robot),
+        "output": arguments.output.as_ref().map(|path| path.display().to_string()),
+    });
+    Ok(Answer { text, json })
 }
 
 fn vector(vector: [f64; 3]) -> String {

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
-use super::args::{ReadingArguments, SimplifyArguments};
-use super::output::{names, read_recordings, read_text, spinner};
+use super::args::SimplifyArguments;
+use super::output::{lines, names, read_recordings, read_text, spinner};
 use crate::equations::Equations;
 use crate::evaluate::Assessment;
 use crate::files::EmittedFile;
@@ -22,63 +22,57 @@ use crate::typeset::{Cell, Rounding, Table, significant};
 use crate::{Error, artifact};
 
 /// Time between restarts of the short rollouts, as in the paper's second test.
-const RESTART_S: f64 = 0.1;
+pub const RESTART_S: f64 = 0.1;
 
 /// A domain with the samples that it was made from.
-pub struct Basis {
+struct Basis {
     domain: Domain,
     samples: Option<Samples>,
     recordings: Vec<Recording>,
     latent: Vec<LatentSegment>,
+    /// `None` if the ranges were given.
+    margin: Option<f64>,
 }
 
 impl Basis {
-    /// The domain that `files` give: one TOML file of ranges, or recordings.
-    pub fn read(
-        model: &ReducedModel,
-        files: &[PathBuf],
-        margin: Option<f64>,
-        reading: &ReadingArguments,
-    ) -> Result<Self, Error> {
+    /// The domain that the files of the arguments give: one TOML file of ranges, or the box around all samples of
+    /// recordings.
+    fn read(model: &ReducedModel, arguments: &SimplifyArguments) -> Result<Self, Error> {
+        let files = &arguments.domain;
         let is_table = |path: &&PathBuf| path.extension().is_some_and(|end| end == "toml");
-        match files.iter().find(is_table) {
-            None => {
-                let recordings = read_recordings(files, reading)?;
-                Self::of(model, recordings, margin.unwrap_or(MARGIN))
+        if let Some(path) = files.iter().find(is_table) {
+            if files.len() > 1 {
+                let message = "one .toml file of ranges, or recordings, but not both".to_owned();
+                let path = path.clone();
+                return Err(SimplifyError::DomainFile { path, message }.into());
             }
-            Some(path) if files.len() > 1 => Err(SimplifyError::DomainFile {
-                path: path.clone(),
-                message: "one .toml file of ranges, or recordings, but not both".to_owned(),
+            if arguments.margin.is_some() {
+                return Err(SimplifyError::Margin.into());
             }
-            .into()),
-            Some(_) if margin.is_some() => Err(SimplifyError::Margin.into()),
-            Some(path) => Ok(Self {
+            return Ok(Self {
                 domain: Domain::from_toml(model, path, &read_text(path)?)?,
                 samples: None,
                 recordings: Vec::new(),
                 latent: Vec::new(),
-            }),
+                margin: None,
+            });
         }
-    }
-
-    /// The box around all samples of `recordings`.
-    fn of(model: &ReducedModel, recordings: Vec<Recording>, margin: f64) -> Result<Self, Error> {
+        let recordings = read_recordings(files, &arguments.reading)?;
         if model.encoder_map().is_err() {
-            return Err(SimplifyError::NoEncoder {
-                model: model.name().to_owned(),
-            }
-            .into());
+            let model = model.name().to_owned();
+            return Err(SimplifyError::NoEncoder { model }.into());
         }
-        let latent = (recordings.iter())
-            .flat_map(|recording| &recording.segments)
-            .map(|segment| LatentSegment::encode(model, segment))
-            .collect::<Result<Vec<_>, _>>()?;
+        let segments = recordings.iter().flat_map(|recording| &recording.segments);
+        let latent = segments.map(|segment| LatentSegment::encode(model, segment));
+        let latent = latent.collect::<Result<Vec<_>, _>>()?;
         let samples = Samples::of(model, &latent.iter().collect::<Vec<_>>());
+        let margin = arguments.margin.unwrap_or(MARGIN);
         Ok(Self {
             domain: Domain::around(model, &samples, margin)?,
             samples: Some(samples),
             recordings,
             latent,
+            margin: Some(margin),
         })
     }
 
@@ -111,8 +105,6 @@ pub struct Outcome {
     rollouts: Option<RolloutEffect>,
     basis: Basis,
     domain_files: Vec<String>,
-    /// `None` if the ranges were given.
-    margin: Option<f64>,
 }
 
 /// Simplifies a model as typed; nothing if no domain was given.
@@ -125,14 +117,12 @@ pub fn run(
         return Ok(None);
     }
     let progress = spinner("simplifying");
-    let (files, reading) = (&arguments.domain, &arguments.reading);
-    let basis = Basis::read(model, files, arguments.margin, reading)?;
+    let basis = Basis::read(model, arguments)?;
     let tolerance = arguments.tolerance.unwrap_or(Tolerance::Absolute(0.0));
     let simplified = simplify(equations, &basis.domain, basis.samples.as_ref(), tolerance)?;
     progress.set_message("rolling out");
     let rollouts = basis.rollouts(model, &simplified.model)?;
     progress.finish_and_clear();
-    let margin = (basis.samples.as_ref()).map(|_| arguments.margin.unwrap_or(MARGIN));
     let mut outcome = Outcome {
         model: simplified.model,
         original: model.clone(),
@@ -140,7 +130,6 @@ pub fn run(
         rollouts,
         basis,
         domain_files: names(&arguments.domain),
-        margin,
     };
     outcome.record_domain()?;
     Ok(Some(outcome))
@@ -154,7 +143,7 @@ impl Outcome {
             && self.certificate.n_changes() > 0
         {
             entry.insert("domain".to_owned(), json!(self.domain_files));
-            entry.insert("margin".to_owned(), json!(self.margin));
+            entry.insert("margin".to_owned(), json!(self.basis.margin));
             let builder = self.model.clone().into_builder();
             self.model = builder.provenance(provenance).build()?;
         }
@@ -170,13 +159,14 @@ impl Outcome {
         }
     }
 
-    /// The certificate as a file beside the emitted ones, its summary, and the same as JSON;
+    /// Adds the certificate to the emitted files, and a comment to each of them; its summary, and the same as JSON.
     /// `equations` are those of the model as they are printed, `rounding` is how.
-    pub fn files_and_summary(
+    pub fn add_to(
         &self,
+        files: &mut Vec<EmittedFile>,
         equations: &Equations<'_>,
         rounding: Rounding,
-    ) -> Result<(EmittedFile, String, Value), Error> {
+    ) -> Result<(String, Value), Error> {
         let basis = &self.basis;
         let printed = match rounding {
             Rounding::Exact => Vec::new(),
@@ -188,34 +178,35 @@ impl Outcome {
         let mut value = certificate_json(&self.certificate);
         value["file"] = json!(name);
         value["domain_files"] = json!(self.domain_files);
-        value["margin"] = json!(self.margin);
-        value["rollouts"] = json!(self.rollouts.as_ref().map(rollouts_json));
+        value["margin"] = json!(basis.margin);
+        value["rollouts"] = json!(rollouts.map(rollouts_json));
         value["printed"] = printed.iter().map(printed_json).collect();
-        Ok((EmittedFile::new(name, page), self.summary(), value))
+        if self.certificate.n_changes() > 0 {
+            self.comment(files, &name);
+        }
+        files.push(EmittedFile::new(name, page));
+        Ok((self.summary(), value))
     }
 
     /// Adds a comment to each file of equations or code that names the model it was simplified from.
-    pub fn comment(&self, files: &mut [EmittedFile]) {
-        if self.certificate.n_changes() == 0 {
-            return;
-        }
+    fn comment(&self, files: &mut [EmittedFile], certificate: &str) {
         let lines = [
             format!("Simplified within {}", self.certificate.tolerance.words()),
             format!(
-                "from the model with digest {}; {}-simplification.md bounds each change.",
-                artifact::digest(&self.original).short(),
-                self.model.identifier()
+                "from the model with digest {}; {certificate} bounds each change.",
+                artifact::digest(&self.original).short()
             ),
         ];
         for file in files {
             let Some([before, after]) = comment_marks(Path::new(&file.path)) else {
                 continue;
             };
-            let comment: String = (lines.iter())
-                .map(|line| format!("{before}{line}{after}\n"))
-                .collect();
+            let comment = lines
+                .each_ref()
+                .map(|line| format!("{before}{line}{after}\n"));
             let after_first_line = file.contents.find('\n').map_or(0, |end| end + 1);
-            file.contents.insert_str(after_first_line, &comment);
+            file.contents
+                .insert_str(after_first_line, &comment.concat());
         }
     }
 
@@ -251,12 +242,9 @@ fn comment_marks(path: &Path) -> Option<[&'static str; 2]> {
 
 /// What exact simplification did, one line for each step; nothing if it did nothing.
 pub fn exact_words(equations: &Equations<'_>) -> String {
-    let lines: String = (equations.steps().iter())
-        .map(|step| format!("  {step}\n"))
-        .collect();
-    match lines.as_str() {
-        "" => lines,
-        _ => format!("simplified exactly:\n{lines}\n"),
+    match equations.steps() {
+        [] => String::new(),
+        steps => format!("simplified exactly:\n{}\n", lines("  ", steps)),
     }
 }
 
@@ -272,23 +260,14 @@ fn printed_json(equation: &PrintedEquation) -> Value {
 /// Tolerances that a report compares.
 const LADDER: [f64; 4] = [0.001, 0.01, 0.05, 0.1];
 
-/// The tables of a report about simplification.
-pub struct Ladder {
-    /// One row per tolerance: size, error and rollouts of the simplified equations.
-    pub tolerances: Table,
-    /// Errors of each equation at the chosen tolerance.
-    pub equations: Table,
-    /// Every change at the chosen tolerance.
-    pub changes: Table,
-}
-
-/// Simplifies a model within several tolerances over the recordings of an assessment, and lists the
-/// changes within `chosen`.
+/// Simplifies a model within several tolerances over the recordings of an assessment: a table with a row per tolerance
+/// (size, error and rollouts of the simplified equations), one of the errors of each equation within `chosen`, and one
+/// of every change within it.
 pub fn ladder(
     model: &ReducedModel,
     assessment: &Assessment<'_>,
     chosen: Tolerance,
-) -> Result<Ladder, Error> {
+) -> Result<[Table; 3], Error> {
     let latent: Vec<&LatentSegment> = assessment.runs.iter().map(|run| &run.latent).collect();
     let samples = Samples::of(model, &latent);
     let domain = Domain::around(model, &samples, MARGIN)?;
@@ -316,11 +295,11 @@ pub fn ladder(
         steps.push((tolerance.to_string(), made.certificate, body));
     }
     let certificate = simplify(equations, &domain, Some(&samples), chosen)?.certificate;
-    Ok(Ladder {
-        tolerances: ladder_table(&steps, assessment.restart_every_s),
-        equations: equation_table(&certificate),
-        changes: change_table(&certificate),
-    })
+    Ok([
+        ladder_table(&steps, assessment.restart_every_s),
+        equation_table(&certificate),
+        change_table(&certificate),
+    ])
 }
 
 /// A tolerance, its certificate, and root mean square errors of body x and z, whole and restarted.
@@ -334,21 +313,17 @@ fn ladder_table(steps: &[Step], restart_every_s: f64) -> Table {
     };
     Table::of(steps)
         .column("tolerance", "", |(name, ..)| name)
-        .column("terms", "", |(_, certificate, _)| certificate.terms().after)
-        .column("digits", "", |(_, certificate, _)| {
-            certificate.digits().after
+        .column("terms", "", |(_, made, _)| made.terms().after)
+        .column("digits", "", |(_, made, _)| made.digits().after)
+        .column("operations", "", |(_, made, _)| made.operations().after)
+        .column("certified error", "", |(_, made, _)| {
+            percent(made.largest_bound_share(), bound_words)
         })
-        .column("operations", "", |(_, certificate, _)| {
-            certificate.operations().after
+        .column("measured max", "", |(_, made, _)| {
+            percent(made.largest_measured_share(), significant)
         })
-        .column("certified error", "", |(_, certificate, _)| {
-            percent(certificate.largest_bound_share(), bound_words)
-        })
-        .column("measured max", "", |(_, certificate, _)| {
-            percent(certificate.largest_measured_share(), significant)
-        })
-        .column("measured rms", "", |(_, certificate, _)| {
-            percent(certificate.largest_rms_share(), significant)
+        .column("measured rms", "", |(_, made, _)| {
+            percent(made.largest_rms_share(), significant)
         })
         .column("body.x", "m", |(.., [x, _])| x[0])
         .column("body.z", "m", |(.., [_, z])| z[0])

@@ -8,26 +8,23 @@ use serde_json::json;
 use super::Answer;
 use super::args::SimulateArguments;
 use super::destination::{Format, Inputs};
-use super::output::{read_recordings, spinner, write_file};
-use crate::evaluate::{Assessment, SegmentRun};
-use crate::files::Overwrite;
+use super::output::{lines, numbered, read_recordings, spinner, write_file};
+use crate::evaluate::Assessment;
 use crate::model::ReducedModel;
 use crate::report::{
     assessment_json, baseline_table, coordinate_table, dynamics_table, phase_table,
 };
-use crate::robot::Robot;
 use crate::typeset::words::counted;
 use crate::typeset::{Table, significant};
 use crate::{Error, artifact};
 
 /// Rolls the model out over every segment of every recording.
 pub fn run(arguments: &SimulateArguments) -> Result<Answer, Error> {
-    let overwrite = Overwrite::when_forced(arguments.force);
     Inputs::default()
         .and([&arguments.model])
         .and(&arguments.recordings)
         .and(&arguments.reading.columns)
-        .check_output(arguments.output.as_deref(), Format::Table, overwrite)?;
+        .check_output(arguments.output.as_deref(), Format::TABLE, arguments.force)?;
     let model = artifact::read(&arguments.model)?;
     let recordings = read_recordings(&arguments.recordings, &arguments.reading)?;
     let progress = spinner("simulating");
@@ -41,19 +38,16 @@ pub fn run(arguments: &SimulateArguments) -> Result<Answer, Error> {
         metrics_text(&model, &assessment)
     );
     if let Some(path) = &arguments.output {
-        let table = trajectory_table(&model, &assessment.runs)?;
-        write_file(path, table.csv().as_bytes(), overwrite)?;
+        let table = trajectory_table(&model, &assessment)?;
+        write_file(path, table.csv().as_bytes(), arguments.force)?;
         let _ = writeln!(text, "trajectories: {}", path.display());
     }
-    Ok(Answer {
-        text,
-        json: json!({
-            "command": "simulate",
-            "model": arguments.model.display().to_string(),
-            "rollouts": assessment_json(&model, &assessment),
-            "output": arguments.output.as_ref().map(|path| path.display().to_string()),
-        }),
-    })
+    let json = json!({
+        "model": arguments.model.display().to_string(),
+        "rollouts": assessment_json(&model, &assessment),
+        "output": arguments.output.as_ref().map(|path| path.display().to_string()),
+    });
+    Ok(Answer { text, json })
 }
 
 /// All metrics of an assessment as text.
@@ -100,10 +94,7 @@ fn metrics_text(model: &ReducedModel, assessment: &Assessment<'_>) -> String {
         shown(lift.torque.r2_all()),
         shown(lift.inconsistency())
     );
-    for remark in &assessment.remarks {
-        let _ = writeln!(text, "\nnote: {remark}");
-    }
-    text
+    text + &lines("\nnote: ", &assessment.remarks)
 }
 
 /// One row per sample: time, phase, recorded and predicted latent state and coordinates.
@@ -111,9 +102,9 @@ fn metrics_text(model: &ReducedModel, assessment: &Assessment<'_>) -> String {
 /// Columns: `segment, time, phase`, then `z_i, z_i_full, z_i_restarted` for each latent coordinate, the same
 /// three of its velocity `dz_i`, the latent input `u_lat_i`, then the three of every robot coordinate
 /// in SI units. A prediction that diverged leaves its cell empty.
-fn trajectory_table(model: &ReducedModel, runs: &[SegmentRun<'_>]) -> Result<Table, Error> {
-    let mut table = Table::new(columns(model));
-    for (index, run) in runs.iter().enumerate() {
+fn trajectory_table(model: &ReducedModel, assessment: &Assessment<'_>) -> Result<Table, Error> {
+    let mut table = Table::new(columns(model.latent_dim(), &assessment.names));
+    for (index, run) in assessment.runs.iter().enumerate() {
         let [full, restarted] =
             [&run.full, &run.restarted].map(|rollout| rollout.states(run.latent.len()));
         for (sample, predictions) in full.iter().zip(&restarted).enumerate() {
@@ -140,24 +131,15 @@ fn trajectory_table(model: &ReducedModel, runs: &[SegmentRun<'_>]) -> Result<Tab
     Ok(table)
 }
 
-fn columns(model: &ReducedModel) -> Vec<String> {
+fn columns(latent_dim: usize, names: &[String]) -> Vec<String> {
     const KINDS: [&str; 3] = ["", "_full", "_restarted"];
-    let latent = |symbol: &str| -> Vec<String> {
-        let indices = 1..=model.latent_dim();
-        indices.map(|index| format!("{symbol}_{index}")).collect()
-    };
-    let thrice = |names: Vec<String>| {
-        let of = |name: String| KINDS.map(|kind| format!("{name}{kind}"));
-        names.into_iter().flat_map(of)
-    };
-    let names = model.state().map(|state| state.names.clone());
-    let names = names.unwrap_or_else(|| Robot::state_names().to_vec());
+    let thrice = |name: String| KINDS.map(|kind| format!("{name}{kind}"));
     let first = ["segment", "time", "phase"].map(str::to_owned).into_iter();
     first
-        .chain(thrice(latent("z")))
-        .chain(thrice(latent("dz")))
-        .chain(latent("u_lat"))
-        .chain(thrice(names))
+        .chain(numbered("z", latent_dim).flat_map(thrice))
+        .chain(numbered("dz", latent_dim).flat_map(thrice))
+        .chain(numbered("u_lat", latent_dim))
+        .chain(names.iter().cloned().flat_map(thrice))
         .collect()
 }
 

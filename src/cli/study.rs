@@ -11,12 +11,12 @@ use super::output::{refused, spinner};
 use super::prepared_recordings::{RecordedSets, read_all, reader_for};
 use super::train_settings;
 use crate::Error;
-use crate::files::{EmittedFile, Overwrite, check_folder};
+use crate::files::{EmittedFile, check_folder};
 use crate::recording::Recording;
 use crate::report::figures::figure_files;
 use crate::report::study_figures;
 use crate::study::{self, Plan, Shard, Spread, Store, Summary, cell_table};
-use crate::train::{Origin, TrainOptions};
+use crate::train::Origin;
 use crate::typeset::{Cell, Table, significant};
 
 /// The tables of a study.
@@ -24,8 +24,7 @@ const TABLES: [&str; 2] = ["cells.csv", "summary.csv"];
 
 /// Trains what is missing, or joins parts, and writes the tables of the study.
 pub fn run(arguments: &StudyArguments) -> Result<Answer, Error> {
-    let overwrite = Overwrite::when_forced(arguments.force);
-    check_folder(&arguments.out_dir, TABLES, overwrite)?;
+    check_folder(&arguments.out_dir, TABLES, arguments.force)?;
     let store = match arguments.merge.is_empty() {
         true => trained(arguments)?,
         false => merged(arguments)?,
@@ -43,7 +42,7 @@ pub fn run(arguments: &StudyArguments) -> Result<Answer, Error> {
         .and(&arguments.config)
         .and(&arguments.reading.columns)
         .and_robot(arguments.robot.as_deref())
-        .write_folder(&arguments.out_dir, &files, overwrite)?;
+        .write_folder(&arguments.out_dir, &files, arguments.force)?;
     Ok(answer(&arguments.out_dir, &store, &summary))
 }
 
@@ -79,18 +78,13 @@ fn trained(arguments: &StudyArguments) -> Result<Store, Error> {
     let store = Store::create(&arguments.out_dir, plan)?;
     let bar = spinner("training");
     let total = store.plan().cells().len();
-    let options = |d: usize| TrainOptions {
-        name: format!("d{d}"),
-        latent_dim: d,
-        ..base.clone()
-    };
     let finished = |_| {
         let left = store.missing().len();
         bar.set_message(format!("{} of {total} models trained", total - left));
     };
     let shard = arguments.shard.unwrap_or(Shard::WHOLE);
     let sets = [&training[..], &validation];
-    study::run(&store, shard, sets, robot, &options, &finished)?;
+    study::run(&store, shard, sets, robot, &base, &finished)?;
     bar.finish_and_clear();
     Ok(store)
 }
@@ -168,15 +162,12 @@ fn answer(folder: &Path, store: &Store, summary: &Summary) -> Answer {
     if !names.is_empty() {
         text += &format!("\nnot trained yet: {}\n", names.join("; "));
     }
-    Answer {
-        text,
-        json: json!({
-            "command": "study",
-            "folder": folder.display().to_string(),
-            "plan": store.plan(),
-            "summary": summary,
-            "least_combined_loss_at": best,
-            "missing": missing,
-        }),
-    }
+    let json = json!({
+        "folder": folder.display().to_string(),
+        "plan": store.plan(),
+        "summary": summary,
+        "least_combined_loss_at": best,
+        "missing": missing,
+    });
+    Answer { text, json }
 }

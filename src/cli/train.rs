@@ -1,7 +1,6 @@
 //! `romc train`: recordings in, a model file out.
 
 use std::fmt::Write as _;
-use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use serde_json::json;
@@ -9,10 +8,9 @@ use serde_json::json;
 use super::Answer;
 use super::args::{TrainArguments, TrainSettings};
 use super::destination::{Format, Inputs};
-use super::output::{named, note, note_repeated, quoted, spinner};
+use super::output::{named, note, note_repeated, quoted, quoted_all, spinner};
 use super::prepared_recordings::{RecordedSets, read_all};
 use super::train_settings;
-use crate::files::Overwrite;
 use crate::model::ReducedModel;
 use crate::recording::Source;
 use crate::robot::{BODY_X, BODY_Z};
@@ -24,7 +22,6 @@ use crate::{Error, artifact, train};
 
 /// Learns a model and writes it.
 pub fn run(arguments: &TrainArguments) -> Result<(Answer, u8), Error> {
-    let overwrite = Overwrite::when_forced(arguments.force);
     let settings = train_settings::effective(arguments)?;
     Inputs::default()
         .and(&arguments.recordings)
@@ -34,7 +31,7 @@ pub fn run(arguments: &TrainArguments) -> Result<(Answer, u8), Error> {
         .and(&arguments.reading.columns)
         .and_robot(settings.robot.as_deref())
         .and(&settings.actuators)
-        .check_output(Some(&arguments.output), Format::Model, overwrite)?;
+        .check_output(Some(&arguments.output), Format::MODEL, arguments.force)?;
     let latent_dim = settings
         .latent_dim
         .expect("checked by clap, or with the file");
@@ -82,7 +79,7 @@ pub fn run(arguments: &TrainArguments) -> Result<(Answer, u8), Error> {
             "interrupted: this is the best model so far; its provenance says so, its command does not repeat it",
         );
     }
-    artifact::write(&arguments.output, &trained.model, overwrite)?;
+    artifact::write(&arguments.output, &trained.model, arguments.force)?;
     let tested = match test.is_empty() {
         true => None,
         false => Some(train::assess(&trained.model, test)?),
@@ -93,7 +90,7 @@ pub fn run(arguments: &TrainArguments) -> Result<(Answer, u8), Error> {
     answer.json["notes"] = notes.into();
     answer.json["interrupted"] = is_interrupted.into();
     answer.json["recordings"] = recorded.findings_json();
-    if let (Some(text), Some(json)) = (recorded.text(), recorded.json()) {
+    if let Some((text, json)) = recorded.division() {
         answer.json["split"] = json;
         let _ = write!(answer.text, "\n{text}");
     }
@@ -159,13 +156,9 @@ fn command_line(
     method: Method,
     options: &TrainOptions,
 ) -> String {
-    let paths = |paths: &[PathBuf]| {
-        let paths: Vec<String> = paths.iter().map(|path| quoted(path)).collect();
-        paths.join(" ")
-    };
-    let mut line = format!("romc train {}", paths(&arguments.recordings));
+    let mut line = format!("romc train {}", quoted_all(&arguments.recordings));
     if !arguments.validation.is_empty() {
-        let _ = write!(line, " --validation {}", paths(&arguments.validation));
+        let _ = write!(line, " --validation {}", quoted_all(&arguments.validation));
     }
     if let Some(split) = arguments.split {
         let _ = write!(line, " --split {split}");
@@ -193,20 +186,15 @@ fn answer(arguments: &TrainArguments, trained: &Trained, tested: Option<&SetMetr
         metrics_table(report, tested),
         seed_table(report)
     );
-    Answer {
-        text,
-        json: json!({
-            "command": "train",
-            "model": arguments.output.display().to_string(),
-            "name": trained.model.name(),
-            "latent_dim": latent_dim,
-            "report": report,
-            "test": tested,
-        }),
-    }
+    let json = json!({
+        "model": arguments.output.display().to_string(),
+        "name": trained.model.name(),
+        "latent_dim": latent_dim,
+        "report": report,
+        "test": tested,
+    });
+    Answer { text, json }
 }
-
-const TORQUE_R2: &str = "torque R^2 of the plain lift, all samples";
 
 /// Every metric on each set of recordings.
 fn metrics_table(report: &TrainReport, tested: Option<&SetMetrics>) -> Table {
@@ -222,32 +210,23 @@ fn metrics_table(report: &TrainReport, tested: Option<&SetMetrics>) -> Table {
         let cells = (sets.iter()).map(|(_, set)| set.map(cell).unwrap_or_default());
         table.row([name.into(), unit.into()].into_iter().chain(cells));
     };
-    type Metric = (&'static str, &'static str, fn(&SetMetrics) -> Option<f64>);
-    let metrics: [Metric; 6] = [
-        ("decoder mean square", "scaled", |set| Some(set.decoder_mse)),
-        (TORQUE_R2, "", |set| Some(set.torque_r2)),
-        ("body x, fixed steps over 0.1 s", "m", |set| {
-            Some(set.prediction_x_m)
-        }),
-        ("body z, fixed steps over 0.1 s", "m", |set| {
-            Some(set.prediction_z_m)
-        }),
-        ("body x, fixed steps, whole jump", "m", |set| {
-            set.rollout_x_m
-        }),
-        ("body z, fixed steps, whole jump", "m", |set| {
-            set.rollout_z_m
-        }),
-    ];
-    for (name, unit, metric) in metrics {
-        row(name, unit, &metric);
-    }
+    row("decoder mean square", "scaled", &|m| Some(m.decoder_mse));
+    row("torque R^2 of the plain lift, all samples", "", &|m| {
+        Some(m.torque_r2)
+    });
+    let (short, whole) = ("fixed steps over 0.1 s", "fixed steps, whole jump");
+    row(&format!("body x, {short}"), "m", &|m| {
+        Some(m.prediction_x_m)
+    });
+    row(&format!("body z, {short}"), "m", &|m| {
+        Some(m.prediction_z_m)
+    });
+    row(&format!("body x, {whole}"), "m", &|m| m.rollout_x_m);
+    row(&format!("body z, {whole}"), "m", &|m| m.rollout_z_m);
     for (phase, terms) in report.active_terms.iter().enumerate() {
-        let name = format!(
-            "smoothed ddz R^2 in {} ({} terms)",
-            terms.phase, terms.active
-        );
-        row(&name, "", &|set| set.ddz_r2.get(phase).copied());
+        let (name, active) = (&terms.phase, terms.active);
+        let name = format!("smoothed ddz R^2 in {name} ({active} terms)");
+        row(&name, "", &|m| m.ddz_r2.get(phase).copied());
     }
     for score in &report.deviations {
         let name = format!("ddz R^2 of deviations in {}, jump left out", score.part);

@@ -61,11 +61,9 @@ impl Metrics {
 
     /// Whether all of them are numbers.
     pub fn is_finite(&self) -> bool {
-        let predictions = [self.prediction_x_m, self.prediction_z_m];
-        let mut values = predictions
-            .into_iter()
-            .chain([self.decoder_mse, self.torque_r2]);
-        values.all(f64::is_finite)
+        let [x, z] = [self.prediction_x_m, self.prediction_z_m];
+        let values = [x, z, self.decoder_mse, self.torque_r2];
+        values.into_iter().all(f64::is_finite)
     }
 
     /// `L_mod = 2 E_dec + 2 lambda ln |Xi|` (29), over the active coefficients of all phases; without any, the

@@ -103,8 +103,20 @@ impl Shard {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
+
+    pub(in crate::study) fn plan() -> Plan {
+        Plan {
+            latent_dims: vec![1, 2],
+            seeds: 2,
+            method: Method::ClosedForm,
+            settings: String::new(),
+            recordings: vec!["sha256:1".to_owned()],
+            training: 1,
+            romc: "0.1.0".to_owned(),
+        }
+    }
 
     #[test]
     fn shards_together_are_the_whole_and_share_nothing() {
@@ -119,15 +131,7 @@ mod tests {
     #[test]
     fn more_seeds_than_can_be_counted_are_refused_before_cells_are_made() {
         for seeds in [10_001, u32::MAX as usize, usize::MAX] {
-            let plan = Plan {
-                latent_dims: vec![1],
-                seeds,
-                method: Method::ClosedForm,
-                settings: String::new(),
-                recordings: Vec::new(),
-                training: 1,
-                romc: String::new(),
-            };
+            let plan = Plan { seeds, ..plan() };
             assert!(matches!(plan.check(), Err(StudyError::Seeds(_))), "{seeds}");
         }
     }

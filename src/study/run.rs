@@ -15,8 +15,8 @@ use crate::train::{Method, Origin, Recordings, TrainError, TrainOptions, Trained
 /// Seeds of the joint method are random starts, as published. The closed form finds the same model from every start,
 /// so its seed `s` leaves out every fifth training jump, beginning with the `s`-th: its spread says how much the
 /// recordings matter. Where the encoder may look at fewer coordinates than the latent space has, the mask is lifted.
-/// `[training, validation]` are the recordings, `options` gives the settings for a latent dimension, `finished` is
-/// called for every cell. The result does not depend on the number of threads.
+/// `[training, validation]` are the recordings, `options` the settings but for name, latent dimension and seed,
+/// `finished` is called for every cell. The result does not depend on the number of threads.
 ///
 /// # Errors
 /// [`StudyError::File`], one of several if more than one file fails. A training that refuses is an outcome, not an error.
@@ -25,7 +25,7 @@ pub fn run(
     shard: Shard,
     [training, validation]: [&[Recording]; 2],
     robot: &'static Robot,
-    options: &(dyn Fn(usize) -> TrainOptions + Sync),
+    options: &TrainOptions,
     finished: &(dyn Fn(CellId) + Sync),
 ) -> Result<(), StudyError> {
     let missing = store.missing();
@@ -35,8 +35,7 @@ pub fn run(
     let next = AtomicUsize::new(0);
     let worker = || {
         while let Some(&id) = todo.get(next.fetch_add(1, Ordering::Relaxed)) {
-            let options = options(id.latent_dim);
-            let outcome = train(id, [training, validation], robot, options, method);
+            let outcome = train(id, [training, validation], robot, options.clone(), method);
             let kept = store.put(&Cell { id, outcome });
             finished(id);
             if kept.is_err() {
@@ -62,6 +61,8 @@ fn train(
     mut options: TrainOptions,
     method: Method,
 ) -> Outcome {
+    options.name = format!("d{}", id.latent_dim);
+    options.latent_dim = id.latent_dim;
     options.seed = id.seed;
     options.n_seeds = 1;
     options.joint.threads = 1;

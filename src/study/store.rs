@@ -178,19 +178,7 @@ fn refused(path: &Path, action: &'static str) -> impl Fn(io::Error) -> StudyErro
 mod tests {
     use super::*;
     use crate::study::cell::Outcome;
-    use crate::train::Method;
-
-    fn plan() -> Plan {
-        Plan {
-            latent_dims: vec![1, 2],
-            seeds: 2,
-            method: Method::ClosedForm,
-            settings: String::new(),
-            recordings: vec!["sha256:1".to_owned()],
-            training: 1,
-            romc: "0.1.0".to_owned(),
-        }
-    }
+    use crate::study::plan::tests::plan;
 
     fn store(folder: &tempfile::TempDir, name: &str, plan: Plan) -> Result<Store, StudyError> {
         Store::create(&folder.path().join(name), plan)

@@ -3,14 +3,15 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{ArgAction, Args, Parser, Subcommand};
 
 use super::compile::CompileArguments;
 use super::import::ImportArguments;
 use super::reading::ReadingArguments;
 use super::train::{StudyArguments, TrainArguments};
-use super::value::{RobotParser, count, real};
+use super::value::{RobotParser, count, overwrite, real};
 use crate::evaluate::ReferenceInput;
+use crate::files::Overwrite;
 use crate::limits::table::{APEX, DISTANCE, HORIZON, RESTART_EVERY, STEP, TORQUE_RATE};
 use crate::mpc::{Lift, Solver};
 use crate::simplify::Tolerance;
@@ -76,8 +77,8 @@ pub struct DemoArguments {
     #[arg(long, value_name = "DIR", default_value = "out/demo")]
     pub out_dir: PathBuf,
     /// Write into a folder that holds files romc did not make
-    #[arg(long)]
-    pub force: bool,
+    #[arg(long, action = ArgAction::SetTrue, value_parser = overwrite())]
+    pub force: Overwrite,
 }
 
 /// `romc inspect`
@@ -99,8 +100,8 @@ pub struct InspectArguments {
     #[arg(long, value_name = "MAP.toml", requires = "guess")]
     pub output: Option<PathBuf>,
     /// Replace an existing output file
-    #[arg(long)]
-    pub force: bool,
+    #[arg(long, action = ArgAction::SetTrue, value_parser = overwrite())]
+    pub force: Overwrite,
     #[command(flatten)]
     pub reading: ReadingArguments,
 }
@@ -125,8 +126,8 @@ pub struct ConvertArguments {
     #[arg(long, value_name = "MODEL.json")]
     pub inputs_of: Option<PathBuf>,
     /// Replace an existing output file
-    #[arg(long)]
-    pub force: bool,
+    #[arg(long, action = ArgAction::SetTrue, value_parser = overwrite())]
+    pub force: Overwrite,
     #[command(flatten)]
     pub reading: ReadingArguments,
 }
@@ -150,8 +151,8 @@ pub struct IdentifyArguments {
     #[arg(long, value_name = "ACTUATORS.toml")]
     pub output: Option<PathBuf>,
     /// Replace an existing output file
-    #[arg(long)]
-    pub force: bool,
+    #[arg(long, action = ArgAction::SetTrue, value_parser = overwrite())]
+    pub force: Overwrite,
     #[command(flatten)]
     pub reading: ReadingArguments,
 }
@@ -172,8 +173,8 @@ pub struct RobotArguments {
     #[arg(long, value_name = "FILE.toml")]
     pub output: Option<PathBuf>,
     /// Replace an existing output file
-    #[arg(long)]
-    pub force: bool,
+    #[arg(long, action = ArgAction::SetTrue, value_parser = overwrite())]
+    pub force: Overwrite,
 }
 
 /// `romc check`
@@ -226,8 +227,8 @@ pub struct SimulateArguments {
     #[arg(long, value_name = "FILE.csv")]
     pub output: Option<PathBuf>,
     /// Replace an existing output file
-    #[arg(long)]
-    pub force: bool,
+    #[arg(long, action = ArgAction::SetTrue, value_parser = overwrite())]
+    pub force: Overwrite,
     #[command(flatten)]
     pub reading: ReadingArguments,
 }
@@ -269,8 +270,8 @@ pub struct MpcArguments {
     #[arg(long, value_name = "DIR")]
     pub figures: Option<PathBuf>,
     /// Replace an existing output file
-    #[arg(long)]
-    pub force: bool,
+    #[arg(long, action = ArgAction::SetTrue, value_parser = overwrite())]
+    pub force: Overwrite,
     #[command(flatten)]
     pub reading: ReadingArguments,
 }
@@ -321,8 +322,8 @@ pub struct PlanArguments {
     #[arg(long, value_name = "FILE.toml")]
     pub settings: Option<PathBuf>,
     /// Write a plan that is not to be trusted, and replace existing files
-    #[arg(long)]
-    pub force: bool,
+    #[arg(long, action = ArgAction::SetTrue, value_parser = overwrite())]
+    pub force: Overwrite,
     #[command(flatten)]
     pub reading: ReadingArguments,
 }
@@ -363,8 +364,8 @@ pub struct ReportArguments {
     )]
     pub tolerance: Tolerance,
     /// Replace an existing page, or write into a folder that holds files romc did not make
-    #[arg(long)]
-    pub force: bool,
+    #[arg(long, action = ArgAction::SetTrue, value_parser = overwrite())]
+    pub force: Overwrite,
     #[command(flatten)]
     pub reading: ReadingArguments,
 }
@@ -379,8 +380,8 @@ pub struct ManualArguments {
     #[arg(long, value_name = "DIR")]
     pub out_dir: PathBuf,
     /// Replace files in the folder that romc did not make
-    #[arg(long)]
-    pub force: bool,
+    #[arg(long, action = ArgAction::SetTrue, value_parser = overwrite())]
+    pub force: Overwrite,
 }
 
 /// `romc completions`

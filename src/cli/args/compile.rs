@@ -2,12 +2,13 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::{ArgAction, Args, ValueEnum};
 
 use super::reading::ReadingArguments;
-use super::value::{count, real};
+use super::value::{count, overwrite, real};
 use crate::codegen::{Precision, SineCosine, Units};
 use crate::deploy::Target;
+use crate::files::Overwrite;
 use crate::limits::table::{DIGITS, MARGIN, SIGNIFICANT, WIDTH};
 use crate::simplify::Tolerance;
 use crate::typeset::Form;
@@ -44,15 +45,14 @@ pub struct CompileArguments {
     #[command(flatten)]
     pub simplification: SimplifyArguments,
     /// Write into a folder that holds files romc did not make
-    #[arg(long, help_heading = None)]
-    pub force: bool,
+    #[arg(long, help_heading = None, action = ArgAction::SetTrue, value_parser = overwrite())]
+    pub force: Overwrite,
 }
 
 /// Units of coordinates and inputs in equations and generated code.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum UnitsChoice {
     /// rad, m, N m, N
-    #[default]
     Si,
     /// Scaled as the model was learned: the model file's factors times SI values
     Scaled,
@@ -72,7 +72,7 @@ impl UnitsChoice {
 }
 
 /// How code is generated.
-#[derive(Debug, Clone, Default, Args)]
+#[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Generated code")]
 pub struct CodeArguments {
     /// Floating-point numbers of C and Rust
@@ -87,7 +87,7 @@ pub struct CodeArguments {
 }
 
 /// How equations are printed.
-#[derive(Debug, Clone, Default, Args)]
+#[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Printed equations")]
 pub struct EquationArguments {
     /// Decimal places of coefficients; as many as each needs, at least two, unless given

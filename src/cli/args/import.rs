@@ -2,10 +2,11 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{ArgAction, Args};
 
 use super::reading::ReadingArguments;
-use super::value::{RobotParser, count, real, wrench_frame};
+use super::value::{RobotParser, count, overwrite, real, wrench_frame};
+use crate::files::Overwrite;
 use crate::import::{
     Format, ImportError, Mapping, PhaseRule, WeightVectors, XiLayout, parse_standard,
 };
@@ -123,8 +124,8 @@ pub struct ImportArguments {
     )]
     pub description: String,
     /// Replace an existing output file
-    #[arg(long)]
-    pub force: bool,
+    #[arg(long, action = ArgAction::SetTrue, value_parser = overwrite())]
+    pub force: Overwrite,
     #[command(flatten)]
     pub reading: ReadingArguments,
 }

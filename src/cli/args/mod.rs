@@ -20,9 +20,7 @@ pub use command::{
     IdentifyArguments, InspectArguments, ManualArguments, MpcArguments, PlanArguments,
     ReportArguments, RobotArguments, SimulateArguments,
 };
-pub use compile::{
-    CodeArguments, CompileArguments, EquationArguments, SimplifyArguments, UnitsChoice,
-};
+pub use compile::{CompileArguments, SimplifyArguments, UnitsChoice};
 pub use import::{ImportArguments, LibraryArgument};
 pub use reading::ReadingArguments;
 pub use train::{PhaseSet, StudyArguments, TrainArguments, TrainSettings, Widths};

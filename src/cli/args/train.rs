@@ -3,11 +3,12 @@
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use clap::{Args, ValueEnum};
+use clap::{ArgAction, Args, ValueEnum};
 use serde::{Deserialize, Serialize};
 
 use super::reading::ReadingArguments;
-use super::value::{RobotParser, count, finite, real, wrench_frame};
+use super::value::{RobotParser, count, finite, overwrite, real, wrench_frame};
+use crate::files::Overwrite;
 use crate::limits::table;
 use crate::model::Activation;
 use crate::recording::smoothing::SavitzkyGolay;
@@ -101,8 +102,8 @@ pub struct TrainArguments {
     #[arg(long)]
     pub name: Option<String>,
     /// Replace an existing output file
-    #[arg(long)]
-    pub force: bool,
+    #[arg(long, action = ArgAction::SetTrue, value_parser = overwrite())]
+    pub force: Overwrite,
     #[command(flatten)]
     pub reading: ReadingArguments,
 }
@@ -278,8 +279,8 @@ pub struct StudyArguments {
     #[arg(long, value_name = "DIR", default_value = "out/study")]
     pub out_dir: PathBuf,
     /// Replace tables and figures of these names that romc did not make
-    #[arg(long)]
-    pub force: bool,
+    #[arg(long, action = ArgAction::SetTrue, value_parser = overwrite())]
+    pub force: Overwrite,
     #[command(flatten)]
     pub reading: ReadingArguments,
 }

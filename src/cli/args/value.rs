@@ -1,8 +1,9 @@
 //! Parsers of numbers by their ranges, and of names.
 
-use clap::builder::{PossibleValue, StringValueParser, TypedValueParser};
+use clap::builder::{BoolValueParser, PossibleValue, StringValueParser, TypedValueParser};
 
 use super::train::Finite;
+use crate::files::Overwrite;
 use crate::limits::Range;
 use crate::robot::{Robot, WrenchFrame};
 
@@ -19,6 +20,11 @@ pub(super) fn real(range: &'static Range) -> impl Fn(&str) -> Result<f64, String
 /// As [`real`], as settings hold it.
 pub(super) fn finite(range: &'static Range) -> impl Fn(&str) -> Result<Finite, String> + Clone {
     |text| range.parse::<f64>(text)?.try_into()
+}
+
+/// `--force`, as those who write files take it.
+pub(super) fn overwrite() -> impl TypedValueParser<Value = Overwrite> {
+    BoolValueParser::new().map(Overwrite::when_forced)
 }
 
 /// Takes any text and offers the names of romc's own robots to shells.

@@ -9,9 +9,9 @@
 //! `tau_k = losses + Y_k pi`, joint by joint. All unknowns enter linearly; torques are taken a delay later, and a column of their rates
 //! tells by how much that delay is wrong.
 
-use nalgebra::{DMatrix, Matrix3, Vector3};
+use nalgebra::{DMatrix, Matrix3, SMatrix, Vector3};
 
-use super::motion::{LegAcceleration, LegFrame, Motion};
+use super::motion::{LegFrame, Motion};
 use super::parameters::{
     ARMATURE, CALF, CALF_FRONT, CALF_SECOND, DELAY, DRY, FOOT_RADIUS, GRAVITY, INVERSE_MASS,
     LEG_SIDE, PARAMETER_DIM, ROLLING, THIGH, THIGH_FRONT, THIGH_SECOND, TRUNK_FORWARD, TRUNK_UP,
@@ -97,7 +97,9 @@ impl SampleEquations {
                     torque_rate: of(&torque_rate),
                     own: own_torques(robot, motion, leg, sample, gravity_m_s2),
                 };
-                body.add_moments(&motion.leg(leg, sample));
+                for (moment, direction) in MOMENTS.into_iter().zip(motion.leg(leg, sample)) {
+                    body.add(moment, -direction);
+                }
                 if segment.feet[sample][leg.index()] {
                     let q = leg.of_joints(&segment.joints(sample));
                     let posture = robot.geometry(leg).manipulability(&q);
@@ -116,36 +118,25 @@ impl SampleEquations {
                     joint.copy_from_slice(&state.joint(kind));
                 }
             }
-            equations.body.column_mut(sample).copy_from_slice(&body.0);
+            equations
+                .body
+                .column_mut(sample)
+                .copy_from_slice(body.0.as_slice());
         }
         equations
     }
 }
 
-/// Coefficients and left side for the trunk's acceleration at one sample.
-struct BodyEquation([f64; 3 * BODY_ROWS]);
-
-impl Default for BodyEquation {
-    fn default() -> Self {
-        Self([0.0; 3 * BODY_ROWS])
-    }
-}
+/// Coefficients and left side for the trunk's acceleration at one sample, a column an axis.
+#[derive(Default)]
+struct BodyEquation(SMatrix<f64, BODY_ROWS, 3>);
 
 impl BodyEquation {
     /// Adds a vector to the coefficients of an unknown, or to the left side.
     fn add(&mut self, unknown: usize, vector: Vector3<f64>) {
         for axis in 0..3 {
-            self.0[axis * BODY_ROWS + unknown] += vector[axis];
+            self.0[(unknown, axis)] += vector[axis];
         }
-    }
-
-    /// A leg's share in the acceleration of the centre of mass.
-    fn add_moments(&mut self, leg: &LegAcceleration) {
-        self.add(LEG_SIDE, -leg.side);
-        self.add(THIGH, -leg.thigh);
-        self.add(CALF, -leg.calf);
-        self.add(THIGH_FRONT, -leg.thigh_front);
-        self.add(CALF_FRONT, -leg.calf_front);
     }
 
     /// The force of a foot on the ground; `map` takes torques to forces in the world.
@@ -172,6 +163,9 @@ impl BodyEquation {
         self.add(ROLLING, map * state.about_joints(&resistance));
     }
 }
+
+/// First moments of a leg by its directions: its share in the acceleration of the centre of mass.
+const MOMENTS: [usize; 5] = [LEG_SIDE, THIGH, CALF, THIGH_FRONT, CALF_FRONT];
 
 /// Unknowns of a leg's own links in the torques of its joints.
 const OWN: [usize; 7] = [
@@ -236,17 +230,19 @@ fn own_torques(
 ) -> [Vector3<f64>; OWN.len()] {
     let links = robot.geometry(leg).links();
     let [side_m, thigh_m] = [links.hip.norm(), links.thigh.norm()];
-    let (frame, second) = (&motion.legs[sample][leg.index()], motion.leg(leg, sample));
+    let frame = &motion.legs[sample][leg.index()];
+    let [to_side, to_knee, to_foot, thigh_front, calf_front] = &frame.directions;
+    let [side2, thigh2, calf2, thigh_front2, calf_front2] = motion.leg(leg, sample);
     let hip = robot.hip_position(leg);
     let trunk = motion.body(sample)
         + Vector3::z() * gravity_m_s2
         + (0..3).fold(Vector3::zeros(), |sum, axis| {
             sum + hip[axis] * motion.trunk_axis(axis, sample)
         });
-    let plane = trunk + side_m * second.side;
-    let knee = plane + thigh_m * second.thigh;
+    let plane = trunk + side_m * side2;
+    let knee = plane + thigh_m * thigh2;
     let abduction = frame.abduction;
-    let (side, thigh) = (side_m * frame.side, thigh_m * frame.thigh);
+    let (side, thigh) = (side_m * to_side, thigh_m * to_knee);
     // Moments about the joint of flexion and about the knee of a first moment along `direction`.
     let torques = |flexion: Vector3<f64>, knee: Vector3<f64>, force: Vector3<f64>| {
         Vector3::new(
@@ -263,16 +259,16 @@ fn own_torques(
         let about_knee = direction.cross(&knee);
         torques(about_knee + thigh.cross(&second), about_knee, second)
     };
-    let thigh_turn = frame.thigh.cross(&second.thigh);
-    let calf_turn = frame.calf.cross(&second.calf);
+    let thigh_turn = to_knee.cross(&thigh2);
+    let calf_turn = to_foot.cross(&calf2);
     [
-        Vector3::new(abduction.dot(&frame.side.cross(&plane)), 0.0, 0.0),
-        on_thigh(&frame.thigh, second.thigh),
+        Vector3::new(abduction.dot(&to_side.cross(&plane)), 0.0, 0.0),
+        on_thigh(to_knee, thigh2),
         torques(thigh_turn, none, none),
-        on_calf(&frame.calf, second.calf),
+        on_calf(to_foot, calf2),
         torques(calf_turn, calf_turn, none),
-        on_thigh(&frame.thigh_front, second.thigh_front),
-        on_calf(&frame.calf_front, second.calf_front),
+        on_thigh(thigh_front, thigh_front2),
+        on_calf(calf_front, calf_front2),
     ]
 }
 

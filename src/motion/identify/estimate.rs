@@ -15,9 +15,9 @@ use super::parameters::{
     THIGH_SECOND, VISCOUS, priors,
 };
 use super::windows::{Group, Row, Windows};
+use crate::recording::Recording;
 use crate::recording::check::check;
 use crate::recording::clock::{Timed, timed};
-use crate::recording::{Recording, Segment};
 use crate::robot::{Actuators, GRAVITY_M_S2, JOINT_DIM, Leg, Robot};
 
 /// Fewest samples with feet on the ground.
@@ -51,22 +51,21 @@ pub fn identify(recordings: &[Recording], robot: &Robot) -> Result<Identificatio
         let timed = recording.segments.iter().map(timed);
         let timed = timed.collect::<Result<Vec<_>, _>>()?;
         notes.extend(mended(&recording.path, &timed));
-        segments.extend(timed.into_iter().map(|timed| Prepared {
-            motion: Motion::of(&timed.segment, robot),
-            segment: timed.segment,
-            lost: timed.lost,
+        segments.extend(timed.into_iter().map(|timed| {
+            let motion = Motion::of(&timed.segment, robot);
+            (timed, motion)
         }));
     }
     let mut state = State::new(robot);
-    let mut round = Round::of(&segments, robot, &state)?;
-    round.require_enough(recordings.len())?;
+    let mut windows = state.windows(&segments, robot)?;
+    require_enough(&windows, recordings.len())?;
     let mut settled = false;
     for _ in 0..MOST_ROUNDS {
-        settled = state.improve(&round.windows, robot)?;
+        settled = state.improve(&windows, robot)?;
         if settled {
             break;
         }
-        round = Round::of(&segments, robot, &state)?;
+        windows = state.windows(&segments, robot)?;
     }
     if !settled {
         notes.push(format!(
@@ -74,87 +73,62 @@ pub fn identify(recordings: &[Recording], robot: &Robot) -> Result<Identificatio
              their standard errors"
         ));
     }
-    notes.extend(round.notes());
-    let mut found = state.result(robot, &segments, &round.windows, notes);
+    notes.extend(exclusions(&windows));
+    let mut found = state.result(robot, &segments, &windows, notes);
     found.notes.extend(found.contradiction());
     found.notes.extend(found.doubts(robot.mass_kg()));
     Ok(found)
 }
 
 /// A segment ready for its equations.
-struct Prepared {
-    segment: Segment,
-    motion: Motion,
-    lost: Vec<bool>,
+type Prepared = (Timed, Motion);
+
+/// Refuses windows that say too little of these many recordings.
+fn require_enough(windows: &Windows, recordings: usize) -> Result<(), IdentifyError> {
+    let (found, expected) = (windows.contact_samples, LEAST_CONTACT_SAMPLES);
+    if found < expected {
+        return Err(IdentifyError::Contact {
+            recordings,
+            found,
+            expected,
+        });
+    }
+    let is_moving = |row: &&Row| row.moving && row.group == Group::Contact(0);
+    let found = windows.rows.iter().filter(is_moving).count();
+    let expected = LEAST_WINDOWS;
+    if found < expected {
+        return Err(IdentifyError::Still {
+            recordings,
+            found,
+            expected,
+        });
+    }
+    Ok(())
 }
 
-/// The equations of all segments at one estimate of gravity and delay.
-struct Round {
-    windows: Windows,
-    clipped_torques: usize,
-}
-
-impl Round {
-    fn of(segments: &[Prepared], robot: &Robot, state: &State) -> Result<Self, IdentifyError> {
-        let mut round = Self {
-            windows: Windows::default(),
-            clipped_torques: 0,
-        };
-        for prepared in segments {
-            let (segment, motion) = (&prepared.segment, &prepared.motion);
-            let equations =
-                SampleEquations::of(segment, motion, robot, state.gravity_m_s2, state.delay_s);
-            round.clipped_torques += equations.clipped_torques;
-            round.windows.add(segment, &equations, &prepared.lost)?;
-        }
-        Ok(round)
+/// What is clipped, left out or lacking in the windows.
+fn exclusions(windows: &Windows) -> Vec<String> {
+    let mut notes = Vec::new();
+    if windows.clipped_torques > 0 {
+        notes.push(format!(
+            "{} torques are above the robot's limits: commanded rather than measured? They \
+             count as the limit",
+            windows.clipped_torques
+        ));
     }
-
-    fn require_enough(&self, recordings: usize) -> Result<(), IdentifyError> {
-        let (found, expected) = (self.windows.contact_samples, LEAST_CONTACT_SAMPLES);
-        if found < expected {
-            return Err(IdentifyError::Contact {
-                recordings,
-                found,
-                expected,
-            });
-        }
-        let is_moving = |row: &&Row| row.moving && row.group == Group::Contact(0);
-        let found = self.windows.rows.iter().filter(is_moving).count();
-        let expected = LEAST_WINDOWS;
-        if found < expected {
-            return Err(IdentifyError::Still {
-                recordings,
-                found,
-                expected,
-            });
-        }
-        Ok(())
+    if windows.singular_samples > 0 {
+        notes.push(format!(
+            "{} samples with a leg on the ground close to a singular posture are left out",
+            windows.singular_samples
+        ));
     }
-
-    fn notes(&self) -> Vec<String> {
-        let mut notes = Vec::new();
-        if self.clipped_torques > 0 {
-            notes.push(format!(
-                "{} torques are above the robot's limits: commanded rather than measured? They \
-                 count as the limit",
-                self.clipped_torques
-            ));
-        }
-        if self.windows.singular_samples > 0 {
-            notes.push(format!(
-                "{} samples with a leg on the ground close to a singular posture are left out",
-                self.windows.singular_samples
-            ));
-        }
-        if self.windows.flight_samples == 0 {
-            notes.push(
-                "no flight of at least 70 ms: gravity and the legs' inertia rest on contact alone"
-                    .to_owned(),
-            );
-        }
-        notes
+    if windows.flight_samples == 0 {
+        notes.push(
+            "no flight of at least 70 ms: gravity and the legs' inertia rest on contact alone"
+                .to_owned(),
+        );
     }
+    notes
 }
 
 /// What the rounds improve.
@@ -177,6 +151,17 @@ impl State {
             iteration: Iteration::default(),
             rounds: 0,
         }
+    }
+
+    /// The equations of all segments at this estimate of gravity and delay.
+    fn windows(&self, segments: &[Prepared], robot: &Robot) -> Result<Windows, IdentifyError> {
+        let mut windows = Windows::default();
+        for (Timed { segment, lost, .. }, motion) in segments {
+            let equations =
+                SampleEquations::of(segment, motion, robot, self.gravity_m_s2, self.delay_s);
+            windows.add(segment, &equations, lost)?;
+        }
+        Ok(windows)
     }
 
     /// One fit; whether it changed nothing that matters.
@@ -218,9 +203,10 @@ impl State {
         let priors = priors(robot.geometry(Leg::FrontLeft), self.mass_kg, &self.losses);
         let estimate = self.iteration.estimate.unwrap_or_default();
         // When within a step a torque acts is not recorded: uniform over it.
-        let longest_step =
-            |step: f64, prepared: &Prepared| step.max(prepared.segment.mean_step_s());
-        let step_s = segments.iter().fold(0.0, longest_step);
+        let steps = segments
+            .iter()
+            .map(|(timed, _)| timed.segment.mean_step_s());
+        let step_s = steps.fold(0.0, f64::max);
         let within_step_s = step_s / 12_f64.sqrt();
         let variances = self.iteration.variances(
             &windows.rows,

@@ -5,14 +5,14 @@ use std::fs;
 use std::path::Path;
 
 use super::error::{IdentifyError, IdentifyFault};
-use super::identification::{Fit, Identification, Legs, PerKind};
+use super::identification::{Fit, Identification, Legs, PerKind, Samples};
 use crate::files::{Located, Place};
 use crate::robot::JOINT_NAMES;
 
 impl Identification {
     /// The file's text: SI units, `[actuators]` in the order of the state's joints.
     pub fn to_toml(&self) -> String {
-        let error = &self.standard_error;
+        let (error, alone) = (&self.standard_error, &self.force_alone);
         let mut out = String::from(
             "# What `romc identify` found in recordings. SI units: m, s, kg, N m, rad.\n",
         );
@@ -20,42 +20,37 @@ impl Identification {
             let _ = writeln!(out, "# {}", note.replace(['\n', '\r'], " "));
         }
         let _ = writeln!(out, "robot = {:?}", self.robot);
-        scalars(&mut out, self.gravity_m_s2, self.mass_kg, self.delay_s);
-        let _ = writeln!(out, "\n# {}", JOINT_NAMES.join(" "));
-        let _ = writeln!(out, "[actuators]");
-        for (name, values) in [
-            ("viscous", &self.actuators.viscous),
-            ("dry", &self.actuators.dry),
-            ("armature", &self.actuators.armature),
-        ] {
-            let listed: Vec<String> = values.iter().map(|value| number(*value)).collect();
-            let _ = writeln!(out, "{name} = [{}]", listed.join(", "));
+        numbers(&mut out, &forces(self.gravity_m_s2, self.mass_kg));
+        numbers(&mut out, &[("delay_s", self.delay_s)]);
+        let _ = writeln!(out, "\n# {}\n[actuators]", JOINT_NAMES.join(" "));
+        for (name, values) in self.actuators.named() {
+            let _ = writeln!(out, "{name} = [{}]", values.map(number).join(", "));
         }
-        legs(&mut out, "legs", &self.legs);
-        let _ = writeln!(out, "\n[standard_error]");
-        scalars(&mut out, error.gravity_m_s2, error.mass_kg, error.delay_s);
-        for (name, values) in [
+        table(&mut out, "legs", &legs(&self.legs));
+        table(
+            &mut out,
+            "standard_error",
+            &forces(error.gravity_m_s2, error.mass_kg),
+        );
+        numbers(&mut out, &[("delay_s", error.delay_s)]);
+        for (name, PerKind { hx, hy, kn }) in [
             ("viscous_nm_s_rad", error.viscous_nm_s_rad),
             ("dry_nm", error.dry_nm),
             ("armature_kg_m2", error.armature_kg_m2),
         ] {
-            let PerKind { hx, hy, kn } = values;
             let [hx, hy, kn] = [hx, hy, kn].map(number);
             let _ = writeln!(out, "{name} = {{ hx = {hx}, hy = {hy}, kn = {kn} }}");
         }
-        legs(&mut out, "standard_error.legs", &error.legs);
-        fit(&mut out, "r2", self.r2);
-        let _ = writeln!(out, "\n[force_alone]");
-        let _ = writeln!(
-            out,
-            "gravity_m_s2 = {}",
-            number(self.force_alone.gravity_m_s2)
+        table(&mut out, "standard_error.legs", &legs(&error.legs));
+        table(&mut out, "r2", &fit(self.r2));
+        table(
+            &mut out,
+            "force_alone",
+            &forces(alone.gravity_m_s2, alone.mass_kg),
         );
-        let _ = writeln!(out, "mass_kg = {}", number(self.force_alone.mass_kg));
-        fit(&mut out, "force_alone.r2", self.force_alone.r2);
-        let _ = writeln!(out, "\n[samples]");
-        let _ = writeln!(out, "contact = {}", self.samples.contact);
-        let _ = writeln!(out, "flight = {}", self.samples.flight);
+        table(&mut out, "force_alone.r2", &fit(alone.r2));
+        let Samples { contact, flight } = self.samples;
+        let _ = writeln!(out, "\n[samples]\ncontact = {contact}\nflight = {flight}");
         out
     }
 
@@ -93,10 +88,7 @@ impl Identification {
             let fault = IdentifyFault::Value { found, expected };
             Err(at(file, Place::Entry(entry.into()), fault))
         };
-        for (name, value) in [
-            ("gravity_m_s2", self.gravity_m_s2),
-            ("mass_kg", self.mass_kg),
-        ] {
+        for (name, value) in forces(self.gravity_m_s2, self.mass_kg) {
             if !(value.is_finite() && value > 0.0) {
                 return refuse(name.to_owned(), value, "a finite number above 0");
             }
@@ -104,17 +96,9 @@ impl Identification {
         if !self.delay_s.is_finite() {
             return refuse("delay_s".to_owned(), self.delay_s, "a finite number");
         }
-        for (name, values) in [
-            ("viscous", &self.actuators.viscous),
-            ("dry", &self.actuators.dry),
-            ("armature", &self.actuators.armature),
-        ] {
-            for (joint, value) in JOINT_NAMES.iter().zip(values) {
-                if !(value.is_finite() && *value >= 0.0) {
-                    let entry = format!("actuators.{name}, joint {joint}");
-                    return refuse(entry, *value, "a finite number, at least 0");
-                }
-            }
+        if let Some((name, joint, value)) = self.actuators.unusable() {
+            let entry = format!("actuators.{name}, joint {}", JOINT_NAMES[joint]);
+            return refuse(entry, value, "a finite number, at least 0");
         }
         Ok(())
     }
@@ -124,33 +108,36 @@ fn at(file: &str, place: Place, fault: IdentifyFault) -> IdentifyError {
     IdentifyError::File(Located::new(file, place, fault))
 }
 
-fn scalars(out: &mut String, gravity_m_s2: f64, mass_kg: f64, delay_s: f64) {
-    for (name, value) in [
-        ("gravity_m_s2", gravity_m_s2),
-        ("mass_kg", mass_kg),
-        ("delay_s", delay_s),
-    ] {
-        let _ = writeln!(out, "{name} = {}", number(value));
-    }
+/// A number with its name.
+type Entry = (&'static str, f64);
+
+fn forces(gravity_m_s2: f64, mass_kg: f64) -> [Entry; 2] {
+    [("gravity_m_s2", gravity_m_s2), ("mass_kg", mass_kg)]
 }
 
-fn legs(out: &mut String, table: &str, legs: &Legs) {
-    let _ = writeln!(out, "\n[{table}]");
-    for (name, value) in [
+fn legs(legs: &Legs) -> [Entry; 5] {
+    [
         ("side_kg_m", legs.side_kg_m),
         ("thigh_kg_m", legs.thigh_kg_m),
         ("calf_kg_m", legs.calf_kg_m),
         ("thigh_kg_m2", legs.thigh_kg_m2),
         ("calf_kg_m2", legs.calf_kg_m2),
-    ] {
-        let _ = writeln!(out, "{name} = {}", number(value));
-    }
+    ]
 }
 
-fn fit(out: &mut String, table: &str, fit: Fit) {
-    let _ = writeln!(out, "\n[{table}]");
-    let _ = writeln!(out, "x = {}", number(fit.x));
-    let _ = writeln!(out, "z = {}", number(fit.z));
+fn fit(fit: Fit) -> [Entry; 2] {
+    [("x", fit.x), ("z", fit.z)]
+}
+
+fn table(out: &mut String, name: &str, entries: &[Entry]) {
+    let _ = writeln!(out, "\n[{name}]");
+    numbers(out, entries);
+}
+
+fn numbers(out: &mut String, entries: &[Entry]) {
+    for (name, value) in entries {
+        let _ = writeln!(out, "{name} = {}", number(*value));
+    }
 }
 
 /// Six significant digits, spelled as TOML has floating-point numbers.

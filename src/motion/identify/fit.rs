@@ -31,20 +31,13 @@ pub struct Iteration {
 }
 
 /// Normal equations `matrix x = side`.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 struct Normal {
     matrix: Square,
     side: Estimate,
 }
 
 impl Normal {
-    fn zero() -> Self {
-        Self {
-            matrix: Square::zeros(),
-            side: Estimate::zeros(),
-        }
-    }
-
     fn add(&mut self, row: &Row, left: f64, weight: f64) {
         let coefficients = row.coefficients.iter().enumerate();
         for (i, a) in coefficients.filter(|(_, a)| **a != 0.0) {
@@ -210,7 +203,7 @@ impl Iteration {
     /// The normal equations of every group that has rows.
     fn parts(&self, rows: &[Row], grouping: &[usize], mass_kg: f64) -> Vec<Normal> {
         let count = grouping.iter().max().map_or(0, |last| last + 1);
-        let mut parts = vec![Normal::zero(); count];
+        let mut parts = vec![Normal::default(); count];
         for row in rows.iter().filter(|row| row.moving) {
             parts[grouping[row.block]].add(row, left(row, mass_kg), self.weight(row, mass_kg));
         }
@@ -219,7 +212,7 @@ impl Iteration {
     }
 
     fn normal(&self, rows: &[Row], priors: &[Prior], mass_kg: f64) -> Normal {
-        let mut normal = Normal::zero();
+        let mut normal = Normal::default();
         for row in rows.iter().filter(|row| row.moving) {
             normal.add(row, left(row, mass_kg), self.weight(row, mass_kg));
         }
@@ -276,7 +269,7 @@ fn spread(whole: &Normal, parts: &[Normal], free: &[usize]) -> Option<Estimate> 
 
 /// Gravity and inverse mass by the feet's forces alone, over rows in contact; `None` without any.
 pub fn force_alone(rows: &[Row]) -> Option<Estimate> {
-    let mut normal = Normal::zero();
+    let mut normal = Normal::default();
     let is_contact = |row: &&Row| matches!(row.group, Group::Contact(_));
     for row in rows.iter().filter(is_contact) {
         normal.add(row, row.left, 1.0);

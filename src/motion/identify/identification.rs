@@ -179,18 +179,8 @@ impl Identification {
         ))
     }
 
-    /// Viscous friction by kind of joint, N m s/rad.
-    pub fn viscous(&self) -> PerKind {
-        PerKind::mean(&self.actuators.viscous)
-    }
-
-    /// Dry friction by kind of joint, N m.
-    pub fn dry(&self) -> PerKind {
-        PerKind::mean(&self.actuators.dry)
-    }
-
-    /// Armature by kind of joint, kg m^2.
-    pub fn armature(&self) -> PerKind {
-        PerKind::mean(&self.actuators.armature)
+    /// By kind of joint viscous friction in N m s/rad, dry friction in N m and armature in kg m^2.
+    pub fn losses(&self) -> [PerKind; 3] {
+        (self.actuators.named()).map(|(_, joints)| PerKind::mean(joints))
     }
 }

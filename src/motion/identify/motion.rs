@@ -10,38 +10,19 @@ use crate::recording::Segment;
 use crate::recording::preprocess::differences;
 use crate::robot::{JOINT_DIM, Leg, LegLinks, Robot};
 
-/// Directions of one leg in the world, unit vectors.
+/// Directions of a leg in the world, or their derivatives: from the axis of abduction to the plane of the leg (side),
+/// from hip to knee (thigh), from knee to foot (calf), in front of the thigh, in front of the calf.
+pub type Directions = [Vector3<f64>; 5];
+
+/// Axes and directions of one leg in the world, unit vectors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LegFrame {
     /// Axis of abduction.
     pub abduction: Vector3<f64>,
-    /// From the axis of abduction to the plane of the leg.
-    pub side: Vector3<f64>,
-    /// From hip to knee.
-    pub thigh: Vector3<f64>,
-    /// From knee to foot.
-    pub calf: Vector3<f64>,
-    /// In front of the thigh.
-    pub thigh_front: Vector3<f64>,
-    /// In front of the calf.
-    pub calf_front: Vector3<f64>,
     /// Axis of flexion and of the knee.
     pub flexion: Vector3<f64>,
-}
-
-/// Second derivatives of a leg's directions, 1/s^2.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LegAcceleration {
-    /// Of [`LegFrame::side`].
-    pub side: Vector3<f64>,
-    /// Of [`LegFrame::thigh`].
-    pub thigh: Vector3<f64>,
-    /// Of [`LegFrame::calf`].
-    pub calf: Vector3<f64>,
-    /// Of [`LegFrame::thigh_front`].
-    pub thigh_front: Vector3<f64>,
-    /// Of [`LegFrame::calf_front`].
-    pub calf_front: Vector3<f64>,
+    /// Where its parts are.
+    pub directions: Directions,
 }
 
 /// Directions of a segment and all accelerations.
@@ -124,37 +105,28 @@ impl Motion {
 
     /// Second derivative of a trunk axis (0 x, 1 y, 2 z), 1/s^2.
     pub fn trunk_axis(&self, axis: usize, sample: usize) -> Vector3<f64> {
-        self.directions
-            .fixed_view::<3, 1>(3 * axis, sample)
-            .into_owned()
+        self.direction(3 * axis, sample)
     }
 
-    /// Second derivatives of a leg's directions.
-    pub fn leg(&self, leg: Leg, sample: usize) -> LegAcceleration {
+    /// Second derivatives of a leg's directions, 1/s^2.
+    pub fn leg(&self, leg: Leg, sample: usize) -> Directions {
         let first = TRUNK_ROWS + LEG_ROWS * leg.index();
-        let of = |place: usize| {
-            self.directions
-                .fixed_view::<3, 1>(first + 3 * place, sample)
-                .into_owned()
-        };
-        LegAcceleration {
-            side: of(0),
-            thigh: of(1),
-            calf: of(2),
-            thigh_front: of(3),
-            calf_front: of(4),
-        }
+        std::array::from_fn(|place| self.direction(first + 3 * place, sample))
+    }
+
+    fn direction(&self, row: usize, sample: usize) -> Vector3<f64> {
+        self.directions.fixed_view::<3, 1>(row, sample).into_owned()
     }
 }
 
-/// A leg's directions, and the velocities of those that [`LegAcceleration`] has, in its order.
+/// A leg's axes and directions, and the velocities of the directions.
 fn leg_frame(
     attitude: &Matrix3<f64>,
     rate: &Vector3<f64>,
     links: &LegLinks,
     q: &[f64; 3],
     dq: &[f64; 3],
-) -> (LegFrame, [Vector3<f64>; 5]) {
+) -> (LegFrame, Directions) {
     let turn =
         |axis, angle| Rotation3::from_axis_angle(&Unit::new_unchecked(axis), angle).into_inner();
     let hip = attitude * turn(links.abduction, q[0]);
@@ -166,22 +138,19 @@ fn leg_frame(
     let to_the_left = links.flexion * links.flexion.y.signum();
     let frame = LegFrame {
         abduction: attitude * links.abduction,
-        side: hip * along_hip,
-        thigh: thigh * along_thigh,
-        calf: calf * along_calf,
-        thigh_front: thigh * along_thigh.cross(&to_the_left),
-        calf_front: calf * along_calf.cross(&to_the_left),
         flexion: hip * links.flexion,
+        directions: [
+            hip * along_hip,
+            thigh * along_thigh,
+            calf * along_calf,
+            thigh * along_thigh.cross(&to_the_left),
+            calf * along_calf.cross(&to_the_left),
+        ],
     };
     let hip_rate = rate + frame.abduction * dq[0];
     let thigh_rate = hip_rate + frame.flexion * dq[1];
     let calf_rate = thigh_rate + frame.flexion * dq[2];
-    let velocities = [
-        hip_rate.cross(&frame.side),
-        thigh_rate.cross(&frame.thigh),
-        calf_rate.cross(&frame.calf),
-        thigh_rate.cross(&frame.thigh_front),
-        calf_rate.cross(&frame.calf_front),
-    ];
+    let rates = [hip_rate, thigh_rate, calf_rate, thigh_rate, calf_rate];
+    let velocities = std::array::from_fn(|i| rates[i].cross(&frame.directions[i]));
     (frame, velocities)
 }

@@ -75,10 +75,13 @@ const LEG_SHARE: f64 = 0.13;
 const LEAST_SIDE: f64 = 0.1;
 /// Second moment of a uniform rod over length times first moment.
 const ROD: f64 = 2.0 / 3.0;
-/// Deviation of a hip's loss from that of the thigh joint of the same leg, relative.
-const HIP_LIKE_THIGH: [(usize, f64); 3] = [(VISCOUS, 1.0), (DRY, 0.5), (ARMATURE, 0.3)];
-/// Smallest loss that the relative deviations count from.
-const SMALLEST_LOSS: [(usize, f64); 3] = [(VISCOUS, 0.05), (DRY, 0.05), (ARMATURE, 1e-3)];
+/// Deviation of a hip's loss from that of the thigh joint of the same leg, relative, and the smallest loss that it
+/// counts from.
+const HIP_LIKE_THIGH: [(usize, f64, f64); 3] = [
+    (VISCOUS, 1.0, 0.05),
+    (DRY, 0.5, 0.05),
+    (ARMATURE, 0.3, 1e-3),
+];
 
 /// What is known of any quadruped of this size and mass (kg). `losses` are present estimates, SI.
 pub fn priors(geometry: &LegGeometry, mass_kg: f64, losses: &[f64; PARAMETER_DIM]) -> Vec<Prior> {
@@ -111,7 +114,7 @@ pub fn priors(geometry: &LegGeometry, mass_kg: f64, losses: &[f64; PARAMETER_DIM
         rod(THIGH_SECOND, THIGH, thigh, 0.005),
         rod(CALF_SECOND, CALF, calf, 0.003),
     ];
-    for ((first, relative), (_, smallest)) in HIP_LIKE_THIGH.into_iter().zip(SMALLEST_LOSS) {
+    for (first, relative, smallest) in HIP_LIKE_THIGH {
         priors.push(Prior {
             terms: vec![(first, 1.0), (first + 1, -1.0)],
             deviation: relative * losses[first + 1].max(smallest),

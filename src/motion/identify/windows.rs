@@ -88,6 +88,8 @@ pub struct Windows {
     pub flight_samples: usize,
     /// Samples left out because a leg on the ground was close to a singular posture.
     pub singular_samples: usize,
+    /// Torques above the robot's limits, which count as the limit.
+    pub clipped_torques: usize,
     /// Number of segments.
     segments: usize,
 }
@@ -103,6 +105,7 @@ impl Windows {
         equations: &SampleEquations,
         lost: &[bool],
     ) -> Result<(), IdentifyError> {
+        self.clipped_torques += equations.clipped_torques;
         let step_s = segment.mean_step_s();
         let samples = |time_s: f64| (time_s / step_s).round() as usize;
         let window = (samples(WINDOW_S) | 1).max(3);
@@ -120,20 +123,22 @@ impl Windows {
                 if !kept(span.start) || span.len() < window {
                     continue;
                 }
-                let centres = (window / 2..span.len() - window / 2)
-                    .step_by((window / OVERLAP).max(1))
-                    .collect::<Vec<_>>();
                 let first_block = self.blocks.len();
-                let block = |centre: usize| first_block + (centre - window / 2) / per_block;
-                let last = centres.last().map_or(first_block, |centre| block(*centre));
+                let blocks = (window / 2..span.len() - window / 2)
+                    .step_by((window / OVERLAP).max(1))
+                    .map(|centre| (centre, first_block + (centre - window / 2) / per_block))
+                    .collect::<Vec<_>>();
+                let last = blocks.last().map_or(first_block, |(_, block)| *block);
                 self.blocks.resize(last + 1, number);
                 let averaged = Averaged {
+                    segment,
+                    equations,
                     filter: &filter,
                     span,
-                    centres: &centres,
+                    blocks,
                 };
-                self.add_body(segment, equations, &averaged, block);
-                self.add_joints(segment, equations, &averaged, block);
+                self.add_body(&averaged);
+                self.add_joints(&averaged);
             }
         }
         Ok(())
@@ -157,13 +162,8 @@ impl Windows {
         groupings
     }
 
-    fn add_body(
-        &mut self,
-        segment: &Segment,
-        equations: &SampleEquations,
-        averaged: &Averaged<'_>,
-        block: impl Fn(usize) -> usize,
-    ) {
+    fn add_body(&mut self, averaged: &Averaged<'_>) {
+        let segment = averaged.segment;
         let feet = segment.feet[averaged.span.start];
         let in_contact = feet.contains(&true);
         let (group, count): (fn(usize) -> Group, _) = match in_contact {
@@ -185,8 +185,8 @@ impl Windows {
         };
         let flexion = mean_speed(|joint| joint % 3 != 0);
         let abduction = mean_speed(|joint| joint % 3 == 0);
-        let means = averaged.of(&equations.body);
-        for &centre in averaged.centres {
+        let means = averaged.of(&averaged.equations.body);
+        for &(centre, block) in &averaged.blocks {
             for axis in 0..3 {
                 let row = axis * BODY_ROWS;
                 let turning = |speed: &DMatrix<f64>| speed[centre] > MOVING_RAD_S;
@@ -195,27 +195,25 @@ impl Windows {
                     coefficients: std::array::from_fn(|i| means[(row + i, centre)]),
                     left: means[(row + PARAMETER_DIM, centre)],
                     group: group(axis),
-                    block: block(centre),
+                    block,
                     moving: !in_contact || moving,
                 });
             }
         }
     }
 
-    fn add_joints(
-        &mut self,
-        segment: &Segment,
-        equations: &SampleEquations,
-        averaged: &Averaged<'_>,
-        block: impl Fn(usize) -> usize,
-    ) {
+    fn add_joints(&mut self, averaged: &Averaged<'_>) {
+        let segment = averaged.segment;
         let feet = segment.feet[averaged.span.start];
         let half = averaged.filter.window() / 2;
         for joint in (0..JOINT_DIM).filter(|joint| !feet[joint / 3]) {
             let unknowns = joint_unknowns(joint % 3);
-            let rows = equations.joints.rows(joint * JOINT_ROWS, JOINT_ROWS);
+            let rows = averaged
+                .equations
+                .joints
+                .rows(joint * JOINT_ROWS, JOINT_ROWS);
             let means = averaged.of(&rows.into_owned());
-            for &centre in averaged.centres {
+            for &(centre, block) in &averaged.blocks {
                 let at = averaged.span.start + centre;
                 let turning = (at - half..=at + half)
                     .all(|sample| segment.dx[(joint, sample)].abs() > TURNING_RAD_S);
@@ -227,7 +225,7 @@ impl Windows {
                     coefficients,
                     left: means[(JOINT_ROWS - 1, centre)],
                     group: Group::Joint(joint % 3),
-                    block: block(centre),
+                    block,
                     moving: turning,
                 });
             }
@@ -235,11 +233,14 @@ impl Windows {
     }
 }
 
-/// A stretch of samples and the centres of its windows, counted from its start.
+/// A stretch of samples of a segment.
 struct Averaged<'a> {
+    segment: &'a Segment,
+    equations: &'a SampleEquations,
     filter: &'a SavitzkyGolay,
     span: Range<usize>,
-    centres: &'a [usize],
+    /// Centre of each of its windows, counted from its start, and the block that it belongs to.
+    blocks: Vec<(usize, usize)>,
 }
 
 impl Averaged<'_> {

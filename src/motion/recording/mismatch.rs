@@ -75,9 +75,10 @@ pub enum MismatchKind {
 }
 
 /// Something about a whole recording that cannot be true of the robot.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Mismatch {
     /// What does not fit.
+    #[serde(rename = "what")]
     pub kind: MismatchKind,
     /// The figure.
     pub value: f64,

@@ -7,6 +7,8 @@
 
 use std::ops::Range;
 
+use serde::Serialize;
+
 use super::error::{RecordingError, RecordingFault};
 use super::segment::{Segment, stretches};
 use crate::robot::{ContactFlags, FeetRule};
@@ -33,7 +35,8 @@ pub struct PhaseRule {
 }
 
 /// Place of a span in a jump.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Stance {
     /// Contact before any flight; a segment without flight is all launch.
     Launch,
