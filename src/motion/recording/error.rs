@@ -166,6 +166,11 @@ impl RecordingFault {
         }
     }
 
+    /// A stretch of fewer samples than are expected.
+    pub(super) fn too_short(found: usize, expected: usize) -> Self {
+        RecordingFault::TooShort { found, expected }
+    }
+
     /// A line that is not separated as expected.
     pub(super) fn delimiter(line: &str, expected: &'static str) -> Self {
         let found = shortened(line);

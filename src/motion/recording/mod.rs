@@ -49,7 +49,6 @@ mod instant;
 mod lines;
 mod number;
 mod segments;
-mod table;
 
 pub use self::csv::{read, read_from_bytes};
 pub use self::write::{WriteOptions, write, write_mcap, write_with};

@@ -10,9 +10,9 @@ use mcap::records::{Channel as Topic, ChunkHeader, Record, SchemaHeader};
 
 use super::log::{Channel, Log};
 use super::message::{Definition, Layout, MessageFault, Value};
+use crate::recording::csv::MAX_ROWS;
 use crate::recording::error::{RecordingError, RecordingFault};
 use crate::recording::instant::Instant;
-use crate::recording::table::MAX_ROWS;
 
 /// Largest chunk unpacked, in bytes.
 const LARGEST_CHUNK: u64 = 1 << 30;

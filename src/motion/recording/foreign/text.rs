@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 
 use super::log::{Channel, Log};
 use super::map::{ColumnMap, Delimiter, TextFormat};
+use crate::recording::csv::MAX_ROWS;
 use crate::recording::error::{RecordingError, RecordingFault, shortened};
 use crate::recording::instant::Instant;
 use crate::recording::lines::{self, Lines};
 use crate::recording::number::NumberReader;
-use crate::recording::table::MAX_ROWS;
 
 /// Numbers from which a column is kept as times: beyond, one number does not hold a microsecond.
 const LARGE: f64 = 1e8;

@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 use super::super::attitude::{angle_rates, in_world};
 use super::super::map::Frame;
 use crate::recording::check::quantile;
-use crate::recording::preprocess::differences;
+use crate::recording::preprocess::differences_within;
 use crate::recording::segment::stretches;
 
 /// Share of a derivative that a velocity must leave unexplained at most to be evidence.
@@ -23,13 +23,8 @@ pub(super) struct Scale {
 
 /// Slopes without the samples at which time jumps.
 pub(super) fn slopes(times_s: &[f64], rows: &DMatrix<f64>) -> DMatrix<f64> {
-    let mut out = DMatrix::zeros(rows.nrows(), rows.ncols());
-    for range in stretches(0..times_s.len(), |before, at| times_s[at] > times_s[before]) {
-        let own = rows.columns(range.start, range.len()).into_owned();
-        let of = differences(&times_s[range.clone()], &own);
-        out.columns_mut(range.start, range.len()).copy_from(&of);
-    }
-    out
+    let ranges = stretches(0..times_s.len(), |before, at| times_s[at] > times_s[before]);
+    differences_within(&ranges, times_s, rows)
 }
 
 /// Squared residual of `derivative = scale x velocity`, as a share of the derivative.
