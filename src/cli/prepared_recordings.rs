@@ -143,10 +143,7 @@ impl RecordedSets {
     fn notes(&self) -> Notes {
         let mut all = Notes::default();
         for set in &self.sets {
-            let notes = set.notes();
-            all.findings.extend(notes.findings);
-            all.mismatches.extend(notes.mismatches);
-            all.left_out += notes.left_out;
+            all.add(set.notes());
         }
         all
     }

@@ -181,8 +181,7 @@ pub fn without(
     }
     if segments.is_empty() {
         let row = recording.segments.first().map_or(1, |s| s.first_row);
-        let (found, expected) = (0, 2);
-        return Err(RecordingFault::TooShort { found, expected }.at(&recording.path, row));
+        return Err(RecordingFault::too_short(0, 2).at(&recording.path, row));
     }
     let out = recording.with_segments(segments);
     let dropped = recording.sample_count() - out.sample_count();

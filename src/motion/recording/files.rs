@@ -5,9 +5,7 @@ use std::sync::mpsc::sync_channel;
 use std::sync::{Arc, OnceLock};
 
 use super::check::{Finding, check};
-use super::condition::{
-    ConditionOptions, Conditioned, ImplausibleSamples, SmoothedRows, conditioned,
-};
+use super::condition::{ConditionOptions, ImplausibleSamples, SmoothedRows, condition};
 use super::error::RecordingError;
 use super::mismatch::{Mismatch, mismatches};
 use super::reader::{Reader, Reading, ReadingNotes};
@@ -88,7 +86,7 @@ pub struct RecordingFile {
     pub segments: Option<Vec<usize>>,
 }
 
-/// What the checks found when the files were first read.
+/// What the checks found in recordings, of files when they were first read.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Notes {
     /// Implausible runs of samples with their files.
@@ -99,6 +97,15 @@ pub struct Notes {
     pub left_out: usize,
     /// What reading did besides reading.
     pub reading: ReadingNotes,
+}
+
+impl Notes {
+    /// Adds what was found in other recordings, but not what reading them did.
+    pub fn add(&mut self, other: Self) {
+        self.findings.extend(other.findings);
+        self.mismatches.extend(other.mismatches);
+        self.left_out += other.left_out;
+    }
 }
 
 impl RecordingFiles {
@@ -160,17 +167,12 @@ impl RecordingFiles {
         mut take: impl FnMut(Recording) -> Result<(), E>,
     ) -> Result<(), E> {
         let mut notes = Notes::default();
-        let result = self.in_order(|recordings| {
-            let (recordings, reading) = recordings?;
+        let result = self.in_order(|ready| {
+            let (recordings, reading) = ready?;
             notes.reading.add(&reading);
-            for ready in recordings {
-                let path = &ready.recording.path;
-                let found = ready.findings.into_iter();
-                (notes.findings).extend(found.map(|finding| (path.clone(), finding)));
-                let unlike = ready.mismatches.into_iter();
-                (notes.mismatches).extend(unlike.map(|mismatch| (path.clone(), mismatch)));
-                notes.left_out += ready.left_out;
-                take(ready.recording)?;
+            for (recording, found) in recordings {
+                notes.add(found);
+                take(recording)?;
             }
             Ok(())
         });
@@ -208,14 +210,10 @@ impl RecordingFiles {
 
     /// The steps for one recording: where times were rebuilt, which is where samples came late or were lost, rows are
     /// smoothed unless a filter is asked for.
-    fn options_for(
-        &self,
-        reading: &mut Reading,
-        recording: &Recording,
-    ) -> Result<ConditionOptions, RecordingError> {
+    fn options_for(&self, reading: &mut Reading) -> Result<ConditionOptions, RecordingError> {
         let mut options = self.options.clone();
         let rebuilt = (reading.mended.iter()).any(|mended| mended.elapsed_ratio.is_some());
-        let segments = || recording.segments.iter();
+        let segments = || reading.recording.segments.iter();
         let step_s = segments().map(Segment::mean_step_s).fold(0.0, f64::max);
         let half = (HALF_SMOOTHING_S / step_s).round();
         let window = match half.is_finite() {
@@ -236,9 +234,9 @@ impl RecordingFiles {
     /// The recordings of one file, and its reading without samples. Checks that only report are made once.
     fn read(&self, file: &RecordingFile) -> Result<Ready, RecordingError> {
         let mut reading = self.reader.read(&file.path)?;
-        let empty = reading.recording.with_segments(Vec::new());
-        let recording = std::mem::replace(&mut reading.recording, empty);
-        let options = self.options_for(&mut reading, &recording)?;
+        let options = self.options_for(&mut reading)?;
+        let segments = std::mem::take(&mut reading.recording.segments);
+        let recording = reading.recording.with_segments(segments);
         let keeps = self.options.implausible == ImplausibleSamples::Keep;
         let is_first = self.notes.get().is_none();
         let ready = chosen(file, recording).into_iter().map(|recording| {
@@ -250,32 +248,32 @@ impl RecordingFiles {
                 true => mismatches(&recording, self.robot),
                 false => Vec::new(),
             };
-            Ok::<_, RecordingError>(Conditioned {
-                mismatches: unlike,
-                ..conditioned(recording, findings, &options)?
-            })
+            let (recording, left_out) = condition(recording, &findings, &options)?;
+            let path = || recording.path.clone();
+            let notes = Notes {
+                findings: findings.into_iter().map(|found| (path(), found)).collect(),
+                mismatches: unlike.into_iter().map(|found| (path(), found)).collect(),
+                left_out,
+                reading: ReadingNotes::default(),
+            };
+            Ok::<_, RecordingError>((recording, notes))
         });
         Ok((ready.collect::<Result<_, _>>()?, reading))
     }
 }
 
-/// The recordings of one file, conditioned, and what reading did.
-type Ready = (Vec<Conditioned>, Reading);
+/// The recordings of one file, conditioned, each with what was found in it, and what reading did.
+type Ready = (Vec<(Recording, Notes)>, Reading);
 
 /// The whole recording of a file, or a recording for each segment that is asked for.
-fn chosen(file: &RecordingFile, recording: Recording) -> Vec<Recording> {
+fn chosen(file: &RecordingFile, mut recording: Recording) -> Vec<Recording> {
     let Some(chosen) = &file.segments else {
         return vec![recording];
     };
-    let single = |segment| Recording {
-        path: recording.path.clone(),
-        segments: vec![segment],
-        ignored_columns: recording.ignored_columns.clone(),
-    };
-    let segments = recording.segments.into_iter().enumerate();
-    segments
+    let segments = std::mem::take(&mut recording.segments);
+    (segments.into_iter().enumerate())
         .filter(|(index, _)| chosen.contains(index))
-        .map(|(_, segment)| single(segment))
+        .map(|(_, segment)| recording.with_segments(vec![segment]))
         .collect()
 }
 

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use nalgebra::DMatrix;
 
 use super::error::{RecordingError, RecordingFault};
+use super::smoothing::moving_average;
 use crate::robot::{BODY_DIM, ContactFlags, InputRule, JOINT_DIM, Robot, STATE_DIM};
 
 /// Time over which accelerations of joints are averaged before the inertia of the motors counts, in
@@ -199,18 +200,15 @@ impl Segment {
             step if step > 0.0 => (0.5 * ACCELERATION_WINDOW_S / step).round() as usize,
             _ => 0,
         };
+        let window = 2 * half.min(self.len()) + 1;
         let mut out = DMatrix::zeros(JOINT_DIM, self.len());
         let down = |sample: usize| self.feet[sample].contains(&true);
         for stretch in stretches(0..self.len(), |a, b| down(a) == down(b)) {
-            for sample in stretch.clone() {
-                let reach = half
-                    .min(sample - stretch.start)
-                    .min(stretch.end - 1 - sample);
-                let window = self
-                    .ddx
-                    .view((0, sample - reach), (JOINT_DIM, 2 * reach + 1));
-                out.set_column(sample, &(window.column_sum() / window.ncols() as f64));
-            }
+            let own = self
+                .ddx
+                .view((0, stretch.start), (JOINT_DIM, stretch.len()));
+            let smooth = moving_average(&own.into_owned(), window);
+            (out.columns_mut(stretch.start, stretch.len())).copy_from(&smooth);
         }
         out
     }

@@ -4,9 +4,9 @@ use nalgebra::DMatrix;
 
 use crate::recording::Source;
 use crate::recording::preprocess::prepare;
+use crate::recording::smoothing::moving_average;
 use crate::train::dataset::{Dataset, scaled};
 use crate::train::error::TrainError;
-use crate::train::smooth::moving_average;
 
 /// Samples of a batch; every phase of a jump is resampled to a multiple (section IV-C4).
 pub const BATCH_ROWS: usize = 100;
