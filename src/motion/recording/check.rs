@@ -348,11 +348,12 @@ fn above(value: f64, bound: f64) -> Breach {
     (value.abs() > bound).then_some((value, bound.copysign(value)))
 }
 
-fn outside(value: f64, low: f64, high: f64) -> Breach {
+/// A value that is not within these bounds, or no number.
+pub(super) fn outside(value: f64, low: f64, high: f64) -> Breach {
     if value < low {
         Some((value, low))
     } else {
-        (value > high).then_some((value, high))
+        (value.is_nan() || value > high).then_some((value, high))
     }
 }
 

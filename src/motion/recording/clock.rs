@@ -167,7 +167,12 @@ fn by_motion(segment: &Segment, elapsed: &[Interval]) -> Segment {
             kept.push(right);
         }
     }
-    chosen(segment, &kept, time_s)
+    let feet = kept.iter().map(|sample| segment.feet[*sample]).collect();
+    let rows = segment.row(segment.len() - 1) - segment.row(0);
+    Segment {
+        row_stride: rows as f64 / kept.len().saturating_sub(1).max(1) as f64,
+        ..segment.remade(time_s, feet, |m| m.select_columns(&kept))
+    }
 }
 
 /// Replaces the trunk's angular rates by differences of its angles if the two disagree; whether so.
@@ -219,15 +224,5 @@ impl Interval {
     fn elapsed_s(&self) -> f64 {
         let time = (self.moved + STANDSTILL * self.stamped_s) / (self.speed + STANDSTILL);
         time.max(0.0)
-    }
-}
-
-/// Some samples of a segment, at other times.
-fn chosen(segment: &Segment, samples: &[usize], time_s: Vec<f64>) -> Segment {
-    let feet = samples.iter().map(|sample| segment.feet[*sample]);
-    let rows = segment.row(segment.len() - 1) - segment.row(0);
-    Segment {
-        row_stride: rows as f64 / samples.len().saturating_sub(1).max(1) as f64,
-        ..segment.remade(time_s, feet.collect(), |m| m.select_columns(samples))
     }
 }

@@ -8,7 +8,7 @@ use super::check::{Finding, check};
 use super::condition::{ConditionOptions, ImplausibleSamples, SmoothedRows, condition};
 use super::error::RecordingError;
 use super::mismatch::{Mismatch, mismatches};
-use super::reader::{Reader, Reading, ReadingNotes};
+use super::reader::{Clocks, Reader, Reading, ReadingNotes};
 use super::segment::{Recording, Segment};
 use super::smoothing::SavitzkyGolay;
 use crate::robot::Robot;
@@ -150,8 +150,10 @@ impl RecordingFiles {
     /// As [`Reader::read`].
     pub fn first(&self, count: usize) -> Result<Vec<Recording>, RecordingError> {
         let mut recordings = Vec::new();
+        let mut reader = self.reader.clone();
+        reader.clocks = Clocks::Recorded;
         for file in self.files.iter().take(count) {
-            let reading = self.reader.as_stamped().read(&file.path)?;
+            let reading = reader.read(&file.path)?;
             recordings.extend(chosen(file, reading.recording));
         }
         Ok(recordings)

@@ -16,7 +16,7 @@ use std::fmt;
 
 use serde::Serialize;
 
-use super::check::check;
+use super::check::{check, outside};
 use super::segment::Recording;
 use crate::robot::{FOOT_DIM, GRAVITY_M_S2, JOINT_DIM, Leg, Robot};
 use balance::Balance;
@@ -283,8 +283,7 @@ fn feet_columns(recording: &Recording, robot: &Robot) -> Option<Broken> {
 }
 
 fn fall(balance: &Balance) -> Option<Broken> {
-    let value = balance.fall_m_s2?;
-    let bound = outside(value, FALL_M_S2)?;
+    let (value, bound) = outside(balance.fall_m_s2?, FALL_M_S2.0, FALL_M_S2.1)?;
     let words = format!(
         "in flight the body accelerates by {value:.2} m/s^2 upwards, expected {} to {}: another axis, sign or \
          unit, another time, or contacts that are not the feet's",
@@ -294,8 +293,7 @@ fn fall(balance: &Balance) -> Option<Broken> {
 }
 
 fn weight(balance: &Balance, robot: &Robot) -> Option<Broken> {
-    let value = balance.weight_share?;
-    let bound = outside(value, WEIGHT_SHARE)?;
+    let (value, bound) = outside(balance.weight_share?, WEIGHT_SHARE.0, WEIGHT_SHARE.1)?;
     let words = format!(
         "the torques carry {value:.3} of what {} kg need ({} to {} are accepted): torques in other units, of \
          other signs or other joints, or another robot",
@@ -362,15 +360,6 @@ fn other_robot(
         other.name()
     );
     Some((share, OTHER_WEIGHT.0.exp(), words))
-}
-
-/// The bound of a range that a value breaks.
-fn outside(value: f64, (low, high): (f64, f64)) -> Option<f64> {
-    if value < low {
-        Some(low)
-    } else {
-        (value.is_nan() || value > high).then_some(high)
-    }
 }
 
 /// Weight of a mass, N.

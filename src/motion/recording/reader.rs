@@ -31,7 +31,7 @@ pub enum Clocks {
 #[derive(Debug, Clone, Default)]
 pub struct Reader {
     map: Option<Arc<ColumnMap>>,
-    clocks: Clocks,
+    pub(super) clocks: Clocks,
 }
 
 /// A recording and what was done to it besides reading.
@@ -62,14 +62,6 @@ impl Reader {
         Self {
             map: map.map(Arc::new),
             clocks,
-        }
-    }
-
-    /// The same reader that leaves clocks as they are.
-    pub fn as_stamped(&self) -> Self {
-        Self {
-            map: self.map.clone(),
-            clocks: Clocks::Recorded,
         }
     }
 

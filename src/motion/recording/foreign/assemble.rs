@@ -364,15 +364,10 @@ impl Rows<'_> {
                 start..end
             }
         };
-        let accelerations = [
-            (Quantity::JointAcceleration, Quantity::JointVelocity),
-            (Quantity::BodyAcceleration, Quantity::BodyVelocity),
-            (Quantity::AngularAcceleration, Quantity::AngularVelocity),
-        ];
-        let mut own = accelerations.iter().map(|(own, _)| own);
-        let has_acceleration = own.any(|own| self.signals.contains_key(own));
+        let mut accelerations = Quantity::ACCELERATIONS.iter();
+        let has_acceleration = accelerations.any(|(own, _)| self.signals.contains_key(own));
         if has_acceleration {
-            for (acceleration, velocity) in accelerations {
+            for (acceleration, velocity) in Quantity::ACCELERATIONS {
                 self.derive(acceleration, velocity);
             }
         } else {

@@ -47,6 +47,13 @@ impl Quantity {
         Self::Feet,
     ];
 
+    /// Accelerations, each with the velocity whose derivative it is.
+    pub(super) const ACCELERATIONS: [(Self, Self); 3] = [
+        (Self::JointAcceleration, Self::JointVelocity),
+        (Self::BodyAcceleration, Self::BodyVelocity),
+        (Self::AngularAcceleration, Self::AngularVelocity),
+    ];
+
     /// Its table in a map.
     pub const fn key(self) -> &'static str {
         match self {

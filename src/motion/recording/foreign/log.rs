@@ -44,6 +44,14 @@ impl Channel {
             ..Self::default()
         }
     }
+
+    /// Its values as times, from the first on where one number does not hold them.
+    pub fn times(&self) -> Vec<f64> {
+        match &self.instants {
+            Some(all) => all.iter().map(|instant| instant.since(all[0])).collect(),
+            None => self.values.clone(),
+        }
+    }
 }
 
 impl Log {

@@ -287,32 +287,26 @@ struct Cursor<'a> {
 }
 
 impl<'a> Cursor<'a> {
+    /// Behind CDR's header, which tells byte order and alignment.
     fn new(layout: Layout, bytes: &'a [u8]) -> Result<Self, MessageFault> {
-        let mut cursor = Self {
+        let (bytes, big_endian, align) = match (layout, bytes) {
+            (Layout::Ros1, bytes) => (bytes, false, 1),
+            (Layout::Ros2, [0, 0, _, _, rest @ ..]) => (rest, true, 8),
+            (Layout::Ros2, [0, 1, _, _, rest @ ..]) => (rest, false, 8),
+            (Layout::Ros2, [0, 6, _, _, rest @ ..]) => (rest, true, 4),
+            (Layout::Ros2, [0, 7, _, _, rest @ ..]) => (rest, false, 4),
+            (Layout::Ros2, [first, kind, _, _, ..]) => {
+                return Err(MessageFault::Encoding(format!("cdr {first:#x} {kind:#x}")));
+            }
+            (Layout::Ros2, short) => return Err(MessageFault::Short(short.len())),
+        };
+        Ok(Self {
             bytes,
             place: 0,
             layout,
-            big_endian: false,
-            align: 1,
-        };
-        if layout == Layout::Ros2 {
-            let header = bytes.get(..4).ok_or(MessageFault::Short(bytes.len()))?;
-            cursor.begin(header[0], header[1])?;
-        }
-        Ok(cursor)
-    }
-
-    /// CDR's header: byte order and alignment.
-    fn begin(&mut self, first: u8, kind: u8) -> Result<(), MessageFault> {
-        (self.big_endian, self.align) = match (first, kind) {
-            (0, 0) => (true, 8),
-            (0, 1) => (false, 8),
-            (0, 6) => (true, 4),
-            (0, 7) => (false, 4),
-            _ => return Err(MessageFault::Encoding(format!("cdr {first:#x} {kind:#x}"))),
-        };
-        self.bytes = &self.bytes[4..];
-        Ok(())
+            big_endian,
+            align,
+        })
     }
 
     fn take(&mut self, count: usize) -> Result<&'a [u8], MessageFault> {

@@ -148,14 +148,8 @@ fn is_possible(channel: &Channel, factor: f64) -> bool {
 
 /// Typical distance of samples in a column that counts upwards, else nothing.
 fn mean_step(channel: &Channel) -> Option<f64> {
-    let steps: Vec<f64> = match &channel.instants {
-        Some(instants) => (instants.windows(2))
-            .map(|pair| pair[1].since(pair[0]))
-            .collect(),
-        None => (channel.values.windows(2))
-            .map(|pair| pair[1] - pair[0])
-            .collect(),
-    };
+    let times = channel.times();
+    let steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
     // Several jumps in a file let time jump back now and then.
     let back = steps
         .iter()

@@ -3,17 +3,14 @@
 use std::path::Path;
 
 use super::super::assemble::assemble;
-use super::super::elements::Quantity;
 use super::super::log::Log;
-use super::super::map::{ColumnMap, Name, TextFormat};
+use super::super::map::{ColumnMap, TextFormat};
 use super::super::mcap::read_mcap;
 use super::super::text::read_text;
+use super::write::map_text;
 use crate::recording::error::{RecordingError, RecordingFault};
 use crate::recording::reader::is_mcap;
 use crate::robot::Robot;
-
-use super::columns::{Clock, Group, clock, groups};
-use super::write::Draft;
 
 /// A first map of a log.
 #[derive(Debug, Clone)]
@@ -33,7 +30,7 @@ pub struct Guess {
 pub fn guess(path: &Path, robot: &Robot) -> Result<Guess, RecordingError> {
     let logs = match is_mcap(path) {
         true => read_mcap(path)?,
-        false => vec![read_text(path, String::new(), &TextFormat::default())?],
+        false => vec![read_text(path, &TextFormat::default())?],
     };
     guess_of(path, &logs, robot)
 }
@@ -47,15 +44,7 @@ pub(in crate::recording) fn guess_of(
     if logs.iter().all(|log| !log.is_named) {
         return Err(RecordingFault::Unnamed.of(path));
     }
-    let groups = groups(logs);
-    let clock = clock(logs, &groups);
-    let map = Draft::of(logs, &groups, clock.as_ref(), robot);
-    let missing: Vec<&'static str> = Quantity::ALL
-        .into_iter()
-        .filter(|quantity| quantity.is_required() && !map.has(*quantity))
-        .map(Quantity::key)
-        .collect();
-    let text = map.text(path, &missing);
+    let (text, missing) = map_text(path, logs, robot);
     let outcome = ColumnMap::parse("the guessed map", &text)
         .and_then(|map| assemble(path, logs, &map))
         .map(|made| made.recording.sample_count())
@@ -64,31 +53,5 @@ pub(in crate::recording) fn guess_of(
         text,
         missing,
         outcome,
-    })
-}
-
-/// Values of a group in the units of the log, one row a column.
-pub(super) fn raw(logs: &[Log], group: &Group) -> nalgebra::DMatrix<f64> {
-    let log = &logs[group.log];
-    nalgebra::DMatrix::from_fn(group.columns.len(), log.len(), |row, sample| {
-        let value = log.columns[group.columns[row]].values[sample];
-        if value.is_finite() { value } else { 0.0 }
-    })
-}
-
-/// Times of a log in s.
-pub(super) fn times_s(logs: &[Log], log: usize, clock: Option<&Clock>) -> Option<Vec<f64>> {
-    let log = &logs[log];
-    let clock = clock?;
-    let (column, factor) = match log.clock {
-        Some(column) => (column, 1.0),
-        None => (log.column(&Name::Text(clock.name.clone()))?, clock.factor),
-    };
-    let channel = &log.columns[column];
-    Some(match &channel.instants {
-        Some(instants) => (instants.iter())
-            .map(|instant| factor * instant.since(instants[0]))
-            .collect(),
-        None => channel.values.iter().map(|time| factor * time).collect(),
     })
 }
