@@ -122,7 +122,7 @@ pub fn recording(bytes: &[u8]) {
             assert_eq!(input.shape(), (18, segment.len()));
         }
     }
-    if let Ok(phases) = prepare(&found, &PhaseRule::two_phase().with_min_samples(5), 100) {
+    if let Ok(phases) = prepare(&found, &PhaseRule::two_phase().with_min_samples(5)) {
         assert!(phases.iter().all(|phase| phase.samples.len() % 100 == 0));
     }
 }

@@ -145,9 +145,6 @@ pub enum RecordingFault {
              at most 1001, and an order of at most 12"
     )]
     Smoothing { window: usize, order: usize },
-    /// A batch of this many rows was asked for; no file's fault.
-    #[error("found a batch of {0} rows, expected at least 2")]
-    Batch(usize),
     /// The robot's kinematics refuse a sample.
     #[error("no body wrench")]
     Wrench(#[source] Box<RobotError>),

@@ -27,27 +27,15 @@ pub enum Source<'a> {
     Files(Arc<RecordingFiles>),
 }
 
-impl<'a> From<&'a [Recording]> for Source<'a> {
-    fn from(recordings: &'a [Recording]) -> Self {
-        Self::Held(recordings)
+impl<'a, R: AsRef<[Recording]> + ?Sized> From<&'a R> for Source<'a> {
+    fn from(recordings: &'a R) -> Self {
+        Self::Held(recordings.as_ref())
     }
 }
 
-impl<'a> From<&'a Vec<Recording>> for Source<'a> {
-    fn from(recordings: &'a Vec<Recording>) -> Self {
-        Self::Held(recordings)
-    }
-}
-
-impl<'a, const N: usize> From<&'a [Recording; N]> for Source<'a> {
-    fn from(recordings: &'a [Recording; N]) -> Self {
-        Self::Held(recordings)
-    }
-}
-
-impl From<&Arc<RecordingFiles>> for Source<'_> {
-    fn from(files: &Arc<RecordingFiles>) -> Self {
-        Self::Files(Arc::clone(files))
+impl From<Arc<RecordingFiles>> for Source<'_> {
+    fn from(files: Arc<RecordingFiles>) -> Self {
+        Self::Files(files)
     }
 }
 

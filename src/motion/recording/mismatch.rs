@@ -45,8 +45,6 @@ const OTHER_SLIP: f64 = 1.15;
 
 /// Distance from the origin, m, and turn about the vertical, rad, at which a segment may begin.
 const ORIGIN: (f64, f64) = (1.0, 0.5);
-/// Height of the feet that are on the ground, m.
-const FLOOR_M: f64 = 0.1;
 
 /// What does not fit; in JSON one word such as `foot_slip`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
@@ -106,7 +104,7 @@ pub fn mismatches(recording: &Recording, robot: &Robot) -> Vec<Mismatch> {
             MismatchKind::LegsOrSigns,
             legs_or_signs(recording, robot, &slip),
         ),
-        (MismatchKind::FeetColumns, feet_columns(recording, robot)),
+        (MismatchKind::FeetColumns, feet::columns(recording, robot)),
         (MismatchKind::Fall, fall(&balance)),
         (MismatchKind::Weight, weight(&balance, robot)),
         (MismatchKind::HipTorques, hip_torques(&balance)),
@@ -116,7 +114,7 @@ pub fn mismatches(recording: &Recording, robot: &Robot) -> Vec<Mismatch> {
             other_robot(recording, robot, &slip, &balance),
         ),
         (MismatchKind::Origin, origin(recording)),
-        (MismatchKind::Floor, floor(recording, robot)),
+        (MismatchKind::Floor, feet::floor(recording, robot)),
     ];
     let found = found.into_iter();
     let broken = found.filter_map(|(kind, broken)| Some((kind, broken?)));
@@ -216,17 +214,6 @@ fn origin(recording: &Recording) -> Option<Broken> {
     })
 }
 
-fn floor(recording: &Recording, robot: &Robot) -> Option<Broken> {
-    let value = feet::floor_m(recording, robot)?;
-    (value.abs() > FLOOR_M).then(|| {
-        let words = format!(
-            "feet on the ground are at a height of {value:.2} m ({FLOOR_M:.2} m are accepted): is z that of the trunk \
-             over the ground?"
-        );
-        (value, FLOOR_M, words)
-    })
-}
-
 fn foot_slip(slip: &Slip) -> Option<Broken> {
     let value = slip.rms_m()?;
     (value.is_nan() || value > SLIP_M).then(|| {
@@ -268,18 +255,6 @@ fn legs_or_signs(recording: &Recording, robot: &Robot, slip: &Slip) -> Option<Br
         );
         (value, bound, words)
     })
-}
-
-fn feet_columns(recording: &Recording, robot: &Robot) -> Option<Broken> {
-    let order = feet::better_order(recording, robot)?;
-    let names = order.legs.map(Leg::short_name).join(", ");
-    let words = format!(
-        "while some feet are on the ground, those said to be in the air are higher by {:.0} mm in sum over the \
-         samples, and by {:.0} mm if the columns of the feet are of {names}: are they exchanged?",
-        1e3 * order.recorded_m,
-        1e3 * order.best_m
-    );
-    Some((order.recorded_m, order.least_m, words))
 }
 
 fn fall(balance: &Balance) -> Option<Broken> {

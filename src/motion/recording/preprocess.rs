@@ -11,50 +11,26 @@ use super::error::{RecordingError, RecordingFault};
 use super::phases::{PhaseRule, PhaseSpan};
 use super::segment::{Recording, Segment};
 
-/// One phase of one segment, as training takes it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct PhaseData {
-    /// Phase, place in the jump, and the samples it was taken from.
-    pub span: PhaseSpan,
-    /// Index of the recording's segment.
-    pub segment: usize,
-    /// The samples.
-    pub samples: Segment,
-}
+/// Samples of a batch: every phase of a jump is resampled to a multiple (section IV-C4).
+pub const BATCH_ROWS: usize = 100;
 
-/// The phases of every segment of a recording, each resampled to a multiple of `batch` rows.
+/// The phases of every segment of a recording, each with its samples resampled to a multiple of [`BATCH_ROWS`].
 ///
 /// # Errors
-/// [`RecordingFault::TooShort`] for a span of one sample, [`RecordingFault::NoPhase`],
-/// [`RecordingFault::Batch`].
+/// [`RecordingFault::TooShort`] for a span of one sample, [`RecordingFault::NoPhase`].
 pub fn prepare(
     recording: &Recording,
     rule: &PhaseRule,
-    batch: usize,
-) -> Result<Vec<PhaseData>, RecordingError> {
+) -> Result<Vec<(PhaseSpan, Segment)>, RecordingError> {
     let mut out = Vec::new();
-    for (index, segment) in recording.segments.iter().enumerate() {
+    for segment in &recording.segments {
         for span in rule.spans(segment)? {
             let part = segment.slice(span.range.clone());
-            out.push(PhaseData {
-                samples: resampled(&part, batch_rows(part.len(), batch)?)?,
-                span,
-                segment: index,
-            });
+            let rows = part.len().div_ceil(BATCH_ROWS).max(1) * BATCH_ROWS;
+            out.push((span, resampled(&part, rows)?));
         }
     }
     Ok(out)
-}
-
-/// The smallest multiple of `batch` that holds `samples`.
-///
-/// # Errors
-/// [`RecordingFault::Batch`] for a batch below 2.
-fn batch_rows(samples: usize, batch: usize) -> Result<usize, RecordingError> {
-    if batch < 2 {
-        return Err(RecordingFault::Batch(batch).of_argument());
-    }
-    Ok(samples.div_ceil(batch).max(1) * batch)
 }
 
 /// Slopes of each row over time: second-order differences inside, also for
@@ -217,24 +193,13 @@ mod tests {
         let second = sample_segment(120);
         let mut recording = Recording::from(jump);
         recording.segments.push(second);
-        let phases = prepare(&recording, &PhaseRule::two_phase(), 100).unwrap();
-        let found: Vec<_> = phases
-            .iter()
-            .map(|p| (p.segment, p.span.phase, p.samples.len()))
-            .collect();
-        assert_eq!(found, [(0, 0, 200), (0, 1, 100), (0, 0, 100), (1, 0, 200)]);
-        let flight = &phases[1].samples;
+        let phases = prepare(&recording, &PhaseRule::two_phase()).unwrap();
+        let found = phases.iter();
+        let found = found.map(|(span, samples)| (span.phase, samples.len()));
+        let found: Vec<_> = found.collect();
+        assert_eq!(found, [(0, 200), (1, 100), (0, 100), (0, 200)]);
+        let flight = &phases[1].1;
         assert!(flight.feet.iter().all(|feet| *feet == [false; 4]));
         assert_eq!(flight.x.column(0), recording.segments[0].x.column(150));
-    }
-
-    #[test]
-    fn batch_rows_refuses_tiny_batches() {
-        assert_eq!(batch_rows(100, 100).unwrap(), 100);
-        let error = batch_rows(5, 1).unwrap_err();
-        assert_eq!(
-            error.to_string(),
-            "found a batch of 1 rows, expected at least 2"
-        );
     }
 }

@@ -50,11 +50,6 @@ impl SavitzkyGolay {
         self.window
     }
 
-    /// Degree of the polynomial.
-    pub fn order(&self) -> usize {
-        self.order
-    }
-
     /// Each row of `rows` smoothed along its samples (columns).
     ///
     /// `None` if there are fewer samples than the window has.
