@@ -83,8 +83,8 @@ impl RecordedSets {
     ) -> Self {
         let options = train_settings::conditioning(settings);
         let sets = files.map(|files| {
-            let files = RecordingFiles::new(files, robot, options.clone());
-            Arc::new(files.read_by(reader.clone()))
+            let (options, reader) = (options.clone(), reader.clone());
+            Arc::new(RecordingFiles::new(files, robot, options, reader))
         });
         Self {
             sets,

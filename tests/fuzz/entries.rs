@@ -123,7 +123,7 @@ pub fn recording(bytes: &[u8]) {
         }
     }
     if let Ok(phases) = prepare(&found, &PhaseRule::two_phase().with_min_samples(5)) {
-        assert!(phases.iter().all(|phase| phase.samples.len() % 100 == 0));
+        assert!(phases.iter().all(|(_, samples)| samples.len() % 100 == 0));
     }
 }
 

@@ -97,24 +97,20 @@ impl Notes {
 }
 
 impl RecordingFiles {
-    /// Files of recordings of `robot`; nothing is read yet.
+    /// Files of recordings of `robot` for this reader; nothing is read yet.
     pub fn new(
         files: Vec<RecordingFile>,
         robot: &'static Robot,
         options: ConditionOptions,
+        reader: Reader,
     ) -> Self {
         Self {
             files,
             robot,
             options,
-            reader: Reader::default(),
+            reader,
             notes: OnceLock::new(),
         }
-    }
-
-    /// The same files, read by this reader.
-    pub fn read_by(self, reader: Reader) -> Self {
-        Self { reader, ..self }
     }
 
     /// The files.
@@ -282,14 +278,14 @@ mod tests {
         };
         let go1 = Robot::by_name("go1").expect("known");
         let files = names.iter().map(file).collect();
-        RecordingFiles::new(files, go1, ConditionOptions::default())
+        RecordingFiles::new(files, go1, ConditionOptions::default(), Reader::default())
     }
 
     #[test]
     fn recordings_come_in_the_order_of_their_files_and_are_the_same_again() {
         let names = [1, 2, 3, 4].map(|i| format!("train_0{i}.csv.gz"));
         let files = Arc::new(files(&names.each_ref().map(String::as_str), Some(vec![0])));
-        let source = Source::from(&files);
+        let source = Source::from(files);
         let all = || {
             let mut all = Vec::new();
             let kept = source.for_each(|recording| {

@@ -18,7 +18,7 @@ use serde::Serialize;
 
 use super::check::{check, outside};
 use super::segment::Recording;
-use crate::robot::{FOOT_DIM, GRAVITY_M_S2, JOINT_DIM, Leg, Robot};
+use crate::robot::{GRAVITY_M_S2, JOINT_DIM, Leg, Robot};
 use balance::Balance;
 use stance::{Slip, best_other_place, best_other_reading};
 
@@ -139,29 +139,20 @@ pub struct Figures {
     pub relative_foot_slip_m: Option<f64>,
     /// That for the best other order of the legs or sign of an angle, m.
     pub other_reading_m: Option<f64>,
-    /// Mean vertical acceleration in flight, m/s^2.
-    pub fall_m_s2: Option<f64>,
-    /// Impulse of the feet over what the robot's weight and change of velocity need.
-    pub weight_share: Option<f64>,
-    /// Hip torque of each leg over what holds the force along the leg: 1 for a force in the leg's plane.
-    pub hip_share: [Option<f64>; FOOT_DIM],
-    /// Largest median difference of the body's acceleration and the slope of its velocity, m/s^2.
-    pub acceleration_offset_m_s2: Option<f64>,
+    /// What forces and accelerations come to.
+    #[serde(flatten)]
+    pub balance: Balance,
 }
 
 impl Figures {
     /// Of a recording on a robot.
     pub fn of(recording: &Recording, robot: &Robot) -> Self {
         let slip = Slip::of(recording, robot);
-        let balance = Balance::of(recording, robot);
         Self {
             foot_slip_m: slip.rms_m(),
             relative_foot_slip_m: slip.relative_rms_m(),
             other_reading_m: best_other_reading(recording, robot).map(|(rms_m, _)| rms_m),
-            fall_m_s2: balance.fall_m_s2,
-            weight_share: balance.weight_share,
-            hip_share: balance.hip_share,
-            acceleration_offset_m_s2: balance.acceleration_offset_m_s2.map(|(_, value)| value),
+            balance: Balance::of(recording, robot),
         }
     }
 }
@@ -295,7 +286,7 @@ fn hip_torques(balance: &Balance) -> Option<Broken> {
 }
 
 fn accelerations(balance: &Balance) -> Option<Broken> {
-    let (axis, value) = balance.acceleration_offset_m_s2?;
+    let (axis, value) = balance.axis.zip(balance.acceleration_offset_m_s2)?;
     (value.abs() > ACCELERATION_M_S2).then(|| {
         let words = format!(
             "the body's acceleration along {axis} differs from the slope of its velocity by {value:.2} m/s^2 in the \
