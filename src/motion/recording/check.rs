@@ -303,11 +303,7 @@ impl Scan<'_> {
     fn clipping(&mut self) {
         let (segment, n) = (self.segment, self.segment.len());
         for i in 0..STATE_DIM {
-            let extreme = segment
-                .dx
-                .row(i)
-                .iter()
-                .fold(0.0, |m: f64, v| m.max(v.abs()));
+            let extreme = segment.dx.row(i).amax();
             if extreme == 0.0 {
                 continue;
             }

@@ -79,19 +79,16 @@ fn read_lines(path: &Path, mut lines: Lines<'_>) -> Result<Reading, RecordingErr
 }
 
 fn read_header(path: &Path, lines: &mut Lines<'_>) -> Result<(char, Layout), RecordingError> {
-    let Some((row, line)) = lines.next_row()? else {
-        return Err(RecordingFault::Empty.of(path));
-    };
-    if line.trim().is_empty() {
-        while let Some((row, line)) = lines.next_row()? {
-            if !line.trim().is_empty() {
-                return Err(
-                    RecordingFault::delimiter("", "`;`, a tab or `,` in a header")
-                        .at(path, row - 1),
-                );
-            }
+    let (row, line) = loop {
+        match lines.next_row()? {
+            None => return Err(RecordingFault::Empty.of(path)),
+            Some((_, line)) if line.trim().is_empty() => {}
+            Some(found) => break found,
         }
-        return Err(RecordingFault::Empty.of(path));
+    };
+    if row > 1 {
+        let fault = RecordingFault::delimiter("", "`;`, a tab or `,` in a header");
+        return Err(fault.at(path, row - 1));
     }
     let delimiter = ([';', '\t', ','].into_iter())
         .find(|mark| line.contains(*mark))

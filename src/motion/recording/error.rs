@@ -243,13 +243,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn listed_many_names_counts_the_rest() {
-        let names: Vec<String> = (0..5).map(|i| format!("c{i}")).collect();
-        assert_eq!(listed(&names, 2), "`c0`, `c1` and 3 more");
-        assert_eq!(listed(&names[..1], 2), "`c0`");
-    }
-
-    #[test]
     fn shortened_cuts_long_text_and_hides_control_characters() {
         assert_eq!(shortened("a\u{1b}b"), "a\u{fffd}b");
         assert_eq!(shortened("Time\tfeet"), "Time\\tfeet");

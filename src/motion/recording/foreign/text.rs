@@ -260,18 +260,6 @@ mod tests {
     }
 
     #[test]
-    fn read_text_epochs_and_dates_keep_their_digits() {
-        let log = log(
-            "t,d\n1700000000123456789,2024-01-01T00:00:00.5\n1700000000125456789,2024-01-01T00:00:01\n",
-        );
-        let steps = log.columns.iter().map(|column| {
-            let instants = column.instants.as_ref().unwrap();
-            instants[1].since(instants[0])
-        });
-        assert_eq!(steps.collect::<Vec<_>>(), [2e6, 0.5]);
-    }
-
-    #[test]
     fn read_text_word_among_numbers_is_kept_with_its_sample() {
         let log = log("a,b\n1,2\n1,x\n");
         assert_eq!(log.columns[1].refused, Some((1, "x".to_owned())));

@@ -66,13 +66,7 @@ pub(super) fn axes<const N: usize>(
 
 /// Whether a quaternion's real part is its first or last element: that of a robot on its feet is the largest.
 pub(super) fn real_is_last(quaternions: &DMatrix<f64>) -> bool {
-    let size = |row: usize| {
-        quaternions
-            .row(row)
-            .iter()
-            .map(|value| value.abs())
-            .sum::<f64>()
-    };
+    let size = |row: usize| quaternions.row(row).abs().sum();
     size(3) > size(0)
 }
 
