@@ -228,24 +228,15 @@ impl Segment {
         out
     }
 
-    /// Force and moment on the body, 6 x n, of the torques at the links and the contacts
-    /// (equation 22). Under the published rule the file's own, if it carries them.
+    /// Input `u = [tau; F; M]`, 18 x n, in N m and N (equation 23), by the rule of a model: `tau`
+    /// are the torques at the links, recorded ones less [`Segment::losses`], `F` and `M` what they and
+    /// the contacts do to the body (equation 22); under the published rule the file's own, if it carries them.
     ///
     /// Near a singularity of a leg in contact its force is damped, see
     /// [`Robot::damped_force_map`](crate::robot::Robot::damped_force_map).
     ///
     /// # Errors
     /// [`RecordingFault::Wrench`] with the row of an angle or torque that is not finite.
-    pub fn wrench(&self, rule: &InputRule) -> Result<DMatrix<f64>, RecordingError> {
-        let input = self.input(rule)?;
-        Ok(input.rows(JOINT_DIM, BODY_DIM).into_owned())
-    }
-
-    /// Input `u = [tau; F; M]`, 18 x n, in N m and N (equation 23), by the rule of a model: `tau`
-    /// are the torques at the links, recorded ones less [`Segment::losses`].
-    ///
-    /// # Errors
-    /// As [`Segment::wrench`].
     pub fn input(&self, rule: &InputRule) -> Result<DMatrix<f64>, RecordingError> {
         self.input_of(rule, &self.torque_nm)
     }
@@ -254,7 +245,7 @@ impl Segment {
     /// the limit.
     ///
     /// # Errors
-    /// As [`Segment::wrench`].
+    /// As [`Segment::input`].
     pub fn input_within_limits(&self, rule: &InputRule) -> Result<DMatrix<f64>, RecordingError> {
         self.input_of(rule, &self.torque_within_limits(rule.robot()))
     }

@@ -65,7 +65,7 @@ struct Field {
 /// A message type with all that it is made of; the first is the message's own.
 #[derive(Debug, Clone)]
 pub(super) struct Definition {
-    types: Vec<Vec<Field>>,
+    types: Vec<(String, Vec<Field>)>,
 }
 
 /// One number of a message.
@@ -90,8 +90,7 @@ impl Definition {
             }
         }
         let mut definition = Self { types: Vec::new() };
-        let mut known = BTreeMap::new();
-        definition.add(&short(name), &texts, &mut known, 0)?;
+        definition.add(&short(name), &texts, 0)?;
         Ok(definition)
     }
 
@@ -100,11 +99,10 @@ impl Definition {
         &mut self,
         name: &str,
         texts: &BTreeMap<String, Vec<&str>>,
-        known: &mut BTreeMap<String, usize>,
         level: usize,
     ) -> Result<usize, MessageFault> {
-        if let Some(index) = known.get(name) {
-            return Ok(*index);
+        if let Some(index) = self.types.iter().position(|(known, _)| known == name) {
+            return Ok(index);
         }
         let lines = texts.get(name).cloned();
         // An empty message has no lines.
@@ -113,8 +111,7 @@ impl Definition {
             return Err(MessageFault::Undefined(name.to_owned()));
         }
         let index = self.types.len();
-        known.insert(name.to_owned(), index);
-        self.types.push(Vec::new());
+        self.types.push((name.to_owned(), Vec::new()));
         let package = name.split('/').next().unwrap_or_default();
         let mut fields = Vec::new();
         for line in lines {
@@ -135,14 +132,14 @@ impl Definition {
                     };
                     match &full[..] {
                         "builtin_interfaces/Time" | "builtin_interfaces/Duration" => Kind::Time,
-                        _ => Kind::Message(self.add(&full, texts, known, level + 1)?),
+                        _ => Kind::Message(self.add(&full, texts, level + 1)?),
                     }
                 }
             };
             let name = field.to_owned();
             fields.push(Field { name, kind, count });
         }
-        self.types[index] = fields;
+        self.types[index].1 = fields;
         Ok(index)
     }
 
@@ -170,7 +167,7 @@ impl Definition {
     ) -> Result<(), MessageFault> {
         let mut names: Vec<String> = Vec::new();
         let before = path.len();
-        for field in &self.types[index] {
+        for field in &self.types[index].1 {
             let count = match field.count {
                 Count::One => 1,
                 Count::Fixed(count) => count,

@@ -160,7 +160,10 @@ impl Source<'_> {
         let (log, clock) = (&self.logs[log], self.clock?);
         let (column, factor) = match log.clock {
             Some(column) => (column, 1.0),
-            None => (log.column(&Name::Text(clock.name.clone()))?, clock.factor),
+            None => {
+                let column = log.column(&Name::Text(clock.name.clone()))?;
+                (column, Dimension::Time.factor(clock.unit)?)
+            }
         };
         let times = log.columns[column].times();
         Some(times.into_iter().map(|time| factor * time).collect())
