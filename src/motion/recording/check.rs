@@ -233,15 +233,12 @@ impl Scan<'_> {
         for i in 0..JOINT_DIM {
             let bound = robot.torque_limit_nm()[i] * TORQUE_FACTOR;
             self.column(Implausible::Torque, Column::Torque(i), |j| {
-                above(segment.torque_nm[(i, j)], bound)
+                outside(segment.torque_nm[(i, j)], -bound, bound)
             });
             let (low, high) = robot.joint_limit_rad()[i];
+            let (low, high) = (low - JOINT_MARGIN_RAD, high + JOINT_MARGIN_RAD);
             self.column(Implausible::JointAngle, Column::Position(i), |j| {
-                outside(
-                    segment.x[(i, j)],
-                    low - JOINT_MARGIN_RAD,
-                    high + JOINT_MARGIN_RAD,
-                )
+                outside(segment.x[(i, j)], low, high)
             });
         }
         for i in 0..STATE_DIM {
@@ -251,12 +248,13 @@ impl Scan<'_> {
                 _ => BODY_RATE_RAD_S,
             };
             self.column(Implausible::Speed, Column::Velocity(i), |j| {
-                above(segment.dx[(i, j)], bound)
+                outside(segment.dx[(i, j)], -bound, bound)
             });
             self.column(Implausible::Jump, Column::Position(i), |j| {
                 let before = j.checked_sub(1)?;
                 let rise = segment.x[(i, j)] - segment.x[(i, before)];
-                above(rise / (segment.time_s[j] - segment.time_s[before]), bound)
+                let speed = rise / (segment.time_s[j] - segment.time_s[before]);
+                outside(speed, -bound, bound)
             });
         }
     }
@@ -338,10 +336,6 @@ fn group(coordinate: usize) -> usize {
         None => 0,
         Some(body) => 1 + body / 3,
     }
-}
-
-fn above(value: f64, bound: f64) -> Breach {
-    (value.abs() > bound).then_some((value, bound.copysign(value)))
 }
 
 /// A value that is not within these bounds, or no number.

@@ -80,6 +80,11 @@ impl Quantity {
         self.facts().0
     }
 
+    /// A key of its table.
+    pub(super) fn at(self, key: &str) -> String {
+        format!("{}.{key}", self.key())
+    }
+
     /// What its units measure.
     pub(super) const fn dimension(self) -> Dimension {
         self.facts().1

@@ -282,17 +282,6 @@ impl ColumnMap {
         out
     }
 
-    /// The fault of a key in the table of a quantity.
-    pub(super) fn fault_in(
-        &self,
-        quantity: Quantity,
-        key: &str,
-        found: impl Into<String>,
-        expected: impl Into<String>,
-    ) -> RecordingError {
-        self.fault(&format!("{}.{key}", quantity.key()), found, expected)
-    }
-
     /// The fault of a key.
     pub(super) fn fault(
         &self,

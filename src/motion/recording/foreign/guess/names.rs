@@ -283,12 +283,9 @@ fn join_pairs(words: &mut Vec<String>) {
 fn split_compact(words: &mut Vec<String>) {
     let parts = |word: &str| -> Option<[String; 2]> {
         for angle in ["roll", "pitch", "yaw"] {
-            for rate in ["rate", "speed", "dot", "vel"] {
-                if word == format!("{angle}{rate}") {
-                    return Some([angle.to_owned(), "rate".to_owned()]);
-                }
-            }
-            if word == format!("d{angle}") {
+            let rate = word.strip_prefix(angle);
+            let is_rate = rate.is_some_and(|rate| is_one(rate, "rate speed dot vel"));
+            if is_rate || word.strip_prefix('d') == Some(angle) {
                 return Some([angle.to_owned(), "rate".to_owned()]);
             }
         }
