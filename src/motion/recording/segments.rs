@@ -94,10 +94,8 @@ impl<'a> SegmentBuilder<'a> {
     }
 
     fn close(&mut self) -> Result<(), RecordingError> {
-        let (time_s, open) = (
-            std::mem::take(&mut self.time_s),
-            std::mem::take(&mut self.open),
-        );
+        let time_s = std::mem::take(&mut self.time_s);
+        let open = std::mem::take(&mut self.open);
         let n = open.len();
         if n < 2 {
             return Err(RecordingFault::too_short(n, 2).at(self.path, self.first_row));

@@ -71,22 +71,6 @@ impl SavitzkyGolay {
     }
 }
 
-/// Mean over a centred window of `window` samples (columns), shortened symmetrically at both ends.
-///
-/// Landing and lift-off spikes in accelerations weigh a regression more than the whole rest of a jump; averaged over
-/// 11 samples (20 ms) they carry the momentum change they stand for. A window of 0 or 1 returns the samples.
-pub fn moving_average(samples: &DMatrix<f64>, window: usize) -> DMatrix<f64> {
-    let n = samples.ncols();
-    let half = window / 2;
-    let mut smooth = DMatrix::zeros(samples.nrows(), n);
-    for i in 0..n {
-        let reach = half.min(i).min(n - 1 - i);
-        let sum = samples.columns(i - reach, 2 * reach + 1).column_sum();
-        smooth.set_column(i, &(sum / (2 * reach + 1) as f64));
-    }
-    smooth
-}
-
 impl FromStr for SavitzkyGolay {
     type Err = String;
 
@@ -111,6 +95,22 @@ impl From<SavitzkyGolay> for String {
     fn from(filter: SavitzkyGolay) -> String {
         format!("{},{}", filter.window, filter.order)
     }
+}
+
+/// Mean over a centred window of `window` samples (columns), shortened symmetrically at both ends.
+///
+/// Landing and lift-off spikes in accelerations weigh a regression more than the whole rest of a jump; averaged over
+/// 11 samples (20 ms) they carry the momentum change they stand for. A window of 0 or 1 returns the samples.
+pub fn moving_average(samples: &DMatrix<f64>, window: usize) -> DMatrix<f64> {
+    let n = samples.ncols();
+    let half = window / 2;
+    let mut smooth = DMatrix::zeros(samples.nrows(), n);
+    for i in 0..n {
+        let reach = half.min(i).min(n - 1 - i);
+        let sum = samples.columns(i - reach, 2 * reach + 1).column_sum();
+        smooth.set_column(i, &(sum / (2 * reach + 1) as f64));
+    }
+    smooth
 }
 
 #[cfg(test)]
