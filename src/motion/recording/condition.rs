@@ -94,18 +94,18 @@ fn smooth(
     filter: &SavitzkyGolay,
     rows: SmoothedRows,
 ) -> Result<(), RecordingError> {
-    let smooth = |m: &DMatrix<f64>| {
-        let too_short = || RecordingFault::too_short(segment.len(), filter.window());
-        (filter.smooth(m)).ok_or_else(|| too_short().at(&segment.path, segment.row(0)))
-    };
-    let ddx = smooth(&segment.ddx)?;
-    if rows == SmoothedRows::All {
-        let [x, dx, torque_nm] = [&segment.x, &segment.dx, &segment.torque_nm].map(&smooth);
-        let body_wrench = segment.body_wrench.as_ref().map(&smooth).transpose()?;
-        (segment.x, segment.dx, segment.torque_nm) = (x?, dx?, torque_nm?);
-        segment.body_wrench = body_wrench;
+    if segment.len() < filter.window() {
+        let fault = RecordingFault::too_short(segment.len(), filter.window());
+        return Err(fault.at(&segment.path, segment.row(0)));
     }
-    segment.ddx = ddx;
+    let smooth = |m: &DMatrix<f64>| filter.smooth(m).expect("invariant: a window of samples");
+    match rows {
+        SmoothedRows::Accelerations => segment.ddx = smooth(&segment.ddx),
+        SmoothedRows::All => {
+            let (time_s, feet) = (segment.time_s.clone(), segment.feet.clone());
+            *segment = segment.remade(time_s, feet, smooth);
+        }
+    }
     Ok(())
 }
 

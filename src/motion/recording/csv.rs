@@ -49,7 +49,6 @@ fn read_lines(path: &Path, mut lines: Lines<'_>) -> Result<Reading, RecordingErr
         path,
         delimiter,
         numbers: NumberReader::new(delimiter),
-        rows: 0,
         start: None,
         segments: SegmentBuilder::new(path, layout.has_acceleration, layout.has_force),
         layout: &layout,
@@ -103,7 +102,6 @@ struct Table<'a> {
     delimiter: char,
     layout: &'a Layout,
     numbers: NumberReader,
-    rows: usize,
     /// The first date, where times are dates.
     start: Option<Instant>,
     segments: SegmentBuilder<'a>,
@@ -111,10 +109,10 @@ struct Table<'a> {
 
 impl Table<'_> {
     fn push(&mut self, row: usize, line: &str) -> Result<(), RecordingError> {
-        if self.rows == MAX_ROWS {
+        // The header is the first row, and none is blank.
+        if row > MAX_ROWS + 1 {
             return Err(RecordingFault::TooManyRows(MAX_ROWS).at(self.path, row));
         }
-        self.rows += 1;
         let sample = self.parse(row, line)?;
         self.segments.push(row, sample)
     }

@@ -171,11 +171,9 @@ pub fn notes(recording: &Recording, robot: &Robot) -> Vec<String> {
         .map(|mismatch| format!("{path}: {mismatch}"))
         .collect();
     let findings = check(recording, robot);
-    let faults: Vec<_> = (findings.iter())
-        .filter(|finding| finding.kind.can_be_left_out())
-        .collect();
-    if let Some(first) = faults.first() {
-        let count = faults.len();
+    let mut faults = findings.iter().filter(|f| f.kind.can_be_left_out());
+    if let Some(first) = faults.next() {
+        let count = 1 + faults.count();
         notes.push(format!(
             "{path}: {count} implausible runs of samples, such as {first}"
         ));

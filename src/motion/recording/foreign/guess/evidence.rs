@@ -64,12 +64,6 @@ pub(super) fn axes<const N: usize>(
     Some((scale, frame))
 }
 
-/// Whether a quaternion's real part is its first or last element: that of a robot on its feet is the largest.
-pub(super) fn real_is_last(quaternions: &DMatrix<f64>) -> bool {
-    let size = |row: usize| quaternions.row(row).abs().sum();
-    size(3) > size(0)
-}
-
 /// The largest value, the 99th percentile of absolute values, so that single spikes do not count.
 pub(super) fn reach(values: impl Iterator<Item = f64>) -> f64 {
     quantile(values.map(f64::abs), 0.99)

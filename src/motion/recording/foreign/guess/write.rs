@@ -11,7 +11,7 @@ use super::super::log::Log;
 use super::super::map::{Frame, Name};
 use super::super::units::Dimension;
 use super::columns::{Clock, Group, clock, groups};
-use super::evidence::{Scale, axes, reach, real_is_last, scale, slopes};
+use super::evidence::{Scale, axes, reach, scale, slopes};
 use super::names::unit;
 use crate::robot::{JOINT_DIM, JOINT_NAMES, Robot};
 
@@ -282,7 +282,9 @@ impl Source<'_> {
             let mut lines = Vec::new();
             let found = match group.is_quaternion {
                 true => {
-                    let last = group.is_counted && real_is_last(&values);
+                    // The real part of a robot on its feet is the largest.
+                    let size = |row: usize| values.row(row).abs().sum();
+                    let last = group.is_counted && size(3) > size(0);
                     lines.push(match (group.is_counted, last) {
                         (true, false) => "order = \"wxyz\"   # the first is the largest".to_owned(),
                         (true, true) => "order = \"xyzw\"   # the last is the largest".to_owned(),
