@@ -116,15 +116,15 @@ pub fn mismatches(recording: &Recording, robot: &Robot) -> Vec<Mismatch> {
         (MismatchKind::Origin, origin(recording)),
         (MismatchKind::Floor, feet::floor(recording, robot)),
     ];
-    let found = found.into_iter();
-    let broken = found.filter_map(|(kind, broken)| Some((kind, broken?)));
-    let mismatch = |(kind, (value, bound, words))| Mismatch {
-        kind,
-        value,
-        bound,
-        words,
+    let mismatch = |(kind, broken): (MismatchKind, Option<Broken>)| {
+        broken.map(|(value, bound, words)| Mismatch {
+            kind,
+            value,
+            bound,
+            words,
+        })
     };
-    broken.map(mismatch).collect()
+    found.into_iter().filter_map(mismatch).collect()
 }
 
 /// A figure, the bound that it breaks, and that in words.

@@ -187,27 +187,25 @@ impl Open {
             (log_time_ns / 1_000_000_000) as i64,
             (log_time_ns % 1_000_000_000) as u32,
         ));
-        let (mut place, mut fits) = (1, true);
-        let visited = self
-            .definition
-            .visit(self.layout, message, is_first, |name, value| {
-                if is_first {
-                    columns.push(Channel::named(name));
-                }
-                match (columns.get_mut(place), value) {
-                    (None, _) => fits = false,
-                    (Some(column), Value::Number(value)) => column.values.push(value),
-                    (Some(column), Value::Time(seconds, nanoseconds)) => {
-                        column.push_instant(instant(seconds, nanoseconds));
-                    }
-                }
-                place += 1;
-            });
-        self.fault = match visited {
-            Err(fault) => Some(fault),
-            Ok(()) if fits && place == columns.len() => None,
-            Ok(()) => Some(MessageFault::Ragged),
+        let values = match self.definition.values(self.layout, message, is_first) {
+            Ok(values) => values,
+            Err(fault) => return self.fault = Some(fault),
         };
+        if is_first {
+            columns.extend(values.iter().map(|(name, _)| Channel::named(name)));
+        }
+        if values.len() + 1 != columns.len() {
+            self.fault = Some(MessageFault::Ragged);
+            return;
+        }
+        for (column, (_, value)) in columns[1..].iter_mut().zip(values) {
+            match value {
+                Value::Number(value) => column.values.push(value),
+                Value::Time(seconds, nanoseconds) => {
+                    column.push_instant(instant(seconds, nanoseconds));
+                }
+            }
+        }
     }
 }
 

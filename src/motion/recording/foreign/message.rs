@@ -143,18 +143,17 @@ impl Definition {
         Ok(index)
     }
 
-    /// Calls `visit` with every number of a message and, if `named`, its name: `pose.position.x`,
-    /// `motor_state[3].q`, and `position[FR_hip_joint]` where a list of names goes with a list of numbers.
-    pub fn visit(
+    /// Every number of a message and, if `named`, its name: `pose.position.x`, `motor_state[3].q`, and
+    /// `position[FR_hip_joint]` where a list of names goes with a list of numbers.
+    pub fn values(
         &self,
         layout: Layout,
         bytes: &[u8],
         named: bool,
-        mut visit: impl FnMut(&str, Value),
-    ) -> Result<(), MessageFault> {
-        let mut cursor = Cursor::new(layout, bytes)?;
-        let mut path = String::new();
-        self.message(0, &mut cursor, named, &mut path, &mut visit)
+    ) -> Result<Vec<(String, Value)>, MessageFault> {
+        let (mut cursor, mut out) = (Cursor::new(layout, bytes)?, Vec::new());
+        self.message(0, &mut cursor, named, &mut String::new(), Some(&mut out))?;
+        Ok(out)
     }
 
     fn message(
@@ -163,7 +162,7 @@ impl Definition {
         cursor: &mut Cursor<'_>,
         named: bool,
         path: &mut String,
-        visit: &mut dyn FnMut(&str, Value),
+        mut out: Option<&mut Vec<(String, Value)>>,
     ) -> Result<(), MessageFault> {
         let mut names: Vec<String> = Vec::new();
         let before = path.len();
@@ -197,12 +196,8 @@ impl Definition {
                 }
                 let value = match field.kind {
                     Kind::Message(part) => {
-                        let mut skip = |_: &str, _: Value| {};
-                        let visit = match count > MOST_ENTRIES {
-                            true => &mut skip,
-                            false => &mut *visit,
-                        };
-                        self.message(part, cursor, named, path, visit)?;
+                        let out = out.as_deref_mut().filter(|_| count <= MOST_ENTRIES);
+                        self.message(part, cursor, named, path, out)?;
                         continue;
                     }
                     Kind::Text => {
@@ -219,8 +214,10 @@ impl Definition {
                     }
                     Kind::Float(_) => Value::Number(f64::from_bits(cursor.unsigned(8)?)),
                 };
-                if count <= MOST_ENTRIES {
-                    visit(path, value);
+                if let Some(out) = out.as_deref_mut()
+                    && count <= MOST_ENTRIES
+                {
+                    out.push((path.clone(), value));
                 }
             }
         }
@@ -398,7 +395,7 @@ mod tests {
     }
 
     #[test]
-    fn visit_messages_of_both_systems_have_the_same_numbers_with_names() {
+    fn values_of_messages_of_both_systems_have_the_same_numbers_with_names() {
         let definition = Definition::parse("demo_msgs/msg/Demo", TEXT).unwrap();
         let expected = [
             ("header.stamp", Value::Time(7, 250_000_000)),
@@ -413,27 +410,23 @@ mod tests {
             ("last", Value::Number(-300.0)),
         ];
         for layout in [Layout::Ros1, Layout::Ros2] {
-            let mut found = Vec::new();
-            let visit = |name: &str, value| found.push((name.to_owned(), value));
-            definition
-                .visit(layout, &message(layout), true, visit)
-                .unwrap();
+            let found = definition.values(layout, &message(layout), true).unwrap();
             let found = found.iter().map(|(name, value)| (name.as_str(), *value));
             assert_eq!(found.collect::<Vec<_>>(), expected, "{layout:?}");
         }
     }
 
     #[test]
-    fn visit_every_cut_message_is_refused() {
+    fn values_of_every_cut_message_is_refused() {
         let definition = Definition::parse("demo_msgs/msg/Demo", TEXT).unwrap();
         let whole = message(Layout::Ros2);
         for end in 0..whole.len() {
-            let cut = definition.visit(Layout::Ros2, &whole[..end], false, |_, _| {});
+            let cut = definition.values(Layout::Ros2, &whole[..end], false);
             assert!(cut.is_err(), "{end}");
         }
         let mut other = whole;
         other[1] = 3;
-        let fault = definition.visit(Layout::Ros2, &other, false, |_, _| {});
+        let fault = definition.values(Layout::Ros2, &other, false);
         assert!(matches!(fault, Err(MessageFault::Encoding(_))));
     }
 

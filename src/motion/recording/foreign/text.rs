@@ -70,12 +70,10 @@ pub(in crate::recording) fn read_text(
             Some(sheet) => sheet.push(row, line)?,
         }
     }
-    match sheet {
-        None => Err(RecordingFault::Empty.of(path)),
-        Some(Sheet { log, .. }) if log.len() == 0 => {
-            Err(RecordingFault::HeaderOnly(log.columns.len()).of(path))
-        }
-        Some(Sheet { log, .. }) => Ok(log),
+    let log = sheet.ok_or_else(|| RecordingFault::Empty.of(path))?.log;
+    match log.len() {
+        0 => Err(RecordingFault::HeaderOnly(log.columns.len()).of(path)),
+        _ => Ok(log),
     }
 }
 

@@ -144,12 +144,9 @@ pub(super) fn clock(logs: &[Log], groups: &[Group]) -> Option<Clock> {
 fn mean_step(channel: &Channel) -> Option<f64> {
     let times = channel.times();
     let steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    // Several jumps in a file let time jump back now and then.
-    let back = steps
-        .iter()
-        .filter(|step| step.is_nan() || **step <= 0.0)
-        .count();
     let forward: Vec<f64> = steps.iter().copied().filter(|step| *step > 0.0).collect();
+    // Several jumps in a file let time jump back now and then.
+    let back = steps.len() - forward.len();
     let counts = !forward.is_empty() && back * 50 <= steps.len();
     counts.then(|| median(forward.into_iter()))
 }
