@@ -147,30 +147,24 @@ impl<'a> Source<'a> {
 
     /// For each column the element that it is.
     fn order(&self, elements: &[String], columns: usize) -> Result<Vec<usize>, RecordingError> {
+        let key = self.quantity.at("order");
         let words = match &self.table.order {
             None if self.is_quaternion(columns) => {
-                return Err(self.map.fault(
-                    &self.quantity.at("order"),
-                    "a quaternion without order",
-                    "`wxyz` or `xyzw`",
-                ));
+                let found = "a quaternion without order";
+                return Err(self.map.fault(&key, found, "`wxyz` or `xyzw`"));
             }
             None => return Ok((0..columns).collect()),
             Some(Words::One(text)) => text.split_whitespace().map(str::to_owned).collect(),
             Some(Words::Many(words)) => words.clone(),
         };
-        let fault = |found: String| {
-            self.map.fault(
-                &self.quantity.at("order"),
-                found,
-                format!("each of {} once", elements.join(" ")),
-            )
-        };
-        let order = ordered(&words, elements).map_err(fault)?;
-        match order.len() == columns {
+        let order = ordered(&words, elements).and_then(|order| match order.len() == columns {
             true => Ok(order),
-            false => Err(fault(format!("{} names", order.len()))),
-        }
+            false => Err(format!("{} names", order.len())),
+        });
+        order.map_err(|found| {
+            let expected = format!("each of {} once", elements.join(" "));
+            self.map.fault(&key, found, expected)
+        })
     }
 
     /// The factor to SI of a unit that stands under this key; 1 without one.
@@ -196,15 +190,15 @@ impl<'a> Source<'a> {
         order: &[usize],
         default: f64,
     ) -> Result<Vec<f64>, RecordingError> {
+        let fault = |found: String, expected: String| {
+            Err(self.map.fault(&self.quantity.at(key), found, expected))
+        };
         match factors {
             None => Ok(vec![default; order.len()]),
             Some(Factors::All(value)) => Ok(vec![*value; order.len()]),
             Some(Factors::Each(values)) if values.len() == order.len() => Ok(values.clone()),
             Some(Factors::Each(values)) => {
-                let found = format!("{} numbers", values.len());
-                Err(self
-                    .map
-                    .fault(&self.quantity.at(key), found, order.len().to_string()))
+                fault(format!("{} numbers", values.len()), order.len().to_string())
             }
             Some(Factors::Named(named_values)) => {
                 let mut of_element = vec![default; elements.len()];
@@ -212,15 +206,11 @@ impl<'a> Source<'a> {
                     let found = named(word, elements);
                     if found.is_empty() {
                         let expected = format!("one of {}", elements.join(" "));
-                        return Err(self.map.fault(
-                            &self.quantity.at(key),
-                            format!("`{word}`"),
-                            expected,
-                        ));
+                        return fault(format!("`{word}`"), expected);
                     }
-                    found
-                        .into_iter()
-                        .for_each(|element| of_element[element] = *value);
+                    for element in found {
+                        of_element[element] = *value;
+                    }
                 }
                 Ok(order.iter().map(|element| of_element[*element]).collect())
             }
