@@ -1075,7 +1075,7 @@ fn bad_recordings_end_with_one_and_name_file_row_and_column() {
     let error = failed(&["simulate", MODEL, &missing]);
     assert!(error.contains("missing.csv"), "{error}");
 
-    let header: Vec<String> = romc::recording::columns::Column::all()
+    let header: Vec<String> = romc::recording::columns::Column::all(true, true)
         .iter()
         .map(|column| column.name())
         .collect();

@@ -83,8 +83,8 @@ impl RecordedSets {
     ) -> Self {
         let options = train_settings::conditioning(settings);
         let sets = files.map(|files| {
-            let files = RecordingFiles::new(files, robot, options.clone());
-            Arc::new(files.read_by(reader.clone()))
+            let (options, reader) = (options.clone(), reader.clone());
+            Arc::new(RecordingFiles::new(files, robot, options, reader))
         });
         Self {
             sets,
@@ -134,10 +134,7 @@ impl RecordedSets {
     fn notes(&self) -> Notes {
         let mut all = Notes::default();
         for set in &self.sets {
-            let notes = set.notes();
-            all.findings.extend(notes.findings);
-            all.mismatches.extend(notes.mismatches);
-            all.left_out += notes.left_out;
+            all.add(set.notes());
         }
         all
     }

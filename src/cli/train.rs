@@ -1,6 +1,7 @@
 //! `romc train`: recordings in, a model file out.
 
 use std::fmt::Write as _;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use serde_json::json;
@@ -44,7 +45,7 @@ pub fn run(arguments: &TrainArguments) -> Result<(Answer, u8), Error> {
     train_settings::identified(&mut options, &settings, training, robot)?;
     // a fault of the test recordings ends the command before the training
     read_all(test)?;
-    let sets = Recordings::new(training, validation);
+    let sets = Recordings::new(Arc::clone(training), Arc::clone(validation));
     let files = arguments.recordings.iter().chain(&arguments.validation);
     let command = command_line(arguments, &settings, method, &options);
     let mut origin = Origin::of_files(command, files);
@@ -82,7 +83,7 @@ pub fn run(arguments: &TrainArguments) -> Result<(Answer, u8), Error> {
     artifact::write(&arguments.output, &trained.model, arguments.force)?;
     let tested = match test.is_empty() {
         true => None,
-        false => Some(train::assess(&trained.model, test)?),
+        false => Some(train::assess(&trained.model, Arc::clone(test))?),
     };
     let mut answer = answer(arguments, &trained, tested.as_ref());
     let notes = notes(&trained.report, tested.as_ref(), &recorded)?;
@@ -119,7 +120,7 @@ fn notes(
     let mut notes = Vec::new();
     for (set, metrics, files) in [judged, ("test", tested, test)] {
         if let Some(metrics) = metrics {
-            notes.extend(whole_jump_note(metrics, (set, files))?);
+            notes.extend(whole_jump_note(metrics, (set, Arc::clone(files)))?);
         }
     }
     Ok(notes)

@@ -122,8 +122,8 @@ pub fn recording(bytes: &[u8]) {
             assert_eq!(input.shape(), (18, segment.len()));
         }
     }
-    if let Ok(phases) = prepare(&found, &PhaseRule::two_phase().with_min_samples(5), 100) {
-        assert!(phases.iter().all(|phase| phase.samples.len() % 100 == 0));
+    if let Ok(phases) = prepare(&found, &PhaseRule::two_phase().with_min_samples(5)) {
+        assert!(phases.iter().all(|(_, samples)| samples.len() % 100 == 0));
     }
 }
 

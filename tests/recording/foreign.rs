@@ -687,8 +687,8 @@ fn files_with_late_samples_are_smoothed_unless_told_otherwise() {
             segments: None,
         };
         let go1 = Robot::by_name("go1").unwrap();
-        let files = RecordingFiles::new(vec![file], go1, ConditionOptions::default());
-        let files = files.read_by(Reader::new(None, clocks));
+        let (options, reader) = (ConditionOptions::default(), Reader::new(None, clocks));
+        let files = RecordingFiles::new(vec![file], go1, options, reader);
         let mut all = Vec::new();
         let kept = files.for_each(|recording| {
             all.push(recording);

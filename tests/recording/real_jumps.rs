@@ -125,15 +125,14 @@ fn asynchronous_jumps_leave_the_ground_front_feet_first() {
 fn own_jumps_are_prepared_in_batches_of_100() {
     for path in own_jumps() {
         let jump = recording::read(&path).unwrap();
-        let phases = prepare(&jump, &PhaseRule::two_phase().with_min_samples(5), 100).unwrap();
+        let phases = prepare(&jump, &PhaseRule::two_phase().with_min_samples(5)).unwrap();
         assert_eq!(phases.len(), 3);
-        for phase in &phases {
-            let span = phase.span.range.len();
-            assert_eq!(phase.samples.len(), span.div_ceil(100) * 100);
+        for (span, samples) in &phases {
+            assert_eq!(samples.len(), span.range.len().div_ceil(100) * 100);
             let ends = |z: f64, at: usize| (z - jump.segments[0].x[(14, at)]).abs();
-            assert!(ends(phase.samples.x[(14, 0)], phase.span.range.start) < 1e-12);
-            let last = phase.samples.len() - 1;
-            assert!(ends(phase.samples.x[(14, last)], phase.span.range.end - 1) < 1e-12);
+            assert!(ends(samples.x[(14, 0)], span.range.start) < 1e-12);
+            let last = samples.len() - 1;
+            assert!(ends(samples.x[(14, last)], span.range.end - 1) < 1e-12);
         }
     }
 }

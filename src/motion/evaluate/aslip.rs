@@ -177,7 +177,7 @@ pub(super) fn stances(
     rule: &InputRule,
     segment: &Segment,
 ) -> Result<Vec<Option<Stance>>, RecordingError> {
-    let wrench = segment.wrench(rule)?;
+    let input = segment.input(rule)?;
     let mut stances = Vec::with_capacity(segment.len());
     let mut foot_m = None;
     for sample in 0..segment.len() {
@@ -187,7 +187,7 @@ pub(super) fn stances(
             continue;
         }
         let foot = *foot_m.get_or_insert_with(|| mean_foot(rule.robot(), segment, sample));
-        let force = wrench.fixed_view::<3, 1>(0, sample).into_owned();
+        let force = input.fixed_view::<3, 1>(JOINT_DIM, sample).into_owned();
         let force = match rule.wrench_frame() {
             WrenchFrame::Body => orientation(segment, sample) * force,
             WrenchFrame::World => force,

@@ -181,8 +181,7 @@ pub fn without(
     }
     if segments.is_empty() {
         let row = recording.segments.first().map_or(1, |s| s.first_row);
-        let (found, expected) = (0, 2);
-        return Err(RecordingFault::TooShort { found, expected }.at(&recording.path, row));
+        return Err(RecordingFault::too_short(0, 2).at(&recording.path, row));
     }
     let out = recording.with_segments(segments);
     let dropped = recording.sample_count() - out.sample_count();
@@ -234,15 +233,12 @@ impl Scan<'_> {
         for i in 0..JOINT_DIM {
             let bound = robot.torque_limit_nm()[i] * TORQUE_FACTOR;
             self.column(Implausible::Torque, Column::Torque(i), |j| {
-                above(segment.torque_nm[(i, j)], bound)
+                outside(segment.torque_nm[(i, j)], -bound, bound)
             });
             let (low, high) = robot.joint_limit_rad()[i];
+            let (low, high) = (low - JOINT_MARGIN_RAD, high + JOINT_MARGIN_RAD);
             self.column(Implausible::JointAngle, Column::Position(i), |j| {
-                outside(
-                    segment.x[(i, j)],
-                    low - JOINT_MARGIN_RAD,
-                    high + JOINT_MARGIN_RAD,
-                )
+                outside(segment.x[(i, j)], low, high)
             });
         }
         for i in 0..STATE_DIM {
@@ -252,12 +248,13 @@ impl Scan<'_> {
                 _ => BODY_RATE_RAD_S,
             };
             self.column(Implausible::Speed, Column::Velocity(i), |j| {
-                above(segment.dx[(i, j)], bound)
+                outside(segment.dx[(i, j)], -bound, bound)
             });
             self.column(Implausible::Jump, Column::Position(i), |j| {
                 let before = j.checked_sub(1)?;
                 let rise = segment.x[(i, j)] - segment.x[(i, before)];
-                above(rise / (segment.time_s[j] - segment.time_s[before]), bound)
+                let speed = rise / (segment.time_s[j] - segment.time_s[before]);
+                outside(speed, -bound, bound)
             });
         }
     }
@@ -304,11 +301,7 @@ impl Scan<'_> {
     fn clipping(&mut self) {
         let (segment, n) = (self.segment, self.segment.len());
         for i in 0..STATE_DIM {
-            let extreme = segment
-                .dx
-                .row(i)
-                .iter()
-                .fold(0.0, |m: f64, v| m.max(v.abs()));
+            let extreme = segment.dx.row(i).amax();
             if extreme == 0.0 {
                 continue;
             }
@@ -345,15 +338,12 @@ fn group(coordinate: usize) -> usize {
     }
 }
 
-fn above(value: f64, bound: f64) -> Breach {
-    (value.abs() > bound).then_some((value, bound.copysign(value)))
-}
-
-fn outside(value: f64, low: f64, high: f64) -> Breach {
+/// A value that is not within these bounds, or no number.
+pub(super) fn outside(value: f64, low: f64, high: f64) -> Breach {
     if value < low {
         Some((value, low))
     } else {
-        (value > high).then_some((value, high))
+        (value.is_nan() || value > high).then_some((value, high))
     }
 }
 

@@ -60,16 +60,8 @@ pub struct Mended {
 /// # Errors
 /// [`TooShort`](crate::recording::RecordingFault::TooShort) if fewer than two samples remain.
 pub fn timed(segment: &Segment) -> Result<Timed, RecordingError> {
-    let n = segment.len();
-    let agreeing = agreeing_coordinates(segment);
-    let elapsed: Vec<Interval> = (1..n)
-        .map(|right| Interval::of(segment, right, &agreeing))
-        .collect();
-    let moved: f64 = elapsed.iter().map(|interval| interval.moved).sum();
-    let stamped: f64 = (elapsed.iter())
-        .map(|interval| interval.speed * interval.stamped_s)
-        .sum();
-    let elapsed_ratio = if stamped > 0.0 { moved / stamped } else { 1.0 };
+    let elapsed = Interval::all(segment, &agreeing_coordinates(segment));
+    let elapsed_ratio = ratio(&elapsed, 0.0).unwrap_or(1.0);
     let rebuilt = (elapsed_ratio - 1.0).abs() > LEAST_DISAGREEMENT && elapsed_ratio > 0.0;
     let chosen = match rebuilt {
         true => by_motion(segment, &elapsed),
@@ -104,14 +96,8 @@ pub fn timed(segment: &Segment) -> Result<Timed, RecordingError> {
 /// The coordinates without those that move and disagree on how fast time passes; none if more than a third of those
 /// that move do, or if the joints disagree with the body: one of the two is wrong, not the clock.
 fn agreeing_coordinates(segment: &Segment) -> Vec<usize> {
-    let ratio = |row: usize| {
-        let intervals = (1..segment.len()).map(|right| Interval::of(segment, right, &[row]));
-        let (moved, stamped) = intervals.fold((0.0, 0.0), |(moved, stamped), interval| {
-            let speed = interval.speed * interval.stamped_s;
-            (moved + interval.moved, stamped + speed)
-        });
-        (stamped > STANDSTILL * segment.duration_s()).then(|| moved / stamped)
-    };
+    let least = STANDSTILL * segment.duration_s();
+    let ratio = |row: usize| ratio(&Interval::all(segment, &[row]), least);
     let ratios: Vec<Option<f64>> = (0..COORDINATES).map(ratio).collect();
     let agrees = |ratio: f64, with: f64| (ratio - with).abs() <= AGREES * with.abs();
     let middle = |ratios: &[Option<f64>]| {
@@ -135,6 +121,16 @@ fn agreeing_coordinates(segment: &Segment) -> Vec<usize> {
     let all = 0..COORDINATES;
     all.filter(|&row| ratios[row].is_none_or(|ratio| agrees(ratio, median)))
         .collect()
+}
+
+/// Time that passed by the motion over time that passed by the stamps, if more moved than `least`.
+fn ratio(intervals: &[Interval], least: f64) -> Option<f64> {
+    let (mut moved, mut stamped) = (0.0, 0.0);
+    for interval in intervals {
+        moved += interval.moved;
+        stamped += interval.speed * interval.stamped_s;
+    }
+    (stamped > least).then(|| moved / stamped)
 }
 
 /// Which times lie between samples that are more than [`LOST_STEPS`] apart.
@@ -167,7 +163,12 @@ fn by_motion(segment: &Segment, elapsed: &[Interval]) -> Segment {
             kept.push(right);
         }
     }
-    chosen(segment, &kept, time_s)
+    let feet = kept.iter().map(|sample| segment.feet[*sample]).collect();
+    let rows = segment.row(segment.len() - 1) - segment.row(0);
+    Segment {
+        row_stride: rows as f64 / kept.len().saturating_sub(1).max(1) as f64,
+        ..segment.remade(time_s, feet, |m| m.select_columns(&kept))
+    }
 }
 
 /// Replaces the trunk's angular rates by differences of its angles if the two disagree; whether so.
@@ -198,7 +199,13 @@ struct Interval {
 }
 
 impl Interval {
-    /// From the sample before `right` to `right`, in some of the coordinates.
+    /// From each sample to the next, in some of the coordinates.
+    fn all(segment: &Segment, coordinates: &[usize]) -> Vec<Self> {
+        let rights = 1..segment.len();
+        (rights.map(|right| Self::of(segment, right, coordinates))).collect()
+    }
+
+    /// From the sample before `right` to `right`.
     fn of(segment: &Segment, right: usize, coordinates: &[usize]) -> Self {
         let (mut speed, mut moved) = (0.0, 0.0);
         for &row in coordinates {
@@ -219,15 +226,5 @@ impl Interval {
     fn elapsed_s(&self) -> f64 {
         let time = (self.moved + STANDSTILL * self.stamped_s) / (self.speed + STANDSTILL);
         time.max(0.0)
-    }
-}
-
-/// Some samples of a segment, at other times.
-fn chosen(segment: &Segment, samples: &[usize], time_s: Vec<f64>) -> Segment {
-    let feet = samples.iter().map(|sample| segment.feet[*sample]);
-    let rows = segment.row(segment.len() - 1) - segment.row(0);
-    Segment {
-        row_stride: rows as f64 / samples.len().saturating_sub(1).max(1) as f64,
-        ..segment.remade(time_s, feet.collect(), |m| m.select_columns(samples))
     }
 }

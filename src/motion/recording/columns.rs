@@ -38,28 +38,17 @@ impl Column {
         }
     }
 
-    /// All columns in the order in which files are written.
-    pub fn all() -> Vec<Column> {
+    /// The columns of a file, with or without accelerations and the body wrench, in the order in which they are written.
+    pub fn all(accelerations: bool, force: bool) -> Vec<Column> {
         let mut out = vec![Column::Time];
         for i in 0..STATE_DIM {
-            out.extend([
-                Column::Position(i),
-                Column::Velocity(i),
-                Column::Acceleration(i),
-            ]);
+            out.extend([Column::Position(i), Column::Velocity(i)]);
+            out.extend(accelerations.then_some(Column::Acceleration(i)));
         }
         out.extend((0..JOINT_DIM).map(Column::Torque));
-        out.extend((0..BODY_DIM).map(Column::Force));
+        out.extend((0..BODY_DIM).filter(|_| force).map(Column::Force));
         out.extend((0..FOOT_DIM).map(Column::Foot));
         out
-    }
-
-    fn is_acceleration(self) -> bool {
-        matches!(self, Column::Acceleration(_))
-    }
-
-    fn is_force(self) -> bool {
-        matches!(self, Column::Force(_))
     }
 }
 
@@ -96,7 +85,7 @@ impl Layout {
     /// # Errors
     /// [`RecordingFault::MissingColumns`], [`RecordingFault::DuplicateColumn`].
     pub fn from_header(path: &Path, names: Vec<String>) -> Result<Layout, RecordingError> {
-        let known: Vec<(String, Column)> = Column::all()
+        let known: Vec<(String, Column)> = Column::all(true, true)
             .into_iter()
             .map(|column| (folded(&column.name()), column))
             .collect();
@@ -113,14 +102,10 @@ impl Layout {
             }
             columns.push(column);
         }
-        let has = |kind: fn(Column) -> bool| columns.iter().flatten().any(|c| kind(*c));
-        let has_acceleration = has(Column::is_acceleration);
-        let has_force = has(Column::is_force);
-        let missing: Vec<String> = known
-            .iter()
-            .map(|(_, column)| *column)
-            .filter(|column| has_acceleration || !column.is_acceleration())
-            .filter(|column| has_force || !column.is_force())
+        let mut read = columns.iter().flatten();
+        let has_acceleration = (read.clone()).any(|c| matches!(c, Column::Acceleration(_)));
+        let has_force = read.any(|c| matches!(c, Column::Force(_)));
+        let missing: Vec<String> = (Column::all(has_acceleration, has_force).into_iter())
             .filter(|column| !columns.contains(&Some(*column)))
             .map(Column::name)
             .collect();
@@ -159,17 +144,14 @@ pub(super) fn folded(name: &str) -> String {
 mod tests {
     use super::*;
 
-    fn header(keep: impl Fn(&Column) -> bool) -> Vec<String> {
-        Column::all()
-            .into_iter()
-            .filter(keep)
-            .map(Column::name)
-            .collect()
+    fn header() -> Vec<String> {
+        let columns = Column::all(true, false).into_iter();
+        columns.map(Column::name).collect()
     }
 
     #[test]
     fn all_without_forces_are_the_71_columns_of_the_format() {
-        let names = header(|c| !c.is_force());
+        let names = header();
         assert_eq!(names.len(), 71);
         assert_eq!(names[3], "fr.hx Acceleration");
         assert_eq!(names[37], "Body linear Position x");
@@ -180,7 +162,7 @@ mod tests {
 
     #[test]
     fn from_header_any_order_and_case_is_arranged() {
-        let mut names = header(|c| !c.is_force());
+        let mut names = header();
         names.reverse();
         names[0] = " RL   foot ".to_owned();
         names.push("Temperature".to_owned());
@@ -194,7 +176,8 @@ mod tests {
 
     #[test]
     fn from_header_some_forces_lists_the_others() {
-        let names = header(|c| !c.is_force() || *c == Column::Force(2));
+        let mut names = header();
+        names.push(Column::Force(2).name());
         let error = Layout::from_header(Path::new("a.csv"), names).unwrap_err();
         let RecordingFault::MissingColumns { columns, .. } = &error.kind else {
             panic!("{error:?}");

@@ -5,13 +5,11 @@ use clap::ValueEnum;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
-use super::check::{Finding, check, without};
+use super::check::{Finding, without};
 use super::error::{RecordingError, RecordingFault};
-use super::mismatch::{Mismatch, mismatches};
 use super::preprocess::differences;
 use super::segment::{Recording, Segment};
 use super::smoothing::SavitzkyGolay;
-use crate::robot::Robot;
 
 /// What becomes of samples that a robot cannot have done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -58,46 +56,20 @@ pub struct ConditionOptions {
     pub smoothing: Option<(SavitzkyGolay, SmoothedRows)>,
 }
 
-/// A recording made ready, and what was found in it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Conditioned {
-    /// The recording to go on with.
-    pub recording: Recording,
-    /// What is implausible in the one that came in; segments and samples are counted there.
-    pub findings: Vec<Finding>,
-    /// What about the one that came in cannot be true of the robot.
-    pub mismatches: Vec<Mismatch>,
-    /// Samples left out: the implausible ones, and pieces between them that are too short.
-    pub left_out: usize,
-}
-
-/// Checks a recording and applies the steps in the order of [`ConditionOptions`].
+/// Applies the steps in the order of [`ConditionOptions`] to a recording with these findings; also how many samples that
+/// leaves out, implausible ones and pieces between them that are too short.
 ///
 /// # Errors
 /// [`RecordingFault::TooShort`] if nothing long enough remains, or a segment is shorter than the filter.
 pub fn condition(
     recording: Recording,
-    robot: &Robot,
+    findings: &[Finding],
     options: &ConditionOptions,
-) -> Result<Conditioned, RecordingError> {
-    let findings = check(&recording, robot);
-    let mismatches = mismatches(&recording, robot);
-    Ok(Conditioned {
-        mismatches,
-        ..conditioned(recording, findings, options)?
-    })
-}
-
-/// Applies the steps to a recording with these findings; mismatches are left to the caller.
-pub(super) fn conditioned(
-    recording: Recording,
-    findings: Vec<Finding>,
-    options: &ConditionOptions,
-) -> Result<Conditioned, RecordingError> {
+) -> Result<(Recording, usize), RecordingError> {
     let n_samples = recording.sample_count();
     let mut kept = match options.implausible {
         ImplausibleSamples::LeaveOut if !findings.is_empty() => {
-            long_enough(without(&recording, &findings)?.0, options.least_samples)?
+            long_enough(without(&recording, findings)?.0, options.least_samples)?
         }
         ImplausibleSamples::LeaveOut | ImplausibleSamples::Keep => recording,
     };
@@ -113,12 +85,7 @@ pub(super) fn conditioned(
             smooth(segment, filter, *rows)?;
         }
     }
-    Ok(Conditioned {
-        recording: kept,
-        findings,
-        mismatches: Vec::new(),
-        left_out,
-    })
+    Ok((kept, left_out))
 }
 
 /// Smooths a segment along time.
@@ -127,19 +94,18 @@ fn smooth(
     filter: &SavitzkyGolay,
     rows: SmoothedRows,
 ) -> Result<(), RecordingError> {
-    let smooth = |m: &DMatrix<f64>| {
-        let (found, expected) = (segment.len(), filter.window());
-        let too_short = || RecordingFault::TooShort { found, expected };
-        (filter.smooth(m)).ok_or_else(|| too_short().at(&segment.path, segment.row(0)))
-    };
-    let ddx = smooth(&segment.ddx)?;
-    if rows == SmoothedRows::All {
-        let [x, dx, torque_nm] = [&segment.x, &segment.dx, &segment.torque_nm].map(&smooth);
-        let body_wrench = segment.body_wrench.as_ref().map(&smooth).transpose()?;
-        (segment.x, segment.dx, segment.torque_nm) = (x?, dx?, torque_nm?);
-        segment.body_wrench = body_wrench;
+    if segment.len() < filter.window() {
+        let fault = RecordingFault::too_short(segment.len(), filter.window());
+        return Err(fault.at(&segment.path, segment.row(0)));
     }
-    segment.ddx = ddx;
+    let smooth = |m: &DMatrix<f64>| filter.smooth(m).expect("invariant: a window of samples");
+    match rows {
+        SmoothedRows::Accelerations => segment.ddx = smooth(&segment.ddx),
+        SmoothedRows::All => {
+            let (time_s, feet) = (segment.time_s.clone(), segment.feet.clone());
+            *segment = segment.remade(time_s, feet, smooth);
+        }
+    }
     Ok(())
 }
 
@@ -149,8 +115,7 @@ fn long_enough(mut recording: Recording, least: usize) -> Result<Recording, Reco
     let (row, found) = longest.map_or((1, 0), |part| (part.first_row, part.len()));
     recording.segments.retain(|segment| segment.len() >= least);
     if recording.segments.is_empty() {
-        let expected = least;
-        return Err(RecordingFault::TooShort { found, expected }.at(&recording.path, row));
+        return Err(RecordingFault::too_short(found, least).at(&recording.path, row));
     }
     Ok(recording)
 }
@@ -158,6 +123,8 @@ fn long_enough(mut recording: Recording, least: usize) -> Result<Recording, Reco
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::recording::check::check;
+    use crate::robot::Robot;
 
     /// A robot that stands still, with noise on the accelerations, and one torque that no motor gives.
     fn recording() -> Recording {
@@ -178,22 +145,19 @@ mod tests {
         })
     }
 
-    fn go1() -> &'static Robot {
-        Robot::by_name("go1").expect("a known robot")
+    /// [`condition`] of a recording with all that is found in it.
+    fn conditioned(
+        recording: &Recording,
+        options: &ConditionOptions,
+    ) -> Result<(Recording, usize), RecordingError> {
+        let go1 = Robot::by_name("go1").expect("a known robot");
+        condition(recording.clone(), &check(recording, go1), options)
     }
 
     #[test]
-    fn condition_by_default_reports_with_place_and_changes_nothing() {
-        let recording = recording();
-        let out = condition(recording.clone(), go1(), &ConditionOptions::default()).expect("sound");
-        assert_eq!(out.recording, recording);
-        assert_eq!(out.left_out, 0);
-        let places: Vec<_> = (out.findings.iter())
-            .map(|f| (f.first_row, f.value))
-            .collect();
-        assert_eq!(places, [(62, 900.0), (72, 900.0)]);
-        let column = &out.findings[0].column;
-        assert!(column.contains("fl.hy"), "{column}");
+    fn condition_by_default_changes_nothing() {
+        let out = conditioned(&recording(), &ConditionOptions::default()).expect("sound");
+        assert_eq!(out, (recording(), 0));
     }
 
     #[test]
@@ -203,18 +167,18 @@ mod tests {
             least_samples: 50,
             ..ConditionOptions::default()
         };
-        let out = condition(recording(), go1(), &options).expect("sound");
-        let pieces: Vec<_> = (out.recording.segments.iter())
+        let (out, left_out) = conditioned(&recording(), &options).expect("sound");
+        let pieces: Vec<_> = (out.segments.iter())
             .map(|piece| (piece.first_row, piece.len()))
             .collect();
         assert_eq!(pieces, [(2, 60), (73, 129)]);
-        assert_eq!(out.left_out, 11);
+        assert_eq!(left_out, 11);
 
         let options = ConditionOptions {
             least_samples: 150,
             ..options
         };
-        let error = condition(recording(), go1(), &options).expect_err("nothing remains");
+        let error = conditioned(&recording(), &options).expect_err("nothing remains");
         let expected = "row 73: found 129 consecutive samples, expected at least 150";
         assert!(error.to_string().ends_with(expected), "{error}");
     }
@@ -227,10 +191,7 @@ mod tests {
             ..ConditionOptions::default()
         };
         let before = recording();
-        let made = |options| {
-            let made = condition(before.clone(), go1(), options);
-            made.expect("sound").recording
-        };
+        let made = |options| conditioned(&before, options).expect("sound").0;
         let out = made(&smooth);
         let ddx = |recording: &Recording| recording.segments[0].ddx.clone();
         assert!(ddx(&out).norm() < 0.3 * ddx(&before).norm());
@@ -253,7 +214,7 @@ mod tests {
             smoothing: Some((filter, SmoothedRows::All)),
             ..ConditionOptions::default()
         };
-        let error = condition(short, go1(), &options).expect_err("five samples");
+        let error = conditioned(&short, &options).expect_err("five samples");
         let expected = "found 5 consecutive samples, expected at least 11";
         assert!(error.to_string().ends_with(expected), "{error}");
     }

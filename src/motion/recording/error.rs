@@ -145,9 +145,6 @@ pub enum RecordingFault {
              at most 1001, and an order of at most 12"
     )]
     Smoothing { window: usize, order: usize },
-    /// A batch of this many rows was asked for; no file's fault.
-    #[error("found a batch of {0} rows, expected at least 2")]
-    Batch(usize),
     /// The robot's kinematics refuse a sample.
     #[error("no body wrench")]
     Wrench(#[source] Box<RobotError>),
@@ -164,6 +161,11 @@ impl RecordingFault {
             io::ErrorKind::NotFound => RecordingFault::Missing,
             _ => RecordingFault::io(action, source),
         }
+    }
+
+    /// A stretch of fewer samples than are expected.
+    pub(super) fn too_short(found: usize, expected: usize) -> Self {
+        RecordingFault::TooShort { found, expected }
     }
 
     /// A line that is not separated as expected.
@@ -239,13 +241,6 @@ pub(super) fn shortened(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn listed_many_names_counts_the_rest() {
-        let names: Vec<String> = (0..5).map(|i| format!("c{i}")).collect();
-        assert_eq!(listed(&names, 2), "`c0`, `c1` and 3 more");
-        assert_eq!(listed(&names[..1], 2), "`c0`");
-    }
 
     #[test]
     fn shortened_cuts_long_text_and_hides_control_characters() {

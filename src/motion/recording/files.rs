@@ -5,12 +5,10 @@ use std::sync::mpsc::sync_channel;
 use std::sync::{Arc, OnceLock};
 
 use super::check::{Finding, check};
-use super::condition::{
-    ConditionOptions, Conditioned, ImplausibleSamples, SmoothedRows, conditioned,
-};
+use super::condition::{ConditionOptions, ImplausibleSamples, SmoothedRows, condition};
 use super::error::RecordingError;
 use super::mismatch::{Mismatch, mismatches};
-use super::reader::{Reader, Reading, ReadingNotes};
+use super::reader::{Clocks, Reader, Reading, ReadingNotes};
 use super::segment::{Recording, Segment};
 use super::smoothing::SavitzkyGolay;
 use crate::robot::Robot;
@@ -29,27 +27,15 @@ pub enum Source<'a> {
     Files(Arc<RecordingFiles>),
 }
 
-impl<'a> From<&'a [Recording]> for Source<'a> {
-    fn from(recordings: &'a [Recording]) -> Self {
-        Self::Held(recordings)
+impl<'a, R: AsRef<[Recording]> + ?Sized> From<&'a R> for Source<'a> {
+    fn from(recordings: &'a R) -> Self {
+        Self::Held(recordings.as_ref())
     }
 }
 
-impl<'a> From<&'a Vec<Recording>> for Source<'a> {
-    fn from(recordings: &'a Vec<Recording>) -> Self {
-        Self::Held(recordings)
-    }
-}
-
-impl<'a, const N: usize> From<&'a [Recording; N]> for Source<'a> {
-    fn from(recordings: &'a [Recording; N]) -> Self {
-        Self::Held(recordings)
-    }
-}
-
-impl From<&Arc<RecordingFiles>> for Source<'_> {
-    fn from(files: &Arc<RecordingFiles>) -> Self {
-        Self::Files(Arc::clone(files))
+impl From<Arc<RecordingFiles>> for Source<'_> {
+    fn from(files: Arc<RecordingFiles>) -> Self {
+        Self::Files(files)
     }
 }
 
@@ -88,7 +74,7 @@ pub struct RecordingFile {
     pub segments: Option<Vec<usize>>,
 }
 
-/// What the checks found when the files were first read.
+/// What the checks found in recordings, of files when they were first read.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Notes {
     /// Implausible runs of samples with their files.
@@ -101,25 +87,30 @@ pub struct Notes {
     pub reading: ReadingNotes,
 }
 
+impl Notes {
+    /// Adds what was found in other recordings, but not what reading them did.
+    pub fn add(&mut self, other: Self) {
+        self.findings.extend(other.findings);
+        self.mismatches.extend(other.mismatches);
+        self.left_out += other.left_out;
+    }
+}
+
 impl RecordingFiles {
-    /// Files of recordings of `robot`; nothing is read yet.
+    /// Files of recordings of `robot` for this reader; nothing is read yet.
     pub fn new(
         files: Vec<RecordingFile>,
         robot: &'static Robot,
         options: ConditionOptions,
+        reader: Reader,
     ) -> Self {
         Self {
             files,
             robot,
             options,
-            reader: Reader::default(),
+            reader,
             notes: OnceLock::new(),
         }
-    }
-
-    /// The same files, read by this reader.
-    pub fn read_by(self, reader: Reader) -> Self {
-        Self { reader, ..self }
     }
 
     /// The files.
@@ -143,8 +134,10 @@ impl RecordingFiles {
     /// As [`Reader::read`].
     pub fn first(&self, count: usize) -> Result<Vec<Recording>, RecordingError> {
         let mut recordings = Vec::new();
+        let mut reader = self.reader.clone();
+        reader.clocks = Clocks::Recorded;
         for file in self.files.iter().take(count) {
-            let reading = self.reader.as_stamped().read(&file.path)?;
+            let reading = reader.read(&file.path)?;
             recordings.extend(chosen(file, reading.recording));
         }
         Ok(recordings)
@@ -160,17 +153,12 @@ impl RecordingFiles {
         mut take: impl FnMut(Recording) -> Result<(), E>,
     ) -> Result<(), E> {
         let mut notes = Notes::default();
-        let result = self.in_order(|recordings| {
-            let (recordings, reading) = recordings?;
+        let result = self.in_order(|ready| {
+            let (recordings, reading) = ready?;
             notes.reading.add(&reading);
-            for ready in recordings {
-                let path = &ready.recording.path;
-                let found = ready.findings.into_iter();
-                (notes.findings).extend(found.map(|finding| (path.clone(), finding)));
-                let unlike = ready.mismatches.into_iter();
-                (notes.mismatches).extend(unlike.map(|mismatch| (path.clone(), mismatch)));
-                notes.left_out += ready.left_out;
-                take(ready.recording)?;
+            for (recording, found) in recordings {
+                notes.add(found);
+                take(recording)?;
             }
             Ok(())
         });
@@ -208,14 +196,10 @@ impl RecordingFiles {
 
     /// The steps for one recording: where times were rebuilt, which is where samples came late or were lost, rows are
     /// smoothed unless a filter is asked for.
-    fn options_for(
-        &self,
-        reading: &mut Reading,
-        recording: &Recording,
-    ) -> Result<ConditionOptions, RecordingError> {
+    fn options_for(&self, reading: &mut Reading) -> Result<ConditionOptions, RecordingError> {
         let mut options = self.options.clone();
         let rebuilt = (reading.mended.iter()).any(|mended| mended.elapsed_ratio.is_some());
-        let segments = || recording.segments.iter();
+        let segments = || reading.recording.segments.iter();
         let step_s = segments().map(Segment::mean_step_s).fold(0.0, f64::max);
         let half = (HALF_SMOOTHING_S / step_s).round();
         let window = match half.is_finite() {
@@ -236,9 +220,9 @@ impl RecordingFiles {
     /// The recordings of one file, and its reading without samples. Checks that only report are made once.
     fn read(&self, file: &RecordingFile) -> Result<Ready, RecordingError> {
         let mut reading = self.reader.read(&file.path)?;
-        let empty = reading.recording.with_segments(Vec::new());
-        let recording = std::mem::replace(&mut reading.recording, empty);
-        let options = self.options_for(&mut reading, &recording)?;
+        let options = self.options_for(&mut reading)?;
+        let segments = std::mem::take(&mut reading.recording.segments);
+        let recording = reading.recording.with_segments(segments);
         let keeps = self.options.implausible == ImplausibleSamples::Keep;
         let is_first = self.notes.get().is_none();
         let ready = chosen(file, recording).into_iter().map(|recording| {
@@ -250,32 +234,32 @@ impl RecordingFiles {
                 true => mismatches(&recording, self.robot),
                 false => Vec::new(),
             };
-            Ok::<_, RecordingError>(Conditioned {
-                mismatches: unlike,
-                ..conditioned(recording, findings, &options)?
-            })
+            let (recording, left_out) = condition(recording, &findings, &options)?;
+            let path = || recording.path.clone();
+            let notes = Notes {
+                findings: findings.into_iter().map(|found| (path(), found)).collect(),
+                mismatches: unlike.into_iter().map(|found| (path(), found)).collect(),
+                left_out,
+                reading: ReadingNotes::default(),
+            };
+            Ok::<_, RecordingError>((recording, notes))
         });
         Ok((ready.collect::<Result<_, _>>()?, reading))
     }
 }
 
-/// The recordings of one file, conditioned, and what reading did.
-type Ready = (Vec<Conditioned>, Reading);
+/// The recordings of one file, conditioned, each with what was found in it, and what reading did.
+type Ready = (Vec<(Recording, Notes)>, Reading);
 
 /// The whole recording of a file, or a recording for each segment that is asked for.
-fn chosen(file: &RecordingFile, recording: Recording) -> Vec<Recording> {
+fn chosen(file: &RecordingFile, mut recording: Recording) -> Vec<Recording> {
     let Some(chosen) = &file.segments else {
         return vec![recording];
     };
-    let single = |segment| Recording {
-        path: recording.path.clone(),
-        segments: vec![segment],
-        ignored_columns: recording.ignored_columns.clone(),
-    };
-    let segments = recording.segments.into_iter().enumerate();
-    segments
+    let segments = std::mem::take(&mut recording.segments);
+    (segments.into_iter().enumerate())
         .filter(|(index, _)| chosen.contains(index))
-        .map(|(_, segment)| single(segment))
+        .map(|(_, segment)| recording.with_segments(vec![segment]))
         .collect()
 }
 
@@ -294,14 +278,14 @@ mod tests {
         };
         let go1 = Robot::by_name("go1").expect("known");
         let files = names.iter().map(file).collect();
-        RecordingFiles::new(files, go1, ConditionOptions::default())
+        RecordingFiles::new(files, go1, ConditionOptions::default(), Reader::default())
     }
 
     #[test]
     fn recordings_come_in_the_order_of_their_files_and_are_the_same_again() {
         let names = [1, 2, 3, 4].map(|i| format!("train_0{i}.csv.gz"));
         let files = Arc::new(files(&names.each_ref().map(String::as_str), Some(vec![0])));
-        let source = Source::from(&files);
+        let source = Source::from(files);
         let all = || {
             let mut all = Vec::new();
             let kept = source.for_each(|recording| {

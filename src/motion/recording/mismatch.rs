@@ -16,9 +16,9 @@ use std::fmt;
 
 use serde::Serialize;
 
-use super::check::check;
+use super::check::{check, outside};
 use super::segment::Recording;
-use crate::robot::{FOOT_DIM, GRAVITY_M_S2, JOINT_DIM, Leg, Robot};
+use crate::robot::{GRAVITY_M_S2, JOINT_DIM, Leg, Robot};
 use balance::Balance;
 use stance::{Slip, best_other_place, best_other_reading};
 
@@ -45,8 +45,6 @@ const OTHER_SLIP: f64 = 1.15;
 
 /// Distance from the origin, m, and turn about the vertical, rad, at which a segment may begin.
 const ORIGIN: (f64, f64) = (1.0, 0.5);
-/// Height of the feet that are on the ground, m.
-const FLOOR_M: f64 = 0.1;
 
 /// What does not fit; in JSON one word such as `foot_slip`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
@@ -99,19 +97,39 @@ pub fn mismatches(recording: &Recording, robot: &Robot) -> Vec<Mismatch> {
     let slip = Slip::of(recording, robot);
     let balance = Balance::of(recording, robot);
     let found = [
-        place(recording, robot, &slip).or_else(|| foot_slip(&slip)),
-        legs_or_signs(recording, robot, &slip),
-        feet_columns(recording, robot),
-        fall(&balance),
-        weight(&balance, robot),
-        hip_torques(&balance),
-        accelerations(&balance),
-        other_robot(recording, robot, &slip, &balance),
-        origin(recording),
-        floor(recording, robot),
+        (
+            MismatchKind::FootSlip,
+            place(recording, robot, &slip).or_else(|| foot_slip(&slip)),
+        ),
+        (
+            MismatchKind::LegsOrSigns,
+            legs_or_signs(recording, robot, &slip),
+        ),
+        (MismatchKind::FeetColumns, feet::columns(recording, robot)),
+        (MismatchKind::Fall, fall(&balance)),
+        (MismatchKind::Weight, weight(&balance, robot)),
+        (MismatchKind::HipTorques, hip_torques(&balance)),
+        (MismatchKind::Accelerations, accelerations(&balance)),
+        (
+            MismatchKind::OtherRobot,
+            other_robot(recording, robot, &slip, &balance),
+        ),
+        (MismatchKind::Origin, origin(recording)),
+        (MismatchKind::Floor, feet::floor(recording, robot)),
     ];
-    found.into_iter().flatten().collect()
+    let mismatch = |(kind, broken): (MismatchKind, Option<Broken>)| {
+        broken.map(|(value, bound, words)| Mismatch {
+            kind,
+            value,
+            bound,
+            words,
+        })
+    };
+    found.into_iter().filter_map(mismatch).collect()
 }
+
+/// A figure, the bound that it breaks, and that in words.
+type Broken = (f64, f64, String);
 
 /// The figures that [`mismatches`] compares with its bounds; none where a recording has too little of what they need.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -122,29 +140,20 @@ pub struct Figures {
     pub relative_foot_slip_m: Option<f64>,
     /// That for the best other order of the legs or sign of an angle, m.
     pub other_reading_m: Option<f64>,
-    /// Mean vertical acceleration in flight, m/s^2.
-    pub fall_m_s2: Option<f64>,
-    /// Impulse of the feet over what the robot's weight and change of velocity need.
-    pub weight_share: Option<f64>,
-    /// Hip torque of each leg over what holds the force along the leg: 1 for a force in the leg's plane.
-    pub hip_share: [Option<f64>; FOOT_DIM],
-    /// Largest median difference of the body's acceleration and the slope of its velocity, m/s^2.
-    pub acceleration_offset_m_s2: Option<f64>,
+    /// What forces and accelerations come to.
+    #[serde(flatten)]
+    pub balance: Balance,
 }
 
 impl Figures {
     /// Of a recording on a robot.
     pub fn of(recording: &Recording, robot: &Robot) -> Self {
         let slip = Slip::of(recording, robot);
-        let balance = Balance::of(recording, robot);
         Self {
             foot_slip_m: slip.rms_m(),
             relative_foot_slip_m: slip.relative_rms_m(),
             other_reading_m: best_other_reading(recording, robot).map(|(rms_m, _)| rms_m),
-            fall_m_s2: balance.fall_m_s2,
-            weight_share: balance.weight_share,
-            hip_share: balance.hip_share,
-            acceleration_offset_m_s2: balance.acceleration_offset_m_s2.map(|(_, value)| value),
+            balance: Balance::of(recording, robot),
         }
     }
 }
@@ -163,11 +172,9 @@ pub fn notes(recording: &Recording, robot: &Robot) -> Vec<String> {
         .map(|mismatch| format!("{path}: {mismatch}"))
         .collect();
     let findings = check(recording, robot);
-    let faults: Vec<_> = (findings.iter())
-        .filter(|finding| finding.kind.can_be_left_out())
-        .collect();
-    if let Some(first) = faults.first() {
-        let count = faults.len();
+    let mut faults = findings.iter().filter(|f| f.kind.can_be_left_out());
+    if let Some(first) = faults.next() {
+        let count = 1 + faults.count();
         notes.push(format!(
             "{path}: {count} implausible runs of samples, such as {first}"
         ));
@@ -176,7 +183,7 @@ pub fn notes(recording: &Recording, robot: &Robot) -> Vec<String> {
 }
 
 /// Encoders and decoders were learned from jumps that begin at the origin and run along x.
-fn origin(recording: &Recording) -> Option<Mismatch> {
+fn origin(recording: &Recording) -> Option<Broken> {
     let [x, y, yaw] = [0, 1, 5].map(|coordinate| {
         let starts = recording.segments.iter().map(|segment| segment.state(0));
         let starts = starts.map(|start| start[JOINT_DIM + coordinate].abs());
@@ -184,165 +191,107 @@ fn origin(recording: &Recording) -> Option<Mismatch> {
     });
     let far = x.max(y);
     let advice = "models expect jumps that begin near the origin and run along x";
-    let (value, bound, words) = if far > ORIGIN.0 {
+    if far > ORIGIN.0 {
         let words = format!(
             "a segment begins {far:.2} m from the origin: {advice}; `origin = \"start\"` in a map of columns counts x \
              and y from the first sample"
         );
-        (far, ORIGIN.0, words)
-    } else if yaw > ORIGIN.1 {
+        return Some((far, ORIGIN.0, words));
+    }
+    (yaw > ORIGIN.1).then(|| {
         let words = format!("a segment begins turned by {yaw:.2} rad about the vertical: {advice}");
         (yaw, ORIGIN.1, words)
-    } else {
-        return None;
-    };
-    Some(Mismatch {
-        kind: MismatchKind::Origin,
-        value,
-        bound,
-        words,
     })
 }
 
-fn floor(recording: &Recording, robot: &Robot) -> Option<Mismatch> {
-    let value = feet::floor_m(recording, robot)?;
-    (value.abs() > FLOOR_M).then(|| Mismatch {
-        kind: MismatchKind::Floor,
-        value,
-        bound: FLOOR_M,
-        words: format!(
-            "feet on the ground are at a height of {value:.2} m ({FLOOR_M:.2} m are accepted): is z that of the trunk \
-             over the ground?"
-        ),
-    })
-}
-
-fn foot_slip(slip: &Slip) -> Option<Mismatch> {
+fn foot_slip(slip: &Slip) -> Option<Broken> {
     let value = slip.rms_m()?;
-    (value.is_nan() || value > SLIP_M).then(|| Mismatch {
-        kind: MismatchKind::FootSlip,
-        value,
-        bound: SLIP_M,
-        words: format!(
+    (value.is_nan() || value > SLIP_M).then(|| {
+        let words = format!(
             "feet on the ground move by {:.0} mm (root mean square; {:.0} mm are accepted): the joints, the body's \
              pose, their units or signs, or the contacts are not this robot's",
             1e3 * value,
             1e3 * SLIP_M
-        ),
+        );
+        (value, SLIP_M, words)
     })
 }
 
-fn place(recording: &Recording, robot: &Robot, slip: &Slip) -> Option<Mismatch> {
+fn place(recording: &Recording, robot: &Robot, slip: &Slip) -> Option<Broken> {
     let value = slip.rms_m()?;
     let (best, reading) = best_other_place(recording, robot)?;
     let bound = PLACE.0 * best + PLACE.1;
-    (value > bound).then(|| Mismatch {
-        kind: MismatchKind::FootSlip,
-        value,
-        bound,
-        words: format!(
+    (value > bound).then(|| {
+        let words = format!(
             "feet on the ground move by {:.1} mm, and by {:.1} mm {reading}: is the body's place in another frame than \
              its attitude?",
             1e3 * value,
             1e3 * best
-        ),
+        );
+        (value, bound, words)
     })
 }
 
-fn legs_or_signs(recording: &Recording, robot: &Robot, slip: &Slip) -> Option<Mismatch> {
+fn legs_or_signs(recording: &Recording, robot: &Robot, slip: &Slip) -> Option<Broken> {
     let value = slip.relative_rms_m()?;
     let (best, reading) = best_other_reading(recording, robot)?;
     let bound = READING_FACTOR * best + READING_LEAST_M;
-    (value > bound).then(|| Mismatch {
-        kind: MismatchKind::LegsOrSigns,
-        value,
-        bound,
-        words: format!(
+    (value > bound).then(|| {
+        let words = format!(
             "feet on the ground move by {:.1} mm against each other, and by {:.1} mm {reading}: are legs or signs \
              exchanged?",
             1e3 * value,
             1e3 * best
-        ),
+        );
+        (value, bound, words)
     })
 }
 
-fn feet_columns(recording: &Recording, robot: &Robot) -> Option<Mismatch> {
-    let order = feet::better_order(recording, robot)?;
-    let names = order.legs.map(Leg::short_name).join(", ");
-    Some(Mismatch {
-        kind: MismatchKind::FeetColumns,
-        value: order.recorded_m,
-        bound: order.least_m,
-        words: format!(
-            "while some feet are on the ground, those said to be in the air are higher by {:.0} mm in sum over the \
-             samples, and by {:.0} mm if the columns of the feet are of {names}: are they exchanged?",
-            1e3 * order.recorded_m,
-            1e3 * order.best_m
-        ),
-    })
+fn fall(balance: &Balance) -> Option<Broken> {
+    let (value, bound) = outside(balance.fall_m_s2?, FALL_M_S2.0, FALL_M_S2.1)?;
+    let words = format!(
+        "in flight the body accelerates by {value:.2} m/s^2 upwards, expected {} to {}: another axis, sign or \
+         unit, another time, or contacts that are not the feet's",
+        FALL_M_S2.0, FALL_M_S2.1
+    );
+    Some((value, bound, words))
 }
 
-fn fall(balance: &Balance) -> Option<Mismatch> {
-    let value = balance.fall_m_s2?;
-    let bound = outside(value, FALL_M_S2)?;
-    Some(Mismatch {
-        kind: MismatchKind::Fall,
-        value,
-        bound,
-        words: format!(
-            "in flight the body accelerates by {value:.2} m/s^2 upwards, expected {} to {}: another axis, sign or \
-             unit, another time, or contacts that are not the feet's",
-            FALL_M_S2.0, FALL_M_S2.1
-        ),
-    })
+fn weight(balance: &Balance, robot: &Robot) -> Option<Broken> {
+    let (value, bound) = outside(balance.weight_share?, WEIGHT_SHARE.0, WEIGHT_SHARE.1)?;
+    let words = format!(
+        "the torques carry {value:.3} of what {} kg need ({} to {} are accepted): torques in other units, of \
+         other signs or other joints, or another robot",
+        (1e6 * robot.mass_kg()).round() / 1e6,
+        WEIGHT_SHARE.0,
+        WEIGHT_SHARE.1
+    );
+    Some((value, bound, words))
 }
 
-fn weight(balance: &Balance, robot: &Robot) -> Option<Mismatch> {
-    let value = balance.weight_share?;
-    let bound = outside(value, WEIGHT_SHARE)?;
-    Some(Mismatch {
-        kind: MismatchKind::Weight,
-        value,
-        bound,
-        words: format!(
-            "the torques carry {value:.3} of what {} kg need ({} to {} are accepted): torques in other units, of \
-             other signs or other joints, or another robot",
-            (1e6 * robot.mass_kg()).round() / 1e6,
-            WEIGHT_SHARE.0,
-            WEIGHT_SHARE.1
-        ),
-    })
-}
-
-fn hip_torques(balance: &Balance) -> Option<Mismatch> {
+fn hip_torques(balance: &Balance) -> Option<Broken> {
     let shares = Leg::ALL.into_iter().zip(balance.hip_share);
     let wrong: Vec<(Leg, f64)> = shares
         .filter_map(|(leg, share)| Some((leg, share.filter(|share| *share < HIP_SHARE)?)))
         .collect();
     let value = (wrong.iter().map(|(_, share)| *share)).min_by(f64::total_cmp)?;
     let names: Vec<&str> = wrong.iter().map(|(leg, _)| leg.short_name()).collect();
-    Some(Mismatch {
-        kind: MismatchKind::HipTorques,
-        value,
-        bound: HIP_SHARE,
-        words: format!(
-            "the hips' torques of {} hold the feet on the other side of the body: are left and right legs or the \
-             torques' signs exchanged?",
-            names.join(", ")
-        ),
-    })
+    let words = format!(
+        "the hips' torques of {} hold the feet on the other side of the body: are left and right legs or the \
+         torques' signs exchanged?",
+        names.join(", ")
+    );
+    Some((value, HIP_SHARE, words))
 }
 
-fn accelerations(balance: &Balance) -> Option<Mismatch> {
-    let (axis, value) = balance.acceleration_offset_m_s2?;
-    (value.abs() > ACCELERATION_M_S2).then(|| Mismatch {
-        kind: MismatchKind::Accelerations,
-        value,
-        bound: ACCELERATION_M_S2.copysign(value),
-        words: format!(
+fn accelerations(balance: &Balance) -> Option<Broken> {
+    let (axis, value) = balance.axis.zip(balance.acceleration_offset_m_s2)?;
+    (value.abs() > ACCELERATION_M_S2).then(|| {
+        let words = format!(
             "the body's acceleration along {axis} differs from the slope of its velocity by {value:.2} m/s^2 in the \
              median: gravity, or another unit?"
-        ),
+        );
+        (value, ACCELERATION_M_S2.copysign(value), words)
     })
 }
 
@@ -351,7 +300,7 @@ fn other_robot(
     robot: &Robot,
     slip: &Slip,
     balance: &Balance,
-) -> Option<Mismatch> {
+) -> Option<Broken> {
     let share = balance.weight_share.filter(|share| *share > 0.0)?;
     let (own, own_slip) = (share.ln().abs(), slip.rms_m()?);
     if own <= OTHER_WEIGHT.0 {
@@ -368,27 +317,14 @@ fn other_robot(
     let nearest =
         |one: &(f64, &Robot), two: &(f64, &Robot)| one.0.ln().abs().total_cmp(&two.0.ln().abs());
     let (other_share, other) = explains.min_by(nearest)?;
-    Some(Mismatch {
-        kind: MismatchKind::OtherRobot,
-        value: share,
-        bound: OTHER_WEIGHT.0.exp(),
-        words: format!(
-            "the torques carry {share:.2} of the weight of a {} and {other_share:.2} of that of a {}, and feet on \
-             the ground stay in place as well: is it a recording of a {}?",
-            robot.name(),
-            other.name(),
-            other.name()
-        ),
-    })
-}
-
-/// The bound of a range that a value breaks.
-fn outside(value: f64, (low, high): (f64, f64)) -> Option<f64> {
-    if value < low {
-        Some(low)
-    } else {
-        (value.is_nan() || value > high).then_some(high)
-    }
+    let words = format!(
+        "the torques carry {share:.2} of the weight of a {} and {other_share:.2} of that of a {}, and feet on \
+         the ground stay in place as well: is it a recording of a {}?",
+        robot.name(),
+        other.name(),
+        other.name()
+    );
+    Some((share, OTHER_WEIGHT.0.exp(), words))
 }
 
 /// Weight of a mass, N.

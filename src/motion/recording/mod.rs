@@ -49,14 +49,11 @@ mod instant;
 mod lines;
 mod number;
 mod segments;
-mod table;
 
 pub use self::csv::{read, read_from_bytes};
 pub use self::write::{WriteOptions, write, write_mcap, write_with};
 pub use clock::Mended;
-pub use condition::{
-    Accelerations, ConditionOptions, Conditioned, ImplausibleSamples, SmoothedRows, condition,
-};
+pub use condition::{Accelerations, ConditionOptions, ImplausibleSamples, SmoothedRows, condition};
 pub use error::{RecordingError, RecordingFault};
 pub use files::{RecordingFile, RecordingFiles, Source};
 pub use foreign::map::ColumnMap;

@@ -47,17 +47,17 @@ impl NumberReader {
         if self.mark.is_some_and(|mark| mark != found) {
             return None;
         }
-        let value = match found {
+        let pointed = match found {
             Mark::Comma => {
                 // A second mark of either kind fails to parse.
                 self.pointed.clear();
-                self.pointed.push_str(&cell[..place]);
-                self.pointed.push('.');
-                self.pointed.push_str(&cell[place + 1..]);
-                self.pointed.parse().ok()?
+                self.pointed
+                    .extend([&cell[..place], ".", &cell[place + 1..]]);
+                &self.pointed
             }
-            Mark::Point => cell.parse().ok()?,
+            Mark::Point => cell,
         };
+        let value = pointed.parse().ok()?;
         self.mark = Some(found);
         Some(value)
     }

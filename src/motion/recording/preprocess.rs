@@ -3,56 +3,34 @@
 //!
 //! Nothing crosses the border of a segment. Scaling belongs to the model.
 
+use std::ops::Range;
+
 use nalgebra::DMatrix;
 
 use super::error::{RecordingError, RecordingFault};
 use super::phases::{PhaseRule, PhaseSpan};
 use super::segment::{Recording, Segment};
 
-/// One phase of one segment, as training takes it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct PhaseData {
-    /// Phase, place in the jump, and the samples it was taken from.
-    pub span: PhaseSpan,
-    /// Index of the recording's segment.
-    pub segment: usize,
-    /// The samples.
-    pub samples: Segment,
-}
+/// Samples of a batch: every phase of a jump is resampled to a multiple (section IV-C4).
+pub const BATCH_ROWS: usize = 100;
 
-/// The phases of every segment of a recording, each resampled to a multiple of `batch` rows.
+/// The phases of every segment of a recording, each with its samples resampled to a multiple of [`BATCH_ROWS`].
 ///
 /// # Errors
-/// [`RecordingFault::TooShort`] for a span of one sample, [`RecordingFault::NoPhase`],
-/// [`RecordingFault::Batch`].
+/// [`RecordingFault::TooShort`] for a span of one sample, [`RecordingFault::NoPhase`].
 pub fn prepare(
     recording: &Recording,
     rule: &PhaseRule,
-    batch: usize,
-) -> Result<Vec<PhaseData>, RecordingError> {
+) -> Result<Vec<(PhaseSpan, Segment)>, RecordingError> {
     let mut out = Vec::new();
-    for (index, segment) in recording.segments.iter().enumerate() {
+    for segment in &recording.segments {
         for span in rule.spans(segment)? {
             let part = segment.slice(span.range.clone());
-            out.push(PhaseData {
-                samples: resampled(&part, batch_rows(part.len(), batch)?)?,
-                span,
-                segment: index,
-            });
+            let rows = part.len().div_ceil(BATCH_ROWS).max(1) * BATCH_ROWS;
+            out.push((span, resampled(&part, rows)?));
         }
     }
     Ok(out)
-}
-
-/// The smallest multiple of `batch` that holds `samples`.
-///
-/// # Errors
-/// [`RecordingFault::Batch`] for a batch below 2.
-fn batch_rows(samples: usize, batch: usize) -> Result<usize, RecordingError> {
-    if batch < 2 {
-        return Err(RecordingFault::Batch(batch).of_argument());
-    }
-    Ok(samples.div_ceil(batch).max(1) * batch)
 }
 
 /// Slopes of each row over time: second-order differences inside, also for
@@ -82,6 +60,21 @@ pub fn differences(time_s: &[f64], rows: &DMatrix<f64>) -> DMatrix<f64> {
     out
 }
 
+/// [`differences`] within each of the ranges alone; 0 outside them.
+pub(super) fn differences_within(
+    ranges: &[Range<usize>],
+    time_s: &[f64],
+    rows: &DMatrix<f64>,
+) -> DMatrix<f64> {
+    let mut out = DMatrix::zeros(rows.nrows(), rows.ncols());
+    for range in ranges {
+        let own = rows.columns(range.start, range.len()).into_owned();
+        let slopes = differences(&time_s[range.clone()], &own);
+        (out.columns_mut(range.start, range.len())).copy_from(&slopes);
+    }
+    out
+}
+
 /// A segment at `rows` equally spaced times over the same duration, by straight lines between samples.
 ///
 /// Contact flags are those of the nearest sample.
@@ -91,53 +84,30 @@ pub fn differences(time_s: &[f64], rows: &DMatrix<f64>) -> DMatrix<f64> {
 pub fn resampled(segment: &Segment, rows: usize) -> Result<Segment, RecordingError> {
     let n = segment.len();
     if n < 2 || rows < 2 {
-        let (found, expected) = (n.min(rows), 2);
-        let fault = RecordingFault::TooShort { found, expected };
-        return Err(fault.at(&segment.path, segment.row(0)));
+        return Err(RecordingFault::too_short(n.min(rows), 2).at(&segment.path, segment.row(0)));
     }
-    let places = places(&segment.time_s, rows);
-    let nearest = |p: &Place| segment.feet[if p.share < 0.5 { p.left } else { p.left + 1 }];
-    let time_s = places.iter().map(|place| place.time_s).collect();
+    let own_s = &segment.time_s;
+    let (start, end) = (own_s[0], own_s[n - 1]);
+    let even = |i: usize| start + (end - start) * (i as f64 / (rows - 1) as f64);
+    let time_s: Vec<f64> = (0..rows).map(|i| even(i).clamp(start, end)).collect();
+    // A time's sample on its left, and its share of the way to the next.
+    let place = |time: &f64| {
+        let left = own_s.partition_point(|own| own <= time).clamp(1, n - 1) - 1;
+        (left, (time - own_s[left]) / (own_s[left + 1] - own_s[left]))
+    };
+    let places: Vec<(usize, f64)> = time_s.iter().map(place).collect();
+    let nearest = |&(left, share): &(usize, f64)| segment.feet[left + usize::from(share >= 0.5)];
     let feet = places.iter().map(nearest).collect();
+    let at_places = |m: &DMatrix<f64>| {
+        DMatrix::from_fn(m.nrows(), rows, |row, i| {
+            let (left, share) = places[i];
+            let (a, b) = (m[(row, left)], m[(row, left + 1)]);
+            a + share * (b - a)
+        })
+    };
     Ok(Segment {
         row_stride: segment.row_stride * (n - 1) as f64 / (rows - 1) as f64,
-        ..segment.remade(time_s, feet, |m| interpolate(m, &places))
-    })
-}
-
-/// A time between the samples `left` and `left + 1`.
-struct Place {
-    time_s: f64,
-    left: usize,
-    share: f64,
-}
-
-fn places(time_s: &[f64], rows: usize) -> Vec<Place> {
-    let last = time_s.len() - 1;
-    let (start, end) = (time_s[0], time_s[last]);
-    let mut left = 0;
-    (0..rows)
-        .map(|i| {
-            let part = i as f64 / (rows - 1) as f64;
-            let time = (start + (end - start) * part).clamp(start, end);
-            while left + 1 < last && time_s[left + 1] <= time {
-                left += 1;
-            }
-            let share = (time - time_s[left]) / (time_s[left + 1] - time_s[left]);
-            Place {
-                time_s: time,
-                left,
-                share,
-            }
-        })
-        .collect()
-}
-
-fn interpolate(rows: &DMatrix<f64>, places: &[Place]) -> DMatrix<f64> {
-    DMatrix::from_fn(rows.nrows(), places.len(), |row, i| {
-        let Place { left, share, .. } = places[i];
-        let (a, b) = (rows[(row, left)], rows[(row, left + 1)]);
-        a + share * (b - a)
+        ..segment.remade(time_s, feet, at_places)
     })
 }
 
@@ -223,24 +193,13 @@ mod tests {
         let second = sample_segment(120);
         let mut recording = Recording::from(jump);
         recording.segments.push(second);
-        let phases = prepare(&recording, &PhaseRule::two_phase(), 100).unwrap();
-        let found: Vec<_> = phases
-            .iter()
-            .map(|p| (p.segment, p.span.phase, p.samples.len()))
-            .collect();
-        assert_eq!(found, [(0, 0, 200), (0, 1, 100), (0, 0, 100), (1, 0, 200)]);
-        let flight = &phases[1].samples;
+        let phases = prepare(&recording, &PhaseRule::two_phase()).unwrap();
+        let found = phases.iter();
+        let found = found.map(|(span, samples)| (span.phase, samples.len()));
+        let found: Vec<_> = found.collect();
+        assert_eq!(found, [(0, 200), (1, 100), (0, 100), (0, 200)]);
+        let flight = &phases[1].1;
         assert!(flight.feet.iter().all(|feet| *feet == [false; 4]));
         assert_eq!(flight.x.column(0), recording.segments[0].x.column(150));
-    }
-
-    #[test]
-    fn batch_rows_refuses_tiny_batches() {
-        assert_eq!(batch_rows(100, 100).unwrap(), 100);
-        let error = batch_rows(5, 1).unwrap_err();
-        assert_eq!(
-            error.to_string(),
-            "found a batch of 1 rows, expected at least 2"
-        );
     }
 }

@@ -11,7 +11,7 @@ use super::csv;
 use super::error::{RecordingError, RecordingFault};
 use super::foreign::guess::guess_of;
 use super::foreign::map::ColumnMap;
-use super::foreign::{Assembled, assemble, read_mcap, read_texts};
+use super::foreign::{assemble, read_mcap, read_texts};
 use super::segment::Recording;
 use crate::robot::Robot;
 
@@ -31,7 +31,7 @@ pub enum Clocks {
 #[derive(Debug, Clone, Default)]
 pub struct Reader {
     map: Option<Arc<ColumnMap>>,
-    clocks: Clocks,
+    pub(super) clocks: Clocks,
 }
 
 /// A recording and what was done to it besides reading.
@@ -39,10 +39,21 @@ pub struct Reader {
 pub struct Reading {
     /// The recording.
     pub recording: Recording,
-    /// What a map of columns left to be derived, resampled or turned.
+    /// What was derived, resampled, turned or cut, in words.
     pub notes: Vec<String>,
     /// What was mended, segment by segment; empty with [`Clocks::Recorded`].
     pub mended: Vec<Mended>,
+}
+
+impl Reading {
+    /// A recording as its file has it.
+    pub(super) fn as_recorded(recording: Recording, notes: Vec<String>) -> Self {
+        Self {
+            recording,
+            notes,
+            mended: Vec::new(),
+        }
+    }
 }
 
 impl Reader {
@@ -54,42 +65,26 @@ impl Reader {
         }
     }
 
-    /// The same reader that leaves clocks as they are.
-    pub fn as_stamped(&self) -> Self {
-        Self {
-            map: self.map.clone(),
-            clocks: Clocks::Recorded,
-        }
-    }
-
     /// Reads a file, or with a map a folder of files that are one recording.
     ///
     /// # Errors
     /// [`RecordingError`] with file, row and column, or with the map's key.
     pub fn read(&self, path: &Path) -> Result<Reading, RecordingError> {
-        let Assembled {
-            mut recording,
-            notes,
-        } = match &self.map {
+        let mut reading = match &self.map {
             Some(map) if is_mcap(path) => assemble(path, &read_mcap(path)?, map)?,
             Some(map) => assemble(path, &read_texts(path, map)?, map)?,
             None if path.is_dir() => return Err(RecordingFault::Folder.of(path)),
             None if is_mcap(path) => by_guess(path)?,
             None => csv::read_noted(path)?,
         };
-        let mut mended = Vec::new();
         if self.clocks == Clocks::Repaired {
-            for segment in &mut recording.segments {
+            for segment in &mut reading.recording.segments {
                 let timed = timed(segment)?;
-                mended.push(timed.mended);
+                reading.mended.push(timed.mended);
                 *segment = timed.segment;
             }
         }
-        Ok(Reading {
-            recording,
-            notes,
-            mended,
-        })
+        Ok(reading)
     }
 }
 
@@ -100,15 +95,15 @@ pub(super) fn is_mcap(path: &Path) -> bool {
 }
 
 /// An MCAP file by the names of its topics and fields.
-fn by_guess(path: &Path) -> Result<Assembled, RecordingError> {
+fn by_guess(path: &Path) -> Result<Reading, RecordingError> {
     let logs = read_mcap(path)?;
     let robot = Robot::by_name("go1").expect("a known robot");
     let text = guess_of(path, &logs, robot)?.text;
     let map = ColumnMap::parse(&format!("{}: the guessed map", path.display()), &text)?;
-    let mut assembled = assemble(path, &logs, &map)?;
+    let mut reading = assemble(path, &logs, &map)?;
     let note = "topics are taken by their names (`romc inspect --guess` prints the map)";
-    assembled.notes.push(note.to_owned());
-    Ok(assembled)
+    reading.notes.push(note.to_owned());
+    Ok(reading)
 }
 
 /// What was done to several recordings besides reading.

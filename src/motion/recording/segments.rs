@@ -47,19 +47,6 @@ impl Sample {
     }
 }
 
-/// The samples of a segment so far, each quantity sample after sample.
-#[derive(Default)]
-struct Open {
-    first_row: usize,
-    time_s: Vec<f64>,
-    x: Vec<f64>,
-    dx: Vec<f64>,
-    ddx: Vec<f64>,
-    torque_nm: Vec<f64>,
-    force: Vec<f64>,
-    feet: Vec<ContactFlags>,
-}
-
 /// The segments of a recording, sample by sample.
 pub(super) struct SegmentBuilder<'a> {
     path: &'a Path,
@@ -67,7 +54,10 @@ pub(super) struct SegmentBuilder<'a> {
     has_force: bool,
     /// Time of the first sample if the clock counts from an epoch, else 0.
     origin_s: Option<f64>,
-    open: Open,
+    /// The segment so far: its first row, its times, its samples.
+    first_row: usize,
+    time_s: Vec<f64>,
+    open: Vec<Sample>,
     segments: Vec<Segment>,
 }
 
@@ -79,95 +69,89 @@ impl<'a> SegmentBuilder<'a> {
             has_acceleration,
             has_force,
             origin_s: None,
-            open: Open::default(),
+            first_row: 0,
+            time_s: Vec::new(),
+            open: Vec::new(),
             segments: Vec::new(),
         }
     }
 
-    pub fn push(&mut self, row: usize, sample: &Sample) -> Result<(), RecordingError> {
+    pub fn push(&mut self, row: usize, sample: Sample) -> Result<(), RecordingError> {
         let is_clock = sample.time_s.abs() > EPOCH_S;
         let first_s = if is_clock { sample.time_s } else { 0.0 };
         let time_s = sample.time_s - *self.origin_s.get_or_insert(first_s);
-        if begins_segment(&self.open.time_s, time_s)
+        if begins_segment(&self.time_s, time_s)
             .map_err(|fault| fault.in_cell(self.path, row, "Time"))?
         {
             self.close()?;
         }
-        if self.open.time_s.is_empty() {
-            self.open.first_row = row;
+        if self.open.is_empty() {
+            self.first_row = row;
         }
-        self.open.time_s.push(time_s);
-        self.open.x.extend_from_slice(&sample.x);
-        self.open.dx.extend_from_slice(&sample.dx);
-        if self.has_acceleration {
-            self.open.ddx.extend_from_slice(&sample.ddx);
-        }
-        self.open.torque_nm.extend_from_slice(&sample.torque_nm);
-        if self.has_force {
-            self.open.force.extend_from_slice(&sample.force);
-        }
-        self.open.feet.push(sample.feet);
+        self.time_s.push(time_s);
+        self.open.push(sample);
         Ok(())
     }
 
     fn close(&mut self) -> Result<(), RecordingError> {
+        let time_s = std::mem::take(&mut self.time_s);
         let open = std::mem::take(&mut self.open);
-        let n = open.time_s.len();
+        let n = open.len();
         if n < 2 {
-            let (found, expected) = (n, 2);
-            let fault = RecordingFault::TooShort { found, expected };
-            return Err(fault.at(self.path, open.first_row));
+            return Err(RecordingFault::too_short(n, 2).at(self.path, self.first_row));
         }
-        let step_s = (open.time_s[n - 1] - open.time_s[0]) / (n - 1) as f64;
+        let step_s = (time_s[n - 1] - time_s[0]) / (n - 1) as f64;
         if step_s > LARGEST_STEP_S {
             let (found, expected) = (step_s, LARGEST_STEP_S);
             let fault = RecordingFault::Sampling { found, expected };
-            return Err(fault.in_cell(self.path, open.first_row, "Time"));
+            return Err(fault.in_cell(self.path, self.first_row, "Time"));
         }
-        let dx = DMatrix::from_column_slice(STATE_DIM, n, &open.dx);
-        let ddx = if self.has_acceleration {
-            DMatrix::from_column_slice(STATE_DIM, n, &open.ddx)
-        } else {
-            differences(&open.time_s, &dx)
+        let dx = columns(&open, |sample| &sample.dx);
+        let ddx = match self.has_acceleration {
+            true => columns(&open, |sample| &sample.ddx),
+            false => differences(&time_s, &dx),
         };
-        self.require_finite(&open, &ddx)?;
+        self.require_finite(&ddx)?;
         self.segments.push(Segment {
             path: self.path.to_owned(),
-            first_row: open.first_row,
+            first_row: self.first_row,
             row_stride: 1.0,
-            time_s: open.time_s,
-            x: DMatrix::from_vec(STATE_DIM, n, open.x),
+            time_s,
+            x: columns(&open, |sample| &sample.x),
             dx,
             ddx,
-            torque_nm: DMatrix::from_vec(JOINT_DIM, n, open.torque_nm),
-            feet: open.feet,
-            body_wrench: self
-                .has_force
-                .then(|| DMatrix::from_vec(BODY_DIM, n, open.force)),
+            torque_nm: columns(&open, |sample| &sample.torque_nm),
+            feet: open.iter().map(|sample| sample.feet).collect(),
+            body_wrench: (self.has_force).then(|| columns(&open, |sample| &sample.force)),
         });
         Ok(())
     }
 
     /// Differences of huge velocities over tiny steps can overflow.
-    fn require_finite(&self, open: &Open, ddx: &DMatrix<f64>) -> Result<(), RecordingError> {
+    fn require_finite(&self, ddx: &DMatrix<f64>) -> Result<(), RecordingError> {
         let Some(place) = ddx.iter().position(|value| !value.is_finite()) else {
             return Ok(());
         };
         let found = format!("{} from differences", ddx[place]);
         let expected = "a finite number";
-        let row = open.first_row + place / STATE_DIM;
+        let row = self.first_row + place / STATE_DIM;
         let column = Column::Acceleration(place % STATE_DIM).name();
         Err(RecordingFault::Number { found, expected }.in_cell(self.path, row, &column))
     }
 
     /// The segments of a file of so many columns.
     pub fn finish(mut self, columns: usize) -> Result<Vec<Segment>, RecordingError> {
-        if self.open.time_s.is_empty() {
+        if self.open.is_empty() {
             return Err(RecordingFault::HeaderOnly(columns).of(self.path));
         }
         self.close()?;
         Ok(self.segments)
     }
+}
+
+/// A quantity of the samples, one column a sample.
+fn columns<const N: usize>(samples: &[Sample], of: fn(&Sample) -> &[f64; N]) -> DMatrix<f64> {
+    DMatrix::from_iterator(N, samples.len(), samples.iter().flat_map(of).copied())
 }
 
 /// Whether a time belongs to a new segment: it jumps back by more than a step or to where the segment of these times

@@ -1,4 +1,4 @@
-//! Savitzky-Golay smoothing: a polynomial through each window by least squares.
+//! Moving averages, and Savitzky-Golay smoothing: a polynomial through each window by least squares.
 //!
 //! Inside, each sample takes the value of the polynomial fitted to the window
 //! centred on it; at the ends, the first and last window's polynomial is
@@ -50,11 +50,6 @@ impl SavitzkyGolay {
         self.window
     }
 
-    /// Degree of the polynomial.
-    pub fn order(&self) -> usize {
-        self.order
-    }
-
     /// Each row of `rows` smoothed along its samples (columns).
     ///
     /// `None` if there are fewer samples than the window has.
@@ -102,9 +97,38 @@ impl From<SavitzkyGolay> for String {
     }
 }
 
+/// Mean over a centred window of `window` samples (columns), shortened symmetrically at both ends.
+///
+/// Landing and lift-off spikes in accelerations weigh a regression more than the whole rest of a jump; averaged over
+/// 11 samples (20 ms) they carry the momentum change they stand for. A window of 0 or 1 returns the samples.
+pub fn moving_average(samples: &DMatrix<f64>, window: usize) -> DMatrix<f64> {
+    let n = samples.ncols();
+    let half = window / 2;
+    let mut smooth = DMatrix::zeros(samples.nrows(), n);
+    for i in 0..n {
+        let reach = half.min(i).min(n - 1 - i);
+        let sum = samples.columns(i - reach, 2 * reach + 1).column_sum();
+        smooth.set_column(i, &(sum / (2 * reach + 1) as f64));
+    }
+    smooth
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn moving_average_keeps_straight_lines_and_flattens_spikes() {
+        let line = DMatrix::from_fn(1, 9, |_, i| 3.0 * i as f64 - 1.0);
+        assert!((moving_average(&line, 5) - &line).amax() < 1e-12);
+        let mut spike = DMatrix::zeros(1, 9);
+        spike[(0, 4)] = 5.0;
+        let smooth = moving_average(&spike, 5);
+        assert_eq!(
+            smooth.row(0).iter().copied().collect::<Vec<_>>(),
+            [0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0]
+        );
+    }
 
     #[test]
     fn new_even_window_or_order_too_high_is_refused() {

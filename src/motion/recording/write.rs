@@ -107,16 +107,7 @@ pub fn write_to(
     options: &WriteOptions,
 ) -> io::Result<()> {
     let with_force = recording.segments.iter().all(|s| s.body_wrench.is_some());
-    let is_written = |column: &Column| match column {
-        Column::Acceleration(_) => options.accelerations,
-        Column::Force(_) => with_force,
-        Column::Time
-        | Column::Position(_)
-        | Column::Velocity(_)
-        | Column::Torque(_)
-        | Column::Foot(_) => true,
-    };
-    let columns: Vec<Column> = Column::all().into_iter().filter(is_written).collect();
+    let columns = Column::all(options.accelerations, with_force);
     let separator = match options.notation {
         Notation::Semicolon => ";",
         Notation::Comma => ",",

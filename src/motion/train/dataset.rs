@@ -7,11 +7,11 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 
 use super::error::TrainError;
-use super::smooth::moving_average;
 use super::subspace::Moments;
 use crate::evaluate::is_plausible;
 use crate::files::Place;
 use crate::model::InputStatistics;
+use crate::recording::smoothing::moving_average;
 use crate::recording::{
     PhaseRule, RecordingError, RecordingFault, RecordingFiles, Segment, Source,
 };

@@ -38,7 +38,6 @@ mod random;
 mod refine;
 mod report;
 mod seeds;
-mod smooth;
 mod split;
 mod stepper;
 mod task;

@@ -9,7 +9,6 @@ use super::closed_form::closed_form;
 use super::data_sets::Recordings;
 use super::dataset::ScaleOptions;
 use super::error::TrainError;
-use super::joint::batch::BATCH_ROWS;
 use super::joint::{LossWeights, Schedule, Unroll, joint};
 use super::map_options::MapOptions;
 use super::metrics::{BODY_X, BODY_Z};
@@ -19,6 +18,7 @@ use crate::limits::table;
 use crate::model::{Library, LibraryChoice, ModelError, StandardLibrary, check_name};
 use crate::recording::PhaseRule;
 use crate::recording::phases::CHATTER_SAMPLES;
+use crate::recording::preprocess::BATCH_ROWS;
 use crate::robot::{Actuators, InputRule, JOINT_NAMES, Robot, STATE_DIM, WrenchFrame};
 
 /// How a model is learned.

@@ -4,16 +4,16 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::Path;
 
-use nalgebra::DMatrix;
-
 use super::attitude::{angle_rates, angles_of_quaternions, in_world, unwrap};
 use super::elements::{QUATERNION, Quantity};
 use super::interpolate::{Between, at_times};
 use super::log::Log;
 use super::map::{ColumnMap, Frame, Origin};
 use super::signal::{Signal, Source};
+use crate::recording::columns::Column;
 use crate::recording::error::{RecordingError, RecordingFault};
-use crate::recording::preprocess::differences;
+use crate::recording::preprocess::differences_within;
+use crate::recording::reader::Reading;
 use crate::recording::segment::Recording;
 use crate::recording::segments::{DERIVED_DDX, EPOCH_S, Sample, SegmentBuilder, begins_segment};
 use crate::robot::FOOT_DIM;
@@ -25,16 +25,7 @@ const QUATERNION_TOLERANCE: f64 = 0.05;
 /// Most samples of a recording that is resampled.
 const MAX_RESAMPLED: usize = 10_000_000;
 
-/// A recording made of a log, and what was done besides copying.
-#[derive(Debug, Clone)]
-pub struct Assembled {
-    /// The recording.
-    pub recording: Recording,
-    /// What was derived, resampled, turned or cut, in words.
-    pub notes: Vec<String>,
-}
-
-/// Makes a recording of the logs as the map says.
+/// Makes a recording of the logs as the map says, with notes of what was derived, resampled, turned or cut.
 ///
 /// # Errors
 /// [`RecordingError`] with the map's key, or with file, row and column.
@@ -42,71 +33,77 @@ pub(in crate::recording) fn assemble(
     path: &Path,
     logs: &[Log],
     map: &ColumnMap,
-) -> Result<Assembled, RecordingError> {
+) -> Result<Reading, RecordingError> {
     let find = |quantity| Source::find(logs, map, quantity);
     let epoch_s = match find(Quantity::JointPosition)? {
         Some(source) => source.epoch_s()?,
         None => None,
     };
-    let mut signals = Signals::default();
+    let mut signals = BTreeMap::new();
     for quantity in Quantity::ALL {
         if let Some(source) = find(quantity)? {
-            let signal = source.take(epoch_s.unwrap_or(0))?;
-            signals.all.insert(quantity, signal);
+            signals.insert(quantity, source.take(epoch_s.unwrap_or(0))?);
         }
     }
-    let mut notes = Vec::new();
-    signals.angles(path, &mut notes)?;
-    signals.contacts(map, logs, path)?;
-    let base = signals.base();
-    let (mut times_s, first_row) = (base.times_s.clone(), base.first_row);
-    let own_clocks = (signals.all.values()).any(|signal| signal.times_s != times_s);
-    let ranges;
-    if own_clocks || map.time.resample_s.is_some() {
-        times_s = signals.common_times(path, map, &mut notes)?;
-        signals.resample(path, map, &times_s)?;
-        ranges = std::iter::once(0..times_s.len()).collect();
-    } else {
-        ranges = ranges_of(path, first_row, &times_s)?;
-    }
-    if epoch_s.is_some_and(|epoch| epoch as f64 >= EPOCH_S) {
-        let start = times_s[0];
-        times_s.iter_mut().for_each(|time| *time -= start);
-        notes.push("times count from the first sample".to_owned());
-    }
+    let base: &Signal =
+        (signals.get(&Quantity::JointPosition)).expect("a map has the joints' positions");
     let mut rows = Rows {
         path,
-        first_row,
-        times_s,
-        ranges,
+        logs,
+        map,
+        first_row: base.first_row,
+        times_s: base.times_s.clone(),
+        ranges: Vec::new(),
         signals,
-        notes,
+        notes: Vec::new(),
     };
-    rows.to_world(map)?;
+    rows.angles()?;
+    rows.contacts()?;
+    rows.one_clock()?;
+    if epoch_s.is_some_and(|epoch| epoch as f64 >= EPOCH_S) {
+        let start = rows.times_s[0];
+        rows.times_s.iter_mut().for_each(|time| *time -= start);
+        (rows.notes).push("times count from the first sample".to_owned());
+    }
+    rows.to_world()?;
     rows.derive_velocities();
-    rows.shift_origin(map);
-    rows.recording(map, logs)
+    rows.shift_origin();
+    rows.recording()
 }
 
-/// The quantities that the log has.
-#[derive(Default)]
-struct Signals {
-    all: BTreeMap<Quantity, Signal>,
+/// The quantities that the log has, and the rows that they become.
+struct Rows<'a> {
+    path: &'a Path,
+    logs: &'a [Log],
+    map: &'a ColumnMap,
+    first_row: usize,
+    /// Times of the recording: those of the joints' positions unless all are brought to others.
+    times_s: Vec<f64>,
+    /// Stretches of increasing time.
+    ranges: Vec<Range<usize>>,
+    signals: BTreeMap<Quantity, Signal>,
+    notes: Vec<String>,
 }
 
-impl Signals {
-    /// The quantity whose clock the recording has.
-    fn base(&self) -> &Signal {
-        (self.all.get(&Quantity::JointPosition)).expect("a map has the joints' positions")
+impl Rows<'_> {
+    /// A quantity that every map has.
+    fn required(&mut self, quantity: Quantity) -> &mut Signal {
+        let signal = self.signals.get_mut(&quantity);
+        signal.expect("a map has what is required")
+    }
+
+    /// The axes that the map gives to a velocity.
+    fn frame(&self, quantity: Quantity) -> Option<Frame> {
+        self.map.table(quantity).and_then(|table| table.frame)
     }
 
     /// Quaternions become angles, and angles do not jump by whole turns.
     ///
     /// # Errors
     /// [`RecordingFault::Number`] for a quaternion whose length is far from one.
-    fn angles(&mut self, path: &Path, notes: &mut Vec<String>) -> Result<(), RecordingError> {
-        let signal = self.all.get_mut(&Quantity::Orientation);
-        let signal = signal.expect("a map has the orientation");
+    fn angles(&mut self) -> Result<(), RecordingError> {
+        let path = self.path;
+        let signal = self.required(Quantity::Orientation);
         if signal.values.nrows() == QUATERNION.len() {
             let norms = signal.values.column_iter().map(|q| q.norm());
             for (sample, norm) in norms.enumerate() {
@@ -120,21 +117,17 @@ impl Signals {
             signal.values = angles_of_quaternions(&signal.values);
         }
         if unwrap(&mut signal.values) {
-            notes.push("angles of the trunk run on past half a turn".to_owned());
+            let note = "angles of the trunk run on past half a turn";
+            self.notes.push(note.to_owned());
         }
         Ok(())
     }
 
     /// Forces become contact: down from the threshold on, up below the release.
-    fn contacts(
-        &mut self,
-        map: &ColumnMap,
-        logs: &[Log],
-        path: &Path,
-    ) -> Result<(), RecordingError> {
-        let table = map.table(Quantity::Feet).expect("a map has the feet");
-        let signal = self.all.get_mut(&Quantity::Feet);
-        let signal = signal.expect("a map has the feet");
+    fn contacts(&mut self) -> Result<(), RecordingError> {
+        let (path, logs) = (self.path, self.logs);
+        let table = self.map.table(Quantity::Feet).expect("a map has the feet");
+        let signal = self.required(Quantity::Feet);
         let unit = table.unit.as_ref();
         let unit = unit.and_then(|unit| Quantity::Feet.dimension().factor(unit));
         let unit = unit.unwrap_or(1.0);
@@ -149,9 +142,8 @@ impl Signals {
                     }
                     None if value == 0.0 || value == 1.0 => value == 1.0,
                     None => {
-                        let file = logs
-                            .iter()
-                            .find(|log| Some(&log.name) == table.file.as_ref());
+                        let mut files = logs.iter();
+                        let file = files.find(|log| Some(&log.name) == table.file.as_ref());
                         let path = file.map_or(path, |log| &log.path);
                         let row = signal.first_row + sample;
                         let name = Quantity::Feet.column(foot).name();
@@ -164,55 +156,72 @@ impl Signals {
         Ok(())
     }
 
+    /// Brings quantities with clocks of their own to one, or all to even steps if the map asks for it.
+    fn one_clock(&mut self) -> Result<(), RecordingError> {
+        let mut signals = self.signals.values();
+        let own_clocks = signals.any(|signal| signal.times_s != self.times_s);
+        if own_clocks || self.map.time.resample_s.is_some() {
+            self.times_s = self.common_times()?;
+            self.resample()?;
+            self.ranges.push(0..self.times_s.len());
+            return Ok(());
+        }
+        let mut start = 0;
+        for i in 1..self.times_s.len() {
+            if begins_segment(&self.times_s[start..i], self.times_s[i])
+                .map_err(|fault| fault.in_cell(self.path, self.first_row + i, "Time"))?
+            {
+                self.ranges.push(start..i);
+                start = i;
+            }
+        }
+        self.ranges.push(start..self.times_s.len());
+        Ok(())
+    }
+
     /// Times that every clock covers: those of the joints' positions, or even steps.
-    fn common_times(
-        &self,
-        path: &Path,
-        map: &ColumnMap,
-        notes: &mut Vec<String>,
-    ) -> Result<Vec<f64>, RecordingError> {
-        let max_gap_s = map.time.max_gap_s.unwrap_or(MAX_GAP_S);
+    fn common_times(&mut self) -> Result<Vec<f64>, RecordingError> {
+        let time = &self.map.time;
+        let max_gap_s = time.max_gap_s.unwrap_or(MAX_GAP_S);
         let (mut start, mut end) = (f64::NEG_INFINITY, f64::INFINITY);
-        for (quantity, signal) in &self.all {
+        for (quantity, signal) in &self.signals {
             let times = &signal.times_s;
-            let name = quantity.column(0).name();
             for i in 1..times.len() {
                 let (found, previous) = (times[i], times[i - 1]);
-                let row = signal.first_row + i;
-                if found <= previous {
-                    return Err(RecordingFault::Time { found, previous }.in_cell(path, row, &name));
-                }
-                if found - previous > max_gap_s {
-                    let fault = RecordingFault::Gap {
-                        found: found - previous,
-                        expected: max_gap_s,
-                    };
-                    return Err(fault.in_cell(path, row, &name));
-                }
+                let fault = if found <= previous {
+                    RecordingFault::Time { found, previous }
+                } else if found - previous > max_gap_s {
+                    let (found, expected) = (found - previous, max_gap_s);
+                    RecordingFault::Gap { found, expected }
+                } else {
+                    continue;
+                };
+                let (row, name) = (signal.first_row + i, quantity.column(0).name());
+                return Err(fault.in_cell(self.path, row, &name));
             }
             start = start.max(times[0]);
             end = end.min(times[times.len() - 1]);
         }
-        let base = &self.base().times_s;
+        let base = &self.times_s;
         let margin = 1e-9 * (1.0 + end.abs());
         let within = |time: &f64| (start - margin..=end + margin).contains(time);
-        let times: Vec<f64> = match map.time.resample_s {
+        let times: Vec<f64> = match time.resample_s {
             None => base.iter().copied().filter(within).collect(),
             Some(step) if end > start => {
                 let steps = ((end - start + margin) / step).floor() as usize;
                 if steps > MAX_RESAMPLED {
                     let found = format!("{step}, which makes {steps} samples");
                     let expected = format!("a step that makes at most {MAX_RESAMPLED}");
-                    return Err(map.fault("time.resample_s", found, expected));
+                    return Err(self.map.fault("time.resample_s", found, expected));
                 }
                 (0..=steps).map(|i| start + step * i as f64).collect()
             }
             Some(_) => Vec::new(),
         };
         if times.len() < 2 {
-            return Err(RecordingFault::NoOverlap.of(path));
+            return Err(RecordingFault::NoOverlap.of(self.path));
         }
-        notes.push(match map.time.resample_s {
+        self.notes.push(match time.resample_s {
             Some(step) => format!("all quantities are brought to even steps of {step} s"),
             None => format!(
                 "topics with clocks of their own are brought to that of the joints ({} of its {} samples)",
@@ -223,91 +232,68 @@ impl Signals {
         Ok(times)
     }
 
-    /// Brings every quantity to these times.
-    fn resample(
-        &mut self,
-        path: &Path,
-        map: &ColumnMap,
-        times_s: &[f64],
-    ) -> Result<(), RecordingError> {
-        let old = Signals {
-            all: self.all.clone(),
-        };
-        for (quantity, signal) in &mut self.all {
+    /// Brings every quantity to the times of the recording.
+    fn resample(&mut self) -> Result<(), RecordingError> {
+        let mut values = Vec::new();
+        for (quantity, signal) in &self.signals {
             if signal.times_s.len() < 2 {
-                let (found, expected) = (signal.times_s.len(), 2);
-                let fault = RecordingFault::TooShort { found, expected };
-                return Err(fault.at(path, signal.first_row));
+                let fault = RecordingFault::too_short(signal.times_s.len(), 2);
+                return Err(fault.at(self.path, signal.first_row));
             }
             let between = match quantity {
                 Quantity::Feet => Between::Nearest,
                 Quantity::JointTorque => Between::Straight,
                 _ => Between::Smooth,
             };
-            let rates = old
-                .known_rates(*quantity, map)
-                .filter(|rates| rates.times_s == signal.times_s);
-            signal.values = at_times(
+            let rates = self.known_rates(*quantity);
+            let rates = rates.filter(|rates| rates.times_s == signal.times_s);
+            values.push(at_times(
                 &signal.times_s,
                 &signal.values,
                 rates.map(|rates| &rates.values),
-                times_s,
+                &self.times_s,
                 between,
-            );
-            signal.times_s = times_s.to_vec();
+            ));
+        }
+        for (signal, values) in self.signals.values_mut().zip(values) {
+            signal.values = values;
         }
         Ok(())
     }
 
     /// The derivatives of a quantity's very elements, if the log has them.
-    fn known_rates(&self, quantity: Quantity, map: &ColumnMap) -> Option<&Signal> {
-        let frame = |quantity| map.table(quantity).and_then(|table| table.frame);
+    fn known_rates(&self, quantity: Quantity) -> Option<&Signal> {
         let rate = match quantity {
             Quantity::JointPosition => Quantity::JointVelocity,
             Quantity::JointVelocity => Quantity::JointAcceleration,
-            Quantity::BodyPosition if frame(Quantity::BodyVelocity) != Some(Frame::Body) => {
+            Quantity::BodyPosition if self.frame(Quantity::BodyVelocity) != Some(Frame::Body) => {
                 Quantity::BodyVelocity
             }
             Quantity::Orientation
-                if matches!(frame(Quantity::AngularVelocity), None | Some(Frame::Angles)) =>
+                if matches!(
+                    self.frame(Quantity::AngularVelocity),
+                    None | Some(Frame::Angles)
+                ) =>
             {
                 Quantity::AngularVelocity
             }
             _ => return None,
         };
-        self.all.get(&rate)
-    }
-}
-
-/// All quantities at the times of the recording.
-struct Rows<'a> {
-    path: &'a Path,
-    first_row: usize,
-    times_s: Vec<f64>,
-    ranges: Vec<Range<usize>>,
-    signals: Signals,
-    notes: Vec<String>,
-}
-
-impl Rows<'_> {
-    fn values(&self, quantity: Quantity) -> Option<&DMatrix<f64>> {
-        self.signals.all.get(&quantity).map(|signal| &signal.values)
+        self.signals.get(&rate)
     }
 
     /// Velocities about the body's own axes become the derivatives of position and angles.
     #[allow(clippy::wrong_self_convention)] // turns what it holds
-    fn to_world(&mut self, map: &ColumnMap) -> Result<(), RecordingError> {
-        let angles = self.values(Quantity::Orientation);
-        let angles = angles.expect("a map has the orientation").clone();
-        let frame = |quantity| map.table(quantity).and_then(|table| table.frame);
-        if frame(Quantity::BodyVelocity) == Some(Frame::Body)
-            && let Some(signal) = self.signals.all.get_mut(&Quantity::BodyVelocity)
+    fn to_world(&mut self) -> Result<(), RecordingError> {
+        let angles = self.required(Quantity::Orientation).values.clone();
+        if self.frame(Quantity::BodyVelocity) == Some(Frame::Body)
+            && let Some(signal) = self.signals.get_mut(&Quantity::BodyVelocity)
         {
             signal.values = in_world(&angles, &signal.values);
         }
-        let frame = frame(Quantity::AngularVelocity).unwrap_or(Frame::Angles);
-        if let Some(signal) = self.signals.all.get_mut(&Quantity::AngularVelocity) {
-            let turned = angle_rates(&angles, &signal.values, frame);
+        let frame = self.frame(Quantity::AngularVelocity);
+        if let Some(signal) = self.signals.get_mut(&Quantity::AngularVelocity) {
+            let turned = angle_rates(&angles, &signal.values, frame.unwrap_or(Frame::Angles));
             signal.values = turned.map_err(|sample| {
                 let row = self.first_row + sample;
                 RecordingFault::Upright.at(self.path, row)
@@ -325,47 +311,36 @@ impl Rows<'_> {
         ] {
             if self.derive(velocity, of) {
                 let (velocity, of) = (velocity.key(), of.key());
-                self.notes
-                    .push(format!("{velocity} are differences of {of}"));
+                (self.notes).push(format!("{velocity} are differences of {of}"));
             }
         }
     }
 
     /// Makes a quantity that the log does not have of differences of another; whether it had to be made.
     fn derive(&mut self, quantity: Quantity, of: Quantity) -> bool {
-        let is_absent = self.values(quantity).is_none();
+        let is_absent = !self.signals.contains_key(&quantity);
         if is_absent {
+            let of = self.signals.get(&of);
+            let of = &of.expect("invariant: a required quantity").values;
             let signal = Signal {
-                values: self.differences(of),
+                values: differences_within(&self.ranges, &self.times_s, of),
                 times_s: Vec::new(),
                 first_row: self.first_row,
             };
-            self.signals.all.insert(quantity, signal);
+            self.signals.insert(quantity, signal);
         }
         is_absent
     }
 
-    /// Slopes of a quantity within each range.
-    fn differences(&self, of: Quantity) -> DMatrix<f64> {
-        let values = self.values(of).expect("invariant: a required quantity");
-        let mut out = DMatrix::zeros(values.nrows(), values.ncols());
-        for range in &self.ranges {
-            let own = values.columns(range.start, range.len()).into_owned();
-            let slopes = differences(&self.times_s[range.clone()], &own);
-            out.columns_mut(range.start, range.len()).copy_from(&slopes);
-        }
-        out
-    }
-
     /// Lets x and y count from the first sample of each range, where the map asks for it.
-    fn shift_origin(&mut self, map: &ColumnMap) {
-        let table = map.table(Quantity::BodyPosition);
+    fn shift_origin(&mut self) {
+        let table = self.map.table(Quantity::BodyPosition);
         if table.and_then(|table| table.origin) != Some(Origin::Start) {
             return;
         }
-        let signal = self.signals.all.get_mut(&Quantity::BodyPosition);
-        let values = &mut signal.expect("a map has the body's position").values;
-        for range in &self.ranges {
+        let ranges = self.ranges.clone();
+        let values = &mut self.required(Quantity::BodyPosition).values;
+        for range in ranges {
             for axis in 0..2 {
                 let start = values[(axis, range.start)];
                 let mut row = values.row_mut(axis);
@@ -375,8 +350,8 @@ impl Rows<'_> {
     }
 
     /// The segments.
-    fn recording(mut self, map: &ColumnMap, logs: &[Log]) -> Result<Assembled, RecordingError> {
-        let kept = match map.text.rows {
+    fn recording(mut self) -> Result<Reading, RecordingError> {
+        let kept = match self.map.text.rows {
             None => 0..self.times_s.len(),
             Some([first, last]) => {
                 let end = last.min(self.times_s.len());
@@ -384,19 +359,15 @@ impl Rows<'_> {
                 if first == 0 || start + 2 > end {
                     let found = format!("{first} to {last}");
                     let expected = format!("two or more of {} samples", self.times_s.len());
-                    return Err(map.fault("text.rows", found, expected));
+                    return Err(self.map.fault("text.rows", found, expected));
                 }
                 start..end
             }
         };
-        let accelerations = [
-            (Quantity::JointAcceleration, Quantity::JointVelocity),
-            (Quantity::BodyAcceleration, Quantity::BodyVelocity),
-            (Quantity::AngularAcceleration, Quantity::AngularVelocity),
-        ];
-        let has_acceleration = (accelerations.iter()).any(|(own, _)| self.values(*own).is_some());
+        let mut accelerations = Quantity::ACCELERATIONS.iter();
+        let has_acceleration = accelerations.any(|(own, _)| self.signals.contains_key(own));
         if has_acceleration {
-            for (acceleration, velocity) in accelerations {
+            for (acceleration, velocity) in Quantity::ACCELERATIONS {
                 self.derive(acceleration, velocity);
             }
         } else {
@@ -404,45 +375,21 @@ impl Rows<'_> {
         }
         let mut builder = SegmentBuilder::new(self.path, has_acceleration, false);
         for i in kept {
-            let mut sample = Sample {
-                time_s: self.times_s[i],
-                ..Sample::default()
-            };
-            for (quantity, signal) in &self.signals.all {
+            let mut sample = Sample::default();
+            sample.set(Column::Time, self.times_s[i]);
+            for (quantity, signal) in &self.signals {
                 for (element, value) in signal.values.column(i).iter().enumerate() {
                     sample.set(quantity.column(element), *value);
                 }
             }
-            builder.push(self.first_row + i, &sample)?;
+            builder.push(self.first_row + i, sample)?;
         }
-        let columns = logs.iter().map(|log| log.columns.len()).sum();
-        Ok(Assembled {
-            recording: Recording {
-                path: self.path.to_owned(),
-                segments: builder.finish(columns)?,
-                ignored_columns: Vec::new(),
-            },
-            notes: self.notes,
-        })
+        let columns = self.logs.iter().map(|log| log.columns.len()).sum();
+        let recording = Recording {
+            path: self.path.to_owned(),
+            segments: builder.finish(columns)?,
+            ignored_columns: Vec::new(),
+        };
+        Ok(Reading::as_recorded(recording, self.notes))
     }
-}
-
-/// Stretches of increasing time.
-fn ranges_of(
-    path: &Path,
-    first_row: usize,
-    times_s: &[f64],
-) -> Result<Vec<Range<usize>>, RecordingError> {
-    let mut ranges = Vec::new();
-    let mut start = 0;
-    for i in 1..times_s.len() {
-        if begins_segment(&times_s[start..i], times_s[i])
-            .map_err(|fault| fault.in_cell(path, first_row + i, "Time"))?
-        {
-            ranges.push(start..i);
-            start = i;
-        }
-    }
-    ranges.push(start..times_s.len());
-    Ok(ranges)
 }

@@ -2,7 +2,7 @@
 
 use super::units::Dimension;
 use crate::recording::columns::Column;
-use crate::robot::{FOOT_DIM, JOINT_DIM, JOINT_NAMES, Leg};
+use crate::robot::{JOINT_DIM, JOINT_NAMES, Leg};
 
 /// A quantity that a map places.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -47,36 +47,53 @@ impl Quantity {
         Self::Feet,
     ];
 
+    /// Accelerations, each with the velocity whose derivative it is.
+    pub(super) const ACCELERATIONS: [(Self, Self); 3] = [
+        (Self::JointAcceleration, Self::JointVelocity),
+        (Self::BodyAcceleration, Self::BodyVelocity),
+        (Self::AngularAcceleration, Self::AngularVelocity),
+    ];
+
+    /// Its table in a map, what its units measure, the recording's columns, and the first of them.
+    const fn facts(self) -> (&'static str, Dimension, fn(usize) -> Column, usize) {
+        use Column::{Acceleration, Foot, Position, Velocity};
+        use Dimension::{Angle, Force, Length, Torque};
+        const BODY: usize = JOINT_DIM;
+        const TURN: usize = JOINT_DIM + 3;
+        match self {
+            Self::JointPosition => ("joint.position", Angle, Position, 0),
+            Self::JointVelocity => ("joint.velocity", Angle, Velocity, 0),
+            Self::JointAcceleration => ("joint.acceleration", Angle, Acceleration, 0),
+            Self::JointTorque => ("joint.torque", Torque, Column::Torque, 0),
+            Self::BodyPosition => ("body.position", Length, Position, BODY),
+            Self::Orientation => ("body.orientation", Angle, Position, TURN),
+            Self::BodyVelocity => ("body.velocity", Length, Velocity, BODY),
+            Self::AngularVelocity => ("body.angular_velocity", Angle, Velocity, TURN),
+            Self::BodyAcceleration => ("body.acceleration", Length, Acceleration, BODY),
+            Self::AngularAcceleration => ("body.angular_acceleration", Angle, Acceleration, TURN),
+            Self::Feet => ("feet", Force, Foot, 0),
+        }
+    }
+
     /// Its table in a map.
     pub const fn key(self) -> &'static str {
-        match self {
-            Self::JointPosition => "joint.position",
-            Self::JointVelocity => "joint.velocity",
-            Self::JointAcceleration => "joint.acceleration",
-            Self::JointTorque => "joint.torque",
-            Self::BodyPosition => "body.position",
-            Self::Orientation => "body.orientation",
-            Self::BodyVelocity => "body.velocity",
-            Self::AngularVelocity => "body.angular_velocity",
-            Self::BodyAcceleration => "body.acceleration",
-            Self::AngularAcceleration => "body.angular_acceleration",
-            Self::Feet => "feet",
-        }
+        self.facts().0
+    }
+
+    /// A key of its table.
+    pub(super) fn at(self, key: &str) -> String {
+        format!("{}.{key}", self.key())
     }
 
     /// What its units measure.
     pub(super) const fn dimension(self) -> Dimension {
-        match self {
-            Self::JointPosition
-            | Self::JointVelocity
-            | Self::JointAcceleration
-            | Self::Orientation
-            | Self::AngularVelocity
-            | Self::AngularAcceleration => Dimension::Angle,
-            Self::BodyPosition | Self::BodyVelocity | Self::BodyAcceleration => Dimension::Length,
-            Self::JointTorque => Dimension::Torque,
-            Self::Feet => Dimension::Force,
-        }
+        self.facts().1
+    }
+
+    /// The recording's column of an element.
+    pub(super) fn column(self, element: usize) -> Column {
+        let (_, _, column, first) = self.facts();
+        column(first + element)
     }
 
     /// Whether a recording cannot be without it.
@@ -107,23 +124,6 @@ impl Quantity {
             Self::Orientation | Self::AngularAcceleration => owned(&ANGLES),
             Self::Feet => Leg::ALL.map(|leg| leg.to_string()).to_vec(),
             _ => owned(&AXES),
-        }
-    }
-
-    /// The recording's column of an element, for messages.
-    pub(super) fn column(self, element: usize) -> Column {
-        match self {
-            Self::JointPosition => Column::Position(element),
-            Self::JointVelocity => Column::Velocity(element),
-            Self::JointAcceleration => Column::Acceleration(element),
-            Self::JointTorque => Column::Torque(element),
-            Self::BodyPosition => Column::Position(JOINT_DIM + element),
-            Self::Orientation => Column::Position(JOINT_DIM + 3 + element.min(2)),
-            Self::BodyVelocity => Column::Velocity(JOINT_DIM + element),
-            Self::AngularVelocity => Column::Velocity(JOINT_DIM + 3 + element),
-            Self::BodyAcceleration => Column::Acceleration(JOINT_DIM + element),
-            Self::AngularAcceleration => Column::Acceleration(JOINT_DIM + 3 + element),
-            Self::Feet => Column::Foot(element.min(FOOT_DIM - 1)),
         }
     }
 }

@@ -53,13 +53,9 @@ pub(super) fn at_times(
             _ if between == Between::Nearest => Some(if share < 0.5 { a } else { b }),
             _ => None,
         };
-        if let Some(exact) = exact {
-            out.set_column(column, &exact);
-            continue;
-        }
         let line = a + (b - a) * share;
-        if between == Between::Straight {
-            out.set_column(column, &line);
+        if exact.is_some() || between == Between::Straight {
+            out.set_column(column, &exact.map_or(line, |exact| exact.into_owned()));
             continue;
         }
         let rest = 1.0 - share;

@@ -44,6 +44,14 @@ impl Channel {
             ..Self::default()
         }
     }
+
+    /// Its values as times, from the first on where one number does not hold them.
+    pub fn times(&self) -> Vec<f64> {
+        match &self.instants {
+            Some(all) => all.iter().map(|instant| instant.since(all[0])).collect(),
+            None => self.values.clone(),
+        }
+    }
 }
 
 impl Log {
@@ -59,11 +67,10 @@ impl Log {
         match name {
             Name::Number(number) => number.checked_sub(1).filter(|i| *i < self.columns.len()),
             Name::Text(text) => {
-                let find = |same: &dyn Fn(&str) -> bool| {
-                    self.columns.iter().position(|channel| same(&channel.name))
-                };
-                let text_folded = folded(text);
-                find(&|name| name == text).or_else(|| find(&|name| folded(name) == text_folded))
+                let mut names = self.columns.iter().map(|channel| &channel.name);
+                let exact = names.clone().position(|name| name == text);
+                let wanted = folded(text);
+                exact.or_else(|| names.position(|name| folded(name) == wanted))
             }
         }
     }

@@ -282,17 +282,6 @@ impl ColumnMap {
         out
     }
 
-    /// The fault of a key in the table of a quantity.
-    pub(super) fn fault_in(
-        &self,
-        quantity: Quantity,
-        key: &str,
-        found: impl Into<String>,
-        expected: impl Into<String>,
-    ) -> RecordingError {
-        self.fault(&format!("{}.{key}", quantity.key()), found, expected)
-    }
-
     /// The fault of a key.
     pub(super) fn fault(
         &self,
@@ -376,27 +365,19 @@ mod tests {
          [joint.torque]\ncolumns = \"tau{1}\"\n[body.position]\ncolumns = \"p{axis}\"\n\
          [body.orientation]\ncolumns = [7, \"2..4\"]\norder = \"wxyz\"\n[feet]\ncolumns = \"f_{leg}\"\n";
 
-    fn texts(map: &ColumnMap, quantity: Quantity) -> Vec<String> {
-        let columns = map.table(quantity).unwrap().columns(&map.names, quantity);
-        let text = |name: &Name| match name {
-            Name::Number(number) => number.to_string(),
-            Name::Text(text) => text.clone(),
-        };
-        columns.iter().map(text).collect()
-    }
-
     #[test]
     fn parse_patterns_and_ranges_are_written_out() {
         let map = ColumnMap::parse("m.toml", REQUIRED).unwrap();
-        let joints = texts(&map, Quantity::JointPosition);
-        assert_eq!(
-            (&joints[0][..], &joints[4][..], joints.len()),
-            ("fr-hx", "fl-hy", 12)
-        );
-        assert_eq!(texts(&map, Quantity::JointTorque)[11], "tau12");
-        assert_eq!(texts(&map, Quantity::BodyPosition), ["px", "py", "pz"]);
-        assert_eq!(texts(&map, Quantity::Orientation), ["7", "2", "3", "4"]);
-        assert_eq!(texts(&map, Quantity::Feet).len(), 4);
+        let columns = |quantity| map.table(quantity).unwrap().columns(&map.names, quantity);
+        let text = |text: &str| Name::Text(text.to_owned());
+        let joints = columns(Quantity::JointPosition);
+        assert_eq!((&joints[0], &joints[4]), (&text("fr-hx"), &text("fl-hy")));
+        assert_eq!(columns(Quantity::JointTorque)[11], text("tau12"));
+        let body = columns(Quantity::BodyPosition);
+        assert_eq!(body, ["px", "py", "pz"].map(text));
+        let turn = columns(Quantity::Orientation);
+        assert_eq!(turn, [7, 2, 3, 4].map(Name::Number));
+        assert_eq!((joints.len(), columns(Quantity::Feet).len()), (12, 4));
     }
 
     #[test]

@@ -20,7 +20,7 @@ impl ColumnMap {
                 continue;
             };
             let refuse =
-                |key: &str, expected: &str| Err(self.fault_in(quantity, key, "a value", expected));
+                |key: &str, expected: &str| Err(self.fault(&quantity.at(key), "a value", expected));
             let angular = quantity == Quantity::AngularVelocity;
             let velocity = quantity == Quantity::BodyVelocity;
             match table.frame {
@@ -78,7 +78,7 @@ impl ColumnMap {
         ] {
             if let Some(value) = values.into_iter().find(|value| !value.is_finite()) {
                 let expected = "a finite number";
-                return Err(self.fault_in(quantity, key, value.to_string(), expected));
+                return Err(self.fault(&quantity.at(key), value.to_string(), expected));
             }
         }
         Ok(())
@@ -87,7 +87,7 @@ impl ColumnMap {
     /// No column of a table twice, and no range that no log could have.
     fn require_distinct(&self, quantity: Quantity, table: &Table) -> Result<(), RecordingError> {
         let refuse = |found: String, expected: &str| {
-            Err(self.fault_in(quantity, "columns", found, expected))
+            Err(self.fault(&quantity.at("columns"), found, expected))
         };
         for entry in table.entries() {
             let Name::Text(text) = entry else { continue };

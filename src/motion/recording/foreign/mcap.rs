@@ -3,16 +3,16 @@
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::io::Read;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use mcap::read::LinearReader;
 use mcap::records::{Channel as Topic, ChunkHeader, Record, SchemaHeader};
 
 use super::log::{Channel, Log};
 use super::message::{Definition, Layout, MessageFault, Value};
+use crate::recording::csv::MAX_ROWS;
 use crate::recording::error::{RecordingError, RecordingFault};
 use crate::recording::instant::Instant;
-use crate::recording::table::MAX_ROWS;
 
 /// Largest chunk unpacked, in bytes.
 const LARGEST_CHUNK: u64 = 1 << 30;
@@ -24,13 +24,20 @@ const LARGEST_CHUNK: u64 = 1 << 30;
 pub(in crate::recording) fn read_mcap(path: &Path) -> Result<Vec<Log>, RecordingError> {
     let bytes = std::fs::read(path)
         .map_err(|source| RecordingFault::unreadable("read", source).of(path))?;
-    let fault = |error: mcap::McapError| RecordingFault::Mcap(error.to_string()).of(path);
-    let mut topics = Topics::new(path);
-    for record in LinearReader::new(&bytes).map_err(fault)? {
+    let logs = topics(&bytes).and_then(Topics::logs);
+    let mut logs = logs.map_err(|fault| fault.of(path))?;
+    logs.iter_mut().for_each(|log| log.path = path.to_owned());
+    Ok(logs)
+}
+
+/// All topics and what does not fit tables.
+fn topics(bytes: &[u8]) -> Result<Topics, RecordingFault> {
+    let fault = |error: mcap::McapError| RecordingFault::Mcap(error.to_string());
+    let mut topics = Topics::default();
+    for record in LinearReader::new(bytes).map_err(fault)? {
         match record.map_err(fault)? {
             Record::Chunk { header, data } => {
-                let unpacked = unpacked(&header, data)
-                    .map_err(|message| RecordingFault::Mcap(message).of(path))?;
+                let unpacked = unpacked(&header, data).map_err(RecordingFault::Mcap)?;
                 for record in LinearReader::sans_magic(&unpacked) {
                     topics.add(record.map_err(fault)?)?;
                 }
@@ -38,7 +45,7 @@ pub(in crate::recording) fn read_mcap(path: &Path) -> Result<Vec<Log>, Recording
             record => topics.add(record)?,
         }
     }
-    topics.logs()
+    Ok(topics)
 }
 
 /// The records of a chunk.
@@ -83,24 +90,15 @@ struct Open {
     fault: Option<MessageFault>,
 }
 
-struct Topics<'a> {
-    path: &'a Path,
+#[derive(Default)]
+struct Topics {
     schemas: BTreeMap<u16, (SchemaHeader, Vec<u8>)>,
     open: BTreeMap<u16, Open>,
     refused: Vec<(String, MessageFault)>,
 }
 
-impl<'a> Topics<'a> {
-    fn new(path: &'a Path) -> Self {
-        Self {
-            path,
-            schemas: BTreeMap::new(),
-            open: BTreeMap::new(),
-            refused: Vec::new(),
-        }
-    }
-
-    fn add(&mut self, record: Record<'_>) -> Result<(), RecordingError> {
+impl Topics {
+    fn add(&mut self, record: Record<'_>) -> Result<(), RecordingFault> {
         match record {
             Record::Schema { header, data } => {
                 self.schemas.insert(header.id, (header, data.into_owned()));
@@ -109,7 +107,7 @@ impl<'a> Topics<'a> {
             Record::Message { header, data } => {
                 if let Some(open) = self.open.get_mut(&header.channel_id) {
                     if open.log.len() == MAX_ROWS {
-                        return Err(RecordingFault::TooManyRows(MAX_ROWS).of(self.path));
+                        return Err(RecordingFault::TooManyRows(MAX_ROWS));
                     }
                     open.push(header.log_time, &data);
                 }
@@ -144,7 +142,7 @@ impl<'a> Topics<'a> {
         let (header, text) = schema.ok_or_else(undefined)?;
         let definition = Definition::parse(&header.name, &String::from_utf8_lossy(text))?;
         let log = Log {
-            path: self.path.to_owned(),
+            path: PathBuf::new(),
             name: topic.topic.clone(),
             clock: None,
             columns: vec![Channel::named("log_time")],
@@ -160,7 +158,7 @@ impl<'a> Topics<'a> {
     }
 
     /// The topics that are tables.
-    fn logs(mut self) -> Result<Vec<Log>, RecordingError> {
+    fn logs(mut self) -> Result<Vec<Log>, RecordingFault> {
         let mut logs = Vec::new();
         for open in self.open.into_values() {
             match open.fault {
@@ -172,7 +170,7 @@ impl<'a> Topics<'a> {
         if logs.is_empty() {
             let refused = self.refused.first();
             let why = refused.map(|(topic, fault)| format!(" (`{topic}`: {fault})"));
-            return Err(RecordingFault::NoTopic(why.unwrap_or_default()).of(self.path));
+            return Err(RecordingFault::NoTopic(why.unwrap_or_default()));
         }
         Ok(logs)
     }
@@ -189,27 +187,25 @@ impl Open {
             (log_time_ns / 1_000_000_000) as i64,
             (log_time_ns % 1_000_000_000) as u32,
         ));
-        let (mut place, mut fits) = (1, true);
-        let visited = self
-            .definition
-            .visit(self.layout, message, is_first, |name, value| {
-                if is_first {
-                    columns.push(Channel::named(name));
-                }
-                match (columns.get_mut(place), value) {
-                    (None, _) => fits = false,
-                    (Some(column), Value::Number(value)) => column.values.push(value),
-                    (Some(column), Value::Time(seconds, nanoseconds)) => {
-                        column.push_instant(instant(seconds, nanoseconds));
-                    }
-                }
-                place += 1;
-            });
-        self.fault = match visited {
-            Err(fault) => Some(fault),
-            Ok(()) if fits && place == columns.len() => None,
-            Ok(()) => Some(MessageFault::Ragged),
+        let values = match self.definition.values(self.layout, message, is_first) {
+            Ok(values) => values,
+            Err(fault) => return self.fault = Some(fault),
         };
+        if is_first {
+            columns.extend(values.iter().map(|(name, _)| Channel::named(name)));
+        }
+        if values.len() + 1 != columns.len() {
+            self.fault = Some(MessageFault::Ragged);
+            return;
+        }
+        for (column, (_, value)) in columns[1..].iter_mut().zip(values) {
+            match value {
+                Value::Number(value) => column.values.push(value),
+                Value::Time(seconds, nanoseconds) => {
+                    column.push_instant(instant(seconds, nanoseconds));
+                }
+            }
+        }
     }
 }
 

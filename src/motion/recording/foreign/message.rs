@@ -65,7 +65,7 @@ struct Field {
 /// A message type with all that it is made of; the first is the message's own.
 #[derive(Debug, Clone)]
 pub(super) struct Definition {
-    types: Vec<Vec<Field>>,
+    types: Vec<(String, Vec<Field>)>,
 }
 
 /// One number of a message.
@@ -90,8 +90,7 @@ impl Definition {
             }
         }
         let mut definition = Self { types: Vec::new() };
-        let mut known = BTreeMap::new();
-        definition.add(&short(name), &texts, &mut known, 0)?;
+        definition.add(&short(name), &texts, 0)?;
         Ok(definition)
     }
 
@@ -100,11 +99,10 @@ impl Definition {
         &mut self,
         name: &str,
         texts: &BTreeMap<String, Vec<&str>>,
-        known: &mut BTreeMap<String, usize>,
         level: usize,
     ) -> Result<usize, MessageFault> {
-        if let Some(index) = known.get(name) {
-            return Ok(*index);
+        if let Some(index) = self.types.iter().position(|(known, _)| known == name) {
+            return Ok(index);
         }
         let lines = texts.get(name).cloned();
         // An empty message has no lines.
@@ -113,8 +111,7 @@ impl Definition {
             return Err(MessageFault::Undefined(name.to_owned()));
         }
         let index = self.types.len();
-        known.insert(name.to_owned(), index);
-        self.types.push(Vec::new());
+        self.types.push((name.to_owned(), Vec::new()));
         let package = name.split('/').next().unwrap_or_default();
         let mut fields = Vec::new();
         for line in lines {
@@ -135,29 +132,28 @@ impl Definition {
                     };
                     match &full[..] {
                         "builtin_interfaces/Time" | "builtin_interfaces/Duration" => Kind::Time,
-                        _ => Kind::Message(self.add(&full, texts, known, level + 1)?),
+                        _ => Kind::Message(self.add(&full, texts, level + 1)?),
                     }
                 }
             };
             let name = field.to_owned();
             fields.push(Field { name, kind, count });
         }
-        self.types[index] = fields;
+        self.types[index].1 = fields;
         Ok(index)
     }
 
-    /// Calls `visit` with every number of a message and, if `named`, its name: `pose.position.x`,
-    /// `motor_state[3].q`, and `position[FR_hip_joint]` where a list of names goes with a list of numbers.
-    pub fn visit(
+    /// Every number of a message and, if `named`, its name: `pose.position.x`, `motor_state[3].q`, and
+    /// `position[FR_hip_joint]` where a list of names goes with a list of numbers.
+    pub fn values(
         &self,
         layout: Layout,
         bytes: &[u8],
         named: bool,
-        mut visit: impl FnMut(&str, Value),
-    ) -> Result<(), MessageFault> {
-        let mut cursor = Cursor::new(layout, bytes)?;
-        let mut path = String::new();
-        self.message(0, &mut cursor, named, &mut path, &mut visit)
+    ) -> Result<Vec<(String, Value)>, MessageFault> {
+        let (mut cursor, mut out) = (Cursor::new(layout, bytes)?, Vec::new());
+        self.message(0, &mut cursor, named, &mut String::new(), Some(&mut out))?;
+        Ok(out)
     }
 
     fn message(
@@ -166,11 +162,11 @@ impl Definition {
         cursor: &mut Cursor<'_>,
         named: bool,
         path: &mut String,
-        visit: &mut dyn FnMut(&str, Value),
+        mut out: Option<&mut Vec<(String, Value)>>,
     ) -> Result<(), MessageFault> {
         let mut names: Vec<String> = Vec::new();
         let before = path.len();
-        for field in &self.types[index] {
+        for field in &self.types[index].1 {
             let count = match field.count {
                 Count::One => 1,
                 Count::Fixed(count) => count,
@@ -200,12 +196,8 @@ impl Definition {
                 }
                 let value = match field.kind {
                     Kind::Message(part) => {
-                        let mut skip = |_: &str, _: Value| {};
-                        let visit = match count > MOST_ENTRIES {
-                            true => &mut skip,
-                            false => &mut *visit,
-                        };
-                        self.message(part, cursor, named, path, visit)?;
+                        let out = out.as_deref_mut().filter(|_| count <= MOST_ENTRIES);
+                        self.message(part, cursor, named, path, out)?;
                         continue;
                     }
                     Kind::Text => {
@@ -222,8 +214,10 @@ impl Definition {
                     }
                     Kind::Float(_) => Value::Number(f64::from_bits(cursor.unsigned(8)?)),
                 };
-                if count <= MOST_ENTRIES {
-                    visit(path, value);
+                if let Some(out) = out.as_deref_mut()
+                    && count <= MOST_ENTRIES
+                {
+                    out.push((path.clone(), value));
                 }
             }
         }
@@ -287,32 +281,26 @@ struct Cursor<'a> {
 }
 
 impl<'a> Cursor<'a> {
+    /// Behind CDR's header, which tells byte order and alignment.
     fn new(layout: Layout, bytes: &'a [u8]) -> Result<Self, MessageFault> {
-        let mut cursor = Self {
+        let (bytes, big_endian, align) = match (layout, bytes) {
+            (Layout::Ros1, bytes) => (bytes, false, 1),
+            (Layout::Ros2, [0, 0, _, _, rest @ ..]) => (rest, true, 8),
+            (Layout::Ros2, [0, 1, _, _, rest @ ..]) => (rest, false, 8),
+            (Layout::Ros2, [0, 6, _, _, rest @ ..]) => (rest, true, 4),
+            (Layout::Ros2, [0, 7, _, _, rest @ ..]) => (rest, false, 4),
+            (Layout::Ros2, [first, kind, _, _, ..]) => {
+                return Err(MessageFault::Encoding(format!("cdr {first:#x} {kind:#x}")));
+            }
+            (Layout::Ros2, short) => return Err(MessageFault::Short(short.len())),
+        };
+        Ok(Self {
             bytes,
             place: 0,
             layout,
-            big_endian: false,
-            align: 1,
-        };
-        if layout == Layout::Ros2 {
-            let header = bytes.get(..4).ok_or(MessageFault::Short(bytes.len()))?;
-            cursor.begin(header[0], header[1])?;
-        }
-        Ok(cursor)
-    }
-
-    /// CDR's header: byte order and alignment.
-    fn begin(&mut self, first: u8, kind: u8) -> Result<(), MessageFault> {
-        (self.big_endian, self.align) = match (first, kind) {
-            (0, 0) => (true, 8),
-            (0, 1) => (false, 8),
-            (0, 6) => (true, 4),
-            (0, 7) => (false, 4),
-            _ => return Err(MessageFault::Encoding(format!("cdr {first:#x} {kind:#x}"))),
-        };
-        self.bytes = &self.bytes[4..];
-        Ok(())
+            big_endian,
+            align,
+        })
     }
 
     fn take(&mut self, count: usize) -> Result<&'a [u8], MessageFault> {
@@ -407,7 +395,7 @@ mod tests {
     }
 
     #[test]
-    fn visit_messages_of_both_systems_have_the_same_numbers_with_names() {
+    fn values_of_messages_of_both_systems_have_the_same_numbers_with_names() {
         let definition = Definition::parse("demo_msgs/msg/Demo", TEXT).unwrap();
         let expected = [
             ("header.stamp", Value::Time(7, 250_000_000)),
@@ -422,27 +410,23 @@ mod tests {
             ("last", Value::Number(-300.0)),
         ];
         for layout in [Layout::Ros1, Layout::Ros2] {
-            let mut found = Vec::new();
-            let visit = |name: &str, value| found.push((name.to_owned(), value));
-            definition
-                .visit(layout, &message(layout), true, visit)
-                .unwrap();
+            let found = definition.values(layout, &message(layout), true).unwrap();
             let found = found.iter().map(|(name, value)| (name.as_str(), *value));
             assert_eq!(found.collect::<Vec<_>>(), expected, "{layout:?}");
         }
     }
 
     #[test]
-    fn visit_every_cut_message_is_refused() {
+    fn values_of_every_cut_message_is_refused() {
         let definition = Definition::parse("demo_msgs/msg/Demo", TEXT).unwrap();
         let whole = message(Layout::Ros2);
         for end in 0..whole.len() {
-            let cut = definition.visit(Layout::Ros2, &whole[..end], false, |_, _| {});
+            let cut = definition.values(Layout::Ros2, &whole[..end], false);
             assert!(cut.is_err(), "{end}");
         }
         let mut other = whole;
         other[1] = 3;
-        let fault = definition.visit(Layout::Ros2, &other, false, |_, _| {});
+        let fault = definition.values(Layout::Ros2, &other, false);
         assert!(matches!(fault, Err(MessageFault::Encoding(_))));
     }
 

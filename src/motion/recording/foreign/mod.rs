@@ -23,7 +23,6 @@ mod signal;
 mod text;
 mod units;
 
-pub use assemble::Assembled;
 pub(super) use assemble::assemble;
 pub(super) use mcap::read_mcap;
 pub(super) use mcap_write::write_mcap;

@@ -47,7 +47,7 @@ impl<'a> Source<'a> {
             let names: Vec<String> = logs.iter().map(|l| format!("`{}`", l.name)).collect();
             let expected = format!("one of {}", names.join(", "));
             let found = (table.file.as_ref()).map_or("nothing".to_owned(), |f| format!("`{f}`"));
-            map.fault_in(quantity, "file", found, expected)
+            map.fault(&quantity.at("file"), found, expected)
         })?;
         Ok(Some(Self {
             map,
@@ -66,12 +66,14 @@ impl<'a> Source<'a> {
         };
         let order = self.order(&elements, columns.len())?;
         let dimension = self.quantity.dimension();
-        let key = format!("{}.unit", self.quantity.key());
+        let key = self.quantity.at("unit");
         let factor = self.factor(&key, dimension, self.table.unit.as_ref())?;
         let signs = self.numbers(&self.table.sign, "sign", &elements, &order, 1.0)?;
         let offsets = self.numbers(&self.table.offset, "offset", &elements, &order, 0.0)?;
         if let Some(wrong) = signs.iter().find(|sign| sign.abs() != 1.0) {
-            return Err(self.fault("sign", wrong.to_string(), "1 or -1"));
+            return Err(self
+                .map
+                .fault(&self.quantity.at("sign"), wrong.to_string(), "1 or -1"));
         }
         let times = self.times()?;
         let kept = self.kept(&columns, times.column);
@@ -101,16 +103,6 @@ impl<'a> Source<'a> {
         Ok(first.map(|instant| instant.whole.div_euclid(times.per_second)))
     }
 
-    /// The fault of a key of the table.
-    fn fault(
-        &self,
-        key: &str,
-        found: impl Into<String>,
-        expected: impl Into<String>,
-    ) -> RecordingError {
-        self.map.fault_in(self.quantity, key, found, expected)
-    }
-
     /// Whether so many columns are a quaternion.
     fn is_quaternion(&self, columns: usize) -> bool {
         self.quantity == Quantity::Orientation && columns == QUATERNION.len()
@@ -118,7 +110,7 @@ impl<'a> Source<'a> {
 
     fn columns(&self) -> Result<Vec<usize>, RecordingError> {
         let names = self.table.columns(&self.map.names, self.quantity);
-        let key = format!("{}.columns", self.quantity.key());
+        let key = self.quantity.at("columns");
         let columns = names.iter().map(|name| self.column(&key, name));
         let columns = columns.collect::<Result<Vec<_>, _>>()?;
         let expected = self.quantity.elements().len();
@@ -129,7 +121,11 @@ impl<'a> Source<'a> {
             Quantity::Orientation => "3 (angles) or 4 (a quaternion)".to_owned(),
             _ => expected.to_string(),
         };
-        Err(self.fault("columns", format!("{} columns", columns.len()), expected))
+        Err(self.map.fault(
+            &self.quantity.at("columns"),
+            format!("{} columns", columns.len()),
+            expected,
+        ))
     }
 
     /// The column of a name that stands under this key.
@@ -151,26 +147,24 @@ impl<'a> Source<'a> {
 
     /// For each column the element that it is.
     fn order(&self, elements: &[String], columns: usize) -> Result<Vec<usize>, RecordingError> {
+        let key = self.quantity.at("order");
         let words = match &self.table.order {
             None if self.is_quaternion(columns) => {
-                return Err(self.fault("order", "a quaternion without order", "`wxyz` or `xyzw`"));
+                let found = "a quaternion without order";
+                return Err(self.map.fault(&key, found, "`wxyz` or `xyzw`"));
             }
             None => return Ok((0..columns).collect()),
             Some(Words::One(text)) => text.split_whitespace().map(str::to_owned).collect(),
             Some(Words::Many(words)) => words.clone(),
         };
-        let fault = |found: String| {
-            self.fault(
-                "order",
-                found,
-                format!("each of {} once", elements.join(" ")),
-            )
-        };
-        let order = ordered(&words, elements).map_err(fault)?;
-        match order.len() == columns {
+        let order = ordered(&words, elements).and_then(|order| match order.len() == columns {
             true => Ok(order),
-            false => Err(fault(format!("{} names", order.len()))),
-        }
+            false => Err(format!("{} names", order.len())),
+        });
+        order.map_err(|found| {
+            let expected = format!("each of {} once", elements.join(" "));
+            self.map.fault(&key, found, expected)
+        })
     }
 
     /// The factor to SI of a unit that stands under this key; 1 without one.
@@ -196,13 +190,15 @@ impl<'a> Source<'a> {
         order: &[usize],
         default: f64,
     ) -> Result<Vec<f64>, RecordingError> {
+        let fault = |found: String, expected: String| {
+            Err(self.map.fault(&self.quantity.at(key), found, expected))
+        };
         match factors {
             None => Ok(vec![default; order.len()]),
             Some(Factors::All(value)) => Ok(vec![*value; order.len()]),
             Some(Factors::Each(values)) if values.len() == order.len() => Ok(values.clone()),
             Some(Factors::Each(values)) => {
-                let found = format!("{} numbers", values.len());
-                Err(self.fault(key, found, order.len().to_string()))
+                fault(format!("{} numbers", values.len()), order.len().to_string())
             }
             Some(Factors::Named(named_values)) => {
                 let mut of_element = vec![default; elements.len()];
@@ -210,11 +206,11 @@ impl<'a> Source<'a> {
                     let found = named(word, elements);
                     if found.is_empty() {
                         let expected = format!("one of {}", elements.join(" "));
-                        return Err(self.fault(key, format!("`{word}`"), expected));
+                        return fault(format!("`{word}`"), expected);
                     }
-                    found
-                        .into_iter()
-                        .for_each(|element| of_element[element] = *value);
+                    for element in found {
+                        of_element[element] = *value;
+                    }
                 }
                 Ok(order.iter().map(|element| of_element[*element]).collect())
             }
@@ -259,7 +255,7 @@ impl<'a> Source<'a> {
         let (time, table) = (&self.map.time, self.table);
         let (key, name, own_unit) = match &table.time {
             Some(name) => {
-                let key = format!("{}.time", self.quantity.key());
+                let key = self.quantity.at("time");
                 (key, Some(name), table.time_unit.as_ref())
             }
             None => ("time.column".to_owned(), time.column.as_ref(), None),

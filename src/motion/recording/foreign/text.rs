@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 
 use super::log::{Channel, Log};
 use super::map::{ColumnMap, Delimiter, TextFormat};
+use crate::recording::csv::MAX_ROWS;
 use crate::recording::error::{RecordingError, RecordingFault, shortened};
 use crate::recording::instant::Instant;
 use crate::recording::lines::{self, Lines};
 use crate::recording::number::NumberReader;
-use crate::recording::table::MAX_ROWS;
 
 /// Numbers from which a column is kept as times: beyond, one number does not hold a microsecond.
 const LARGE: f64 = 1e8;
@@ -31,14 +31,13 @@ pub(in crate::recording) fn read_texts(
     }
     let mut logs = Vec::new();
     if !path.is_dir() {
-        logs.push(read_text(path, String::new(), &map.text)?);
+        logs.push(read_text(path, &map.text)?);
     }
     for name in named {
-        logs.push(read_text(
-            &file_beside(path, name),
-            name.to_owned(),
-            &map.text,
-        )?);
+        logs.push(Log {
+            name: name.to_owned(),
+            ..read_text(&file_beside(path, name), &map.text)?
+        });
     }
     Ok(logs)
 }
@@ -52,10 +51,9 @@ fn file_beside(path: &Path, name: &str) -> PathBuf {
     folder.join(name.replace("{}", stem.trim_end_matches(".csv")))
 }
 
-/// Reads one text file, plain or gzip, as a log of this name.
+/// Reads one text file, plain or gzip, as a log without name.
 pub(in crate::recording) fn read_text(
     path: &Path,
-    name: String,
     format: &TextFormat,
 ) -> Result<Log, RecordingError> {
     let mut lines = Lines::open(path)?;
@@ -65,40 +63,30 @@ pub(in crate::recording) fn read_text(
             continue;
         }
         match &mut sheet {
-            None => sheet = Some(Sheet::begin(row, line, format)),
-            Some(sheet) if sheet.rows == MAX_ROWS => {
-                return Err(RecordingFault::TooManyRows(MAX_ROWS).at(path, sheet.first_row));
+            None => sheet = Some(Sheet::begin(path, row, line, format)),
+            Some(Sheet { log, .. }) if log.len() == MAX_ROWS => {
+                return Err(RecordingFault::TooManyRows(MAX_ROWS).at(path, log.first_row));
             }
-            Some(sheet) => sheet.push(path, row, line)?,
+            Some(sheet) => sheet.push(row, line)?,
         }
     }
-    let sheet = sheet.ok_or_else(|| RecordingFault::Empty.of(path))?;
-    if sheet.rows == 0 {
-        return Err(RecordingFault::HeaderOnly(sheet.columns.len()).of(path));
+    let log = sheet.ok_or_else(|| RecordingFault::Empty.of(path))?.log;
+    match log.len() {
+        0 => Err(RecordingFault::HeaderOnly(log.columns.len()).of(path)),
+        _ => Ok(log),
     }
-    Ok(Log {
-        path: path.to_owned(),
-        name,
-        clock: None,
-        columns: sheet.columns,
-        is_named: sheet.is_named,
-        first_row: sheet.first_row,
-    })
 }
 
 /// The rows read so far.
 struct Sheet {
     delimiter: Delimiter,
     numbers: NumberReader,
-    columns: Vec<Channel>,
-    is_named: bool,
-    first_row: usize,
-    rows: usize,
+    log: Log,
 }
 
 impl Sheet {
     /// From the first line: names, or already numbers.
-    fn begin(row: usize, line: &str, format: &TextFormat) -> Self {
+    fn begin(path: &Path, row: usize, line: &str, format: &TextFormat) -> Self {
         // NumPy and MATLAB write headers as comments.
         let header = line.trim_start().trim_start_matches(['#', '%']);
         let delimiter = format.delimiter.unwrap_or_else(|| delimiter_of(header));
@@ -111,13 +99,17 @@ impl Sheet {
         let mut sheet = Self {
             delimiter,
             numbers: numbers(),
-            columns: vec![Channel::default(); cells.len()],
-            is_named,
-            first_row: if is_named { row + 1 } else { row },
-            rows: 0,
+            log: Log {
+                path: path.to_owned(),
+                name: String::new(),
+                clock: None,
+                columns: vec![Channel::default(); cells.len()],
+                is_named,
+                first_row: if is_named { row + 1 } else { row },
+            },
         };
         if is_named {
-            for (column, name) in sheet.columns.iter_mut().zip(cells) {
+            for (column, name) in sheet.log.columns.iter_mut().zip(cells) {
                 column.name = name;
             }
         } else {
@@ -126,9 +118,10 @@ impl Sheet {
         sheet
     }
 
-    fn push(&mut self, path: &Path, row: usize, line: &str) -> Result<(), RecordingError> {
+    fn push(&mut self, row: usize, line: &str) -> Result<(), RecordingError> {
+        let log = &mut self.log;
         let mut cells = cells(line, self.delimiter);
-        let expected = self.columns.len();
+        let expected = log.columns.len();
         // A separator at the end of each line is no column.
         if cells.len() == expected + 1 && cells.last().is_some_and(String::is_empty) {
             cells.pop();
@@ -140,26 +133,25 @@ impl Sheet {
                 expected,
                 hint,
             };
-            let name = self.columns.get(found).map_or("", |column| &column.name);
-            return Err(fault.in_cell(path, row, name));
+            let name = log.columns.get(found).map_or("", |column| &column.name);
+            return Err(fault.in_cell(&log.path, row, name));
         }
-        if self.rows == 0 {
-            self.first_row = row;
+        if log.len() == 0 {
+            log.first_row = row;
         }
         self.push_cells(cells);
         Ok(())
     }
 
     fn push_cells(&mut self, cells: Vec<String>) {
-        for (column, cell) in self.columns.iter_mut().zip(cells) {
-            column.push(&cell, &mut self.numbers, self.rows);
+        for (column, cell) in self.log.columns.iter_mut().zip(cells) {
+            column.push(&cell, &mut self.numbers);
         }
-        self.rows += 1;
     }
 }
 
 impl Channel {
-    fn push(&mut self, cell: &str, numbers: &mut NumberReader, sample: usize) {
+    fn push(&mut self, cell: &str, numbers: &mut NumberReader) {
         let value = match numbers.parse(cell) {
             Some(value) => value,
             None if cell.is_empty() => f64::NAN,
@@ -169,6 +161,7 @@ impl Channel {
                 if let Some(instant) = Instant::from_iso(cell) {
                     return self.push_instant(instant);
                 }
+                let sample = self.values.len();
                 self.refused
                     .get_or_insert_with(|| (sample, shortened(cell)));
                 f64::NAN
@@ -237,7 +230,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("log.txt");
         std::fs::write(&path, text).unwrap();
-        read_text(&path, String::new(), &TextFormat::default()).unwrap()
+        read_text(&path, &TextFormat::default()).unwrap()
     }
 
     #[test]
@@ -262,18 +255,6 @@ mod tests {
         assert_eq!(log.columns[1].values, [2.0, 4.0]);
         assert_eq!(log.column(&super::super::map::Name::Number(2)), Some(1));
         assert_eq!(log.column(&super::super::map::Name::Number(3)), None);
-    }
-
-    #[test]
-    fn read_text_epochs_and_dates_keep_their_digits() {
-        let log = log(
-            "t,d\n1700000000123456789,2024-01-01T00:00:00.5\n1700000000125456789,2024-01-01T00:00:01\n",
-        );
-        let steps = log.columns.iter().map(|column| {
-            let instants = column.instants.as_ref().unwrap();
-            instants[1].since(instants[0])
-        });
-        assert_eq!(steps.collect::<Vec<_>>(), [2e6, 0.5]);
     }
 
     #[test]

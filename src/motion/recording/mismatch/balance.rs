@@ -1,6 +1,7 @@
 //! Forces against weight and acceleration, falling in flight, hips' torques against the side they hold.
 
 use nalgebra::{Rotation3, Unit, Vector3};
+use serde::Serialize;
 
 use super::weight_n;
 use crate::recording::preprocess::{differences, median};
@@ -17,17 +18,20 @@ const LEAST_S: f64 = 0.04;
 const LEAST_FORCE: f64 = 0.02;
 
 /// What forces and accelerations of a recording come to.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Balance {
-    /// Mean vertical acceleration in flight, upwards.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Balance {
+    /// Mean vertical acceleration in flight, upwards, m/s^2.
     pub fall_m_s2: Option<f64>,
-    /// Impulse of the feet over what weight and change of velocity need.
+    /// Impulse of the feet over what the robot's weight and change of velocity need.
     pub weight_share: Option<f64>,
     /// Slope of each hip's abduction torque over its lever times the force along the leg; 1 for a force in the plane
     /// of the leg.
     pub hip_share: [Option<f64>; FOOT_DIM],
-    /// The axis with the largest median difference of acceleration and slope of velocity.
-    pub acceleration_offset_m_s2: Option<(&'static str, f64)>,
+    /// Largest median difference of the body's acceleration and the slope of its velocity, m/s^2.
+    pub acceleration_offset_m_s2: Option<f64>,
+    /// Its axis.
+    #[serde(skip)]
+    pub axis: Option<&'static str>,
 }
 
 /// Sums of a balance.
@@ -50,13 +54,15 @@ impl Balance {
         }
         let (dv, flight_s) = sums.flight;
         let (impulse, needed, ground_s) = sums.ground;
+        let (axis, offset_m_s2) = acceleration_offset(recording).unzip();
         Self {
             fall_m_s2: (flight_s >= LEAST_S).then(|| dv / flight_s),
             weight_share: (ground_s >= LEAST_S && needed > 0.0).then(|| impulse / needed),
             hip_share: sums
                 .hips
                 .map(|(product, square)| (square > 0.0).then(|| product / square)),
-            acceleration_offset_m_s2: acceleration_offset(recording),
+            acceleration_offset_m_s2: offset_m_s2,
+            axis,
         }
     }
 }

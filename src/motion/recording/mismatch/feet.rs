@@ -1,5 +1,7 @@
-//! Which column of contact belongs to which foot: while only some feet are on the ground, those in the air are higher.
+//! Heights of the feet: while only some are on the ground, those in the air are higher, which tells what column of
+//! contact belongs to which foot; those on the ground are at height zero.
 
+use super::Broken;
 use super::stance::{foot_place, orders};
 use crate::recording::preprocess::median;
 use crate::recording::{Recording, Segment};
@@ -9,22 +11,11 @@ use crate::robot::{ContactFlags, FOOT_DIM, Leg, Robot};
 ///
 /// In right recordings single samples of a foot that rolls off or touches down can favour another order by 8 mm in sum.
 const LEAST_GAIN: (f64, f64) = (9e-3, 0.3);
+/// Height of the feet that are on the ground, m.
+const FLOOR_M: f64 = 0.1;
 
-/// An order of the columns that fits the heights of the feet better.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct BetterOrder {
-    /// The leg that each column seems to be of.
-    pub legs: [Leg; FOOT_DIM],
-    /// Sum over the samples of how much higher feet in the air are, as recorded, m.
-    pub recorded_m: f64,
-    /// The least that would have been accepted, m.
-    pub least_m: f64,
-    /// The same sum in the better order, m.
-    pub best_m: f64,
-}
-
-/// The order that fits best, if it fits clearly better than the recorded one.
-pub(super) fn better_order(recording: &Recording, robot: &Robot) -> Option<BetterOrder> {
+/// Another order of the columns, if it fits the heights of the feet clearly better than the recorded one.
+pub(super) fn columns(recording: &Recording, robot: &Robot) -> Option<Broken> {
     let orders = orders();
     let mut sums = vec![0.0; orders.len()];
     for segment in &recording.segments {
@@ -37,17 +28,19 @@ pub(super) fn better_order(recording: &Recording, robot: &Robot) -> Option<Bette
             }
         }
     }
-    let recorded_m = (orders.iter().zip(&sums))
-        .find(|(order, _)| **order == Leg::ALL)?
-        .1;
-    let (legs, best_m) =
-        (orders.iter().zip(&sums)).max_by(|one, other| one.1.total_cmp(other.1))?;
+    let judged = || orders.iter().zip(&sums);
+    let (_, &recorded_m) = judged().find(|(order, _)| **order == Leg::ALL)?;
+    let (legs, &best_m) = judged().max_by(|one, other| one.1.total_cmp(other.1))?;
     let least_m = best_m - LEAST_GAIN.0.max(LEAST_GAIN.1 * best_m.abs());
-    (*recorded_m < least_m).then_some(BetterOrder {
-        legs: *legs,
-        recorded_m: *recorded_m,
-        least_m,
-        best_m: *best_m,
+    (recorded_m < least_m).then(|| {
+        let words = format!(
+            "while some feet are on the ground, those said to be in the air are higher by {:.0} mm in sum over the \
+             samples, and by {:.0} mm if the columns of the feet are of {}: are they exchanged?",
+            1e3 * recorded_m,
+            1e3 * best_m,
+            legs.map(Leg::short_name).join(", ")
+        );
+        (recorded_m, least_m, words)
     })
 }
 
@@ -61,8 +54,8 @@ fn higher_m(feet: &ContactFlags, height: &[f64; FOOT_DIM], legs: &[Leg; FOOT_DIM
     mean(false) - mean(true)
 }
 
-/// Median height of the feet that are on the ground, m; none if no foot ever is.
-pub(super) fn floor_m(recording: &Recording, robot: &Robot) -> Option<f64> {
+/// The median height of the feet that are on the ground, if that is not the floor's.
+pub(super) fn floor(recording: &Recording, robot: &Robot) -> Option<Broken> {
     let mut heights = Vec::new();
     for segment in &recording.segments {
         for (sample, feet) in segment.feet.iter().enumerate() {
@@ -71,7 +64,15 @@ pub(super) fn floor_m(recording: &Recording, robot: &Robot) -> Option<f64> {
             heights.extend(standing.map(|leg| foot_place(robot, leg, &x, false).z));
         }
     }
-    (!heights.is_empty()).then(|| median(heights.into_iter()))
+    // 0 where no foot ever stands.
+    let value = median(heights.into_iter());
+    (value.abs() > FLOOR_M).then(|| {
+        let words = format!(
+            "feet on the ground are at a height of {value:.2} m ({FLOOR_M:.2} m are accepted): is z that of the trunk \
+             over the ground?"
+        );
+        (value, FLOOR_M, words)
+    })
 }
 
 /// Height of each foot over where it stands, m.

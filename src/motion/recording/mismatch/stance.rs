@@ -93,10 +93,7 @@ const PLACES: [Reading; 6] = [
 /// The reading of the body's place under which feet on the ground stay best where they are, and their root mean square
 /// then, m.
 pub(super) fn best_other_place(recording: &Recording, robot: &Robot) -> Option<(f64, Reading)> {
-    best(PLACES.into_iter().map(|reading| {
-        let slip = Slip::read(recording, robot, &reading);
-        (slip.rms_m(), reading)
-    }))
+    best(PLACES.map(|reading| (Slip::read(recording, robot, &reading).rms_m(), reading)))
 }
 
 /// The reading under which feet on the ground stay best in place against each other, and their root mean square then,
@@ -110,17 +107,18 @@ pub(super) fn best_other_reading(recording: &Recording, robot: &Robot) -> Option
         let mut slip = Slip::default();
         all.iter()
             .for_each(|stances| stances.add_to(&mut slip, &order));
-        (slip, Reading::Legs(order))
+        (slip.relative_rms_m(), Reading::Legs(order))
     });
-    let of_signs =
-        (SIGNS.into_iter()).map(|reading| (Slip::read(recording, robot, &reading), reading));
-    let readings = of_orders.chain(of_signs);
-    best(readings.map(|(slip, reading)| (slip.relative_rms_m(), reading)))
+    let slip = |reading: &Reading| Slip::read(recording, robot, reading);
+    let of_signs = SIGNS.map(|reading| (slip(&reading).relative_rms_m(), reading));
+    best(of_orders.chain(of_signs))
 }
 
 /// The reading with the least of these figures.
-fn best(judged: impl Iterator<Item = (Option<f64>, Reading)>) -> Option<(f64, Reading)> {
-    let known = judged.filter_map(|(rms_m, reading)| Some((rms_m?, reading)));
+fn best(judged: impl IntoIterator<Item = (Option<f64>, Reading)>) -> Option<(f64, Reading)> {
+    let known = judged
+        .into_iter()
+        .filter_map(|(rms_m, reading)| Some((rms_m?, reading)));
     let finite = known.filter(|(rms_m, _)| rms_m.is_finite());
     finite.min_by(|one, other| one.0.total_cmp(&other.0))
 }

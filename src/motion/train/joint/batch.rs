@@ -3,13 +3,10 @@
 use nalgebra::DMatrix;
 
 use crate::recording::Source;
-use crate::recording::preprocess::prepare;
+use crate::recording::preprocess::{BATCH_ROWS, prepare};
+use crate::recording::smoothing::moving_average;
 use crate::train::dataset::{Dataset, scaled};
 use crate::train::error::TrainError;
-use crate::train::smooth::moving_average;
-
-/// Samples of a batch; every phase of a jump is resampled to a multiple (section IV-C4).
-pub const BATCH_ROWS: usize = 100;
 
 /// Consecutive samples of one phase, rows are samples, scaled units.
 #[derive(Clone, Debug)]
@@ -71,15 +68,14 @@ pub fn batches(recordings: &Source<'_>, dataset: &Dataset) -> Result<Vec<Batch>,
     let mut out = Vec::new();
     let state = |columns| scaled(columns, &dataset.scaling.state).transpose();
     recordings.for_each(|recording| {
-        for part in prepare(recording, &dataset.phases, BATCH_ROWS)? {
-            let samples = &part.samples;
+        for (span, samples) in prepare(recording, &dataset.phases)? {
             let u = scaled(samples.input(&dataset.rule)?, &dataset.scaling.input).transpose();
             let (x, dx) = (state(samples.x.clone()), state(samples.dx.clone()));
             let ddx = state(moving_average(&samples.ddx, dataset.smoothing));
             for start in (0..samples.len()).step_by(BATCH_ROWS) {
                 let cut = |all: &DMatrix<f64>| all.rows(start, BATCH_ROWS).into_owned();
                 let blocks = [cut(&x), cut(&dx), cut(&ddx), cut(&u)];
-                out.push(Batch::new(part.span.phase, blocks, samples.mean_step_s()));
+                out.push(Batch::new(span.phase, blocks, samples.mean_step_s()));
             }
         }
         Ok::<_, TrainError>(())

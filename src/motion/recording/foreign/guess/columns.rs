@@ -25,8 +25,6 @@ pub(super) struct Group {
 pub(super) struct Clock {
     pub name: String,
     pub unit: &'static str,
-    /// Seconds of a unit.
-    pub factor: f64,
 }
 
 /// The quantities that the names say, the first complete family of columns of each.
@@ -123,7 +121,6 @@ pub(super) fn clock(logs: &[Log], groups: &[Group]) -> Option<Clock> {
         return Some(Clock {
             name: log.columns[column].name.clone(),
             unit: "s",
-            factor: 1.0,
         });
     }
     let counts = |channel: &&Channel| mean_step(channel).is_some();
@@ -131,37 +128,25 @@ pub(super) fn clock(logs: &[Log], groups: &[Group]) -> Option<Clock> {
     let named = candidates().find(|channel| is_time(&channel.name));
     let channel = named.or_else(|| candidates().next())?;
     const UNITS: [&str; 4] = ["s", "ms", "us", "ns"];
-    let factor = |unit: &str| Dimension::Time.factor(unit).unwrap_or(1.0);
     let told = unit(&channel.name, &["ms", "us", "ns", "s"]);
-    let unit = (told.into_iter().chain(UNITS)).find(|unit| is_possible(channel, factor(unit)))?;
+    // Samples further apart show no jump.
+    let step = mean_step(channel)?;
+    let is_possible = |unit: &&str| {
+        (Dimension::Time.factor(unit)).is_some_and(|factor| (2e-4..0.06).contains(&(factor * step)))
+    };
     Some(Clock {
         name: channel.name.clone(),
-        unit,
-        factor: factor(unit),
+        unit: told.into_iter().chain(UNITS).find(is_possible)?,
     })
-}
-
-/// Whether samples this far apart can show a jump.
-fn is_possible(channel: &Channel, factor: f64) -> bool {
-    mean_step(channel).is_some_and(|step| (2e-4..0.06).contains(&(factor * step)))
 }
 
 /// Typical distance of samples in a column that counts upwards, else nothing.
 fn mean_step(channel: &Channel) -> Option<f64> {
-    let steps: Vec<f64> = match &channel.instants {
-        Some(instants) => (instants.windows(2))
-            .map(|pair| pair[1].since(pair[0]))
-            .collect(),
-        None => (channel.values.windows(2))
-            .map(|pair| pair[1] - pair[0])
-            .collect(),
-    };
-    // Several jumps in a file let time jump back now and then.
-    let back = steps
-        .iter()
-        .filter(|step| step.is_nan() || **step <= 0.0)
-        .count();
+    let times = channel.times();
+    let steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let forward: Vec<f64> = steps.iter().copied().filter(|step| *step > 0.0).collect();
+    // Several jumps in a file let time jump back now and then.
+    let back = steps.len() - forward.len();
     let counts = !forward.is_empty() && back * 50 <= steps.len();
     counts.then(|| median(forward.into_iter()))
 }

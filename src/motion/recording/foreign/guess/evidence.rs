@@ -2,10 +2,9 @@
 
 use nalgebra::DMatrix;
 
-use super::super::attitude::{angle_rates, in_world};
 use super::super::map::Frame;
 use crate::recording::check::quantile;
-use crate::recording::preprocess::differences;
+use crate::recording::preprocess::differences_within;
 use crate::recording::segment::stretches;
 
 /// Share of a derivative that a velocity must leave unexplained at most to be evidence.
@@ -17,27 +16,17 @@ const AS_GOOD: f64 = 1.1;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Scale {
     pub unit: &'static str,
-    pub factor: f64,
     pub sign: f64,
 }
 
 /// Slopes without the samples at which time jumps.
 pub(super) fn slopes(times_s: &[f64], rows: &DMatrix<f64>) -> DMatrix<f64> {
-    let mut out = DMatrix::zeros(rows.nrows(), rows.ncols());
-    for range in stretches(0..times_s.len(), |before, at| times_s[at] > times_s[before]) {
-        let own = rows.columns(range.start, range.len()).into_owned();
-        let of = differences(&times_s[range.clone()], &own);
-        out.columns_mut(range.start, range.len()).copy_from(&of);
-    }
-    out
+    let ranges = stretches(0..times_s.len(), |before, at| times_s[at] > times_s[before]);
+    differences_within(&ranges, times_s, rows)
 }
 
-/// Squared residual of `derivative = scale x velocity`, as a share of the derivative.
-pub(super) fn residual(derivative: &DMatrix<f64>, velocity: &DMatrix<f64>) -> f64 {
-    (derivative - velocity).norm_squared() / derivative.norm_squared().max(1e-30)
-}
-
-/// The unit among `units` in which velocities are the derivatives best; `None` if in none.
+/// The unit and sign in which velocities are the derivatives best, and the squared residual as a share of the
+/// derivative; `None` if in none of `units`.
 pub(super) fn scale(
     derivative: &DMatrix<f64>,
     raw: &DMatrix<f64>,
@@ -46,71 +35,33 @@ pub(super) fn scale(
     let signs = [1.0, -1.0];
     let candidates = units.iter().flat_map(|(unit, factor)| {
         signs.map(|sign| {
-            let (unit, factor) = (*unit, *factor);
-            let left = residual(derivative, &(raw * (sign * factor)));
-            (Scale { unit, factor, sign }, left)
+            let left = (derivative - raw * (sign * factor)).norm_squared();
+            let left = left / derivative.norm_squared().max(1e-30);
+            (Scale { unit, sign }, left)
         })
     });
     let best = candidates.min_by(|a, b| a.1.total_cmp(&b.1))?;
     (best.1 < UNEXPLAINED).then_some(best)
 }
 
-/// Unit and axes of an angular velocity that is the rate of these angles.
-pub(super) fn angular(
-    angles: &DMatrix<f64>,
+/// Unit and axes of a velocity that is these rates of a position or of angles: the first of `frames` from which its
+/// values, `turned` to the rates' own, explain nearly as much as the best.
+pub(super) fn axes<const N: usize>(
+    frames: [Frame; N],
+    turned: impl Fn(Frame) -> Option<DMatrix<f64>>,
     rates: &DMatrix<f64>,
-    raw: &DMatrix<f64>,
     units: &[(&'static str, f64)],
 ) -> Option<(Scale, Frame)> {
-    best([Frame::Angles, Frame::Body, Frame::World], |frame| {
-        scale(rates, &angle_rates(angles, raw, frame).ok()?, units)
-    })
-}
-
-/// Unit and axes of a velocity that is the rate of a position, in the world's axes or the body's.
-pub(super) fn linear(
-    angles: Option<&DMatrix<f64>>,
-    rates: &DMatrix<f64>,
-    raw: &DMatrix<f64>,
-    units: &[(&'static str, f64)],
-) -> Option<(Scale, Frame)> {
-    best([Frame::World, Frame::Body], |frame| match frame {
-        Frame::World => scale(rates, raw, units),
-        Frame::Body => {
-            let angles = angles.filter(|angles| angles.ncols() == raw.ncols())?;
-            scale(rates, &in_world(angles, raw), units)
-        }
-        Frame::Angles => None,
-    })
-}
-
-/// The first choice that explains nearly as much as the best.
-fn best<const N: usize>(
-    choices: [Frame; N],
-    explain: impl Fn(Frame) -> Option<(Scale, f64)>,
-) -> Option<(Scale, Frame)> {
-    let found = choices.into_iter();
-    let found = found.filter_map(|frame| explain(frame).map(|(scale, left)| (frame, scale, left)));
-    let found: Vec<(Frame, Scale, f64)> = found.collect();
-    let least = found
-        .iter()
-        .map(|choice| choice.2)
-        .fold(f64::INFINITY, f64::min);
-    let is_as_good = |choice: &(Frame, Scale, f64)| choice.2 <= AS_GOOD * least + 1e-12;
-    let first = found.into_iter().find(is_as_good)?;
-    Some((first.1, first.0))
-}
-
-/// Whether a quaternion's real part is its first or last element: that of a robot on its feet is the largest.
-pub(super) fn real_is_last(quaternions: &DMatrix<f64>) -> bool {
-    let size = |row: usize| {
-        quaternions
-            .row(row)
-            .iter()
-            .map(|value| value.abs())
-            .sum::<f64>()
+    let explained = |frame| {
+        let (scale, left) = scale(rates, &turned(frame)?, units)?;
+        Some((frame, scale, left))
     };
-    size(3) > size(0)
+    let found: Vec<(Frame, Scale, f64)> = frames.into_iter().filter_map(explained).collect();
+    let least = found.iter().map(|choice| choice.2);
+    let least = least.fold(f64::INFINITY, f64::min);
+    let is_as_good = |choice: &(Frame, Scale, f64)| choice.2 <= AS_GOOD * least + 1e-12;
+    let (frame, scale, _) = found.into_iter().find(is_as_good)?;
+    Some((scale, frame))
 }
 
 /// The largest value, the 99th percentile of absolute values, so that single spikes do not count.

@@ -1,10 +1,37 @@
 //! What the name of a column says: leg, joint, axis, quantity, unit.
 
 use super::super::elements::Quantity;
-use super::vocabulary::{
-    ACCELERATION, ANGULAR, ANGULAR_VELOCITY, FEET, JOINT_ARRAYS, JOINTS, LEGS, PLACE, QUATERNION,
-    TIME, TORQUE, VELOCITY, WANTED,
-};
+
+// Words of many loggers, lower case, with blanks between them.
+
+/// Words for legs, in romc's order.
+const LEGS: [&str; 4] = [
+    "fr rf vr frontright rightfront foreright rightfore",
+    "fl lf vl frontleft leftfront foreleft leftfore",
+    "rr hr rh br rb rearright hindright backright rightrear righthind",
+    "rl hl lh bl lb rearleft hindleft backleft leftrear lefthind",
+];
+/// Words for joints, in romc's order; a bare `hip` is the first, unless `y`, `pitch` or `flexion` is beside it or
+/// another joint of the leg is.
+const JOINTS: [&str; 3] = [
+    "hx haa abad abduction hipx hipaa",
+    "hy hfe thigh upper flexion hipy hipfe",
+    "kn kfe calf knee lower shank",
+];
+const TORQUE: &str = "torque torques tau effort efforts trq moment tauest ctrl";
+const ACCELERATION: &str = "acceleration acc accel ddq qdd ddot accelerometer";
+const VELOCITY: &str = "velocity vel dq qd qdot dot speed rate rates twist v dp dx";
+const ANGULAR_VELOCITY: &str = "gyro gyroscope omega w angvel";
+const ANGULAR: &str = "angular rpy euler attitude orientation ang rot rotation";
+const QUATERNION: &str = "quat quaternion orientation attitude rotation rot q";
+const PLACE: &str = "position pos p com base body trunk torso pose odom";
+const FEET: &str = "foot feet contact contacts grf touch stance toe fz";
+const JOINT_ARRAYS: &str = "motor motors joint joints q dq ddq qd qdd qdot tau torque torques effort efforts position \
+     velocity dof ctrl actuator angle angles theta";
+/// Words of values that a controller asked for rather than measured.
+const WANTED: &str = "des desired ref reference cmd command target setpoint goal raw lost temperature mode \
+     covariance ff kp kd";
+const TIME: &str = "time timestamp stamp t sec secs seconds clock datetime date";
 
 /// What a name says.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -256,12 +283,9 @@ fn join_pairs(words: &mut Vec<String>) {
 fn split_compact(words: &mut Vec<String>) {
     let parts = |word: &str| -> Option<[String; 2]> {
         for angle in ["roll", "pitch", "yaw"] {
-            for rate in ["rate", "speed", "dot", "vel"] {
-                if word == format!("{angle}{rate}") {
-                    return Some([angle.to_owned(), "rate".to_owned()]);
-                }
-            }
-            if word == format!("d{angle}") {
+            let rate = word.strip_prefix(angle);
+            let is_rate = rate.is_some_and(|rate| is_one(rate, "rate speed dot vel"));
+            if is_rate || word.strip_prefix('d') == Some(angle) {
                 return Some([angle.to_owned(), "rate".to_owned()]);
             }
         }

@@ -1,19 +1,17 @@
 //! The guessed map as text, each line with what it rests on.
 
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
 use std::path::Path;
 
 use nalgebra::DMatrix;
 
-use super::super::attitude::angles_of_quaternions;
+use super::super::attitude::{angle_rates, angles_of_quaternions, in_world, unwrap};
 use super::super::elements::Quantity;
 use super::super::log::Log;
-use super::super::map::Frame;
+use super::super::map::{Frame, Name};
 use super::super::units::Dimension;
-use super::columns::{Clock, Group};
-use super::evidence::{Scale, angular, linear, reach, real_is_last, scale, slopes};
-use super::first_map::{raw, times_s};
+use super::columns::{Clock, Group, clock, groups};
+use super::evidence::{Scale, axes, reach, scale, slopes};
 use super::names::unit;
 use crate::robot::{JOINT_DIM, JOINT_NAMES, Robot};
 
@@ -32,84 +30,59 @@ const RESTING: f64 = 0.3;
 /// The lines of tables.
 type Lines = BTreeMap<Quantity, Vec<String>>;
 
-/// A map in the making.
-pub(super) struct Draft {
-    tables: Lines,
-    time: Vec<String>,
-}
-
-impl Draft {
-    pub fn of(logs: &[Log], groups: &[Group], clock: Option<&Clock>, robot: &Robot) -> Self {
-        let source = Source {
-            logs,
-            groups,
-            clock,
-        };
-        let time = match clock {
-            None => vec![
-                "# sample_time_s = 0.001   # no column counts time: the distance of samples"
-                    .to_owned(),
-            ],
-            Some(_) if logs[groups[0].log].clock.is_some() => {
-                vec!["# each topic has the time stamps of its messages".to_owned()]
-            }
-            Some(clock) => vec![
-                format!("column = {}", quoted(&clock.name)),
-                format!("unit = \"{}\"", clock.unit),
-            ],
-        };
-        let mut scales = source.trunk();
-        let mut tables = Lines::new();
-        let order = source.joint_scales(robot, &mut scales);
-        for group in groups {
-            let quantity = group.quantity;
-            if !source.is_sound(group, &scales) {
-                continue;
-            }
-            let mut lines = source.columns(group);
-            match quantity {
-                Quantity::Feet => lines.extend(source.feet(group)),
-                Quantity::JointPosition
-                | Quantity::JointVelocity
-                | Quantity::JointAcceleration
-                | Quantity::JointTorque => lines.extend(order_line(order, group)),
-                Quantity::BodyPosition
-                | Quantity::Orientation
-                | Quantity::BodyVelocity
-                | Quantity::AngularVelocity
-                | Quantity::BodyAcceleration
-                | Quantity::AngularAcceleration => {}
-            }
-            lines.extend(scales.get(&quantity).into_iter().flatten().cloned());
-            tables.insert(quantity, lines);
+/// The guessed map of logs, and the tables that a recording needs and that were not found.
+pub(super) fn map_text(path: &Path, logs: &[Log], robot: &Robot) -> (String, Vec<&'static str>) {
+    let groups = groups(logs);
+    let clock = clock(logs, &groups);
+    let source = Source {
+        logs,
+        groups: &groups,
+        clock: clock.as_ref(),
+    };
+    let time = match &clock {
+        None => {
+            "# sample_time_s = 0.001   # no column counts time: the distance of samples".to_owned()
         }
-        Self { tables, time }
-    }
-
-    /// Whether a quantity was found.
-    pub fn has(&self, quantity: Quantity) -> bool {
-        self.tables.contains_key(&quantity)
-    }
-
-    /// The map.
-    pub fn text(&self, path: &Path, missing: &[&str]) -> String {
-        let mut text = format!(
-            "# Guessed from {}: check every line, then `romc inspect LOG --columns THIS.toml`.\n\n[time]\n{}\n",
-            path.file_name().unwrap_or_default().to_string_lossy(),
-            self.time.join("\n")
-        );
-        for (quantity, lines) in &self.tables {
-            let lines = lines.join("\n");
-            let _ = write!(text, "\n[{}]\n{lines}\n", quantity.key());
+        Some(_) if logs[groups[0].log].clock.is_some() => {
+            "# each topic has the time stamps of its messages".to_owned()
         }
-        for key in missing {
-            let _ = write!(
-                text,
-                "\n# not found, and needed:\n# [{key}]\n# columns = [ ]\n"
-            );
+        Some(clock) => format!(
+            "column = {}\nunit = \"{}\"",
+            quoted(&clock.name),
+            clock.unit
+        ),
+    };
+    let mut text = format!(
+        "# Guessed from {}: check every line, then `romc inspect LOG --columns THIS.toml`.\n\n[time]\n{time}\n",
+        path.file_name().unwrap_or_default().to_string_lossy(),
+    );
+    let mut scales = source.trunk();
+    let order = source.joint_scales(robot, &mut scales);
+    let sound: Vec<&Group> = (groups.iter())
+        .filter(|group| source.is_sound(group, &scales))
+        .collect();
+    for group in &sound {
+        let mut lines = source.columns(group);
+        if group.quantity == Quantity::Feet {
+            lines.extend(source.feet(group));
+        } else if group.quantity.is_of_joints() {
+            lines.extend(order_line(order, group));
         }
-        text
+        lines.extend(scales.remove(&group.quantity).unwrap_or_default());
+        let (key, lines) = (group.quantity.key(), lines.join("\n"));
+        text.push_str(&format!("\n[{key}]\n{lines}\n"));
     }
+    let is_missing = |quantity: &Quantity| {
+        quantity.is_required() && sound.iter().all(|group| group.quantity != *quantity)
+    };
+    let missing = Quantity::ALL.into_iter().filter(is_missing);
+    let missing: Vec<&'static str> = missing.map(Quantity::key).collect();
+    for key in &missing {
+        text.push_str(&format!(
+            "\n# not found, and needed:\n# [{key}]\n# columns = [ ]\n"
+        ));
+    }
+    (text, missing)
 }
 
 fn quoted(name: &str) -> String {
@@ -170,8 +143,30 @@ impl Source<'_> {
     /// Values of a group and their times, if they share the log of `with`.
     fn beside(&self, quantity: Quantity, with: &Group) -> Option<(DMatrix<f64>, Vec<f64>)> {
         let group = self.group(quantity).filter(|group| group.log == with.log)?;
-        let times = times_s(self.logs, group.log, self.clock)?;
-        Some((raw(self.logs, group), times))
+        Some((self.raw(group), self.times_s(group.log)?))
+    }
+
+    /// Values of a group in the units of the log, one row a column.
+    fn raw(&self, group: &Group) -> DMatrix<f64> {
+        let log = &self.logs[group.log];
+        DMatrix::from_fn(group.columns.len(), log.len(), |row, sample| {
+            let value = log.columns[group.columns[row]].values[sample];
+            if value.is_finite() { value } else { 0.0 }
+        })
+    }
+
+    /// Times of a log in s.
+    fn times_s(&self, log: usize) -> Option<Vec<f64>> {
+        let (log, clock) = (&self.logs[log], self.clock?);
+        let (column, factor) = match log.clock {
+            Some(column) => (column, 1.0),
+            None => {
+                let column = log.column(&Name::Text(clock.name.clone()))?;
+                (column, Dimension::Time.factor(clock.unit)?)
+            }
+        };
+        let times = log.columns[column].times();
+        Some(times.into_iter().map(|time| factor * time).collect())
     }
 
     /// The file and the columns of a group.
@@ -197,7 +192,7 @@ impl Source<'_> {
     /// Adds units and signs of the joints' quantities; the order of their columns, if it is not that of the legs.
     fn joint_scales(&self, robot: &Robot, lines: &mut Lines) -> Option<&'static str> {
         let group = self.group(Quantity::JointPosition)?;
-        let mut position = raw(self.logs, group);
+        let mut position = self.raw(group);
         let told = self.told(group, &["mrad", "rad", "deg"]);
         let in_degrees = reach(position.iter().copied()) > ANGLE_RAD;
         let unit = told.unwrap_or(if in_degrees { "deg" } else { "rad" });
@@ -235,8 +230,6 @@ impl Source<'_> {
             if inside(-1.0) > 2 * inside(1.0) {
                 signs[row] = -1.0;
             }
-        }
-        for row in 0..JOINT_DIM {
             position.row_mut(row).scale_mut(signs[row]);
         }
         let all =
@@ -264,7 +257,7 @@ impl Source<'_> {
             lines.insert(Quantity::JointVelocity, all(unit_line(unit, why), &own));
         }
         if let Some(group) = self.group(Quantity::JointTorque) {
-            let mut torque = in_order(&raw(self.logs, group));
+            let mut torque = in_order(&self.raw(group));
             let is_large = reach(torque.iter().copied()) > 1000.0;
             for row in 0..JOINT_DIM {
                 torque.row_mut(row).scale_mut(signs[row]);
@@ -285,11 +278,13 @@ impl Source<'_> {
     fn trunk(&self) -> Lines {
         let (mut out, mut angles) = (Lines::new(), None);
         if let Some(group) = self.group(Quantity::Orientation) {
-            let values = raw(self.logs, group);
+            let values = self.raw(group);
             let mut lines = Vec::new();
             let found = match group.is_quaternion {
                 true => {
-                    let last = group.is_counted && real_is_last(&values);
+                    // The real part of a robot on its feet is the largest.
+                    let size = |row: usize| values.row(row).abs().sum();
+                    let last = group.is_counted && size(3) > size(0);
                     lines.push(match (group.is_counted, last) {
                         (true, false) => "order = \"wxyz\"   # the first is the largest".to_owned(),
                         (true, true) => "order = \"xyzw\"   # the last is the largest".to_owned(),
@@ -312,18 +307,18 @@ impl Source<'_> {
             out.insert(Quantity::Orientation, lines);
             if let Some((raw, times)) = self.beside(Quantity::AngularVelocity, group) {
                 let mut own = found.clone();
-                super::super::attitude::unwrap(&mut own);
+                unwrap(&mut own);
                 let rates = slopes(&times, &own);
-                let scale = angular(&own, &rates, &raw, &ANGLE[..2]);
-                out.insert(
-                    Quantity::AngularVelocity,
-                    velocity_lines(scale, "the angles"),
-                );
+                let frames = [Frame::Angles, Frame::Body, Frame::World];
+                let turned = |frame| angle_rates(&own, &raw, frame).ok();
+                let scale = axes(frames, turned, &rates, &ANGLE[..2]);
+                let lines = velocity_lines(scale, "the angles");
+                out.insert(Quantity::AngularVelocity, lines);
             }
             angles = Some(found);
         }
         if let Some(group) = self.group(Quantity::BodyPosition) {
-            let values = raw(self.logs, group);
+            let values = self.raw(group);
             let told = self.told(group, &["mm", "cm"]);
             let height = reach(values.row(2).iter().copied());
             let unit = told.unwrap_or(match height {
@@ -336,11 +331,15 @@ impl Source<'_> {
             let factor = Dimension::Length.factor(unit).unwrap_or(1.0);
             if let Some((raw, times)) = self.beside(Quantity::BodyVelocity, group) {
                 let rates = slopes(&times, &(values * factor));
-                let scale = linear(angles.as_ref(), &rates, &raw, Dimension::Length.units());
-                out.insert(
-                    Quantity::BodyVelocity,
-                    velocity_lines(scale, "the position"),
-                );
+                let angles = angles.filter(|angles| angles.ncols() == raw.ncols());
+                let turned = |frame| match frame {
+                    Frame::Body => Some(in_world(angles.as_ref()?, &raw)),
+                    Frame::World | Frame::Angles => Some(raw.clone()),
+                };
+                let frames = [Frame::World, Frame::Body];
+                let scale = axes(frames, turned, &rates, Dimension::Length.units());
+                let lines = velocity_lines(scale, "the position");
+                out.insert(Quantity::BodyVelocity, lines);
             }
         }
         out
@@ -348,7 +347,7 @@ impl Source<'_> {
 
     /// Contact as flags or by a threshold.
     fn feet(&self, group: &Group) -> Vec<String> {
-        let values = raw(self.logs, group);
+        let values = self.raw(group);
         let mut lines = Vec::new();
         if group.is_counted {
             lines.push(
@@ -370,18 +369,9 @@ impl Source<'_> {
     /// Whether a group is what it is called: an acceleration has to be the derivative of its velocity, not what an IMU
     /// feels.
     fn is_sound(&self, group: &Group, scales: &Lines) -> bool {
-        let velocity = match group.quantity {
-            Quantity::JointAcceleration => Quantity::JointVelocity,
-            Quantity::BodyAcceleration => Quantity::BodyVelocity,
-            Quantity::AngularAcceleration => Quantity::AngularVelocity,
-            Quantity::JointPosition
-            | Quantity::JointVelocity
-            | Quantity::JointTorque
-            | Quantity::BodyPosition
-            | Quantity::Orientation
-            | Quantity::BodyVelocity
-            | Quantity::AngularVelocity
-            | Quantity::Feet => return true,
+        let mut accelerations = Quantity::ACCELERATIONS.into_iter();
+        let Some((_, velocity)) = accelerations.find(|(own, _)| *own == group.quantity) else {
+            return true;
         };
         let mut of_velocity = scales.get(&velocity).into_iter().flatten();
         let has_frame = of_velocity.any(|line| line.contains("frame"));
@@ -389,7 +379,7 @@ impl Source<'_> {
             return false;
         };
         let rates = slopes(&times, &velocity);
-        let same = scale(&rates, &raw(self.logs, group), &[("", 1.0)]);
+        let same = scale(&rates, &self.raw(group), &[("", 1.0)]);
         !has_frame && same.is_some_and(|(scale, left)| scale.sign > 0.0 && left < 0.1)
     }
 }
