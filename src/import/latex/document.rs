@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use super::super::equations::refused;
 use super::super::error::ImportError;
 use super::derivatives::with_dots;
+use super::reader::has;
 use super::token::{Kind, Token, group_length};
 
 /// Most tokens that macros may make of one display.
@@ -47,8 +48,7 @@ struct Macro {
 
 /// Whether `list` has the word `name`, its star aside.
 pub(super) fn is_one_of(list: &str, name: &str) -> bool {
-    let name = name.trim_end_matches('*');
-    list.split_whitespace().any(|word| word == name)
+    has(list, name.trim_end_matches('*'))
 }
 
 /// Finds the displays.

@@ -100,7 +100,6 @@ impl Reader<'_> {
         if is_negative && self.is_next(&Kind::Superscript) {
             return self.unexpected("parentheses around the negative number");
         }
-        self.powers(place)?;
         Ok(Last::Number)
     }
 
@@ -123,7 +122,6 @@ impl Reader<'_> {
             self.push(place, ")");
         }
         self.push(place, ")");
-        self.powers(place)?;
         Ok(Last::Other)
     }
 

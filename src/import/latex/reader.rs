@@ -77,6 +77,7 @@ pub(super) const BARE: &str = "parentheses around the argument of the function b
 
 pub(super) type Read<T> = Result<T, ImportError>;
 
+/// Whether `list` has a word.
 pub(super) fn has(list: &str, word: &str) -> bool {
     list.split_whitespace().any(|known| known == word)
 }

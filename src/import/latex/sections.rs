@@ -28,10 +28,9 @@ pub(in crate::import) fn read(
 ) -> Result<Sections, ImportError> {
     let text = text_of(file, bytes)?;
     let is_markdown = file.ends_with(".md") || file.ends_with(".markdown");
-    let tokens = if is_markdown {
-        of_markdown(text)
-    } else {
-        of_tex(text)
+    let tokens = match is_markdown {
+        true => of_markdown(text),
+        false => of_tex(text),
     };
     let items = items(file, &tokens)?;
     let mut document = Document {
@@ -81,18 +80,10 @@ fn has_indexed_left_side(file: &str, items: &[Item], in_lines: bool) -> bool {
         let Ok(mut reader) = Reader::new(file, &default, tokens) else {
             return false;
         };
-        dotted(&reader.tokens).into_iter().any(|at| {
-            let left_side = reader.left_side(at);
-            left_side.is_some_and(|(symbol, _)| reader.output(&symbol).is_some())
-        })
+        let left_sides = reader.left_sides();
+        let mut symbols = left_sides.iter().map(|(_, symbol, _)| symbol);
+        symbols.any(|symbol| reader.output(symbol).is_some())
     })
-}
-
-/// Places of `\ddot`.
-fn dotted(tokens: &[Token]) -> Vec<usize> {
-    (0..tokens.len())
-        .filter(|place| tokens[*place].is_command("ddot"))
-        .collect()
 }
 
 /// The tokens without `\begin` and `\end` of environments that arrange lines, and without the
@@ -125,7 +116,7 @@ fn flattened(file: &str, tokens: &[Token]) -> Result<Vec<Token>, ImportError> {
             Kind::End(name)
                 if is_one_of(LAYOUTS, name)
                     && (!is_one_of(DISTINCTIONS, name)
-                        || open.last().is_some_and(|begin| is_distinction(begin))) =>
+                        || open.last().is_some_and(is_distinction)) =>
             {
                 if open.pop().map(|begin| &begin.kind) != Some(&Kind::Begin(name.clone())) {
                     let expected = "environments that end in the order in which they begin";
@@ -149,7 +140,7 @@ fn flattened(file: &str, tokens: &[Token]) -> Result<Vec<Token>, ImportError> {
     }
 }
 
-fn is_distinction(token: &Token) -> bool {
+fn is_distinction(token: &&Token) -> bool {
     matches!(&token.kind, Kind::Begin(name) if is_one_of(DISTINCTIONS, name))
 }
 
@@ -157,8 +148,8 @@ fn is_distinction(token: &Token) -> bool {
 /// right side, where it would tell cases apart.
 fn has_left_side(contents: &[Token], name: &str) -> bool {
     let end = Kind::End(name.to_owned());
-    let inside = contents.iter().take_while(|token| token.kind != end);
-    inside.into_iter().any(|token| token.is_command("ddot"))
+    let mut inside = contents.iter().take_while(|token| token.kind != end);
+    inside.any(|token| token.is_command("ddot"))
 }
 
 /// The digits that a comment states, none in what is no such comment.
@@ -213,10 +204,7 @@ impl Document<'_> {
         (reader.alone, reader.digits) = (alone, self.digits);
         let mut left_sides = Vec::new();
         let mut strange = None;
-        for at in dotted(&reader.tokens) {
-            let Some((symbol, after)) = reader.left_side(at) else {
-                continue;
-            };
+        for (at, symbol, after) in reader.left_sides() {
             let token = reader.tokens[at].clone();
             match reader.output(&symbol) {
                 Some(output) => left_sides.push((output, at, after, token)),
@@ -228,8 +216,8 @@ impl Document<'_> {
             if self.strange.is_none() {
                 let token = tokens.iter().find(|token| token.is_command("ddot"));
                 let unequal = token.map(|token| {
-                    let found = "a second derivative without `=` behind its variable".to_owned();
-                    (token.clone(), found)
+                    let found = "a second derivative without `=` behind its variable";
+                    (token.clone(), found.to_owned())
                 });
                 self.strange = strange.or(unequal);
             }
@@ -247,20 +235,17 @@ impl Document<'_> {
         }
         let total = reader.tokens.len();
         let shared = self.label(&reader.tokens[..left_sides[0].1]);
+        let mut before = 0;
         for (place, (output, _, after, token)) in left_sides.iter().enumerate() {
             let end = left_sides.get(place + 1).map_or(total, |next| next.1);
-            let label = shared
-                .clone()
-                .or_else(|| self.label(&reader.tokens[*after..end]));
-            let before = place
-                .checked_sub(1)
-                .map_or(0, |previous| left_sides[previous].2);
+            let own = || self.label(&reader.tokens[*after..end]);
+            let label = shared.clone().or_else(own);
             for token in &reader.tokens[before..*after] {
                 if let Kind::Comment(text) = &token.kind {
-                    let text = text.clone();
-                    self.comment(&text);
+                    self.comment(text);
                 }
             }
+            before = *after;
             let equation = reader.equation(*output, token.place.0, *after, end)?;
             let section = self.section(*output, token, label)?;
             section.equations.push(equation);
@@ -276,22 +261,16 @@ impl Document<'_> {
         })?;
         // Rows of one system are numbered: eq:model:contact:2.
         let stem = label.trim_end_matches(|c: char| c.is_ascii_digit());
-        let stem = stem
-            .strip_suffix(':')
+        let stem = (stem.strip_suffix(':'))
             .filter(|stem| *stem != label)
             .unwrap_or(label);
         let plain = |text: &str| text.replace(|c: char| !c.is_ascii_alphanumeric(), "-");
         let ends_in = |name: &&String| {
-            let rest = [label, stem]
-                .into_iter()
-                .find_map(|label| plain(label).strip_suffix(&plain(name)).map(str::to_owned));
+            let (name, texts) = (plain(name), [label, stem].map(plain));
+            let rest = texts.iter().find_map(|text| text.strip_suffix(&name));
             !name.is_empty() && rest.is_some_and(|rest| rest.is_empty() || rest.ends_with('-'))
         };
-        let known = self
-            .known
-            .iter()
-            .filter(ends_in)
-            .max_by_key(|name| name.len());
+        let known = (self.known.iter().filter(ends_in)).max_by_key(|name| name.len());
         let last = || stem.rsplit_once(':').map(|(_, last)| last.to_owned());
         (known.cloned().or_else(last))
             .filter(|name| !name.bytes().all(|byte| byte.is_ascii_digit()))
@@ -312,13 +291,9 @@ impl Document<'_> {
         let is_new = match self.sections.last() {
             None => true,
             Some(open) => {
-                let repeats = open
-                    .equations
-                    .iter()
-                    .any(|equation| equation.output == output);
-                let is_known = label
-                    .as_ref()
-                    .is_some_and(|label| self.known.contains(label));
+                let mut equations = open.equations.iter();
+                let repeats = equations.any(|equation| equation.output == output);
+                let is_known = (label.as_ref()).is_some_and(|label| self.known.contains(label));
                 let other_label = self.phase.is_none() && is_known && label != open.phase;
                 named.is_some() || repeats || other_label
             }

@@ -292,11 +292,16 @@ impl Line {
 
     /// The tokens of a letter with dots above it, or of raised or lowered digits.
     fn dotted_or_raised(&mut self, first: char) -> Option<Vec<Kind>> {
-        let precomposed = [('ż', 'z'), ('ẋ', 'x'), ('ẏ', 'y'), ('ẍ', 'x'), ('ÿ', 'y')];
-        let precomposed = precomposed.iter().find(|(dotted, _)| *dotted == first);
+        const DOTTED: [(char, char, &str); 5] = [
+            ('ż', 'z', "dot"),
+            ('ẋ', 'x', "dot"),
+            ('ẏ', 'y', "dot"),
+            ('ẍ', 'x', "ddot"),
+            ('ÿ', 'y', "ddot"),
+        ];
+        let precomposed = DOTTED.iter().find(|(dotted, ..)| *dotted == first);
         let (letter, dots, length) = match (precomposed, self.peek(1)) {
-            (Some((_, letter)), _) if "ẍÿ".contains(first) => (*letter, "ddot", 1),
-            (Some((_, letter)), _) => (*letter, "dot", 1),
+            (Some(&(_, letter, dots)), _) => (letter, dots, 1),
             (None, Some('\u{307}')) => (first, "dot", 2),
             (None, Some('\u{308}')) => (first, "ddot", 2),
             (None, _) => return self.raised(),
