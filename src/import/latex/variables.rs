@@ -215,23 +215,21 @@ impl Reader<'_> {
                 self.at += 1;
                 Ok(Some((name.clone(), 0)))
             }
-            Kind::Command(name) if depth < 8 && has("dot ddot dddot", name) => {
+            Kind::Command(command) if depth < 8 && has("dot ddot dddot", command) => {
                 self.at += 1;
-                let more = name.len() - 2;
                 let inner = self.inside(|reader| {
                     let Some((mut name, dots)) = reader.glyph(depth + 1)? else {
                         return Ok(None);
                     };
                     reader.subscript(&mut name)?;
+                    let dots = dots + command.len() - 2;
                     Ok(reader.peek().is_none().then_some((name, dots)))
                 });
-                match inner.ok().flatten() {
-                    Some((name, dots)) => Ok(Some((name, dots + more))),
-                    None => {
-                        self.at = at + 1;
-                        self.unexpected("a variable under the dots")
-                    }
+                if let Ok(Some(inner)) = inner {
+                    return Ok(Some(inner));
                 }
+                self.at = at + 1;
+                self.unexpected("a variable under the dots")
             }
             Kind::Command(name) if has(FONTS, name) => {
                 self.at += 1;
