@@ -10,9 +10,11 @@ use super::token::{Kind, Token, group_length};
 
 /// Most tokens that macros may make of one display.
 const MAX_EXPANDED: usize = 200_000;
-/// Environments of mathematics of their own.
-const DISPLAYS: &str = "equation align gather multline eqnarray flalign alignat displaymath dmath \
-    dgroup cases dcases aligned alignedat split gathered IEEEeqnarray";
+/// Environments that arrange lines of mathematics, in a display of their own or inside one.
+pub(super) const LAYOUTS: &str = "equation align gather multline eqnarray flalign alignat displaymath dmath \
+    dgroup aligned alignedat split gathered IEEEeqnarray";
+/// Environments that are displays of their own as well.
+const CASES: &str = "cases dcases";
 /// Environments that begin with an argument: a number of columns, or what each column is.
 pub(super) const WITH_COLUMNS: &str = "alignat alignedat array IEEEeqnarray";
 /// Environments whose contents are no LaTeX.
@@ -66,7 +68,7 @@ pub(super) fn items(file: &str, tokens: &[Token]) -> Result<Vec<Item>, ImportErr
                 items.push(Item::Comment(text.clone()));
                 continue;
             }
-            Kind::Begin(name) if is_one_of(DISPLAYS, name) => {
+            Kind::Begin(name) if is_one_of(LAYOUTS, name) || is_one_of(CASES, name) => {
                 if is_one_of(WITH_COLUMNS, name) && scanner.peek() == Some(&Kind::Open) {
                     scanner.argument();
                 }

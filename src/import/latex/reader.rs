@@ -226,16 +226,13 @@ impl<'a> Reader<'a> {
             return self.unexpected("an argument");
         }
         self.deepen()?;
-        let (first, end, after) = match &self.tokens[self.at].kind {
-            Kind::Open => (
-                self.at + 1,
-                self.closing[self.at],
-                self.closing[self.at] + 1,
-            ),
+        let (at, after) = (self.at, self.after_argument(self.at));
+        let (first, end) = match &self.tokens[at].kind {
+            Kind::Open => (at + 1, after - 1),
             Kind::Number(text) if text.len() > 1 => {
                 return self.unexpected("braces around an argument of several digits");
             }
-            _ => (self.at, self.at + 1, self.at + 1),
+            _ => (at, after),
         };
         let outer_end = std::mem::replace(&mut self.end, end);
         self.at = first;

@@ -2,15 +2,12 @@
 
 use super::super::equations::{Section, Sections, complete, refused, text_of};
 use super::super::error::ImportError;
-use super::document::{Item, WITH_COLUMNS, is_one_of, items};
+use super::document::{Item, LAYOUTS, WITH_COLUMNS, is_one_of, items};
 use super::names::SymbolNames;
 use super::reader::{Digits, Reader};
 use super::token::{Kind, Token, group_length, of_markdown, of_tex};
 
-/// Environments that only arrange lines.
-const LAYOUTS: &str = "equation align gather multline eqnarray flalign alignat displaymath dmath dgroup \
-    cases dcases array aligned alignedat split gathered subequations IEEEeqnarray";
-/// Those that arrange lines only if whole equations are in them.
+/// Environments that arrange lines only if whole equations are in them.
 const DISTINCTIONS: &str = "cases dcases array";
 
 /// Reads the equations of a document.
@@ -96,8 +93,8 @@ fn flattened(file: &str, tokens: &[Token]) -> Result<Vec<Token>, ImportError> {
         at += 1;
         match &token.kind {
             Kind::Begin(name)
-                if is_one_of(LAYOUTS, name)
-                    && (!is_one_of(DISTINCTIONS, name) || has_left_side(&tokens[at..], name)) =>
+                if is_layout(name)
+                    || is_one_of(DISTINCTIONS, name) && has_left_side(&tokens[at..], name) =>
             {
                 open.push(token);
                 if flat.len() >= 2 && flat[flat.len() - 2].is_command("left") {
@@ -114,9 +111,8 @@ fn flattened(file: &str, tokens: &[Token]) -> Result<Vec<Token>, ImportError> {
                 }
             }
             Kind::End(name)
-                if is_one_of(LAYOUTS, name)
-                    && (!is_one_of(DISTINCTIONS, name)
-                        || open.last().is_some_and(is_distinction)) =>
+                if is_layout(name)
+                    || is_one_of(DISTINCTIONS, name) && open.last().is_some_and(is_distinction) =>
             {
                 if open.pop().map(|begin| &begin.kind) != Some(&Kind::Begin(name.clone())) {
                     let expected = "environments that end in the order in which they begin";
@@ -138,6 +134,10 @@ fn flattened(file: &str, tokens: &[Token]) -> Result<Vec<Token>, ImportError> {
             Err(refused(file, token.place, found, expected))
         }
     }
+}
+
+fn is_layout(name: &str) -> bool {
+    is_one_of(LAYOUTS, name) || is_one_of("subequations", name)
 }
 
 fn is_distinction(token: &&Token) -> bool {
