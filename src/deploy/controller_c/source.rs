@@ -9,7 +9,6 @@ use super::legs::Legs;
 use super::numbers::{Numbers, integers, nested};
 use crate::codegen::Precision;
 use crate::codegen::interface::{ModelInterface, PhaseInterface};
-use crate::deploy::controller::texts;
 use crate::mpc::problem::{Row, StageRows, pairs};
 use crate::mpc::shared::{
     DEVIATION_FLOOR, EFFECTIVENESS_RANGE, GAP, HALF_WINDOW_S, LARGEST_WEIGHT, LIFT_CURVATURE,
@@ -51,7 +50,6 @@ pub(super) struct Source<'a> {
     torque_deviation: String,
     weight_n: f64,
     fallback: FallbackSettings,
-    texts: Vec<(i32, String)>,
     encoder: String,
     encoder_bias: String,
     decoder: String,
@@ -143,7 +141,6 @@ impl<'a> Source<'a> {
             torque_deviation: nested(deviations.iter().map(|rows| numbers.matrix(*rows))),
             weight_n,
             fallback: mpc.fallback,
-            texts: texts().collect(),
             encoder: matrix(&parts.encoder, facts.latent_dim),
             encoder_bias: numbers.vector(parts.encoder_bias.iter().copied()),
             decoder: matrix(&parts.decoder, JOINT_DIM),
