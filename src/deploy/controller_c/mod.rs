@@ -50,11 +50,7 @@ struct Facts<'a> {
     n_phases: usize,
     /// Whether the model knows what its states say of its inputs, in all phases.
     has_given_state: bool,
-    n_torque_stored: usize,
-    n_joint_stored: usize,
-    /// Rows of the rates of torques.
-    n_rate: usize,
-    n_rate_stored: usize,
+    rows: &'a StageRows,
 }
 
 impl<'a> Deref for Facts<'a> {
@@ -119,7 +115,7 @@ pub fn emit(
     };
     let deviations: Vec<_> = (plant.phases().iter().map(deviation)).collect::<Result<_, _>>()?;
     let plant_of_lift = (&plant, deviations.as_slice());
-    let source = Source::new(facts, &entries, plant_of_lift, &rows, options.precision);
+    let source = Source::new(facts, &entries, plant_of_lift, options.precision);
     let jump = match &options.plan {
         Some(plan) => Jump::planned(plan),
         None => Jump::shipped()?.within(model),
@@ -152,7 +148,7 @@ pub fn emit(
 fn facts<'a>(
     entries: &'a ModelInterface,
     plant: &'a ControlModel,
-    rows: &StageRows,
+    rows: &'a StageRows,
     precision: Precision,
     provenance: &str,
 ) -> Facts<'a> {
@@ -180,9 +176,6 @@ fn facts<'a>(
             .phases()
             .iter()
             .all(|phase| phase.given_state.is_some()),
-        n_torque_stored: rows.torque.len().max(1),
-        n_joint_stored: rows.joint.len().max(1),
-        n_rate: rows.rate.len(),
-        n_rate_stored: rows.rate.len().max(1),
+        rows,
     }
 }
