@@ -15,28 +15,8 @@ const CASES: u64 = 150;
 const POINTS: usize = 200;
 
 /// Terms of every kind, over two latent coordinates; the last is not defined everywhere.
-const TERMS: [&str; 20] = [
-    "1",
-    "z1",
-    "z2",
-    "dz1",
-    "dz2",
-    "u1",
-    "u2",
-    "sin(z1)",
-    "cos(dz2)",
-    "sin(z1 + 0.5*dz1)",
-    "z1*dz2",
-    "z2^2",
-    "tanh(u1)",
-    "exp(z2)",
-    "z1*sin(z2)",
-    "1/(3 + z1)",
-    "u1*u2",
-    "cos(z1/3)",
-    "2*z1",
-    "log(2.5 + dz1)",
-];
+const TERMS: &str = "1; z1; z2; dz1; dz2; u1; u2; sin(z1); cos(dz2); sin(z1 + 0.5*dz1); z1*dz2; z2^2; \
+    tanh(u1); exp(z2); z1*sin(z2); 1/(3 + z1); u1*u2; cos(z1/3); 2*z1; log(2.5 + dz1)";
 
 /// What simplification makes of a model's equations over a domain without samples.
 fn made_of(model: &ReducedModel, domain: &Domain, tolerance: f64) -> Simplified {
@@ -86,7 +66,7 @@ impl Random {
     }
 
     fn model(&mut self) -> ReducedModel {
-        let mut texts: Vec<String> = TERMS.map(str::to_owned).to_vec();
+        let mut texts: Vec<String> = TERMS.split("; ").map(str::to_owned).collect();
         texts.retain(|_| self.chance(0.6));
         texts.push("3*dz1".to_owned());
         let library = Library::from_terms(2, &texts).expect("terms parse");

@@ -63,7 +63,7 @@ pub(super) fn items(file: &str, tokens: &[Token]) -> Result<Vec<Item>, ImportErr
     };
     let mut items = Vec::new();
     while let Some(token) = scanner.next() {
-        let found = match &token.kind {
+        let end = match &token.kind {
             Kind::Comment(text) => {
                 items.push(Item::Comment(text.clone()));
                 continue;
@@ -72,33 +72,31 @@ pub(super) fn items(file: &str, tokens: &[Token]) -> Result<Vec<Item>, ImportErr
                 if is_one_of(WITH_COLUMNS, name) && scanner.peek() == Some(&Kind::Open) {
                     scanner.argument();
                 }
-                Some(scanner.until(token, &Kind::End(name.clone()), Some(&token.kind))?)
+                Kind::End(name.clone())
             }
             Kind::Begin(name) if is_one_of(VERBATIM, name) => {
                 scanner.until(token, &Kind::End(name.clone()), None)?;
-                None
+                continue;
             }
-            Kind::Command(name) if name == "[" => {
-                Some(scanner.until(token, &Kind::Command("]".to_owned()), None)?)
-            }
-            Kind::Display => Some(scanner.until(token, &Kind::Display, None)?),
+            Kind::Command(name) if name == "[" => Kind::Command("]".to_owned()),
+            Kind::Display => Kind::Display,
             Kind::Dollar => {
                 items.extend(scanner.inline(&Kind::Dollar));
-                None
+                continue;
             }
             Kind::Command(name) if name == "(" => {
                 items.extend(scanner.inline(&Kind::Command(")".to_owned())));
-                None
+                continue;
             }
             Kind::Command(name) => {
                 scanner.definition(name);
-                None
+                continue;
             }
-            _ => None,
+            _ => continue,
         };
-        if let Some(display) = found {
-            items.push(Item::Display(with_dots(&scanner.expanded(display)?)));
-        }
+        let nested = matches!(token.kind, Kind::Begin(_)).then_some(&token.kind);
+        let display = scanner.until(token, &end, nested)?;
+        items.push(Item::Display(with_dots(&scanner.expanded(display)?)));
     }
     Ok(items)
 }
