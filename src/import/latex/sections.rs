@@ -193,9 +193,9 @@ impl Document<'_> {
     }
 
     fn display(&mut self, tokens: &[Token], alone: bool) -> Result<(), ImportError> {
-        if !tokens.iter().any(|token| token.is_command("ddot")) {
+        let Some(dotted) = tokens.iter().find(|token| token.is_command("ddot")) else {
             return Ok(());
-        }
+        };
         let flat = flattened(self.file, tokens);
         let mut reader = match &flat {
             Ok(flat) => Reader::new(self.file, self.names, flat)?,
@@ -208,19 +208,15 @@ impl Document<'_> {
             let token = reader.tokens[at].clone();
             match reader.output(&symbol) {
                 Some(output) => left_sides.push((output, at, after, token)),
-                None if strange.is_none() => strange = Some((token, symbol.quoted())),
-                None => {}
+                None => {
+                    strange.get_or_insert((token, symbol.quoted()));
+                }
             }
         }
         if left_sides.is_empty() {
-            if self.strange.is_none() {
-                let token = tokens.iter().find(|token| token.is_command("ddot"));
-                let unequal = token.map(|token| {
-                    let found = "a second derivative without `=` behind its variable";
-                    (token.clone(), found.to_owned())
-                });
-                self.strange = strange.or(unequal);
-            }
+            let unequal = "a second derivative without `=` behind its variable";
+            let found = strange.unwrap_or((dotted.clone(), unequal.to_owned()));
+            self.strange.get_or_insert(found);
             return Ok(());
         }
         flat?;
@@ -284,20 +280,15 @@ impl Document<'_> {
         token: &Token,
         label: Option<String>,
     ) -> Result<&mut Section, ImportError> {
-        let named = match std::mem::take(&mut self.starts_phase) {
-            true => self.phase.clone(),
-            false => None,
-        };
-        let is_new = match self.sections.last() {
-            None => true,
-            Some(open) => {
-                let mut equations = open.equations.iter();
-                let repeats = equations.any(|equation| equation.output == output);
-                let is_known = (label.as_ref()).is_some_and(|label| self.known.contains(label));
-                let other_label = self.phase.is_none() && is_known && label != open.phase;
-                named.is_some() || repeats || other_label
-            }
-        };
+        let starts_phase = std::mem::take(&mut self.starts_phase);
+        let named = self.phase.clone().filter(|_| starts_phase);
+        let is_known = |name: &String| self.known.contains(name);
+        let is_new = self.sections.last().is_none_or(|open| {
+            let mut equations = open.equations.iter();
+            let repeats = equations.any(|equation| equation.output == output);
+            let is_other = label.as_ref().is_some_and(is_known) && label != open.phase;
+            named.is_some() || repeats || self.phase.is_none() && is_other
+        });
         if is_new {
             let named = named.or(label.clone().filter(|_| self.phase.is_none()));
             if let Some(earlier) =
@@ -310,7 +301,6 @@ impl Document<'_> {
             self.sections.push(Section::new(named, token.place.0));
         }
         let section = (self.sections.last_mut()).expect("one was just made if there was none");
-        let is_known = |name: &String| self.known.contains(name);
         if self.phase.is_none() && label.is_some() && label != section.phase {
             // Labels that name single equations do not name their phase.
             section.phase.take_if(|name| !is_known(name));

@@ -146,22 +146,19 @@ pub(super) fn of_markdown(text: &str) -> Vec<Token> {
             tokens.push(Token { kind, place });
         };
         let content = line.trim();
-        if let Some(is_math) = fence {
-            if content == "```" {
-                fence = None;
-                if is_math {
-                    push(Kind::Display);
-                }
-            } else if is_math {
-                Line::new(line, number, 1).read(&mut tokens);
+        let opens = content.strip_prefix("```");
+        let opens = opens.filter(|_| fence.is_none() && !in_display);
+        if opens.is_some() || fence.is_some() && content == "```" {
+            let is_math = opens.map_or(fence == Some(true), |language| language.trim() == "math");
+            fence = opens.map(|_| is_math);
+            if is_math {
+                push(Kind::Display);
             }
             continue;
         }
-        if !in_display && let Some(language) = content.strip_prefix("```") {
-            let is_math = language.trim() == "math";
-            fence = Some(is_math);
+        if let Some(is_math) = fence {
             if is_math {
-                push(Kind::Display);
+                Line::new(line, number, 1).read(&mut tokens);
             }
             continue;
         }
