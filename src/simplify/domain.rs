@@ -100,14 +100,12 @@ impl Domain {
         samples: &Samples,
         margin: f64,
     ) -> Result<Self, SimplifyError> {
-        let point = |sample: &[f64]| -> Vec<Interval> {
-            sample.iter().copied().map(Interval::point).collect()
-        };
         let boxes = samples.phases.iter().map(|samples| {
-            (samples.column_iter())
-                .map(|sample| point(sample.as_slice()))
-                .reduce(|all, point| all.into_iter().zip(point).map(|(a, b)| a.hull(b)).collect())
-                .map(|ranges| ranges.into_iter().map(|r| widened(r, margin)).collect())
+            let ranges = samples.row_iter().map(|row| {
+                let points = row.iter().copied().map(Interval::point);
+                points.reduce(Interval::hull).map(|r| widened(r, margin))
+            });
+            ranges.collect()
         });
         Self::new(model, boxes.collect())
     }
