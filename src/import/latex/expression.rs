@@ -360,12 +360,11 @@ impl Reader<'_> {
         self.at += 1;
         self.push(place, "(");
         let has_right = self.sum_between(false)?;
-        if !self.is_next(&closer) || has_left != has_right {
+        if has_left != has_right || !self.takes(&closer) {
             let quoted = closer.quoted();
             let right = if has_left { "`\\right` and " } else { "" };
             return self.unexpected(&format!("an operator or {right}{quoted}"));
         }
-        self.at += 1;
         self.push(place, ")");
         Ok(Last::Other)
     }
@@ -378,10 +377,9 @@ impl Reader<'_> {
 
     /// The power behind a factor.
     pub(super) fn powers(&mut self, place: (usize, usize)) -> Read<()> {
-        if !self.is_next(&Kind::Superscript) {
+        if !self.takes(&Kind::Superscript) {
             return Ok(());
         }
-        self.at += 1;
         if self.kind(self.at) == Some(&Kind::Open) {
             self.at += 1;
             if self.is_lone_integer() {

@@ -42,10 +42,8 @@ impl Reader<'_> {
 
     fn behind_power_of_ten(&mut self) -> Option<i32> {
         let is_product = self.command("times") || self.command("cdot");
-        for wanted in [Kind::Number("10".to_owned()), Kind::Superscript] {
-            (is_product && self.is_next(&wanted)).then_some(())?;
-            self.at += 1;
-        }
+        let is_of_ten = is_product && self.takes(&Kind::Number("10".to_owned()));
+        (is_of_ten && self.takes(&Kind::Superscript)).then_some(())?;
         let behind = self.after_argument(self.at);
         let text: String = (self.tokens[self.at..behind].iter())
             .map(|token| match &token.kind {

@@ -178,10 +178,15 @@ impl<'a> Reader<'a> {
         }
     }
 
-    pub(super) fn character(&mut self, wanted: char) -> bool {
-        let found = self.is_next(&Kind::Character(wanted));
+    /// Takes `wanted` if it comes next; whether it does.
+    pub(super) fn takes(&mut self, wanted: &Kind) -> bool {
+        let found = self.is_next(wanted);
         self.at += usize::from(found);
         found
+    }
+
+    pub(super) fn character(&mut self, wanted: char) -> bool {
+        self.takes(&Kind::Character(wanted))
     }
 
     pub(super) fn command(&mut self, wanted: &str) -> bool {

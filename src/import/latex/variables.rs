@@ -72,8 +72,7 @@ impl Reader<'_> {
             return self.enclosed_sum(place, "exp(");
         }
         let mut power = None;
-        if self.is_next(&Kind::Superscript) {
-            self.at += 1;
+        if self.takes(&Kind::Superscript) {
             let expected = "a positive power; an inverse function has no reading here";
             power = Some(self.inside(|reader| reader.number(expected))?);
         }
@@ -254,10 +253,9 @@ impl Reader<'_> {
 
     /// Reads `_1`, `_{10}`, `_{\mathrm{lat},1}` behind a variable.
     pub(super) fn subscript(&mut self, name: &mut String) -> Read<()> {
-        if !self.is_next(&Kind::Subscript) {
+        if !self.takes(&Kind::Subscript) {
             return Ok(());
         }
-        self.at += 1;
         let parts = self.inside(|reader| match reader.word(reader.at, reader.end) {
             Some(word) => {
                 reader.at = reader.end;
