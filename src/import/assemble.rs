@@ -135,27 +135,30 @@ impl<'a> Assembly<'a, '_> {
         }
     }
 
-    /// Reads a tensor for its role, as a matrix of `rows x columns`.
+    /// Reads a tensor for its role, stored as a matrix of `rows x columns`, as the model has it, and notes its use.
     fn read(
-        &self,
+        &mut self,
         assigned: &Assigned<'_>,
         shape: (usize, usize),
+        layout: Layout,
     ) -> Result<DMatrix<f64>, ImportError> {
-        if assigned.info.element == Element::Bool && !matches!(assigned.role, Role::Mask(_)) {
+        let info = assigned.info;
+        if info.element == Element::Bool && !matches!(assigned.role, Role::Mask(_)) {
             return Err(self.refused(assigned, "numbers of type bool", "f32 or f64"));
         }
-        (self.tensors).read(assigned.info, shape, |index| assigned.place(index))
-    }
-
-    fn note_used(&mut self, assigned: &Assigned<'_>, layout: Layout) {
+        let stored = (self.tensors).read(info, shape, |index| assigned.place(index))?;
         self.report.used.push(UsedTensor {
             role: assigned.role.to_string(),
-            tensor: assigned.info.name.clone(),
-            shape: assigned.info.shape.clone(),
-            element: assigned.info.element.name().to_owned(),
+            tensor: info.name.clone(),
+            shape: info.shape.clone(),
+            element: info.element.name().to_owned(),
             chosen: assigned.chosen,
             layout,
         });
+        Ok(match layout {
+            Layout::Row | Layout::LatentByTerms => stored.transpose(),
+            Layout::Column | Layout::TermsByLatent | Layout::Plain => stored,
+        })
     }
 
     /// A tensor that is a list of `length` numbers; a matrix of one row or column is one.
@@ -172,8 +175,7 @@ impl<'a> Assembly<'a, '_> {
         if !is_list {
             return Err(self.wrong_shape(assigned, format!("{length} numbers")));
         }
-        let values = self.read(assigned, (length, 1))?;
-        self.note_used(assigned, Layout::Plain);
+        let values = self.read(assigned, (length, 1), Layout::Plain)?;
         Ok(values.column(0).into_owned())
     }
 
@@ -199,9 +201,8 @@ impl<'a> Assembly<'a, '_> {
     fn xi(&mut self, phase: &str, choice: &LibraryChoice) -> Result<DMatrix<f64>, ImportError> {
         let assigned = self.find(&Role::Xi(phase.to_owned()));
         let assigned = assigned.expect("every phase was assigned coefficients");
-        let (xi, layout) = self.terms_by_latent(assigned, choice)?;
+        let (xi, _) = self.terms_by_latent(assigned, choice)?;
         self.known.latent = Some(xi.ncols());
-        self.note_used(assigned, layout);
         let Some(assigned) = self.find(&Role::Mask(phase.to_owned())) else {
             return Ok(xi);
         };
@@ -215,7 +216,6 @@ impl<'a> Assembly<'a, '_> {
             let found = mask[position].to_string();
             return Err(self.tensors.refused(place, found, "0 or 1"));
         }
-        self.note_used(assigned, layout);
         let off = |(value, flag): &(&f64, &f64)| **flag == 0.0 && **value != 0.0;
         self.report.notes.push(Note::Masked {
             phase: phase.to_owned(),
@@ -226,7 +226,7 @@ impl<'a> Assembly<'a, '_> {
 
     /// A tensor of one number per term and latent coordinate.
     fn terms_by_latent(
-        &self,
+        &mut self,
         assigned: &Assigned<'_>,
         choice: &LibraryChoice,
     ) -> Result<(DMatrix<f64>, Layout), ImportError> {
@@ -254,11 +254,11 @@ impl<'a> Assembly<'a, '_> {
             _ => self.expected_xi(choice),
         };
         let (layout, (terms, latent)) = self.only_way(assigned, &ways, expected, option)?;
-        let matrix = match layout {
-            Layout::LatentByTerms => self.read(assigned, (latent, terms))?.transpose(),
-            _ => self.read(assigned, (terms, latent))?,
+        let stored = match layout {
+            Layout::LatentByTerms => (latent, terms),
+            _ => (terms, latent),
         };
-        Ok((matrix, layout))
+        Ok((self.read(assigned, stored, layout)?, layout))
     }
 
     fn expected_xi(&self, choice: &LibraryChoice) -> String {
@@ -297,27 +297,16 @@ impl<'a> Assembly<'a, '_> {
         self.tensors.refused(Place::Whole, found, expected)
     }
 
-    /// Both tensors of a pair, or none.
-    fn pair(
-        &self,
-        a: &Role,
-        b: &Role,
-    ) -> Result<Option<(&'a Assigned<'a>, &'a Assigned<'a>)>, ImportError> {
-        match (self.find(a), self.find(b)) {
-            (None, None) => Ok(None),
-            (Some(a), Some(b)) => Ok(Some((a, b))),
-            (Some(_), None) => Err(self.tensors.missing(b)),
-            (None, Some(_)) => Err(self.tensors.missing(a)),
-        }
-    }
-
     fn statistics(&mut self) -> Result<Vec<(String, InputStatistics)>, ImportError> {
         let mut all = Vec::new();
         for rule in &self.assignment.phases {
             let mean = Role::InputMean(rule.name.clone());
             let covariance = Role::InputCovariance(rule.name.clone());
-            let Some((mean, covariance)) = self.pair(&mean, &covariance)? else {
-                continue;
+            let (mean, covariance) = match (self.find(&mean), self.find(&covariance)) {
+                (None, None) => continue,
+                (Some(mean), Some(covariance)) => (mean, covariance),
+                (Some(_), None) => return Err(self.tensors.missing(&covariance)),
+                (None, Some(_)) => return Err(self.tensors.missing(&mean)),
             };
             let length = mean.info.shape.first().copied();
             let dim = self.known.state.or(length).unwrap_or(0);
@@ -327,10 +316,9 @@ impl<'a> Assembly<'a, '_> {
             }
             let statistics = InputStatistics {
                 mean,
-                covariance: self.read(covariance, (dim, dim))?,
+                covariance: self.read(covariance, (dim, dim), Layout::Plain)?,
                 given_state: None,
             };
-            self.note_used(covariance, Layout::Plain);
             all.push((rule.name.clone(), statistics));
         }
         Ok(all)

@@ -76,10 +76,7 @@ fn xi(library: &Library, columns: &[Coefficients], rows: &HashMap<ExprId, Row>) 
     for (column, coefficients) in columns.iter().enumerate() {
         for (term, coefficient) in coefficients {
             let row = &rows[term];
-            xi[(row.index, column)] = match row.factor {
-                1.0 => coefficient.to_f64(),
-                factor => coefficient.to_f64() / factor,
-            };
+            xi[(row.index, column)] = coefficient.to_f64() / row.factor;
         }
     }
     xi

@@ -1,14 +1,14 @@
 //! The candidate terms of imported coefficients.
 
 use std::path::Path;
-use std::{fs, io};
 
 use serde_json::Value;
 
 use super::error::{ImportError, ImportFault};
 use super::options::standard_text;
 use super::pysindy;
-use crate::files::{Located, Place};
+use super::run::{check_size, read_file};
+use crate::files::Place;
 use crate::model::{Library, LibraryChoice, LibraryError, StandardLibrary};
 
 /// Largest file with a list of terms.
@@ -34,21 +34,20 @@ pub(super) fn build(choice: &LibraryChoice, latent_dim: usize) -> Result<Library
 
 /// The shorthands that have this many terms.
 pub(super) fn standards_with(term_count: usize, latent_dim: usize) -> Vec<String> {
-    let mut texts = Vec::new();
-    for degree in 0..=3 {
-        for (trigonometric, inputs) in [(true, true), (true, false), (false, true), (false, false)]
-        {
-            let standard = StandardLibrary {
-                degree,
-                trigonometric,
-                inputs,
-            };
-            if standard.term_count(latent_dim) == Some(term_count) {
-                texts.push(standard_text(standard));
-            }
-        }
-    }
-    texts
+    let fits = |standard: &StandardLibrary| standard.term_count(latent_dim) == Some(term_count);
+    small_standards().filter(fits).map(standard_text).collect()
+}
+
+/// The standard libraries that shorthands are suggested for, the richest of a degree first.
+pub(super) fn small_standards() -> impl Iterator<Item = StandardLibrary> {
+    (0..=3).flat_map(|degree| {
+        let more = [(true, true), (true, false), (false, true), (false, false)];
+        more.map(|(trigonometric, inputs)| StandardLibrary {
+            degree,
+            trigonometric,
+            inputs,
+        })
+    })
 }
 
 /// Reads a list of terms: a JSON list of texts, a JSON object with such a list under `library`, or
@@ -57,12 +56,8 @@ pub(super) fn standards_with(term_count: usize, latent_dim: usize) -> Vec<String
 /// # Errors
 /// [`ImportError`] with line and column.
 pub fn read_terms(path: &Path) -> Result<Vec<String>, ImportError> {
-    let file = path.display().to_string();
-    let io = |source: io::Error| Located::new(&file, Place::Whole, source);
-    if fs::metadata(path).map_err(io)?.len() > MAX_TERMS_BYTES {
-        return Err(ImportFault::too_large(&file, MAX_TERMS_BYTES, "bytes"));
-    }
-    let bytes = fs::read(path).map_err(io)?;
+    let (file, bytes) = read_file(path, MAX_TERMS_BYTES)?;
+    check_size(&file, &bytes, MAX_TERMS_BYTES)?;
     parse_terms(&file, &String::from_utf8_lossy(&bytes))
 }
 

@@ -15,22 +15,21 @@ pub(super) fn readable(terms: &[String], latent_dim: usize) -> Vec<String> {
         (true, Some(('u', k))) => format!("u{}", k + 1),
         _ => token.to_owned(),
     };
-    terms
-        .iter()
-        .map(|term| readable_term(term, &name))
-        .collect()
+    let terms = terms.iter().map(|term| readable_term(term, &name));
+    terms.collect()
 }
 
 fn readable_term(term: &str, name: &dyn Fn(&str) -> String) -> String {
     let mut text = String::with_capacity(term.len());
-    let mut before: Option<&str> = None;
+    let mut before = "";
     for token in tokens(term) {
         if token.trim().is_empty() {
             text.push_str(token);
             continue;
         }
         let is_separate = text.ends_with(char::is_whitespace);
-        if before.is_some_and(ends_operand) && is_separate && starts_operand(token) {
+        let ends_operand = before == ")" || is_word(before);
+        if ends_operand && is_separate && (token == "(" || is_word(token)) {
             text.truncate(text.trim_end().len());
             text.push('*');
         }
@@ -38,17 +37,9 @@ fn readable_term(term: &str, name: &dyn Fn(&str) -> String) -> String {
             "**" => text.push('^'),
             _ => text.push_str(&name(token)),
         }
-        before = Some(token);
+        before = token;
     }
     text
-}
-
-fn ends_operand(token: &str) -> bool {
-    token == ")" || is_word(token)
-}
-
-fn starts_operand(token: &str) -> bool {
-    token == "(" || is_word(token)
 }
 
 fn is_word(token: &str) -> bool {
@@ -63,13 +54,11 @@ fn is_number(text: &str) -> bool {
 fn number_after_first(token: &str) -> Option<(char, usize)> {
     let first = token.chars().next()?;
     let digits = &token[first.len_utf8()..];
-    is_number(digits)
-        .then(|| digits.parse().ok())
-        .flatten()
-        .map(|number| (first, number))
+    let number = digits.parse().ok().filter(|_| is_number(digits))?;
+    Some((first, number))
 }
 
-/// Words (names and numbers), runs of white space, `**`, and single characters.
+/// Words (names, digits with points, and exponents for themselves), runs of white space, `**`, and single characters.
 fn tokens(text: &str) -> impl Iterator<Item = &str> {
     let mut rest = text;
     std::iter::from_fn(move || {
@@ -80,7 +69,7 @@ fn tokens(text: &str) -> impl Iterator<Item = &str> {
             _ if first.is_ascii_alphabetic() || first == '_' => {
                 run(&|c| c.is_ascii_alphanumeric() || c == '_')
             }
-            _ if first.is_ascii_digit() || first == '.' => number_length(rest),
+            _ if first.is_ascii_digit() || first == '.' => run(&|c| c.is_ascii_digit() || c == '.'),
             _ if first.is_whitespace() => run(&char::is_whitespace),
             '*' if rest.starts_with("**") => 2,
             _ => first.len_utf8(),
@@ -89,24 +78,6 @@ fn tokens(text: &str) -> impl Iterator<Item = &str> {
         rest = after;
         Some(token)
     })
-}
-
-/// Bytes of the number that a text begins with, its exponent included.
-fn number_length(text: &str) -> usize {
-    let digits = |from: usize| {
-        let rest = &text[from..];
-        from + rest
-            .find(|c: char| !c.is_ascii_digit() && c != '.')
-            .unwrap_or(rest.len())
-    };
-    let end = digits(0);
-    let exponent = text[end..]
-        .strip_prefix(['e', 'E'])
-        .map(|rest| end + 1 + usize::from(rest.starts_with(['+', '-'])));
-    match exponent {
-        Some(start) if text[start..].starts_with(|c: char| c.is_ascii_digit()) => digits(start),
-        _ => end,
-    }
 }
 
 #[cfg(test)]

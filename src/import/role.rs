@@ -202,21 +202,10 @@ mod tests {
 
     #[test]
     fn role_text_reads_back() {
-        for text in [
-            "encoder.weight",
-            "decoder.bias",
-            "encoder.0.weight",
-            "decoder.12.bias",
-            "xi.contact",
-            "mask.rear_stance",
-            "input_mean.contact",
-            "input_covariance.contact",
-            "scaling.state",
-            "scaling.input",
-            "mean.state",
-            "std.state",
-            "std.input",
-        ] {
+        let names = "encoder.weight decoder.bias encoder.0.weight decoder.12.bias xi.contact \
+                     mask.rear_stance input_mean.contact input_covariance.contact scaling.state \
+                     scaling.input mean.state std.state std.input";
+        for text in names.split_whitespace() {
             let role: Role = text.parse().expect("the name of a part");
             assert_eq!(role.to_string(), text);
             assert_eq!(Role::of_name(&text.replace('.', "_")), Some(role));
@@ -248,14 +237,7 @@ mod tests {
 
     #[test]
     fn mapping_without_part_or_tensor_is_refused() {
-        for text in [
-            "",
-            "encoder.weight",
-            "encoder.weight=",
-            "=W",
-            "encoder=W",
-            "xi.=W",
-        ] {
+        for text in "|encoder.weight|encoder.weight=|=W|encoder=W|xi.=W".split('|') {
             let error = text.parse::<Mapping>().expect_err(text);
             assert!(error.to_string().starts_with("--map: found "), "{error}");
         }

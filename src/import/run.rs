@@ -42,13 +42,19 @@ pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported, ImportEr
         Some(format) => format,
         None => Format::of_path(path)?,
     };
+    let (file, bytes) = read_file(path, MAX_FILE_BYTES)?;
+    import_from_bytes(&file, format, &bytes, options)
+}
+
+/// The name of a file and its bytes. One more than allowed distinguishes a file that is too large from one that just
+/// fits.
+pub(super) fn read_file(path: &Path, max: u64) -> Result<(String, Vec<u8>), ImportError> {
     let file = path.display().to_string();
     let mut bytes = Vec::new();
-    // One byte more than allowed distinguishes a file that is too large from one that just fits.
-    File::open(path)
-        .and_then(|file| file.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes))
-        .map_err(|source| Located::new(&file, Place::Whole, source))?;
-    import_from_bytes(&file, format, &bytes, options)
+    match File::open(path).and_then(|open| open.take(max + 1).read_to_end(&mut bytes)) {
+        Ok(_) => Ok((file, bytes)),
+        Err(source) => Err(Located::new(&file, Place::Whole, source)),
+    }
 }
 
 /// Imports a model from a file in memory; `file` names it in errors.
@@ -96,7 +102,7 @@ pub fn import_tensors(
     finish(parts, report, &memory::digest(tensors), options)
 }
 
-fn check_size(file: &str, bytes: &[u8], max: u64) -> Result<(), ImportError> {
+pub(super) fn check_size(file: &str, bytes: &[u8], max: u64) -> Result<(), ImportError> {
     match bytes.len() as u64 > max {
         true => Err(ImportFault::too_large(file, max, "bytes")),
         false => Ok(()),
@@ -167,10 +173,8 @@ fn provenance(report: &ImportReport, digest: &[u8]) -> Map<String, Value> {
         ("sha256", json!(hex(digest))),
         ("romc", json!(env!("CARGO_PKG_VERSION"))),
     ];
-    let mut entries: Map<_, _> = entries
-        .map(|(key, value)| (key.to_owned(), value))
-        .into_iter()
-        .collect();
+    let entries = entries.map(|(key, value)| (key.to_owned(), value));
+    let mut entries = Map::from_iter(entries);
     if !report.used.is_empty() {
         let tensors = report.used.iter().map(|used| {
             let value = json!({ "tensor": used.tensor, "layout": used.layout });

@@ -2,9 +2,9 @@
 
 use std::fmt;
 
-use serde::Serialize;
+use serde::{Serialize, Serializer};
+use serde_json::{Value, json};
 
-use super::json;
 use super::measure::Measured;
 use super::tolerance::Tolerance;
 use crate::equations::ExactStep;
@@ -69,7 +69,7 @@ pub struct Effect {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Change {
     /// Its kind.
-    #[serde(flatten, serialize_with = "json::kind")]
+    #[serde(flatten, serialize_with = "kind")]
     pub kind: ChangeKind,
     /// The term in the library's syntax.
     pub term: String,
@@ -81,7 +81,7 @@ pub struct Change {
     #[serde(rename = "others")]
     pub effects: Vec<Effect>,
     /// Contains `ddz` before this change minus `ddz` after it at every point of the domain.
-    #[serde(serialize_with = "json::ends")]
+    #[serde(serialize_with = "ends")]
     pub bound: Interval,
     /// The same at the recorded samples.
     pub measured: Option<Measured>,
@@ -91,7 +91,7 @@ pub struct Change {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct EquationCertificate {
     /// Index of the latent coordinate.
-    #[serde(rename = "equation", serialize_with = "json::equation")]
+    #[serde(rename = "equation", serialize_with = "equation")]
     pub output: usize,
     /// Root mean square of the model's `ddz` over the recorded samples.
     pub rms: Option<f64>,
@@ -99,10 +99,10 @@ pub struct EquationCertificate {
     pub allowed: f64,
     /// Contains `ddz` of the model minus `ddz` of the simplified model at every point of the domain;
     /// found from the two models, not from the list of changes.
-    #[serde(serialize_with = "json::ends")]
+    #[serde(serialize_with = "ends")]
     pub bound: Interval,
     /// The sum of the changes' bounds, which contains the same difference.
-    #[serde(serialize_with = "json::ends")]
+    #[serde(serialize_with = "ends")]
     pub sum_of_bounds: Interval,
     /// The difference at the recorded samples.
     pub measured: Option<Measured>,
@@ -121,7 +121,7 @@ pub struct PhaseCertificate {
     pub name: String,
     /// The box: each variable's name and range. `None` if there is no sample of the phase, so that
     /// its equations were kept.
-    #[serde(serialize_with = "json::ranges")]
+    #[serde(serialize_with = "ranges")]
     pub domain: Option<Vec<(String, Interval)>>,
     /// Recorded samples in the box, at which errors were measured.
     pub samples: usize,
@@ -132,7 +132,7 @@ pub struct PhaseCertificate {
     pub operations: BeforeAfter,
     /// Variables that some `ddz` of the phase depended on, and none does any more: inputs among them
     /// can no longer be used for control.
-    #[serde(rename = "no_longer_depends_on", serialize_with = "json::names")]
+    #[serde(rename = "no_longer_depends_on", serialize_with = "names")]
     pub lost: Vec<LatentVariable>,
     /// One entry per latent coordinate.
     pub equations: Vec<EquationCertificate>,
@@ -206,4 +206,60 @@ impl Certificate {
             })
             .reduce(f64::max)
     }
+}
+
+/// The whole certificate.
+pub fn certificate_json(certificate: &Certificate) -> Value {
+    json!({
+        "tolerance": certificate.tolerance.to_string(),
+        "tolerance_is": match certificate.tolerance {
+            Tolerance::ShareOfRms(_) => "share of the root mean square of each ddz over the recordings",
+            Tolerance::Absolute(_) => "scaled units per s^2",
+        },
+        "terms": certificate.terms(),
+        "digits": certificate.digits(),
+        "operations": certificate.operations(),
+        "largest_bound_share_of_rms": certificate.largest_bound_share(),
+        "largest_measured_share_of_rms": certificate.largest_measured_share(),
+        "phases": certificate.phases,
+        "exact": certificate.exact,
+    })
+}
+
+/// `ddz1` for the first latent coordinate.
+fn equation<S: Serializer>(output: &usize, to: S) -> Result<S::Ok, S::Error> {
+    to.collect_str(&format_args!("ddz{}", output + 1))
+}
+
+/// The lower and the upper end of an interval.
+fn ends<S: Serializer>(interval: &Interval, to: S) -> Result<S::Ok, S::Error> {
+    [interval.lo(), interval.hi()].serialize(to)
+}
+
+/// Ranges under their variables' names.
+fn ranges<S: Serializer>(
+    domain: &Option<Vec<(String, Interval)>>,
+    to: S,
+) -> Result<S::Ok, S::Error> {
+    let Some(ranges) = domain else {
+        return to.serialize_none();
+    };
+    to.collect_map((ranges.iter()).map(|(name, range)| (name, [range.lo(), range.hi()])))
+}
+
+/// Names of variables.
+fn names<S: Serializer>(lost: &[LatentVariable], to: S) -> Result<S::Ok, S::Error> {
+    to.collect_seq(lost.iter().map(ToString::to_string))
+}
+
+/// The kind of a change, with the digits of a rounding.
+fn kind<S: Serializer>(kind: &ChangeKind, to: S) -> Result<S::Ok, S::Error> {
+    let (kind, digits) = match kind {
+        ChangeKind::Dropped => ("dropped", None),
+        ChangeKind::Constant => ("constant", None),
+        ChangeKind::Linear => ("linear", None),
+        ChangeKind::Quadratic => ("quadratic", None),
+        ChangeKind::Rounded { digits } => ("rounded", Some(digits)),
+    };
+    json!({ "kind": kind, "digits": digits }).serialize(to)
 }

@@ -101,16 +101,11 @@ impl Domain {
         margin: f64,
     ) -> Result<Self, SimplifyError> {
         let boxes = samples.phases.iter().map(|samples| {
-            (samples.column_iter())
-                .map(|point| {
-                    point
-                        .iter()
-                        .copied()
-                        .map(Interval::point)
-                        .collect::<Vec<_>>()
-                })
-                .reduce(|all, point| all.into_iter().zip(point).map(|(a, b)| a.hull(b)).collect())
-                .map(|ranges| ranges.into_iter().map(|r| widened(r, margin)).collect())
+            let ranges = samples.row_iter().map(|row| {
+                let points = row.iter().copied().map(Interval::point);
+                points.reduce(Interval::hull).map(|r| widened(r, margin))
+            });
+            ranges.collect()
         });
         Self::new(model, boxes.collect())
     }
@@ -127,10 +122,7 @@ impl Domain {
         };
         let mut tables: BTreeMap<String, BTreeMap<String, [f64; 2]>> =
             toml::from_str(text).map_err(|error| refused(error.to_string()))?;
-        let names = model
-            .phases()
-            .iter()
-            .map(|phase| format!("[{}]", phase.name));
+        let names = (model.phases().iter()).map(|phase| format!("[{}]", phase.name));
         let expected = names.collect::<Vec<_>>().join(" or ");
         let mut boxes = Vec::new();
         for phase in model.phases() {
@@ -185,13 +177,10 @@ impl Domain {
     /// # Panics
     /// If there is no such phase.
     pub fn contains(&self, phase: usize, point: impl Iterator<Item = f64>) -> bool {
-        let Some(ranges) = self.phase(phase) else {
-            return false;
+        let is_inside = |ranges: &[Interval]| {
+            (ranges.iter().zip(point)).all(|(range, value)| range.contains(value))
         };
-        ranges
-            .iter()
-            .zip(point)
-            .all(|(range, value)| range.contains(value))
+        self.phase(phase).is_some_and(is_inside)
     }
 
     /// Values of the terms of `library` at the samples of a phase that lie in its box: one row per

@@ -82,10 +82,9 @@ impl Equation {
 
     /// Simplifies an equation so that the sum of its changes' errors stays within `allowed`.
     pub fn simplified(mut self, terms: &mut Terms<'_>, allowed: f64) -> Self {
-        let equation = &mut self;
-        equation.remove_terms(terms, REMOVAL_SHARE * allowed);
-        equation.fold_functions(terms, REMOVAL_SHARE * allowed);
-        equation.round(terms, allowed);
+        self.remove_terms(terms, REMOVAL_SHARE * allowed);
+        self.fold_functions(terms, REMOVAL_SHARE * allowed);
+        self.round(terms, allowed);
         self
     }
 

@@ -11,15 +11,11 @@ use super::tables::{
 use crate::artifact;
 use crate::equations::ExactStep;
 use crate::model::ReducedModel;
-use crate::symbolic::Interval;
 use crate::typeset::Table;
 
 /// What phases no longer depend on, a sentence each without its stop.
 pub fn lost_words(certificate: &Certificate) -> Vec<String> {
-    let phases = certificate
-        .phases
-        .iter()
-        .filter(|phase| !phase.lost.is_empty());
+    let phases = (certificate.phases.iter()).filter(|phase| !phase.lost.is_empty());
     let sentence = |phase: &PhaseCertificate| {
         let names: Vec<String> = phase.lost.iter().map(ToString::to_string).collect();
         format!(
@@ -164,12 +160,11 @@ fn domain(phase: &PhaseCertificate) -> String {
     if phase.samples_outside > 0 {
         let _ = write!(text, " and {} outside", phase.samples_outside);
     }
-    let range =
-        |of: fn(&Interval) -> f64| ranges.iter().map(move |(_, range)| of(range).to_string());
-    let mut table = Table::default();
-    table.column("variable", "", ranges.iter().map(|(variable, _)| variable));
-    table.column("from", "", range(|range| range.lo()));
-    table.column("to", "", range(|range| range.hi()));
+    let table = Table::of(ranges)
+        .column("variable", "", |(variable, _)| variable)
+        .column("from", "", |(_, range)| range.lo().to_string())
+        .column("to", "", |(_, range)| range.hi().to_string())
+        .table();
     text + ":\n\n" + &table.markdown() + "\n"
 }
 

@@ -36,11 +36,9 @@
 //! ```
 
 mod certificate;
-mod count;
 mod domain;
 mod equation;
 mod error;
-mod json;
 mod markdown;
 mod measure;
 mod printing;
@@ -57,14 +55,14 @@ mod tests;
 
 pub use certificate::{
     BeforeAfter, Certificate, Change, ChangeKind, Effect, EquationCertificate, PhaseCertificate,
+    certificate_json,
 };
 pub use domain::{Domain, MARGIN, Samples};
 pub use error::SimplifyError;
-pub use json::{certificate_json, rollouts_json};
 pub use markdown::{lost_words, markdown};
 pub use measure::Measured;
 pub use printing::{PrintedEquation, printed};
-pub use rollouts::{RolloutBasis, RolloutEffect, RolloutErrors};
+pub use rollouts::{RolloutBasis, RolloutEffect, RolloutErrors, rollouts_json};
 pub use run::{Simplified, simplify};
 pub use tables::{bound_words, change_table, equation_table, rollout_table};
 pub use tolerance::{Tolerance, ToleranceError};

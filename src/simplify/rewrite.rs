@@ -45,11 +45,10 @@ pub(super) fn rewrites(workspace: &Workspace, ranges: &mut Ranges, row: usize) -
     ] {
         let Some(parts) = parts else { continue };
         let mut difference = vec![(row, Interval::point(1.0))];
-        difference.extend(
-            parts
-                .iter()
-                .map(|&(row, factor)| (row, Interval::point(-factor))),
-        );
+        let negated = parts
+            .iter()
+            .map(|&(row, factor)| (row, Interval::point(-factor)));
+        difference.extend(negated);
         let error = ranges.combination(&difference);
         if !error.magnitude().is_finite() {
             continue;
@@ -101,7 +100,7 @@ fn slopes(
         if half == 0.0 || rise.abs() <= WORTHWHILE * size {
             continue;
         }
-        parts.push((workspace.linear(symbol)?, rise / (2.0 * half)));
+        parts.push((workspace.power(Some(symbol), 1)?, rise / (2.0 * half)));
     }
     let is_line = !parts.is_empty() && parts.iter().all(|part| part.1.is_finite());
     is_line.then_some(parts)
@@ -128,9 +127,9 @@ fn parabola(
     if !curvature.is_finite() || !slope.is_finite() || curvature == 0.0 {
         return None;
     }
-    let mut parts = vec![(workspace.square(symbol)?, curvature)];
+    let mut parts = vec![(workspace.power(Some(symbol), 2)?, curvature)];
     if slope.abs() > 1e-9 * (curvature * half).abs() {
-        parts.push((workspace.linear(symbol)?, slope));
+        parts.push((workspace.power(Some(symbol), 1)?, slope));
     }
     Some(parts)
 }

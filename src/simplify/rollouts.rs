@@ -1,5 +1,7 @@
 //! The effect of simplification on rollouts over recordings.
 
+use serde_json::{Map, Value, json};
+
 use super::domain::Domain;
 use crate::evaluate::CoordinateSums;
 use crate::evaluate::EvaluateError;
@@ -122,4 +124,22 @@ fn body(model: &ReducedModel) -> impl Iterator<Item = (usize, String, String)> +
         .flat_map(|state| state.names.iter().zip(&state.units).enumerate())
         .filter(|(_, (name, _))| name.starts_with(BODY))
         .map(|(index, (name, unit))| (index, name.clone(), unit.clone()))
+}
+
+/// The effect on rollouts; keys are the coordinates' names.
+pub fn rollouts_json(effect: &RolloutEffect) -> Value {
+    let of = |errors: &RolloutErrors| -> Map<String, Value> {
+        let named = effect.names.iter().zip(&errors.rms);
+        let entry = |rms: &[Option<f64>; 2]| json!({ "full": rms[0], "restarted": rms[1] });
+        named
+            .map(|(name, rms)| (name.clone(), entry(rms)))
+            .collect()
+    };
+    json!({
+        "restart_every_s": effect.restart_every_s,
+        "rms_before": of(&effect.before),
+        "rms_after": of(&effect.after),
+        "diverged": { "full": effect.after.diverged[0], "restarted": effect.after.diverged[1] },
+        "share_outside_domain": { "full": effect.after.outside[0], "restarted": effect.after.outside[1] },
+    })
 }

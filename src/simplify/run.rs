@@ -1,12 +1,13 @@
 //! From a model, a domain and a tolerance to a simplified model and its certificate.
 
+use std::collections::BTreeSet;
+
 use nalgebra::DMatrix;
 use serde_json::{Value, json};
 
 use super::certificate::{
     BeforeAfter, Certificate, Change, Effect, EquationCertificate, PhaseCertificate,
 };
-use super::count::{digits, operations, variables};
 use super::domain::{Domain, Samples};
 use super::equation::{Equation, Step, Terms, is_same_decimal};
 use super::error::SimplifyError;
@@ -15,9 +16,11 @@ use super::tolerance::Tolerance;
 use super::workspace::Workspace;
 use crate::artifact;
 use crate::equations::Equations;
+use crate::ir::{Program, Statement};
+use crate::lower::{self, Form};
 use crate::model::{LatentVariable, ReducedModel};
 use crate::robot::{BODY_Z, GRAVITY_M_S2};
-use crate::symbolic::Interval;
+use crate::symbolic::{Interval, SymbolId};
 
 /// What the search may use is lowered to this share of itself until the final evaluation confirms
 /// the tolerance.
@@ -317,4 +320,39 @@ impl<'a> PhaseProblem<'a> {
             measured: differences.measured(&self.theta),
         }
     }
+}
+
+/// Significant decimal digits of the shortest texts that read back as the coefficients.
+fn digits(xi: &[f64]) -> usize {
+    let active = xi.iter().filter(|&&coefficient| coefficient != 0.0);
+    let of = |coefficient: &f64| {
+        let text = format!("{coefficient:e}");
+        let mantissa = text.split('e').next().unwrap_or_default();
+        mantissa.chars().filter(char::is_ascii_digit).count()
+    };
+    active.map(of).sum()
+}
+
+/// Operations of the straight-line code of `ddz`.
+fn operations(system: &Equations<'_>, phase: usize) -> Result<usize, SimplifyError> {
+    let program: Program = lower::dynamics(system, phase, Form::StraightLine)?;
+    let counted = program.statements().iter().enumerate();
+    Ok(counted
+        .map(|(index, statement)| match statement {
+            Statement::Constant(_) | Statement::Input { .. } | Statement::Constants { .. } => 0,
+            _ => program.values_of(index).len(),
+        })
+        .sum())
+}
+
+/// The variables that any `ddz` of a phase depends on, in the order of [`LatentVariable::all`].
+fn variables(system: &Equations<'_>, phase: usize) -> Vec<LatentVariable> {
+    let summands = system.phases()[phase].ddz.iter().flatten();
+    let terms: BTreeSet<usize> = summands.map(|summand| summand.term).collect();
+    let symbols: BTreeSet<SymbolId> = (terms.into_iter())
+        .flat_map(|term| system.pool().symbols_of(system.terms()[term].expr()))
+        .collect();
+    LatentVariable::all(system.latent_dim())
+        .filter(|variable| symbols.contains(&system.symbol(*variable)))
+        .collect()
 }

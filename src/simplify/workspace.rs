@@ -16,7 +16,7 @@ pub(super) struct Workspace {
     library: Library,
     /// Number of the equations' own terms; the others are appended.
     original: usize,
-    /// Rows of powers of variables; the constant is the power 0 of no variable.
+    /// Rows by variable and exponent.
     powers: BTreeMap<(Option<SymbolId>, i64), usize>,
 }
 
@@ -66,19 +66,14 @@ impl Workspace {
         self.library.terms()[row].text()
     }
 
+    /// The row of a power of a variable, 1 or 2, or of the constant, the power 0 of none.
+    pub fn power(&self, of: Option<SymbolId>, exponent: i64) -> Option<usize> {
+        self.powers.get(&(of, exponent)).copied()
+    }
+
     /// The row of `1`.
     pub fn constant(&self) -> Option<usize> {
-        self.powers.get(&(None, 0)).copied()
-    }
-
-    /// The row of a variable itself.
-    pub fn linear(&self, symbol: SymbolId) -> Option<usize> {
-        self.powers.get(&(Some(symbol), 1)).copied()
-    }
-
-    /// The row of a variable's square.
-    pub fn square(&self, symbol: SymbolId) -> Option<usize> {
-        self.powers.get(&(Some(symbol), 2)).copied()
+        self.power(None, 0)
     }
 
     /// Ranges over a box, `3 latent_dim` intervals.

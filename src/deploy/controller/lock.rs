@@ -57,40 +57,30 @@ impl Lock<'static> {
 impl<'a> Lock<'a> {
     /// The version of a direct dependency of romc.
     pub fn version(&self, name: &str) -> &'a str {
-        self.find(&self.direct(name)).version
+        self.packages[self.position(self.direct(name))].version
     }
 
     /// The lock file of a controller whose model's crate is `name`.
     pub fn text(&self, banner: &str, name: &str) -> String {
-        let mut dependencies: Vec<String> = DIRECT.iter().map(|name| self.direct(name)).collect();
+        let mut dependencies = DIRECT.map(|name| self.direct(name)).to_vec();
         let mut needed = BTreeSet::new();
-        let mut open: Vec<usize> = (dependencies.iter())
-            .map(|name| self.position(name))
-            .collect();
-        while let Some(position) = open.pop() {
+        let mut open = dependencies.clone();
+        while let Some(spelled) = open.pop() {
+            let position = self.position(spelled);
             if needed.insert(position) {
-                let dependencies = &self.packages[position].dependencies;
-                open.extend(dependencies.iter().map(|name| self.position(name)));
+                open.extend(&self.packages[position].dependencies);
             }
         }
-        let own = |name: &str, dependencies: String| {
-            format!("name = \"{name}\"\nversion = \"0.1.0\"{dependencies}")
-        };
-        dependencies.push(name.to_owned());
-        dependencies.sort();
-        let list: String = dependencies
-            .iter()
-            .map(|name| format!(" \"{name}\",\n"))
-            .collect();
-        let mut texts: Vec<String> = (needed.iter())
-            .map(|&position| self.packages[position].text.to_owned())
-            .collect();
-        texts.push(own(name, String::new()));
-        texts.push(own(
-            &format!("{name}-controller"),
-            format!("\ndependencies = [\n{list}]"),
-        ));
-        texts.sort();
+        dependencies.push(name);
+        dependencies.sort_unstable();
+        let list = dependencies.iter().map(|name| format!(" \"{name}\",\n"));
+        let list = list.collect::<String>();
+        let own = format!("name = \"{name}\"\nversion = \"0.1.0\"");
+        let controller =
+            format!("name = \"{name}-controller\"\nversion = \"0.1.0\"\ndependencies = [\n{list}]");
+        let mut texts = vec![own.as_str(), &controller];
+        texts.extend(needed.iter().map(|&position| self.packages[position].text));
+        texts.sort_unstable();
         let packages: String = texts
             .iter()
             .map(|text| format!("\n[[package]]\n{text}\n"))
@@ -99,29 +89,22 @@ impl<'a> Lock<'a> {
     }
 
     /// A direct dependency of the crate with the controller, as its own entry spells it, with a version if it needs one.
-    fn direct(&self, name: &str) -> String {
-        let own = self.find("romc-motion");
-        own.dependencies
-            .iter()
-            .find(|dependency| dependency.split(' ').next() == Some(name))
-            .map(|dependency| (*dependency).to_owned())
+    fn direct(&self, name: &str) -> &'a str {
+        let own = &self.packages[self.position("romc-motion")].dependencies;
+        let is_named = |dependency: &&&str| dependency.split(' ').next() == Some(name);
+        own.iter()
+            .find(is_named)
             .expect("the controller depends on it")
     }
 
     fn position(&self, spelled: &str) -> usize {
         let mut words = spelled.split(' ');
         let (name, version) = (words.next(), words.next());
-        self.packages
-            .iter()
-            .position(|package| {
-                Some(package.name) == name
-                    && version.is_none_or(|version| version == package.version)
-            })
-            .expect("the lock file has all that its entries name")
-    }
-
-    fn find(&self, spelled: &str) -> &Package<'a> {
-        &self.packages[self.position(spelled)]
+        let is_it = |package: &Package<'_>| {
+            name == Some(package.name) && version.is_none_or(|version| version == package.version)
+        };
+        let position = self.packages.iter().position(is_it);
+        position.expect("the lock file has all that its entries name")
     }
 }
 

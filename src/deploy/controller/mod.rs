@@ -8,6 +8,8 @@ mod control_model;
 mod lock;
 mod sources;
 
+use std::ffi::CStr;
+
 use askama::Template;
 
 use crate::codegen::interface::ModelInterface;
@@ -24,28 +26,59 @@ use crate::robot::{InputRule, Leg, Robot, STATE_DIM, WrenchFrame};
 use control_model::ControlModelText;
 use lock::Lock;
 
-/// What the files of a controller's project take from the model, the robot and romc.
-struct Facts<'a> {
-    model: &'a str,
-    name: &'a str,
-    upper: String,
-    robot: &'a str,
-    latent_dim: usize,
-    state_dim: usize,
-    state_names: String,
-    input_names: String,
-    joint_names: String,
+/// What the files of a controller, as a crate or in C, take from the model, the robot and romc.
+pub(super) struct Facts<'a> {
+    pub(super) model: &'a str,
+    pub(super) name: &'a str,
+    pub(super) upper: String,
+    pub(super) robot: &'a str,
+    pub(super) latent_dim: usize,
+    pub(super) state_dim: usize,
+    pub(super) state_names: String,
+    pub(super) input_names: String,
+    pub(super) joint_names: String,
     /// How `u` comes from torques, lines of a comment.
-    input_is: String,
+    pub(super) input_is: String,
     /// Constant and value of every code.
-    codes: Vec<(String, i32)>,
-    texts: Vec<(i32, String)>,
-    defaults: Settings,
+    pub(super) codes: Vec<(String, i32)>,
+    /// Every code with its text.
+    pub(super) texts: Vec<(i32, String)>,
+    pub(super) defaults: Settings,
     link_m: String,
     rust_version: &'static str,
-    clarabel: &'a str,
-    nalgebra: &'a str,
-    thiserror: &'a str,
+    clarabel: &'static str,
+    nalgebra: &'static str,
+    thiserror: &'static str,
+}
+
+impl<'a> Facts<'a> {
+    pub(super) fn new(entries: &'a ModelInterface, plant: &'a ControlModel) -> Self {
+        let (name, robot, lock) = (entries.identifier.as_str(), plant.robot(), Lock::own());
+        let text = |code: &(i32, &CStr)| (code.0, code.1.to_string_lossy().into_owned());
+        let texts: Vec<(i32, String)> = TEXTS.iter().map(text).collect();
+        Self {
+            model: &entries.name,
+            name,
+            upper: name.to_ascii_uppercase(),
+            robot: robot.name(),
+            latent_dim: entries.latent_dim,
+            state_dim: STATE_DIM,
+            state_names: Robot::state_names().join(" "),
+            input_names: Robot::input_names().join(" "),
+            joint_names: robot.joint_names().join(" "),
+            input_is: input_in_words(plant.input_rule(), name),
+            codes: (texts.iter())
+                .map(|(code, text)| (constant(text), *code))
+                .collect(),
+            texts,
+            defaults: Settings::default(),
+            link_m: format!("{:?}", robot.geometry(Leg::FrontRight).lengths()[0]),
+            rust_version: env!("CARGO_PKG_RUST_VERSION"),
+            clarabel: lock.version("clarabel"),
+            nalgebra: lock.version("nalgebra"),
+            thiserror: lock.version("thiserror"),
+        }
+    }
 }
 
 templates! {
@@ -114,7 +147,7 @@ pub(super) fn plant(model: &ReducedModel) -> Result<ControlModel, EmitError> {
 }
 
 /// How the controller's inputs come from torques, for the header's first comment.
-pub(super) fn input_in_words(rule: &InputRule, name: &str) -> String {
+fn input_in_words(rule: &InputRule, name: &str) -> String {
     let torques = match rule.actuators() {
         None => "its torques are those of the motors",
         Some(_) => {
@@ -149,30 +182,8 @@ fn project(
     provenance: &str,
     jumps_a_plan: bool,
 ) -> Result<Vec<(String, String)>, EmitError> {
-    let name = entries.identifier.as_str();
-    let lock = Lock::own();
-    let facts = &Facts {
-        model: &entries.name,
-        name,
-        upper: name.to_ascii_uppercase(),
-        robot: plant.robot().name(),
-        latent_dim: entries.latent_dim,
-        state_dim: STATE_DIM,
-        state_names: Robot::state_names().join(" "),
-        input_names: Robot::input_names().join(" "),
-        joint_names: plant.robot().joint_names().join(" "),
-        input_is: input_in_words(plant.input_rule(), name),
-        codes: texts()
-            .map(|(code, text)| (constant(&text), code))
-            .collect(),
-        texts: texts().collect(),
-        defaults: Settings::default(),
-        link_m: format!("{:?}", plant.robot().geometry(Leg::FrontRight).lengths()[0]),
-        rust_version: env!("CARGO_PKG_RUST_VERSION"),
-        clarabel: lock.version("clarabel"),
-        nalgebra: lock.version("nalgebra"),
-        thiserror: lock.version("thiserror"),
-    };
+    let facts = &Facts::new(entries, plant);
+    let name = facts.name;
     let (hash, slashes) = (format!("# {provenance}"), format!("// {provenance}"));
     let [hash, slashes] = [hash.as_str(), &slashes];
     let block = &format!("/* {provenance} */");
@@ -193,22 +204,15 @@ fn project(
     let mut files: Vec<(String, String)> = (templates.into_iter())
         .map(|(path, text)| (path.replace("NAME", name), tidy(&text)))
         .collect();
-    files.push(("Cargo.lock".to_owned(), lock.text(hash, name)));
+    files.push(("Cargo.lock".to_owned(), Lock::own().text(hash, name)));
     for (path, text) in sources::LICENCES {
         files.push((path.to_owned(), text.to_owned()));
     }
     Ok(files)
 }
 
-/// Every code of the interface with its text.
-pub(super) fn texts() -> impl Iterator<Item = (i32, String)> {
-    TEXTS
-        .iter()
-        .map(|(code, text)| (*code, text.to_string_lossy().into_owned()))
-}
-
 /// The name of a code: the words of its text before the colon.
-pub(super) fn constant(text: &str) -> String {
+fn constant(text: &str) -> String {
     let word = text.split(':').next().unwrap_or(text);
     word.to_ascii_uppercase().replace(' ', "_")
 }

@@ -36,13 +36,8 @@ impl Jump {
         let mut recording = recording::read_from_bytes("test_01.csv.gz", SHIPPED)?;
         let segment = recording.segments.swap_remove(0);
         let (x, dx, torque) = (&segment.x, &segment.dx, &segment.torque_nm);
-        let what = "A jump of a simulated go1";
-        Ok(Self::of(
-            what,
-            &segment.time_s,
-            [x, dx, torque],
-            &segment.feet,
-        ))
+        let (what, time_s) = ("A jump of a simulated go1", &segment.time_s);
+        Ok(Self::of(what, time_s, [x, dx, torque], &segment.feet))
     }
 
     /// A jump of one's own.
@@ -86,15 +81,13 @@ impl Jump {
         let parts = all.split(|&k| model.phase_for(self.feet[k]).is_none());
         let part = parts.max_by_key(|part| part.len()).unwrap_or(&[]);
         if let [first, .., last] = *part {
-            let start = self.time_s[first];
-            self.time_s = self.time_s[first..=last]
-                .iter()
-                .map(|time| time - start)
-                .collect();
-            self.x = self.x[first..=last].to_vec();
-            self.dx = self.dx[first..=last].to_vec();
-            self.torque_nm = self.torque_nm[first..=last].to_vec();
-            self.feet = self.feet[first..=last].to_vec();
+            let part = first..=last;
+            let from_start = |time: &f64| time - self.time_s[first];
+            self.time_s = self.time_s[part.clone()].iter().map(from_start).collect();
+            self.x = self.x[part.clone()].to_vec();
+            self.dx = self.dx[part.clone()].to_vec();
+            self.torque_nm = self.torque_nm[part.clone()].to_vec();
+            self.feet = self.feet[part].to_vec();
         }
         self
     }

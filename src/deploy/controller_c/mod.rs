@@ -12,21 +12,21 @@ mod ros2_control;
 mod selftest;
 mod source;
 
+use std::ops::Deref;
+
 use askama::Template;
 
 use crate::codegen::interface::{ModelInterface, PhaseInterface};
 use crate::codegen::line_wrapping::tidy;
 use crate::codegen::{Precision, Units, c};
 use crate::deploy::EmitError;
-use crate::deploy::controller::{constant, input_in_words, plant, texts};
+use crate::deploy::controller::{self, plant};
 use crate::deploy::emit::{EmitOptions, compiled};
 use crate::equations::Equations;
 use crate::files::EmittedFile;
-use crate::mpc::interface::Settings;
 use crate::mpc::problem::StageRows;
 use crate::mpc::shared::torque_deviation;
 use crate::mpc::{ControlModel, ControlPhase, MpcError, MpcSettings};
-use crate::robot::{Robot, STATE_DIM};
 use jump::Jump;
 use numbers::Numbers;
 use source::Source;
@@ -36,16 +36,8 @@ const OTHER_ROWS: usize = 5;
 
 /// What all files take from model and robot.
 struct Facts<'a> {
+    controller: controller::Facts<'a>,
     banner: String,
-    model: &'a str,
-    name: &'a str,
-    upper: String,
-    robot: &'a str,
-    latent_dim: usize,
-    state_dim: usize,
-    state_names: String,
-    input_names: String,
-    input_is: String,
     real: &'static str,
     /// Torque limits, an initialiser in double precision.
     torque_limit: String,
@@ -54,17 +46,19 @@ struct Facts<'a> {
     joint_upper: String,
     /// Suffix of libm's functions.
     f: &'static str,
-    codes: Vec<(String, i32)>,
-    defaults: Settings,
     max_rows: usize,
     n_phases: usize,
     /// Whether the model knows what its states say of its inputs, in all phases.
     has_given_state: bool,
-    n_torque_stored: usize,
-    n_joint_stored: usize,
-    /// Rows of the rates of torques.
-    n_rate: usize,
-    n_rate_stored: usize,
+    rows: &'a StageRows,
+}
+
+impl<'a> Deref for Facts<'a> {
+    type Target = controller::Facts<'a>;
+
+    fn deref(&self) -> &Self::Target {
+        &self.controller
+    }
 }
 
 templates! {
@@ -121,7 +115,7 @@ pub fn emit(
     };
     let deviations: Vec<_> = (plant.phases().iter().map(deviation)).collect::<Result<_, _>>()?;
     let plant_of_lift = (&plant, deviations.as_slice());
-    let source = Source::new(facts, &entries, plant_of_lift, &rows, options.precision);
+    let source = Source::new(facts, &entries, plant_of_lift, options.precision);
     let jump = match &options.plan {
         Some(plan) => Jump::planned(plan),
         None => Jump::shipped()?.within(model),
@@ -154,25 +148,16 @@ pub fn emit(
 fn facts<'a>(
     entries: &'a ModelInterface,
     plant: &'a ControlModel,
-    rows: &StageRows,
+    rows: &'a StageRows,
     precision: Precision,
     provenance: &str,
 ) -> Facts<'a> {
-    let name = entries.identifier.as_str();
     let joint_limit = |side: fn(&(f64, f64)) -> f64| {
         Numbers(Precision::Double).vector(plant.robot().joint_limit_rad().iter().map(side))
     };
     Facts {
+        controller: controller::Facts::new(entries, plant),
         banner: format!("/* {provenance} */"),
-        model: &entries.name,
-        name,
-        upper: name.to_ascii_uppercase(),
-        robot: plant.robot().name(),
-        latent_dim: plant.latent_dim(),
-        state_dim: STATE_DIM,
-        state_names: Robot::state_names().join(" "),
-        input_names: Robot::input_names().join(" "),
-        input_is: input_in_words(plant.input_rule(), name),
         real: match precision {
             Precision::Double => "double",
             Precision::Single => "float",
@@ -185,19 +170,12 @@ fn facts<'a>(
             Precision::Double => "",
             Precision::Single => "f",
         },
-        codes: texts()
-            .map(|(code, text)| (constant(&text), code))
-            .collect(),
-        defaults: Settings::default(),
         max_rows: rows.torque.len() + rows.joint.len() + OTHER_ROWS,
         n_phases: plant.phases().len(),
         has_given_state: plant
             .phases()
             .iter()
             .all(|phase| phase.given_state.is_some()),
-        n_torque_stored: rows.torque.len().max(1),
-        n_joint_stored: rows.joint.len().max(1),
-        n_rate: rows.rate.len(),
-        n_rate_stored: rows.rate.len().max(1),
+        rows,
     }
 }

@@ -1,5 +1,7 @@
 //! Numbers as initialisers of C.
 
+use nalgebra::DMatrix;
+
 use crate::codegen::Precision;
 
 /// Numbers per line.
@@ -21,6 +23,12 @@ impl Numbers {
     /// `{1.0, 2.0}`; one zero if there are none, as C has no empty arrays.
     pub(super) fn vector(self, values: impl IntoIterator<Item = f64>) -> String {
         list(values.into_iter().map(|value| self.one(value)))
+    }
+
+    /// The first rows of a matrix.
+    pub(super) fn rows(self, matrix: &DMatrix<f64>, count: usize) -> String {
+        let row = |i| (0..matrix.ncols()).map(move |j| matrix[(i, j)]);
+        self.matrix((0..count).map(row))
     }
 
     /// Rows of vectors; one row of zeros if there are none.

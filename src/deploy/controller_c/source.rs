@@ -3,20 +3,20 @@
 use std::ops::Deref;
 
 use askama::Template;
+use nalgebra::DMatrix;
 
 use super::Facts;
 use super::legs::Legs;
 use super::numbers::{Numbers, integers, nested};
 use crate::codegen::Precision;
 use crate::codegen::interface::{ModelInterface, PhaseInterface};
-use crate::deploy::controller::texts;
-use crate::mpc::problem::{Row, StageRows, pairs};
+use crate::mpc::problem::{Row, pairs};
 use crate::mpc::shared::{
     DEVIATION_FLOOR, EFFECTIVENESS_RANGE, GAP, HALF_WINDOW_S, LARGEST_WEIGHT, LIFT_CURVATURE,
     LIFT_ITERATIONS, MOST_TURN_RAD, POSTURE_SHARE, PRIOR_WEIGHT, RATE_SOFTNESS, RATE_TOLERANCE,
     SLACK_PRICE, SOFTENED_FROM, STATE_REACH, STILL_SHARE, STILL_TIME_S, TOLERANCE,
 };
-use crate::mpc::{ControlModel, FallbackSettings, InputGivenState, MpcSettings};
+use crate::mpc::{ControlModel, ControlModelParts, FallbackSettings, InputGivenState, MpcSettings};
 use crate::robot::{DRY_SPEED_RAD_S, GRAVITY_M_S2, JOINT_DIM, SINGULAR_BOUND, WrenchFrame};
 use crate::solver::{
     AGAIN, COLD, FAR, FAR_CHANGE, LEFT, MARGIN, MARGIN_FACTOR, PATIENCE, SHORT_STEP, WARM,
@@ -36,9 +36,9 @@ const SINGLE_RATE: (f64, f64) = (1e-5, 1e-4);
 #[template(path = "controller_c/source.askama", config = "templates/askama.toml")]
 pub(super) struct Source<'a> {
     facts: &'a Facts<'a>,
-    n_torque: usize,
+    numbers: Numbers,
+    parts: &'a ControlModelParts,
     n_torque_pairs: usize,
-    n_joint: usize,
     max_nnz: usize,
     has_actuators: bool,
     given_state: String,
@@ -51,14 +51,7 @@ pub(super) struct Source<'a> {
     torque_deviation: String,
     weight_n: f64,
     fallback: FallbackSettings,
-    texts: Vec<(i32, String)>,
-    encoder: String,
-    encoder_bias: String,
-    decoder: String,
-    decoder_bias: String,
-    lift: String,
     force: String,
-    projection: String,
     phase_of_feet: String,
     is_grounded: String,
     input_mean: String,
@@ -101,15 +94,12 @@ impl<'a> Source<'a> {
     pub(super) fn new(
         facts: &'a Facts<'a>,
         entries: &'a ModelInterface,
-        (plant, deviations): (&ControlModel, &[[[f64; JOINT_DIM]; JOINT_DIM]]),
-        rows: &StageRows,
+        (plant, deviations): (&'a ControlModel, &[[[f64; JOINT_DIM]; JOINT_DIM]]),
         precision: Precision,
     ) -> Self {
-        let numbers = Numbers(precision);
+        let (numbers, rows) = (Numbers(precision), facts.rows);
         let (parts, robot) = (plant.parts(), plant.robot());
-        let matrix = |matrix: &nalgebra::DMatrix<f64>, count: usize| {
-            numbers.matrix((0..count).map(|i| (0..matrix.ncols()).map(move |j| matrix[(i, j)])))
-        };
+        let matrix = |matrix: &DMatrix<f64>| numbers.rows(matrix, facts.latent_dim);
         let row_matrix = |rows: &[Row]| numbers.matrix(rows.iter().map(|row| row.row.clone()));
         let limits = robot.joint_limit_rad();
         let weight_n = robot.mass_kg() * GRAVITY_M_S2;
@@ -119,15 +109,15 @@ impl<'a> Source<'a> {
         };
         let phases = plant.phases();
         let mpc = MpcSettings::default();
-        let of_given = |part: fn(&InputGivenState) -> &nalgebra::DMatrix<f64>| {
+        let of_given = |part: fn(&InputGivenState) -> &DMatrix<f64>| {
             let given = phases.iter().filter_map(|phase| phase.given_state.as_ref());
-            nested(given.map(|given| matrix(part(given), facts.latent_dim)))
+            nested(given.map(|given| matrix(part(given))))
         };
         Self {
             facts,
-            n_torque: rows.torque.len(),
+            numbers,
+            parts,
             n_torque_pairs: pairs(&rows.torque),
-            n_joint: rows.joint.len(),
             max_nnz: (entries.phases.iter())
                 .map(|phase| phase.pattern.len())
                 .fold(1, usize::max),
@@ -143,28 +133,17 @@ impl<'a> Source<'a> {
             torque_deviation: nested(deviations.iter().map(|rows| numbers.matrix(*rows))),
             weight_n,
             fallback: mpc.fallback,
-            texts: texts().collect(),
-            encoder: matrix(&parts.encoder, facts.latent_dim),
-            encoder_bias: numbers.vector(parts.encoder_bias.iter().copied()),
-            decoder: matrix(&parts.decoder, JOINT_DIM),
-            decoder_bias: numbers.vector(parts.decoder_bias.iter().take(JOINT_DIM).copied()),
-            lift: matrix(&parts.lift, JOINT_DIM),
             force: numbers.matrix((0..3).map(|axis| {
                 let row = parts.lift.row(JOINT_DIM + axis);
                 row.iter().map(|entry| entry / weight_n).collect::<Vec<_>>()
             })),
-            projection: matrix(&parts.projection, facts.latent_dim),
             phase_of_feet: integers(
                 (parts.phase_of_feet.iter()).map(|phase| phase.map_or(-1, |phase| phase as i64)),
             ),
             is_grounded: integers(phases.iter().map(|phase| i64::from(phase.is_grounded))),
             input_mean: numbers
                 .matrix(phases.iter().map(|phase| phase.latent_mean.iter().copied())),
-            input_root: nested(
-                phases
-                    .iter()
-                    .map(|phase| matrix(&phase.latent_root, facts.latent_dim)),
-            ),
+            input_root: nested(phases.iter().map(|phase| matrix(&phase.latent_root))),
             torque_rows: row_matrix(&rows.torque),
             torque_bound: numbers.vector(rows.torque.iter().map(|row| row.bound)),
             torque_per_loss: numbers.vector(rows.torque.iter().map(|row| row.per_loss)),

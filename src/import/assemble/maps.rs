@@ -80,12 +80,7 @@ impl<'a> Assembly<'a, '_> {
         let mut layers = Vec::with_capacity(tensors.len());
         for (place, &(assigned, bias)) in tensors.iter().enumerate() {
             let shape = shape_of(part, assigned).expect("the orientation is of matrices");
-            let stored = self.read(assigned, shape)?;
-            let matrix = match layout {
-                Layout::Row => stored.transpose(),
-                _ => stored,
-            };
-            self.note_used(assigned, layout);
+            let matrix = self.read(assigned, shape, layout)?;
             let bias = match bias {
                 Some(bias) => self.list(bias, matrix.nrows())?,
                 None => {

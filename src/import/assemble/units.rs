@@ -19,21 +19,21 @@ impl<'a> Assembly<'a, '_> {
         let state = self.one_of(&Role::StateScaling, &Role::StateStd)?;
         let input = self.one_of(&Role::InputScaling, &Role::InputStd)?;
         let given = self.options.input_scaling.clone();
-        let (state, input) = match (state, input, &self.options.scaling) {
-            (None, None, scaling) => {
-                if given.is_some() {
+        let known = self.options.scaling.clone();
+        if known.is_some() && (state.is_some() || input.is_some()) {
+            let found = "factors here and in tensors";
+            return Err(ImportFault::option("--scaling", found, "one of the two"));
+        }
+        let Some(state) = state else {
+            return match (input, given) {
+                (Some(_), _) => Err(self.tensors.missing(&Role::StateScaling)),
+                (None, None) => Ok(known),
+                (None, Some(_)) => {
                     let found = "factors of the inputs alone";
                     let expected = "--scaling, or a tensor scaling.state or std.state";
-                    return Err(ImportFault::option("--input-scaling", found, expected));
+                    Err(ImportFault::option("--input-scaling", found, expected))
                 }
-                return Ok(scaling.clone());
-            }
-            (_, _, Some(_)) => {
-                let found = "factors here and in tensors";
-                return Err(ImportFault::option("--scaling", found, "one of the two"));
-            }
-            (None, Some(_), None) => return Err(self.tensors.missing(&Role::StateScaling)),
-            (Some(state), input, None) => (state, input),
+            };
         };
         let input = match (input, given) {
             (Some(_), Some(_)) => {

@@ -39,12 +39,8 @@ fn with_each(tokens: &[Token], find: fn(&[Token], usize) -> Option<Derivative>) 
 
 /// A derivative written as a fraction at `at`.
 fn fraction(tokens: &[Token], at: usize) -> Option<Derivative> {
-    let is_fraction = ["frac", "dfrac", "tfrac"]
-        .iter()
-        .any(|name| tokens[at].is_command(name));
-    if !is_fraction {
-        return None;
-    }
+    let fractions = ["frac", "dfrac", "tfrac"];
+    (fractions.iter().any(|name| tokens[at].is_command(name))).then_some(())?;
     let (top, after_top) = group(tokens, at + 1)?;
     let (bottom, behind) = group(tokens, after_top)?;
     let of_top = differential(top, 0)?;
@@ -85,23 +81,14 @@ fn ends_product(tokens: &[Token]) -> bool {
 
 /// The place behind the `d` of a differential, upright or not, or its `\partial`.
 fn differential(tokens: &[Token], at: usize) -> Option<usize> {
-    let is_d = |at: usize| {
-        let is_sign =
-            |token: &Token| token.kind == Kind::Character('d') || token.is_command("partial");
-        tokens.get(at).is_some_and(is_sign)
-    };
-    if is_d(at) {
-        return Some(at + 1);
-    }
-    let Kind::Command(font) = &tokens.get(at)?.kind else {
-        return None;
-    };
-    if !has(FONTS, font) {
-        return None;
-    }
-    match group(tokens, at + 1) {
-        Some((inside, behind)) => (inside.len() == 1 && is_d(at + 2)).then_some(behind),
-        None => is_d(at + 1).then_some(at + 2),
+    let is_d = |token: &Token| token.kind == Kind::Character('d') || token.is_command("partial");
+    match &tokens.get(at)?.kind {
+        _ if is_d(&tokens[at]) => Some(at + 1),
+        Kind::Command(font) if has(FONTS, font) => match argument(tokens, at + 1)? {
+            ([sign], behind) if is_d(sign) => Some(behind),
+            _ => None,
+        },
+        _ => None,
     }
 }
 
@@ -109,13 +96,11 @@ fn differential(tokens: &[Token], at: usize) -> Option<usize> {
 fn power(tokens: &[Token], at: usize) -> (usize, usize) {
     let found = || {
         (tokens.get(at)?.kind == Kind::Superscript).then_some(())?;
-        let (number, behind) = match group(tokens, at + 1) {
-            Some(([number], behind)) => (number, behind),
-            Some(_) => return None,
-            None => (tokens.get(at + 1)?, at + 2),
-        };
-        match &number.kind {
-            Kind::Number(text) => Some((text.parse().ok()?, behind)),
+        match argument(tokens, at + 1)? {
+            ([number], behind) => match &number.kind {
+                Kind::Number(text) => Some((text.parse().ok()?, behind)),
+                _ => None,
+            },
             _ => None,
         }
     };
@@ -131,6 +116,11 @@ fn group(tokens: &[Token], at: usize) -> Option<(&[Token], usize)> {
     Some((&tokens[at + 1..behind - 1], behind))
 }
 
+/// What stands in a group, or one token, and the place behind it.
+fn argument(tokens: &[Token], at: usize) -> Option<(&[Token], usize)> {
+    group(tokens, at).or_else(|| Some((tokens.get(at..=at)?, at + 1)))
+}
+
 /// The place behind the letter or word at `at` with its dots and subscript.
 fn variable_end(tokens: &[Token], at: usize) -> Option<usize> {
     let end = letter_end(tokens, at)?;
@@ -142,7 +132,7 @@ fn letter_end(tokens: &[Token], at: usize) -> Option<usize> {
         Kind::Character(letter) if letter.is_ascii_alphabetic() => Some(at + 1),
         Kind::Command(name) if is_greek(name) => Some(at + 1),
         Kind::Command(name) if has(FONTS, name) || has("dot ddot", name) => {
-            argument_end(tokens, at + 1)
+            Some(argument(tokens, at + 1)?.1)
         }
         Kind::Open => {
             let (inside, behind) = group(tokens, at)?;
@@ -154,14 +144,7 @@ fn letter_end(tokens: &[Token], at: usize) -> Option<usize> {
 
 fn subscript_end(tokens: &[Token], at: usize) -> Option<usize> {
     (tokens.get(at)?.kind == Kind::Subscript).then_some(())?;
-    argument_end(tokens, at + 1)
-}
-
-fn argument_end(tokens: &[Token], at: usize) -> Option<usize> {
-    match group(tokens, at) {
-        Some((_, behind)) => Some(behind),
-        None => tokens.get(at).map(|_| at + 1),
-    }
+    Some(argument(tokens, at + 1)?.1)
 }
 
 /// A variable with primes at `at`.
@@ -186,10 +169,9 @@ fn primes(tokens: &[Token], at: usize) -> Option<(usize, usize)> {
     let is_mark = |token: &&Token| matches!(token.kind, Kind::Character('\'' | '′' | '’'));
     let marks = tokens[at..].iter().take_while(is_mark).count();
     let (count, behind) = match tokens.get(at).map(|token| &token.kind) {
-        Some(Kind::Superscript) => match group(tokens, at + 1) {
-            Some((inside, behind)) if inside.iter().all(is_prime) => (inside.len(), behind),
-            Some(_) => return None,
-            None => (usize::from(is_prime(tokens.get(at + 1)?)), at + 2),
+        Some(Kind::Superscript) => match argument(tokens, at + 1)? {
+            (inside, behind) if inside.iter().all(is_prime) => (inside.len(), behind),
+            _ => return None,
         },
         _ => (marks, at + marks),
     };

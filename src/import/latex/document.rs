@@ -5,13 +5,16 @@ use std::collections::HashMap;
 use super::super::equations::refused;
 use super::super::error::ImportError;
 use super::derivatives::with_dots;
+use super::reader::has;
 use super::token::{Kind, Token, group_length};
 
 /// Most tokens that macros may make of one display.
 const MAX_EXPANDED: usize = 200_000;
-/// Environments of mathematics of their own.
-const DISPLAYS: &str = "equation align gather multline eqnarray flalign alignat displaymath dmath \
-    dgroup cases dcases aligned alignedat split gathered IEEEeqnarray";
+/// Environments that arrange lines of mathematics, in a display of their own or inside one.
+pub(super) const LAYOUTS: &str = "equation align gather multline eqnarray flalign alignat displaymath dmath \
+    dgroup aligned alignedat split gathered IEEEeqnarray";
+/// Environments that are displays of their own as well.
+const CASES: &str = "cases dcases";
 /// Environments that begin with an argument: a number of columns, or what each column is.
 pub(super) const WITH_COLUMNS: &str = "alignat alignedat array IEEEeqnarray";
 /// Environments whose contents are no LaTeX.
@@ -47,8 +50,7 @@ struct Macro {
 
 /// Whether `list` has the word `name`, its star aside.
 pub(super) fn is_one_of(list: &str, name: &str) -> bool {
-    let name = name.trim_end_matches('*');
-    list.split_whitespace().any(|word| word == name)
+    has(list, name.trim_end_matches('*'))
 }
 
 /// Finds the displays.
@@ -61,42 +63,40 @@ pub(super) fn items(file: &str, tokens: &[Token]) -> Result<Vec<Item>, ImportErr
     };
     let mut items = Vec::new();
     while let Some(token) = scanner.next() {
-        let found = match &token.kind {
+        let end = match &token.kind {
             Kind::Comment(text) => {
                 items.push(Item::Comment(text.clone()));
                 continue;
             }
-            Kind::Begin(name) if is_one_of(DISPLAYS, name) => {
+            Kind::Begin(name) if is_one_of(LAYOUTS, name) || is_one_of(CASES, name) => {
                 if is_one_of(WITH_COLUMNS, name) && scanner.peek() == Some(&Kind::Open) {
                     scanner.argument();
                 }
-                Some(scanner.until(token, &Kind::End(name.clone()), Some(&token.kind))?)
+                Kind::End(name.clone())
             }
             Kind::Begin(name) if is_one_of(VERBATIM, name) => {
                 scanner.until(token, &Kind::End(name.clone()), None)?;
-                None
+                continue;
             }
-            Kind::Command(name) if name == "[" => {
-                Some(scanner.until(token, &Kind::Command("]".to_owned()), None)?)
-            }
-            Kind::Display => Some(scanner.until(token, &Kind::Display, None)?),
+            Kind::Command(name) if name == "[" => Kind::Command("]".to_owned()),
+            Kind::Display => Kind::Display,
             Kind::Dollar => {
                 items.extend(scanner.inline(&Kind::Dollar));
-                None
+                continue;
             }
             Kind::Command(name) if name == "(" => {
                 items.extend(scanner.inline(&Kind::Command(")".to_owned())));
-                None
+                continue;
             }
             Kind::Command(name) => {
                 scanner.definition(name);
-                None
+                continue;
             }
-            _ => None,
+            _ => continue,
         };
-        if let Some(display) = found {
-            items.push(Item::Display(with_dots(&scanner.expanded(display)?)));
-        }
+        let nested = matches!(token.kind, Kind::Begin(_)).then_some(&token.kind);
+        let display = scanner.until(token, &end, nested)?;
+        items.push(Item::Display(with_dots(&scanner.expanded(display)?)));
     }
     Ok(items)
 }

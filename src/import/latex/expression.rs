@@ -9,12 +9,25 @@ use super::token::{Kind, Token};
 use super::variables::function;
 use crate::model::LatentVariable;
 
+/// What can stand where a factor begins.
+const FACTOR: &str = "a number, a variable, a function or a group";
 /// Commands whose argument is text.
 const WORDS: &str = "text textrm textit mbox intertext shortintertext";
 
 impl Reader<'_> {
+    /// The left sides `\ddot z_1 =`, each with its place and the place behind it.
+    pub(super) fn left_sides(&mut self) -> Vec<(usize, Symbol, usize)> {
+        let is_dotted = |at: &usize| self.tokens[*at].is_command("ddot");
+        let places: Vec<usize> = (0..self.tokens.len()).filter(is_dotted).collect();
+        let left_side = |at| {
+            self.left_side(at)
+                .map(|(symbol, after)| (at, symbol, after))
+        };
+        places.into_iter().filter_map(left_side).collect()
+    }
+
     /// Reads `\ddot z_1 =` at `at`; the left side and the place behind it.
-    pub(super) fn left_side(&mut self, at: usize) -> Option<(Symbol, usize)> {
+    fn left_side(&mut self, at: usize) -> Option<(Symbol, usize)> {
         let (end, depth) = (self.end, self.depth);
         self.at = at;
         let symbol = self.symbol();
@@ -117,20 +130,19 @@ impl Reader<'_> {
         loop {
             let from = self.at;
             let place = self.here();
-            match self.next_kind() {
-                Some(Kind::Command(name)) if has("cdot times ast cdotp", &name) => {
-                    if last == Last::BareNumber {
-                        return self.unexpected(BARE);
-                    }
-                    self.at += 1;
-                    self.push(place, "*");
-                    self.signs();
-                    last = self.factor(false)?;
-                    after_slash = false;
+            let kind = self.next_kind();
+            let is_dot =
+                matches!(&kind, Some(Kind::Command(name)) if has("cdot times ast cdotp", name));
+            match kind {
+                Some(Kind::Command(_)) if is_dot && last == Last::BareNumber => {
+                    return self.unexpected(BARE);
                 }
-                Some(Kind::Character('*')) => {
+                Some(kind) if is_dot || kind == Kind::Character('*') => {
                     self.at += 1;
                     self.push(place, "*");
+                    if is_dot {
+                        self.signs();
+                    }
                     last = self.factor(false)?;
                     after_slash = false;
                 }
@@ -207,21 +219,24 @@ impl Reader<'_> {
         }
     }
 
+    /// Reads a number, a variable, a function or a group, each with its power.
     pub(super) fn factor(&mut self, leads: bool) -> Read<Last> {
-        const EXPECTED: &str = "a number, a variable, a function or a group";
         let place = self.here();
         let Some(token) = self.peek().cloned() else {
-            return self.unexpected(EXPECTED);
+            return self.unexpected(FACTOR);
         };
-        match &token.kind {
+        if let Some((name, after)) = self.function_name() {
+            self.at = after;
+            return self.call(place, &name);
+        }
+        let last = match &token.kind {
             Kind::Number(text) => {
                 self.at += 1;
                 let literal = self.literal(text, leads);
                 self.push(place, literal);
-                self.powers(place)?;
-                Ok(Last::Number)
+                Last::Number
             }
-            Kind::Command(name) if name == "num" => self.macro_number(place),
+            Kind::Command(name) if name == "num" => self.macro_number(place)?,
             Kind::Command(name) if has("frac dfrac tfrac cfrac nicefrac sfrac", name) => {
                 self.at += 1;
                 self.push(place, "((");
@@ -229,71 +244,65 @@ impl Reader<'_> {
                 self.push(place, ")/(");
                 let bottom = self.inside(|reader| reader.group_sum(false))?;
                 self.push(place, "))");
-                self.powers(place)?;
-                Ok(if (top, bottom) == (Last::Number, Last::Number) {
-                    Last::Number
-                } else {
-                    Last::Other
-                })
+                match (top, bottom) {
+                    (Last::Number, Last::Number) => Last::Number,
+                    _ => Last::Other,
+                }
             }
-            Kind::Command(name) if name == "sqrt" => self.root(place),
-            Kind::Command(name) if has("abs lvert vert", name) => self.absolute(place, name),
-            Kind::Character('|') => self.absolute(place, "|"),
+            Kind::Command(name) if name == "sqrt" => self.root(place)?,
+            Kind::Command(name) if has("abs lvert vert", name) => self.absolute(place, name)?,
+            Kind::Character('|') => self.absolute(place, "|")?,
             Kind::Command(name) if name == "left" && self.opens_bar() => {
-                self.absolute(place, "left")
+                self.absolute(place, "left")?
             }
-            Kind::Character('(' | '[') => self.parentheses(place),
-            Kind::Command(name) if name == "left" || name == "{" => self.parentheses(place),
-            Kind::Character('e')
-                if self.kind(self.at + 1) == Some(&Kind::Superscript)
-                    && self.names.variable("e", self.alone).is_none() =>
-            {
-                self.at += 2;
-                self.exponential(place)
-            }
-            _ => self.named(place, &token),
-        }
+            Kind::Character('(' | '[') => self.delimited(place)?,
+            Kind::Command(name) if name == "left" || name == "{" => self.delimited(place)?,
+            kind => self.variable_or_braces(place, kind)?,
+        };
+        self.powers(place)?;
+        Ok(last)
     }
 
-    /// A function, a variable, or a group in braces.
-    pub(super) fn named(&mut self, place: (usize, usize), token: &Token) -> Read<Last> {
-        if let Some((name, after)) = self.function_name() {
-            self.at = after;
-            return self.call(place, &name);
-        }
+    /// A variable, or a group in braces, which stands for what is in it; sums need parentheses that are printed.
+    fn variable_or_braces(&mut self, place: (usize, usize), kind: &Kind) -> Read<Last> {
         let start = self.at;
         if let Some(symbol) = self.symbol()? {
             return self.variable(place, &symbol);
         }
         self.at = start;
-        if token.kind == Kind::Open {
-            return self.braces(place);
-        }
-        let expected = match &token.kind {
+        match kind {
+            Kind::Open => {}
             Kind::Command(_) => {
-                "a number, a variable, a group, \\frac, \\sqrt, \\sin, \\cos, \\tan, \\tanh, \\exp, \\ln or \\operatorname{sgn}"
+                return self.unexpected(
+                    "a number, a variable, a group, \\frac, \\sqrt, \\sin, \\cos, \\tan, \\tanh, \\exp, \\ln or \\operatorname{sgn}",
+                );
             }
-            _ => "a number, a variable, a function or a group",
-        };
-        self.unexpected(expected)
-    }
-
-    /// A group in braces stands for what is in it; sums need parentheses that are printed.
-    pub(super) fn braces(&mut self, place: (usize, usize)) -> Read<Last> {
-        self.push(place, "(");
-        let last = self.inside(|reader| {
+            _ => return self.unexpected(FACTOR),
+        }
+        let last = self.enclosed(place, "(", |reader| {
             let last = reader.factor(false)?;
             match reader.peek() {
                 None => Ok(last),
                 Some(_) => reader.unexpected("one factor in braces, or parentheses"),
             }
         })?;
-        self.push(place, ")");
         if last == Last::Bare && self.is_next(&Kind::Superscript) {
             return self.unexpected("parentheses around the function or its argument");
         }
-        self.powers(place)?;
         Ok(last)
+    }
+
+    /// What `read` makes of the argument that comes next, between an opening text and a parenthesis.
+    pub(super) fn enclosed<T>(
+        &mut self,
+        place: (usize, usize),
+        open: &str,
+        read: impl FnOnce(&mut Self) -> Read<T>,
+    ) -> Read<T> {
+        self.push(place, open);
+        let value = self.inside(read)?;
+        self.push(place, ")");
+        Ok(value)
     }
 
     /// A sum in a group; whether it is a number alone. `leads` as in [`Self::sum`].
@@ -314,19 +323,17 @@ impl Reader<'_> {
 
     pub(super) fn absolute(&mut self, place: (usize, usize), opener: &str) -> Read<Last> {
         self.at += 1 + usize::from(opener == "left");
-        self.push(place, "abs(");
         if opener == "abs" {
-            self.inside(|reader| reader.sum(false))?;
-        } else {
-            let has_right = self.sum_between(true)?;
-            let closed =
-                self.character('|') || ["rvert", "vert", "|"].iter().any(|name| self.command(name));
-            if !closed || has_right != (opener == "left") {
-                return self.unexpected("an operator or the closing bar");
-            }
+            return self.enclosed_sum(place, "abs(");
+        }
+        self.push(place, "abs(");
+        let has_right = self.sum_between(true)?;
+        let closed =
+            self.character('|') || ["rvert", "vert", "|"].iter().any(|name| self.command(name));
+        if !closed || has_right != (opener == "left") {
+            return self.unexpected("an operator or the closing bar");
         }
         self.push(place, ")");
-        self.powers(place)?;
         Ok(Last::Other)
     }
 
@@ -340,14 +347,8 @@ impl Reader<'_> {
         Ok(self.command("right"))
     }
 
-    /// Parentheses of any kind and size, with their powers.
-    pub(super) fn parentheses(&mut self, place: (usize, usize)) -> Read<Last> {
-        self.delimited(place)?;
-        self.powers(place)?;
-        Ok(Last::Other)
-    }
-
-    pub(super) fn delimited(&mut self, place: (usize, usize)) -> Read<()> {
+    /// Parentheses of any kind and size.
+    pub(super) fn delimited(&mut self, place: (usize, usize)) -> Read<Last> {
         let has_left = self.command("left");
         let closer = match self.next_kind() {
             Some(Kind::Character('(')) => Kind::Character(')'),
@@ -359,29 +360,26 @@ impl Reader<'_> {
         self.at += 1;
         self.push(place, "(");
         let has_right = self.sum_between(false)?;
-        if !self.is_next(&closer) || has_left != has_right {
+        if has_left != has_right || !self.takes(&closer) {
             let quoted = closer.quoted();
             let right = if has_left { "`\\right` and " } else { "" };
             return self.unexpected(&format!("an operator or {right}{quoted}"));
         }
-        self.at += 1;
-        self.push(place, ")");
-        Ok(())
-    }
-
-    pub(super) fn exponential(&mut self, place: (usize, usize)) -> Read<Last> {
-        self.push(place, "exp(");
-        self.inside(|reader| reader.sum(false))?;
         self.push(place, ")");
         Ok(Last::Other)
     }
 
+    /// The sum in the argument that comes next, between an opening text and a parenthesis.
+    pub(super) fn enclosed_sum(&mut self, place: (usize, usize), open: &str) -> Read<Last> {
+        let read = |reader: &mut Self| reader.sum(false);
+        self.enclosed(place, open, read).map(|()| Last::Other)
+    }
+
     /// The power behind a factor.
     pub(super) fn powers(&mut self, place: (usize, usize)) -> Read<()> {
-        if !self.is_next(&Kind::Superscript) {
+        if !self.takes(&Kind::Superscript) {
             return Ok(());
         }
-        self.at += 1;
         if self.kind(self.at) == Some(&Kind::Open) {
             self.at += 1;
             if self.is_lone_integer() {
@@ -390,9 +388,7 @@ impl Reader<'_> {
             }
             self.at -= 1;
         }
-        self.push(place, "^(");
-        self.inside(|reader| reader.sum(false))?;
-        self.push(place, ")");
+        self.enclosed_sum(place, "^(")?;
         match self.is_next(&Kind::Superscript) {
             true => self.unexpected("one power, or parentheses around the first"),
             false => Ok(()),

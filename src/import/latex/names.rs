@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::reader::has;
 use crate::model::{LatentVariable, MAX_LATENT_DIM};
 
 /// The Greek letters that a variable can be named by.
@@ -11,7 +12,7 @@ const GREEK: &str = "alpha beta gamma delta epsilon varepsilon zeta eta theta va
 
 /// Whether a command is a Greek letter.
 pub(super) fn is_greek(command: &str) -> bool {
-    GREEK.split_whitespace().any(|letter| letter == command)
+    has(GREEK, command)
 }
 
 /// Why a name for a variable was refused.
@@ -52,14 +53,11 @@ impl SymbolNames {
             let name: String = (right.chars())
                 .filter(|c| !c.is_whitespace() && !"{}\\".contains(*c))
                 .collect();
-            let is_name = name.starts_with(|c: char| c.is_ascii_alphabetic())
-                && name
-                    .chars()
-                    .all(|c| c.is_ascii_alphanumeric() || "_,".contains(c));
-            if !is_name || names.values().any(|other| *other == variable) {
-                return Err(refused());
-            }
-            if names.insert(name, variable).is_some() {
+            let is_part = |c: char| c.is_ascii_alphanumeric() || "_,".contains(c);
+            let is_name =
+                name.starts_with(|c: char| c.is_ascii_alphabetic()) && name.chars().all(is_part);
+            let is_again = names.values().any(|other| *other == variable);
+            if !is_name || is_again || names.insert(name, variable).is_some() {
                 return Err(refused());
             }
         }

@@ -33,32 +33,30 @@ impl Reader<'_> {
     /// Passes `\times 10^{-3}`, and gives its exponent.
     pub(super) fn power_of_ten(&mut self) -> Option<i32> {
         let start = self.at;
-        let found = (|| {
-            if !self.command("times") && !self.command("cdot") {
-                return None;
-            }
-            for wanted in [Kind::Number("10".to_owned()), Kind::Superscript] {
-                if !self.is_next(&wanted) {
-                    return None;
-                }
-                self.at += 1;
-            }
-            let behind = self.after_argument(self.at);
-            let text: String = (self.tokens[self.at..behind].iter())
-                .map(|token| match &token.kind {
-                    Kind::Open | Kind::Close => String::new(),
-                    Kind::Character(sign @ ('+' | '-')) => sign.to_string(),
-                    Kind::Number(text) => text.clone(),
-                    _ => "?".to_owned(),
-                })
-                .collect();
-            let is_one_token = behind == self.at + 1;
-            let exponent = text.parse().ok();
-            let exponent = exponent.filter(|e: &i32| !is_one_token || *e < 10)?;
-            Some((exponent, behind))
-        })();
-        self.at = found.map_or(start, |(_, behind)| behind);
-        found.map(|(exponent, _)| exponent)
+        let exponent = self.behind_power_of_ten();
+        if exponent.is_none() {
+            self.at = start;
+        }
+        exponent
+    }
+
+    fn behind_power_of_ten(&mut self) -> Option<i32> {
+        let is_product = self.command("times") || self.command("cdot");
+        let is_of_ten = is_product && self.takes(&Kind::Number("10".to_owned()));
+        (is_of_ten && self.takes(&Kind::Superscript)).then_some(())?;
+        let behind = self.after_argument(self.at);
+        let text: String = (self.tokens[self.at..behind].iter())
+            .map(|token| match &token.kind {
+                Kind::Open | Kind::Close => String::new(),
+                Kind::Character(sign @ ('+' | '-')) => sign.to_string(),
+                Kind::Number(text) => text.clone(),
+                _ => "?".to_owned(),
+            })
+            .collect();
+        let is_one_token = behind == self.at + 1;
+        self.at = behind;
+        let exponent = text.parse().ok();
+        exponent.filter(|exponent: &i32| !is_one_token || *exponent < 10)
     }
 
     /// Takes the number that comes next.
@@ -100,7 +98,6 @@ impl Reader<'_> {
         if is_negative && self.is_next(&Kind::Superscript) {
             return self.unexpected("parentheses around the negative number");
         }
-        self.powers(place)?;
         Ok(Last::Number)
     }
 
@@ -123,7 +120,6 @@ impl Reader<'_> {
             self.push(place, ")");
         }
         self.push(place, ")");
-        self.powers(place)?;
         Ok(Last::Other)
     }
 

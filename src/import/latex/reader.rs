@@ -77,6 +77,7 @@ pub(super) const BARE: &str = "parentheses around the argument of the function b
 
 pub(super) type Read<T> = Result<T, ImportError>;
 
+/// Whether `list` has a word.
 pub(super) fn has(list: &str, word: &str) -> bool {
     list.split_whitespace().any(|known| known == word)
 }
@@ -177,10 +178,15 @@ impl<'a> Reader<'a> {
         }
     }
 
-    pub(super) fn character(&mut self, wanted: char) -> bool {
-        let found = self.is_next(&Kind::Character(wanted));
+    /// Takes `wanted` if it comes next; whether it does.
+    pub(super) fn takes(&mut self, wanted: &Kind) -> bool {
+        let found = self.is_next(wanted);
         self.at += usize::from(found);
         found
+    }
+
+    pub(super) fn character(&mut self, wanted: char) -> bool {
+        self.takes(&Kind::Character(wanted))
     }
 
     pub(super) fn command(&mut self, wanted: &str) -> bool {
@@ -225,16 +231,13 @@ impl<'a> Reader<'a> {
             return self.unexpected("an argument");
         }
         self.deepen()?;
-        let (first, end, after) = match &self.tokens[self.at].kind {
-            Kind::Open => (
-                self.at + 1,
-                self.closing[self.at],
-                self.closing[self.at] + 1,
-            ),
+        let (at, after) = (self.at, self.after_argument(self.at));
+        let (first, end) = match &self.tokens[at].kind {
+            Kind::Open => (at + 1, after - 1),
             Kind::Number(text) if text.len() > 1 => {
                 return self.unexpected("braces around an argument of several digits");
             }
-            _ => (self.at, self.at + 1, self.at + 1),
+            _ => (at, after),
         };
         let outer_end = std::mem::replace(&mut self.end, end);
         self.at = first;

@@ -2,15 +2,12 @@
 
 use super::super::equations::{Section, Sections, complete, refused, text_of};
 use super::super::error::ImportError;
-use super::document::{Item, WITH_COLUMNS, is_one_of, items};
+use super::document::{Item, LAYOUTS, WITH_COLUMNS, is_one_of, items};
 use super::names::SymbolNames;
 use super::reader::{Digits, Reader};
 use super::token::{Kind, Token, group_length, of_markdown, of_tex};
 
-/// Environments that only arrange lines.
-const LAYOUTS: &str = "equation align gather multline eqnarray flalign alignat displaymath dmath dgroup \
-    cases dcases array aligned alignedat split gathered subequations IEEEeqnarray";
-/// Those that arrange lines only if whole equations are in them.
+/// Environments that arrange lines only if whole equations are in them.
 const DISTINCTIONS: &str = "cases dcases array";
 
 /// Reads the equations of a document.
@@ -28,10 +25,9 @@ pub(in crate::import) fn read(
 ) -> Result<Sections, ImportError> {
     let text = text_of(file, bytes)?;
     let is_markdown = file.ends_with(".md") || file.ends_with(".markdown");
-    let tokens = if is_markdown {
-        of_markdown(text)
-    } else {
-        of_tex(text)
+    let tokens = match is_markdown {
+        true => of_markdown(text),
+        false => of_tex(text),
     };
     let items = items(file, &tokens)?;
     let mut document = Document {
@@ -81,18 +77,10 @@ fn has_indexed_left_side(file: &str, items: &[Item], in_lines: bool) -> bool {
         let Ok(mut reader) = Reader::new(file, &default, tokens) else {
             return false;
         };
-        dotted(&reader.tokens).into_iter().any(|at| {
-            let left_side = reader.left_side(at);
-            left_side.is_some_and(|(symbol, _)| reader.output(&symbol).is_some())
-        })
+        let left_sides = reader.left_sides();
+        let mut symbols = left_sides.iter().map(|(_, symbol, _)| symbol);
+        symbols.any(|symbol| reader.output(symbol).is_some())
     })
-}
-
-/// Places of `\ddot`.
-fn dotted(tokens: &[Token]) -> Vec<usize> {
-    (0..tokens.len())
-        .filter(|place| tokens[*place].is_command("ddot"))
-        .collect()
 }
 
 /// The tokens without `\begin` and `\end` of environments that arrange lines, and without the
@@ -105,8 +93,8 @@ fn flattened(file: &str, tokens: &[Token]) -> Result<Vec<Token>, ImportError> {
         at += 1;
         match &token.kind {
             Kind::Begin(name)
-                if is_one_of(LAYOUTS, name)
-                    && (!is_one_of(DISTINCTIONS, name) || has_left_side(&tokens[at..], name)) =>
+                if is_layout(name)
+                    || is_one_of(DISTINCTIONS, name) && has_left_side(&tokens[at..], name) =>
             {
                 open.push(token);
                 if flat.len() >= 2 && flat[flat.len() - 2].is_command("left") {
@@ -123,9 +111,8 @@ fn flattened(file: &str, tokens: &[Token]) -> Result<Vec<Token>, ImportError> {
                 }
             }
             Kind::End(name)
-                if is_one_of(LAYOUTS, name)
-                    && (!is_one_of(DISTINCTIONS, name)
-                        || open.last().is_some_and(|begin| is_distinction(begin))) =>
+                if is_layout(name)
+                    || is_one_of(DISTINCTIONS, name) && open.last().is_some_and(is_distinction) =>
             {
                 if open.pop().map(|begin| &begin.kind) != Some(&Kind::Begin(name.clone())) {
                     let expected = "environments that end in the order in which they begin";
@@ -149,7 +136,11 @@ fn flattened(file: &str, tokens: &[Token]) -> Result<Vec<Token>, ImportError> {
     }
 }
 
-fn is_distinction(token: &Token) -> bool {
+fn is_layout(name: &str) -> bool {
+    is_one_of(LAYOUTS, name) || is_one_of("subequations", name)
+}
+
+fn is_distinction(token: &&Token) -> bool {
     matches!(&token.kind, Kind::Begin(name) if is_one_of(DISTINCTIONS, name))
 }
 
@@ -157,8 +148,8 @@ fn is_distinction(token: &Token) -> bool {
 /// right side, where it would tell cases apart.
 fn has_left_side(contents: &[Token], name: &str) -> bool {
     let end = Kind::End(name.to_owned());
-    let inside = contents.iter().take_while(|token| token.kind != end);
-    inside.into_iter().any(|token| token.is_command("ddot"))
+    let mut inside = contents.iter().take_while(|token| token.kind != end);
+    inside.any(|token| token.is_command("ddot"))
 }
 
 /// The digits that a comment states, none in what is no such comment.
@@ -202,9 +193,9 @@ impl Document<'_> {
     }
 
     fn display(&mut self, tokens: &[Token], alone: bool) -> Result<(), ImportError> {
-        if !tokens.iter().any(|token| token.is_command("ddot")) {
+        let Some(dotted) = tokens.iter().find(|token| token.is_command("ddot")) else {
             return Ok(());
-        }
+        };
         let flat = flattened(self.file, tokens);
         let mut reader = match &flat {
             Ok(flat) => Reader::new(self.file, self.names, flat)?,
@@ -213,26 +204,19 @@ impl Document<'_> {
         (reader.alone, reader.digits) = (alone, self.digits);
         let mut left_sides = Vec::new();
         let mut strange = None;
-        for at in dotted(&reader.tokens) {
-            let Some((symbol, after)) = reader.left_side(at) else {
-                continue;
-            };
+        for (at, symbol, after) in reader.left_sides() {
             let token = reader.tokens[at].clone();
             match reader.output(&symbol) {
                 Some(output) => left_sides.push((output, at, after, token)),
-                None if strange.is_none() => strange = Some((token, symbol.quoted())),
-                None => {}
+                None => {
+                    strange.get_or_insert((token, symbol.quoted()));
+                }
             }
         }
         if left_sides.is_empty() {
-            if self.strange.is_none() {
-                let token = tokens.iter().find(|token| token.is_command("ddot"));
-                let unequal = token.map(|token| {
-                    let found = "a second derivative without `=` behind its variable".to_owned();
-                    (token.clone(), found)
-                });
-                self.strange = strange.or(unequal);
-            }
+            let unequal = "a second derivative without `=` behind its variable";
+            let found = strange.unwrap_or((dotted.clone(), unequal.to_owned()));
+            self.strange.get_or_insert(found);
             return Ok(());
         }
         flat?;
@@ -247,20 +231,17 @@ impl Document<'_> {
         }
         let total = reader.tokens.len();
         let shared = self.label(&reader.tokens[..left_sides[0].1]);
+        let mut before = 0;
         for (place, (output, _, after, token)) in left_sides.iter().enumerate() {
             let end = left_sides.get(place + 1).map_or(total, |next| next.1);
-            let label = shared
-                .clone()
-                .or_else(|| self.label(&reader.tokens[*after..end]));
-            let before = place
-                .checked_sub(1)
-                .map_or(0, |previous| left_sides[previous].2);
+            let own = || self.label(&reader.tokens[*after..end]);
+            let label = shared.clone().or_else(own);
             for token in &reader.tokens[before..*after] {
                 if let Kind::Comment(text) = &token.kind {
-                    let text = text.clone();
-                    self.comment(&text);
+                    self.comment(text);
                 }
             }
+            before = *after;
             let equation = reader.equation(*output, token.place.0, *after, end)?;
             let section = self.section(*output, token, label)?;
             section.equations.push(equation);
@@ -276,22 +257,16 @@ impl Document<'_> {
         })?;
         // Rows of one system are numbered: eq:model:contact:2.
         let stem = label.trim_end_matches(|c: char| c.is_ascii_digit());
-        let stem = stem
-            .strip_suffix(':')
+        let stem = (stem.strip_suffix(':'))
             .filter(|stem| *stem != label)
             .unwrap_or(label);
         let plain = |text: &str| text.replace(|c: char| !c.is_ascii_alphanumeric(), "-");
         let ends_in = |name: &&String| {
-            let rest = [label, stem]
-                .into_iter()
-                .find_map(|label| plain(label).strip_suffix(&plain(name)).map(str::to_owned));
+            let (name, texts) = (plain(name), [label, stem].map(plain));
+            let rest = texts.iter().find_map(|text| text.strip_suffix(&name));
             !name.is_empty() && rest.is_some_and(|rest| rest.is_empty() || rest.ends_with('-'))
         };
-        let known = self
-            .known
-            .iter()
-            .filter(ends_in)
-            .max_by_key(|name| name.len());
+        let known = (self.known.iter().filter(ends_in)).max_by_key(|name| name.len());
         let last = || stem.rsplit_once(':').map(|(_, last)| last.to_owned());
         (known.cloned().or_else(last))
             .filter(|name| !name.bytes().all(|byte| byte.is_ascii_digit()))
@@ -305,24 +280,15 @@ impl Document<'_> {
         token: &Token,
         label: Option<String>,
     ) -> Result<&mut Section, ImportError> {
-        let named = match std::mem::take(&mut self.starts_phase) {
-            true => self.phase.clone(),
-            false => None,
-        };
-        let is_new = match self.sections.last() {
-            None => true,
-            Some(open) => {
-                let repeats = open
-                    .equations
-                    .iter()
-                    .any(|equation| equation.output == output);
-                let is_known = label
-                    .as_ref()
-                    .is_some_and(|label| self.known.contains(label));
-                let other_label = self.phase.is_none() && is_known && label != open.phase;
-                named.is_some() || repeats || other_label
-            }
-        };
+        let starts_phase = std::mem::take(&mut self.starts_phase);
+        let named = self.phase.clone().filter(|_| starts_phase);
+        let is_known = |name: &String| self.known.contains(name);
+        let is_new = self.sections.last().is_none_or(|open| {
+            let mut equations = open.equations.iter();
+            let repeats = equations.any(|equation| equation.output == output);
+            let is_other = label.as_ref().is_some_and(is_known) && label != open.phase;
+            named.is_some() || repeats || self.phase.is_none() && is_other
+        });
         if is_new {
             let named = named.or(label.clone().filter(|_| self.phase.is_none()));
             if let Some(earlier) =
@@ -335,7 +301,6 @@ impl Document<'_> {
             self.sections.push(Section::new(named, token.place.0));
         }
         let section = (self.sections.last_mut()).expect("one was just made if there was none");
-        let is_known = |name: &String| self.known.contains(name);
         if self.phase.is_none() && label.is_some() && label != section.phase {
             // Labels that name single equations do not name their phase.
             section.phase.take_if(|name| !is_known(name));

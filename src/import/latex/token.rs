@@ -146,22 +146,19 @@ pub(super) fn of_markdown(text: &str) -> Vec<Token> {
             tokens.push(Token { kind, place });
         };
         let content = line.trim();
-        if let Some(is_math) = fence {
-            if content == "```" {
-                fence = None;
-                if is_math {
-                    push(Kind::Display);
-                }
-            } else if is_math {
-                Line::new(line, number, 1).read(&mut tokens);
+        let opens = content.strip_prefix("```");
+        let opens = opens.filter(|_| fence.is_none() && !in_display);
+        if opens.is_some() || fence.is_some() && content == "```" {
+            let is_math = opens.map_or(fence == Some(true), |language| language.trim() == "math");
+            fence = opens.map(|_| is_math);
+            if is_math {
+                push(Kind::Display);
             }
             continue;
         }
-        if !in_display && let Some(language) = content.strip_prefix("```") {
-            let is_math = language.trim() == "math";
-            fence = Some(is_math);
+        if let Some(is_math) = fence {
             if is_math {
-                push(Kind::Display);
+                Line::new(line, number, 1).read(&mut tokens);
             }
             continue;
         }
@@ -292,11 +289,16 @@ impl Line {
 
     /// The tokens of a letter with dots above it, or of raised or lowered digits.
     fn dotted_or_raised(&mut self, first: char) -> Option<Vec<Kind>> {
-        let precomposed = [('ż', 'z'), ('ẋ', 'x'), ('ẏ', 'y'), ('ẍ', 'x'), ('ÿ', 'y')];
-        let precomposed = precomposed.iter().find(|(dotted, _)| *dotted == first);
+        const DOTTED: [(char, char, &str); 5] = [
+            ('ż', 'z', "dot"),
+            ('ẋ', 'x', "dot"),
+            ('ẏ', 'y', "dot"),
+            ('ẍ', 'x', "ddot"),
+            ('ÿ', 'y', "ddot"),
+        ];
+        let precomposed = DOTTED.iter().find(|(dotted, ..)| *dotted == first);
         let (letter, dots, length) = match (precomposed, self.peek(1)) {
-            (Some((_, letter)), _) if "ẍÿ".contains(first) => (*letter, "ddot", 1),
-            (Some((_, letter)), _) => (*letter, "dot", 1),
+            (Some(&(_, letter, dots)), _) => (letter, dots, 1),
             (None, Some('\u{307}')) => (first, "dot", 2),
             (None, Some('\u{308}')) => (first, "ddot", 2),
             (None, _) => return self.raised(),

@@ -9,7 +9,7 @@ use crate::model::LatentVariable;
 impl Reader<'_> {
     /// A function's name at the reader's place, and the place behind it.
     pub(super) fn function_name(&self) -> Option<(String, usize)> {
-        let Some(Kind::Command(command)) = self.kind(self.at) else {
+        let Kind::Command(command) = self.kind(self.at)? else {
             return self.plain_function_name();
         };
         if let Some(name) = function(command) {
@@ -39,7 +39,11 @@ impl Reader<'_> {
 
     /// `sin(`, typed without a backslash, where its first letter is no variable.
     fn plain_function_name(&self) -> Option<(String, usize)> {
-        let first = self.tokens.get(self.at)?;
+        let first = &self.tokens[self.at];
+        let is_power = self.kind(self.at + 1) == Some(&Kind::Superscript);
+        if first.kind == Kind::Character('e') && is_power && !self.is_variable("e") {
+            return Some(("e".to_owned(), self.at + 2));
+        }
         let letters = self.tokens[self.at..self.end].iter().enumerate();
         let word: String = letters
             .map_while(|(place, token)| match token.kind {
@@ -55,27 +59,29 @@ impl Reader<'_> {
             Kind::Character('(' | '[') | Kind::Superscript => true,
             kind => *kind == Kind::Command("left".to_owned()),
         };
-        let is_variable = |letter| self.names.variable(letter, self.alone).is_some();
-        let name = function(&word).filter(|_| has_argument && !is_variable(&word[..1]))?;
+        let name = function(&word).filter(|_| has_argument && !self.is_variable(&word[..1]))?;
         Some((name.to_owned(), after))
+    }
+
+    fn is_variable(&self, name: &str) -> bool {
+        self.names.variable(name, self.alone).is_some()
     }
 
     pub(super) fn call(&mut self, place: (usize, usize), name: &str) -> Read<Last> {
         if name == "e" {
-            return self.exponential(place);
+            return self.enclosed_sum(place, "exp(");
         }
         let mut power = None;
-        if self.is_next(&Kind::Superscript) {
-            self.at += 1;
+        if self.takes(&Kind::Superscript) {
             let expected = "a positive power; an inverse function has no reading here";
             power = Some(self.inside(|reader| reader.number(expected))?);
         }
         let before = self.pieces.len();
         let argument = self.here();
         let last = match self.next_kind() {
-            Some(Kind::Character('(' | '[')) => self.delimited(argument).map(|()| Last::Other)?,
+            Some(Kind::Character('(' | '[')) => self.delimited(argument)?,
             Some(Kind::Command(opener)) if opener == "left" && !self.opens_bar() => {
-                self.delimited(argument).map(|()| Last::Other)?
+                self.delimited(argument)?
             }
             // Braces do not print: a sum or a power of what is in them would read otherwise without.
             Some(Kind::Open) => {
@@ -158,7 +164,6 @@ impl Reader<'_> {
         };
         self.push(place, name);
         self.skip_time();
-        self.powers(place)?;
         Ok(Last::Other)
     }
 
@@ -209,23 +214,21 @@ impl Reader<'_> {
                 self.at += 1;
                 Ok(Some((name.clone(), 0)))
             }
-            Kind::Command(name) if depth < 8 && has("dot ddot dddot", name) => {
+            Kind::Command(command) if depth < 8 && has("dot ddot dddot", command) => {
                 self.at += 1;
-                let more = name.len() - 2;
                 let inner = self.inside(|reader| {
                     let Some((mut name, dots)) = reader.glyph(depth + 1)? else {
                         return Ok(None);
                     };
                     reader.subscript(&mut name)?;
+                    let dots = dots + command.len() - 2;
                     Ok(reader.peek().is_none().then_some((name, dots)))
                 });
-                match inner.ok().flatten() {
-                    Some((name, dots)) => Ok(Some((name, dots + more))),
-                    None => {
-                        self.at = at + 1;
-                        self.unexpected("a variable under the dots")
-                    }
+                if let Ok(Some(inner)) = inner {
+                    return Ok(Some(inner));
                 }
+                self.at = at + 1;
+                self.unexpected("a variable under the dots")
             }
             Kind::Command(name) if has(FONTS, name) => {
                 self.at += 1;
@@ -250,10 +253,9 @@ impl Reader<'_> {
 
     /// Reads `_1`, `_{10}`, `_{\mathrm{lat},1}` behind a variable.
     pub(super) fn subscript(&mut self, name: &mut String) -> Read<()> {
-        if !self.is_next(&Kind::Subscript) {
+        if !self.takes(&Kind::Subscript) {
             return Ok(());
         }
-        self.at += 1;
         let parts = self.inside(|reader| match reader.word(reader.at, reader.end) {
             Some(word) => {
                 reader.at = reader.end;
