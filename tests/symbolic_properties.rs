@@ -434,7 +434,7 @@ proptest! {
         let ids = NAMES.map(|name| pool.symbol_id(name));
         let place = |symbol: SymbolId| ids.iter().position(|id| *id == symbol).expect("known");
         let range = |place: usize| Interval::new(lows[place], lows[place] + widths[place]);
-        let natural = pool.evaluate_interval(expr, &|symbol| range(place(symbol)));
+        let natural = pool.evaluate_intervals(&[expr], &|symbol| range(place(symbol)))[0];
         let domain: Vec<(SymbolId, Interval)> = pool
             .symbols_of(expr)
             .into_iter()

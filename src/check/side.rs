@@ -9,7 +9,7 @@ use crate::artifact;
 use crate::equations::Equations;
 use crate::import::{Format, read_equations};
 use crate::model::{LatentVariable, ReducedModel};
-use crate::symbolic::{ExprId, ExprPool, Literal, Number, ParseError, SymbolId};
+use crate::symbolic::{ExprId, ExprPool, Literal, Number, ParseError, ParseLimits, SymbolId};
 
 /// Marks of symbols that stand for decimals: exact ones, and ones rounded in their last digit.
 const EXACT: char = '#';
@@ -159,7 +159,8 @@ impl Side {
 
     fn parse(&self, text: &str, pool: &mut ExprPool) -> Result<ExprId, ParseError> {
         let known = |name: &str| LatentVariable::from_name(name, self.latent_dim).is_some();
-        pool.parse_with_literals(text, &known, &|number| self.literal_name(number))
+        let literal = |number: &str| self.literal_name(number);
+        pool.parse_within(text, &known, &literal, ParseLimits::default())
     }
 
     /// The symbol of a decimal. Integers are numbers of the pool, and multiples of 1/2 of exact

@@ -6,20 +6,10 @@ use super::number::Number;
 use super::pool::ExprPool;
 
 impl ExprPool {
-    /// An interval that contains every value which `expr` takes where symbols lie in the
-    /// intervals that `range_of` gives, at the points where it is defined.
+    /// For each expression an interval that contains every value which it takes where symbols lie in
+    /// the intervals that `range_of` gives, at the points where it is defined.
     ///
     /// Sound but not tight: occurrences of a symbol in different terms count as independent.
-    pub fn evaluate_interval(
-        &self,
-        expr: ExprId,
-        range_of: &dyn Fn(SymbolId) -> Interval,
-    ) -> Interval {
-        self.evaluate_intervals(&[expr], range_of)[0]
-    }
-
-    /// As [`evaluate_interval`](ExprPool::evaluate_interval) for several expressions, which share
-    /// the work of common subexpressions.
     pub fn evaluate_intervals(
         &self,
         exprs: &[ExprId],
@@ -82,7 +72,7 @@ mod tests {
     fn bounds(text: &str, range: Interval) -> Interval {
         let mut pool = ExprPool::new();
         let expr = pool.parsed(text);
-        pool.evaluate_interval(expr, &|_| range)
+        pool.evaluate_intervals(&[expr], &|_| range)[0]
     }
 
     #[test]

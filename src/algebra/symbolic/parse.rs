@@ -119,37 +119,16 @@ impl ExprPool {
         text: &str,
         allowed: &dyn Fn(&str) -> bool,
     ) -> Result<ExprId, ParseError> {
-        self.parse_within(text, allowed, ParseLimits::default())
+        self.parse_within(text, allowed, &|_| None, ParseLimits::default())
     }
 
-    /// As [`parse`](ExprPool::parse), with symbols for numbers: where `literal` gives a name for
-    /// the text of a number, it is the symbol of that name, so that it is never rounded or folded.
-    ///
-    /// # Errors
-    /// As [`parse`](ExprPool::parse).
-    pub fn parse_with_literals(
-        &mut self,
-        text: &str,
-        allowed: &dyn Fn(&str) -> bool,
-        literal: &dyn Fn(&str) -> Option<String>,
-    ) -> Result<ExprId, ParseError> {
-        self.read(text, allowed, literal, ParseLimits::default())
-    }
-
-    /// As [`parse`](ExprPool::parse), within given limits.
+    /// As [`parse`](ExprPool::parse), within given limits and with symbols for numbers: where
+    /// `literal` gives a name for the text of a number, it is the symbol of that name, so that it is
+    /// never rounded or folded.
     ///
     /// # Errors
     /// As [`parse`](ExprPool::parse).
     pub fn parse_within(
-        &mut self,
-        text: &str,
-        allowed: &dyn Fn(&str) -> bool,
-        limits: ParseLimits,
-    ) -> Result<ExprId, ParseError> {
-        self.read(text, allowed, &|_| None, limits)
-    }
-
-    fn read(
         &mut self,
         text: &str,
         allowed: &dyn Fn(&str) -> bool,
