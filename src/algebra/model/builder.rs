@@ -278,17 +278,20 @@ impl ModelBuilder {
         }
     }
 
+    /// Number of robot coordinates, by the first of the parts that has it.
+    pub(super) fn state_dim(&self) -> Option<usize> {
+        let named = |signals: &Option<CoordinateNames>| signals.as_ref().map(CoordinateNames::dim);
+        named(&self.state)
+            .or(named(&self.input))
+            .or(self.encoder.as_ref().map(StateMap::input_dim))
+            .or(self.decoder.as_ref().map(StateMap::output_dim))
+    }
+
     /// Checks shapes of encoder and decoder; returns the number of robot coordinates if known.
     fn check_maps(&self) -> Result<Option<usize>, ModelError> {
         let latent_dim = self.library.latent_dim();
-        let named = |signals: &Option<CoordinateNames>| signals.as_ref().map(CoordinateNames::dim);
-        let state_dim = self
-            .robot
-            .map(|_| crate::robot::STATE_DIM)
-            .or(named(&self.state))
-            .or(named(&self.input))
-            .or(self.encoder.as_ref().map(StateMap::input_dim))
-            .or(self.decoder.as_ref().map(StateMap::output_dim));
+        let of_robot = self.robot.map(|_| crate::robot::STATE_DIM);
+        let state_dim = of_robot.or(self.state_dim());
         let (encoder, decoder) = (self.encoder.is_some(), self.decoder.is_some());
         if (encoder || decoder) && self.scaling.is_none() {
             let (part, needs) = (if encoder { "encoder" } else { "decoder" }, "scaling");

@@ -43,7 +43,6 @@ mod given_state;
 mod identifier;
 mod jump_prior;
 mod library;
-mod library_error;
 mod maps;
 mod normal;
 mod order;
@@ -66,7 +65,7 @@ pub use affine::AffineMap;
 pub use builder::ModelBuilder;
 pub use checks::check_name;
 pub use coordinate_names::CoordinateNames;
-pub use error::ModelError;
+pub use error::{LibraryError, ModelError};
 pub use evaluation::{Step, Tape};
 pub use given_state::InputGivenState;
 pub use identifier::{Identifier, IdentifierError, MAX_IDENTIFIER_LEN};
@@ -74,7 +73,6 @@ pub use jump_prior::{FEATURE_DIM, GOAL_DIM, GoalFeatures, GoalRange, JumpPart, J
 pub use library::{
     CandidateTerm, Library, LibraryChoice, MAX_LATENT_DIM, MAX_LIBRARY_DIM, MAX_TERM_LEN,
 };
-pub use library_error::LibraryError;
 pub use normal::{DENSITY_AT_ZERO, TAIL};
 pub use order::CoordinateOrder;
 pub use phase::Phase;

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::error::LibraryError;
 use super::library::MAX_LIBRARY_DIM;
-use super::library_error::LibraryError;
 
 /// Largest polynomial degree of the standard library.
 pub const MAX_DEGREE: u32 = 8;
