@@ -119,12 +119,6 @@ impl fmt::Display for Identifier {
     }
 }
 
-impl AsRef<str> for Identifier {
-    fn as_ref(&self) -> &str {
-        &self.0
-    }
-}
-
 /// Keywords by language, lower case (`_Bool` and its like cannot begin a name anyway).
 const KEYWORDS: [(&str, &str); 3] = [
     (

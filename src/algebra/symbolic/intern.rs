@@ -31,10 +31,6 @@ impl Hasher for IdHasher {
         self.0 = (self.0.rotate_left(26) ^ word).wrapping_mul(MULTIPLIER);
     }
 
-    fn write_u8(&mut self, word: u8) {
-        self.write_u64(u64::from(word));
-    }
-
     fn write_u32(&mut self, word: u32) {
         self.write_u64(u64::from(word));
     }

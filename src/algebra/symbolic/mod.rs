@@ -10,7 +10,7 @@
 //! | `node`, `number`, `pool`, `intern`, `order` | what an expression is and how it is stored |
 //! | `build`, `power` | canonical constructors |
 //! | `lexer`, `parse`, `display` | the grammar of candidate terms, both ways |
-//! | `eval`, `interval`, `rounding`, `interval_eval`, `bounds` | values, and bounds over boxes |
+//! | `eval`, `interval`, `rounding`, `bounds` | values, and bounds over boxes |
 //! | `diff`, `substitute` | derivatives and substitution |
 //! | `expand`, `rational`, `perfect_power`, `trig`, `rules`, `magnitudes` | rewriting, each way when asked |
 //! | `simplify`, `shorten`, `cost`, `region` | choosing the shortest of equal forms |
@@ -45,7 +45,6 @@ mod eval;
 mod expand;
 mod intern;
 mod interval;
-mod interval_eval;
 mod lexer;
 mod magnitudes;
 mod node;

@@ -12,7 +12,7 @@
 use std::cmp::Ordering;
 use std::fmt;
 
-use num_integer::Integer;
+use num_integer::{Integer, Roots};
 
 /// Largest magnitude below which every integer is a float: `2^53`.
 const EXACT_INTEGER: f64 = 9_007_199_254_740_992.0;
@@ -284,9 +284,8 @@ fn gcd(a: i128, b: i128) -> i128 {
 
 /// The integer whose `root`-th power is `value`, for a non-negative `value`.
 fn exact_root(value: i64, root: u32) -> Option<i64> {
-    let estimate = (value as f64).powf(1.0 / f64::from(root)).round() as i64;
-    (estimate.saturating_sub(1)..=estimate.saturating_add(1))
-        .find(|candidate| *candidate >= 0 && candidate.checked_pow(root) == Some(value))
+    let floor = value.nth_root(root);
+    (floor.checked_pow(root) == Some(value)).then_some(floor)
 }
 
 impl std::ops::Neg for Number {

@@ -20,7 +20,7 @@ pub(super) struct SymbolKey {
     prefix: String,
     /// The number at the end of the name.
     index: Option<u64>,
-    name: String,
+    pub(super) name: String,
 }
 
 impl SymbolKey {

@@ -44,7 +44,6 @@ pub struct ExprPool {
 
 #[derive(Clone, Debug)]
 struct Symbol {
-    name: String,
     key: SymbolKey,
     expr: ExprId,
 }
@@ -146,7 +145,6 @@ impl ExprPool {
         );
         self.symbol_ids.insert(name.to_owned(), id);
         self.symbols.push(Symbol {
-            name: name.to_owned(),
             key: SymbolKey::of(name),
             expr: ExprId::ZERO,
         });
@@ -167,7 +165,7 @@ impl ExprPool {
 
     /// The name of a variable.
     pub fn symbol_name(&self, symbol: SymbolId) -> &str {
-        &self.symbols[symbol.index()].name
+        &self.symbols[symbol.index()].key.name
     }
 
     pub(super) fn symbol_key(&self, symbol: SymbolId) -> &SymbolKey {
