@@ -5,10 +5,9 @@ use std::collections::HashMap;
 use serde_json::{Map, Value};
 
 use super::affine::AffineMap;
-use super::checks::{check_map, check_robot_names, check_widths, identifier_of};
 use super::coordinate_names::CoordinateNames;
 use super::error::{ModelError, check_tensor};
-use super::identifier::Identifier;
+use super::identifier::{Identifier, identifier_of};
 use super::jump_prior::JumpPrior;
 use super::library::Library;
 use super::phase::{Phase, all_patterns, selected};
@@ -306,27 +305,32 @@ impl ModelBuilder {
             return Err(ModelError::invalid("`state`", found, expected));
         }
         if let Some(encoder) = &self.encoder {
-            check_map("encoder", encoder, (latent_dim, dim))?;
-            check_widths(encoder, latent_dim)?;
+            encoder.check("encoder", (latent_dim, dim))?;
+            encoder.check_widths(latent_dim)?;
         }
         if let Some(decoder) = &self.decoder {
-            check_map("decoder", decoder, (dim, latent_dim))?;
+            decoder.check("decoder", (dim, latent_dim))?;
         }
         Ok(Some(dim))
     }
 
     fn check_signals(&self, state_dim: Option<usize>) -> Result<(), ModelError> {
-        if let Some(state) = &self.state {
-            state.check("state", state_dim)?;
-        }
-        if let Some(input) = &self.input {
-            input.check("input", state_dim)?;
+        let named = [("state", &self.state), ("input", &self.input)];
+        for (signals, names) in named {
+            if let Some(names) = names {
+                names.check(signals, state_dim)?;
+            }
         }
         let Some(robot) = self.robot else {
             return Ok(());
         };
-        check_robot_names("state", &self.state, &Robot::state_names(), robot)?;
-        check_robot_names("input", &self.input, &Robot::input_names(), robot)
+        let of_robot = [Robot::state_names(), Robot::input_names()];
+        for ((signals, names), of_robot) in named.into_iter().zip(of_robot) {
+            if let Some(names) = names {
+                names.check_robot(signals, &of_robot, robot)?;
+            }
+        }
+        Ok(())
     }
 
     /// Actuators and a frame are those of a robot.

@@ -35,7 +35,6 @@
 mod activation;
 mod affine;
 mod builder;
-mod checks;
 mod coordinate_names;
 mod error;
 mod evaluation;
@@ -63,12 +62,11 @@ pub use crate::robot::FeetRule;
 pub use activation::{Activation, GELU_CUBIC, GELU_RATE};
 pub use affine::AffineMap;
 pub use builder::ModelBuilder;
-pub use checks::check_name;
 pub use coordinate_names::CoordinateNames;
 pub use error::{LibraryError, ModelError};
 pub use evaluation::{Step, Tape};
 pub use given_state::InputGivenState;
-pub use identifier::{Identifier, IdentifierError, MAX_IDENTIFIER_LEN};
+pub use identifier::{Identifier, IdentifierError, MAX_IDENTIFIER_LEN, check_name};
 pub use jump_prior::{FEATURE_DIM, GOAL_DIM, GoalFeatures, GoalRange, JumpPart, JumpPrior};
 pub use library::{
     CandidateTerm, Library, LibraryChoice, MAX_LATENT_DIM, MAX_LIBRARY_DIM, MAX_TERM_LEN,

@@ -160,6 +160,37 @@ impl StateMap {
         Ok(jacobian.expect("a map has a layer"))
     }
 
+    /// Checks what enters the first layer and what leaves the last; `expected` is the Jacobian's shape.
+    pub(super) fn check(&self, name: &str, expected: (usize, usize)) -> Result<(), ModelError> {
+        if let Some(affine) = self.as_affine() {
+            let (tensor, found) = (format!("{name}.weights"), affine.weights().shape());
+            return check_shape(&tensor, found, expected);
+        }
+        let last = self.layers.len() - 1;
+        let ends = [(0, None, Some(expected.1)), (last, Some(expected.0), None)];
+        for (layer, rows, columns) in ends {
+            let found = self.layers[layer].map.weights().shape();
+            let expected = (rows.unwrap_or(found.0), columns.unwrap_or(found.1));
+            check_shape(&format!("{name}.layers[{layer}].weights"), found, expected)?;
+        }
+        Ok(())
+    }
+
+    /// No layer of an encoder may be narrower than the latent space, or its Jacobian never has full
+    /// rank.
+    pub(super) fn check_widths(&self, latent_dim: usize) -> Result<(), ModelError> {
+        let widths = self.layers.iter().map(|layer| layer.map.output_dim());
+        match widths.enumerate().find(|&(_, width)| width < latent_dim) {
+            None => Ok(()),
+            Some((layer, found)) => {
+                let expected = format!("at least {latent_dim}, one per latent coordinate");
+                let place = format!("`encoder.layers[{layer}]`");
+                let found = format!("{found} units");
+                Err(ModelError::invalid(place, found, expected))
+            }
+        }
+    }
+
     /// The layers in words: `18 -> 32 elu -> 4`.
     pub fn summary(&self) -> String {
         let mut text = self.input_dim().to_string();

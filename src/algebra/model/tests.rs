@@ -1,4 +1,4 @@
-//! Laws of the whole model: maps in SI units, phases, equations.
+//! Laws of the whole model: maps in SI units, phases.
 
 use nalgebra::{DMatrix, DVector, SVD};
 use proptest::prelude::*;
@@ -277,31 +277,5 @@ proptest! {
         let again = tangent.project * (tangent.lift * &u_lat);
         let error = (&again - &u_lat).amax();
         prop_assert!(error <= 1e-14 * condition * condition.max(100.0) * (1.0 + u_lat.amax()), "{error}");
-    }
-
-    #[test]
-    fn equations_have_the_value_of_theta_times_xi(
-        xi in proptest::collection::vec(prop_oneof![Just(0.0), -3.0..3.0f64], 15 * 2),
-        point in proptest::collection::vec(-2.0..2.0f64, 6),
-    ) {
-        let library = Library::standard(2, StandardLibrary::default()).unwrap();
-        let model = ReducedModel::builder("random", library)
-            .phase(phase("contact", FeetRule::Any, DMatrix::from_vec(15, 2, xi)))
-            .build()
-            .unwrap();
-        let part = |from: usize| DVector::from_row_slice(&point[from..from + 2]);
-        let (z, dz, u_lat) = (part(0), part(2), part(4));
-        let expected = model.ddz(0, &z, &dz, &u_lat).unwrap();
-        let (pool, sums) = crate::equations::Equations::of(&model).sums(0).unwrap();
-        for (expr, expected) in sums.iter().zip(expected.iter()) {
-            let value = pool.evaluate(*expr, &|symbol| {
-                match model.library().variable(symbol).unwrap() {
-                    LatentVariable::Z(i) => z[i],
-                    LatentVariable::Dz(i) => dz[i],
-                    LatentVariable::U(i) => u_lat[i],
-                }
-            });
-            prop_assert!((value - expected).abs() < 1e-12, "{value} {expected}");
-        }
     }
 }

@@ -123,6 +123,12 @@ impl Number {
         }
     }
 
+    /// Numerators and denominators, `a/b` and `c/d`, of two exact numbers.
+    fn fractions(self, other: Number) -> Option<[i128; 4]> {
+        let ((a, b), (c, d)) = (self.as_rational()?, other.as_rational()?);
+        Some([a, b, c, d].map(i128::from))
+    }
+
     /// The value if it is an exact integer.
     pub fn as_integer(self) -> Option<i64> {
         match self.as_rational() {
@@ -143,13 +149,10 @@ impl Number {
 
     /// `self + other`, exactly if both are exact and the result fits; `None` on overflow.
     pub fn checked_add(self, other: Number) -> Option<Number> {
-        match (self.as_rational(), other.as_rational()) {
-            (Some((a, b)), Some((c, d))) => {
-                let (a, b, c, d) = (i128::from(a), i128::from(b), i128::from(c), i128::from(d));
-                // |a d|, |c b| and b d stay below 2^126: their sum fits an i128.
-                Number::from_ratio(a * d + c * b, b * d)
-            }
-            _ => self
+        match self.fractions(other) {
+            // |a d|, |c b| and b d stay below 2^126: their sum fits an i128.
+            Some([a, b, c, d]) => Number::from_ratio(a * d + c * b, b * d),
+            None => self
                 .as_decimals(other, Number::checked_add)
                 .or_else(|| Number::from_f64(self.to_f64() + other.to_f64())),
         }
@@ -193,10 +196,8 @@ impl Number {
 
     /// `self * other`; `None` when a float result overflows or loses digits to underflow.
     pub fn checked_mul(self, other: Number) -> Option<Number> {
-        match (self.as_rational(), other.as_rational()) {
-            (Some((a, b)), Some((c, d))) => {
-                Number::from_ratio(i128::from(a) * i128::from(c), i128::from(b) * i128::from(d))
-            }
+        match self.fractions(other) {
+            Some([a, b, c, d]) => Number::from_ratio(a * c, b * d),
             _ if self.is_zero() || other.is_zero() => Some(Number::ZERO),
             _ => self
                 .as_decimals(other, Number::checked_mul)
@@ -206,10 +207,8 @@ impl Number {
 
     /// `self / other`; `None` for a zero divisor, overflow or underflow.
     pub fn checked_div(self, other: Number) -> Option<Number> {
-        match (self.as_rational(), other.as_rational()) {
-            (Some((a, b)), Some((c, d))) => {
-                Number::from_ratio(i128::from(a) * i128::from(d), i128::from(b) * i128::from(c))
-            }
+        match self.fractions(other) {
+            Some([a, b, c, d]) => Number::from_ratio(a * d, b * c),
             _ if other.is_zero() => None,
             _ if self.is_zero() => Some(Number::ZERO),
             _ => self
@@ -308,13 +307,10 @@ impl PartialOrd for Number {
 /// By value; of an exact number and a float that is its nearest, the exact one comes first.
 impl Ord for Number {
     fn cmp(&self, other: &Number) -> Ordering {
-        self.to_f64().total_cmp(&other.to_f64()).then_with(|| {
-            match (self.as_rational(), other.as_rational()) {
-                (Some((a, b)), Some((c, d))) => {
-                    (i128::from(a) * i128::from(d)).cmp(&(i128::from(c) * i128::from(b)))
-                }
-                (exact, other_exact) => other_exact.is_some().cmp(&exact.is_some()),
-            }
+        let by_value = self.to_f64().total_cmp(&other.to_f64());
+        by_value.then_with(|| match self.fractions(*other) {
+            Some([a, b, c, d]) => (a * d).cmp(&(c * b)),
+            None => other.is_exact().cmp(&self.is_exact()),
         })
     }
 }
