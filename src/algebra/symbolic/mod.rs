@@ -7,7 +7,7 @@
 //!
 //! | files | |
 //! |---|---|
-//! | `node`, `number`, `pool`, `intern`, `order` | what an expression is and how it is stored |
+//! | `node`, `number`, `pool`, `id_map`, `order` | what an expression is and how it is stored |
 //! | `build`, `power` | canonical constructors |
 //! | `lexer`, `parse`, `display` | the grammar of candidate terms, both ways |
 //! | `eval`, `interval`, `rounding`, `bounds` | values, and bounds over boxes |
@@ -43,7 +43,7 @@ mod diff;
 mod display;
 mod eval;
 mod expand;
-mod intern;
+mod id_map;
 mod interval;
 mod lexer;
 mod magnitudes;

@@ -3,7 +3,7 @@
 use std::collections::{BTreeSet, HashMap};
 use std::hash::BuildHasher;
 
-use super::intern::BuildIdHasher;
+use super::id_map::{BuildIdHasher, IdSet};
 use super::node::{ExprId, Function, Node, SymbolId};
 use super::number::Number;
 use super::order::SymbolKey;
@@ -242,23 +242,26 @@ impl ExprPool {
 
     /// Every expression that `roots` are made of, each once, operands before what uses them.
     pub fn reachable(&self, roots: &[ExprId]) -> Vec<ExprId> {
-        self.reachable_where(roots, |_| true)
+        self.walk(roots, |_| true, |_| true)
     }
 
-    /// As [`reachable`](ExprPool::reachable), without what fails `wanted` and is not reached
-    /// otherwise. Ids rise from operands to users, so sorting them is a topological order.
-    pub(super) fn reachable_where(
+    /// As [`reachable`](ExprPool::reachable): what fails `wanted` is left out, and what does not pass `opened` is not looked into. Ids rise
+    /// from operands to users, so sorting them is a topological order.
+    pub(super) fn walk(
         &self,
         roots: &[ExprId],
         mut wanted: impl FnMut(ExprId) -> bool,
+        opened: impl Fn(ExprId) -> bool,
     ) -> Vec<ExprId> {
-        let mut seen = std::collections::HashSet::with_hasher(BuildIdHasher::default());
+        let mut seen = IdSet::default();
         let mut found = Vec::new();
         let mut stack: Vec<ExprId> = roots.to_vec();
         while let Some(expr) = stack.pop() {
             if wanted(expr) && seen.insert(expr) {
                 found.push(expr);
-                stack.extend(self.children(expr));
+                if opened(expr) {
+                    stack.extend(self.children(expr));
+                }
             }
         }
         found.sort_unstable();
@@ -272,7 +275,7 @@ impl ExprPool {
 
     /// The variables that occur in an expression.
     pub fn symbols_of(&self, expr: ExprId) -> BTreeSet<SymbolId> {
-        self.reachable_where(&[expr], |node| self.facts[node.index()].symbols != 0)
+        self.walk(&[expr], |node| !self.is_constant(node), |_| true)
             .into_iter()
             .filter_map(|node| self.as_symbol(node))
             .collect()

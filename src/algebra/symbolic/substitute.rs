@@ -1,8 +1,6 @@
 //! Simultaneous substitution.
 
-use std::collections::HashMap;
-
-use super::intern::BuildIdHasher;
+use super::id_map::IdMap;
 use super::node::{ExprId, Node, SymbolId};
 use super::pool::ExprPool;
 
@@ -20,13 +18,12 @@ impl ExprPool {
         exprs: &[ExprId],
         replacements: &[(SymbolId, ExprId)],
     ) -> Vec<ExprId> {
-        let affected = |pool: &ExprPool, expr: ExprId| {
-            replacements
-                .iter()
-                .any(|(symbol, _)| pool.may_contain(expr, *symbol))
+        let affected = |expr| {
+            let mut symbols = replacements.iter().map(|(symbol, _)| *symbol);
+            symbols.any(|symbol| self.may_contain(expr, symbol))
         };
-        let order = self.reachable_where(exprs, |expr| affected(self, expr));
-        let mut replaced: HashMap<ExprId, ExprId, BuildIdHasher> = HashMap::default();
+        let order = self.walk(exprs, affected, |_| true);
+        let mut replaced: IdMap<ExprId> = IdMap::default();
         for expr in order {
             let symbol = self.as_symbol(expr);
             let known = replacements.iter().find(|(old, _)| Some(*old) == symbol);

@@ -1,6 +1,14 @@
-//! A fast hasher for the pool's own keys.
+//! Maps of expressions, with a fast hasher for the pool's own keys.
 
+use std::collections::{HashMap, HashSet};
 use std::hash::{BuildHasherDefault, Hasher};
+
+use super::node::ExprId;
+
+/// What is known of expressions.
+pub(super) type IdMap<V> = HashMap<ExprId, V, BuildIdHasher>;
+/// Some expressions.
+pub(super) type IdSet = HashSet<ExprId, BuildIdHasher>;
 
 /// A multiplicative hasher for short keys of small integers (ids, numbers): such keys are the
 /// pool's own, so resistance to chosen collisions is not needed, only speed.
