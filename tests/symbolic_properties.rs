@@ -440,7 +440,8 @@ proptest! {
             .into_iter()
             .map(|symbol| (symbol, range(place(symbol))))
             .collect();
-        let bounds = pool.bound(expr, &domain);
+        let slopes: Vec<ExprId> = domain.iter().map(|(symbol, _)| pool.derivative(expr, *symbol)).collect();
+        let bounds = pool.bound_by_slopes(expr, &slopes, &domain);
         prop_assert!(natural.lo() <= bounds.lo() && bounds.hi() <= natural.hi());
         for share in shares {
             let point: [f64; 3] = std::array::from_fn(|i| (lows[i] + widths[i] * share[i]).min(lows[i] + widths[i]));

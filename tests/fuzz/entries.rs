@@ -65,7 +65,7 @@ pub fn expression(bytes: &[u8]) {
         return;
     };
     let printed = reads_back(&mut pool, expr, text);
-    if printed.len() > 400 || pool.node_count(expr) > 60 {
+    if printed.len() > 400 || pool.reachable(&[expr]).len() > 60 {
         return;
     }
     let simpler = pool.simplify(expr);

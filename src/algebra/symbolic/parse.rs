@@ -50,6 +50,7 @@ pub struct ParseError {
 
 /// The fault at a place of a text.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[allow(missing_docs, reason = "each variant's message names its fields")]
 pub enum ParseErrorKind {
     /// A character that the grammar does not have.
     #[error("found `{}`, expected numbers, names, functions and + - * / ^ ( )", .0.escape_debug())]
@@ -60,9 +61,7 @@ pub enum ParseErrorKind {
     /// A token in quotes, or `end of text`, in the wrong place.
     #[error("found {found}, expected {expected}")]
     Unexpected {
-        /// The token.
         found: String,
-        /// What could stand there.
         expected: &'static str,
     },
     /// A variable that is not allowed here.
@@ -73,23 +72,13 @@ pub enum ParseErrorKind {
     UnknownFunction(String),
     /// The text is longer than allowed.
     #[error("found a text of {found} bytes, expected at most {limit}")]
-    TooLong {
-        /// Length in bytes.
-        found: usize,
-        /// The limit.
-        limit: usize,
-    },
+    TooLong { found: usize, limit: usize },
     /// Too many open parentheses and exponents.
     #[error("found too many open parentheses and exponents, expected at most {0}")]
     TooDeep(usize),
     /// A constant exponent is larger than allowed.
     #[error("found the exponent {found}, expected at most {limit}")]
-    Exponent {
-        /// The exponent.
-        found: String,
-        /// The limit on its magnitude.
-        limit: u32,
-    },
+    Exponent { found: String, limit: u32 },
 }
 
 impl ParseErrorKind {

@@ -126,13 +126,8 @@ impl ExprPool {
     }
 
     /// The number of distinct expressions made so far.
-    pub fn len(&self) -> usize {
+    pub fn n_nodes(&self) -> usize {
         self.nodes.len()
-    }
-
-    /// Never: every pool holds `0` and `1`.
-    pub fn is_empty(&self) -> bool {
-        self.nodes.is_empty()
     }
 
     /// The variable of that name, made at its first mention.
@@ -266,11 +261,6 @@ impl ExprPool {
         }
         found.sort_unstable();
         found
-    }
-
-    /// The number of distinct nodes of an expression.
-    pub fn node_count(&self, expr: ExprId) -> usize {
-        self.reachable(&[expr]).len()
     }
 
     /// The variables that occur in an expression.
@@ -426,7 +416,6 @@ mod tests {
         let root = pool.mul(x, sine);
         let order = pool.reachable(&[root, sine]);
         assert_eq!(order, [x, sine, root]);
-        assert_eq!(pool.node_count(root), 3);
     }
 
     #[test]
