@@ -12,7 +12,7 @@
 //! | `lexer`, `parse`, `display` | the grammar of candidate terms, both ways |
 //! | `eval`, `interval`, `rounding`, `bounds` | values, and bounds over boxes |
 //! | `diff`, `substitute` | derivatives and substitution |
-//! | `expand`, `rational`, `perfect_power`, `trig`, `rules`, `magnitudes` | rewriting, each way when asked |
+//! | `expand`, `rational`, `perfect_power`, `trig`, `rules`, `factors` | rewriting, each way when asked |
 //! | `simplify`, `shorten`, `cost`, `region` | choosing the shortest of equal forms |
 //! | `canonical/` | a normal form with exact coefficients, to decide equality |
 //!
@@ -43,10 +43,10 @@ mod diff;
 mod display;
 mod eval;
 mod expand;
+mod factors;
 mod id_map;
 mod interval;
 mod lexer;
-mod magnitudes;
 mod node;
 mod number;
 mod order;
@@ -61,7 +61,6 @@ mod rules;
 mod shorten;
 mod simplify;
 mod substitute;
-mod tangents;
 #[cfg(test)]
 mod testing;
 mod trig;
