@@ -74,7 +74,7 @@ impl<'s> Sides<'s> {
         let symbols = whole.iter().flat_map(|side| pool.symbols_of(*side));
         let literals = symbols.filter_map(|symbol| {
             let literal = literal(pool, symbol)?;
-            Some((symbol, (literal.to_f64(), literal.radius)))
+            Some((symbol, (literal.to_f64(), literal.radius())))
         });
         Self {
             pool,

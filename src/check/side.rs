@@ -9,7 +9,7 @@ use crate::artifact;
 use crate::equations::Equations;
 use crate::import::{Format, read_equations};
 use crate::model::{LatentVariable, ReducedModel};
-use crate::symbolic::{ExprId, ExprPool, Literal, Number, ParseError, ParseLimits, SymbolId};
+use crate::symbolic::{Coefficient, ExprId, ExprPool, Number, ParseError, ParseLimits, SymbolId};
 
 /// Marks of symbols that stand for decimals: exact ones, and ones rounded in their last digit.
 const EXACT: char = '#';
@@ -169,8 +169,8 @@ impl Side {
         if number.bytes().all(|byte| byte.is_ascii_digit()) && number.parse::<i64>().is_ok() {
             return None;
         }
-        let literal = Literal::parse(number, self.is_rounded)?;
-        let is_half = (&literal.value + &literal.value).is_integer();
+        let literal = Coefficient::parse(number, self.is_rounded)?;
+        let is_half = literal.plus(&literal).is_integer();
         if !self.is_rounded && is_half && literal.to_f64() < LARGEST_HALF {
             return None;
         }
@@ -238,10 +238,10 @@ fn has_all_digits(decimal: &str) -> bool {
 }
 
 /// The decimal that a symbol stands for.
-pub(super) fn literal(pool: &ExprPool, symbol: SymbolId) -> Option<Literal> {
+pub(super) fn literal(pool: &ExprPool, symbol: SymbolId) -> Option<Coefficient> {
     let name = pool.symbol_name(symbol);
     match name.strip_prefix(ROUNDED) {
-        Some(digits) => Literal::parse(digits, true),
-        None => Literal::parse(name.strip_prefix(EXACT)?, false),
+        Some(digits) => Coefficient::parse(digits, true),
+        None => Coefficient::parse(name.strip_prefix(EXACT)?, false),
     }
 }

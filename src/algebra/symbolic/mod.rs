@@ -65,7 +65,7 @@ mod substitute;
 mod testing;
 mod trig;
 
-pub use canonical::{CanonicalForm, CanonicalForms, Coefficient, Literal, Rational};
+pub use canonical::{CanonicalForm, CanonicalForms, Coefficient};
 pub use display::Display;
 pub(crate) use eval::integer_power;
 pub use interval::Interval;

@@ -19,7 +19,7 @@ fn difference(a: &str, b: &str) -> (CanonicalForm, f64) {
         let rounded = name.strip_prefix('~').map(|digits| (digits, true));
         let (digits, is_rounded) =
             rounded.or(name.strip_prefix('#').map(|digits| (digits, false)))?;
-        Literal::parse(digits, is_rounded)
+        Coefficient::parse(digits, is_rounded)
     };
     let mut forms = CanonicalForms::new(&pool, &[left, right], &literal);
     let difference = forms.of(left).minus(&forms.of(right));
