@@ -5,7 +5,7 @@
 
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
-use romc::symbolic::{ExprId, ExprPool, Function, Interval, Node, SymbolId};
+use romc::symbolic::{ExprId, ExprPool, Function, Interval, Node, Number, SymbolId};
 
 const NAMES: [&str; 3] = ["x", "y", "z1"];
 
@@ -29,7 +29,7 @@ impl Tree {
     fn build(&self, pool: &mut ExprPool) -> ExprId {
         match self {
             Tree::Integer(value) => pool.integer(*value),
-            Tree::Ratio(numerator, denominator) => pool.rational(*numerator, *denominator),
+            Tree::Ratio(numerator, denominator) => ratio(pool, *numerator, *denominator),
             Tree::Float(value) => pool.number(*value),
             Tree::Symbol(index) => pool.symbol(NAMES[*index]),
             Tree::Sum(operands) => {
@@ -50,7 +50,7 @@ impl Tree {
             }
             Tree::Root(base, thirds) => {
                 let base = base.build(pool);
-                let exponent = pool.rational(*thirds, 3);
+                let exponent = ratio(pool, *thirds, 3);
                 pool.pow(base, exponent)
             }
             Tree::Exponential(base, exponent) => {
@@ -63,6 +63,10 @@ impl Tree {
             }
         }
     }
+}
+
+fn ratio(pool: &mut ExprPool, numerator: i64, denominator: i64) -> ExprId {
+    pool.constant(Number::rational(numerator, denominator).expect("denominators are not zero"))
 }
 
 fn leaf() -> impl Strategy<Value = Tree> {

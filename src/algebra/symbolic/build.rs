@@ -20,16 +20,6 @@ impl ExprPool {
         self.constant(number)
     }
 
-    /// The exact fraction `numerator / denominator`.
-    ///
-    /// # Panics
-    /// If `denominator` is zero.
-    pub fn rational(&mut self, numerator: i64, denominator: i64) -> ExprId {
-        let number = Number::rational(numerator, denominator)
-            .expect("denominators of exact fractions are not zero");
-        self.constant(number)
-    }
-
     /// The exact integer `value`.
     pub fn integer(&mut self, value: i64) -> ExprId {
         self.constant(Number::integer(value))
