@@ -87,10 +87,9 @@ impl ExprPool {
         self.factors_of(rest)
             .iter()
             .filter_map(|factor| match self.base_and_exponent(*factor) {
-                (base, Exponent::Number(number)) if self.as_number(base).is_none() => {
-                    Some((base, number))
+                (base, Exponent::Number(number)) => {
+                    self.as_number(base).is_none().then_some((base, number))
                 }
-                (_, Exponent::Number(_)) => None,
                 (_, Exponent::Expr(_)) => Some((*factor, Number::ONE)),
             })
             .collect()
