@@ -4,6 +4,7 @@ use super::number::Number;
 use super::parse::{ParseError, ParseErrorKind, short};
 
 /// A token and where it starts.
+#[derive(Clone, Copy)]
 pub(super) struct Token<'a> {
     pub(super) kind: TokenKind<'a>,
     /// 1 for the first character.

@@ -128,16 +128,23 @@ impl ExprPool {
             let (found, limit) = (text.len(), limits.length);
             return Err(ParseErrorKind::TooLong { found, limit }.at(1));
         }
-        let tokens = tokenize(text)?;
         let mut parser = Parser {
             pool: self,
             allowed,
             literal,
             limits,
+            tokens: tokenize(text)?,
+            next: 0,
             groups: vec![Group::default()],
             depth: 0,
         };
-        parser.run(&tokens)
+        loop {
+            if let Some(operand) = parser.read_operand()?
+                && let Some(result) = parser.after_operand(operand)?
+            {
+                return Ok(result);
+            }
+        }
     }
 }
 
@@ -173,32 +180,23 @@ struct Parser<'p> {
     /// The symbol that stands for the text of a number.
     literal: &'p dyn Fn(&str) -> Option<String>,
     limits: ParseLimits,
+    tokens: Vec<Token<'p>>,
+    /// Index of the token that is read next.
+    next: usize,
     groups: Vec<Group>,
     /// Open groups and pending powers.
     depth: usize,
 }
 
-impl Parser<'_> {
-    fn run(&mut self, tokens: &[Token]) -> Result<ExprId, ParseError> {
-        let mut next = 0;
-        loop {
-            let Some(operand) = self.read_operand(tokens, &mut next)? else {
-                continue;
-            };
-            if let Some(result) = self.after_operand(tokens, &mut next, operand)? {
-                return Ok(result);
-            }
-        }
+impl<'p> Parser<'p> {
+    fn token(&mut self) -> Token<'p> {
+        self.next += 1;
+        self.tokens[self.next - 1]
     }
 
     /// Reads signs and one atom; `None` if it opened a group instead.
-    fn read_operand(
-        &mut self,
-        tokens: &[Token],
-        next: &mut usize,
-    ) -> Result<Option<ExprId>, ParseError> {
-        let token = &tokens[*next];
-        *next += 1;
+    fn read_operand(&mut self) -> Result<Option<ExprId>, ParseError> {
+        let token = self.token();
         match token.kind {
             TokenKind::Plus => Ok(None),
             TokenKind::Minus => {
@@ -210,15 +208,16 @@ impl Parser<'_> {
                 Some(name) => self.pool.symbol(&name),
                 None => self.pool.constant(number),
             })),
-            TokenKind::Open => self.open(Opener::Parenthesis, token).map(|()| None),
+            TokenKind::Open => self.open(Opener::Parenthesis, &token).map(|()| None),
             TokenKind::Name(name) => {
-                let called = tokens[*next].kind == TokenKind::Open;
+                let after = self.tokens[self.next];
+                let called = after.kind == TokenKind::Open;
                 match Function::by_name(name) {
                     Some(function) if called => {
-                        *next += 1;
-                        self.open(Opener::Call(function), token).map(|()| None)
+                        self.next += 1;
+                        self.open(Opener::Call(function), &token).map(|()| None)
                     }
-                    Some(_) => Err(unexpected(&tokens[*next], "`(` after a function")),
+                    Some(_) => Err(unexpected(&after, "`(` after a function")),
                     None if called => {
                         Err(ParseErrorKind::UnknownFunction(short(name)).at(token.position))
                     }
@@ -230,21 +229,15 @@ impl Parser<'_> {
             | TokenKind::Divide
             | TokenKind::Caret
             | TokenKind::Close
-            | TokenKind::End => Err(unexpected(token, "a number, a name, `(` or a sign")),
+            | TokenKind::End => Err(unexpected(&token, "a number, a name, `(` or a sign")),
         }
     }
 
     /// Reads what follows an operand, closing groups as long as they end; the finished
     /// expression at the end of the text.
-    fn after_operand(
-        &mut self,
-        tokens: &[Token],
-        next: &mut usize,
-        mut operand: ExprId,
-    ) -> Result<Option<ExprId>, ParseError> {
+    fn after_operand(&mut self, mut operand: ExprId) -> Result<Option<ExprId>, ParseError> {
         loop {
-            let token = &tokens[*next];
-            *next += 1;
+            let token = &self.token();
             if token.kind == TokenKind::Caret {
                 self.deepen(token)?;
                 let group = self.group();
