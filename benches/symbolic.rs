@@ -123,7 +123,7 @@ fn main() {
     let derivatives = mean(|| {
         let mut pool = model.pool.clone();
         let time = timed(|| n_entries = jacobian(&mut pool, &model).len());
-        n_nodes = pool.len();
+        n_nodes = pool.n_nodes();
         time
     });
     report(
@@ -200,7 +200,7 @@ fn time_pool_of_distinct_sums() {
     report(
         "build distinct sums",
         build,
-        &format!("{} expressions", pool.len()),
+        &format!("{} expressions", pool.n_nodes()),
     );
     let sum = timed(|| pool.sum(&roots));
     report("add them up", sum, &format!("{} operands", roots.len()));

@@ -5,7 +5,7 @@
 
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
-use romc::symbolic::{ExprId, ExprPool, Function, Interval, Node, SymbolId};
+use romc::symbolic::{ExprId, ExprPool, Function, Interval, Node, Number, SymbolId};
 
 const NAMES: [&str; 3] = ["x", "y", "z1"];
 
@@ -29,7 +29,7 @@ impl Tree {
     fn build(&self, pool: &mut ExprPool) -> ExprId {
         match self {
             Tree::Integer(value) => pool.integer(*value),
-            Tree::Ratio(numerator, denominator) => pool.rational(*numerator, *denominator),
+            Tree::Ratio(numerator, denominator) => ratio(pool, *numerator, *denominator),
             Tree::Float(value) => pool.number(*value),
             Tree::Symbol(index) => pool.symbol(NAMES[*index]),
             Tree::Sum(operands) => {
@@ -50,7 +50,7 @@ impl Tree {
             }
             Tree::Root(base, thirds) => {
                 let base = base.build(pool);
-                let exponent = pool.rational(*thirds, 3);
+                let exponent = ratio(pool, *thirds, 3);
                 pool.pow(base, exponent)
             }
             Tree::Exponential(base, exponent) => {
@@ -63,6 +63,10 @@ impl Tree {
             }
         }
     }
+}
+
+fn ratio(pool: &mut ExprPool, numerator: i64, denominator: i64) -> ExprId {
+    pool.constant(Number::rational(numerator, denominator).expect("denominators are not zero"))
 }
 
 fn leaf() -> impl Strategy<Value = Tree> {
@@ -434,13 +438,14 @@ proptest! {
         let ids = NAMES.map(|name| pool.symbol_id(name));
         let place = |symbol: SymbolId| ids.iter().position(|id| *id == symbol).expect("known");
         let range = |place: usize| Interval::new(lows[place], lows[place] + widths[place]);
-        let natural = pool.evaluate_interval(expr, &|symbol| range(place(symbol)));
+        let natural = pool.evaluate_intervals(&[expr], &|symbol| range(place(symbol)))[0];
         let domain: Vec<(SymbolId, Interval)> = pool
             .symbols_of(expr)
             .into_iter()
             .map(|symbol| (symbol, range(place(symbol))))
             .collect();
-        let bounds = pool.bound(expr, &domain);
+        let slopes: Vec<ExprId> = domain.iter().map(|(symbol, _)| pool.derivative(expr, *symbol)).collect();
+        let bounds = pool.bound_by_slopes(expr, &slopes, &domain);
         prop_assert!(natural.lo() <= bounds.lo() && bounds.hi() <= natural.hi());
         for share in shares {
             let point: [f64; 3] = std::array::from_fn(|i| (lows[i] + widths[i] * share[i]).min(lows[i] + widths[i]));

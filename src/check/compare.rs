@@ -373,7 +373,7 @@ fn parted(pool: &ExprPool, expr: ExprId) -> (Coefficient, Vec<ExprId>, Vec<ExprI
 fn value_of(pool: &ExprPool, factor: ExprId) -> Option<Coefficient> {
     match pool.node(factor) {
         Node::Number(number) => Some(Coefficient::from(*number)),
-        Node::Symbol(symbol) => literal(pool, *symbol).map(Coefficient::from),
+        Node::Symbol(symbol) => literal(pool, *symbol),
         _ => None,
     }
 }

@@ -69,7 +69,7 @@ pub(super) fn decimals(pool: &ExprPool, sides: [ExprId; 2]) -> HashMap<SymbolId,
     let symbols = sides.iter().flat_map(|side| pool.symbols_of(*side));
     let decimals = symbols.filter_map(|symbol| {
         let literal = literal(pool, symbol)?;
-        Some((symbol, (literal.to_f64(), literal.radius)))
+        Some((symbol, (literal.to_f64(), literal.radius())))
     });
     decimals.collect()
 }

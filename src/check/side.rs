@@ -9,7 +9,7 @@ use crate::artifact;
 use crate::equations::Equations;
 use crate::import::{Format, read_equations};
 use crate::model::{LatentVariable, ReducedModel};
-use crate::symbolic::{ExprId, ExprPool, Literal, Number, ParseError, SymbolId};
+use crate::symbolic::{Coefficient, ExprId, ExprPool, Number, ParseError, ParseLimits, SymbolId};
 
 /// Marks of symbols that stand for decimals: exact ones, and ones rounded in their last digit.
 const EXACT: char = '#';
@@ -159,7 +159,8 @@ impl Side {
 
     fn parse(&self, text: &str, pool: &mut ExprPool) -> Result<ExprId, ParseError> {
         let known = |name: &str| LatentVariable::from_name(name, self.latent_dim).is_some();
-        pool.parse_with_literals(text, &known, &|number| self.literal_name(number))
+        let literal = |number: &str| self.literal_name(number);
+        pool.parse_within(text, &known, &literal, ParseLimits::default())
     }
 
     /// The symbol of a decimal. Integers are numbers of the pool, and multiples of 1/2 of exact
@@ -168,8 +169,8 @@ impl Side {
         if number.bytes().all(|byte| byte.is_ascii_digit()) && number.parse::<i64>().is_ok() {
             return None;
         }
-        let literal = Literal::parse(number, self.is_rounded)?;
-        let is_half = (&literal.value + &literal.value).is_integer();
+        let literal = Coefficient::parse(number, self.is_rounded)?;
+        let is_half = literal.plus(&literal).is_integer();
         if !self.is_rounded && is_half && literal.to_f64() < LARGEST_HALF {
             return None;
         }
@@ -237,10 +238,10 @@ fn has_all_digits(decimal: &str) -> bool {
 }
 
 /// The decimal that a symbol stands for.
-pub(super) fn literal(pool: &ExprPool, symbol: SymbolId) -> Option<Literal> {
+pub(super) fn literal(pool: &ExprPool, symbol: SymbolId) -> Option<Coefficient> {
     let name = pool.symbol_name(symbol);
     match name.strip_prefix(ROUNDED) {
-        Some(digits) => Literal::parse(digits, true),
-        None => Literal::parse(name.strip_prefix(EXACT)?, false),
+        Some(digits) => Coefficient::parse(digits, true),
+        None => Coefficient::parse(name.strip_prefix(EXACT)?, false),
     }
 }

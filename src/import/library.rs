@@ -28,7 +28,7 @@ pub(super) fn build(choice: &LibraryChoice, latent_dim: usize) -> Result<Library
         LibraryChoice::Terms(terms) => {
             Library::from_terms(latent_dim, &pysindy::readable(terms, latent_dim))
         }
-        LibraryChoice::Standard(_) => Library::of(latent_dim, choice),
+        LibraryChoice::Standard(_) => Library::of(latent_dim, choice.clone()),
     }
 }
 

@@ -154,7 +154,7 @@ impl Ranges {
         let visits: usize = slopes
             .iter()
             .chain([&expr])
-            .map(|&part| self.pool.node_count(part))
+            .map(|&part| self.pool.reachable(&[part]).len())
             .sum();
         let mut parts = vec![(domain.clone(), whole)];
         let mut reached = Interval::EMPTY;

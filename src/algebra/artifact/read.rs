@@ -119,7 +119,7 @@ fn check_schema(file: &str, bytes: &[u8]) -> Result<(), ArtifactError> {
 
 fn to_model(file: &str, manifest: Manifest) -> Result<ReducedModel, ArtifactError> {
     let latent_dim = manifest.latent_dim;
-    let library = Library::of(latent_dim, &manifest.library);
+    let library = Library::of(latent_dim, manifest.library);
     let library = library.map_err(|source| refused(file, source))?;
     let mut builder = ReducedModel::builder(manifest.name, library)
         .description(manifest.description)

@@ -85,17 +85,18 @@ impl Activation {
 
     /// `phi'(a)`.
     pub fn slope(self, a: f64) -> f64 {
+        self.derivative(a, 1)
+    }
+
+    /// `phi''(a)`; of elu at zero, where it jumps, that of the negative side.
+    pub fn curvature(self, a: f64) -> f64 {
+        self.derivative(a, 2)
+    }
+
+    fn derivative(self, a: f64, order: usize) -> f64 {
         match self {
             Self::Elu if a <= 0.0 => a.exp(),
-            Self::Softplus => sigmoid(a),
-            Self::Linear
-            | Self::Elu
-            | Self::Tanh
-            | Self::Sigmoid
-            | Self::Relu
-            | Self::Gelu
-            | Self::GeluTanh
-            | Self::Silu => self.jet(a)[1],
+            every => every.jet(a)[order],
         }
     }
 
@@ -148,22 +149,6 @@ impl Activation {
                 let [s, first, second, _] = Self::Sigmoid.jet(a);
                 [self.value(a), s, first, second]
             }
-        }
-    }
-
-    /// `phi''(a)`; of elu at zero, where it jumps, that of the negative side.
-    pub fn curvature(self, a: f64) -> f64 {
-        match self {
-            Self::Elu if a <= 0.0 => a.exp(),
-            Self::Linear
-            | Self::Elu
-            | Self::Tanh
-            | Self::Sigmoid
-            | Self::Relu
-            | Self::Gelu
-            | Self::GeluTanh
-            | Self::Silu
-            | Self::Softplus => self.jet(a)[2],
         }
     }
 }

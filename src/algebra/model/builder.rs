@@ -5,10 +5,9 @@ use std::collections::HashMap;
 use serde_json::{Map, Value};
 
 use super::affine::AffineMap;
-use super::checks::{check_map, check_robot_names, check_widths, identifier_of};
 use super::coordinate_names::CoordinateNames;
 use super::error::{ModelError, check_tensor};
-use super::identifier::Identifier;
+use super::identifier::{Identifier, identifier_of};
 use super::jump_prior::JumpPrior;
 use super::library::Library;
 use super::phase::{Phase, all_patterns, selected};
@@ -278,17 +277,20 @@ impl ModelBuilder {
         }
     }
 
+    /// Number of robot coordinates, by the first of the parts that has it.
+    pub(super) fn state_dim(&self) -> Option<usize> {
+        let named = |signals: &Option<CoordinateNames>| signals.as_ref().map(CoordinateNames::dim);
+        named(&self.state)
+            .or(named(&self.input))
+            .or(self.encoder.as_ref().map(StateMap::input_dim))
+            .or(self.decoder.as_ref().map(StateMap::output_dim))
+    }
+
     /// Checks shapes of encoder and decoder; returns the number of robot coordinates if known.
     fn check_maps(&self) -> Result<Option<usize>, ModelError> {
         let latent_dim = self.library.latent_dim();
-        let named = |signals: &Option<CoordinateNames>| signals.as_ref().map(CoordinateNames::dim);
-        let state_dim = self
-            .robot
-            .map(|_| crate::robot::STATE_DIM)
-            .or(named(&self.state))
-            .or(named(&self.input))
-            .or(self.encoder.as_ref().map(StateMap::input_dim))
-            .or(self.decoder.as_ref().map(StateMap::output_dim));
+        let of_robot = self.robot.map(|_| crate::robot::STATE_DIM);
+        let state_dim = of_robot.or(self.state_dim());
         let (encoder, decoder) = (self.encoder.is_some(), self.decoder.is_some());
         if (encoder || decoder) && self.scaling.is_none() {
             let (part, needs) = (if encoder { "encoder" } else { "decoder" }, "scaling");
@@ -303,27 +305,32 @@ impl ModelBuilder {
             return Err(ModelError::invalid("`state`", found, expected));
         }
         if let Some(encoder) = &self.encoder {
-            check_map("encoder", encoder, (latent_dim, dim))?;
-            check_widths(encoder, latent_dim)?;
+            encoder.check("encoder", (latent_dim, dim))?;
+            encoder.check_widths(latent_dim)?;
         }
         if let Some(decoder) = &self.decoder {
-            check_map("decoder", decoder, (dim, latent_dim))?;
+            decoder.check("decoder", (dim, latent_dim))?;
         }
         Ok(Some(dim))
     }
 
     fn check_signals(&self, state_dim: Option<usize>) -> Result<(), ModelError> {
-        if let Some(state) = &self.state {
-            state.check("state", state_dim)?;
-        }
-        if let Some(input) = &self.input {
-            input.check("input", state_dim)?;
+        let named = [("state", &self.state), ("input", &self.input)];
+        for (signals, names) in named {
+            if let Some(names) = names {
+                names.check(signals, state_dim)?;
+            }
         }
         let Some(robot) = self.robot else {
             return Ok(());
         };
-        check_robot_names("state", &self.state, &Robot::state_names(), robot)?;
-        check_robot_names("input", &self.input, &Robot::input_names(), robot)
+        let of_robot = [Robot::state_names(), Robot::input_names()];
+        for ((signals, names), of_robot) in named.into_iter().zip(of_robot) {
+            if let Some(names) = names {
+                names.check_robot(signals, &of_robot, robot)?;
+            }
+        }
+        Ok(())
     }
 
     /// Actuators and a frame are those of a robot.

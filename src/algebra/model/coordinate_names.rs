@@ -62,6 +62,24 @@ impl CoordinateNames {
         }
         Ok(())
     }
+
+    /// Complains unless the names are these of a robot.
+    pub(super) fn check_robot(
+        &self,
+        signals: &str,
+        expected: &[String],
+        robot: &Robot,
+    ) -> Result<(), ModelError> {
+        let mut pairs = self.names.iter().zip(expected).enumerate();
+        match pairs.find(|(_, (found, expected))| found != expected) {
+            None => Ok(()),
+            Some((index, (found, expected))) => {
+                let place = format!("`{signals}.names`[{index}]");
+                let expected = format!("{expected:?} as on robot {}", robot.name());
+                Err(ModelError::invalid(place, format!("{found:?}"), expected))
+            }
+        }
+    }
 }
 
 /// Refuses texts of other characters than letters, digits and the given punctuation, which comes

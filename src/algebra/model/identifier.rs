@@ -4,6 +4,8 @@ use std::fmt;
 
 use thiserror::Error;
 
+use super::error::ModelError;
+
 /// Longest identifier in bytes, so that names made of model, phase and function stay readable.
 pub const MAX_IDENTIFIER_LEN: usize = 40;
 
@@ -119,10 +121,20 @@ impl fmt::Display for Identifier {
     }
 }
 
-impl AsRef<str> for Identifier {
-    fn as_ref(&self) -> &str {
-        &self.0
-    }
+/// Refuses a name that a model cannot have, before one is made.
+///
+/// # Errors
+/// [`ModelError::Name`].
+pub fn check_name(name: &str) -> Result<(), ModelError> {
+    identifier_of("model name", name).map(|_| ())
+}
+
+pub(super) fn identifier_of(what: &str, name: &str) -> Result<Identifier, ModelError> {
+    Identifier::from_name(name).map_err(|source| ModelError::Name {
+        what: what.to_owned(),
+        name: name.chars().take(80).collect(),
+        source,
+    })
 }
 
 /// Keywords by language, lower case (`_Bool` and its like cannot begin a name anyway).

@@ -6,9 +6,8 @@ use std::fmt;
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
-use super::error::{ModelError, check_shape};
+use super::error::{LibraryError, ModelError, check_shape};
 use super::evaluation::Tape;
-use super::library_error::LibraryError;
 use super::standard_library::StandardLibrary;
 use super::variable::LatentVariable;
 use crate::symbolic::{ExprId, ExprPool, SymbolId};
@@ -73,7 +72,7 @@ impl Library {
     /// Each variant of [`LibraryError`] except [`LibraryError::Degree`] and
     /// [`LibraryError::Duplicate`].
     pub fn from_terms(latent_dim: usize, texts: &[String]) -> Result<Self, LibraryError> {
-        Self::build(latent_dim, texts.to_vec(), None)
+        Self::of(latent_dim, LibraryChoice::Terms(texts.to_vec()))
     }
 
     /// The standard library, in the order of the published arrays.
@@ -81,28 +80,21 @@ impl Library {
     /// # Errors
     /// [`LibraryError::LatentDim`], [`LibraryError::Degree`], [`LibraryError::TooManyTerms`].
     pub fn standard(latent_dim: usize, standard: StandardLibrary) -> Result<Self, LibraryError> {
-        check_latent_dim(latent_dim)?;
-        let texts = standard.texts(latent_dim)?;
-        Self::build(latent_dim, texts, Some(standard))
+        Self::of(latent_dim, LibraryChoice::Standard(standard))
     }
 
     /// The library with the terms that were chosen.
     ///
     /// # Errors
     /// As [`Self::from_terms`] and [`Self::standard`].
-    pub fn of(latent_dim: usize, choice: &LibraryChoice) -> Result<Self, LibraryError> {
-        match choice {
-            LibraryChoice::Terms(texts) => Self::from_terms(latent_dim, texts),
-            LibraryChoice::Standard(standard) => Self::standard(latent_dim, *standard),
+    pub fn of(latent_dim: usize, choice: LibraryChoice) -> Result<Self, LibraryError> {
+        if !(1..=MAX_LATENT_DIM).contains(&latent_dim) {
+            return Err(LibraryError::LatentDim { found: latent_dim });
         }
-    }
-
-    fn build(
-        latent_dim: usize,
-        texts: Vec<String>,
-        standard: Option<StandardLibrary>,
-    ) -> Result<Self, LibraryError> {
-        check_latent_dim(latent_dim)?;
+        let (texts, standard) = match choice {
+            LibraryChoice::Terms(texts) => (texts, None),
+            LibraryChoice::Standard(standard) => (standard.texts(latent_dim)?, Some(standard)),
+        };
         if texts.is_empty() {
             return Err(LibraryError::Empty);
         }
@@ -113,11 +105,10 @@ impl Library {
         let symbols: Vec<SymbolId> = LatentVariable::all(latent_dim)
             .map(|variable| pool.symbol_id(&variable.to_string()))
             .collect();
-        let zero = pool.number(0.0);
         let mut terms: Vec<CandidateTerm> = Vec::with_capacity(texts.len());
         for (index, text) in texts.into_iter().enumerate() {
             let expr = parse_term(&mut pool, latent_dim, index, &text)?;
-            if expr == zero {
+            if expr == ExprId::ZERO {
                 return Err(LibraryError::Zero { index, text });
             }
             if !constants_are_finite(&pool, expr) {
@@ -272,14 +263,6 @@ impl fmt::Debug for Library {
     }
 }
 
-fn check_latent_dim(latent_dim: usize) -> Result<(), LibraryError> {
-    if (1..=MAX_LATENT_DIM).contains(&latent_dim) {
-        Ok(())
-    } else {
-        Err(LibraryError::LatentDim { found: latent_dim })
-    }
-}
-
 fn parse_term(
     pool: &mut ExprPool,
     latent_dim: usize,
@@ -383,6 +366,9 @@ mod tests {
         let variables = DMatrix::from_fn(3, 3, |row, point| points[point][row]);
         let all = library.evaluate_points(&variables).unwrap();
         for (point, values) in points.iter().enumerate() {
+            let [z, dz, u_lat] = values.map(|value| DVector::from_element(1, value));
+            let alone = library.evaluate(&z, &dz, &u_lat).unwrap();
+            assert_eq!(alone.transpose(), all.row(point));
             let exprs: Vec<ExprId> = library.terms().iter().map(CandidateTerm::expr).collect();
             let expected = library
                 .pool()
@@ -390,21 +376,6 @@ mod tests {
             for (term, expected) in expected.iter().enumerate() {
                 assert_eq!(all[(point, term)], *expected, "{}", texts[term]);
             }
-        }
-    }
-
-    #[test]
-    fn library_values_are_those_of_the_terms() {
-        let library = Library::from_terms(
-            1,
-            &terms(&["1", "z1*dz1", "sin(dz1)", "exp(-z1^2)", "u1/2"]),
-        )
-        .unwrap();
-        let at = |value| DVector::from_element(1, value);
-        let theta = library.evaluate(&at(0.5), &at(-2.0), &at(3.0)).unwrap();
-        let expected = [1.0, -1.0, (-2.0f64).sin(), (-0.25f64).exp(), 1.5];
-        for (value, expected) in theta.iter().zip(expected) {
-            assert!((value - expected).abs() < 1e-15, "{value} {expected}");
         }
     }
 }

@@ -120,7 +120,8 @@ impl ReducedModel {
     ) -> Result<DVector<f64>, ModelError> {
         let (x, dx) = (self.scaled_state(x)?, self.scaled_state(dx)?);
         let ddx = self.scaled_state(ddx)?;
-        self.encoder_map()?.apply_acceleration(&x, &dx, &ddx)
+        let [_, _, ddz] = self.encoder_map()?.apply_rates(&x, &dx, &ddx)?;
+        Ok(ddz)
     }
 
     pub(super) fn scaled_state(&self, x: &DVector<f64>) -> Result<DVector<f64>, ModelError> {

@@ -35,7 +35,6 @@
 mod activation;
 mod affine;
 mod builder;
-mod checks;
 mod coordinate_names;
 mod error;
 mod evaluation;
@@ -43,7 +42,6 @@ mod given_state;
 mod identifier;
 mod jump_prior;
 mod library;
-mod library_error;
 mod maps;
 mod normal;
 mod order;
@@ -64,17 +62,15 @@ pub use crate::robot::FeetRule;
 pub use activation::{Activation, GELU_CUBIC, GELU_RATE};
 pub use affine::AffineMap;
 pub use builder::ModelBuilder;
-pub use checks::check_name;
 pub use coordinate_names::CoordinateNames;
-pub use error::ModelError;
+pub use error::{LibraryError, ModelError};
 pub use evaluation::{Step, Tape};
 pub use given_state::InputGivenState;
-pub use identifier::{Identifier, IdentifierError, MAX_IDENTIFIER_LEN};
+pub use identifier::{Identifier, IdentifierError, MAX_IDENTIFIER_LEN, check_name};
 pub use jump_prior::{FEATURE_DIM, GOAL_DIM, GoalFeatures, GoalRange, JumpPart, JumpPrior};
 pub use library::{
     CandidateTerm, Library, LibraryChoice, MAX_LATENT_DIM, MAX_LIBRARY_DIM, MAX_TERM_LEN,
 };
-pub use library_error::LibraryError;
 pub use normal::{DENSITY_AT_ZERO, TAIL};
 pub use order::CoordinateOrder;
 pub use phase::Phase;

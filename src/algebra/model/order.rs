@@ -3,7 +3,8 @@
 use std::fmt;
 use std::str::FromStr;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::allocator::Allocator;
+use nalgebra::{DefaultAllocator, Dim, Dyn, OMatrix};
 
 use super::error::ModelError;
 use crate::robot::joints::LEG_JOINT_DIM;
@@ -29,26 +30,17 @@ impl CoordinateOrder {
         &self.places
     }
 
-    /// A vector in this order, brought into romc's.
+    /// A vector or matrix whose rows are in this order, with its rows in romc's.
     ///
     /// # Panics
-    /// If the vector does not have 18 entries.
-    pub fn sorted(&self, vector: &DVector<f64>) -> DVector<f64> {
-        let mut sorted = vector.clone();
+    /// If it does not have 18 rows.
+    pub fn sorted<C: Dim>(&self, rows: &OMatrix<f64, Dyn, C>) -> OMatrix<f64, Dyn, C>
+    where
+        DefaultAllocator: Allocator<Dyn, C>,
+    {
+        let mut sorted = rows.clone();
         for (place, &coordinate) in self.places.iter().enumerate() {
-            sorted[coordinate] = vector[place];
-        }
-        sorted
-    }
-
-    /// A matrix whose rows are in this order, with its rows in romc's.
-    ///
-    /// # Panics
-    /// If the matrix does not have 18 rows.
-    pub fn sorted_rows(&self, matrix: &DMatrix<f64>) -> DMatrix<f64> {
-        let mut sorted = matrix.clone();
-        for (place, &coordinate) in self.places.iter().enumerate() {
-            sorted.set_row(coordinate, &matrix.row(place));
+            sorted.row_mut(coordinate).copy_from(&rows.row(place));
         }
         sorted
     }
@@ -160,6 +152,8 @@ impl fmt::Display for CoordinateOrder {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::{DMatrix, DVector};
+
     use super::*;
 
     #[test]
@@ -171,7 +165,7 @@ mod tests {
         let sorted = order.sorted(&foreign);
         assert_eq!(sorted, DVector::from_fn(18, |index, _| index as f64));
         let columns = DMatrix::from_columns(&[foreign.clone(), foreign]);
-        assert_eq!(order.sorted_rows(&columns).column(1), sorted);
+        assert_eq!(order.sorted(&columns).column(1), sorted);
         let by_kind: CoordinateOrder = "kn,hx,hy,body".parse().unwrap();
         assert_eq!(by_kind.places()[..5], [2, 5, 8, 11, 0]);
     }

@@ -24,7 +24,6 @@ use super::jump_prior::JumpPrior;
 use super::library::{CandidateTerm, Library};
 use super::phase::{Phase, selected};
 use super::scaling::Scaling;
-use super::state_map::StateMap;
 use super::statistics::InputStatistics;
 use crate::robot::{Actuators, ContactFlags, InputRule, Robot, WrenchFrame};
 
@@ -77,12 +76,7 @@ impl ReducedModel {
 
     /// Number of robot coordinates, `n`; `None` for a latent-only model.
     pub fn state_dim(&self) -> Option<usize> {
-        let encoder = self.parts.encoder.as_ref().map(StateMap::input_dim);
-        let decoder = self.parts.decoder.as_ref().map(StateMap::output_dim);
-        encoder
-            .or(decoder)
-            .or(self.state().map(CoordinateNames::dim))
-            .or(self.input().map(CoordinateNames::dim))
+        self.parts.state_dim()
     }
 
     /// The candidate terms.

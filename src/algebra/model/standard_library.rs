@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::error::LibraryError;
 use super::library::MAX_LIBRARY_DIM;
-use super::library_error::LibraryError;
 
 /// Largest polynomial degree of the standard library.
 pub const MAX_DEGREE: u32 = 8;
@@ -74,8 +74,19 @@ impl StandardLibrary {
         let dz = || (1..=latent_dim).map(|i| format!("dz{i}"));
         let state: Vec<String> = z().chain(dz()).collect();
         let mut texts = vec!["1".to_owned()];
-        for degree in 1..=self.degree as usize {
-            push_monomials(&mut texts, &state, &mut Vec::new(), 0, degree);
+        // The monomials of one degree by their factors; with one more, none before the last.
+        let mut monomials: Vec<Vec<usize>> = vec![Vec::new()];
+        for _ in 0..self.degree {
+            let longer = monomials.iter().flat_map(|factors| {
+                let last = factors.last().copied().unwrap_or(0);
+                (last..state.len()).map(move |next| [&factors[..], &[next]].concat())
+            });
+            monomials = longer.collect();
+            texts.extend(
+                monomials
+                    .iter()
+                    .map(|factors| monomial_text(&state, factors)),
+            );
         }
         if self.trigonometric {
             for function in ["sin", "cos"] {
@@ -86,25 +97,6 @@ impl StandardLibrary {
             texts.extend((1..=latent_dim).map(|i| format!("u{i}")));
         }
         Ok(texts)
-    }
-}
-
-/// Appends all monomials of `degree` with indices that do not fall, in lexicographic order.
-fn push_monomials(
-    texts: &mut Vec<String>,
-    names: &[String],
-    chosen: &mut Vec<usize>,
-    from: usize,
-    degree: usize,
-) {
-    if chosen.len() == degree {
-        texts.push(monomial_text(names, chosen));
-        return;
-    }
-    for index in from..names.len() {
-        chosen.push(index);
-        push_monomials(texts, names, chosen, index, degree);
-        chosen.pop();
     }
 }
 

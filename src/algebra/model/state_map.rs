@@ -27,7 +27,7 @@ pub struct Layer {
 /// A smooth map between scaled coordinates: an encoder or a decoder.
 ///
 /// Positions go through [`StateMap::apply`]; velocities and accelerations through its first and
-/// second time derivative, which for a linear map are `W dx` and `W ddx`.
+/// second time derivative ([`StateMap::apply_rates`]), which for a linear map are `W dx` and `W ddx`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StateMap {
     layers: Vec<Layer>,
@@ -111,37 +111,18 @@ impl StateMap {
             .try_fold(y, |y, layer| Ok(layer.activated(layer.map.apply(&y)?)))
     }
 
-    /// How velocities map: `J(x) dx`.
+    /// How positions, velocities and accelerations map: `y`, `J(x) dx` and `J(x) ddx + dJ/dt dx`.
     ///
-    /// # Errors
-    /// [`ModelError::Dimension`] if `x` or `dx` is not `input_dim` long.
-    pub fn apply_velocity(
-        &self,
-        x: &DVector<f64>,
-        dx: &DVector<f64>,
-    ) -> Result<DVector<f64>, ModelError> {
-        let (mut y, mut dy) = (x.clone(), dx.clone());
-        for layer in &self.layers {
-            let a = layer.map.apply(&y)?;
-            dy = layer.map.apply_linear(&dy)?;
-            dy.zip_apply(&a, |dy, a| *dy *= layer.activation.slope(a));
-            y = a.map(|a| layer.activation.value(a));
-        }
-        Ok(dy)
-    }
-
-    /// How accelerations map: `J(x) ddx + dJ/dt dx`.
-    ///
-    /// Each layer takes `ddy -> phi''(a) (W dy)^2 + phi'(a) W ddy`.
+    /// Each layer takes `dy -> phi'(a) W dy` and `ddy -> phi''(a) (W dy)^2 + phi'(a) W ddy`.
     ///
     /// # Errors
     /// [`ModelError::Dimension`] if an argument is not `input_dim` long.
-    pub fn apply_acceleration(
+    pub fn apply_rates(
         &self,
         x: &DVector<f64>,
         dx: &DVector<f64>,
         ddx: &DVector<f64>,
-    ) -> Result<DVector<f64>, ModelError> {
+    ) -> Result<[DVector<f64>; 3], ModelError> {
         let (mut y, mut dy, mut ddy) = (x.clone(), dx.clone(), ddx.clone());
         for layer in &self.layers {
             let a = layer.map.apply(&y)?;
@@ -154,7 +135,7 @@ impl StateMap {
             dy = da.zip_map(&a, |da, a| phi.slope(a) * da);
             y = a.map(|a| phi.value(a));
         }
-        Ok(ddy)
+        Ok([y, dy, ddy])
     }
 
     /// The Jacobian `J(x) = dy/dx`, `output_dim x input_dim`.
@@ -177,6 +158,37 @@ impl StateMap {
             y = a.map(|a| layer.activation.value(a));
         }
         Ok(jacobian.expect("a map has a layer"))
+    }
+
+    /// Checks what enters the first layer and what leaves the last; `expected` is the Jacobian's shape.
+    pub(super) fn check(&self, name: &str, expected: (usize, usize)) -> Result<(), ModelError> {
+        if let Some(affine) = self.as_affine() {
+            let (tensor, found) = (format!("{name}.weights"), affine.weights().shape());
+            return check_shape(&tensor, found, expected);
+        }
+        let last = self.layers.len() - 1;
+        let ends = [(0, None, Some(expected.1)), (last, Some(expected.0), None)];
+        for (layer, rows, columns) in ends {
+            let found = self.layers[layer].map.weights().shape();
+            let expected = (rows.unwrap_or(found.0), columns.unwrap_or(found.1));
+            check_shape(&format!("{name}.layers[{layer}].weights"), found, expected)?;
+        }
+        Ok(())
+    }
+
+    /// No layer of an encoder may be narrower than the latent space, or its Jacobian never has full
+    /// rank.
+    pub(super) fn check_widths(&self, latent_dim: usize) -> Result<(), ModelError> {
+        let widths = self.layers.iter().map(|layer| layer.map.output_dim());
+        match widths.enumerate().find(|&(_, width)| width < latent_dim) {
+            None => Ok(()),
+            Some((layer, found)) => {
+                let expected = format!("at least {latent_dim}, one per latent coordinate");
+                let place = format!("`encoder.layers[{layer}]`");
+                let found = format!("{found} units");
+                Err(ModelError::invalid(place, found, expected))
+            }
+        }
     }
 
     /// The layers in words: `18 -> 32 elu -> 4`.
@@ -245,6 +257,11 @@ mod tests {
         DVector::from_fn(5, |i, _| (seed + 2.3 * i as f64).sin())
     }
 
+    fn velocity(map: &StateMap, x: &DVector<f64>, dx: &DVector<f64>) -> DVector<f64> {
+        let [_, dy, _] = map.apply_rates(x, dx, &vector(9.0)).unwrap();
+        dy
+    }
+
     #[test]
     fn jacobian_and_velocity_equal_central_differences() {
         let (x, dx) = (vector(0.2), vector(1.4));
@@ -253,7 +270,7 @@ mod tests {
             let forward = map.apply(&(&x + &dx * h)).unwrap();
             let backward = map.apply(&(&x - &dx * h)).unwrap();
             let expected = (forward - backward) / (2.0 * h);
-            let found = map.apply_velocity(&x, &dx).unwrap();
+            let found = velocity(&map, &x, &dx);
             assert!((&found - &expected).amax() < 1e-8, "{found} {expected}");
             let product = map.jacobian(&x).unwrap() * &dx;
             assert!((&found - product).amax() < 1e-13);
@@ -267,10 +284,11 @@ mod tests {
         for map in all() {
             let velocity = |t: f64| {
                 let at = &x + &dx * t + &ddx * (0.5 * t * t);
-                map.apply_velocity(&at, &(&dx + &ddx * t)).unwrap()
+                velocity(&map, &at, &(&dx + &ddx * t))
             };
             let expected = (velocity(h) - velocity(-h)) / (2.0 * h);
-            let found = map.apply_acceleration(&x, &dx, &ddx).unwrap();
+            let [y, _, found] = map.apply_rates(&x, &dx, &ddx).unwrap();
+            assert_eq!(Ok(y), map.apply(&x));
             assert!((&found - &expected).amax() < 1e-7, "{found} {expected}");
         }
     }
@@ -282,7 +300,7 @@ mod tests {
         let x = vector(0.5);
         assert_eq!(map.apply(&x), affine.apply(&x));
         assert_eq!(
-            map.apply_velocity(&vector(3.0), &x),
+            Ok(velocity(&map, &vector(3.0), &x)),
             affine.apply_linear(&x)
         );
         assert!(chain(&[Activation::Tanh]).as_affine().is_none());

@@ -13,6 +13,13 @@ pub enum LatentVariable {
     U(usize),
 }
 
+/// The kinds in the order of [`LatentVariable::all`], with their names.
+const KINDS: [(&str, fn(usize) -> LatentVariable); 3] = [
+    ("z", LatentVariable::Z),
+    ("dz", LatentVariable::Dz),
+    ("u", LatentVariable::U),
+];
+
 impl LatentVariable {
     /// The variable with this name, if there is one at `latent_dim`.
     pub fn from_name(name: &str, latent_dim: usize) -> Option<Self> {
@@ -21,41 +28,35 @@ impl LatentVariable {
         let canonical = !digits.starts_with('0') && digits.bytes().all(|b| b.is_ascii_digit());
         let number: usize = digits.parse().ok().filter(|_| canonical)?;
         let index = number.checked_sub(1).filter(|&index| index < latent_dim)?;
-        match kind {
-            "z" => Some(LatentVariable::Z(index)),
-            "dz" => Some(LatentVariable::Dz(index)),
-            "u" => Some(LatentVariable::U(index)),
-            _ => None,
+        let (_, variable) = KINDS.iter().find(|(known, _)| *known == kind)?;
+        Some(variable(index))
+    }
+
+    /// Its kind's place in [`KINDS`], and its index.
+    fn parts(self) -> (usize, usize) {
+        match self {
+            LatentVariable::Z(index) => (0, index),
+            LatentVariable::Dz(index) => (1, index),
+            LatentVariable::U(index) => (2, index),
         }
     }
 
     /// Its place in [`Self::all`], if it is there at `latent_dim`.
     pub fn place(self, latent_dim: usize) -> Option<usize> {
-        let (block, index) = match self {
-            LatentVariable::Z(index) => (0, index),
-            LatentVariable::Dz(index) => (1, index),
-            LatentVariable::U(index) => (2, index),
-        };
-        (index < latent_dim).then_some(block * latent_dim + index)
+        let (kind, index) = self.parts();
+        (index < latent_dim).then_some(kind * latent_dim + index)
     }
 
     /// All variables at `latent_dim`: z, then dz, then u.
     pub fn all(latent_dim: usize) -> impl Iterator<Item = Self> {
-        let indices = move || 0..latent_dim;
-        indices()
-            .map(LatentVariable::Z)
-            .chain(indices().map(LatentVariable::Dz))
-            .chain(indices().map(LatentVariable::U))
+        (KINDS.into_iter()).flat_map(move |(_, variable)| (0..latent_dim).map(variable))
     }
 }
 
 impl fmt::Display for LatentVariable {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            LatentVariable::Z(index) => write!(f, "z{}", index + 1),
-            LatentVariable::Dz(index) => write!(f, "dz{}", index + 1),
-            LatentVariable::U(index) => write!(f, "u{}", index + 1),
-        }
+        let (kind, index) = self.parts();
+        write!(f, "{}{}", KINDS[kind].0, index + 1)
     }
 }
 

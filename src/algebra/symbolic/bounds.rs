@@ -1,28 +1,63 @@
-//! Sharper bounds of smooth expressions over boxes, by their slopes.
+//! Bounds of expressions over boxes, those of smooth ones sharpened by their slopes.
+
+use std::ops::Neg;
 
 use super::interval::Interval;
 use super::node::{ExprId, Function, Node, SymbolId};
+use super::number::Number;
 use super::pool::ExprPool;
 
 impl ExprPool {
-    /// An interval that contains every value of `expr` where symbols lie in the given intervals
-    /// (others may be anything), at the points where it is defined.
+    /// For each expression an interval that contains every value which it takes where symbols lie in
+    /// the intervals that `range_of` gives, at the points where it is defined.
     ///
-    /// Where the expression is defined and Lipschitz continuous on the whole box, its slopes
-    /// sharpen what [`evaluate_interval`](ExprPool::evaluate_interval) gives: a symbol of which
+    /// Sound but not tight: occurrences of a symbol in different terms count as independent.
+    pub fn evaluate_intervals(
+        &self,
+        exprs: &[ExprId],
+        range_of: &dyn Fn(SymbolId) -> Interval,
+    ) -> Vec<Interval> {
+        self.fold_up(exprs, |pool, expr, child| match pool.node(expr) {
+            Node::Number(number) => enclose(*number),
+            Node::Symbol(symbol) => range_of(*symbol),
+            Node::Sum(terms) => terms
+                .iter()
+                .map(|term| child(*term))
+                .fold(Interval::point(0.0), |a, b| a + b),
+            Node::Product(factors) => factors
+                .iter()
+                .map(|factor| child(*factor))
+                .fold(Interval::point(1.0), |a, b| a * b),
+            Node::Power(base, exponent) => match pool.as_integer(*exponent) {
+                Some(integer) => child(*base).powi(integer),
+                None => child(*base).pow(child(*exponent)),
+            },
+            Node::Apply(function, argument) => {
+                let argument = child(*argument);
+                match function {
+                    Function::Sin => argument.sin(),
+                    Function::Cos => argument.cos(),
+                    Function::Tan => argument.tan(),
+                    Function::Tanh => argument.tanh(),
+                    Function::Exp => argument.exp(),
+                    Function::Log => argument.log(),
+                    Function::Sqrt => argument.sqrt(),
+                    Function::Abs => argument.abs(),
+                    Function::Sign => argument.sign(),
+                }
+            }
+        })
+    }
+
+    /// An interval that contains every value of `expr` where symbols lie in the given intervals
+    /// (others may be anything), at the points where it is defined; `slopes` are the derivatives of
+    /// `expr` by the symbols of `domain`.
+    ///
+    /// Where the expression is defined and Lipschitz continuous on the whole box, they
+    /// sharpen what [`evaluate_intervals`](ExprPool::evaluate_intervals) gives: a symbol of which
     /// it is monotone goes to its ends, and for the others the mean value form
     /// `f(c) + sum D_i (X_i - c_i)` around the centre is used. `sin(x) - x` on `[-0.1, 0.1]` is
     /// bounded by 1.7e-4 this way, instead of by 0.2.
-    pub fn bound(&mut self, expr: ExprId, domain: &[(SymbolId, Interval)]) -> Interval {
-        let slopes: Vec<ExprId> = domain
-            .iter()
-            .map(|(symbol, _)| self.derivative(expr, *symbol))
-            .collect();
-        self.bound_by_slopes(expr, &slopes, domain)
-    }
-
-    /// As [`bound`](ExprPool::bound) with the derivatives of `expr` by the symbols of `domain`, for
-    /// many boxes of the same expression.
     pub fn bound_by_slopes(
         &self,
         expr: ExprId,
@@ -37,30 +72,27 @@ impl ExprPool {
             .iter()
             .map(|slope| self.bound_naturally(*slope, domain))
             .collect();
-        let lowest = self.bound_from_side(expr, domain, &slopes, Side::Low);
-        let highest = self.bound_from_side(expr, domain, &slopes, Side::High);
+        let lowest = self.bound_from_side(expr, domain, &slopes, |slope| slope);
+        let highest = self.bound_from_side(expr, domain, &slopes, Neg::neg);
         natural.intersection(Interval::new(lowest.lo(), highest.hi()))
     }
 
     fn bound_naturally(&self, expr: ExprId, domain: &[(SymbolId, Interval)]) -> Interval {
-        self.evaluate_interval(expr, &|symbol| range_of(domain, symbol))
+        self.evaluate_intervals(&[expr], &|symbol| range_of(domain, symbol))[0]
     }
 
-    /// Bounds of `expr` where every symbol of which it is monotone is at the end that leads to
-    /// `side`.
+    /// Bounds of `expr` where every symbol of which it is monotone is at the end from which `expr`
+    /// goes up, where `away` keeps slopes, or down, where it negates them.
     fn bound_from_side(
         &self,
         expr: ExprId,
         domain: &[(SymbolId, Interval)],
         slopes: &[Interval],
-        side: Side,
+        away: fn(Interval) -> Interval,
     ) -> Interval {
         let mut reduced = domain.to_vec();
         for ((_, range), slope) in reduced.iter_mut().zip(slopes) {
-            let away = match side {
-                Side::Low => *slope,
-                Side::High => -*slope,
-            };
+            let away = away(*slope);
             if away.lo() >= 0.0 {
                 *range = Interval::point(range.lo());
             } else if away.hi() <= 0.0 {
@@ -106,18 +138,28 @@ impl ExprPool {
     }
 }
 
-/// Which bound is wanted.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Side {
-    Low,
-    High,
-}
-
 fn range_of(domain: &[(SymbolId, Interval)], symbol: SymbolId) -> Interval {
     domain
         .iter()
         .find(|(known, _)| *known == symbol)
         .map_or(Interval::ENTIRE, |(_, range)| *range)
+}
+
+/// The floats around a number; one if it is a float or a short integer.
+fn enclose(number: Number) -> Interval {
+    match number.as_rational() {
+        None => Interval::point(number.to_f64()),
+        Some((numerator, denominator)) => enclose_integer(numerator) / enclose_integer(denominator),
+    }
+}
+
+fn enclose_integer(integer: i64) -> Interval {
+    let nearest = integer as f64;
+    if nearest as i128 == i128::from(integer) {
+        Interval::point(nearest)
+    } else {
+        Interval::new(nearest.next_down(), nearest.next_up())
+    }
 }
 
 #[cfg(test)]
@@ -132,7 +174,18 @@ mod tests {
             .into_iter()
             .map(|symbol| (symbol, Interval::new(lo, hi)))
             .collect();
-        pool.bound(expr, &domain)
+        let slopes = domain
+            .iter()
+            .map(|(symbol, _)| pool.derivative(expr, *symbol));
+        let slopes: Vec<ExprId> = slopes.collect();
+        pool.bound_by_slopes(expr, &slopes, &domain)
+    }
+
+    /// Without slopes.
+    fn bounds(text: &str, range: Interval) -> Interval {
+        let mut pool = ExprPool::new();
+        let expr = pool.parsed(text);
+        pool.evaluate_intervals(&[expr], &|_| range)[0]
     }
 
     #[test]
@@ -174,5 +227,30 @@ mod tests {
     fn bound_of_magnitude_knows_its_kink() {
         assert_eq!(bound("abs(x)", -1.0, 2.0), Interval::new(0.0, 2.0));
         assert!(bound("abs(x) - x", 1.0, 2.0).magnitude() < 1e-12);
+    }
+
+    #[test]
+    fn bounds_of_polynomial_use_collected_powers() {
+        let range = Interval::new(-2.0, 1.0);
+        assert_eq!(bounds("x*x", range), Interval::new(0.0, 4.0));
+        assert_eq!(bounds("1 + 2*x", range), Interval::new(-3.0, 3.0));
+        assert_eq!(bounds("x - x", range), Interval::point(0.0));
+    }
+
+    #[test]
+    fn bounds_of_fraction_contain_the_exact_value() {
+        let third = bounds("1/3", Interval::EMPTY);
+        assert!(third.contains(1.0 / 3.0) && third.lo() < third.hi());
+        let large = bounds("9007199254740993", Interval::EMPTY);
+        assert_eq!(
+            large,
+            Interval::new(9_007_199_254_740_991.0, 9_007_199_254_740_994.0)
+        );
+    }
+
+    #[test]
+    fn bounds_of_undefined_expression_are_empty() {
+        assert!(bounds("log(-1 - x^2)", Interval::new(-1.0, 1.0)).is_empty());
+        assert!(bounds("1/0", Interval::ENTIRE).is_empty());
     }
 }

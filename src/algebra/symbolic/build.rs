@@ -20,16 +20,6 @@ impl ExprPool {
         self.constant(number)
     }
 
-    /// The exact fraction `numerator / denominator`.
-    ///
-    /// # Panics
-    /// If `denominator` is zero.
-    pub fn rational(&mut self, numerator: i64, denominator: i64) -> ExprId {
-        let number = Number::rational(numerator, denominator)
-            .expect("denominators of exact fractions are not zero");
-        self.constant(number)
-    }
-
     /// The exact integer `value`.
     pub fn integer(&mut self, value: i64) -> ExprId {
         self.constant(Number::integer(value))
@@ -97,7 +87,7 @@ impl ExprPool {
     pub(super) fn sum_of_terms(&mut self, terms: Vec<(Number, ExprId)>) -> ExprId {
         let mut terms = terms;
         for _ in 0..MAX_PASSES {
-            terms = collect(terms, |a, b| self.folded(a.checked_add(b)));
+            terms = self.collected(terms);
             // Collecting may leave `1 * (a + b)`, which belongs into this sum.
             let nested = |&(coefficient, rest): &(Number, ExprId)| {
                 coefficient.abs().is_one() && matches!(self.node(rest), Node::Sum(_))
@@ -122,6 +112,24 @@ impl ExprPool {
             [only] => *only,
             _ => self.intern(Node::Sum(terms.into())),
         }
+    }
+
+    /// Adds the coefficients of equal rests and drops what cancels.
+    fn collected(&self, mut terms: Vec<(Number, ExprId)>) -> Vec<(Number, ExprId)> {
+        terms.sort_by_key(|(_, rest)| *rest);
+        let add = |a: Number, b| self.folded(a.checked_add(b));
+        let mut collected = Vec::with_capacity(terms.len());
+        for group in terms.chunk_by(|a, b| a.1 == b.1) {
+            if let [only] = group {
+                collected.push(*only);
+                continue;
+            }
+            let numbers = group.iter().map(|(coefficient, _)| *coefficient).collect();
+            let sums = fold(numbers, add, Number::is_negative);
+            collected.extend(sums.into_iter().map(|sum| (sum, group[0].1)));
+        }
+        collected.retain(|(coefficient, _)| !coefficient.is_zero());
+        collected
     }
 
     fn push_terms(&self, expr: ExprId, terms: &mut Vec<(Number, ExprId)>) {
@@ -324,28 +332,6 @@ impl ExprPool {
     fn compare_bases(&self, a: ExprId, b: ExprId) -> std::cmp::Ordering {
         self.compare(self.base_and_exponent(a).0, self.base_and_exponent(b).0)
     }
-}
-
-/// Adds the coefficients of equal rests and drops what cancels.
-fn collect(
-    mut terms: Vec<(Number, ExprId)>,
-    add: impl Fn(Number, Number) -> Option<Number>,
-) -> Vec<(Number, ExprId)> {
-    terms.sort_by_key(|(_, rest)| *rest);
-    let mut collected = Vec::with_capacity(terms.len());
-    for group in terms.chunk_by(|a, b| a.1 == b.1) {
-        match group {
-            [only] => collected.push(*only),
-            _ => {
-                let rest = group[0].1;
-                let numbers = group.iter().map(|(coefficient, _)| *coefficient).collect();
-                let sums = fold(numbers, &add, Number::is_negative);
-                collected.extend(sums.into_iter().map(|sum| (sum, rest)));
-            }
-        }
-    }
-    collected.retain(|(coefficient, _)| !coefficient.is_zero());
-    collected
 }
 
 /// Folds numbers in an order that depends on their values alone: exact ones first, then floats

@@ -57,6 +57,8 @@ fn constructors_give_canonical_expressions() {
             ("sqrt(1/2)", "1/2*sqrt(2)"),
             ("sqrt(2)*sqrt(2)", "2"),
             ("27^(2/3)", "9"),
+            ("sqrt(9/16)", "3/4"),
+            ("sqrt(2.5)", "1.5811388300841898"),
             ("10^400*10^-399", "10"),
             // Functions know symmetries and inverses.
             ("sin(-x) + cos(-x)", "-sin(x) + cos(x)"),

@@ -12,9 +12,7 @@
 //!
 //! A shared part counts as often as it is written.
 
-use std::collections::HashMap;
-
-use super::intern::BuildIdHasher;
+use super::id_map::IdMap;
 use super::node::{ExprId, Function, Node};
 use super::number::Number;
 use super::order::Exponent;
@@ -33,7 +31,7 @@ const MOST_DIGITS: usize = 3;
 /// Lengths found so far.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Costs {
-    known: HashMap<ExprId, u64, BuildIdHasher>,
+    known: IdMap<u64>,
 }
 
 impl Costs {
@@ -64,7 +62,8 @@ impl Costs {
     }
 
     fn of_factor(&mut self, pool: &ExprPool, expr: ExprId) -> u64 {
-        for node in pool.reachable_where(&[expr], |node| !self.known.contains_key(&node)) {
+        let is_new = |node| !self.known.contains_key(&node);
+        for node in pool.walk(&[expr], is_new, |_| true) {
             let length = pool.length_of_node(node, |operand| self.known[&operand]);
             self.known.insert(node, length);
         }
@@ -148,14 +147,10 @@ impl ExprPool {
     }
 
     fn n_terms(&self, expr: ExprId) -> u64 {
-        match self.node(expr) {
-            Node::Sum(terms) => terms.len() as u64,
-            Node::Number(_)
-            | Node::Symbol(_)
-            | Node::Product(_)
-            | Node::Power(..)
-            | Node::Apply(..) => 1,
-        }
+        let Node::Sum(terms) = self.node(expr) else {
+            return 1;
+        };
+        terms.len() as u64
     }
 }
 

@@ -1,8 +1,6 @@
 //! Derivatives, memoised per expression and symbol.
 
-use std::collections::HashSet;
-
-use super::intern::BuildIdHasher;
+use super::id_map::IdSet;
 use super::node::{ExprId, Function, Node, SymbolId};
 use super::number::Number;
 use super::pool::ExprPool;
@@ -26,7 +24,7 @@ impl ExprPool {
     /// What has to be differentiated before and with `expr`, operands first. A product with a
     /// numeric factor needs only the rest, which other terms share.
     fn to_differentiate(&self, expr: ExprId, symbol: SymbolId) -> Vec<ExprId> {
-        let mut seen = HashSet::with_hasher(BuildIdHasher::default());
+        let mut seen = IdSet::default();
         let mut stack = vec![expr];
         while let Some(node) = stack.pop() {
             if self.known_derivative(node, symbol).is_some() || !seen.insert(node) {

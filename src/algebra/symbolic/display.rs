@@ -23,75 +23,62 @@ impl ExprPool {
 
 /// A piece of text still to be written. The printer keeps its own stack of these, so that deep
 /// expressions need no deep recursion.
-enum Piece {
-    Text(&'static str),
+enum Piece<'p> {
+    Text(&'p str),
     Number(Number),
     Expr(ExprId),
-    /// `coefficient * rest`, with the sign written in front.
-    Term(Number, ExprId),
     /// A base raised to a positive power, or a constant raised to any.
     Power(ExprId, Exponent),
     /// An expression in parentheses unless it is a single word.
     Operand(ExprId),
+    /// `coefficient * rest`, with the sign written in front.
+    Term(Number, ExprId),
 }
 
 impl fmt::Display for Display<'_> {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut printer = Printer {
-            pool: self.pool,
-            stack: vec![Piece::Expr(self.expr)],
-        };
-        while let Some(piece) = printer.stack.pop() {
-            match piece {
-                Piece::Text(text) => formatter.write_str(text)?,
-                Piece::Number(number) => write!(formatter, "{number}")?,
-                Piece::Expr(expr) => match self.pool.node(expr) {
-                    Node::Symbol(symbol) => {
-                        formatter.write_str(self.pool.symbol_name(*symbol))?;
-                    }
-                    _ => printer.push_expr(expr),
-                },
-                Piece::Term(coefficient, rest) => printer.push_term(coefficient, rest),
-                Piece::Power(base, exponent) => printer.push_power(base, exponent),
-                Piece::Operand(expr) => printer.push_operand(expr),
-            }
+        let mut stack = vec![Piece::Expr(self.expr)];
+        while let Some(piece) = stack.pop() {
+            let pieces = match piece {
+                Piece::Text(text) => {
+                    formatter.write_str(text)?;
+                    continue;
+                }
+                Piece::Number(number) => {
+                    write!(formatter, "{number}")?;
+                    continue;
+                }
+                Piece::Expr(expr) => self.of_expr(expr),
+                Piece::Term(coefficient, rest) => self.of_term(coefficient, rest),
+                Piece::Power(base, exponent) => self.of_power(base, exponent),
+                Piece::Operand(expr) => self.of_operand(expr),
+            };
+            stack.extend(pieces.into_iter().rev());
         }
         Ok(())
     }
 }
 
-struct Printer<'p> {
-    pool: &'p ExprPool,
-    /// Pieces in reverse order.
-    stack: Vec<Piece>,
-}
-
-impl Printer<'_> {
-    fn push_all(&mut self, pieces: Vec<Piece>) {
-        self.stack.extend(pieces.into_iter().rev());
-    }
-
-    fn push_expr(&mut self, expr: ExprId) {
+impl<'p> Display<'p> {
+    fn of_expr(&self, expr: ExprId) -> Vec<Piece<'p>> {
         match self.pool.node(expr) {
-            Node::Number(number) => self.stack.push(Piece::Number(*number)),
-            Node::Sum(_) => self.push_sum(expr),
-            Node::Apply(function, argument) if !self.is_root(expr) => {
-                let (function, argument) = (function.name(), *argument);
-                self.push_all(vec![
-                    Piece::Text(function),
-                    Piece::Text("("),
-                    Piece::Expr(argument),
-                    Piece::Text(")"),
-                ]);
-            }
-            Node::Symbol(_) | Node::Product(_) | Node::Power(..) | Node::Apply(..) => {
+            Node::Number(number) => vec![Piece::Number(*number)],
+            Node::Symbol(symbol) => vec![Piece::Text(self.pool.symbol_name(*symbol))],
+            Node::Sum(_) => self.of_sum(expr),
+            Node::Apply(function, argument) if self.pool.base_and_exponent(expr).0 == expr => vec![
+                Piece::Text(function.name()),
+                Piece::Text("("),
+                Piece::Expr(*argument),
+                Piece::Text(")"),
+            ],
+            Node::Product(_) | Node::Power(..) | Node::Apply(..) => {
                 let (coefficient, rest) = self.pool.split(expr);
-                self.stack.push(Piece::Term(coefficient, rest));
+                self.of_term(coefficient, rest)
             }
         }
     }
 
-    fn push_sum(&mut self, expr: ExprId) {
+    fn of_sum(&self, expr: ExprId) -> Vec<Piece<'p>> {
         let mut pieces = Vec::new();
         for (index, (coefficient, rest)) in self.pool.terms_of(expr).into_iter().enumerate() {
             match (index, coefficient.is_negative()) {
@@ -100,11 +87,11 @@ impl Printer<'_> {
                 (_, true) => pieces.extend([Piece::Text(" - "), Piece::Term(-coefficient, rest)]),
             }
         }
-        self.push_all(pieces);
+        pieces
     }
 
     /// A product as one fraction: `-0.5*x*y/(z*w^2)`.
-    fn push_term(&mut self, coefficient: Number, rest: ExprId) {
+    fn of_term(&self, coefficient: Number, rest: ExprId) -> Vec<Piece<'p>> {
         let mut numerator = Vec::new();
         let mut denominator = Vec::new();
         for &factor in self.pool.factors_of(rest) {
@@ -137,35 +124,34 @@ impl Printer<'_> {
             join(&mut pieces, denominator);
             pieces.push(Piece::Text(")"));
         }
-        self.push_all(pieces);
+        pieces
     }
 
-    fn push_power(&mut self, base: ExprId, exponent: Exponent) {
+    fn of_power(&self, base: ExprId, exponent: Exponent) -> Vec<Piece<'p>> {
         let mut pieces = vec![Piece::Operand(base), Piece::Text("^")];
         let number = match exponent {
             Exponent::Expr(exponent) => {
                 pieces.push(Piece::Operand(exponent));
-                return self.push_all(pieces);
+                return pieces;
             }
             Exponent::Number(number) => number,
         };
         pieces.extend(match number.as_rational() {
-            Some((1, 1)) => return self.stack.push(Piece::Operand(base)),
+            Some((1, 1)) => return vec![Piece::Operand(base)],
             // `sqrt(36)` would read as 6, though the power itself is beyond every float;
             // `sqrt(0)` as zero, though its negative powers are not.
             Some((halves, 2)) if !self.has_exact_root(base) => {
-                let root = [Piece::Text("sqrt("), Piece::Expr(base), Piece::Text(")")];
-                let mut pieces = Vec::from(root);
+                let mut root = vec![Piece::Text("sqrt("), Piece::Expr(base), Piece::Text(")")];
                 if halves != 1 {
-                    pieces.extend([Piece::Text("^"), Piece::Number(Number::integer(halves))]);
+                    root.extend([Piece::Text("^"), Piece::Number(Number::integer(halves))]);
                 }
-                return self.push_all(pieces);
+                return root;
             }
             Some((_, 1)) => vec![Piece::Number(number)],
             None if !number.is_negative() => vec![Piece::Number(number)],
             Some(_) | None => vec![Piece::Text("("), Piece::Number(number), Piece::Text(")")],
         });
-        self.push_all(pieces);
+        pieces
     }
 
     /// Whether the square root of `expr` would be read as a number.
@@ -174,7 +160,7 @@ impl Printer<'_> {
         number.is_some_and(|number| number.checked_root(2).is_some())
     }
 
-    fn push_operand(&mut self, expr: ExprId) {
+    fn of_operand(&self, expr: ExprId) -> Vec<Piece<'p>> {
         let is_word = match self.pool.node(expr) {
             Node::Symbol(_) | Node::Apply(..) => true,
             Node::Number(number) => {
@@ -182,20 +168,15 @@ impl Printer<'_> {
             }
             Node::Sum(_) | Node::Product(_) | Node::Power(..) => false,
         };
-        if is_word {
-            self.stack.push(Piece::Expr(expr));
-        } else {
-            self.push_all(vec![Piece::Text("("), Piece::Expr(expr), Piece::Text(")")]);
+        match is_word {
+            true => vec![Piece::Expr(expr)],
+            false => vec![Piece::Text("("), Piece::Expr(expr), Piece::Text(")")],
         }
-    }
-
-    fn is_root(&self, expr: ExprId) -> bool {
-        self.pool.base_and_exponent(expr).0 != expr
     }
 }
 
 /// Appends factors with `*` between them.
-fn join(pieces: &mut Vec<Piece>, factors: Vec<Piece>) {
+fn join<'p>(pieces: &mut Vec<Piece<'p>>, factors: Vec<Piece<'p>>) {
     for (index, factor) in factors.into_iter().enumerate() {
         if index > 0 {
             pieces.push(Piece::Text("*"));

@@ -19,16 +19,8 @@ impl ExprPool {
         self.fold_up(exprs, |pool, expr, child| match pool.node(expr) {
             Node::Number(number) => number.to_f64(),
             Node::Symbol(symbol) => value_of(*symbol),
-            Node::Sum(terms) => terms
-                .iter()
-                .map(|term| child(*term))
-                .reduce(|a, b| a + b)
-                .expect("sums have two terms or more"),
-            Node::Product(factors) => factors
-                .iter()
-                .map(|factor| child(*factor))
-                .reduce(|a, b| a * b)
-                .expect("products have two factors or more"),
+            Node::Sum(terms) => terms.iter().map(|term| child(*term)).sum(),
+            Node::Product(factors) => factors.iter().map(|factor| child(*factor)).product(),
             Node::Power(base, exponent) => match pool.as_integer(*exponent) {
                 Some(integer) => integer_power(child(*base), integer),
                 None => child(*base).powf(child(*exponent)),

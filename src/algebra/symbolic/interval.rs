@@ -7,6 +7,7 @@
 
 use std::fmt;
 
+use super::node::Function;
 use super::rounding::{
     is_exact_root, mul_up, power_down, power_up, recip_down, recip_up, sub_up, widen_down, widen_up,
 };
@@ -131,7 +132,8 @@ impl Interval {
         if self.is_empty() {
             return self;
         }
-        Interval::between(sign(self.lo), sign(self.hi))
+        let [lo, hi] = [self.lo, self.hi].map(|end| Function::Sign.evaluate(end));
+        Interval::between(lo, hi)
     }
 
     /// `x^exponent`.
@@ -349,10 +351,6 @@ impl std::ops::Div for Interval {
     fn div(self, other: Interval) -> Interval {
         self * other.recip()
     }
-}
-
-fn sign(x: f64) -> f64 {
-    if x == 0.0 { 0.0 } else { x.signum() }
 }
 
 #[cfg(test)]

@@ -40,7 +40,8 @@ fn inexact_operations_are_widened_to_the_outside() {
     let square = tenth * tenth;
     assert!(square.lo() < square.hi() && square.hi() == square.lo().next_up());
     let third = Interval::point(3.0).recip();
-    assert!(third.lo() < third.hi() && third.contains(1.0 / 3.0));
+    assert!(third.lo() < 1.0 / 3.0 && 1.0 / 3.0 < third.hi());
+    assert_eq!(third.hi(), third.lo().next_up().next_up());
 }
 
 #[test]
@@ -51,6 +52,13 @@ fn overflow_keeps_the_finite_side() {
     assert_eq!(large.powi(2), interval(f64::MAX, f64::INFINITY));
     let tiny = Interval::point(1e-200) * Interval::point(1e-200);
     assert!(tiny.contains(0.0) && tiny.hi() > 0.0);
+    assert_eq!(Interval::point(1e-200).powi(2).lo(), 0.0);
+    assert_eq!(
+        Interval::point(0.0) * Interval::ENTIRE,
+        Interval::point(0.0)
+    );
+    let infinite = Interval::point(f64::INFINITY);
+    assert_eq!(infinite - infinite, Interval::ENTIRE);
     assert_eq!(
         Interval::point(1e308) + Interval::point(1e308),
         interval(f64::MAX, f64::INFINITY)

@@ -4,7 +4,7 @@ use super::number::Number;
 use super::parse::{ParseError, ParseErrorKind, short};
 
 /// A token and where it starts.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Copy)]
 pub(super) struct Token<'a> {
     pub(super) kind: TokenKind<'a>,
     /// 1 for the first character.
@@ -128,65 +128,4 @@ fn read_number(token: &str) -> Option<Number> {
         return Some(Number::integer(integer));
     }
     Number::from_f64(token.parse().ok()?)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn kinds(text: &str) -> Vec<TokenKind<'_>> {
-        tokenize(text)
-            .expect("test text has only known characters")
-            .into_iter()
-            .map(|token| token.kind)
-            .collect()
-    }
-
-    fn float(value: f64) -> TokenKind<'static> {
-        TokenKind::Number(Number::from_f64(value).expect("finite"))
-    }
-
-    #[test]
-    fn numbers_read_in_all_spellings() {
-        let numbers = ["0.36", ".36", "36e-2", "3.6E-1", "0.036e+1"];
-        for text in numbers {
-            assert_eq!(kinds(text), [float(0.36), TokenKind::End], "{text}");
-        }
-        assert_eq!(kinds("2."), [float(2.0), TokenKind::End]);
-        assert_eq!(
-            kinds("9007199254740993")[0],
-            TokenKind::Number(Number::integer(9_007_199_254_740_993))
-        );
-    }
-
-    #[test]
-    fn exponent_without_digits_is_a_name() {
-        let (two, name, end) = (float(2.0), TokenKind::Name("e"), TokenKind::End);
-        assert_eq!(kinds("2e"), [two, name, end]);
-        assert_eq!(kinds("2e+"), [two, name, TokenKind::Plus, end]);
-    }
-
-    #[test]
-    fn names_may_have_dotted_parts() {
-        assert_eq!(kinds("body.x"), [TokenKind::Name("body.x"), TokenKind::End]);
-        assert_eq!(kinds("z_1"), [TokenKind::Name("z_1"), TokenKind::End]);
-    }
-
-    #[test]
-    fn number_that_overflows_or_is_a_lone_point_is_refused() {
-        for text in ["1e999", "."] {
-            assert_eq!(
-                tokenize(text),
-                Err(ParseErrorKind::Number(text.to_owned()).at(1))
-            );
-        }
-    }
-
-    #[test]
-    fn positions_count_characters() {
-        let tokens = tokenize("a  + 12").expect("known characters");
-        let positions: Vec<usize> = tokens.iter().map(|token| token.position).collect();
-        assert_eq!(positions, [1, 4, 6, 8]);
-        assert_eq!(tokenize("x é"), Err(ParseErrorKind::Character('é').at(3)));
-    }
 }

@@ -7,12 +7,12 @@
 //!
 //! | files | |
 //! |---|---|
-//! | `node`, `number`, `pool`, `intern`, `order` | what an expression is and how it is stored |
+//! | `node`, `number`, `pool`, `id_map`, `order` | what an expression is and how it is stored |
 //! | `build`, `power` | canonical constructors |
 //! | `lexer`, `parse`, `display` | the grammar of candidate terms, both ways |
-//! | `eval`, `interval`, `rounding`, `interval_eval`, `bounds` | values, and bounds over boxes |
+//! | `eval`, `interval`, `rounding`, `bounds` | values, and bounds over boxes |
 //! | `diff`, `substitute` | derivatives and substitution |
-//! | `expand`, `rational`, `perfect_power`, `trig`, `rules`, `magnitudes` | rewriting, each way when asked |
+//! | `expand`, `rational`, `perfect_power`, `trig`, `rules`, `factors` | rewriting, each way when asked |
 //! | `simplify`, `shorten`, `cost`, `region` | choosing the shortest of equal forms |
 //! | `canonical/` | a normal form with exact coefficients, to decide equality |
 //!
@@ -43,11 +43,10 @@ mod diff;
 mod display;
 mod eval;
 mod expand;
-mod intern;
+mod factors;
+mod id_map;
 mod interval;
-mod interval_eval;
 mod lexer;
-mod magnitudes;
 mod node;
 mod number;
 mod order;
@@ -62,12 +61,11 @@ mod rules;
 mod shorten;
 mod simplify;
 mod substitute;
-mod tangents;
 #[cfg(test)]
 mod testing;
 mod trig;
 
-pub use canonical::{CanonicalForm, CanonicalForms, Coefficient, Literal, Rational};
+pub use canonical::{CanonicalForm, CanonicalForms, Coefficient};
 pub use display::Display;
 pub(crate) use eval::integer_power;
 pub use interval::Interval;

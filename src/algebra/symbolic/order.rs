@@ -20,7 +20,7 @@ pub(super) struct SymbolKey {
     prefix: String,
     /// The number at the end of the name.
     index: Option<u64>,
-    name: String,
+    pub(super) name: String,
 }
 
 impl SymbolKey {
@@ -166,10 +166,11 @@ impl ExprPool {
                 .fold(0, combine_grades),
             Node::Power(base, exponent) => {
                 let degree = self.as_integer(*exponent).map(u32::try_from);
-                let degree = degree
-                    .and_then(Result::ok)
-                    .map(|n| n.min(NOT_POLYNOMIAL - 1));
-                match (degree, self.as_symbol(*base)) {
+                let degree = degree.and_then(Result::ok);
+                match (
+                    degree.map(|n| n.min(NOT_POLYNOMIAL - 1)),
+                    self.as_symbol(*base),
+                ) {
                     (Some(degree), Some(_)) => degree,
                     (Some(degree), None) => NOT_POLYNOMIAL | degree,
                     (None, _) => NOT_POLYNOMIAL + 1,

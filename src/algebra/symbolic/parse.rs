@@ -50,6 +50,7 @@ pub struct ParseError {
 
 /// The fault at a place of a text.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[allow(missing_docs, reason = "each variant's message names its fields")]
 pub enum ParseErrorKind {
     /// A character that the grammar does not have.
     #[error("found `{}`, expected numbers, names, functions and + - * / ^ ( )", .0.escape_debug())]
@@ -60,9 +61,7 @@ pub enum ParseErrorKind {
     /// A token in quotes, or `end of text`, in the wrong place.
     #[error("found {found}, expected {expected}")]
     Unexpected {
-        /// The token.
         found: String,
-        /// What could stand there.
         expected: &'static str,
     },
     /// A variable that is not allowed here.
@@ -73,23 +72,13 @@ pub enum ParseErrorKind {
     UnknownFunction(String),
     /// The text is longer than allowed.
     #[error("found a text of {found} bytes, expected at most {limit}")]
-    TooLong {
-        /// Length in bytes.
-        found: usize,
-        /// The limit.
-        limit: usize,
-    },
+    TooLong { found: usize, limit: usize },
     /// Too many open parentheses and exponents.
     #[error("found too many open parentheses and exponents, expected at most {0}")]
     TooDeep(usize),
     /// A constant exponent is larger than allowed.
     #[error("found the exponent {found}, expected at most {limit}")]
-    Exponent {
-        /// The exponent.
-        found: String,
-        /// The limit on its magnitude.
-        limit: u32,
-    },
+    Exponent { found: String, limit: u32 },
 }
 
 impl ParseErrorKind {
@@ -119,37 +108,16 @@ impl ExprPool {
         text: &str,
         allowed: &dyn Fn(&str) -> bool,
     ) -> Result<ExprId, ParseError> {
-        self.parse_within(text, allowed, ParseLimits::default())
+        self.parse_within(text, allowed, &|_| None, ParseLimits::default())
     }
 
-    /// As [`parse`](ExprPool::parse), with symbols for numbers: where `literal` gives a name for
-    /// the text of a number, it is the symbol of that name, so that it is never rounded or folded.
-    ///
-    /// # Errors
-    /// As [`parse`](ExprPool::parse).
-    pub fn parse_with_literals(
-        &mut self,
-        text: &str,
-        allowed: &dyn Fn(&str) -> bool,
-        literal: &dyn Fn(&str) -> Option<String>,
-    ) -> Result<ExprId, ParseError> {
-        self.read(text, allowed, literal, ParseLimits::default())
-    }
-
-    /// As [`parse`](ExprPool::parse), within given limits.
+    /// As [`parse`](ExprPool::parse), within given limits and with symbols for numbers: where
+    /// `literal` gives a name for the text of a number, it is the symbol of that name, so that it is
+    /// never rounded or folded.
     ///
     /// # Errors
     /// As [`parse`](ExprPool::parse).
     pub fn parse_within(
-        &mut self,
-        text: &str,
-        allowed: &dyn Fn(&str) -> bool,
-        limits: ParseLimits,
-    ) -> Result<ExprId, ParseError> {
-        self.read(text, allowed, &|_| None, limits)
-    }
-
-    fn read(
         &mut self,
         text: &str,
         allowed: &dyn Fn(&str) -> bool,
@@ -160,16 +128,23 @@ impl ExprPool {
             let (found, limit) = (text.len(), limits.length);
             return Err(ParseErrorKind::TooLong { found, limit }.at(1));
         }
-        let tokens = tokenize(text)?;
         let mut parser = Parser {
             pool: self,
             allowed,
             literal,
             limits,
+            tokens: tokenize(text)?,
+            next: 0,
             groups: vec![Group::default()],
             depth: 0,
         };
-        parser.run(&tokens)
+        loop {
+            if let Some(operand) = parser.read_operand()?
+                && let Some(result) = parser.after_operand(operand)?
+            {
+                return Ok(result);
+            }
+        }
     }
 }
 
@@ -205,32 +180,23 @@ struct Parser<'p> {
     /// The symbol that stands for the text of a number.
     literal: &'p dyn Fn(&str) -> Option<String>,
     limits: ParseLimits,
+    tokens: Vec<Token<'p>>,
+    /// Index of the token that is read next.
+    next: usize,
     groups: Vec<Group>,
     /// Open groups and pending powers.
     depth: usize,
 }
 
-impl Parser<'_> {
-    fn run(&mut self, tokens: &[Token]) -> Result<ExprId, ParseError> {
-        let mut next = 0;
-        loop {
-            let Some(operand) = self.read_operand(tokens, &mut next)? else {
-                continue;
-            };
-            if let Some(result) = self.after_operand(tokens, &mut next, operand)? {
-                return Ok(result);
-            }
-        }
+impl<'p> Parser<'p> {
+    fn token(&mut self) -> Token<'p> {
+        self.next += 1;
+        self.tokens[self.next - 1]
     }
 
     /// Reads signs and one atom; `None` if it opened a group instead.
-    fn read_operand(
-        &mut self,
-        tokens: &[Token],
-        next: &mut usize,
-    ) -> Result<Option<ExprId>, ParseError> {
-        let token = &tokens[*next];
-        *next += 1;
+    fn read_operand(&mut self) -> Result<Option<ExprId>, ParseError> {
+        let token = self.token();
         match token.kind {
             TokenKind::Plus => Ok(None),
             TokenKind::Minus => {
@@ -242,15 +208,16 @@ impl Parser<'_> {
                 Some(name) => self.pool.symbol(&name),
                 None => self.pool.constant(number),
             })),
-            TokenKind::Open => self.open(Opener::Parenthesis, token).map(|()| None),
+            TokenKind::Open => self.open(Opener::Parenthesis, &token).map(|()| None),
             TokenKind::Name(name) => {
-                let called = tokens[*next].kind == TokenKind::Open;
+                let after = self.tokens[self.next];
+                let called = after.kind == TokenKind::Open;
                 match Function::by_name(name) {
                     Some(function) if called => {
-                        *next += 1;
-                        self.open(Opener::Call(function), token).map(|()| None)
+                        self.next += 1;
+                        self.open(Opener::Call(function), &token).map(|()| None)
                     }
-                    Some(_) => Err(unexpected(&tokens[*next], "`(` after a function")),
+                    Some(_) => Err(unexpected(&after, "`(` after a function")),
                     None if called => {
                         Err(ParseErrorKind::UnknownFunction(short(name)).at(token.position))
                     }
@@ -262,21 +229,15 @@ impl Parser<'_> {
             | TokenKind::Divide
             | TokenKind::Caret
             | TokenKind::Close
-            | TokenKind::End => Err(unexpected(token, "a number, a name, `(` or a sign")),
+            | TokenKind::End => Err(unexpected(&token, "a number, a name, `(` or a sign")),
         }
     }
 
     /// Reads what follows an operand, closing groups as long as they end; the finished
     /// expression at the end of the text.
-    fn after_operand(
-        &mut self,
-        tokens: &[Token],
-        next: &mut usize,
-        mut operand: ExprId,
-    ) -> Result<Option<ExprId>, ParseError> {
+    fn after_operand(&mut self, mut operand: ExprId) -> Result<Option<ExprId>, ParseError> {
         loop {
-            let token = &tokens[*next];
-            *next += 1;
+            let token = &self.token();
             if token.kind == TokenKind::Caret {
                 self.deepen(token)?;
                 let group = self.group();

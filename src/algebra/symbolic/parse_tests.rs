@@ -38,6 +38,14 @@ fn operators_bind_as_in_mathematics() {
 }
 
 #[test]
+fn numbers_read_in_all_spellings() {
+    for text in ["0.36", ".36", "36e-2", "3.6E-1", "0.036e+1"] {
+        assert_eq!(value(text), 0.36, "{text}");
+    }
+    assert_eq!(value("2."), 2.0);
+}
+
+#[test]
 fn functions_apply_to_their_argument_alone() {
     assert_eq!(value("sqrt(z1 + z1)*3"), 6.0);
     assert_eq!(value("sin(z1)^2"), 2f64.sin().powi(2));
@@ -64,13 +72,20 @@ fn faults_have_their_place_and_what_was_found() {
         ("z1 # note", 4, ParseErrorKind::Character('#')),
         ("z1\u{202e}", 3, ParseErrorKind::Character('\u{202e}')),
         // Names and functions are told apart.
-        ("z1 + z9", 6, ParseErrorKind::UnknownName("z9".into())),
+        ("z1  + z9", 7, ParseErrorKind::UnknownName("z9".into())),
+        ("z_1", 1, ParseErrorKind::UnknownName("z_1".into())),
         (
             "system(z1)",
             1,
             ParseErrorKind::UnknownFunction("system".into()),
         ),
         ("sin + 1", 5, found("`+`", "`(` after a function")),
+        // Numbers are finite; an exponent without digits is a name.
+        ("1e999", 1, ParseErrorKind::Number("1e999".into())),
+        ("z1 + .", 6, ParseErrorKind::Number(".".into())),
+        ("2e", 2, found("`e`", "an operator or the end")),
+        ("2e+", 2, found("`e`", "an operator or the end")),
+        ("é", 1, ParseErrorKind::Character('é')),
         // Misplaced tokens.
         ("", 1, operand("end of text")),
         ("z1 +", 5, operand("end of text")),
@@ -132,12 +147,12 @@ fn long_sums_are_read_in_near_linear_time() {
         ..ParseLimits::default()
     };
     let expr = pool
-        .parse_within(&text, &|_| true, limits)
+        .parse_within(&text, &|_| true, &|_| None, limits)
         .expect("text is within its limits");
     assert_eq!(pool.terms_of(expr).len(), 6_000);
     assert!(
-        pool.len() < 20_000,
+        pool.n_nodes() < 20_000,
         "partial sums were kept: {}",
-        pool.len()
+        pool.n_nodes()
     );
 }

@@ -1,8 +1,9 @@
 //! The pool that owns all expressions: storage, symbols and traversal.
 
 use std::collections::{BTreeSet, HashMap};
+use std::hash::BuildHasher;
 
-use super::intern::{BuildIdHasher, InternTable};
+use super::id_map::{BuildIdHasher, IdSet};
 use super::node::{ExprId, Function, Node, SymbolId};
 use super::number::Number;
 use super::order::SymbolKey;
@@ -31,7 +32,8 @@ use super::order::SymbolKey;
 pub struct ExprPool {
     nodes: Vec<Node>,
     facts: Vec<Facts>,
-    table: InternTable,
+    /// The node of every hash; those of equal hashes stand at the next ones that are free.
+    places: HashMap<u64, ExprId, BuildIdHasher>,
     symbols: Vec<Symbol>,
     symbol_ids: HashMap<String, SymbolId>,
     /// See [`ExprPool::exact`].
@@ -42,7 +44,6 @@ pub struct ExprPool {
 
 #[derive(Clone, Debug)]
 struct Symbol {
-    name: String,
     key: SymbolKey,
     expr: ExprId,
 }
@@ -81,7 +82,7 @@ impl ExprPool {
         let mut pool = ExprPool {
             nodes: Vec::new(),
             facts: Vec::new(),
-            table: InternTable::new(),
+            places: HashMap::default(),
             symbols: Vec::new(),
             symbol_ids: HashMap::new(),
             is_exact: false,
@@ -125,13 +126,8 @@ impl ExprPool {
     }
 
     /// The number of distinct expressions made so far.
-    pub fn len(&self) -> usize {
+    pub fn n_nodes(&self) -> usize {
         self.nodes.len()
-    }
-
-    /// Never: every pool holds `0` and `1`.
-    pub fn is_empty(&self) -> bool {
-        self.nodes.is_empty()
     }
 
     /// The variable of that name, made at its first mention.
@@ -144,7 +140,6 @@ impl ExprPool {
         );
         self.symbol_ids.insert(name.to_owned(), id);
         self.symbols.push(Symbol {
-            name: name.to_owned(),
             key: SymbolKey::of(name),
             expr: ExprId::ZERO,
         });
@@ -165,7 +160,7 @@ impl ExprPool {
 
     /// The name of a variable.
     pub fn symbol_name(&self, symbol: SymbolId) -> &str {
-        &self.symbols[symbol.index()].name
+        &self.symbols[symbol.index()].key.name
     }
 
     pub(super) fn symbol_key(&self, symbol: SymbolId) -> &SymbolKey {
@@ -242,37 +237,35 @@ impl ExprPool {
 
     /// Every expression that `roots` are made of, each once, operands before what uses them.
     pub fn reachable(&self, roots: &[ExprId]) -> Vec<ExprId> {
-        self.reachable_where(roots, |_| true)
+        self.walk(roots, |_| true, |_| true)
     }
 
-    /// As [`reachable`](ExprPool::reachable), without what fails `wanted` and is not reached
-    /// otherwise. Ids rise from operands to users, so sorting them is a topological order.
-    pub(super) fn reachable_where(
+    /// As [`reachable`](ExprPool::reachable): what fails `wanted` is left out, and what does not pass `opened` is not looked into. Ids rise
+    /// from operands to users, so sorting them is a topological order.
+    pub(super) fn walk(
         &self,
         roots: &[ExprId],
         mut wanted: impl FnMut(ExprId) -> bool,
+        opened: impl Fn(ExprId) -> bool,
     ) -> Vec<ExprId> {
-        let mut seen = std::collections::HashSet::with_hasher(BuildIdHasher::default());
+        let mut seen = IdSet::default();
         let mut found = Vec::new();
         let mut stack: Vec<ExprId> = roots.to_vec();
         while let Some(expr) = stack.pop() {
             if wanted(expr) && seen.insert(expr) {
                 found.push(expr);
-                stack.extend(self.children(expr));
+                if opened(expr) {
+                    stack.extend(self.children(expr));
+                }
             }
         }
         found.sort_unstable();
         found
     }
 
-    /// The number of distinct nodes of an expression.
-    pub fn node_count(&self, expr: ExprId) -> usize {
-        self.reachable(&[expr]).len()
-    }
-
     /// The variables that occur in an expression.
     pub fn symbols_of(&self, expr: ExprId) -> BTreeSet<SymbolId> {
-        self.reachable_where(&[expr], |node| self.facts[node.index()].symbols != 0)
+        self.walk(&[expr], |node| !self.is_constant(node), |_| true)
             .into_iter()
             .filter_map(|node| self.as_symbol(node))
             .collect()
@@ -304,19 +297,15 @@ impl ExprPool {
 
     /// The id of a node that is canonical already.
     pub(super) fn intern(&mut self, node: Node) -> ExprId {
-        let slot = match self.table.find(&self.nodes, &node) {
+        let mut place = match self.place_of(&node) {
             Ok(id) => return id,
-            Err(slot) => slot,
+            Err(free) => free,
         };
-        // Interning the rest first keeps operands at smaller ids; it may move the free slot.
+        // Interning the rest first keeps operands at smaller ids; it may take the free place.
         let rest = self.rest_of(&node);
-        let slot = match rest {
-            Some(_) => match self.table.find(&self.nodes, &node) {
-                Ok(id) => return id,
-                Err(slot) => slot,
-            },
-            None => slot,
-        };
+        while self.places.contains_key(&place) {
+            place = place.wrapping_add(1);
+        }
         let id = ExprId(
             u32::try_from(self.nodes.len()).expect("a pool holds fewer than 2^32 expressions"),
         );
@@ -329,8 +318,20 @@ impl ExprPool {
         };
         self.nodes.push(node);
         self.facts.push(facts);
-        self.table.fill(slot, id, &self.nodes);
+        self.places.insert(place, id);
         id
+    }
+
+    /// The id of a node equal to `node`, or the free place where it belongs.
+    fn place_of(&self, node: &Node) -> Result<ExprId, u64> {
+        let mut place = BuildIdHasher::default().hash_one(node);
+        while let Some(&id) = self.places.get(&place) {
+            if self.nodes[id.index()] == *node {
+                return Ok(id);
+            }
+            place = place.wrapping_add(1);
+        }
+        Err(place)
     }
 
     /// The product without its number, if it has exactly one.
@@ -393,17 +394,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn symbol_of_same_name_is_the_same_expression() {
-        let mut pool = ExprPool::new();
-        let first = pool.symbol("z1");
-        assert_eq!(pool.symbol("z1"), first);
-        assert_ne!(pool.symbol("z2"), first);
-        let id = pool.symbol_id("z1");
-        assert_eq!(pool.symbol_name(id), "z1");
-        assert_eq!(pool.as_symbol(first), Some(id));
-    }
-
-    #[test]
     fn split_of_weighted_monomial_gives_coefficient_and_rest() {
         let mut pool = ExprPool::new();
         let (x, y) = (pool.symbol("x"), pool.symbol("y"));
@@ -426,7 +416,6 @@ mod tests {
         let root = pool.mul(x, sine);
         let order = pool.reachable(&[root, sine]);
         assert_eq!(order, [x, sine, root]);
-        assert_eq!(pool.node_count(root), 3);
     }
 
     #[test]

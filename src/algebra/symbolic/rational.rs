@@ -50,7 +50,11 @@ impl ExprPool {
         let terms = self.terms_of(expr);
         let mut denominators: Vec<(ExprId, Number)> = Vec::new();
         for (_, rest) in &terms {
-            for (base, exponent) in self.denominators_of(*rest) {
+            for (base, exponent) in self.numeric_powers(*rest) {
+                if !exponent.is_negative() || exponent.as_integer().is_none() {
+                    continue;
+                }
+                let exponent = -exponent;
                 match denominators.iter_mut().find(|(known, _)| *known == base) {
                     Some((_, known)) => *known = (*known).max(exponent),
                     None => denominators.push((base, exponent)),
@@ -78,23 +82,14 @@ impl ExprPool {
         self.cancel(numerator, &denominators)
     }
 
-    /// Bases with negative integer exponents in a term, and the magnitudes of these.
-    fn denominators_of(&self, rest: ExprId) -> Vec<(ExprId, Number)> {
-        (self.numeric_powers(rest).into_iter())
-            .filter(|(_, exponent)| exponent.is_negative() && exponent.as_integer().is_some())
-            .map(|(base, exponent)| (base, -exponent))
-            .collect()
-    }
-
     /// The factors of a term as powers with constant exponents.
     pub(super) fn numeric_powers(&self, rest: ExprId) -> Vec<(ExprId, Number)> {
         self.factors_of(rest)
             .iter()
             .filter_map(|factor| match self.base_and_exponent(*factor) {
-                (base, Exponent::Number(number)) if self.as_number(base).is_none() => {
-                    Some((base, number))
+                (base, Exponent::Number(number)) => {
+                    self.as_number(base).is_none().then_some((base, number))
                 }
-                (_, Exponent::Number(_)) => None,
                 (_, Exponent::Expr(_)) => Some((*factor, Number::ONE)),
             })
             .collect()

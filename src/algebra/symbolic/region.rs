@@ -4,16 +4,11 @@
 //! A *region* is what can be reached from an expression through sums, products and integer powers.
 //! Function calls and other powers are its atoms; their arguments are regions of their own.
 
-use std::collections::HashMap;
-
-use super::intern::BuildIdHasher;
+use super::id_map::IdMap;
 use super::node::{ExprId, Function, Node};
 use super::number::Number;
 use super::order::Exponent;
 use super::pool::ExprPool;
-
-/// Results by expression.
-type Memo = HashMap<ExprId, ExprId, BuildIdHasher>;
 
 impl ExprPool {
     /// Rebuilds `expr` bottom-up within its region, passing every new node through `rule`.
@@ -22,7 +17,7 @@ impl ExprPool {
         expr: ExprId,
         mut rule: impl FnMut(&mut ExprPool, ExprId) -> ExprId,
     ) -> ExprId {
-        let mut rewritten = Memo::default();
+        let mut rewritten = IdMap::default();
         for node in self.region(expr) {
             let rebuilt = if self.is_atom(node) {
                 node
@@ -41,8 +36,8 @@ impl ExprPool {
         expr: ExprId,
         mut finish: impl FnMut(&mut ExprPool, ExprId) -> ExprId,
     ) -> ExprId {
-        let mut rebuilt = Memo::default();
-        let mut finished = Memo::default();
+        let mut rebuilt = IdMap::default();
+        let mut finished = IdMap::default();
         for node in self.reachable(&[expr]) {
             let is_atom = self.is_atom(node);
             if is_atom {
@@ -61,19 +56,7 @@ impl ExprPool {
 
     /// All nodes of the region of `expr`, operands first.
     fn region(&self, expr: ExprId) -> Vec<ExprId> {
-        let mut seen = std::collections::HashSet::with_hasher(BuildIdHasher::default());
-        let mut found = Vec::new();
-        let mut stack = vec![expr];
-        while let Some(node) = stack.pop() {
-            if seen.insert(node) {
-                found.push(node);
-                if !self.is_atom(node) {
-                    stack.extend(self.children(node));
-                }
-            }
-        }
-        found.sort_unstable();
-        found
+        self.walk(&[expr], |_| true, |node| !self.is_atom(node))
     }
 
     /// The function calls and other powers of the region of `expr`, in order of creation.

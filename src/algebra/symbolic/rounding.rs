@@ -114,35 +114,3 @@ pub(super) fn widen_up(value: f64) -> f64 {
     }
     (0..FUNCTION_ULPS).fold(value, |value, _| value.next_up())
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn directed_operations_bracket_the_exact_result() {
-        // 0.1 + 0.2 as stored lies above the float 0.3.
-        assert_eq!(sub_up(0.1, -0.2), 0.3f64.next_up());
-        assert_eq!(-sub_up(-0.1, 0.2), 0.3);
-        assert_eq!(sub_up(1.5, 0.25), 1.25);
-        assert_eq!(mul_up(0.5, 3.0), 1.5);
-        assert!(mul_up(0.1, 0.1) > -mul_up(-0.1, 0.1));
-        assert_eq!(recip_up(4.0), recip_down(4.0));
-        assert_eq!(recip_up(3.0), recip_down(3.0).next_up().next_up());
-    }
-
-    #[test]
-    fn overflow_is_infinite_only_on_the_outer_side() {
-        assert_eq!(mul_up(1e200, 1e200), f64::INFINITY);
-        assert_eq!(mul_up(-1e200, 1e200), f64::MIN);
-        assert_eq!(mul_up(0.0, f64::INFINITY), 0.0);
-        assert_eq!(sub_up(f64::INFINITY, f64::INFINITY), f64::INFINITY);
-        assert_eq!(power_down(1e200, 2), f64::MAX);
-    }
-
-    #[test]
-    fn underflow_keeps_a_tiny_bound() {
-        assert!(mul_up(1e-200, 1e-200) > 0.0);
-        assert_eq!(power_down(1e-200, 2), 0.0);
-    }
-}

@@ -1,6 +1,5 @@
-//! Identities of exponentials, logarithms, roots and tangents, and where each of them is applied;
-//! those of magnitudes and signs are in `magnitudes`,
-//! those of tangents in `tangents`.
+//! Identities of exponentials, logarithms and roots, and where each is applied; those of tangents,
+//! magnitudes and signs are in `factors`.
 //!
 //! Rules come in two directions: towards a normal form in which equal expressions coincide, and
 //! towards fewer function calls. Each is an identity wherever its left side has a value:
@@ -58,20 +57,14 @@ impl ExprPool {
 
     /// One node rewritten towards fewer function calls.
     pub(super) fn compact_rules(&mut self, expr: ExprId) -> ExprId {
-        match self.node(expr) {
-            Node::Product(_) => {
-                let expr = self.merge_tangents(expr);
-                let expr = self.merge_double_angles(expr);
-                let expr = self.merge_hyperbolic_tangent(expr);
-                let expr = self.merge_factors(Function::Abs, expr);
-                self.abs_to_sign(expr)
-            }
-            Node::Number(_)
-            | Node::Symbol(_)
-            | Node::Sum(_)
-            | Node::Power(..)
-            | Node::Apply(..) => expr,
-        }
+        let Node::Product(_) = self.node(expr) else {
+            return expr;
+        };
+        let expr = self.merge_tangents(expr);
+        let expr = self.merge_double_angles(expr);
+        let expr = self.merge_hyperbolic_tangent(expr);
+        let expr = self.merge_factors(Function::Abs, expr);
+        self.abs_to_sign(expr)
     }
 
     /// `exp(n*log(a) + b) = a^n*exp(b)`.
@@ -267,32 +260,24 @@ impl ExprPool {
 
     /// `(exp(a) - exp(b))/(exp(a) + exp(b)) = tanh((a - b)/2)`, where `1` is `exp(0)`.
     fn merge_hyperbolic_tangent(&mut self, expr: ExprId) -> ExprId {
-        let factors = self.factors_of(expr).to_vec();
-        for (above, &top) in factors.iter().enumerate() {
-            let Some([(first, a), (second, b)]) = self.two_exponentials(top) else {
-                continue;
-            };
-            let Some((below, unit)) = factors.iter().enumerate().find_map(|(below, factor)| {
-                let (base, -1) = self.integer_power(*factor)? else {
+        self.merge_first(expr, |pool, factors, above| {
+            let [(first, a), (second, b)] = pool.two_exponentials(factors[above])?;
+            let (below, unit) = factors.iter().enumerate().find_map(|(below, factor)| {
+                let (base, -1) = pool.integer_power(*factor)? else {
                     return None;
                 };
-                let [(unit, c), (other, d)] = self.two_exponentials(base)?;
+                let [(unit, c), (other, d)] = pool.two_exponentials(base)?;
                 (unit == other && [a, b] == [c, d]).then_some((below, unit))
-            }) else {
-                continue;
-            };
-            let Some(scale) = first.checked_div(unit).filter(|_| first == -second) else {
-                continue;
-            };
-            let difference = self.sub(a, b);
-            let half = self.scale(Number::HALF, difference);
-            let tangent = self.apply(Function::Tanh, half);
-            let mut merged = factors.clone();
-            merged[above] = self.scale(scale, tangent);
+            })?;
+            let scale = first.checked_div(unit).filter(|_| first == -second)?;
+            let difference = pool.sub(a, b);
+            let half = pool.scale(Number::HALF, difference);
+            let tangent = pool.apply(Function::Tanh, half);
+            let mut merged = factors.to_vec();
+            merged[above] = pool.scale(scale, tangent);
             merged[below] = ExprId::ONE;
-            return self.product(&merged);
-        }
-        expr
+            Some(pool.product(&merged))
+        })
     }
 
     /// Coefficients and exponents of a sum of two exponentials, of which one may be a number.

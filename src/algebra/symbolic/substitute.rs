@@ -1,8 +1,6 @@
 //! Simultaneous substitution.
 
-use std::collections::HashMap;
-
-use super::intern::BuildIdHasher;
+use super::id_map::IdMap;
 use super::node::{ExprId, Node, SymbolId};
 use super::pool::ExprPool;
 
@@ -20,13 +18,12 @@ impl ExprPool {
         exprs: &[ExprId],
         replacements: &[(SymbolId, ExprId)],
     ) -> Vec<ExprId> {
-        let affected = |pool: &ExprPool, expr: ExprId| {
-            replacements
-                .iter()
-                .any(|(symbol, _)| pool.may_contain(expr, *symbol))
+        let affected = |expr| {
+            let mut symbols = replacements.iter().map(|(symbol, _)| *symbol);
+            symbols.any(|symbol| self.may_contain(expr, symbol))
         };
-        let order = self.reachable_where(exprs, |expr| affected(self, expr));
-        let mut replaced: HashMap<ExprId, ExprId, BuildIdHasher> = HashMap::default();
+        let order = self.walk(exprs, affected, |_| true);
+        let mut replaced: IdMap<ExprId> = IdMap::default();
         for expr in order {
             let symbol = self.as_symbol(expr);
             let known = replacements.iter().find(|(old, _)| Some(*old) == symbol);
@@ -75,31 +72,27 @@ mod tests {
     use super::*;
 
     #[test]
-    fn substitution_is_simultaneous() {
-        let mut pool = ExprPool::new();
-        let expr = pool.parsed("x - 2*sin(y)");
-        let (x, y) = (pool.symbol_id("x"), pool.symbol_id("y"));
-        let swapped = [(x, pool.symbol_expr(y)), (y, pool.symbol_expr(x))];
-        let result = pool.substitute(expr, &swapped);
-        assert_eq!(pool.display(result).to_string(), "y - 2*sin(x)");
-    }
-
-    #[test]
-    fn substitution_of_a_map_into_robot_coordinates() {
-        let mut pool = ExprPool::new();
-        let expr = pool.parsed("0.36 + z1^2*sin(z1)");
-        let encoder = pool.parsed("0.5*body.x - 0.1");
-        let z1 = pool.symbol_id("z1");
-        let result = pool.substitute(expr, &[(z1, encoder)]);
-        let expected = pool.parsed("0.36 + (0.5*body.x - 0.1)^2*sin(0.5*body.x - 0.1)");
-        assert_eq!(result, expected);
-    }
-
-    #[test]
-    fn substitution_of_absent_symbol_changes_nothing() {
-        let mut pool = ExprPool::new();
-        let expr = pool.parsed("x + y");
-        let z = pool.symbol_id("z");
-        assert_eq!(pool.substitute(expr, &[(z, ExprId::ONE)]), expr);
+    fn substitution_is_simultaneous_and_takes_expressions() {
+        for (text, replacements, expected) in [
+            (
+                "x - 2*sin(y)",
+                &[("x", "y"), ("y", "x")][..],
+                "y - 2*sin(x)",
+            ),
+            (
+                "0.36 + z1^2*sin(z1)",
+                &[("z1", "0.5*body.x - 0.1")],
+                "0.36 + (0.5*body.x - 0.1)^2*sin(0.5*body.x - 0.1)",
+            ),
+            ("x + y", &[("z", "1")], "x + y"),
+        ] {
+            let mut pool = ExprPool::new();
+            let expr = pool.parsed(text);
+            let replacements: Vec<(SymbolId, ExprId)> = (replacements.iter())
+                .map(|(name, by)| (pool.symbol_id(name), pool.parsed(by)))
+                .collect();
+            let expected = pool.parsed(expected);
+            assert_eq!(pool.substitute(expr, &replacements), expected, "{text}");
+        }
     }
 }

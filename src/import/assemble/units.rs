@@ -153,10 +153,10 @@ impl<'a> Assembly<'a, '_> {
         self.change_ends(
             parts,
             |first| {
-                let weights = order.sorted_rows(&first.weights().transpose()).transpose();
+                let weights = order.sorted(&first.weights().transpose()).transpose();
                 (weights, first.bias().clone())
             },
-            |last| (order.sorted_rows(last.weights()), order.sorted(last.bias())),
+            |last| (order.sorted(last.weights()), order.sorted(last.bias())),
         )?;
         if let Some(scaling) = &mut parts.scaling {
             for factors in [&mut scaling.state, &mut scaling.input] {
@@ -187,10 +187,10 @@ fn replaced(
 }
 
 fn sorted_statistics(statistics: &InputStatistics, order: &CoordinateOrder) -> InputStatistics {
-    let rows = order.sorted_rows(&statistics.covariance);
+    let rows = order.sorted(&statistics.covariance);
     InputStatistics {
         mean: order.sorted(&statistics.mean),
-        covariance: order.sorted_rows(&rows.transpose()).transpose(),
+        covariance: order.sorted(&rows.transpose()).transpose(),
         given_state: statistics.given_state.clone(),
     }
 }

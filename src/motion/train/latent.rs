@@ -59,14 +59,10 @@ impl Latent {
         for sample in 0..jump.len() {
             let column = |matrix: &DMatrix<f64>| matrix.column(sample).into_owned();
             let (x, dx) = (column(&jump.x), column(&rates.dx));
-            let derivatives = [
-                encoder.apply(&x),
-                encoder.apply_velocity(&x, &dx),
-                encoder.apply_acceleration(&x, &dx, &column(&rates.ddx)),
-            ];
+            let mapped = encoder.apply_rates(&x, &dx, &column(&rates.ddx));
             let into = [&mut latent.z, &mut latent.dz, &mut latent.ddz];
-            for (matrix, value) in into.into_iter().zip(derivatives) {
-                matrix.set_column(sample, &value.expect(FITS));
+            for (matrix, value) in into.into_iter().zip(mapped.expect(FITS)) {
+                matrix.set_column(sample, &value);
             }
             let projection = input_projection(&encoder.jacobian(&x).expect(FITS));
             let u_lat = projection * jump.u.column(sample);

@@ -232,7 +232,8 @@ impl TrainOptions {
     /// # Errors
     /// [`TrainError::Model`] for a term that does not parse or a latent dimension out of range.
     pub fn library(&self) -> Result<Library, TrainError> {
-        let library = Library::of(self.latent_dim, &self.library).map_err(ModelError::from)?;
+        let library = Library::of(self.latent_dim, self.library.clone());
+        let library = library.map_err(ModelError::from)?;
         library.check_distinct().map_err(ModelError::from)?;
         Ok(library)
     }

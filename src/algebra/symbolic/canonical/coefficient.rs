@@ -11,59 +11,6 @@ use crate::symbolic::number::Number;
 /// Widens a radius by more than the rounding errors of the operations on it.
 const OUTWARD: f64 = 1.0 + 1e-12;
 
-/// A decimal as it is written: its exact value, and half a unit of its last digit where the
-/// decimal stands for a rounded number.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Literal {
-    /// The exact value.
-    pub value: Rational,
-    /// Largest distance of the number that was rounded; 0 for an exact one.
-    pub radius: f64,
-}
-
-impl Literal {
-    /// Reads digits with at most one point and an exponent, such as `0.36` or `1.2e-3`.
-    ///
-    /// `None` for other texts and for exponents beyond 400.
-    pub fn parse(text: &str, is_rounded: bool) -> Option<Self> {
-        let (digits, exponent) = match text.split_once(['e', 'E']) {
-            Some((digits, exponent)) => (digits, exponent.parse::<i32>().ok()?),
-            None => (text, 0),
-        };
-        let (before, after) = digits.split_once('.').unwrap_or((digits, ""));
-        let mantissa: BigInt = format!("{before}{after}").parse().ok()?;
-        let last = exponent.checked_sub(i32::try_from(after.len()).ok()?)?;
-        if !(-800..=400).contains(&last) {
-            return None;
-        }
-        let unit = power_of_ten(last);
-        let radius = match is_rounded {
-            true => 0.5 * unit.to_f64(),
-            false => 0.0,
-        };
-        Some(Self {
-            value: &Rational::from(mantissa) * &unit,
-            radius,
-        })
-    }
-
-    /// The value as the nearest float, or one beside it.
-    pub fn to_f64(&self) -> f64 {
-        self.value.to_f64()
-    }
-
-    /// The shortest decimal that reads back to a finite float.
-    pub fn of_f64(value: f64) -> Option<Self> {
-        let magnitude = Self::parse(&format!("{:?}", value.abs()), false)?;
-        let value = if value < 0.0 {
-            -magnitude.value
-        } else {
-            magnitude.value
-        };
-        Some(Self { value, radius: 0.0 })
-    }
-}
-
 fn power_of_ten(exponent: i32) -> Rational {
     let power = Rational::from(BigInt::from(10).pow(exponent.unsigned_abs()));
     if exponent < 0 { power.recip() } else { power }
@@ -96,33 +43,51 @@ impl Hash for Coefficient {
 
 impl From<Rational> for Coefficient {
     fn from(value: Rational) -> Self {
-        Self::real(value, 0.0)
+        Self::complex(value, Rational::zero())
     }
 }
 
-impl From<Literal> for Coefficient {
-    fn from(literal: Literal) -> Self {
-        Self::real(literal.value, literal.radius)
-    }
-}
-
+/// A float is the shortest decimal that reads back to it.
 impl From<Number> for Coefficient {
     fn from(number: Number) -> Self {
-        match number.as_rational() {
-            Some((top, bottom)) => Rational::new(top, bottom),
-            None => Literal::of_f64(number.to_f64()).map_or_else(Rational::zero, |l| l.value),
-        }
-        .into()
+        let Some((top, bottom)) = number.as_rational() else {
+            let decimal = Self::parse(&format!("{:?}", number.abs().to_f64()), false);
+            let magnitude = decimal.map_or_else(Rational::zero, |decimal| decimal.re);
+            return Self::from(match number.is_negative() {
+                true => -magnitude,
+                false => magnitude,
+            });
+        };
+        Rational::new(top, bottom).into()
     }
 }
 
 impl Coefficient {
-    fn real(re: Rational, radius: f64) -> Self {
-        Self {
-            re,
+    /// Reads a decimal as it is written: digits with at most one point and an exponent, such as `0.36`
+    /// or `1.2e-3`. Where it stands for a rounded number its radius is half a unit of its last digit.
+    ///
+    /// `None` for other texts and for exponents beyond 400.
+    pub fn parse(text: &str, is_rounded: bool) -> Option<Self> {
+        let (digits, exponent) = match text.split_once(['e', 'E']) {
+            Some((digits, exponent)) => (digits, exponent.parse::<i32>().ok()?),
+            None => (text, 0),
+        };
+        let (before, after) = digits.split_once('.').unwrap_or((digits, ""));
+        let mantissa: BigInt = format!("{before}{after}").parse().ok()?;
+        let last = exponent.checked_sub(i32::try_from(after.len()).ok()?)?;
+        if !(-800..=400).contains(&last) {
+            return None;
+        }
+        let unit = power_of_ten(last);
+        let radius = match is_rounded {
+            true => 0.5 * unit.to_f64(),
+            false => 0.0,
+        };
+        Some(Self {
+            re: &Rational::from(mantissa) * &unit,
             im: Rational::zero(),
             radius,
-        }
+        })
     }
 
     pub(super) fn integer(value: i64) -> Self {
@@ -153,7 +118,7 @@ impl Coefficient {
         self.re.to_f64().hypot(self.im.to_f64())
     }
 
-    /// The real part as a float.
+    /// The real part as the nearest float, or one beside it.
     pub fn to_f64(&self) -> f64 {
         self.re.to_f64()
     }
@@ -180,6 +145,11 @@ impl Coefficient {
     /// The value if it is real.
     pub(super) fn as_real(&self) -> Option<&Rational> {
         self.im.is_zero().then_some(&self.re)
+    }
+
+    /// Whether the value is an integer.
+    pub fn is_integer(&self) -> bool {
+        self.as_real().is_some_and(Rational::is_integer)
     }
 
     pub(super) fn is_one(&self) -> bool {

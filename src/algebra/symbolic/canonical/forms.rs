@@ -5,7 +5,7 @@ use std::collections::{HashMap, HashSet};
 use num_traits::ToPrimitive;
 
 use super::atoms::Atom;
-use super::coefficient::{Coefficient, Literal};
+use super::coefficient::Coefficient;
 use super::polynomial::{CanonicalForm, Monomial};
 use super::rational::Rational;
 use crate::symbolic::node::{ExprId, Function, Node, SymbolId};
@@ -22,7 +22,7 @@ pub(super) const MAX_ROOT: i64 = 1_000;
 /// Normal forms of the expressions of a pool; the documentation of this folder has the method.
 pub struct CanonicalForms<'p> {
     pub(super) pool: &'p ExprPool,
-    pub(super) literal: &'p dyn Fn(SymbolId) -> Option<Literal>,
+    pub(super) literal: &'p dyn Fn(SymbolId) -> Option<Coefficient>,
     pub(super) atoms: Vec<Atom>,
     pub(super) numbers: HashMap<Atom, u32>,
     pub(super) forms: HashMap<ExprId, CanonicalForm>,
@@ -45,7 +45,7 @@ impl<'p> CanonicalForms<'p> {
     pub fn new(
         pool: &'p ExprPool,
         exprs: &[ExprId],
-        literal: &'p dyn Fn(SymbolId) -> Option<Literal>,
+        literal: &'p dyn Fn(SymbolId) -> Option<Coefficient>,
     ) -> Self {
         let mut forms = Self {
             pool,
@@ -167,8 +167,7 @@ impl<'p> CanonicalForms<'p> {
     /// Whether an exponent is an integer, such as `6/3`.
     fn is_integer(&mut self, expr: ExprId) -> bool {
         let value = self.of(expr).as_constant();
-        let real = value.as_ref().and_then(Coefficient::as_real);
-        real.is_some_and(Rational::is_integer)
+        value.is_some_and(|value| value.is_integer())
     }
 
     pub(super) fn atom(&mut self, atom: Atom) -> CanonicalForm {
@@ -191,7 +190,7 @@ impl<'p> CanonicalForms<'p> {
         match pool.node(expr) {
             Node::Number(number) => Some(CanonicalForm::constant(Coefficient::from(*number))),
             Node::Symbol(symbol) => Some(match (self.literal)(*symbol) {
-                Some(literal) => CanonicalForm::constant(Coefficient::from(literal)),
+                Some(literal) => CanonicalForm::constant(literal),
                 None => self.atom(Atom::Symbol(*symbol)),
             }),
             Node::Sum(terms) => {

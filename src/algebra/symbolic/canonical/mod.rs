@@ -38,7 +38,6 @@ mod squares;
 #[cfg(test)]
 mod tests;
 
-pub use coefficient::{Coefficient, Literal};
+pub use coefficient::Coefficient;
 pub use forms::CanonicalForms;
 pub use polynomial::CanonicalForm;
-pub use rational::Rational;

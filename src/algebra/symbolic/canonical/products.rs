@@ -47,7 +47,6 @@ impl CanonicalForms<'_> {
 
     /// A monomial with one atom out of range, as a monomial without it times a form. The outer
     /// option is empty if that is too large.
-    #[allow(clippy::type_complexity, reason = "a pair that is taken apart at once")]
     pub(super) fn rewritten(
         &mut self,
         monomial: &Monomial,

@@ -8,7 +8,7 @@ use num_traits::ToPrimitive;
 
 /// A fraction in lowest terms with a positive denominator.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct Rational {
+pub(super) struct Rational {
     numerator: BigInt,
     denominator: BigInt,
 }
@@ -61,8 +61,7 @@ impl Rational {
         self.numerator.div_floor(&self.denominator)
     }
 
-    /// Whether it is zero.
-    pub fn is_zero(&self) -> bool {
+    pub(super) fn is_zero(&self) -> bool {
         self.numerator.sign() == Sign::NoSign
     }
 
@@ -74,13 +73,12 @@ impl Rational {
         self.numerator.sign() == Sign::Minus
     }
 
-    /// Whether the denominator is one.
-    pub fn is_integer(&self) -> bool {
+    pub(super) fn is_integer(&self) -> bool {
         self.denominator == BigInt::from(1)
     }
 
     /// The nearest float, or one beside it; infinite beyond the range of floats.
-    pub fn to_f64(&self) -> f64 {
+    pub(super) fn to_f64(&self) -> f64 {
         // Both parts within the range of floats, 64 bits of the quotient kept.
         let excess = (self.numerator.bits().max(self.denominator.bits())).saturating_sub(1_000);
         let both = [&self.numerator, &self.denominator].map(|part| (part >> excess).to_f64());

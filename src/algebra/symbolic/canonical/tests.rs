@@ -1,7 +1,7 @@
 //! Equal expressions get equal forms, different ones do not.
 
 use super::*;
-use crate::symbolic::{ExprPool, SymbolId};
+use crate::symbolic::{ExprPool, ParseLimits, SymbolId};
 
 /// The form of `a - b` without fractions; decimals are rounded where their text starts with `~`.
 fn difference(a: &str, b: &str) -> (CanonicalForm, f64) {
@@ -9,7 +9,8 @@ fn difference(a: &str, b: &str) -> (CanonicalForm, f64) {
     let parse = |pool: &mut ExprPool, text: &str| {
         let mark = if text.starts_with('~') { '~' } else { '#' };
         let named = |number: &str| number.contains('.').then(|| format!("{mark}{number}"));
-        let parsed = pool.parse_with_literals(text.trim_start_matches('~'), &|_| true, &named);
+        let (text, limits) = (text.trim_start_matches('~'), ParseLimits::default());
+        let parsed = pool.parse_within(text, &|_| true, &named, limits);
         parsed.unwrap_or_else(|error| panic!("{text}: {error}"))
     };
     let (left, right) = (parse(&mut pool, a), parse(&mut pool, b));
@@ -18,7 +19,7 @@ fn difference(a: &str, b: &str) -> (CanonicalForm, f64) {
         let rounded = name.strip_prefix('~').map(|digits| (digits, true));
         let (digits, is_rounded) =
             rounded.or(name.strip_prefix('#').map(|digits| (digits, false)))?;
-        Literal::parse(digits, is_rounded)
+        Coefficient::parse(digits, is_rounded)
     };
     let mut forms = CanonicalForms::new(&pool, &[left, right], &literal);
     let difference = forms.of(left).minus(&forms.of(right));

@@ -1,12 +1,10 @@
 //! The shortest form of a group of summands.
 
-use std::collections::HashMap;
-
 use super::search::Shortener;
 use super::units::{in_f64, in_units};
 use super::{Scaled, Summands};
 use crate::symbolic::expand::MAX_PRODUCTS;
-use crate::symbolic::intern::BuildIdHasher;
+use crate::symbolic::id_map::IdMap;
 use crate::symbolic::node::{ExprId, Function, Node};
 use crate::symbolic::number::Number;
 use crate::symbolic::pool::ExprPool;
@@ -121,7 +119,7 @@ impl Shortener<'_> {
     /// Functions that are written, each as often as it is.
     fn calls(&self, summands: &Scaled) -> usize {
         let roots: Vec<ExprId> = summands.iter().map(|&(_, expr)| expr).collect();
-        let mut calls: HashMap<ExprId, usize, BuildIdHasher> = HashMap::default();
+        let mut calls: IdMap<usize> = IdMap::default();
         for expr in self.pool.reachable(&roots) {
             let own = usize::from(matches!(self.pool.node(expr), Node::Apply(..)));
             let of_operands = self.pool.children(expr).map(|operand| calls[&operand]);
@@ -349,7 +347,7 @@ pub(super) enum Keep {
 /// of their first appearance.
 pub(super) fn collected(pool: &ExprPool, summands: &[(Number, ExprId)], keep: Keep) -> Scaled {
     let mut result = Scaled::new();
-    let mut place: HashMap<ExprId, usize, BuildIdHasher> = HashMap::default();
+    let mut place: IdMap<usize> = IdMap::default();
     for &(number, expr) in summands {
         let parts = match pool.node(expr) {
             Node::Sum(_) if keep == Keep::Sums => vec![(Number::ONE, expr)],

@@ -1,11 +1,11 @@
 //! Which summands can interact.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 
 use super::Summands;
 use super::search::{Block, Reach, Shortener};
 use crate::symbolic::expand::MAX_PRODUCTS;
-use crate::symbolic::intern::BuildIdHasher;
+use crate::symbolic::id_map::IdMap;
 use crate::symbolic::node::{ExprId, Function, Node};
 use crate::symbolic::number::Number;
 use crate::symbolic::perfect_power::MAX_POWER;
@@ -31,7 +31,7 @@ impl Shortener<'_> {
             .unzip();
         let waves = self.all_angles(&summands);
         let mut leader: Vec<usize> = (0..blocks.len()).collect();
-        let mut owner: HashMap<ExprId, usize, BuildIdHasher> = HashMap::default();
+        let mut owner: IdMap<usize> = IdMap::default();
         let mut is_plain = vec![true; blocks.len()];
         for (place, block) in blocks.iter().enumerate() {
             for &(_, expr) in &block.summands {
@@ -77,7 +77,7 @@ impl Shortener<'_> {
         if summands.len() < 3 {
             return pairs;
         }
-        let places: HashMap<ExprId, usize, BuildIdHasher> = (summands.iter().enumerate())
+        let places: IdMap<usize> = (summands.iter().enumerate())
             .map(|(place, &(_, expr))| (expr, place))
             .collect();
         for power in 2..=MAX_POWER {

@@ -5,7 +5,7 @@ use std::collections::{BTreeSet, HashMap};
 use super::forms::{Keep, collected};
 use super::{Scaled, Summands};
 use crate::symbolic::cost::Costs;
-use crate::symbolic::intern::BuildIdHasher;
+use crate::symbolic::id_map::{IdMap, IdSet};
 use crate::symbolic::node::{ExprId, Function, Node, SymbolId};
 use crate::symbolic::number::Number;
 use crate::symbolic::order::Exponent;
@@ -64,8 +64,8 @@ pub struct Shortened {
 pub struct Shortener<'a> {
     pub(super) pool: &'a mut ExprPool,
     pub(super) costs: Costs,
-    singles: HashMap<ExprId, ExprId, BuildIdHasher>,
-    pub(super) plain: HashMap<ExprId, bool, BuildIdHasher>,
+    singles: IdMap<ExprId>,
+    pub(super) plain: IdMap<bool>,
     /// By term and by the sum of all waves beside it.
     pub(super) monomials: HashMap<(ExprId, ExprId), Vec<ExprId>>,
 }
@@ -117,8 +117,8 @@ impl<'a> Shortener<'a> {
         Self {
             pool,
             costs: Costs::default(),
-            singles: HashMap::default(),
-            plain: HashMap::default(),
+            singles: IdMap::default(),
+            plain: IdMap::default(),
             monomials: HashMap::new(),
         }
     }
@@ -270,7 +270,7 @@ impl<'a> Shortener<'a> {
             }
         }
         let mut variables = Vec::new();
-        let mut replaced: HashMap<ExprId, ExprId, BuildIdHasher> = HashMap::default();
+        let mut replaced: IdMap<ExprId> = IdMap::default();
         for (place, (monic, angles)) in families.into_iter().enumerate() {
             let least = angles.iter().map(|(factor, _)| factor.abs()).min()?;
             // `cos(2*a)` may be a square of `cos(a)`.
@@ -310,7 +310,7 @@ impl<'a> Shortener<'a> {
     /// The summands with a variable of its own in the place of each factor of [`View::Factors`], and
     /// these; nothing if there is none.
     fn whole_factors(&mut self, summands: &[(f64, ExprId)]) -> Option<Seen> {
-        let mut n_terms: HashMap<ExprId, usize, BuildIdHasher> = HashMap::default();
+        let mut n_terms: IdMap<usize> = IdMap::default();
         for &(_, expr) in summands {
             for &factor in self.pool.factors_of(expr) {
                 *n_terms.entry(factor).or_insert(0) += 1;
@@ -354,7 +354,7 @@ impl<'a> Shortener<'a> {
 
     /// Whether the terms are distinct monomials that cannot interact.
     fn is_plain_sum(&mut self, summands: &[(f64, ExprId)]) -> bool {
-        let mut seen = std::collections::HashSet::with_hasher(BuildIdHasher::default());
+        let mut seen = IdSet::default();
         (summands.iter()).all(|&(_, expr)| seen.insert(expr) && self.is_plain(expr))
     }
 

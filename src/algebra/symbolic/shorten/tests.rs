@@ -96,7 +96,7 @@ fn shorten_of_a_long_plain_sum_makes_no_expression() {
             (0.1, pool.parsed(&text))
         })
         .collect();
-    let before = pool.len();
+    let before = pool.n_nodes();
     assert_eq!(Shortener::new(&mut pool).shorten(&summands), []);
-    assert_eq!(pool.len(), before);
+    assert_eq!(pool.n_nodes(), before);
 }
