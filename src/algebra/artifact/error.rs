@@ -1,5 +1,7 @@
 //! Faults of model files.
 
+#![allow(missing_docs, reason = "each variant's message names its fields")]
+
 use std::error::Error as _;
 use std::io;
 
@@ -19,9 +21,7 @@ pub enum ArtifactFault {
     /// The file system refused.
     #[error("cannot {action} the model file")]
     Io {
-        /// `read` or `write`.
         action: &'static str,
-        /// The system's answer.
         source: io::Error,
     },
     /// The file is larger than this bound in bytes, and so than any model.
@@ -32,11 +32,8 @@ pub enum ArtifactFault {
     Syntax {
         /// Path inside the file, such as `encoder.weights[3][2]`.
         place: String,
-        /// Line, from 1.
         line: usize,
-        /// Column, from 1.
         column: usize,
-        /// Found and expected.
         message: String,
     },
     /// The file follows another schema.
@@ -47,12 +44,7 @@ pub enum ArtifactFault {
     LaterKey(&'static str),
     /// A row of a matrix has the wrong length.
     #[error("found {found} numbers, expected {expected}")]
-    RowLength {
-        /// Its length.
-        found: usize,
-        /// The length of the other rows, or the one that the model needs.
-        expected: usize,
-    },
+    RowLength { found: usize, expected: usize },
     /// The robot that the file describes is none.
     #[error("{0}")]
     Robot(RobotFileError),
