@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::chain::ChainLeg;
-use super::kinematics::PlanarLeg;
+use super::kinematics::{self, PlanarLeg};
 
 /// The shape of one leg. Both forms agree where both apply; the planar one has fewer operations.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -108,8 +108,7 @@ impl LegGeometry {
 
     /// The volume that bounds `|det J|`: thigh times calf times their sum.
     pub fn volume_m3(&self) -> f64 {
-        let [thigh, calf] = self.lengths();
-        thigh * calf * (thigh + calf)
+        kinematics::volume_m3(self.lengths())
     }
 
     /// `|det J| / volume`: 0 at full extension or with the foot on the axis of the first joint, at
@@ -124,10 +123,7 @@ impl LegGeometry {
     /// Below which the area that thigh and calf span (m^2) and the height of the foot in the plane
     /// of the leg (m) are damped.
     pub fn least_levers(&self) -> [f64; 2] {
-        match self {
-            LegGeometry::Planar(leg) => leg.least_levers(),
-            LegGeometry::Chain(leg) => leg.least_levers(),
-        }
+        kinematics::least_levers(self.lengths())
     }
 
     /// Span of thigh and calf over the product of their lengths, and height of the foot over the
@@ -135,10 +131,12 @@ impl LegGeometry {
     /// [`LEAST_SPAN`](super::kinematics::LEAST_SPAN) and
     /// [`LEAST_HEIGHT`](super::kinematics::LEAST_HEIGHT) are compared with.
     pub fn spans(&self, q: &[f64; 3]) -> [f64; 2] {
-        match self {
-            LegGeometry::Planar(leg) => leg.spans(q),
-            LegGeometry::Chain(leg) => leg.spans(q),
-        }
+        let [area, lever] = match self {
+            LegGeometry::Planar(leg) => leg.levers(q),
+            LegGeometry::Chain(leg) => leg.levers(q),
+        };
+        let [thigh, calf] = self.lengths();
+        [area.abs() / (thigh * calf), lever.abs() / (thigh + calf)]
     }
 
     pub(super) fn damped_force_map(&self, q: &[f64; 3]) -> Option<Matrix3<f64>> {

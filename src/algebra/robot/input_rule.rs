@@ -9,7 +9,7 @@ use nalgebra::{Matrix3, SMatrix, Vector6};
 
 use super::actuators::Actuators;
 use super::error::RobotError;
-use super::joints::{BODY_DIM, ContactFlags, JOINT_DIM, LEG_JOINT_DIM, Leg, STATE_DIM};
+use super::joints::{BODY_DIM, ContactFlags, JOINT_DIM, STATE_DIM};
 use super::registry::Robot;
 
 /// Axes of the force and moment in an input.
@@ -110,14 +110,11 @@ impl InputRule {
         contact: ContactFlags,
     ) -> Result<Vector6<f64>, RobotError> {
         let joints = std::array::from_fn(|i| x[i]);
-        match self.frame {
-            WrenchFrame::Body => self.robot.body_wrench(&joints, net, contact),
-            WrenchFrame::World => {
-                let attitude = [x[15], x[16], x[17]];
-                let about_body = self.robot.wrench_about_body(&joints, net, contact)?;
-                Ok(generalised(attitude) * about_body)
-            }
-        }
+        let wrench = (self.robot).wrench_by_arms(self.frame, &joints, net, contact)?;
+        Ok(match self.frame {
+            WrenchFrame::Body => wrench,
+            WrenchFrame::World => generalised([x[15], x[16], x[17]]) * wrench,
+        })
     }
 
     /// The 6 x 12 matrix `G` of `[F; M] = G net` at a posture (rad), an attitude (roll, pitch, yaw,
@@ -131,24 +128,11 @@ impl InputRule {
         attitude: [f64; 3],
         contact: ContactFlags,
     ) -> Result<SMatrix<f64, BODY_DIM, JOINT_DIM>, RobotError> {
-        match self.frame {
-            WrenchFrame::Body => self.robot.wrench_map(joints, contact),
-            WrenchFrame::World => {
-                let mut map = SMatrix::<f64, BODY_DIM, JOINT_DIM>::zeros();
-                for leg in Leg::ALL.into_iter().filter(|leg| contact[leg.index()]) {
-                    let q = leg.of_joints(joints);
-                    let force = self.robot.damped_force_map(leg, &q)?;
-                    let arm = self.robot.hip_position(leg) + self.robot.foot_position(leg, &q);
-                    let first = LEG_JOINT_DIM * leg.index();
-                    let mut of_leg = map.fixed_columns_mut::<LEG_JOINT_DIM>(first);
-                    of_leg.fixed_rows_mut::<3>(0).copy_from(&force);
-                    of_leg
-                        .fixed_rows_mut::<3>(3)
-                        .copy_from(&(arm.cross_matrix() * force));
-                }
-                Ok(generalised(attitude) * map)
-            }
-        }
+        let map = self.robot.map_by_arms(self.frame, joints, contact)?;
+        Ok(match self.frame {
+            WrenchFrame::Body => map,
+            WrenchFrame::World => generalised(attitude) * map,
+        })
     }
 }
 
@@ -186,6 +170,8 @@ mod tests {
     use super::*;
     use nalgebra::{SVector, Vector3};
 
+    use crate::robot::joints::{LEG_JOINT_DIM, Leg};
+
     const CONTACTS: [ContactFlags; 3] = [
         [true; 4],
         [false, false, true, true],
@@ -213,7 +199,7 @@ mod tests {
     /// Where a foot is in the world, m.
     fn foot(robot: &Robot, leg: Leg, x: &[f64; STATE_DIM]) -> Vector3<f64> {
         let joints = std::array::from_fn(|i| x[i]);
-        let arm = robot.hip_position(leg) + robot.foot_position(leg, &leg.of_joints(&joints));
+        let arm = robot.foot_from_body(leg, &leg.of_joints(&joints));
         Vector3::new(x[12], x[13], x[14]) + rotation([x[15], x[16], x[17]]) * arm
     }
 

@@ -84,6 +84,11 @@ impl Robot {
         self.geometry(leg).foot_position(q)
     }
 
+    /// The same from the body's origin.
+    pub fn foot_from_body(&self, leg: Leg, q: &[f64; 3]) -> Vector3<f64> {
+        self.hip_position(leg) + self.foot_position(leg, q)
+    }
+
     /// Jacobian of [`Robot::foot_position`] by the leg's joint angles, in m.
     pub fn foot_jacobian(&self, leg: Leg, q: &[f64; 3]) -> Matrix3<f64> {
         self.geometry(leg).foot_jacobian(q)

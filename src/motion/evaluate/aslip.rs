@@ -214,7 +214,7 @@ fn mean_foot(robot: &Robot, segment: &Segment, sample: usize) -> Vector2<f64> {
         .filter(|leg| segment.feet[sample][leg.index()]);
     let (mut sum, mut count) = (Vector3::zeros(), 0.0);
     for leg in down {
-        sum += robot.hip_position(leg) + robot.foot_position(leg, &leg.of_joints(&joints));
+        sum += robot.foot_from_body(leg, &leg.of_joints(&joints));
         count += 1.0;
     }
     let in_body = sum / f64::max(count, 1.0);

@@ -18,7 +18,7 @@ pub fn foot_place(seed: &Seed<'_>, leg: Leg, z: &DVector<f64>) -> FootPlace {
     let joints: [f64; JOINT_DIM] = std::array::from_fn(|i| x[i]);
     let q = leg.of_joints(&joints);
     let (sin, cos) = x[PITCH].sin_cos();
-    let foot: Vector3<f64> = robot.hip_position(leg) + robot.foot_position(leg, &q);
+    let foot = robot.foot_from_body(leg, &q);
     let along = |v: &Vector3<f64>| cos * v.x + sin * v.z;
     let above = |v: &Vector3<f64>| -sin * v.x + cos * v.z;
     let jacobian = robot.foot_jacobian(leg, &q);

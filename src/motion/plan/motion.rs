@@ -150,7 +150,7 @@ fn foot_drift(robot: &Robot, motion: &Segment) -> [f64; 2] {
         let x: [f64; STATE_DIM] = std::array::from_fn(|row| motion.x[(row, sample)]);
         let [body_x, body_y, body_z, roll, pitch, yaw] = std::array::from_fn(|i| x[JOINT_DIM + i]);
         let joints: [f64; JOINT_DIM] = std::array::from_fn(|i| x[i]);
-        let foot = robot.hip_position(leg) + robot.foot_position(leg, &leg.of_joints(&joints));
+        let foot = robot.foot_from_body(leg, &leg.of_joints(&joints));
         Vector3::new(body_x, body_y, body_z) + Rotation3::from_euler_angles(roll, pitch, yaw) * foot
     };
     let mut farthest = [0.0_f64; 2];
