@@ -19,7 +19,7 @@ use crate::files::EmittedFile;
 use crate::lower::Form;
 use crate::model::ReducedModel;
 use crate::mpc::ControlModel;
-use crate::mpc::interface::{Settings, TEXTS};
+use crate::mpc::interface::{self, Settings};
 use crate::robot::{InputRule, Leg, Robot, STATE_DIM, WrenchFrame};
 use control_model::ControlModelText;
 use lock::Lock;
@@ -202,9 +202,10 @@ fn project(
 
 /// Every code of the interface with its text.
 pub(super) fn texts() -> impl Iterator<Item = (i32, String)> {
-    TEXTS
-        .iter()
-        .map(|(code, text)| (*code, text.to_string_lossy().into_owned()))
+    interface::all_codes().map(|code| {
+        let text = interface::status_text(code).to_string_lossy();
+        (code, text.into_owned())
+    })
 }
 
 /// The name of a code: the words of its text before the colon.

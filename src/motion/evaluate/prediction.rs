@@ -137,17 +137,13 @@ pub(super) fn prediction_error(
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
     use super::*;
-    use crate::{artifact, recording};
+    use crate::{evaluate::shipped_model, recording};
 
     #[test]
     fn pitch_without_a_latent_coordinate_does_not_make_right_predictions_fail() {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-        let model = artifact::read(&root.join("models/go1-d6.json")).expect("shipped");
-        let jump = root.join("examples/recordings/go1-other/jump_04.csv.gz");
-        let jump = recording::read(&jump).expect("shipped");
+        let model = shipped_model("go1-d6");
+        let jump = recording::shipped("go1-other/jump_04");
         let stages = recorded_stages(&model, &jump, 0.01).expect("of its robot");
         let error = |dynamics| {
             let error = prediction_error(&model, dynamics, &stages);

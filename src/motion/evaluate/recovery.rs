@@ -224,18 +224,14 @@ impl Deviation {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
     use super::*;
     use crate::mpc::MpcSettings;
-    use crate::{artifact, recording};
+    use crate::{evaluate::shipped_model, recording};
 
     #[test]
     fn replay_moves_on_at_the_speed_of_the_push_and_feedback_does_not() {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-        let model = artifact::read(&root.join("models/go1-d6.json")).expect("shipped");
-        let jump = root.join("examples/recordings/go1/test_01.csv.gz");
-        let jump = recording::read(&jump).expect("shipped");
+        let model = shipped_model("go1-d6");
+        let jump = recording::shipped("go1/test_01");
         let mut controller = Controller::new(&model, MpcSettings::default()).expect("complete");
         // after k of 100 samples of 2 ms the body is 0.1 m/s k 2 ms away, whatever the control step
         let mean_square = (1..=100).map(|k| f64::from(k * k)).sum::<f64>() / 100.0;

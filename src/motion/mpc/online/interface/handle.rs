@@ -177,9 +177,7 @@ mod tests {
     }
 
     fn handle(is_broken: bool) -> Box<Handle<4>> {
-        let path =
-            std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models/go1-d4.json");
-        let model = crate::artifact::read(&path).expect("a shipped model");
+        let model = crate::evaluate::shipped_model("go1-d4");
         Handle::create(None, |settings| {
             let controller = Controller::new(&model, settings).expect("a complete model");
             if !is_broken {

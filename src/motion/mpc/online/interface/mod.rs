@@ -10,7 +10,7 @@ mod settings;
 mod values;
 
 pub use codes::{
-    BAD_POINTER, BAD_SETTING, INTERNAL, SOLVER_REFUSED, TEXTS, TIME_ORDER, UNKNOWN_FEET,
+    BAD_POINTER, BAD_SETTING, INTERNAL, SOLVER_REFUSED, TIME_ORDER, UNKNOWN_FEET, all_codes,
     last_error, report, status_text,
 };
 pub use handle::Handle;
