@@ -1,9 +1,8 @@
 //! Where the body is to be highest.
 
 use super::affine::Affine;
-use super::seed::BODY_Z;
 use super::transcribe::Task;
-use crate::robot::GRAVITY_M_S2;
+use crate::robot::{BODY_Z, GRAVITY_M_S2};
 
 impl Task<'_> {
     /// Takes the apex at the node of the flight where the body is highest at an iterate.
@@ -20,6 +19,11 @@ impl Task<'_> {
         let mut parts = self.seed.parts.iter();
         let flight = parts.position(|part| !part.is_grounded());
         flight.expect("invariant: checked with the model")
+    }
+
+    /// The part at whose beginning feet of a part stand as they are to stay: the first, or that of the landing.
+    pub fn anchor_part(&self, part: usize) -> usize {
+        if part > self.flight() { part } else { 0 }
     }
 
     /// Height that the body reaches by its height and speed at the node of the apex, less the height

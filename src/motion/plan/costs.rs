@@ -13,26 +13,25 @@ const FIRST_OF_POSTURE: usize = 2;
 /// Adds the cost about an iterate; half the sum of squares each, so that weights are as documented
 /// up to a common factor.
 pub fn add(task: &Task<'_>, y: &[f64], builder: &mut Builder) {
-    each(task, y, &mut |expression, weight| {
-        builder.square(expression, weight)
-    });
+    for (expression, weight) in squares(task, y) {
+        builder.square(&expression, weight);
+    }
 }
 
 /// The cost of a point: the sum of weighted squares.
 pub fn value(task: &Task<'_>, y: &[f64]) -> f64 {
-    let mut total = 0.0;
-    each(task, y, &mut |expression, weight| {
-        total += weight * expression.at(y).powi(2);
-    });
-    total
+    let squares = squares(task, y).into_iter();
+    squares.fold(0.0, |total, (expression, weight)| {
+        total + weight * expression.at(y).powi(2)
+    })
 }
 
-fn each(task: &Task<'_>, y: &[f64], square: &mut dyn FnMut(&Affine, f64)) {
+/// What is squared, and its weight.
+fn squares(task: &Task<'_>, y: &[f64]) -> Vec<(Affine, f64)> {
     let (d, settings) = (task.layout.latent_dim, task.settings);
     let share = 1.0 / d as f64;
-    let one = |variable: usize, weight: f64, square: &mut dyn FnMut(&Affine, f64)| {
-        square(&Affine::default().plus(variable, 1.0), weight);
-    };
+    let one = |variable: usize, weight: f64| (Affine::default().plus(variable, 1.0), weight);
+    let mut out = Vec::new();
     for (part, of) in task.seed.parts.iter().enumerate() {
         let step = of.duration_s / of.intervals() as f64;
         for node in 0..of.z.len() {
@@ -41,10 +40,10 @@ fn each(task: &Task<'_>, y: &[f64], square: &mut dyn FnMut(&Affine, f64)) {
             let at = task.layout.node(part, node);
             for i in 0..d {
                 if i >= FIRST_OF_POSTURE {
-                    one(at + i, settings.posture * share * time, square);
+                    out.push(one(at + i, settings.posture * share * time));
                 }
-                one(at + d + i, settings.rate * share * time, square);
-                one(at + 2 * d + i, settings.input * share * time, square);
+                out.push(one(at + d + i, settings.rate * share * time));
+                out.push(one(at + 2 * d + i, settings.input * share * time));
             }
             if node < of.intervals() {
                 let next = task.layout.node(part, node + 1);
@@ -52,7 +51,7 @@ fn each(task: &Task<'_>, y: &[f64], square: &mut dyn FnMut(&Affine, f64)) {
                 for i in 0..d {
                     let change = Affine::default().plus(next + 2 * d + i, 1.0);
                     let change = change.plus(at + 2 * d + i, -1.0);
-                    square(&change, settings.smoothness * share * per_unit);
+                    out.push((change, settings.smoothness * share * per_unit));
                 }
             }
         }
@@ -61,43 +60,36 @@ fn each(task: &Task<'_>, y: &[f64], square: &mut dyn FnMut(&Affine, f64)) {
             _ => settings.duration[usize::from(!of.is_grounded())],
         };
         // A little for every duration keeps the program strictly convex.
-        one(task.layout.duration(part), weight.max(1e-3), square);
+        out.push(one(task.layout.duration(part), weight.max(1e-3)));
     }
-    feet(task, y, square);
+    for part in 0..task.seed.parts.len() {
+        add_feet(task, y, part, &mut out);
+    }
+    out
 }
 
 /// Feet on the ground stay where they stand, as far as they do in the prior: along the floor from
 /// the start or from touch-down, above it from the start or from the prior's own height.
-fn feet(task: &Task<'_>, y: &[f64], square: &mut dyn FnMut(&Affine, f64)) {
-    let settings = task.settings;
-    let flight = task.flight();
-    for (part, of) in task.seed.parts.iter().enumerate() {
-        let is_landing = part > flight;
-        let anchor_part = if is_landing { part } else { 0 };
-        if !of.is_grounded() {
-            continue;
-        }
-        let step = of.duration_s / of.intervals() as f64;
-        let down: Vec<Leg> = (Leg::ALL.into_iter())
-            .filter(|leg| of.part.feet[leg.index()])
-            .collect();
-        for &leg in &down {
-            let anchor = moved_foot(task, y, leg, (anchor_part, 0));
-            for node in 0..of.z.len() {
-                if (part, node) == (anchor_part, 0) {
-                    continue;
+fn add_feet(task: &Task<'_>, y: &[f64], part: usize, out: &mut Vec<(Affine, f64)>) {
+    let (settings, of) = (task.settings, &task.seed.parts[part]);
+    let anchor_part = task.anchor_part(part);
+    let time = of.duration_s / of.intervals() as f64 / TIME_UNIT_S;
+    let count = of.legs_down().count();
+    for leg in of.legs_down() {
+        let anchor = moved_foot(task, y, leg, (anchor_part, 0));
+        for node in 0..of.z.len() {
+            if (part, node) == (anchor_part, 0) {
+                continue;
+            }
+            for (axis, mut slip) in moved_foot(task, y, leg, (part, node))
+                .into_iter()
+                .enumerate()
+            {
+                if axis == 0 || anchor_part == 0 {
+                    slip.add_scaled(&anchor[axis], -1.0);
                 }
-                let foot = moved_foot(task, y, leg, (part, node));
-                for axis in 0..2 {
-                    let mut slip = foot[axis].clone();
-                    if axis == 0 || !is_landing {
-                        slip.add_scaled(&anchor[axis], -1.0);
-                    }
-                    let time = step / TIME_UNIT_S;
-                    let unit = settings.foot_m[axis];
-                    let weight = settings.feet / down.len() as f64 * time / (unit * unit);
-                    square(&slip, weight);
-                }
+                let unit = settings.foot_m[axis];
+                out.push((slip, settings.feet / count as f64 * time / (unit * unit)));
             }
         }
     }

@@ -2,8 +2,8 @@
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
-use super::seed::{BODY_X, BODY_Z, PITCH, Seed};
-use crate::robot::{JOINT_DIM, Leg, STATE_DIM};
+use super::seed::{PITCH, Seed};
+use crate::robot::{BODY_X, BODY_Z, JOINT_DIM, Leg, STATE_DIM};
 
 /// A foot's place along the floor and above it (m), and the derivatives by `z` (one row each).
 pub struct FootPlace {

@@ -14,6 +14,7 @@ use crate::model::ReducedModel;
 use crate::mpc::{Outcome, QpSettings, QpSolver, SolverProfile};
 use crate::recording::mismatch::weight_share;
 use crate::recording::{Recording, Segment};
+use crate::robot::{BODY_X, BODY_Z, GRAVITY_M_S2};
 
 /// Largest violation of an equation that counts as none, in standard deviations.
 const CONVERGED_DEFECT: f64 = 1e-4;
@@ -182,11 +183,8 @@ fn outside(seed: &Seed<'_>, goal_m: [f64; 2]) -> [f64; 2] {
 /// Distance and rise of the body in a motion, m.
 fn reached(motion: &Segment) -> [f64; 2] {
     let (x, last) = (&motion.x, motion.len() - 1);
-    let height = x.row(super::seed::BODY_Z);
-    [
-        x[(super::seed::BODY_X, last)] - x[(super::seed::BODY_X, 0)],
-        height.max() - height[0],
-    ]
+    let height = x.row(BODY_Z);
+    [x[(BODY_X, last)] - x[(BODY_X, 0)], height.max() - height[0]]
 }
 
 /// What accelerations of the thrust that the deviations do not explain make of distance and rise.
@@ -201,9 +199,9 @@ fn expected_error(task: &Task<'_>, y: &[f64]) -> [f64; 2] {
         let squares = row.iter().zip(of_latent).map(|(a, std)| (a * std).powi(2));
         squares.sum::<f64>().sqrt() * duration_s
     };
-    let up = task.dx(flight, 0, super::seed::BODY_Z).at(y);
+    let up = task.dx(flight, 0, BODY_Z).at(y);
     [
-        speed(super::seed::BODY_X) * task.duration_s(flight, y),
-        speed(super::seed::BODY_Z) * up.abs() / crate::robot::GRAVITY_M_S2,
+        speed(BODY_X) * task.duration_s(flight, y),
+        speed(BODY_Z) * up.abs() / GRAVITY_M_S2,
     ]
 }

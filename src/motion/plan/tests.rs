@@ -10,7 +10,7 @@ use crate::artifact;
 use crate::evaluate::shipped_model;
 use crate::model::ReducedModel;
 use crate::recording::Recording;
-use crate::robot::{GRAVITY_M_S2, Robot};
+use crate::robot::{BODY_Z, GRAVITY_M_S2, Robot};
 use crate::train::{Method, Origin, Progress, Recordings, TrainOptions, Watch};
 
 fn recordings(split: &str, count: usize) -> Vec<Recording> {
@@ -210,7 +210,7 @@ fn jumps_recorded_up_to_touch_down_are_planned_up_to_it() {
     let plan = plan(&model, &goal, &PlanSettings::default()).expect("a plan");
     let last = plan.motion.len() - 1;
     assert_eq!(plan.motion.feet[last], [false; 4]);
-    assert!(plan.motion.dx[(seed::BODY_Z, last)] < -0.3, "still falling");
+    assert!(plan.motion.dx[(BODY_Z, last)] < -0.3, "still falling");
     assert!((plan.reached_m[0] - distance.mean).abs() < 3e-3);
     assert!((plan.reached_m[1] - apex.mean).abs() < 3e-3);
 }

@@ -23,10 +23,10 @@ use nalgebra::DVector;
 
 use super::affine::{Affine, Builder};
 use super::costs;
-use super::seed::{BODY_X, BODY_Z, PITCH, Seed};
+use super::seed::{PITCH, Seed};
 use super::settings::PlanSettings;
 use crate::mpc::ConeProgram;
-use crate::robot::JOINT_DIM;
+use crate::robot::{BODY_X, BODY_Z, JOINT_DIM};
 
 /// Change of a duration that the variable `tau` counts as one.
 pub const DURATION_SHARE: f64 = 0.15;
