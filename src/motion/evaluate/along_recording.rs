@@ -27,7 +27,7 @@ use super::control_metrics::ControlMetrics;
 use super::torque::{Comparison, exceeds, is_plausible};
 use crate::mpc::{
     Command, ControlError, Controller, Lift, Measurement, MpcError, ReferenceSamples, STEP_SLACK,
-    Source, StanceState, Status, foot_forces, to_upright,
+    StanceState, foot_forces, to_upright,
 };
 use crate::recording::{Recording, Segment};
 use crate::robot::{GRAVITY_M_S2, JOINT_DIM, STATE_DIM};
@@ -48,23 +48,11 @@ pub struct StepRow {
     pub segment: usize,
     /// Time of the measurement, s.
     pub time_s: f64,
-    /// Index of the phase of the first stage, if there was a plan.
-    pub phase: Option<usize>,
-    /// How the step ended.
-    pub status: Status,
-    /// Where the command comes from.
-    pub source: Source,
-    /// Wall time of the step, µs.
-    pub solve_us: f64,
-    /// Interior-point iterations.
-    pub iterations: u32,
-    /// Latent input.
-    pub u_lat: Vec<f64>,
+    /// The command.
+    pub command: Command,
     /// Lifted input in SI units: with the transpose lift `W_eᵀ u_lat`, with the consistent lift the
     /// torques at the links and the force that they produce.
     pub input: [f64; STATE_DIM],
-    /// Commanded torques, N m.
-    pub torque_nm: [f64; JOINT_DIM],
     /// Recorded torques, N m, averaged over the time that the command is held.
     pub recorded_torque_nm: [f64; JOINT_DIM],
     /// Reference in latent coordinates.
@@ -95,8 +83,9 @@ impl Run {
             return None;
         }
         let mut statuses: BTreeMap<&str, usize> = BTreeMap::new();
-        for row in self.rows.iter().filter(|row| !row.status.has_plan()) {
-            *statuses.entry(row.status.word()).or_default() += 1;
+        let of_steps = self.rows.iter().map(|row| row.command.status);
+        for status in of_steps.filter(|status| !status.has_plan()) {
+            *statuses.entry(status.word()).or_default() += 1;
         }
         let statuses = statuses
             .iter()
@@ -276,19 +265,13 @@ fn one_step(
     StepRow {
         segment: number,
         time_s,
-        phase: command.phase,
-        status: command.status,
-        source: command.source,
-        solve_us: command.solve_us,
-        iterations: command.iterations,
         input: lifted_input(controller, &command, segment, sample),
-        torque_nm: command.torque_nm,
         recorded_torque_nm: recorded.unwrap_or([0.0; JOINT_DIM]),
         z_reference: reference[..d].to_vec(),
-        u_lat: command.u_lat,
         z,
         z_planned: (command.status.has_plan())
             .then(|| controller.plan().end(controller.settings().horizon - 1)[..d].to_vec()),
+        command,
     }
 }
 

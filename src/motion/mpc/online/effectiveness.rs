@@ -32,7 +32,7 @@ pub const LARGEST_WEIGHT: f64 = 2.0;
 pub const RANGE: (f64, f64) = (0.7, 1.3);
 
 /// The estimate and the sums behind it.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Effectiveness {
     estimate: f64,
     /// Weights, and weights times what they say, of the steps so far.
@@ -56,14 +56,10 @@ impl Effectiveness {
     pub(super) fn full(latent_dim: usize) -> Self {
         Self {
             estimate: 1.0,
-            weight: 0.0,
-            weighted: 0.0,
-            unit: None,
-            is_grounded: false,
             by_input: vec![0.0; latent_dim * latent_dim],
-            held: None,
             at_command: vec![0.0; latent_dim],
             drives: vec![0.0; latent_dim],
+            ..Self::default()
         }
     }
 

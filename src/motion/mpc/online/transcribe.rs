@@ -6,7 +6,7 @@
 use nalgebra::DMatrix;
 
 use super::control_model::ControlPhase;
-use super::layout::{Layout, block};
+use super::layout::Layout;
 use super::linearise::StageModel;
 use super::problem::{Row, StageRows};
 use super::qp::{Cone, ConeProgram, dot};
@@ -90,6 +90,26 @@ struct StagePositions {
     force: Vec<usize>,
 }
 
+impl StagePositions {
+    fn of(blocks: [Vec<(usize, usize)>; 7], a: &SparseColumns) -> Self {
+        let [input, state, torque, rate, rate_before, joint, force] = blocks.map(|block| {
+            let positions = block.into_iter().map(|(row, col)| a.position(row, col));
+            positions
+                .map(|position| position.expect("block belongs to the pattern"))
+                .collect()
+        });
+        Self {
+            input,
+            state,
+            torque,
+            rate,
+            rate_before,
+            joint,
+            force,
+        }
+    }
+}
+
 /// Where each number of a step goes.
 #[derive(Debug, Clone)]
 pub struct Transcription {
@@ -104,18 +124,17 @@ impl Transcription {
     pub fn new(latent_dim: usize, horizon: usize, rows: StageRows) -> (Self, ConeProgram) {
         let layout = Layout::new(latent_dim, horizon, rows);
         let (n, m) = (layout.variables(), layout.row_count());
-        let mut a = SparseColumns::from_pattern(m, n, &layout.pattern());
-        let mut transcription = Self {
-            layout,
-            positions: Vec::with_capacity(horizon),
-            work: vec![0.0; latent_dim],
-        };
-        for stage in 0..horizon {
-            let positions = transcription.stage_positions(stage, &a);
-            transcription.positions.push(positions);
+        let constants: Vec<_> = (0..horizon)
+            .flat_map(|stage| layout.constants(stage))
+            .collect();
+        let blocks: Vec<_> = (0..horizon).map(|stage| layout.blocks(stage)).collect();
+        let entries = blocks.iter().flatten().flatten().chain(&constants);
+        let mut a = SparseColumns::from_pattern(m, n, &entries.copied().collect::<Vec<_>>());
+        for &(row, col) in &constants {
+            a.set(row, col, -1.0);
         }
-        transcription.write_constants(&mut a);
-        let layout = &transcription.layout;
+        let positions = (blocks.into_iter()).map(|blocks| StagePositions::of(blocks, &a));
+        let positions = positions.collect();
         let diagonal: Vec<(usize, usize)> = (0..n).map(|index| (index, index)).collect();
         let mut cones = vec![
             Cone::Zero(2 * latent_dim * horizon),
@@ -131,6 +150,12 @@ impl Transcription {
             a,
             b: vec![0.0; m],
             cones,
+        };
+        let work = vec![0.0; latent_dim];
+        let transcription = Self {
+            layout,
+            positions,
+            work,
         };
         (transcription, program)
     }
@@ -176,51 +201,6 @@ impl Transcription {
     /// `x̂⁺` at the end of a stage in a solution.
     pub fn state<'a>(&self, index: usize, solution: &'a [f64]) -> &'a [f64] {
         &solution[self.layout.state_column(index)..][..2 * self.layout.latent_dim]
-    }
-
-    fn stage_positions(&self, stage: usize, a: &SparseColumns) -> StagePositions {
-        let (layout, rows) = (&self.layout, &self.layout.rows);
-        let d = layout.latent_dim;
-        let find = |row: usize, n_rows: usize, col: usize, n_cols: usize| -> Vec<usize> {
-            block(row, n_rows, col, n_cols)
-                .map(|(row, col)| a.position(row, col).expect("block belongs to the pattern"))
-                .collect()
-        };
-        let (input, state) = (layout.input_column(stage), layout.state_column(stage));
-        let (dynamics, rate) = (layout.dynamics_row(stage), layout.rate_row(stage));
-        let (torque, joint) = (layout.torque_row(stage), layout.joint_row(stage));
-        let (mut by_state, mut rate_before) = (Vec::new(), Vec::new());
-        if stage > 0 {
-            by_state = find(dynamics, 2 * d, layout.state_column(stage - 1), 2 * d);
-            rate_before = find(rate, rows.rate.len(), layout.input_column(stage - 1), d);
-        }
-        let force_rows = rows.friction.as_ref().map_or(0, |_| 3);
-        StagePositions {
-            input: find(dynamics, 2 * d, input, d),
-            state: by_state,
-            torque: find(torque, rows.torque.len(), input, d),
-            rate: find(rate, rows.rate.len(), input, d),
-            rate_before,
-            joint: find(joint, rows.joint.len(), state, d),
-            force: find(layout.force_row(stage), force_rows, input, d),
-        }
-    }
-
-    fn write_constants(&self, a: &mut SparseColumns) {
-        for stage in 0..self.layout.horizon {
-            let (row, column) = (
-                self.layout.dynamics_row(stage),
-                self.layout.state_column(stage),
-            );
-            for index in 0..2 * self.layout.latent_dim {
-                a.set(row + index, column + index, -1.0);
-            }
-            if self.layout.has_slack {
-                for row in self.layout.joint_row(stage)..=self.layout.slack_row(stage) {
-                    a.set(row, self.layout.slack_column(stage), -1.0);
-                }
-            }
-        }
     }
 
     /// `Â x̂_k + B̂ û_k − x̂_{k+1} = −σ⁻¹ defect`, with `x̂_0` on the right.
