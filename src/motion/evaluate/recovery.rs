@@ -103,7 +103,10 @@ pub(super) fn recovery(
         for window in windows.into_iter().step_by(every) {
             for push in PUSHES {
                 controller.reset();
-                let pushed = Deviation::pushed(Vector3::from(push) * PUSH_M_S);
+                let pushed = Deviation {
+                    velocity_m_s: Vector3::from(push) * PUSH_M_S,
+                    ..Deviation::default()
+                };
                 run(controller, segment, window, pushed, driver, &mut recovery);
             }
         }
@@ -163,13 +166,6 @@ struct Deviation {
 }
 
 impl Deviation {
-    fn pushed(velocity_m_s: Vector3<f64>) -> Self {
-        Self {
-            velocity_m_s,
-            ..Self::default()
-        }
-    }
-
     /// State and velocity of the robot, joints such that feet on the ground stay where they are.
     fn measured(
         &self,
