@@ -175,43 +175,33 @@ mod tests {
     }
 
     #[test]
-    fn foot_force_stretched_knee_is_an_error_with_leg_and_angles() {
-        let error = go1()
-            .foot_force(Leg::RearLeft, &[0.0, 0.2, 0.0], &[1.0, 1.0, 1.0])
-            .unwrap_err();
-        let RobotError::SingularLeg {
-            leg, joints_rad, ..
-        } = &error
-        else {
-            panic!("{error:?}");
-        };
-        assert_eq!((*leg, *joints_rad), (Leg::RearLeft, [0.0, 0.2, 0.0]));
-        let text = error.to_string();
+    fn foot_force_of_a_leg_beyond_the_singular_bound_is_an_error_with_leg_and_angles() {
+        let force = |knee: f64| go1().foot_force(Leg::RearLeft, &[0.0, 0.2, knee], &[1.0; 3]);
+        for knee in [0.0, -1e-4] {
+            let Err(RobotError::SingularLeg {
+                leg, joints_rad, ..
+            }) = force(knee)
+            else {
+                panic!("{knee}: {:?}", force(knee));
+            };
+            assert_eq!((leg, joints_rad), (Leg::RearLeft, [0.0, 0.2, knee]));
+        }
+        let text = force(0.0).unwrap_err().to_string();
         assert!(text.contains("go1: leg rl is singular"), "{text}");
         assert!(text.contains("kn 0.0000"), "{text}");
-    }
-
-    #[test]
-    fn foot_force_near_extension_is_bounded_by_the_singular_bound() {
-        let error = go1().foot_force(Leg::FrontLeft, &[0.0, 0.0, -1e-4], &[1.0; 3]);
-        assert!(matches!(error, Err(RobotError::SingularLeg { .. })));
-        assert!(
-            go1()
-                .foot_force(Leg::FrontLeft, &[0.0, 0.0, -2e-2], &[1.0; 3])
-                .is_ok()
-        );
+        assert!(force(-2e-2).is_ok());
     }
 
     #[test]
     fn foot_force_not_finite_argument_is_an_error() {
-        let error = go1()
-            .foot_force(Leg::FrontRight, &[0.0, 0.7, -1.4], &[0.0, f64::NAN, 0.0])
-            .unwrap_err();
-        assert!(error.to_string().contains("leg fr has the torque NaN"));
-        let error = go1()
-            .foot_force(Leg::FrontRight, &[f64::INFINITY, 0.7, -1.4], &[0.0; 3])
-            .unwrap_err();
-        assert!(error.to_string().contains("joint angle inf"));
+        let (q, nan) = ([0.0, 0.7, -1.4], f64::NAN);
+        for (q, tau, said) in [
+            (q, [0.0, nan, 0.0], "leg fr has the torque NaN"),
+            ([f64::INFINITY, 0.7, -1.4], [0.0; 3], "joint angle inf"),
+        ] {
+            let error = go1().foot_force(Leg::FrontRight, &q, &tau).unwrap_err();
+            assert!(error.to_string().contains(said), "{error}");
+        }
     }
 
     #[test]

@@ -83,18 +83,14 @@ impl Settings {
         let points = [Linearisation::Reference, Linearisation::LastPlan];
         let about = "0 (the reference) or 1 (the last plan)";
         let solvers = [Solver::Clarabel, Solver::Riccati];
+        let which = "0 (clarabel) or 1 (Riccati)";
         let mut settings = MpcSettings {
             horizon: usize::try_from(self.horizon)
                 .map_err(|_| refused("horizon", self.horizon, "1 to 500 stages"))?,
             step_s: self.step_s,
             lift: chosen("lift", self.lift, lifts, "0 (transpose) or 1 (consistent)")?,
             linearisation: chosen("linearisation", self.linearisation, points, about)?,
-            solver: chosen(
-                "solver",
-                self.solver,
-                solvers,
-                "0 (clarabel) or 1 (Riccati)",
-            )?,
+            solver: chosen("solver", self.solver, solvers, which)?,
             input_weight: self.input_weight,
             velocity_weight: self.velocity_weight,
             terminal_weight: self.terminal_weight,
