@@ -5,7 +5,7 @@
 //! frames ([`WrenchFrame`]). A model states which rule its inputs were made by; training,
 //! simulation, control and generated code all follow it.
 
-use nalgebra::{Matrix3, SMatrix, Vector6};
+use nalgebra::{Matrix3, Rotation3, SMatrix, Vector6};
 
 use super::actuators::Actuators;
 use super::error::RobotError;
@@ -138,18 +138,7 @@ impl InputRule {
 
 /// Rotation from the body's axes to the world's, `R_z(yaw) R_y(pitch) R_x(roll)`.
 pub fn rotation([roll, pitch, yaw]: [f64; 3]) -> Matrix3<f64> {
-    let ((s_r, c_r), (s_p, c_p), (s_y, c_y)) = (roll.sin_cos(), pitch.sin_cos(), yaw.sin_cos());
-    Matrix3::new(
-        c_y * c_p,
-        c_y * s_p * s_r - s_y * c_r,
-        c_y * s_p * c_r + s_y * s_r,
-        s_y * c_p,
-        s_y * s_p * s_r + c_y * c_r,
-        s_y * s_p * c_r - c_y * s_r,
-        -s_p,
-        c_p * s_r,
-        c_p * c_r,
-    )
+    Rotation3::from_euler_angles(roll, pitch, yaw).into_inner()
 }
 
 /// From force and moment about the body's origin in the body's axes to the generalised forces of
@@ -196,13 +185,6 @@ mod tests {
         std::array::from_fn(|i| 3.0 - 0.7 * i as f64 + 0.2 * (i * i) as f64)
     }
 
-    /// Where a foot is in the world, m.
-    fn foot(robot: &Robot, leg: Leg, x: &[f64; STATE_DIM]) -> Vector3<f64> {
-        let joints = std::array::from_fn(|i| x[i]);
-        let arm = robot.foot_from_body(leg, &leg.of_joints(&joints));
-        Vector3::new(x[12], x[13], x[14]) + rotation([x[15], x[16], x[17]]) * arm
-    }
-
     #[test]
     fn world_wrench_does_the_work_of_the_feet_on_the_bodys_coordinates() {
         // Virtual work: F_k . d(foot k)/dx_i over the feet in contact is -tau_i for a joint of a leg
@@ -228,9 +210,8 @@ mod tests {
                     upper[i] += step;
                     let work: f64 = (forces.iter())
                         .map(|(leg, force)| {
-                            let moved =
-                                foot(rule.robot(), *leg, &upper) - foot(rule.robot(), *leg, &lower);
-                            force.dot(&moved) / (2.0 * step)
+                            let foot = |x| rule.robot().foot_in_world(*leg, x);
+                            force.dot(&(foot(&upper) - foot(&lower))) / (2.0 * step)
                         })
                         .sum();
                     let expected = match i {

@@ -3,6 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::geometry::LegGeometry;
+use super::input_rule::rotation;
 use super::joints::{
     BODY_NAMES, FOOT_DIM, JOINT_DIM, JOINT_NAMES, LEG_JOINT_DIM, Leg, STATE_DIM, WRENCH_NAMES,
 };
@@ -87,6 +88,13 @@ impl Robot {
     /// The same from the body's origin.
     pub fn foot_from_body(&self, leg: Leg, q: &[f64; 3]) -> Vector3<f64> {
         self.hip_position(leg) + self.foot_position(leg, q)
+    }
+
+    /// The same in the world, at a state `x` of the robot.
+    pub fn foot_in_world(&self, leg: Leg, x: &[f64; STATE_DIM]) -> Vector3<f64> {
+        let joints = std::array::from_fn(|i| x[i]);
+        let foot = self.foot_from_body(leg, &leg.of_joints(&joints));
+        Vector3::new(x[12], x[13], x[14]) + rotation([x[15], x[16], x[17]]) * foot
     }
 
     /// Jacobian of [`Robot::foot_position`] by the leg's joint angles, in m.

@@ -26,8 +26,8 @@ use super::control::{Summary, Tally};
 use super::control_metrics::ControlMetrics;
 use super::torque::{Comparison, exceeds, is_plausible};
 use crate::mpc::{
-    Command, ControlError, Controller, Lift, Measurement, MpcError, ReferenceSamples, STEP_SLACK,
-    StanceState, foot_forces, to_upright,
+    Command, Controller, Lift, Measurement, MpcError, ReferenceSamples, STEP_SLACK, StanceState,
+    foot_forces, to_upright,
 };
 use crate::recording::{Recording, Segment};
 use crate::robot::{GRAVITY_M_S2, JOINT_DIM, STATE_DIM};
@@ -143,8 +143,7 @@ pub fn along_recording(
         if segment.len() < 2 {
             continue;
         }
-        let input = segment.input_within_limits(controller.plant().input_rule())?;
-        set_reference(controller, segment, reference_input, input.as_slice())?;
+        set_reference(controller, segment, reference_input)?;
         for &sample in schedule {
             let started = Instant::now();
             controller.prepare(segment.time_s[sample]);
@@ -279,18 +278,19 @@ pub(super) fn set_reference(
     controller: &mut Controller,
     segment: &Segment,
     reference_input: ReferenceInput,
-    input: &[f64],
-) -> Result<(), ControlError> {
+) -> Result<(), MpcError> {
+    let input = segment.input_within_limits(controller.plant().input_rule())?;
     controller.set_reference(ReferenceSamples {
         time_s: &segment.time_s,
         x: segment.x.as_slice(),
         dx: segment.dx.as_slice(),
         u: match reference_input {
-            ReferenceInput::Recorded => Some(input),
+            ReferenceInput::Recorded => Some(input.as_slice()),
             ReferenceInput::None => None,
         },
         feet: &segment.feet,
-    })
+    })?;
+    Ok(())
 }
 
 /// Mean recorded torques over the time that a command is held; none if one is not finite.
@@ -311,13 +311,8 @@ fn held_torque(segment: &Segment, sample: usize, step_s: f64) -> Option<[f64; JO
 
 fn stance(controller: &Controller, segment: &Segment, sample: usize) -> Option<StanceState> {
     let feet = segment.feet[sample];
-    Some(StanceState {
-        joints_rad: segment.joints(sample),
-        attitude_rad: std::array::from_fn(|angle| segment.x[(15 + angle, sample)]),
-        feet,
-        phase: controller.plant().phase_for(feet)?,
-        losses_nm: [0.0; JOINT_DIM],
-    })
+    let phase = controller.plant().phase_for(feet)?;
+    Some(StanceState::at(&segment.state(sample), feet, phase))
 }
 
 fn lifted_input(

@@ -85,13 +85,7 @@ pub(super) fn recovery(
     let [window_steps, steps_between] =
         [WINDOW_S, BETWEEN_S].map(|time_s| ((time_s / step_s).round() as usize).max(1));
     for segment in recording.segments.iter().filter(|s| s.len() >= 2) {
-        let input = segment.input_within_limits(controller.plant().input_rule())?;
-        set_reference(
-            controller,
-            segment,
-            ReferenceInput::Recorded,
-            input.as_slice(),
-        )?;
+        set_reference(controller, segment, ReferenceInput::Recorded)?;
         let samples = control_samples(&segment.time_s, step_s);
         let stands = |window: &&[usize]| {
             let feet = &segment.feet[window[0]..=window[window_steps]];
@@ -126,11 +120,12 @@ fn run(
     let limits = robot.torque_limit_nm();
     for pair in window.windows(2) {
         let (start, end) = (pair[0], pair[1]);
-        let command = (driver != Driver::Replay).then(|| {
-            let seen = match driver {
-                Driver::Feedback => deviation,
-                Driver::NoFeedback | Driver::Replay => Deviation::default(),
-            };
+        let seen = match driver {
+            Driver::Feedback => Some(deviation),
+            Driver::NoFeedback => Some(Deviation::default()),
+            Driver::Replay => None,
+        };
+        let command = seen.map(|seen| {
             let (x, dx) = seen.measured(segment, start, robot);
             let command = controller.step(Measurement {
                 time_s: segment.time_s[start],

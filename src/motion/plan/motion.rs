@@ -4,7 +4,7 @@
 //! passes through the nodes of the program. Torques are the lifted input with what the joints take
 //! of the very motion that is written, so that who reads the recording finds the planned input.
 
-use nalgebra::{DMatrix, DVector, Rotation3, Vector3};
+use nalgebra::{DMatrix, DVector};
 
 use super::costs::moved_foot;
 use super::error::PlanError;
@@ -143,12 +143,7 @@ fn foot_slip(task: &Task<'_>, y: &[f64]) -> [f64; 2] {
 /// Farthest that a foot on the ground is, at any sample, from its place at the first sample of that
 /// contact, along the floor, and below its height at the first of all samples.
 fn foot_drift(robot: &Robot, motion: &Segment) -> [f64; 2] {
-    let place = |leg: Leg, sample: usize| -> Vector3<f64> {
-        let x = motion.state(sample);
-        let [body_x, body_y, body_z, roll, pitch, yaw] = std::array::from_fn(|i| x[JOINT_DIM + i]);
-        let foot = robot.foot_from_body(leg, &leg.of_joints(&motion.joints(sample)));
-        Vector3::new(body_x, body_y, body_z) + Rotation3::from_euler_angles(roll, pitch, yaw) * foot
-    };
+    let place = |leg: Leg, sample: usize| robot.foot_in_world(leg, &motion.state(sample));
     let mut farthest = [0.0_f64; 2];
     for leg in Leg::ALL {
         let floor = place(leg, 0).z;

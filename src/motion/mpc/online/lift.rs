@@ -51,6 +51,19 @@ pub struct StanceState {
     pub losses_nm: [f64; JOINT_DIM],
 }
 
+impl StanceState {
+    /// At a state (18, SI units), without losses.
+    pub fn at(x: &[f64], feet: ContactFlags, phase: usize) -> Self {
+        Self {
+            joints_rad: std::array::from_fn(|joint| x[joint]),
+            attitude_rad: std::array::from_fn(|angle| x[15 + angle]),
+            feet,
+            phase,
+            losses_nm: [0.0; JOINT_DIM],
+        }
+    }
+}
+
 /// Why no torques were found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LiftFailure {

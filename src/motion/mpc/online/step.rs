@@ -89,13 +89,7 @@ impl Controller {
         let (by_input, planned) = (&step.stages[0].model.b, &self.plant.phases()[phase]);
         self.effectiveness.begin(by_input, planned.is_grounded);
         command.slack = self.largest_violation();
-        self.memory.stance = Some(StanceState {
-            joints_rad: std::array::from_fn(|joint| measurement.x[joint]),
-            attitude_rad: std::array::from_fn(|angle| measurement.x[15 + angle]),
-            feet: measurement.feet,
-            phase,
-            losses_nm: [0.0; JOINT_DIM],
-        });
+        self.memory.stance = Some(StanceState::at(measurement.x, measurement.feet, phase));
         if !self.write_plan(0, command) {
             return Status::LiftFailed;
         }
