@@ -90,36 +90,3 @@ impl SparseColumns {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn products_match_the_dense_matrices() {
-        let mut matrix = SparseColumns::from_pattern(2, 3, &[(0, 0), (1, 0), (1, 2)]);
-        matrix.values_mut().copy_from_slice(&[2.0, -1.0, 5.0]);
-        let (mut forward, mut backward) = ([1.0, 0.0], [0.0; 3]);
-        matrix.multiply_add(&[3.0, 100.0, 2.0], &mut forward);
-        matrix.transpose_multiply_add(&[1.0, 2.0], &mut backward);
-        assert_eq!((forward, backward), ([7.0, 7.0], [0.0, 0.0, 10.0]));
-
-        let mut upper = SparseColumns::from_pattern(2, 2, &[(0, 0), (0, 1), (1, 1)]);
-        upper.values_mut().copy_from_slice(&[2.0, 3.0, 4.0]);
-        let mut symmetric = [0.0; 2];
-        upper.symmetric_multiply_add(&[1.0, 10.0], &mut symmetric);
-        assert_eq!(symmetric, [32.0, 43.0]);
-    }
-
-    #[test]
-    fn pattern_with_repeated_entries_stores_each_once_in_column_order() {
-        let mut matrix = SparseColumns::from_pattern(2, 3, &[(1, 2), (0, 0), (1, 0), (0, 0)]);
-        matrix.set(0, 0, 2.0);
-        matrix.set(1, 0, -1.0);
-        matrix.set(1, 2, 5.0);
-        assert_eq!(matrix.csc().colptr, [0, 2, 2, 3]);
-        assert_eq!(matrix.csc().rowval, [0, 1, 1]);
-        assert_eq!(matrix.values(), [2.0, -1.0, 5.0]);
-        assert_eq!(matrix.position(0, 1), None);
-    }
-}

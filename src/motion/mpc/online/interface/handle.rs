@@ -154,7 +154,7 @@ mod tests {
 
     use nalgebra::DMatrix;
 
-    use super::super::codes::{TIME_ORDER, last_error};
+    use super::super::codes::last_error;
     use super::*;
     use crate::mpc::online::LatentDynamics;
 
@@ -176,163 +176,50 @@ mod tests {
         }
     }
 
-    fn handle(is_broken: bool) -> Box<Handle<4>> {
-        let model = crate::evaluate::shipped_model("go1-d4");
-        Handle::create(None, |settings| {
-            let controller = Controller::new(&model, settings).expect("a complete model");
-            if !is_broken {
-                return Ok(controller);
-            }
-            Controller::with_plant(controller.plant().clone(), Box::new(Broken), settings)
-        })
-        .expect("default settings")
-    }
-
-    /// A robot that stands for 0.2 s.
-    struct Stand {
-        time_s: Vec<f64>,
-        x: Vec<f64>,
-        zeros: Vec<f64>,
-        feet: Vec<u8>,
-    }
-
-    impl Stand {
-        fn new() -> Self {
-            let stand = [0.0, 0.8, -1.6].repeat(4);
-            let x = [stand, vec![0.0, 0.0, 0.3, 0.0, 0.0, 0.0]].concat();
-            Self {
-                time_s: (0..100).map(|sample| 0.002 * f64::from(sample)).collect(),
-                x: x.repeat(100),
-                zeros: vec![0.0; 1800],
-                feet: vec![1; 400],
-            }
-        }
-
-        fn reference(&self) -> RawReference<'_> {
-            RawReference {
-                time_s: Some(&self.time_s),
-                x: Some(&self.x),
-                dx: Some(&self.zeros),
-                u: Some(Some(&self.zeros)),
-                feet: Some(&self.feet),
-            }
-        }
-
-        fn measurement(&self) -> RawMeasurement<'_> {
-            RawMeasurement {
-                time_s: 0.0,
-                x: Some(&self.x[..18]),
-                dx: Some(&self.zeros[..18]),
-                feet: Some(&self.feet[..4]),
-            }
-        }
-    }
-
-    fn message() -> String {
-        // SAFETY: the text lives until the next refusal on this thread.
-        let text = unsafe { CStr::from_ptr(last_error()) };
-        text.to_string_lossy().into_owned()
-    }
-
-    #[test]
-    fn settings_out_of_range_make_no_controller_and_say_which() {
-        let bad: [(&str, fn(&mut Settings)); 7] = [
-            ("horizon", |settings| settings.horizon = -1),
-            ("horizon", |settings| settings.horizon = 0),
-            ("lift", |settings| settings.lift = 2),
-            ("linearisation", |settings| settings.linearisation = -1),
-            ("max_iterations", |settings| settings.max_iterations = -3),
-            ("step_s", |settings| settings.step_s = f64::NAN),
-            ("body_friction", |settings| settings.body_friction = -0.6),
-        ];
-        for (name, change) in bad {
-            let mut settings = Settings::default();
-            change(&mut settings);
-            let found = Handle::<4>::create(Some(&settings), |settings| {
-                settings.check()?;
-                panic!("{name} was accepted");
-            });
-            assert!(found.is_none());
-            assert!(message().contains(name), "{name}: {}", message());
-        }
-    }
-
-    #[test]
-    fn reference_with_a_fault_is_refused_with_its_code_and_the_old_one_stays() {
-        let stand = Stand::new();
-        let mut handle = handle(false);
-        assert_eq!(handle.set_reference(&stand.reference()), 0);
-        let sound = stand.reference();
-        let RawReference {
-            time_s, x, u, feet, ..
-        } = sound;
-        let with = |time_s, x, u, feet| RawReference {
-            time_s,
-            x,
-            u,
-            feet,
-            ..sound
-        };
-        let mut nan = stand.x.clone();
-        nan[20] = f64::NAN;
-        let mut repeated = stand.time_s.clone();
-        repeated[7] = repeated[6];
-        let faults = [
-            (BAD_POINTER, with(time_s, None, u, feet)),
-            (BAD_POINTER, with(time_s, x, u, None)),
-            (BAD_POINTER, with(time_s, x, Some(None), feet)),
-            (-1, with(time_s, Some(&nan), u, feet)),
-            (-2, with(time_s, Some(&stand.x[1..]), u, feet)),
-            (-2, with(Some(&[]), x, u, feet)),
-            (TIME_ORDER, with(Some(&repeated), x, u, feet)),
-        ];
-        for (expected, reference) in faults {
-            assert_eq!(handle.set_reference(&reference), expected, "{}", message());
-        }
-        let mut command = RawCommand::at_rest(handle.controller.plant().robot(), 99);
-        assert_eq!(handle.step(&stand.measurement(), &mut command), 0);
-        assert_eq!(handle.set_reference(&RawReference { u: None, ..sound }), 0);
-    }
-
-    #[test]
-    fn measurement_without_values_gets_a_safe_command_and_the_next_one_a_plan() {
-        let stand = Stand::new();
-        let mut handle = handle(false);
-        let mut command = RawCommand::at_rest(handle.controller.plant().robot(), 99);
-        assert_eq!(handle.step(&stand.measurement(), &mut command), -3);
-        assert_eq!(handle.set_reference(&stand.reference()), 0);
-        let sound = stand.measurement();
-        let [mut no_state, mut no_feet, mut not_finite] = [sound; 3];
-        no_state.x = None;
-        assert_eq!(handle.step(&no_state, &mut command), BAD_POINTER);
-        assert!(command.torque.iter().all(|torque| torque.abs() <= 23.7));
-        no_feet.feet = None;
-        assert_eq!(handle.step(&no_feet, &mut command), BAD_POINTER);
-        not_finite.time_s = f64::NAN;
-        assert_eq!(handle.step(&not_finite, &mut command), -1);
-        assert_eq!(handle.step(&sound, &mut command), 0);
-        handle.reset();
-        assert_eq!(handle.step(&sound, &mut command), 0);
-    }
-
     #[test]
     fn panic_inside_a_step_becomes_a_code_with_the_last_posture_and_no_torque() {
-        let stand = Stand::new();
-        let mut handle = handle(true);
-        assert_eq!(handle.set_reference(&stand.reference()), 0);
+        let model = crate::evaluate::shipped_model("go1-d4");
+        let handle = Handle::<4>::create(None, |settings| {
+            let controller = Controller::new(&model, settings).expect("a complete model");
+            Controller::with_plant(controller.plant().clone(), Box::new(Broken), settings)
+        });
+        let mut handle = handle.expect("default settings");
+        // A robot that stands for 0.2 s.
+        let time_s: Vec<f64> = (0..100).map(|sample| 0.002 * f64::from(sample)).collect();
+        let joints = [0.0, 0.8, -1.6].repeat(4);
+        let x = [&joints[..], &[0.0, 0.0, 0.3, 0.0, 0.0, 0.0]]
+            .concat()
+            .repeat(100);
+        let (zeros, feet) = ([0.0; 1800], [1; 400]);
+        let reference = RawReference {
+            time_s: Some(&time_s),
+            x: Some(&x),
+            dx: Some(&zeros),
+            u: Some(Some(&zeros)),
+            feet: Some(&feet),
+        };
+        assert_eq!(handle.set_reference(&reference), 0);
+        let measurement = RawMeasurement {
+            time_s: 0.0,
+            x: Some(&x[..18]),
+            dx: Some(&zeros[..18]),
+            feet: Some(&feet[..4]),
+        };
         let mut command = RawCommand::at_rest(handle.controller.plant().robot(), 99);
         let rest = command.joint_position;
         for _ in 0..2 {
-            assert_eq!(handle.step(&stand.measurement(), &mut command), INTERNAL);
+            assert_eq!(handle.step(&measurement, &mut command), INTERNAL);
             assert_eq!((command.status, command.torque), (INTERNAL, [0.0; 12]));
             assert_eq!(command.joint_position, rest);
         }
         // Without an input the reference asks the equations for one.
         let no_input = RawReference {
             u: None,
-            ..stand.reference()
+            ..reference
         };
         assert_eq!(handle.set_reference(&no_input), INTERNAL);
-        assert!(message().contains("broke down"));
+        // SAFETY: the text lives until the next refusal on this thread.
+        let message = unsafe { CStr::from_ptr(last_error()) };
+        assert!(message.to_string_lossy().contains("broke down"));
     }
 }
