@@ -2,10 +2,8 @@
 
 #![allow(missing_docs, reason = "each variant's message names its fields")]
 
-use std::error::Error as _;
+use std::error::Error;
 use std::io;
-
-use thiserror::Error;
 
 use super::manifest::{SCHEMA, SCHEMA_2};
 use crate::files::{Located, Place};
@@ -16,7 +14,7 @@ use crate::robot_file::RobotFileError;
 pub type ArtifactError = Located<ArtifactFault>;
 
 /// Why a model file could not be read or written.
-#[derive(Debug, Error)]
+#[derive(Debug, thiserror::Error)]
 pub enum ArtifactFault {
     /// The file system refused.
     #[error("cannot {action} the model file")]
@@ -68,8 +66,8 @@ pub(super) fn refused(file: &str, source: impl Into<ModelError>) -> ArtifactErro
     ArtifactFault::Model(Box::new(source.into())).of(file)
 }
 
-/// The error and all its causes in one line.
-pub fn describe(error: &ArtifactError) -> String {
+/// An error and all its causes in one line.
+pub fn describe(error: &dyn Error) -> String {
     let mut text = error.to_string();
     let mut cause = error.source();
     while let Some(source) = cause {

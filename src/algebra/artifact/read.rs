@@ -32,14 +32,16 @@ pub fn is_standard_input(path: &Path) -> bool {
 /// # Errors
 /// [`ArtifactError`], of any kind but [`ArtifactFault::Exists`].
 pub fn read(path: &Path) -> Result<ReducedModel, ArtifactError> {
-    let name = match is_standard_input(path) {
-        true => "standard input".to_owned(),
-        false => path.display().to_string(),
-    };
     let mut bytes = Vec::new();
-    let source: io::Result<Box<dyn Read>> = match is_standard_input(path) {
-        true => Ok(Box::new(io::stdin().lock())),
-        false => File::open(path).map(|file| Box::new(file) as Box<dyn Read>),
+    let (name, source): (String, io::Result<Box<dyn Read>>) = match is_standard_input(path) {
+        true => (
+            "standard input".to_owned(),
+            Ok(Box::new(io::stdin().lock())),
+        ),
+        false => (
+            path.display().to_string(),
+            File::open(path).map(|file| Box::new(file) as _),
+        ),
     };
     // One byte more than allowed distinguishes a file that is too large from one that just fits.
     source

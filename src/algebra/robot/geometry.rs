@@ -29,11 +29,14 @@ pub struct LegLinks {
     pub calf: Vector3<f64>,
 }
 
+/// Axes of a planar leg: x, y, y.
+const USUAL_AXES: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
+
 impl LegGeometry {
     /// The simplest form of a chain.
     pub fn of_chain(chain: ChainLeg) -> Self {
         let [hip, thigh, calf] = chain.links;
-        let is_usual = chain.axes == [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 1.0, 0.0]]
+        let is_usual = chain.axes == USUAL_AXES
             && (hip[0], hip[2]) == (0.0, 0.0)
             && (thigh[0], thigh[1]) == (0.0, 0.0)
             && calf[1] == 0.0
@@ -55,7 +58,7 @@ impl LegGeometry {
         match self {
             LegGeometry::Chain(chain) => *chain,
             LegGeometry::Planar(leg) => ChainLeg {
-                axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 1.0, 0.0]],
+                axes: USUAL_AXES,
                 links: [
                     [0.0, leg.hip_m, 0.0],
                     [0.0, 0.0, -leg.thigh_m],
@@ -149,16 +152,10 @@ impl LegGeometry {
     /// Directions and lengths at the zero posture. The foot's offset from a straight calf is left
     /// out of a planar leg.
     pub fn links(&self) -> LegLinks {
-        let chain = match self {
-            LegGeometry::Chain(chain) => *chain,
-            LegGeometry::Planar(leg) => {
-                let straight = PlanarLeg {
-                    foot_forward_m: 0.0,
-                    ..*leg
-                };
-                LegGeometry::Planar(straight).chain()
-            }
-        };
+        let mut chain = self.chain();
+        if let LegGeometry::Planar(_) = self {
+            chain.links[2][0] = 0.0;
+        }
         let [abduction, flexion, _] = chain.axes.map(Vector3::from);
         let [hip, thigh, calf] = chain.links.map(Vector3::from);
         let aside = flexion * (flexion.dot(&thigh) + flexion.dot(&calf));

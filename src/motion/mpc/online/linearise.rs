@@ -214,22 +214,4 @@ mod tests {
             }
         }
     }
-
-    #[test]
-    fn step_of_a_linear_oscillator_is_the_taylor_polynomial_of_order_four() {
-        let mut stage = StageModel::zeros(1);
-        let oscillator =
-            |z: &[f64], _: &[f64], u: &[f64], ddz: &mut [f64], jacobian: &mut DMatrix<f64>| {
-                ddz[0] = -z[0] + u[0];
-                jacobian.copy_from(&DMatrix::from_row_slice(1, 3, &[-1.0, 0.0, 1.0]));
-            };
-        let h: f64 = 0.5;
-        Lineariser::new(1).stage(&[2.0, 0.0], &[0.0], h, oscillator, &mut stage);
-        let cosine = 1.0 - h.powi(2) / 2.0 + h.powi(4) / 24.0;
-        let sine = h - h.powi(3) / 6.0;
-        assert!((stage.a[(0, 0)] - cosine).abs() < 1e-15);
-        assert!((stage.a[(0, 1)] - sine).abs() < 1e-15);
-        assert!((stage.next[0] - 2.0 * cosine).abs() < 1e-15);
-        assert!((stage.b[(0, 0)] - (1.0 - cosine)).abs() < 1e-15);
-    }
 }
