@@ -3,7 +3,6 @@
 //! The classes are in `romc/errors.py`: `ModelError` with tensor, row and column (from 0, as in
 //! NumPy), `RecordingError` with file, row (of the file, from 1) and column name.
 
-
 use pyo3::IntoPyObjectExt as _;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
