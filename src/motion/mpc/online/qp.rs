@@ -194,11 +194,6 @@ impl QpSolver {
         &mut self.program
     }
 
-    /// The settings the solver was built with.
-    pub fn settings(&self) -> &QpSettings {
-        &self.settings
-    }
-
     /// Solves the program with its present values.
     pub fn solve(&mut self) -> Outcome {
         if !self.data_is_finite() {

@@ -83,9 +83,8 @@ impl Controller {
         let (plan, engine) = (&mut self.plan, &self.engine);
         plan.begin(measurement.time_s, phase, &self.memory.measured);
         for stage in 0..self.settings.horizon {
-            engine.input(stage, &step, &mut plan.inputs[stage]);
-            let (reference, end) = (self.horizon.end(stage), &mut plan.states[stage + 1]);
-            engine.state(stage, &step, reference, end);
+            let of_stage = (&mut plan.inputs[stage][..], &mut plan.states[stage + 1][..]);
+            engine.write(stage, &step, self.horizon.end(stage), of_stage);
         }
         let (by_input, planned) = (&step.stages[0].model.b, &self.plant.phases()[phase]);
         self.effectiveness.begin(by_input, planned.is_grounded);

@@ -193,14 +193,10 @@ impl Transcription {
         }
     }
 
-    /// `û` of a stage in a solution.
-    pub fn input<'a>(&self, index: usize, solution: &'a [f64]) -> &'a [f64] {
-        &solution[self.layout.input_column(index)..][..self.layout.latent_dim]
-    }
-
-    /// `x̂⁺` at the end of a stage in a solution.
-    pub fn state<'a>(&self, index: usize, solution: &'a [f64]) -> &'a [f64] {
-        &solution[self.layout.state_column(index)..][..2 * self.layout.latent_dim]
+    /// `û` of a stage in a solution, and `x̂⁺` at its end.
+    pub fn stage<'a>(&self, index: usize, solution: &'a [f64]) -> (&'a [f64], &'a [f64]) {
+        let d = self.layout.latent_dim;
+        solution[self.layout.input_column(index)..][..3 * d].split_at(d)
     }
 
     /// `Â x̂_k + B̂ û_k − x̂_{k+1} = −σ⁻¹ defect`, with `x̂_0` on the right.
