@@ -26,7 +26,7 @@ const SOURCES: &[(&str, &str)] = sources! {
     "motion/mpc/online/interface":
         codes handle mod settings values;
     "motion/mpc/online":
-        layout lift lift_cones lift_pyramids linearise mod nonlinear plan problem prune qp reference
+        layout lift lift_cones lift_pyramids linearise mod plan problem prune qp reference
         settings sparse step structured swing transcribe;
     "algebra/robot":
         actuators chain error feet geometry input_rule joints kinematics mod registry wrench;

@@ -4,10 +4,9 @@ use serde::Serialize;
 
 use super::along_recording::{ReferenceInput, along_recording};
 use super::error::EvaluateError;
-use super::prediction::{PredictionError, prediction_error, recorded_stages};
+use super::prediction::{PredictionError, prediction_error, recorded_stages, uninformed};
 use super::recovery::{Driver, Recovery, recovery};
 use super::torque::ByContact;
-use super::uninformed::uninformed;
 use crate::model::ReducedModel;
 use crate::mpc::{Controller, MAX_STRUCTURED_DIM, MpcSettings, Solver};
 use crate::recording::Recording;

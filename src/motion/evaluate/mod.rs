@@ -22,7 +22,6 @@ mod recovery;
 mod remarks;
 mod round_trip;
 mod torque;
-mod uninformed;
 
 /// A model of the project's own, by the name of its file.
 #[cfg(test)]
