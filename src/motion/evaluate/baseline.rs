@@ -91,7 +91,7 @@ pub fn fit_aslip(rule: &InputRule, segments: &[&Segment]) -> Result<Option<Aslip
             mass_kg: 1.0 / c,
             stiffness_n_m: a / c,
             rest_length_m: b / a,
-            gravity_m_s2: published.gravity_m_s2,
+            ..published
         }));
     }
     let mass_only = least_squares(&rows, &[2], &right);
@@ -100,7 +100,7 @@ pub fn fit_aslip(rule: &InputRule, segments: &[&Segment]) -> Result<Option<Aslip
             mass_kg: 1.0 / c,
             stiffness_n_m: 0.0,
             rest_length_m: 0.0,
-            gravity_m_s2: published.gravity_m_s2,
+            ..published
         }),
         Some(_) | None => None,
     })

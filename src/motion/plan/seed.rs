@@ -155,17 +155,11 @@ fn seed_part<'a>(
     let [least, most] = part.duration_range_s;
     let duration_s = part.duration(features).clamp(0.5 * least, 2.0 * most);
     let step = duration_s / (part.nodes() - 1) as f64;
-    let pairs = |rows: &[DVector<f64>], of: fn(&DVector<f64>, &DVector<f64>) -> DVector<f64>| {
-        let pairs = rows.windows(2);
-        pairs.map(|pair| of(&pair[0], &pair[1])).collect::<Vec<_>>()
-    };
-    let mut ddz = pairs(&dz, |a, b| b - a);
-    ddz.iter_mut().for_each(|change| *change /= step);
-    let mean = pairs(&dz, |a, b| (a + b) * 0.5);
-    let mut drift = pairs(&z, |a, b| b - a);
-    for (drift, mean) in drift.iter_mut().zip(&mean) {
-        *drift = &*drift / step - mean;
-    }
+    let rate = |rows: &[DVector<f64>], k: usize| (&rows[k + 1] - &rows[k]) / step;
+    let mean = |k: usize| (&dz[k] + &dz[k + 1]) * 0.5;
+    let intervals = 0..part.nodes() - 1;
+    let ddz = intervals.clone().map(|k| rate(&dz, k)).collect();
+    let drift = intervals.map(|k| rate(&z, k) - mean(k)).collect();
     let root = (part.input_covariance.clone().cholesky())
         .expect("invariant: checked with the model")
         .unpack();

@@ -115,8 +115,6 @@ impl StagePositions {
 pub struct Transcription {
     layout: Layout,
     positions: Vec<StagePositions>,
-    /// `T C_p` and the like, for the current phase.
-    work: Vec<f64>,
 }
 
 impl Transcription {
@@ -151,12 +149,7 @@ impl Transcription {
             b: vec![0.0; m],
             cones,
         };
-        let work = vec![0.0; latent_dim];
-        let transcription = Self {
-            layout,
-            positions,
-            work,
-        };
+        let transcription = Self { layout, positions };
         (transcription, program)
     }
 
@@ -185,7 +178,7 @@ impl Transcription {
     }
 
     /// Writes a step's values.
-    pub fn write(&mut self, step: &StepData<'_>, program: &mut ConeProgram) {
+    pub fn write(&self, step: &StepData<'_>, program: &mut ConeProgram) {
         for index in 0..self.layout.horizon {
             self.write_dynamics(index, step, program);
             self.write_inputs(index, step, program);
@@ -225,22 +218,22 @@ impl Transcription {
     }
 
     /// Torque, rate and friction rows.
-    fn write_inputs(&mut self, index: usize, step: &StepData<'_>, program: &mut ConeProgram) {
+    fn write_inputs(&self, index: usize, step: &StepData<'_>, program: &mut ConeProgram) {
         let d = self.layout.latent_dim;
         let stage = &step.stages[index];
         let root = &step.phases[stage.phase].latent_root;
+        let scale = (root, &stage.input[..]);
         let rows = stage.rows.as_ref().unwrap_or(&self.layout.rows);
+        let values = program.a.values_mut();
         for (number, row) in rows.torque.iter().enumerate() {
             let positions = &self.positions[index].torque[number * d..][..d];
-            let at_reference = scaled_row(&row.row, root, &stage.input, &mut self.work);
-            scatter(&self.work, positions, program.a.values_mut());
+            let at_reference = place_row(&row.row, scale, 1.0, positions, values);
             let bound = row.bound - row.per_loss * stage.losses_nm[row.joint];
             program.b[self.layout.torque_row(index) + number] = bound - at_reference;
         }
         for (number, row) in rows.rate.iter().enumerate() {
             let positions = &self.positions[index].rate[number * d..][..d];
-            let at_reference = scaled_row(&row.row, root, &stage.input, &mut self.work);
-            scatter(&self.work, positions, program.a.values_mut());
+            let at_reference = place_row(&row.row, scale, 1.0, positions, values);
             let before = if index == 0 {
                 dot(&row.row, step.last_input)
             } else {
@@ -250,11 +243,8 @@ impl Transcription {
                     &rows.rate[number].row,
                     &step.phases[earlier.phase].latent_root,
                 );
-                let before = scaled_row(row, root, &earlier.input, &mut self.work);
-                self.work.iter_mut().for_each(|entry| *entry = -*entry);
                 let positions = &self.positions[index].rate_before[number * d..][..d];
-                scatter(&self.work, positions, program.a.values_mut());
-                before
+                place_row(row, (root, &earlier.input), -1.0, positions, values)
             };
             program.b[self.layout.rate_row(index) + number] = row.bound - at_reference + before;
         }
@@ -262,9 +252,7 @@ impl Transcription {
             for number in 0..3 {
                 let positions = &self.positions[index].force[number * d..][..d];
                 let row = &stage.force[number * d..][..d];
-                let at_reference = scaled_row(row, root, &stage.input, &mut self.work);
-                self.work.iter_mut().for_each(|entry| *entry = -*entry);
-                scatter(&self.work, positions, program.a.values_mut());
+                let at_reference = place_row(row, scale, -1.0, positions, values);
                 // A stage without contact has the cone's axis as its slack: strictly inside.
                 let is_free = number == 0 && stage.force.iter().all(|entry| *entry == 0.0);
                 program.b[self.layout.force_row(index) + number] =
@@ -291,17 +279,17 @@ impl Transcription {
     }
 }
 
-/// `work = row C` for a lower triangular `C`; returns `row · input`.
-fn scaled_row(row: &[f64], root: &DMatrix<f64>, input: &[f64], work: &mut [f64]) -> f64 {
-    let d = row.len();
-    for (col, work) in work.iter_mut().enumerate() {
-        *work = (col..d).map(|k| row[k] * root[(k, col)]).sum();
+/// Writes `sign row C` for a lower triangular `C` to its positions; returns `row · input`.
+fn place_row(
+    row: &[f64],
+    (root, input): (&DMatrix<f64>, &[f64]),
+    sign: f64,
+    positions: &[usize],
+    values: &mut [f64],
+) -> f64 {
+    for (col, &position) in positions.iter().enumerate() {
+        let terms = (col..row.len()).map(|k| row[k] * root[(k, col)]);
+        values[position] = sign * terms.sum::<f64>();
     }
     dot(row, input)
-}
-
-fn scatter(from: &[f64], positions: &[usize], values: &mut [f64]) {
-    for (value, &position) in from.iter().zip(positions) {
-        values[position] = *value;
-    }
 }

@@ -76,10 +76,6 @@ impl<const D: usize> Handle<D> {
 
     /// Computes the command for a measurement; returns its status.
     pub fn step(&mut self, raw: &RawMeasurement<'_>, out: &mut RawCommand<D>) -> i32 {
-        if self.is_broken {
-            *out = self.safe(INTERNAL);
-            return INTERNAL;
-        }
         let has_all = raw.x.is_some() && raw.dx.is_some() && raw.feet.is_some();
         let measurement = Measurement {
             time_s: raw.time_s,
@@ -89,14 +85,13 @@ impl<const D: usize> Handle<D> {
             feet: raw.feet.map_or([false; FOOT_DIM], contact),
         };
         let (controller, command) = (&mut self.controller, &mut self.command);
-        let stepped = catch_unwind(AssertUnwindSafe(|| {
-            controller.step_into(measurement, command);
-        }));
-        if stepped.is_err() {
-            self.is_broken = true;
-            *out = self.safe(INTERNAL);
+        let step = AssertUnwindSafe(|| controller.step_into(measurement, command));
+        self.is_broken = self.is_broken || catch_unwind(step).is_err();
+        if self.is_broken {
+            *out = self.safe();
             return INTERNAL;
         }
+        let command = &self.command;
         *out = RawCommand {
             torque: command.torque_nm,
             joint_position: command.joint_position_rad,
@@ -122,14 +117,14 @@ impl<const D: usize> Handle<D> {
     }
 
     /// No torque, at the posture of the last command.
-    fn safe(&self, status: i32) -> RawCommand<D> {
+    fn safe(&self) -> RawCommand<D> {
         RawCommand {
             torque: [0.0; JOINT_DIM],
             joint_velocity: [0.0; JOINT_DIM],
             u_lat: [0.0; D],
             iterations: 0,
             solve_us: 0.0,
-            status,
+            status: INTERNAL,
             ..self.last
         }
     }
