@@ -141,10 +141,9 @@ fn solve(task: &mut Task<'_>) -> Result<(Vec<f64>, usize), PlanError> {
             task.place_apex(&y);
         }
         let defect = task.defect(&y);
-        if defect < CONVERGED_DEFECT && step < CONVERGED_STEP {
-            return Ok((y, iteration));
-        }
-        if iteration == task.settings.programs && defect < USABLE_DEFECT {
+        let has_converged = defect < CONVERGED_DEFECT && step < CONVERGED_STEP;
+        let is_last = iteration == task.settings.programs;
+        if has_converged || (is_last && defect < USABLE_DEFECT) {
             return Ok((y, iteration));
         }
     }

@@ -25,10 +25,10 @@ use nalgebra::Matrix3;
 
 use super::control_model::ControlModel;
 use super::error::ControlError;
-use super::lift_cones::ConeLift;
+use super::lift_cones::{empty_program, lift_in_cones};
 use super::lift_pyramids::PyramidLift;
 use super::problem::upright;
-use super::qp::{Outcome, QpSettings};
+use super::qp::{Outcome, QpSettings, QpSolver};
 use super::settings::{MpcSettings, Solver};
 use crate::robot::{ContactFlags, FOOT_DIM, GRAVITY_M_S2, JOINT_DIM, Leg};
 
@@ -114,7 +114,7 @@ pub(super) struct LiftProblem<'a> {
 
 #[derive(Debug)]
 enum Method {
-    Cones(Box<ConeLift>),
+    Cones(Box<QpSolver>),
     Pyramids(Box<PyramidLift>),
 }
 
@@ -139,11 +139,14 @@ impl ConsistentLift {
     pub fn new(plant: &ControlModel, settings: &MpcSettings) -> Result<Self, ControlError> {
         let d = plant.latent_dim();
         let method = match settings.solver {
-            Solver::Clarabel => Method::Cones(Box::new(ConeLift::new(QpSettings {
-                max_iterations: LIFT_ITERATIONS,
-                tolerance: 1e-8,
-                ..settings.qp
-            })?)),
+            Solver::Clarabel => {
+                let settings = QpSettings {
+                    max_iterations: LIFT_ITERATIONS,
+                    tolerance: 1e-8,
+                    ..settings.qp
+                };
+                Method::Cones(Box::new(QpSolver::new(empty_program(), settings)?))
+            }
             Solver::Riccati => Method::Pyramids(Box::new(PyramidLift::new(
                 d,
                 plant.phases(),
@@ -210,7 +213,7 @@ impl ConsistentLift {
         };
         let phase = &plant.phases()[stance.phase];
         let (torque, iterations) = match &mut self.method {
-            Method::Cones(cones) => cones.lift(phase, &problem, &self.rules),
+            Method::Cones(solver) => lift_in_cones(solver, phase, &problem, &self.rules),
             Method::Pyramids(pyramids) => {
                 pyramids.lift((stance.phase, phase), &problem, &self.rules)
             }
