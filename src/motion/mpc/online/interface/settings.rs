@@ -145,20 +145,18 @@ mod tests {
 
     #[test]
     fn choices_come_back_by_their_numbers() {
-        let with = |lift: Lift, linearisation: Linearisation, solver: Solver| Settings {
-            lift: lift as i32,
-            linearisation: linearisation as i32,
-            solver: solver as i32,
-            ..Settings::default()
-        };
-        for (lift, linearisation, solver) in [
+        for choices in [
             (Lift::Transpose, Linearisation::Reference, Solver::Clarabel),
             (Lift::Consistent, Linearisation::LastPlan, Solver::Riccati),
         ] {
-            let read = with(lift, linearisation, solver).to_mpc().expect("sound");
-            assert_eq!(read.lift, lift);
-            assert_eq!(read.linearisation, linearisation);
-            assert_eq!(read.solver, solver);
+            let settings = Settings {
+                lift: choices.0 as i32,
+                linearisation: choices.1 as i32,
+                solver: choices.2 as i32,
+                ..Settings::default()
+            };
+            let read = settings.to_mpc().expect("sound");
+            assert_eq!((read.lift, read.linearisation, read.solver), choices);
         }
     }
 }
