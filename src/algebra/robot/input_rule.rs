@@ -196,7 +196,7 @@ mod tests {
                 let wrench = rule.wrench(&x, &tau, contact).unwrap();
                 let joints = std::array::from_fn(|i| x[i]);
                 let turn = rotation([x[15], x[16], x[17]]);
-                let legs = Leg::ALL.into_iter().filter(|leg| contact[leg.index()]);
+                let legs = Leg::down(contact);
                 let forces: Vec<(Leg, Vector3<f64>)> = legs
                     .map(|leg| {
                         let (q, tau) = (leg.of_joints(&joints), leg.of_joints(&tau));

@@ -99,7 +99,7 @@ impl Robot {
         contact: ContactFlags,
     ) -> Result<Vector6<f64>, RobotError> {
         let mut wrench = Vector6::zeros();
-        for leg in Leg::ALL.into_iter().filter(|leg| contact[leg.index()]) {
+        for leg in Leg::down(contact) {
             let q = leg.of_joints(joints);
             let tau = leg.of_joints(torque);
             self.require_finite(leg, "torque", &tau)?;
@@ -122,7 +122,7 @@ impl Robot {
         contact: ContactFlags,
     ) -> Result<SMatrix<f64, 6, JOINT_DIM>, RobotError> {
         let mut map = SMatrix::<f64, 6, JOINT_DIM>::zeros();
-        for leg in Leg::ALL.into_iter().filter(|leg| contact[leg.index()]) {
+        for leg in Leg::down(contact) {
             let q = leg.of_joints(joints);
             let force = self.damped_force_map(leg, &q)?;
             let moment = self.arm(frame, leg, &q).cross_matrix() * force;

@@ -127,7 +127,7 @@ fn foot_slip(task: &Task<'_>, y: &[f64]) -> [f64; 2] {
     let mut farthest = [0.0_f64; 2];
     for (part, of) in task.seed.parts.iter().enumerate() {
         let anchor = (task.anchor_part(part), 0);
-        for leg in of.legs_down() {
+        for leg in Leg::down(of.part.feet) {
             let from = moved_foot(task, y, leg, anchor).map(|moved| moved.at(y));
             for node in 0..of.z.len() {
                 let moved = moved_foot(task, y, leg, (part, node)).map(|moved| moved.at(y));

@@ -7,7 +7,7 @@ use super::goal::{Goal, Start};
 use super::settings::PlanSettings;
 use crate::lower::CompiledModel;
 use crate::model::{JumpPart, JumpPrior, ReducedModel};
-use crate::robot::{BODY_NAMES, BODY_Z, InputRule, JOINT_DIM, JOINT_NAMES, Leg, STATE_DIM};
+use crate::robot::{BODY_NAMES, BODY_Z, InputRule, JOINT_DIM, JOINT_NAMES, STATE_DIM};
 
 /// Pitch of the body in the state.
 pub const PITCH: usize = 16;
@@ -61,13 +61,6 @@ impl SeedPart<'_> {
     /// Whether a foot is on the ground.
     pub fn is_grounded(&self) -> bool {
         self.part.feet.contains(&true)
-    }
-
-    /// The legs on the ground.
-    pub fn legs_down(&self) -> impl Iterator<Item = Leg> {
-        Leg::ALL
-            .into_iter()
-            .filter(|leg| self.part.feet[leg.index()])
     }
 }
 

@@ -237,11 +237,9 @@ pub fn foot_forces(
     let turned = upright([roll, pitch]);
     let rotation = Matrix3::from_fn(|row, col| turned[row][col]);
     let mut forces = [None; FOOT_DIM];
-    for leg in Leg::ALL {
-        if stance.feet[leg.index()] {
-            let joints = leg.of_joints(&stance.joints_rad);
-            forces[leg.index()] = Some(rotation * plant.robot().foot_force_map(leg, &joints).ok()?);
-        }
+    for leg in Leg::down(stance.feet) {
+        let joints = leg.of_joints(&stance.joints_rad);
+        forces[leg.index()] = Some(rotation * plant.robot().foot_force_map(leg, &joints).ok()?);
     }
     Some(forces)
 }
