@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::error::PlanError;
-use super::goal::{Goal, Start};
+use super::goal::Goal;
 use super::settings::PlanSettings;
 use crate::lower::CompiledModel;
 use crate::model::{JumpPart, JumpPrior, ReducedModel};
@@ -76,7 +76,8 @@ impl<'a> Seed<'a> {
         settings: &PlanSettings,
     ) -> Result<Self, PlanError> {
         let prior = model.jump_prior()?;
-        let start: Start = goal.start(prior);
+        let at_rest = || (prior.start.clone(), DVector::zeros(prior.start.len()));
+        let start = goal.start.clone().unwrap_or_else(at_rest);
         let height = start.0[BODY_Z];
         goal.check_within(prior, height, settings.reach)?;
         let features = prior.features(goal.clipped(prior, height, settings.inset));
@@ -87,9 +88,9 @@ impl<'a> Seed<'a> {
             .collect::<Result<_, PlanError>>()?;
         let zero = DVector::zeros(model.latent_dim());
         let latent = model.encode(&start.0)?;
-        let start_lost = match goal.has_start() {
-            true => lost(&start.0, &model.decode(&latent)?),
-            false => Vec::new(),
+        let start_lost = match goal.start {
+            Some(_) => lost(&start.0, &model.decode(&latent)?),
+            None => Vec::new(),
         };
         Ok(Self {
             start_lost,

@@ -84,7 +84,7 @@ pub fn plan(model: &ReducedModel, goal: &Goal, settings: &PlanSettings) -> Resul
             duration_s: task.duration_s(part, &y),
         })
         .collect();
-    let goal_m = [goal.distance_m(), goal.apex_m()];
+    let goal_m = goal.goal_m();
     let slack = Bound::ALL.map(|bound| (bound, y[task.layout.slack(bound)]));
     let input_deviation = input_deviation(&task, &y);
     let findings = Findings {
@@ -112,8 +112,7 @@ pub fn plan(model: &ReducedModel, goal: &Goal, settings: &PlanSettings) -> Resul
 
 /// The variables at the end of the programs, and how many there were.
 fn solve(task: &mut Task<'_>) -> Result<(Vec<f64>, usize), PlanError> {
-    let goal = &task.seed.goal;
-    let (distance_m, apex_m) = (goal.distance_m(), goal.apex_m());
+    let [distance_m, apex_m] = task.seed.goal.goal_m();
     let settings = QpSettings {
         profile: SolverProfile::Scaled,
         max_iterations: 60,

@@ -328,7 +328,7 @@ impl<'a> Task<'a> {
         builder.equal(scaled(self.apex(y), 0.1));
         let (part, node) = self.last();
         let mut distance = self.x(part, node, BODY_X);
-        distance.constant -= self.start_x(BODY_X) + self.seed.goal.distance_m();
+        distance.constant -= self.start_x(BODY_X) + self.seed.goal.goal_m()[0];
         builder.equal(scaled(distance, 0.1));
         if self.seed.parts[part].is_grounded() {
             self.rest(builder);
@@ -437,7 +437,7 @@ impl<'a> Task<'a> {
     fn apex(&self, y: &[f64]) -> Affine {
         let flight = self.flight();
         let mut height = self.x(flight, self.apex_node, BODY_Z);
-        height.constant -= self.start_x(BODY_Z) + self.seed.goal.apex_m();
+        height.constant -= self.start_x(BODY_Z) + self.seed.goal.goal_m()[1];
         let speed = self.dx(flight, self.apex_node, BODY_Z);
         let now = speed.at(y);
         height.add_scaled(&speed, now.abs() / GRAVITY_M_S2);
