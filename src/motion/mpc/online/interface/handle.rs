@@ -48,7 +48,7 @@ impl<const D: usize> RawCommand<D> {
     }
 }
 
-/// A trajectory as it comes through the interface; see [`ReferenceSamples`](ReferenceSamples).
+/// A trajectory as it comes through the interface; see [`ReferenceSamples`].
 #[derive(Debug, Clone, Copy)]
 pub struct RawReference<'a> {
     /// Time of each sample, s.
