@@ -304,9 +304,9 @@ fn dump(model: &romc::model::ReducedModel, segments: &[Segment], push: f64, path
             let equalities = program.cones.first().map_or(0, |cone| cone.dim());
             let matrix = |matrix: &romc::mpc::SparseColumns| {
                 serde_json::json!({
-                    "shape": [matrix.n_rows(), matrix.n_cols()],
-                    "indptr": matrix.column_start(),
-                    "indices": matrix.row_index(),
+                    "shape": [matrix.csc().m, matrix.csc().n],
+                    "indptr": matrix.csc().colptr,
+                    "indices": matrix.csc().rowval,
                     "data": matrix.values(),
                 })
             };

@@ -222,10 +222,10 @@ impl Controller {
             into_rows(py, DMatrix::from_iterator(width, rows.len(), samples))
         };
         let list = |of: &dyn Fn(&StepRow) -> f64| PyArray1::from_iter(py, rows.iter().map(of));
-        let words: Vec<&str> = rows.iter().map(|row| row.status.word()).collect();
+        let words: Vec<&str> = rows.iter().map(|row| row.command.status.word()).collect();
         let phases = rows
             .iter()
-            .map(|row| row.phase.map(|phase| self.phases[phase].as_str()));
+            .map(|row| row.command.phase.map(|phase| self.phases[phase].as_str()));
         dict.set_item(
             "segment",
             PyArray1::from_iter(py, rows.iter().map(|r| r.segment as i64)),
@@ -233,13 +233,13 @@ impl Controller {
         dict.set_item("t", list(&|row| row.time_s))?;
         dict.set_item("phase", phases.collect::<Vec<_>>())?;
         dict.set_item("status", words)?;
-        let iterations = rows.iter().map(|row| i64::from(row.iterations));
+        let iterations = rows.iter().map(|row| i64::from(row.command.iterations));
         dict.set_item("iterations", PyArray1::from_iter(py, iterations))?;
-        dict.set_item("solve_us", list(&|row| row.solve_us))?;
-        dict.set_item("torque", numbers(&|row| &row.torque_nm))?;
+        dict.set_item("solve_us", list(&|row| row.command.solve_us))?;
+        dict.set_item("torque", numbers(&|row| &row.command.torque_nm))?;
         dict.set_item("recorded_torque", numbers(&|row| &row.recorded_torque_nm))?;
         dict.set_item("u", numbers(&|row| &row.input))?;
-        dict.set_item("u_lat", numbers(&|row| &row.u_lat))?;
+        dict.set_item("u_lat", numbers(&|row| &row.command.u_lat))?;
         dict.set_item("z", numbers(&|row| &row.z))?;
         dict.set_item("z_ref", numbers(&|row| &row.z_reference))?;
         Ok(dict)

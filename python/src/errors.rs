@@ -3,8 +3,6 @@
 //! The classes are in `romc/errors.py`: `ModelError` with tensor, row and column (from 0, as in
 //! NumPy), `RecordingError` with file, row (of the file, from 1) and column name.
 
-use std::error::Error as _;
-
 use pyo3::IntoPyObjectExt as _;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
@@ -284,14 +282,7 @@ fn tensor_and_indices(place: &str) -> (String, Vec<usize>) {
 /// An error of the library as Python's, its causes in the message.
 pub fn python_error(py: Python<'_>, error: impl Into<Error>) -> PyErr {
     let error = error.into();
-    let mut message = error.to_string();
-    let mut cause = error.source();
-    while let Some(source) = cause {
-        message.push_str(": ");
-        message.push_str(&source.to_string());
-        cause = source.source();
-    }
-    Fault::of_any(&error).raise(py, &message)
+    Fault::of_any(&error).raise(py, &romc::artifact::describe(&error))
 }
 
 /// A `ModelError` of an argument.

@@ -122,8 +122,9 @@ fn answer(
     text += &lines("FAILED along ", failures(runs).iter().chain(failed));
     text += &lines("note: ", remarks);
     let mut rows = runs.iter().flat_map(|(_, run)| &run.rows);
-    if let Some(row) = rows.find(|row| row.status.has_plan()) {
-        let torques = row.torque_nm.map(|torque| format!("{torque:.2}")).join(" ");
+    if let Some(row) = rows.find(|row| row.command.status.has_plan()) {
+        let torques = row.command.torque_nm.map(|torque| format!("{torque:.2}"));
+        let torques = torques.join(" ");
         let _ = writeln!(text, "first torque command (N m): {torques}");
     }
     let output = arguments.output.as_ref().map(|path| path.display());
@@ -191,10 +192,13 @@ pub fn command_table(model: &ReducedModel, runs: &[NamedRun]) -> Table {
         .iter()
         .flat_map(|(path, run)| run.rows.iter().map(move |row| (path, row)));
     for (path, row) in steps {
-        let phase = row.phase.map(|phase| model.phases()[phase].name.clone());
-        let values = (row.u_lat.iter())
+        let command = &row.command;
+        let phase = command
+            .phase
+            .map(|phase| model.phases()[phase].name.clone());
+        let values = (command.u_lat.iter())
             .chain(&row.input)
-            .chain(&row.torque_nm)
+            .chain(&command.torque_nm)
             .chain(&row.z_reference)
             .chain(&row.z);
         let first = [
@@ -202,9 +206,9 @@ pub fn command_table(model: &ReducedModel, runs: &[NamedRun]) -> Table {
             row.segment.to_string(),
             row.time_s.to_string(),
             phase.unwrap_or_default(),
-            row.status.word().to_owned(),
-            format!("{:.1}", row.solve_us),
-            row.iterations.to_string(),
+            command.status.word().to_owned(),
+            format!("{:.1}", command.solve_us),
+            command.iterations.to_string(),
         ];
         table.row(first.into_iter().chain(values.map(f64::to_string)));
     }

@@ -50,7 +50,7 @@ pub(super) fn torques(model: &ReducedModel, lift: Lift, run: &Run, place: &Place
             line(run, Role::Recorded, |row| {
                 Some(row.recorded_torque_nm[joint])
             }),
-            line(run, Role::Full, |row| Some(row.torque_nm[joint])),
+            line(run, Role::Full, |row| Some(row.command.torque_nm[joint])),
             line(run, Role::Limit, |_| limit(1.0)),
             line(run, Role::Limit, |_| limit(-1.0)),
         ];
@@ -78,7 +78,9 @@ pub(super) fn torques(model: &ReducedModel, lift: Lift, run: &Run, place: &Place
 /// The controller's latent inputs.
 pub(super) fn latent_inputs(model: &ReducedModel, run: &Run, place: &Place) -> Figure {
     let panel = |latent: usize| {
-        let chosen = line(run, Role::Full, |row| row.u_lat.get(latent).copied());
+        let chosen = line(run, Role::Full, |row| {
+            row.command.u_lat.get(latent).copied()
+        });
         Panel::lines(format!("u{}", latent + 1), vec![chosen])
     };
     Figure::over_time(
@@ -126,8 +128,10 @@ fn latent_tracking(
 
 /// Wall time and iterations of every step.
 fn solve_times(settings: &MpcSettings, run: &Run, place: &Place) -> Figure {
-    let milliseconds = line(run, Role::Recorded, |row| Some(1e-3 * row.solve_us));
-    let iterations = line(run, Role::Recorded, |row| Some(f64::from(row.iterations)));
+    let milliseconds = line(run, Role::Recorded, |row| Some(1e-3 * row.command.solve_us));
+    let iterations = line(run, Role::Recorded, |row| {
+        Some(f64::from(row.command.iterations))
+    });
     Figure {
         panel_size: (360.0, 170.0),
         columns: 2,

@@ -67,6 +67,18 @@ static void settings_are_checked(void)
     bad = base;
     bad.max_iterations = 0;
     refused(bad, "max_iterations");
+    bad = base;
+    bad.max_iterations = -3;
+    refused(bad, "max_iterations");
+    bad = base;
+    bad.horizon = 0;
+    refused(bad, "horizon");
+    bad = base;
+    bad.linearisation = -1;
+    refused(bad, "linearisation");
+    bad = base;
+    bad.body_friction = -0.6;
+    refused(bad, "body_friction");
 }
 
 static void references_are_checked(controller_type *controller)
@@ -77,6 +89,8 @@ static void references_are_checked(controller_type *controller)
     expect("no feet", CALL(set_reference)(controller, COUNT, time_s, x, dx, NULL, NULL), CODE(BAD_POINTER));
     expect("odd address", CALL(set_reference)(controller, 2, time_s, (const double *)(const void *)((const char *)x + 1),
                                               dx, NULL, feet), CODE(BAD_POINTER));
+    expect("odd inputs", CALL(set_reference)(controller, 2, time_s, x, dx, (const double *)(const void *)((const char *)dx + 1),
+                                             feet), CODE(BAD_POINTER));
     expect("no samples", CALL(set_reference)(controller, 0, time_s, x, dx, NULL, feet), CODE(WRONG_DIMENSION));
     expect("one sample", CALL(set_reference)(controller, 1, time_s, x, dx, NULL, feet), CODE(WRONG_DIMENSION));
     expect("more than memory", CALL(set_reference)(controller, SIZE_MAX / 2, time_s, x, dx, NULL, feet), CODE(BAD_POINTER));
@@ -108,6 +122,7 @@ int main(void)
     step(controller, "no reference", 0.0, x, dx, feet, CODE(NO_REFERENCE));
     references_are_checked(controller);
     expect("a sound reference", CALL(set_reference)(controller, COUNT, time_s, x, dx, NULL, feet), 0);
+    references_are_checked(controller);
     step(controller, "no state", 0.0, NULL, dx, feet, CODE(BAD_POINTER));
     step(controller, "no feet", 0.0, x, dx, NULL, CODE(BAD_POINTER));
     step(controller, "time is NaN", (double)NAN, x, dx, feet, CODE(NOT_FINITE));

@@ -14,7 +14,7 @@ use romc::identify::parameters::{
 use romc::identify::{Identification, IdentifyError, IdentifyFault, identify};
 use romc::recording::clock::timed;
 use romc::recording::{Recording, Segment};
-use romc::robot::{ContactFlags, JOINT_DIM, Robot, STATE_DIM};
+use romc::robot::{ContactFlags, InputRule, JOINT_DIM, Robot, STATE_DIM};
 
 const STEP_S: f64 = 0.002;
 const MASS_KG: f64 = 11.0;
@@ -142,7 +142,9 @@ fn torques(segment: &Segment, truth: &[f64; PARAMETER_DIM]) -> DMatrix<f64> {
                 * MASS_KG;
         }
         if feet.contains(&true) {
-            let map = go1().wrench_map(&segment.joints(sample), feet).unwrap();
+            let map = InputRule::published(go1())
+                .wrench_map(&segment.joints(sample), [0.0; 3], feet)
+                .unwrap();
             let force_map = motion.attitude[sample] * map.fixed_rows::<3>(0);
             let rest = SVector::<f64, 3>::from_fn(|axis, _| {
                 let row = axis * BODY_ROWS;

@@ -53,14 +53,7 @@ fn message(
     change_file(&mut stored);
     change_options(&mut options);
     let error = run(&stored, &options).expect_err("the change makes it unusable");
-    let mut text = error.to_string();
-    let mut cause = std::error::Error::source(&error);
-    while let Some(source) = cause {
-        text.push_str(": ");
-        text.push_str(&source.to_string());
-        cause = source.source();
-    }
-    text
+    romc::artifact::describe(&error)
 }
 
 fn tensor_message(name: &str, with: Stored) -> String {

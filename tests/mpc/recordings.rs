@@ -75,9 +75,9 @@ fn run_along_a_recording_that_the_model_follows_finds_its_torques() {
     assert!(summary.tracking_rms.expect("plans") < 0.05, "{summary:?}");
     assert!(summary.step_us.p50 > 0.0 && summary.step_us.p50 <= summary.step_us.max);
     for row in &run.rows {
-        assert_eq!(row.source, Source::Plan);
+        assert_eq!(row.command.source, Source::Plan);
         for joint in 0..12 {
-            assert!((row.input[joint] - row.torque_nm[joint]).abs() < 1e-9);
+            assert!((row.input[joint] - row.command.torque_nm[joint]).abs() < 1e-9);
         }
         for (z, reference) in row.z.iter().zip(&row.z_reference) {
             assert!((z - reference).abs() < 1e-12);

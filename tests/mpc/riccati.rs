@@ -392,12 +392,13 @@ fn riccati_commands_clarabels_torques_along_recordings_and_prepares_ahead() {
         assert_eq!(conic.rows.len(), structured.rows.len());
         let mut equal = 0;
         for (a, b) in conic.rows.iter().zip(&structured.rows) {
+            let (a, b, time_s) = (&a.command, &b.command, a.time_s);
             assert_eq!((a.status, b.iterations), (b.status, 0));
             let off = a.torque_nm.iter().zip(b.torque_nm);
             let off = off.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
             equal += usize::from(off < 1e-6);
             // In the few steps in which a foot would leave its pyramid torques are others, but not far.
-            assert!(off < 2.0, "{name} at {}: {off} N m", a.time_s);
+            assert!(off < 2.0, "{name} at {}: {off} N m", time_s);
         }
         match lift {
             Lift::Transpose => assert_eq!(equal, conic.rows.len(), "{name}"),
@@ -435,7 +436,8 @@ fn riccati_commands_clarabels_torques_under_limits_on_their_rates() {
             });
             let (mut active, mut worst) = (0, 0.0_f64);
             for (a, b) in conic.rows.iter().zip(&structured.rows) {
-                assert_eq!(a.status, b.status, "{name} at {}", a.time_s);
+                let (a, b, time_s) = (&a.command, &b.command, a.time_s);
+                assert_eq!(a.status, b.status, "{name} at {time_s}");
                 active += usize::from(b.iterations > 0);
                 let off = a.torque_nm.iter().zip(b.torque_nm);
                 worst = off.fold(worst, |worst, (a, b)| worst.max((a - b).abs()));

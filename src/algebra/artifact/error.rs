@@ -1,9 +1,9 @@
 //! Faults of model files.
 
-use std::error::Error as _;
-use std::io;
+#![allow(missing_docs, reason = "each variant's message names its fields")]
 
-use thiserror::Error;
+use std::error::Error;
+use std::io;
 
 use super::manifest::{SCHEMA, SCHEMA_2};
 use crate::files::{Located, Place};
@@ -14,14 +14,12 @@ use crate::robot_file::RobotFileError;
 pub type ArtifactError = Located<ArtifactFault>;
 
 /// Why a model file could not be read or written.
-#[derive(Debug, Error)]
+#[derive(Debug, thiserror::Error)]
 pub enum ArtifactFault {
     /// The file system refused.
     #[error("cannot {action} the model file")]
     Io {
-        /// `read` or `write`.
         action: &'static str,
-        /// The system's answer.
         source: io::Error,
     },
     /// The file is larger than this bound in bytes, and so than any model.
@@ -32,11 +30,8 @@ pub enum ArtifactFault {
     Syntax {
         /// Path inside the file, such as `encoder.weights[3][2]`.
         place: String,
-        /// Line, from 1.
         line: usize,
-        /// Column, from 1.
         column: usize,
-        /// Found and expected.
         message: String,
     },
     /// The file follows another schema.
@@ -47,12 +42,7 @@ pub enum ArtifactFault {
     LaterKey(&'static str),
     /// A row of a matrix has the wrong length.
     #[error("found {found} numbers, expected {expected}")]
-    RowLength {
-        /// Its length.
-        found: usize,
-        /// The length of the other rows, or the one that the model needs.
-        expected: usize,
-    },
+    RowLength { found: usize, expected: usize },
     /// The robot that the file describes is none.
     #[error("{0}")]
     Robot(RobotFileError),
@@ -76,8 +66,8 @@ pub(super) fn refused(file: &str, source: impl Into<ModelError>) -> ArtifactErro
     ArtifactFault::Model(Box::new(source.into())).of(file)
 }
 
-/// The error and all its causes in one line.
-pub fn describe(error: &ArtifactError) -> String {
+/// An error and all its causes in one line.
+pub fn describe(error: &dyn Error) -> String {
     let mut text = error.to_string();
     let mut cause = error.source();
     while let Some(source) = cause {

@@ -5,7 +5,7 @@ use super::manifest::{
     GivenStateEntry, LayerEntry, Manifest, MapEntry, PhaseEntry, RobotValue, SCHEMA, SCHEMA_2,
     Statistics, StatisticsEntry, to_rows,
 };
-use crate::model::{InputStatistics, Phase, ReducedModel, StateMap};
+use crate::model::{InputStatistics, ReducedModel, StateMap};
 use crate::robot::{Robot, WrenchFrame};
 use crate::robot_file::RobotEntry;
 
@@ -29,7 +29,13 @@ pub(super) fn manifest_of(model: &ReducedModel) -> Manifest {
         decoder: model.decoder_map().ok().map(map_entry),
         latent_dim: model.latent_dim(),
         library: model.library().choice(),
-        phases: model.phases().iter().map(phase_entry).collect(),
+        phases: (model.phases().iter())
+            .map(|phase| PhaseEntry {
+                name: phase.name.clone(),
+                feet: phase.feet.clone(),
+                xi: to_rows(&phase.xi),
+            })
+            .collect(),
         input_statistics: Statistics(statistics.collect()),
         robot: model.robot().ok().map(robot_value),
         actuators: model.actuators().cloned(),
@@ -66,14 +72,6 @@ fn map_entry(map: &StateMap) -> MapEntry {
     });
     MapEntry::Layers {
         layers: layers.collect(),
-    }
-}
-
-fn phase_entry(phase: &Phase) -> PhaseEntry {
-    PhaseEntry {
-        name: phase.name.clone(),
-        feet: phase.feet.clone(),
-        xi: to_rows(&phase.xi),
     }
 }
 

@@ -9,47 +9,37 @@ const LINE_WIDTH: usize = 100;
 
 /// The value as text, with a newline at the end.
 pub(super) fn print(value: &Value) -> String {
-    let mut out = String::new();
-    push_value(&mut out, value, 0);
-    out.push('\n');
-    out
+    lines(value, 0) + "\n"
 }
 
-fn push_value(out: &mut String, value: &Value, depth: usize) {
-    match value {
-        Value::Array(words)
-            if words.iter().all(Value::is_string) && !on_one_line(words.iter(), value) =>
-        {
-            let lines = fill_lines(words);
-            push_lines(out, depth, ('[', ']'), lines.iter(), |out, line| {
-                out.push_str(line)
-            });
+fn lines(value: &Value, depth: usize) -> String {
+    let items: Vec<String> = match value {
+        Value::Array(items) if on_one_line(items.iter(), value) => return compact(value),
+        Value::Object(entries) if on_one_line(entries.values(), value) => return compact(value),
+        Value::Array(words) if words.iter().all(Value::is_string) => fill_lines(words),
+        Value::Array(items) => items.iter().map(|item| lines(item, depth + 1)).collect(),
+        Value::Object(entries) => {
+            let entry = |(key, item): (&String, &Value)| {
+                format!("{}: {}", quoted(key), lines(item, depth + 1))
+            };
+            entries.iter().map(entry).collect()
         }
-        Value::Array(items) if !on_one_line(items.iter(), value) => {
-            push_lines(out, depth, ('[', ']'), items.iter(), |out, item| {
-                push_value(out, item, depth + 1);
-            });
+        Value::Null | Value::Bool(_) | Value::Number(_) | Value::String(_) => {
+            return compact(value);
         }
-        Value::Object(entries) if !on_one_line(entries.values(), value) => {
-            push_lines(
-                out,
-                depth,
-                ('{', '}'),
-                entries.iter(),
-                |out, (key, item)| {
-                    push_compact(out, &Value::String(key.clone()));
-                    out.push_str(": ");
-                    push_value(out, item, depth + 1);
-                },
-            );
-        }
-        Value::Array(_)
-        | Value::Object(_)
-        | Value::Null
-        | Value::Bool(_)
-        | Value::Number(_)
-        | Value::String(_) => push_compact(out, value),
+    };
+    let [open, close] = if value.is_array() {
+        ["[", "]"]
+    } else {
+        ["{", "}"]
+    };
+    let mut text = open.to_owned();
+    for (index, item) in items.iter().enumerate() {
+        text.push_str(if index == 0 { "\n" } else { ",\n" });
+        text.push_str(&INDENT.repeat(depth + 1));
+        text.push_str(item);
     }
+    text + "\n" + &INDENT.repeat(depth) + close
 }
 
 /// Rows of numbers stay on one line however long; other lists and objects if they are short.
@@ -58,19 +48,13 @@ fn on_one_line<'a>(mut items: impl Iterator<Item = &'a Value> + Clone, whole: &V
         return whole.is_array();
     }
     let scalar = |item: &Value| !item.is_array() && !item.is_object();
-    let mut text = String::new();
-    items.all(scalar) && {
-        push_compact(&mut text, whole);
-        text.len() <= LINE_WIDTH
-    }
+    items.all(scalar) && compact(whole).len() <= LINE_WIDTH
 }
 
 /// Words with commas between them, as many on a line as fit; no comma at the end of a line.
 fn fill_lines(words: &[Value]) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
-    for word in words {
-        let mut text = String::new();
-        push_compact(&mut text, word);
+    for text in words.iter().map(compact) {
         match lines.last_mut() {
             Some(line) if line.len() + text.len() + 3 <= LINE_WIDTH => {
                 line.push_str(", ");
@@ -82,49 +66,26 @@ fn fill_lines(words: &[Value]) -> Vec<String> {
     lines
 }
 
-fn push_lines<T>(
-    out: &mut String,
-    depth: usize,
-    (open, close): (char, char),
-    items: impl Iterator<Item = T>,
-    push: impl Fn(&mut String, T),
-) {
-    out.push(open);
-    for (index, item) in items.enumerate() {
-        out.push_str(if index == 0 { "\n" } else { ",\n" });
-        out.push_str(&INDENT.repeat(depth + 1));
-        push(out, item);
-    }
-    out.push('\n');
-    out.push_str(&INDENT.repeat(depth));
-    out.push(close);
-}
-
 /// On one line, with a space after each comma and colon.
-fn push_compact(out: &mut String, value: &Value) {
+fn compact(value: &Value) -> String {
     match value {
         Value::Array(items) => {
-            out.push('[');
-            for (index, item) in items.iter().enumerate() {
-                out.push_str(if index == 0 { "" } else { ", " });
-                push_compact(out, item);
-            }
-            out.push(']');
+            let items: Vec<String> = items.iter().map(compact).collect();
+            format!("[{}]", items.join(", "))
         }
+        Value::Object(entries) if entries.is_empty() => "{}".to_owned(),
         Value::Object(entries) => {
-            out.push('{');
-            for (index, (key, item)) in entries.iter().enumerate() {
-                out.push_str(if index == 0 { " " } else { ", " });
-                push_compact(out, &Value::String(key.clone()));
-                out.push_str(": ");
-                push_compact(out, item);
-            }
-            out.push_str(if entries.is_empty() { "}" } else { " }" });
+            let entry =
+                |(key, item): (&String, &Value)| format!("{}: {}", quoted(key), compact(item));
+            let entries: Vec<String> = entries.iter().map(entry).collect();
+            format!("{{ {} }}", entries.join(", "))
         }
-        Value::Null | Value::Bool(_) | Value::Number(_) | Value::String(_) => {
-            out.push_str(&value.to_string());
-        }
+        Value::Null | Value::Bool(_) | Value::Number(_) | Value::String(_) => value.to_string(),
     }
+}
+
+fn quoted(key: &str) -> String {
+    Value::String(key.to_owned()).to_string()
 }
 
 #[cfg(test)]

@@ -32,14 +32,16 @@ pub fn is_standard_input(path: &Path) -> bool {
 /// # Errors
 /// [`ArtifactError`], of any kind but [`ArtifactFault::Exists`].
 pub fn read(path: &Path) -> Result<ReducedModel, ArtifactError> {
-    let name = match is_standard_input(path) {
-        true => "standard input".to_owned(),
-        false => path.display().to_string(),
-    };
     let mut bytes = Vec::new();
-    let source: io::Result<Box<dyn Read>> = match is_standard_input(path) {
-        true => Ok(Box::new(io::stdin().lock())),
-        false => File::open(path).map(|file| Box::new(file) as Box<dyn Read>),
+    let (name, source): (String, io::Result<Box<dyn Read>>) = match is_standard_input(path) {
+        true => (
+            "standard input".to_owned(),
+            Ok(Box::new(io::stdin().lock())),
+        ),
+        false => (
+            path.display().to_string(),
+            File::open(path).map(|file| Box::new(file) as _),
+        ),
     };
     // One byte more than allowed distinguishes a file that is too large from one that just fits.
     source
@@ -211,27 +213,21 @@ fn statistics_of(
 ) -> Result<InputStatistics, ArtifactError> {
     let phase: String = phase.chars().take(80).collect();
     let place = format!("input_statistics.{}", phase.escape_debug());
-    let tensor = format!("{place}.covariance");
-    let given = entry.given_state.as_ref();
+    let matrix = |key: &str, rows: &Rows, columns: Option<usize>| {
+        from_rows(file, &format!("{place}.{key}"), rows, columns)
+    };
+    let covariance = matrix("covariance", &entry.covariance, Some(entry.mean.len()))?;
+    let given = |given: &GivenStateEntry| {
+        let matrix = |key: &str, rows: &Rows| matrix(&format!("given_state.{key}"), rows, None);
+        Ok(InputGivenState {
+            mean: matrix("mean", &given.mean)?,
+            covariance: matrix("covariance", &given.covariance)?,
+            acceleration_error: matrix("acceleration_error", &given.acceleration_error)?,
+        })
+    };
     Ok(InputStatistics {
         mean: DVector::from_column_slice(&entry.mean),
-        covariance: from_rows(file, &tensor, &entry.covariance, Some(entry.mean.len()))?,
-        given_state: given
-            .map(|given| given_state_of(file, &place, given))
-            .transpose()?,
-    })
-}
-
-fn given_state_of(
-    file: &str,
-    place: &str,
-    entry: &GivenStateEntry,
-) -> Result<InputGivenState, ArtifactError> {
-    let matrix =
-        |key: &str, rows: &Rows| from_rows(file, &format!("{place}.given_state.{key}"), rows, None);
-    Ok(InputGivenState {
-        mean: matrix("mean", &entry.mean)?,
-        covariance: matrix("covariance", &entry.covariance)?,
-        acceleration_error: matrix("acceleration_error", &entry.acceleration_error)?,
+        covariance,
+        given_state: entry.given_state.as_ref().map(given).transpose()?,
     })
 }

@@ -2,6 +2,7 @@
 
 use super::wrench::Steps;
 use crate::ir::{Binary, Unary, ValueId};
+use crate::robot::kinematics::least_levers;
 use crate::robot::{BODY_DIM, ChainLeg};
 
 /// A number that is known, or a value of the program; what is known costs no operation.
@@ -48,7 +49,7 @@ impl Steps<'_> {
         let across = self.cross(columns[1], columns[2]);
         let (area, lever) = (self.dot(across, normal), self.dot(columns[0], normal));
         let [area, lever] = [area, lever].map(|scalar| self.value(scalar));
-        let [least_area, least_lever] = leg.least_levers();
+        let [least_area, least_lever] = least_levers(leg.lengths());
         let one = self.0.constant(1.0);
         let of_area = Scalar::Value(self.damped(one, area, least_area));
         let of_lever = Scalar::Value(self.damped(one, lever, least_lever));

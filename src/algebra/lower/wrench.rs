@@ -25,6 +25,7 @@ use crate::ir::{Program, ProgramBuilder, Unary, ValueId};
 use crate::model::ReducedModel;
 use crate::robot::actuators::DRY_SPEED_RAD_S;
 use crate::robot::joints::LEG_JOINT_DIM;
+use crate::robot::kinematics::least_levers;
 use crate::robot::{
     BODY_DIM, FOOT_DIM, InputRule, JOINT_DIM, Leg, LegGeometry, PlanarLeg, STATE_DIM, WrenchFrame,
 };
@@ -273,7 +274,7 @@ impl Steps<'_> {
         let up = self.0.add(thigh_up, calf_up);
         // The same as up c_fwd - fwd c_up, without what cancels.
         let det = self.minor((thigh_up, calf_forward), (thigh_forward, calf_up));
-        let [least_det, least_up] = geometry.least_levers();
+        let [least_det, least_up] = least_levers([thigh, calf]);
 
         let [tau_0, tau_1, tau_2] = torques.map(|torque| self.0.mul(foot, torque));
         let hip = self.0.constant(geometry.hip_m);

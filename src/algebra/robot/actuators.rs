@@ -22,13 +22,6 @@ pub struct Actuators {
 }
 
 impl Actuators {
-    /// Motors that lose nothing.
-    pub const IDEAL: Self = Self {
-        viscous: [0.0; JOINT_DIM],
-        dry: [0.0; JOINT_DIM],
-        armature: [0.0; JOINT_DIM],
-    };
-
     /// The same three values, of abduction, flexion and knee, for every leg.
     #[must_use]
     pub fn of_leg(viscous: [f64; 3], dry: [f64; 3], armature: [f64; 3]) -> Self {
@@ -95,9 +88,5 @@ mod tests {
         assert!((losses[0] - (-1.2 - 0.2 + 0.3)).abs() < 1e-12);
         let slow = actuators.losses(&[0.5; JOINT_DIM], &[0.0; JOINT_DIM])[3];
         assert!((slow - 0.5).abs() < 1e-8, "{slow}");
-        assert_eq!(
-            Actuators::IDEAL.losses(&[1.0; JOINT_DIM], &[1.0; JOINT_DIM]),
-            [0.0; JOINT_DIM]
-        );
     }
 }

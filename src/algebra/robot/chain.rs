@@ -7,7 +7,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::kinematics::{LEAST_HEIGHT, LEAST_SPAN};
+use super::kinematics::least_levers;
 
 /// Axes and links of a leg at its zero posture.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,6 +25,14 @@ struct Moved {
     columns: [Vector3<f64>; 3],
     /// Axis of the second joint: the normal of the plane in which the last two move the foot.
     normal: Vector3<f64>,
+}
+
+impl Moved {
+    fn levers(&self) -> [f64; 2] {
+        let [first, second, third] = &self.columns;
+        let area = second.cross(third).dot(&self.normal);
+        [area, first.dot(&self.normal)]
+    }
 }
 
 impl ChainLeg {
@@ -70,24 +78,8 @@ impl ChainLeg {
 
     /// Area that thigh and calf span, with its sign, in m^2, and lever of the first joint along the
     /// normal of their plane, in m; their product is `det J`.
-    fn levers(moved: &Moved) -> [f64; 2] {
-        let [first, second, third] = &moved.columns;
-        [
-            second.cross(third).dot(&moved.normal),
-            first.dot(&moved.normal),
-        ]
-    }
-
-    /// As `levers` over their largest values, absolute.
-    pub fn spans(&self, q: &[f64; 3]) -> [f64; 2] {
-        let ([area, lever], [thigh, calf]) = (Self::levers(&self.moved(q)), self.lengths());
-        [area.abs() / (thigh * calf), lever.abs() / (thigh + calf)]
-    }
-
-    /// Below which area (m^2) and lever (m) are damped.
-    pub fn least_levers(&self) -> [f64; 2] {
-        let [thigh, calf] = self.lengths();
-        [LEAST_SPAN * thigh * calf, LEAST_HEIGHT * (thigh + calf)]
+    pub(super) fn levers(&self, q: &[f64; 3]) -> [f64; 2] {
+        self.moved(q).levers()
     }
 
     /// `-J^-T` with levers that are never shorter than the damping lets them be, or none where
@@ -105,8 +97,8 @@ impl ChainLeg {
     /// in which `1 / d` of both becomes `d / max(d^2, least^2)`.
     pub(super) fn damped_force_map(&self, q: &[f64; 3]) -> Option<Matrix3<f64>> {
         let moved = self.moved(q);
-        let [area, lever] = Self::levers(&moved);
-        let [least_area, least_lever] = self.least_levers();
+        let [area, lever] = moved.levers();
+        let [least_area, least_lever] = least_levers(self.lengths());
         if area.abs() >= least_area && lever.abs() >= least_lever {
             return None;
         }
@@ -188,22 +180,6 @@ mod tests {
             }
         }
         assert!(damped > 5);
-    }
-
-    #[test]
-    fn jacobian_agrees_with_central_differences() {
-        let (chain, step) = (odd(), 1e-6);
-        for q in postures() {
-            let exact = chain.foot_jacobian(&q);
-            for joint in 0..3 {
-                let (mut lower, mut upper) = (q, q);
-                lower[joint] -= step;
-                upper[joint] += step;
-                let moved = chain.foot_position(&upper) - chain.foot_position(&lower);
-                let error = (exact.column(joint) - moved / (2.0 * step)).norm();
-                assert!(error < 1e-9, "{q:?} joint {joint}: {error:e}");
-            }
-        }
     }
 
     #[test]

@@ -1,5 +1,7 @@
 //! Errors of robots: unknown names, joint angles, singular legs.
 
+#![allow(missing_docs, reason = "each variant's message names its fields")]
+
 use thiserror::Error;
 
 use super::joints::Leg;
@@ -9,12 +11,7 @@ use super::joints::Leg;
 pub enum RobotError {
     /// No robot of that name is registered.
     #[error("unknown robot `{found}`; known: {known}")]
-    UnknownRobot {
-        /// The name asked for.
-        found: String,
-        /// The registered names, separated by commas.
-        known: String,
-    },
+    UnknownRobot { found: String, known: String },
     /// The leg is so close to full extension (or its foot so close to the axis
     /// of hip abduction) that torques do not determine a foot force.
     #[error(
@@ -24,27 +21,19 @@ pub enum RobotError {
         joints_rad[0], joints_rad[1], joints_rad[2]
     )]
     SingularLeg {
-        /// The robot's name.
         robot: String,
-        /// The leg.
         leg: Leg,
-        /// Its joint angles: abduction, flexion, knee.
         joints_rad: [f64; 3],
         /// `|det J|` over the product of its link lengths.
         determinant: f64,
-        /// The smallest value accepted.
         bound: f64,
     },
     /// A joint angle or torque of a leg in contact is NaN or infinite.
     #[error("{robot}: leg {leg} has the {quantity} {found}, expected a finite number")]
     NotFinite {
-        /// The robot's name.
         robot: String,
-        /// The leg.
         leg: Leg,
-        /// `joint angle` or `torque`.
         quantity: &'static str,
-        /// The value.
         found: f64,
     },
 }

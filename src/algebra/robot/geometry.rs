@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::chain::ChainLeg;
-use super::kinematics::PlanarLeg;
+use super::kinematics::{self, PlanarLeg};
 
 /// The shape of one leg. Both forms agree where both apply; the planar one has fewer operations.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,11 +29,14 @@ pub struct LegLinks {
     pub calf: Vector3<f64>,
 }
 
+/// Axes of a planar leg: x, y, y.
+const USUAL_AXES: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
+
 impl LegGeometry {
     /// The simplest form of a chain.
     pub fn of_chain(chain: ChainLeg) -> Self {
         let [hip, thigh, calf] = chain.links;
-        let is_usual = chain.axes == [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 1.0, 0.0]]
+        let is_usual = chain.axes == USUAL_AXES
             && (hip[0], hip[2]) == (0.0, 0.0)
             && (thigh[0], thigh[1]) == (0.0, 0.0)
             && calf[1] == 0.0
@@ -55,7 +58,7 @@ impl LegGeometry {
         match self {
             LegGeometry::Chain(chain) => *chain,
             LegGeometry::Planar(leg) => ChainLeg {
-                axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 1.0, 0.0]],
+                axes: USUAL_AXES,
                 links: [
                     [0.0, leg.hip_m, 0.0],
                     [0.0, 0.0, -leg.thigh_m],
@@ -108,8 +111,7 @@ impl LegGeometry {
 
     /// The volume that bounds `|det J|`: thigh times calf times their sum.
     pub fn volume_m3(&self) -> f64 {
-        let [thigh, calf] = self.lengths();
-        thigh * calf * (thigh + calf)
+        kinematics::volume_m3(self.lengths())
     }
 
     /// `|det J| / volume`: 0 at full extension or with the foot on the axis of the first joint, at
@@ -124,10 +126,7 @@ impl LegGeometry {
     /// Below which the area that thigh and calf span (m^2) and the height of the foot in the plane
     /// of the leg (m) are damped.
     pub fn least_levers(&self) -> [f64; 2] {
-        match self {
-            LegGeometry::Planar(leg) => leg.least_levers(),
-            LegGeometry::Chain(leg) => leg.least_levers(),
-        }
+        kinematics::least_levers(self.lengths())
     }
 
     /// Span of thigh and calf over the product of their lengths, and height of the foot over the
@@ -135,10 +134,12 @@ impl LegGeometry {
     /// [`LEAST_SPAN`](super::kinematics::LEAST_SPAN) and
     /// [`LEAST_HEIGHT`](super::kinematics::LEAST_HEIGHT) are compared with.
     pub fn spans(&self, q: &[f64; 3]) -> [f64; 2] {
-        match self {
-            LegGeometry::Planar(leg) => leg.spans(q),
-            LegGeometry::Chain(leg) => leg.spans(q),
-        }
+        let [area, lever] = match self {
+            LegGeometry::Planar(leg) => leg.levers(q),
+            LegGeometry::Chain(leg) => leg.levers(q),
+        };
+        let [thigh, calf] = self.lengths();
+        [area.abs() / (thigh * calf), lever.abs() / (thigh + calf)]
     }
 
     pub(super) fn damped_force_map(&self, q: &[f64; 3]) -> Option<Matrix3<f64>> {
@@ -151,16 +152,10 @@ impl LegGeometry {
     /// Directions and lengths at the zero posture. The foot's offset from a straight calf is left
     /// out of a planar leg.
     pub fn links(&self) -> LegLinks {
-        let chain = match self {
-            LegGeometry::Chain(chain) => *chain,
-            LegGeometry::Planar(leg) => {
-                let straight = PlanarLeg {
-                    foot_forward_m: 0.0,
-                    ..*leg
-                };
-                LegGeometry::Planar(straight).chain()
-            }
-        };
+        let mut chain = self.chain();
+        if let LegGeometry::Planar(_) = self {
+            chain.links[2][0] = 0.0;
+        }
         let [abduction, flexion, _] = chain.axes.map(Vector3::from);
         let [hip, thigh, calf] = chain.links.map(Vector3::from);
         let aside = flexion * (flexion.dot(&thigh) + flexion.dot(&calf));

@@ -5,11 +5,11 @@
 //! frames ([`WrenchFrame`]). A model states which rule its inputs were made by; training,
 //! simulation, control and generated code all follow it.
 
-use nalgebra::{Matrix3, SMatrix, Vector6};
+use nalgebra::{Matrix3, Rotation3, SMatrix, Vector6};
 
 use super::actuators::Actuators;
 use super::error::RobotError;
-use super::joints::{BODY_DIM, ContactFlags, JOINT_DIM, LEG_JOINT_DIM, Leg, STATE_DIM};
+use super::joints::{BODY_DIM, ContactFlags, JOINT_DIM, STATE_DIM};
 use super::registry::Robot;
 
 /// Axes of the force and moment in an input.
@@ -110,14 +110,11 @@ impl InputRule {
         contact: ContactFlags,
     ) -> Result<Vector6<f64>, RobotError> {
         let joints = std::array::from_fn(|i| x[i]);
-        match self.frame {
-            WrenchFrame::Body => self.robot.body_wrench(&joints, net, contact),
-            WrenchFrame::World => {
-                let attitude = [x[15], x[16], x[17]];
-                let about_body = self.robot.wrench_about_body(&joints, net, contact)?;
-                Ok(generalised(attitude) * about_body)
-            }
-        }
+        let wrench = (self.robot).wrench_by_arms(self.frame, &joints, net, contact)?;
+        Ok(match self.frame {
+            WrenchFrame::Body => wrench,
+            WrenchFrame::World => generalised([x[15], x[16], x[17]]) * wrench,
+        })
     }
 
     /// The 6 x 12 matrix `G` of `[F; M] = G net` at a posture (rad), an attitude (roll, pitch, yaw,
@@ -131,41 +128,17 @@ impl InputRule {
         attitude: [f64; 3],
         contact: ContactFlags,
     ) -> Result<SMatrix<f64, BODY_DIM, JOINT_DIM>, RobotError> {
-        match self.frame {
-            WrenchFrame::Body => self.robot.wrench_map(joints, contact),
-            WrenchFrame::World => {
-                let mut map = SMatrix::<f64, BODY_DIM, JOINT_DIM>::zeros();
-                for leg in Leg::ALL.into_iter().filter(|leg| contact[leg.index()]) {
-                    let q = leg.of_joints(joints);
-                    let force = self.robot.damped_force_map(leg, &q)?;
-                    let arm = self.robot.hip_position(leg) + self.robot.foot_position(leg, &q);
-                    let first = LEG_JOINT_DIM * leg.index();
-                    let mut of_leg = map.fixed_columns_mut::<LEG_JOINT_DIM>(first);
-                    of_leg.fixed_rows_mut::<3>(0).copy_from(&force);
-                    of_leg
-                        .fixed_rows_mut::<3>(3)
-                        .copy_from(&(arm.cross_matrix() * force));
-                }
-                Ok(generalised(attitude) * map)
-            }
-        }
+        let map = self.robot.map_by_arms(self.frame, joints, contact)?;
+        Ok(match self.frame {
+            WrenchFrame::Body => map,
+            WrenchFrame::World => generalised(attitude) * map,
+        })
     }
 }
 
 /// Rotation from the body's axes to the world's, `R_z(yaw) R_y(pitch) R_x(roll)`.
 pub fn rotation([roll, pitch, yaw]: [f64; 3]) -> Matrix3<f64> {
-    let ((s_r, c_r), (s_p, c_p), (s_y, c_y)) = (roll.sin_cos(), pitch.sin_cos(), yaw.sin_cos());
-    Matrix3::new(
-        c_y * c_p,
-        c_y * s_p * s_r - s_y * c_r,
-        c_y * s_p * c_r + s_y * s_r,
-        s_y * c_p,
-        s_y * s_p * s_r + c_y * c_r,
-        s_y * s_p * c_r - c_y * s_r,
-        -s_p,
-        c_p * s_r,
-        c_p * c_r,
-    )
+    Rotation3::from_euler_angles(roll, pitch, yaw).into_inner()
 }
 
 /// From force and moment about the body's origin in the body's axes to the generalised forces of
@@ -185,6 +158,8 @@ fn generalised(attitude: [f64; 3]) -> SMatrix<f64, BODY_DIM, BODY_DIM> {
 mod tests {
     use super::*;
     use nalgebra::{SVector, Vector3};
+
+    use crate::robot::joints::{LEG_JOINT_DIM, Leg};
 
     const CONTACTS: [ContactFlags; 3] = [
         [true; 4],
@@ -210,13 +185,6 @@ mod tests {
         std::array::from_fn(|i| 3.0 - 0.7 * i as f64 + 0.2 * (i * i) as f64)
     }
 
-    /// Where a foot is in the world, m.
-    fn foot(robot: &Robot, leg: Leg, x: &[f64; STATE_DIM]) -> Vector3<f64> {
-        let joints = std::array::from_fn(|i| x[i]);
-        let arm = robot.hip_position(leg) + robot.foot_position(leg, &leg.of_joints(&joints));
-        Vector3::new(x[12], x[13], x[14]) + rotation([x[15], x[16], x[17]]) * arm
-    }
-
     #[test]
     fn world_wrench_does_the_work_of_the_feet_on_the_bodys_coordinates() {
         // Virtual work: F_k . d(foot k)/dx_i over the feet in contact is -tau_i for a joint of a leg
@@ -228,7 +196,7 @@ mod tests {
                 let wrench = rule.wrench(&x, &tau, contact).unwrap();
                 let joints = std::array::from_fn(|i| x[i]);
                 let turn = rotation([x[15], x[16], x[17]]);
-                let legs = Leg::ALL.into_iter().filter(|leg| contact[leg.index()]);
+                let legs = Leg::down(contact);
                 let forces: Vec<(Leg, Vector3<f64>)> = legs
                     .map(|leg| {
                         let (q, tau) = (leg.of_joints(&joints), leg.of_joints(&tau));
@@ -242,9 +210,8 @@ mod tests {
                     upper[i] += step;
                     let work: f64 = (forces.iter())
                         .map(|(leg, force)| {
-                            let moved =
-                                foot(rule.robot(), *leg, &upper) - foot(rule.robot(), *leg, &lower);
-                            force.dot(&moved) / (2.0 * step)
+                            let foot = |x| rule.robot().foot_in_world(*leg, x);
+                            force.dot(&(foot(&upper) - foot(&lower))) / (2.0 * step)
                         })
                         .sum();
                     let expected = match i {

@@ -70,6 +70,11 @@ impl Leg {
         Leg::RearLeft,
     ];
 
+    /// The legs whose feet are on the ground.
+    pub fn down(feet: ContactFlags) -> impl Iterator<Item = Leg> {
+        Leg::ALL.into_iter().filter(move |leg| feet[leg.index()])
+    }
+
     /// Position in [`Leg::ALL`].
     pub const fn index(self) -> usize {
         self as usize

@@ -67,11 +67,6 @@ impl PlanarLeg {
         )
     }
 
-    /// The volume that bounds `|det J|`: thigh times calf times their sum.
-    pub fn volume_m3(&self) -> f64 {
-        self.thigh_m * self.calf_m * (self.thigh_m + self.calf_m)
-    }
-
     /// `|det J| / volume`: 0 at full extension or with the foot on the axis of
     /// abduction, at most about 1.
     ///
@@ -80,7 +75,7 @@ impl PlanarLeg {
     pub fn manipulability(&self, q: &[f64; 3]) -> f64 {
         let plane = self.in_plane(q);
         let area = plane.forward * plane.calf_up - plane.up * plane.calf_forward;
-        (area * plane.up).abs() / self.volume_m3()
+        (area * plane.up).abs() / volume_m3([self.thigh_m, self.calf_m])
     }
 
     /// `-J^-T` with levers that are never shorter than the damping lets them be, or none where
@@ -99,8 +94,8 @@ impl PlanarLeg {
     /// for `up`.
     pub(super) fn damped_force_map(&self, q: &[f64; 3]) -> Option<Matrix3<f64>> {
         let plane = self.in_plane(q);
-        let det = plane.up * plane.calf_forward - plane.forward * plane.calf_up;
-        let [least_det, least_up] = self.least_levers();
+        let det = plane.determinant();
+        let [least_det, least_up] = least_levers([self.thigh_m, self.calf_m]);
         if det.abs() >= least_det && plane.up.abs() >= least_up {
             return None;
         }
@@ -120,24 +115,11 @@ impl PlanarLeg {
         ]))
     }
 
-    /// Below which `|det|` (m^2) and `|up|` (m) are damped.
-    pub fn least_levers(&self) -> [f64; 2] {
-        [
-            LEAST_SPAN * self.thigh_m * self.calf_m,
-            LEAST_HEIGHT * (self.thigh_m + self.calf_m),
-        ]
-    }
-
-    /// Span of thigh and calf over the product of their lengths, and height of the foot over the
-    /// length of the stretched leg, as absolute values: what [`LEAST_SPAN`] and [`LEAST_HEIGHT`]
-    /// are compared with.
-    pub fn spans(&self, q: &[f64; 3]) -> [f64; 2] {
+    /// Area that thigh and calf span, with its sign, in m^2, and height of the foot in the plane of
+    /// the leg, in m.
+    pub(super) fn levers(&self, q: &[f64; 3]) -> [f64; 2] {
         let plane = self.in_plane(q);
-        let det = plane.up * plane.calf_forward - plane.forward * plane.calf_up;
-        [
-            det.abs() / (self.thigh_m * self.calf_m),
-            plane.up.abs() / (self.thigh_m + self.calf_m),
-        ]
+        [plane.determinant(), plane.up]
     }
 
     fn in_plane(&self, q: &[f64; 3]) -> InPlane {
@@ -160,6 +142,22 @@ struct InPlane {
     up: f64,
     calf_forward: f64,
     calf_up: f64,
+}
+
+impl InPlane {
+    fn determinant(&self) -> f64 {
+        self.up * self.calf_forward - self.forward * self.calf_up
+    }
+}
+
+/// The volume that bounds `|det J|`: thigh times calf times their sum.
+pub(super) fn volume_m3([thigh, calf]: [f64; 2]) -> f64 {
+    thigh * calf * (thigh + calf)
+}
+
+/// Below which the area that thigh and calf span (m^2) and the height of the foot (m) are damped.
+pub fn least_levers([thigh, calf]: [f64; 2]) -> [f64; 2] {
+    [LEAST_SPAN * thigh * calf, LEAST_HEIGHT * (thigh + calf)]
 }
 
 #[cfg(test)]
@@ -194,35 +192,12 @@ mod tests {
     }
 
     #[test]
-    fn foot_position_stretched_leg_hangs_below_hip_offset() {
-        let p = LEG.foot_position(&[0.0; 3]);
-        assert!((p - Vector3::new(0.0, 0.08, -0.423)).norm() < 1e-15);
-        let p = RIGHT.foot_position(&[0.0; 3]);
-        assert!((p - Vector3::new(0.0, -0.08, -0.423)).norm() < 1e-15);
-    }
-
-    #[test]
-    fn foot_position_thigh_turned_back_by_a_right_angle_points_backwards() {
-        let quarter = std::f64::consts::FRAC_PI_2;
-        let p = LEG.foot_position(&[0.0, quarter, -quarter]);
-        assert!((p - Vector3::new(-0.213, 0.08, -0.21)).norm() < 1e-15);
-    }
-
-    #[test]
-    fn foot_position_abduction_keeps_distance_to_the_hip() {
-        let plain = LEG.foot_position(&[0.0, 0.4, -1.0]);
-        let turned = LEG.foot_position(&[0.7, 0.4, -1.0]);
-        assert!((plain.norm() - turned.norm()).abs() < 1e-15);
-        // Abduction of a left leg lifts its foot outwards.
-        assert!(turned.y > plain.y && turned.z > plain.z);
-    }
-
-    #[test]
     fn manipulability_is_the_normalised_determinant() {
         for geometry in [LEG, RIGHT, BENT] {
             for q in postures() {
                 let determinant = geometry.foot_jacobian(&q).determinant();
-                let expected = determinant.abs() / geometry.volume_m3();
+                let volume = volume_m3([geometry.thigh_m, geometry.calf_m]);
+                let expected = determinant.abs() / volume;
                 assert!(
                     (geometry.manipulability(&q) - expected).abs() < 1e-13,
                     "{q:?}"

@@ -3,6 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::geometry::LegGeometry;
+use super::input_rule::rotation;
 use super::joints::{
     BODY_NAMES, FOOT_DIM, JOINT_DIM, JOINT_NAMES, LEG_JOINT_DIM, Leg, STATE_DIM, WRENCH_NAMES,
 };
@@ -84,6 +85,18 @@ impl Robot {
         self.geometry(leg).foot_position(q)
     }
 
+    /// The same from the body's origin.
+    pub fn foot_from_body(&self, leg: Leg, q: &[f64; 3]) -> Vector3<f64> {
+        self.hip_position(leg) + self.foot_position(leg, q)
+    }
+
+    /// The same in the world, at a state `x` of the robot.
+    pub fn foot_in_world(&self, leg: Leg, x: &[f64; STATE_DIM]) -> Vector3<f64> {
+        let joints = std::array::from_fn(|i| x[i]);
+        let foot = self.foot_from_body(leg, &leg.of_joints(&joints));
+        Vector3::new(x[12], x[13], x[14]) + rotation([x[15], x[16], x[17]]) * foot
+    }
+
     /// Jacobian of [`Robot::foot_position`] by the leg's joint angles, in m.
     pub fn foot_jacobian(&self, leg: Leg, q: &[f64; 3]) -> Matrix3<f64> {
         self.geometry(leg).foot_jacobian(q)
@@ -128,10 +141,8 @@ mod tests {
     fn mirrored_joints_of_known_robots_are_abductions_against_and_flexions_alike() {
         for name in Robot::known_names() {
             let robot = Robot::by_name(name).unwrap();
-            let signs: Vec<f64> = (0..JOINT_DIM)
-                .map(|joint| robot.mirror_sign(joint))
-                .collect();
-            assert_eq!(signs, [-1.0, 1.0, 1.0].repeat(4), "{name}");
+            let signs = (0..JOINT_DIM).map(|joint| robot.mirror_sign(joint));
+            assert!(signs.eq([-1.0, 1.0, 1.0].repeat(4)), "{name}");
         }
     }
 
@@ -148,21 +159,13 @@ mod tests {
 
     #[test]
     fn state_and_input_names_are_in_the_order_of_the_contract() {
-        let state = Robot::state_names();
-        assert_eq!((state[0].as_str(), state[11].as_str()), ("fr.hx", "rl.kn"));
-        assert_eq!(
-            (state[12].as_str(), state[17].as_str()),
-            ("body.x", "body.yaw")
-        );
-        let input = Robot::input_names();
+        let [state, input] = [Robot::state_names(), Robot::input_names()];
+        let ends = |names: &[String]| [0, 11, 12, 17].map(|i| names[i].clone());
+        assert_eq!(ends(&state), ["fr.hx", "rl.kn", "body.x", "body.yaw"]);
+        assert_eq!(ends(&input), ["fr.hx", "rl.kn", "force.x", "moment.z"]);
         assert_eq!(input[..12], state[..12]);
-        assert_eq!(
-            (input[12].as_str(), input[17].as_str()),
-            ("force.x", "moment.z")
-        );
         assert_eq!(Robot::state_units()[14], "m");
-        assert_eq!(Robot::input_units()[14], "N");
-        assert_eq!(Robot::input_units()[15], "N m");
+        assert_eq!(Robot::input_units()[14..16], ["N", "N m"]);
     }
 
     #[test]
@@ -173,12 +176,8 @@ mod tests {
                 let stand = [0.0, 0.8, -1.5][joint % 3];
                 assert!(*low < stand && stand < *high, "{name} joint {joint}");
             }
-            assert!(
-                robot
-                    .geometry(Leg::RearLeft)
-                    .manipulability(&[0.0, 0.8, -1.5])
-                    > 0.3
-            );
+            let leg = robot.geometry(Leg::RearLeft);
+            assert!(leg.manipulability(&[0.0, 0.8, -1.5]) > 0.3);
             assert!(robot.torque_limit_nm().iter().all(|limit| *limit > 0.0));
         }
     }
@@ -186,33 +185,18 @@ mod tests {
     #[test]
     fn foot_positions_agree_with_a_physics_engine() {
         // Foot sphere minus hip body in MuJoCo's Go1 and Go2, trunk upright.
-        let (front, rear) = ([0.31, 0.72, -1.43], [-0.2, 1.1, -2.0]);
-        for (name, leg, q, expected) in [
-            (
-                "go1",
-                Leg::FrontRight,
-                front,
-                [-0.001608342, 0.021940214, -0.330737735],
-            ),
-            (
-                "go1",
-                Leg::RearLeft,
-                rear,
-                [-0.022978536, 0.032906295, -0.240347313],
-            ),
-            (
-                "go2",
-                Leg::FrontRight,
-                front,
-                [-0.003125066, 0.007576739, -0.33670767],
-            ),
-            (
-                "go2",
-                Leg::RearLeft,
-                rear,
-                [-0.024221756, 0.047786081, -0.244962113],
-            ),
-        ] {
+        let postures = [
+            (Leg::FrontRight, [0.31, 0.72, -1.43]),
+            (Leg::RearLeft, [-0.2, 1.1, -2.0]),
+        ];
+        let expected = [
+            [-0.001608342, 0.021940214, -0.330737735],
+            [-0.022978536, 0.032906295, -0.240347313],
+            [-0.003125066, 0.007576739, -0.33670767],
+            [-0.024221756, 0.047786081, -0.244962113],
+        ];
+        let legs = ["go1", "go2"].map(|name| postures.map(|(leg, q)| (name, leg, q)));
+        for ((name, leg, q), expected) in legs.into_iter().flatten().zip(expected) {
             let foot = Robot::by_name(name).unwrap().foot_position(leg, &q);
             let error = (foot - Vector3::from(expected)).norm();
             assert!(error < 2e-9, "{name} {leg}: {error:e}");

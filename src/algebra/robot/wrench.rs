@@ -9,6 +9,7 @@
 use nalgebra::{Matrix3, SMatrix, Vector3, Vector6};
 
 use super::error::RobotError;
+use super::input_rule::WrenchFrame;
 use super::joints::{ContactFlags, JOINT_DIM, LEG_JOINT_DIM, Leg};
 use super::kinematics::SINGULAR_BOUND;
 use super::registry::Robot;
@@ -86,37 +87,24 @@ impl Robot {
         torque: &[f64; JOINT_DIM],
         contact: ContactFlags,
     ) -> Result<Vector6<f64>, RobotError> {
-        self.summed_wrench(joints, torque, contact, |_, foot| foot)
+        self.wrench_by_arms(WrenchFrame::Body, joints, torque, contact)
     }
 
-    /// The same with the moment about the body's origin: `(h_k + x_k) x F_k` with the hip `h_k`.
-    ///
-    /// # Errors
-    /// As [`Robot::body_wrench`].
-    pub fn wrench_about_body(
+    /// The same with the moments by the arms of a frame, in axes parallel to the body's.
+    pub(super) fn wrench_by_arms(
         &self,
+        frame: WrenchFrame,
         joints: &[f64; JOINT_DIM],
         torque: &[f64; JOINT_DIM],
         contact: ContactFlags,
-    ) -> Result<Vector6<f64>, RobotError> {
-        let about_body = |leg, foot| self.hip_position(leg) + foot;
-        self.summed_wrench(joints, torque, contact, about_body)
-    }
-
-    fn summed_wrench(
-        &self,
-        joints: &[f64; JOINT_DIM],
-        torque: &[f64; JOINT_DIM],
-        contact: ContactFlags,
-        arm: impl Fn(Leg, Vector3<f64>) -> Vector3<f64>,
     ) -> Result<Vector6<f64>, RobotError> {
         let mut wrench = Vector6::zeros();
-        for leg in Leg::ALL.into_iter().filter(|leg| contact[leg.index()]) {
+        for leg in Leg::down(contact) {
             let q = leg.of_joints(joints);
             let tau = leg.of_joints(torque);
             self.require_finite(leg, "torque", &tau)?;
             let force = self.damped_force_map(leg, &q)? * Vector3::from(tau);
-            let moment = arm(leg, self.foot_position(leg, &q)).cross(&force);
+            let moment = self.arm(frame, leg, &q).cross(&force);
             for axis in 0..3 {
                 wrench[axis] += force[axis];
                 wrench[3 + axis] += moment[axis];
@@ -127,24 +115,29 @@ impl Robot {
 
     /// The 6 x 12 matrix `G` of `[F_lin; F_ang] = G tau` at a posture and
     /// contact; columns of legs in the air are zero.
-    ///
-    /// # Errors
-    /// As [`Robot::damped_force_map`].
-    pub fn wrench_map(
+    pub(super) fn map_by_arms(
         &self,
+        frame: WrenchFrame,
         joints: &[f64; JOINT_DIM],
         contact: ContactFlags,
     ) -> Result<SMatrix<f64, 6, JOINT_DIM>, RobotError> {
         let mut map = SMatrix::<f64, 6, JOINT_DIM>::zeros();
-        for leg in Leg::ALL.into_iter().filter(|leg| contact[leg.index()]) {
+        for leg in Leg::down(contact) {
             let q = leg.of_joints(joints);
             let force = self.damped_force_map(leg, &q)?;
-            let moment = self.foot_position(leg, &q).cross_matrix() * force;
+            let moment = self.arm(frame, leg, &q).cross_matrix() * force;
             let first = LEG_JOINT_DIM * leg.index();
             map.fixed_view_mut::<3, 3>(0, first).copy_from(&force);
             map.fixed_view_mut::<3, 3>(3, first).copy_from(&moment);
         }
         Ok(map)
+    }
+
+    fn arm(&self, frame: WrenchFrame, leg: Leg, q: &[f64; 3]) -> Vector3<f64> {
+        match frame {
+            WrenchFrame::Body => self.foot_position(leg, q),
+            WrenchFrame::World => self.foot_from_body(leg, q),
+        }
     }
 
     fn require_finite(
@@ -182,54 +175,33 @@ mod tests {
     }
 
     #[test]
-    fn foot_force_does_the_work_of_its_torques() {
-        // Virtual work: tau . dq = -F . dp for every joint motion dq.
-        let (q, tau) = ([0.1, 0.8, -1.6], [2.0, -3.0, 7.0]);
-        for leg in Leg::ALL {
-            let force = go1().foot_force(leg, &q, &tau).unwrap();
-            let back = -go1().foot_jacobian(leg, &q).transpose() * force;
-            assert!((back - Vector3::from(tau)).norm() < 1e-12);
+    fn foot_force_of_a_leg_beyond_the_singular_bound_is_an_error_with_leg_and_angles() {
+        let force = |knee: f64| go1().foot_force(Leg::RearLeft, &[0.0, 0.2, knee], &[1.0; 3]);
+        for knee in [0.0, -1e-4] {
+            let Err(RobotError::SingularLeg {
+                leg, joints_rad, ..
+            }) = force(knee)
+            else {
+                panic!("{knee}: {:?}", force(knee));
+            };
+            assert_eq!((leg, joints_rad), (Leg::RearLeft, [0.0, 0.2, knee]));
         }
-    }
-
-    #[test]
-    fn foot_force_stretched_knee_is_an_error_with_leg_and_angles() {
-        let error = go1()
-            .foot_force(Leg::RearLeft, &[0.0, 0.2, 0.0], &[1.0, 1.0, 1.0])
-            .unwrap_err();
-        let RobotError::SingularLeg {
-            leg, joints_rad, ..
-        } = &error
-        else {
-            panic!("{error:?}");
-        };
-        assert_eq!((*leg, *joints_rad), (Leg::RearLeft, [0.0, 0.2, 0.0]));
-        let text = error.to_string();
+        let text = force(0.0).unwrap_err().to_string();
         assert!(text.contains("go1: leg rl is singular"), "{text}");
         assert!(text.contains("kn 0.0000"), "{text}");
-    }
-
-    #[test]
-    fn foot_force_near_extension_is_bounded_by_the_singular_bound() {
-        let error = go1().foot_force(Leg::FrontLeft, &[0.0, 0.0, -1e-4], &[1.0; 3]);
-        assert!(matches!(error, Err(RobotError::SingularLeg { .. })));
-        assert!(
-            go1()
-                .foot_force(Leg::FrontLeft, &[0.0, 0.0, -2e-2], &[1.0; 3])
-                .is_ok()
-        );
+        assert!(force(-2e-2).is_ok());
     }
 
     #[test]
     fn foot_force_not_finite_argument_is_an_error() {
-        let error = go1()
-            .foot_force(Leg::FrontRight, &[0.0, 0.7, -1.4], &[0.0, f64::NAN, 0.0])
-            .unwrap_err();
-        assert!(error.to_string().contains("leg fr has the torque NaN"));
-        let error = go1()
-            .foot_force(Leg::FrontRight, &[f64::INFINITY, 0.7, -1.4], &[0.0; 3])
-            .unwrap_err();
-        assert!(error.to_string().contains("joint angle inf"));
+        let (q, nan) = ([0.0, 0.7, -1.4], f64::NAN);
+        for (q, tau, said) in [
+            (q, [0.0, nan, 0.0], "leg fr has the torque NaN"),
+            ([f64::INFINITY, 0.7, -1.4], [0.0; 3], "joint angle inf"),
+        ] {
+            let error = go1().foot_force(Leg::FrontRight, &q, &tau).unwrap_err();
+            assert!(error.to_string().contains(said), "{error}");
+        }
     }
 
     #[test]
@@ -238,8 +210,10 @@ mod tests {
             .body_wrench(&[0.0; 12], &torques(), [false; 4])
             .unwrap();
         assert_eq!(wrench, Vector6::zeros());
-        let map = go1().wrench_map(&[0.0; 12], [false; 4]).unwrap();
-        assert!(map.iter().all(|entry| *entry == 0.0));
+        for frame in WrenchFrame::ALL {
+            let map = go1().map_by_arms(frame, &[0.0; 12], [false; 4]).unwrap();
+            assert!(map.iter().all(|entry| *entry == 0.0));
+        }
     }
 
     #[test]

@@ -25,13 +25,11 @@ mod actuators;
 mod entry;
 mod error;
 mod legs;
-mod print;
 mod read;
 mod registry;
 mod urdf;
 
 pub use actuators::{ActuatorsEntry, read_actuators};
-pub use entry::RobotEntry;
+pub use entry::{RobotEntry, to_toml};
 pub use error::{RobotFileError, RobotFileFault};
-pub use print::to_toml;
 pub use read::{find, from_toml, from_urdf, read};

@@ -198,43 +198,36 @@ impl<'x> Tree<'x> {
         })
     }
 
-    /// Moving joints with fixed joints alone between them and a link.
-    fn next_moving(&self, link: &str) -> Vec<usize> {
-        let mut found = Vec::new();
+    /// What fixed joints hold to a link: moving joints at it or at a link that they hold, and these links.
+    fn held_by(&self, link: &str) -> (Vec<usize>, Vec<&'x str>) {
+        let (mut moving, mut links) = (Vec::new(), Vec::new());
         for &joint in self.below.get(link).into_iter().flatten() {
-            match self.joints[joint].moves() {
-                true => found.push(joint),
-                false => found.extend(self.next_moving(self.joints[joint].child)),
+            if self.joints[joint].moves() {
+                moving.push(joint);
+                continue;
             }
+            let child = self.joints[joint].child;
+            let (joints, further) = self.held_by(child);
+            moving.extend(joints);
+            links.push(child);
+            links.extend(further);
         }
-        found
-    }
-
-    /// Links that fixed joints hold to a link, itself left out.
-    fn held_by(&self, link: &str) -> Vec<&'x str> {
-        let mut found = Vec::new();
-        for &joint in self.below.get(link).into_iter().flatten() {
-            if !self.joints[joint].moves() {
-                found.push(self.joints[joint].child);
-                found.extend(self.held_by(self.joints[joint].child));
-            }
-        }
-        found
+        (moving, links)
     }
 
     fn limb(&self, first: usize) -> Limb {
         let mut joints = vec![first];
-        let mut next = self.next_moving(self.joints[first].child);
+        let mut next = self.held_by(self.joints[first].child).0;
         while let [only] = next[..] {
             joints.push(only);
-            next = self.next_moving(self.joints[only].child);
+            next = self.held_by(self.joints[only].child).0;
         }
         (joints, next.is_empty())
     }
 
     /// Moving joints and foot of each leg.
     fn found_legs(&self, trunk: &'x str) -> Result<Vec<(Vec<usize>, &'x str)>, RobotFileError> {
-        let limbs = self.next_moving(trunk).into_iter().map(|j| self.limb(j));
+        let limbs = self.held_by(trunk).0.into_iter().map(|j| self.limb(j));
         let limbs: Vec<Limb> = limbs.collect();
         let is_leg = |(joints, is_chain): &&Limb| *is_chain && joints.len() == LEG_JOINT_DIM;
         let legs: Vec<&Limb> = limbs.iter().filter(is_leg).collect();
@@ -260,7 +253,7 @@ impl<'x> Tree<'x> {
 
     fn foot(&self, joints: &[usize]) -> Result<&'x str, RobotFileError> {
         let last = &self.joints[joints[joints.len() - 1]];
-        let held = self.held_by(last.child);
+        let (_, held) = self.held_by(last.child);
         let says_so = |link: &&&str| {
             let name = link.to_lowercase();
             name.contains("foot") || name.contains("toe")

@@ -21,7 +21,7 @@ use crate::files::EmittedFile;
 use crate::lower::Form;
 use crate::model::ReducedModel;
 use crate::mpc::ControlModel;
-use crate::mpc::interface::{Settings, TEXTS};
+use crate::mpc::interface::{Settings, all_codes, status_text};
 use crate::robot::{InputRule, Leg, Robot, STATE_DIM, WrenchFrame};
 use control_model::ControlModelText;
 use lock::Lock;
@@ -54,8 +54,8 @@ pub(super) struct Facts<'a> {
 impl<'a> Facts<'a> {
     pub(super) fn new(entries: &'a ModelInterface, plant: &'a ControlModel) -> Self {
         let (name, robot, lock) = (entries.identifier.as_str(), plant.robot(), Lock::own());
-        let text = |code: &(i32, &CStr)| (code.0, code.1.to_string_lossy().into_owned());
-        let texts: Vec<(i32, String)> = TEXTS.iter().map(text).collect();
+        let text = |code| (code, status_text(code).to_string_lossy().into_owned());
+        let texts: Vec<(i32, String)> = all_codes().map(text).collect();
         Self {
             model: &entries.name,
             name,

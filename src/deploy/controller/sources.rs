@@ -21,12 +21,11 @@ macro_rules! sources {
 
 const SOURCES: &[(&str, &str)] = sources! {
     "motion/mpc/online":
-        command control_model controller dense dynamics effectiveness engine error estimate fallback
-        horizon;
+        command control_model controller dense effectiveness engine error estimate fallback horizon;
     "motion/mpc/online/interface":
-        codes handle mod settings values;
+        codes handle mod settings;
     "motion/mpc/online":
-        layout lift lift_cones lift_pyramids linearise mod nonlinear plan problem prune qp reference
+        layout lift lift_cones lift_pyramids linearise mod plan problem prune qp reference
         settings sparse step structured swing transcribe;
     "algebra/robot":
         actuators chain error feet geometry input_rule joints kinematics mod registry wrench;

@@ -26,8 +26,8 @@ use super::control::{Summary, Tally};
 use super::control_metrics::ControlMetrics;
 use super::torque::{Comparison, exceeds, is_plausible};
 use crate::mpc::{
-    Command, ControlError, Controller, Lift, Measurement, MpcError, ReferenceSamples, STEP_SLACK,
-    Source, StanceState, Status, foot_forces, to_upright,
+    Command, Controller, Lift, Measurement, MpcError, ReferenceSamples, STEP_SLACK, StanceState,
+    foot_forces, to_upright,
 };
 use crate::recording::{Recording, Segment};
 use crate::robot::{GRAVITY_M_S2, JOINT_DIM, STATE_DIM};
@@ -48,23 +48,11 @@ pub struct StepRow {
     pub segment: usize,
     /// Time of the measurement, s.
     pub time_s: f64,
-    /// Index of the phase of the first stage, if there was a plan.
-    pub phase: Option<usize>,
-    /// How the step ended.
-    pub status: Status,
-    /// Where the command comes from.
-    pub source: Source,
-    /// Wall time of the step, µs.
-    pub solve_us: f64,
-    /// Interior-point iterations.
-    pub iterations: u32,
-    /// Latent input.
-    pub u_lat: Vec<f64>,
+    /// The command.
+    pub command: Command,
     /// Lifted input in SI units: with the transpose lift `W_eᵀ u_lat`, with the consistent lift the
     /// torques at the links and the force that they produce.
     pub input: [f64; STATE_DIM],
-    /// Commanded torques, N m.
-    pub torque_nm: [f64; JOINT_DIM],
     /// Recorded torques, N m, averaged over the time that the command is held.
     pub recorded_torque_nm: [f64; JOINT_DIM],
     /// Reference in latent coordinates.
@@ -95,8 +83,9 @@ impl Run {
             return None;
         }
         let mut statuses: BTreeMap<&str, usize> = BTreeMap::new();
-        for row in self.rows.iter().filter(|row| !row.status.has_plan()) {
-            *statuses.entry(row.status.word()).or_default() += 1;
+        let of_steps = self.rows.iter().map(|row| row.command.status);
+        for status in of_steps.filter(|status| !status.has_plan()) {
+            *statuses.entry(status.word()).or_default() += 1;
         }
         let statuses = statuses
             .iter()
@@ -154,8 +143,7 @@ pub fn along_recording(
         if segment.len() < 2 {
             continue;
         }
-        let input = segment.input_within_limits(controller.plant().input_rule())?;
-        set_reference(controller, segment, reference_input, input.as_slice())?;
+        set_reference(controller, segment, reference_input)?;
         for &sample in schedule {
             let started = Instant::now();
             controller.prepare(segment.time_s[sample]);
@@ -276,19 +264,13 @@ fn one_step(
     StepRow {
         segment: number,
         time_s,
-        phase: command.phase,
-        status: command.status,
-        source: command.source,
-        solve_us: command.solve_us,
-        iterations: command.iterations,
         input: lifted_input(controller, &command, segment, sample),
-        torque_nm: command.torque_nm,
         recorded_torque_nm: recorded.unwrap_or([0.0; JOINT_DIM]),
         z_reference: reference[..d].to_vec(),
-        u_lat: command.u_lat,
         z,
         z_planned: (command.status.has_plan())
             .then(|| controller.plan().end(controller.settings().horizon - 1)[..d].to_vec()),
+        command,
     }
 }
 
@@ -296,18 +278,19 @@ pub(super) fn set_reference(
     controller: &mut Controller,
     segment: &Segment,
     reference_input: ReferenceInput,
-    input: &[f64],
-) -> Result<(), ControlError> {
+) -> Result<(), MpcError> {
+    let input = segment.input_within_limits(controller.plant().input_rule())?;
     controller.set_reference(ReferenceSamples {
         time_s: &segment.time_s,
         x: segment.x.as_slice(),
         dx: segment.dx.as_slice(),
         u: match reference_input {
-            ReferenceInput::Recorded => Some(input),
+            ReferenceInput::Recorded => Some(input.as_slice()),
             ReferenceInput::None => None,
         },
         feet: &segment.feet,
-    })
+    })?;
+    Ok(())
 }
 
 /// Mean recorded torques over the time that a command is held; none if one is not finite.
@@ -328,13 +311,8 @@ fn held_torque(segment: &Segment, sample: usize, step_s: f64) -> Option<[f64; JO
 
 fn stance(controller: &Controller, segment: &Segment, sample: usize) -> Option<StanceState> {
     let feet = segment.feet[sample];
-    Some(StanceState {
-        joints_rad: segment.joints(sample),
-        attitude_rad: std::array::from_fn(|angle| segment.x[(15 + angle, sample)]),
-        feet,
-        phase: controller.plant().phase_for(feet)?,
-        losses_nm: [0.0; JOINT_DIM],
-    })
+    let phase = controller.plant().phase_for(feet)?;
+    Some(StanceState::at(&segment.state(sample), feet, phase))
 }
 
 fn lifted_input(

@@ -209,12 +209,9 @@ fn orientation(segment: &Segment, sample: usize) -> Rotation3<f64> {
 /// Mean of the feet in contact in the world's plane of x and z.
 fn mean_foot(robot: &Robot, segment: &Segment, sample: usize) -> Vector2<f64> {
     let joints = segment.joints(sample);
-    let down = Leg::ALL
-        .into_iter()
-        .filter(|leg| segment.feet[sample][leg.index()]);
     let (mut sum, mut count) = (Vector3::zeros(), 0.0);
-    for leg in down {
-        sum += robot.hip_position(leg) + robot.foot_position(leg, &leg.of_joints(&joints));
+    for leg in Leg::down(segment.feet[sample]) {
+        sum += robot.foot_from_body(leg, &leg.of_joints(&joints));
         count += 1.0;
     }
     let in_body = sum / f64::max(count, 1.0);

@@ -77,54 +77,44 @@ impl<'a> Assessment<'a> {
             Some(state) => (state.names.clone(), state.units.clone()),
             None => (Robot::state_names().to_vec(), Robot::state_units().to_vec()),
         };
+        let full = CoordinateSums::new(model)?;
+        let rule = model.input_rule()?;
         let mut assessment = Self {
             names,
             units,
             restart_every_s,
             runs: Vec::with_capacity(segments.len()),
-            full: CoordinateSums::new(model)?,
-            restarted: CoordinateSums::new(model)?,
+            restarted: full.clone(),
+            full,
             pointwise: PointwiseSums::new(model),
-            baselines: Baseline::all(&model.input_rule()?, &segments)?,
+            baselines: Baseline::all(&rule, &segments)?,
             linearised: Vec::new(),
             lift: LiftSums::default(),
             active_terms: model.phases().iter().map(|p| p.active_count()).sum(),
             remarks: remarks(model, recordings)?,
         };
+        let restart = Restart::Every(restart_every_s);
         for segment in segments {
-            assessment.add(model, &compiled, segment)?;
+            let latent = LatentSegment::encode(model, segment)?;
+            let full = rollout(&compiled, &latent, Restart::Never);
+            let restarted = rollout(&compiled, &latent, restart);
+            (assessment.full).add_rollout(model, segment, &latent, &full)?;
+            (assessment.restarted).add_rollout(model, segment, &latent, &restarted)?;
+            assessment.pointwise.add(model, segment, &latent)?;
+            assessment.lift.add(model, segment)?;
+            let baselines = assessment.baselines.iter_mut();
+            let baselines = baselines.map(|baseline| baseline.add(&rule, segment, restart));
+            assessment.runs.push(SegmentRun {
+                segment,
+                full,
+                restarted,
+                baselines: baselines.collect::<Result<_, _>>()?,
+                latent,
+            });
         }
         let latent: Vec<&LatentSegment> = assessment.runs.iter().map(|run| &run.latent).collect();
         assessment.linearised = linearise_phases(&compiled, &latent);
         Ok(assessment)
-    }
-
-    fn add(
-        &mut self,
-        model: &ReducedModel,
-        compiled: &CompiledModel,
-        segment: &'a Segment,
-    ) -> Result<(), EvaluateError> {
-        let restart = Restart::Every(self.restart_every_s);
-        let latent = LatentSegment::encode(model, segment)?;
-        let full = rollout(compiled, &latent, Restart::Never);
-        let restarted = rollout(compiled, &latent, restart);
-        self.full.add_rollout(model, segment, &latent, &full)?;
-        (self.restarted).add_rollout(model, segment, &latent, &restarted)?;
-        self.pointwise.add(model, segment, &latent)?;
-        self.lift.add(model, segment)?;
-        let rule = model.input_rule()?;
-        let baselines = (self.baselines.iter_mut())
-            .map(|baseline| baseline.add(&rule, segment, restart))
-            .collect::<Result<_, _>>()?;
-        self.runs.push(SegmentRun {
-            segment,
-            latent,
-            full,
-            restarted,
-            baselines,
-        });
-        Ok(())
     }
 
     /// Mean square of `decode(encode(x)) - x` over all coordinates, in scaled units (equation 16).

@@ -91,7 +91,7 @@ pub fn fit_aslip(rule: &InputRule, segments: &[&Segment]) -> Result<Option<Aslip
             mass_kg: 1.0 / c,
             stiffness_n_m: a / c,
             rest_length_m: b / a,
-            gravity_m_s2: published.gravity_m_s2,
+            ..published
         }));
     }
     let mass_only = least_squares(&rows, &[2], &right);
@@ -100,7 +100,7 @@ pub fn fit_aslip(rule: &InputRule, segments: &[&Segment]) -> Result<Option<Aslip
             mass_kg: 1.0 / c,
             stiffness_n_m: 0.0,
             rest_length_m: 0.0,
-            gravity_m_s2: published.gravity_m_s2,
+            ..published
         }),
         Some(_) | None => None,
     })
@@ -125,25 +125,20 @@ fn least_squares(rows: &[[f64; 3]], columns: &[usize], right: &DVector<f64>) -> 
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
     use super::*;
     use crate::recording;
     use crate::robot::Robot;
 
     #[test]
     fn fitted_pendulum_explains_short_rollouts_better_than_the_published_one() {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/recordings/go1");
-        let recording = recording::read(&folder.join("test_01.csv.gz")).expect("shipped");
+        let recording = recording::shipped("go1/test_01");
         let rule = &InputRule::published(Robot::by_name("go1").expect("known"));
         let segments: Vec<&Segment> = recording.segments.iter().collect();
         let mut baselines = Baseline::all(rule, &segments).expect("legs are bent");
         assert_eq!(baselines.len(), 2);
         for baseline in &mut baselines {
-            let restart = Restart::Every(0.1);
-            baseline
-                .add(rule, segments[0], restart)
-                .expect("integrates");
+            let rollout = baseline.add(rule, segments[0], Restart::Every(0.1));
+            rollout.expect("integrates");
         }
         let rms = |b: &Baseline| b.restarted.z.fit().expect("samples").rms;
         assert!(rms(&baselines[1]) < rms(&baselines[0]));
@@ -153,12 +148,7 @@ mod tests {
 
     #[test]
     fn least_squares_recovers_coefficients_and_refuses_dependent_columns() {
-        let rows = [
-            [1.0, 2.0, 0.0],
-            [0.0, 1.0, 0.0],
-            [3.0, 1.0, 0.0],
-            [1.0, 1.0, 0.0],
-        ];
+        let rows = [[1.0, 2.0], [0.0, 1.0], [3.0, 1.0], [1.0, 1.0]].map(|[a, b]| [a, b, 0.0]);
         let right = DVector::from_vec(vec![8.0, 3.0, 9.0, 5.0]);
         let found = least_squares(&rows, &[0, 1], &right).expect("independent");
         assert!((found[0] - 2.0).abs() < 1e-12 && (found[1] - 3.0).abs() < 1e-12);

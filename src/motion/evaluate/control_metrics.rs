@@ -4,10 +4,9 @@ use serde::Serialize;
 
 use super::along_recording::{ReferenceInput, along_recording};
 use super::error::EvaluateError;
-use super::prediction::{PredictionError, prediction_error, recorded_stages};
+use super::prediction::{PredictionError, prediction_error, recorded_stages, uninformed};
 use super::recovery::{Driver, Recovery, recovery};
 use super::torque::ByContact;
-use super::uninformed::uninformed;
 use crate::model::ReducedModel;
 use crate::mpc::{Controller, MAX_STRUCTURED_DIM, MpcSettings, Solver};
 use crate::recording::Recording;
@@ -86,18 +85,13 @@ pub struct ConstantVelocity {
 pub fn control_metrics(
     model: &ReducedModel,
     recording: &Recording,
-    settings: MpcSettings,
+    mut settings: MpcSettings,
 ) -> Result<ControlMetrics, EvaluateError> {
-    let is_structured = model.latent_dim() <= MAX_STRUCTURED_DIM
-        && settings.torque_rate_nm_s.is_none()
-        && settings.body_friction.is_none();
-    let settings = MpcSettings {
-        solver: match is_structured {
-            true => Solver::Riccati,
-            false => settings.solver,
-        },
-        ..settings
-    };
+    let has_links_or_cones =
+        settings.torque_rate_nm_s.is_some() || settings.body_friction.is_some();
+    if model.latent_dim() <= MAX_STRUCTURED_DIM && !has_links_or_cones {
+        settings.solver = Solver::Riccati;
+    }
     let stages = recorded_stages(model, recording, settings.step_s)?;
     let predicted = |dynamics: Option<&ReducedModel>| prediction_error(model, dynamics, &stages);
     let blind = uninformed(model, &stages)?;
@@ -113,7 +107,7 @@ pub fn control_metrics(
     let off = |recovery: Recovery| Pushed {
         recovery_rms_m: recovery.rms_m(),
     };
-    let metrics = ControlMetrics {
+    let mut metrics = ControlMetrics {
         prediction_rms: predicted(Some(model))?,
         torque_r2: run.torque_r2,
         torque_rms_nm: run.torque_rms_nm,
@@ -135,27 +129,20 @@ pub fn control_metrics(
         },
         failure: None,
     };
-    Ok(ControlMetrics {
-        failure: failure(&metrics),
-        ..metrics
-    })
+    metrics.failure = failure(&metrics);
+    Ok(metrics)
 }
 
 /// Why the model has failed: its predictions or its feedback are no better than those of a baseline.
 fn failure(metrics: &ControlMetrics) -> Option<String> {
     let baseline = &metrics.baseline;
-    let predictions = [
-        (
-            "a constant velocity",
-            &baseline.constant_velocity.prediction_rms,
-        ),
-        (
-            "a model that knows nothing",
-            &baseline.knows_nothing.prediction_rms,
-        ),
-    ];
+    let constant = &baseline.constant_velocity.prediction_rms;
+    let blind = &baseline.knows_nothing.prediction_rms;
     let mut reasons = Vec::new();
-    for (name, other) in predictions {
+    for (name, other) in [
+        ("a constant velocity", constant),
+        ("a model that knows nothing", blind),
+    ] {
         if let (Some(own), Some(other)) = (&metrics.prediction_rms, other) {
             let share = own.share_of(other);
             if share.is_nan() || share > NO_BETTER {

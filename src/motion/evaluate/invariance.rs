@@ -82,8 +82,11 @@ impl Invariance {
 impl PhaseInvariance {
     fn of(model: &ReducedModel, phase: usize, rest: &DVector<f64>) -> Result<Self, ModelError> {
         let input = mean_input(model, phase);
+        // Linear acceleration of the body, m/s^2.
         let accelerated = |x: &DVector<f64>, dx: &DVector<f64>, u: &DVector<f64>| {
-            Instant { x, dx, u }.body_acceleration(model, phase)
+            let ddz = latent_acceleration(model, phase, [x, dx, u])?;
+            let decoder = model.decoder_jacobian(&model.encode(x)?)?;
+            Ok::<_, ModelError>(decoder.rows(BODY_X, 3) * ddz)
         };
         let mut shifts = [0.0_f64; 2];
         for velocity in velocities() {
@@ -144,40 +147,15 @@ fn mean_input(model: &ReducedModel, phase: usize) -> DVector<f64> {
     statistics.map_or(DVector::zeros(STATE_DIM), |known| known.mean.clone())
 }
 
-/// A state and an input of the robot, SI, `state_dim` each.
-struct Instant<'a> {
-    x: &'a DVector<f64>,
-    dx: &'a DVector<f64>,
-    u: &'a DVector<f64>,
-}
-
-impl Instant<'_> {
-    /// Latent acceleration of a phase, scaled units.
-    fn latent_acceleration(
-        &self,
-        model: &ReducedModel,
-        phase: usize,
-    ) -> Result<DVector<f64>, ModelError> {
-        let tangent = model.tangent(self.x)?;
-        let z = model.encode(self.x)?;
-        model.ddz(
-            phase,
-            &z,
-            &(&tangent.encode * self.dx),
-            &(&tangent.project * self.u),
-        )
-    }
-
-    /// Linear acceleration of the body, m/s^2.
-    fn body_acceleration(
-        &self,
-        model: &ReducedModel,
-        phase: usize,
-    ) -> Result<DVector<f64>, ModelError> {
-        let ddz = self.latent_acceleration(model, phase)?;
-        let decoder = model.decoder_jacobian(&model.encode(self.x)?)?;
-        Ok(decoder.rows(BODY_X, 3) * ddz)
-    }
+/// Latent acceleration of a phase, scaled units, at a state and an input of the robot, SI, `state_dim` each.
+fn latent_acceleration(
+    model: &ReducedModel,
+    phase: usize,
+    [x, dx, u]: [&DVector<f64>; 3],
+) -> Result<DVector<f64>, ModelError> {
+    let tangent = model.tangent(x)?;
+    let (dz, u_lat) = (&tangent.encode * dx, &tangent.project * u);
+    model.ddz(phase, &model.encode(x)?, &dz, &u_lat)
 }
 
 /// The mirror image of a state, a velocity or an input: legs change sides; abduction, y, roll and yaw (and the force and
@@ -219,12 +197,8 @@ fn by_height(model: &ReducedModel, rest: &DVector<f64>) -> Result<[Option<f64>; 
     let free: Vec<usize> = (0..d).filter(|&i| projector.eigenvalues[i] > 0.5).collect();
     let others = projector.eigenvectors.select_columns(&free);
     let input = mean_input(model, phase);
-    let flight = Instant {
-        x: rest,
-        dx: &DVector::zeros(STATE_DIM),
-        u: &input,
-    };
-    let ddz = flight.latent_acceleration(model, phase)?;
+    let still = DVector::zeros(STATE_DIM);
+    let ddz = latent_acceleration(model, phase, [rest, &still, &input])?;
     let change = gain(model, phase, rest, &input, &ddz)?.transpose();
     let inverse = || (&change * &others).pseudo_inverse(1e-9 * change.amax());
     let combination = match (!free.is_empty()).then(inverse) {
@@ -287,12 +261,7 @@ fn mass_kg(
         .copy_from(&wrench);
     let input = mean_input(model, phase);
     let still = DVector::zeros(STATE_DIM);
-    let at = |u: &DVector<f64>| {
-        let (x, dx) = (rest, &still);
-        Instant { x, dx, u }.latent_acceleration(model, phase)
-    };
+    let at = |u: &DVector<f64>| latent_acceleration(model, phase, [rest, &still, u]);
     let change = combination.dot(&(at(&(&input + &u))? - at(&input)?));
-    Ok((change != 0.0)
-        .then(|| 1.0 / change)
-        .filter(|mass| mass.is_finite()))
+    Ok(Some(1.0 / change).filter(|mass| mass.is_finite()))
 }

@@ -77,10 +77,8 @@ pub fn combined_loss(decoder_mean_square: f64, active_terms: usize, lambda: f64)
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
     use super::*;
-    use crate::{artifact, recording};
+    use crate::{evaluate::shipped_model, recording};
 
     #[test]
     fn combined_loss_follows_equation_29() {
@@ -91,14 +89,12 @@ mod tests {
 
     #[test]
     fn more_latent_coordinates_lose_less_of_the_torques() {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-        let jump = recording::read(&root.join("examples/recordings/go1/test_01.csv.gz"));
-        let jump = jump.expect("shipped");
+        let jump = recording::shipped("go1/test_01");
         let [two, six] = ["go1-d2", "go1-d6"].map(|name| {
-            let model = artifact::read(&root.join(format!("models/{name}.json"))).expect("shipped");
             let mut sums = LiftSums::default();
             for segment in &jump.segments {
-                sums.add(&model, segment).expect("legs are bent");
+                let added = sums.add(&shipped_model(name), segment);
+                added.expect("legs are bent");
             }
             sums
         });

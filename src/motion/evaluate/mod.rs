@@ -22,7 +22,13 @@ mod recovery;
 mod remarks;
 mod round_trip;
 mod torque;
-mod uninformed;
+
+/// A model of the project's own, by the name of its file.
+#[cfg(test)]
+pub(crate) fn shipped_model(name: &str) -> crate::model::ReducedModel {
+    let path = format!("{}/../../models/{name}.json", env!("CARGO_MANIFEST_DIR"));
+    crate::artifact::read(path.as_ref()).expect("a shipped model")
+}
 
 pub use along_recording::{ReferenceInput, Run, StepRow, along_recording, lift_comparison};
 pub use aslip::{Aslip, AslipRollout, AslipSums};

@@ -1,11 +1,12 @@
-//! Predictions one stage ahead: the recorded state and input in, where the robot is one control step later out.
+//! Predictions one stage ahead: the recorded state and input in, where the robot is one control step later out; and
+//! a model that knows nothing, to compare with: the same maps, and latent inputs that accelerate their own coordinate.
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
 use super::error::EvaluateError;
 use crate::lower::CompiledModel;
-use crate::model::ReducedModel;
+use crate::model::{Library, Phase, ReducedModel};
 use crate::recording::Recording;
 use crate::robot::{BODY_Z, JOINT_DIM};
 use crate::sim::LatentSegment;
@@ -66,7 +67,7 @@ pub(super) fn recorded_stages(
     for segment in &recording.segments {
         let latent = LatentSegment::encode(model, segment)?;
         let at = |sample: usize| {
-            let column = |rows: &nalgebra::DMatrix<f64>| rows.column(sample).into_owned();
+            let column = |rows: &DMatrix<f64>| rows.column(sample).into_owned();
             (column(&latent.z), column(&latent.dz))
         };
         let samples = super::along_recording::control_samples(&latent.time_s, step_s);
@@ -135,19 +136,73 @@ pub(super) fn prediction_error(
     }))
 }
 
+/// A copy of a model with `ddz = g u_lat` for dynamics.
+///
+/// Encoder, decoder, robot and input statistics stay. The one number `g` of each phase is the least-squares fit to these
+/// very stages, so that the copy has the right scale and nothing else: no gravity, no coupling of coordinates, no
+/// effect of the state. How far its accelerations are off is its own.
+///
+/// # Errors
+/// [`EvaluateError::Model`] if the copy is not a model.
+pub(super) fn uninformed(
+    model: &ReducedModel,
+    stages: &[RecordedStage],
+) -> Result<ReducedModel, EvaluateError> {
+    let d = model.latent_dim();
+    let terms: Vec<String> = (1..=d).map(|latent| format!("u{latent}")).collect();
+    let library = Library::from_terms(d, &terms).expect("invariant: inputs are terms");
+    let mut phases = Vec::with_capacity(model.phases().len());
+    let mut statistics = Vec::new();
+    for (index, phase) in model.phases().iter().enumerate() {
+        let samples: Vec<(DVector<f64>, &DVector<f64>)> = stages
+            .iter()
+            .filter(|stage| stage.phase == index)
+            .map(|stage| {
+                let ddz = (&stage.end.1 - &stage.start.1) / stage.duration_s;
+                (ddz, &stage.input)
+            })
+            .collect();
+        let product: f64 = samples.iter().map(|(ddz, input)| ddz.dot(input)).sum();
+        let square: f64 = samples.iter().map(|(_, input)| input.norm_squared()).sum();
+        let gain = if square > 0.0 { product / square } else { 0.0 };
+        phases.push(Phase {
+            xi: DMatrix::identity(d, d) * gain,
+            ..phase.clone()
+        });
+        let mut own = model.input_statistics(index)?.clone();
+        if let (Some(given), false) = (&mut own.given_state, samples.is_empty()) {
+            given.acceleration_error = error_covariance(&samples, gain);
+        }
+        statistics.push((phase.name.clone(), own));
+    }
+    let builder = model.clone().into_builder().library(library);
+    Ok(builder
+        .phases(phases)
+        .all_input_statistics(statistics)
+        .build()?)
+}
+
+/// Covariance of `ddz - g u_lat` about zero.
+fn error_covariance(samples: &[(DVector<f64>, &DVector<f64>)], gain: f64) -> DMatrix<f64> {
+    let d = samples[0].0.len();
+    let share = 1.0 / samples.len() as f64;
+    samples
+        .iter()
+        .fold(DMatrix::zeros(d, d), |sum, (ddz, input)| {
+            let left = ddz - *input * gain;
+            sum + &left * left.transpose() * share
+        })
+}
+
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
     use super::*;
-    use crate::{artifact, recording};
+    use crate::{evaluate::shipped_model, recording};
 
     #[test]
     fn pitch_without_a_latent_coordinate_does_not_make_right_predictions_fail() {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-        let model = artifact::read(&root.join("models/go1-d6.json")).expect("shipped");
-        let jump = root.join("examples/recordings/go1-other/jump_04.csv.gz");
-        let jump = recording::read(&jump).expect("shipped");
+        let model = shipped_model("go1-d6");
+        let jump = recording::shipped("go1-other/jump_04");
         let stages = recorded_stages(&model, &jump, 0.01).expect("of its robot");
         let error = |dynamics| {
             let error = prediction_error(&model, dynamics, &stages);

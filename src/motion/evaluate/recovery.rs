@@ -85,13 +85,7 @@ pub(super) fn recovery(
     let [window_steps, steps_between] =
         [WINDOW_S, BETWEEN_S].map(|time_s| ((time_s / step_s).round() as usize).max(1));
     for segment in recording.segments.iter().filter(|s| s.len() >= 2) {
-        let input = segment.input_within_limits(controller.plant().input_rule())?;
-        set_reference(
-            controller,
-            segment,
-            ReferenceInput::Recorded,
-            input.as_slice(),
-        )?;
+        set_reference(controller, segment, ReferenceInput::Recorded)?;
         let samples = control_samples(&segment.time_s, step_s);
         let stands = |window: &&[usize]| {
             let feet = &segment.feet[window[0]..=window[window_steps]];
@@ -103,7 +97,10 @@ pub(super) fn recovery(
         for window in windows.into_iter().step_by(every) {
             for push in PUSHES {
                 controller.reset();
-                let pushed = Deviation::pushed(Vector3::from(push) * PUSH_M_S);
+                let pushed = Deviation {
+                    velocity_m_s: Vector3::from(push) * PUSH_M_S,
+                    ..Deviation::default()
+                };
                 run(controller, segment, window, pushed, driver, &mut recovery);
             }
         }
@@ -123,11 +120,12 @@ fn run(
     let limits = robot.torque_limit_nm();
     for pair in window.windows(2) {
         let (start, end) = (pair[0], pair[1]);
-        let command = (driver != Driver::Replay).then(|| {
-            let seen = match driver {
-                Driver::Feedback => deviation,
-                Driver::NoFeedback | Driver::Replay => Deviation::default(),
-            };
+        let seen = match driver {
+            Driver::Feedback => Some(deviation),
+            Driver::NoFeedback => Some(Deviation::default()),
+            Driver::Replay => None,
+        };
+        let command = seen.map(|seen| {
             let (x, dx) = seen.measured(segment, start, robot);
             let command = controller.step(Measurement {
                 time_s: segment.time_s[start],
@@ -163,13 +161,6 @@ struct Deviation {
 }
 
 impl Deviation {
-    fn pushed(velocity_m_s: Vector3<f64>) -> Self {
-        Self {
-            velocity_m_s,
-            ..Self::default()
-        }
-    }
-
     /// State and velocity of the robot, joints such that feet on the ground stay where they are.
     fn measured(
         &self,
@@ -224,18 +215,14 @@ impl Deviation {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
     use super::*;
     use crate::mpc::MpcSettings;
-    use crate::{artifact, recording};
+    use crate::{evaluate::shipped_model, recording};
 
     #[test]
     fn replay_moves_on_at_the_speed_of_the_push_and_feedback_does_not() {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-        let model = artifact::read(&root.join("models/go1-d6.json")).expect("shipped");
-        let jump = root.join("examples/recordings/go1/test_01.csv.gz");
-        let jump = recording::read(&jump).expect("shipped");
+        let model = shipped_model("go1-d6");
+        let jump = recording::shipped("go1/test_01");
         let mut controller = Controller::new(&model, MpcSettings::default()).expect("complete");
         // after k of 100 samples of 2 ms the body is 0.1 m/s k 2 ms away, whatever the control step
         let mean_square = (1..=100).map(|k| f64::from(k * k)).sum::<f64>() / 100.0;

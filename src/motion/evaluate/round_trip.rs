@@ -68,12 +68,22 @@ pub enum Slip {
 }
 
 impl RoundTrip {
-    /// Looks at a model along recordings.
+    /// Looks at an imported model along the recordings that came with it; none without recordings or
+    /// without both maps.
     ///
     /// # Errors
-    /// [`EvaluateError`] for a model without maps or robot, or inputs that cannot be computed.
-    pub fn of(model: &ReducedModel, segments: &[&Segment]) -> Result<Self, EvaluateError> {
-        let samples = Samples::new(model, segments)?;
+    /// [`EvaluateError`] for a model without robot, or inputs that cannot be computed.
+    pub fn of_import(
+        model: &ReducedModel,
+        segments: &[&Segment],
+    ) -> Result<Option<Self>, EvaluateError> {
+        let (Ok(encoder), Ok(decoder)) = (model.encoder_map(), model.decoder_map()) else {
+            return Ok(None);
+        };
+        if segments.is_empty() {
+            return Ok(None);
+        }
+        let samples = Samples::new((encoder, decoder), model.state_factors()?, segments);
         let error = samples.error(&samples.given())?;
         let best = samples.best_slip()?;
         let is_explained =
@@ -84,29 +94,13 @@ impl RoundTrip {
             Some(r2) if r2 < 0.0 => acceleration_slip(model, segments, &samples.mean)?,
             _ => None,
         };
-        Ok(Self {
+        Ok(Some(Self {
             error,
             slip: best.filter(|(_, found)| is_explained(*found)),
             acceleration_r2,
             all_acceleration_r2: all,
             acceleration_slip,
-        })
-    }
-
-    /// Looks at an imported model along the recordings that came with it; none without recordings or
-    /// without both maps.
-    ///
-    /// # Errors
-    /// As [`RoundTrip::of`].
-    pub fn of_import(
-        model: &ReducedModel,
-        segments: &[&Segment],
-    ) -> Result<Option<Self>, EvaluateError> {
-        let has_maps = model.encoder_map().is_ok() && model.decoder_map().is_ok();
-        match segments.is_empty() || !has_maps {
-            true => Ok(None),
-            false => Self::of(model, segments).map(Some),
-        }
+        }))
     }
 
     /// Whether the maps fit the recordings.
@@ -202,7 +196,11 @@ struct Samples<'m> {
 }
 
 impl<'m> Samples<'m> {
-    fn new(model: &'m ReducedModel, segments: &[&Segment]) -> Result<Self, EvaluateError> {
+    fn new(
+        (encoder, decoder): (&'m StateMap, &'m StateMap),
+        factors: DVector<f64>,
+        segments: &[&Segment],
+    ) -> Self {
         let total: usize = segments.iter().map(|segment| segment.len()).sum();
         let every = total.div_ceil(SAMPLES).max(1);
         let columns = segments.iter().flat_map(|segment| segment.x.column_iter());
@@ -211,14 +209,14 @@ impl<'m> Samples<'m> {
         let mean = x.iter().sum::<DVector<f64>>() / count;
         let squares = x.iter().map(|x| (x - &mean).map(|v| v * v));
         let deviation = (squares.sum::<DVector<f64>>() / count).map(f64::sqrt);
-        Ok(Self {
-            encoder: model.encoder_map()?,
-            decoder: model.decoder_map()?,
-            factors: model.state_factors()?,
+        Self {
+            encoder,
+            decoder,
+            factors,
             x,
             mean,
             deviation,
-        })
+        }
     }
 
     fn given(&self) -> Reading {
@@ -230,41 +228,27 @@ impl<'m> Samples<'m> {
     }
 
     fn with(&self, slip: &Slip) -> Reading {
-        let given = self.given();
+        let mut reading = self.given();
         match slip {
-            Slip::Order(order) => Reading {
-                order: *order.places(),
-                ..given
-            },
-            Slip::Factor(factor) => {
-                let factors = DVector::repeat(STATE_DIM, *factor);
-                Reading { factors, ..given }
+            Slip::Order(order) => reading.order = *order.places(),
+            Slip::Factor(factor) => reading.factors.fill(*factor),
+            Slip::Centred => reading.mean.clone_from(&self.mean),
+            Slip::Standardised => {
+                reading.factors = self.deviation.map(|v| 1.0 / v.max(1e-9));
+                reading.mean.clone_from(&self.mean);
             }
-            Slip::Centred => Reading {
-                mean: self.mean.clone(),
-                ..given
-            },
-            Slip::Standardised => Reading {
-                factors: self.deviation.map(|v| 1.0 / v.max(1e-9)),
-                mean: self.mean.clone(),
-                ..given
-            },
             Slip::Both(order, slip) => {
-                let reading = self.with(slip);
-                let factors = match **slip {
+                reading = self.with(slip);
+                reading.order = *order.places();
+                if **slip == Slip::Standardised {
                     // Factors of coordinates, not of places.
-                    Slip::Standardised => {
-                        DVector::from_fn(STATE_DIM, |k, _| reading.factors[order.places()[k]])
-                    }
-                    _ => reading.factors,
-                };
-                Reading {
-                    order: *order.places(),
-                    factors,
-                    mean: reading.mean,
+                    let places = order.places().iter();
+                    let factors = places.map(|place| reading.factors[*place]);
+                    reading.factors = DVector::from_iterator(STATE_DIM, factors);
                 }
             }
         }
+        reading
     }
 
     /// Mean square of the round trip's residual over that of the deviation.

@@ -1,5 +1,7 @@
 //! Errors of setting up a controller.
 
+#![allow(missing_docs, reason = "each variant's message names its fields")]
+
 use std::path::PathBuf;
 
 use thiserror::Error;
@@ -27,22 +29,13 @@ pub enum MpcError {
     Recording(#[from] RecordingError),
     /// The model is not over the robot's generalised coordinates.
     #[error("the model's encoder takes {found} coordinates, the robot has {expected}")]
-    StateDim {
-        /// Coordinates that the encoder takes.
-        found: usize,
-        /// Coordinates of the robot.
-        expected: usize,
-    },
+    StateDim { found: usize, expected: usize },
     /// A covariance of the training inputs is no covariance.
     #[error("input statistics of phase `{phase}`: the covariance cannot be factorised")]
-    Statistics {
-        /// The phase.
-        phase: String,
-    },
+    Statistics { phase: String },
     /// A controller that acts more often than there are samples.
     #[error("{}: a sample every {:.3} ms; found a step of {} s, expected at least as long (`romc mpc --step {}`)", path.display(), recorded_s * 1e3, found_s, (recorded_s * 1e4).ceil() / 1e4)]
     Step {
-        /// The recording.
         path: PathBuf,
         /// Duration of a stage, s.
         found_s: f64,
@@ -52,9 +45,7 @@ pub enum MpcError {
     /// A controller whose commands are held for longer than any stretch of the recording.
     #[error("{}: {longest_s:.3} s without a gap, found a step of {found_s:.3e} s, expected a shorter one or a longer recording", path.display())]
     NoStep {
-        /// The recording.
         path: PathBuf,
-        /// Duration of a stage, s.
         found_s: f64,
         /// The recording's longest segment, s.
         longest_s: f64,

@@ -11,13 +11,14 @@ impl ValueEnum for Lift {
     }
 
     fn to_possible_value(&self) -> Option<PossibleValue> {
-        Some(match self {
-            Self::Transpose => {
-                PossibleValue::new("transpose").help("`u = W_e^T u_lat`, the paper's")
-            }
-            Self::Consistent => PossibleValue::new("consistent")
-                .help("Torques whose own ground reaction forces reproduce the latent input"),
-        })
+        let (name, help) = match self {
+            Self::Transpose => ("transpose", "`u = W_e^T u_lat`, the paper's"),
+            Self::Consistent => (
+                "consistent",
+                "Torques whose own ground reaction forces reproduce the latent input",
+            ),
+        };
+        Some(PossibleValue::new(name).help(help))
     }
 }
 

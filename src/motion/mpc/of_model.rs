@@ -176,12 +176,13 @@ fn phase_under(
 fn with_floor(mut covariance: DMatrix<f64>) -> DMatrix<f64> {
     let dim = covariance.nrows();
     let mean_variance = covariance.trace() / dim as f64;
-    let floor = match mean_variance > 0.0 {
-        true => VARIANCE_FLOOR * mean_variance,
-        false => VARIANCE_FLOOR,
+    let size = if mean_variance > 0.0 {
+        mean_variance
+    } else {
+        1.0
     };
     for index in 0..dim {
-        covariance[(index, index)] += floor;
+        covariance[(index, index)] += VARIANCE_FLOOR * size;
     }
     covariance
 }

@@ -1,9 +1,11 @@
 //! The cost of a plan: weighted squares of deviations.
 
+use nalgebra::{DMatrix, DVector, Vector3};
+
 use super::affine::{Affine, Builder};
-use super::feet::foot_place;
+use super::seed::{PITCH, Seed};
 use super::transcribe::Task;
-use crate::robot::Leg;
+use crate::robot::{BODY_X, BODY_Z, JOINT_DIM, Leg, STATE_DIM};
 
 /// Time that the weights are per, s.
 const TIME_UNIT_S: f64 = 0.01;
@@ -13,26 +15,25 @@ const FIRST_OF_POSTURE: usize = 2;
 /// Adds the cost about an iterate; half the sum of squares each, so that weights are as documented
 /// up to a common factor.
 pub fn add(task: &Task<'_>, y: &[f64], builder: &mut Builder) {
-    each(task, y, &mut |expression, weight| {
-        builder.square(expression, weight)
-    });
+    for (expression, weight) in squares(task, y) {
+        builder.square(&expression, weight);
+    }
 }
 
 /// The cost of a point: the sum of weighted squares.
 pub fn value(task: &Task<'_>, y: &[f64]) -> f64 {
-    let mut total = 0.0;
-    each(task, y, &mut |expression, weight| {
-        total += weight * expression.at(y).powi(2);
-    });
-    total
+    let squares = squares(task, y).into_iter();
+    squares.fold(0.0, |total, (expression, weight)| {
+        total + weight * expression.at(y).powi(2)
+    })
 }
 
-fn each(task: &Task<'_>, y: &[f64], square: &mut dyn FnMut(&Affine, f64)) {
+/// What is squared, and its weight.
+fn squares(task: &Task<'_>, y: &[f64]) -> Vec<(Affine, f64)> {
     let (d, settings) = (task.layout.latent_dim, task.settings);
     let share = 1.0 / d as f64;
-    let one = |variable: usize, weight: f64, square: &mut dyn FnMut(&Affine, f64)| {
-        square(&Affine::default().plus(variable, 1.0), weight);
-    };
+    let one = |variable: usize, weight: f64| (Affine::default().plus(variable, 1.0), weight);
+    let mut out = Vec::new();
     for (part, of) in task.seed.parts.iter().enumerate() {
         let step = of.duration_s / of.intervals() as f64;
         for node in 0..of.z.len() {
@@ -41,10 +42,10 @@ fn each(task: &Task<'_>, y: &[f64], square: &mut dyn FnMut(&Affine, f64)) {
             let at = task.layout.node(part, node);
             for i in 0..d {
                 if i >= FIRST_OF_POSTURE {
-                    one(at + i, settings.posture * share * time, square);
+                    out.push(one(at + i, settings.posture * share * time));
                 }
-                one(at + d + i, settings.rate * share * time, square);
-                one(at + 2 * d + i, settings.input * share * time, square);
+                out.push(one(at + d + i, settings.rate * share * time));
+                out.push(one(at + 2 * d + i, settings.input * share * time));
             }
             if node < of.intervals() {
                 let next = task.layout.node(part, node + 1);
@@ -52,7 +53,7 @@ fn each(task: &Task<'_>, y: &[f64], square: &mut dyn FnMut(&Affine, f64)) {
                 for i in 0..d {
                     let change = Affine::default().plus(next + 2 * d + i, 1.0);
                     let change = change.plus(at + 2 * d + i, -1.0);
-                    square(&change, settings.smoothness * share * per_unit);
+                    out.push((change, settings.smoothness * share * per_unit));
                 }
             }
         }
@@ -61,43 +62,36 @@ fn each(task: &Task<'_>, y: &[f64], square: &mut dyn FnMut(&Affine, f64)) {
             _ => settings.duration[usize::from(!of.is_grounded())],
         };
         // A little for every duration keeps the program strictly convex.
-        one(task.layout.duration(part), weight.max(1e-3), square);
+        out.push(one(task.layout.duration(part), weight.max(1e-3)));
     }
-    feet(task, y, square);
+    for part in 0..task.seed.parts.len() {
+        add_feet(task, y, part, &mut out);
+    }
+    out
 }
 
 /// Feet on the ground stay where they stand, as far as they do in the prior: along the floor from
 /// the start or from touch-down, above it from the start or from the prior's own height.
-fn feet(task: &Task<'_>, y: &[f64], square: &mut dyn FnMut(&Affine, f64)) {
-    let settings = task.settings;
-    let flight = task.flight();
-    for (part, of) in task.seed.parts.iter().enumerate() {
-        let is_landing = part > flight;
-        let anchor_part = if is_landing { part } else { 0 };
-        if !of.is_grounded() {
-            continue;
-        }
-        let step = of.duration_s / of.intervals() as f64;
-        let down: Vec<Leg> = (Leg::ALL.into_iter())
-            .filter(|leg| of.part.feet[leg.index()])
-            .collect();
-        for &leg in &down {
-            let anchor = moved_foot(task, y, leg, (anchor_part, 0));
-            for node in 0..of.z.len() {
-                if (part, node) == (anchor_part, 0) {
-                    continue;
+fn add_feet(task: &Task<'_>, y: &[f64], part: usize, out: &mut Vec<(Affine, f64)>) {
+    let (settings, of) = (task.settings, &task.seed.parts[part]);
+    let anchor_part = task.anchor_part(part);
+    let time = of.duration_s / of.intervals() as f64 / TIME_UNIT_S;
+    let count = Leg::down(of.part.feet).count();
+    for leg in Leg::down(of.part.feet) {
+        let anchor = moved_foot(task, y, leg, (anchor_part, 0));
+        for node in 0..of.z.len() {
+            if (part, node) == (anchor_part, 0) {
+                continue;
+            }
+            for (axis, mut slip) in moved_foot(task, y, leg, (part, node))
+                .into_iter()
+                .enumerate()
+            {
+                if axis == 0 || anchor_part == 0 {
+                    slip.add_scaled(&anchor[axis], -1.0);
                 }
-                let foot = moved_foot(task, y, leg, (part, node));
-                for axis in 0..2 {
-                    let mut slip = foot[axis].clone();
-                    if axis == 0 || !is_landing {
-                        slip.add_scaled(&anchor[axis], -1.0);
-                    }
-                    let time = step / TIME_UNIT_S;
-                    let unit = settings.foot_m[axis];
-                    let weight = settings.feet / down.len() as f64 * time / (unit * unit);
-                    square(&slip, weight);
-                }
+                let unit = settings.foot_m[axis];
+                out.push((slip, settings.feet / count as f64 * time / (unit * unit)));
             }
         }
     }
@@ -122,4 +116,38 @@ pub fn moved_foot(
         }
         moved
     })
+}
+
+/// A foot's place along the floor and above it (m), and the derivatives by `z` (one row each).
+struct FootPlace {
+    at: [f64; 2],
+    by_z: DMatrix<f64>,
+}
+
+/// The foot of a leg at a latent position; roll and yaw of a jump forwards are left out.
+fn foot_place(seed: &Seed<'_>, leg: Leg, z: &DVector<f64>) -> FootPlace {
+    let robot = seed.rule.robot();
+    let x = seed.decoded(z);
+    let joints: [f64; JOINT_DIM] = std::array::from_fn(|i| x[i]);
+    let q = leg.of_joints(&joints);
+    let (sin, cos) = x[PITCH].sin_cos();
+    let foot = robot.foot_from_body(leg, &q);
+    let along = |v: &Vector3<f64>| cos * v.x + sin * v.z;
+    let above = |v: &Vector3<f64>| -sin * v.x + cos * v.z;
+    let jacobian = robot.foot_jacobian(leg, &q);
+    let mut by_x = DMatrix::zeros(2, STATE_DIM);
+    for joint in 0..3 {
+        let column = Vector3::from(jacobian.column(joint));
+        let at = 3 * leg.index() + joint;
+        by_x[(0, at)] = along(&column);
+        by_x[(1, at)] = above(&column);
+    }
+    by_x[(0, BODY_X)] = 1.0;
+    by_x[(1, BODY_Z)] = 1.0;
+    by_x[(0, PITCH)] = above(&foot);
+    by_x[(1, PITCH)] = -along(&foot);
+    FootPlace {
+        at: [x[BODY_X] + along(&foot), x[BODY_Z] + above(&foot)],
+        by_z: by_x * &seed.decode,
+    }
 }

@@ -8,13 +8,10 @@ use crate::model::{GOAL_DIM, JumpPrior};
 /// A wanted jump.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Goal {
-    distance_m: f64,
-    apex_m: f64,
-    start: Option<Start>,
+    goal_m: [f64; 2],
+    /// State and velocity that the jump starts from, 18 each, SI units.
+    pub(super) start: Option<(DVector<f64>, DVector<f64>)>,
 }
-
-/// State and velocity that a jump starts from, 18 each, SI units.
-pub type Start = (DVector<f64>, DVector<f64>);
 
 impl Goal {
     /// A jump forwards by `distance_m`, during which the body rises `apex_m` above its height at the
@@ -35,8 +32,7 @@ impl Goal {
             }
         }
         Ok(Self {
-            distance_m,
-            apex_m,
+            goal_m: [distance_m, apex_m],
             start: None,
         })
     }
@@ -48,25 +44,9 @@ impl Goal {
         self
     }
 
-    /// Distance of the body, m.
-    pub fn distance_m(&self) -> f64 {
-        self.distance_m
-    }
-
-    /// Rise of the body, m.
-    pub fn apex_m(&self) -> f64 {
-        self.apex_m
-    }
-
-    /// Whether the start was given.
-    pub(super) fn has_start(&self) -> bool {
-        self.start.is_some()
-    }
-
-    /// State and velocity at the start.
-    pub(super) fn start(&self, prior: &JumpPrior) -> Start {
-        let at_rest = || (prior.start.clone(), DVector::zeros(prior.start.len()));
-        self.start.clone().unwrap_or_else(at_rest)
+    /// Distance and rise of the body, m.
+    pub fn goal_m(&self) -> [f64; 2] {
+        self.goal_m
     }
 
     /// Refuses goals that are out of all proportion to the training jumps, so that no time is spent
@@ -83,7 +63,7 @@ impl Goal {
             ("apex", 0.0),
             ("height at the start", f64::NEG_INFINITY),
         ];
-        let values = [self.distance_m, self.apex_m, start_height_m];
+        let values = [self.goal_m[0], self.goal_m[1], start_height_m];
         for ((found, range), (what, floor)) in values.into_iter().zip(prior.ranges()).zip(names) {
             let width = (range.most - range.least).max(0.02);
             let least = (range.least - reach * width).max(floor);
@@ -112,7 +92,7 @@ impl Goal {
         start_height_m: f64,
         share: f64,
     ) -> [f64; GOAL_DIM] {
-        let values = [self.distance_m, self.apex_m, start_height_m];
+        let values = [self.goal_m[0], self.goal_m[1], start_height_m];
         std::array::from_fn(|i| {
             let range = &prior.ranges()[i];
             let inset = share * (range.most - range.least);

@@ -17,10 +17,8 @@
 //! ```
 
 mod affine;
-mod apex;
 mod costs;
 mod error;
-mod feet;
 mod goal;
 mod motion;
 mod reach;

@@ -4,7 +4,7 @@
 //! passes through the nodes of the program. Torques are the lifted input with what the joints take
 //! of the very motion that is written, so that who reads the recording finds the planned input.
 
-use nalgebra::{DMatrix, DVector, Rotation3, Vector3};
+use nalgebra::{DMatrix, DVector};
 
 use super::costs::moved_foot;
 use super::error::PlanError;
@@ -100,7 +100,7 @@ fn margins(task: &Task<'_>, y: &[f64], (motion, input): (&Segment, &DMatrix<f64>
         torque_share: 0.0,
         beyond_joint_limit_rad: f64::NEG_INFINITY,
         beyond_friction_n: f64::NEG_INFINITY,
-        foot_slip_m: [0.0; 2],
+        foot_slip_m: foot_slip(task, y),
         foot_drift_m: foot_drift(robot, motion),
     };
     for sample in 0..motion.len() {
@@ -118,7 +118,6 @@ fn margins(task: &Task<'_>, y: &[f64], (motion, input): (&Segment, &DMatrix<f64>
             margins.beyond_friction_n = margins.beyond_friction_n.max(beyond);
         }
     }
-    margins.foot_slip_m = foot_slip(task, y);
     margins
 }
 
@@ -126,11 +125,9 @@ fn margins(task: &Task<'_>, y: &[f64], (motion, input): (&Segment, &DMatrix<f64>
 /// floor from the start or from touch-down, above it.
 fn foot_slip(task: &Task<'_>, y: &[f64]) -> [f64; 2] {
     let mut farthest = [0.0_f64; 2];
-    let mut landed = false;
     for (part, of) in task.seed.parts.iter().enumerate() {
-        landed |= !of.is_grounded();
-        let anchor = (if landed { part } else { 0 }, 0);
-        for leg in Leg::ALL.into_iter().filter(|leg| of.part.feet[leg.index()]) {
+        let anchor = (task.anchor_part(part), 0);
+        for leg in Leg::down(of.part.feet) {
             let from = moved_foot(task, y, leg, anchor).map(|moved| moved.at(y));
             for node in 0..of.z.len() {
                 let moved = moved_foot(task, y, leg, (part, node)).map(|moved| moved.at(y));
@@ -146,13 +143,7 @@ fn foot_slip(task: &Task<'_>, y: &[f64]) -> [f64; 2] {
 /// Farthest that a foot on the ground is, at any sample, from its place at the first sample of that
 /// contact, along the floor, and below its height at the first of all samples.
 fn foot_drift(robot: &Robot, motion: &Segment) -> [f64; 2] {
-    let place = |leg: Leg, sample: usize| -> Vector3<f64> {
-        let x: [f64; STATE_DIM] = std::array::from_fn(|row| motion.x[(row, sample)]);
-        let [body_x, body_y, body_z, roll, pitch, yaw] = std::array::from_fn(|i| x[JOINT_DIM + i]);
-        let joints: [f64; JOINT_DIM] = std::array::from_fn(|i| x[i]);
-        let foot = robot.hip_position(leg) + robot.foot_position(leg, &leg.of_joints(&joints));
-        Vector3::new(body_x, body_y, body_z) + Rotation3::from_euler_angles(roll, pitch, yaw) * foot
-    };
+    let place = |leg: Leg, sample: usize| robot.foot_in_world(leg, &motion.state(sample));
     let mut farthest = [0.0_f64; 2];
     for leg in Leg::ALL {
         let floor = place(leg, 0).z;

@@ -3,13 +3,11 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::error::PlanError;
-use super::goal::{Goal, Start};
+use super::goal::Goal;
 use super::settings::PlanSettings;
 use crate::lower::CompiledModel;
 use crate::model::{JumpPart, JumpPrior, ReducedModel};
-use crate::robot::{BODY_NAMES, InputRule, JOINT_DIM, JOINT_NAMES, STATE_DIM};
-
-pub use crate::robot::{BODY_X, BODY_Z};
+use crate::robot::{BODY_NAMES, BODY_Z, InputRule, JOINT_DIM, JOINT_NAMES, STATE_DIM};
 
 /// Pitch of the body in the state.
 pub const PITCH: usize = 16;
@@ -78,7 +76,8 @@ impl<'a> Seed<'a> {
         settings: &PlanSettings,
     ) -> Result<Self, PlanError> {
         let prior = model.jump_prior()?;
-        let start: Start = goal.start(prior);
+        let at_rest = || (prior.start.clone(), DVector::zeros(prior.start.len()));
+        let start = goal.start.clone().unwrap_or_else(at_rest);
         let height = start.0[BODY_Z];
         goal.check_within(prior, height, settings.reach)?;
         let features = prior.features(goal.clipped(prior, height, settings.inset));
@@ -89,9 +88,9 @@ impl<'a> Seed<'a> {
             .collect::<Result<_, PlanError>>()?;
         let zero = DVector::zeros(model.latent_dim());
         let latent = model.encode(&start.0)?;
-        let start_lost = match goal.has_start() {
-            true => lost(&start.0, &model.decode(&latent)?),
-            false => Vec::new(),
+        let start_lost = match goal.start {
+            Some(_) => lost(&start.0, &model.decode(&latent)?),
+            None => Vec::new(),
         };
         Ok(Self {
             start_lost,
@@ -150,17 +149,11 @@ fn seed_part<'a>(
     let [least, most] = part.duration_range_s;
     let duration_s = part.duration(features).clamp(0.5 * least, 2.0 * most);
     let step = duration_s / (part.nodes() - 1) as f64;
-    let pairs = |rows: &[DVector<f64>], of: fn(&DVector<f64>, &DVector<f64>) -> DVector<f64>| {
-        let pairs = rows.windows(2);
-        pairs.map(|pair| of(&pair[0], &pair[1])).collect::<Vec<_>>()
-    };
-    let mut ddz = pairs(&dz, |a, b| b - a);
-    ddz.iter_mut().for_each(|change| *change /= step);
-    let mean = pairs(&dz, |a, b| (a + b) * 0.5);
-    let mut drift = pairs(&z, |a, b| b - a);
-    for (drift, mean) in drift.iter_mut().zip(&mean) {
-        *drift = &*drift / step - mean;
-    }
+    let rate = |rows: &[DVector<f64>], k: usize| (&rows[k + 1] - &rows[k]) / step;
+    let mean = |k: usize| (&dz[k] + &dz[k + 1]) * 0.5;
+    let intervals = 0..part.nodes() - 1;
+    let ddz = intervals.clone().map(|k| rate(&dz, k)).collect();
+    let drift = intervals.map(|k| rate(&z, k) - mean(k)).collect();
     let root = (part.input_covariance.clone().cholesky())
         .expect("invariant: checked with the model")
         .unpack();

@@ -112,7 +112,7 @@ impl PlanSettings {
             ("foot_m", self.foot_m[1], 1.0),
         ];
         for (name, found, most) in inside {
-            if !(found.is_finite() && found >= 0.0 && found <= most) {
+            if !(0.0..=most).contains(&found) {
                 return Err(format!("`{name}` is {found}, expected 0 to {most}"));
             }
         }

@@ -14,6 +14,7 @@ use crate::model::ReducedModel;
 use crate::mpc::{Outcome, QpSettings, QpSolver, SolverProfile};
 use crate::recording::mismatch::weight_share;
 use crate::recording::{Recording, Segment};
+use crate::robot::{BODY_X, BODY_Z, GRAVITY_M_S2};
 
 /// Largest violation of an equation that counts as none, in standard deviations.
 const CONVERGED_DEFECT: f64 = 1e-4;
@@ -83,7 +84,7 @@ pub fn plan(model: &ReducedModel, goal: &Goal, settings: &PlanSettings) -> Resul
             duration_s: task.duration_s(part, &y),
         })
         .collect();
-    let goal_m = [goal.distance_m(), goal.apex_m()];
+    let goal_m = goal.goal_m();
     let slack = Bound::ALL.map(|bound| (bound, y[task.layout.slack(bound)]));
     let input_deviation = input_deviation(&task, &y);
     let findings = Findings {
@@ -111,8 +112,7 @@ pub fn plan(model: &ReducedModel, goal: &Goal, settings: &PlanSettings) -> Resul
 
 /// The variables at the end of the programs, and how many there were.
 fn solve(task: &mut Task<'_>) -> Result<(Vec<f64>, usize), PlanError> {
-    let goal = &task.seed.goal;
-    let (distance_m, apex_m) = (goal.distance_m(), goal.apex_m());
+    let [distance_m, apex_m] = task.seed.goal.goal_m();
     let settings = QpSettings {
         profile: SolverProfile::Scaled,
         max_iterations: 60,
@@ -140,10 +140,9 @@ fn solve(task: &mut Task<'_>) -> Result<(Vec<f64>, usize), PlanError> {
             task.place_apex(&y);
         }
         let defect = task.defect(&y);
-        if defect < CONVERGED_DEFECT && step < CONVERGED_STEP {
-            return Ok((y, iteration));
-        }
-        if iteration == task.settings.programs && defect < USABLE_DEFECT {
+        let has_converged = defect < CONVERGED_DEFECT && step < CONVERGED_STEP;
+        let is_last = iteration == task.settings.programs;
+        if has_converged || (is_last && defect < USABLE_DEFECT) {
             return Ok((y, iteration));
         }
     }
@@ -182,11 +181,8 @@ fn outside(seed: &Seed<'_>, goal_m: [f64; 2]) -> [f64; 2] {
 /// Distance and rise of the body in a motion, m.
 fn reached(motion: &Segment) -> [f64; 2] {
     let (x, last) = (&motion.x, motion.len() - 1);
-    let height = x.row(super::seed::BODY_Z);
-    [
-        x[(super::seed::BODY_X, last)] - x[(super::seed::BODY_X, 0)],
-        height.max() - height[0],
-    ]
+    let height = x.row(BODY_Z);
+    [x[(BODY_X, last)] - x[(BODY_X, 0)], height.max() - height[0]]
 }
 
 /// What accelerations of the thrust that the deviations do not explain make of distance and rise.
@@ -201,9 +197,9 @@ fn expected_error(task: &Task<'_>, y: &[f64]) -> [f64; 2] {
         let squares = row.iter().zip(of_latent).map(|(a, std)| (a * std).powi(2));
         squares.sum::<f64>().sqrt() * duration_s
     };
-    let up = task.dx(flight, 0, super::seed::BODY_Z).at(y);
+    let up = task.dx(flight, 0, BODY_Z).at(y);
     [
-        speed(super::seed::BODY_X) * task.duration_s(flight, y),
-        speed(super::seed::BODY_Z) * up.abs() / crate::robot::GRAVITY_M_S2,
+        speed(BODY_X) * task.duration_s(flight, y),
+        speed(BODY_Z) * up.abs() / GRAVITY_M_S2,
     ]
 }

@@ -1,6 +1,5 @@
 //! Plans of a model that is trained on the shipped recordings.
 
-use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use std::sync::atomic::AtomicBool;
 
@@ -8,9 +7,10 @@ use nalgebra::DVector;
 
 use super::*;
 use crate::artifact;
+use crate::evaluate::shipped_model;
 use crate::model::ReducedModel;
 use crate::recording::Recording;
-use crate::robot::{GRAVITY_M_S2, Robot};
+use crate::robot::{BODY_Z, GRAVITY_M_S2, Robot};
 use crate::train::{Method, Origin, Progress, Recordings, TrainOptions, Watch};
 
 fn recordings(split: &str, count: usize) -> Vec<Recording> {
@@ -84,11 +84,7 @@ fn motion_of_a_plan_is_its_own_integral_and_falls_freely_in_flight() {
 #[test]
 fn plan_read_as_a_recording_has_the_planned_torques_inside_their_limits() {
     let plan = planned(0.3, 0.12).expect("a plan");
-    let recording = Recording {
-        path: PathBuf::from("plan.csv"),
-        segments: vec![plan.motion.clone()],
-        ignored_columns: Vec::new(),
-    };
+    let recording = Recording::from(plan.motion.clone());
     let mut bytes = Vec::new();
     let options = crate::recording::WriteOptions::default();
     crate::recording::write::write_to(&mut bytes, &recording, None, &options).unwrap();
@@ -134,17 +130,15 @@ fn start_that_the_latent_coordinates_drop_is_told() {
 
 #[test]
 fn plan_whose_feet_do_not_stand_is_not_trusted() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let shipped = |name: &str| artifact::read(&root.join("models").join(name)).expect("a model");
     let farthest = |name: &str, distance: f64, apex: f64| {
         let goal = Goal::new(distance, apex).unwrap();
-        let plan = plan(&shipped(name), &goal, &PlanSettings::default()).expect("a plan");
+        let plan = plan(&shipped_model(name), &goal, &PlanSettings::default()).expect("a plan");
         let told = format!("{:?}", plan.verdict).contains("feet on the ground move");
         (plan.margins.foot_drift_m, told)
     };
-    let ([along, below], told) = farthest("go1-d4.json", 0.3, 0.12);
+    let ([along, below], told) = farthest("go1-d4", 0.3, 0.12);
     assert!(along < 0.03 && below < 0.015 && !told);
-    let ([along, below], told) = farthest("go2-async-d4.json", 0.4, 0.14);
+    let ([along, below], told) = farthest("go2-async-d4", 0.4, 0.14);
     assert!(along > 0.05 && below > 0.025 && told);
 }
 
@@ -216,7 +210,7 @@ fn jumps_recorded_up_to_touch_down_are_planned_up_to_it() {
     let plan = plan(&model, &goal, &PlanSettings::default()).expect("a plan");
     let last = plan.motion.len() - 1;
     assert_eq!(plan.motion.feet[last], [false; 4]);
-    assert!(plan.motion.dx[(seed::BODY_Z, last)] < -0.3, "still falling");
+    assert!(plan.motion.dx[(BODY_Z, last)] < -0.3, "still falling");
     assert!((plan.reached_m[0] - distance.mean).abs() < 3e-3);
     assert!((plan.reached_m[1] - apex.mean).abs() < 3e-3);
 }

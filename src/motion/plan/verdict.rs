@@ -79,27 +79,30 @@ pub fn verdict(settings: &PlanSettings, found: &Findings<'_>) -> Verdict {
         }
     }
     let margins = found.margins;
-    if margins.torque_share > 1.0 {
-        let share = 100.0 * margins.torque_share;
-        refused.push(format!(
-            "torques reach {share:.0} % of their limits between nodes"
-        ));
+    let share = 100.0 * margins.torque_share;
+    let (joint, force) = (margins.beyond_joint_limit_rad, margins.beyond_friction_n);
+    let between_nodes = [
+        (
+            margins.torque_share > 1.0,
+            format!("torques reach {share:.0} % of their limits"),
+        ),
+        (
+            joint > NO_JOINT,
+            format!("a joint is {joint:.3} rad beyond its limit"),
+        ),
+        (
+            force > settings.friction_slack_n + NO_FRICTION_N,
+            format!("the force is {force:.0} N outside the friction cone"),
+        ),
+    ];
+    for (_, what) in between_nodes
+        .into_iter()
+        .filter(|(is_broken, _)| *is_broken)
+    {
+        refused.push(what + " between nodes");
     }
-    if margins.beyond_joint_limit_rad > NO_JOINT {
-        let beyond = margins.beyond_joint_limit_rad;
-        refused.push(format!(
-            "a joint is {beyond:.3} rad beyond its limit between nodes"
-        ));
-    }
-    if margins.beyond_friction_n > settings.friction_slack_n + NO_FRICTION_N {
-        let beyond = margins.beyond_friction_n;
-        refused.push(format!(
-            "the force is {beyond:.0} N outside the friction cone between nodes"
-        ));
-    }
-    if let Some(share) = found
-        .weight_share
-        .filter(|share| *share < LEAST_WEIGHT_SHARE)
+    if let Some(share) = found.weight_share
+        && share < LEAST_WEIGHT_SHARE
     {
         refused.push(format!(
             "its torques carry {share:.3} of what the robot's weight needs: the model's inputs cannot be lifted to \

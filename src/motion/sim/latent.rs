@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::error::SimError;
-use crate::model::ReducedModel;
+use crate::model::{InputStatistics, ReducedModel};
 use crate::recording::phases::{CHATTER_SAMPLES, PhasePattern};
 use crate::recording::segment::between;
 use crate::recording::{PhaseRule, Segment};
@@ -79,7 +79,7 @@ impl LatentSegment {
 
 /// The phase of each sample by the spans of the model's phases ([`PhaseRule::spans`]): samples in transition, and
 /// contact chatter, belong to a neighbouring span, as in training.
-pub(super) fn phases(model: &ReducedModel, segment: &Segment) -> Result<Vec<usize>, SimError> {
+fn phases(model: &ReducedModel, segment: &Segment) -> Result<Vec<usize>, SimError> {
     let mut phases = vec![0; segment.len()];
     for span in phase_rule(model).spans(segment)? {
         phases[span.range].fill(span.phase);
@@ -94,4 +94,35 @@ pub fn phase_rule(model: &ReducedModel) -> PhaseRule {
         feet: phase.feet.clone(),
     });
     PhaseRule::new(patterns.collect()).with_min_samples(CHATTER_SAMPLES)
+}
+
+/// The model with mean and covariance of the recorded inputs `u = [tau; F; M]` (SI, by the model's rule) in the phases
+/// that the recordings have samples of.
+///
+/// # Errors
+/// [`SimError::Model`] for a model without robot, [`SimError::Recording`] if the body wrench cannot
+/// be computed, and if no feet of a segment are in a phase of the model.
+pub fn with_input_statistics(
+    model: ReducedModel,
+    segments: &[&Segment],
+) -> Result<ReducedModel, SimError> {
+    let rule = model.input_rule()?;
+    let names = model.phases().iter().map(|phase| phase.name.clone());
+    let mut of_phases: Vec<(String, Vec<DVector<f64>>)> =
+        names.map(|name| (name, Vec::new())).collect();
+    for segment in segments {
+        let input = segment.input(&rule)?;
+        for (sample, phase) in phases(&model, segment)?.into_iter().enumerate() {
+            of_phases[phase].1.push(input.column(sample).into_owned());
+        }
+    }
+    let mut builder = model.into_builder();
+    for (name, samples) in of_phases {
+        if let Some(first) = samples.first() {
+            let block = || std::iter::once(DMatrix::from_columns(&samples));
+            let statistics = InputStatistics::of_blocks(first.len(), samples.len(), block);
+            builder = builder.input_statistics(name, statistics);
+        }
+    }
+    Ok(builder.build()?)
 }

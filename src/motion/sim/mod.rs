@@ -4,13 +4,11 @@
 //! for how a recording is encoded.
 
 mod error;
-mod inputs;
 mod integrate;
 mod latent;
 mod rollout;
 
 pub use error::SimError;
-pub use inputs::with_input_statistics;
 pub use integrate::{Integration, IntegrationMethod, IntegrationOptions, OdeSystem, integrate};
-pub use latent::{LatentSegment, phase_rule};
+pub use latent::{LatentSegment, phase_rule, with_input_statistics};
 pub use rollout::{Restart, Rollout, Window, integrate_stretches, restart_windows, rollout};

@@ -4,13 +4,13 @@ use std::time::Instant;
 
 use super::command::Command;
 use super::control_model::{ControlModel, ControlPhase};
-use super::dynamics::LatentDynamics;
 use super::effectiveness::Effectiveness;
 use super::engine::Engine;
 use super::error::ControlError;
 use super::fallback::Memory;
 use super::horizon::{Contact, Horizon, StageInputs};
 use super::lift::{ConsistentLift, LiftFailure, StanceState};
+use super::linearise::LatentDynamics;
 use super::plan::Plan;
 use super::problem::{ROW_MARGIN, StageRows, row_selection};
 use super::qp::QpSolver;

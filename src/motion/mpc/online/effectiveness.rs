@@ -32,7 +32,7 @@ pub const LARGEST_WEIGHT: f64 = 2.0;
 pub const RANGE: (f64, f64) = (0.7, 1.3);
 
 /// The estimate and the sums behind it.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Effectiveness {
     estimate: f64,
     /// Weights, and weights times what they say, of the steps so far.
@@ -41,9 +41,9 @@ pub(super) struct Effectiveness {
     /// `φᵀ φ` of the first step.
     unit: Option<f64>,
     /// Whether the plan's first stage has feet on the ground, and the change of the velocities at its
-    /// end by its input, row by row.
+    /// end by its input.
     is_grounded: bool,
-    by_input: Vec<f64>,
+    by_input: DMatrix<f64>,
     /// Posture and joint velocities that the motors' PD holds; none before a command.
     held: Option<[[f64; JOINT_DIM]; 2]>,
     /// Latent input of the PD at the last command, and at the present measurement.
@@ -56,14 +56,10 @@ impl Effectiveness {
     pub(super) fn full(latent_dim: usize) -> Self {
         Self {
             estimate: 1.0,
-            weight: 0.0,
-            weighted: 0.0,
-            unit: None,
-            is_grounded: false,
-            by_input: vec![0.0; latent_dim * latent_dim],
-            held: None,
+            by_input: DMatrix::zeros(latent_dim, latent_dim),
             at_command: vec![0.0; latent_dim],
             drives: vec![0.0; latent_dim],
+            ..Self::default()
         }
     }
 
@@ -77,9 +73,7 @@ impl Effectiveness {
     pub(super) fn begin(&mut self, by_input: &DMatrix<f64>, is_grounded: bool) {
         self.is_grounded = is_grounded;
         let d = self.drives.len();
-        for (entry, value) in self.by_input.iter_mut().enumerate() {
-            *value = by_input[(d + entry / d, entry % d)];
-        }
+        self.by_input.copy_from(&by_input.rows(d, d));
     }
 
     /// Keeps what was commanded at a measurement: posture and joint velocities.
@@ -125,7 +119,7 @@ impl Effectiveness {
         for i in 0..d {
             let (mut by_plan, mut by_drives) = (0.0, 0.0);
             for k in 0..d {
-                let by_input = share * self.by_input[i * d + k] / deviation[i];
+                let by_input = share * self.by_input[(i, k)] / deviation[i];
                 by_plan += by_input * input[k];
                 by_drives += by_input * (0.5 * (self.at_command[k] + self.drives[k]));
             }

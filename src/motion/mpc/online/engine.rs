@@ -99,43 +99,33 @@ impl Engine {
         }
     }
 
-    /// Latent input of a stage in the solution, `u_r + C_p û`.
-    pub(super) fn input(&self, index: usize, step: &StepData<'_>, out: &mut [f64]) {
-        let scaled = match self {
-            Self::Conic {
-                transcription,
-                solver,
-            } => transcription.input(index, solver.solution()),
-            Self::Structured(program) => program.input(index),
-        };
-        let stage = &step.stages[index];
-        let root = &step.phases[stage.phase].latent_root;
-        for (row, out) in out.iter_mut().enumerate() {
-            let mut sum = 0.0;
-            for (col, scaled) in scaled[..=row].iter().enumerate() {
-                sum += root[(row, col)] * scaled;
-            }
-            *out = stage.input[row] + sum;
-        }
-    }
-
-    /// Latent state at a stage's end in the solution, `x_r⁺ + σ x̂⁺`, with `reference` the reference state there.
-    pub(super) fn state(
+    /// Writes what a stage has in the solution: its latent input `u_r + C_p û` and the latent state at
+    /// its end `x_r⁺ + σ x̂⁺`, with `reference` the reference state there.
+    pub(super) fn write(
         &self,
         index: usize,
         step: &StepData<'_>,
         reference: &[f64],
-        out: &mut [f64],
+        (input, end): (&mut [f64], &mut [f64]),
     ) {
-        let scaled = match self {
+        let (scaled_input, scaled_end) = match self {
             Self::Conic {
                 transcription,
                 solver,
-            } => transcription.state(index, solver.solution()),
-            Self::Structured(program) => program.state(index),
+            } => transcription.stage(index, solver.solution()),
+            Self::Structured(program) => program.stage(index),
         };
-        for (row, out) in out.iter_mut().enumerate() {
-            *out = reference[row] + step.deviation[row] * scaled[row];
+        let stage = &step.stages[index];
+        let root = &step.phases[stage.phase].latent_root;
+        for (row, out) in input.iter_mut().enumerate() {
+            let mut sum = 0.0;
+            for (col, scaled) in scaled_input[..=row].iter().enumerate() {
+                sum += root[(row, col)] * scaled;
+            }
+            *out = stage.input[row] + sum;
+        }
+        for (row, out) in end.iter_mut().enumerate() {
+            *out = reference[row] + step.deviation[row] * scaled_end[row];
         }
     }
 }

@@ -23,7 +23,7 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use super::control_model::{ControlModel, ControlPhase};
 use super::dense::{factorise, solve_lower, solve_upper};
-use super::dynamics::LatentDynamics;
+use super::linearise::LatentDynamics;
 
 /// Half width of the window in which velocities are fitted by a straight line, s.
 pub const HALF_WINDOW_S: f64 = 0.016 + 1e-9;

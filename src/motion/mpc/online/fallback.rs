@@ -9,7 +9,7 @@ use super::lift::StanceState;
 use crate::robot::JOINT_DIM;
 
 /// What a fallback goes back to.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Memory {
     pub measured: Vec<f64>,
     pub input: Vec<f64>,
@@ -30,12 +30,7 @@ impl Memory {
         Self {
             measured: vec![0.0; 2 * latent_dim],
             input: vec![0.0; latent_dim],
-            stance: None,
-            joint_velocity: [0.0; JOINT_DIM],
-            feed_forward_nm: [0.0; JOINT_DIM],
-            joint_position: None,
-            command_s: None,
-            disbelieved: 0,
+            ..Self::default()
         }
     }
 }

@@ -1,8 +1,7 @@
 //! The stages of the horizon at a control step: phases, reference, linearised dynamics.
 
 use super::control_model::ControlModel;
-use super::dynamics::LatentDynamics;
-use super::linearise::{Lineariser, StageModel};
+use super::linearise::{LatentDynamics, Lineariser, StageModel};
 use super::plan::Plan;
 use super::problem::StageRows;
 use super::reference::Reference;

@@ -99,43 +99,48 @@ impl Layout {
         self.force_row(self.rows.friction.as_ref().map_or(0, |_| self.horizon))
     }
 
-    /// Every entry of `A` that may be nonzero, as (row, column).
-    pub fn pattern(&self) -> Vec<(usize, usize)> {
+    /// The dense blocks of a stage, row by row: dynamics by its input and by the state before; torque
+    /// rows by the input; rate rows by the input and by the one before; joint rows by the state; cone rows
+    /// by the input. What is by the stage before is empty for the first.
+    pub fn blocks(&self, stage: usize) -> [Vec<(usize, usize)>; 7] {
         let (d, rows) = (self.latent_dim, &self.rows);
         let [torques, rates, joints] = [&rows.torque, &rows.rate, &rows.joint].map(Vec::len);
-        let mut entries = Vec::new();
-        for stage in 0..self.horizon {
-            let (input, state) = (self.input_column(stage), self.state_column(stage));
-            let (dynamics, rate) = (self.dynamics_row(stage), self.rate_row(stage));
-            entries.extend(block(dynamics, 2 * d, input, d));
-            entries.extend((0..2 * d).map(|index| (dynamics + index, state + index)));
-            if stage > 0 {
-                let (input, state) = (self.input_column(stage - 1), self.state_column(stage - 1));
-                entries.extend(block(dynamics, 2 * d, state, 2 * d));
-                entries.extend(block(rate, rates, input, d));
-            }
-            entries.extend(block(self.torque_row(stage), torques, input, d));
-            entries.extend(block(rate, rates, input, d));
-            entries.extend(block(self.joint_row(stage), joints, state, d));
-            if self.has_slack {
-                let slack = self.slack_column(stage);
-                let slacked = self.joint_row(stage)..=self.slack_row(stage);
-                entries.extend(slacked.map(|row| (row, slack)));
-            }
-            if self.rows.friction.is_some() {
-                entries.extend(block(self.force_row(stage), 3, input, d));
-            }
-        }
-        entries
+        let forces = rows.friction.as_ref().map_or(0, |_| 3);
+        let (input, dynamics) = (self.input_column(stage), self.dynamics_row(stage));
+        let rate = self.rate_row(stage);
+        let [by_state, by_input_before] = match stage.checked_sub(1) {
+            None => [Vec::new(), Vec::new()],
+            Some(before) => [
+                block(dynamics, 2 * d, self.state_column(before), 2 * d),
+                block(rate, rates, self.input_column(before), d),
+            ],
+        };
+        [
+            block(dynamics, 2 * d, input, d),
+            by_state,
+            block(self.torque_row(stage), torques, input, d),
+            block(rate, rates, input, d),
+            by_input_before,
+            block(self.joint_row(stage), joints, self.state_column(stage), d),
+            block(self.force_row(stage), forces, input, d),
+        ]
+    }
+
+    /// Entries that are -1 at all times: the state that a stage leads to, and its slack.
+    pub fn constants(&self, stage: usize) -> Vec<(usize, usize)> {
+        let (row, column) = (self.dynamics_row(stage), self.state_column(stage));
+        let states = (0..2 * self.latent_dim).map(|index| (row + index, column + index));
+        let slacked = self.joint_row(stage)..=self.slack_row(stage);
+        let slacks = slacked.filter(|_| self.has_slack);
+        states
+            .chain(slacks.map(|row| (row, self.slack_column(stage))))
+            .collect()
     }
 }
 
 /// The entries of a dense block.
-pub fn block(
-    row: usize,
-    n_rows: usize,
-    col: usize,
-    n_cols: usize,
-) -> impl Iterator<Item = (usize, usize)> {
-    (row..row + n_rows).flat_map(move |row| (col..col + n_cols).map(move |col| (row, col)))
+fn block(row: usize, n_rows: usize, col: usize, n_cols: usize) -> Vec<(usize, usize)> {
+    let columns = col..col + n_cols;
+    let rows = (row..row + n_rows).flat_map(|row| columns.clone().map(move |col| (row, col)));
+    rows.collect()
 }

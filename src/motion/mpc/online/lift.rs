@@ -25,10 +25,10 @@ use nalgebra::Matrix3;
 
 use super::control_model::ControlModel;
 use super::error::ControlError;
-use super::lift_cones::ConeLift;
+use super::lift_cones::{empty_program, lift_in_cones};
 use super::lift_pyramids::PyramidLift;
 use super::problem::upright;
-use super::qp::{Outcome, QpSettings};
+use super::qp::{Outcome, QpSettings, QpSolver};
 use super::settings::{MpcSettings, Solver};
 use crate::robot::{ContactFlags, FOOT_DIM, GRAVITY_M_S2, JOINT_DIM, Leg};
 
@@ -49,6 +49,19 @@ pub struct StanceState {
     /// What the joints take of the motors' torques, N m, at most the torque limits; zero in a model
     /// without actuators.
     pub losses_nm: [f64; JOINT_DIM],
+}
+
+impl StanceState {
+    /// At a state (18, SI units), without losses.
+    pub fn at(x: &[f64], feet: ContactFlags, phase: usize) -> Self {
+        Self {
+            joints_rad: std::array::from_fn(|joint| x[joint]),
+            attitude_rad: std::array::from_fn(|angle| x[15 + angle]),
+            feet,
+            phase,
+            losses_nm: [0.0; JOINT_DIM],
+        }
+    }
 }
 
 /// Why no torques were found.
@@ -101,7 +114,7 @@ pub(super) struct LiftProblem<'a> {
 
 #[derive(Debug)]
 enum Method {
-    Cones(Box<ConeLift>),
+    Cones(Box<QpSolver>),
     Pyramids(Box<PyramidLift>),
 }
 
@@ -126,11 +139,14 @@ impl ConsistentLift {
     pub fn new(plant: &ControlModel, settings: &MpcSettings) -> Result<Self, ControlError> {
         let d = plant.latent_dim();
         let method = match settings.solver {
-            Solver::Clarabel => Method::Cones(Box::new(ConeLift::new(QpSettings {
-                max_iterations: LIFT_ITERATIONS,
-                tolerance: 1e-8,
-                ..settings.qp
-            })?)),
+            Solver::Clarabel => {
+                let settings = QpSettings {
+                    max_iterations: LIFT_ITERATIONS,
+                    tolerance: 1e-8,
+                    ..settings.qp
+                };
+                Method::Cones(Box::new(QpSolver::new(empty_program(), settings)?))
+            }
             Solver::Riccati => Method::Pyramids(Box::new(PyramidLift::new(
                 d,
                 plant.phases(),
@@ -197,7 +213,7 @@ impl ConsistentLift {
         };
         let phase = &plant.phases()[stance.phase];
         let (torque, iterations) = match &mut self.method {
-            Method::Cones(cones) => cones.lift(phase, &problem, &self.rules),
+            Method::Cones(solver) => lift_in_cones(solver, phase, &problem, &self.rules),
             Method::Pyramids(pyramids) => {
                 pyramids.lift((stance.phase, phase), &problem, &self.rules)
             }
@@ -221,11 +237,9 @@ pub fn foot_forces(
     let turned = upright([roll, pitch]);
     let rotation = Matrix3::from_fn(|row, col| turned[row][col]);
     let mut forces = [None; FOOT_DIM];
-    for leg in Leg::ALL {
-        if stance.feet[leg.index()] {
-            let joints = leg.of_joints(&stance.joints_rad);
-            forces[leg.index()] = Some(rotation * plant.robot().foot_force_map(leg, &joints).ok()?);
-        }
+    for leg in Leg::down(stance.feet) {
+        let joints = leg.of_joints(&stance.joints_rad);
+        forces[leg.index()] = Some(rotation * plant.robot().foot_force_map(leg, &joints).ok()?);
     }
     Some(forces)
 }

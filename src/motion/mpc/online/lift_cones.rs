@@ -3,9 +3,8 @@
 use nalgebra::{Cholesky, SMatrix, SVector};
 
 use super::control_model::ControlPhase;
-use super::error::ControlError;
 use super::lift::{LiftFailure, LiftProblem, LiftRules};
-use super::qp::{Cone, ConeProgram, Outcome, QpSettings, QpSolver};
+use super::qp::{Cone, ConeProgram, Outcome, QpSolver};
 use super::sparse::SparseColumns;
 use crate::robot::{FOOT_DIM, JOINT_DIM};
 
@@ -15,89 +14,71 @@ type TorqueSquare = SMatrix<f64, JOINT_DIM, JOINT_DIM>;
 /// Rows of the two sides of the torque limits.
 const BOUND_ROWS: usize = 2 * JOINT_DIM;
 
-/// The program with its persistent solver.
-#[derive(Debug)]
-pub(super) struct ConeLift {
-    solver: QpSolver,
+/// Torques at the links, N m, and interior-point iterations: zero if the optimum without
+/// constraints keeps them; `solver` is one of [`empty_program`].
+pub(super) fn lift_in_cones(
+    solver: &mut QpSolver,
+    phase: &ControlPhase,
+    problem: &LiftProblem<'_>,
+    rules: &LiftRules,
+) -> (Result<[f64; JOINT_DIM], LiftFailure>, u32) {
+    let (hessian, gradient) = cost(phase, problem, rules.prior_weight);
+    if let Some(factor) = Cholesky::new(hessian) {
+        let torque = factor.solve(&-gradient);
+        if is_allowed(&torque, problem, rules) {
+            return (Ok(torque.into()), 0);
+        }
+    }
+    let torque = solve(solver, &hessian, &gradient, problem, rules);
+    (torque, solver.iterations())
 }
 
-impl ConeLift {
-    /// Prepares the program.
-    ///
-    /// # Errors
-    /// [`ControlError::Solver`] if clarabel refuses it.
-    pub(super) fn new(settings: QpSettings) -> Result<Self, ControlError> {
-        Ok(Self {
-            solver: QpSolver::new(empty_program(), settings)?,
-        })
+fn solve(
+    solver: &mut QpSolver,
+    hessian: &TorqueSquare,
+    gradient: &Torque,
+    problem: &LiftProblem<'_>,
+    rules: &LiftRules,
+) -> Result<[f64; JOINT_DIM], LiftFailure> {
+    let (limit, losses) = (&rules.limit_nm, problem.losses_nm);
+    let program = solver.program_mut();
+    // Torques as shares of their limits, the cost with a largest curvature of one.
+    let scaled = |row: usize, col: usize| hessian[(row, col)] * limit[row] * limit[col];
+    let curvatures = (0..JOINT_DIM).map(|i| scaled(i, i));
+    let cost_scale = 1.0 / curvatures.fold(f64::MIN_POSITIVE, f64::max);
+    for col in 0..JOINT_DIM {
+        for row in 0..=col {
+            program.p.set(row, col, cost_scale * scaled(row, col));
+        }
+        program.q[col] = cost_scale * gradient[col] * limit[col];
+        program.b[col] = 1.0 - losses[col] / limit[col];
+        program.b[JOINT_DIM + col] = 1.0 + losses[col] / limit[col];
     }
-
-    /// Torques at the links, N m, and interior-point iterations: zero if the optimum without
-    /// constraints keeps them.
-    pub(super) fn lift(
-        &mut self,
-        phase: &ControlPhase,
-        problem: &LiftProblem<'_>,
-        rules: &LiftRules,
-    ) -> (Result<[f64; JOINT_DIM], LiftFailure>, u32) {
-        let (hessian, gradient) = cost(phase, problem, rules.prior_weight);
-        if let Some(factor) = Cholesky::new(hessian) {
-            let torque = factor.solve(&-gradient);
-            if is_allowed(&torque, problem, rules) {
-                return (Ok(torque.into()), 0);
+    for (leg, force) in problem.forces.iter().enumerate() {
+        let first_row = BOUND_ROWS + 3 * leg;
+        let axes = [(2, rules.friction), (0, 1.0), (1, 1.0)].into_iter();
+        for (row, (axis, factor)) in (first_row..).zip(axes) {
+            for k in 0..3 {
+                let joint = 3 * leg + k;
+                let entry = force.map_or(0.0, |map| factor * map[(axis, k)] / rules.weight_n);
+                program.a.set(row, joint, -entry * limit[joint]);
             }
         }
-        let torque = self.solve(&hessian, &gradient, problem, rules);
-        (torque, self.solver.iterations())
+        // A foot in the air has the cone's axis as its slack: strictly inside.
+        program.b[first_row] = if force.is_some() { 0.0 } else { 1.0 };
     }
-
-    fn solve(
-        &mut self,
-        hessian: &TorqueSquare,
-        gradient: &Torque,
-        problem: &LiftProblem<'_>,
-        rules: &LiftRules,
-    ) -> Result<[f64; JOINT_DIM], LiftFailure> {
-        let (limit, losses) = (&rules.limit_nm, problem.losses_nm);
-        let program = self.solver.program_mut();
-        // Torques as shares of their limits, the cost with a largest curvature of one.
-        let scaled = |row: usize, col: usize| hessian[(row, col)] * limit[row] * limit[col];
-        let curvatures = (0..JOINT_DIM).map(|i| scaled(i, i));
-        let cost_scale = 1.0 / curvatures.fold(f64::MIN_POSITIVE, f64::max);
-        for col in 0..JOINT_DIM {
-            for row in 0..=col {
-                program.p.set(row, col, cost_scale * scaled(row, col));
-            }
-            program.q[col] = cost_scale * gradient[col] * limit[col];
-            program.b[col] = 1.0 - losses[col] / limit[col];
-            program.b[JOINT_DIM + col] = 1.0 + losses[col] / limit[col];
+    match solver.solve() {
+        Outcome::Solved => {
+            let solution = solver.solution();
+            Ok(std::array::from_fn(|joint| {
+                rules.within_limit(solution[joint] * limit[joint], joint, losses)
+            }))
         }
-        for (leg, force) in problem.forces.iter().enumerate() {
-            let first_row = BOUND_ROWS + 3 * leg;
-            let axes = [(2, rules.friction), (0, 1.0), (1, 1.0)].into_iter();
-            for (row, (axis, factor)) in (first_row..).zip(axes) {
-                for k in 0..3 {
-                    let joint = 3 * leg + k;
-                    let entry = force.map_or(0.0, |map| factor * map[(axis, k)] / rules.weight_n);
-                    program.a.set(row, joint, -entry * limit[joint]);
-                }
-            }
-            // A foot in the air has the cone's axis as its slack: strictly inside.
-            program.b[first_row] = if force.is_some() { 0.0 } else { 1.0 };
-        }
-        match self.solver.solve() {
-            Outcome::Solved => {
-                let solution = self.solver.solution();
-                Ok(std::array::from_fn(|joint| {
-                    rules.within_limit(solution[joint] * limit[joint], joint, losses)
-                }))
-            }
-            outcome @ (Outcome::Inaccurate
-            | Outcome::Infeasible
-            | Outcome::Unbounded
-            | Outcome::IterationCap
-            | Outcome::NumericalFailure) => Err(LiftFailure::Solver(outcome)),
-        }
+        outcome @ (Outcome::Inaccurate
+        | Outcome::Infeasible
+        | Outcome::Unbounded
+        | Outcome::IterationCap
+        | Outcome::NumericalFailure) => Err(LiftFailure::Solver(outcome)),
     }
 }
 
@@ -132,7 +113,7 @@ fn is_allowed(torque: &Torque, problem: &LiftProblem<'_>, rules: &LiftRules) -> 
 }
 
 /// Torque bounds, and a friction cone for each foot; costs and cones are filled at each lift.
-fn empty_program() -> ConeProgram {
+pub(super) fn empty_program() -> ConeProgram {
     let upper: Vec<(usize, usize)> = (0..JOINT_DIM)
         .flat_map(|col| (0..=col).map(move |row| (row, col)))
         .collect();

@@ -26,6 +26,10 @@ use crate::robot::{FOOT_DIM, JOINT_DIM};
 use crate::solver::{Cost, Links, Program, RowMatrices, Settings, Shape, Stage};
 
 type Torque = [f64; JOINT_DIM];
+type Lifted = (Result<Torque, LiftFailure>, u32);
+
+/// No lift at all.
+const BROKEN: Lifted = (Err(LiftFailure::Solver(Outcome::NumericalFailure)), 0);
 
 /// Curvature of the cost as the solver has it: `CURVATURE / 2 ‖v‖²`. Inputs a few deviations beyond the
 /// limits then have multipliers near those at which its iterations begin.
@@ -98,14 +102,13 @@ impl PyramidLift {
         phase: (usize, &ControlPhase),
         problem: &LiftProblem<'_>,
         rules: &LiftRules,
-    ) -> (Result<Torque, LiftFailure>, u32) {
-        let failed = Err(LiftFailure::Solver(Outcome::NumericalFailure));
+    ) -> Lifted {
         let Some(deviation) = self.deviation[phase.0] else {
-            return (failed, 0);
+            return BROKEN;
         };
         let mean: Torque = phase.1.torque_mean.into();
         let Some(y) = self.free_optimum(&deviation, &mean, problem, rules) else {
-            return (failed, 0);
+            return BROKEN;
         };
         let torque = torque_of(&deviation, &mean, &y);
         let count = self.write_rows(&torque, problem, rules);
@@ -206,12 +209,7 @@ impl PyramidLift {
     }
 
     /// The solution under the first `count` rows, from the optimum without them.
-    fn solve(
-        &mut self,
-        deviation: &[Torque; JOINT_DIM],
-        mut y: Torque,
-        count: usize,
-    ) -> (Result<Torque, LiftFailure>, u32) {
+    fn solve(&mut self, deviation: &[Torque; JOINT_DIM], mut y: Torque, count: usize) -> Lifted {
         let mut hessian = [0.0; JOINT_DIM * JOINT_DIM];
         for i in 0..JOINT_DIM {
             for j in 0..=i {
@@ -223,7 +221,7 @@ impl PyramidLift {
             }
         }
         if !factorise(&mut hessian, JOINT_DIM) {
-            return (Err(LiftFailure::Solver(Outcome::NumericalFailure)), 0);
+            return BROKEN;
         }
         for row in &mut self.rows[..count] {
             let mut by_deviation = [0.0; JOINT_DIM];
@@ -260,7 +258,7 @@ impl PyramidLift {
         };
         program.bounds_mut(0).copy_from_slice(&self.room[..count]);
         if !prepare(&mut program) {
-            return (Err(LiftFailure::Solver(Outcome::NumericalFailure)), 0);
+            return BROKEN;
         }
         let report = solve(&mut program, &[0.0], false, &self.settings);
         let outcome = outcome_of(report.outcome);

@@ -19,7 +19,29 @@
 //! So `A` and `B` are derivatives of the discrete map to rounding, not approximations of a matrix
 //! exponential.
 
+use std::fmt::Debug;
+
 use nalgebra::{DMatrix, DVector};
+
+/// The latent accelerations of every phase with their derivatives.
+///
+/// The interpreter's programs and the generated code of a controller both are.
+pub trait LatentDynamics: Debug + Send {
+    /// Writes `ddz = Xiᵀ Θ(z, dz, u_lat)` of a phase and its dense Jacobian by `(z, dz, u_lat)`,
+    /// `latent_dim × 3 latent_dim`.
+    ///
+    /// # Panics
+    /// May panic if the phase does not exist or a length does not fit.
+    fn jacobian(
+        &mut self,
+        phase: usize,
+        z: &[f64],
+        dz: &[f64],
+        u_lat: &[f64],
+        ddz: &mut [f64],
+        jacobian: &mut DMatrix<f64>,
+    );
+}
 
 /// Runge-Kutta step of one stage and its derivatives.
 #[derive(Debug, Clone, PartialEq)]
@@ -213,23 +235,5 @@ mod tests {
                 assert!(off < 1e-8, "row {row}, column {col}");
             }
         }
-    }
-
-    #[test]
-    fn step_of_a_linear_oscillator_is_the_taylor_polynomial_of_order_four() {
-        let mut stage = StageModel::zeros(1);
-        let oscillator =
-            |z: &[f64], _: &[f64], u: &[f64], ddz: &mut [f64], jacobian: &mut DMatrix<f64>| {
-                ddz[0] = -z[0] + u[0];
-                jacobian.copy_from(&DMatrix::from_row_slice(1, 3, &[-1.0, 0.0, 1.0]));
-            };
-        let h: f64 = 0.5;
-        Lineariser::new(1).stage(&[2.0, 0.0], &[0.0], h, oscillator, &mut stage);
-        let cosine = 1.0 - h.powi(2) / 2.0 + h.powi(4) / 24.0;
-        let sine = h - h.powi(3) / 6.0;
-        assert!((stage.a[(0, 0)] - cosine).abs() < 1e-15);
-        assert!((stage.a[(0, 1)] - sine).abs() < 1e-15);
-        assert!((stage.next[0] - 2.0 * cosine).abs() < 1e-15);
-        assert!((stage.b[(0, 0)] - (1.0 - cosine)).abs() < 1e-15);
     }
 }

@@ -9,7 +9,6 @@ mod command;
 mod control_model;
 mod controller;
 mod dense;
-mod dynamics;
 mod effectiveness;
 mod engine;
 mod error;
@@ -22,7 +21,6 @@ pub(super) mod lift;
 mod lift_cones;
 mod lift_pyramids;
 pub mod linearise;
-mod nonlinear;
 mod plan;
 pub mod problem;
 mod prune;
@@ -56,13 +54,12 @@ pub mod widest {
 }
 
 pub use command::{Command, Source, Status};
-pub use control_model::{ControlModel, ControlModelParts, ControlPhase};
+pub use control_model::{ControlModel, ControlModelParts, ControlPhase, InputMaps, NonlinearMaps};
 pub use controller::{Controller, Measurement};
-pub use dynamics::LatentDynamics;
 pub use error::ControlError;
 pub use estimate::InputGivenState;
 pub use lift::{ConsistentLift, LiftFailure, StanceState, foot_forces};
-pub use nonlinear::{InputMaps, NonlinearMaps};
+pub use linearise::LatentDynamics;
 pub use plan::Plan;
 pub use problem::{to_upright, upright};
 pub use prune::needed_rows;

@@ -7,25 +7,23 @@ pub const POSTURE_SHARE: f64 = 0.9;
 /// Inputs and states of a solved horizon.
 #[derive(Debug, Clone)]
 pub struct Plan {
-    latent_dim: usize,
     step_s: f64,
     start_s: Option<f64>,
     phase: usize,
-    inputs: Vec<f64>,
+    pub(super) inputs: Vec<Vec<f64>>,
     /// States at the beginning of each stage and at the end of the last.
-    states: Vec<f64>,
+    pub(super) states: Vec<Vec<f64>>,
 }
 
 impl Plan {
     /// Memory for a plan; there is none yet.
     pub(super) fn new(latent_dim: usize, horizon: usize, step_s: f64) -> Self {
         Self {
-            latent_dim,
             step_s,
             start_s: None,
             phase: 0,
-            inputs: vec![0.0; horizon * latent_dim],
-            states: vec![0.0; (horizon + 1) * 2 * latent_dim],
+            inputs: vec![vec![0.0; latent_dim]; horizon],
+            states: vec![vec![0.0; 2 * latent_dim]; horizon + 1],
         }
     }
 
@@ -34,12 +32,11 @@ impl Plan {
         self.start_s = None;
     }
 
-    /// Begins a new plan at a time with the state measured then; inputs and states follow through
-    /// [`Plan::input_mut`] and [`Plan::end_mut`].
+    /// Begins a new plan at a time with the state measured then; inputs and states follow.
     pub(super) fn begin(&mut self, start_s: f64, phase: usize, state: &[f64]) {
         self.start_s = Some(start_s);
         self.phase = phase;
-        self.states[..2 * self.latent_dim].copy_from_slice(state);
+        self.states[0].copy_from_slice(state);
     }
 
     /// Duration of a stage, s.
@@ -59,16 +56,6 @@ impl Plan {
         self.phase
     }
 
-    /// Input of a stage, to be overwritten.
-    pub(super) fn input_mut(&mut self, stage: usize) -> &mut [f64] {
-        &mut self.inputs[stage * self.latent_dim..][..self.latent_dim]
-    }
-
-    /// State at the end of a stage, to be overwritten.
-    pub(super) fn end_mut(&mut self, stage: usize) -> &mut [f64] {
-        &mut self.states[(stage + 1) * 2 * self.latent_dim..][..2 * self.latent_dim]
-    }
-
     /// The stage that a time belongs to, counted from the plan's first; none before the plan or
     /// without one.
     pub fn stage_at(&self, time_s: f64) -> Option<usize> {
@@ -84,24 +71,23 @@ impl Plan {
 
     /// Input of a stage.
     pub fn input(&self, stage: usize) -> &[f64] {
-        &self.inputs[stage * self.latent_dim..][..self.latent_dim]
+        &self.inputs[stage]
     }
 
     /// State at the beginning of a stage.
     pub fn start(&self, stage: usize) -> &[f64] {
-        &self.states[stage * 2 * self.latent_dim..][..2 * self.latent_dim]
+        &self.states[stage]
     }
 
     /// State at the end of a stage.
     pub fn end(&self, stage: usize) -> &[f64] {
-        &self.states[(stage + 1) * 2 * self.latent_dim..][..2 * self.latent_dim]
+        &self.states[stage + 1]
     }
 
     /// State and input that the plan has at a time, beyond its end those of its last stage; none
     /// without a plan.
     pub fn at(&self, time_s: f64) -> Option<(&[f64], &[f64])> {
-        let last = self.inputs.len() / self.latent_dim - 1;
-        let stage = self.stage_at(time_s)?.min(last);
+        let stage = self.stage_at(time_s)?.min(self.inputs.len() - 1);
         Some((self.start(stage), self.input(stage)))
     }
 
@@ -114,7 +100,7 @@ impl Plan {
         deviation: &[f64],
     ) -> Option<f64> {
         let passed = (time_s - self.start_s?) / self.step_s;
-        let stages = self.inputs.len() / self.latent_dim;
+        let stages = self.inputs.len();
         if !(passed >= 0.0 && passed <= stages as f64) {
             return None;
         }

@@ -12,7 +12,7 @@
 //! [`Outcome`], and it is `Solved` only if the optimality conditions hold for the returned point
 //! by [`QpSolver::residuals`], which is computed here from the problem's own data.
 
-use clarabel::algebra::CscMatrix;
+pub use clarabel::algebra::CscMatrix;
 use clarabel::solver::{
     DefaultSettings, DefaultSettingsBuilder, DefaultSolver, IPSolver, SolverStatus, SupportedConeT,
 };
@@ -160,9 +160,9 @@ impl QpSolver {
         let cones: Vec<SupportedConeT<f64>> =
             program.cones.iter().map(|&cone| supported(cone)).collect();
         let solver = DefaultSolver::new(
-            &to_csc(&program.p),
+            program.p.csc(),
             &program.q,
-            &to_csc(&program.a),
+            program.a.csc(),
             &program.b,
             &cones,
             clarabel_settings(&settings),
@@ -194,19 +194,18 @@ impl QpSolver {
         &mut self.program
     }
 
-    /// The settings the solver was built with.
-    pub fn settings(&self) -> &QpSettings {
-        &self.settings
-    }
-
     /// Solves the program with its present values.
     pub fn solve(&mut self) -> Outcome {
         if !self.data_is_finite() {
             return Outcome::NumericalFailure;
         }
-        let updated = self.solver.update_q(&self.program.q).is_ok()
-            && self.solver.update_b(&self.program.b).is_ok()
-            && self.update_matrices();
+        // An iterator of all positions would do without whole vectors, at the price of a division per
+        // entry inside clarabel: whole-vector updates are copied as they are.
+        let (program, solver) = (&self.program, &mut self.solver);
+        let updated = solver.update_q(&program.q).is_ok()
+            && solver.update_b(&program.b).is_ok()
+            && solver.update_P(&program.p.csc().nzval).is_ok()
+            && solver.update_A(&program.a.csc().nzval).is_ok();
         if !updated {
             return Outcome::NumericalFailure;
         }
@@ -241,13 +240,6 @@ impl QpSolver {
             && finite(&self.program.b)
             && finite(self.program.p.values())
             && finite(self.program.a.values())
-    }
-
-    fn update_matrices(&mut self) -> bool {
-        // An iterator of all positions would do without the two vectors, at the price of a
-        // division per entry inside clarabel: whole-vector updates are copied as they are.
-        self.solver.update_P(self.program.p.values_vec()).is_ok()
-            && self.solver.update_A(self.program.a.values_vec()).is_ok()
     }
 
     fn outcome(&self) -> Outcome {
@@ -353,16 +345,6 @@ fn supported(cone: Cone) -> SupportedConeT<f64> {
         Cone::Nonnegative(dim) => SupportedConeT::NonnegativeConeT(dim),
         Cone::SecondOrder(dim) => SupportedConeT::SecondOrderConeT(dim),
     }
-}
-
-fn to_csc(matrix: &SparseColumns) -> CscMatrix<f64> {
-    CscMatrix::new(
-        matrix.n_rows(),
-        matrix.n_cols(),
-        matrix.column_start().to_vec(),
-        matrix.row_index().to_vec(),
-        matrix.values().to_vec(),
-    )
 }
 
 fn clarabel_settings(settings: &QpSettings) -> DefaultSettings<f64> {

@@ -1,9 +1,9 @@
 //! The trajectory that the controller follows, in latent coordinates.
 
 use super::control_model::ControlModel;
-use super::dynamics::LatentDynamics;
 use super::error::ControlError;
 use super::estimate::{Motion, estimate_input};
+use super::linearise::LatentDynamics;
 use crate::robot::{ContactFlags, FOOT_DIM, STATE_DIM};
 
 /// A trajectory in SI units as its user has it: samples one after the other.

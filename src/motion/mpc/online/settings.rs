@@ -192,23 +192,19 @@ impl MpcSettings {
     /// # Errors
     /// [`ControlError::Setting`] names the first one that is out of its range.
     pub fn check(&self) -> Result<(), ControlError> {
-        let check = |name, found, is_allowed: bool, expected| match is_allowed {
-            true => Ok(()),
-            false => Err(ControlError::Setting {
-                name,
-                found,
-                expected,
-            }),
+        let refused = |(name, found), expected| ControlError::Setting {
+            name,
+            found,
+            expected,
         };
-        let has_stages = (1..=MAX_HORIZON).contains(&self.horizon);
-        check(
-            "horizon",
-            self.horizon as f64,
-            has_stages,
-            "1 to 500 stages",
-        )?;
-        let effectiveness = self.effectiveness.as_ref();
-        let time_s = effectiveness.map_or(1.0, |effectiveness| effectiveness.time_constant_s);
+        if !(1..=MAX_HORIZON).contains(&self.horizon) {
+            return Err(refused(("horizon", self.horizon as f64), "1 to 500 stages"));
+        }
+        let effectiveness = self.effectiveness.unwrap_or(Effectiveness {
+            time_constant_s: 1.0,
+            stiffness_nm_rad: 0.0,
+            damping_nm_s_rad: 0.0,
+        });
         let positive = [
             ("step_s", self.step_s),
             ("input_weight", self.input_weight),
@@ -219,33 +215,30 @@ impl MpcSettings {
             ("lift_prior_weight", self.lift_prior_weight),
             ("body_friction", self.body_friction.unwrap_or(1.0)),
             ("torque_rate_nm_s", self.torque_rate_nm_s.unwrap_or(1.0)),
-            ("effectiveness_time_s", time_s),
+            ("effectiveness_time_s", effectiveness.time_constant_s),
             ("qp.tolerance", self.qp.tolerance),
             ("qp.accepted_residual", self.qp.accepted_residual),
             ("qp.max_iterations", f64::from(self.qp.max_iterations)),
             ("fallback.torque_decay_s", self.fallback.torque_decay_s),
             ("fallback.jump_deviations", self.fallback.jump_deviations),
         ];
-        for (name, found) in positive {
-            check(
-                name,
-                found,
-                found.is_finite() && found > 0.0,
-                "a positive number",
-            )?;
-        }
-        let mut not_negative = vec![
+        let not_negative = [
             ("fallback.damping_nm_s", self.fallback.damping_nm_s),
             ("swing_turn", self.swing_turn),
+            ("drive_stiffness_nm_rad", effectiveness.stiffness_nm_rad),
+            ("drive_damping_nm_s_rad", effectiveness.damping_nm_s_rad),
         ];
-        if let Some(effectiveness) = effectiveness {
-            not_negative.push(("drive_stiffness_nm_rad", effectiveness.stiffness_nm_rad));
-            not_negative.push(("drive_damping_nm_s_rad", effectiveness.damping_nm_s_rad));
+        let is_positive = |found: f64| found.is_finite() && found > 0.0;
+        if let Some(wrong) = positive.into_iter().find(|(_, found)| !is_positive(*found)) {
+            return Err(refused(wrong, "a positive number"));
         }
-        for (name, found) in not_negative {
-            let is_allowed = found.is_finite() && found >= 0.0;
-            check(name, found, is_allowed, "zero or a positive number")?;
+        let is_allowed = |found: f64| found == 0.0 || is_positive(found);
+        match not_negative
+            .into_iter()
+            .find(|(_, found)| !is_allowed(*found))
+        {
+            Some(wrong) => Err(refused(wrong, "zero or a positive number")),
+            None => Ok(()),
         }
-        Ok(())
     }
 }

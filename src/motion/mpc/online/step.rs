@@ -83,19 +83,13 @@ impl Controller {
         let (plan, engine) = (&mut self.plan, &self.engine);
         plan.begin(measurement.time_s, phase, &self.memory.measured);
         for stage in 0..self.settings.horizon {
-            engine.input(stage, &step, plan.input_mut(stage));
-            engine.state(stage, &step, self.horizon.end(stage), plan.end_mut(stage));
+            let of_stage = (&mut plan.inputs[stage][..], &mut plan.states[stage + 1][..]);
+            engine.write(stage, &step, self.horizon.end(stage), of_stage);
         }
         let (by_input, planned) = (&step.stages[0].model.b, &self.plant.phases()[phase]);
         self.effectiveness.begin(by_input, planned.is_grounded);
         command.slack = self.largest_violation();
-        self.memory.stance = Some(StanceState {
-            joints_rad: std::array::from_fn(|joint| measurement.x[joint]),
-            attitude_rad: std::array::from_fn(|angle| measurement.x[15 + angle]),
-            feet: measurement.feet,
-            phase,
-            losses_nm: [0.0; JOINT_DIM],
-        });
+        self.memory.stance = Some(StanceState::at(measurement.x, measurement.feet, phase));
         if !self.write_plan(0, command) {
             return Status::LiftFailed;
         }

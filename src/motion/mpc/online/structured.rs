@@ -45,11 +45,8 @@ pub(super) trait StructuredProgram: Debug + Send {
     /// Solves from the measurement; how it ended, and iterations.
     fn solve(&mut self, step: &StepData<'_>) -> (Outcome, u32);
 
-    /// Scaled input of a stage.
-    fn input(&self, stage: usize) -> &[f64];
-
-    /// Scaled state at a stage's end.
-    fn state(&self, stage: usize) -> &[f64];
+    /// Scaled input of a stage, and scaled state at its end.
+    fn stage(&self, stage: usize) -> (&[f64], &[f64]);
 }
 
 /// A program, or none for a latent dimension above [`MAX_STRUCTURED_DIM`]. An odd dimension is filled up to the next
@@ -370,11 +367,8 @@ impl<const NX: usize, const NU: usize, const LINKED: bool> StructuredProgram
         (outcome, report.iterations)
     }
 
-    fn input(&self, stage: usize) -> &[f64] {
-        &self.stages[self.place(stage)].v[..self.latent_dim]
-    }
-
-    fn state(&self, stage: usize) -> &[f64] {
-        &self.stages[self.place(stage)].x[..2 * self.latent_dim]
+    fn stage(&self, stage: usize) -> (&[f64], &[f64]) {
+        let (stage, dim) = (&self.stages[self.place(stage)], self.latent_dim);
+        (&stage.v[..dim], &stage.x[..2 * dim])
     }
 }

@@ -28,7 +28,7 @@ impl ControlModel {
             let Ok(map) = robot.damped_force_map(leg, &q) else {
                 continue;
             };
-            let foot = robot.hip_position(leg) + robot.foot_position(leg, &q);
+            let foot = robot.foot_from_body(leg, &q);
             let forward = (cosine - 1.0) * foot.x - sine * foot.z;
             let up = sine * foot.x + (cosine - 1.0) * foot.z;
             for joint in 0..3 {

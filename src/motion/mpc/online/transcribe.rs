@@ -6,7 +6,7 @@
 use nalgebra::DMatrix;
 
 use super::control_model::ControlPhase;
-use super::layout::{Layout, block};
+use super::layout::Layout;
 use super::linearise::StageModel;
 use super::problem::{Row, StageRows};
 use super::qp::{Cone, ConeProgram, dot};
@@ -90,13 +90,31 @@ struct StagePositions {
     force: Vec<usize>,
 }
 
+impl StagePositions {
+    fn of(blocks: [Vec<(usize, usize)>; 7], a: &SparseColumns) -> Self {
+        let [input, state, torque, rate, rate_before, joint, force] = blocks.map(|block| {
+            let positions = block.into_iter().map(|(row, col)| a.position(row, col));
+            positions
+                .map(|position| position.expect("block belongs to the pattern"))
+                .collect()
+        });
+        Self {
+            input,
+            state,
+            torque,
+            rate,
+            rate_before,
+            joint,
+            force,
+        }
+    }
+}
+
 /// Where each number of a step goes.
 #[derive(Debug, Clone)]
 pub struct Transcription {
     layout: Layout,
     positions: Vec<StagePositions>,
-    /// `T C_p` and the like, for the current phase.
-    work: Vec<f64>,
 }
 
 impl Transcription {
@@ -104,18 +122,17 @@ impl Transcription {
     pub fn new(latent_dim: usize, horizon: usize, rows: StageRows) -> (Self, ConeProgram) {
         let layout = Layout::new(latent_dim, horizon, rows);
         let (n, m) = (layout.variables(), layout.row_count());
-        let mut a = SparseColumns::from_pattern(m, n, &layout.pattern());
-        let mut transcription = Self {
-            layout,
-            positions: Vec::with_capacity(horizon),
-            work: vec![0.0; latent_dim],
-        };
-        for stage in 0..horizon {
-            let positions = transcription.stage_positions(stage, &a);
-            transcription.positions.push(positions);
+        let constants: Vec<_> = (0..horizon)
+            .flat_map(|stage| layout.constants(stage))
+            .collect();
+        let blocks: Vec<_> = (0..horizon).map(|stage| layout.blocks(stage)).collect();
+        let entries = blocks.iter().flatten().flatten().chain(&constants);
+        let mut a = SparseColumns::from_pattern(m, n, &entries.copied().collect::<Vec<_>>());
+        for &(row, col) in &constants {
+            a.set(row, col, -1.0);
         }
-        transcription.write_constants(&mut a);
-        let layout = &transcription.layout;
+        let positions = (blocks.into_iter()).map(|blocks| StagePositions::of(blocks, &a));
+        let positions = positions.collect();
         let diagonal: Vec<(usize, usize)> = (0..n).map(|index| (index, index)).collect();
         let mut cones = vec![
             Cone::Zero(2 * latent_dim * horizon),
@@ -132,6 +149,7 @@ impl Transcription {
             b: vec![0.0; m],
             cones,
         };
+        let transcription = Self { layout, positions };
         (transcription, program)
     }
 
@@ -160,7 +178,7 @@ impl Transcription {
     }
 
     /// Writes a step's values.
-    pub fn write(&mut self, step: &StepData<'_>, program: &mut ConeProgram) {
+    pub fn write(&self, step: &StepData<'_>, program: &mut ConeProgram) {
         for index in 0..self.layout.horizon {
             self.write_dynamics(index, step, program);
             self.write_inputs(index, step, program);
@@ -168,59 +186,10 @@ impl Transcription {
         }
     }
 
-    /// `û` of a stage in a solution.
-    pub fn input<'a>(&self, index: usize, solution: &'a [f64]) -> &'a [f64] {
-        &solution[self.layout.input_column(index)..][..self.layout.latent_dim]
-    }
-
-    /// `x̂⁺` at the end of a stage in a solution.
-    pub fn state<'a>(&self, index: usize, solution: &'a [f64]) -> &'a [f64] {
-        &solution[self.layout.state_column(index)..][..2 * self.layout.latent_dim]
-    }
-
-    fn stage_positions(&self, stage: usize, a: &SparseColumns) -> StagePositions {
-        let (layout, rows) = (&self.layout, &self.layout.rows);
-        let d = layout.latent_dim;
-        let find = |row: usize, n_rows: usize, col: usize, n_cols: usize| -> Vec<usize> {
-            block(row, n_rows, col, n_cols)
-                .map(|(row, col)| a.position(row, col).expect("block belongs to the pattern"))
-                .collect()
-        };
-        let (input, state) = (layout.input_column(stage), layout.state_column(stage));
-        let (dynamics, rate) = (layout.dynamics_row(stage), layout.rate_row(stage));
-        let (torque, joint) = (layout.torque_row(stage), layout.joint_row(stage));
-        let (mut by_state, mut rate_before) = (Vec::new(), Vec::new());
-        if stage > 0 {
-            by_state = find(dynamics, 2 * d, layout.state_column(stage - 1), 2 * d);
-            rate_before = find(rate, rows.rate.len(), layout.input_column(stage - 1), d);
-        }
-        let force_rows = rows.friction.as_ref().map_or(0, |_| 3);
-        StagePositions {
-            input: find(dynamics, 2 * d, input, d),
-            state: by_state,
-            torque: find(torque, rows.torque.len(), input, d),
-            rate: find(rate, rows.rate.len(), input, d),
-            rate_before,
-            joint: find(joint, rows.joint.len(), state, d),
-            force: find(layout.force_row(stage), force_rows, input, d),
-        }
-    }
-
-    fn write_constants(&self, a: &mut SparseColumns) {
-        for stage in 0..self.layout.horizon {
-            let (row, column) = (
-                self.layout.dynamics_row(stage),
-                self.layout.state_column(stage),
-            );
-            for index in 0..2 * self.layout.latent_dim {
-                a.set(row + index, column + index, -1.0);
-            }
-            if self.layout.has_slack {
-                for row in self.layout.joint_row(stage)..=self.layout.slack_row(stage) {
-                    a.set(row, self.layout.slack_column(stage), -1.0);
-                }
-            }
-        }
+    /// `û` of a stage in a solution, and `x̂⁺` at its end.
+    pub fn stage<'a>(&self, index: usize, solution: &'a [f64]) -> (&'a [f64], &'a [f64]) {
+        let d = self.layout.latent_dim;
+        solution[self.layout.input_column(index)..][..3 * d].split_at(d)
     }
 
     /// `Â x̂_k + B̂ û_k − x̂_{k+1} = −σ⁻¹ defect`, with `x̂_0` on the right.
@@ -249,22 +218,22 @@ impl Transcription {
     }
 
     /// Torque, rate and friction rows.
-    fn write_inputs(&mut self, index: usize, step: &StepData<'_>, program: &mut ConeProgram) {
+    fn write_inputs(&self, index: usize, step: &StepData<'_>, program: &mut ConeProgram) {
         let d = self.layout.latent_dim;
         let stage = &step.stages[index];
         let root = &step.phases[stage.phase].latent_root;
+        let scale = (root, &stage.input[..]);
         let rows = stage.rows.as_ref().unwrap_or(&self.layout.rows);
+        let values = program.a.values_mut();
         for (number, row) in rows.torque.iter().enumerate() {
             let positions = &self.positions[index].torque[number * d..][..d];
-            let at_reference = scaled_row(&row.row, root, &stage.input, &mut self.work);
-            scatter(&self.work, positions, program.a.values_mut());
+            let at_reference = place_row(&row.row, scale, 1.0, positions, values);
             let bound = row.bound - row.per_loss * stage.losses_nm[row.joint];
             program.b[self.layout.torque_row(index) + number] = bound - at_reference;
         }
         for (number, row) in rows.rate.iter().enumerate() {
             let positions = &self.positions[index].rate[number * d..][..d];
-            let at_reference = scaled_row(&row.row, root, &stage.input, &mut self.work);
-            scatter(&self.work, positions, program.a.values_mut());
+            let at_reference = place_row(&row.row, scale, 1.0, positions, values);
             let before = if index == 0 {
                 dot(&row.row, step.last_input)
             } else {
@@ -274,11 +243,8 @@ impl Transcription {
                     &rows.rate[number].row,
                     &step.phases[earlier.phase].latent_root,
                 );
-                let before = scaled_row(row, root, &earlier.input, &mut self.work);
-                self.work.iter_mut().for_each(|entry| *entry = -*entry);
                 let positions = &self.positions[index].rate_before[number * d..][..d];
-                scatter(&self.work, positions, program.a.values_mut());
-                before
+                place_row(row, (root, &earlier.input), -1.0, positions, values)
             };
             program.b[self.layout.rate_row(index) + number] = row.bound - at_reference + before;
         }
@@ -286,9 +252,7 @@ impl Transcription {
             for number in 0..3 {
                 let positions = &self.positions[index].force[number * d..][..d];
                 let row = &stage.force[number * d..][..d];
-                let at_reference = scaled_row(row, root, &stage.input, &mut self.work);
-                self.work.iter_mut().for_each(|entry| *entry = -*entry);
-                scatter(&self.work, positions, program.a.values_mut());
+                let at_reference = place_row(row, scale, -1.0, positions, values);
                 // A stage without contact has the cone's axis as its slack: strictly inside.
                 let is_free = number == 0 && stage.force.iter().all(|entry| *entry == 0.0);
                 program.b[self.layout.force_row(index) + number] =
@@ -315,17 +279,17 @@ impl Transcription {
     }
 }
 
-/// `work = row C` for a lower triangular `C`; returns `row · input`.
-fn scaled_row(row: &[f64], root: &DMatrix<f64>, input: &[f64], work: &mut [f64]) -> f64 {
-    let d = row.len();
-    for (col, work) in work.iter_mut().enumerate() {
-        *work = (col..d).map(|k| row[k] * root[(k, col)]).sum();
+/// Writes `sign row C` for a lower triangular `C` to its positions; returns `row · input`.
+fn place_row(
+    row: &[f64],
+    (root, input): (&DMatrix<f64>, &[f64]),
+    sign: f64,
+    positions: &[usize],
+    values: &mut [f64],
+) -> f64 {
+    for (col, &position) in positions.iter().enumerate() {
+        let terms = (col..row.len()).map(|k| row[k] * root[(k, col)]);
+        values[position] = sign * terms.sum::<f64>();
     }
     dot(row, input)
-}
-
-fn scatter(from: &[f64], positions: &[usize], values: &mut [f64]) {
-    for (value, &position) in from.iter().zip(positions) {
-        values[position] = *value;
-    }
 }

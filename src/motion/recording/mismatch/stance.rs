@@ -8,7 +8,6 @@ use nalgebra::Vector3;
 use crate::recording::preprocess::median;
 use crate::recording::segment::stretches;
 use crate::recording::{Recording, Segment};
-use crate::robot::input_rule::rotation;
 use crate::robot::{FOOT_DIM, JOINT_DIM, Leg, Robot, STATE_DIM};
 
 /// Shortest stance that counts, s.
@@ -144,16 +143,12 @@ pub(super) fn foot_place(
     x: &[f64; STATE_DIM],
     rolled: bool,
 ) -> Vector3<f64> {
-    let [px, py, pz, roll, pitch, yaw] = std::array::from_fn(|i| x[JOINT_DIM + i]);
-    let first = 3 * leg.index();
-    let q = [x[first], x[first + 1], x[first + 2]];
-    let attitude = rotation([roll, pitch, yaw]);
-    let foot = robot.hip_position(leg) + robot.foot_position(leg, &q);
-    let place = Vector3::new(px, py, pz) + attitude * foot;
+    let place = robot.foot_in_world(leg, x);
     if !rolled {
         return place;
     }
-    let inclination = pitch + q[1] + q[2];
+    let (first, [pitch, yaw]) = (3 * leg.index(), [x[16], x[17]]);
+    let inclination = pitch + x[first + 1] + x[first + 2];
     place - FOOT_RADIUS_M * inclination * Vector3::new(yaw.cos(), yaw.sin(), 0.0)
 }
 

@@ -65,101 +65,67 @@ pub fn last_error() -> *const c_char {
     LAST_ERROR.with_borrow(|last| last.as_ptr())
 }
 
-/// A status or return code in words.
-pub fn status_text(code: i32) -> &'static CStr {
-    match TEXTS.iter().find(|(known, _)| *known == code) {
-        Some((_, text)) => text,
-        None => c"unknown status",
-    }
+/// Every code that the interface returns.
+pub fn all_codes() -> impl Iterator<Item = i32> {
+    let beyond_steps = [
+        BAD_POINTER,
+        TIME_ORDER,
+        UNKNOWN_FEET,
+        BAD_SETTING,
+        SOLVER_REFUSED,
+        INTERNAL,
+    ];
+    Status::ALL
+        .into_iter()
+        .map(Status::code)
+        .chain(beyond_steps)
 }
 
-/// Every code that the interface returns, with its meaning.
-pub const TEXTS: [(i32, &CStr); 20] = [
-    (
-        0,
-        c"solved: a plan whose optimality conditions were checked",
-    ),
-    (
-        1,
-        c"softened: a checked plan that leaves the joint limits somewhere",
-    ),
-    (
-        2,
-        c"contact early: a checked plan, the feet are in the reference's next phase",
-    ),
-    (
-        3,
-        c"contact late: a checked plan, the feet are in the reference's last phase",
-    ),
-    (
-        4,
-        c"contact unknown: a checked plan, the feet are in no phase of the model or in one far from the reference",
-    ),
-    (
-        10,
-        c"inaccurate: the solver's point fails the optimality conditions; fallback",
-    ),
-    (
-        11,
-        c"infeasible: the constraints contradict each other; fallback",
-    ),
-    (
-        12,
-        c"iteration cap: the solver reached its deadline; fallback",
-    ),
-    (13, c"numerical failure: the solver broke down; fallback"),
-    (
-        14,
-        c"measurement jump: a measurement far from the prediction; fallback",
-    ),
-    (
-        15,
-        c"lift failed: no torques for the latent input; fallback",
-    ),
-    (
-        -1,
-        c"not finite: a number is infinite or not a number; fallback",
-    ),
-    (
-        -2,
-        c"wrong dimension: the wrong number of values or too few samples; fallback",
-    ),
-    (-3, c"no reference: none has been set; fallback"),
-    (BAD_POINTER, c"bad pointer: null or not aligned; fallback"),
-    (
-        TIME_ORDER,
-        c"time order: the reference's time does not increase",
-    ),
-    (
-        UNKNOWN_FEET,
-        c"unknown feet: no phase of the model has these feet in contact",
-    ),
-    (BAD_SETTING, c"bad setting: a setting is out of its range"),
-    (
-        SOLVER_REFUSED,
-        c"solver refused: the conic solver does not take the problem",
-    ),
-    (
-        INTERNAL,
-        c"internal: the controller broke down; set a reference to use it again",
-    ),
-];
+/// A status or return code in words.
+pub fn status_text(code: i32) -> &'static CStr {
+    match code {
+        0 => c"solved: a plan whose optimality conditions were checked",
+        1 => c"softened: a checked plan that leaves the joint limits somewhere",
+        2 => c"contact early: a checked plan, the feet are in the reference's next phase",
+        3 => c"contact late: a checked plan, the feet are in the reference's last phase",
+        4 => c"contact unknown: a checked plan, the feet are in no phase of the model or in one far from the reference",
+        10 => c"inaccurate: the solver's point fails the optimality conditions; fallback",
+        11 => c"infeasible: the constraints contradict each other; fallback",
+        12 => c"iteration cap: the solver reached its deadline; fallback",
+        13 => c"numerical failure: the solver broke down; fallback",
+        14 => c"measurement jump: a measurement far from the prediction; fallback",
+        15 => c"lift failed: no torques for the latent input; fallback",
+        -1 => c"not finite: a number is infinite or not a number; fallback",
+        -2 => c"wrong dimension: the wrong number of values or too few samples; fallback",
+        -3 => c"no reference: none has been set; fallback",
+        BAD_POINTER => c"bad pointer: null or not aligned; fallback",
+        TIME_ORDER => c"time order: the reference's time does not increase",
+        UNKNOWN_FEET => c"unknown feet: no phase of the model has these feet in contact",
+        BAD_SETTING => c"bad setting: a setting is out of its range",
+        SOLVER_REFUSED => c"solver refused: the conic solver does not take the problem",
+        INTERNAL => c"internal: the controller broke down; set a reference to use it again",
+        _ => c"unknown status",
+    }
+}
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn every_status_has_a_text_that_begins_with_its_word() {
-        let mut codes: Vec<i32> = TEXTS.iter().map(|(code, _)| *code).collect();
-        codes.sort_unstable();
-        codes.dedup();
-        assert_eq!(codes.len(), TEXTS.len());
+    fn every_code_has_a_text_and_that_of_a_status_begins_with_its_word() {
+        let mut known: Vec<i32> = all_codes().collect();
+        let unknown = c"unknown status";
+        assert!(known.iter().all(|code| status_text(*code) != unknown));
+        let count = known.len();
+        known.sort_unstable();
+        known.dedup();
+        assert_eq!(known.len(), count);
         for status in Status::ALL {
             let text = status_text(status.code()).to_string_lossy();
             let word = status.word().replace('_', " ");
             assert!(text.starts_with(&format!("{word}:")), "{text}");
         }
-        assert_eq!(status_text(77), c"unknown status");
+        assert_eq!(status_text(77), unknown);
     }
 }

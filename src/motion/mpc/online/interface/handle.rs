@@ -1,4 +1,4 @@
-//! A controller that C holds by its address.
+//! A controller that C holds by its address: a trajectory and measurements in, commands out.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -9,8 +9,72 @@ use super::super::reference::ReferenceSamples;
 use super::super::settings::MpcSettings;
 use super::codes::{BAD_POINTER, INTERNAL, guarded, report};
 use super::settings::Settings;
-use super::values::{RawCommand, RawMeasurement, RawReference};
-use crate::robot::{ContactFlags, FOOT_DIM, JOINT_DIM};
+use crate::robot::{ContactFlags, FOOT_DIM, JOINT_DIM, Robot};
+
+/// What a robot's low-level interface takes, as C has it; `D` latent coordinates.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RawCommand<const D: usize> {
+    /// Feed-forward torques, N m.
+    pub torque: [f64; JOINT_DIM],
+    /// Desired joint positions, rad.
+    pub joint_position: [f64; JOINT_DIM],
+    /// Desired joint velocities, rad/s.
+    pub joint_velocity: [f64; JOINT_DIM],
+    /// Latent input behind the torques.
+    pub u_lat: [f64; D],
+    /// How the step ended.
+    pub status: i32,
+    /// Interior-point iterations.
+    pub iterations: i32,
+    /// Wall time of the step, µs.
+    pub solve_us: f64,
+}
+
+impl<const D: usize> RawCommand<D> {
+    /// No torque, at the middle of the joints' ranges: what is commanded when nothing is known.
+    pub fn at_rest(robot: &Robot, status: i32) -> Self {
+        Self {
+            torque: [0.0; JOINT_DIM],
+            joint_position: robot
+                .joint_limit_rad()
+                .map(|(lower, upper)| 0.5 * (lower + upper)),
+            joint_velocity: [0.0; JOINT_DIM],
+            u_lat: [0.0; D],
+            status,
+            iterations: 0,
+            solve_us: 0.0,
+        }
+    }
+}
+
+/// A trajectory as it comes through the interface; see [`ReferenceSamples`].
+#[derive(Debug, Clone, Copy)]
+pub struct RawReference<'a> {
+    /// Time of each sample, s.
+    pub time_s: Option<&'a [f64]>,
+    /// States, 18 values per sample.
+    pub x: Option<&'a [f64]>,
+    /// Velocities, 18 values per sample.
+    pub dx: Option<&'a [f64]>,
+    /// Inputs, 18 values per sample, unless there are none; the inner `None` is a bad pointer.
+    pub u: Option<Option<&'a [f64]>>,
+    /// Feet in contact, 4 values per sample, zero in the air.
+    pub feet: Option<&'a [u8]>,
+}
+
+/// A measurement as it comes through the interface.
+#[derive(Debug, Clone, Copy)]
+pub struct RawMeasurement<'a> {
+    /// Time, s.
+    pub time_s: f64,
+    /// State, 18 values.
+    pub x: Option<&'a [f64]>,
+    /// Velocity, 18 values.
+    pub dx: Option<&'a [f64]>,
+    /// Feet in contact, 4 values, zero in the air.
+    pub feet: Option<&'a [u8]>,
+}
 
 /// A controller with the memory that its interface needs; `D` latent coordinates.
 #[derive(Debug)]
@@ -76,10 +140,6 @@ impl<const D: usize> Handle<D> {
 
     /// Computes the command for a measurement; returns its status.
     pub fn step(&mut self, raw: &RawMeasurement<'_>, out: &mut RawCommand<D>) -> i32 {
-        if self.is_broken {
-            *out = self.safe(INTERNAL);
-            return INTERNAL;
-        }
         let has_all = raw.x.is_some() && raw.dx.is_some() && raw.feet.is_some();
         let measurement = Measurement {
             time_s: raw.time_s,
@@ -89,14 +149,13 @@ impl<const D: usize> Handle<D> {
             feet: raw.feet.map_or([false; FOOT_DIM], contact),
         };
         let (controller, command) = (&mut self.controller, &mut self.command);
-        let stepped = catch_unwind(AssertUnwindSafe(|| {
-            controller.step_into(measurement, command);
-        }));
-        if stepped.is_err() {
-            self.is_broken = true;
-            *out = self.safe(INTERNAL);
+        let step = AssertUnwindSafe(|| controller.step_into(measurement, command));
+        self.is_broken = self.is_broken || catch_unwind(step).is_err();
+        if self.is_broken {
+            *out = self.safe();
             return INTERNAL;
         }
+        let command = &self.command;
         *out = RawCommand {
             torque: command.torque_nm,
             joint_position: command.joint_position_rad,
@@ -122,14 +181,14 @@ impl<const D: usize> Handle<D> {
     }
 
     /// No torque, at the posture of the last command.
-    fn safe(&self, status: i32) -> RawCommand<D> {
+    fn safe(&self) -> RawCommand<D> {
         RawCommand {
             torque: [0.0; JOINT_DIM],
             joint_velocity: [0.0; JOINT_DIM],
             u_lat: [0.0; D],
             iterations: 0,
             solve_us: 0.0,
-            status,
+            status: INTERNAL,
             ..self.last
         }
     }
@@ -154,7 +213,7 @@ mod tests {
 
     use nalgebra::DMatrix;
 
-    use super::super::codes::{TIME_ORDER, last_error};
+    use super::super::codes::last_error;
     use super::*;
     use crate::mpc::online::LatentDynamics;
 
@@ -176,165 +235,50 @@ mod tests {
         }
     }
 
-    fn handle(is_broken: bool) -> Box<Handle<4>> {
-        let path =
-            std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models/go1-d4.json");
-        let model = crate::artifact::read(&path).expect("a shipped model");
-        Handle::create(None, |settings| {
-            let controller = Controller::new(&model, settings).expect("a complete model");
-            if !is_broken {
-                return Ok(controller);
-            }
-            Controller::with_plant(controller.plant().clone(), Box::new(Broken), settings)
-        })
-        .expect("default settings")
-    }
-
-    /// A robot that stands for 0.2 s.
-    struct Stand {
-        time_s: Vec<f64>,
-        x: Vec<f64>,
-        zeros: Vec<f64>,
-        feet: Vec<u8>,
-    }
-
-    impl Stand {
-        fn new() -> Self {
-            let stand = [0.0, 0.8, -1.6].repeat(4);
-            let x = [stand, vec![0.0, 0.0, 0.3, 0.0, 0.0, 0.0]].concat();
-            Self {
-                time_s: (0..100).map(|sample| 0.002 * f64::from(sample)).collect(),
-                x: x.repeat(100),
-                zeros: vec![0.0; 1800],
-                feet: vec![1; 400],
-            }
-        }
-
-        fn reference(&self) -> RawReference<'_> {
-            RawReference {
-                time_s: Some(&self.time_s),
-                x: Some(&self.x),
-                dx: Some(&self.zeros),
-                u: Some(Some(&self.zeros)),
-                feet: Some(&self.feet),
-            }
-        }
-
-        fn measurement(&self) -> RawMeasurement<'_> {
-            RawMeasurement {
-                time_s: 0.0,
-                x: Some(&self.x[..18]),
-                dx: Some(&self.zeros[..18]),
-                feet: Some(&self.feet[..4]),
-            }
-        }
-    }
-
-    fn message() -> String {
-        // SAFETY: the text lives until the next refusal on this thread.
-        let text = unsafe { CStr::from_ptr(last_error()) };
-        text.to_string_lossy().into_owned()
-    }
-
-    #[test]
-    fn settings_out_of_range_make_no_controller_and_say_which() {
-        let bad: [(&str, fn(&mut Settings)); 7] = [
-            ("horizon", |settings| settings.horizon = -1),
-            ("horizon", |settings| settings.horizon = 0),
-            ("lift", |settings| settings.lift = 2),
-            ("linearisation", |settings| settings.linearisation = -1),
-            ("max_iterations", |settings| settings.max_iterations = -3),
-            ("step_s", |settings| settings.step_s = f64::NAN),
-            ("body_friction", |settings| settings.body_friction = -0.6),
-        ];
-        for (name, change) in bad {
-            let mut settings = Settings::default();
-            change(&mut settings);
-            let found = Handle::<4>::create(Some(&settings), |settings| {
-                settings.check()?;
-                panic!("{name} was accepted");
-            });
-            assert!(found.is_none());
-            assert!(message().contains(name), "{name}: {}", message());
-        }
-    }
-
-    #[test]
-    fn reference_with_a_fault_is_refused_with_its_code_and_the_old_one_stays() {
-        let stand = Stand::new();
-        let mut handle = handle(false);
-        assert_eq!(handle.set_reference(&stand.reference()), 0);
-        let sound = stand.reference();
-        let RawReference {
-            time_s, x, u, feet, ..
-        } = sound;
-        let with = |time_s, x, u, feet| RawReference {
-            time_s,
-            x,
-            u,
-            feet,
-            ..sound
-        };
-        let mut nan = stand.x.clone();
-        nan[20] = f64::NAN;
-        let mut repeated = stand.time_s.clone();
-        repeated[7] = repeated[6];
-        let faults = [
-            (BAD_POINTER, with(time_s, None, u, feet)),
-            (BAD_POINTER, with(time_s, x, u, None)),
-            (BAD_POINTER, with(time_s, x, Some(None), feet)),
-            (-1, with(time_s, Some(&nan), u, feet)),
-            (-2, with(time_s, Some(&stand.x[1..]), u, feet)),
-            (-2, with(Some(&[]), x, u, feet)),
-            (TIME_ORDER, with(Some(&repeated), x, u, feet)),
-        ];
-        for (expected, reference) in faults {
-            assert_eq!(handle.set_reference(&reference), expected, "{}", message());
-        }
-        let mut command = RawCommand::at_rest(handle.controller.plant().robot(), 99);
-        assert_eq!(handle.step(&stand.measurement(), &mut command), 0);
-        assert_eq!(handle.set_reference(&RawReference { u: None, ..sound }), 0);
-    }
-
-    #[test]
-    fn measurement_without_values_gets_a_safe_command_and_the_next_one_a_plan() {
-        let stand = Stand::new();
-        let mut handle = handle(false);
-        let mut command = RawCommand::at_rest(handle.controller.plant().robot(), 99);
-        assert_eq!(handle.step(&stand.measurement(), &mut command), -3);
-        assert_eq!(handle.set_reference(&stand.reference()), 0);
-        let sound = stand.measurement();
-        let [mut no_state, mut no_feet, mut not_finite] = [sound; 3];
-        no_state.x = None;
-        assert_eq!(handle.step(&no_state, &mut command), BAD_POINTER);
-        assert!(command.torque.iter().all(|torque| torque.abs() <= 23.7));
-        no_feet.feet = None;
-        assert_eq!(handle.step(&no_feet, &mut command), BAD_POINTER);
-        not_finite.time_s = f64::NAN;
-        assert_eq!(handle.step(&not_finite, &mut command), -1);
-        assert_eq!(handle.step(&sound, &mut command), 0);
-        handle.reset();
-        assert_eq!(handle.step(&sound, &mut command), 0);
-    }
-
     #[test]
     fn panic_inside_a_step_becomes_a_code_with_the_last_posture_and_no_torque() {
-        let stand = Stand::new();
-        let mut handle = handle(true);
-        assert_eq!(handle.set_reference(&stand.reference()), 0);
+        let model = crate::evaluate::shipped_model("go1-d4");
+        let handle = Handle::<4>::create(None, |settings| {
+            let controller = Controller::new(&model, settings).expect("a complete model");
+            Controller::with_plant(controller.plant().clone(), Box::new(Broken), settings)
+        });
+        let mut handle = handle.expect("default settings");
+        // A robot that stands for 0.2 s.
+        let time_s: Vec<f64> = (0..100).map(|sample| 0.002 * f64::from(sample)).collect();
+        let joints = [0.0, 0.8, -1.6].repeat(4);
+        let x = [&joints[..], &[0.0, 0.0, 0.3, 0.0, 0.0, 0.0]]
+            .concat()
+            .repeat(100);
+        let (zeros, feet) = ([0.0; 1800], [1; 400]);
+        let reference = RawReference {
+            time_s: Some(&time_s),
+            x: Some(&x),
+            dx: Some(&zeros),
+            u: Some(Some(&zeros)),
+            feet: Some(&feet),
+        };
+        assert_eq!(handle.set_reference(&reference), 0);
+        let measurement = RawMeasurement {
+            time_s: 0.0,
+            x: Some(&x[..18]),
+            dx: Some(&zeros[..18]),
+            feet: Some(&feet[..4]),
+        };
         let mut command = RawCommand::at_rest(handle.controller.plant().robot(), 99);
         let rest = command.joint_position;
         for _ in 0..2 {
-            assert_eq!(handle.step(&stand.measurement(), &mut command), INTERNAL);
+            assert_eq!(handle.step(&measurement, &mut command), INTERNAL);
             assert_eq!((command.status, command.torque), (INTERNAL, [0.0; 12]));
             assert_eq!(command.joint_position, rest);
         }
         // Without an input the reference asks the equations for one.
         let no_input = RawReference {
             u: None,
-            ..stand.reference()
+            ..reference
         };
         assert_eq!(handle.set_reference(&no_input), INTERNAL);
-        assert!(message().contains("broke down"));
+        // SAFETY: the text lives until the next refusal on this thread.
+        let message = unsafe { CStr::from_ptr(last_error()) };
+        assert!(message.to_string_lossy().contains("broke down"));
     }
 }

@@ -2,17 +2,15 @@
 //!
 //! A generated controller wraps these functions under its model's name; pointers are turned into
 //! slices there, everything else happens here. A pointer that cannot be used arrives as `None`.
-//! Read `handle` first: it takes `values` and answers with `codes`.
+//! Read `handle` first, which answers with `codes`.
 
 mod codes;
 mod handle;
 mod settings;
-mod values;
 
 pub use codes::{
-    BAD_POINTER, BAD_SETTING, INTERNAL, SOLVER_REFUSED, TEXTS, TIME_ORDER, UNKNOWN_FEET,
+    BAD_POINTER, BAD_SETTING, INTERNAL, SOLVER_REFUSED, TIME_ORDER, UNKNOWN_FEET, all_codes,
     last_error, report, status_text,
 };
-pub use handle::Handle;
+pub use handle::{Handle, RawCommand, RawMeasurement, RawReference};
 pub use settings::Settings;
-pub use values::{RawCommand, RawMeasurement, RawReference};

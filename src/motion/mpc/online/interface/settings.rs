@@ -83,18 +83,14 @@ impl Settings {
         let points = [Linearisation::Reference, Linearisation::LastPlan];
         let about = "0 (the reference) or 1 (the last plan)";
         let solvers = [Solver::Clarabel, Solver::Riccati];
+        let which = "0 (clarabel) or 1 (Riccati)";
         let mut settings = MpcSettings {
             horizon: usize::try_from(self.horizon)
                 .map_err(|_| refused("horizon", self.horizon, "1 to 500 stages"))?,
             step_s: self.step_s,
             lift: chosen("lift", self.lift, lifts, "0 (transpose) or 1 (consistent)")?,
             linearisation: chosen("linearisation", self.linearisation, points, about)?,
-            solver: chosen(
-                "solver",
-                self.solver,
-                solvers,
-                "0 (clarabel) or 1 (Riccati)",
-            )?,
+            solver: chosen("solver", self.solver, solvers, which)?,
             input_weight: self.input_weight,
             velocity_weight: self.velocity_weight,
             terminal_weight: self.terminal_weight,
@@ -149,20 +145,18 @@ mod tests {
 
     #[test]
     fn choices_come_back_by_their_numbers() {
-        let with = |lift: Lift, linearisation: Linearisation, solver: Solver| Settings {
-            lift: lift as i32,
-            linearisation: linearisation as i32,
-            solver: solver as i32,
-            ..Settings::default()
-        };
-        for (lift, linearisation, solver) in [
+        for choices in [
             (Lift::Transpose, Linearisation::Reference, Solver::Clarabel),
             (Lift::Consistent, Linearisation::LastPlan, Solver::Riccati),
         ] {
-            let read = with(lift, linearisation, solver).to_mpc().expect("sound");
-            assert_eq!(read.lift, lift);
-            assert_eq!(read.linearisation, linearisation);
-            assert_eq!(read.solver, solver);
+            let settings = Settings {
+                lift: choices.0 as i32,
+                linearisation: choices.1 as i32,
+                solver: choices.2 as i32,
+                ..Settings::default()
+            };
+            let read = settings.to_mpc().expect("sound");
+            assert_eq!((read.lift, read.linearisation, read.solver), choices);
         }
     }
 }
