@@ -42,18 +42,18 @@ impl TableId {
 
 /// A constant matrix, row-major.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Table {
+pub struct Table<T = f64> {
     pub(super) rows: usize,
     pub(super) cols: usize,
-    pub(super) entries: Vec<f64>,
+    pub(super) entries: Vec<T>,
 }
 
-impl Table {
+impl<T> Table<T> {
     /// A table of `rows` x `cols` from its row-major entries.
     ///
     /// # Panics
     /// If the number of entries is not `rows * cols`; a caller's defect.
-    pub fn new(rows: usize, cols: usize, entries: Vec<f64>) -> Self {
+    pub fn new(rows: usize, cols: usize, entries: Vec<T>) -> Self {
         assert_eq!(entries.len(), rows * cols, "table entries fill the shape");
         Self {
             rows,
@@ -73,12 +73,12 @@ impl Table {
     }
 
     /// One row, `cols` entries.
-    pub fn row(&self, row: usize) -> &[f64] {
+    pub fn row(&self, row: usize) -> &[T] {
         &self.entries[row * self.cols..(row + 1) * self.cols]
     }
 
     /// All entries, row-major.
-    pub fn entries(&self) -> &[f64] {
+    pub fn entries(&self) -> &[T] {
         &self.entries
     }
 }
@@ -172,7 +172,7 @@ pub struct QuadSum {
 pub enum Statement {
     /// A finite constant.
     Constant(f64),
-    /// Element `index` of input `slot`.
+    /// Element `index` of input `slot`; every element has one such statement, in their order.
     Input {
         /// Which input.
         slot: usize,
@@ -373,6 +373,12 @@ impl Program {
             matches!(self.statements[statement], Statement::Constant(x) if x.to_bits() == 0)
         };
         values.iter().rev().take_while(is_zero).count()
+    }
+
+    /// Whether such a statement computes something that an output depends on.
+    pub fn has(&self, is_wanted: impl Fn(&Statement) -> bool) -> bool {
+        let mut statements = self.statements.iter().zip(self.live());
+        statements.any(|(statement, live)| live && is_wanted(statement))
     }
 
     /// Which statements compute something that an output depends on.
