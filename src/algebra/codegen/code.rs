@@ -3,8 +3,7 @@
 use super::fours::Fours;
 use super::ident::Ident;
 use super::lanes::Row;
-use super::literal::Literal;
-use crate::ir::{Binary, Table};
+use crate::ir::{Binary, Table, Unary};
 
 /// A subscript `offset + sum_i stride_i * name_i`.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -59,61 +58,21 @@ impl Index {
     }
 }
 
-/// Functions of one argument that every target has.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum MathFunction {
-    /// Square root.
-    Sqrt,
-    /// Absolute value.
-    Abs,
-    /// -1, 0 or 1.
-    Sign,
-    /// Tangent.
-    Tan,
-    /// Hyperbolic tangent.
-    Tanh,
-    /// Exponential.
-    Exp,
-    /// Natural logarithm.
-    Log,
-}
-
-impl MathFunction {
-    /// What most targets call it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Sqrt => "sqrt",
-            Self::Abs => "abs",
-            Self::Sign => "sign",
-            Self::Tan => "tan",
-            Self::Tanh => "tanh",
-            Self::Exp => "exp",
-            Self::Log => "log",
-        }
-    }
-}
-
 /// An expression.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Expr {
-    /// A number.
-    Literal(Literal),
+    /// A finite number.
+    Literal(f64),
     /// A scalar variable.
     Name(Ident),
     /// `array[index]`
     Element(Ident, Index),
     /// `table[row][col]`
     Entry(Ident, Index, Index),
-    /// `-a`
-    Negate(Box<Expr>),
+    /// `-a` or `f(a)`
+    Unary(Unary, Box<Expr>),
     /// `a op b`
     Infix(Binary, Box<Expr>, Box<Expr>),
-    /// `f(a)`
-    Apply(MathFunction, Box<Expr>),
-    /// The sums of all lanes, within a loop of a variable over lanes.
-    Lanes(Ident, Ident),
-    /// The total of the sums of all lanes.
-    LaneTotal(Ident),
 }
 
 impl Expr {
@@ -125,16 +84,15 @@ impl Expr {
     /// With another subscript in place of a variable.
     pub fn with(&self, variable: &Ident, at: &Index) -> Self {
         match self {
-            Self::Literal(_) | Self::Name(_) | Self::Lanes(..) | Self::LaneTotal(_) => self.clone(),
+            Self::Literal(_) | Self::Name(_) => self.clone(),
             Self::Element(array, index) => Self::Element(array.clone(), index.with(variable, at)),
             Self::Entry(table, row, col) => Self::Entry(
                 table.clone(),
                 row.with(variable, at),
                 col.with(variable, at),
             ),
-            Self::Negate(a) => Self::Negate(Box::new(a.with(variable, at))),
+            Self::Unary(op, a) => Self::Unary(*op, Box::new(a.with(variable, at))),
             Self::Infix(op, a, b) => Self::infix(*op, a.with(variable, at), b.with(variable, at)),
-            Self::Apply(function, a) => Self::Apply(*function, Box::new(a.with(variable, at))),
         }
     }
 }
@@ -201,29 +159,6 @@ pub enum Stmt {
     Row(Box<Row>),
     /// Sums of vectors of four numbers.
     Fours(Box<Fours>),
-    /// Sums of the lanes, which are assigned later.
-    DeclareLanes(Ident),
-    /// A loop of the variable over the lanes, or all of them at once.
-    ForLanes(Ident, Vec<Stmt>),
-}
-
-impl Stmt {
-    /// The body of a loop; nothing for other statements.
-    pub fn inner(&self) -> &[Stmt] {
-        match self {
-            Self::For(_, _, body) | Self::ForLanes(_, body) => body,
-            Self::Let(..)
-            | Self::LetArray(..)
-            | Self::Declare(..)
-            | Self::Assign(..)
-            | Self::AddAssign(..)
-            | Self::SinCosLane { .. }
-            | Self::Call { .. }
-            | Self::Row(_)
-            | Self::Fours(_)
-            | Self::DeclareLanes(_) => &[],
-        }
-    }
 }
 
 /// What a parameter of a generated function is for.
@@ -272,6 +207,8 @@ pub struct Function {
     pub parameters: Vec<Parameter>,
     /// Parameters that the body does not mention.
     pub unused: Vec<Ident>,
+    /// Arrays that are assigned in lanes.
+    pub in_lanes: Vec<Ident>,
     /// What it does.
     pub body: Vec<Stmt>,
 }

@@ -4,7 +4,6 @@ use std::ops::Range;
 
 use super::code::{Expr, Index, Span, Stmt};
 use super::ident::Ident;
-use super::literal::Literal;
 use crate::ir::{Binary, QUAD, Quad, QuadSum, Table};
 
 /// Sums that are added side by side: what the registers hold beside a weight.
@@ -143,10 +142,7 @@ impl Fours {
 
     fn number(&self, vector: Quad, lane: usize) -> Expr {
         match vector {
-            Quad::Row(row) => {
-                let literal = Literal::new(self.table.0.row(row)[lane]);
-                Expr::Literal(literal.expect("tables of programs are finite"))
-            }
+            Quad::Row(row) => Expr::Literal(self.table.0.row(row)[lane]),
             Quad::Sum(sum) => Expr::Element(self.array.clone(), Index::fixed(QUAD * sum + lane)),
         }
     }

@@ -6,7 +6,7 @@ use super::precision::{Precision, stated_bounds};
 use super::units::Units;
 use crate::equations::{Equations, LatentUnits, Unit, summand_words};
 use crate::ir::{Program, Slot, Statement, Unary};
-use crate::lower::{self, Form, JacobianPattern, LowerError};
+use crate::lower::{self, Form, JacobianPattern, LowerError, Map};
 use crate::model::{CandidateTerm, CoordinateNames, ModelError, ReducedModel};
 use crate::robot::WrenchFrame;
 use crate::robot::kinematics::{LEAST_HEIGHT, LEAST_SPAN};
@@ -131,6 +131,11 @@ impl ModelInterface {
         }
     }
 
+    /// Whether a function has such a statement.
+    pub(super) fn has(&self, is_wanted: impl Fn(&Statement) -> bool) -> bool {
+        self.all().any(|entry| entry.program.has(&is_wanted))
+    }
+
     /// All entries in the order in which they are generated.
     pub fn all(&self) -> impl Iterator<Item = &FunctionSpec> {
         let phases = self
@@ -139,6 +144,11 @@ impl ModelInterface {
             .flat_map(|phase| [&phase.dynamics, &phase.jacobian, &phase.step]);
         self.maps.iter().chain(phases)
     }
+}
+
+/// Whether a statement computes sines and cosines.
+pub(super) fn computes_angles(statement: &Statement) -> bool {
+    matches!(statement, Statement::SinCos { .. })
 }
 
 /// What computes the input of the maps, and torques of the motors from it, if the model is over a
@@ -225,44 +235,31 @@ fn map_entries(
         Some(_) => "(in the units of z per second)",
     };
     let inputs = in_units("u_lat", latent.map(|units| &units.input));
-    let project = || match latent {
-        None => lower::project_input(model),
-        Some(units) => lower::linear_map("project_input", ("u", "u_lat"), &units.project),
-    };
-    let lift = || match latent {
-        None => lower::lift_input(model),
-        Some(units) => lower::linear_map("lift_input", ("u_lat", "u"), &units.lift),
-    };
     let [at_x, at_z] = points(is_nonlinear);
     let (of_x, of_u) = (elements("x", state), elements("u", input));
-    let candidates = [
-        (
-            lower::encode(model),
-            format!("x: {n}. z: latent coordinates {positions}.{of_x}"),
-        ),
-        (
-            lower::encode_velocity(model),
-            format!("{at_x}dx: velocities of the {n}. dz: latent velocities {velocities}."),
-        ),
-        (
-            lower::decode(model),
-            format!("z: latent coordinates {positions}. x: {n}.{of_x}"),
-        ),
-        (
-            lower::decode_velocity(model),
-            format!("{at_z}dz: latent velocities {velocities}. dx: velocities of the {n}."),
-        ),
-        (
-            project(),
-            format!("{at_x}u: generalised inputs in {unit}. u_lat: latent inputs {inputs}.{of_u}"),
-        ),
-        (
-            lift(),
-            format!("{at_x}u_lat: latent inputs {inputs}. u: generalised inputs in {unit}.{of_u}"),
-        ),
-    ];
     let mut entries = Vec::new();
-    for ((program, text), title) in candidates.into_iter().zip(titles(is_nonlinear)) {
+    for (map, title) in Map::ALL.into_iter().zip(titles(is_nonlinear)) {
+        let text = match map {
+            Map::Encode => format!("x: {n}. z: latent coordinates {positions}.{of_x}"),
+            Map::EncodeVelocity => {
+                format!("{at_x}dx: velocities of the {n}. dz: latent velocities {velocities}.")
+            }
+            Map::Decode => format!("z: latent coordinates {positions}. x: {n}.{of_x}"),
+            Map::DecodeVelocity => {
+                format!("{at_z}dz: latent velocities {velocities}. dx: velocities of the {n}.")
+            }
+            Map::ProjectInput => format!(
+                "{at_x}u: generalised inputs in {unit}. u_lat: latent inputs {inputs}.{of_u}"
+            ),
+            Map::LiftInput => format!(
+                "{at_x}u_lat: latent inputs {inputs}. u: generalised inputs in {unit}.{of_u}"
+            ),
+        };
+        let program = match (map, latent) {
+            (Map::ProjectInput, Some(units)) => map.of_weights(&units.project),
+            (Map::LiftInput, Some(units)) => map.of_weights(&units.lift),
+            (_, _) => map.lower(model),
+        };
         match program {
             Ok(program) => {
                 let title = match (latent, units) {

@@ -40,58 +40,11 @@ pub struct Run {
 }
 
 impl Row {
-    /// Statements that take block after block, all lanes of one side by side.
-    pub fn in_lanes(&self) -> Vec<Stmt> {
-        let [block, lane, _, sums] = &self.names;
-        let full = self.n_slopes / LANES;
-        let mut body = vec![Stmt::DeclareLanes(sums.clone())];
-        for run in &self.runs {
-            // The first block begins the sums, and the last may have fewer slopes than lanes.
-            let mut blocks = run.blocks.clone();
-            if blocks.start == 0 {
-                body.push(self.block(run, &Index::fixed(0), full > 0, true));
-                blocks.start = 1;
-            }
-            let inner = blocks.start..blocks.end.min(full).max(blocks.start);
-            if inner.len() == 1 {
-                body.push(self.block(run, &Index::fixed(LANES * inner.start), true, false));
-            } else if !inner.is_empty() {
-                let at = Index::fixed(LANES * inner.start).plus(LANES, block);
-                let inside = self.block(run, &at, true, false);
-                body.push(Stmt::For(block.clone(), inner.len(), vec![inside]));
-            }
-            if inner.end < blocks.end {
-                body.push(self.block(run, &Index::fixed(LANES * inner.end), false, false));
-            }
-            if run.blocks.contains(&full) && !self.n_slopes.is_multiple_of(LANES) {
-                let at = Index::variable(lane).shifted(LANES * full);
-                let slope = self.assign_slope(run, &at);
-                body.push(Stmt::For(lane.clone(), self.n_slopes % LANES, vec![slope]));
-            }
-        }
-        let total = Expr::LaneTotal(sums.clone());
-        let total = Expr::infix(Binary::Add, self.start.clone(), total);
-        body.push(Stmt::Assign(self.sum.clone(), total));
-        body
-    }
-
-    /// One block of columns from `first` on.
-    fn block(&self, run: &Run, first: &Index, has_slopes: bool, begins: bool) -> Stmt {
-        let [_, lane, _, sums] = &self.names;
-        let at = first.clone().plus(1, lane);
-        let term = run.term.with(&self.column, &at);
-        let target = Expr::Lanes(sums.clone(), lane.clone());
-        let add = match begins {
-            true => Stmt::Assign(target, term),
-            false => Stmt::AddAssign(target, term),
-        };
-        let slope = has_slopes.then(|| self.assign_slope(run, &at));
-        Stmt::ForLanes(lane.clone(), slope.into_iter().chain([add]).collect())
-    }
-
-    fn assign_slope(&self, run: &Run, at: &Index) -> Stmt {
-        let target = Expr::Element(self.slopes.clone(), self.slope_at.with(&self.column, at));
-        Stmt::Assign(target, run.slope.with(&self.column, at))
+    /// Where the slope of a column goes, and what it is.
+    pub fn slope(&self, run: &Run, at: &Index) -> [Expr; 2] {
+        let place = self.slope_at.with(&self.column, at);
+        let target = Expr::Element(self.slopes.clone(), place);
+        [target, run.slope.with(&self.column, at)]
     }
 
     /// Statements that take column after column, then add what the lanes would.
@@ -104,8 +57,9 @@ impl Row {
             let (first, end) = (LANES * run.blocks.start, LANES * run.blocks.end);
             let at = Index::variable(&self.column).shifted(first);
             let term = Expr::Element(terms.clone(), at.clone());
+            let [target, slope] = self.slope(run, &at);
             let columns = vec![
-                self.assign_slope(run, &at),
+                Stmt::Assign(target, slope),
                 Stmt::Assign(term, run.term.with(&self.column, &at)),
             ];
             let n = end.min(self.n_slopes) - first;

@@ -4,7 +4,6 @@ use std::ops::Range;
 
 use super::code::{Expr, Index, Role, Span, Stmt};
 use super::ident::Ident;
-use super::literal::Literal;
 use super::translate::Translator;
 use crate::ir::{Statement, ValueId};
 
@@ -191,7 +190,7 @@ impl Translator<'_> {
         self.body.push(Stmt::Declare(array.clone(), len + n_zeros));
         for k in len..len + n_zeros {
             let zero = Expr::Element(array.clone(), Index::fixed(k));
-            let assign = Stmt::Assign(zero, Expr::Literal(Literal::ZERO));
+            let assign = Stmt::Assign(zero, Expr::Literal(0.0));
             self.body.push(assign);
         }
         if n_zeros > 0 {

@@ -5,7 +5,7 @@ use super::fours::{FourBlock, Fours};
 use super::ident::Ident;
 use super::lanes::{Row, Run};
 use super::translate::Translator;
-use crate::ir::{Binary, Group, LANES, QUAD, QuadSum, Slopes, TableId, ValueId};
+use crate::ir::{Binary, Group, LANES, QUAD, QuadSum, Slopes, TableId, Unary, ValueId};
 
 /// A group of functions where its numbers live.
 struct GroupCode {
@@ -149,6 +149,7 @@ impl Translator<'_> {
         let groups: Vec<GroupCode> = groups.iter().map(|group| self.group(group)).collect();
         let sums = self.home(first, rows, "y");
         let slopes = self.matrix_storage(first + rows, rows, cols);
+        self.in_lanes.push(slopes.home.array.clone());
         let i = self.names.locals.mint("i");
         let names = ["k", "l", "q", "p"].map(|name| self.names.locals.mint(name));
 
@@ -279,7 +280,7 @@ fn column<'a>(
 fn joined(a: Option<Expr>, op: Binary, b: Expr) -> Expr {
     match (a, op) {
         (Some(a), op) => Expr::infix(op, a, b),
-        (None, Binary::Sub) => Expr::Negate(Box::new(b)),
+        (None, Binary::Sub) => Expr::Unary(Unary::Neg, Box::new(b)),
         (None, Binary::Add | Binary::Mul | Binary::Div) => b,
     }
 }

@@ -8,7 +8,7 @@ use crate::codegen::error::CodegenError;
 use crate::codegen::functions::ModelFunctions;
 use crate::codegen::interface::{ModelInterface, PhaseInterface};
 use crate::codegen::line_wrapping::comment_lines;
-use crate::codegen::phase_text::PhaseText;
+use crate::codegen::model_text::ModelText;
 use crate::codegen::printer::Printer;
 
 /// A function of a script. A parameter that is read and written is taken and returned.
@@ -82,73 +82,26 @@ pub fn names(parameters: Vec<&Parameter>) -> String {
     list(&parameters, |parameter| parameter.name.to_string())
 }
 
-/// What the files of all languages say of a model; `F` is what they print of a function.
-pub struct ModelText<F> {
-    /// Name of the model.
-    pub name: String,
-    /// Name of the first phase's accelerations, for an example of a call.
-    pub example: String,
-    /// Units of robot coordinates.
-    pub units: String,
-    /// Number of latent coordinates.
-    pub latent_dim: usize,
-    /// Number of robot coordinates.
-    pub state_dim: Option<usize>,
-    /// Constant tables.
-    pub tables: Vec<String>,
-    /// Maps between robot and latent coordinates.
-    pub maps: Vec<F>,
-    /// Phases.
-    pub phases: Vec<PhaseText<F>>,
-}
-
 /// Prints a function, with the phase it belongs to, if it belongs to one.
 pub type PrintFunction<'a, F> =
     dyn Fn(&FunctionText, Option<&PhaseInterface>) -> Result<F, CodegenError> + 'a;
 
-impl<F> ModelText<F> {
-    /// All of a model in a language, which prints functions, and rows or columns of nonzeros, counted
-    /// from 0.
-    pub fn new(
-        entries: &ModelInterface,
-        dialect: &dyn Dialect,
-        print: &PrintFunction<'_, F>,
-        numbers: fn(&[usize]) -> String,
-    ) -> Result<Self, CodegenError> {
-        let functions = ModelFunctions::new(entries, dialect, "");
-        let printer = Printer::new(dialect);
-        let phase = |(phase, of_phase): (&PhaseInterface, &[Function; 3])| {
-            let texts = of_phase.iter().map(|function| {
-                let text = FunctionText::new(function, &functions, &printer);
-                print(&text, Some(phase))
-            });
-            let texts = texts.collect::<Result<_, CodegenError>>()?;
-            Ok(PhaseText::new(phase, texts, numbers))
-        };
-        let maps = functions.maps.iter().map(|map| {
-            let text = FunctionText::new(map, &functions, &printer);
-            print(&text, None)
-        });
-        let phases = entries.phases.iter().zip(&functions.phases).map(phase);
-        let first = entries.phases.first();
-        let all = functions.all();
-        let read: BTreeSet<String> = all
-            .flat_map(|function| FunctionText::new(function, &functions, &printer).tables)
-            .collect();
-        let is_read = |name: String| read.contains(&name);
-        let tables = functions.tables.iter();
-        Ok(Self {
-            name: entries.name.clone(),
-            example: first.map_or(String::new(), |phase| phase.dynamics.name.clone()),
-            units: entries.units_in_words(),
-            latent_dim: entries.latent_dim,
-            state_dim: entries.state_dim,
-            tables: tables
-                .filter(|table| is_read(table.name.to_string()))
-                .map(|table| dialect.table(table))
-                .collect(),
-            maps: maps.collect::<Result<_, CodegenError>>()?,
-            phases: phases.collect::<Result<_, CodegenError>>()?,
-        })
-    }
+/// All of a model in a language, which prints functions, and rows or columns of nonzeros, counted from 0.
+pub fn model_text<'a, F>(
+    entries: &'a ModelInterface,
+    dialect: &dyn Dialect,
+    print: &PrintFunction<'_, F>,
+    numbers: fn(&[usize]) -> String,
+) -> Result<ModelText<'a, F>, CodegenError> {
+    let functions = &ModelFunctions::new(entries, dialect, "");
+    let printer = &Printer::new(dialect);
+    let text = |function| FunctionText::new(function, functions, printer);
+    let read: BTreeSet<String> = functions.all().flat_map(|f| text(f).tables).collect();
+    let tables = functions.tables.iter();
+    let tables = tables.filter(|table| read.contains(&table.name.to_string()));
+    let tables = tables.map(|table| dialect.table(table)).collect();
+    let print = |function: &Function, phase: Option<&PhaseInterface>| {
+        print(&FunctionText::new(function, functions, printer), phase)
+    };
+    ModelText::new(entries, functions, tables, &print, numbers)
 }

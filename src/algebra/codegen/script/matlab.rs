@@ -2,16 +2,17 @@
 
 use askama::Template;
 
-use super::functions::{FunctionText, ModelText, list, names};
-use crate::codegen::code::{ConstTable, Index, MathFunction, Span};
-use crate::codegen::dialect::Dialect;
+use super::functions::{FunctionText, list, model_text, names};
+use crate::codegen::code::{ConstTable, Index, Span};
+use crate::codegen::dialect::{Dialect, name};
 use crate::codegen::error::CodegenError;
 use crate::codegen::ident::Namer;
 use crate::codegen::interface::ModelInterface;
 use crate::codegen::line_wrapping::tidy;
+use crate::codegen::model_text::ModelText;
 use crate::codegen::printer::subscript;
 use crate::files::EmittedFile;
-use crate::ir::Binary;
+use crate::ir::{Binary, Unary};
 
 /// MATLAB without toolboxes; Octave runs the same.
 #[derive(Clone, Copy, Debug)]
@@ -59,8 +60,8 @@ impl Dialect for MatlabDialect {
         format!("{table}({}, {})", from_one(row), from_one(col))
     }
 
-    fn apply(&self, function: MathFunction, argument: &str) -> String {
-        format!("{}({argument})", function.name())
+    fn apply(&self, function: Unary, argument: &str) -> String {
+        format!("{}({argument})", name(function))
     }
 
     fn let_array(&self, name: &str, elements: &[String]) -> String {
@@ -122,7 +123,7 @@ struct MatlabFile<'a> {
     banner: String,
     file: &'a str,
     /// Functions are names and definitions.
-    m: ModelText<(String, String)>,
+    m: ModelText<'a, (String, String)>,
 }
 
 #[derive(Template)]
@@ -143,7 +144,7 @@ pub fn emit(entries: &ModelInterface, provenance: &str) -> Result<Vec<EmittedFil
     let file = MatlabFile {
         banner: format!("% {provenance}"),
         file: &stem,
-        m: ModelText::new(entries, &MatlabDialect, &|f, _| matlab_function(f), column)?,
+        m: model_text(entries, &MatlabDialect, &|f, _| matlab_function(f), column)?,
     };
     Ok(vec![EmittedFile::new(
         format!("{stem}.m"),

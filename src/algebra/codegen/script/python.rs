@@ -2,14 +2,16 @@
 
 use askama::Template;
 
-use super::functions::{FunctionText, ModelText, list, names};
-use crate::codegen::code::{ConstTable, MathFunction, Role, Span};
-use crate::codegen::dialect::Dialect;
+use super::functions::{FunctionText, list, model_text, names};
+use crate::codegen::code::{ConstTable, Role, Span};
+use crate::codegen::dialect::{Dialect, name};
 use crate::codegen::error::CodegenError;
 use crate::codegen::ident::Namer;
 use crate::codegen::interface::{ModelInterface, PhaseInterface};
 use crate::codegen::line_wrapping::tidy;
+use crate::codegen::model_text::ModelText;
 use crate::files::EmittedFile;
+use crate::ir::Unary;
 
 /// Python with the elementary functions of the library on whose numbers the functions work.
 #[derive(Clone, Copy, Debug)]
@@ -56,14 +58,14 @@ impl Dialect for Library {
         " \\"
     }
 
-    fn apply(&self, function: MathFunction, argument: &str) -> String {
+    fn apply(&self, function: Unary, argument: &str) -> String {
         let library = match self {
             Library::NumPy => "np",
             Library::Casadi => "casadi",
         };
         let name = match (function, self) {
-            (MathFunction::Abs, Library::Casadi) => "fabs",
-            (named, _) => named.name(),
+            (Unary::Abs, Library::Casadi) => "fabs",
+            (named, _) => name(named),
         };
         format!("{library}.{name}({argument})")
     }
@@ -105,9 +107,9 @@ fn slice(span: &Span) -> String {
 
 #[derive(Template)]
 #[template(path = "script/numpy.askama", config = "../../templates/askama.toml")]
-struct NumPyModule {
+struct NumPyModule<'a> {
     banner: String,
-    m: ModelText<String>,
+    m: ModelText<'a, String>,
 }
 
 #[derive(Template)]
@@ -126,7 +128,7 @@ struct CasadiModule<'a> {
     banner: String,
     module: &'a str,
     /// Functions are expressions, and the function made of them.
-    m: ModelText<(String, String)>,
+    m: ModelText<'a, (String, String)>,
 }
 
 #[derive(Template)]
@@ -146,7 +148,7 @@ struct CasadiFunction<'a> {
 pub fn emit(entries: &ModelInterface, provenance: &str) -> Result<Vec<EmittedFile>, CodegenError> {
     let module = NumPyModule {
         banner: format!("# {provenance}"),
-        m: ModelText::new(entries, &Library::NumPy, &|f, _| numpy_function(f), tuple)?,
+        m: model_text(entries, &Library::NumPy, &|f, _| numpy_function(f), tuple)?,
     };
     let path = format!("{}.py", stem(entries));
     Ok(vec![EmittedFile::new(path, tidy(&module.render()?))])
@@ -166,7 +168,7 @@ pub fn emit_casadi(
         banner: format!("# {provenance}"),
         module: &module_name,
         // Expressions are private functions; the functions made of them have the plain names.
-        m: ModelText::new(
+        m: model_text(
             entries,
             &Library::Casadi,
             &|f, phase| casadi_function(model, f, phase),
