@@ -40,21 +40,10 @@ impl Index {
         self
     }
 
-    /// With another subscript in place of a variable.
-    pub fn with(&self, variable: &Ident, at: &Self) -> Self {
-        let mut result = Self::fixed(self.offset);
-        for (stride, name) in &self.terms {
-            if name == variable {
-                result.offset += stride * at.offset;
-                let scaled = at.terms.iter().map(|(inner, name)| (stride * inner, name));
-                result
-                    .terms
-                    .extend(scaled.map(|(s, name)| (s, name.clone())));
-            } else {
-                result.terms.push((*stride, name.clone()));
-            }
-        }
-        result
+    /// With another subscript added.
+    pub fn sum(mut self, other: &Self) -> Self {
+        self.terms.extend_from_slice(&other.terms);
+        self.shifted(other.offset)
     }
 }
 
@@ -79,21 +68,6 @@ impl Expr {
     /// `a op b`
     pub fn infix(op: Binary, a: Expr, b: Expr) -> Self {
         Self::Infix(op, Box::new(a), Box::new(b))
-    }
-
-    /// With another subscript in place of a variable.
-    pub fn with(&self, variable: &Ident, at: &Index) -> Self {
-        match self {
-            Self::Literal(_) | Self::Name(_) => self.clone(),
-            Self::Element(array, index) => Self::Element(array.clone(), index.with(variable, at)),
-            Self::Entry(table, row, col) => Self::Entry(
-                table.clone(),
-                row.with(variable, at),
-                col.with(variable, at),
-            ),
-            Self::Unary(op, a) => Self::Unary(*op, Box::new(a.with(variable, at))),
-            Self::Infix(op, a, b) => Self::infix(*op, a.with(variable, at), b.with(variable, at)),
-        }
     }
 }
 
@@ -194,6 +168,8 @@ pub struct ConstTable {
     pub values: Table,
     /// Whether rows are read in lanes.
     pub is_in_lanes: bool,
+    /// Whether entries are read by their subscripts.
+    pub is_entered: bool,
 }
 
 /// A generated function.

@@ -124,8 +124,8 @@ pub trait Dialect {
             .collect()
     }
 
-    /// Definition of a constant table.
-    fn table(&self, table: &ConstTable) -> String;
+    /// Definition of a constant table; nothing for one of vectors of four in languages that have none.
+    fn table(&self, table: &ConstTable) -> Option<String>;
 }
 
 /// What most targets call a function.

@@ -1,58 +1,13 @@
-//! Entries to functions of one target.
+//! Programs to functions of one target.
 
 use super::code::{Function, Parameter, Role, Stmt};
 use super::dialect::Dialect;
 use super::ident::{Ident, Namer};
-use super::interface::{FunctionSpec, ModelInterface, computes_angles};
+use super::interface::{FunctionSpec, computes_angles};
 use super::sines::SineCosine;
 use super::tables::Tables;
 use super::translate::{Names, translate};
 use crate::ir::{Program, Slot, Statement, Unary};
-
-/// The functions of a model in one target, with the tables that they share.
-#[derive(Debug)]
-pub struct ModelFunctions {
-    /// Functions of the maps.
-    pub maps: Vec<Function>,
-    /// Per phase: dynamics, dynamics with Jacobian, step.
-    pub phases: Vec<[Function; 3]>,
-    /// Constant tables.
-    pub tables: Tables,
-}
-
-impl ModelFunctions {
-    /// Translates all entries; `prefix` begins each name.
-    pub fn new(entries: &ModelInterface, dialect: &dyn Dialect, prefix: &str) -> Self {
-        let mut globals = Namer::new(dialect.reserved());
-        let mut tables = Tables::new(Namer::new(dialect.reserved()), &dialect.table_base(prefix));
-        let mut generate = |entry: &FunctionSpec, callees: &[Ident]| {
-            let name = globals.mint(&format!("{prefix}{}", entry.name));
-            function(entry, name, dialect, callees, &mut tables)
-        };
-        let maps = entries.maps.iter().map(|map| generate(map, &[])).collect();
-        let phases = entries
-            .phases
-            .iter()
-            .map(|phase| {
-                let dynamics = generate(&phase.dynamics, &[]);
-                let jacobian = generate(&phase.jacobian, &[]);
-                let callees = std::slice::from_ref(&dynamics.name);
-                let step = generate(&phase.step, callees);
-                [dynamics, jacobian, step]
-            })
-            .collect();
-        Self {
-            maps,
-            phases,
-            tables,
-        }
-    }
-
-    /// All functions in the order of the file.
-    pub fn all(&self) -> impl Iterator<Item = &Function> {
-        self.maps.iter().chain(self.phases.iter().flatten())
-    }
-}
 
 /// The body of the loop over the lanes of a block of points; arrays are called `z_lanes` and so on, the
 /// loop variable `lane`. Nothing if the program is better run point by point: it loops over tables itself,
@@ -105,7 +60,8 @@ fn vectorises(statement: &Statement) -> bool {
     }
 }
 
-fn function(
+/// The function of an entry, with the functions that it calls.
+pub fn function(
     entry: &FunctionSpec,
     name: Ident,
     dialect: &dyn Dialect,

@@ -3,10 +3,12 @@
 use super::code::Function;
 use super::dialect::Dialect;
 use super::error::CodegenError;
-use super::functions::{ModelFunctions, lanes};
-use super::interface::{ModelInterface, PhaseInterface, computes_angles};
+use super::functions::{function, lanes};
+use super::ident::{Ident, Namer};
+use super::interface::{FunctionSpec, ModelInterface, PhaseInterface, computes_angles};
 use super::printer::Printer;
 use super::sines::SineCosine;
+use super::tables::Tables;
 
 /// What the files of all languages say of a model; `F` is what they print of a function.
 pub struct ModelText<'a, F> {
@@ -40,41 +42,55 @@ pub struct PhaseText<F> {
     pub lanes_have_angles: bool,
 }
 
-/// Prints a function, with the phase it belongs to, if it belongs to one.
+/// Prints a function, with the tables so far and the phase it belongs to, if it belongs to one.
 pub type PrintFunction<'a, F> =
-    dyn Fn(&Function, Option<&PhaseInterface>) -> Result<F, CodegenError> + 'a;
+    dyn Fn(&Function, &Tables, Option<&PhaseInterface>) -> Result<F, CodegenError> + 'a;
 
 impl<'a, F> ModelText<'a, F> {
-    /// All of a model without lanes; `numbers` prints rows or columns of nonzeros, counted from 0.
+    /// All of a model without lanes. `prefix` begins each name; `numbers` prints rows or columns of nonzeros,
+    /// counted from 0.
     pub fn new(
         entries: &'a ModelInterface,
-        functions: &ModelFunctions,
-        tables: Vec<String>,
+        dialect: &dyn Dialect,
+        prefix: &str,
         print: &PrintFunction<'_, F>,
         numbers: fn(&[usize]) -> String,
     ) -> Result<Self, CodegenError> {
-        let maps = functions.maps.iter().map(|map| print(map, None));
-        let phases = entries.phases.iter().zip(&functions.phases);
-        let phases = phases.map(|(phase, functions)| {
-            let functions = functions
-                .iter()
-                .map(|function| print(function, Some(phase)));
+        let mut globals = Namer::new(dialect.reserved());
+        let mut tables = Tables::new(Namer::new(dialect.reserved()), &dialect.table_base(prefix));
+        let mut text = |entry: &FunctionSpec, callees: &[Ident], phase: Option<&PhaseInterface>| {
+            let name = globals.mint(&format!("{prefix}{}", entry.name));
+            let function = function(entry, name.clone(), dialect, callees, &mut tables);
+            Ok::<_, CodegenError>((name, print(&function, &tables, phase)?))
+        };
+        let maps = entries.maps.iter();
+        let maps = maps
+            .map(|map| Ok(text(map, &[], None)?.1))
+            .collect::<Result<_, CodegenError>>()?;
+        let phases = entries.phases.iter().map(|phase| {
+            let (name, dynamics) = text(&phase.dynamics, &[], Some(phase))?;
+            let (_, jacobian) = text(&phase.jacobian, &[], Some(phase))?;
+            let (_, step) = text(&phase.step, &[name], Some(phase))?;
             Ok(PhaseText {
                 identifier: phase.identifier.clone(),
                 upper: phase.identifier.to_ascii_uppercase(),
                 nnz: phase.pattern.len(),
                 rows: numbers(&phase.pattern.rows),
                 cols: numbers(&phase.pattern.cols),
-                functions: functions.collect::<Result<_, CodegenError>>()?,
+                functions: vec![dynamics, jacobian, step],
                 lanes: None,
                 lanes_have_angles: phase.dynamics.program.has(computes_angles),
             })
         });
+        let phases = phases.collect::<Result<_, CodegenError>>()?;
         Ok(Self {
             entries,
-            tables,
-            maps: maps.collect::<Result<_, CodegenError>>()?,
-            phases: phases.collect::<Result<_, CodegenError>>()?,
+            tables: tables
+                .iter()
+                .filter_map(|table| dialect.table(table))
+                .collect(),
+            maps,
+            phases,
         })
     }
 

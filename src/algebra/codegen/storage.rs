@@ -12,8 +12,11 @@ use crate::ir::{Statement, ValueId};
 const LONGEST_LIST: usize = 24;
 
 /// Where the rows of a matrix of values live: `stride` apart in an array, from the home's first element on.
-pub(super) struct MatrixStorage {
+#[derive(Clone, Debug, PartialEq)]
+pub struct MatrixStorage {
+    /// Where the first row begins.
     pub home: Span,
+    /// From one row to the next.
     pub stride: usize,
 }
 

@@ -3,22 +3,9 @@
 use super::code::{Expr, Index, Span, Stmt};
 use super::fours::{FourBlock, Fours};
 use super::ident::Ident;
-use super::lanes::{Row, Run};
+use super::lanes::Row;
 use super::translate::Translator;
-use crate::ir::{Binary, Group, LANES, QUAD, QuadSum, Slopes, TableId, Unary, ValueId};
-
-/// A group of functions where its numbers live.
-struct GroupCode {
-    table: Ident,
-    values: Span,
-    slopes: SlopeCode,
-}
-
-enum SlopeCode {
-    One,
-    Plus(Span),
-    Minus(Span),
-}
+use crate::ir::{Binary, Group, QUAD, QuadSum, TableId, ValueId};
 
 impl Translator<'_> {
     pub(super) fn sin_cos(&mut self, first: usize, arguments: &[ValueId]) {
@@ -40,7 +27,9 @@ impl Translator<'_> {
     }
 
     fn table(&mut self, id: TableId) -> Ident {
-        self.names.tables.name(&self.program.tables()[id.index()])
+        let table = self.names.tables.stored(&self.program.tables()[id.index()]);
+        table.is_entered = true;
+        table.name.clone()
     }
 
     fn sin_cos_lane(&mut self, sine_value: usize, cosine_value: usize, argument: ValueId) {
@@ -107,15 +96,18 @@ impl Translator<'_> {
         let table = &self.program.tables()[table.index()];
         let weights = self.whole_span(weights);
         let home = self.local_home(first, QUAD * sums.len(), "y");
+        let stored = self.names.tables.stored(table);
+        stored.is_in_lanes = true;
+        let table = (table.clone(), stored.name.clone());
         let name = |_| self.names.locals.mint("v");
         let names = (0..FourBlock::LARGEST.min(sums.len())).map(name).collect();
         self.body.push(Stmt::Fours(Box::new(Fours {
             array: home.array,
             sums: sums.to_vec(),
             weights,
-            table: (table.clone(), self.names.tables.name_in_lanes(table)),
             names,
-            filled: Fours::filled(table, sums),
+            filled: Fours::filled(&table.0, sums),
+            table,
             blocks: FourBlock::divide(sums),
         })));
     }
@@ -146,41 +138,21 @@ impl Translator<'_> {
         let r = self.names.locals.mint("r");
         let start = self.at(start, &r);
         let base = base.map(|base| self.span(base));
-        let groups: Vec<GroupCode> = groups.iter().map(|group| self.group(group)).collect();
+        let base = base.map(|base| (base.len / rows, base));
+        let groups: Vec<_> = groups.iter().map(|group| self.group(group)).collect();
         let sums = self.home(first, rows, "y");
         let slopes = self.matrix_storage(first + rows, rows, cols);
         self.in_lanes.push(slopes.home.array.clone());
-        let i = self.names.locals.mint("i");
-        let names = ["k", "l", "q", "p"].map(|name| self.names.locals.mint(name));
-
-        let mut bounds: Vec<usize> = groups.iter().map(|group| group.values.len).collect();
-        let width = base.as_ref().map_or(0, |base| base.len / rows);
-        bounds.extend(base.iter().map(|_| width));
-        bounds.sort_unstable();
-        bounds.dedup();
-        let mut runs = Vec::new();
-        let mut from = 0;
-        for to in bounds {
-            let here = groups.iter().filter(|group| group.values.len > from);
-            let base = base.as_ref().filter(|_| width > from);
-            let (term, slope) = column(here, base.map(|base| (base, width)), &r, &i);
-            let blocks = from / LANES..to / LANES;
-            runs.push(Run {
-                blocks,
-                term,
-                slope,
-            });
-            from = to;
-        }
+        let names = ["i", "k", "l", "q", "p"].map(|name| self.names.locals.mint(name));
         let row = Row {
-            slope_at: slopes.index(&r, &i),
-            slopes: slopes.home.array,
-            column: i,
             names,
-            runs,
+            groups,
+            base,
+            slopes,
             n_slopes: cols,
             start,
             sum: Expr::Element(sums.array, Index::variable(&r).shifted(sums.offset)),
+            row: r.clone(),
         };
         self.body
             .push(Stmt::For(r, rows, vec![Stmt::Row(Box::new(row))]));
@@ -200,18 +172,14 @@ impl Translator<'_> {
         Expr::Element(span.array, Index::variable(variable).shifted(span.offset))
     }
 
-    fn group(&mut self, group: &Group) -> GroupCode {
-        GroupCode {
-            table: self
-                .names
-                .tables
-                .name_in_lanes(&self.program.tables()[group.table.index()]),
+    fn group(&mut self, group: &Group) -> Group<Ident, Span> {
+        let table = self.table(group.table);
+        let values = &self.program.tables()[group.table.index()];
+        self.names.tables.stored(values).is_in_lanes = true;
+        Group {
+            table,
             values: self.span(&group.values),
-            slopes: match &group.slopes {
-                Slopes::One => SlopeCode::One,
-                Slopes::Plus(values) => SlopeCode::Plus(self.span(values)),
-                Slopes::Minus(values) => SlopeCode::Minus(self.span(values)),
-            },
+            slopes: group.slopes.map(|values| self.span(values)),
         }
     }
 
@@ -240,47 +208,5 @@ impl Translator<'_> {
             read,
             written,
         });
-    }
-}
-
-/// Term and slope of column `i` of row `r`; the base comes with the length of its rows.
-fn column<'a>(
-    groups: impl Iterator<Item = &'a GroupCode>,
-    base: Option<(&Span, usize)>,
-    r: &Ident,
-    i: &Ident,
-) -> (Expr, Expr) {
-    let (mut term, mut slope): (Option<Expr>, Option<Expr>) = (None, None);
-    if let Some((base, width)) = base {
-        let index = Index::fixed(base.offset).plus(width, r).plus(1, i);
-        slope = Some(Expr::Element(base.array.clone(), index));
-    }
-    for group in groups {
-        let entry = || {
-            let (row, col) = (Index::variable(r), Index::variable(i));
-            Expr::Entry(group.table.clone(), row, col)
-        };
-        let times = |span: &Span| {
-            let index = Index::variable(i).shifted(span.offset);
-            let element = Expr::Element(span.array.clone(), index);
-            Expr::infix(Binary::Mul, entry(), element)
-        };
-        term = Some(joined(term, Binary::Add, times(&group.values)));
-        slope = Some(match &group.slopes {
-            SlopeCode::One => joined(slope, Binary::Add, entry()),
-            SlopeCode::Plus(span) => joined(slope, Binary::Add, times(span)),
-            SlopeCode::Minus(span) => joined(slope, Binary::Sub, times(span)),
-        });
-    }
-    let invariant = "one group has a part in every column";
-    (term.expect(invariant), slope.expect(invariant))
-}
-
-/// `a op b`, or `b` alone (negated for a difference) if there is no `a`.
-fn joined(a: Option<Expr>, op: Binary, b: Expr) -> Expr {
-    match (a, op) {
-        (Some(a), op) => Expr::infix(op, a, b),
-        (None, Binary::Sub) => Expr::Unary(Unary::Neg, Box::new(b)),
-        (None, Binary::Add | Binary::Mul | Binary::Div) => b,
     }
 }

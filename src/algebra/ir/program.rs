@@ -119,34 +119,43 @@ pub enum Binary {
 
 /// Derivatives of a group of functions, one a column.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Slopes {
+pub enum Slopes<V = Vec<ValueId>> {
     /// All are one: the group is the variables themselves.
     One,
     /// These values.
-    Plus(Vec<ValueId>),
+    Plus(V),
     /// The negatives of these values.
-    Minus(Vec<ValueId>),
+    Minus(V),
 }
 
-impl Slopes {
-    /// The values that are read.
-    pub fn values(&self) -> &[ValueId] {
+impl<V> Slopes<V> {
+    /// The values that are read, if any.
+    pub fn values(&self) -> Option<&V> {
         match self {
-            Self::One => &[],
-            Self::Plus(values) | Self::Minus(values) => values,
+            Self::One => None,
+            Self::Plus(values) | Self::Minus(values) => Some(values),
+        }
+    }
+
+    /// The same with other values.
+    pub fn map<W>(&self, of: impl FnOnce(&V) -> W) -> Slopes<W> {
+        match self {
+            Self::One => Slopes::One,
+            Self::Plus(values) => Slopes::Plus(of(values)),
+            Self::Minus(values) => Slopes::Minus(of(values)),
         }
     }
 }
 
 /// Functions of one variable each, one a column of a table.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Group {
+pub struct Group<T = TableId, V = Vec<ValueId>> {
     /// Coefficients, a multiple of [`LANES`] columns.
-    pub table: TableId,
+    pub table: T,
     /// Value of each function; zero behind the last variable, as the coefficients are.
-    pub values: Vec<ValueId>,
+    pub values: V,
     /// Derivative of each function by its variable.
-    pub slopes: Slopes,
+    pub slopes: Slopes<V>,
 }
 
 /// A vector of [`QUAD`] numbers.
@@ -272,7 +281,7 @@ impl Statement {
                 operands.extend(base.iter().flatten());
                 for group in groups {
                     operands.extend(&group.values);
-                    operands.extend(group.slopes.values());
+                    operands.extend(group.slopes.values().into_iter().flatten());
                 }
                 operands
             }
@@ -284,7 +293,8 @@ impl Statement {
         match self {
             Self::Separable { groups, .. } => groups
                 .iter()
-                .flat_map(|group| [group.values.as_slice(), group.slopes.values()])
+                .flat_map(|group| std::iter::once(&group.values).chain(group.slopes.values()))
+                .map(Vec::as_slice)
                 .collect(),
             Self::Constant(_)
             | Self::Input { .. }

@@ -1,6 +1,6 @@
 //! What every program promises, checked once when it is built.
 
-use super::program::{LANES, Program, QUAD, Quad, Slopes, Statement, TableId, ValueId};
+use super::program::{LANES, Program, QUAD, Quad, Statement, TableId, ValueId};
 
 /// Why a program is refused.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -197,8 +197,8 @@ fn check_shape(program: &Program, statement: &Statement) -> Result<(), Fault> {
                 count(table.rows, start.len())?;
                 count(table.cols, table.cols.next_multiple_of(LANES))?;
                 count(group.values.len(), table.cols)?;
-                if group.slopes != Slopes::One {
-                    count(group.slopes.values().len(), table.cols)?;
+                if let Some(slopes) = group.slopes.values() {
+                    count(slopes.len(), table.cols)?;
                 }
             }
             Ok(())
@@ -216,7 +216,7 @@ fn check_shape(program: &Program, statement: &Statement) -> Result<(), Fault> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Binary, Group, ProgramBuilder, Table};
+    use super::super::{Binary, Group, ProgramBuilder, Slopes, Table};
     use super::*;
 
     fn at(statement: usize, fault: Fault) -> IrError {

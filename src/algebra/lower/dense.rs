@@ -302,7 +302,7 @@ impl DenseJacobian {
         let (sines, cosines) = (of_angles(sines), of_angles(cosines));
         let width = self.used.len().next_multiple_of(LANES);
         let mut is_first = true;
-        let mut group = |of: Kind, values: &[ValueId], slopes: Slopes| {
+        let mut group = |of: Kind, values: &[ValueId], slopes: Slopes<&[ValueId]>| {
             let mut rows = Self::coefficients(lowering.pool, equations, &self.used, of);
             let last = rows
                 .iter()
@@ -326,17 +326,13 @@ impl DenseJacobian {
                     .builder
                     .table(Table::new(rows.len(), cols, rows.concat())),
                 values: padded(values),
-                slopes: match slopes {
-                    Slopes::One => Slopes::One,
-                    Slopes::Plus(values) => Slopes::Plus(padded(&values)),
-                    Slopes::Minus(values) => Slopes::Minus(padded(&values)),
-                },
+                slopes: slopes.map(|values| padded(values)),
             })
         };
         [
             group(Kind::Variable, &values, Slopes::One),
-            group(Kind::Sine, &sines, Slopes::Plus(cosines.clone())),
-            group(Kind::Cosine, &cosines, Slopes::Minus(sines.clone())),
+            group(Kind::Sine, &sines, Slopes::Plus(cosines.as_slice())),
+            group(Kind::Cosine, &cosines, Slopes::Minus(sines.as_slice())),
         ]
         .into_iter()
         .flatten()

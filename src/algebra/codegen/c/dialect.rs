@@ -125,19 +125,19 @@ impl Dialect for CDialect {
         format!("{prefix}table")
     }
 
-    fn table(&self, table: &ConstTable) -> String {
+    fn table(&self, table: &ConstTable) -> Option<String> {
         let rows = self.rows(table, ["    {", ",\n     ", "},"]);
         let aligned = match table.is_in_lanes {
             true => format!(" {}_ALIGNED", self.upper()),
             false => String::new(),
         };
-        format!(
+        Some(format!(
             "static const {}{aligned} {}[{}][{}] = {{\n{rows}}};",
             self.real(),
             table.name,
             table.values.rows(),
             table.values.cols(),
-        )
+        ))
     }
 }
 
@@ -191,7 +191,7 @@ impl CDialect {
     }
 
     /// The definition of a function; the header has its documentation.
-    pub fn definition(&self, function: &Function, printer: &Printer) -> String {
+    pub fn definition(&self, function: &Function) -> String {
         // Without `restrict` on what lanes assign, gcc keeps in registers what it has read for them;
         // with it, it reads tables once for each use.
         let head = self.head(function, |parameter| {
@@ -200,7 +200,7 @@ impl CDialect {
                 false => "restrict ",
             }
         });
-        printer.function(&head, |unused| format!("(void){unused};"), function)
+        Printer::new(self).function(&head, |unused| format!("(void){unused};"), function)
     }
 
     /// The function's name and parameters, arrays with what `qualifier` says of each.

@@ -1,24 +1,26 @@
 //! Rows of functions in C: block after block of columns, all lanes of one side by side.
 
+use std::ops::Range;
+
 use super::dialect::CDialect;
 use crate::codegen::code::{Expr, Index};
 use crate::codegen::dialect::{Dialect, Lines};
-use crate::codegen::lanes::{Row, Run};
+use crate::codegen::lanes::Row;
 use crate::codegen::printer::Printer;
 use crate::ir::LANES;
 
 /// The lines of a row.
 pub(super) fn row(dialect: &CDialect, row: &Row) -> Lines {
-    let [block, lane, _, sums] = &row.names;
+    let [_, block, lane, _, sums] = &row.names;
     let print = |expr: &Expr| Printer::new(dialect).expression(expr);
     let full = row.n_slopes / LANES;
     let mut lines = vec![(0, format!("{}_eight {sums};", dialect.name))];
-    for run in &row.runs {
+    for run in &row.runs() {
         let columns = |first: Index, has_slopes: bool, op: &str| {
             columns(dialect, row, run, &first, has_slopes, op)
         };
         // The first block begins the sums, and the last may have fewer slopes than lanes.
-        let mut blocks = run.blocks.clone();
+        let mut blocks = run.clone();
         if blocks.start == 0 {
             lines.extend(columns(Index::fixed(0), full > 0, "="));
             blocks.start = 1;
@@ -35,9 +37,9 @@ pub(super) fn row(dialect: &CDialect, row: &Row) -> Lines {
         if inner.end < blocks.end {
             lines.extend(columns(Index::fixed(LANES * inner.end), false, "+="));
         }
-        if run.blocks.contains(&full) && !row.n_slopes.is_multiple_of(LANES) {
+        if run.contains(&full) && !row.n_slopes.is_multiple_of(LANES) {
             let at = Index::variable(lane).shifted(LANES * full);
-            let [target, slope] = row.slope(run, &at).map(|expr| print(&expr));
+            let [_, target, slope] = row.column(run, &at).map(|expr| print(&expr));
             let head = dialect.for_loop(&lane.to_string(), row.n_slopes % LANES);
             lines.extend(looped(head, vec![(0, format!("{target} = {slope};"))]));
         }
@@ -52,12 +54,12 @@ pub(super) fn row(dialect: &CDialect, row: &Row) -> Lines {
 fn columns(
     dialect: &CDialect,
     row: &Row,
-    run: &Run,
+    run: &Range<usize>,
     first: &Index,
     has_slopes: bool,
     op: &str,
 ) -> Lines {
-    let [_, lane, _, sums] = &row.names;
+    let [_, _, lane, _, sums] = &row.names;
     let (upper, at) = (dialect.upper(), first.clone().plus(1, lane));
     let in_lanes = CDialect {
         in_lanes: true,
@@ -65,12 +67,12 @@ fn columns(
     };
     let print = |expr: &Expr| Printer::new(&in_lanes).expression(expr);
     let mut body = Vec::new();
+    let [term, target, slope] = row.column(run, &at);
     if has_slopes {
-        let [target, slope] = row.slope(run, &at);
         let target = Printer::new(dialect).expression(&target);
         body.push((0, format!("{upper}_WRITE({target}) = {};", print(&slope))));
     }
-    let term = print(&run.term.with(&row.column, &at));
+    let term = print(&term);
     body.push((0, format!("{upper}_SUMS({sums}, {lane}) {op} {term};")));
     let head = format!("for (size_t {lane} = 0; {lane} < {LANES}; {lane} += {upper}_LANE_STEP)");
     looped(head, body)

@@ -6,14 +6,11 @@ mod selftest;
 
 use askama::Template;
 
-use super::dialect::Dialect;
 use super::error::CodegenError;
-use super::functions::ModelFunctions;
 use super::interface::{ModelInterface, computes_angles};
 use super::line_wrapping::{braced, tidy};
-use super::model_text::ModelText;
+use super::model_text::{ModelText, PrintFunction};
 use super::precision::Precision;
-use super::printer::Printer;
 use super::sin_cos::KernelText;
 use super::sines::SineCosine;
 use super::test_vectors::TestVectors;
@@ -41,8 +38,6 @@ struct Source<'a> {
     m: &'a Text<'a>,
     is_library: bool,
     kernel: Option<KernelText>,
-    /// Whether rows of tables are read in lanes.
-    has_lanes: bool,
     /// Whether rows of functions are added in eight lanes.
     has_rows: bool,
     /// Whether there are sums of vectors of four numbers.
@@ -73,18 +68,8 @@ pub fn emit(
         precision,
         in_lanes: false,
     };
-    let functions = ModelFunctions::new(entries, d, &format!("{name}_"));
-    let tables = functions.tables.iter().map(|table| d.table(table));
-    let text = ModelText::new(
-        entries,
-        &functions,
-        tables.collect(),
-        &|function, _| {
-            let definition = d.definition(function, &Printer::new(d));
-            Ok((d.prototype(function), definition))
-        },
-        numbers,
-    )?;
+    let print: &PrintFunction<_> = &|f, _, _| Ok((d.prototype(f), d.definition(f)));
+    let text = ModelText::new(entries, d, &format!("{name}_"), print, numbers)?;
     let m = &text.with_lanes(d, sines);
     let banner = &format!("/* {provenance} */");
     let header = Header { banner, d, m };
@@ -94,7 +79,6 @@ pub fn emit(
         m,
         is_library: sines == SineCosine::Library,
         kernel: (entries.has(computes_angles)).then(|| KernelText::new(precision, d)),
-        has_lanes: functions.tables.iter().any(|table| table.is_in_lanes),
         has_rows: entries.has(|s| matches!(s, Statement::Separable { .. })),
         has_fours: entries.has(|s| matches!(s, Statement::Quads { .. })),
         sign: entries.has(|s| matches!(s, Statement::Unary(Unary::Sign, _))),

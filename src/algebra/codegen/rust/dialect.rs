@@ -92,12 +92,12 @@ impl RustDialect {
     }
 
     /// A function with its documentation.
-    pub fn definition(&self, function: &Function, printer: &Printer) -> String {
+    pub fn definition(&self, function: &Function) -> String {
         let parameters = function.parameters.iter().map(|p| self.parameter(p));
         let parameters = parameters.collect::<Vec<_>>().join(", ");
         let docs = documentation(&function.docs);
         let head = format!("{docs}pub fn {}({parameters})", function.name);
-        printer.function(&head, |unused| format!("let _ = {unused};"), function)
+        Printer::new(self).function(&head, |unused| format!("let _ = {unused};"), function)
     }
 }
 
@@ -180,16 +180,16 @@ impl Dialect for RustDialect {
         )
     }
 
-    fn table(&self, table: &ConstTable) -> String {
+    fn table(&self, table: &ConstTable) -> Option<String> {
         let rows = self.rows(table, ["    [", ",\n     ", "],"]);
         let (name, real) = (&table.name, self.real());
         let (n, cols) = (table.values.rows(), table.values.cols());
-        match table.is_in_lanes {
+        Some(match table.is_in_lanes {
             true => {
                 format!("static {name}: &[[{real}; {cols}]; {n}] = &Aligned([\n{rows}]).0;")
             }
             false => format!("static {name}: [[{real}; {cols}]; {n}] = [\n{rows}];"),
-        }
+        })
     }
 }
 

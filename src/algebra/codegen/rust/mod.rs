@@ -6,14 +6,11 @@ mod selftest;
 
 use askama::Template;
 
-use super::dialect::Dialect;
 use super::error::CodegenError;
-use super::functions::ModelFunctions;
 use super::interface::{ModelInterface, computes_angles};
 use super::line_wrapping::{comment_lines, tidy};
 use super::model_text::ModelText;
 use super::precision::Precision;
-use super::printer::Printer;
 use super::sin_cos::KernelText;
 use super::sines::SineCosine;
 use super::test_vectors::TestVectors;
@@ -39,8 +36,8 @@ struct Lib<'a> {
     kernel: Option<KernelText>,
     /// Whether there are sums of vectors of four numbers.
     has_fours: bool,
-    /// Whether rows of tables are read by wide registers.
-    has_aligned: bool,
+    /// Whether rows of functions are added in eight lanes.
+    has_rows: bool,
 }
 
 /// The crate of a model; `provenance` is the text of each file's first line.
@@ -55,15 +52,7 @@ pub fn emit(
 ) -> Result<Vec<EmittedFile>, CodegenError> {
     let name = entries.identifier.as_str();
     let d = RustDialect { precision };
-    let functions = ModelFunctions::new(entries, &d, "");
-    let tables = functions.tables.iter().map(|table| d.table(table));
-    let text = ModelText::new(
-        entries,
-        &functions,
-        tables.collect(),
-        &|function, _| Ok(d.definition(function, &Printer::new(&d))),
-        numbers,
-    )?;
+    let text = ModelText::new(entries, &d, "", &|f, _, _| Ok(d.definition(f)), numbers)?;
     let banner = &format!("// {provenance}");
     let lib = Lib {
         banner,
@@ -72,7 +61,7 @@ pub fn emit(
         is_library: sines == SineCosine::Library,
         kernel: (entries.has(computes_angles)).then(|| KernelText::new(precision, &d)),
         has_fours: entries.has(|s| matches!(s, Statement::Quads { .. })),
-        has_aligned: functions.tables.iter().any(|table| table.is_in_lanes),
+        has_rows: entries.has(|s| matches!(s, Statement::Separable { .. })),
     };
     let cargo = Cargo {
         banner: format!("# {provenance}"),

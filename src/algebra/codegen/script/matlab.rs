@@ -2,14 +2,14 @@
 
 use askama::Template;
 
-use super::functions::{FunctionText, list, model_text, names};
+use super::functions::{FunctionText, list, names};
 use crate::codegen::code::{ConstTable, Index, Span};
 use crate::codegen::dialect::{Dialect, name};
 use crate::codegen::error::CodegenError;
 use crate::codegen::ident::Namer;
 use crate::codegen::interface::ModelInterface;
 use crate::codegen::line_wrapping::tidy;
-use crate::codegen::model_text::ModelText;
+use crate::codegen::model_text::{ModelText, PrintFunction};
 use crate::codegen::printer::subscript;
 use crate::files::EmittedFile;
 use crate::ir::{Binary, Unary};
@@ -91,12 +91,13 @@ impl Dialect for MatlabDialect {
         }
     }
 
-    fn table(&self, table: &ConstTable) -> String {
+    fn table(&self, table: &ConstTable) -> Option<String> {
         let (name, rows) = (
             &table.name,
             self.rows(table, ["        ", ", ...\n        ", ""]),
         );
-        format!("function t = {name}_entries()\n    t = [\n{rows}    ];\nend")
+        (table.is_entered)
+            .then(|| format!("function t = {name}_entries()\n    t = [\n{rows}    ];\nend"))
     }
 }
 
@@ -141,10 +142,12 @@ struct MatlabFunction<'a> {
 /// [`CodegenError::Template`] if a template fails.
 pub fn emit(entries: &ModelInterface, provenance: &str) -> Result<Vec<EmittedFile>, CodegenError> {
     let stem = Namer::new(RESERVED).mint(&entries.identifier).to_string();
+    let print: &PrintFunction<_> =
+        &|f, tables, _| matlab_function(&FunctionText::new(f, tables, &MatlabDialect));
     let file = MatlabFile {
         banner: format!("% {provenance}"),
         file: &stem,
-        m: model_text(entries, &MatlabDialect, &|f, _| matlab_function(f), column)?,
+        m: ModelText::new(entries, &MatlabDialect, "", print, column)?,
     };
     Ok(vec![EmittedFile::new(
         format!("{stem}.m"),

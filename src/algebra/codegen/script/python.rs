@@ -2,14 +2,14 @@
 
 use askama::Template;
 
-use super::functions::{FunctionText, list, model_text, names};
+use super::functions::{FunctionText, list, names};
 use crate::codegen::code::{ConstTable, Role, Span};
 use crate::codegen::dialect::{Dialect, name};
 use crate::codegen::error::CodegenError;
 use crate::codegen::ident::Namer;
 use crate::codegen::interface::{ModelInterface, PhaseInterface};
 use crate::codegen::line_wrapping::tidy;
-use crate::codegen::model_text::ModelText;
+use crate::codegen::model_text::{ModelText, PrintFunction};
 use crate::files::EmittedFile;
 use crate::ir::Unary;
 
@@ -95,9 +95,9 @@ impl Dialect for Library {
         format!("{} = {callee}({read})", list(written, slice))
     }
 
-    fn table(&self, table: &ConstTable) -> String {
+    fn table(&self, table: &ConstTable) -> Option<String> {
         let rows = self.rows(table, ["    [", ",\n     ", "],"]);
-        format!("{} = [\n{rows}]", table.name)
+        (table.is_entered).then(|| format!("{} = [\n{rows}]", table.name))
     }
 }
 
@@ -146,9 +146,11 @@ struct CasadiFunction<'a> {
 /// # Errors
 /// [`CodegenError::Template`] if a template fails.
 pub fn emit(entries: &ModelInterface, provenance: &str) -> Result<Vec<EmittedFile>, CodegenError> {
+    let print: &PrintFunction<_> =
+        &|f, tables, _| numpy_function(&FunctionText::new(f, tables, &Library::NumPy));
     let module = NumPyModule {
         banner: format!("# {provenance}"),
-        m: model_text(entries, &Library::NumPy, &|f, _| numpy_function(f), tuple)?,
+        m: ModelText::new(entries, &Library::NumPy, "", print, tuple)?,
     };
     let path = format!("{}.py", stem(entries));
     Ok(vec![EmittedFile::new(path, tidy(&module.render()?))])
@@ -164,16 +166,15 @@ pub fn emit_casadi(
 ) -> Result<Vec<EmittedFile>, CodegenError> {
     let model = entries.identifier.as_str();
     let module_name = format!("{}_casadi", stem(entries));
+    // Expressions are private functions; the functions made of them have the plain names.
+    let print: &PrintFunction<_> = &|f, tables, phase| {
+        let text = FunctionText::new(f, tables, &Library::Casadi);
+        casadi_function(model, &text, phase)
+    };
     let module = CasadiModule {
         banner: format!("# {provenance}"),
         module: &module_name,
-        // Expressions are private functions; the functions made of them have the plain names.
-        m: model_text(
-            entries,
-            &Library::Casadi,
-            &|f, phase| casadi_function(model, f, phase),
-            tuple,
-        )?,
+        m: ModelText::new(entries, &Library::Casadi, "", print, tuple)?,
     };
     let path = format!("{module_name}.py");
     Ok(vec![EmittedFile::new(path, tidy(&module.render()?))])
