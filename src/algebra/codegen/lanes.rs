@@ -16,8 +16,8 @@ pub struct Row {
     pub names: [Ident; 5],
     /// The functions.
     pub groups: Vec<Group<Ident, Span>>,
-    /// What the slopes begin with, after how many of them there are in a row.
-    pub base: Option<(usize, Span)>,
+    /// What the slopes begin with, as many a row as the rows are apart.
+    pub base: Option<MatrixStorage>,
     /// Where the slopes go.
     pub slopes: MatrixStorage,
     /// Number of columns with a slope.
@@ -32,7 +32,9 @@ impl Row {
     /// Runs of blocks of [`LANES`] columns, one after the other, whose columns have terms alike.
     pub fn runs(&self) -> Vec<Range<usize>> {
         let ends = self.groups.iter().map(|group| group.values.len);
-        let mut ends: Vec<usize> = ends.chain(self.base.iter().map(|base| base.0)).collect();
+        let mut ends: Vec<usize> = ends
+            .chain(self.base.iter().map(|base| base.stride))
+            .collect();
         ends.sort_unstable();
         ends.dedup();
         let begins = std::iter::once(0).chain(ends.iter().copied());
@@ -43,11 +45,8 @@ impl Row {
     /// The term of a column of a run, where its slope goes, and its slope.
     pub fn column(&self, run: &Range<usize>, at: &Index) -> [Expr; 3] {
         let from = LANES * run.start;
-        let base = self.base.as_ref().filter(|(width, _)| *width > from);
-        let mut slope = base.map(|(width, base)| {
-            let row = Index::fixed(base.offset).plus(*width, &self.row);
-            Expr::Element(base.array.clone(), row.sum(at))
-        });
+        let base = self.base.as_ref().filter(|base| base.stride > from);
+        let mut slope = base.map(|base| base.element(&self.row, at));
         let mut term = None;
         for group in self.groups.iter().filter(|group| group.values.len > from) {
             let entry = || Expr::Entry(group.table.clone(), Index::variable(&self.row), at.clone());
@@ -62,9 +61,7 @@ impl Row {
                 Slopes::Minus(span) => joined(slope, Binary::Sub, times(span)),
             });
         }
-        let home = &self.slopes.home;
-        let row = Index::fixed(home.offset).plus(self.slopes.stride, &self.row);
-        let target = Expr::Element(home.array.clone(), row.sum(at));
+        let target = self.slopes.element(&self.row, at);
         let invariant = "one group has a part in every column";
         [term.expect(invariant), target, slope.expect(invariant)]
     }

@@ -2,10 +2,9 @@
 
 use super::code::Function;
 use super::dialect::Dialect;
-use super::error::CodegenError;
 use super::functions::{function, lanes};
 use super::ident::{Ident, Namer};
-use super::interface::{FunctionSpec, ModelInterface, PhaseInterface, computes_angles};
+use super::interface::{FunctionSpec, ModelInterface, computes_angles};
 use super::printer::Printer;
 use super::sines::SineCosine;
 use super::tables::Tables;
@@ -35,63 +34,54 @@ pub struct PhaseText<F> {
     /// Columns of the nonzeros.
     pub cols: String,
     /// Accelerations, then with Jacobian, then a step.
-    pub functions: Vec<F>,
+    pub functions: [F; 3],
     /// Body of the loop over the lanes of a batch.
     pub lanes: Option<String>,
     /// Whether that loop has sines, whose arguments may be beyond the kernel's limit.
     pub lanes_have_angles: bool,
 }
 
-/// Prints a function, with the tables so far and the phase it belongs to, if it belongs to one.
-pub type PrintFunction<'a, F> =
-    dyn Fn(&Function, &Tables, Option<&PhaseInterface>) -> Result<F, CodegenError> + 'a;
-
 impl<'a, F> ModelText<'a, F> {
-    /// All of a model without lanes. `prefix` begins each name; `numbers` prints rows or columns of nonzeros,
-    /// counted from 0.
+    /// All of a model without lanes. `prefix` begins each name; `print` prints a function that reads some of
+    /// the tables, `numbers` rows or columns of nonzeros, counted from 0.
     pub fn new(
         entries: &'a ModelInterface,
         dialect: &dyn Dialect,
         prefix: &str,
-        print: &PrintFunction<'_, F>,
+        print: impl Fn(Function, &Tables) -> F,
         numbers: fn(&[usize]) -> String,
-    ) -> Result<Self, CodegenError> {
+    ) -> Self {
         let mut globals = Namer::new(dialect.reserved());
         let mut tables = Tables::new(Namer::new(dialect.reserved()), &dialect.table_base(prefix));
-        let mut text = |entry: &FunctionSpec, callees: &[Ident], phase: Option<&PhaseInterface>| {
+        let mut text = |entry: &FunctionSpec, callees: &[Ident]| {
             let name = globals.mint(&format!("{prefix}{}", entry.name));
             let function = function(entry, name.clone(), dialect, callees, &mut tables);
-            Ok::<_, CodegenError>((name, print(&function, &tables, phase)?))
+            (name, print(function, &tables))
         };
-        let maps = entries.maps.iter();
-        let maps = maps
-            .map(|map| Ok(text(map, &[], None)?.1))
-            .collect::<Result<_, CodegenError>>()?;
+        let maps = entries.maps.iter().map(|map| text(map, &[]).1).collect();
         let phases = entries.phases.iter().map(|phase| {
-            let (name, dynamics) = text(&phase.dynamics, &[], Some(phase))?;
-            let (_, jacobian) = text(&phase.jacobian, &[], Some(phase))?;
-            let (_, step) = text(&phase.step, &[name], Some(phase))?;
-            Ok(PhaseText {
+            let (name, dynamics) = text(&phase.dynamics, &[]);
+            let (_, jacobian) = text(&phase.jacobian, &[]);
+            let (_, step) = text(&phase.step, &[name]);
+            PhaseText {
                 identifier: phase.identifier.clone(),
                 upper: phase.identifier.to_ascii_uppercase(),
                 nnz: phase.pattern.len(),
                 rows: numbers(&phase.pattern.rows),
                 cols: numbers(&phase.pattern.cols),
-                functions: vec![dynamics, jacobian, step],
+                functions: [dynamics, jacobian, step],
                 lanes: None,
                 lanes_have_angles: phase.dynamics.program.has(computes_angles),
-            })
+            }
         });
-        let phases = phases.collect::<Result<_, CodegenError>>()?;
-        Ok(Self {
+        let phases = phases.collect();
+        let tables = tables.iter().filter_map(|table| dialect.table(table));
+        Self {
             entries,
-            tables: tables
-                .iter()
-                .filter_map(|table| dialect.table(table))
-                .collect(),
+            tables: tables.collect(),
             maps,
             phases,
-        })
+        }
     }
 
     /// The same with the loops over the lanes of batches that run in blocks.

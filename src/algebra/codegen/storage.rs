@@ -21,15 +21,10 @@ pub struct MatrixStorage {
 }
 
 impl MatrixStorage {
-    /// The entry at two loop variables.
-    pub fn element(&self, row: &Ident, col: &Ident) -> Expr {
-        Expr::Element(self.home.array.clone(), self.index(row, col))
-    }
-
-    /// Where in the array that is.
-    pub fn index(&self, row: &Ident, col: &Ident) -> Index {
+    /// The entry at a loop variable and a subscript.
+    pub fn element(&self, row: &Ident, col: &Index) -> Expr {
         let row = Index::fixed(self.home.offset).plus(self.stride, row);
-        row.plus(1, col)
+        Expr::Element(self.home.array.clone(), row.sum(col))
     }
 }
 
@@ -67,15 +62,15 @@ impl Translator<'_> {
         }
         let array = self.names.locals.mint("a");
         self.copies.push((values.to_vec(), array.clone()));
-        let runs = self.runs(values);
         if values.len() < LONGEST_LIST {
             let elements = values.iter().map(|&value| self.read(value).0).collect();
             self.body.push(Stmt::LetArray(array.clone(), elements));
-            return local(array, values.len());
-        }
-        self.body.push(Stmt::Declare(array.clone(), values.len()));
-        for run in runs {
-            self.copy_run(&array, values, run);
+        } else {
+            let runs = self.runs(values);
+            self.body.push(Stmt::Declare(array.clone(), values.len()));
+            for run in runs {
+                self.copy_run(&array, values, run);
+            }
         }
         local(array, values.len())
     }

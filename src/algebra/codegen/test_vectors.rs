@@ -32,11 +32,15 @@ impl<'a> TestVectors<'a> {
         precision: Precision,
         [nan, infinite, negative]: [&str; 3],
     ) -> Self {
-        let text = |value: f64, digits: &dyn Fn(f64) -> String| match value {
-            finite if finite.is_finite() => digits(finite),
-            nan_value if nan_value.is_nan() => nan.to_owned(),
-            above if above > 0.0 => infinite.to_owned(),
-            _ => negative.to_owned(),
+        let text = |value: f64, digits: &dyn Fn(f64) -> String| match (
+            value.is_finite(),
+            value.is_nan(),
+            value > 0.0,
+        ) {
+            (true, _, _) => digits(value),
+            (false, true, _) => nan.to_owned(),
+            (false, false, true) => infinite.to_owned(),
+            (false, false, false) => negative.to_owned(),
         };
         let spell = |value: f64| text(value, &|value| dialect.literal(value));
         let with_all_digits = |value: f64| text(value, &|value| Precision::Double.digits(value));

@@ -4,6 +4,7 @@ use super::code::{Expr, Index, Span, Stmt};
 use super::fours::{FourBlock, Fours};
 use super::ident::Ident;
 use super::lanes::Row;
+use super::storage::MatrixStorage;
 use super::translate::Translator;
 use crate::ir::{Binary, Group, QUAD, QuadSum, TableId, ValueId};
 
@@ -120,7 +121,7 @@ impl Translator<'_> {
         let home = self.matrix_storage(first, rows, cols);
         let (r, i) = (self.names.locals.mint("r"), self.names.locals.mint("i"));
         let entry = Expr::Entry(name, Index::variable(&r), Index::variable(&i));
-        let assign = Stmt::Assign(home.element(&r, &i), entry);
+        let assign = Stmt::Assign(home.element(&r, &Index::variable(&i)), entry);
         let inner = Stmt::For(i, cols, vec![assign]);
         self.body.push(Stmt::For(r, rows, vec![inner]));
     }
@@ -138,7 +139,10 @@ impl Translator<'_> {
         let r = self.names.locals.mint("r");
         let start = self.at(start, &r);
         let base = base.map(|base| self.span(base));
-        let base = base.map(|base| (base.len / rows, base));
+        let base = base.map(|home| MatrixStorage {
+            stride: home.len / rows,
+            home,
+        });
         let groups: Vec<_> = groups.iter().map(|group| self.group(group)).collect();
         let sums = self.home(first, rows, "y");
         let slopes = self.matrix_storage(first + rows, rows, cols);

@@ -17,12 +17,8 @@ use crate::symbolic::{ExprId, ExprPool, Function, Node, SymbolId};
 /// Fewest weights for which a loop of their own is worth it.
 const SHORTEST_RUN: usize = 4;
 
-/// Number of distinct candidate terms that the equations use.
-pub(super) fn n_weights(equations: &[Combination]) -> usize {
-    distinct(equations).len()
-}
-
-fn distinct(equations: &[Combination]) -> Vec<ExprId> {
+/// The distinct candidate terms that equations use.
+pub(super) fn distinct(equations: &[Combination]) -> Vec<ExprId> {
     let mut seen = BTreeSet::new();
     let items = equations.iter().flat_map(|equation| &equation.items);
     items

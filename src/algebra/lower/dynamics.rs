@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use super::combination::Combination;
 use super::cost::Form;
-use super::dense::{self, DenseJacobian};
+use super::dense::{DenseJacobian, distinct, matrix_vector};
 use super::error::LowerError;
 use super::expression::ExpressionLowering;
 use super::gradient::Gradient;
@@ -46,8 +46,8 @@ pub fn dynamics(system: &Equations<'_>, phase: usize, form: Form) -> Result<Prog
     let mut pool = system.pool().clone();
     let (mut builder, ddz) = if form.uses_tables(&equations) {
         let mut lowering = start(system, &pool, "dynamics");
-        lowering.prepare(&expressions(&equations));
-        let ddz = dense::matrix_vector(&mut lowering, &equations);
+        lowering.prepare(&distinct(&equations));
+        let ddz = matrix_vector(&mut lowering, &equations);
         (lowering.builder, ddz)
     } else {
         let demand = Demand::new(&mut pool, &equations);
@@ -154,7 +154,7 @@ fn dense_jacobian(
 ) -> (ProgramBuilder, Vec<ValueId>, Vec<ValueId>) {
     let dense = DenseJacobian::new(pool, equations, columns);
     let mut lowering = start(system, pool, "dynamics_jacobian");
-    let mut roots = expressions(equations);
+    let mut roots = distinct(equations);
     roots.extend(dense.expressions());
     lowering.prepare(&roots);
     let (ddz, entries) = dense.lower(&mut lowering, equations);
@@ -210,13 +210,6 @@ fn start<'a>(system: &Equations<'_>, pool: &'a ExprPool, name: &str) -> Expressi
         .map(|(variable, value)| (system.symbol(variable), value))
         .collect();
     ExpressionLowering::new(pool, builder, variables)
-}
-
-fn expressions(combinations: &[Combination]) -> Vec<ExprId> {
-    let items = combinations
-        .iter()
-        .flat_map(|combination| &combination.items);
-    items.map(|&(_, expr)| expr).collect()
 }
 
 /// The values of nested sums; each may share a part of one before it.

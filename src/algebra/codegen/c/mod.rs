@@ -9,10 +9,11 @@ use askama::Template;
 use super::error::CodegenError;
 use super::interface::{ModelInterface, computes_angles};
 use super::line_wrapping::{braced, tidy};
-use super::model_text::{ModelText, PrintFunction};
+use super::model_text::ModelText;
 use super::precision::Precision;
 use super::sin_cos::KernelText;
 use super::sines::SineCosine;
+use super::tables::Tables;
 use super::test_vectors::TestVectors;
 use crate::files::EmittedFile;
 use crate::ir::{Statement, Unary};
@@ -68,8 +69,8 @@ pub fn emit(
         precision,
         in_lanes: false,
     };
-    let print: &PrintFunction<_> = &|f, _, _| Ok((d.prototype(f), d.definition(f)));
-    let text = ModelText::new(entries, d, &format!("{name}_"), print, numbers)?;
+    let print = |f, _: &Tables| (d.prototype(&f), d.definition(&f));
+    let text = ModelText::new(entries, d, &format!("{name}_"), print, numbers);
     let m = &text.with_lanes(d, sines);
     let banner = &format!("/* {provenance} */");
     let header = Header { banner, d, m };

@@ -52,7 +52,7 @@ pub fn emit(
 ) -> Result<Vec<EmittedFile>, CodegenError> {
     let name = entries.identifier.as_str();
     let d = RustDialect { precision };
-    let text = ModelText::new(entries, &d, "", &|f, _, _| Ok(d.definition(f)), numbers)?;
+    let text = ModelText::new(entries, &d, "", |f, _| d.definition(&f), numbers);
     let banner = &format!("// {provenance}");
     let lib = Lib {
         banner,

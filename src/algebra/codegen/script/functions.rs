@@ -7,8 +7,8 @@ use crate::codegen::printer::Printer;
 use crate::codegen::tables::Tables;
 
 /// A function of a script. A parameter that is read and written is taken and returned.
-pub struct FunctionText<'a> {
-    function: &'a Function,
+pub struct FunctionText {
+    parameters: Vec<Parameter>,
     /// Its name.
     pub name: String,
     /// Lines of documentation, not yet escaped.
@@ -19,16 +19,16 @@ pub struct FunctionText<'a> {
     pub tables: Vec<String>,
 }
 
-impl<'a> FunctionText<'a> {
+impl FunctionText {
     /// The text of a function that reads some of the tables.
-    pub fn new(function: &'a Function, tables: &Tables, dialect: &dyn Dialect) -> Self {
+    pub fn new(function: Function, tables: &Tables, dialect: &dyn Dialect) -> Self {
         let body = Printer::new(dialect).statements(&function.body, 1);
         let names = tables.iter().map(|table| table.name.to_string());
         let is_read = |name: &String| {
             body.contains(&format!("{name}[")) || body.contains(&format!("{name}("))
         };
         Self {
-            function,
+            parameters: function.parameters,
             name: function.name.to_string(),
             docs: comment_lines(&function.docs, 90),
             tables: names.filter(is_read).collect(),
@@ -37,33 +37,33 @@ impl<'a> FunctionText<'a> {
     }
 
     /// Parameters of these roles.
-    fn of(&self, roles: &[Role]) -> Vec<&'a Parameter> {
-        let parameters = self.function.parameters.iter();
+    fn of(&self, roles: &[Role]) -> Vec<&Parameter> {
+        let parameters = self.parameters.iter();
         parameters.filter(|p| roles.contains(&p.role)).collect()
     }
 
     /// What it takes.
-    pub fn inputs(&self) -> Vec<&'a Parameter> {
+    pub fn inputs(&self) -> Vec<&Parameter> {
         self.of(&[Role::Input, Role::InOut, Role::Scalar])
     }
 
     /// What it returns.
-    pub fn outputs(&self) -> Vec<&'a Parameter> {
+    pub fn outputs(&self) -> Vec<&Parameter> {
         self.of(&[Role::Output, Role::InOut])
     }
 
     /// The parameters that are arrays.
-    pub fn arrays(&self) -> Vec<&'a Parameter> {
+    pub fn arrays(&self) -> Vec<&Parameter> {
         self.of(&[Role::Input, Role::InOut])
     }
 
     /// What is taken and returned.
-    pub fn copied(&self) -> Vec<&'a Parameter> {
+    pub fn copied(&self) -> Vec<&Parameter> {
         self.of(&[Role::InOut])
     }
 
     /// What is returned and not taken, so that the body has to begin with it.
-    pub fn created(&self) -> Vec<&'a Parameter> {
+    pub fn created(&self) -> Vec<&Parameter> {
         self.of(&[Role::Output])
     }
 }

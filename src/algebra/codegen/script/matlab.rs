@@ -9,8 +9,9 @@ use crate::codegen::error::CodegenError;
 use crate::codegen::ident::Namer;
 use crate::codegen::interface::ModelInterface;
 use crate::codegen::line_wrapping::tidy;
-use crate::codegen::model_text::{ModelText, PrintFunction};
+use crate::codegen::model_text::ModelText;
 use crate::codegen::printer::subscript;
+use crate::codegen::tables::Tables;
 use crate::files::EmittedFile;
 use crate::ir::{Binary, Unary};
 
@@ -123,17 +124,7 @@ fn span_text(span: &Span) -> String {
 struct MatlabFile<'a> {
     banner: String,
     file: &'a str,
-    /// Functions are names and definitions.
-    m: ModelText<'a, (String, String)>,
-}
-
-#[derive(Template)]
-#[template(
-    path = "script/matlab_function.askama",
-    config = "../../templates/askama.toml"
-)]
-struct MatlabFunction<'a> {
-    f: &'a FunctionText<'a>,
+    m: ModelText<'a, FunctionText>,
 }
 
 /// The file of a model; `provenance` is the text of the first line.
@@ -142,21 +133,16 @@ struct MatlabFunction<'a> {
 /// [`CodegenError::Template`] if a template fails.
 pub fn emit(entries: &ModelInterface, provenance: &str) -> Result<Vec<EmittedFile>, CodegenError> {
     let stem = Namer::new(RESERVED).mint(&entries.identifier).to_string();
-    let print: &PrintFunction<_> =
-        &|f, tables, _| matlab_function(&FunctionText::new(f, tables, &MatlabDialect));
+    let print = |f, tables: &Tables| FunctionText::new(f, tables, &MatlabDialect);
     let file = MatlabFile {
         banner: format!("% {provenance}"),
         file: &stem,
-        m: ModelText::new(entries, &MatlabDialect, "", print, column)?,
+        m: ModelText::new(entries, &MatlabDialect, "", print, column),
     };
     Ok(vec![EmittedFile::new(
         format!("{stem}.m"),
         tidy(&file.render()?),
     )])
-}
-
-fn matlab_function(f: &FunctionText) -> Result<(String, String), CodegenError> {
-    Ok((f.name.clone(), MatlabFunction { f }.render()?))
 }
 
 /// Numbers of a column, counted from one.

@@ -7,9 +7,10 @@ use crate::codegen::code::{ConstTable, Role, Span};
 use crate::codegen::dialect::{Dialect, name};
 use crate::codegen::error::CodegenError;
 use crate::codegen::ident::Namer;
-use crate::codegen::interface::{ModelInterface, PhaseInterface};
+use crate::codegen::interface::ModelInterface;
 use crate::codegen::line_wrapping::tidy;
-use crate::codegen::model_text::{ModelText, PrintFunction};
+use crate::codegen::model_text::ModelText;
+use crate::codegen::tables::Tables;
 use crate::files::EmittedFile;
 use crate::ir::Unary;
 
@@ -109,17 +110,7 @@ fn slice(span: &Span) -> String {
 #[template(path = "script/numpy.askama", config = "../../templates/askama.toml")]
 struct NumPyModule<'a> {
     banner: String,
-    m: ModelText<'a, String>,
-}
-
-#[derive(Template)]
-#[template(
-    path = "script/numpy_function.askama",
-    config = "../../templates/askama.toml"
-)]
-struct NumPyFunction<'a> {
-    f: &'a FunctionText<'a>,
-    docs: Vec<String>,
+    m: ModelText<'a, FunctionText>,
 }
 
 #[derive(Template)]
@@ -127,18 +118,7 @@ struct NumPyFunction<'a> {
 struct CasadiModule<'a> {
     banner: String,
     module: &'a str,
-    /// Functions are expressions, and the function made of them.
-    m: ModelText<'a, (String, String)>,
-}
-
-#[derive(Template)]
-#[template(
-    path = "script/casadi_function.askama",
-    config = "../../templates/askama.toml"
-)]
-struct CasadiFunction<'a> {
-    f: &'a FunctionText<'a>,
-    docs: Vec<String>,
+    m: ModelText<'a, FunctionText>,
 }
 
 /// The module of a model on NumPy; `provenance` is the text of the first line.
@@ -146,11 +126,10 @@ struct CasadiFunction<'a> {
 /// # Errors
 /// [`CodegenError::Template`] if a template fails.
 pub fn emit(entries: &ModelInterface, provenance: &str) -> Result<Vec<EmittedFile>, CodegenError> {
-    let print: &PrintFunction<_> =
-        &|f, tables, _| numpy_function(&FunctionText::new(f, tables, &Library::NumPy));
+    let print = |f, tables: &Tables| FunctionText::new(f, tables, &Library::NumPy);
     let module = NumPyModule {
         banner: format!("# {provenance}"),
-        m: ModelText::new(entries, &Library::NumPy, "", print, tuple)?,
+        m: ModelText::new(entries, &Library::NumPy, "", print, tuple),
     };
     let path = format!("{}.py", stem(entries));
     Ok(vec![EmittedFile::new(path, tidy(&module.render()?))])
@@ -164,17 +143,12 @@ pub fn emit_casadi(
     entries: &ModelInterface,
     provenance: &str,
 ) -> Result<Vec<EmittedFile>, CodegenError> {
-    let model = entries.identifier.as_str();
     let module_name = format!("{}_casadi", stem(entries));
-    // Expressions are private functions; the functions made of them have the plain names.
-    let print: &PrintFunction<_> = &|f, tables, phase| {
-        let text = FunctionText::new(f, tables, &Library::Casadi);
-        casadi_function(model, &text, phase)
-    };
+    let print = |f, tables: &Tables| FunctionText::new(f, tables, &Library::Casadi);
     let module = CasadiModule {
         banner: format!("# {provenance}"),
         module: &module_name,
-        m: ModelText::new(entries, &Library::Casadi, "", print, tuple)?,
+        m: ModelText::new(entries, &Library::Casadi, "", print, tuple),
     };
     let path = format!("{module_name}.py");
     Ok(vec![EmittedFile::new(path, tidy(&module.render()?))])
@@ -185,37 +159,27 @@ fn stem(entries: &ModelInterface) -> String {
     namer.mint(&entries.identifier).to_string()
 }
 
-fn numpy_function(f: &FunctionText) -> Result<String, CodegenError> {
-    let docs = escaped(&f.docs);
-    Ok(NumPyFunction { f, docs }.render()?)
-}
-
-/// The expressions of a function, and the definition of the CasADi function made of them.
-fn casadi_function(
-    model: &str,
-    f: &FunctionText,
-    phase: Option<&PhaseInterface>,
-) -> Result<(String, String), CodegenError> {
-    let (name, docs) = (&f.name, escaped(&f.docs));
-    let inputs = list(&f.inputs(), |input| {
-        format!("(\"{}\", {})", input.name, input.len)
-    });
-    let outputs = list(&f.outputs(), |output| match output.role {
-        Role::InOut => format!("\"{}_next\"", output.name),
-        Role::Output | Role::Input | Role::Scalar => format!("\"{}\"", output.name),
-    });
-    let pattern = match phase {
-        Some(phase) if phase.jacobian.name == *name => {
-            let upper = phase.identifier.to_ascii_uppercase();
-            format!(",\n    ({upper}_JACOBIAN_ROWS, {upper}_JACOBIAN_COLS)")
-        }
-        Some(_) | None => String::new(),
-    };
-    let expressions = private(name);
-    let definition = format!(
-        "{name} = _function(\n    \"{model}_{name}\", {expressions}, [{inputs}], [{outputs}]{pattern})"
-    );
-    Ok((CasadiFunction { f, docs }.render()?, definition))
+impl CasadiModule<'_> {
+    /// The function made of expressions; these are private functions, so that it has the plain name.
+    fn definition(&self, f: &FunctionText) -> String {
+        let (model, name) = (&self.m.entries.identifier, &f.name);
+        let inputs = list(&f.inputs(), |input| {
+            format!("(\"{}\", {})", input.name, input.len)
+        });
+        let outputs = list(&f.outputs(), |output| match output.role {
+            Role::InOut => format!("\"{}_next\"", output.name),
+            Role::Output | Role::Input | Role::Scalar => format!("\"{}\"", output.name),
+        });
+        let mut phases = self.m.phases.iter();
+        let pattern = match phases.find(|phase| phase.functions[1].name == *name) {
+            Some(phase) => format!(",\n    ({0}_JACOBIAN_ROWS, {0}_JACOBIAN_COLS)", phase.upper),
+            None => String::new(),
+        };
+        let expressions = private(name);
+        format!(
+            "{name} = _function(\n    \"{model}_{name}\", {expressions}, [{inputs}], [{outputs}]{pattern})"
+        )
+    }
 }
 
 /// Name of the expressions of a function.
@@ -223,10 +187,9 @@ fn private(name: &str) -> String {
     format!("_{name}")
 }
 
-/// Lines inside a documentation string.
-fn escaped(lines: &[String]) -> Vec<String> {
-    let escaped = |line: &String| line.replace('\\', "\\\\").replace('"', "\\\"");
-    lines.iter().map(escaped).collect()
+/// A line inside a documentation string.
+fn escaped(line: &str) -> String {
+    line.replace('\\', "\\\\").replace('"', "\\\"")
 }
 
 /// Numbers of a tuple, which needs a comma even after its only element.
