@@ -74,7 +74,6 @@ impl Expr {
 /// `len` elements of an array from `offset` on, handed to a function.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Span {
-    /// The array.
     pub array: Ident,
     /// First element.
     pub offset: usize,
@@ -111,7 +110,6 @@ pub enum Stmt {
     /// Sine and cosine of one argument by the kernel's core, which notes arguments beyond
     /// its limit for the whole block of lanes.
     SinCosLane {
-        /// The argument.
         argument: Expr,
         /// New scalar for the sine.
         sine: Ident,
@@ -122,7 +120,6 @@ pub enum Stmt {
     },
     /// A call of another generated function or, without a name, of the sine-and-cosine kernel.
     Call {
-        /// The function.
         callee: Option<Ident>,
         /// What it reads; of the kernel the angles.
         read: Vec<Span>,
@@ -151,7 +148,6 @@ pub enum Role {
 /// A parameter of a generated function, in a language or, with a text for a name, in any.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Parameter<N = Ident> {
-    /// Its name.
     pub name: N,
     /// Number of elements; an output may have none.
     pub len: usize,
@@ -162,9 +158,7 @@ pub struct Parameter<N = Ident> {
 /// A constant matrix with static storage.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ConstTable {
-    /// Its name.
     pub name: Ident,
-    /// Its entries.
     pub values: Table,
     /// Whether rows are read in lanes.
     pub is_in_lanes: bool,
@@ -175,11 +169,8 @@ pub struct ConstTable {
 /// A generated function.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Function {
-    /// Its name.
     pub name: Ident,
-    /// Lines of documentation.
     pub docs: Vec<String>,
-    /// Parameters in order.
     pub parameters: Vec<Parameter>,
     /// Parameters that the body does not mention.
     pub unused: Vec<Ident>,

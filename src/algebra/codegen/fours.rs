@@ -14,9 +14,7 @@ const SUMS_AT_ONCE: usize = 12;
 pub struct Fours {
     /// The local array that the sums go to.
     pub array: Ident,
-    /// The sums.
     pub sums: Vec<QuadSum>,
-    /// The weights.
     pub weights: Span,
     /// The constant vectors, and what their table is called.
     pub table: (Table, Ident),
@@ -31,7 +29,6 @@ pub struct Fours {
 /// Neighbouring sums that do not need each other.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FourBlock {
-    /// Which sums.
     pub sums: Range<usize>,
     /// What is added to them, by weights as far as each sum's order allows.
     pub terms: Vec<Four>,
@@ -44,7 +41,6 @@ pub struct Four {
     pub sum: usize,
     /// Position among the weights.
     pub weight: usize,
-    /// The vector.
     pub vector: Quad,
 }
 

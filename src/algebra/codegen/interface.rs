@@ -2,10 +2,10 @@
 
 use super::code::{Parameter, Role};
 use super::map_equations::{in_matrices, points, titles, without_factors};
-use super::precision::{Precision, stated_bounds};
+use super::precision::stated_bounds;
 use super::units::Units;
 use crate::equations::{Equations, LatentUnits, Unit, summand_words};
-use crate::ir::{Program, Slot, Statement, Unary};
+use crate::ir::{Program, Slot, Statement};
 use crate::lower::{self, Form, JacobianPattern, LowerError, Map};
 use crate::model::{CandidateTerm, CoordinateNames, ModelError, ReducedModel};
 use crate::robot::WrenchFrame;
@@ -61,24 +61,6 @@ pub struct ModelInterface {
     pub maps: Vec<FunctionSpec>,
     /// Phases in the order of the model.
     pub phases: Vec<PhaseInterface>,
-}
-
-impl PhaseInterface {
-    /// An angle beyond the kernel's limit for the test of batches, or one within it if the
-    /// accelerations have functions that overflow there.
-    pub fn far_angle(&self, precision: Precision) -> f64 {
-        let overflows = self.dynamics.program.statements().iter().any(|statement| {
-            matches!(
-                statement,
-                Statement::Unary(Unary::Exp | Unary::Tan | Unary::Tanh | Unary::Log, _)
-            )
-        });
-        match (overflows, precision) {
-            (true, _) => 0.125,
-            (false, Precision::Double) => 9000.125,
-            (false, Precision::Single) => 160.125,
-        }
-    }
 }
 
 impl ModelInterface {
@@ -405,12 +387,11 @@ fn equations(system: &Equations<'_>, phase: usize) -> Result<Vec<String>, LowerE
             right.push_str(sign);
             right.push_str(&summand_words(coefficient.abs(), term.text()));
         }
-        if terms.is_empty() {
-            right.push('0');
-        }
-        if terms.len() > MOST_TERMS {
-            right = format!("a sum of {} terms", terms.len());
-        }
+        let right = match terms.len() {
+            0 => "0".to_owned(),
+            1..=MOST_TERMS => right,
+            count => format!("a sum of {count} terms"),
+        };
         lines.push(format!("ddz{} = {right}", row + 1));
         if let Some(units) = system
             .latent_units()

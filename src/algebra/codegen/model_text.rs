@@ -17,7 +17,6 @@ pub struct ModelText<'a, F> {
     pub tables: Vec<String>,
     /// Maps between robot and latent coordinates.
     pub maps: Vec<F>,
-    /// Phases.
     pub phases: Vec<PhaseText<F>>,
 }
 
@@ -29,9 +28,7 @@ pub struct PhaseText<F> {
     pub upper: String,
     /// Number of structural nonzeros of the Jacobian.
     pub nnz: usize,
-    /// Rows of the nonzeros.
     pub rows: String,
-    /// Columns of the nonzeros.
     pub cols: String,
     /// Accelerations, then with Jacobian, then a step.
     pub functions: [F; 3],

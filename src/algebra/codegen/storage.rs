@@ -155,24 +155,9 @@ impl Translator<'_> {
         })
     }
 
-    /// Reserves `len` elements for values, in an output where they belong if possible.
-    pub(super) fn home(&mut self, first: usize, len: usize, wanted: &str) -> Span {
-        match self.output_home(first, len) {
-            Some(home) => self.allocate(first, home),
-            None => self.local_home(first, len, wanted),
-        }
-    }
-
-    /// Reserves `len` elements of a new array for values.
-    pub(super) fn local_home(&mut self, first: usize, len: usize, wanted: &str) -> Span {
-        let array = self.names.locals.mint(wanted);
-        self.body.push(Stmt::Declare(array.clone(), len));
-        self.allocate(first, local(array, len))
-    }
-
     /// Reserves elements of a new array for values, with the zeros behind them that a later
     /// statement reads.
-    pub(super) fn padded_home(&mut self, first: usize, len: usize, wanted: &str) -> Span {
+    pub(super) fn local_home(&mut self, first: usize, len: usize, wanted: &str) -> Span {
         let is_here = |values: &&[ValueId]| {
             let here = values.iter().map(|value| value.index()).take(len);
             here.eq(first..first + len)
@@ -210,13 +195,6 @@ impl Translator<'_> {
         home
     }
 
-    /// The output array, if the values are just a run of its elements and nothing in it is
-    /// still to be read.
-    pub(super) fn output_home(&self, first: usize, len: usize) -> Option<Span> {
-        let row = self.output_matrix(first, 1, len)?;
-        Some(row.home)
-    }
-
     /// Reserves `rows x cols` elements for values, row by row in an output where they belong
     /// if possible.
     pub(super) fn matrix_storage(
@@ -224,9 +202,10 @@ impl Translator<'_> {
         first: usize,
         rows: usize,
         cols: usize,
+        wanted: &str,
     ) -> MatrixStorage {
         let matrix = self.output_matrix(first, rows, cols).unwrap_or_else(|| {
-            let array = self.names.locals.mint("m");
+            let array = self.names.locals.mint(wanted);
             self.body.push(Stmt::Declare(array.clone(), rows * cols));
             MatrixStorage {
                 home: local(array, rows * cols),
@@ -244,19 +223,20 @@ impl Translator<'_> {
         matrix
     }
 
-    /// The output array in which each row is a run of elements, all equally far apart.
-    fn output_matrix(&self, first: usize, rows: usize, cols: usize) -> Option<MatrixStorage> {
+    /// The output array in which each row is a run of elements, all equally far apart, if nothing in it is still
+    /// to be read.
+    pub(super) fn output_matrix(
+        &self,
+        first: usize,
+        rows: usize,
+        cols: usize,
+    ) -> Option<MatrixStorage> {
         let results = self.program.results();
-        let find = |value: usize| {
-            results
-                .iter()
-                .position(|entry| entry.value.index() == value)
-        };
+        let find = |value: usize| results.iter().position(|e| e.value.index() == value);
         let at = find(first)?;
-        let stride = if rows > 1 {
-            find(first + cols)?.checked_sub(at)?
-        } else {
-            cols
+        let stride = match rows {
+            0 | 1 => cols,
+            _ => find(first + cols)?.checked_sub(at)?,
         };
         let slot = results[at].slot;
         let output = &self.names.outputs[slot];

@@ -103,7 +103,6 @@ impl FunctionVectors {
 pub struct ParameterVectors {
     /// What it is for.
     pub role: Role,
-    /// Name of the parameter.
     pub name: String,
     /// Number of elements.
     pub len: usize,

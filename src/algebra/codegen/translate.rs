@@ -182,9 +182,9 @@ impl Translator<'_> {
 
     /// Input parameters that no statement mentions.
     pub(super) fn unused(&self) -> impl Iterator<Item = &Ident> {
-        let is_read = |slot: usize| {
-            let reads = |statement: &Statement| matches!(statement, Statement::Input { slot: read, .. } if *read == slot);
-            self.program.has(reads)
+        let is_read = |wanted: usize| {
+            let program = self.program;
+            program.has(|s| matches!(s, Statement::Input { slot, .. } if *slot == wanted))
         };
         let inputs = self.names.inputs.iter().enumerate();
         inputs

@@ -18,8 +18,8 @@ impl Translator<'_> {
             return;
         }
         let read = vec![self.span_with_rest(arguments)];
-        let sines = self.padded_home(first, n, "s");
-        let cosines = self.padded_home(first + n, n, "c");
+        let sines = self.local_home(first, n, "s");
+        let cosines = self.local_home(first + n, n, "c");
         self.body.push(Stmt::Call {
             callee: None,
             read,
@@ -58,7 +58,7 @@ impl Translator<'_> {
             return;
         }
         let weights: Vec<Span> = sections.iter().map(|section| self.span(section)).collect();
-        let home = self.home(first, cols, "y");
+        let home = self.matrix_storage(first, 1, cols, "y").home;
         let (i, k) = (self.names.locals.mint("i"), self.names.locals.mint("k"));
         let target = || Expr::Element(home.array.clone(), Index::variable(&i).shifted(home.offset));
         let entry = |row: Index| Expr::Entry(name.clone(), row, Index::variable(&i));
@@ -118,7 +118,7 @@ impl Translator<'_> {
         let shape = &self.program.tables()[table.index()];
         let (rows, cols) = (shape.rows(), shape.cols());
         let name = self.table(table);
-        let home = self.matrix_storage(first, rows, cols);
+        let home = self.matrix_storage(first, rows, cols, "m");
         let (r, i) = (self.names.locals.mint("r"), self.names.locals.mint("i"));
         let entry = Expr::Entry(name, Index::variable(&r), Index::variable(&i));
         let assign = Stmt::Assign(home.element(&r, &Index::variable(&i)), entry);
@@ -144,8 +144,8 @@ impl Translator<'_> {
             home,
         });
         let groups: Vec<_> = groups.iter().map(|group| self.group(group)).collect();
-        let sums = self.home(first, rows, "y");
-        let slopes = self.matrix_storage(first + rows, rows, cols);
+        let sums = self.matrix_storage(first, 1, rows, "y").home;
+        let slopes = self.matrix_storage(first + rows, rows, cols, "m");
         self.in_lanes.push(slopes.home.array.clone());
         let names = ["i", "k", "l", "q", "p"].map(|name| self.names.locals.mint(name));
         let row = Row {
@@ -198,12 +198,13 @@ impl Translator<'_> {
         }
         let mut next = first;
         for slot in program.outputs() {
-            let home = self.output_home(next, slot.len).filter(Span::is_whole);
-            let home = match home {
+            let output = self
+                .output_matrix(next, 1, slot.len)
+                .map(|matrix| matrix.home);
+            written.push(match output.filter(Span::is_whole) {
                 Some(home) => self.allocate(next, home),
                 None => self.local_home(next, slot.len, &slot.name),
-            };
-            written.push(home);
+            });
             next += slot.len;
         }
         let callee = Some(self.names.callees[callee].clone());

@@ -9,7 +9,7 @@ use super::real::Real;
 /// Runs one program as often as asked; owns the memory of all its values, so that
 /// a run allocates nothing.
 ///
-/// Numbers are `f64` unless another [`Real`] is named: `Interpreter::<f32>::of(&program)` is the
+/// Numbers are `f64` unless another [`Real`] is named: `Interpreter::<f32>::new(&program)` is the
 /// reference for generated code in single precision.
 #[derive(Clone, Debug)]
 pub struct Interpreter<T = f64> {
@@ -27,16 +27,9 @@ pub struct Interpreter<T = f64> {
     values: Vec<T>,
 }
 
-impl Interpreter {
-    /// Prepares a program for runs in double precision.
-    pub fn new(program: &Program) -> Self {
-        Self::of(program)
-    }
-}
-
 impl<T: Real> Interpreter<T> {
-    /// Prepares a program for runs on a kind of numbers.
-    pub fn of(program: &Program) -> Self {
+    /// Prepares a program for runs.
+    pub fn new(program: &Program) -> Self {
         let mut values = vec![T::constant(0.0); program.n_values()];
         let (mut loads, mut steps) = (Vec::new(), Vec::new());
         for (position, statement) in program.statements().iter().enumerate() {
@@ -57,7 +50,7 @@ impl<T: Real> Interpreter<T> {
             loads,
             steps,
             tables: program.tables().iter().map(table).collect(),
-            callees: program.callees().iter().map(Self::of).collect(),
+            callees: program.callees().iter().map(Self::new).collect(),
             stores: program.results().iter().map(|entry| entry.value).collect(),
             values,
         }
@@ -88,6 +81,19 @@ impl<T: Real> Interpreter<T> {
         for (result, store) in results.zip(&self.stores) {
             *result = self.values[store.index()];
         }
+    }
+
+    /// The same with an array per input slot, which gives one per output slot.
+    ///
+    /// # Panics
+    /// As [`Self::run`].
+    pub fn results(&mut self, inputs: &[Vec<T>]) -> Vec<Vec<T>> {
+        let slots = self.outputs.iter();
+        let mut outputs: Vec<_> = slots.map(|slot| vec![T::constant(0.0); slot.len]).collect();
+        let read: Vec<&[T]> = inputs.iter().map(Vec::as_slice).collect();
+        let mut written: Vec<&mut [T]> = outputs.iter_mut().map(Vec::as_mut_slice).collect();
+        self.run(&read, &mut written);
+        outputs
     }
 
     fn evaluate(&mut self) {
@@ -267,8 +273,7 @@ mod tests {
         let entries: Vec<f64> = (0..21).map(|k| f64::from(k) * 0.37 - 3.1).collect();
         let mut builder = ProgramBuilder::new("table");
         let x = builder.input("x", 6);
-        let table = builder.table(Table::new(7, 3, entries.clone()));
-        let y = builder.accumulate(table, vec![x]);
+        let y = builder.accumulate(Table::new(7, 3, entries.clone()), vec![x]);
         builder.output("y", &y);
         (builder.finish().expect("valid program"), entries)
     }

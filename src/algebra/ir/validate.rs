@@ -250,8 +250,7 @@ mod tests {
         let (found, expected) = (2, 3);
         refused(1, Fault::OperandCount { found, expected }, |builder| {
             let x = builder.input("x", 1);
-            let table = builder.table(Table::new(3, 2, vec![1.0; 6]));
-            let y = builder.accumulate(table, vec![x]);
+            let y = builder.accumulate(Table::new(3, 2, vec![1.0; 6]), vec![x]);
             builder.output("y", &y);
         });
     }

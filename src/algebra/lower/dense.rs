@@ -53,7 +53,6 @@ pub(super) fn matrix_vector(
         }
     }
     let table = Table::new(weights.len() + 1, cols, entries);
-    let table = lowering.builder.table(table);
     lowering.builder.accumulate(table, sections)
 }
 
@@ -283,19 +282,20 @@ impl DenseJacobian {
             .map(|&symbol| lowering.pool.symbol_expr(symbol))
             .collect();
         let values: Vec<ValueId> = variables.iter().map(|&v| lowering.value(v)).collect();
-        let is_nonlinear = |&(symbol, _): &(&SymbolId, &ExprId)| self.curved.contains(symbol);
-        let angles = self.used.iter().zip(&variables).filter(is_nonlinear);
-        let angles: Vec<ExprId> = angles.map(|(_, &angle)| angle).collect();
-        let (sines, cosines) = lowering.angles(&angles);
-        let of_angles = |values: Vec<ValueId>| {
-            let mut values = values.into_iter();
-            let value = |symbol| match self.curved.contains(symbol) {
-                true => values.next().expect("one value an angle"),
-                false => zero,
-            };
-            self.used.iter().map(value).collect::<Vec<_>>()
+        let variables = self.used.iter().zip(variables);
+        let is_curved = |(symbol, _): &(&SymbolId, ExprId)| self.curved.contains(symbol);
+        let angles: Vec<ExprId> = variables
+            .clone()
+            .filter(is_curved)
+            .map(|(_, v)| v)
+            .collect();
+        // All at once.
+        lowering.angles(&angles);
+        let angle = |variable: (&SymbolId, ExprId)| match is_curved(&variable) {
+            true => lowering.angle(variable.1),
+            false => (zero, zero),
         };
-        let (sines, cosines) = (of_angles(sines), of_angles(cosines));
+        let (sines, cosines): (Vec<_>, Vec<_>) = variables.map(angle).unzip();
         let width = self.used.len().next_multiple_of(LANES);
         let mut is_first = true;
         let mut group = |of: Kind, values: &[ValueId], slopes: Slopes<&[ValueId]>| {
@@ -345,7 +345,6 @@ impl DenseJacobian {
         }
         let rows = Self::coefficients(lowering.pool, equations, &self.linear, Kind::Variable);
         let table = Table::new(rows.len(), self.linear.len(), rows.concat());
-        let table = lowering.builder.table(table);
         lowering.builder.constants(table)
     }
 }

@@ -24,6 +24,11 @@ pub struct JacobianPattern {
 }
 
 impl JacobianPattern {
+    /// Row and column of each entry.
+    pub(super) fn places(&self) -> impl Iterator<Item = (usize, usize)> {
+        self.rows.iter().copied().zip(self.cols.iter().copied())
+    }
+
     /// Number of entries.
     pub fn len(&self) -> usize {
         self.rows.len()
@@ -99,8 +104,7 @@ pub fn dynamics_jacobian(
         let mut lowering = start(system, &pool, "dynamics_jacobian");
         lowering.prepare(gradient.expressions());
         let (ddz, slopes) = gradient.lower(&mut lowering, system.latent_dim());
-        let places = pattern.rows.iter().zip(&pattern.cols);
-        let jacobian = places.map(|(&row, &col)| slopes[&(row, col)]).collect();
+        let jacobian = pattern.places().map(|place| slopes[&place]).collect();
         (lowering.builder, ddz, jacobian)
     } else if form.uses_tables(&equations) {
         dense_jacobian(system, &mut pool, &equations, &columns, &pattern)
@@ -130,7 +134,7 @@ fn nested_jacobian(
     let demand = Demand::new(pool, equations.iter().chain(&entries));
     let nest = |equation| demand.nest(pool, equation);
     let mut sums: Vec<Nested> = equations.iter().map(nest).collect();
-    for ((&row, &col), mut entry) in pattern.rows.iter().zip(&pattern.cols).zip(entries) {
+    for ((row, col), mut entry) in pattern.places().zip(entries) {
         let variable = pool.symbol_expr(columns[col]);
         let shared = sums[row].part_of(variable, &entry).map(|group| {
             let known = &sums[row].groups[group].single.items;
@@ -158,10 +162,9 @@ fn dense_jacobian(
     roots.extend(dense.expressions());
     lowering.prepare(&roots);
     let (ddz, entries) = dense.lower(&mut lowering, equations);
-    let places = pattern.rows.iter().zip(&pattern.cols);
-    let jacobian = places
-        .map(|(&row, &col)| entries[&(row, columns[col])])
-        .collect();
+    let places = pattern.places();
+    let jacobian = places.map(|(row, col)| entries[&(row, columns[col])]);
+    let jacobian = jacobian.collect();
     (lowering.builder, ddz, jacobian)
 }
 

@@ -263,7 +263,8 @@ impl<'a> ExpressionLowering<'a> {
             .unzip()
     }
 
-    fn angle(&mut self, argument: ExprId) -> (ValueId, ValueId) {
+    /// Sine and cosine of an argument.
+    pub fn angle(&mut self, argument: ExprId) -> (ValueId, ValueId) {
         let (sines, cosines) = self.angles(&[argument]);
         (sines[0], cosines[0])
     }

@@ -9,10 +9,9 @@ use nalgebra::DVector;
 
 use super::error::LowerError;
 use super::maps::Map;
-use super::number::{Number, Sheet};
+use super::number::{Number, Sheet, ids, numbers};
 use super::solve::pinv_times;
-use super::sums::scaled;
-use crate::ir::{Program, ProgramBuilder, Table, Unary, ValueId};
+use crate::ir::{Program, ProgramBuilder, Table, Unary};
 use crate::model::{
     Activation, DENSITY_AT_ZERO, GELU_CUBIC, GELU_RATE, ReducedModel, StateMap, TAIL,
 };
@@ -20,97 +19,86 @@ use crate::model::{
 /// The program of a map over layers.
 pub(super) fn lower(map: Map, model: &ReducedModel) -> Result<Program, LowerError> {
     let (name, (from, to)) = map.words();
-    let mut network = match map {
-        Map::Decode | Map::DecodeVelocity => Network {
-            builder: ProgramBuilder::new(name),
-            factors: DVector::from_element(model.latent_dim(), 1.0),
-            map: model.decoder_map()?,
-        },
-        Map::Encode | Map::EncodeVelocity | Map::ProjectInput | Map::LiftInput => Network {
-            builder: ProgramBuilder::new(name),
-            factors: model.state_factors()?,
-            map: model.encoder_map()?,
-        },
+    let (at, factors, layers) = match map {
+        Map::Decode | Map::DecodeVelocity => {
+            let ones = DVector::from_element(model.latent_dim(), 1.0);
+            ("z", ones, model.decoder_map()?)
+        }
+        Map::Encode | Map::EncodeVelocity | Map::ProjectInput | Map::LiftInput => {
+            ("x", model.state_factors()?, model.encoder_map()?)
+        }
     };
+    let mut builder = ProgramBuilder::new(name);
+    let point = builder.input(at, factors.len());
+    // What the Jacobian at the point is multiplied with.
+    let given = match map {
+        Map::Encode | Map::Decode => Vec::new(),
+        Map::EncodeVelocity | Map::DecodeVelocity | Map::ProjectInput => {
+            builder.input(from, factors.len())
+        }
+        Map::LiftInput => builder.input(from, model.latent_dim()),
+    };
+    let sheet = &Sheet::new(&mut builder);
+    let network = Network {
+        sheet,
+        map: layers,
+        factors,
+    };
+    let [point, given] = [point, given].map(|ids| numbers(sheet, &ids));
+    let (y, slopes) = network.forward(&point);
     let result = match map {
         // z = E(s_x x)
-        Map::Encode => {
-            let x = network.input(from);
-            network.forward(&x).0
-        }
+        Map::Encode => y,
         // dz = J_E(s_x x) (s_x dx)
-        Map::EncodeVelocity => {
-            let (x, dx) = (network.input("x"), network.input(from));
-            let (_, slopes) = network.forward(&x);
-            network.tangent(&dx, &slopes)
-        }
+        Map::EncodeVelocity => network.tangent(&given, &slopes),
         // x = D(z) / s_x
-        Map::Decode => {
-            let z = network.input(from);
-            let (scaled, _) = network.forward(&z);
-            network.divided(&scaled, &model.state_factors()?)
-        }
+        Map::Decode => divided(&y, &model.state_factors()?),
         // dx = J_D(z) dz / s_x
         Map::DecodeVelocity => {
-            let (z, dz) = (network.input("z"), network.input(from));
-            let (_, slopes) = network.forward(&z);
-            let scaled = network.tangent(&dz, &slopes);
-            network.divided(&scaled, &model.state_factors()?)
+            let scaled = network.tangent(&given, &slopes);
+            divided(&scaled, &model.state_factors()?)
         }
         // u_lat = pinv(J_E(s_x x)^T) (s_u u)
         Map::ProjectInput => {
+            let rows = (0..model.latent_dim()).map(|row| network.jacobian_row(row, &slopes));
+            let rows: Vec<Vec<Number>> = rows.collect();
             let factors = model.input_factors()?;
-            let x = network.input("x");
-            let u = network.builder.input(from, factors.len());
-            let (_, slopes) = network.forward(&x);
-            let rows: Vec<Vec<ValueId>> = (0..model.latent_dim())
-                .map(|row| network.jacobian_row(row, &slopes))
-                .collect();
-            let scaled: Vec<ValueId> = (u.iter().zip(&factors))
-                .map(|(&u, &factor)| scaled(&mut network.builder, factor, u))
-                .collect();
-            pinv_times(&mut network.builder, &rows, &scaled)
+            let scaled = given.iter().zip(&factors);
+            let scaled: Vec<Number> = scaled.map(|(u, &factor)| u.scaled(factor)).collect();
+            pinv_times(sheet, &rows, &scaled)
         }
         // u = (J_E(s_x x)^T u_lat) / s_u
         Map::LiftInput => {
-            let x = network.input("x");
-            let u_lat = network.builder.input(from, model.latent_dim());
-            let (_, slopes) = network.forward(&x);
-            let last = network.map.layers().len() - 1;
-            let seed = network.times_slopes(&u_lat, &slopes[last]);
-            let scaled = network.backward(last, seed, &slopes);
-            network.divided(&scaled, &model.input_factors()?)
+            let last = layers.layers().len() - 1;
+            let seed = times_slopes(&given, &slopes[last]);
+            let scaled = network.backward(last, &seed, &slopes);
+            divided(&scaled, &model.input_factors()?)
         }
     };
-    network.builder.output(to, &result);
-    Ok(network.builder.finish()?)
+    let result = ids(&result);
+    builder.output(to, &result);
+    Ok(builder.finish()?)
 }
 
 /// Slopes of one layer's activation; `None` where it is linear.
-type Slopes = Option<Vec<ValueId>>;
+type Slopes<'b> = Option<Vec<Number<'b>>>;
 
 /// A program over the layers of one map.
-struct Network<'a> {
-    builder: ProgramBuilder,
-    map: &'a StateMap,
+struct Network<'b> {
+    sheet: &'b Sheet<'b>,
+    map: &'b StateMap,
     /// What the map's inputs are multiplied by, as part of the first layer.
     factors: DVector<f64>,
 }
 
-impl Network<'_> {
-    fn input(&mut self, name: &str) -> Vec<ValueId> {
-        self.builder.input(name, self.factors.len())
-    }
-
+impl<'b> Network<'b> {
     /// The map of `factors * input`, and the slopes of each layer.
-    fn forward(&mut self, input: &[ValueId]) -> (Vec<ValueId>, Vec<Slopes>) {
+    fn forward(&self, input: &[Number<'b>]) -> (Vec<Number<'b>>, Vec<Slopes<'b>>) {
         let mut y = input.to_vec();
         let mut slopes = Vec::new();
         for (index, layer) in self.map.layers().iter().enumerate() {
             let a = self.product(index, &y, true).into_iter();
-            let activated: Vec<(ValueId, Option<ValueId>)> = a
-                .map(|a| activation(&mut self.builder, layer.activation, a))
-                .collect();
+            let activated: Vec<_> = a.map(|a| activation(layer.activation, a)).collect();
             y = activated.iter().map(|pair| pair.0).collect();
             slopes.push(activated.into_iter().map(|pair| pair.1).collect());
         }
@@ -118,46 +106,41 @@ impl Network<'_> {
     }
 
     /// `J (factors * direction)`, from the first layer to the last.
-    fn tangent(&mut self, direction: &[ValueId], slopes: &[Slopes]) -> Vec<ValueId> {
+    fn tangent(&self, direction: &[Number<'b>], slopes: &[Slopes<'b>]) -> Vec<Number<'b>> {
         let mut v = direction.to_vec();
         for (index, slopes) in slopes.iter().enumerate() {
-            let a = self.product(index, &v, false);
-            v = self.times_slopes(&a, slopes);
+            v = times_slopes(&self.product(index, &v, false), slopes);
         }
         v
     }
 
     /// `g^T J` for the part of `J` up to layer `last`, whose slopes `g` has already.
-    fn backward(&mut self, last: usize, g: Vec<ValueId>, slopes: &[Slopes]) -> Vec<ValueId> {
-        let mut g = self.transposed_product(last, &g);
+    fn backward(&self, last: usize, g: &[Number<'b>], slopes: &[Slopes<'b>]) -> Vec<Number<'b>> {
+        let mut g = self.transposed_product(last, g);
         for index in (0..last).rev() {
-            let seed = self.times_slopes(&g, &slopes[index]);
-            g = self.transposed_product(index, &seed);
+            g = self.transposed_product(index, &times_slopes(&g, &slopes[index]));
         }
         g
     }
 
     /// Row `row` of `J`.
-    fn jacobian_row(&mut self, row: usize, slopes: &[Slopes]) -> Vec<ValueId> {
+    fn jacobian_row(&self, row: usize, slopes: &[Slopes<'b>]) -> Vec<Number<'b>> {
         let last = self.map.layers().len() - 1;
-        let weights = self.map.layers()[last].map.weights();
+        let weights = self.map.layers()[last].map.weights().row(row);
         let slope = slopes[last].as_ref().map(|slopes| slopes[row]);
-        let mut g: Vec<ValueId> = Vec::with_capacity(weights.ncols());
-        for &weight in weights.row(row).iter() {
-            g.push(match slope {
-                Some(slope) => scaled(&mut self.builder, weight, slope),
-                None => self.builder.constant(weight),
-            });
-        }
+        let entry = |&weight: &f64| match slope {
+            Some(slope) => slope.scaled(weight),
+            None => Number::known(self.sheet, weight),
+        };
+        let g: Vec<Number> = weights.iter().map(entry).collect();
         if last == 0 {
             return g;
         }
-        let seed = self.times_slopes(&g, &slopes[last - 1]);
-        self.backward(last - 1, seed, slopes)
+        self.backward(last - 1, &times_slopes(&g, &slopes[last - 1]), slopes)
     }
 
     /// `W y` of a layer, of the first `W (factors * y)`; plus its bias if asked.
-    fn product(&mut self, index: usize, y: &[ValueId], is_biased: bool) -> Vec<ValueId> {
+    fn product(&self, index: usize, y: &[Number<'b>], is_biased: bool) -> Vec<Number<'b>> {
         let map = &self.map.layers()[index].map;
         let (rows, cols) = map.weights().shape();
         let mut entries = match is_biased {
@@ -168,56 +151,47 @@ impl Network<'_> {
             let factor = if index == 0 { self.factors[col] } else { 1.0 };
             entries.extend(map.weights().column(col).iter().map(|w| w * factor));
         }
-        let table = self.builder.table(Table::new(cols + 1, rows, entries));
-        self.builder.accumulate(table, vec![y.to_vec()])
+        self.accumulated(Table::new(cols + 1, rows, entries), y)
     }
 
     /// `W^T g` of a layer.
-    fn transposed_product(&mut self, index: usize, g: &[ValueId]) -> Vec<ValueId> {
+    fn transposed_product(&self, index: usize, g: &[Number<'b>]) -> Vec<Number<'b>> {
         let weights = self.map.layers()[index].map.weights();
         let (rows, cols) = weights.shape();
         let mut entries = vec![0.0; cols];
         for row in weights.row_iter() {
             entries.extend(row.iter());
         }
-        let table = self.builder.table(Table::new(rows + 1, cols, entries));
-        self.builder.accumulate(table, vec![g.to_vec()])
+        self.accumulated(Table::new(rows + 1, cols, entries), g)
     }
 
-    fn times_slopes(&mut self, values: &[ValueId], slopes: &Slopes) -> Vec<ValueId> {
-        match slopes {
-            None => values.to_vec(),
-            Some(slopes) => values
-                .iter()
-                .zip(slopes)
-                .map(|(&value, &slope)| self.builder.mul(value, slope))
-                .collect(),
-        }
+    fn accumulated(&self, table: Table, weights: &[Number<'b>]) -> Vec<Number<'b>> {
+        let sections = vec![ids(weights)];
+        let sums = self.sheet.borrow_mut().accumulate(table, sections);
+        numbers(self.sheet, &sums)
     }
+}
 
-    fn divided(&mut self, values: &[ValueId], factors: &DVector<f64>) -> Vec<ValueId> {
-        (values.iter().zip(factors))
-            .map(|(&value, &factor)| {
-                let factor = self.builder.constant(factor);
-                self.builder.div(value, factor)
-            })
-            .collect()
-    }
+fn times_slopes<'b>(values: &[Number<'b>], slopes: &Slopes<'b>) -> Vec<Number<'b>> {
+    let Some(slopes) = slopes else {
+        return values.to_vec();
+    };
+    let pairs = values.iter().zip(slopes);
+    pairs.map(|(&value, &slope)| value * slope).collect()
+}
+
+fn divided<'b>(values: &[Number<'b>], factors: &DVector<f64>) -> Vec<Number<'b>> {
+    let pairs = values.iter().zip(factors);
+    pairs.map(|(&value, &factor)| value / factor).collect()
 }
 
 /// `phi(a)` and, unless it is one everywhere, `phi'(a)`.
 ///
 /// Without branches: `min(a, 0) = (a - |a|)/2` and `max(a, 0) = (a + |a|)/2` are exact in floating
 /// point, so that elu has the slope `e = exp(min(a, 0))` and the value `max(a, 0) + (e - 1)`.
-fn activation(
-    builder: &mut ProgramBuilder,
-    activation: Activation,
-    a: ValueId,
-) -> (ValueId, Option<ValueId>) {
-    let sheet = Sheet::new(builder);
-    let a = Number::new(&sheet, a);
+fn activation<'b>(activation: Activation, a: Number<'b>) -> (Number<'b>, Option<Number<'b>>) {
     let (value, slope) = match activation {
-        Activation::Linear => return (a.id, None),
+        Activation::Linear => return (a, None),
         Activation::Elu => {
             let below = 0.5 * (a - a.abs());
             let above = positive_part(a);
@@ -247,7 +221,7 @@ fn activation(
             (above + log, s)
         }
     };
-    (value.id, Some(slope.id))
+    (value, Some(slope))
 }
 
 fn positive_part(a: Number) -> Number {
@@ -302,9 +276,10 @@ mod tests {
         for phi in Activation::ALL {
             let mut builder = ProgramBuilder::new("phi");
             let a = builder.input("a", 1);
-            let (value, slope) = activation(&mut builder, phi, a[0]);
-            let slope = slope.unwrap_or_else(|| builder.constant(1.0));
-            builder.output("y", &[value, slope]);
+            let sheet = &Sheet::new(&mut builder);
+            let (value, slope) = activation(phi, Number::new(sheet, a[0]));
+            let y = ids(&[value, slope.unwrap_or(Number::known(sheet, 1.0))]);
+            builder.output("y", &y);
             let program = builder.finish().expect("a program");
             for a in [-30.0, -6.0, -0.7, -1e-9, 0.0, 0.3, 2.5, 9.0, 400.0] {
                 let mut found = [0.0; 2];

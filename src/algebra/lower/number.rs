@@ -3,6 +3,7 @@
 use std::cell::RefCell;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
+use super::sums::scaled;
 use crate::ir::{Binary, ProgramBuilder, Unary, ValueId};
 
 /// The program, while formulas add to it.
@@ -20,9 +21,19 @@ impl<'b> Number<'b> {
         Self { id, sheet }
     }
 
+    pub fn known(sheet: &'b Sheet<'b>, value: f64) -> Self {
+        Self::new(sheet, sheet.borrow_mut().constant(value))
+    }
+
     /// A constant of the same program.
     pub fn constant(self, value: f64) -> Self {
-        Self::new(self.sheet, self.sheet.borrow_mut().constant(value))
+        Self::known(self.sheet, value)
+    }
+
+    /// `coefficient * self` without needless operations.
+    pub fn scaled(self, coefficient: f64) -> Self {
+        let id = scaled(&mut self.sheet.borrow_mut(), coefficient, self.id);
+        Self::new(self.sheet, id)
     }
 
     pub fn unary(self, op: Unary) -> Self {
@@ -37,6 +48,14 @@ impl<'b> Number<'b> {
         let id = self.sheet.borrow_mut().binary(op, self.id, other.id);
         Self::new(self.sheet, id)
     }
+}
+
+pub(super) fn numbers<'b>(sheet: &'b Sheet<'b>, ids: &[ValueId]) -> Vec<Number<'b>> {
+    ids.iter().map(|&id| Number::new(sheet, id)).collect()
+}
+
+pub(super) fn ids(numbers: &[Number]) -> Vec<ValueId> {
+    numbers.iter().map(|number| number.id).collect()
 }
 
 impl Neg for Number<'_> {

@@ -3,9 +3,9 @@
 use super::cost::Form;
 use super::dynamics::dynamics;
 use super::error::LowerError;
-use super::number::{Number, Sheet};
+use super::number::{Number, Sheet, ids, numbers};
 use crate::equations::Equations;
-use crate::ir::{Program, ProgramBuilder, ValueId};
+use crate::ir::{Program, ProgramBuilder};
 
 /// The program of one fourth-order Runge-Kutta step of `d/dt (z, dz) = (dz, ddz)` over
 /// `h` seconds with constant `u_lat`: inputs `z`, `dz`, `u_lat`, `h`; outputs `z`, `dz`
@@ -20,10 +20,7 @@ pub fn rk4_step(system: &Equations<'_>, phase: usize, form: Form) -> Result<Prog
     let inputs = ["z", "dz", "u_lat"].map(|name| builder.input(name, d));
     let h = builder.input("h", 1)[0];
     let sheet = &Sheet::new(&mut builder);
-    let numbers = |ids: Vec<ValueId>| -> Vec<Number> {
-        ids.into_iter().map(|id| Number::new(sheet, id)).collect()
-    };
-    let [z, dz, u_lat] = inputs.map(numbers);
+    let [z, dz, u_lat] = inputs.map(|ids| numbers(sheet, &ids));
     let h = Number::new(sheet, h);
     let (half_step, sixth_step) = (0.5 * h, h / 6.0);
 
@@ -36,7 +33,7 @@ pub fn rk4_step(system: &Equations<'_>, phase: usize, form: Form) -> Result<Prog
             .borrow_mut()
             .call(&accelerations, &arguments)
             .remove(0);
-        slopes.push(numbers(ddz));
+        slopes.push(numbers(sheet, &ddz));
         if stage < 3 {
             let length = if stage == 2 { h } else { half_step };
             at = advance(&z, length, &velocities[stage]);
@@ -48,10 +45,6 @@ pub fn rk4_step(system: &Equations<'_>, phase: usize, form: Form) -> Result<Prog
     builder.output("z", &z_next);
     builder.output("dz", &dz_next);
     Ok(builder.finish()?)
-}
-
-fn ids(numbers: &[Number]) -> Vec<ValueId> {
-    numbers.iter().map(|number| number.id).collect()
 }
 
 /// `start + length * slope`.

@@ -3,7 +3,7 @@
 use crate::codegen::code::{ConstTable, Function, Parameter, Role, Span};
 use crate::codegen::dialect::{Dialect, Lines, name};
 use crate::codegen::fours::{FourBlock, Fours};
-use crate::codegen::line_wrapping::comment_lines;
+use crate::codegen::line_wrapping::wrapped;
 use crate::codegen::precision::Precision;
 use crate::codegen::printer::Printer;
 use crate::ir::{QUAD, Quad, Unary};
@@ -202,14 +202,14 @@ fn documentation(lines: &[String]) -> String {
         if position > 0 {
             text.push_str("///\n");
         }
-        for line in comment_lines(&[(*paragraph).clone()], 94) {
+        for line in wrapped(paragraph, 94, " ") {
             text.push_str(&format!("/// {}\n", plain(line.trim_start())));
         }
     }
     if !equations.is_empty() {
         text.push_str("///\n/// ```text\n");
         for equation in equations {
-            for line in comment_lines(std::slice::from_ref(equation), 94) {
+            for line in wrapped(equation, 94, " ") {
                 text.push_str(&format!("/// {line}\n"));
             }
         }

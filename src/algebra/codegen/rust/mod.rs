@@ -8,7 +8,7 @@ use askama::Template;
 
 use super::error::CodegenError;
 use super::interface::{ModelInterface, computes_angles};
-use super::line_wrapping::{comment_lines, tidy};
+use super::line_wrapping::{tidy, wrapped};
 use super::model_text::ModelText;
 use super::precision::Precision;
 use super::sin_cos::KernelText;
@@ -85,5 +85,5 @@ pub fn emit(
 
 fn numbers(values: &[usize]) -> String {
     let texts: Vec<String> = values.iter().map(usize::to_string).collect();
-    comment_lines(&[texts.join(", ")], 90).join("\n   ")
+    wrapped(&texts.join(", "), 90, " ").join("\n   ")
 }

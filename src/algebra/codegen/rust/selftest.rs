@@ -3,7 +3,7 @@
 use askama::Template;
 
 use crate::codegen::code::Role;
-use crate::codegen::line_wrapping::comment_lines;
+use crate::codegen::line_wrapping::wrapped;
 use crate::codegen::test_vectors::{N_POINTS, ParameterVectors, TOLERANCE_F64, TestVectors};
 
 use super::dialect::RustDialect;
@@ -20,7 +20,7 @@ pub(super) struct SelfTest<'a> {
 
 /// An array of one row.
 fn array(row: &[String]) -> String {
-    let lines = comment_lines(&[row.join(", ")], 80);
+    let lines = wrapped(&row.join(", "), 80, " ");
     format!("[{}]", lines.join("\n           "))
 }
 
