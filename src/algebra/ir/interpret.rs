@@ -278,16 +278,15 @@ mod tests {
         (builder.finish().expect("valid program"), entries)
     }
 
+    const X: [f64; 6] = [0.5, -1.25, 2.0, 3.5, -0.75, 1.5];
+
     #[test]
     fn accumulate_equals_matrix_vector_product() {
         let (program, entries) = table_program();
-        let x = [0.5, -1.25, 2.0, 3.5, -0.75, 1.5];
-        let mut y = [0.0; 3];
-        Interpreter::new(&program).run(&[&x], &mut [&mut y]);
-        for j in 0..3 {
+        let y = Interpreter::new(&program).results(&[X.to_vec()]).remove(0);
+        for (j, found) in y.into_iter().enumerate() {
             let expected: f64 =
-                entries[j] + (0..6).map(|i| entries[3 * (i + 1) + j] * x[i]).sum::<f64>();
-            let found = y[j];
+                entries[j] + (0..6).map(|i| entries[3 * (i + 1) + j] * X[i]).sum::<f64>();
             assert!((found - expected).abs() < 1e-13, "{found}, {expected}");
         }
     }
@@ -298,19 +297,14 @@ mod tests {
         let mut builder = ProgramBuilder::new("twice");
         let x = builder.input("x", 6);
         let once = builder.call(&inner, &x).remove(0);
-        let again = builder.call(&inner, &[x[3], x[4], x[5], once[0], once[1], once[2]]);
+        let again = builder.call(&inner, &[&x[3..], &once].concat());
         builder.output("y", &again[0]);
         let program = builder.finish().expect("valid program");
 
-        let x = [0.5, -1.25, 2.0, 3.5, -0.75, 1.5];
-        let (mut first, mut expected, mut found) = ([0.0; 3], [0.0; 3], [0.0; 3]);
         let mut single = Interpreter::new(&inner);
-        single.run(&[&x], &mut [&mut first]);
-        single.run(
-            &[&[x[3], x[4], x[5], first[0], first[1], first[2]]],
-            &mut [&mut expected],
-        );
-        Interpreter::new(&program).run(&[&x], &mut [&mut found]);
+        let first = single.results(&[X.to_vec()]).remove(0);
+        let expected = single.results(&[[&X[3..], &first].concat()]);
+        let found = Interpreter::new(&program).results(&[X.to_vec()]);
         assert_eq!(found, expected);
     }
 
@@ -343,8 +337,8 @@ mod tests {
         let program = builder.finish().expect("valid program");
 
         let x: [f64; 5] = [0.3, -1.2, 2.0, 0.7, -0.4];
-        let (mut y, mut slopes) = ([0.0; 2], [0.0; 10]);
-        Interpreter::new(&program).run(&[&x], &mut [&mut y, &mut slopes]);
+        let results = Interpreter::new(&program).results(&[x.to_vec()]);
+        let (y, slopes) = (&results[0], &results[1]);
         for r in 0..2 {
             let mut expected = 1.0;
             for i in 0..5 {

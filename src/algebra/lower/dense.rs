@@ -133,21 +133,15 @@ fn slopes(
     equations.iter().map(&mut row).collect()
 }
 
-/// [`slopes`] up to the last variable of which there are any, with zeros up to a multiple of
-/// [`LANES`].
-fn padded_slopes(
-    pool: &mut ExprPool,
-    equations: &[Combination],
-    variables: &[SymbolId],
-) -> Vec<Combination> {
-    let mut rows = slopes(pool, equations, variables);
+/// Rows up to the last column in which any is not zero, with zeros up to a multiple of [`LANES`].
+fn padded(mut rows: Vec<Vec<Combination>>) -> Vec<Vec<Combination>> {
     let last = |row: &Vec<Combination>| row.iter().rposition(|slope| !slope.is_zero());
     let used = (rows.iter().filter_map(last).max()).map_or(0, |last| last + 1);
     for row in &mut rows {
         row.truncate(used);
         row.resize(used.next_multiple_of(LANES), Combination::default());
     }
-    rows.concat()
+    rows
 }
 
 /// How the equations divide; `columns` are the variables in the order of the Jacobian.
@@ -203,8 +197,8 @@ impl DenseJacobian {
             equation.items.retain(|&(_, expr)| !in_group(expr));
         }
         let rest_slopes = match has_angles {
-            true => padded_slopes(pool, &rest, &used),
-            false => slopes(pool, &rest, &curved).concat(),
+            true => padded(slopes(pool, &rest, &used)),
+            false => slopes(pool, &rest, &curved),
         };
         Self {
             curved,
@@ -212,7 +206,7 @@ impl DenseJacobian {
             used,
             has_angles,
             rest,
-            rest_slopes,
+            rest_slopes: rest_slopes.concat(),
         }
     }
 
@@ -289,8 +283,7 @@ impl DenseJacobian {
             .filter(is_curved)
             .map(|(_, v)| v)
             .collect();
-        // All at once.
-        lowering.angles(&angles);
+        lowering.sines_and_cosines(&angles);
         let angle = |variable: (&SymbolId, ExprId)| match is_curved(&variable) {
             true => lowering.angle(variable.1),
             false => (zero, zero),

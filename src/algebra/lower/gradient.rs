@@ -397,12 +397,10 @@ mod tests {
         let (program, pattern) = dynamics_jacobian(&system, 0, form).expect("lowers");
         let point =
             |shift: f64| -> Vec<f64> { (0..5).map(|k| shift - 0.4 * f64::from(k)).collect() };
-        let (mut ddz, mut entries) = (vec![0.0; 5], vec![0.0; pattern.len()]);
         let inputs = [point(0.9), point(1.3), point(-0.2)];
-        let inputs = inputs.each_ref().map(Vec::as_slice);
-        Interpreter::new(&program).run(&inputs, &mut [&mut ddz, &mut entries]);
-        ddz.extend(entries);
-        (program, ddz)
+        let results = Interpreter::new(&program).results(&inputs);
+        assert_eq!(results[1].len(), pattern.len());
+        (program, results.concat())
     }
 
     #[test]

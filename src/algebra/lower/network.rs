@@ -282,8 +282,7 @@ mod tests {
             builder.output("y", &y);
             let program = builder.finish().expect("a program");
             for a in [-30.0, -6.0, -0.7, -1e-9, 0.0, 0.3, 2.5, 9.0, 400.0] {
-                let mut found = [0.0; 2];
-                Interpreter::new(&program).run(&[&[a]], &mut [&mut found]);
+                let found = Interpreter::new(&program).results(&[vec![a]]).remove(0);
                 for (found, expected) in found.into_iter().zip([phi.value(a), phi.slope(a)]) {
                     let bound = 4e-15 * (1.0 + expected.abs());
                     assert!(

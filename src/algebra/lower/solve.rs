@@ -78,11 +78,8 @@ mod tests {
         let solution = ids(&pinv_times(sheet, &rows, &numbers(sheet, &w_values)));
         builder.output("u", &solution);
         let program = builder.finish().expect("a valid program");
-        let row_major = jacobian.transpose();
-        let mut u = DVector::zeros(d);
-        let inputs = [row_major.as_slice(), w.as_slice()];
-        Interpreter::new(&program).run(&inputs, &mut [u.as_mut_slice()]);
-        u
+        let inputs = [jacobian.transpose().as_slice(), w.as_slice()].map(<[f64]>::to_vec);
+        DVector::from_vec(Interpreter::new(&program).results(&inputs).remove(0))
     }
 
     #[test]

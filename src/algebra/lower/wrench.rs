@@ -270,11 +270,10 @@ mod tests {
         rules.flatten().collect()
     }
 
-    fn run(rule: &InputRule, x: &[f64], dx: &[f64], tau: &[f64], feet: &[f64]) -> [f64; STATE_DIM] {
+    fn run(rule: &InputRule, x: &[f64], dx: &[f64], tau: &[f64], feet: &[f64]) -> Vec<f64> {
         let program = input_of(rule).expect("lowers");
-        let mut u = [f64::NAN; STATE_DIM];
-        Interpreter::new(&program).run(&[x, dx, tau, feet], &mut [&mut u]);
-        u
+        let inputs = [x, dx, tau, feet].map(<[f64]>::to_vec);
+        Interpreter::new(&program).results(&inputs).remove(0)
     }
 
     fn contacts() -> impl Iterator<Item = ContactFlags> {
@@ -365,11 +364,11 @@ mod tests {
             let program = torque_of(&rule).expect("lowers");
             let mut interpreter = Interpreter::new(&program);
             for acceleration in [0.0, 70.0] {
-                let mut back = [f64::NAN; JOINT_DIM];
                 let ddx = [acceleration; STATE_DIM];
-                interpreter.run(&[&dx, &ddx, &u[..JOINT_DIM]], &mut [&mut back]);
+                let inputs = [&dx[..], &ddx, &u[..JOINT_DIM]].map(<[f64]>::to_vec);
+                let back = interpreter.results(&inputs).remove(0);
                 let inertia = rule.actuators().map_or(0.0, |_| 0.01 * acceleration);
-                for (found, tau) in back.iter().zip(tau) {
+                for (found, tau) in back.into_iter().zip(tau) {
                     assert!((found - tau - inertia).abs() < 1e-13 * 50.0, "{rule:?}");
                 }
             }
