@@ -194,4 +194,10 @@ mod tests {
             );
         }
     }
+
+    #[test]
+    #[should_panic(expected = "finite")]
+    fn number_that_is_not_finite_is_never_spelled() {
+        Precision::Single.digits(f64::NAN);
+    }
 }

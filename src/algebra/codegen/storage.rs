@@ -1,7 +1,5 @@
 //! Where values live: which arrays hold them, in place or copied.
 
-use std::ops::Range;
-
 use super::code::{Expr, Index, Role, Span, Stmt};
 use super::ident::Ident;
 use super::translate::Translator;
@@ -68,45 +66,38 @@ impl Translator<'_> {
         } else {
             let runs = self.runs(values);
             self.body.push(Stmt::Declare(array.clone(), values.len()));
+            let mut at = 0;
             for run in runs {
-                self.copy_run(&array, values, run);
+                self.copy_run(&array, at, run);
+                at += run.len();
             }
         }
         local(array, values.len())
     }
 
-    fn copy_run(&mut self, array: &Ident, values: &[ValueId], run: Range<usize>) {
-        let from = self.read(values[run.start]).0;
-        match from {
-            Expr::Element(source, at) if run.len() > 1 => {
+    fn copy_run(&mut self, array: &Ident, at: usize, run: &[ValueId]) {
+        match self.read(run[0]).0 {
+            Expr::Element(source, from) if run.len() > 1 => {
                 let i = self.names.locals.mint("i");
-                let target = Index::variable(&i).shifted(run.start);
-                let source = Expr::Element(source, Index::variable(&i).shifted(at.offset));
+                let target = Index::variable(&i).shifted(at);
+                let source = Expr::Element(source, Index::variable(&i).shifted(from.offset));
                 let assign = Stmt::Assign(Expr::Element(array.clone(), target), source);
                 self.body.push(Stmt::For(i, run.len(), vec![assign]));
             }
             value => {
-                let target = Expr::Element(array.clone(), Index::fixed(run.start));
+                let target = Expr::Element(array.clone(), Index::fixed(at));
                 self.body.push(Stmt::Assign(target, value));
             }
         }
     }
 
     /// Divides values into runs of consecutive elements of one array.
-    fn runs(&self, values: &[ValueId]) -> Vec<Range<usize>> {
-        let mut runs: Vec<Range<usize>> = Vec::new();
-        for (k, &value) in values.iter().enumerate() {
-            let follows = k > 0
-                && match (self.element(values[k - 1]), self.element(value)) {
-                    (Some((before, at)), Some((array, next))) => before == array && at + 1 == next,
-                    _ => false,
-                };
-            match runs.last_mut() {
-                Some(run) if follows => run.end = k + 1,
-                _ => runs.push(k..k + 1),
-            }
-        }
-        runs
+    fn runs<'v>(&self, values: &'v [ValueId]) -> Vec<&'v [ValueId]> {
+        let follows = |a: &ValueId, b: &ValueId| match (self.element(*a), self.element(*b)) {
+            (Some((before, at)), Some((array, next))) => before == array && at + 1 == next,
+            (None, _) | (_, None) => false,
+        };
+        values.chunk_by(follows).collect()
     }
 
     /// Array and position of a value that is an element.
