@@ -7,7 +7,7 @@ use super::ident::Ident;
 use crate::ir::{Binary, QUAD, Quad, QuadSum, Table};
 
 /// Sums that are added side by side: what the registers hold beside a weight.
-const SUMS_AT_ONCE: usize = 12;
+pub const SUMS_AT_ONCE: usize = 12;
 
 /// [`Statement::Quads`](crate::ir::Statement) where its numbers live.
 #[derive(Clone, Debug, PartialEq)]
@@ -45,9 +45,6 @@ pub struct Four {
 }
 
 impl FourBlock {
-    /// The number of names that [`Fours`] needs at most.
-    pub const LARGEST: usize = SUMS_AT_ONCE;
-
     /// Divides the sums of a statement.
     pub fn divide(sums: &[QuadSum]) -> Vec<Self> {
         let mut blocks = Vec::new();
@@ -87,9 +84,8 @@ impl FourBlock {
 
 /// Whether a sum reads one from `first` on.
 fn needs(sum: &QuadSum, first: usize) -> bool {
-    let vectors = sum.terms.iter().map(|&(_, vector)| vector);
-    let mut vectors = vectors.chain([sum.start]);
-    vectors.any(|vector| matches!(vector, Quad::Sum(earlier) if earlier >= first))
+    sum.vectors()
+        .any(|vector| matches!(vector, Quad::Sum(earlier) if earlier >= first))
 }
 
 impl Fours {
@@ -98,8 +94,7 @@ impl Fours {
         let mut filled: Vec<[bool; QUAD]> = Vec::new();
         for sum in sums {
             let mut lanes = [false; QUAD];
-            let vectors = sum.terms.iter().map(|&(_, vector)| vector);
-            for vector in vectors.chain([sum.start]) {
+            for vector in sum.vectors() {
                 let of_vector = filled_lanes(table, &filled, vector);
                 lanes = std::array::from_fn(|l| lanes[l] || of_vector[l]);
             }

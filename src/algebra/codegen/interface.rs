@@ -212,10 +212,7 @@ fn map_entries(
     let is_nonlinear = [model.encoder_map(), model.decoder_map()]
         .map(|map| map.is_ok_and(|map| map.as_affine().is_none()));
     let positions = in_units("z", latent.map(|units| &units.position));
-    let velocities = match latent {
-        None => "(scaled)",
-        Some(_) => "(in the units of z per second)",
-    };
+    let velocities = latent.map_or("(scaled)", |_| "(in the units of z per second)");
     let inputs = in_units("u_lat", latent.map(|units| &units.input));
     let [at_x, at_z] = points(is_nonlinear);
     let (of_x, of_u) = (elements("x", state), elements("u", input));
@@ -249,8 +246,8 @@ fn map_entries(
                     (Some(_), _) => in_matrices(title),
                     (None, Units::Scaled) => without_factors(title),
                 };
-                let name = program.name().to_owned();
-                entries.push(entry(name, program, vec![title, text]));
+                let docs = vec![title, text];
+                entries.push(entry(program.name().to_owned(), program, docs));
             }
             Err(LowerError::Model(ModelError::Missing { .. })) => {}
             Err(error) => return Err(error),

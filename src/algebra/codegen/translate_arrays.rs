@@ -1,7 +1,7 @@
 //! Array statements as loops.
 
 use super::code::{Expr, Index, Span, Stmt};
-use super::fours::{FourBlock, Fours};
+use super::fours::{FourBlock, Fours, SUMS_AT_ONCE};
 use super::ident::Ident;
 use super::lanes::Row;
 use super::storage::MatrixStorage;
@@ -101,7 +101,7 @@ impl Translator<'_> {
         stored.is_in_lanes = true;
         let table = (table.clone(), stored.name.clone());
         let name = |_| self.names.locals.mint("v");
-        let names = (0..FourBlock::LARGEST.min(sums.len())).map(name).collect();
+        let names = (0..SUMS_AT_ONCE.min(sums.len())).map(name).collect();
         self.body.push(Stmt::Fours(Box::new(Fours {
             array: home.array,
             sums: sums.to_vec(),

@@ -98,8 +98,7 @@ impl<T: Real> Interpreter<T> {
 
     fn evaluate(&mut self) {
         let (values, tables) = (&mut self.values, &self.tables);
-        for (statement, first) in &self.steps {
-            let first = *first;
+        for &(ref statement, first) in &self.steps {
             match statement {
                 // No steps.
                 Statement::Constant(_) | Statement::Input { .. } => {}

@@ -176,6 +176,14 @@ pub struct QuadSum {
     pub terms: Vec<(usize, Quad)>,
 }
 
+impl QuadSum {
+    /// The vectors that are added, then that of the start.
+    pub fn vectors(&self) -> impl Iterator<Item = Quad> {
+        let added = self.terms.iter().map(|&(_, vector)| vector);
+        added.chain([self.start])
+    }
+}
+
 /// One step of the schedule; defines one or several values.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Statement {

@@ -162,8 +162,7 @@ fn check_shape(program: &Program, statement: &Statement) -> Result<(), Fault> {
                 false => count(found + 1, end),
             };
             for (position, sum) in sums.iter().enumerate() {
-                let vectors = sum.terms.iter().map(|&(_, vector)| vector);
-                for vector in vectors.chain([sum.start]) {
+                for vector in sum.vectors() {
                     match vector {
                         Quad::Row(row) => below(row, table(id).rows)?,
                         Quad::Sum(earlier) => below(earlier, position)?,

@@ -63,9 +63,8 @@ pub(super) fn lower(map: Map, model: &ReducedModel) -> Result<Program, LowerErro
             let rows = (0..model.latent_dim()).map(|row| network.jacobian_row(row, &slopes));
             let rows: Vec<Vec<Number>> = rows.collect();
             let factors = model.input_factors()?;
-            let scaled = given.iter().zip(&factors);
-            let scaled: Vec<Number> = scaled.map(|(u, &factor)| u.scaled(factor)).collect();
-            pinv_times(sheet, &rows, &scaled)
+            let scaled = given.iter().zip(&factors).map(|(u, &s_u)| u.scaled(s_u));
+            pinv_times(sheet, &rows, &scaled.collect::<Vec<_>>())
         }
         // u = (J_E(s_x x)^T u_lat) / s_u
         Map::LiftInput => {
