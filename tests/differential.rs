@@ -29,7 +29,7 @@ use nalgebra::DVector;
 use romc::equations::Equations;
 use romc::ir::{Interpreter, Statement};
 use romc::lower::CompiledModel;
-use romc::lower::{self, Form, dynamics_jacobian};
+use romc::lower::{Form, Map, dynamics_jacobian};
 use romc::model::{LatentVariable, ReducedModel};
 
 /// Random models of tests that compile nothing.
@@ -262,25 +262,25 @@ fn lowered_maps_of_nonlinear_models_equal_the_models_own_evaluation() {
             let (z, dz, u_lat) = (vector(d), vector(d), vector(d));
             let tangent = model.tangent(&x).expect("full rank");
             let pairs = [
-                (lower::encode(&model), vec![&x], model.encode(&x)),
+                (Map::Encode.lower(&model), vec![&x], model.encode(&x)),
                 (
-                    lower::encode_velocity(&model),
+                    Map::EncodeVelocity.lower(&model),
                     vec![&x, &dx],
                     Ok(&tangent.encode * &dx),
                 ),
-                (lower::decode(&model), vec![&z], model.decode(&z)),
+                (Map::Decode.lower(&model), vec![&z], model.decode(&z)),
                 (
-                    lower::decode_velocity(&model),
+                    Map::DecodeVelocity.lower(&model),
                     vec![&z, &dz],
                     model.decoder_jacobian(&z).map(|jacobian| jacobian * &dz),
                 ),
                 (
-                    lower::lift_input(&model),
+                    Map::LiftInput.lower(&model),
                     vec![&x, &u_lat],
                     Ok(&tangent.lift * &u_lat),
                 ),
                 (
-                    lower::project_input(&model),
+                    Map::ProjectInput.lower(&model),
                     vec![&x, &u],
                     Ok(&tangent.project * &u),
                 ),

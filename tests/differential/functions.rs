@@ -2,7 +2,7 @@
 
 use romc::equations::Equations;
 use romc::ir::{Interpreter, Program};
-use romc::lower::{self, Form, JacobianPattern};
+use romc::lower::{self, Form, JacobianPattern, Map};
 use romc::model::{ModelError, ReducedModel, StateMap};
 
 /// A generated function: its name after the model's, and the program it must equal.
@@ -118,12 +118,12 @@ pub fn functions(model: &ReducedModel, n_points: usize, form: Form) -> Vec<Funct
     };
     let (encoder, decoder) = (kind_of(model.encoder_map()), kind_of(model.decoder_map()));
     let maps = [
-        (lower::encode(model), &encoder),
-        (lower::encode_velocity(model), &encoder),
-        (lower::decode(model), &decoder),
-        (lower::decode_velocity(model), &decoder),
-        (lower::project_input(model), &encoder),
-        (lower::lift_input(model), &encoder),
+        (Map::Encode.lower(model), &encoder),
+        (Map::EncodeVelocity.lower(model), &encoder),
+        (Map::Decode.lower(model), &decoder),
+        (Map::DecodeVelocity.lower(model), &decoder),
+        (Map::ProjectInput.lower(model), &encoder),
+        (Map::LiftInput.lower(model), &encoder),
     ];
     for (program, kind) in maps {
         if let Ok(program) = program {

@@ -32,7 +32,7 @@ fn points(function: &Function, random: &mut Random) -> Vec<f64> {
 
 /// What the interpreter makes of the points in single precision.
 fn interpret_single(function: &Function, points: &[f64]) -> Vec<f64> {
-    let mut interpreter = Interpreter::<f32>::of(&function.program);
+    let mut interpreter = Interpreter::<f32>::new(&function.program);
     let mut results = Vec::new();
     for point in points.chunks(function.input_len()) {
         let point: Vec<f32> = point.iter().map(|&x| x as f32).collect();

@@ -3,8 +3,7 @@
 use super::fours::Fours;
 use super::ident::Ident;
 use super::lanes::Row;
-use super::literal::Literal;
-use crate::ir::{Binary, Table};
+use crate::ir::{Binary, Table, Unary};
 
 /// A subscript `offset + sum_i stride_i * name_i`.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -41,79 +40,28 @@ impl Index {
         self
     }
 
-    /// With another subscript in place of a variable.
-    pub fn with(&self, variable: &Ident, at: &Self) -> Self {
-        let mut result = Self::fixed(self.offset);
-        for (stride, name) in &self.terms {
-            if name == variable {
-                result.offset += stride * at.offset;
-                let scaled = at.terms.iter().map(|(inner, name)| (stride * inner, name));
-                result
-                    .terms
-                    .extend(scaled.map(|(s, name)| (s, name.clone())));
-            } else {
-                result.terms.push((*stride, name.clone()));
-            }
-        }
-        result
-    }
-}
-
-/// Functions of one argument that every target has.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum MathFunction {
-    /// Square root.
-    Sqrt,
-    /// Absolute value.
-    Abs,
-    /// -1, 0 or 1.
-    Sign,
-    /// Tangent.
-    Tan,
-    /// Hyperbolic tangent.
-    Tanh,
-    /// Exponential.
-    Exp,
-    /// Natural logarithm.
-    Log,
-}
-
-impl MathFunction {
-    /// What most targets call it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Sqrt => "sqrt",
-            Self::Abs => "abs",
-            Self::Sign => "sign",
-            Self::Tan => "tan",
-            Self::Tanh => "tanh",
-            Self::Exp => "exp",
-            Self::Log => "log",
-        }
+    /// With another subscript added.
+    pub fn sum(mut self, other: &Self) -> Self {
+        self.terms.extend_from_slice(&other.terms);
+        self.shifted(other.offset)
     }
 }
 
 /// An expression.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Expr {
-    /// A number.
-    Literal(Literal),
+    /// A finite number.
+    Literal(f64),
     /// A scalar variable.
     Name(Ident),
     /// `array[index]`
     Element(Ident, Index),
     /// `table[row][col]`
     Entry(Ident, Index, Index),
-    /// `-a`
-    Negate(Box<Expr>),
+    /// `-a` or `f(a)`
+    Unary(Unary, Box<Expr>),
     /// `a op b`
     Infix(Binary, Box<Expr>, Box<Expr>),
-    /// `f(a)`
-    Apply(MathFunction, Box<Expr>),
-    /// The sums of all lanes, within a loop of a variable over lanes.
-    Lanes(Ident, Ident),
-    /// The total of the sums of all lanes.
-    LaneTotal(Ident),
 }
 
 impl Expr {
@@ -121,28 +69,11 @@ impl Expr {
     pub fn infix(op: Binary, a: Expr, b: Expr) -> Self {
         Self::Infix(op, Box::new(a), Box::new(b))
     }
-
-    /// With another subscript in place of a variable.
-    pub fn with(&self, variable: &Ident, at: &Index) -> Self {
-        match self {
-            Self::Literal(_) | Self::Name(_) | Self::Lanes(..) | Self::LaneTotal(_) => self.clone(),
-            Self::Element(array, index) => Self::Element(array.clone(), index.with(variable, at)),
-            Self::Entry(table, row, col) => Self::Entry(
-                table.clone(),
-                row.with(variable, at),
-                col.with(variable, at),
-            ),
-            Self::Negate(a) => Self::Negate(Box::new(a.with(variable, at))),
-            Self::Infix(op, a, b) => Self::infix(*op, a.with(variable, at), b.with(variable, at)),
-            Self::Apply(function, a) => Self::Apply(*function, Box::new(a.with(variable, at))),
-        }
-    }
 }
 
 /// `len` elements of an array from `offset` on, handed to a function.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Span {
-    /// The array.
     pub array: Ident,
     /// First element.
     pub offset: usize,
@@ -179,7 +110,6 @@ pub enum Stmt {
     /// Sine and cosine of one argument by the kernel's core, which notes arguments beyond
     /// its limit for the whole block of lanes.
     SinCosLane {
-        /// The argument.
         argument: Expr,
         /// New scalar for the sine.
         sine: Ident,
@@ -190,7 +120,6 @@ pub enum Stmt {
     },
     /// A call of another generated function or, without a name, of the sine-and-cosine kernel.
     Call {
-        /// The function.
         callee: Option<Ident>,
         /// What it reads; of the kernel the angles.
         read: Vec<Span>,
@@ -201,29 +130,6 @@ pub enum Stmt {
     Row(Box<Row>),
     /// Sums of vectors of four numbers.
     Fours(Box<Fours>),
-    /// Sums of the lanes, which are assigned later.
-    DeclareLanes(Ident),
-    /// A loop of the variable over the lanes, or all of them at once.
-    ForLanes(Ident, Vec<Stmt>),
-}
-
-impl Stmt {
-    /// The body of a loop; nothing for other statements.
-    pub fn inner(&self) -> &[Stmt] {
-        match self {
-            Self::For(_, _, body) | Self::ForLanes(_, body) => body,
-            Self::Let(..)
-            | Self::LetArray(..)
-            | Self::Declare(..)
-            | Self::Assign(..)
-            | Self::AddAssign(..)
-            | Self::SinCosLane { .. }
-            | Self::Call { .. }
-            | Self::Row(_)
-            | Self::Fours(_)
-            | Self::DeclareLanes(_) => &[],
-        }
-    }
 }
 
 /// What a parameter of a generated function is for.
@@ -242,7 +148,6 @@ pub enum Role {
 /// A parameter of a generated function, in a language or, with a text for a name, in any.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Parameter<N = Ident> {
-    /// Its name.
     pub name: N,
     /// Number of elements; an output may have none.
     pub len: usize,
@@ -253,25 +158,24 @@ pub struct Parameter<N = Ident> {
 /// A constant matrix with static storage.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ConstTable {
-    /// Its name.
     pub name: Ident,
-    /// Its entries.
     pub values: Table,
     /// Whether rows are read in lanes.
     pub is_in_lanes: bool,
+    /// Whether entries are read by their subscripts.
+    pub is_entered: bool,
 }
 
 /// A generated function.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Function {
-    /// Its name.
     pub name: Ident,
-    /// Lines of documentation.
     pub docs: Vec<String>,
-    /// Parameters in order.
     pub parameters: Vec<Parameter>,
     /// Parameters that the body does not mention.
     pub unused: Vec<Ident>,
+    /// Arrays that are assigned in lanes.
+    pub in_lanes: Vec<Ident>,
     /// What it does.
     pub body: Vec<Stmt>,
 }

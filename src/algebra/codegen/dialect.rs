@@ -1,31 +1,14 @@
 //! What targets spell differently.
 
-use super::code::{ConstTable, Index, MathFunction, Span};
-use super::fours::{FourBlock, Fours};
-use super::literal::Literal;
+use super::code::{ConstTable, Index, Span};
+use super::fours::Fours;
+use super::lanes::Row;
+use super::precision::Precision;
 use super::printer::subscript;
-use crate::ir::Binary;
+use crate::ir::{Binary, Unary};
 
-/// Spelling of lanes: neighbours of an array that are computed side by side.
-pub trait LaneDialect {
-    /// Declaration of one sum a lane.
-    fn declare(&self, sums: &str) -> String;
-
-    /// Head of a loop over the lanes.
-    fn for_lanes(&self, variable: &str) -> String;
-
-    /// The element of each lane, to be read; `element` is the first lane's.
-    fn read(&self, element: &str) -> String;
-
-    /// The element of each lane, to be assigned.
-    fn write(&self, element: &str) -> String;
-
-    /// The sum of each lane.
-    fn sums(&self, sums: &str, variable: &str) -> String;
-
-    /// The total of all lanes.
-    fn total(&self, sums: &str) -> String;
-}
+/// Lines, each with its depth of indentation.
+pub type Lines = Vec<(usize, String)>;
 
 /// Spelling of a target language. The printer owns precedence and parentheses, the
 /// dialect everything that differs between languages.
@@ -73,25 +56,25 @@ pub trait Dialect {
         format!("{table}[{}][{}]", subscript(row), subscript(col))
     }
 
-    /// How lanes run side by side, in a language in which they do; in others loops take column
+    /// Lines that compute the columns of a row side by side in lanes; nothing in languages whose loops take column
     /// after column.
-    fn lanes(&self) -> Option<&dyn LaneDialect> {
+    fn row(&self, _: &Row) -> Option<Lines> {
         None
     }
 
-    /// Lines that compute the sums of a block of vectors of four numbers side by side, each with its depth
-    /// of indentation: of every block, or of none in languages that take one number after the other.
-    fn fours(&self, _: &Fours, _: &FourBlock) -> Option<Vec<(usize, String)>> {
+    /// Lines that compute sums of vectors of four numbers side by side; nothing in languages that take one number
+    /// after the other.
+    fn fours(&self, _: &Fours) -> Option<Lines> {
         None
     }
 
     /// A number in the target's precision.
-    fn literal(&self, literal: Literal) -> String {
-        literal.to_string()
+    fn literal(&self, value: f64) -> String {
+        Precision::Double.digits(value)
     }
 
     /// A function applied to a printed argument.
-    fn apply(&self, function: MathFunction, argument: &str) -> String;
+    fn apply(&self, function: Unary, argument: &str) -> String;
 
     /// Definition of a scalar.
     fn let_scalar(&self, name: &str, value: &str) -> String {
@@ -101,7 +84,7 @@ pub trait Dialect {
     /// Definition of an array by its printed elements.
     fn let_array(&self, name: &str, elements: &[String]) -> String;
 
-    /// Declaration of an array that is assigned later; without [`Self::lanes`] of zeros.
+    /// Declaration of an array that is assigned later; without [`Self::row`] of zeros.
     fn declare(&self, name: &str, len: usize) -> String;
 
     /// Head of a loop.
@@ -131,12 +114,8 @@ pub trait Dialect {
     /// The rows of a constant table: entries between `open` and `close`, with `between` after every
     /// eight of them.
     fn rows(&self, table: &ConstTable, [open, between, close]: [&str; 3]) -> String {
-        let entry = |&value: &f64| {
-            let literal = Literal::new(value).expect("tables of programs are finite");
-            self.literal(literal)
-        };
         let row = |row: &[f64]| {
-            let entries: Vec<String> = row.iter().map(entry).collect();
+            let entries: Vec<String> = row.iter().map(|&entry| self.literal(entry)).collect();
             let lines: Vec<String> = entries.chunks(8).map(|line| line.join(", ")).collect();
             format!("{open}{}{close}\n", lines.join(between))
         };
@@ -145,6 +124,20 @@ pub trait Dialect {
             .collect()
     }
 
-    /// Definition of a constant table.
-    fn table(&self, table: &ConstTable) -> String;
+    /// Definition of a constant table; nothing for one of vectors of four in languages that have none.
+    fn table(&self, table: &ConstTable) -> Option<String>;
+}
+
+/// What most targets call a function.
+pub fn name(function: Unary) -> &'static str {
+    match function {
+        Unary::Neg => unreachable!("the printer spells negation as an operator"),
+        Unary::Sqrt => "sqrt",
+        Unary::Abs => "abs",
+        Unary::Sign => "sign",
+        Unary::Tan => "tan",
+        Unary::Tanh => "tanh",
+        Unary::Exp => "exp",
+        Unary::Log => "log",
+    }
 }

@@ -4,20 +4,17 @@ use std::ops::Range;
 
 use super::code::{Expr, Index, Span, Stmt};
 use super::ident::Ident;
-use super::literal::Literal;
 use crate::ir::{Binary, QUAD, Quad, QuadSum, Table};
 
 /// Sums that are added side by side: what the registers hold beside a weight.
-const SUMS_AT_ONCE: usize = 12;
+pub const SUMS_AT_ONCE: usize = 12;
 
 /// [`Statement::Quads`](crate::ir::Statement) where its numbers live.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fours {
     /// The local array that the sums go to.
     pub array: Ident,
-    /// The sums.
     pub sums: Vec<QuadSum>,
-    /// The weights.
     pub weights: Span,
     /// The constant vectors, and what their table is called.
     pub table: (Table, Ident),
@@ -32,7 +29,6 @@ pub struct Fours {
 /// Neighbouring sums that do not need each other.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FourBlock {
-    /// Which sums.
     pub sums: Range<usize>,
     /// What is added to them, by weights as far as each sum's order allows.
     pub terms: Vec<Four>,
@@ -45,14 +41,10 @@ pub struct Four {
     pub sum: usize,
     /// Position among the weights.
     pub weight: usize,
-    /// The vector.
     pub vector: Quad,
 }
 
 impl FourBlock {
-    /// The number of names that [`Fours`] needs at most.
-    pub const LARGEST: usize = SUMS_AT_ONCE;
-
     /// Divides the sums of a statement.
     pub fn divide(sums: &[QuadSum]) -> Vec<Self> {
         let mut blocks = Vec::new();
@@ -92,9 +84,8 @@ impl FourBlock {
 
 /// Whether a sum reads one from `first` on.
 fn needs(sum: &QuadSum, first: usize) -> bool {
-    let vectors = sum.terms.iter().map(|&(_, vector)| vector);
-    let mut vectors = vectors.chain([sum.start]);
-    vectors.any(|vector| matches!(vector, Quad::Sum(earlier) if earlier >= first))
+    sum.vectors()
+        .any(|vector| matches!(vector, Quad::Sum(earlier) if earlier >= first))
 }
 
 impl Fours {
@@ -103,8 +94,7 @@ impl Fours {
         let mut filled: Vec<[bool; QUAD]> = Vec::new();
         for sum in sums {
             let mut lanes = [false; QUAD];
-            let vectors = sum.terms.iter().map(|&(_, vector)| vector);
-            for vector in vectors.chain([sum.start]) {
+            for vector in sum.vectors() {
                 let of_vector = filled_lanes(table, &filled, vector);
                 lanes = std::array::from_fn(|l| lanes[l] || of_vector[l]);
             }
@@ -143,10 +133,7 @@ impl Fours {
 
     fn number(&self, vector: Quad, lane: usize) -> Expr {
         match vector {
-            Quad::Row(row) => {
-                let literal = Literal::new(self.table.0.row(row)[lane]);
-                Expr::Literal(literal.expect("tables of programs are finite"))
-            }
+            Quad::Row(row) => Expr::Literal(self.table.0.row(row)[lane]),
             Quad::Sum(sum) => Expr::Element(self.array.clone(), Index::fixed(QUAD * sum + lane)),
         }
     }

@@ -2,11 +2,11 @@
 
 use super::code::{Parameter, Role};
 use super::map_equations::{in_matrices, points, titles, without_factors};
-use super::precision::{Precision, stated_bounds};
+use super::precision::stated_bounds;
 use super::units::Units;
 use crate::equations::{Equations, LatentUnits, Unit, summand_words};
-use crate::ir::{Program, Slot, Statement, Unary};
-use crate::lower::{self, Form, JacobianPattern, LowerError};
+use crate::ir::{Program, Slot, Statement};
+use crate::lower::{self, Form, JacobianPattern, LowerError, Map};
 use crate::model::{CandidateTerm, CoordinateNames, ModelError, ReducedModel};
 use crate::robot::WrenchFrame;
 use crate::robot::kinematics::{LEAST_HEIGHT, LEAST_SPAN};
@@ -63,24 +63,6 @@ pub struct ModelInterface {
     pub phases: Vec<PhaseInterface>,
 }
 
-impl PhaseInterface {
-    /// An angle beyond the kernel's limit for the test of batches, or one within it if the
-    /// accelerations have functions that overflow there.
-    pub fn far_angle(&self, precision: Precision) -> f64 {
-        let overflows = self.dynamics.program.statements().iter().any(|statement| {
-            matches!(
-                statement,
-                Statement::Unary(Unary::Exp | Unary::Tan | Unary::Tanh | Unary::Log, _)
-            )
-        });
-        match (overflows, precision) {
-            (true, _) => 0.125,
-            (false, Precision::Double) => 9000.125,
-            (false, Precision::Single) => 160.125,
-        }
-    }
-}
-
 impl ModelInterface {
     /// Lowers all functions of a model.
     ///
@@ -131,6 +113,11 @@ impl ModelInterface {
         }
     }
 
+    /// Whether a function has such a statement.
+    pub(super) fn has(&self, is_wanted: impl Fn(&Statement) -> bool) -> bool {
+        self.all().any(|entry| entry.program.has(&is_wanted))
+    }
+
     /// All entries in the order in which they are generated.
     pub fn all(&self) -> impl Iterator<Item = &FunctionSpec> {
         let phases = self
@@ -139,6 +126,11 @@ impl ModelInterface {
             .flat_map(|phase| [&phase.dynamics, &phase.jacobian, &phase.step]);
         self.maps.iter().chain(phases)
     }
+}
+
+/// Whether a statement computes sines and cosines.
+pub(super) fn computes_angles(statement: &Statement) -> bool {
+    matches!(statement, Statement::SinCos { .. })
 }
 
 /// What computes the input of the maps, and torques of the motors from it, if the model is over a
@@ -220,49 +212,33 @@ fn map_entries(
     let is_nonlinear = [model.encoder_map(), model.decoder_map()]
         .map(|map| map.is_ok_and(|map| map.as_affine().is_none()));
     let positions = in_units("z", latent.map(|units| &units.position));
-    let velocities = match latent {
-        None => "(scaled)",
-        Some(_) => "(in the units of z per second)",
-    };
+    let velocities = latent.map_or("(scaled)", |_| "(in the units of z per second)");
     let inputs = in_units("u_lat", latent.map(|units| &units.input));
-    let project = || match latent {
-        None => lower::project_input(model),
-        Some(units) => lower::linear_map("project_input", ("u", "u_lat"), &units.project),
-    };
-    let lift = || match latent {
-        None => lower::lift_input(model),
-        Some(units) => lower::linear_map("lift_input", ("u_lat", "u"), &units.lift),
-    };
     let [at_x, at_z] = points(is_nonlinear);
     let (of_x, of_u) = (elements("x", state), elements("u", input));
-    let candidates = [
-        (
-            lower::encode(model),
-            format!("x: {n}. z: latent coordinates {positions}.{of_x}"),
-        ),
-        (
-            lower::encode_velocity(model),
-            format!("{at_x}dx: velocities of the {n}. dz: latent velocities {velocities}."),
-        ),
-        (
-            lower::decode(model),
-            format!("z: latent coordinates {positions}. x: {n}.{of_x}"),
-        ),
-        (
-            lower::decode_velocity(model),
-            format!("{at_z}dz: latent velocities {velocities}. dx: velocities of the {n}."),
-        ),
-        (
-            project(),
-            format!("{at_x}u: generalised inputs in {unit}. u_lat: latent inputs {inputs}.{of_u}"),
-        ),
-        (
-            lift(),
-            format!("{at_x}u_lat: latent inputs {inputs}. u: generalised inputs in {unit}.{of_u}"),
-        ),
-    ];
     let mut entries = Vec::new();
-    for ((program, text), title) in candidates.into_iter().zip(titles(is_nonlinear)) {
+    for (map, title) in Map::ALL.into_iter().zip(titles(is_nonlinear)) {
+        let text = match map {
+            Map::Encode => format!("x: {n}. z: latent coordinates {positions}.{of_x}"),
+            Map::EncodeVelocity => {
+                format!("{at_x}dx: velocities of the {n}. dz: latent velocities {velocities}.")
+            }
+            Map::Decode => format!("z: latent coordinates {positions}. x: {n}.{of_x}"),
+            Map::DecodeVelocity => {
+                format!("{at_z}dz: latent velocities {velocities}. dx: velocities of the {n}.")
+            }
+            Map::ProjectInput => format!(
+                "{at_x}u: generalised inputs in {unit}. u_lat: latent inputs {inputs}.{of_u}"
+            ),
+            Map::LiftInput => format!(
+                "{at_x}u_lat: latent inputs {inputs}. u: generalised inputs in {unit}.{of_u}"
+            ),
+        };
+        let program = match (map, latent) {
+            (Map::ProjectInput, Some(units)) => map.of_weights(&units.project),
+            (Map::LiftInput, Some(units)) => map.of_weights(&units.lift),
+            (_, _) => map.lower(model),
+        };
         match program {
             Ok(program) => {
                 let title = match (latent, units) {
@@ -270,8 +246,8 @@ fn map_entries(
                     (Some(_), _) => in_matrices(title),
                     (None, Units::Scaled) => without_factors(title),
                 };
-                let name = program.name().to_owned();
-                entries.push(entry(name, program, vec![title, text]));
+                let docs = vec![title, text];
+                entries.push(entry(program.name().to_owned(), program, docs));
             }
             Err(LowerError::Model(ModelError::Missing { .. })) => {}
             Err(error) => return Err(error),
@@ -408,12 +384,11 @@ fn equations(system: &Equations<'_>, phase: usize) -> Result<Vec<String>, LowerE
             right.push_str(sign);
             right.push_str(&summand_words(coefficient.abs(), term.text()));
         }
-        if terms.is_empty() {
-            right.push('0');
-        }
-        if terms.len() > MOST_TERMS {
-            right = format!("a sum of {} terms", terms.len());
-        }
+        let right = match terms.len() {
+            0 => "0".to_owned(),
+            1..=MOST_TERMS => right,
+            count => format!("a sum of {count} terms"),
+        };
         lines.push(format!("ddz{} = {right}", row + 1));
         if let Some(units) = system
             .latent_units()

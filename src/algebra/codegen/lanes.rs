@@ -2,24 +2,24 @@
 
 use std::ops::Range;
 
-use super::code::{Expr, Index, Stmt};
+use super::code::{Expr, Index, Span, Stmt};
 use super::ident::Ident;
-use crate::ir::{Binary, LANES};
+use super::storage::MatrixStorage;
+use crate::ir::{Binary, Group, LANES, Slopes, Unary};
 
-/// One row of [`Statement::Separable`](crate::ir::Statement); expressions are in terms of the variable
-/// `column`.
+/// One row of [`Statement::Separable`](crate::ir::Statement) where its numbers live.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
-    /// The variable for a column.
-    pub column: Ident,
-    /// Names for a block of columns, a lane, the terms of all columns and the sums of the lanes.
-    pub names: [Ident; 4],
-    /// Runs of blocks whose columns have terms alike, one after the other.
-    pub runs: Vec<Run>,
-    /// The array that the slopes go to.
-    pub slopes: Ident,
-    /// Where in it the slope of a column goes.
-    pub slope_at: Index,
+    /// The variable for the row.
+    pub row: Ident,
+    /// Names for a column, a block of columns, a lane, the terms of all columns and the sums of the lanes.
+    pub names: [Ident; 5],
+    /// The functions.
+    pub groups: Vec<Group<Ident, Span>>,
+    /// What the slopes begin with, as many a row as the rows are apart.
+    pub base: Option<MatrixStorage>,
+    /// Where the slopes go.
+    pub slopes: MatrixStorage,
     /// Number of columns with a slope.
     pub n_slopes: usize,
     /// What is added to the lanes' total.
@@ -28,88 +28,58 @@ pub struct Row {
     pub sum: Expr,
 }
 
-/// Blocks of [`LANES`] columns whose terms are alike.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Run {
-    /// The blocks.
-    pub blocks: Range<usize>,
-    /// A column's term of the sum.
-    pub term: Expr,
-    /// A column's slope.
-    pub slope: Expr,
-}
-
 impl Row {
-    /// Statements that take block after block, all lanes of one side by side.
-    pub fn in_lanes(&self) -> Vec<Stmt> {
-        let [block, lane, _, sums] = &self.names;
-        let full = self.n_slopes / LANES;
-        let mut body = vec![Stmt::DeclareLanes(sums.clone())];
-        for run in &self.runs {
-            // The first block begins the sums, and the last may have fewer slopes than lanes.
-            let mut blocks = run.blocks.clone();
-            if blocks.start == 0 {
-                body.push(self.block(run, &Index::fixed(0), full > 0, true));
-                blocks.start = 1;
-            }
-            let inner = blocks.start..blocks.end.min(full).max(blocks.start);
-            if inner.len() == 1 {
-                body.push(self.block(run, &Index::fixed(LANES * inner.start), true, false));
-            } else if !inner.is_empty() {
-                let at = Index::fixed(LANES * inner.start).plus(LANES, block);
-                let inside = self.block(run, &at, true, false);
-                body.push(Stmt::For(block.clone(), inner.len(), vec![inside]));
-            }
-            if inner.end < blocks.end {
-                body.push(self.block(run, &Index::fixed(LANES * inner.end), false, false));
-            }
-            if run.blocks.contains(&full) && !self.n_slopes.is_multiple_of(LANES) {
-                let at = Index::variable(lane).shifted(LANES * full);
-                let slope = self.assign_slope(run, &at);
-                body.push(Stmt::For(lane.clone(), self.n_slopes % LANES, vec![slope]));
-            }
+    /// Runs of blocks of [`LANES`] columns, one after the other, whose columns have terms alike.
+    pub fn runs(&self) -> Vec<Range<usize>> {
+        let ends = self.groups.iter().map(|group| group.values.len);
+        let mut ends: Vec<usize> = ends
+            .chain(self.base.iter().map(|base| base.stride))
+            .collect();
+        ends.sort_unstable();
+        ends.dedup();
+        let begins = std::iter::once(0).chain(ends.iter().copied());
+        let runs = begins.zip(&ends);
+        runs.map(|(from, to)| from / LANES..to / LANES).collect()
+    }
+
+    /// The term of a column of a run, where its slope goes, and its slope.
+    pub fn column(&self, run: &Range<usize>, at: &Index) -> [Expr; 3] {
+        let from = LANES * run.start;
+        let base = self.base.as_ref().filter(|base| base.stride > from);
+        let mut slope = base.map(|base| base.element(&self.row, at));
+        let mut term = None;
+        for group in self.groups.iter().filter(|group| group.values.len > from) {
+            let entry = || Expr::Entry(group.table.clone(), Index::variable(&self.row), at.clone());
+            let times = |span: &Span| {
+                let element = Expr::Element(span.array.clone(), at.clone().shifted(span.offset));
+                Expr::infix(Binary::Mul, entry(), element)
+            };
+            term = Some(joined(term, Binary::Add, times(&group.values)));
+            slope = Some(match &group.slopes {
+                Slopes::One => joined(slope, Binary::Add, entry()),
+                Slopes::Plus(span) => joined(slope, Binary::Add, times(span)),
+                Slopes::Minus(span) => joined(slope, Binary::Sub, times(span)),
+            });
         }
-        let total = Expr::LaneTotal(sums.clone());
-        let total = Expr::infix(Binary::Add, self.start.clone(), total);
-        body.push(Stmt::Assign(self.sum.clone(), total));
-        body
-    }
-
-    /// One block of columns from `first` on.
-    fn block(&self, run: &Run, first: &Index, has_slopes: bool, begins: bool) -> Stmt {
-        let [_, lane, _, sums] = &self.names;
-        let at = first.clone().plus(1, lane);
-        let term = run.term.with(&self.column, &at);
-        let target = Expr::Lanes(sums.clone(), lane.clone());
-        let add = match begins {
-            true => Stmt::Assign(target, term),
-            false => Stmt::AddAssign(target, term),
-        };
-        let slope = has_slopes.then(|| self.assign_slope(run, &at));
-        Stmt::ForLanes(lane.clone(), slope.into_iter().chain([add]).collect())
-    }
-
-    fn assign_slope(&self, run: &Run, at: &Index) -> Stmt {
-        let target = Expr::Element(self.slopes.clone(), self.slope_at.with(&self.column, at));
-        Stmt::Assign(target, run.slope.with(&self.column, at))
+        let target = self.slopes.element(&self.row, at);
+        let invariant = "one group has a part in every column";
+        [term.expect(invariant), target, slope.expect(invariant)]
     }
 
     /// Statements that take column after column, then add what the lanes would.
     pub fn in_columns(&self) -> Vec<Stmt> {
-        let [_, lane, terms, sums] = &self.names;
+        let [column, _, lane, terms, sums] = &self.names;
         let width = self.n_slopes.next_multiple_of(LANES);
         // Without lanes arrays are declared as zeros, also behind the last column.
         let mut body = vec![Stmt::Declare(terms.clone(), width)];
-        for run in &self.runs {
-            let (first, end) = (LANES * run.blocks.start, LANES * run.blocks.end);
-            let at = Index::variable(&self.column).shifted(first);
-            let term = Expr::Element(terms.clone(), at.clone());
-            let columns = vec![
-                self.assign_slope(run, &at),
-                Stmt::Assign(term, run.term.with(&self.column, &at)),
-            ];
+        for run in self.runs() {
+            let (first, end) = (LANES * run.start, LANES * run.end);
+            let at = Index::variable(column).shifted(first);
+            let [term, target, slope] = self.column(&run, &at);
+            let term = Stmt::Assign(Expr::Element(terms.clone(), at), term);
             let n = end.min(self.n_slopes) - first;
-            body.push(Stmt::For(self.column.clone(), n, columns));
+            let columns = vec![Stmt::Assign(target, slope), term];
+            body.push(Stmt::For(column.clone(), n, columns));
         }
         let lane_sum = (0..width / LANES)
             .map(|k| Expr::Element(terms.clone(), Index::variable(lane).shifted(LANES * k)))
@@ -125,5 +95,14 @@ impl Row {
         let total = Expr::infix(Binary::Add, self.start.clone(), total);
         body.push(Stmt::Assign(self.sum.clone(), total));
         body
+    }
+}
+
+/// `a op b`, or `b` alone (negated for a difference) if there is no `a`.
+fn joined(a: Option<Expr>, op: Binary, b: Expr) -> Expr {
+    match (a, op) {
+        (Some(a), op) => Expr::infix(op, a, b),
+        (None, Binary::Sub) => Expr::Unary(Unary::Neg, Box::new(b)),
+        (None, Binary::Add | Binary::Mul | Binary::Div) => b,
     }
 }

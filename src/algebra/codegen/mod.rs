@@ -17,12 +17,10 @@ pub mod interface;
 mod lanes;
 #[doc(hidden)] // for `deploy`, in the crate above
 pub mod line_wrapping;
-mod literal;
 mod map_equations;
-mod phase_text;
+mod model_text;
 mod precision;
 mod printer;
-mod requirements;
 #[doc(hidden)] // for `deploy`, in the crate above
 pub mod rust;
 #[doc(hidden)] // for `deploy`, in the crate above

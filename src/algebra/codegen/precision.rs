@@ -25,12 +25,27 @@ impl Precision {
         }
     }
 
+    /// A finite number with the fewest digits that read back to the nearest number of this precision, always with
+    /// a point or an exponent, so that it is no integer in any target.
+    pub fn digits(self, value: f64) -> String {
+        assert!(value.is_finite(), "numbers of programs are finite");
+        match self {
+            Self::Double => format!("{value:?}"),
+            Self::Single => format!("{:?}", value as f32),
+        }
+    }
+
     /// Points of a block of a batch: what the widest common registers hold.
     pub fn lanes(self) -> usize {
         match self {
             Self::Double => 8,
             Self::Single => 16,
         }
+    }
+
+    /// Whether numbers have 32 bits.
+    pub fn is_single(self) -> bool {
+        self == Self::Single
     }
 
     /// A number as a program in this precision holds it.
@@ -146,4 +161,43 @@ pub fn worst_errors(
 /// Two significant digits, never less than the number.
 pub fn rounded_up(bound: f64) -> String {
     format!("{:.1e}", crate::typeset::rounded_up(bound, 2))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn literals_read_back_to_the_same_bits_and_in_single_precision_to_the_nearest_number() {
+        for value in [
+            0.36,
+            -0.0,
+            1e-300,
+            5e-324,
+            1e16,
+            123_456_789.0,
+            0.1 + 0.2,
+            1e-44,
+            16_777_217.0,
+        ] {
+            let texts = [Precision::Double, Precision::Single].map(|of| of.digits(value));
+            let (double, single): (f64, f32) = (
+                texts[0].parse().expect("a number"),
+                texts[1].parse().expect("a number"),
+            );
+            assert_eq!(double.to_bits(), value.to_bits(), "{texts:?}");
+            assert_eq!(single.to_bits(), (value as f32).to_bits(), "{texts:?}");
+            let has_point = |text: &String| text.contains(['.', 'e']);
+            assert!(
+                texts.iter().all(has_point),
+                "{texts:?} would be integers in C"
+            );
+        }
+    }
+
+    #[test]
+    #[should_panic(expected = "finite")]
+    fn number_that_is_not_finite_is_never_spelled() {
+        Precision::Single.digits(f64::NAN);
+    }
 }

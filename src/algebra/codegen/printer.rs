@@ -1,10 +1,9 @@
 //! The one place that owns precedence, parentheses, indentation and line width.
 
 use super::code::{Expr, Function, Index, Stmt};
-use super::dialect::{Dialect, LaneDialect};
-use super::fours::Fours;
+use super::dialect::{Dialect, Lines};
 use super::ident::Ident;
-use crate::ir::Binary;
+use crate::ir::{Binary, Unary};
 
 /// Longest line before an expression is broken, in characters.
 const WIDTH: usize = 100;
@@ -24,8 +23,6 @@ pub struct Printer<'a> {
     dialect: &'a dyn Dialect,
     /// Function that sums with a product are printed with.
     multiply_add: Option<&'static str>,
-    /// How elements are spelled within a loop over lanes.
-    lanes: Option<&'a dyn LaneDialect>,
 }
 
 impl<'a> Printer<'a> {
@@ -34,7 +31,6 @@ impl<'a> Printer<'a> {
         Self {
             dialect,
             multiply_add: None,
-            lanes: None,
         }
     }
 
@@ -78,25 +74,14 @@ impl<'a> Printer<'a> {
                     self.in_loop().looped(&head, body, depth, text);
                     continue;
                 }
-                Stmt::ForLanes(variable, body) => {
-                    let lanes = self.lane_dialect();
-                    let inside = Self {
-                        lanes: Some(lanes),
-                        ..*self
-                    };
-                    inside.looped(&lanes.for_lanes(&variable.to_string()), body, depth, text);
-                    continue;
-                }
                 Stmt::Row(row) => {
-                    let statements = match self.dialect.lanes() {
-                        Some(_) => row.in_lanes(),
-                        None => row.in_columns(),
-                    };
-                    self.block(&statements, depth, text);
+                    let lines = self.dialect.row(row);
+                    self.side_by_side(lines, || row.in_columns(), depth, text);
                     continue;
                 }
                 Stmt::Fours(fours) => {
-                    self.fours(fours, depth, text);
+                    let lines = self.dialect.fours(fours);
+                    self.side_by_side(lines, || fours.one_by_one(), depth, text);
                     continue;
                 }
                 Stmt::SinCosLane {
@@ -133,7 +118,6 @@ impl<'a> Printer<'a> {
                         false => self.assign(target, " += ", value),
                     }
                 }
-                Stmt::DeclareLanes(sums) => self.lane_dialect().declare(&sums.to_string()),
                 Stmt::Call {
                     callee,
                     read,
@@ -157,32 +141,24 @@ impl<'a> Printer<'a> {
         }
     }
 
-    fn fours(&self, fours: &Fours, depth: usize, text: &mut String) {
-        for block in &fours.blocks {
-            let Some(lines) = self.dialect.fours(fours, block) else {
-                return self.block(&fours.one_by_one(), depth, text);
-            };
-            for (inner, line) in lines {
-                self.line(&line, depth + inner, text);
-            }
+    /// Lines as they are, or statements where a language has none.
+    fn side_by_side(
+        &self,
+        lines: Option<Lines>,
+        one_by_one: impl FnOnce() -> Vec<Stmt>,
+        depth: usize,
+        text: &mut String,
+    ) {
+        let Some(lines) = lines else {
+            return self.block(&one_by_one(), depth, text);
+        };
+        for (inner, line) in lines {
+            self.line(&line, depth + inner, text);
         }
     }
 
-    /// Lanes are only where [`Dialect::lanes`] has been asked.
-    fn lane_dialect(&self) -> &'a dyn LaneDialect {
-        self.dialect.lanes().expect("a dialect with lanes")
-    }
-
     fn assign(&self, target: &Expr, op: &str, value: &Expr) -> String {
-        let value = self.expression(value);
-        let outside = Self {
-            lanes: None,
-            ..*self
-        };
-        let target = match (target, self.lanes) {
-            (Expr::Element(..), Some(lanes)) => lanes.write(&outside.expression(target)),
-            _ => self.expression(target),
-        };
+        let [target, value] = [target, value].map(|expr| self.expression(expr));
         format!("{target}{op}{value}{}", self.dialect.terminator())
     }
 
@@ -217,17 +193,10 @@ impl<'a> Printer<'a> {
         match expr {
             Expr::Literal(literal) => self.dialect.literal(*literal),
             Expr::Name(name) => name.to_string(),
-            Expr::Element(array, index) => {
-                self.read(self.dialect.element(&array.to_string(), index))
-            }
-            Expr::Entry(table, row, col) => {
-                self.read(self.dialect.entry(&table.to_string(), row, col))
-            }
-            Expr::Lanes(sums, variable) => self
-                .lane_dialect()
-                .sums(&sums.to_string(), &variable.to_string()),
-            Expr::LaneTotal(sums) => self.lane_dialect().total(&sums.to_string()),
-            Expr::Negate(a) => format!("-{}", self.operand(a, Precedence::Atom)),
+            Expr::Element(array, index) => self.dialect.element(&array.to_string(), index),
+            Expr::Entry(table, row, col) => self.dialect.entry(&table.to_string(), row, col),
+            Expr::Unary(Unary::Neg, a) => format!("-{}", self.operand(a, Precedence::Atom)),
+            Expr::Unary(function, a) => self.dialect.apply(*function, &self.expression(a)),
             Expr::Infix(op, a, b) => {
                 if let Some(fused) = self.multiply_added(*op, a, b) {
                     return fused;
@@ -247,14 +216,6 @@ impl<'a> Printer<'a> {
                 let operator = self.dialect.operator(*op);
                 format!("{left}{operator}{}", self.operand(b, right))
             }
-            Expr::Apply(function, a) => self.dialect.apply(*function, &self.expression(a)),
-        }
-    }
-
-    fn read(&self, element: String) -> String {
-        match self.lanes {
-            Some(lanes) => lanes.read(&element),
-            None => element,
         }
     }
 
@@ -295,15 +256,13 @@ impl<'a> Printer<'a> {
 
 fn precedence(expr: &Expr) -> Precedence {
     match expr {
-        Expr::Literal(literal) if literal.is_negative() => Precedence::Sign,
+        Expr::Literal(value) if value.is_sign_negative() => Precedence::Sign,
+        Expr::Unary(Unary::Neg, _) => Precedence::Sign,
         Expr::Literal(_)
         | Expr::Name(_)
         | Expr::Element(..)
         | Expr::Entry(..)
-        | Expr::Lanes(..)
-        | Expr::LaneTotal(_)
-        | Expr::Apply(..) => Precedence::Atom,
-        Expr::Negate(_) => Precedence::Sign,
+        | Expr::Unary(..) => Precedence::Atom,
         Expr::Infix(Binary::Add | Binary::Sub, ..) => Precedence::Sum,
         Expr::Infix(Binary::Mul | Binary::Div, ..) => Precedence::Product,
     }
@@ -319,16 +278,13 @@ fn product(expr: &Expr) -> Option<(&Expr, &Expr)> {
 /// Whether the printed expression begins with a minus that would follow an operator.
 fn starts_with_minus(expr: &Expr) -> bool {
     match expr {
-        Expr::Literal(literal) => literal.is_negative(),
-        Expr::Negate(_) => true,
+        Expr::Literal(value) => value.is_sign_negative(),
+        Expr::Unary(op, _) => *op == Unary::Neg,
         Expr::Infix(Binary::Mul | Binary::Div, a, _) => starts_with_minus(a),
         Expr::Infix(Binary::Add | Binary::Sub, ..)
         | Expr::Name(_)
         | Expr::Element(..)
-        | Expr::Entry(..)
-        | Expr::Lanes(..)
-        | Expr::LaneTotal(_)
-        | Expr::Apply(..) => false,
+        | Expr::Entry(..) => false,
     }
 }
 

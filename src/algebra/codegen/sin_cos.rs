@@ -1,6 +1,6 @@
 //! The constants of the sine-and-cosine kernel as text.
 
-use super::literal::Literal;
+use super::dialect::Dialect;
 use super::precision::Precision;
 use crate::ir::{sin_cos, sin_cos_f32};
 
@@ -24,8 +24,8 @@ pub struct KernelText {
 }
 
 impl KernelText {
-    /// The constants in a precision, each spelled by `spell`.
-    pub fn new(precision: Precision, spell: &dyn Fn(Literal) -> String) -> Self {
+    /// The constants in a precision, spelled in a language.
+    pub fn new(precision: Precision, dialect: &dyn Dialect) -> Self {
         let wide = |values: [f32; 3]| values.map(f64::from);
         let (single, lists) = match precision {
             Precision::Double => {
@@ -39,14 +39,12 @@ impl KernelText {
                 (wide([LIMIT, TWO_OVER_PI, ROUND]), lists)
             }
         };
-        let text =
-            |value: f64| spell(Literal::new(value).expect("the kernel's constants are finite"));
         let signed = |value: f64| match value < 0.0 {
-            true => format!("({})", text(value)),
-            false => text(value),
+            true => format!("({})", dialect.literal(value)),
+            false => dialect.literal(value),
         };
         let [pi_2, sin, cos] = lists.map(|values| values.into_iter().map(signed).collect());
-        let [limit, two_over_pi, round] = single.map(text);
+        let [limit, two_over_pi, round] = single.map(|value| dialect.literal(value));
         Self {
             limit,
             two_over_pi,

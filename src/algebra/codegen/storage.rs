@@ -1,10 +1,7 @@
 //! Where values live: which arrays hold them, in place or copied.
 
-use std::ops::Range;
-
 use super::code::{Expr, Index, Role, Span, Stmt};
 use super::ident::Ident;
-use super::literal::Literal;
 use super::translate::Translator;
 use crate::ir::{Statement, ValueId};
 
@@ -13,21 +10,19 @@ use crate::ir::{Statement, ValueId};
 const LONGEST_LIST: usize = 24;
 
 /// Where the rows of a matrix of values live: `stride` apart in an array, from the home's first element on.
-pub(super) struct MatrixStorage {
+#[derive(Clone, Debug, PartialEq)]
+pub struct MatrixStorage {
+    /// Where the first row begins.
     pub home: Span,
+    /// From one row to the next.
     pub stride: usize,
 }
 
 impl MatrixStorage {
-    /// The entry at two loop variables.
-    pub fn element(&self, row: &Ident, col: &Ident) -> Expr {
-        Expr::Element(self.home.array.clone(), self.index(row, col))
-    }
-
-    /// Where in the array that is.
-    pub fn index(&self, row: &Ident, col: &Ident) -> Index {
+    /// The entry at a loop variable and a subscript.
+    pub fn element(&self, row: &Ident, col: &Index) -> Expr {
         let row = Index::fixed(self.home.offset).plus(self.stride, row);
-        row.plus(1, col)
+        Expr::Element(self.home.array.clone(), row.sum(col))
     }
 }
 
@@ -65,51 +60,44 @@ impl Translator<'_> {
         }
         let array = self.names.locals.mint("a");
         self.copies.push((values.to_vec(), array.clone()));
-        let runs = self.runs(values);
         if values.len() < LONGEST_LIST {
             let elements = values.iter().map(|&value| self.read(value).0).collect();
             self.body.push(Stmt::LetArray(array.clone(), elements));
-            return local(array, values.len());
-        }
-        self.body.push(Stmt::Declare(array.clone(), values.len()));
-        for run in runs {
-            self.copy_run(&array, values, run);
+        } else {
+            let runs = self.runs(values);
+            self.body.push(Stmt::Declare(array.clone(), values.len()));
+            let mut at = 0;
+            for run in runs {
+                self.copy_run(&array, at, run);
+                at += run.len();
+            }
         }
         local(array, values.len())
     }
 
-    fn copy_run(&mut self, array: &Ident, values: &[ValueId], run: Range<usize>) {
-        let from = self.read(values[run.start]).0;
-        match from {
-            Expr::Element(source, at) if run.len() > 1 => {
+    fn copy_run(&mut self, array: &Ident, at: usize, run: &[ValueId]) {
+        match self.read(run[0]).0 {
+            Expr::Element(source, from) if run.len() > 1 => {
                 let i = self.names.locals.mint("i");
-                let target = Index::variable(&i).shifted(run.start);
-                let source = Expr::Element(source, Index::variable(&i).shifted(at.offset));
+                let target = Index::variable(&i).shifted(at);
+                let source = Expr::Element(source, Index::variable(&i).shifted(from.offset));
                 let assign = Stmt::Assign(Expr::Element(array.clone(), target), source);
                 self.body.push(Stmt::For(i, run.len(), vec![assign]));
             }
             value => {
-                let target = Expr::Element(array.clone(), Index::fixed(run.start));
+                let target = Expr::Element(array.clone(), Index::fixed(at));
                 self.body.push(Stmt::Assign(target, value));
             }
         }
     }
 
     /// Divides values into runs of consecutive elements of one array.
-    fn runs(&self, values: &[ValueId]) -> Vec<Range<usize>> {
-        let mut runs: Vec<Range<usize>> = Vec::new();
-        for (k, &value) in values.iter().enumerate() {
-            let follows = k > 0
-                && match (self.element(values[k - 1]), self.element(value)) {
-                    (Some((before, at)), Some((array, next))) => before == array && at + 1 == next,
-                    _ => false,
-                };
-            match runs.last_mut() {
-                Some(run) if follows => run.end = k + 1,
-                _ => runs.push(k..k + 1),
-            }
-        }
-        runs
+    fn runs<'v>(&self, values: &'v [ValueId]) -> Vec<&'v [ValueId]> {
+        let follows = |a: &ValueId, b: &ValueId| match (self.element(*a), self.element(*b)) {
+            (Some((before, at)), Some((array, next))) => before == array && at + 1 == next,
+            (None, _) | (_, None) => false,
+        };
+        values.chunk_by(follows).collect()
     }
 
     /// Array and position of a value that is an element.
@@ -158,24 +146,9 @@ impl Translator<'_> {
         })
     }
 
-    /// Reserves `len` elements for values, in an output where they belong if possible.
-    pub(super) fn home(&mut self, first: usize, len: usize, wanted: &str) -> Span {
-        match self.output_home(first, len) {
-            Some(home) => self.allocate(first, home),
-            None => self.local_home(first, len, wanted),
-        }
-    }
-
-    /// Reserves `len` elements of a new array for values.
-    pub(super) fn local_home(&mut self, first: usize, len: usize, wanted: &str) -> Span {
-        let array = self.names.locals.mint(wanted);
-        self.body.push(Stmt::Declare(array.clone(), len));
-        self.allocate(first, local(array, len))
-    }
-
     /// Reserves elements of a new array for values, with the zeros behind them that a later
     /// statement reads.
-    pub(super) fn padded_home(&mut self, first: usize, len: usize, wanted: &str) -> Span {
+    pub(super) fn local_home(&mut self, first: usize, len: usize, wanted: &str) -> Span {
         let is_here = |values: &&[ValueId]| {
             let here = values.iter().map(|value| value.index()).take(len);
             here.eq(first..first + len)
@@ -191,7 +164,7 @@ impl Translator<'_> {
         self.body.push(Stmt::Declare(array.clone(), len + n_zeros));
         for k in len..len + n_zeros {
             let zero = Expr::Element(array.clone(), Index::fixed(k));
-            let assign = Stmt::Assign(zero, Expr::Literal(Literal::ZERO));
+            let assign = Stmt::Assign(zero, Expr::Literal(0.0));
             self.body.push(assign);
         }
         if n_zeros > 0 {
@@ -213,13 +186,6 @@ impl Translator<'_> {
         home
     }
 
-    /// The output array, if the values are just a run of its elements and nothing in it is
-    /// still to be read.
-    pub(super) fn output_home(&self, first: usize, len: usize) -> Option<Span> {
-        let row = self.output_matrix(first, 1, len)?;
-        Some(row.home)
-    }
-
     /// Reserves `rows x cols` elements for values, row by row in an output where they belong
     /// if possible.
     pub(super) fn matrix_storage(
@@ -227,9 +193,10 @@ impl Translator<'_> {
         first: usize,
         rows: usize,
         cols: usize,
+        wanted: &str,
     ) -> MatrixStorage {
         let matrix = self.output_matrix(first, rows, cols).unwrap_or_else(|| {
-            let array = self.names.locals.mint("m");
+            let array = self.names.locals.mint(wanted);
             self.body.push(Stmt::Declare(array.clone(), rows * cols));
             MatrixStorage {
                 home: local(array, rows * cols),
@@ -247,19 +214,20 @@ impl Translator<'_> {
         matrix
     }
 
-    /// The output array in which each row is a run of elements, all equally far apart.
-    fn output_matrix(&self, first: usize, rows: usize, cols: usize) -> Option<MatrixStorage> {
+    /// The output array in which each row is a run of elements, all equally far apart, if nothing in it is still
+    /// to be read.
+    pub(super) fn output_matrix(
+        &self,
+        first: usize,
+        rows: usize,
+        cols: usize,
+    ) -> Option<MatrixStorage> {
         let results = self.program.results();
-        let find = |value: usize| {
-            results
-                .iter()
-                .position(|entry| entry.value.index() == value)
-        };
+        let find = |value: usize| results.iter().position(|e| e.value.index() == value);
         let at = find(first)?;
-        let stride = if rows > 1 {
-            find(first + cols)?.checked_sub(at)?
-        } else {
-            cols
+        let stride = match rows {
+            0 | 1 => cols,
+            _ => find(first + cols)?.checked_sub(at)?,
         };
         let slot = results[at].slot;
         let output = &self.names.outputs[slot];

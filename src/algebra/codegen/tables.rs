@@ -1,7 +1,7 @@
 //! The constant tables of a generated file.
 
 use super::code::ConstTable;
-use super::ident::{Ident, Namer};
+use super::ident::Namer;
 use crate::ir::Table;
 
 /// The constant tables of a file; equal tables are stored once.
@@ -27,19 +27,8 @@ impl Tables {
         self.known.iter()
     }
 
-    /// The name of a table, which is stored if it is new.
-    pub fn name(&mut self, table: &Table) -> Ident {
-        self.stored(table).name.clone()
-    }
-
-    /// The name of a table whose rows are read in lanes.
-    pub fn name_in_lanes(&mut self, table: &Table) -> Ident {
-        let table = self.stored(table);
-        table.is_in_lanes = true;
-        table.name.clone()
-    }
-
-    fn stored(&mut self, table: &Table) -> &mut ConstTable {
+    /// A table, which is stored if it is new.
+    pub fn stored(&mut self, table: &Table) -> &mut ConstTable {
         let known = self.known.iter().position(|known| known.values == *table);
         let place = known.unwrap_or_else(|| {
             let place = self.known.len();
@@ -47,6 +36,7 @@ impl Tables {
                 name: self.namer.mint(&format!("{}_{place}", self.base)),
                 values: table.clone(),
                 is_in_lanes: false,
+                is_entered: false,
             });
             place
         });

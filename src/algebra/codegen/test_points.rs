@@ -2,7 +2,7 @@
 
 use super::interface::{FunctionSpec, PhaseInterface};
 use super::precision::Precision;
-use crate::ir::Interpreter;
+use crate::ir::{Interpreter, Statement, Unary};
 use crate::robot::JOINT_DIM;
 use crate::robot::joints::LEG_JOINT_DIM;
 
@@ -25,11 +25,7 @@ pub struct TestPoint {
 
 impl TestPoint {
     fn new(entry: &FunctionSpec, inputs: Vec<Vec<f64>>, precision: Precision) -> Self {
-        let slots = entry.program.outputs().iter();
-        let mut outputs: Vec<Vec<f64>> = slots.map(|slot| vec![0.0; slot.len]).collect();
-        let read: Vec<&[f64]> = inputs.iter().map(Vec::as_slice).collect();
-        let mut written: Vec<&mut [f64]> = outputs.iter_mut().map(Vec::as_mut_slice).collect();
-        Interpreter::new(&entry.program).run(&read, &mut written);
+        let outputs = Interpreter::new(&entry.program).results(&inputs);
         let values = outputs.iter().flatten();
         Self {
             undefined: values.filter(|value| !precision.holds(**value)).count(),
@@ -126,7 +122,15 @@ pub struct BatchPoints {
 impl BatchPoints {
     /// Numbers of both signs, or positive ones where the accelerations are finite at more of these.
     pub fn new(phase: &PhaseInterface, precision: Precision) -> Self {
-        let far_angle = phase.far_angle(precision);
+        let overflows = phase.dynamics.program.statements().iter().any(|statement| {
+            use Unary::{Exp, Log, Tan, Tanh};
+            matches!(statement, Statement::Unary(Exp | Tan | Tanh | Log, _))
+        });
+        let far_angle = match (overflows, precision) {
+            (true, _) => 0.125,
+            (false, Precision::Double) => 9000.125,
+            (false, Precision::Single) => 160.125,
+        };
         let (signed, positive) = ((-0.5, 0.5, -0.3), (0.0625, 0.9375, 0.0625));
         let [signed, positive] = [signed, positive].map(|(z, dz, u_lat)| Self {
             z,

@@ -1,8 +1,8 @@
 //! Input and output vectors for self-tests of generated code, made by the interpreter.
 
 use super::code::Role;
+use super::dialect::Dialect;
 use super::interface::{FunctionSpec, ModelInterface, PhaseInterface};
-use super::literal::Literal;
 use super::precision::{Precision, rounded_up};
 use super::test_points::{BatchPoints, N_BATCH, Random, point};
 use crate::ir::{Range, rounding_errors};
@@ -24,9 +24,29 @@ pub struct TestVectors<'a> {
 }
 
 impl<'a> TestVectors<'a> {
-    /// The vectors of all functions in a precision.
-    pub fn new(entries: &'a ModelInterface, precision: Precision) -> Self {
-        let functions = entries.all().map(|entry| vectors(entry, precision));
+    /// The vectors of all functions in a precision, with numbers as a language spells them and its words for
+    /// what is not a number or infinite.
+    pub fn new(
+        entries: &'a ModelInterface,
+        dialect: &dyn Dialect,
+        precision: Precision,
+        [nan, infinite, negative]: [&str; 3],
+    ) -> Self {
+        let text = |value: f64, digits: &dyn Fn(f64) -> String| match (
+            value.is_finite(),
+            value.is_nan(),
+            value > 0.0,
+        ) {
+            (true, _, _) => digits(value),
+            (false, true, _) => nan.to_owned(),
+            (false, false, true) => infinite.to_owned(),
+            (false, false, false) => negative.to_owned(),
+        };
+        let spell = |value: f64| text(value, &|value| dialect.literal(value));
+        let with_all_digits = |value: f64| text(value, &|value| Precision::Double.digits(value));
+        let functions = entries.all();
+        let functions =
+            functions.map(|entry| vectors(entry, precision, [&spell, &with_all_digits]));
         let batches = entries.phases.iter();
         Self {
             functions: functions.collect(),
@@ -83,14 +103,13 @@ impl FunctionVectors {
 pub struct ParameterVectors {
     /// What it is for.
     pub role: Role,
-    /// Name of the parameter.
     pub name: String,
     /// Number of elements.
     pub len: usize,
-    /// Values before the call, point after point; empty for outputs.
-    pub before: Vec<f64>,
-    /// Values after the call, point after point; empty for inputs.
-    pub after: Vec<f64>,
+    /// Values before the call, a row a point; empty for outputs.
+    pub before: Vec<Vec<String>>,
+    /// Values after the call with all digits in either precision, a row a point; empty for inputs.
+    pub after: Vec<Vec<String>>,
     /// Largest accepted difference of single precision at these points: the bound of the rounding
     /// errors, or a share of the largest value where there is none.
     pub tolerance_single: f64,
@@ -106,24 +125,6 @@ impl ParameterVectors {
     pub fn tolerance(&self) -> String {
         rounded_up(self.tolerance_single)
     }
-
-    /// Values of all points, a row each: literals as `spell` prints them, and the target's words for
-    /// what is not a number or infinite.
-    pub fn rows(
-        &self,
-        values: &[f64],
-        spell: impl Fn(Literal) -> String,
-        [nan, infinite, negative]: [&str; 3],
-    ) -> Vec<Vec<String>> {
-        let text = |&value: &f64| match Literal::new(value) {
-            Some(literal) => spell(literal),
-            None if value.is_nan() => nan.to_owned(),
-            None if value > 0.0 => infinite.to_owned(),
-            None => negative.to_owned(),
-        };
-        let rows = values.chunks(self.len);
-        rows.map(|row| row.iter().map(text).collect()).collect()
-    }
 }
 
 /// Share of the largest value by which single precision may be off where its errors have no bound.
@@ -131,7 +132,14 @@ const TOLERANCE_UNBOUNDED: f64 = 1e-3;
 
 /// The vectors of all parameters of an entry, at points where its results are finite if such points are found;
 /// inputs are numbers of the precision.
-fn vectors(entry: &FunctionSpec, precision: Precision) -> FunctionVectors {
+fn vectors(
+    entry: &FunctionSpec,
+    precision: Precision,
+    [before, after]: [&dyn Fn(f64) -> String; 2],
+) -> FunctionVectors {
+    let row = |values: &[f64], text: &dyn Fn(f64) -> String| -> Vec<String> {
+        values.iter().map(|&value| text(value)).collect()
+    };
     let mut random = Random::new();
     let parameters = entry.parameters.iter().map(|parameter| ParameterVectors {
         role: parameter.role,
@@ -160,11 +168,12 @@ fn vectors(entry: &FunctionSpec, precision: Precision) -> FunctionVectors {
         for parameter in &mut vectors.parameters {
             let slots = entry.program.inputs().iter().zip(&point.inputs);
             if let Some((_, values)) = slots.into_iter().find(|(s, _)| s.name == parameter.name) {
-                parameter.before.extend(values);
+                parameter.before.push(row(values, before));
             }
             let slots = entry.program.outputs().iter();
             if let Some(position) = slots.into_iter().position(|s| s.name == parameter.name) {
-                parameter.after.extend(&point.outputs[position]);
+                let values = &point.outputs[position];
+                parameter.after.push(row(values, after));
                 parameter.tolerance_single = parameter.tolerance_single.max(tolerances[position]);
             }
         }

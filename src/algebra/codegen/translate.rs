@@ -2,22 +2,13 @@
 //!
 //! No mathematics happens here: the tree of operations of the program is kept as it is.
 
-use super::code::{Expr, Index, MathFunction, Parameter, Role, Stmt};
+use super::code::{Expr, Index, Parameter, Role, Stmt};
 use super::ident::{Ident, Namer};
-use super::literal::Literal;
 use super::tables::Tables;
-use crate::ir::{Program, Statement, Unary, ValueId};
+use crate::ir::{Program, Statement, ValueId};
 
 /// Deepest nesting of operations in one expression.
 const DEEPEST: usize = 48;
-
-/// The statements of a program.
-pub struct Translation {
-    /// Statements, ending with the assignments of the outputs.
-    pub body: Vec<Stmt>,
-    /// Parameters that no statement mentions.
-    pub unused: Vec<Ident>,
-}
 
 /// How a program's slots, callees and tables are called where it is translated.
 pub struct Names<'a> {
@@ -34,6 +25,7 @@ pub struct Names<'a> {
     pub tables: &'a mut Tables,
 }
 
+/// What has become of a program.
 pub(super) struct Translator<'a> {
     pub program: &'a Program,
     pub names: Names<'a>,
@@ -41,46 +33,25 @@ pub(super) struct Translator<'a> {
     /// How a value is read: a name, an element, or an expression to be nested once, and
     /// how deeply operations are nested in it.
     pub spelled: Vec<Option<(Expr, usize)>>,
+    /// Statements, ending with the assignments of the outputs.
     pub body: Vec<Stmt>,
     /// Values that were copied to an array.
     pub copies: Vec<(Vec<ValueId>, Ident)>,
     /// Arrays that end with zeros, and where these begin.
     pub zeros: Vec<(Ident, usize)>,
+    /// Arrays that are assigned in lanes.
+    pub in_lanes: Vec<Ident>,
     /// Loop variable of a block of lanes.
     pub lane: Option<Ident>,
 }
 
-/// Translates a program into the body of a function.
-pub fn translate(program: &Program, names: Names) -> Translation {
-    translate_as(program, names, None)
-}
-
-/// Translates a program into the body of a loop over the lanes of a block of points; inputs
-/// and outputs are `array[element][lane]`. Nothing if the program is better run point
-/// by point: it loops over tables itself, or calls functions that no compiler vectorises.
-pub fn translate_lanes(program: &Program, names: Names, lane: Ident) -> Option<Vec<Stmt>> {
-    let vectorises = program
-        .statements()
-        .iter()
-        .all(|statement| match statement {
-            Statement::Constant(_)
-            | Statement::Input { .. }
-            | Statement::Binary(..)
-            | Statement::SinCos { .. } => true,
-            Statement::Unary(op, _) => match op {
-                Unary::Neg | Unary::Sqrt | Unary::Abs => true,
-                Unary::Sign | Unary::Tan | Unary::Tanh | Unary::Exp | Unary::Log => false,
-            },
-            Statement::Accumulate { .. }
-            | Statement::Quads { .. }
-            | Statement::Constants { .. }
-            | Statement::Separable { .. }
-            | Statement::Call { .. } => false,
-        });
-    vectorises.then(|| translate_as(program, names, Some(lane)).body)
-}
-
-fn translate_as(program: &Program, names: Names, lane: Option<Ident>) -> Translation {
+/// Translates a program into the body of a function or, with a loop variable, into the body of a loop over the
+/// lanes of a block of points; inputs and outputs of the latter are `array[element][lane]`.
+pub(super) fn translate<'a>(
+    program: &'a Program,
+    names: Names<'a>,
+    lane: Option<Ident>,
+) -> Translator<'a> {
     let live = program.live();
     let mut translator = Translator {
         program,
@@ -90,13 +61,13 @@ fn translate_as(program: &Program, names: Names, lane: Option<Ident>) -> Transla
         body: Vec::new(),
         copies: Vec::new(),
         zeros: Vec::new(),
+        in_lanes: Vec::new(),
         lane,
     };
     for (position, statement) in program.statements().iter().enumerate() {
         if let Statement::Constant(value) = statement {
-            let literal = Literal::new(*value).expect("constants of programs are finite");
-            let value = program.values_of(position).start;
-            translator.spell(value, Expr::Literal(literal));
+            let constant = Expr::Literal(*value);
+            translator.spell(program.values_of(position).start, constant);
         }
     }
     for (position, statement) in program.statements().iter().enumerate() {
@@ -105,11 +76,7 @@ fn translate_as(program: &Program, names: Names, lane: Option<Ident>) -> Transla
         }
     }
     translator.results();
-    let unused = translator.unused(&live);
-    Translation {
-        body: translator.body,
-        unused,
-    }
+    translator
 }
 
 fn n_uses(program: &Program, live: &[bool]) -> Vec<usize> {
@@ -144,12 +111,7 @@ impl Translator<'_> {
             }
             Statement::Unary(op, a) => {
                 let (a, depth) = self.read(*a);
-                let a = Box::new(a);
-                let expr = match math_function(*op) {
-                    Some(function) => Expr::Apply(function, a),
-                    None => Expr::Negate(a),
-                };
-                self.define(first, expr, depth + 1);
+                self.define(first, Expr::Unary(*op, Box::new(a)), depth + 1);
             }
             Statement::Binary(op, a, b) => {
                 let ((a, left), (b, right)) = (self.read(*a), self.read(*b));
@@ -218,19 +180,16 @@ impl Translator<'_> {
             .expect("values are defined before they are read")
     }
 
-    /// Input parameters without a live element, and outputs without elements.
-    fn unused(&self, live: &[bool]) -> Vec<Ident> {
-        let statements = || self.program.statements().iter().zip(live);
-        let is_read = |slot: usize| {
-            statements().any(|(statement, &live)| {
-                live && matches!(statement, Statement::Input { slot: read, .. } if *read == slot)
-            })
+    /// Input parameters that no statement mentions.
+    pub(super) fn unused(&self) -> impl Iterator<Item = &Ident> {
+        let is_read = |wanted: usize| {
+            let program = self.program;
+            program.has(|s| matches!(s, Statement::Input { slot, .. } if *slot == wanted))
         };
         let inputs = self.names.inputs.iter().enumerate();
         inputs
-            .filter(|&(slot, input)| input.role != Role::InOut && !is_read(slot))
-            .map(|(_, input)| input.name.clone())
-            .collect()
+            .filter(move |&(slot, input)| input.role != Role::InOut && !is_read(slot))
+            .map(|(_, input)| &input.name)
     }
 
     /// Assigns the outputs. What replaces an input is computed completely beforehand.
@@ -256,18 +215,5 @@ impl Translator<'_> {
             assigned.push(Stmt::Assign(target, value));
         }
         self.body.extend(assigned);
-    }
-}
-
-fn math_function(op: Unary) -> Option<MathFunction> {
-    match op {
-        Unary::Neg => None,
-        Unary::Sqrt => Some(MathFunction::Sqrt),
-        Unary::Abs => Some(MathFunction::Abs),
-        Unary::Sign => Some(MathFunction::Sign),
-        Unary::Tan => Some(MathFunction::Tan),
-        Unary::Tanh => Some(MathFunction::Tanh),
-        Unary::Exp => Some(MathFunction::Exp),
-        Unary::Log => Some(MathFunction::Log),
     }
 }

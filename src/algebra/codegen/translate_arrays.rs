@@ -1,24 +1,12 @@
 //! Array statements as loops.
 
 use super::code::{Expr, Index, Span, Stmt};
-use super::fours::{FourBlock, Fours};
+use super::fours::{FourBlock, Fours, SUMS_AT_ONCE};
 use super::ident::Ident;
-use super::lanes::{Row, Run};
+use super::lanes::Row;
+use super::storage::MatrixStorage;
 use super::translate::Translator;
-use crate::ir::{Binary, Group, LANES, QUAD, QuadSum, Slopes, TableId, ValueId};
-
-/// A group of functions where its numbers live.
-struct GroupCode {
-    table: Ident,
-    values: Span,
-    slopes: SlopeCode,
-}
-
-enum SlopeCode {
-    One,
-    Plus(Span),
-    Minus(Span),
-}
+use crate::ir::{Binary, Group, QUAD, QuadSum, TableId, ValueId};
 
 impl Translator<'_> {
     pub(super) fn sin_cos(&mut self, first: usize, arguments: &[ValueId]) {
@@ -30,8 +18,8 @@ impl Translator<'_> {
             return;
         }
         let read = vec![self.span_with_rest(arguments)];
-        let sines = self.padded_home(first, n, "s");
-        let cosines = self.padded_home(first + n, n, "c");
+        let sines = self.local_home(first, n, "s");
+        let cosines = self.local_home(first + n, n, "c");
         self.body.push(Stmt::Call {
             callee: None,
             read,
@@ -40,7 +28,9 @@ impl Translator<'_> {
     }
 
     fn table(&mut self, id: TableId) -> Ident {
-        self.names.tables.name(&self.program.tables()[id.index()])
+        let table = self.names.tables.stored(&self.program.tables()[id.index()]);
+        table.is_entered = true;
+        table.name.clone()
     }
 
     fn sin_cos_lane(&mut self, sine_value: usize, cosine_value: usize, argument: ValueId) {
@@ -68,7 +58,7 @@ impl Translator<'_> {
             return;
         }
         let weights: Vec<Span> = sections.iter().map(|section| self.span(section)).collect();
-        let home = self.home(first, cols, "y");
+        let home = self.matrix_storage(first, 1, cols, "y").home;
         let (i, k) = (self.names.locals.mint("i"), self.names.locals.mint("k"));
         let target = || Expr::Element(home.array.clone(), Index::variable(&i).shifted(home.offset));
         let entry = |row: Index| Expr::Entry(name.clone(), row, Index::variable(&i));
@@ -107,15 +97,18 @@ impl Translator<'_> {
         let table = &self.program.tables()[table.index()];
         let weights = self.whole_span(weights);
         let home = self.local_home(first, QUAD * sums.len(), "y");
+        let stored = self.names.tables.stored(table);
+        stored.is_in_lanes = true;
+        let table = (table.clone(), stored.name.clone());
         let name = |_| self.names.locals.mint("v");
-        let names = (0..FourBlock::LARGEST.min(sums.len())).map(name).collect();
+        let names = (0..SUMS_AT_ONCE.min(sums.len())).map(name).collect();
         self.body.push(Stmt::Fours(Box::new(Fours {
             array: home.array,
             sums: sums.to_vec(),
             weights,
-            table: (table.clone(), self.names.tables.name_in_lanes(table)),
             names,
-            filled: Fours::filled(table, sums),
+            filled: Fours::filled(&table.0, sums),
+            table,
             blocks: FourBlock::divide(sums),
         })));
     }
@@ -125,10 +118,10 @@ impl Translator<'_> {
         let shape = &self.program.tables()[table.index()];
         let (rows, cols) = (shape.rows(), shape.cols());
         let name = self.table(table);
-        let home = self.matrix_storage(first, rows, cols);
+        let home = self.matrix_storage(first, rows, cols, "m");
         let (r, i) = (self.names.locals.mint("r"), self.names.locals.mint("i"));
         let entry = Expr::Entry(name, Index::variable(&r), Index::variable(&i));
-        let assign = Stmt::Assign(home.element(&r, &i), entry);
+        let assign = Stmt::Assign(home.element(&r, &Index::variable(&i)), entry);
         let inner = Stmt::For(i, cols, vec![assign]);
         self.body.push(Stmt::For(r, rows, vec![inner]));
     }
@@ -146,40 +139,24 @@ impl Translator<'_> {
         let r = self.names.locals.mint("r");
         let start = self.at(start, &r);
         let base = base.map(|base| self.span(base));
-        let groups: Vec<GroupCode> = groups.iter().map(|group| self.group(group)).collect();
-        let sums = self.home(first, rows, "y");
-        let slopes = self.matrix_storage(first + rows, rows, cols);
-        let i = self.names.locals.mint("i");
-        let names = ["k", "l", "q", "p"].map(|name| self.names.locals.mint(name));
-
-        let mut bounds: Vec<usize> = groups.iter().map(|group| group.values.len).collect();
-        let width = base.as_ref().map_or(0, |base| base.len / rows);
-        bounds.extend(base.iter().map(|_| width));
-        bounds.sort_unstable();
-        bounds.dedup();
-        let mut runs = Vec::new();
-        let mut from = 0;
-        for to in bounds {
-            let here = groups.iter().filter(|group| group.values.len > from);
-            let base = base.as_ref().filter(|_| width > from);
-            let (term, slope) = column(here, base.map(|base| (base, width)), &r, &i);
-            let blocks = from / LANES..to / LANES;
-            runs.push(Run {
-                blocks,
-                term,
-                slope,
-            });
-            from = to;
-        }
+        let base = base.map(|home| MatrixStorage {
+            stride: home.len / rows,
+            home,
+        });
+        let groups: Vec<_> = groups.iter().map(|group| self.group(group)).collect();
+        let sums = self.matrix_storage(first, 1, rows, "y").home;
+        let slopes = self.matrix_storage(first + rows, rows, cols, "m");
+        self.in_lanes.push(slopes.home.array.clone());
+        let names = ["i", "k", "l", "q", "p"].map(|name| self.names.locals.mint(name));
         let row = Row {
-            slope_at: slopes.index(&r, &i),
-            slopes: slopes.home.array,
-            column: i,
             names,
-            runs,
+            groups,
+            base,
+            slopes,
             n_slopes: cols,
             start,
             sum: Expr::Element(sums.array, Index::variable(&r).shifted(sums.offset)),
+            row: r.clone(),
         };
         self.body
             .push(Stmt::For(r, rows, vec![Stmt::Row(Box::new(row))]));
@@ -199,18 +176,14 @@ impl Translator<'_> {
         Expr::Element(span.array, Index::variable(variable).shifted(span.offset))
     }
 
-    fn group(&mut self, group: &Group) -> GroupCode {
-        GroupCode {
-            table: self
-                .names
-                .tables
-                .name_in_lanes(&self.program.tables()[group.table.index()]),
+    fn group(&mut self, group: &Group) -> Group<Ident, Span> {
+        let table = self.table(group.table);
+        let values = &self.program.tables()[group.table.index()];
+        self.names.tables.stored(values).is_in_lanes = true;
+        Group {
+            table,
             values: self.span(&group.values),
-            slopes: match &group.slopes {
-                Slopes::One => SlopeCode::One,
-                Slopes::Plus(values) => SlopeCode::Plus(self.span(values)),
-                Slopes::Minus(values) => SlopeCode::Minus(self.span(values)),
-            },
+            slopes: group.slopes.map(|values| self.span(values)),
         }
     }
 
@@ -225,12 +198,13 @@ impl Translator<'_> {
         }
         let mut next = first;
         for slot in program.outputs() {
-            let home = self.output_home(next, slot.len).filter(Span::is_whole);
-            let home = match home {
+            let output = self
+                .output_matrix(next, 1, slot.len)
+                .map(|matrix| matrix.home);
+            written.push(match output.filter(Span::is_whole) {
                 Some(home) => self.allocate(next, home),
                 None => self.local_home(next, slot.len, &slot.name),
-            };
-            written.push(home);
+            });
             next += slot.len;
         }
         let callee = Some(self.names.callees[callee].clone());
@@ -239,47 +213,5 @@ impl Translator<'_> {
             read,
             written,
         });
-    }
-}
-
-/// Term and slope of column `i` of row `r`; the base comes with the length of its rows.
-fn column<'a>(
-    groups: impl Iterator<Item = &'a GroupCode>,
-    base: Option<(&Span, usize)>,
-    r: &Ident,
-    i: &Ident,
-) -> (Expr, Expr) {
-    let (mut term, mut slope): (Option<Expr>, Option<Expr>) = (None, None);
-    if let Some((base, width)) = base {
-        let index = Index::fixed(base.offset).plus(width, r).plus(1, i);
-        slope = Some(Expr::Element(base.array.clone(), index));
-    }
-    for group in groups {
-        let entry = || {
-            let (row, col) = (Index::variable(r), Index::variable(i));
-            Expr::Entry(group.table.clone(), row, col)
-        };
-        let times = |span: &Span| {
-            let index = Index::variable(i).shifted(span.offset);
-            let element = Expr::Element(span.array.clone(), index);
-            Expr::infix(Binary::Mul, entry(), element)
-        };
-        term = Some(joined(term, Binary::Add, times(&group.values)));
-        slope = Some(match &group.slopes {
-            SlopeCode::One => joined(slope, Binary::Add, entry()),
-            SlopeCode::Plus(span) => joined(slope, Binary::Add, times(span)),
-            SlopeCode::Minus(span) => joined(slope, Binary::Sub, times(span)),
-        });
-    }
-    let invariant = "one group has a part in every column";
-    (term.expect(invariant), slope.expect(invariant))
-}
-
-/// `a op b`, or `b` alone (negated for a difference) if there is no `a`.
-fn joined(a: Option<Expr>, op: Binary, b: Expr) -> Expr {
-    match (a, op) {
-        (Some(a), op) => Expr::infix(op, a, b),
-        (None, Binary::Sub) => Expr::Negate(Box::new(b)),
-        (None, Binary::Add | Binary::Mul | Binary::Div) => b,
     }
 }

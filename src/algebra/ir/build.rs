@@ -103,28 +103,28 @@ impl ProgramBuilder {
         (values[..n].to_vec(), values[n..].to_vec())
     }
 
-    /// A constant table for the array statements.
+    /// A constant table for groups of functions.
     pub fn table(&mut self, table: Table) -> TableId {
         TableId(place_of(&mut self.program.tables, &table) as u32)
     }
 
     /// Matrix-vector accumulation, see [`Statement::Accumulate`].
-    pub fn accumulate(&mut self, table: TableId, sections: Vec<Vec<ValueId>>) -> Vec<ValueId> {
-        let cols = self.program.tables[table.index()].cols;
-        let statement = Statement::Accumulate { table, sections };
-        self.push_array(statement, cols)
+    pub fn accumulate(&mut self, table: Table, sections: Vec<Vec<ValueId>>) -> Vec<ValueId> {
+        let cols = table.cols;
+        let table = self.table(table);
+        self.push_array(Statement::Accumulate { table, sections }, cols)
     }
 
     /// Sums of vectors, see [`Statement::Quads`]; defines [`QUAD`] values per sum.
     pub fn quads(
         &mut self,
-        table: TableId,
+        table: Table,
         weights: Vec<ValueId>,
         sums: Vec<QuadSum>,
     ) -> Vec<ValueId> {
         let n = QUAD * sums.len();
         let statement = Statement::Quads {
-            table,
+            table: self.table(table),
             weights,
             sums,
         };
@@ -132,8 +132,9 @@ impl ProgramBuilder {
     }
 
     /// All entries of a constant table, row-major.
-    pub fn constants(&mut self, table: TableId) -> Vec<ValueId> {
-        let n = self.program.tables[table.index()].entries.len();
+    pub fn constants(&mut self, table: Table) -> Vec<ValueId> {
+        let n = table.entries.len();
+        let table = self.table(table);
         self.push_array(Statement::Constants { table }, n)
     }
 
@@ -166,14 +167,11 @@ impl ProgramBuilder {
             arguments: arguments.to_vec(),
         };
         let values = self.push_array(statement, n);
-        let mut rest = values.as_slice();
-        let mut outputs = Vec::with_capacity(callee.outputs.len());
-        for slot in &callee.outputs {
-            let (these, others) = rest.split_at(slot.len);
-            outputs.push(these.to_vec());
-            rest = others;
-        }
+        let mut values = values.into_iter();
+        let outputs = callee.outputs.iter();
         outputs
+            .map(|slot| values.by_ref().take(slot.len).collect())
+            .collect()
     }
 
     /// Declares an output array that takes the given values.

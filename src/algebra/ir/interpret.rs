@@ -2,164 +2,56 @@
 //! control run.
 
 use super::program::{
-    Binary, Group, LANES, Program, QUAD, Quad, QuadSum, Slopes, Slot, Statement, Table, Unary,
-    ValueId,
+    Binary, Group, LANES, Program, QUAD, Quad, QuadSum, Slopes, Slot, Statement, Table, ValueId,
 };
 use super::real::Real;
 
 /// Runs one program as often as asked; owns the memory of all its values, so that
 /// a run allocates nothing.
 ///
-/// Numbers are `f64` unless another [`Real`] is named: `Interpreter::<f32>::of(&program)` is the
+/// Numbers are `f64` unless another [`Real`] is named: `Interpreter::<f32>::new(&program)` is the
 /// reference for generated code in single precision.
 #[derive(Clone, Debug)]
 pub struct Interpreter<T = f64> {
     inputs: Vec<Slot>,
     outputs: Vec<Slot>,
-    /// (slot, index, value) of each input element that the program reads.
-    loads: Vec<(usize, usize, usize)>,
-    steps: Vec<Step<T>>,
-    tables: Vec<Entries<T>>,
-    callees: Vec<Callee<T>>,
-    /// (slot, index, value) of each output element.
-    stores: Vec<(usize, usize, usize)>,
+    /// Positions among the values of the elements of all inputs.
+    loads: Vec<usize>,
+    /// The statements that compute something, and the position of the first value of each.
+    steps: Vec<(Statement, usize)>,
+    tables: Vec<Table<T>>,
+    callees: Vec<Interpreter<T>>,
+    /// The values of the elements of all outputs.
+    stores: Vec<ValueId>,
     /// Constants are set once; every other value is computed before it is read.
     values: Vec<T>,
 }
 
-/// A constant table in the numbers of the run.
-#[derive(Clone, Debug)]
-struct Entries<T> {
-    cols: usize,
-    entries: Box<[T]>,
-}
-
-impl<T: Real> Entries<T> {
-    fn new(table: &Table) -> Self {
-        Self {
-            cols: table.cols(),
-            entries: table.entries().iter().map(|&x| T::constant(x)).collect(),
-        }
-    }
-
-    fn row(&self, row: usize) -> &[T] {
-        &self.entries[row * self.cols..(row + 1) * self.cols]
-    }
-}
-
-/// A statement that computes something, with positions in the values.
-#[derive(Clone, Debug)]
-enum Step<T> {
-    Unary(Unary, usize, usize),
-    Binary(Binary, usize, usize, usize),
-    Square(usize, usize),
-    SinCos(Box<[usize]>, usize),
-    Accumulate(usize, Box<[Box<[usize]>]>, usize),
-    Quads(usize, Box<[QuadSum]>, usize),
-    Constants(usize, usize),
-    Separable(Box<SeparableStep<T>>, usize),
-    Call(usize, Box<[usize]>, usize),
-}
-
-/// Sums of functions of one variable each; positions in the values.
-#[derive(Clone, Debug)]
-struct SeparableStep<T> {
-    start: Box<[usize]>,
-    base: Option<Box<[usize]>>,
-    groups: Vec<Group>,
-    /// Number of variables.
-    cols: usize,
-    /// One product sum a column, reused by every row; zero behind the last.
-    columns: Vec<T>,
-}
-
-/// A program run inside another one.
-#[derive(Clone, Debug)]
-struct Callee<T> {
-    interpreter: Interpreter<T>,
-    arguments: Vec<T>,
-    results: Vec<T>,
-}
-
-impl Interpreter {
-    /// Prepares a program for runs in double precision.
-    pub fn new(program: &Program) -> Self {
-        Self::of(program)
-    }
-}
-
 impl<T: Real> Interpreter<T> {
-    /// Prepares a program for runs on a kind of numbers.
-    pub fn of(program: &Program) -> Self {
+    /// Prepares a program for runs.
+    pub fn new(program: &Program) -> Self {
         let mut values = vec![T::constant(0.0); program.n_values()];
         let (mut loads, mut steps) = (Vec::new(), Vec::new());
         for (position, statement) in program.statements().iter().enumerate() {
             let first = program.values_of(position).start;
             match statement {
                 Statement::Constant(constant) => values[first] = T::constant(*constant),
-                Statement::Input { slot, index } => loads.push((*slot, *index, first)),
-                Statement::Unary(op, a) => steps.push(Step::Unary(*op, a.index(), first)),
-                Statement::Binary(Binary::Mul, a, b) if a == b => {
-                    steps.push(Step::Square(a.index(), first));
-                }
-                Statement::Binary(op, a, b) => {
-                    steps.push(Step::Binary(*op, a.index(), b.index(), first));
-                }
-                Statement::SinCos { arguments } => {
-                    steps.push(Step::SinCos(positions(arguments), first));
-                }
-                Statement::Accumulate { table, sections } => {
-                    let sections = sections.iter().map(|section| positions(section)).collect();
-                    steps.push(Step::Accumulate(table.index(), sections, first));
-                }
-                Statement::Quads {
-                    table,
-                    weights,
-                    sums,
-                } => {
-                    // Weights by their positions in the values.
-                    let mut sums = sums.clone();
-                    for term in sums.iter_mut().flat_map(|sum| &mut sum.terms) {
-                        term.0 = weights[term.0].index();
-                    }
-                    steps.push(Step::Quads(table.index(), sums.into(), first));
-                }
-                Statement::Constants { table } => {
-                    steps.push(Step::Constants(table.index(), first));
-                }
-                Statement::Separable {
-                    start,
-                    base,
-                    groups,
-                    cols,
-                } => {
-                    let step = SeparableStep {
-                        start: positions(start),
-                        base: base.as_deref().map(positions),
-                        groups: groups.clone(),
-                        cols: *cols,
-                        columns: vec![T::constant(0.0); cols.next_multiple_of(LANES)],
-                    };
-                    steps.push(Step::Separable(Box::new(step), first));
-                }
-                Statement::Call { callee, arguments } => {
-                    steps.push(Step::Call(*callee, positions(arguments), first));
-                }
+                Statement::Input { .. } => loads.push(first),
+                computed => steps.push((computed.clone(), first)),
             }
         }
-        let stores = program
-            .results()
-            .iter()
-            .map(|entry| (entry.slot, entry.index, entry.value.index()))
-            .collect();
+        let table = |table: &Table| {
+            let entries = table.entries.iter().map(|&x| T::constant(x));
+            Table::new(table.rows, table.cols, entries.collect())
+        };
         Self {
             inputs: program.inputs().to_vec(),
             outputs: program.outputs().to_vec(),
             loads,
             steps,
-            tables: program.tables().iter().map(Entries::new).collect(),
-            callees: program.callees().iter().map(Callee::new).collect(),
-            stores,
+            tables: program.tables().iter().map(table).collect(),
+            callees: program.callees().iter().map(Self::new).collect(),
+            stores: program.results().iter().map(|entry| entry.value).collect(),
             values,
         }
     }
@@ -181,97 +73,98 @@ impl<T: Real> Interpreter<T> {
         for (slice, slot) in outputs.iter().zip(&self.outputs) {
             assert_eq!(slice.len(), slot.len, "length of output `{}`", slot.name);
         }
-        for &(slot, index, value) in &self.loads {
-            self.values[value] = inputs[slot][index];
+        for (&load, &x) in self.loads.iter().zip(inputs.iter().copied().flatten()) {
+            self.values[load] = x;
         }
         self.evaluate();
-        for &(slot, index, value) in &self.stores {
-            outputs[slot][index] = self.values[value];
+        let results = outputs.iter_mut().flat_map(|slice| slice.iter_mut());
+        for (result, store) in results.zip(&self.stores) {
+            *result = self.values[store.index()];
         }
     }
 
+    /// The same with an array per input slot, which gives one per output slot.
+    ///
+    /// # Panics
+    /// As [`Self::run`].
+    pub fn results(&mut self, inputs: &[Vec<T>]) -> Vec<Vec<T>> {
+        let slots = self.outputs.iter();
+        let mut outputs: Vec<_> = slots.map(|slot| vec![T::constant(0.0); slot.len]).collect();
+        let read: Vec<&[T]> = inputs.iter().map(Vec::as_slice).collect();
+        let mut written: Vec<&mut [T]> = outputs.iter_mut().map(Vec::as_mut_slice).collect();
+        self.run(&read, &mut written);
+        outputs
+    }
+
     fn evaluate(&mut self) {
-        let values = &mut self.values;
-        for step in &mut self.steps {
-            match step {
-                Step::Unary(op, a, result) => values[*result] = T::unary(*op, values[*a]),
-                Step::Binary(op, a, b, result) => {
-                    values[*result] = binary(*op, values[*a], values[*b]);
+        let (values, tables) = (&mut self.values, &self.tables);
+        for &(ref statement, first) in &self.steps {
+            match statement {
+                // No steps.
+                Statement::Constant(_) | Statement::Input { .. } => {}
+                Statement::Unary(op, a) => values[first] = T::unary(*op, values[a.index()]),
+                Statement::Binary(Binary::Mul, a, b) if a == b => {
+                    values[first] = values[a.index()].square();
                 }
-                Step::Square(a, result) => values[*result] = values[*a].square(),
-                Step::SinCos(arguments, first) => {
-                    for (k, &argument) in arguments.iter().enumerate() {
-                        let (sine, cosine) = values[argument].sin_cos();
-                        values[*first + k] = sine;
-                        values[*first + arguments.len() + k] = cosine;
+                Statement::Binary(op, a, b) => {
+                    let (a, b) = (values[a.index()], values[b.index()]);
+                    values[first] = match op {
+                        Binary::Add => a + b,
+                        Binary::Sub => a - b,
+                        Binary::Mul => a * b,
+                        Binary::Div => a / b,
+                    };
+                }
+                Statement::SinCos { arguments } => {
+                    for (k, argument) in arguments.iter().enumerate() {
+                        let (sine, cosine) = values[argument.index()].sin_cos();
+                        values[first + k] = sine;
+                        values[first + arguments.len() + k] = cosine;
                     }
                 }
-                Step::Accumulate(table, sections, first) => {
-                    accumulate(&self.tables[*table], sections, *first, values);
+                Statement::Accumulate { table, sections } => {
+                    accumulate(&tables[table.index()], sections, first, values);
                 }
-                Step::Quads(table, sums, first) => {
-                    quads(&self.tables[*table], sums, *first, values);
+                Statement::Quads {
+                    table,
+                    weights,
+                    sums,
+                } => quads(&tables[table.index()], weights, sums, first, values),
+                Statement::Constants { table } => {
+                    let entries = tables[table.index()].entries();
+                    values[first..first + entries.len()].copy_from_slice(entries);
                 }
-                Step::Constants(table, first) => {
-                    let entries = &self.tables[*table].entries;
-                    values[*first..*first + entries.len()].copy_from_slice(entries);
+                Statement::Separable {
+                    start,
+                    base,
+                    groups,
+                    cols,
+                } => {
+                    let base = base.as_deref();
+                    separable(tables, start, base, groups, *cols, first, values);
                 }
-                Step::Separable(step, first) => step.run(&self.tables, *first, values),
-                Step::Call(callee, arguments, first) => {
+                Statement::Call { callee, arguments } => {
                     let callee = &mut self.callees[*callee];
-                    for (slot, &argument) in callee.arguments.iter_mut().zip(&*arguments) {
-                        *slot = values[argument];
+                    for (&load, argument) in callee.loads.iter().zip(arguments) {
+                        callee.values[load] = values[argument.index()];
                     }
-                    callee.run();
-                    let end = *first + callee.results.len();
-                    values[*first..end].copy_from_slice(&callee.results);
+                    callee.evaluate();
+                    for (k, store) in callee.stores.iter().enumerate() {
+                        values[first + k] = callee.values[store.index()];
+                    }
                 }
             }
         }
     }
 }
 
-impl<T: Real> Callee<T> {
-    fn new(program: &Program) -> Self {
-        let len = |slots: &[Slot]| slots.iter().map(|slot| slot.len).sum();
-        Self {
-            interpreter: Interpreter::of(program),
-            arguments: vec![T::constant(0.0); len(program.inputs())],
-            results: vec![T::constant(0.0); len(program.outputs())],
-        }
-    }
-
-    /// Runs on `arguments`, which hold all input slots one after the other.
-    fn run(&mut self) {
-        let inner = &mut self.interpreter;
-        let offset = |slots: &[Slot], slot: usize| -> usize {
-            slots[..slot].iter().map(|earlier| earlier.len).sum()
-        };
-        for &(slot, index, value) in &inner.loads {
-            inner.values[value] = self.arguments[offset(&inner.inputs, slot) + index];
-        }
-        inner.evaluate();
-        for &(slot, index, value) in &inner.stores {
-            self.results[offset(&inner.outputs, slot) + index] = inner.values[value];
-        }
-    }
-}
-
-fn positions(values: &[ValueId]) -> Box<[usize]> {
-    values.iter().map(|value| value.index()).collect()
-}
-
-fn binary<T: Real>(op: Binary, a: T, b: T) -> T {
-    match op {
-        Binary::Add => a + b,
-        Binary::Sub => a - b,
-        Binary::Mul => a * b,
-        Binary::Div => a / b,
-    }
-}
-
-/// The sums' terms have positions of weights in the values.
-fn quads<T: Real>(table: &Entries<T>, sums: &[QuadSum], first: usize, values: &mut [T]) {
+fn quads<T: Real>(
+    table: &Table<T>,
+    weights: &[ValueId],
+    sums: &[QuadSum],
+    first: usize,
+    values: &mut [T],
+) {
     let vector = |quad: Quad, values: &[T]| -> [T; QUAD] {
         std::array::from_fn(|l| match quad {
             Quad::Row(row) => table.row(row)[l],
@@ -281,7 +174,7 @@ fn quads<T: Real>(table: &Entries<T>, sums: &[QuadSum], first: usize, values: &m
     for (position, sum) in sums.iter().enumerate() {
         let mut y = vector(sum.start, values);
         for &(weight, quad) in &sum.terms {
-            let (w, v) = (values[weight], vector(quad, values));
+            let (w, v) = (values[weights[weight].index()], vector(quad, values));
             for (y, v) in y.iter_mut().zip(v) {
                 *y = *y + v * w;
             }
@@ -291,8 +184,8 @@ fn quads<T: Real>(table: &Entries<T>, sums: &[QuadSum], first: usize, values: &m
 }
 
 fn accumulate<T: Real>(
-    table: &Entries<T>,
-    sections: &[Box<[usize]>],
+    table: &Table<T>,
+    sections: &[Vec<ValueId>],
     first: usize,
     values: &mut [T],
 ) {
@@ -303,7 +196,7 @@ fn accumulate<T: Real>(
         let blocks = weights.chunks_exact(4);
         let rest = blocks.remainder();
         for block in blocks {
-            let w: [T; 4] = std::array::from_fn(|k| values[block[k]]);
+            let w: [T; 4] = std::array::from_fn(|k| values[block[k].index()]);
             let rows: [&[T]; 4] = std::array::from_fn(|k| table.row(row + k));
             for (j, y) in values[first..first + cols].iter_mut().enumerate() {
                 let front = rows[0][j] * w[0] + rows[1][j] * w[1];
@@ -312,8 +205,8 @@ fn accumulate<T: Real>(
             }
             row += 4;
         }
-        for &weight in rest {
-            let w = values[weight];
+        for weight in rest {
+            let w = values[weight.index()];
             for (y, t) in values[first..first + cols].iter_mut().zip(table.row(row)) {
                 *y = *y + *t * w;
             }
@@ -322,49 +215,56 @@ fn accumulate<T: Real>(
     }
 }
 
-impl<T: Real> SeparableStep<T> {
-    fn run(&mut self, tables: &[Entries<T>], first: usize, values: &mut [T]) {
-        let (rows, cols) = (self.start.len(), self.cols);
-        let width = self.base.as_ref().map_or(0, |base| base.len() / rows);
-        for r in 0..rows {
-            for i in 0..cols {
-                let mut sum: Option<T> = None;
-                let base = self.base.as_ref().filter(|_| i < width);
-                let mut slope = base.map(|base| values[base[r * width + i]]);
-                for group in self.groups.iter().filter(|group| i < group.values.len()) {
-                    let t = tables[group.table.index()].row(r)[i];
-                    let times = |factors: &[ValueId]| t * values[factors[i].index()];
-                    let product = times(&group.values);
-                    sum = Some(sum.map_or(product, |sum| sum + product));
-                    slope = Some(match (&group.slopes, slope) {
-                        (Slopes::One, None) => t,
-                        (Slopes::One, Some(slope)) => slope + t,
-                        (Slopes::Plus(slopes), None) => times(slopes),
-                        (Slopes::Plus(slopes), Some(slope)) => slope + times(slopes),
-                        (Slopes::Minus(slopes), None) => -times(slopes),
-                        (Slopes::Minus(slopes), Some(slope)) => slope - times(slopes),
-                    });
-                }
-                self.columns[i] = sum.unwrap_or(T::constant(0.0));
-                values[first + rows + r * cols + i] = slope.unwrap_or(T::constant(0.0));
+/// Associated as [`Statement::Separable`] says.
+fn separable<T: Real>(
+    tables: &[Table<T>],
+    start: &[ValueId],
+    base: Option<&[ValueId]>,
+    groups: &[Group],
+    cols: usize,
+    first: usize,
+    values: &mut [T],
+) {
+    let (rows, zero) = (start.len(), T::constant(0.0));
+    let width = base.map_or(0, |base| base.len() / rows);
+    for r in 0..rows {
+        let mut p = [zero; LANES];
+        for i in 0..cols.next_multiple_of(LANES) {
+            let mut sum: Option<T> = None;
+            let base = base.filter(|_| i < width);
+            let mut slope = base.map(|base| values[base[r * width + i].index()]);
+            // Zeros fill the lanes behind the last column.
+            let groups = groups
+                .iter()
+                .filter(|group| i < cols.min(group.values.len()));
+            for group in groups {
+                let t = tables[group.table.index()].row(r)[i];
+                let times = |factors: &[ValueId]| t * values[factors[i].index()];
+                let product = times(&group.values);
+                sum = Some(sum.map_or(product, |sum| sum + product));
+                slope = Some(match (&group.slopes, slope) {
+                    (Slopes::One, None) => t,
+                    (Slopes::One, Some(slope)) => slope + t,
+                    (Slopes::Plus(slopes), None) => times(slopes),
+                    (Slopes::Plus(slopes), Some(slope)) => slope + times(slopes),
+                    (Slopes::Minus(slopes), None) => -times(slopes),
+                    (Slopes::Minus(slopes), Some(slope)) => slope - times(slopes),
+                });
             }
-            values[first + r] = lane_sum(values[self.start[r]], &self.columns);
+            let sum = sum.unwrap_or(zero);
+            p[i % LANES] = if i < LANES { sum } else { p[i % LANES] + sum };
+            if i < cols {
+                values[first + rows + r * cols + i] = slope.unwrap_or(zero);
+            }
         }
+        let total = ((p[0] + p[4]) + (p[2] + p[6])) + ((p[1] + p[5]) + (p[3] + p[7]));
+        values[first + r] = values[start[r].index()] + total;
     }
-}
-
-/// `start` plus all columns, associated as [`Statement::Separable`] says.
-fn lane_sum<T: Real>(start: T, columns: &[T]) -> T {
-    let p: [T; LANES] = std::array::from_fn(|l| {
-        let lane = columns[l..].iter().step_by(LANES).copied();
-        lane.reduce(|p, q| p + q).unwrap_or(T::constant(0.0))
-    });
-    start + (((p[0] + p[4]) + (p[2] + p[6])) + ((p[1] + p[5]) + (p[3] + p[7])))
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::ProgramBuilder;
+    use super::super::{ProgramBuilder, Unary};
     use super::*;
 
     /// y = W^T [1; x] by table, for six weights: one block of four and two rows more.
@@ -372,22 +272,20 @@ mod tests {
         let entries: Vec<f64> = (0..21).map(|k| f64::from(k) * 0.37 - 3.1).collect();
         let mut builder = ProgramBuilder::new("table");
         let x = builder.input("x", 6);
-        let table = builder.table(Table::new(7, 3, entries.clone()));
-        let y = builder.accumulate(table, vec![x]);
+        let y = builder.accumulate(Table::new(7, 3, entries.clone()), vec![x]);
         builder.output("y", &y);
         (builder.finish().expect("valid program"), entries)
     }
 
+    const X: [f64; 6] = [0.5, -1.25, 2.0, 3.5, -0.75, 1.5];
+
     #[test]
     fn accumulate_equals_matrix_vector_product() {
         let (program, entries) = table_program();
-        let x = [0.5, -1.25, 2.0, 3.5, -0.75, 1.5];
-        let mut y = [0.0; 3];
-        Interpreter::new(&program).run(&[&x], &mut [&mut y]);
-        for j in 0..3 {
+        let y = Interpreter::new(&program).results(&[X.to_vec()]).remove(0);
+        for (j, found) in y.into_iter().enumerate() {
             let expected: f64 =
-                entries[j] + (0..6).map(|i| entries[3 * (i + 1) + j] * x[i]).sum::<f64>();
-            let found = y[j];
+                entries[j] + (0..6).map(|i| entries[3 * (i + 1) + j] * X[i]).sum::<f64>();
             assert!((found - expected).abs() < 1e-13, "{found}, {expected}");
         }
     }
@@ -398,19 +296,14 @@ mod tests {
         let mut builder = ProgramBuilder::new("twice");
         let x = builder.input("x", 6);
         let once = builder.call(&inner, &x).remove(0);
-        let again = builder.call(&inner, &[x[3], x[4], x[5], once[0], once[1], once[2]]);
+        let again = builder.call(&inner, &[&x[3..], &once].concat());
         builder.output("y", &again[0]);
         let program = builder.finish().expect("valid program");
 
-        let x = [0.5, -1.25, 2.0, 3.5, -0.75, 1.5];
-        let (mut first, mut expected, mut found) = ([0.0; 3], [0.0; 3], [0.0; 3]);
         let mut single = Interpreter::new(&inner);
-        single.run(&[&x], &mut [&mut first]);
-        single.run(
-            &[&[x[3], x[4], x[5], first[0], first[1], first[2]]],
-            &mut [&mut expected],
-        );
-        Interpreter::new(&program).run(&[&x], &mut [&mut found]);
+        let first = single.results(&[X.to_vec()]).remove(0);
+        let expected = single.results(&[[&X[3..], &first].concat()]);
+        let found = Interpreter::new(&program).results(&[X.to_vec()]);
         assert_eq!(found, expected);
     }
 
@@ -443,8 +336,8 @@ mod tests {
         let program = builder.finish().expect("valid program");
 
         let x: [f64; 5] = [0.3, -1.2, 2.0, 0.7, -0.4];
-        let (mut y, mut slopes) = ([0.0; 2], [0.0; 10]);
-        Interpreter::new(&program).run(&[&x], &mut [&mut y, &mut slopes]);
+        let results = Interpreter::new(&program).results(&[x.to_vec()]);
+        let (y, slopes) = (&results[0], &results[1]);
         for r in 0..2 {
             let mut expected = 1.0;
             for i in 0..5 {

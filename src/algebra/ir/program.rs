@@ -42,18 +42,18 @@ impl TableId {
 
 /// A constant matrix, row-major.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Table {
+pub struct Table<T = f64> {
     pub(super) rows: usize,
     pub(super) cols: usize,
-    pub(super) entries: Vec<f64>,
+    pub(super) entries: Vec<T>,
 }
 
-impl Table {
+impl<T> Table<T> {
     /// A table of `rows` x `cols` from its row-major entries.
     ///
     /// # Panics
     /// If the number of entries is not `rows * cols`; a caller's defect.
-    pub fn new(rows: usize, cols: usize, entries: Vec<f64>) -> Self {
+    pub fn new(rows: usize, cols: usize, entries: Vec<T>) -> Self {
         assert_eq!(entries.len(), rows * cols, "table entries fill the shape");
         Self {
             rows,
@@ -73,12 +73,12 @@ impl Table {
     }
 
     /// One row, `cols` entries.
-    pub fn row(&self, row: usize) -> &[f64] {
+    pub fn row(&self, row: usize) -> &[T] {
         &self.entries[row * self.cols..(row + 1) * self.cols]
     }
 
     /// All entries, row-major.
-    pub fn entries(&self) -> &[f64] {
+    pub fn entries(&self) -> &[T] {
         &self.entries
     }
 }
@@ -119,34 +119,43 @@ pub enum Binary {
 
 /// Derivatives of a group of functions, one a column.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Slopes {
+pub enum Slopes<V = Vec<ValueId>> {
     /// All are one: the group is the variables themselves.
     One,
     /// These values.
-    Plus(Vec<ValueId>),
+    Plus(V),
     /// The negatives of these values.
-    Minus(Vec<ValueId>),
+    Minus(V),
 }
 
-impl Slopes {
-    /// The values that are read.
-    pub fn values(&self) -> &[ValueId] {
+impl<V> Slopes<V> {
+    /// The values that are read, if any.
+    pub fn values(&self) -> Option<&V> {
         match self {
-            Self::One => &[],
-            Self::Plus(values) | Self::Minus(values) => values,
+            Self::One => None,
+            Self::Plus(values) | Self::Minus(values) => Some(values),
+        }
+    }
+
+    /// The same with other values.
+    pub fn map<W>(&self, of: impl FnOnce(&V) -> W) -> Slopes<W> {
+        match self {
+            Self::One => Slopes::One,
+            Self::Plus(values) => Slopes::Plus(of(values)),
+            Self::Minus(values) => Slopes::Minus(of(values)),
         }
     }
 }
 
 /// Functions of one variable each, one a column of a table.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Group {
+pub struct Group<T = TableId, V = Vec<ValueId>> {
     /// Coefficients, a multiple of [`LANES`] columns.
-    pub table: TableId,
+    pub table: T,
     /// Value of each function; zero behind the last variable, as the coefficients are.
-    pub values: Vec<ValueId>,
+    pub values: V,
     /// Derivative of each function by its variable.
-    pub slopes: Slopes,
+    pub slopes: Slopes<V>,
 }
 
 /// A vector of [`QUAD`] numbers.
@@ -167,12 +176,20 @@ pub struct QuadSum {
     pub terms: Vec<(usize, Quad)>,
 }
 
+impl QuadSum {
+    /// The vectors that are added, then that of the start.
+    pub fn vectors(&self) -> impl Iterator<Item = Quad> {
+        let added = self.terms.iter().map(|&(_, vector)| vector);
+        added.chain([self.start])
+    }
+}
+
 /// One step of the schedule; defines one or several values.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Statement {
     /// A finite constant.
     Constant(f64),
-    /// Element `index` of input `slot`.
+    /// Element `index` of input `slot`; every element has one such statement, in their order.
     Input {
         /// Which input.
         slot: usize,
@@ -272,7 +289,7 @@ impl Statement {
                 operands.extend(base.iter().flatten());
                 for group in groups {
                     operands.extend(&group.values);
-                    operands.extend(group.slopes.values());
+                    operands.extend(group.slopes.values().into_iter().flatten());
                 }
                 operands
             }
@@ -284,7 +301,8 @@ impl Statement {
         match self {
             Self::Separable { groups, .. } => groups
                 .iter()
-                .flat_map(|group| [group.values.as_slice(), group.slopes.values()])
+                .flat_map(|group| std::iter::once(&group.values).chain(group.slopes.values()))
+                .map(Vec::as_slice)
                 .collect(),
             Self::Constant(_)
             | Self::Input { .. }
@@ -373,6 +391,12 @@ impl Program {
             matches!(self.statements[statement], Statement::Constant(x) if x.to_bits() == 0)
         };
         values.iter().rev().take_while(is_zero).count()
+    }
+
+    /// Whether such a statement computes something that an output depends on.
+    pub fn has(&self, is_wanted: impl Fn(&Statement) -> bool) -> bool {
+        let mut statements = self.statements.iter().zip(self.live());
+        statements.any(|(statement, live)| live && is_wanted(statement))
     }
 
     /// Which statements compute something that an output depends on.

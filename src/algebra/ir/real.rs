@@ -35,55 +35,36 @@ pub trait Real:
     fn sin_cos(self) -> (Self, Self);
 }
 
-impl Real for f64 {
-    #[inline]
-    fn constant(value: f64) -> Self {
-        value
-    }
+macro_rules! real {
+    ($float:ident, $kernel:path) => {
+        impl Real for $float {
+            /// The nearest number; infinite beyond the largest.
+            #[inline]
+            fn constant(value: f64) -> Self {
+                value as $float
+            }
 
-    #[inline]
-    fn unary(op: Unary, a: f64) -> f64 {
-        match op {
-            Unary::Neg => -a,
-            Unary::Sqrt => a.sqrt(),
-            Unary::Abs => a.abs(),
-            Unary::Sign => f64::from(i8::from(a > 0.0) - i8::from(a < 0.0)),
-            Unary::Tan => a.tan(),
-            Unary::Tanh => a.tanh(),
-            Unary::Exp => a.exp(),
-            Unary::Log => a.ln(),
+            #[inline]
+            fn unary(op: Unary, a: $float) -> $float {
+                match op {
+                    Unary::Neg => -a,
+                    Unary::Sqrt => a.sqrt(),
+                    Unary::Abs => a.abs(),
+                    Unary::Sign => $float::from(i8::from(a > 0.0) - i8::from(a < 0.0)),
+                    Unary::Tan => a.tan(),
+                    Unary::Tanh => a.tanh(),
+                    Unary::Exp => a.exp(),
+                    Unary::Log => a.ln(),
+                }
+            }
+
+            #[inline]
+            fn sin_cos(self) -> ($float, $float) {
+                $kernel(self)
+            }
         }
-    }
-
-    #[inline]
-    fn sin_cos(self) -> (f64, f64) {
-        sin_cos::sin_cos(self)
-    }
+    };
 }
 
-impl Real for f32 {
-    /// The nearest single-precision number; infinite beyond the largest.
-    #[inline]
-    fn constant(value: f64) -> Self {
-        value as f32
-    }
-
-    #[inline]
-    fn unary(op: Unary, a: f32) -> f32 {
-        match op {
-            Unary::Neg => -a,
-            Unary::Sqrt => a.sqrt(),
-            Unary::Abs => a.abs(),
-            Unary::Sign => f32::from(i8::from(a > 0.0) - i8::from(a < 0.0)),
-            Unary::Tan => a.tan(),
-            Unary::Tanh => a.tanh(),
-            Unary::Exp => a.exp(),
-            Unary::Log => a.ln(),
-        }
-    }
-
-    #[inline]
-    fn sin_cos(self) -> (f32, f32) {
-        sin_cos_f32::sin_cos(self)
-    }
-}
+real!(f64, sin_cos::sin_cos);
+real!(f32, sin_cos_f32::sin_cos);

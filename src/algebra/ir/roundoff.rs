@@ -260,20 +260,12 @@ impl Real for Rounded {
 /// # Panics
 /// If the number or a length of the ranges differs from the program's input slots.
 pub fn rounding_errors(program: &Program, ranges: &[Vec<Range>]) -> Vec<Vec<Option<f64>>> {
-    let inputs: Vec<Vec<Rounded>> = ranges
-        .iter()
-        .map(|slot| slot.iter().map(|&range| Rounded::input(range)).collect())
-        .collect();
-    let mut outputs: Vec<Vec<Rounded>> = program
-        .outputs()
-        .iter()
-        .map(|slot| vec![Rounded::UNBOUNDED; slot.len])
-        .collect();
-    let read: Vec<&[Rounded]> = inputs.iter().map(Vec::as_slice).collect();
-    let mut written: Vec<&mut [Rounded]> = outputs.iter_mut().map(Vec::as_mut_slice).collect();
-    Interpreter::<Rounded>::of(program).run(&read, &mut written);
-    outputs
-        .into_iter()
+    let inputs = ranges.iter();
+    let inputs = inputs.map(|slot| slot.iter().copied().map(Rounded::input).collect());
+    let inputs: Vec<Vec<Rounded>> = inputs.collect();
+    let outputs = Interpreter::new(program).results(&inputs);
+    let bounds = outputs.into_iter();
+    bounds
         .map(|slot| slot.into_iter().map(Rounded::bound).collect())
         .collect()
 }
@@ -311,8 +303,10 @@ mod tests {
     #[test]
     fn single_precision_stays_within_the_bound_of_its_box_and_not_far_below() {
         let program = program();
-        let (mut double, mut single) =
-            (Interpreter::new(&program), Interpreter::<f32>::of(&program));
+        let (mut double, mut single) = (
+            Interpreter::new(&program),
+            Interpreter::<f32>::new(&program),
+        );
         for magnitude in [0.1_f64, 1.0, 10.0] {
             let bounds = bounds(&program, Range::within(magnitude)).map(|b| b.expect("a bound"));
             let mut worst = [0.0_f64; 3];

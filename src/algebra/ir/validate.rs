@@ -1,6 +1,6 @@
 //! What every program promises, checked once when it is built.
 
-use super::program::{LANES, Program, QUAD, Quad, Slopes, Statement, TableId, ValueId};
+use super::program::{LANES, Program, QUAD, Quad, Statement, TableId, ValueId};
 
 /// Why a program is refused.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -162,8 +162,7 @@ fn check_shape(program: &Program, statement: &Statement) -> Result<(), Fault> {
                 false => count(found + 1, end),
             };
             for (position, sum) in sums.iter().enumerate() {
-                let vectors = sum.terms.iter().map(|&(_, vector)| vector);
-                for vector in vectors.chain([sum.start]) {
+                for vector in sum.vectors() {
                     match vector {
                         Quad::Row(row) => below(row, table(id).rows)?,
                         Quad::Sum(earlier) => below(earlier, position)?,
@@ -197,8 +196,8 @@ fn check_shape(program: &Program, statement: &Statement) -> Result<(), Fault> {
                 count(table.rows, start.len())?;
                 count(table.cols, table.cols.next_multiple_of(LANES))?;
                 count(group.values.len(), table.cols)?;
-                if group.slopes != Slopes::One {
-                    count(group.slopes.values().len(), table.cols)?;
+                if let Some(slopes) = group.slopes.values() {
+                    count(slopes.len(), table.cols)?;
                 }
             }
             Ok(())
@@ -216,55 +215,47 @@ fn check_shape(program: &Program, statement: &Statement) -> Result<(), Fault> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Binary, Group, ProgramBuilder, Table};
+    use super::super::{Group, ProgramBuilder, Slopes, Table};
     use super::*;
 
-    fn at(statement: usize, fault: Fault) -> IrError {
-        let program = "p".to_owned();
-        IrError::Statement {
-            program,
-            statement,
-            fault,
-        }
+    fn finished(build: impl FnOnce(&mut ProgramBuilder)) -> Result<Program, IrError> {
+        let mut builder = ProgramBuilder::new("p");
+        build(&mut builder);
+        builder.finish()
     }
 
     #[test]
-    fn program_with_non_finite_constant_is_refused() {
-        let mut builder = ProgramBuilder::new("p");
-        let value = builder.constant(f64::INFINITY);
-        builder.output("y", &[value]);
-        assert_eq!(
-            builder.finish(),
-            Err(at(0, Fault::NonFinite(f64::INFINITY)))
-        );
-    }
-
-    #[test]
-    fn program_with_value_of_another_program_is_refused() {
-        let mut other = ProgramBuilder::new("other");
-        let values = other.input("x", 3);
-        let mut builder = ProgramBuilder::new("p");
-        builder.input("x", 1);
-        let sum = builder.binary(Binary::Add, values[0], values[2]);
-        builder.output("y", &[sum]);
-        assert_eq!(builder.finish(), Err(at(1, Fault::UndefinedValue(2))));
-    }
-
-    #[test]
-    fn table_with_too_few_weights_is_refused() {
-        let mut builder = ProgramBuilder::new("p");
-        let x = builder.input("x", 1);
-        let table = builder.table(Table::new(3, 2, vec![1.0; 6]));
-        let y = builder.accumulate(table, vec![x]);
-        builder.output("y", &y);
+    fn statement_that_breaks_a_promise_is_refused() {
+        let refused = |at: usize, fault: Fault, build: fn(&mut ProgramBuilder)| {
+            let program = "p".to_owned();
+            let error = IrError::Statement {
+                program,
+                statement: at,
+                fault,
+            };
+            assert_eq!(finished(build), Err(error));
+        };
+        refused(0, Fault::NonFinite(f64::INFINITY), |builder| {
+            let value = builder.constant(f64::INFINITY);
+            builder.output("y", &[value]);
+        });
+        // Values of another program.
+        refused(1, Fault::UndefinedValue(2), |builder| {
+            let values = ProgramBuilder::new("other").input("x", 3);
+            builder.input("x", 1);
+            let sum = builder.add(values[0], values[2]);
+            builder.output("y", &[sum]);
+        });
         let (found, expected) = (2, 3);
-        let fault = Fault::OperandCount { found, expected };
-        assert_eq!(builder.finish(), Err(at(1, fault)));
+        refused(1, Fault::OperandCount { found, expected }, |builder| {
+            let x = builder.input("x", 1);
+            let y = builder.accumulate(Table::new(3, 2, vec![1.0; 6]), vec![x]);
+            builder.output("y", &y);
+        });
     }
 
     /// One row over two variables; the value behind them is zero or not.
-    fn separable(is_padded: bool) -> Result<Program, IrError> {
-        let mut builder = ProgramBuilder::new("p");
+    fn separable(builder: &mut ProgramBuilder, is_padded: bool) {
         let x = builder.input("x", 3);
         let start = builder.constant(0.0);
         let mut values = vec![start; LANES];
@@ -272,51 +263,36 @@ mod tests {
         if !is_padded {
             values[2] = x[2];
         }
-        let table = builder.table(Table::new(1, LANES, vec![1.0; LANES]));
-        let slopes = Slopes::One;
         let group = Group {
-            table,
+            table: builder.table(Table::new(1, LANES, vec![1.0; LANES])),
             values,
-            slopes,
+            slopes: Slopes::One,
         };
         let (sums, slopes) = builder.separable(vec![start], None, vec![group], 2);
         builder.output("y", &sums);
         builder.output("slopes", &slopes);
-        builder.finish()
     }
 
     #[test]
-    fn separable_values_behind_the_variables_must_be_zero() {
-        assert!(separable(true).is_ok());
-        assert_count_refused(separable(false));
-    }
-
-    fn assert_count_refused(found: Result<Program, IrError>) {
-        assert!(
-            matches!(
-                found,
-                Err(IrError::Statement {
-                    fault: Fault::OperandCount { .. },
-                    ..
-                })
-            ),
-            "{found:?}"
-        );
-    }
-
-    #[test]
-    fn separable_without_groups_is_refused() {
-        let mut builder = ProgramBuilder::new("p");
-        let start = builder.input("x", 1);
-        let (sums, _) = builder.separable(start, None, Vec::new(), 0);
-        builder.output("y", &sums);
-        assert_count_refused(builder.finish());
+    fn separable_has_groups_and_zeros_behind_the_variables() {
+        assert!(finished(|builder| separable(builder, true)).is_ok());
+        let without_zeros = finished(|builder| separable(builder, false));
+        let without_groups = finished(|builder| {
+            let start = builder.input("x", 1);
+            let (sums, _) = builder.separable(start, None, Vec::new(), 0);
+            builder.output("y", &sums);
+        });
+        for found in [without_zeros, without_groups] {
+            let Err(IrError::Statement { fault, .. }) = &found else {
+                panic!("{found:?}");
+            };
+            assert!(matches!(fault, Fault::OperandCount { .. }), "{found:?}");
+        }
     }
 
     #[test]
     fn output_without_elements_is_refused() {
-        let mut builder = ProgramBuilder::new("p");
-        builder.output("y", &[]);
-        assert!(matches!(builder.finish(), Err(IrError::Slot { .. })));
+        let found = finished(|builder| builder.output("y", &[]));
+        assert!(matches!(found, Err(IrError::Slot { .. })), "{found:?}");
     }
 }

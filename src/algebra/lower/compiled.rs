@@ -99,9 +99,8 @@ impl CompiledModel {
             phase.jacobian.run(&[z, dz, u_lat], outputs);
         }
         jacobian.fill(0.0);
-        let places = phase.pattern.rows.iter().zip(&phase.pattern.cols);
-        for ((&row, &col), &entry) in places.zip(&phase.entries) {
-            jacobian[(row, col)] = entry;
+        for (place, &entry) in phase.pattern.places().zip(&phase.entries) {
+            jacobian[place] = entry;
         }
     }
 

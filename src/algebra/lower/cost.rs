@@ -1,7 +1,7 @@
 //! Which form a function's code takes.
 
 use super::combination::Combination;
-use super::dense::n_weights;
+use super::dense::distinct;
 
 /// Form of the code that adds coefficients times candidate terms.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -35,7 +35,7 @@ impl Form {
             Self::Tables => true,
             Self::Automatic => {
                 let active: usize = equations.iter().map(|e| e.items.len()).sum();
-                let entries = equations.len() * n_weights(equations);
+                let entries = equations.len() * distinct(equations).len();
                 let least_fill = match equations.len() < MANY_EQUATIONS {
                     true => LEAST_FILL_OF_FEW,
                     false => LEAST_FILL,

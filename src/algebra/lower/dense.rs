@@ -17,12 +17,8 @@ use crate::symbolic::{ExprId, ExprPool, Function, Node, SymbolId};
 /// Fewest weights for which a loop of their own is worth it.
 const SHORTEST_RUN: usize = 4;
 
-/// Number of distinct candidate terms that the equations use.
-pub(super) fn n_weights(equations: &[Combination]) -> usize {
-    distinct(equations).len()
-}
-
-fn distinct(equations: &[Combination]) -> Vec<ExprId> {
+/// The distinct candidate terms that equations use.
+pub(super) fn distinct(equations: &[Combination]) -> Vec<ExprId> {
     let mut seen = BTreeSet::new();
     let items = equations.iter().flat_map(|equation| &equation.items);
     items
@@ -57,7 +53,6 @@ pub(super) fn matrix_vector(
         }
     }
     let table = Table::new(weights.len() + 1, cols, entries);
-    let table = lowering.builder.table(table);
     lowering.builder.accumulate(table, sections)
 }
 
@@ -138,21 +133,15 @@ fn slopes(
     equations.iter().map(&mut row).collect()
 }
 
-/// [`slopes`] up to the last variable of which there are any, with zeros up to a multiple of
-/// [`LANES`].
-fn padded_slopes(
-    pool: &mut ExprPool,
-    equations: &[Combination],
-    variables: &[SymbolId],
-) -> Vec<Combination> {
-    let mut rows = slopes(pool, equations, variables);
+/// Rows up to the last column in which any is not zero, with zeros up to a multiple of [`LANES`].
+fn padded(mut rows: Vec<Vec<Combination>>) -> Vec<Vec<Combination>> {
     let last = |row: &Vec<Combination>| row.iter().rposition(|slope| !slope.is_zero());
     let used = (rows.iter().filter_map(last).max()).map_or(0, |last| last + 1);
     for row in &mut rows {
         row.truncate(used);
         row.resize(used.next_multiple_of(LANES), Combination::default());
     }
-    rows.concat()
+    rows
 }
 
 /// How the equations divide; `columns` are the variables in the order of the Jacobian.
@@ -208,8 +197,8 @@ impl DenseJacobian {
             equation.items.retain(|&(_, expr)| !in_group(expr));
         }
         let rest_slopes = match has_angles {
-            true => padded_slopes(pool, &rest, &used),
-            false => slopes(pool, &rest, &curved).concat(),
+            true => padded(slopes(pool, &rest, &used)),
+            false => slopes(pool, &rest, &curved),
         };
         Self {
             curved,
@@ -217,7 +206,7 @@ impl DenseJacobian {
             used,
             has_angles,
             rest,
-            rest_slopes,
+            rest_slopes: rest_slopes.concat(),
         }
     }
 
@@ -287,22 +276,22 @@ impl DenseJacobian {
             .map(|&symbol| lowering.pool.symbol_expr(symbol))
             .collect();
         let values: Vec<ValueId> = variables.iter().map(|&v| lowering.value(v)).collect();
-        let is_nonlinear = |&(symbol, _): &(&SymbolId, &ExprId)| self.curved.contains(symbol);
-        let angles = self.used.iter().zip(&variables).filter(is_nonlinear);
-        let angles: Vec<ExprId> = angles.map(|(_, &angle)| angle).collect();
-        let (sines, cosines) = lowering.angles(&angles);
-        let of_angles = |values: Vec<ValueId>| {
-            let mut values = values.into_iter();
-            let value = |symbol| match self.curved.contains(symbol) {
-                true => values.next().expect("one value an angle"),
-                false => zero,
-            };
-            self.used.iter().map(value).collect::<Vec<_>>()
+        let variables = self.used.iter().zip(variables);
+        let is_curved = |(symbol, _): &(&SymbolId, ExprId)| self.curved.contains(symbol);
+        let angles: Vec<ExprId> = variables
+            .clone()
+            .filter(is_curved)
+            .map(|(_, v)| v)
+            .collect();
+        lowering.sines_and_cosines(&angles);
+        let angle = |variable: (&SymbolId, ExprId)| match is_curved(&variable) {
+            true => lowering.angle(variable.1),
+            false => (zero, zero),
         };
-        let (sines, cosines) = (of_angles(sines), of_angles(cosines));
+        let (sines, cosines): (Vec<_>, Vec<_>) = variables.map(angle).unzip();
         let width = self.used.len().next_multiple_of(LANES);
         let mut is_first = true;
-        let mut group = |of: Kind, values: &[ValueId], slopes: Slopes| {
+        let mut group = |of: Kind, values: &[ValueId], slopes: Slopes<&[ValueId]>| {
             let mut rows = Self::coefficients(lowering.pool, equations, &self.used, of);
             let last = rows
                 .iter()
@@ -326,17 +315,13 @@ impl DenseJacobian {
                     .builder
                     .table(Table::new(rows.len(), cols, rows.concat())),
                 values: padded(values),
-                slopes: match slopes {
-                    Slopes::One => Slopes::One,
-                    Slopes::Plus(values) => Slopes::Plus(padded(&values)),
-                    Slopes::Minus(values) => Slopes::Minus(padded(&values)),
-                },
+                slopes: slopes.map(|values| padded(values)),
             })
         };
         [
             group(Kind::Variable, &values, Slopes::One),
-            group(Kind::Sine, &sines, Slopes::Plus(cosines.clone())),
-            group(Kind::Cosine, &cosines, Slopes::Minus(sines.clone())),
+            group(Kind::Sine, &sines, Slopes::Plus(cosines.as_slice())),
+            group(Kind::Cosine, &cosines, Slopes::Minus(sines.as_slice())),
         ]
         .into_iter()
         .flatten()
@@ -353,7 +338,6 @@ impl DenseJacobian {
         }
         let rows = Self::coefficients(lowering.pool, equations, &self.linear, Kind::Variable);
         let table = Table::new(rows.len(), self.linear.len(), rows.concat());
-        let table = lowering.builder.table(table);
         lowering.builder.constants(table)
     }
 }

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use super::combination::Combination;
 use super::cost::Form;
-use super::dense::{self, DenseJacobian};
+use super::dense::{DenseJacobian, distinct, matrix_vector};
 use super::error::LowerError;
 use super::expression::ExpressionLowering;
 use super::gradient::Gradient;
@@ -24,6 +24,11 @@ pub struct JacobianPattern {
 }
 
 impl JacobianPattern {
+    /// Row and column of each entry.
+    pub(super) fn places(&self) -> impl Iterator<Item = (usize, usize)> {
+        self.rows.iter().copied().zip(self.cols.iter().copied())
+    }
+
     /// Number of entries.
     pub fn len(&self) -> usize {
         self.rows.len()
@@ -46,8 +51,8 @@ pub fn dynamics(system: &Equations<'_>, phase: usize, form: Form) -> Result<Prog
     let mut pool = system.pool().clone();
     let (mut builder, ddz) = if form.uses_tables(&equations) {
         let mut lowering = start(system, &pool, "dynamics");
-        lowering.prepare(&expressions(&equations));
-        let ddz = dense::matrix_vector(&mut lowering, &equations);
+        lowering.prepare(&distinct(&equations));
+        let ddz = matrix_vector(&mut lowering, &equations);
         (lowering.builder, ddz)
     } else {
         let demand = Demand::new(&mut pool, &equations);
@@ -99,8 +104,7 @@ pub fn dynamics_jacobian(
         let mut lowering = start(system, &pool, "dynamics_jacobian");
         lowering.prepare(gradient.expressions());
         let (ddz, slopes) = gradient.lower(&mut lowering, system.latent_dim());
-        let places = pattern.rows.iter().zip(&pattern.cols);
-        let jacobian = places.map(|(&row, &col)| slopes[&(row, col)]).collect();
+        let jacobian = pattern.places().map(|place| slopes[&place]).collect();
         (lowering.builder, ddz, jacobian)
     } else if form.uses_tables(&equations) {
         dense_jacobian(system, &mut pool, &equations, &columns, &pattern)
@@ -130,7 +134,7 @@ fn nested_jacobian(
     let demand = Demand::new(pool, equations.iter().chain(&entries));
     let nest = |equation| demand.nest(pool, equation);
     let mut sums: Vec<Nested> = equations.iter().map(nest).collect();
-    for ((&row, &col), mut entry) in pattern.rows.iter().zip(&pattern.cols).zip(entries) {
+    for ((row, col), mut entry) in pattern.places().zip(entries) {
         let variable = pool.symbol_expr(columns[col]);
         let shared = sums[row].part_of(variable, &entry).map(|group| {
             let known = &sums[row].groups[group].single.items;
@@ -154,14 +158,13 @@ fn dense_jacobian(
 ) -> (ProgramBuilder, Vec<ValueId>, Vec<ValueId>) {
     let dense = DenseJacobian::new(pool, equations, columns);
     let mut lowering = start(system, pool, "dynamics_jacobian");
-    let mut roots = expressions(equations);
+    let mut roots = distinct(equations);
     roots.extend(dense.expressions());
     lowering.prepare(&roots);
     let (ddz, entries) = dense.lower(&mut lowering, equations);
-    let places = pattern.rows.iter().zip(&pattern.cols);
-    let jacobian = places
-        .map(|(&row, &col)| entries[&(row, columns[col])])
-        .collect();
+    let places = pattern.places();
+    let jacobian = places.map(|(row, col)| entries[&(row, columns[col])]);
+    let jacobian = jacobian.collect();
     (lowering.builder, ddz, jacobian)
 }
 
@@ -210,13 +213,6 @@ fn start<'a>(system: &Equations<'_>, pool: &'a ExprPool, name: &str) -> Expressi
         .map(|(variable, value)| (system.symbol(variable), value))
         .collect();
     ExpressionLowering::new(pool, builder, variables)
-}
-
-fn expressions(combinations: &[Combination]) -> Vec<ExprId> {
-    let items = combinations
-        .iter()
-        .flat_map(|combination| &combination.items);
-    items.map(|&(_, expr)| expr).collect()
 }
 
 /// The values of nested sums; each may share a part of one before it.

@@ -71,10 +71,16 @@ impl<'a> ExpressionLowering<'a> {
         }
     }
 
-    fn sines_and_cosines(&mut self, arguments: &[ExprId]) {
+    /// Computes the sines and cosines that are still missing, in one statement.
+    pub fn sines_and_cosines(&mut self, arguments: &[ExprId]) {
+        let mut missing = arguments.to_vec();
+        missing.retain(|argument| !self.angles.contains_key(argument));
+        if missing.is_empty() {
+            return;
+        }
+        let arguments = missing.into_iter();
         let mut arguments: Vec<(ExprId, ValueId)> = arguments
-            .iter()
-            .map(|&argument| (argument, self.value(argument)))
+            .map(|argument| (argument, self.value(argument)))
             .collect();
         // Arguments in the order of the inputs can be read in place by generated loops.
         arguments.sort_by_key(|&(_, value)| value);
@@ -247,25 +253,10 @@ impl<'a> ExpressionLowering<'a> {
         self.builder.unary(op, argument)
     }
 
-    /// Sines and cosines of the arguments, in their order.
-    pub fn angles(&mut self, arguments: &[ExprId]) -> (Vec<ValueId>, Vec<ValueId>) {
-        let missing: Vec<ExprId> = arguments
-            .iter()
-            .copied()
-            .filter(|argument| !self.angles.contains_key(argument))
-            .collect();
-        if !missing.is_empty() {
-            self.sines_and_cosines(&missing);
-        }
-        arguments
-            .iter()
-            .map(|argument| self.angles[argument])
-            .unzip()
-    }
-
-    fn angle(&mut self, argument: ExprId) -> (ValueId, ValueId) {
-        let (sines, cosines) = self.angles(&[argument]);
-        (sines[0], cosines[0])
+    /// Sine and cosine of an argument.
+    pub fn angle(&mut self, argument: ExprId) -> (ValueId, ValueId) {
+        self.sines_and_cosines(&[argument]);
+        self.angles[&argument]
     }
 }
 

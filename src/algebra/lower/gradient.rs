@@ -57,12 +57,8 @@ impl Gradient {
             return None;
         }
         let gradient = Division::default().gradient(pool, &terms, columns);
-        let products: usize = gradient
-            .vectors
-            .sums
-            .iter()
-            .map(|sum| sum.terms.len())
-            .sum();
+        let sums = gradient.vectors.sums.iter();
+        let products: usize = sums.map(|sum| sum.terms.len()).sum();
         let is_filled = n_terms as f64 >= LEAST_FILL * products as f64;
         (is_filled && products <= MOST_PRODUCTS).then_some(gradient)
     }
@@ -78,19 +74,18 @@ impl Gradient {
         lowering: &mut ExpressionLowering,
         n_equations: usize,
     ) -> (Vec<ValueId>, HashMap<(usize, usize), ValueId>) {
-        let weights = self
-            .vectors
-            .weights
-            .iter()
-            .map(|&weight| lowering.value(weight));
+        let Division {
+            weights,
+            rows,
+            sums,
+            ..
+        } = &self.vectors;
+        let weights = weights.iter().map(|&weight| lowering.value(weight));
         let weights = weights.collect();
-        let table = Table::new(self.vectors.rows.len(), QUAD, self.vectors.rows.concat());
-        let table = lowering.builder.table(table);
-        let sums = lowering
-            .builder
-            .quads(table, weights, self.vectors.sums.clone());
+        let table = Table::new(rows.len(), QUAD, rows.concat());
+        let sums = lowering.builder.quads(table, weights, sums.clone());
         let mut value = |vector: Quad, lane: usize| match vector {
-            Quad::Row(row) => lowering.builder.constant(self.vectors.rows[row][lane]),
+            Quad::Row(row) => lowering.builder.constant(rows[row][lane]),
             Quad::Sum(sum) => sums[QUAD * sum + lane],
         };
         let ddz = (0..n_equations).map(|row| value(self.values[row / QUAD], row % QUAD));
@@ -231,8 +226,7 @@ impl Division {
             for block in 0..n_blocks {
                 let thirds = thirds.iter().map(|(&k, &column)| (x[k], column));
                 let thirds = self.scaled(thirds, block);
-                let start = terms.monomials.get(&vec![i, j]);
-                let start = start.and_then(|column| self.row(column, block));
+                let start = self.monomial(terms, &[i, j], block);
                 inner.insert((i, j, block), self.sum(start, thirds));
             }
         }
@@ -241,9 +235,9 @@ impl Division {
             for block in 0..n_blocks {
                 let products = pairs.keys().filter(|pair| pair.0 == i);
                 let products = products.filter_map(|&(_, j)| Some((x[j], inner[&(i, j, block)]?)));
-                let start = terms.monomials.get(&vec![i]);
-                let start = start.and_then(|column| self.row(column, block));
-                heads.insert((i, block), self.sum(start, products.collect()));
+                let products = products.collect();
+                let start = self.monomial(terms, &[i], block);
+                heads.insert((i, block), self.sum(start, products));
             }
         }
         let mut values = Vec::new();
@@ -322,6 +316,11 @@ impl Division {
             .then(|| self.constant(row))
     }
 
+    /// A block of a monomial's coefficients, unless it is zero.
+    fn monomial(&mut self, terms: &Terms, factors: &[usize], block: usize) -> Option<Quad> {
+        self.row(terms.monomials.get(factors)?, block)
+    }
+
     fn constant(&mut self, row: [f64; QUAD]) -> Quad {
         let position = *self.row_of.entry(row.map(f64::to_bits)).or_insert_with(|| {
             self.rows.push(row);
@@ -398,12 +397,10 @@ mod tests {
         let (program, pattern) = dynamics_jacobian(&system, 0, form).expect("lowers");
         let point =
             |shift: f64| -> Vec<f64> { (0..5).map(|k| shift - 0.4 * f64::from(k)).collect() };
-        let (mut ddz, mut entries) = (vec![0.0; 5], vec![0.0; pattern.len()]);
         let inputs = [point(0.9), point(1.3), point(-0.2)];
-        let inputs = inputs.each_ref().map(Vec::as_slice);
-        Interpreter::new(&program).run(&inputs, &mut [&mut ddz, &mut entries]);
-        ddz.extend(entries);
-        (program, ddz)
+        let results = Interpreter::new(&program).results(&inputs);
+        assert_eq!(results[1].len(), pattern.len());
+        (program, results.concat())
     }
 
     #[test]

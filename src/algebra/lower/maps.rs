@@ -10,106 +10,94 @@ use super::error::LowerError;
 use super::network;
 use super::sums::{Term, linear_combination};
 use crate::ir::{Program, ProgramBuilder};
-use crate::model::{AffineMap, ReducedModel};
+use crate::model::ReducedModel;
 
-/// `z = W_e (s_x x) + b_e`: input `x` (SI units), output `z`.
-///
-/// # Errors
-/// [`LowerError::Model`] if the model has no encoder or scaling.
-pub fn encode(model: &ReducedModel) -> Result<Program, LowerError> {
-    let Some(encoder) = model.encoder_map()?.as_affine() else {
-        return network::encode(model);
-    };
-    let weights = model.encoder_jacobian(&anywhere(encoder))?;
-    let bias = encoder.bias().as_slice();
-    affine("encode", ("x", "z"), &weights, Some(bias))
+/// A map between robot coordinates (SI units) and latent ones; velocities take no bias.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Map {
+    /// `z = W_e (s_x x) + b_e`
+    Encode,
+    /// `dz = W_e (s_x dx)`
+    EncodeVelocity,
+    /// `x = (W_d z + b_d) / s_x`
+    Decode,
+    /// `dx = (W_d dz) / s_x`
+    DecodeVelocity,
+    /// `u_lat = pinv(W_e^T) (s_u u)`
+    ProjectInput,
+    /// `u = (W_e^T u_lat) / s_u`
+    LiftInput,
 }
 
-/// `dz = W_e (s_x dx)`: input `dx` (SI units), output `dz`; velocities take no bias.
-///
-/// # Errors
-/// As [`encode`].
-pub fn encode_velocity(model: &ReducedModel) -> Result<Program, LowerError> {
-    let Some(encoder) = model.encoder_map()?.as_affine() else {
-        return network::encode_velocity(model);
-    };
-    let weights = model.encoder_jacobian(&anywhere(encoder))?;
-    affine("encode_velocity", ("dx", "dz"), &weights, None)
-}
+impl Map {
+    /// All maps.
+    pub const ALL: [Self; 6] = [
+        Self::Encode,
+        Self::EncodeVelocity,
+        Self::Decode,
+        Self::DecodeVelocity,
+        Self::ProjectInput,
+        Self::LiftInput,
+    ];
 
-/// `x = (W_d z + b_d) / s_x`: input `z`, output `x` (SI units).
-///
-/// # Errors
-/// [`LowerError::Model`] if the model has no decoder or scaling.
-pub fn decode(model: &ReducedModel) -> Result<Program, LowerError> {
-    let Some(decoder) = model.decoder_map()?.as_affine() else {
-        return network::decode(model);
-    };
-    let weights = model.decoder_jacobian(&anywhere(decoder))?;
-    let bias = decoder.bias().component_div(&model.state_factors()?);
-    affine("decode", ("z", "x"), &weights, Some(bias.as_slice()))
-}
+    /// Name, input and output of the map's program.
+    pub(super) fn words(self) -> (&'static str, (&'static str, &'static str)) {
+        match self {
+            Self::Encode => ("encode", ("x", "z")),
+            Self::EncodeVelocity => ("encode_velocity", ("dx", "dz")),
+            Self::Decode => ("decode", ("z", "x")),
+            Self::DecodeVelocity => ("decode_velocity", ("dz", "dx")),
+            Self::ProjectInput => ("project_input", ("u", "u_lat")),
+            Self::LiftInput => ("lift_input", ("u_lat", "u")),
+        }
+    }
 
-/// `dx = (W_d dz) / s_x`: input `dz`, output `dx` (SI units); velocities take no bias.
-///
-/// # Errors
-/// As [`decode`].
-pub fn decode_velocity(model: &ReducedModel) -> Result<Program, LowerError> {
-    let Some(decoder) = model.decoder_map()?.as_affine() else {
-        return network::decode_velocity(model);
-    };
-    let weights = model.decoder_jacobian(&anywhere(decoder))?;
-    affine("decode_velocity", ("dz", "dx"), &weights, None)
-}
+    /// The program of a model's map.
+    ///
+    /// # Errors
+    /// [`LowerError::Model`] if the model has no scaling, encoder or, for the maps that decode, decoder.
+    pub fn lower(self, model: &ReducedModel) -> Result<Program, LowerError> {
+        let map = match self {
+            Self::Encode | Self::EncodeVelocity | Self::ProjectInput | Self::LiftInput => {
+                model.encoder_map()?
+            }
+            Self::Decode | Self::DecodeVelocity => model.decoder_map()?,
+        };
+        let Some(map) = map.as_affine() else {
+            return network::lower(self, model);
+        };
+        // The Jacobian of a linear map is the same everywhere.
+        let at = &DVector::zeros(map.input_dim());
+        let (weights, bias) = match self {
+            Self::Encode => (model.encoder_jacobian(at)?, Some(map.bias().clone())),
+            Self::EncodeVelocity => (model.encoder_jacobian(at)?, None),
+            Self::Decode => {
+                let bias = map.bias().component_div(&model.state_factors()?);
+                (model.decoder_jacobian(at)?, Some(bias))
+            }
+            Self::DecodeVelocity => (model.decoder_jacobian(at)?, None),
+            Self::ProjectInput => (model.tangent(at)?.project, None),
+            Self::LiftInput => (model.tangent(at)?.lift, None),
+        };
+        affine(self, &weights, bias.as_ref())
+    }
 
-/// `u_lat = pinv(W_e^T) (s_u u)`: input `u` (SI units), output `u_lat`.
-///
-/// # Errors
-/// As [`encode`].
-pub fn project_input(model: &ReducedModel) -> Result<Program, LowerError> {
-    let Some(encoder) = model.encoder_map()?.as_affine() else {
-        return network::project_input(model);
-    };
-    let weights = model.tangent(&anywhere(encoder))?.project;
-    affine("project_input", ("u", "u_lat"), &weights, None)
-}
-
-/// `u = (W_e^T u_lat) / s_u`: input `u_lat`, output `u` (SI units).
-///
-/// # Errors
-/// As [`encode`].
-pub fn lift_input(model: &ReducedModel) -> Result<Program, LowerError> {
-    let Some(encoder) = model.encoder_map()?.as_affine() else {
-        return network::lift_input(model);
-    };
-    let weights = model.tangent(&anywhere(encoder))?.lift;
-    affine("lift_input", ("u_lat", "u"), &weights, None)
-}
-
-/// `output = weights input` by name, for input maps in other units than the model's.
-///
-/// # Errors
-/// [`LowerError::Program`] if a weight is not finite.
-pub fn linear_map(
-    name: &str,
-    slots: (&str, &str),
-    weights: &DMatrix<f64>,
-) -> Result<Program, LowerError> {
-    affine(name, slots, weights, None)
-}
-
-/// A point of a linear map, whose Jacobian is the same at all.
-fn anywhere(map: &AffineMap) -> DVector<f64> {
-    DVector::zeros(map.input_dim())
+    /// The same for `output = weights input`, for input maps in other units than the model's.
+    ///
+    /// # Errors
+    /// [`LowerError::Program`] if a weight is not finite.
+    pub fn of_weights(self, weights: &DMatrix<f64>) -> Result<Program, LowerError> {
+        affine(self, weights, None)
+    }
 }
 
 /// `output = weights input + bias`.
 fn affine(
-    name: &str,
-    (from, to): (&str, &str),
+    map: Map,
     weights: &DMatrix<f64>,
-    bias: Option<&[f64]>,
+    bias: Option<&DVector<f64>>,
 ) -> Result<Program, LowerError> {
+    let (name, (from, to)) = map.words();
     let mut builder = ProgramBuilder::new(name);
     let input = builder.input(from, weights.ncols());
     let mut output = Vec::with_capacity(weights.nrows());

@@ -18,6 +18,7 @@ mod gradient;
 mod maps;
 mod nested;
 mod network;
+mod number;
 mod solve;
 mod step;
 mod sums;
@@ -27,8 +28,6 @@ pub use compiled::CompiledModel;
 pub use cost::Form;
 pub use dynamics::{JacobianPattern, dynamics, dynamics_jacobian};
 pub use error::LowerError;
-pub use maps::{
-    decode, decode_velocity, encode, encode_velocity, lift_input, linear_map, project_input,
-};
+pub use maps::Map;
 pub use step::rk4_step;
 pub use wrench::{actuator_torque, generalised_input};

@@ -254,9 +254,8 @@ mod tests {
         let program = builder.finish().expect("valid program");
         let is_product = |s: &&Statement| matches!(s, Statement::Binary(Binary::Mul, ..));
         let products = program.statements().iter().filter(is_product).count();
-        let mut found = vec![0.0; sums.len()];
-        Interpreter::new(&program).run(&[point], &mut [&mut found]);
-        (found, products)
+        let mut results = Interpreter::new(&program).results(&[point.to_vec()]);
+        (results.remove(0), products)
     }
 
     #[test]

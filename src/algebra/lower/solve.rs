@@ -1,76 +1,63 @@
 //! Least squares of small, known size as straight-line operations.
 
-use crate::ir::{ProgramBuilder, Unary, ValueId};
+use super::number::{Number, Sheet};
+use crate::ir::Unary;
 
 /// `pinv(J^T) w = (J J^T)^-1 J w` for the `d x n` matrix with these rows, `d <= n`.
 ///
 /// The normal equations by Cholesky, `J J^T = L L^T`; d is small, so all is unrolled. The error
 /// grows with the square of J's condition number. If J has not full row rank a pivot is zero or
 /// negative, and the result infinite or not a number.
-pub(super) fn pinv_times(
-    builder: &mut ProgramBuilder,
-    rows: &[Vec<ValueId>],
-    w: &[ValueId],
-) -> Vec<ValueId> {
+pub(super) fn pinv_times<'b>(
+    sheet: &'b Sheet<'b>,
+    rows: &[Vec<Number<'b>>],
+    w: &[Number<'b>],
+) -> Vec<Number<'b>> {
+    let dot =
+        |a: &[Number<'b>], b: &[Number<'b>]| dot(a, b).unwrap_or_else(|| Number::known(sheet, 0.0));
     let d = rows.len();
-    let mut lower: Vec<Vec<ValueId>> = Vec::with_capacity(d);
-    let mut pivots: Vec<ValueId> = Vec::with_capacity(d);
+    let mut lower: Vec<Vec<Number>> = Vec::with_capacity(d);
+    let mut pivots: Vec<Number> = Vec::with_capacity(d);
     // L y = J w, along with the factorisation.
-    let mut y: Vec<ValueId> = Vec::with_capacity(d);
+    let mut y: Vec<Number> = Vec::with_capacity(d);
     for i in 0..d {
-        let mut row: Vec<ValueId> = Vec::with_capacity(i);
+        let mut row: Vec<Number> = Vec::with_capacity(i);
         for j in 0..i {
-            let entry = dot(builder, &rows[i], &rows[j]);
-            let entry = minus_products(builder, entry, &row, &lower[j]);
-            row.push(builder.div(entry, pivots[j]));
+            let entry = minus_products(dot(&rows[i], &rows[j]), &row, &lower[j]);
+            row.push(entry / pivots[j]);
         }
-        let square = dot(builder, &rows[i], &rows[i]);
-        let square = minus_products(builder, square, &row, &row);
-        let pivot = builder.unary(Unary::Sqrt, square);
-        let right = dot(builder, &rows[i], w);
-        let right = minus_products(builder, right, &row, &y);
-        y.push(builder.div(right, pivot));
+        let square = minus_products(dot(&rows[i], &rows[i]), &row, &row);
+        let pivot = square.unary(Unary::Sqrt);
+        let right = minus_products(dot(&rows[i], w), &row, &y);
+        y.push(right / pivot);
         pivots.push(pivot);
         lower.push(row);
     }
     // L^T u = y, from the last unknown to the first.
     let mut solution = y;
     for i in (0..d).rev() {
-        let column: Vec<ValueId> = (i + 1..d).map(|k| lower[k][i]).collect();
-        let right = minus_products(builder, solution[i], &column, &solution[i + 1..]);
-        solution[i] = builder.div(right, pivots[i]);
+        let column: Vec<Number> = (i + 1..d).map(|k| lower[k][i]).collect();
+        let right = minus_products(solution[i], &column, &solution[i + 1..]);
+        solution[i] = right / pivots[i];
     }
     solution
 }
 
 /// `a . b`; two chains, so that one does not wait for every sum of the other.
-fn dot(builder: &mut ProgramBuilder, a: &[ValueId], b: &[ValueId]) -> ValueId {
-    let mut sums: [Option<ValueId>; 2] = [None; 2];
+fn dot<'b>(a: &[Number<'b>], b: &[Number<'b>]) -> Option<Number<'b>> {
+    let mut sums: [Option<Number>; 2] = [None; 2];
     for (k, (&a, &b)) in a.iter().zip(b).enumerate() {
-        let product = builder.mul(a, b);
-        sums[k % 2] = Some(match sums[k % 2] {
-            None => product,
-            Some(sum) => builder.add(sum, product),
-        });
+        let product = a * b;
+        sums[k % 2] = Some(sums[k % 2].map_or(product, |sum| sum + product));
     }
-    match sums {
-        [Some(even), Some(odd)] => builder.add(even, odd),
-        [Some(only), None] => only,
-        [None, _] => builder.constant(0.0),
-    }
+    let [even, odd] = sums;
+    even.map(|even| odd.map_or(even, |odd| even + odd))
 }
 
 /// `start - a . b`.
-fn minus_products(
-    builder: &mut ProgramBuilder,
-    start: ValueId,
-    a: &[ValueId],
-    b: &[ValueId],
-) -> ValueId {
-    a.iter().zip(b).fold(start, |sum, (&a, &b)| {
-        let product = builder.mul(a, b);
-        builder.sub(sum, product)
-    })
+fn minus_products<'b>(start: Number<'b>, a: &[Number<'b>], b: &[Number<'b>]) -> Number<'b> {
+    let pairs = a.iter().zip(b);
+    pairs.fold(start, |sum, (&a, &b)| sum - a * b)
 }
 
 #[cfg(test)]
@@ -78,22 +65,21 @@ mod tests {
     use nalgebra::{DMatrix, DVector};
 
     use super::*;
-    use crate::ir::Interpreter;
+    use crate::ir::{Interpreter, ProgramBuilder};
+    use crate::lower::number::{ids, numbers};
 
     fn solve(jacobian: &DMatrix<f64>, w: &DVector<f64>) -> DVector<f64> {
         let (d, n) = jacobian.shape();
         let mut builder = ProgramBuilder::new("solve");
         let entries = builder.input("jacobian", d * n);
         let w_values = builder.input("w", n);
-        let rows: Vec<Vec<ValueId>> = entries.chunks(n).map(<[ValueId]>::to_vec).collect();
-        let solution = pinv_times(&mut builder, &rows, &w_values);
+        let sheet = &Sheet::new(&mut builder);
+        let rows: Vec<Vec<Number>> = entries.chunks(n).map(|row| numbers(sheet, row)).collect();
+        let solution = ids(&pinv_times(sheet, &rows, &numbers(sheet, &w_values)));
         builder.output("u", &solution);
         let program = builder.finish().expect("a valid program");
-        let row_major = jacobian.transpose();
-        let mut u = DVector::zeros(d);
-        let inputs = [row_major.as_slice(), w.as_slice()];
-        Interpreter::new(&program).run(&inputs, &mut [u.as_mut_slice()]);
-        u
+        let inputs = [jacobian.transpose().as_slice(), w.as_slice()].map(<[f64]>::to_vec);
+        DVector::from_vec(Interpreter::new(&program).results(&inputs).remove(0))
     }
 
     #[test]

@@ -3,8 +3,9 @@
 use super::cost::Form;
 use super::dynamics::dynamics;
 use super::error::LowerError;
+use super::number::{Number, Sheet, ids, numbers};
 use crate::equations::Equations;
-use crate::ir::{Program, ProgramBuilder, ValueId};
+use crate::ir::{Program, ProgramBuilder};
 
 /// The program of one fourth-order Runge-Kutta step of `d/dt (z, dz) = (dz, ddz)` over
 /// `h` seconds with constant `u_lat`: inputs `z`, `dz`, `u_lat`, `h`; outputs `z`, `dz`
@@ -16,72 +17,56 @@ pub fn rk4_step(system: &Equations<'_>, phase: usize, form: Form) -> Result<Prog
     let accelerations = dynamics(system, phase, form)?;
     let d = system.latent_dim();
     let mut builder = ProgramBuilder::new("step");
-    let z = builder.input("z", d);
-    let dz = builder.input("dz", d);
-    let u_lat = builder.input("u_lat", d);
+    let inputs = ["z", "dz", "u_lat"].map(|name| builder.input(name, d));
     let h = builder.input("h", 1)[0];
-    let (half, sixth) = (builder.constant(0.5), builder.constant(6.0));
-    let half_step = builder.mul(half, h);
-    let sixth_step = builder.div(h, sixth);
+    let sheet = &Sheet::new(&mut builder);
+    let [z, dz, u_lat] = inputs.map(|ids| numbers(sheet, &ids));
+    let h = Number::new(sheet, h);
+    let (half_step, sixth_step) = (0.5 * h, h / 6.0);
 
     let mut velocities = vec![dz.clone()];
-    let mut slopes: Vec<Vec<ValueId>> = Vec::new();
+    let mut slopes: Vec<Vec<Number>> = Vec::new();
     let mut at = z.clone();
     for stage in 0..4 {
-        let arguments = [at.as_slice(), &velocities[stage], &u_lat].concat();
-        slopes.push(builder.call(&accelerations, &arguments).remove(0));
+        let arguments = ids(&[at.as_slice(), &velocities[stage], &u_lat].concat());
+        let ddz = sheet
+            .borrow_mut()
+            .call(&accelerations, &arguments)
+            .remove(0);
+        slopes.push(numbers(sheet, &ddz));
         if stage < 3 {
             let length = if stage == 2 { h } else { half_step };
-            at = advance(&mut builder, &z, length, &velocities[stage]);
-            let velocity = advance(&mut builder, &dz, length, &slopes[stage]);
-            velocities.push(velocity);
+            at = advance(&z, length, &velocities[stage]);
+            velocities.push(advance(&dz, length, &slopes[stage]));
         }
     }
-    let z_next = weighted(&mut builder, &z, sixth_step, &velocities);
-    let dz_next = weighted(&mut builder, &dz, sixth_step, &slopes);
+    let z_next = ids(&weighted(&z, sixth_step, &velocities));
+    let dz_next = ids(&weighted(&dz, sixth_step, &slopes));
     builder.output("z", &z_next);
     builder.output("dz", &dz_next);
     Ok(builder.finish()?)
 }
 
 /// `start + length * slope`.
-fn advance(
-    builder: &mut ProgramBuilder,
-    start: &[ValueId],
-    length: ValueId,
-    slope: &[ValueId],
-) -> Vec<ValueId> {
-    start
-        .iter()
-        .zip(slope)
-        .map(|(&start, &slope)| {
-            let change = builder.mul(length, slope);
-            builder.add(start, change)
-        })
+fn advance<'b>(start: &[Number<'b>], length: Number<'b>, slope: &[Number<'b>]) -> Vec<Number<'b>> {
+    let pairs = start.iter().zip(slope);
+    pairs
+        .map(|(&start, &slope)| start + length * slope)
         .collect()
 }
 
 /// `start + sixth_step * ((s_1 + s_4) + 2 (s_2 + s_3))`.
-fn weighted(
-    builder: &mut ProgramBuilder,
-    start: &[ValueId],
-    sixth_step: ValueId,
-    stages: &[Vec<ValueId>],
-) -> Vec<ValueId> {
-    let two = builder.constant(2.0);
-    let mut sum = |a: &[ValueId], b: &[ValueId]| -> Vec<ValueId> {
-        let pairs = a.iter().zip(b);
-        pairs.map(|(&a, &b)| builder.add(a, b)).collect()
+fn weighted<'b>(
+    start: &[Number<'b>],
+    sixth_step: Number<'b>,
+    stages: &[Vec<Number<'b>>],
+) -> Vec<Number<'b>> {
+    let sum = |a: &[Number<'b>], b: &[Number<'b>]| -> Vec<Number<'b>> {
+        a.iter().zip(b).map(|(&a, &b)| a + b).collect()
     };
     let outer = sum(&stages[0], &stages[3]);
     let inner = sum(&stages[1], &stages[2]);
-    let mean: Vec<ValueId> = outer
-        .into_iter()
-        .zip(inner)
-        .map(|(outer, inner)| {
-            let inner = builder.mul(two, inner);
-            builder.add(outer, inner)
-        })
-        .collect();
-    advance(builder, start, sixth_step, &mean)
+    let pairs = outer.into_iter().zip(inner);
+    let mean: Vec<Number> = pairs.map(|(outer, inner)| outer + 2.0 * inner).collect();
+    advance(start, sixth_step, &mean)
 }

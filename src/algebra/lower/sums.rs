@@ -43,24 +43,16 @@ fn partial_sums(
         4..=7 => 2,
         _ => 4,
     };
-    let mut sums: Vec<Option<ValueId>> = (0..n_chains)
-        .map(|k| {
-            let own: Vec<Term> = terms.iter().copied().skip(k).step_by(n_chains).collect();
-            chain(builder, start.filter(|_| k == 0), &own)
-        })
-        .collect();
+    let sums = (0..n_chains).filter_map(|k| {
+        let own: Vec<Term> = terms.iter().copied().skip(k).step_by(n_chains).collect();
+        chain(builder, start.filter(|_| k == 0), &own)
+    });
+    let mut sums: Vec<ValueId> = sums.collect();
     while sums.len() > 1 {
-        sums = sums
-            .chunks(2)
-            .map(|pair| match pair {
-                [Some(a), Some(b)] => Some(builder.add(*a, *b)),
-                [one] | [one, None] => *one,
-                [None, other] => *other,
-                _ => None,
-            })
-            .collect();
+        let pairs = sums.chunks(2);
+        sums = pairs.map(|pair| builder.add(pair[0], pair[1])).collect();
     }
-    sums.pop().flatten()
+    sums.pop()
 }
 
 /// Adds the terms one after the other.

@@ -19,8 +19,9 @@
 //! `d / max(d^2, least^2)`, see
 //! [`LegGeometry::least_levers`](crate::robot::LegGeometry::least_levers).
 
-use super::chain::JointAngles;
+use super::chain::{JointAngles, chain_wrench};
 use super::error::LowerError;
+use super::number::{Number, Sheet};
 use crate::ir::{Program, ProgramBuilder, Unary, ValueId};
 use crate::model::ReducedModel;
 use crate::robot::actuators::DRY_SPEED_RAD_S;
@@ -67,16 +68,15 @@ fn torque_of(rule: &InputRule) -> Result<Program, LowerError> {
     let dx = builder.input("dx", STATE_DIM);
     let ddx = builder.input("ddx", STATE_DIM);
     let net = builder.input("net", JOINT_DIM);
-    let mut steps = Steps(&mut builder);
-    let tau: Vec<ValueId> = (0..JOINT_DIM)
-        .map(|joint| {
-            let friction = steps.friction(rule, joint, dx[joint]);
-            let armature = rule.actuators().map_or(0.0, |a| a.armature[joint]);
-            let inertia = steps.scaled(armature, ddx[joint]);
-            let losses = steps.sum(friction, inertia);
-            steps.sum(Some(net[joint]), losses).expect("of something")
-        })
-        .collect();
+    let sheet = &Sheet::new(&mut builder);
+    let tau = (0..JOINT_DIM).map(|joint| {
+        let [dx, ddx, net] = [dx[joint], ddx[joint], net[joint]].map(|id| Number::new(sheet, id));
+        let friction = friction(rule, joint, dx);
+        let armature = rule.actuators().map_or(0.0, |a| a.armature[joint]);
+        let losses = sum(friction, scaled(armature, ddx));
+        losses.map_or(net, |losses| net + losses).id
+    });
+    let tau: Vec<ValueId> = tau.collect();
     builder.output("tau", &tau);
     Ok(builder.finish()?)
 }
@@ -88,13 +88,13 @@ fn input_of(rule: &InputRule) -> Result<Program, LowerError> {
     let dx = builder.input("dx", STATE_DIM);
     let tau = builder.input("tau", JOINT_DIM);
     let feet = builder.input("feet", FOOT_DIM);
-    let mut steps = Steps(&mut builder);
-    let net: Vec<ValueId> = (0..JOINT_DIM)
-        .map(|joint| match steps.friction(rule, joint, dx[joint]) {
-            None => tau[joint],
-            Some(friction) => steps.0.sub(tau[joint], friction),
-        })
-        .collect();
+    let sheet = &Sheet::new(&mut builder);
+    let number = |id: ValueId| Number::new(sheet, id);
+    let net: [Number; JOINT_DIM] = std::array::from_fn(|joint| {
+        let tau = number(tau[joint]);
+        let friction = friction(rule, joint, number(dx[joint]));
+        friction.map_or(tau, |friction| tau - friction)
+    });
     let joint = |kind: usize| (0..FOOT_DIM).map(move |leg| LEG_JOINT_DIM * leg + kind);
     // Abductions, then flexions, then of planar legs the angles of the calves, flexion plus knee, of
     // others those of the knees.
@@ -102,7 +102,7 @@ fn input_of(rule: &InputRule) -> Result<Program, LowerError> {
     for leg in Leg::ALL {
         let k = LEG_JOINT_DIM * leg.index() + 1;
         angles.push(match robot.geometry(leg) {
-            LegGeometry::Planar(_) => builder.add(x[k], x[k + 1]),
+            LegGeometry::Planar(_) => (number(x[k]) + number(x[k + 1])).id,
             LegGeometry::Chain(_) => x[k + 1],
         });
     }
@@ -110,196 +110,135 @@ fn input_of(rule: &InputRule) -> Result<Program, LowerError> {
     if frame == WrenchFrame::World {
         angles.extend(&x[STATE_DIM - 3..]);
     }
-    let (sines, cosines) = builder.sin_cos(&angles);
-    let mut steps = Steps(&mut builder);
-    let of_legs: Vec<[ValueId; BODY_DIM]> = Leg::ALL
-        .into_iter()
-        .map(|leg| {
-            let k = leg.index();
-            let at = |group: usize| (sines[FOOT_DIM * group + k], cosines[FOOT_DIM * group + k]);
-            let angles = [at(0), at(1), at(2)];
-            let torques = std::array::from_fn(|i| net[LEG_JOINT_DIM * k + i]);
-            let wrench = match robot.geometry(leg) {
-                LegGeometry::Planar(planar) => steps.leg_wrench(planar, angles, torques, feet[k]),
-                LegGeometry::Chain(chain) => steps.chain_wrench(chain, angles, torques, feet[k]),
-            };
-            match frame {
-                WrenchFrame::Body => wrench,
-                WrenchFrame::World => steps.about_body(robot.hip_position(leg).into(), wrench),
-            }
-        })
-        .collect();
-    let wrench: [ValueId; BODY_DIM] = std::array::from_fn(|i| {
-        let front = steps.0.add(of_legs[0][i], of_legs[1][i]);
-        let rear = steps.0.add(of_legs[2][i], of_legs[3][i]);
-        steps.0.add(front, rear)
+    let (sines, cosines) = sheet.borrow_mut().sin_cos(&angles);
+    let at = |angle: usize| (number(sines[angle]), number(cosines[angle]));
+    let of_legs = Leg::ALL.map(|leg| {
+        let k = leg.index();
+        let angles = [at(k), at(FOOT_DIM + k), at(2 * FOOT_DIM + k)];
+        let torques = std::array::from_fn(|i| net[LEG_JOINT_DIM * k + i]);
+        let foot = number(feet[k]);
+        let wrench = match robot.geometry(leg) {
+            LegGeometry::Planar(planar) => leg_wrench(planar, angles, torques, foot),
+            LegGeometry::Chain(chain) => chain_wrench(chain, angles, torques, foot),
+        };
+        match frame {
+            WrenchFrame::Body => wrench,
+            WrenchFrame::World => about_body(robot.hip_position(leg).into(), wrench),
+        }
     });
+    let [fr, fl, rr, rl] = of_legs;
+    let wrench = std::array::from_fn(|i| (fr[i] + fl[i]) + (rr[i] + rl[i]));
     let wrench = match frame {
         WrenchFrame::Body => wrench,
-        WrenchFrame::World => {
-            let at = |angle: usize| {
-                let k = JOINT_DIM + angle;
-                (sines[k], cosines[k])
-            };
-            steps.in_world([at(0), at(1), at(2)], wrench)
-        }
+        WrenchFrame::World => in_world([0, 1, 2].map(|angle| at(JOINT_DIM + angle)), wrench),
     };
-    let u: Vec<ValueId> = net.into_iter().chain(wrench).collect();
+    let u: Vec<ValueId> = net.into_iter().chain(wrench).map(|u| u.id).collect();
     builder.output("u", &u);
     Ok(builder.finish()?)
 }
 
-/// The builder, with longer operations by name.
-pub(super) struct Steps<'b>(pub(super) &'b mut ProgramBuilder);
+/// `factor value`; nothing is computed for a factor of zero.
+fn scaled(factor: f64, value: Number) -> Option<Number> {
+    (factor != 0.0).then(|| factor * value)
+}
 
-impl Steps<'_> {
-    /// `a b - c d`.
-    fn minor(&mut self, (a, b): (ValueId, ValueId), (c, d): (ValueId, ValueId)) -> ValueId {
-        let (left, right) = (self.0.mul(a, b), self.0.mul(c, d));
-        self.0.sub(left, right)
+/// The sum of what is there.
+fn sum<'b>(a: Option<Number<'b>>, b: Option<Number<'b>>) -> Option<Number<'b>> {
+    match (a, b) {
+        (Some(a), Some(b)) => Some(a + b),
+        (one, None) | (None, one) => one,
     }
+}
 
-    /// `factor value`; nothing is computed for a factor of zero.
-    fn scaled(&mut self, factor: f64, value: ValueId) -> Option<ValueId> {
-        (factor != 0.0).then(|| {
-            let factor = self.0.constant(factor);
-            self.0.mul(factor, value)
-        })
-    }
+/// `a value_a + b value_b`.
+fn combined<'b>((a, of_a): (f64, Number<'b>), (b, of_b): (f64, Number<'b>)) -> Number<'b> {
+    let combined = sum(scaled(a, of_a), scaled(b, of_b));
+    combined.unwrap_or_else(|| of_a.constant(0.0))
+}
 
-    /// `a value_a + b value_b`.
-    fn combined(&mut self, (a, of_a): (f64, ValueId), (b, of_b): (f64, ValueId)) -> ValueId {
-        match (self.scaled(a, of_a), self.scaled(b, of_b)) {
-            (Some(a), Some(b)) => self.0.add(a, b),
-            (Some(only), None) | (None, Some(only)) => only,
-            (None, None) => self.0.constant(0.0),
-        }
-    }
+/// Viscous and dry friction of a joint at a velocity; none without any.
+fn friction<'b>(rule: &InputRule, joint: usize, velocity: Number<'b>) -> Option<Number<'b>> {
+    let actuators = rule.actuators()?;
+    let viscous = scaled(actuators.viscous[joint], velocity);
+    let dry = actuators.dry[joint];
+    let dry = (dry != 0.0).then(|| dry * (velocity / DRY_SPEED_RAD_S).unary(Unary::Tanh));
+    sum(viscous, dry)
+}
 
-    /// The sum of what is there.
-    fn sum(&mut self, a: Option<ValueId>, b: Option<ValueId>) -> Option<ValueId> {
-        match (a, b) {
-            (Some(a), Some(b)) => Some(self.0.add(a, b)),
-            (one, None) | (None, one) => one,
-        }
-    }
+/// `numerator / divisor`, with `divisor / max(divisor^2, least^2)` for the reciprocal.
+pub(super) fn damped<'b>(numerator: Number<'b>, divisor: Number<'b>, least: f64) -> Number<'b> {
+    let (square, floor) = (divisor * divisor, divisor.constant(least * least));
+    let twice_larger = (square + floor) + (square - floor).abs();
+    2.0 * (numerator * divisor) / twice_larger
+}
 
-    /// Viscous and dry friction of a joint at a velocity; none without any.
-    fn friction(&mut self, rule: &InputRule, joint: usize, velocity: ValueId) -> Option<ValueId> {
-        let actuators = rule.actuators()?;
-        let viscous = self.scaled(actuators.viscous[joint], velocity);
-        let dry = actuators.dry[joint];
-        let dry = (dry != 0.0).then(|| {
-            let speed = self.0.constant(DRY_SPEED_RAD_S);
-            let share = self.0.div(velocity, speed);
-            let share = self.0.unary(Unary::Tanh, share);
-            let dry = self.0.constant(dry);
-            self.0.mul(dry, share)
-        });
-        self.sum(viscous, dry)
-    }
-
-    /// `numerator / divisor`, with `divisor / max(divisor^2, least^2)` for the reciprocal.
-    pub(super) fn damped(&mut self, numerator: ValueId, divisor: ValueId, least: f64) -> ValueId {
-        let (square, floor) = (self.0.mul(divisor, divisor), self.0.constant(least * least));
-        let (sum, difference) = (self.0.add(square, floor), self.0.sub(square, floor));
-        let difference = self.0.unary(Unary::Abs, difference);
-        let twice_larger = self.0.add(sum, difference);
-        let two = self.0.constant(2.0);
-        let product = self.0.mul(numerator, divisor);
-        let product = self.0.mul(two, product);
-        self.0.div(product, twice_larger)
-    }
-
-    /// The same wrench with its moment about the body's origin instead of the hip `[x, y, z]`.
-    fn about_body(&mut self, hip: [f64; 3], wrench: [ValueId; BODY_DIM]) -> [ValueId; BODY_DIM] {
-        let mut moved = wrench;
-        for axis in 0..3 {
-            let (next, last) = ((axis + 1) % 3, (axis + 2) % 3);
-            for (lever, force) in [(hip[next], wrench[last]), (-hip[last], wrench[next])] {
-                if let Some(part) = self.scaled(lever, force) {
-                    moved[3 + axis] = self.0.add(moved[3 + axis], part);
-                }
+/// The same wrench with its moment about the body's origin instead of the hip `[x, y, z]`.
+fn about_body<'b>(hip: [f64; 3], wrench: [Number<'b>; BODY_DIM]) -> [Number<'b>; BODY_DIM] {
+    let mut moved = wrench;
+    for axis in 0..3 {
+        let (next, last) = ((axis + 1) % 3, (axis + 2) % 3);
+        for (lever, force) in [(hip[next], wrench[last]), (-hip[last], wrench[next])] {
+            if let Some(part) = scaled(lever, force) {
+                moved[3 + axis] = moved[3 + axis] + part;
             }
         }
-        moved
     }
+    moved
+}
 
-    /// Force and moment in the body's axes as the generalised forces of the body's coordinates, with
-    /// sine and cosine of roll, pitch and yaw.
-    fn in_world(
-        &mut self,
-        [(s_r, c_r), (s_p, c_p), (s_y, c_y)]: [(ValueId, ValueId); 3],
-        [f_x, f_y, f_z, m_x, m_y, m_z]: [ValueId; BODY_DIM],
-    ) -> [ValueId; BODY_DIM] {
-        // R_x, then R_y, then R_z on the force.
-        let (across, up) = (
-            self.minor((c_r, f_y), (s_r, f_z)),
-            self.cross_sum((s_r, f_y), (c_r, f_z)),
-        );
-        let (along, up) = (
-            self.cross_sum((c_p, f_x), (s_p, up)),
-            self.minor((c_p, up), (s_p, f_x)),
-        );
-        let force_x = self.minor((c_y, along), (s_y, across));
-        let force_y = self.cross_sum((s_y, along), (c_y, across));
-        // The axis of the pitch rate is e_y turned by the roll alone, that of the yaw rate is vertical.
-        let pitch = self.minor((c_r, m_y), (s_r, m_z));
-        let about_up = self.cross_sum((s_r, m_y), (c_r, m_z));
-        let yaw = self.minor((c_p, about_up), (s_p, m_x));
-        [force_x, force_y, up, m_x, pitch, yaw]
-    }
+/// Force and moment in the body's axes as the generalised forces of the body's coordinates, with
+/// sine and cosine of roll, pitch and yaw.
+fn in_world<'b>(
+    [(s_r, c_r), (s_p, c_p), (s_y, c_y)]: JointAngles<'b>,
+    [f_x, f_y, f_z, m_x, m_y, m_z]: [Number<'b>; BODY_DIM],
+) -> [Number<'b>; BODY_DIM] {
+    // R_x, then R_y, then R_z on the force.
+    let (across, up) = (c_r * f_y - s_r * f_z, s_r * f_y + c_r * f_z);
+    let (along, up) = (c_p * f_x + s_p * up, c_p * up - s_p * f_x);
+    let force_x = c_y * along - s_y * across;
+    let force_y = s_y * along + c_y * across;
+    // The axis of the pitch rate is e_y turned by the roll alone, that of the yaw rate is vertical.
+    let pitch = c_r * m_y - s_r * m_z;
+    let about_up = s_r * m_y + c_r * m_z;
+    let yaw = c_p * about_up - s_p * m_x;
+    [force_x, force_y, up, m_x, pitch, yaw]
+}
 
-    /// `a b + c d`.
-    fn cross_sum(&mut self, (a, b): (ValueId, ValueId), (c, d): (ValueId, ValueId)) -> ValueId {
-        let (left, right) = (self.0.mul(a, b), self.0.mul(c, d));
-        self.0.add(left, right)
-    }
+/// Force and moment of one leg about its hip, in axes parallel to the body's; the third angle is that
+/// of the calf, flexion plus knee.
+fn leg_wrench<'b>(
+    geometry: &PlanarLeg,
+    [abduction, of_thigh, (calf_sin, calf_cos)]: JointAngles<'b>,
+    torques: [Number<'b>; LEG_JOINT_DIM],
+    foot: Number<'b>,
+) -> [Number<'b>; BODY_DIM] {
+    let (thigh, calf, forward) = (geometry.thigh_m, geometry.calf_m, geometry.foot_forward_m);
+    let calf_forward = combined((-calf, calf_sin), (forward, calf_cos));
+    let calf_up = combined((-calf, calf_cos), (-forward, calf_sin));
+    let thigh_forward = combined((-thigh, of_thigh.0), (0.0, of_thigh.0));
+    let thigh_up = combined((-thigh, of_thigh.1), (0.0, of_thigh.1));
+    let (fwd, up) = (thigh_forward + calf_forward, thigh_up + calf_up);
+    // The same as up c_fwd - fwd c_up, without what cancels.
+    let det = thigh_up * calf_forward - thigh_forward * calf_up;
+    let [least_det, least_up] = least_levers([thigh, calf]);
 
-    /// Force and moment of one leg about its hip, in axes parallel to the body's; the third angle is that
-    /// of the calf, flexion plus knee.
-    fn leg_wrench(
-        &mut self,
-        geometry: &PlanarLeg,
-        [abduction, of_thigh, (calf_sin, calf_cos)]: JointAngles,
-        torques: [ValueId; LEG_JOINT_DIM],
-        foot: ValueId,
-    ) -> [ValueId; BODY_DIM] {
-        let (thigh, calf, forward) = (geometry.thigh_m, geometry.calf_m, geometry.foot_forward_m);
-        let calf_forward = self.combined((-calf, calf_sin), (forward, calf_cos));
-        let calf_up = self.combined((-calf, calf_cos), (-forward, calf_sin));
-        let thigh_forward = self.combined((-thigh, of_thigh.0), (0.0, of_thigh.0));
-        let thigh_up = self.combined((-thigh, of_thigh.1), (0.0, of_thigh.1));
-        let fwd = self.0.add(thigh_forward, calf_forward);
-        let up = self.0.add(thigh_up, calf_up);
-        // The same as up c_fwd - fwd c_up, without what cancels.
-        let det = self.minor((thigh_up, calf_forward), (thigh_forward, calf_up));
-        let [least_det, least_up] = least_levers([thigh, calf]);
+    let [tau_0, tau_1, tau_2] = torques.map(|torque| foot * torque);
+    let hip = foot.constant(geometry.hip_m);
+    let f_x = damped(fwd * tau_2 - calf_forward * tau_1, det, least_det);
+    let f_e = damped(calf_up * tau_1 - up * tau_2, det, least_det);
+    let f_n = damped(tau_0 - hip * f_e, up, least_up);
+    let m_x = -(up * f_n + hip * f_e);
+    let m_e = hip * f_x - fwd * f_n;
+    let m_n = fwd * f_e + up * f_x;
 
-        let [tau_0, tau_1, tau_2] = torques.map(|torque| self.0.mul(foot, torque));
-        let hip = self.0.constant(geometry.hip_m);
-        let across = self.minor((fwd, tau_2), (calf_forward, tau_1));
-        let f_x = self.damped(across, det, least_det);
-        let along = self.minor((calf_up, tau_1), (up, tau_2));
-        let f_e = self.damped(along, det, least_det);
-        let of_hip = self.0.mul(hip, f_e);
-        let rest = self.0.sub(tau_0, of_hip);
-        let f_n = self.damped(rest, up, least_up);
-        let m_x = self.cross_sum((up, f_n), (hip, f_e));
-        let m_x = self.0.unary(Unary::Neg, m_x);
-        let m_e = self.minor((hip, f_x), (fwd, f_n));
-        let m_n = self.cross_sum((fwd, f_e), (up, f_x));
+    let [f_y, f_z] = turned(abduction, f_e, f_n);
+    let [m_y, m_z] = turned(abduction, m_e, m_n);
+    [f_x, f_y, f_z, m_x, m_y, m_z]
+}
 
-        let [f_y, f_z] = self.turned(abduction, f_e, f_n);
-        let [m_y, m_z] = self.turned(abduction, m_e, m_n);
-        [f_x, f_y, f_z, m_x, m_y, m_z]
-    }
-
-    /// The components along y and z of `a e + b n`.
-    fn turned(&mut self, (s, c): (ValueId, ValueId), a: ValueId, b: ValueId) -> [ValueId; 2] {
-        let (a_s, b_c) = (self.0.mul(a, s), self.0.mul(b, c));
-        [self.0.add(a_s, b_c), self.minor((b, s), (a, c))]
-    }
+/// The components along y and z of `a e + b n`.
+fn turned<'b>((s, c): (Number<'b>, Number<'b>), a: Number<'b>, b: Number<'b>) -> [Number<'b>; 2] {
+    [a * s + b * c, b * s - a * c]
 }
 
 #[cfg(test)]
@@ -332,11 +271,10 @@ mod tests {
         rules.flatten().collect()
     }
 
-    fn run(rule: &InputRule, x: &[f64], dx: &[f64], tau: &[f64], feet: &[f64]) -> [f64; STATE_DIM] {
+    fn run(rule: &InputRule, x: &[f64], dx: &[f64], tau: &[f64], feet: &[f64]) -> Vec<f64> {
         let program = input_of(rule).expect("lowers");
-        let mut u = [f64::NAN; STATE_DIM];
-        Interpreter::new(&program).run(&[x, dx, tau, feet], &mut [&mut u]);
-        u
+        let inputs = [x, dx, tau, feet].map(<[f64]>::to_vec);
+        Interpreter::new(&program).results(&inputs).remove(0)
     }
 
     fn contacts() -> impl Iterator<Item = ContactFlags> {
@@ -427,11 +365,11 @@ mod tests {
             let program = torque_of(&rule).expect("lowers");
             let mut interpreter = Interpreter::new(&program);
             for acceleration in [0.0, 70.0] {
-                let mut back = [f64::NAN; JOINT_DIM];
                 let ddx = [acceleration; STATE_DIM];
-                interpreter.run(&[&dx, &ddx, &u[..JOINT_DIM]], &mut [&mut back]);
+                let inputs = [&dx[..], &ddx, &u[..JOINT_DIM]].map(<[f64]>::to_vec);
+                let back = interpreter.results(&inputs).remove(0);
                 let inertia = rule.actuators().map_or(0.0, |_| 0.01 * acceleration);
-                for (found, tau) in back.iter().zip(tau) {
+                for (found, tau) in back.into_iter().zip(tau) {
                     assert!((found - tau - inertia).abs() < 1e-13 * 50.0, "{rule:?}");
                 }
             }

@@ -8,7 +8,6 @@ mod control_model;
 mod lock;
 mod sources;
 
-use std::ffi::CStr;
 
 use askama::Template;
 

@@ -1,14 +1,14 @@
 //! How C99 spells statements.
 
-use crate::codegen::code::{ConstTable, Function, MathFunction, Parameter, Role, Span};
-use crate::codegen::dialect::{Dialect, LaneDialect};
+use super::lanes;
+use crate::codegen::code::{ConstTable, Function, Index, Parameter, Role, Span};
+use crate::codegen::dialect::{Dialect, Lines, name};
 use crate::codegen::fours::{FourBlock, Fours};
+use crate::codegen::lanes::Row;
 use crate::codegen::line_wrapping::{braced, comment_lines};
-use crate::codegen::literal::Literal;
 use crate::codegen::precision::Precision;
-use crate::codegen::printer::Printer;
-use crate::codegen::requirements::assigned_in_lanes;
-use crate::ir::{LANES, QUAD, Quad};
+use crate::codegen::printer::{Printer, subscript};
+use crate::ir::{QUAD, Quad, Unary};
 
 /// C99 with the names of one model.
 #[derive(Clone, Debug)]
@@ -17,6 +17,8 @@ pub struct CDialect {
     pub name: String,
     /// Floating-point numbers of the code.
     pub precision: Precision,
+    /// Whether elements are those of the first of several lanes.
+    pub in_lanes: bool,
 }
 
 /// Keywords of C and C++, and the library names that generated files use.
@@ -36,15 +38,15 @@ impl Dialect for CDialect {
         RESERVED
     }
 
-    fn literal(&self, literal: Literal) -> String {
-        format!("{}{}", literal.digits(self.precision), self.suffix())
+    fn literal(&self, value: f64) -> String {
+        format!("{}{}", self.precision.digits(value), self.suffix())
     }
 
-    fn apply(&self, function: MathFunction, argument: &str) -> String {
+    fn apply(&self, function: Unary, argument: &str) -> String {
         let name = match function {
-            MathFunction::Abs => "fabs",
-            MathFunction::Sign => return format!("{}_sign({argument})", self.name),
-            named => named.name(),
+            Unary::Abs => "fabs",
+            Unary::Sign => return format!("{}_sign({argument})", self.name),
+            named => name(named),
         };
         format!("{name}{}({argument})", self.suffix())
     }
@@ -98,11 +100,49 @@ impl Dialect for CDialect {
         ]
     }
 
-    fn lanes(&self) -> Option<&dyn LaneDialect> {
-        Some(self)
+    fn element(&self, array: &str, index: &Index) -> String {
+        self.read(format!("{array}[{}]", subscript(index)))
     }
 
-    fn fours(&self, fours: &Fours, block: &FourBlock) -> Option<Vec<(usize, String)>> {
+    fn entry(&self, table: &str, row: &Index, col: &Index) -> String {
+        self.read(format!("{table}[{}][{}]", subscript(row), subscript(col)))
+    }
+
+    fn row(&self, row: &Row) -> Option<Lines> {
+        Some(lanes::row(self, row))
+    }
+
+    fn fours(&self, fours: &Fours) -> Option<Lines> {
+        let blocks = fours.blocks.iter();
+        Some(
+            blocks
+                .flat_map(|block| self.four_block(fours, block))
+                .collect(),
+        )
+    }
+
+    fn table_base(&self, prefix: &str) -> String {
+        format!("{prefix}table")
+    }
+
+    fn table(&self, table: &ConstTable) -> Option<String> {
+        let rows = self.rows(table, ["    {", ",\n     ", "},"]);
+        let aligned = match table.is_in_lanes {
+            true => format!(" {}_ALIGNED", self.upper()),
+            false => String::new(),
+        };
+        Some(format!(
+            "static const {}{aligned} {}[{}][{}] = {{\n{rows}}};",
+            self.real(),
+            table.name,
+            table.values.rows(),
+            table.values.cols(),
+        ))
+    }
+}
+
+impl CDialect {
+    fn four_block(&self, fours: &Fours, block: &FourBlock) -> Lines {
         let (upper, y, weights) = (self.upper(), &fours.array, &fours.weights);
         let vector = |vector: Quad| match vector {
             Quad::Row(row) => format!("{}[{row}]", fours.table.1),
@@ -134,74 +174,33 @@ impl Dialect for CDialect {
             lines.push((1, format!("{upper}_STORE_FOUR(&{y}[{at}], {});", name(sum))));
         }
         lines.push((0, "}".to_owned()));
-        Some(lines)
+        lines
     }
 
-    fn table_base(&self, prefix: &str) -> String {
-        format!("{prefix}table")
+    /// An element, or that of each lane if it is the first lane's.
+    fn read(&self, element: String) -> String {
+        match self.in_lanes {
+            true => format!("{}_READ({element})", self.upper()),
+            false => element,
+        }
     }
 
-    fn table(&self, table: &ConstTable) -> String {
-        let rows = self.rows(table, ["    {", ",\n     ", "},"]);
-        let aligned = match table.is_in_lanes {
-            true => format!(" {}_ALIGNED", self.upper()),
-            false => String::new(),
-        };
-        format!(
-            "static const {}{aligned} {}[{}][{}] = {{\n{rows}}};",
-            self.real(),
-            table.name,
-            table.values.rows(),
-            table.values.cols(),
-        )
-    }
-}
-
-impl LaneDialect for CDialect {
-    fn declare(&self, sums: &str) -> String {
-        format!("{}_eight {sums};", self.name)
-    }
-
-    fn for_lanes(&self, variable: &str) -> String {
-        let step = format!("{}_LANE_STEP", self.upper());
-        format!("for (size_t {variable} = 0; {variable} < {LANES}; {variable} += {step})")
-    }
-
-    fn read(&self, element: &str) -> String {
-        format!("{}_READ({element})", self.upper())
-    }
-
-    fn write(&self, element: &str) -> String {
-        format!("{}_WRITE({element})", self.upper())
-    }
-
-    fn sums(&self, sums: &str, variable: &str) -> String {
-        format!("{}_SUMS({sums}, {variable})", self.upper())
-    }
-
-    fn total(&self, sums: &str) -> String {
-        format!("{}_LANE_TOTAL({sums})", self.upper())
-    }
-}
-
-impl CDialect {
     /// What macros begin with.
     pub fn upper(&self) -> String {
         self.name.to_ascii_uppercase()
     }
 
     /// The definition of a function; the header has its documentation.
-    pub fn definition(&self, function: &Function, printer: &Printer) -> String {
+    pub fn definition(&self, function: &Function) -> String {
         // Without `restrict` on what lanes assign, gcc keeps in registers what it has read for them;
         // with it, it reads tables once for each use.
-        let in_lanes = assigned_in_lanes(&function.body);
         let head = self.head(function, |parameter| {
-            match in_lanes.contains(&parameter.name) {
+            match function.in_lanes.contains(&parameter.name) {
                 true => "",
                 false => "restrict ",
             }
         });
-        printer.function(&head, |unused| format!("(void){unused};"), function)
+        Printer::new(self).function(&head, |unused| format!("(void){unused};"), function)
     }
 
     /// The function's name and parameters, arrays with what `qualifier` says of each.

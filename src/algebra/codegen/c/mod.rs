@@ -1,66 +1,49 @@
 //! C99: `NAME.h`, `NAME.c`, `NAME_selftest.c` and `CMakeLists.txt`.
 
 mod dialect;
+mod lanes;
 mod selftest;
 
 use askama::Template;
 
-use super::code::{Function, MathFunction, Stmt};
-use super::dialect::Dialect;
 use super::error::CodegenError;
-use super::functions::ModelFunctions;
-use super::interface::ModelInterface;
+use super::interface::{ModelInterface, computes_angles};
 use super::line_wrapping::{braced, tidy};
-use super::phase_text::PhaseText;
+use super::model_text::ModelText;
 use super::precision::Precision;
-use super::printer::Printer;
-use super::requirements::{assigned_in_lanes, calls_function, calls_kernel, has_fours};
 use super::sin_cos::KernelText;
 use super::sines::SineCosine;
+use super::tables::Tables;
+use super::test_vectors::TestVectors;
 use crate::files::EmittedFile;
+use crate::ir::{Statement, Unary};
 use dialect::CDialect;
+use selftest::SelfTest;
+
+/// Functions are prototypes and definitions.
+type Text<'a> = ModelText<'a, (String, String)>;
 
 #[derive(Template)]
 #[template(path = "c/header.askama", config = "../../templates/askama.toml")]
 struct Header<'a> {
-    banner: String,
-    model: &'a str,
-    upper: String,
-    is_single: bool,
-    units: String,
-    latent_dim: usize,
-    state_dim: Option<usize>,
-    /// Prototypes, as those of the phases.
-    maps: Vec<String>,
-    phases: Vec<PhaseText<String>>,
+    banner: &'a str,
+    d: &'a CDialect,
+    m: &'a Text<'a>,
 }
 
 #[derive(Template)]
 #[template(path = "c/source.askama", config = "../../templates/askama.toml")]
 struct Source<'a> {
-    banner: String,
-    name: &'a str,
-    upper: String,
-    real: &'static str,
-    /// What numbers of that type end with.
-    f: &'static str,
-    /// Bytes of a number.
-    size: usize,
-    is_single: bool,
+    banner: &'a str,
+    d: &'a CDialect,
+    m: &'a Text<'a>,
     is_library: bool,
-    latent_dim: usize,
-    n_lanes: usize,
     kernel: Option<KernelText>,
-    /// Whether rows of tables are read in lanes.
-    has_lanes: bool,
     /// Whether rows of functions are added in eight lanes.
     has_rows: bool,
     /// Whether there are sums of vectors of four numbers.
     has_fours: bool,
     sign: bool,
-    tables: Vec<String>,
-    maps: Vec<String>,
-    phases: Vec<PhaseText<String>>,
 }
 
 #[derive(Template)]
@@ -81,77 +64,43 @@ pub fn emit(
     sines: SineCosine,
 ) -> Result<Vec<EmittedFile>, CodegenError> {
     let name = entries.identifier.as_str();
-    let dialect = CDialect {
+    let d = &CDialect {
         name: name.to_owned(),
         precision,
+        in_lanes: false,
     };
-    let mut functions = ModelFunctions::new(entries, &dialect, &format!("{name}_"));
-    if sines == SineCosine::Library {
-        functions.sines_point_by_point();
-    }
-    let printer = Printer::new(&dialect);
-    let print = |function: &Function| dialect.definition(function, &printer);
-    let prototype = |function: &Function| dialect.prototype(function);
-    let of_phases = || entries.phases.iter().zip(&functions.phases);
-    let banner = format!("/* {provenance} */");
-    let is_single = precision == Precision::Single;
-    let header = Header {
-        banner: banner.clone(),
-        model: &entries.name,
-        upper: dialect.upper(),
-        is_single,
-        units: entries.units_in_words(),
-        latent_dim: entries.latent_dim,
-        state_dim: entries.state_dim,
-        maps: functions.maps.iter().map(prototype).collect(),
-        phases: of_phases()
-            .map(|(phase, functions)| {
-                let batch = batch_prototype(&dialect, &phase.identifier);
-                let functions = functions.iter().map(prototype).chain([batch]);
-                PhaseText::new(phase, functions.collect(), numbers)
-            })
-            .collect(),
-    };
-    let has = |is: &dyn Fn(&[Stmt]) -> bool| functions.all().any(|function| is(&function.body));
+    let print = |f, _: &Tables| (d.prototype(&f), d.definition(&f));
+    let text = ModelText::new(entries, d, &format!("{name}_"), print, numbers);
+    let m = &text.with_lanes(d, sines);
+    let banner = &format!("/* {provenance} */");
+    let header = Header { banner, d, m };
     let source = Source {
-        banner: banner.clone(),
-        name,
-        upper: dialect.upper(),
-        real: dialect.real(),
-        f: dialect.suffix(),
-        size: precision.bits() / 8,
-        is_single,
+        banner,
+        d,
+        m,
         is_library: sines == SineCosine::Library,
-        latent_dim: entries.latent_dim,
-        n_lanes: precision.lanes(),
-        kernel: has(&calls_kernel)
-            .then(|| KernelText::new(precision, &|literal| dialect.literal(literal))),
-        has_lanes: functions.tables.iter().any(|table| table.is_in_lanes),
-        has_rows: has(&|body| !assigned_in_lanes(body).is_empty()),
-        has_fours: has(&has_fours),
-        sign: has(&|body| calls_function(body, MathFunction::Sign)),
-        tables: (functions.tables.iter())
-            .map(|table| dialect.table(table))
-            .collect(),
-        maps: functions.maps.iter().map(print).collect(),
-        phases: (of_phases().zip(&functions.lanes))
-            .map(|((phase, functions), lanes)| {
-                PhaseText::new(phase, functions.iter().map(print).collect(), numbers)
-                    .with_lanes(lanes.as_deref(), &printer)
-            })
-            .collect(),
+        kernel: (entries.has(computes_angles)).then(|| KernelText::new(precision, d)),
+        has_rows: entries.has(|s| matches!(s, Statement::Separable { .. })),
+        has_fours: entries.has(|s| matches!(s, Statement::Quads { .. })),
+        sign: entries.has(|s| matches!(s, Statement::Unary(Unary::Sign, _))),
     };
     let cmake = CMake {
         banner: format!("# {provenance}"),
         name,
     };
+    let words = ["NAN", "INFINITY", "-INFINITY"];
+    let selftest = SelfTest {
+        banner,
+        d,
+        latent_dim: entries.latent_dim,
+        vectors: TestVectors::new(entries, d, precision, words),
+    };
+    let file =
+        |ending: &str, text: String| EmittedFile::new(format!("{name}{ending}"), tidy(&text));
     Ok(vec![
-        EmittedFile::new(format!("{name}.h"), tidy(&header.render()?)),
-        EmittedFile::new(format!("{name}.c"), tidy(&source.render()?)),
-        EmittedFile::new(
-            format!("{name}_selftest.c"),
-            tidy(&selftest::render(entries, &dialect, &banner)?),
-        ),
+        file(".h", header.render()?),
+        file(".c", source.render()?),
+        file("_selftest.c", selftest.render()?),
         EmittedFile::new("CMakeLists.txt", tidy(&cmake.render()?)),
     ])
 }

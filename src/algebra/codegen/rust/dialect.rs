@@ -1,13 +1,12 @@
 //! How Rust spells statements.
 
-use crate::codegen::code::{ConstTable, Function, MathFunction, Parameter, Role, Span};
-use crate::codegen::dialect::Dialect;
+use crate::codegen::code::{ConstTable, Function, Parameter, Role, Span};
+use crate::codegen::dialect::{Dialect, Lines, name};
 use crate::codegen::fours::{FourBlock, Fours};
-use crate::codegen::line_wrapping::comment_lines;
-use crate::codegen::literal::Literal;
+use crate::codegen::line_wrapping::wrapped;
 use crate::codegen::precision::Precision;
 use crate::codegen::printer::Printer;
-use crate::ir::{QUAD, Quad};
+use crate::ir::{QUAD, Quad, Unary};
 
 /// Most terms of a sum in one function: LLVM loses sight of vectors in longer chains.
 const LONGEST_CHAIN: usize = 10;
@@ -28,6 +27,11 @@ impl RustDialect {
         }
     }
 
+    /// The type of integers as wide.
+    pub fn bits(&self) -> String {
+        format!("u{}", self.precision.bits())
+    }
+
     fn parameter(&self, parameter: &Parameter) -> String {
         let (name, len, real) = (&parameter.name, parameter.len, self.real());
         match parameter.role {
@@ -37,13 +41,63 @@ impl RustDialect {
         }
     }
 
+    fn four_block(&self, fours: &Fours, block: &FourBlock) -> Lines {
+        let (real, y, n_sums) = (self.real(), &fours.array, QUAD * fours.sums.len());
+        let (weights, n_weights) = (&fours.weights.array, fours.weights.of);
+        let vector = |vector: Quad| match vector {
+            Quad::Row(row) => format!("{}[{row}]", fours.table.1),
+            Quad::Sum(sum) => format!("four({y}, {})", QUAD * sum),
+        };
+        let starts = block.sums.clone().map(|sum| {
+            let start = vector(fours.sums[sum].start);
+            (2, format!("start_four({y}, {}, {start});", QUAD * sum))
+        });
+        let mut parts: Vec<Lines> = vec![starts.collect()];
+        let mut lengths = vec![0; block.sums.len()];
+        for four in &block.terms {
+            let length = &mut lengths[four.sum - block.sums.start];
+            if *length == LONGEST_CHAIN {
+                lengths.fill(0);
+                parts.push(Vec::new());
+            }
+            lengths[four.sum - block.sums.start] += 1;
+            let (at, vector) = (QUAD * four.sum, vector(four.vector));
+            let weight = format!("{weights}[{}]", fours.weights.offset + four.weight);
+            let lanes = fours.lanes(four.vector).map(u8::from);
+            let lanes = lanes.iter().rev().map(u8::to_string).collect::<String>();
+            let line = format!("add_four::<0b{lanes}, _>({y}, {at}, {vector}, {weight});");
+            parts.last_mut().expect("one part at least").push((2, line));
+        }
+        let by = if fours.weights.is_parameter { "" } else { "&" };
+        let mut lines = Vec::new();
+        for part in parts {
+            let head = format!(
+                "fn part({y}: &mut [{real}; {n_sums}], {weights}: &[{real}; {n_weights}]) {{"
+            );
+            lines.push((0, "{".to_owned()));
+            // Without wide registers the compiler adds number by number, best all in one function.
+            let avx = "target_feature = \"avx\"";
+            lines.push((1, format!("#[cfg_attr({avx}, inline(never))]")));
+            lines.push((1, format!("#[cfg_attr(not({avx}), inline(always))]")));
+            lines.push((1, head));
+            if !part.iter().any(|(_, line)| line.contains("add_four")) {
+                lines.push((2, format!("let _ = {weights};")));
+            }
+            lines.extend(part);
+            lines.push((1, "}".to_owned()));
+            lines.push((1, format!("part(&mut {y}, {by}{weights});")));
+            lines.push((0, "}".to_owned()));
+        }
+        lines
+    }
+
     /// A function with its documentation.
-    pub fn definition(&self, function: &Function, printer: &Printer) -> String {
+    pub fn definition(&self, function: &Function) -> String {
         let parameters = function.parameters.iter().map(|p| self.parameter(p));
         let parameters = parameters.collect::<Vec<_>>().join(", ");
         let docs = documentation(&function.docs);
         let head = format!("{docs}pub fn {}({parameters})", function.name);
-        printer.function(&head, |unused| format!("let _ = {unused};"), function)
+        Printer::new(self).function(&head, |unused| format!("let _ = {unused};"), function)
     }
 }
 
@@ -60,12 +114,12 @@ impl Dialect for RustDialect {
         RESERVED
     }
 
-    fn literal(&self, literal: Literal) -> String {
-        literal.digits(self.precision)
+    fn literal(&self, value: f64) -> String {
+        self.precision.digits(value)
     }
 
-    fn apply(&self, function: MathFunction, argument: &str) -> String {
-        format!("math::{}({argument})", function.name())
+    fn apply(&self, function: Unary, argument: &str) -> String {
+        format!("math::{}({argument})", name(function))
     }
 
     fn let_scalar(&self, name: &str, value: &str) -> String {
@@ -117,66 +171,25 @@ impl Dialect for RustDialect {
         ]
     }
 
-    fn fours(&self, fours: &Fours, block: &FourBlock) -> Option<Vec<(usize, String)>> {
-        let (real, y, n_sums) = (self.real(), &fours.array, QUAD * fours.sums.len());
-        let (weights, n_weights) = (&fours.weights.array, fours.weights.of);
-        let vector = |vector: Quad| match vector {
-            Quad::Row(row) => format!("{}[{row}]", fours.table.1),
-            Quad::Sum(sum) => format!("four({y}, {})", QUAD * sum),
-        };
-        let starts = block.sums.clone().map(|sum| {
-            let start = vector(fours.sums[sum].start);
-            (2, format!("start_four({y}, {}, {start});", QUAD * sum))
-        });
-        let mut parts: Vec<Vec<(usize, String)>> = vec![starts.collect()];
-        let mut lengths = vec![0; block.sums.len()];
-        for four in &block.terms {
-            let length = &mut lengths[four.sum - block.sums.start];
-            if *length == LONGEST_CHAIN {
-                lengths.fill(0);
-                parts.push(Vec::new());
-            }
-            lengths[four.sum - block.sums.start] += 1;
-            let (at, vector) = (QUAD * four.sum, vector(four.vector));
-            let weight = format!("{weights}[{}]", fours.weights.offset + four.weight);
-            let lanes = fours.lanes(four.vector).map(u8::from);
-            let lanes = lanes.iter().rev().map(u8::to_string).collect::<String>();
-            let line = format!("add_four::<0b{lanes}, _>({y}, {at}, {vector}, {weight});");
-            parts.last_mut().expect("one part at least").push((2, line));
-        }
-        let by = if fours.weights.is_parameter { "" } else { "&" };
-        let mut lines = Vec::new();
-        for part in parts {
-            let head = format!(
-                "fn part({y}: &mut [{real}; {n_sums}], {weights}: &[{real}; {n_weights}]) {{"
-            );
-            lines.push((0, "{".to_owned()));
-            // Without wide registers the compiler adds number by number, best all in one function.
-            let avx = "target_feature = \"avx\"";
-            lines.push((1, format!("#[cfg_attr({avx}, inline(never))]")));
-            lines.push((1, format!("#[cfg_attr(not({avx}), inline(always))]")));
-            lines.push((1, head));
-            if !part.iter().any(|(_, line)| line.contains("add_four")) {
-                lines.push((2, format!("let _ = {weights};")));
-            }
-            lines.extend(part);
-            lines.push((1, "}".to_owned()));
-            lines.push((1, format!("part(&mut {y}, {by}{weights});")));
-            lines.push((0, "}".to_owned()));
-        }
-        Some(lines)
+    fn fours(&self, fours: &Fours) -> Option<Lines> {
+        let blocks = fours.blocks.iter();
+        Some(
+            blocks
+                .flat_map(|block| self.four_block(fours, block))
+                .collect(),
+        )
     }
 
-    fn table(&self, table: &ConstTable) -> String {
+    fn table(&self, table: &ConstTable) -> Option<String> {
         let rows = self.rows(table, ["    [", ",\n     ", "],"]);
         let (name, real) = (&table.name, self.real());
         let (n, cols) = (table.values.rows(), table.values.cols());
-        match table.is_in_lanes {
+        Some(match table.is_in_lanes {
             true => {
                 format!("static {name}: &[[{real}; {cols}]; {n}] = &Aligned([\n{rows}]).0;")
             }
             false => format!("static {name}: [[{real}; {cols}]; {n}] = [\n{rows}];"),
-        }
+        })
     }
 }
 
@@ -189,14 +202,14 @@ fn documentation(lines: &[String]) -> String {
         if position > 0 {
             text.push_str("///\n");
         }
-        for line in comment_lines(&[(*paragraph).clone()], 94) {
+        for line in wrapped(paragraph, 94, " ") {
             text.push_str(&format!("/// {}\n", plain(line.trim_start())));
         }
     }
     if !equations.is_empty() {
         text.push_str("///\n/// ```text\n");
         for equation in equations {
-            for line in comment_lines(std::slice::from_ref(equation), 94) {
+            for line in wrapped(equation, 94, " ") {
                 text.push_str(&format!("/// {line}\n"));
             }
         }

@@ -1,19 +1,14 @@
 //! Functions that return what they compute, as text for the templates.
 
-use std::collections::BTreeSet;
-
 use crate::codegen::code::{Function, Parameter, Role};
 use crate::codegen::dialect::Dialect;
-use crate::codegen::error::CodegenError;
-use crate::codegen::functions::ModelFunctions;
-use crate::codegen::interface::{ModelInterface, PhaseInterface};
 use crate::codegen::line_wrapping::comment_lines;
-use crate::codegen::phase_text::PhaseText;
 use crate::codegen::printer::Printer;
+use crate::codegen::tables::Tables;
 
 /// A function of a script. A parameter that is read and written is taken and returned.
-pub struct FunctionText<'a> {
-    function: &'a Function,
+pub struct FunctionText {
+    parameters: Vec<Parameter>,
     /// Its name.
     pub name: String,
     /// Lines of documentation, not yet escaped.
@@ -24,15 +19,16 @@ pub struct FunctionText<'a> {
     pub tables: Vec<String>,
 }
 
-impl<'a> FunctionText<'a> {
-    fn new(function: &'a Function, functions: &ModelFunctions, printer: &Printer) -> Self {
-        let body = printer.statements(&function.body, 1);
-        let names = functions.tables.iter().map(|table| table.name.to_string());
+impl FunctionText {
+    /// The text of a function that reads some of the tables.
+    pub fn new(function: Function, tables: &Tables, dialect: &dyn Dialect) -> Self {
+        let body = Printer::new(dialect).statements(&function.body, 1);
+        let names = tables.iter().map(|table| table.name.to_string());
         let is_read = |name: &String| {
             body.contains(&format!("{name}[")) || body.contains(&format!("{name}("))
         };
         Self {
-            function,
+            parameters: function.parameters,
             name: function.name.to_string(),
             docs: comment_lines(&function.docs, 90),
             tables: names.filter(is_read).collect(),
@@ -41,33 +37,33 @@ impl<'a> FunctionText<'a> {
     }
 
     /// Parameters of these roles.
-    fn of(&self, roles: &[Role]) -> Vec<&'a Parameter> {
-        let parameters = self.function.parameters.iter();
+    fn of(&self, roles: &[Role]) -> Vec<&Parameter> {
+        let parameters = self.parameters.iter();
         parameters.filter(|p| roles.contains(&p.role)).collect()
     }
 
     /// What it takes.
-    pub fn inputs(&self) -> Vec<&'a Parameter> {
+    pub fn inputs(&self) -> Vec<&Parameter> {
         self.of(&[Role::Input, Role::InOut, Role::Scalar])
     }
 
     /// What it returns.
-    pub fn outputs(&self) -> Vec<&'a Parameter> {
+    pub fn outputs(&self) -> Vec<&Parameter> {
         self.of(&[Role::Output, Role::InOut])
     }
 
     /// The parameters that are arrays.
-    pub fn arrays(&self) -> Vec<&'a Parameter> {
+    pub fn arrays(&self) -> Vec<&Parameter> {
         self.of(&[Role::Input, Role::InOut])
     }
 
     /// What is taken and returned.
-    pub fn copied(&self) -> Vec<&'a Parameter> {
+    pub fn copied(&self) -> Vec<&Parameter> {
         self.of(&[Role::InOut])
     }
 
     /// What is returned and not taken, so that the body has to begin with it.
-    pub fn created(&self) -> Vec<&'a Parameter> {
+    pub fn created(&self) -> Vec<&Parameter> {
         self.of(&[Role::Output])
     }
 }
@@ -80,75 +76,4 @@ pub fn list<T>(elements: &[T], print: impl Fn(&T) -> String) -> String {
 /// Names of parameters.
 pub fn names(parameters: Vec<&Parameter>) -> String {
     list(&parameters, |parameter| parameter.name.to_string())
-}
-
-/// What the files of all languages say of a model; `F` is what they print of a function.
-pub struct ModelText<F> {
-    /// Name of the model.
-    pub name: String,
-    /// Name of the first phase's accelerations, for an example of a call.
-    pub example: String,
-    /// Units of robot coordinates.
-    pub units: String,
-    /// Number of latent coordinates.
-    pub latent_dim: usize,
-    /// Number of robot coordinates.
-    pub state_dim: Option<usize>,
-    /// Constant tables.
-    pub tables: Vec<String>,
-    /// Maps between robot and latent coordinates.
-    pub maps: Vec<F>,
-    /// Phases.
-    pub phases: Vec<PhaseText<F>>,
-}
-
-/// Prints a function, with the phase it belongs to, if it belongs to one.
-pub type PrintFunction<'a, F> =
-    dyn Fn(&FunctionText, Option<&PhaseInterface>) -> Result<F, CodegenError> + 'a;
-
-impl<F> ModelText<F> {
-    /// All of a model in a language, which prints functions, and rows or columns of nonzeros, counted
-    /// from 0.
-    pub fn new(
-        entries: &ModelInterface,
-        dialect: &dyn Dialect,
-        print: &PrintFunction<'_, F>,
-        numbers: fn(&[usize]) -> String,
-    ) -> Result<Self, CodegenError> {
-        let functions = ModelFunctions::new(entries, dialect, "");
-        let printer = Printer::new(dialect);
-        let phase = |(phase, of_phase): (&PhaseInterface, &[Function; 3])| {
-            let texts = of_phase.iter().map(|function| {
-                let text = FunctionText::new(function, &functions, &printer);
-                print(&text, Some(phase))
-            });
-            let texts = texts.collect::<Result<_, CodegenError>>()?;
-            Ok(PhaseText::new(phase, texts, numbers))
-        };
-        let maps = functions.maps.iter().map(|map| {
-            let text = FunctionText::new(map, &functions, &printer);
-            print(&text, None)
-        });
-        let phases = entries.phases.iter().zip(&functions.phases).map(phase);
-        let first = entries.phases.first();
-        let all = functions.all();
-        let read: BTreeSet<String> = all
-            .flat_map(|function| FunctionText::new(function, &functions, &printer).tables)
-            .collect();
-        let is_read = |name: String| read.contains(&name);
-        let tables = functions.tables.iter();
-        Ok(Self {
-            name: entries.name.clone(),
-            example: first.map_or(String::new(), |phase| phase.dynamics.name.clone()),
-            units: entries.units_in_words(),
-            latent_dim: entries.latent_dim,
-            state_dim: entries.state_dim,
-            tables: tables
-                .filter(|table| is_read(table.name.to_string()))
-                .map(|table| dialect.table(table))
-                .collect(),
-            maps: maps.collect::<Result<_, CodegenError>>()?,
-            phases: phases.collect::<Result<_, CodegenError>>()?,
-        })
-    }
 }

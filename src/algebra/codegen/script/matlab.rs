@@ -2,16 +2,18 @@
 
 use askama::Template;
 
-use super::functions::{FunctionText, ModelText, list, names};
-use crate::codegen::code::{ConstTable, Index, MathFunction, Span};
-use crate::codegen::dialect::Dialect;
+use super::functions::{FunctionText, list, names};
+use crate::codegen::code::{ConstTable, Index, Span};
+use crate::codegen::dialect::{Dialect, name};
 use crate::codegen::error::CodegenError;
 use crate::codegen::ident::Namer;
 use crate::codegen::interface::ModelInterface;
 use crate::codegen::line_wrapping::tidy;
+use crate::codegen::model_text::ModelText;
 use crate::codegen::printer::subscript;
+use crate::codegen::tables::Tables;
 use crate::files::EmittedFile;
-use crate::ir::Binary;
+use crate::ir::{Binary, Unary};
 
 /// MATLAB without toolboxes; Octave runs the same.
 #[derive(Clone, Copy, Debug)]
@@ -59,8 +61,8 @@ impl Dialect for MatlabDialect {
         format!("{table}({}, {})", from_one(row), from_one(col))
     }
 
-    fn apply(&self, function: MathFunction, argument: &str) -> String {
-        format!("{}({argument})", function.name())
+    fn apply(&self, function: Unary, argument: &str) -> String {
+        format!("{}({argument})", name(function))
     }
 
     fn let_array(&self, name: &str, elements: &[String]) -> String {
@@ -90,12 +92,13 @@ impl Dialect for MatlabDialect {
         }
     }
 
-    fn table(&self, table: &ConstTable) -> String {
+    fn table(&self, table: &ConstTable) -> Option<String> {
         let (name, rows) = (
             &table.name,
             self.rows(table, ["        ", ", ...\n        ", ""]),
         );
-        format!("function t = {name}_entries()\n    t = [\n{rows}    ];\nend")
+        (table.is_entered)
+            .then(|| format!("function t = {name}_entries()\n    t = [\n{rows}    ];\nend"))
     }
 }
 
@@ -121,17 +124,7 @@ fn span_text(span: &Span) -> String {
 struct MatlabFile<'a> {
     banner: String,
     file: &'a str,
-    /// Functions are names and definitions.
-    m: ModelText<(String, String)>,
-}
-
-#[derive(Template)]
-#[template(
-    path = "script/matlab_function.askama",
-    config = "../../templates/askama.toml"
-)]
-struct MatlabFunction<'a> {
-    f: &'a FunctionText<'a>,
+    m: ModelText<'a, FunctionText>,
 }
 
 /// The file of a model; `provenance` is the text of the first line.
@@ -140,19 +133,16 @@ struct MatlabFunction<'a> {
 /// [`CodegenError::Template`] if a template fails.
 pub fn emit(entries: &ModelInterface, provenance: &str) -> Result<Vec<EmittedFile>, CodegenError> {
     let stem = Namer::new(RESERVED).mint(&entries.identifier).to_string();
+    let print = |f, tables: &Tables| FunctionText::new(f, tables, &MatlabDialect);
     let file = MatlabFile {
         banner: format!("% {provenance}"),
         file: &stem,
-        m: ModelText::new(entries, &MatlabDialect, &|f, _| matlab_function(f), column)?,
+        m: ModelText::new(entries, &MatlabDialect, "", print, column),
     };
     Ok(vec![EmittedFile::new(
         format!("{stem}.m"),
         tidy(&file.render()?),
     )])
-}
-
-fn matlab_function(f: &FunctionText) -> Result<(String, String), CodegenError> {
-    Ok((f.name.clone(), MatlabFunction { f }.render()?))
 }
 
 /// Numbers of a column, counted from one.

@@ -2,14 +2,17 @@
 
 use askama::Template;
 
-use super::functions::{FunctionText, ModelText, list, names};
-use crate::codegen::code::{ConstTable, MathFunction, Role, Span};
-use crate::codegen::dialect::Dialect;
+use super::functions::{FunctionText, list, names};
+use crate::codegen::code::{ConstTable, Role, Span};
+use crate::codegen::dialect::{Dialect, name};
 use crate::codegen::error::CodegenError;
 use crate::codegen::ident::Namer;
-use crate::codegen::interface::{ModelInterface, PhaseInterface};
+use crate::codegen::interface::ModelInterface;
 use crate::codegen::line_wrapping::tidy;
+use crate::codegen::model_text::ModelText;
+use crate::codegen::tables::Tables;
 use crate::files::EmittedFile;
+use crate::ir::Unary;
 
 /// Python with the elementary functions of the library on whose numbers the functions work.
 #[derive(Clone, Copy, Debug)]
@@ -56,14 +59,14 @@ impl Dialect for Library {
         " \\"
     }
 
-    fn apply(&self, function: MathFunction, argument: &str) -> String {
+    fn apply(&self, function: Unary, argument: &str) -> String {
         let library = match self {
             Library::NumPy => "np",
             Library::Casadi => "casadi",
         };
         let name = match (function, self) {
-            (MathFunction::Abs, Library::Casadi) => "fabs",
-            (named, _) => named.name(),
+            (Unary::Abs, Library::Casadi) => "fabs",
+            (named, _) => name(named),
         };
         format!("{library}.{name}({argument})")
     }
@@ -93,9 +96,9 @@ impl Dialect for Library {
         format!("{} = {callee}({read})", list(written, slice))
     }
 
-    fn table(&self, table: &ConstTable) -> String {
+    fn table(&self, table: &ConstTable) -> Option<String> {
         let rows = self.rows(table, ["    [", ",\n     ", "],"]);
-        format!("{} = [\n{rows}]", table.name)
+        (table.is_entered).then(|| format!("{} = [\n{rows}]", table.name))
     }
 }
 
@@ -105,19 +108,9 @@ fn slice(span: &Span) -> String {
 
 #[derive(Template)]
 #[template(path = "script/numpy.askama", config = "../../templates/askama.toml")]
-struct NumPyModule {
+struct NumPyModule<'a> {
     banner: String,
-    m: ModelText<String>,
-}
-
-#[derive(Template)]
-#[template(
-    path = "script/numpy_function.askama",
-    config = "../../templates/askama.toml"
-)]
-struct NumPyFunction<'a> {
-    f: &'a FunctionText<'a>,
-    docs: Vec<String>,
+    m: ModelText<'a, FunctionText>,
 }
 
 #[derive(Template)]
@@ -125,18 +118,7 @@ struct NumPyFunction<'a> {
 struct CasadiModule<'a> {
     banner: String,
     module: &'a str,
-    /// Functions are expressions, and the function made of them.
-    m: ModelText<(String, String)>,
-}
-
-#[derive(Template)]
-#[template(
-    path = "script/casadi_function.askama",
-    config = "../../templates/askama.toml"
-)]
-struct CasadiFunction<'a> {
-    f: &'a FunctionText<'a>,
-    docs: Vec<String>,
+    m: ModelText<'a, FunctionText>,
 }
 
 /// The module of a model on NumPy; `provenance` is the text of the first line.
@@ -144,9 +126,10 @@ struct CasadiFunction<'a> {
 /// # Errors
 /// [`CodegenError::Template`] if a template fails.
 pub fn emit(entries: &ModelInterface, provenance: &str) -> Result<Vec<EmittedFile>, CodegenError> {
+    let print = |f, tables: &Tables| FunctionText::new(f, tables, &Library::NumPy);
     let module = NumPyModule {
         banner: format!("# {provenance}"),
-        m: ModelText::new(entries, &Library::NumPy, &|f, _| numpy_function(f), tuple)?,
+        m: ModelText::new(entries, &Library::NumPy, "", print, tuple),
     };
     let path = format!("{}.py", stem(entries));
     Ok(vec![EmittedFile::new(path, tidy(&module.render()?))])
@@ -160,18 +143,12 @@ pub fn emit_casadi(
     entries: &ModelInterface,
     provenance: &str,
 ) -> Result<Vec<EmittedFile>, CodegenError> {
-    let model = entries.identifier.as_str();
     let module_name = format!("{}_casadi", stem(entries));
+    let print = |f, tables: &Tables| FunctionText::new(f, tables, &Library::Casadi);
     let module = CasadiModule {
         banner: format!("# {provenance}"),
         module: &module_name,
-        // Expressions are private functions; the functions made of them have the plain names.
-        m: ModelText::new(
-            entries,
-            &Library::Casadi,
-            &|f, phase| casadi_function(model, f, phase),
-            tuple,
-        )?,
+        m: ModelText::new(entries, &Library::Casadi, "", print, tuple),
     };
     let path = format!("{module_name}.py");
     Ok(vec![EmittedFile::new(path, tidy(&module.render()?))])
@@ -182,37 +159,27 @@ fn stem(entries: &ModelInterface) -> String {
     namer.mint(&entries.identifier).to_string()
 }
 
-fn numpy_function(f: &FunctionText) -> Result<String, CodegenError> {
-    let docs = escaped(&f.docs);
-    Ok(NumPyFunction { f, docs }.render()?)
-}
-
-/// The expressions of a function, and the definition of the CasADi function made of them.
-fn casadi_function(
-    model: &str,
-    f: &FunctionText,
-    phase: Option<&PhaseInterface>,
-) -> Result<(String, String), CodegenError> {
-    let (name, docs) = (&f.name, escaped(&f.docs));
-    let inputs = list(&f.inputs(), |input| {
-        format!("(\"{}\", {})", input.name, input.len)
-    });
-    let outputs = list(&f.outputs(), |output| match output.role {
-        Role::InOut => format!("\"{}_next\"", output.name),
-        Role::Output | Role::Input | Role::Scalar => format!("\"{}\"", output.name),
-    });
-    let pattern = match phase {
-        Some(phase) if phase.jacobian.name == *name => {
-            let upper = phase.identifier.to_ascii_uppercase();
-            format!(",\n    ({upper}_JACOBIAN_ROWS, {upper}_JACOBIAN_COLS)")
-        }
-        Some(_) | None => String::new(),
-    };
-    let expressions = private(name);
-    let definition = format!(
-        "{name} = _function(\n    \"{model}_{name}\", {expressions}, [{inputs}], [{outputs}]{pattern})"
-    );
-    Ok((CasadiFunction { f, docs }.render()?, definition))
+impl CasadiModule<'_> {
+    /// The function made of expressions; these are private functions, so that it has the plain name.
+    fn definition(&self, f: &FunctionText) -> String {
+        let (model, name) = (&self.m.entries.identifier, &f.name);
+        let inputs = list(&f.inputs(), |input| {
+            format!("(\"{}\", {})", input.name, input.len)
+        });
+        let outputs = list(&f.outputs(), |output| match output.role {
+            Role::InOut => format!("\"{}_next\"", output.name),
+            Role::Output | Role::Input | Role::Scalar => format!("\"{}\"", output.name),
+        });
+        let mut phases = self.m.phases.iter();
+        let pattern = match phases.find(|phase| phase.functions[1].name == *name) {
+            Some(phase) => format!(",\n    ({0}_JACOBIAN_ROWS, {0}_JACOBIAN_COLS)", phase.upper),
+            None => String::new(),
+        };
+        let expressions = private(name);
+        format!(
+            "{name} = _function(\n    \"{model}_{name}\", {expressions}, [{inputs}], [{outputs}]{pattern})"
+        )
+    }
 }
 
 /// Name of the expressions of a function.
@@ -220,10 +187,9 @@ fn private(name: &str) -> String {
     format!("_{name}")
 }
 
-/// Lines inside a documentation string.
-fn escaped(lines: &[String]) -> Vec<String> {
-    let escaped = |line: &String| line.replace('\\', "\\\\").replace('"', "\\\"");
-    lines.iter().map(escaped).collect()
+/// A line inside a documentation string.
+fn escaped(line: &str) -> String {
+    line.replace('\\', "\\\\").replace('"', "\\\"")
 }
 
 /// Numbers of a tuple, which needs a comma even after its only element.
