@@ -154,8 +154,7 @@ impl Equations<'_> {
             terms,
             phases,
             steps: self.steps.clone(),
-            latent_units: Some(units),
-            scaled: Some(Box::new(self.clone().into_owned())),
+            physical: Some((units, Box::new(self.clone().into_owned()))),
         })
     }
 

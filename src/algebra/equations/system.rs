@@ -40,9 +40,8 @@ pub struct Equations<'a> {
     pub(super) terms: Vec<CandidateTerm>,
     pub(super) phases: Vec<PhaseEquations>,
     pub(super) steps: Vec<ExactStep>,
-    pub(super) latent_units: Option<LatentUnits>,
-    /// What equations in physical units were made from.
-    pub(super) scaled: Option<Box<Equations<'static>>>,
+    /// The units of equations in physical units, and what these were made from.
+    pub(super) physical: Option<(LatentUnits, Box<Equations<'static>>)>,
 }
 
 impl<'a> Equations<'a> {
@@ -72,8 +71,7 @@ impl<'a> Equations<'a> {
             phases: phases.collect(),
             model: Cow::Borrowed(model),
             steps: Vec::new(),
-            latent_units: None,
-            scaled: None,
+            physical: None,
         }
     }
 
@@ -112,23 +110,22 @@ impl<'a> Equations<'a> {
             terms: self.terms,
             phases: self.phases,
             steps: self.steps,
-            latent_units: self.latent_units,
-            scaled: self.scaled,
+            physical: self.physical,
         }
     }
 
     /// These equations in the scaled units of the model's maps, whose latent inputs are those of `W_e`: what a
     /// controller computes with.
     pub fn in_scaled_units(&self) -> &Equations<'_> {
-        match &self.scaled {
-            Some(scaled) => scaled,
+        match &self.physical {
+            Some((_, scaled)) => scaled,
             None => self,
         }
     }
 
     /// Units of latent coordinates and inputs, if they are physical; none where they are scaled.
     pub fn latent_units(&self) -> Option<&LatentUnits> {
-        self.latent_units.as_ref()
+        self.physical.as_ref().map(|(units, _)| units)
     }
 
     /// The model with maps, names and scale factors; its Xi may be that of equal, longer equations.

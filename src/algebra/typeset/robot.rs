@@ -1,6 +1,8 @@
 //! The model in robot coordinates: what the latent coordinates are made of, and the
 //! accelerations of the robot that the latent dynamics mean.
 
+use std::collections::BTreeSet;
+
 use nalgebra::{DMatrix, DVector};
 
 use crate::equations::Equations;
@@ -148,17 +150,11 @@ fn coordinate_symbols(names: &[String]) -> Vec<Symbol> {
         })
         .collect();
     match named {
-        Some(symbols) if all_differ(&symbols) => symbols,
+        Some(symbols) if BTreeSet::from_iter(&symbols).len() == symbols.len() => symbols,
         Some(_) | None => (1..=names.len())
             .map(|number| spelled(vec![Glyph::Digits(number.to_string())]))
             .collect(),
     }
-}
-
-fn all_differ(symbols: &[Symbol]) -> bool {
-    let mut sorted: Vec<&Symbol> = symbols.iter().collect();
-    sorted.sort();
-    sorted.windows(2).all(|pair| pair[0] != pair[1])
 }
 
 #[cfg(test)]

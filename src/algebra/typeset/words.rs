@@ -3,7 +3,7 @@
 use crate::model::FeetRule;
 use crate::robot::{ContactFlags, Leg};
 
-use super::decimal::{Decimal, Rounding};
+use super::decimal::{Decimal, LEAST_DECIMALS, RELATIVE_ERROR, Rounding};
 use super::rounder::{Place, RoundingReport};
 use super::table::{rounded, rounded_up};
 use super::tree::{Math, Signed};
@@ -116,12 +116,9 @@ fn by_name(pattern: &ContactFlags) -> String {
 /// How coefficients were rounded and what it changed, in a few sentences.
 pub fn rounding<S: Spelling>(rule: Rounding, report: &RoundingReport) -> String {
     let rule = match rule {
-        Rounding::Adaptive {
-            decimals,
-            relative_error,
-        } => format!(
-            "Coefficients have {decimals} decimals, more where they would be off by over {} %.",
-            100.0 * relative_error
+        Rounding::Adaptive => format!(
+            "Coefficients have {LEAST_DECIMALS} decimals, more where they would be off by over {} %.",
+            100.0 * RELATIVE_ERROR
         ),
         Rounding::Decimals(places) => format!("Coefficients have {places} decimals."),
         Rounding::Significant(digits) => format!("Coefficients have {digits} significant digits."),
