@@ -15,9 +15,8 @@ use crate::evaluate::{Assessment, LAMBDA};
 use crate::files::{EmittedFile, Overwrite};
 use crate::model::ReducedModel;
 use crate::recording::Recording;
-use crate::report::figures::figure_files;
 use crate::report::{
-    Content, PageOptions, Verdict, all_figures, page, verdict, without_statistics,
+    Content, PageOptions, Verdict, all_figures, figure_files, page, verdict, without_statistics,
 };
 use crate::simplify::Tolerance;
 use crate::study::{Store, Summary};

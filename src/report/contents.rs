@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use super::complexity::study_figures;
 use super::control::{latent_inputs, torques};
-use super::figures::{Figure, Film, HeatMap, Panel, subscript};
+use super::figures::{Drawing, Figure, Film, HeatMap, Panel, subscript};
 use super::jump::{Jump, Place};
 use super::tables::NamedRun;
 use crate::evaluate::{Assessment, SegmentRun};
@@ -162,12 +162,14 @@ fn encoder(
     };
     let caption = format!("{what}: how much of each coordinate a latent one takes (scaled units).");
     let columns = (1..=d).map(|index| format!("z{}", subscript(index)));
-    let map = Panel::Heat(HeatMap {
+    let map = Panel {
         title: "|weight|".to_owned(),
-        rows: assessment.names.clone(),
-        columns: columns.collect(),
-        values,
-    });
+        drawing: Drawing::Heat(HeatMap {
+            rows: assessment.names.clone(),
+            columns: columns.collect(),
+            values,
+        }),
+    };
     Ok(Figure {
         x_label: String::new(),
         panel_size: (120.0 + 40.0 * d.min(18) as f64, 330.0),

@@ -9,7 +9,7 @@ use crate::typeset::mathml::HtmlText;
 /// One panel as an `svg` element that takes its colours from the page.
 pub fn panel_svg(figure: &Figure, panel: &Panel) -> String {
     let (width, height) = figure.panel_size;
-    let title = HtmlText(panel.title());
+    let title = HtmlText(&panel.title);
     let mut text = format!(
         "<svg class=\"plot\" viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{title}\">"
     );
