@@ -6,10 +6,13 @@ use std::str::FromStr;
 /// Numbers that a setting may have.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Range {
-    name: &'static str,
+    /// Name of the setting: that of its flag without dashes.
+    pub name: &'static str,
     kind: Kind,
-    least: f64,
-    most: f64,
+    /// Its lower end.
+    pub least: f64,
+    /// Its upper end.
+    pub most: f64,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,19 +60,9 @@ impl Range {
         }
     }
 
-    /// Name of the setting: that of its flag without dashes.
-    pub fn name(&self) -> &'static str {
-        self.name
-    }
-
     /// Whether only whole numbers are in the range.
     pub fn is_whole(&self) -> bool {
         self.kind == Kind::Whole
-    }
-
-    /// The ends of the range.
-    pub fn ends(&self) -> [f64; 2] {
-        [self.least, self.most]
     }
 
     /// Whether a number is in the range; NaN never is.
@@ -87,10 +80,7 @@ impl Range {
     /// # Errors
     /// [`OutOfRange`] with the name, the number and the range.
     pub fn check(&self, value: f64) -> Result<f64, OutOfRange> {
-        match self.contains(value) {
-            true => Ok(value),
-            false => Err(self.refusal(short(value))),
-        }
+        (self.contains(value).then_some(value)).ok_or_else(|| self.refusal(short(value)))
     }
 
     /// The count, if it is in the range.
@@ -98,10 +88,7 @@ impl Range {
     /// # Errors
     /// As [`Range::check`].
     pub fn check_count(&self, value: usize) -> Result<usize, OutOfRange> {
-        match self.contains(value as f64) {
-            true => Ok(value),
-            false => Err(self.refusal(value)),
-        }
+        (self.contains(value as f64).then_some(value)).ok_or_else(|| self.refusal(value))
     }
 
     /// The number that a text spells.
@@ -120,7 +107,7 @@ impl Range {
 
     /// "a whole number from 1 to 500"
     pub fn in_words(&self) -> String {
-        let [least, most] = self.ends().map(short);
+        let [least, most] = [self.least, self.most].map(short);
         match self.kind {
             Kind::Whole => format!("a whole number from {least} to {most}"),
             Kind::Real => format!("a number from {least} to {most}"),

@@ -33,10 +33,8 @@ pub struct Equation {
 /// Every candidate term that is printed somewhere, with its coefficients.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CoefficientTable {
-    /// Column heads: the acceleration, with the phase it belongs to.
-    pub columns: Vec<(String, Symbol)>,
-    /// Unit of each column's acceleration, for equations in physical units.
-    pub units: Option<Vec<Unit>>,
+    /// Column heads: the acceleration, with the phase it belongs to, and its unit where that is physical.
+    pub columns: Vec<(String, Symbol, Option<Unit>)>,
     /// One row a candidate term, in library order.
     pub rows: Vec<CoefficientRow>,
 }
@@ -119,15 +117,12 @@ fn table(
             .collect(),
         columns: (phases.iter())
             .flat_map(|(phase, _)| {
-                outputs
-                    .iter()
-                    .map(|(left, _)| ((*phase).clone(), left.clone()))
+                outputs.iter().enumerate().map(|(output, (left, _))| {
+                    let unit = units.map(|units| units.acceleration(output));
+                    ((*phase).clone(), left.clone(), unit)
+                })
             })
             .collect(),
-        units: units.map(|units| {
-            let of_phase = || (0..outputs.len()).map(|output| units.acceleration(output));
-            phases.iter().flat_map(|_| of_phase()).collect()
-        }),
     }
 }
 

@@ -44,8 +44,6 @@ impl Page {
         let typeset = Typeset::new(equations, &options.symbols, options.rounding);
         let phases = typeset.systems.iter().zip(equations.phases());
         let table = &typeset.table;
-        let unit = |column: usize| table.units.as_ref().map(|units| units[column]);
-        let columns = table.columns.iter().enumerate();
         let cell = |number: &Option<Decimal>| number.as_ref().map_or(String::new(), M::number);
         Self {
             name: M::text(model.name()),
@@ -59,8 +57,8 @@ impl Page {
                 })
                 .collect(),
             rounding: words::rounding::<M>(options.rounding, &typeset.rounding),
-            heads: columns
-                .map(|(column, (phase, symbol))| M::head(symbol, phase, unit(column)))
+            heads: (table.columns.iter())
+                .map(|(phase, symbol, unit)| M::head(symbol, phase, *unit))
                 .collect(),
             rows: (table.rows.iter())
                 .map(|row| {

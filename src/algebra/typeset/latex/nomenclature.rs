@@ -11,20 +11,11 @@ use super::math::{tex_number, tex_symbol, tex_unit};
 const STRONGEST: usize = 3;
 /// Weights below this share of the row's largest are not named.
 const NEGLIGIBLE: f64 = 0.1;
-/// One line of the list of symbols, both parts as LaTeX.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Entry {
-    /// The symbol, in dollars.
-    pub symbol: String,
-    /// What it is.
-    pub meaning: String,
-}
+/// One line of the list of symbols as LaTeX: the symbol, in dollars, and what it is.
+pub(super) type Entry = (String, String);
 
 fn entry(symbol: impl Into<String>, meaning: impl Into<String>) -> Entry {
-    Entry {
-        symbol: symbol.into(),
-        meaning: meaning.into(),
-    }
+    (symbol.into(), meaning.into())
 }
 
 const ROBOT_STATE: &str = r"$\mathbf{x}$, $\mathbf{u}$";

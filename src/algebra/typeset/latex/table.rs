@@ -62,9 +62,9 @@ pub(super) fn blocks(
         })
         .collect();
     let count = cuts.len();
-    let units = match table.units {
-        Some(_) => ". The unit of a coefficient is that of its column over that of its term",
-        None => "",
+    let units = match table.columns.iter().any(|(.., unit)| unit.is_some()) {
+        true => ". The unit of a coefficient is that of its column over that of its term",
+        false => "",
     };
     let name = tex_text(model_name);
     let stem = format!("tab:{}", label(model_name));
@@ -109,7 +109,7 @@ fn groups(table: &CoefficientTable, width_em: f64) -> Vec<Vec<usize>> {
     let widths: Vec<f64> = (0..table.columns.len())
         .map(|column| {
             let cells = table.rows.iter().map(|row| &row.coefficients[column]);
-            let head = table.units.as_ref().map_or(1.0, |_| UNIT_EM);
+            let head = table.columns[column].2.map_or(1.0, |_| UNIT_EM);
             ColumnWidth::of(cells).em().max(head) + COLUMN_SPACE_EM
         })
         .collect();
@@ -183,15 +183,19 @@ impl Layout<'_> {
             NumberStyle::Plain => format!(" & ${math}$"),
             NumberStyle::Siunitx => format!(" & {{${math}$}}"),
         };
-        let symbol = |&column: &usize| cell(tex_symbol(&self.table.columns[column].1));
-        let symbols: String = self.columns.iter().map(symbol).collect();
-        let heads = format!(r"Term{symbols} \\");
-        let Some(units) = &self.table.units else {
-            return heads;
+        let columns = || {
+            self.columns
+                .iter()
+                .map(|&column| &self.table.columns[column])
         };
-        let unit = |&column: &usize| cell(tex_unit(units[column]));
-        let units: String = self.columns.iter().map(unit).collect();
-        format!("{heads}\n{units} \\\\")
+        let symbols: String = columns()
+            .map(|(_, left, _)| cell(tex_symbol(left)))
+            .collect();
+        let units = columns().map(|(.., unit)| Some(cell(tex_unit((*unit)?))));
+        match units.collect::<Option<String>>() {
+            Some(units) => format!("Term{symbols} \\\\\n{units} \\\\"),
+            None => format!(r"Term{symbols} \\"),
+        }
     }
 
     fn row(&self, row: &CoefficientRow, widths: &[ColumnWidth]) -> String {
