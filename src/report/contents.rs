@@ -124,7 +124,6 @@ pub fn all_figures(content: &Content<'_>) -> Result<AllFigures, ModelError> {
 /// Every jump of an assessment, named.
 pub(super) fn jumps<'a>(content: &Content<'a>) -> Vec<Jump<'a>> {
     let (model, assessment) = (content.model, content.assessment);
-    let runs = assessment.runs.iter().enumerate();
     let jump = |(index, run): (usize, &'a SegmentRun<'a>)| {
         let path = &run.segment.path;
         let mut place = Place::of_recording(index, path);
@@ -139,7 +138,7 @@ pub(super) fn jumps<'a>(content: &Content<'a>) -> Vec<Jump<'a>> {
             place,
         }
     };
-    runs.map(jump).collect()
+    assessment.runs.iter().enumerate().map(jump).collect()
 }
 
 /// Figures 6, 9 and 15 of the paper.

@@ -85,11 +85,8 @@ impl Typeset {
 
 /// Every coefficient of all equations.
 pub(super) fn coefficients(system: &Equations<'_>) -> impl Iterator<Item = f64> {
-    let summands = system
-        .phases()
-        .iter()
-        .flat_map(|phase| phase.ddz.iter().flatten());
-    summands.map(|summand| summand.coefficient)
+    let equations = system.phases().iter().flat_map(|phase| &phase.ddz);
+    equations.flatten().map(|summand| summand.coefficient)
 }
 
 /// The coefficients of all phases beside each other.
@@ -134,10 +131,9 @@ impl Equation {
 
     /// The right side as one piece: a lone zero when there are no terms.
     pub fn right(&self) -> Math {
-        if self.terms.is_empty() {
-            Math::Number(Decimal::integer(0))
-        } else {
-            Math::Sum(self.terms.clone())
+        match self.terms.is_empty() {
+            true => Math::Number(Decimal::integer(0)),
+            false => Math::Sum(self.terms.clone()),
         }
     }
 }

@@ -88,11 +88,8 @@ pub fn break_lines(terms: &[Signed], available: f64, first: f64, indent: f64) ->
     let mut start = 0;
     let mut used = first;
     for (place, term) in terms.iter().enumerate() {
-        let sign = if place == 0 && !term.negative {
-            0.0
-        } else {
-            OPERATOR
-        };
+        let is_signed = place > 0 || term.negative;
+        let sign = if is_signed { OPERATOR } else { 0.0 };
         let needed = sign + width(&term.math);
         if place > start && used + needed > available {
             lines.push(&terms[start..place]);

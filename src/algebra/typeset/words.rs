@@ -84,21 +84,14 @@ fn pairs(patterns: &[ContactFlags]) -> String {
         Some(((_, [false, false, true]), (_, [false, false, true]))) => "all four feet".to_owned(),
         Some(((_, [true, false, false]), (_, [true, false, false]))) => "no foot".to_owned(),
         Some(((front, _), (rear, _))) => {
-            let words =
-                [(front, "front"), (rear, "rear")].map(|(words, pair)| words.replace("{}", pair));
-            let mut words: Vec<String> = words
-                .into_iter()
-                .filter(|words| !words.is_empty())
-                .collect();
+            let pairs = [(front, "front"), (rear, "rear")];
+            let mut words = Vec::from(pairs.map(|(words, pair)| words.replace("{}", pair)));
+            words.retain(|words| !words.is_empty());
             // what is there comes before what is not
             words.sort_by_key(|words| words.starts_with("no "));
             words.join(" and ")
         }
-        None => patterns
-            .iter()
-            .map(by_name)
-            .collect::<Vec<_>>()
-            .join(", or "),
+        None => (patterns.iter().map(by_name).collect::<Vec<_>>()).join(", or "),
     }
 }
 
@@ -157,19 +150,14 @@ fn summand<S: Spelling>(place: &Place) -> String {
             math: Math::Number(one),
             ..
         } if one.is_one() => number,
-        term => format!(
-            "{number} {}",
-            S::math(&term.clone().into_math(), &place.term)
-        ),
+        term => number + " " + &S::math(&term.clone().into_math(), &place.term),
     }
 }
 
 /// Two significant digits that are not below `error`, but for its own last bits.
 fn at_most(error: f64) -> Decimal {
-    Decimal::rounded(
-        rounded_up(error * (1.0 - 1e-9), 2),
-        Rounding::Significant(2),
-    )
+    let error = rounded_up(error * (1.0 - 1e-9), 2);
+    Decimal::rounded(error, Rounding::Significant(2))
 }
 
 #[cfg(test)]

@@ -62,9 +62,10 @@ pub(super) fn figure_size(figure: &Figure) -> (f64, f64) {
 }
 
 fn legend_height(figure: &Figure) -> f64 {
-    match figure.legend.is_empty() {
-        true => 0.0,
-        false => LEGEND,
+    if figure.legend.is_empty() {
+        0.0
+    } else {
+        LEGEND
     }
 }
 

@@ -41,14 +41,10 @@ impl Sticks {
             (point.x * cos + point.y * sin, point.z)
         };
         let [front, rear] = [Leg::FrontRight, Leg::RearRight].map(|leg| robot.hip_position(leg).x);
-        let corner = |x: f64, z: f64| seen(Vector3::new(x, 0.0, z * TRUNK_HALF_HEIGHT_M));
-        let trunk = vec![
-            corner(rear, -1.0),
-            corner(front, -1.0),
-            corner(front, 1.0),
-            corner(rear, 1.0),
-            corner(rear, -1.0),
-        ];
+        let corner = |(x, z): (f64, f64)| seen(Vector3::new(x, 0.0, z * TRUNK_HALF_HEIGHT_M));
+        let first = (rear, -1.0);
+        let corners = [first, (front, -1.0), (front, 1.0), (rear, 1.0), first];
+        let trunk = corners.map(corner).into();
         let leg = |leg: Leg| {
             let (hip, q) = (robot.hip_position(leg), leg.of_joints(&joints));
             let knee = robot.geometry(leg).knee_position(&q);
@@ -144,10 +140,8 @@ impl Motion {
 
     /// What each motion's lines mean.
     pub(super) fn legend(motions: &[Self]) -> Vec<(Role, String)> {
-        let entries = motions
-            .iter()
-            .map(|motion| (motion.role, motion.words.clone()));
-        entries.collect()
+        let entry = |motion: &Self| (motion.role, motion.words.clone());
+        motions.iter().map(entry).collect()
     }
 }
 

@@ -48,10 +48,9 @@ pub fn system(system: &EquationSystem, width_em: f64) -> String {
 }
 
 fn row(left: &str, right: &str, indent: f64) -> String {
-    let space = if indent > 0.0 {
-        format!("<mspace width=\"{indent}em\"/>")
-    } else {
-        String::new()
+    let space = match indent > 0.0 {
+        true => format!("<mspace width=\"{indent}em\"/>"),
+        false => String::new(),
     };
     format!(
         "<mtr><mtd style=\"text-align:right;padding-right:0\"><mrow>{left}</mrow></mtd>\
