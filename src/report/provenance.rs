@@ -95,10 +95,8 @@ fn text(value: &Value) -> String {
             shown.join(", ") + &rest
         }
         Value::Object(entries) => {
-            let shown = entries
-                .iter()
-                .map(|(key, value)| format!("{key}: {}", text(value)));
-            shown.collect::<Vec<_>>().join(", ")
+            let shown = |(key, value): (&String, &Value)| format!("{key}: {}", text(value));
+            entries.iter().map(shown).collect::<Vec<_>>().join(", ")
         }
     }
 }
