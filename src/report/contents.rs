@@ -53,10 +53,8 @@ pub struct JumpFigures {
     pub title: String,
     /// Root mean square errors of body x and z over the whole jump, in m.
     pub body_rms_m: [Option<f64>; 2],
-    /// The robot recorded and predicted, animated.
-    pub film: Option<Film>,
-    /// The same as a strip, for paper.
-    pub strip: Option<Figure>,
+    /// The robot recorded and predicted, as a strip for paper and animated.
+    pub motion: Option<(Figure, Film)>,
     /// Position and orientation of the body.
     pub body: Figure,
     /// Figures to fold away, each with a title: accelerations, template models, joints, and the controller's run if this
@@ -70,7 +68,8 @@ impl AllFigures {
         let jumps = self.jumps.iter();
         let jumps = jumps.flat_map(|jump| {
             let folded = jump.folded.iter().map(|(_, figure)| figure);
-            jump.strip.iter().chain([&jump.body]).chain(folded)
+            let strip = jump.motion.iter().map(|(strip, _)| strip);
+            strip.chain([&jump.body]).chain(folded)
         });
         self.encoder.iter().chain(jumps).chain(&self.study)
     }
@@ -105,12 +104,10 @@ pub fn all_figures(content: &Content<'_>) -> Result<AllFigures, ModelError> {
             ]);
         }
         let plan = content.plan.filter(|_| index == 0);
-        let (strip, film) = jump.motion(plan)?.unzip();
         figures.jumps.push(JumpFigures {
             title: jump.place.words.clone(),
             body_rms_m: jump.body_rms_m()?,
-            film,
-            strip,
+            motion: jump.motion(plan)?,
             body,
             folded,
         });

@@ -71,7 +71,12 @@ impl Jump<'_> {
             return Ok(None);
         };
         let segment = self.run.segment;
-        let mut motions = Vec::from(self.motions()?);
+        let predicted = Motion {
+            role: Role::Full,
+            words: "model, whole jump".to_owned(),
+            states: self.states()?,
+        };
+        let mut motions = vec![Motion::recorded(segment), predicted];
         motions.extend(plan.map(|plan| Motion::planned(plan, segment)));
         let caption = match plan {
             Some(_) => "planned, recorded, and predicted over the whole jump",
@@ -89,9 +94,8 @@ impl Jump<'_> {
         )))
     }
 
-    /// What was recorded, and the rollout over the whole jump; coordinates that the model does not
-    /// encode stay as recorded.
-    fn motions(&self) -> Result<[Motion; 2], ModelError> {
+    /// The robot along the rollout over the whole jump; coordinates that the model does not encode stay as recorded.
+    fn states(&self) -> Result<Samples, ModelError> {
         let recorded = &self.run.segment.x;
         let modelled = modelled(self.model, self.run)?;
         let mut states = self.decoded(&self.run.full)?;
@@ -101,12 +105,7 @@ impl Jump<'_> {
                 state[row] = recorded[(row, sample)];
             }
         }
-        let predicted = Motion {
-            role: Role::Full,
-            words: "model, whole jump".to_owned(),
-            states,
-        };
-        Ok([Motion::recorded(self.run.segment), predicted])
+        Ok(states)
     }
 
     /// A function's value at every predicted sample.
