@@ -151,8 +151,8 @@ pub fn page_of(
         simplification: vec![
             ladder.tolerances.captioned(LADDER_CAPTION),
             ladder.equations.captioned(errors),
+            ladder.changes.captioned(changes),
         ],
-        changes: ladder.changes.captioned(changes),
     };
     let verdict = verdict(content)?;
     Ok(Made {

@@ -24,7 +24,7 @@ const TABLES: [&str; 2] = ["cells.csv", "summary.csv"];
 /// Trains what is missing, or joins parts, and writes the tables of the study.
 pub fn run(arguments: &StudyArguments) -> Result<Answer, Error> {
     let overwrite = Overwrite::when_forced(arguments.force);
-    check_folder(&arguments.out_dir, TABLES, overwrite)?;
+    check_folder(&arguments.out_dir, &TABLES, overwrite)?;
     let store = match arguments.merge.is_empty() {
         true => trained(arguments)?,
         false => merged(arguments)?,

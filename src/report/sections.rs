@@ -198,7 +198,6 @@ fn simplification(options: &PageOptions) -> Section<'static> {
     let title = "How far the equations can be simplified";
     Section::new("simplification", title, &SIMPLIFICATION_WORDS)
         .folding(options.simplification.iter().cloned())
-        .folding([options.changes.clone()])
 }
 
 const ENCODER_WORDS: &str = "The darker a cell (the brighter on a dark screen), the more of that coordinate the latent one takes.";

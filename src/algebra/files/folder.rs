@@ -33,12 +33,11 @@ pub enum FolderError {
 ///
 /// # Errors
 /// [`FolderError::Foreign`], [`FolderError::Changed`], [`FolderError::Io`].
-pub fn check_folder<'a>(
+pub fn check_folder(
     folder: &Path,
-    names: impl IntoIterator<Item = &'a str>,
+    names: &[&str],
     overwrite: Overwrite,
 ) -> Result<(), FolderError> {
-    let names: Vec<&str> = names.into_iter().collect();
     check_all(folder, names.iter().map(|name| (*name, None)), overwrite)
 }
 
@@ -94,10 +93,10 @@ pub fn write_files(
     list.extend(files)?;
     for part in &mut staged {
         let put = part.put();
-        put.map_err(|error| io_error(part.place(), error))?;
+        put.map_err(|error| io_error(&part.place, error))?;
     }
     list.settle(folder)?;
-    Ok(staged.iter().map(|part| part.place().to_owned()).collect())
+    Ok(staged.iter().map(|part| part.place.clone()).collect())
 }
 
 /// How a lock file begins that Cargo has written.
@@ -420,7 +419,7 @@ mod tests {
         assert_eq!(fs::read_to_string(&own).expect("kept"), "my own work");
         let other = folder.path().join("m/src/lib.rs");
         assert_eq!(fs::read_to_string(other).expect("kept"), "one");
-        let checked = check_folder(folder.path(), ["m.c"], Overwrite::Refuse);
+        let checked = check_folder(folder.path(), &["m.c"], Overwrite::Refuse);
         assert!(matches!(checked, Err(FolderError::Changed { .. })));
         // What romc would write anyway is no loss.
         fs::write(&own, "two").expect("written");

@@ -120,12 +120,8 @@ impl Decimal {
 
     /// What the printed text means.
     pub fn value(&self) -> f64 {
-        let text = match self.exponent {
-            Some(exponent) => format!("{}e{exponent}", self.digits),
-            None => self.digits.clone(),
-        };
-        let size: f64 = text.parse().expect("digits and exponent form a number");
-        if self.negative { -size } else { size }
+        let value = self.to_string().parse();
+        value.expect("sign, digits and exponent form a number")
     }
 
     /// Whether it prints as nothing but zeros.

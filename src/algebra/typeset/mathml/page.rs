@@ -11,8 +11,8 @@ use crate::typeset::{
     EQUALS, EquationSystem, Math, PrintOptions, Symbol, TypesetError, break_lines, symbol_width,
 };
 
-use super::escape::HtmlText;
 use super::math::{mathml, mathml_symbol, mathml_terms};
+use super::prose::HtmlText;
 
 /// What a continued line is set in by, in em.
 const INDENT: f64 = 2.0;
