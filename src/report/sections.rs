@@ -131,13 +131,12 @@ pub(super) fn sections<'a>(
 
 fn beside_pendulum(content: &Content<'_>) -> Section<'static> {
     let assessment = content.assessment;
-    let baselines = assessment.baselines.iter();
-    let constants = baselines.map(|b| format!("{}: {}.", b.name, b.template.constants()));
-    let mut stiffness = assessment
-        .baselines
+    let baselines = &assessment.baselines;
+    let constants = baselines
         .iter()
-        .map(|b| b.template.stiffness_n_m);
-    let springless = (stiffness.any(|stiffness| stiffness == 0.0)).then(|| SPRINGLESS.to_owned());
+        .map(|b| format!("{}: {}.", b.name, b.template.constants()));
+    let is_springless = baselines.iter().any(|b| b.template.stiffness_n_m == 0.0);
+    let springless = is_springless.then(|| SPRINGLESS.to_owned());
     let table = baseline_table(assessment).captioned("Body position: the model and the pendulum");
     Section::new("aslip", "Beside the pendulum", &[BASELINE_WORDS])
         .and(constants)

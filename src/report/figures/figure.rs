@@ -31,35 +31,19 @@ impl Role {
 
     /// Class of its lines in SVG.
     pub fn class(self) -> &'static str {
-        match self {
-            Self::Recorded => "recorded",
-            Self::Full => "full",
-            Self::Restarted => "restarted",
-            Self::Baseline => "baseline",
-            Self::SecondBaseline => "baseline2",
-            Self::Limit => "limit",
-        }
+        self.style().0
     }
 
-    /// Colour on white, as red, green and blue from 0 to 255.
-    pub fn colour(self) -> [u8; 3] {
+    /// That class, the colour on white, as red, green and blue from 0 to 255, and lengths of dashes and gaps, as SVG and
+    /// PDF list them, so that lines differ in grey print too; no lengths for a full line.
+    pub fn style(self) -> (&'static str, [u8; 3], &'static str) {
         match self {
-            Self::Recorded => [31, 95, 168],
-            Self::Full => [194, 87, 12],
-            Self::Restarted => [35, 122, 62],
-            Self::Baseline => [123, 63, 160],
-            Self::SecondBaseline | Self::Limit => [110, 110, 110],
-        }
-    }
-
-    /// Lengths of dashes and gaps, as SVG and PDF list them, so that lines differ in grey print too; empty for a full line.
-    pub fn dashes(self) -> &'static str {
-        match self {
-            Self::Recorded => "",
-            Self::Full => "6 2.5",
-            Self::Restarted => "2 1.6",
-            Self::Baseline => "8 2 2 2",
-            Self::SecondBaseline | Self::Limit => "1 2",
+            Self::Recorded => ("recorded", [31, 95, 168], ""),
+            Self::Full => ("full", [194, 87, 12], "6 2.5"),
+            Self::Restarted => ("restarted", [35, 122, 62], "2 1.6"),
+            Self::Baseline => ("baseline", [123, 63, 160], "8 2 2 2"),
+            Self::SecondBaseline => ("baseline2", [110; 3], "1 2"),
+            Self::Limit => ("limit", [110; 3], "1 2"),
         }
     }
 }

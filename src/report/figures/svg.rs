@@ -47,8 +47,7 @@ fn style() -> String {
          .shade{{fill:#eee}}.heat{{fill:#1f5fa8}}polyline{{fill:none;stroke-width:1.2}}"
     );
     for role in Role::ALL {
-        let [r, g, b] = role.colour();
-        let (class, dashes) = (role.class(), role.dashes());
+        let (class, [r, g, b], dashes) = role.style();
         let dashes = if dashes.is_empty() { "none" } else { dashes };
         let _ = write!(
             text,
