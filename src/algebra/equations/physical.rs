@@ -12,7 +12,6 @@
 //! every term and into its coefficient.
 
 use std::borrow::Cow;
-use std::collections::HashMap;
 
 use nalgebra::{DMatrix, DVector};
 
@@ -80,18 +79,15 @@ impl LatentUnits {
 
     /// The unit of a term: that of a product of powers of variables; anything else counts as a pure number,
     /// whose inner numbers carry the units.
-    pub fn of_term(&self, equations: &Equations<'_>, term: ExprId) -> Unit {
-        let variables: HashMap<SymbolId, LatentVariable> = LatentVariable::all(self.position.len())
-            .map(|variable| (equations.symbol(variable), variable))
-            .collect();
-        let pool = equations.pool();
+    pub fn of_term(&self, pool: &ExprPool, term: ExprId) -> Unit {
         let factors = pool.factors_of(term).iter().map(|&factor| {
             let (base, exponent) = match pool.node(factor) {
                 Node::Power(base, exponent) => (*base, pool.as_number(*exponent)?.as_integer()?),
                 _ => (factor, 1),
             };
-            let variable = variables.get(&pool.as_symbol(base)?)?;
-            Some(self.of(*variable).power(i8::try_from(exponent).ok()?))
+            let name = pool.symbol_name(pool.as_symbol(base)?);
+            let variable = LatentVariable::from_name(name, self.position.len())?;
+            Some(self.of(variable).power(i8::try_from(exponent).ok()?))
         });
         let mut factors = factors.into_iter();
         let product = factors.try_fold(Unit::default(), |unit, factor| Some(unit * factor?));

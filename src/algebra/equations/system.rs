@@ -9,7 +9,7 @@ use super::physical::LatentUnits;
 use crate::model::{
     CandidateTerm, FeetRule, LatentVariable, Library, ModelError, Phase, ReducedModel,
 };
-use crate::symbolic::{ExprId, ExprPool, SymbolId};
+use crate::symbolic::{ExprPool, SymbolId};
 
 /// One summand of an equation: `coefficient * terms[term]`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -171,25 +171,6 @@ impl<'a> Equations<'a> {
     pub fn symbol(&self, variable: LatentVariable) -> SymbolId {
         let symbol = self.model.library().symbol(variable);
         symbol.expect("variables up to latent_dim are in the library's pool")
-    }
-
-    /// The accelerations of one phase as canonical sums, in a clone of the pool.
-    ///
-    /// # Errors
-    /// [`ModelError::PhaseIndex`].
-    pub fn sums(&self, phase: usize) -> Result<(ExprPool, Vec<ExprId>), ModelError> {
-        let phase = self.phase(phase)?;
-        let mut pool = self.pool.clone();
-        let mut sums = Vec::with_capacity(phase.ddz.len());
-        for output in 0..phase.ddz.len() {
-            let mut products = Vec::new();
-            for (coefficient, term) in phase.summands(self, output) {
-                let factor = pool.number(coefficient);
-                products.push(pool.mul(factor, term.expr()));
-            }
-            sums.push(pool.sum(&products));
-        }
-        Ok((pool, sums))
     }
 
     /// The coefficients of a phase as a matrix, one row per term, one column per acceleration.

@@ -307,15 +307,17 @@ proptest! {
         let part = |from: usize| DVector::from_row_slice(&point[from..from + 2]);
         let (z, dz, u_lat) = (part(0), part(2), part(4));
         let expected = model.ddz(0, &z, &dz, &u_lat).unwrap();
-        let (pool, sums) = crate::equations::Equations::of(&model).sums(0).unwrap();
-        for (expr, expected) in sums.iter().zip(expected.iter()) {
-            let value = pool.evaluate(*expr, &|symbol| {
-                match model.library().variable(symbol).unwrap() {
-                    LatentVariable::Z(i) => z[i],
-                    LatentVariable::Dz(i) => dz[i],
-                    LatentVariable::U(i) => u_lat[i],
-                }
-            });
+        let equations = crate::equations::Equations::of(&model);
+        let of_term = |term: &CandidateTerm| equations.pool().evaluate(term.expr(), &|symbol| {
+            match model.library().variable(symbol).unwrap() {
+                LatentVariable::Z(i) => z[i],
+                LatentVariable::Dz(i) => dz[i],
+                LatentVariable::U(i) => u_lat[i],
+            }
+        });
+        for (row, expected) in expected.iter().enumerate() {
+            let summands = equations.phases()[0].summands(&equations, row);
+            let value: f64 = summands.map(|(coefficient, term)| coefficient * of_term(term)).sum();
             prop_assert!((value - expected).abs() < 1e-12, "{value} {expected}");
         }
     }
