@@ -6,7 +6,7 @@ use super::Answer;
 use super::output::names;
 use crate::Error;
 use crate::files::{EmittedFile, Overwrite, write_files};
-use crate::report::figures::{Figure, figure_files};
+use crate::report::{Figure, figure_files};
 use crate::robot::Robot;
 
 /// What an output file holds, which the ending of its name says: one of these.

@@ -17,9 +17,8 @@ use crate::evaluate::{Assessment, LAMBDA};
 use crate::files::EmittedFile;
 use crate::model::ReducedModel;
 use crate::recording::Recording;
-use crate::report::figures::figure_files;
 use crate::report::{
-    Content, PageOptions, Verdict, all_figures, page, verdict, without_statistics,
+    Content, PageOptions, Verdict, all_figures, figure_files, page, verdict, without_statistics,
 };
 use crate::simplify::Tolerance;
 use crate::study::{Store, Summary};
@@ -149,8 +148,8 @@ pub fn page_of(
         simplification: vec![
             ladder.captioned(LADDER_CAPTION),
             equations.captioned(errors),
+            changes.captioned(bounds),
         ],
-        changes: changes.captioned(bounds),
     };
     let verdict = verdict(content)?;
     Ok(Made {

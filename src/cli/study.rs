@@ -13,8 +13,7 @@ use super::train_settings;
 use crate::Error;
 use crate::files::{EmittedFile, check_folder};
 use crate::recording::Recording;
-use crate::report::figures::figure_files;
-use crate::report::study_figures;
+use crate::report::{figure_files, study_figures};
 use crate::study::{self, Plan, Shard, Spread, Store, Summary, cell_table};
 use crate::train::Origin;
 use crate::typeset::{Cell, Table, significant};
@@ -24,7 +23,7 @@ const TABLES: [&str; 2] = ["cells.csv", "summary.csv"];
 
 /// Trains what is missing, or joins parts, and writes the tables of the study.
 pub fn run(arguments: &StudyArguments) -> Result<Answer, Error> {
-    check_folder(&arguments.out_dir, TABLES, arguments.force)?;
+    check_folder(&arguments.out_dir, &TABLES, arguments.force)?;
     let store = match arguments.merge.is_empty() {
         true => trained(arguments)?,
         false => merged(arguments)?,

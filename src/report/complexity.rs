@@ -71,6 +71,7 @@ fn panel(title: &str, rows: &[DimensionSummary], bar: impl Fn(&DimensionSummary)
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::report::figures::Drawing;
 
     #[test]
     fn bars_reach_a_standard_deviation_to_either_side_and_do_not_join() {
@@ -91,15 +92,16 @@ mod tests {
             dimensions: vec![row(1, spread(10.0, 2.0)), row(2, spread(20.0, 3.0))],
         };
         let figures = study_figures(&summary);
-        let [Panel::Lines(decoder), Panel::Lines(active), ..] = &figures[0].panels[..] else {
-            panic!("line plots");
-        };
-        let [bars, means] = [0, 1].map(|line| active.series[line].points.as_slice());
+        let [decoder, active] = [0, 1].map(|panel| match &figures[0].panels[panel].drawing {
+            Drawing::Lines(series, _) => series,
+            other => panic!("{other:?}"),
+        });
+        let [bars, means] = [0, 1].map(|line| active[line].points.as_slice());
         assert_eq!(
             bars[..3],
             [(1.0, Some(8.0)), (1.0, Some(12.0)), (1.0, None)]
         );
         assert_eq!(means, [(1.0, Some(10.0)), (2.0, Some(20.0))]);
-        assert_eq!(decoder.series[0].points[0], (1.0, Some(-5.0)));
+        assert_eq!(decoder[0].points[0], (1.0, Some(-5.0)));
     }
 }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use super::complexity::study_figures;
 use super::control::{latent_inputs, torques};
-use super::figures::{Figure, Film, HeatMap, Panel, subscript};
+use super::figures::{Drawing, Figure, Film, HeatMap, Panel, subscript};
 use super::jump::{Jump, Place};
 use super::tables::NamedRun;
 use crate::evaluate::{Assessment, SegmentRun};
@@ -53,10 +53,8 @@ pub struct JumpFigures {
     pub title: String,
     /// Root mean square errors of body x and z over the whole jump, in m.
     pub body_rms_m: [Option<f64>; 2],
-    /// The robot recorded and predicted, animated.
-    pub film: Option<Film>,
-    /// The same as a strip, for paper.
-    pub strip: Option<Figure>,
+    /// The robot recorded and predicted, as a strip for paper and animated.
+    pub motion: Option<(Figure, Film)>,
     /// Position and orientation of the body.
     pub body: Figure,
     /// Figures to fold away, each with a title: accelerations, template models, joints, and the controller's run if this
@@ -70,7 +68,8 @@ impl AllFigures {
         let jumps = self.jumps.iter();
         let jumps = jumps.flat_map(|jump| {
             let folded = jump.folded.iter().map(|(_, figure)| figure);
-            jump.strip.iter().chain([&jump.body]).chain(folded)
+            let strip = jump.motion.iter().map(|(strip, _)| strip);
+            strip.chain([&jump.body]).chain(folded)
         });
         self.encoder.iter().chain(jumps).chain(&self.study)
     }
@@ -105,12 +104,10 @@ pub fn all_figures(content: &Content<'_>) -> Result<AllFigures, ModelError> {
             ]);
         }
         let plan = content.plan.filter(|_| index == 0);
-        let (strip, film) = jump.motion(plan)?.unzip();
         figures.jumps.push(JumpFigures {
             title: jump.place.words.clone(),
             body_rms_m: jump.body_rms_m()?,
-            film,
-            strip,
+            motion: jump.motion(plan)?,
             body,
             folded,
         });
@@ -124,7 +121,6 @@ pub fn all_figures(content: &Content<'_>) -> Result<AllFigures, ModelError> {
 /// Every jump of an assessment, named.
 pub(super) fn jumps<'a>(content: &Content<'a>) -> Vec<Jump<'a>> {
     let (model, assessment) = (content.model, content.assessment);
-    let runs = assessment.runs.iter().enumerate();
     let jump = |(index, run): (usize, &'a SegmentRun<'a>)| {
         let path = &run.segment.path;
         let mut place = Place::of_recording(index, path);
@@ -139,7 +135,7 @@ pub(super) fn jumps<'a>(content: &Content<'a>) -> Vec<Jump<'a>> {
             place,
         }
     };
-    runs.map(jump).collect()
+    assessment.runs.iter().enumerate().map(jump).collect()
 }
 
 /// Figures 6, 9 and 15 of the paper.
@@ -162,12 +158,14 @@ fn encoder(
     };
     let caption = format!("{what}: how much of each coordinate a latent one takes (scaled units).");
     let columns = (1..=d).map(|index| format!("z{}", subscript(index)));
-    let map = Panel::Heat(HeatMap {
+    let map = Panel {
         title: "|weight|".to_owned(),
-        rows: assessment.names.clone(),
-        columns: columns.collect(),
-        values,
-    });
+        drawing: Drawing::Heat(HeatMap {
+            rows: assessment.names.clone(),
+            columns: columns.collect(),
+            values,
+        }),
+    };
     Ok(Figure {
         x_label: String::new(),
         panel_size: (120.0 + 40.0 * d.min(18) as f64, 330.0),

@@ -43,13 +43,13 @@ fn line(run: &Run, role: Role, value: impl Fn(&StepRow) -> Option<f64>) -> Serie
 
 /// Commanded torques beside the recorded ones, between the limits.
 pub(super) fn torques(model: &ReducedModel, lift: Lift, run: &Run, place: &Place) -> Figure {
+    let Place { suffix, words } = place;
     let limits = model.robot().ok().map(Robot::torque_limit_nm);
     let panel = |joint: usize| {
         let limit = |sign: f64| limits.map(|limits| sign * limits[joint]);
+        let recorded = |row: &StepRow| Some(row.recorded_torque_nm[joint]);
         let lines = vec![
-            line(run, Role::Recorded, |row| {
-                Some(row.recorded_torque_nm[joint])
-            }),
+            line(run, Role::Recorded, recorded),
             line(run, Role::Full, |row| Some(row.command.torque_nm[joint])),
             line(run, Role::Limit, |_| limit(1.0)),
             line(run, Role::Limit, |_| limit(-1.0)),
@@ -61,10 +61,9 @@ pub(super) fn torques(model: &ReducedModel, lift: Lift, run: &Run, place: &Place
         Lift::Consistent => "consistent",
     };
     Figure::over_time(
-        format!("torques_{}", place.suffix),
+        format!("torques_{suffix}"),
         format!(
-            "Joint torques along {}: recorded, and commanded by the latent controller ({lift} lift), within the robot's limits.",
-            place.words
+            "Joint torques along {words}: recorded, and commanded by the latent controller ({lift} lift), within the robot's limits."
         ),
         (0..JOINT_DIM).map(panel).collect(),
         &[
@@ -77,6 +76,7 @@ pub(super) fn torques(model: &ReducedModel, lift: Lift, run: &Run, place: &Place
 
 /// The controller's latent inputs.
 pub(super) fn latent_inputs(model: &ReducedModel, run: &Run, place: &Place) -> Figure {
+    let Place { suffix, words } = place;
     let panel = |latent: usize| {
         let chosen = line(run, Role::Full, |row| {
             row.command.u_lat.get(latent).copied()
@@ -84,11 +84,8 @@ pub(super) fn latent_inputs(model: &ReducedModel, run: &Run, place: &Place) -> F
         Panel::lines(format!("u{}", latent + 1), vec![chosen])
     };
     Figure::over_time(
-        format!("latent_inputs_{}", place.suffix),
-        format!(
-            "Latent inputs that the controller chose along {} (scaled units).",
-            place.words
-        ),
+        format!("latent_inputs_{suffix}"),
+        format!("Latent inputs that the controller chose along {words} (scaled units)."),
         (0..model.latent_dim()).map(panel).collect(),
         &[(Role::Full, "commanded")],
     )
@@ -99,7 +96,7 @@ fn latent_tracking(
     model: &ReducedModel,
     settings: &MpcSettings,
     run: &Run,
-    place: &Place,
+    Place { suffix, words }: &Place,
 ) -> Figure {
     let horizon_s = settings.horizon as f64 * settings.step_s;
     let panel = |latent: usize| {
@@ -112,11 +109,10 @@ fn latent_tracking(
         Panel::lines(format!("z{}", latent + 1), vec![reference, planned])
     };
     Figure::over_time(
-        format!("latent_tracking_{}", place.suffix),
+        format!("latent_tracking_{suffix}"),
         format!(
-            "Latent positions along {} (scaled units): the reference, and what each plan expects \
-             {horizon_s} s ahead, drawn where it expects it.",
-            place.words
+            "Latent positions along {words} (scaled units): the reference, and what each plan expects \
+             {horizon_s} s ahead, drawn where it expects it."
         ),
         (0..model.latent_dim()).map(panel).collect(),
         &[

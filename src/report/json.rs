@@ -89,15 +89,13 @@ fn rollouts_json(
 /// A planned jump: goal and what is reached, durations, how far it is from what was recorded.
 pub fn plan_json(planned: &Plan) -> Value {
     let parts = planned.parts.iter();
-    let durations: Map<String, Value> = parts
-        .map(|part| (part.name.clone(), json!(part.duration_s)))
-        .collect();
+    let durations = parts.map(|part| (part.name.clone(), json!(part.duration_s)));
     json!({
         "distance_m": planned.reached_m[0],
         "apex_m": planned.reached_m[1],
         "goal_m": planned.goal_m,
         "expected_error_m": { "distance": planned.error_m[0], "apex": planned.error_m[1] },
-        "durations_s": durations,
+        "durations_s": durations.collect::<Map<_, _>>(),
         "cost": planned.cost,
         "input_deviation": planned.input_deviation,
         "extrapolates": planned.verdict != Verdict::Trusted,

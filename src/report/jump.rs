@@ -10,7 +10,7 @@ use super::figures::{
 use super::tables::file_name;
 use crate::evaluate::{Assessment, FitSums, SegmentRun};
 use crate::model::{ModelError, ReducedModel};
-use crate::recording::Segment;
+use crate::recording::{Segment, stretches};
 use crate::robot::{BODY_X, BODY_Z, JOINT_DIM, STATE_DIM};
 use crate::sim::Rollout;
 
@@ -71,7 +71,12 @@ impl Jump<'_> {
             return Ok(None);
         };
         let segment = self.run.segment;
-        let mut motions = Vec::from(self.motions()?);
+        let predicted = Motion {
+            role: Role::Full,
+            words: "model, whole jump".to_owned(),
+            states: self.states()?,
+        };
+        let mut motions = vec![Motion::recorded(segment), predicted];
         motions.extend(plan.map(|plan| Motion::planned(plan, segment)));
         let caption = match plan {
             Some(_) => "planned, recorded, and predicted over the whole jump",
@@ -89,9 +94,8 @@ impl Jump<'_> {
         )))
     }
 
-    /// What was recorded, and the rollout over the whole jump; coordinates that the model does not
-    /// encode stay as recorded.
-    fn motions(&self) -> Result<[Motion; 2], ModelError> {
+    /// The robot along the rollout over the whole jump; coordinates that the model does not encode stay as recorded.
+    fn states(&self) -> Result<Samples, ModelError> {
         let recorded = &self.run.segment.x;
         let modelled = modelled(self.model, self.run)?;
         let mut states = self.decoded(&self.run.full)?;
@@ -101,12 +105,7 @@ impl Jump<'_> {
                 state[row] = recorded[(row, sample)];
             }
         }
-        let predicted = Motion {
-            role: Role::Full,
-            words: "model, whole jump".to_owned(),
-            states,
-        };
-        Ok([Motion::recorded(self.run.segment), predicted])
+        Ok(states)
     }
 
     /// A function's value at every predicted sample.
@@ -138,19 +137,12 @@ impl Jump<'_> {
 
     /// Times without a foot down.
     fn flights(&self) -> Vec<(f64, f64)> {
-        let time = &self.run.segment.time_s;
-        let mut spans: Vec<(f64, f64)> = Vec::new();
-        let mut airborne = false;
-        for (sample, feet) in self.run.segment.feet.iter().enumerate() {
-            let in_air = !feet.contains(&true);
-            match (spans.last_mut(), in_air, airborne) {
-                (Some(span), true, true) => span.1 = time[sample],
-                (_, true, _) => spans.push((time[sample], time[sample])),
-                (_, false, _) => {}
-            }
-            airborne = in_air;
-        }
-        spans
+        let Segment { time_s, feet, .. } = self.run.segment;
+        let in_air = |sample: usize| !feet[sample].contains(&true);
+        let spans = stretches(0..feet.len(), |a, b| in_air(a) == in_air(b)).into_iter();
+        let flights = spans.filter(|span| in_air(span.start));
+        let times = flights.map(|span| (time_s[span.start], time_s[span.end - 1]));
+        times.collect()
     }
 
     /// A figure of rollouts beside the recording; `id` gets the number of the jump.

@@ -7,7 +7,7 @@
 mod complexity;
 mod contents;
 mod control;
-pub mod figures;
+mod figures;
 mod json;
 mod jump;
 mod page;
@@ -18,14 +18,14 @@ mod tables;
 mod verdict;
 
 pub use complexity::study_figures;
-pub use contents::{AllFigures, Content, JumpFigures, all_figures};
+pub use contents::{Content, all_figures};
 pub use control::{control_figures, without_statistics};
+pub use figures::{Figure, figure_files};
 pub use json::{assessment_json, plan_json};
-pub use jump::modelled;
 pub use page::{PageOptions, page};
 pub use plan::{plan_figures, reach_figure};
 pub use tables::{
     NamedRun, baseline_table, control_table, coordinate_table, dynamics_table, failed_runs,
-    failures, invariance_table, phase_table, run_table, template_rms,
+    failures, invariance_table, phase_table, run_table,
 };
 pub use verdict::{Verdict, verdict};

@@ -23,10 +23,9 @@ const WIDTH_EM: f64 = 44.0;
 /// The parts of the page that do not follow from its [`Content`].
 #[derive(Debug, Clone, Default)]
 pub struct PageOptions {
-    /// Effects of simplification within several tolerances.
+    /// Effects of simplification within several tolerances, and every change of the chosen one; tables without rows
+    /// are left out.
     pub simplification: Vec<Table>,
-    /// Every change of the chosen tolerance; none if it has no rows.
-    pub changes: Table,
     /// Commands that reproduce the report, in order.
     pub commands: Vec<String>,
 }

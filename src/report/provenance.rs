@@ -25,24 +25,23 @@ pub fn origin(provenance: &Map<String, Value>) -> Origin {
     for (key, value) in provenance {
         match value {
             Value::Object(entries) => {
-                let mut facts = Table::new(["entry", "value"]).captioned(spaced(key));
-                let place = origin.lists.len();
+                let (mut facts, place) = (Vec::new(), origin.lists.len());
                 for (key, value) in entries {
                     add(&mut facts, &mut origin.lists, key, value);
                 }
-                origin.lists.insert(place, facts);
+                let table = Table::of(&facts)
+                    .column("entry", "", |(entry, _)| entry)
+                    .column("value", "", |(_, value)| value);
+                (origin.lists).insert(place, table.table().captioned(spaced(key)));
             }
-            Value::Array(items) if items.iter().any(Value::is_object) => {
-                origin.lists.push(list(key, items));
-            }
-            _ => origin.facts.push((spaced(key), text(value))),
+            value => add(&mut origin.facts, &mut origin.lists, key, value),
         }
     }
     origin
 }
 
 /// Adds a value under its place to the facts, or a table of its own to the lists.
-fn add(facts: &mut Table, lists: &mut Vec<Table>, place: &str, value: &Value) {
+fn add(facts: &mut Vec<(String, String)>, lists: &mut Vec<Table>, place: &str, value: &Value) {
     match value {
         Value::Object(entries) => {
             for (key, value) in entries {
@@ -52,9 +51,7 @@ fn add(facts: &mut Table, lists: &mut Vec<Table>, place: &str, value: &Value) {
         Value::Array(items) if items.iter().any(Value::is_object) => {
             lists.push(list(place, items));
         }
-        _ => {
-            facts.row([spaced(place), text(value)]);
-        }
+        value => facts.push((spaced(place), text(value))),
     }
 }
 
@@ -98,10 +95,8 @@ fn text(value: &Value) -> String {
             shown.join(", ") + &rest
         }
         Value::Object(entries) => {
-            let shown = entries
-                .iter()
-                .map(|(key, value)| format!("{key}: {}", text(value)));
-            shown.collect::<Vec<_>>().join(", ")
+            let shown = |(key, value): (&String, &Value)| format!("{key}: {}", text(value));
+            entries.iter().map(shown).collect::<Vec<_>>().join(", ")
         }
     }
 }

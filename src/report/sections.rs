@@ -8,7 +8,7 @@ use super::tables::{
     NamedRun, baseline_table, body_rms, control_table, dynamics_table, error_table, failures,
     invariance_table, run_table,
 };
-use crate::evaluate::{Baseline, CoordinateSums, Invariance};
+use crate::evaluate::{CoordinateSums, Invariance};
 use crate::typeset::{Table, rounded, significant};
 
 /// A section in the template.
@@ -104,10 +104,8 @@ pub(super) fn sections<'a>(
     let not_told = invariance.as_ref().err();
     let not_told = not_told.map(|error| format!("Invariance is not told: {error}."));
     let invariance = invariance.ok().flatten();
-    let dynamics = [dynamics_table(model, assessment).captioned("Each phase of the model")];
-    let dynamics = dynamics
-        .into_iter()
-        .chain(invariance.as_ref().map(invariance_table));
+    let dynamics = dynamics_table(model, assessment).captioned("Each phase of the model");
+    let physics = invariance.as_ref().map(invariance_table);
     let stability = "Phases, stability and inputs";
     let latent = "Composition of the latent coordinates";
     let mut sections = vec![
@@ -115,7 +113,7 @@ pub(super) fn sections<'a>(
             .folding([error_table(model, assessment).captioned(by_phase)]),
         Section::new("stability", stability, &[DYNAMICS_WORDS])
             .and(not_told)
-            .with(&[], dynamics),
+            .with(&[], [dynamics].into_iter().chain(physics)),
         beside_pendulum(content),
         control(content),
         Section::new("latent", latent, &[ENCODER_WORDS]).with(&figures.encoder, []),
@@ -133,11 +131,12 @@ pub(super) fn sections<'a>(
 
 fn beside_pendulum(content: &Content<'_>) -> Section<'static> {
     let assessment = content.assessment;
-    let baselines = assessment.baselines.iter();
-    let constants = baselines.map(|b| format!("{}: {}.", b.name, b.template.constants()));
-    let is_springless = |b: &Baseline| b.template.stiffness_n_m == 0.0;
-    let springless =
-        (assessment.baselines.iter().any(is_springless)).then(|| SPRINGLESS.to_owned());
+    let baselines = &assessment.baselines;
+    let constants = baselines
+        .iter()
+        .map(|b| format!("{}: {}.", b.name, b.template.constants()));
+    let is_springless = baselines.iter().any(|b| b.template.stiffness_n_m == 0.0);
+    let springless = is_springless.then(|| SPRINGLESS.to_owned());
     let table = baseline_table(assessment).captioned("Body position: the model and the pendulum");
     Section::new("aslip", "Beside the pendulum", &[BASELINE_WORDS])
         .and(constants)
@@ -160,22 +159,16 @@ fn control(content: &Content<'_>) -> Section<'static> {
     };
     let judged = |runs: &[NamedRun], caption: String| control_table(runs).captioned(caption);
     let beside = "the model and its baselines";
-    let first = shown
-        .get(..1)
-        .map(|first| judged(first, format!("{CONSISTENT}: {beside}{along}")));
-    let every = (shown.len() > 1).then(|| {
-        judged(
-            shown,
-            format!("{CONSISTENT}: the same along every recording"),
-        )
-    });
+    let of_first = format!("{CONSISTENT}: {beside}{along}");
+    let first = shown.get(..1).map(|first| judged(first, of_first));
+    let of_every = format!("{CONSISTENT}: the same along every recording");
+    let every = (shown.len() > 1).then(|| judged(shown, of_every));
     let runs = [(PLAIN, plain), (CONSISTENT, shown)].into_iter();
-    let work = runs
-        .filter(|(_, runs)| !runs.is_empty())
-        .map(|(lift, runs)| {
-            let words = "the solver's work, and what the lift makes of recorded inputs";
-            upright(run_table(runs)).captioned(format!("{lift}: {words}"))
-        });
+    let runs = runs.filter(|(_, runs)| !runs.is_empty());
+    let work = runs.map(|(lift, runs)| {
+        let words = "the solver's work, and what the lift makes of recorded inputs";
+        upright(run_table(runs)).captioned(format!("{lift}: {words}"))
+    });
     let title = "The controller along the recordings";
     Section::new("control", title, &CONTROL_WORDS)
         .and(without)
@@ -204,7 +197,6 @@ fn simplification(options: &PageOptions) -> Section<'static> {
     let title = "How far the equations can be simplified";
     Section::new("simplification", title, &SIMPLIFICATION_WORDS)
         .folding(options.simplification.iter().cloned())
-        .folding([options.changes.clone()])
 }
 
 const ENCODER_WORDS: &str = "The darker a cell (the brighter on a dark screen), the more of that coordinate the latent one takes.";

@@ -55,22 +55,19 @@ pub fn coordinate_table(model: &ReducedModel, assessment: &Assessment<'_>) -> Ta
 
 /// Fit of every coordinate, and its restarted residuals in each phase.
 pub fn error_table(model: &ReducedModel, assessment: &Assessment<'_>) -> Table {
-    let mut table = coordinate_table(model, assessment);
-    add_phases(&mut table, model, assessment);
-    table
-}
-
-fn add_phases(table: &mut Table, model: &ReducedModel, assessment: &Assessment<'_>) {
-    for (index, phase) in model.phases().iter().enumerate() {
-        let fits = assessment.restarted.phase_fits(index);
-        table.column(&phase.name, "", fits.into_iter().map(rms));
-    }
+    with_phases(coordinate_table(model, assessment), model, assessment)
 }
 
 /// Restarted residuals of every coordinate, one column per phase.
 pub fn phase_table(model: &ReducedModel, assessment: &Assessment<'_>) -> Table {
-    let mut table = coordinates(assessment);
-    add_phases(&mut table, model, assessment);
+    with_phases(coordinates(assessment), model, assessment)
+}
+
+fn with_phases(mut table: Table, model: &ReducedModel, assessment: &Assessment<'_>) -> Table {
+    for (index, phase) in model.phases().iter().enumerate() {
+        let fits = assessment.restarted.phase_fits(index);
+        table.column(&phase.name, "", fits.into_iter().map(rms));
+    }
     table
 }
 
@@ -167,24 +164,15 @@ pub fn control_table(runs: &[NamedRun]) -> Table {
     let stage =
         |of: fn(&PredictionError) -> f64| move |(_, row): &(&PathBuf, Driven<'_>)| row.1.map(of);
     let millimetres = |metres: f64| 1e3 * metres;
+    let x = stage(|error| 1e3 * error.body_x_m);
+    let z = stage(|error| 1e3 * error.body_z_m);
+    let joints = stage(|error| error.joints_rad);
     Table::of(rows)
         .column("recording", "", |(path, _)| file_name(path))
         .column("controller", "", |(_, row)| row.0)
-        .column(
-            "x one stage ahead",
-            "mm",
-            stage(|error| 1e3 * error.body_x_m),
-        )
-        .column(
-            "z one stage ahead",
-            "mm",
-            stage(|error| 1e3 * error.body_z_m),
-        )
-        .column(
-            "joints one stage ahead",
-            "rad",
-            stage(|error| error.joints_rad),
-        )
+        .column("x one stage ahead", "mm", x)
+        .column("z one stage ahead", "mm", z)
+        .column("joints one stage ahead", "rad", joints)
         .column("own input: torque R^2 contact", "", |(_, row)| {
             row.2.contact
         })
@@ -242,6 +230,7 @@ pub(super) fn file_name(path: &Path) -> String {
 /// dynamics are right changes none of it.
 pub fn run_table(runs: &[NamedRun]) -> Table {
     let rows = runs.iter().map(|(path, run)| (path, &run.summary));
+    let whole = |us: f64| format!("{us:.0}");
     Table::of(rows)
         .column("recording", "", |(path, _)| file_name(path))
         .column("steps", "", |(_, run)| run.steps)
@@ -254,11 +243,7 @@ pub fn run_table(runs: &[NamedRun]) -> Table {
         .column("friction violations", "", |(_, run)| {
             run.friction_violations
         })
-        .column("step, median", "us", |(_, run)| {
-            format!("{:.0}", run.step_us.p50)
-        })
-        .column("step, p99", "us", |(_, run)| {
-            format!("{:.0}", run.step_us.p99)
-        })
+        .column("step, median", "us", |(_, run)| whole(run.step_us.p50))
+        .column("step, p99", "us", |(_, run)| whole(run.step_us.p99))
         .table()
 }

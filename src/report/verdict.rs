@@ -58,10 +58,8 @@ enum Seen {
 /// [`ModelError`] for a model without encoder or decoder.
 pub fn verdict(content: &Content<'_>) -> Result<Verdict, ModelError> {
     let assessment = content.assessment;
-    let [whole, short] = [
-        grade(content, &assessment.full, CLOSE),
-        grade(content, &assessment.restarted, CLOSE_RESTARTED),
-    ];
+    let whole = grade(content, &assessment.full, CLOSE);
+    let short = grade(content, &assessment.restarted, CLOSE_RESTARTED);
     let is_doubtful = !assessment.remarks.is_empty();
     let mut sentences = vec![subject(content)?, compared(content), errors(content)];
     sentences.extend(beside_pendulum(content));
@@ -167,12 +165,8 @@ fn compared(content: &Content<'_>) -> String {
     let seconds: f64 = runs.iter().map(|run| run.segment.duration_s()).sum();
     let known = known_digests(content.model);
     let paths: BTreeSet<&Path> = runs.iter().map(|run| run.segment.path.as_path()).collect();
-    let is = |what: Seen| {
-        let paths = paths.iter();
-        paths
-            .filter(|path| seen(content, &known, path) == what)
-            .count()
-    };
+    let all_seen: Vec<Seen> = (paths.iter().map(|path| seen(content, &known, path))).collect();
+    let is = |what: Seen| all_seen.iter().filter(|seen| **seen == what).count();
     let training = match (is(Seen::Yes), is(Seen::No)) {
         (0, 0) => "The model file does not say which recordings it was made with.".to_owned(),
         (0, 1) if paths.len() == 1 => "Its training did not see it.".to_owned(),
@@ -207,10 +201,8 @@ fn errors(content: &Content<'_>) -> String {
     let [whole, short] =
         [&assessment.full, &assessment.restarted].map(|sums| pair(body_rms(assessment, sums)));
     let runs = assessment.runs.iter();
-    let diverged = match runs
-        .filter(|run| run.full.diverged_at_s().is_some())
-        .count()
-    {
+    let diverged = runs.filter(|run| run.full.diverged_at_s().is_some());
+    let diverged = match diverged.count() {
         0 => String::new(),
         diverged => format!(" The rollout diverges in {}.", counted(diverged, "jump")),
     };
@@ -225,16 +217,10 @@ fn errors(content: &Content<'_>) -> String {
 fn beside_pendulum(content: &Content<'_>) -> Option<String> {
     let assessment = content.assessment;
     let own = body_rms(assessment, &assessment.full);
-    let templates = assessment.baselines.iter();
-    let templates: Vec<_> = templates
-        .map(|baseline| template_rms(&baseline.full))
-        .collect();
     let words = |axis: usize, name: &str| -> Option<String> {
-        let best = templates
-            .iter()
-            .filter_map(|rms| rms[axis])
-            .reduce(f64::min)?;
-        let ratio = best / own[axis]?;
+        let templates = assessment.baselines.iter();
+        let errors = templates.filter_map(|template| template_rms(&template.full)[axis]);
+        let ratio = errors.reduce(f64::min)? / own[axis]?;
         let words = match ratio {
             1.05.. => format!("{} times closer in {name}", rounded(ratio, 2)),
             0.96.. => format!("as close in {name}"),
@@ -242,10 +228,8 @@ fn beside_pendulum(content: &Content<'_>) -> Option<String> {
         };
         (ratio.is_finite() && ratio > 0.0).then_some(words)
     };
-    let words = [words(0, "body.x"), words(1, "body.z")]
-        .into_iter()
-        .flatten();
-    let words = words.reduce(|x, z| format!("{x} and {z}"))?;
+    let words = [words(0, "body.x"), words(1, "body.z")].into_iter();
+    let words = words.flatten().reduce(|x, z| format!("{x} and {z}"))?;
     Some(format!(
         "Beside the better of two spring-loaded pendulums under the same forces it is {words}."
     ))
@@ -294,9 +278,8 @@ fn recordings(content: &Content<'_>) -> Result<Table, ModelError> {
     let known = known_digests(content.model);
     let mut rows = Vec::new();
     for jump in jumps(content) {
-        let segment = jump.run.segment;
         let rms = jump.body_rms_m()?;
-        rows.push((jump.place.words, segment, rms));
+        rows.push((jump.place.words, jump.run.segment, rms));
     }
     let names = content.assessment.names.iter();
     let [x, z] = ["body.x", "body.z"].map(|body| names.clone().position(|name| name == body));

@@ -394,8 +394,9 @@ fn equations(system: &Equations<'_>, phase: usize) -> Result<Vec<String>, LowerE
             .latent_units()
             .filter(|_| (1..=MOST_TERMS).contains(&terms.len()))
         {
+            let pool = system.pool();
             let of =
-                |term: &CandidateTerm| units.acceleration(row) / units.of_term(system, term.expr());
+                |term: &CandidateTerm| units.acceleration(row) / units.of_term(pool, term.expr());
             let each = terms
                 .iter()
                 .map(|(_, term)| format!("{} {}", term.text(), of(term)));

@@ -10,7 +10,7 @@ use serde::{Serialize, Serializer};
 
 use super::system::{Equations, Summand};
 use crate::model::{CandidateTerm, MAX_TERM_LEN};
-use crate::symbolic::{ExprId, Shortened, Shortener};
+use crate::symbolic::{ExprId, ExprPool, Shortened, Shortener};
 
 /// Terms of one equation that a shorter form took the place of.
 #[derive(Clone, Debug, PartialEq)]
@@ -76,8 +76,6 @@ impl Serialize for ExactStep {
 
 /// Place of a term: the term as learned that it follows or is, then its number among new ones.
 type Place = (usize, usize);
-/// A changed equation: its phase, its row, its summands by place.
-type Changed = (usize, usize, Vec<(Place, f64)>);
 
 impl Equations<'_> {
     /// The equations in their shortest form; what is shortest already keeps its bits.
@@ -87,8 +85,8 @@ impl Equations<'_> {
         let mut pool = std::mem::take(&mut self.pool);
         let mut shortener = Shortener::new(&mut pool);
         let mut steps = Vec::new();
-        let mut changed: Vec<Changed> = Vec::new();
-        for (number, phase) in self.phases.iter().enumerate() {
+        let mut equations = Vec::new();
+        for phase in &self.phases {
             for (output, equation) in phase.ddz.iter().enumerate() {
                 let summands: Vec<(f64, ExprId)> = (equation.iter())
                     .map(|summand| (summand.coefficient, self.terms[summand.term].expr()))
@@ -96,7 +94,7 @@ impl Equations<'_> {
                 let mut kept: Vec<Option<(Place, f64)>> = (equation.iter())
                     .map(|summand| Some(((summand.term, 0), summand.coefficient)))
                     .collect();
-                let mut added = Vec::new();
+                let mut placed = Vec::new();
                 for Shortened { replaced, by } in shortener.shorten(&summands) {
                     let first = equation[replaced[0]].term;
                     let Some(after) = new.placed(shortener.pool(), &self.terms, first, &by) else {
@@ -110,52 +108,42 @@ impl Equations<'_> {
                         phase: phase.name.clone(),
                         output,
                         before: replaced.iter().map(named).collect(),
-                        after: after
-                            .iter()
+                        after: (after.iter())
                             .map(|(_, c, text)| (*c, text.clone()))
                             .collect(),
                     });
                     replaced.iter().for_each(|&position| kept[position] = None);
-                    added.extend(after.into_iter().map(|(place, c, _)| (place, c)));
+                    placed.extend(after.into_iter().map(|(place, c, _)| (place, c)));
                 }
-                if kept.iter().any(Option::is_none) {
-                    added.extend(kept.into_iter().flatten());
-                    changed.push((number, output, added));
-                }
+                placed.extend(kept.into_iter().flatten());
+                equations.push(placed);
             }
         }
         self.pool = pool;
-        if !changed.is_empty() {
-            self.replace(changed, new);
+        if !steps.is_empty() {
+            self.replace(equations, new);
         }
         self.steps.extend(steps);
         self
     }
 
-    /// Puts the new terms among the old and the changed equations in the place of theirs.
-    fn replace(&mut self, changed: Vec<Changed>, new: NewTerms) {
+    /// Puts the new terms among the old, and in all equations the summands that they have by place.
+    fn replace(&mut self, equations: Vec<Vec<(Place, f64)>>, new: NewTerms) {
         let old = self.terms.drain(..).enumerate();
-        let mut all: Vec<(Place, CandidateTerm)> = (old)
-            .map(|(index, term)| ((index, 0), term))
-            .chain(new.terms)
-            .collect();
+        let old = old.map(|(index, term)| ((index, 0), term));
+        let mut all: Vec<(Place, CandidateTerm)> = old.chain(new.terms).collect();
         all.sort_by_key(|(place, _)| *place);
         let index: HashMap<Place, usize> = (all.iter().enumerate())
             .map(|(index, (place, _))| (*place, index))
             .collect();
         self.terms = all.into_iter().map(|(_, term)| term).collect();
-        for phase in &mut self.phases {
-            for summand in phase.ddz.iter_mut().flatten() {
-                summand.term = index[&(summand.term, 0)];
-            }
-        }
-        for (phase, output, summands) in changed {
-            let mut equation: Vec<Summand> = (summands.into_iter())
-                .map(|(place, coefficient)| Summand {
-                    coefficient,
-                    term: index[&place],
-                })
-                .collect();
+        let old = self.phases.iter_mut().flat_map(|phase| &mut phase.ddz);
+        for (equation, summands) in old.zip(equations) {
+            let summand = |(place, coefficient)| Summand {
+                coefficient,
+                term: index[&place],
+            };
+            *equation = summands.into_iter().map(summand).collect();
             equation.sort_by_key(|summand| summand.term);
             equation.dedup_by(|later, first| {
                 let is_same = later.term == first.term;
@@ -163,7 +151,6 @@ impl Equations<'_> {
                 is_same
             });
             equation.retain(|summand| summand.coefficient != 0.0);
-            self.phases[phase].ddz[output] = equation;
         }
     }
 }
@@ -181,7 +168,7 @@ impl NewTerms {
     /// text that a model file could hold.
     fn placed(
         &mut self,
-        pool: &crate::symbolic::ExprPool,
+        pool: &ExprPool,
         old: &[CandidateTerm],
         first: usize,
         summands: &[(f64, ExprId)],
@@ -201,18 +188,15 @@ impl NewTerms {
         if texts.iter().any(|text| text.len() > MAX_TERM_LEN) {
             return None;
         }
-        let placed = summands
-            .iter()
-            .zip(texts)
-            .map(|(&(coefficient, expr), text)| {
-                let next = (first, self.terms.len() + 1);
-                let place = *self.known.entry(expr).or_insert(next);
-                if place == next {
-                    let term = CandidateTerm::new(text.clone(), expr);
-                    self.terms.push((place, term));
-                }
-                (place, coefficient, text)
-            });
-        Some(placed.collect())
+        let placed = |(&(coefficient, expr), text): (&(f64, ExprId), String)| {
+            let next = (first, self.terms.len() + 1);
+            let place = *self.known.entry(expr).or_insert(next);
+            if place == next {
+                let term = CandidateTerm::new(text.clone(), expr);
+                self.terms.push((place, term));
+            }
+            (place, coefficient, text)
+        };
+        Some(summands.iter().zip(texts).map(placed).collect())
     }
 }

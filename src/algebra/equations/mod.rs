@@ -1,11 +1,8 @@
 //! The latent dynamics as equations, between a model and everything that prints or emits it.
 //!
-//! A [`ReducedModel`](crate::model::ReducedModel) enters, [`Equations`] leave: for each phase the
-//! accelerations as sums of coefficients times expressions over named variables, in library order,
-//! in one pool, in their shortest form unless asked
-//! otherwise. Equations in LaTeX, Markdown and MathML, programs, scripts, certificates and
-//! reports are made from them; nothing else reads Xi to print or emit. Read `system.rs` first, then
-//! `exact.rs`.
+//! For each phase the accelerations are sums of coefficients times expressions over named variables, in library
+//! order, in one pool, in their shortest form unless asked otherwise; nothing else reads Xi to print or emit. Read
+//! `system.rs` first, then `exact.rs`.
 //!
 //! ```
 //! use nalgebra::DMatrix;

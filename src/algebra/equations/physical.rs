@@ -12,7 +12,6 @@
 //! every term and into its coefficient.
 
 use std::borrow::Cow;
-use std::collections::HashMap;
 
 use nalgebra::{DMatrix, DVector};
 
@@ -80,22 +79,18 @@ impl LatentUnits {
 
     /// The unit of a term: that of a product of powers of variables; anything else counts as a pure number,
     /// whose inner numbers carry the units.
-    pub fn of_term(&self, equations: &Equations<'_>, term: ExprId) -> Unit {
-        let variables: HashMap<SymbolId, LatentVariable> = LatentVariable::all(self.position.len())
-            .map(|variable| (equations.symbol(variable), variable))
-            .collect();
-        let pool = equations.pool();
+    pub fn of_term(&self, pool: &ExprPool, term: ExprId) -> Unit {
         let factors = pool.factors_of(term).iter().map(|&factor| {
             let (base, exponent) = match pool.node(factor) {
                 Node::Power(base, exponent) => (*base, pool.as_number(*exponent)?.as_integer()?),
                 _ => (factor, 1),
             };
-            let variable = variables.get(&pool.as_symbol(base)?)?;
-            Some(self.of(*variable).power(i8::try_from(exponent).ok()?))
+            let name = pool.symbol_name(pool.as_symbol(base)?);
+            let variable = LatentVariable::from_name(name, self.position.len())?;
+            Some(self.of(variable).power(i8::try_from(exponent).ok()?))
         });
-        let product: Option<Unit> = factors
-            .into_iter()
-            .try_fold(Unit::default(), |unit, factor| Some(unit * factor?));
+        let mut factors = factors.into_iter();
+        let product = factors.try_fold(Unit::default(), |unit, factor| Some(unit * factor?));
         product.unwrap_or_default()
     }
 }
@@ -123,21 +118,12 @@ impl Equations<'_> {
         let mut phases = Vec::with_capacity(self.phases().len());
         for phase in self.phases() {
             let ddz = (phase.ddz.iter().enumerate()).map(|(output, equation)| {
-                let summands = equation.iter().map(|summand| {
-                    let factor = factors[summand.term] / scales[output].position.0;
-                    let coefficient = summand.coefficient * factor;
-                    let place = || {
-                        format!(
-                            "phase {}, ddz{}: the coefficient of {}",
-                            phase.name,
-                            output + 1,
-                            terms[summand.term].text()
-                        )
-                    };
-                    finite(coefficient, model, place).map(|coefficient| Summand {
-                        coefficient,
-                        term: summand.term,
-                    })
+                let summands = equation.iter().map(|&Summand { coefficient, term }| {
+                    let factor = factors[term] / scales[output].position.0;
+                    let (phase, ddz, text) = (&phase.name, output + 1, terms[term].text());
+                    let place = || format!("phase {phase}, ddz{ddz}: the coefficient of {text}");
+                    let coefficient = finite(coefficient * factor, model, place)?;
+                    Ok::<_, PhysicalError>(Summand { coefficient, term })
                 });
                 summands.collect::<Result<Vec<_>, _>>()
             });
@@ -154,8 +140,7 @@ impl Equations<'_> {
             terms,
             phases,
             steps: self.steps.clone(),
-            latent_units: Some(units),
-            scaled: Some(Box::new(self.clone().into_owned())),
+            physical: Some((units, Box::new(self.clone().into_owned()))),
         })
     }
 
@@ -175,13 +160,11 @@ impl Equations<'_> {
             .collect();
         let exprs: Vec<ExprId> = self.terms().iter().map(|term| term.expr()).collect();
         let scaled = pool.substitute_all(&exprs, &replacements);
-        let split = scaled
-            .into_iter()
-            .map(|expr| match pool.terms_of(expr).as_slice() {
-                [(number, rest)] => (number.to_f64(), *rest),
-                _ => (1.0, expr),
-            });
-        let (factors, exprs): (Vec<f64>, Vec<ExprId>) = split.unzip();
+        let split = |expr: ExprId| match pool.terms_of(expr).as_slice() {
+            [(number, rest)] => (number.to_f64(), *rest),
+            _ => (1.0, expr),
+        };
+        let (factors, exprs): (Vec<f64>, Vec<ExprId>) = scaled.into_iter().map(split).unzip();
         let terms =
             (exprs.iter().zip(self.terms())).map(|(&expr, term)| match expr == term.expr() {
                 true => term.clone(),

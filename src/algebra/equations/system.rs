@@ -9,7 +9,7 @@ use super::physical::LatentUnits;
 use crate::model::{
     CandidateTerm, FeetRule, LatentVariable, Library, ModelError, Phase, ReducedModel,
 };
-use crate::symbolic::{ExprId, ExprPool, SymbolId};
+use crate::symbolic::{ExprPool, SymbolId};
 
 /// One summand of an equation: `coefficient * terms[term]`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,9 +40,8 @@ pub struct Equations<'a> {
     pub(super) terms: Vec<CandidateTerm>,
     pub(super) phases: Vec<PhaseEquations>,
     pub(super) steps: Vec<ExactStep>,
-    pub(super) latent_units: Option<LatentUnits>,
-    /// What equations in physical units were made from.
-    pub(super) scaled: Option<Box<Equations<'static>>>,
+    /// The units of equations in physical units, and what these were made from.
+    pub(super) physical: Option<(LatentUnits, Box<Equations<'static>>)>,
 }
 
 impl<'a> Equations<'a> {
@@ -72,8 +71,7 @@ impl<'a> Equations<'a> {
             phases: phases.collect(),
             model: Cow::Borrowed(model),
             steps: Vec::new(),
-            latent_units: None,
-            scaled: None,
+            physical: None,
         }
     }
 
@@ -112,23 +110,22 @@ impl<'a> Equations<'a> {
             terms: self.terms,
             phases: self.phases,
             steps: self.steps,
-            latent_units: self.latent_units,
-            scaled: self.scaled,
+            physical: self.physical,
         }
     }
 
     /// These equations in the scaled units of the model's maps, whose latent inputs are those of `W_e`: what a
     /// controller computes with.
     pub fn in_scaled_units(&self) -> &Equations<'_> {
-        match &self.scaled {
-            Some(scaled) => scaled,
+        match &self.physical {
+            Some((_, scaled)) => scaled,
             None => self,
         }
     }
 
     /// Units of latent coordinates and inputs, if they are physical; none where they are scaled.
     pub fn latent_units(&self) -> Option<&LatentUnits> {
-        self.latent_units.as_ref()
+        self.physical.as_ref().map(|(units, _)| units)
     }
 
     /// The model with maps, names and scale factors; its Xi may be that of equal, longer equations.
@@ -174,25 +171,6 @@ impl<'a> Equations<'a> {
     pub fn symbol(&self, variable: LatentVariable) -> SymbolId {
         let symbol = self.model.library().symbol(variable);
         symbol.expect("variables up to latent_dim are in the library's pool")
-    }
-
-    /// The accelerations of one phase as canonical sums, in a clone of the pool.
-    ///
-    /// # Errors
-    /// [`ModelError::PhaseIndex`].
-    pub fn sums(&self, phase: usize) -> Result<(ExprPool, Vec<ExprId>), ModelError> {
-        let phase = self.phase(phase)?;
-        let mut pool = self.pool.clone();
-        let mut sums = Vec::with_capacity(phase.ddz.len());
-        for output in 0..phase.ddz.len() {
-            let mut products = Vec::new();
-            for (coefficient, term) in phase.summands(self, output) {
-                let factor = pool.number(coefficient);
-                products.push(pool.mul(factor, term.expr()));
-            }
-            sums.push(pool.sum(&products));
-        }
-        Ok((pool, sums))
     }
 
     /// The coefficients of a phase as a matrix, one row per term, one column per acceleration.

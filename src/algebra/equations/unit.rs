@@ -7,24 +7,16 @@ use std::ops::{Div, Mul};
 ///
 /// Radians are kept apart from 1, so that angles and lengths can be told from pure numbers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Unit {
-    exponents: [i8; 4],
-}
+pub struct Unit([i8; 4]);
 
 const SYMBOLS: [&str; 4] = ["m", "rad", "kg", "s"];
-const METRE: Unit = Unit::new(1, 0, 0, 0);
-const RADIAN: Unit = Unit::new(0, 1, 0, 0);
-const SECOND: Unit = Unit::new(0, 0, 0, 1);
-const NEWTON: Unit = Unit::new(1, 0, 1, -2);
-const NEWTON_METRE: Unit = Unit::new(2, 0, 1, -2);
+const METRE: Unit = Unit([1, 0, 0, 0]);
+const RADIAN: Unit = Unit([0, 1, 0, 0]);
+const SECOND: Unit = Unit([0, 0, 0, 1]);
+const NEWTON: Unit = Unit([1, 0, 1, -2]);
+const NEWTON_METRE: Unit = Unit([2, 0, 1, -2]);
 
 impl Unit {
-    const fn new(metre: i8, radian: i8, kilogram: i8, second: i8) -> Self {
-        Self {
-            exponents: [metre, radian, kilogram, second],
-        }
-    }
-
     /// The unit of a position or generalised force that a model file names, if it is one of
     /// `m`, `rad`, `N`, `N m`.
     pub fn from_name(name: &str) -> Option<Self> {
@@ -53,9 +45,7 @@ impl Unit {
 
     /// The unit of a power.
     pub fn power(self, exponent: i8) -> Self {
-        Self {
-            exponents: self.exponents.map(|e| e.saturating_mul(exponent)),
-        }
+        Self(self.0.map(|own| own.saturating_mul(exponent)))
     }
 
     /// The unit with this text between factors, and powers above 1 in this spelling.
@@ -82,14 +72,13 @@ impl Unit {
     /// Numerator and denominator as lists of symbol and positive power.
     fn fraction(self) -> [Vec<(&'static str, i8)>; 2] {
         match self {
-            NEWTON => return [vec![("N", 1)], Vec::new()],
-            NEWTON_METRE => return [vec![("N", 1), ("m", 1)], Vec::new()],
-            _ => {}
+            NEWTON => [vec![("N", 1)], Vec::new()],
+            NEWTON_METRE => [vec![("N", 1), ("m", 1)], Vec::new()],
+            Self(exponents) => [1, -1].map(|sign| {
+                let order = [2, 0, 1, 3].map(|at| (SYMBOLS[at], exponents[at] * sign));
+                order.into_iter().filter(|&(_, power)| power > 0).collect()
+            }),
         }
-        [1, -1].map(|sign| {
-            let order = [2, 0, 1, 3].map(|at| (SYMBOLS[at], self.exponents[at] * sign));
-            order.into_iter().filter(|&(_, power)| power > 0).collect()
-        })
     }
 }
 
@@ -97,11 +86,9 @@ impl Mul for Unit {
     type Output = Self;
 
     fn mul(self, other: Self) -> Self {
-        let mut exponents = self.exponents;
-        for (own, other) in exponents.iter_mut().zip(other.exponents) {
-            *own = own.saturating_add(other);
-        }
-        Self { exponents }
+        Self(std::array::from_fn(|at| {
+            self.0[at].saturating_add(other.0[at])
+        }))
     }
 }
 

@@ -24,16 +24,15 @@ pub(super) struct Part {
     /// Open for writing.
     pub file: File,
     path: PathBuf,
-    place: PathBuf,
+    /// Where it goes.
+    pub place: PathBuf,
     is_placed: bool,
 }
 
 impl Part {
     /// Beside `place`. A link or file of that name that somebody else has put there is never opened.
     pub fn beside(place: &Path) -> io::Result<Self> {
-        let name = place
-            .file_name()
-            .ok_or_else(|| io::Error::from(io::ErrorKind::InvalidFilename))?;
+        let name = place.file_name().ok_or(io::ErrorKind::InvalidFilename)?;
         let mut last = None;
         for _ in 0..MAX_TRIED {
             let number = RandomState::new().build_hasher().finish();
@@ -69,11 +68,6 @@ impl Part {
         self.is_placed = true;
         Ok(())
     }
-
-    /// Where it goes.
-    pub fn place(&self) -> &Path {
-        &self.place
-    }
 }
 
 impl Drop for Part {
@@ -102,9 +96,8 @@ pub(super) fn remove_left_in(folder: &Path) {
 
 /// `.NAME.0123456789abcdef.part`
 fn is_part(name: &str) -> bool {
-    let inner = name
-        .strip_prefix('.')
-        .and_then(|name| name.strip_suffix(ENDING));
+    let inner = name.strip_prefix('.');
+    let inner = inner.and_then(|inner| inner.strip_suffix(ENDING));
     let number = inner.and_then(|inner| inner.rsplit_once('.'));
     number.is_some_and(|(_, digits)| {
         digits.len() == DIGITS && digits.bytes().all(|byte| byte.is_ascii_hexdigit())

@@ -3,8 +3,178 @@
 //! Imports nothing. [`table`] has a [`Range`] per setting; the command line parses with it, the rooms that take the
 //! number check it, and a program that calls the library may ask it first.
 
-mod range;
 pub mod table;
 
-pub use range::{OutOfRange, Range};
+use std::fmt;
+use std::str::FromStr;
+
 pub use table::of_training;
+
+/// Numbers that a setting may have.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Range {
+    /// Name of the setting: that of its flag without dashes.
+    pub name: &'static str,
+    kind: Kind,
+    /// Its lower end.
+    pub least: f64,
+    /// Its upper end.
+    pub most: f64,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    Whole,
+    Real,
+    /// Without its lower end.
+    Above,
+}
+
+/// A number outside the range of its setting.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{name} is {found}, expected {expected}")]
+pub struct OutOfRange {
+    /// Name of the setting, that of its flag without dashes.
+    pub name: &'static str,
+    /// What was given.
+    pub found: String,
+    /// The range in words.
+    pub expected: String,
+}
+
+impl Range {
+    /// Whole numbers from `least` to `most`.
+    pub const fn whole(name: &'static str, least: u32, most: u32) -> Self {
+        Self::new(name, Kind::Whole, least as f64, most as f64)
+    }
+
+    /// Numbers from `least` to `most`.
+    pub const fn real(name: &'static str, least: f64, most: f64) -> Self {
+        Self::new(name, Kind::Real, least, most)
+    }
+
+    /// Numbers above `least`, up to `most`.
+    pub const fn above(name: &'static str, least: f64, most: f64) -> Self {
+        Self::new(name, Kind::Above, least, most)
+    }
+
+    const fn new(name: &'static str, kind: Kind, least: f64, most: f64) -> Self {
+        Self {
+            name,
+            kind,
+            least,
+            most,
+        }
+    }
+
+    /// Whether only whole numbers are in the range.
+    pub fn is_whole(&self) -> bool {
+        self.kind == Kind::Whole
+    }
+
+    /// Whether a number is in the range; NaN never is.
+    pub fn contains(&self, value: f64) -> bool {
+        let is_kind = match self.kind {
+            Kind::Whole => value.fract() == 0.0,
+            Kind::Real => true,
+            Kind::Above => value > self.least,
+        };
+        is_kind && (self.least..=self.most).contains(&value)
+    }
+
+    /// The number, if it is in the range.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] with the name, the number and the range.
+    pub fn check(&self, value: f64) -> Result<f64, OutOfRange> {
+        (self.contains(value).then_some(value)).ok_or_else(|| self.refusal(short(value)))
+    }
+
+    /// The count, if it is in the range.
+    ///
+    /// # Errors
+    /// As [`Range::check`].
+    pub fn check_count(&self, value: usize) -> Result<usize, OutOfRange> {
+        (self.contains(value as f64).then_some(value)).ok_or_else(|| self.refusal(value))
+    }
+
+    /// The number that a text spells.
+    ///
+    /// # Errors
+    /// The range in words, for a text that is no number in it.
+    pub fn parse<T: FromStr + Copy + fmt::Display>(&self, text: &str) -> Result<T, String> {
+        let in_range = |number: &T| {
+            // A whole number beyond 2^53 is far beyond every range, so that its rounding does not matter.
+            let value = number.to_string().parse();
+            value.is_ok_and(|value| self.contains(value))
+        };
+        let parsed = text.trim().parse().ok().filter(in_range);
+        parsed.ok_or_else(|| format!("expected {}", self.in_words()))
+    }
+
+    /// "a whole number from 1 to 500"
+    pub fn in_words(&self) -> String {
+        let [least, most] = [self.least, self.most].map(short);
+        match self.kind {
+            Kind::Whole => format!("a whole number from {least} to {most}"),
+            Kind::Real => format!("a number from {least} to {most}"),
+            Kind::Above => format!("a number above {least} and at most {most}"),
+        }
+    }
+
+    fn refusal(&self, found: impl fmt::Display) -> OutOfRange {
+        OutOfRange {
+            name: self.name,
+            found: found.to_string(),
+            expected: self.in_words(),
+        }
+    }
+}
+
+/// Decimals, or powers of ten where these are shorter.
+fn short(value: f64) -> String {
+    let (plain, power) = (format!("{value}"), format!("{value:e}"));
+    match plain.len() > power.len() {
+        true => power,
+        false => plain,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ends_are_inside_and_what_lies_beyond_is_not() {
+        const COUNT: Range = Range::whole("count", 1, 500);
+        const SHARE: Range = Range::above("share", 0.0, 1.0);
+        for (text, expected) in [
+            ("1", Ok(1)),
+            (" 500", Ok(500)),
+            ("0", Err(())),
+            ("501", Err(())),
+            ("1.5", Err(())),
+            ("-1", Err(())),
+            ("18446744073709551615", Err(())),
+        ] {
+            assert_eq!(
+                COUNT.parse::<usize>(text).map_err(|_| ()),
+                expected,
+                "{text}"
+            );
+        }
+        assert!(SHARE.contains(1.0) && SHARE.contains(1e-300));
+        for outside in [0.0, 1.0 + 1e-9, f64::NAN, f64::INFINITY, -1.0] {
+            assert!(SHARE.check(outside).is_err(), "{outside}");
+        }
+    }
+
+    #[test]
+    fn refusal_names_the_setting_the_number_and_the_range() {
+        let refused = Range::real("state-scaling", 1e-6, 1e4).check(1e-200);
+        assert_eq!(
+            refused.expect_err("too small").to_string(),
+            "state-scaling is 1e-200, expected a number from 1e-6 to 1e4"
+        );
+    }
+}

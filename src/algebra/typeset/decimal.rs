@@ -3,16 +3,12 @@
 use std::fmt;
 
 /// How coefficients are rounded for print.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Rounding {
-    /// At least `decimals` places, and as many more as keep each coefficient
-    /// within `relative_error` of its value. Never rounds a term away.
-    Adaptive {
-        /// Fewest places after the point.
-        decimals: usize,
-        /// Largest |printed - value| / |value| of any coefficient.
-        relative_error: f64,
-    },
+    /// The paper's two decimals, with more for coefficients that would be off by over 5 %: every coefficient
+    /// of 0.1 and above has exactly two. Never rounds a term away.
+    #[default]
+    Adaptive,
     /// Exactly this many places after the point, as the paper prints; small
     /// coefficients can vanish.
     Decimals(usize),
@@ -20,17 +16,6 @@ pub enum Rounding {
     Significant(usize),
     /// The shortest text that reads back as the same `f64`.
     Exact,
-}
-
-impl Default for Rounding {
-    /// The paper's two decimals, with more for coefficients that would be off
-    /// by over 5 %: every coefficient of 0.1 and above has exactly two.
-    fn default() -> Self {
-        Rounding::Adaptive {
-            decimals: 2,
-            relative_error: 0.05,
-        }
-    }
 }
 
 /// A decimal number in print: sign, digits and perhaps a power of ten.
@@ -43,8 +28,12 @@ pub struct Decimal {
 
 /// Most digits that are ever printed of a fixed number of them.
 pub const MOST_DIGITS: usize = 40;
-/// Places after the point beyond which [`Rounding::Adaptive`] turns to powers of ten.
+/// Fewest places after the point of [`Rounding::Adaptive`].
+pub(super) const LEAST_DECIMALS: usize = 2;
+/// Places after the point beyond which it turns to powers of ten.
 const MOST_DECIMALS: usize = 6;
+/// Its largest |printed - value| / |value| of any coefficient.
+pub(super) const RELATIVE_ERROR: f64 = 0.05;
 /// Values from here on are printed with a power of ten.
 const LARGE: f64 = 1e7;
 /// Values below are printed with a power of ten where digits are not fixed.
@@ -74,26 +63,18 @@ impl Decimal {
             Rounding::Exact => Self::exact(value),
             Rounding::Decimals(places) => Self::fixed(value, places.min(MOST_DIGITS)),
             Rounding::Significant(digits) => Self::significant(value, digits.clamp(1, MOST_DIGITS)),
-            Rounding::Adaptive {
-                decimals,
-                relative_error,
-            } => Self::adaptive(value, decimals.min(MOST_DIGITS), relative_error),
+            Rounding::Adaptive => Self::adaptive(value),
         }
     }
 
-    fn adaptive(value: f64, decimals: usize, relative_error: f64) -> Self {
+    fn adaptive(value: f64) -> Self {
         let close =
-            |candidate: &Self| (candidate.value() - value).abs() <= relative_error * value.abs();
-        if value.abs() < LARGE {
-            for places in decimals..=MOST_DECIMALS.max(decimals) {
-                let candidate = Self::fixed(value, places);
-                if close(&candidate) {
-                    return candidate;
-                }
-            }
-        }
-        (1..17)
-            .map(|places| Self::scientific(value, format!("{:.places$e}", value.abs())))
+            |candidate: &Self| (candidate.value() - value).abs() <= RELATIVE_ERROR * value.abs();
+        let fixed = (LEAST_DECIMALS..=MOST_DECIMALS).map(|places| Self::fixed(value, places));
+        let scientific =
+            (1..17).map(|places| Self::scientific(value, format!("{:.places$e}", value.abs())));
+        (fixed.filter(|_| value.abs() < LARGE))
+            .chain(scientific)
             .find(close)
             .unwrap_or_else(|| Self::exact(value))
     }
@@ -139,12 +120,8 @@ impl Decimal {
 
     /// What the printed text means.
     pub fn value(&self) -> f64 {
-        let text = match self.exponent {
-            Some(exponent) => format!("{}e{exponent}", self.digits),
-            None => self.digits.clone(),
-        };
-        let size: f64 = text.parse().expect("digits and exponent form a number");
-        if self.negative { -size } else { size }
+        let value = self.to_string().parse();
+        value.expect("sign, digits and exponent form a number")
     }
 
     /// Whether it prints as nothing but zeros.

@@ -33,10 +33,8 @@ pub struct Equation {
 /// Every candidate term that is printed somewhere, with its coefficients.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CoefficientTable {
-    /// Column heads: the acceleration, with the phase it belongs to.
-    pub columns: Vec<(String, Symbol)>,
-    /// Unit of each column's acceleration, for equations in physical units.
-    pub units: Option<Vec<Unit>>,
+    /// Column heads: the acceleration, with the phase it belongs to, and its unit where that is physical.
+    pub columns: Vec<(String, Symbol, Option<Unit>)>,
     /// One row a candidate term, in library order.
     pub rows: Vec<CoefficientRow>,
 }
@@ -87,11 +85,8 @@ impl Typeset {
 
 /// Every coefficient of all equations.
 pub(super) fn coefficients(system: &Equations<'_>) -> impl Iterator<Item = f64> {
-    let summands = system
-        .phases()
-        .iter()
-        .flat_map(|phase| phase.ddz.iter().flatten());
-    summands.map(|summand| summand.coefficient)
+    let equations = system.phases().iter().flat_map(|phase| &phase.ddz);
+    equations.flatten().map(|summand| summand.coefficient)
 }
 
 /// The coefficients of all phases beside each other.
@@ -107,7 +102,7 @@ fn table(
     let row = |(row, (_, term)): (usize, &(&str, Signed))| CoefficientRow {
         term: term.clone().into_math(),
         unit: units
-            .map(|units| units.of_term(system, system.terms()[row].expr()))
+            .map(|units| units.of_term(system.pool(), system.terms()[row].expr()))
             .filter(|unit| *unit != Unit::default()),
         coefficients: (phases.iter())
             .flat_map(|(_, xi)| xi.row(row).iter().map(cell).collect::<Vec<_>>())
@@ -119,15 +114,12 @@ fn table(
             .collect(),
         columns: (phases.iter())
             .flat_map(|(phase, _)| {
-                outputs
-                    .iter()
-                    .map(|(left, _)| ((*phase).clone(), left.clone()))
+                outputs.iter().enumerate().map(|(output, (left, _))| {
+                    let unit = units.map(|units| units.acceleration(output));
+                    ((*phase).clone(), left.clone(), unit)
+                })
             })
             .collect(),
-        units: units.map(|units| {
-            let of_phase = || (0..outputs.len()).map(|output| units.acceleration(output));
-            phases.iter().flat_map(|_| of_phase()).collect()
-        }),
     }
 }
 
@@ -139,10 +131,9 @@ impl Equation {
 
     /// The right side as one piece: a lone zero when there are no terms.
     pub fn right(&self) -> Math {
-        if self.terms.is_empty() {
-            Math::Number(Decimal::integer(0))
-        } else {
-            Math::Sum(self.terms.clone())
+        match self.terms.is_empty() {
+            true => Math::Number(Decimal::integer(0)),
+            false => Math::Sum(self.terms.clone()),
         }
     }
 }

@@ -91,18 +91,16 @@ impl Layout<'_> {
     fn sum(&self, terms: &[ExprId]) -> Signed {
         let mut order: Vec<ExprId> = terms.to_vec();
         order.sort_by(|a, b| self.compare_terms(*a, *b));
-        let mut terms: Vec<Signed> = order
-            .into_iter()
-            .map(|term| {
-                let signed = self.signed(term);
-                // A sum inside a sum does not occur in canonical form; brackets keep it right.
-                let math = match signed.math {
-                    sum @ Math::Sum(_) => Math::Group(Box::new(sum)),
-                    math => math,
-                };
-                Signed { math, ..signed }
-            })
-            .collect();
+        let laid_out = |term| {
+            let signed = self.signed(term);
+            // A sum inside a sum does not occur in canonical form; brackets keep it right.
+            let math = match signed.math {
+                sum @ Math::Sum(_) => Math::Group(Box::new(sum)),
+                math => math,
+            };
+            Signed { math, ..signed }
+        };
+        let mut terms: Vec<Signed> = order.into_iter().map(laid_out).collect();
         // z_1 - 1 rather than -1 + z_1.
         if let Some(positive) = terms.iter().position(|term| !term.negative) {
             terms[..=positive].rotate_right(1);
@@ -176,20 +174,18 @@ impl Layout<'_> {
                     parts.bottom.push((FactorKey::Number, integer(bottom)));
                 }
             }
-            None => parts
-                .numbers
-                .push(Math::Number(Decimal::exact(size.to_f64()))),
+            None => (parts.numbers).push(Math::Number(Decimal::exact(size.to_f64()))),
         }
     }
 
     fn take_power(&self, base: ExprId, exponent: ExprId, parts: &mut Quotient) {
         match self.pool.as_number(exponent) {
             Some(number) => {
-                let factor = self.numeric_power(base, number.abs());
-                match number.is_negative() {
-                    true => parts.bottom.push(factor),
-                    false => parts.top.push(factor),
-                }
+                let side = match number.is_negative() {
+                    true => &mut parts.bottom,
+                    false => &mut parts.top,
+                };
+                side.push(self.numeric_power(base, number.abs()));
             }
             None => {
                 let exponent = self.signed(exponent).into_math();
@@ -356,9 +352,7 @@ fn turn_difference(factor: &mut Math) -> bool {
         && terms[1..].iter().all(|term| term.negative);
     if is_difference {
         terms.rotate_left(1);
-        terms
-            .iter_mut()
-            .for_each(|term| term.negative = !term.negative);
+        (terms.iter_mut()).for_each(|term| term.negative = !term.negative);
     }
     is_difference
 }
@@ -402,12 +396,7 @@ fn starts_with_word(math: &Math) -> bool {
 }
 
 fn ends_with_word(math: &Math) -> bool {
-    match math {
-        Math::Symbol(symbol) => {
-            matches!(symbol.glyph, Glyph::Word(_)) && symbol.subscript.is_empty()
-        }
-        _other => false,
-    }
+    matches!(math, Math::Symbol(symbol) if symbol.subscript.is_empty()) && starts_with_word(math)
 }
 
 /// Whether the power of a function is written on its name, as in `sin^2`.

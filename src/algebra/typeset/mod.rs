@@ -34,4 +34,4 @@ pub use rounder::{Place, RoundingReport};
 pub use symbols::SymbolTable;
 pub use table::{Cell, Rows, Table, rounded, rounded_up, significant};
 pub use tree::{GREEK, Glyph, Math, Signed, Symbol};
-pub use width::{EQUALS, OPERATOR, break_lines, sum_width, symbol_width, width};
+pub use width::{EQUALS, break_lines, symbol_width, width};

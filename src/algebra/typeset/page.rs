@@ -28,23 +28,12 @@ pub(super) struct Page {
     pub description: String,
     pub version: &'static str,
     pub digest: Option<String>,
-    pub phases: Vec<PhaseView>,
+    /// Name, feet and equations of each phase.
+    pub phases: Vec<[String; 3]>,
     pub rounding: String,
     pub heads: Vec<String>,
-    pub rows: Vec<RowView>,
-}
-
-/// One phase in the template.
-pub(super) struct PhaseView {
-    pub name: String,
-    pub feet: String,
-    pub math: String,
-}
-
-/// One candidate term in the template, with a cell for each column.
-pub(super) struct RowView {
-    pub term: String,
-    pub cells: Vec<String>,
+    /// Each candidate term with a cell for each column.
+    pub rows: Vec<(String, Vec<String>)>,
 }
 
 impl Page {
@@ -55,8 +44,6 @@ impl Page {
         let typeset = Typeset::new(equations, &options.symbols, options.rounding);
         let phases = typeset.systems.iter().zip(equations.phases());
         let table = &typeset.table;
-        let unit = |column: usize| table.units.as_ref().map(|units| units[column]);
-        let columns = table.columns.iter().enumerate();
         let cell = |number: &Option<Decimal>| number.as_ref().map_or(String::new(), M::number);
         Self {
             name: M::text(model.name()),
@@ -64,20 +51,19 @@ impl Page {
             version: env!("CARGO_PKG_VERSION"),
             digest: options.digest.as_deref().map(M::text),
             phases: phases
-                .map(|(system, phase)| PhaseView {
-                    name: M::text(&phase.name),
-                    feet: M::text(&words::feet(&phase.feet)),
-                    math: M::system(system, width_em),
+                .map(|(system, phase)| {
+                    let feet = M::text(&words::feet(&phase.feet));
+                    [M::text(&phase.name), feet, M::system(system, width_em)]
                 })
                 .collect(),
             rounding: words::rounding::<M>(options.rounding, &typeset.rounding),
-            heads: columns
-                .map(|(column, (phase, symbol))| M::head(symbol, phase, unit(column)))
+            heads: (table.columns.iter())
+                .map(|(phase, symbol, unit)| M::head(symbol, phase, *unit))
                 .collect(),
             rows: (table.rows.iter())
-                .map(|row| RowView {
-                    term: M::row_head(&row.term, row.unit),
-                    cells: row.coefficients.iter().map(cell).collect(),
+                .map(|row| {
+                    let cells = row.coefficients.iter().map(cell).collect();
+                    (M::row_head(&row.term, row.unit), cells)
                 })
                 .collect(),
         }

@@ -1,6 +1,8 @@
 //! The model in robot coordinates: what the latent coordinates are made of, and the
 //! accelerations of the robot that the latent dynamics mean.
 
+use std::collections::BTreeSet;
+
 use nalgebra::{DMatrix, DVector};
 
 use crate::equations::Equations;
@@ -57,12 +59,12 @@ impl RobotTypeset {
         let (encoder, negligible_weights) = encoder(map, &factors, symbols, &coordinates)?;
         let mut rounder = Rounder::new(rounding, coefficients(system));
         let mut systems = Vec::new();
-        let outputs: Vec<(Symbol, String)> = (coordinates.iter().zip(&state.names))
-            .map(|(symbol, name)| {
-                let symbol = symbol.clone();
-                (Symbol { dots: 2, ..symbol }, format!("dd({name})"))
-            })
-            .collect();
+        let doubled = coordinates.iter().map(|symbol| Symbol {
+            dots: 2,
+            ..symbol.clone()
+        });
+        let names = state.names.iter().map(|name| format!("dd({name})"));
+        let outputs: Vec<(Symbol, String)> = doubled.zip(names).collect();
         for (index, phase) in system.phases().iter().enumerate() {
             let xi = system.coefficients(index);
             let mut ddq = DMatrix::zeros(terms.len(), outputs.len());
@@ -123,14 +125,14 @@ fn encoder(
 
 /// `value`, unless folding it with weights and scale factors left the range of floats.
 fn finite(value: f64, output: &str, term: &str) -> Result<f64, TypesetError> {
-    if value.is_finite() {
-        return Ok(value);
+    match value.is_finite() {
+        true => Ok(value),
+        false => Err(TypesetError::NotFinite {
+            output: output.to_owned(),
+            term: term.to_owned(),
+            value,
+        }),
     }
-    Err(TypesetError::NotFinite {
-        output: output.to_owned(),
-        term: term.to_owned(),
-        value,
-    })
 }
 
 /// `fr.hx` as q with the subscript fr,hx; numbers where two names would look the same.
@@ -148,17 +150,11 @@ fn coordinate_symbols(names: &[String]) -> Vec<Symbol> {
         })
         .collect();
     match named {
-        Some(symbols) if all_differ(&symbols) => symbols,
+        Some(symbols) if BTreeSet::from_iter(&symbols).len() == symbols.len() => symbols,
         Some(_) | None => (1..=names.len())
             .map(|number| spelled(vec![Glyph::Digits(number.to_string())]))
             .collect(),
     }
-}
-
-fn all_differ(symbols: &[Symbol]) -> bool {
-    let mut sorted: Vec<&Symbol> = symbols.iter().collect();
-    sorted.sort();
-    sorted.windows(2).all(|pair| pair[0] != pair[1])
 }
 
 #[cfg(test)]

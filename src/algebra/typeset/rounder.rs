@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::decimal::{Decimal, Rounding};
+use super::decimal::{Decimal, LEAST_DECIMALS, Rounding};
 use super::equations::{Equation, EquationSystem};
 use super::expression::with_coefficient;
 use super::tree::{Signed, Symbol};
@@ -51,11 +51,11 @@ const ROUNDED_SHARE: f64 = 0.6;
 /// Whether a whole number among `coefficients` is one exactly: not where it could as well be a
 /// rounded one, because digits were asked for or because the model itself was rounded.
 fn are_whole_exact(rounding: Rounding, coefficients: impl Iterator<Item = f64>) -> bool {
-    let decimals = match rounding {
+    match rounding {
         Rounding::Significant(_) | Rounding::Exact => return true,
         Rounding::Decimals(_) => return false,
-        Rounding::Adaptive { decimals, .. } => decimals,
-    };
+        Rounding::Adaptive => {}
+    }
     let needs = |value: f64| {
         let number = Decimal::exact(value);
         let (_, after) = number.places();
@@ -64,10 +64,10 @@ fn are_whole_exact(rounding: Rounding, coefficients: impl Iterator<Item = f64>) 
     let (mut count, mut all) = (0, 0);
     for coefficient in coefficients.filter(|value| *value != 0.0) {
         match needs(coefficient) {
-            more if more > decimals => return true,
+            more if more > LEAST_DECIMALS => return true,
             needed => {
                 count += 1;
-                all += usize::from(needed == decimals);
+                all += usize::from(needed == LEAST_DECIMALS);
             }
         }
     }
@@ -86,10 +86,10 @@ impl Rounder {
 
     /// A coefficient as it is printed.
     pub(super) fn round(&self, coefficient: f64) -> Decimal {
-        let is_adaptive = matches!(self.rounding, Rounding::Adaptive { .. });
-        match is_adaptive && self.is_exact && coefficient.fract() == 0.0 {
-            true => Decimal::rounded(coefficient, Rounding::Exact),
-            false => Decimal::rounded(coefficient, self.rounding),
+        let is_whole = self.is_exact && coefficient.fract() == 0.0;
+        match self.rounding {
+            Rounding::Adaptive if is_whole => Decimal::exact(coefficient),
+            rounding => Decimal::rounded(coefficient, rounding),
         }
     }
 

@@ -160,21 +160,14 @@ impl Table {
     /// The same cells with a row for each column but the first, whose cells become the titles.
     pub fn transposed(&self) -> Self {
         let header = self.header();
-        let corner = header.first().cloned().unwrap_or_default();
-        let titles = self
-            .rows
-            .iter()
-            .map(|row| row.first().cloned().unwrap_or_default());
-        let mut table = Self {
-            caption: self.caption.clone(),
-            ..Self::new(std::iter::once(corner).chain(titles))
-        };
-        for (column, title) in header.into_iter().enumerate().skip(1) {
-            let cells = self
-                .rows
-                .iter()
-                .map(|row| row.get(column).cloned().unwrap_or_default());
-            table.row(std::iter::once(title).chain(cells));
+        let mut columns = (0..header.len()).map(|column| {
+            let lines = std::iter::once(&header).chain(&self.rows);
+            lines.map(move |line| line.get(column).cloned().unwrap_or_default())
+        });
+        let titles = columns.next().into_iter().flatten();
+        let mut table = Self::new(titles).captioned(&self.caption);
+        for cells in columns {
+            table.row(cells);
         }
         table
     }

@@ -11,7 +11,7 @@ const LETTER: f64 = 0.55;
 const THIN_SPACE: f64 = 0.167;
 const PARENTHESIS: f64 = 0.39;
 /// A binary plus or minus with its spaces.
-pub const OPERATOR: f64 = 1.222;
+const OPERATOR: f64 = 1.222;
 /// An equals sign with its spaces.
 pub const EQUALS: f64 = 1.333;
 const MINUS: f64 = 0.778;
@@ -53,7 +53,7 @@ pub fn width(math: &Math) -> f64 {
 }
 
 /// The width of signed terms one after the other.
-pub fn sum_width(terms: &[Signed]) -> f64 {
+fn sum_width(terms: &[Signed]) -> f64 {
     let mut total = 0.0;
     for (place, term) in terms.iter().enumerate() {
         total += match (place, term.negative) {
@@ -88,11 +88,8 @@ pub fn break_lines(terms: &[Signed], available: f64, first: f64, indent: f64) ->
     let mut start = 0;
     let mut used = first;
     for (place, term) in terms.iter().enumerate() {
-        let sign = if place == 0 && !term.negative {
-            0.0
-        } else {
-            OPERATOR
-        };
+        let is_signed = place > 0 || term.negative;
+        let sign = if is_signed { OPERATOR } else { 0.0 };
         let needed = sign + width(&term.math);
         if place > start && used + needed > available {
             lines.push(&terms[start..place]);

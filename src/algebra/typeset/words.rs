@@ -3,7 +3,7 @@
 use crate::model::FeetRule;
 use crate::robot::{ContactFlags, Leg};
 
-use super::decimal::{Decimal, Rounding};
+use super::decimal::{Decimal, LEAST_DECIMALS, RELATIVE_ERROR, Rounding};
 use super::rounder::{Place, RoundingReport};
 use super::table::{rounded, rounded_up};
 use super::tree::{Math, Signed};
@@ -84,21 +84,14 @@ fn pairs(patterns: &[ContactFlags]) -> String {
         Some(((_, [false, false, true]), (_, [false, false, true]))) => "all four feet".to_owned(),
         Some(((_, [true, false, false]), (_, [true, false, false]))) => "no foot".to_owned(),
         Some(((front, _), (rear, _))) => {
-            let words =
-                [(front, "front"), (rear, "rear")].map(|(words, pair)| words.replace("{}", pair));
-            let mut words: Vec<String> = words
-                .into_iter()
-                .filter(|words| !words.is_empty())
-                .collect();
+            let pairs = [(front, "front"), (rear, "rear")];
+            let mut words = Vec::from(pairs.map(|(words, pair)| words.replace("{}", pair)));
+            words.retain(|words| !words.is_empty());
             // what is there comes before what is not
             words.sort_by_key(|words| words.starts_with("no "));
             words.join(" and ")
         }
-        None => patterns
-            .iter()
-            .map(by_name)
-            .collect::<Vec<_>>()
-            .join(", or "),
+        None => (patterns.iter().map(by_name).collect::<Vec<_>>()).join(", or "),
     }
 }
 
@@ -116,12 +109,9 @@ fn by_name(pattern: &ContactFlags) -> String {
 /// How coefficients were rounded and what it changed, in a few sentences.
 pub fn rounding<S: Spelling>(rule: Rounding, report: &RoundingReport) -> String {
     let rule = match rule {
-        Rounding::Adaptive {
-            decimals,
-            relative_error,
-        } => format!(
-            "Coefficients have {decimals} decimals, more where they would be off by over {} %.",
-            100.0 * relative_error
+        Rounding::Adaptive => format!(
+            "Coefficients have {LEAST_DECIMALS} decimals, more where they would be off by over {} %.",
+            100.0 * RELATIVE_ERROR
         ),
         Rounding::Decimals(places) => format!("Coefficients have {places} decimals."),
         Rounding::Significant(digits) => format!("Coefficients have {digits} significant digits."),
@@ -160,19 +150,14 @@ fn summand<S: Spelling>(place: &Place) -> String {
             math: Math::Number(one),
             ..
         } if one.is_one() => number,
-        term => format!(
-            "{number} {}",
-            S::math(&term.clone().into_math(), &place.term)
-        ),
+        term => number + " " + &S::math(&term.clone().into_math(), &place.term),
     }
 }
 
 /// Two significant digits that are not below `error`, but for its own last bits.
 fn at_most(error: f64) -> Decimal {
-    Decimal::rounded(
-        rounded_up(error * (1.0 - 1e-9), 2),
-        Rounding::Significant(2),
-    )
+    let error = rounded_up(error * (1.0 - 1e-9), 2);
+    Decimal::rounded(error, Rounding::Significant(2))
 }
 
 #[cfg(test)]

@@ -92,7 +92,7 @@ mod tests {
             return Some(table::LAYER_WIDTH);
         }
         let of_training = table::of_training(flag).copied();
-        of_training.or_else(|| others.into_iter().find(|range| range.name() == flag))
+        of_training.or_else(|| others.into_iter().find(|range| range.name == flag))
     }
 
     /// Whether a command refuses the value of a flag as such.
@@ -123,8 +123,8 @@ mod tests {
                 }
                 let range = range(name, flag);
                 let range = range.unwrap_or_else(|| panic!("--{flag} of {name} has no range"));
-                met.insert(range.name());
-                let [least, most] = range.ends();
+                met.insert(range.name);
+                let (least, most) = (range.least, range.most);
                 assert!(!refuses(name, flag, &most.to_string()), "--{flag}={most}");
                 let outside = match range.is_whole() {
                     true => [least - 1.0, most + 1.0],

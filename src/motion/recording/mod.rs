@@ -59,7 +59,7 @@ pub use files::{RecordingFile, RecordingFiles, Source};
 pub use foreign::map::ColumnMap;
 pub use phases::{PhaseRule, PhaseSpan, Stance};
 pub use reader::{Clocks, Reader, Reading, ReadingNotes};
-pub use segment::{Recording, Segment};
+pub use segment::{Recording, Segment, stretches};
 
 /// A recording below `examples/recordings`, such as `go1/test_01`.
 #[cfg(test)]

@@ -1,12 +1,12 @@
 //! The numbers of a figure, all of them.
 
-use super::figure::{Figure, Panel, Role};
+use super::figure::{Drawing, Figure, Role};
 use super::sticks::Sticks;
 use crate::typeset::Table;
 
 /// A figure as CSV in long form: `panel,line,x,y`, or `panel,row,column,value` for shades.
 pub fn csv(figure: &Figure) -> String {
-    let is_heat = (figure.panels.iter()).all(|panel| matches!(panel, Panel::Heat(_)));
+    let is_heat = (figure.panels.iter()).all(|panel| matches!(panel.drawing, Drawing::Heat(_)));
     let mut table = Table::new(match is_heat {
         true => ["panel", "row", "column", "value"],
         false => ["panel", "line", "x", "y"],
@@ -16,10 +16,10 @@ pub fn csv(figure: &Figure) -> String {
         words.map_or(role.class(), |entry| &entry.1)
     };
     for panel in &figure.panels {
-        let title = panel.title();
-        match panel {
-            Panel::Lines(plot) => {
-                for series in &plot.series {
+        let title = panel.title.as_str();
+        match &panel.drawing {
+            Drawing::Lines(series, _) => {
+                for series in series {
                     let name = named(series.role);
                     for (x, y) in &series.points {
                         let y = y.map_or(String::new(), |y| y.to_string());
@@ -27,7 +27,7 @@ pub fn csv(figure: &Figure) -> String {
                     }
                 }
             }
-            Panel::Sticks(plot) => {
+            Drawing::Sticks(plot) => {
                 for (role, sticks) in &plot.sticks {
                     let lines = sticks.lines.iter().zip(Sticks::NAMES);
                     for (line, part) in lines {
@@ -38,7 +38,7 @@ pub fn csv(figure: &Figure) -> String {
                     }
                 }
             }
-            Panel::Heat(map) => {
+            Drawing::Heat(map) => {
                 for (place, value) in map.values.iter().enumerate() {
                     let row = &map.rows[place / map.columns.len()];
                     let column = &map.columns[place % map.columns.len()];

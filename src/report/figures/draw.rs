@@ -1,6 +1,6 @@
 //! From a panel to marks on a plane; y grows downwards, lengths are points.
 
-use super::figure::{Figure, HeatMap, LinePlot, Panel, Role, StickPlot};
+use super::figure::{Drawing, Figure, HeatMap, Panel, Role, Series, StickPlot};
 use super::ticks::{number, padded, range, ticks};
 
 /// Space left of the axes, for their numbers.
@@ -18,11 +18,8 @@ pub(super) const FONT: f64 = 9.0;
 /// Where a text is held.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Anchor {
-    /// At its left end.
     Start,
-    /// In its middle.
     Middle,
-    /// At its right end.
     End,
 }
 
@@ -103,10 +100,11 @@ fn legend_marks(figure: &Figure) -> Vec<Mark> {
 /// Draws one panel in the given size, the first mark below the others; `x_label` stands below its
 /// axis.
 pub fn draw_panel(panel: &Panel, size: (f64, f64), x_label: &str) -> Vec<Mark> {
-    match panel {
-        Panel::Lines(plot) => draw_lines(plot, size, x_label),
-        Panel::Heat(map) => draw_heat(map, size, x_label),
-        Panel::Sticks(plot) => draw_sticks(plot, size),
+    let title = panel.title.as_str();
+    match &panel.drawing {
+        Drawing::Lines(series, shaded) => draw_lines(title, (series, shaded), size, x_label),
+        Drawing::Heat(map) => draw_heat(title, map, size, x_label),
+        Drawing::Sticks(plot) => draw_sticks(title, plot, size),
     }
 }
 
@@ -137,27 +135,32 @@ impl Axes {
     }
 }
 
-fn draw_lines(plot: &LinePlot, size: (f64, f64), x_label: &str) -> Vec<Mark> {
-    let points = || plot.series.iter().flat_map(|series| &series.points);
+fn draw_lines(
+    title: &str,
+    (series, shaded): (&[Series], &[(f64, f64)]),
+    size: (f64, f64),
+    x_label: &str,
+) -> Vec<Mark> {
+    let points = || series.iter().flat_map(|series| &series.points);
     let (first, last) = range(points().map(|point| point.0));
     let axes = Axes {
         x: match last > first {
             true => (first, last),
             false => padded(points().map(|point| point.0)),
         },
-        y: padded(visible(plot)),
+        y: padded(visible(series)),
         size,
     };
     let mut marks = Vec::new();
-    for &(from, to) in &plot.shaded {
+    for &(from, to) in shaded {
         let (from, to) = (axes.x_at(from.max(axes.x.0)), axes.x_at(to.min(axes.x.1)));
         let rectangle = [from, TOP, (to - from).max(0.0), axes.bottom() - TOP];
         marks.push(Mark::Rectangle(rectangle, Paint::Shade));
     }
     draw_axes(&axes, x_label, &mut marks);
-    let title = plot.title.clone();
+    let title = title.to_owned();
     marks.push(Mark::Text(LEFT, TOP - 6.0, Anchor::Start, title));
-    for series in &plot.series {
+    for series in series {
         // a line ends where it leaves the frame
         let inside = |y: f64| (axes.y.0..=axes.y.1).contains(&y);
         let points = thinned(&series.points);
@@ -175,8 +178,8 @@ fn draw_lines(plot: &LinePlot, size: (f64, f64), x_label: &str) -> Vec<Mark> {
 
 /// Values that the range of y follows: a prediction that runs away does not flatten the record,
 /// a limit is always in sight.
-fn visible(plot: &LinePlot) -> impl Iterator<Item = f64> {
-    let recorded = (plot.series.iter()).find(|series| series.role == Role::Recorded);
+fn visible(series: &[Series]) -> impl Iterator<Item = f64> {
+    let recorded = (series.iter()).find(|series| series.role == Role::Recorded);
     let bounds = recorded.map(|series| padded(series.points.iter().filter_map(|p| p.1)));
     let follows = move |role: Role, value: f64| match (role, bounds) {
         (Role::Limit, _) | (_, None) => value,
@@ -185,7 +188,7 @@ fn visible(plot: &LinePlot) -> impl Iterator<Item = f64> {
             value.clamp(low - reach, high + reach)
         }
     };
-    plot.series.iter().flat_map(move |series| {
+    series.iter().flat_map(move |series| {
         let values = series.points.iter().filter_map(|point| point.1);
         values.map(move |value| follows(series.role, value))
     })
@@ -223,13 +226,13 @@ fn draw_axes(axes: &Axes, x_label: &str, marks: &mut Vec<Mark>) {
     marks.push(Mark::Text(right, bottom + 22.0, Anchor::End, label));
 }
 
-fn draw_heat(map: &HeatMap, size: (f64, f64), x_label: &str) -> Vec<Mark> {
+fn draw_heat(title: &str, map: &HeatMap, size: (f64, f64), x_label: &str) -> Vec<Mark> {
     let left = LEFT + 22.0;
     let (width, height) = (size.0 - left - RIGHT, size.1 - TOP - BOTTOM);
     let [columns, rows] = [&map.columns, &map.rows].map(|names| names.len().max(1) as f64);
     let cell = (width / columns, height / rows);
     let largest = map.values.iter().fold(0.0f64, |m, v| m.max(v.abs()));
-    let mut marks = heat_scale(&map.title, left, largest);
+    let mut marks = heat_scale(title, left, largest);
     for (row, name) in map.rows.iter().enumerate() {
         let y = TOP + row as f64 * cell.1;
         let middle = y + 0.5 * cell.1 + 3.0;
@@ -273,7 +276,7 @@ fn heat_scale(title: &str, left: f64, largest: f64) -> Vec<Mark> {
 }
 
 /// Robots on their floor; the title stands above.
-fn draw_sticks(plot: &StickPlot, size: (f64, f64)) -> Vec<Mark> {
+fn draw_sticks(title: &str, plot: &StickPlot, size: (f64, f64)) -> Vec<Mark> {
     let (x, z) = (plot.extent.forward_m, plot.extent.up_m);
     let (width, height) = (size.0 - 2.0 * RIGHT, size.1 - TOP - RIGHT);
     let scale = (width / (x.1 - x.0)).min(height / (z.1 - z.0));
@@ -284,7 +287,7 @@ fn draw_sticks(plot: &StickPlot, size: (f64, f64)) -> Vec<Mark> {
     };
     let floor = at((0.0, plot.floor_m)).1;
     let mut marks = vec![
-        Mark::Text(RIGHT, TOP - 6.0, Anchor::Start, plot.title.clone()),
+        Mark::Text(RIGHT, TOP - 6.0, Anchor::Start, title.to_owned()),
         Mark::Rule([RIGHT, floor, size.0 - RIGHT, floor], Paint::Axis),
     ];
     for (role, sticks) in &plot.sticks {
@@ -297,7 +300,6 @@ fn draw_sticks(plot: &StickPlot, size: (f64, f64)) -> Vec<Mark> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::figures::Series;
 
     #[test]
     fn thinned_line_keeps_its_ends_and_gaps() {
@@ -313,20 +315,15 @@ mod tests {
 
     #[test]
     fn every_mark_of_a_runaway_prediction_stays_inside_the_frame() {
-        let line = |role, values: [f64; 3]| Series {
-            role,
-            points: (0..3).map(|k| (k as f64, Some(values[k]))).collect(),
-        };
-        let plot = LinePlot {
-            title: "body.z, m".to_owned(),
-            series: vec![
-                line(Role::Recorded, [0.2, 0.3, 0.25]),
-                line(Role::Full, [0.2, 0.21, -1e9]),
-                line(Role::Limit, [3.0; 3]),
-            ],
-            shaded: vec![(1.0, 9.0)],
-        };
-        let marks = draw_panel(&Panel::Lines(plot), (240.0, 150.0), "time, s");
+        let line =
+            |role, values: [f64; 3]| Series::over(role, &[0.0, 1.0, 2.0], |k| Some(values[k]));
+        let lines = vec![
+            line(Role::Recorded, [0.2, 0.3, 0.25]),
+            line(Role::Full, [0.2, 0.21, -1e9]),
+            line(Role::Limit, [3.0; 3]),
+        ];
+        let panel = Panel::shaded("body.z, m", lines, vec![(1.0, 9.0)]);
+        let marks = draw_panel(&panel, (240.0, 150.0), "time, s");
         let lines = marks.iter().filter_map(|mark| match mark {
             Mark::Line(points, _) => Some(points),
             Mark::Rectangle(..) | Mark::Rule(..) | Mark::Text(..) => None,

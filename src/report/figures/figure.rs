@@ -20,7 +20,6 @@ pub enum Role {
 }
 
 impl Role {
-    /// Every role.
     pub const ALL: [Self; 6] = [
         Self::Recorded,
         Self::Full,
@@ -32,35 +31,19 @@ impl Role {
 
     /// Class of its lines in SVG.
     pub fn class(self) -> &'static str {
-        match self {
-            Self::Recorded => "recorded",
-            Self::Full => "full",
-            Self::Restarted => "restarted",
-            Self::Baseline => "baseline",
-            Self::SecondBaseline => "baseline2",
-            Self::Limit => "limit",
-        }
+        self.style().0
     }
 
-    /// Colour on white, as red, green and blue from 0 to 255.
-    pub fn colour(self) -> [u8; 3] {
+    /// That class, the colour on white, as red, green and blue from 0 to 255, and lengths of dashes and gaps, as SVG and
+    /// PDF list them, so that lines differ in grey print too; no lengths for a full line.
+    pub fn style(self) -> (&'static str, [u8; 3], &'static str) {
         match self {
-            Self::Recorded => [31, 95, 168],
-            Self::Full => [194, 87, 12],
-            Self::Restarted => [35, 122, 62],
-            Self::Baseline => [123, 63, 160],
-            Self::SecondBaseline | Self::Limit => [110, 110, 110],
-        }
-    }
-
-    /// Lengths of dashes and gaps, as SVG and PDF list them, so that lines differ in grey print too; empty for a full line.
-    pub fn dashes(self) -> &'static str {
-        match self {
-            Self::Recorded => "",
-            Self::Full => "6 2.5",
-            Self::Restarted => "2 1.6",
-            Self::Baseline => "8 2 2 2",
-            Self::SecondBaseline | Self::Limit => "1 2",
+            Self::Recorded => ("recorded", [31, 95, 168], ""),
+            Self::Full => ("full", [194, 87, 12], "6 2.5"),
+            Self::Restarted => ("restarted", [35, 122, 62], "2 1.6"),
+            Self::Baseline => ("baseline", [123, 63, 160], "8 2 2 2"),
+            Self::SecondBaseline => ("baseline2", [110; 3], "1 2"),
+            Self::Limit => ("limit", [110; 3], "1 2"),
         }
     }
 }
@@ -68,9 +51,7 @@ impl Role {
 /// One line: points in the order of x; a point without y breaks the line.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
-    /// Its meaning.
     pub role: Role,
-    /// Pairs of x and y.
     pub points: Vec<(f64, Option<f64>)>,
 }
 
@@ -81,59 +62,49 @@ impl Series {
         Self::through(role, times.map(|(sample, &time)| (time, value(sample))))
     }
 
-    /// A line through points.
     pub fn through(role: Role, points: impl IntoIterator<Item = (f64, Option<f64>)>) -> Self {
         let points = points.into_iter().collect();
         Self { role, points }
     }
 }
 
-/// Lines over one axis.
+/// One frame of a figure.
 #[derive(Debug, Clone, PartialEq)]
-pub struct LinePlot {
-    /// The quantity with its unit, such as `body.x, m`.
+pub struct Panel {
+    /// The quantity with its unit, such as `body.x, m`, or the instant, such as `0.12 s`.
     pub title: String,
-    /// The lines.
-    pub series: Vec<Series>,
-    /// Ranges of x with a grey ground, such as flight.
-    pub shaded: Vec<(f64, f64)>,
+    pub drawing: Drawing,
+}
+
+/// What a panel shows.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Drawing {
+    /// Lines over one axis; ranges of x with a grey ground, such as flight.
+    Lines(Vec<Series>, Vec<(f64, f64)>),
+    /// Magnitudes of a matrix as shades.
+    Heat(HeatMap),
+    /// Robots.
+    Sticks(StickPlot),
 }
 
 /// Magnitudes of a matrix as shades.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeatMap {
-    /// The quantity.
-    pub title: String,
-    /// Names of the rows.
     pub rows: Vec<String>,
-    /// Names of the columns.
     pub columns: Vec<String>,
-    /// Values, row by row.
+    /// Row by row.
     pub values: Vec<f64>,
 }
 
 /// Robots as sticks in a vertical plane, one length for a metre in both directions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StickPlot {
-    /// The instant, such as `0.12 s`.
-    pub title: String,
     /// The robots, the first below the others.
     pub sticks: Vec<(Role, Sticks)>,
     /// The part of the plane that is in sight.
     pub extent: Extent,
     /// Height of the floor, in m.
     pub floor_m: f64,
-}
-
-/// One frame of a figure.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Panel {
-    /// Lines.
-    Lines(LinePlot),
-    /// Shades.
-    Heat(HeatMap),
-    /// Robots.
-    Sticks(StickPlot),
 }
 
 impl Panel {
@@ -144,20 +115,9 @@ impl Panel {
 
     /// Lines over one axis, some ranges of which are shaded.
     pub fn shaded(title: impl Into<String>, series: Vec<Series>, shaded: Vec<(f64, f64)>) -> Self {
-        let title = title.into();
-        Self::Lines(LinePlot {
-            title,
-            series,
-            shaded,
-        })
-    }
-
-    /// Its title.
-    pub fn title(&self) -> &str {
-        match self {
-            Self::Lines(plot) => &plot.title,
-            Self::Heat(map) => &map.title,
-            Self::Sticks(plot) => &plot.title,
+        Self {
+            title: title.into(),
+            drawing: Drawing::Lines(series, shaded),
         }
     }
 }

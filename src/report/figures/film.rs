@@ -43,11 +43,8 @@ fn lines(sticks: &Option<Sticks>) -> Vec<String> {
 
 /// Middle of the trunk: forward and up, in m.
 fn middle(sticks: &Sticks) -> (f64, f64) {
-    let trunk = &sticks.lines[0];
-    (
-        0.5 * (trunk[0].0 + trunk[2].0),
-        0.5 * (trunk[0].1 + trunk[2].1),
-    )
+    let (one, other) = (sticks.lines[0][0], sticks.lines[0][2]);
+    (0.5 * (one.0 + other.0), 0.5 * (one.1 + other.1))
 }
 
 /// The animation of `motions` over `time_s`, seen from the right of a robot that looks along `heading_rad`.
@@ -58,13 +55,12 @@ pub fn film(
 ) -> Film {
     let stride = time_s.len().div_ceil(MOST_FRAMES).max(1);
     let chosen: Vec<usize> = (0..time_s.len()).step_by(stride).collect();
-    let sticks: Vec<Vec<Option<Sticks>>> = (motions.iter())
-        .map(|motion| {
-            let samples = chosen.iter();
-            let sticks = samples.map(|&sample| motion.sticks(robot, heading_rad, sample));
-            sticks.collect()
-        })
-        .collect();
+    let of_motion = |motion: &Motion| {
+        let samples = chosen.iter();
+        let sticks = samples.map(|&sample| motion.sticks(robot, heading_rad, sample));
+        sticks.collect()
+    };
+    let sticks: Vec<Vec<Option<Sticks>>> = motions.iter().map(of_motion).collect();
     let height = |sticks: &Option<Sticks>| sticks.as_ref().map_or(f64::MIN, |s| middle(s).1);
     let first = sticks.first().map_or(&[][..], Vec::as_slice);
     let shown = (0..first.len())
@@ -75,13 +71,9 @@ pub fn film(
     let times: Vec<f64> = (chosen.iter())
         .map(|&sample| (1e3 * (time_s[sample] - start_s)).round() / 1e3)
         .collect();
+    let joined = |sticks| lines(sticks).join(";");
     let lines: Vec<Vec<String>> = (sticks.iter())
-        .map(|motion| {
-            motion
-                .iter()
-                .map(|sticks| lines(sticks).join(";"))
-                .collect()
-        })
+        .map(|motion| motion.iter().map(joined).collect())
         .collect();
     let roles: Vec<Role> = motions.iter().map(|motion| motion.role).collect();
     Film {

@@ -13,13 +13,10 @@ mod sticks;
 mod svg;
 mod ticks;
 
-pub use csv::csv;
-pub use draw::{Anchor, Mark, Paint, draw_panel};
-pub use figure::{Figure, HeatMap, LinePlot, Panel, Role, Series, StickPlot};
+pub use figure::{Drawing, Figure, HeatMap, Panel, Role, Series};
 pub use film::{Film, film};
-pub use pdf::pdf;
-pub use sticks::{Extent, Motion, Sticks, film_strip, floor_m};
-pub use svg::{panel_svg, standalone_svg};
+pub use sticks::{Motion, film_strip, floor_m};
+pub use svg::panel_svg;
 pub use ticks::subscript;
 
 use crate::files::EmittedFile;
@@ -28,8 +25,8 @@ use crate::files::EmittedFile;
 pub fn figure_files(figure: &Figure) -> [EmittedFile; 3] {
     let file = |ending, contents| EmittedFile::new(format!("{}.{ending}", figure.id), contents);
     [
-        file("svg", standalone_svg(figure)),
-        file("pdf", pdf(figure)),
-        file("csv", csv(figure)),
+        file("svg", svg::standalone_svg(figure)),
+        file("pdf", pdf::pdf(figure)),
+        file("csv", csv::csv(figure)),
     ]
 }

@@ -72,8 +72,8 @@ fn write_mark(text: &mut String, mark: &Mark, (dx, dy): (f64, f64), height: f64)
             )
         }
         Mark::Line(points, role) => {
-            let [r, g, b] = role.colour().map(|part| f64::from(part) / 255.0);
-            let dashes = role.dashes();
+            let (_, colour, dashes) = role.style();
+            let [r, g, b] = colour.map(|part| f64::from(part) / 255.0);
             let mut path = format!("[{dashes}] 0 d 1.1 w {r:.3} {g:.3} {b:.3} RG");
             for (place, (x, y)) in points.iter().enumerate() {
                 let operator = if place == 0 { "m" } else { "l" };

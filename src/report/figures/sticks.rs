@@ -2,7 +2,7 @@
 
 use nalgebra::{DVector, Vector3};
 
-use super::figure::{Figure, Panel, Role, StickPlot};
+use super::figure::{Drawing, Figure, Panel, Role, StickPlot};
 use super::ticks::range;
 use crate::recording::Segment;
 use crate::robot::input_rule::rotation;
@@ -41,14 +41,10 @@ impl Sticks {
             (point.x * cos + point.y * sin, point.z)
         };
         let [front, rear] = [Leg::FrontRight, Leg::RearRight].map(|leg| robot.hip_position(leg).x);
-        let corner = |x: f64, z: f64| seen(Vector3::new(x, 0.0, z * TRUNK_HALF_HEIGHT_M));
-        let trunk = vec![
-            corner(rear, -1.0),
-            corner(front, -1.0),
-            corner(front, 1.0),
-            corner(rear, 1.0),
-            corner(rear, -1.0),
-        ];
+        let corner = |(x, z): (f64, f64)| seen(Vector3::new(x, 0.0, z * TRUNK_HALF_HEIGHT_M));
+        let first = (rear, -1.0);
+        let corners = [first, (front, -1.0), (front, 1.0), (rear, 1.0), first];
+        let trunk = corners.map(corner).into();
         let leg = |leg: Leg| {
             let (hip, q) = (robot.hip_position(leg), leg.of_joints(&joints));
             let knee = robot.geometry(leg).knee_position(&q);
@@ -144,10 +140,8 @@ impl Motion {
 
     /// What each motion's lines mean.
     pub(super) fn legend(motions: &[Self]) -> Vec<(Role, String)> {
-        let entries = motions
-            .iter()
-            .map(|motion| (motion.role, motion.words.clone()));
-        entries.collect()
+        let entry = |motion: &Self| (motion.role, motion.words.clone());
+        motions.iter().map(entry).collect()
     }
 }
 
@@ -191,13 +185,13 @@ pub fn film_strip(
     let frames: Vec<_> = chosen.iter().map(|&sample| sticks_at(sample)).collect();
     let extent = Extent::around(frames.iter().flatten().map(|(_, sticks)| sticks), floor_m);
     let start_s = time_s.first().copied().unwrap_or(0.0);
-    let panels = chosen.iter().zip(frames).map(|(&sample, sticks)| {
-        Panel::Sticks(StickPlot {
-            title: format!("{:.2} s", time_s[sample] - start_s),
+    let panels = chosen.iter().zip(frames).map(|(&sample, sticks)| Panel {
+        title: format!("{:.2} s", time_s[sample] - start_s),
+        drawing: Drawing::Sticks(StickPlot {
             sticks,
             extent,
             floor_m,
-        })
+        }),
     });
     let width = 156.0;
     let slope = (extent.up_m.1 - extent.up_m.0) / (extent.forward_m.1 - extent.forward_m.0);
@@ -295,14 +289,14 @@ mod tests {
         let names = ("strip".to_owned(), String::new());
         let figure = film_strip(go1(), names, (&time_s, &motions), (0.0, 0.0), 5);
         let plots: Vec<&StickPlot> = (figure.panels.iter())
-            .map(|panel| match panel {
-                Panel::Sticks(plot) => plot,
+            .map(|panel| match &panel.drawing {
+                Drawing::Sticks(plot) => plot,
                 other => panic!("{other:?}"),
             })
             .collect();
         assert_eq!(plots.len(), 5);
         assert_eq!(
-            [0, 4].map(|frame| &plots[frame].title),
+            [0, 4].map(|frame| &figure.panels[frame].title),
             ["0.00 s", "1.00 s"]
         );
         assert_eq!((plots[0].sticks.len(), plots[4].sticks.len()), (2, 1));

@@ -9,7 +9,7 @@ use crate::typeset::mathml::HtmlText;
 /// One panel as an `svg` element that takes its colours from the page.
 pub fn panel_svg(figure: &Figure, panel: &Panel) -> String {
     let (width, height) = figure.panel_size;
-    let title = HtmlText(panel.title());
+    let title = HtmlText(&panel.title);
     let mut text = format!(
         "<svg class=\"plot\" viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{title}\">"
     );
@@ -47,8 +47,7 @@ fn style() -> String {
          .shade{{fill:#eee}}.heat{{fill:#1f5fa8}}polyline{{fill:none;stroke-width:1.2}}"
     );
     for role in Role::ALL {
-        let [r, g, b] = role.colour();
-        let (class, dashes) = (role.class(), role.dashes());
+        let (class, [r, g, b], dashes) = role.style();
         let dashes = if dashes.is_empty() { "none" } else { dashes };
         let _ = write!(
             text,

@@ -61,12 +61,12 @@ pub fn emit(
         false => "Needs booktabs.",
     };
     let tables = table::references(&blocks);
-    let coefficients = Table {
+    let coefficients = Document::Tables {
         header: header.short(packages) + &label_list(blocks.iter().flat_map(|block| &block.labels)),
         blocks,
     };
     files.push(file(format!("{stem}-table.tex"), &coefficients)?);
-    let nomenclature = Nomenclature {
+    let nomenclature = Document::Nomenclature {
         header: header.short("A table as wide as the line; needs amsmath."),
         entries: nomenclature::entries(system, &options.symbols, options.numbers),
     };
@@ -78,7 +78,7 @@ pub fn emit(
         let path = format!("{stem}-robot.tex");
         files.push(equations(path, of_robot, &systems, true)?);
     }
-    let preview = Preview {
+    let preview = Document::Preview {
         header: header.short("A document of its own; the files beside it are for \\input."),
         model,
         phases: (systems.iter().enumerate())
@@ -102,7 +102,7 @@ fn equations(
     systems: &[System],
     is_introduced: bool,
 ) -> Result<EmittedFile, TypesetError> {
-    let equations = EquationsFile {
+    let equations = Document::Equations {
         header: header + &label_list(systems.iter().map(|system| system.block.labels())),
         is_introduced,
         systems,
@@ -110,17 +110,40 @@ fn equations(
     file(path, &equations)
 }
 
+/// What the templates show below the comments at the top.
 #[derive(Template)]
-#[template(
-    path = "latex/equations.askama",
-    config = "../../templates/askama.toml",
-    syntax = "latex"
-)]
-struct EquationsFile<'a> {
-    header: String,
-    /// Whether a sentence stands before each system: the file holds more than the equations of motion.
-    is_introduced: bool,
-    systems: &'a [System],
+#[template(config = "../../templates/askama.toml", syntax = "latex")]
+enum Document<'a> {
+    #[template(path = "latex/equations.askama")]
+    Equations {
+        header: String,
+        /// Whether a sentence stands before each system: the file holds more than the equations of motion.
+        is_introduced: bool,
+        systems: &'a [System],
+    },
+    #[template(path = "latex/table.askama")]
+    Tables {
+        header: String,
+        blocks: Vec<TableBlock>,
+    },
+    #[template(path = "latex/nomenclature.askama")]
+    Nomenclature { header: String, entries: Vec<Entry> },
+    #[template(path = "latex/preview.askama")]
+    Preview {
+        header: String,
+        model: &'a ReducedModel,
+        /// Introduction and identifier of each phase.
+        phases: Vec<(&'a str, &'a Identifier)>,
+        rounding: String,
+        siunitx: bool,
+        two_columns: bool,
+        /// Whether there is a file of the robot's equations.
+        has_robot: bool,
+        /// Whether the latent quantities have units.
+        is_physical: bool,
+        /// References to the tables of coefficients.
+        tables: String,
+    },
 }
 
 /// Widest column, in em, for which previews have two.
@@ -157,50 +180,6 @@ struct System {
 fn label_list(labels: impl IntoIterator<Item = impl fmt::Display>) -> String {
     let lines = labels.into_iter().map(|label| format!("\n%   {label}"));
     format!("\n% Labels:{}", lines.collect::<String>())
-}
-
-#[derive(Template)]
-#[template(
-    path = "latex/table.askama",
-    config = "../../templates/askama.toml",
-    syntax = "latex"
-)]
-struct Table {
-    header: String,
-    blocks: Vec<TableBlock>,
-}
-
-#[derive(Template)]
-#[template(
-    path = "latex/nomenclature.askama",
-    config = "../../templates/askama.toml",
-    syntax = "latex"
-)]
-struct Nomenclature {
-    header: String,
-    entries: Vec<Entry>,
-}
-
-#[derive(Template)]
-#[template(
-    path = "latex/preview.askama",
-    config = "../../templates/askama.toml",
-    syntax = "latex"
-)]
-struct Preview<'a> {
-    header: String,
-    model: &'a ReducedModel,
-    /// Introduction and identifier of each phase.
-    phases: Vec<(&'a str, &'a Identifier)>,
-    rounding: String,
-    siunitx: bool,
-    two_columns: bool,
-    /// Whether there is a file of the robot's equations.
-    has_robot: bool,
-    /// Whether the latent quantities have units.
-    is_physical: bool,
-    /// References to the tables of coefficients.
-    tables: String,
 }
 
 /// The systems of a model's phases; `part` tells their labels from those of another file.
@@ -298,6 +277,6 @@ impl Header<'_> {
     }
 }
 
-fn file(path: String, template: &impl Template) -> Result<EmittedFile, TypesetError> {
+fn file(path: String, template: &Document<'_>) -> Result<EmittedFile, TypesetError> {
     Ok(EmittedFile::new(path, rendered(template)?))
 }

@@ -55,12 +55,9 @@ pub(super) fn block(system: &EquationSystem, label: String, options: &PrintOptio
         Form::Cases => false,
         Form::Align => true,
     };
-    let widest = system
-        .equations
-        .iter()
-        .map(|equation| symbol_width(&equation.left));
+    let lefts = system.equations.iter().map(|equation| &equation.left);
     let sides = match aligned {
-        true => all(Some(widest.fold(0.0, f64::max))),
+        true => all(Some(lefts.map(symbol_width).fold(0.0, f64::max))),
         false => in_cases,
     };
     let count = lines_of(&sides);
@@ -75,10 +72,9 @@ pub(super) fn block(system: &EquationSystem, label: String, options: &PrintOptio
             (false, true) => (r"\displaystyle ", ""),
             (false, false) => ("", ""),
         };
-        let relation = if equation.is_approximate {
-            r"\approx"
-        } else {
-            "="
+        let relation = match equation.is_approximate {
+            true => r"\approx",
+            false => "=",
         };
         let label = format!(r" \label{{{label}:{}}}", place + 1);
         for (line, side) in of_equation.iter().enumerate() {

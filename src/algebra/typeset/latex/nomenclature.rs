@@ -11,20 +11,11 @@ use super::math::{tex_number, tex_symbol, tex_unit};
 const STRONGEST: usize = 3;
 /// Weights below this share of the row's largest are not named.
 const NEGLIGIBLE: f64 = 0.1;
-/// One line of the list of symbols, both parts as LaTeX.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Entry {
-    /// The symbol, in dollars.
-    pub symbol: String,
-    /// What it is.
-    pub meaning: String,
-}
+/// One line of the list of symbols as LaTeX: the symbol, in dollars, and what it is.
+pub(super) type Entry = (String, String);
 
 fn entry(symbol: impl Into<String>, meaning: impl Into<String>) -> Entry {
-    Entry {
-        symbol: symbol.into(),
-        meaning: meaning.into(),
-    }
+    (symbol.into(), meaning.into())
 }
 
 const ROBOT_STATE: &str = r"$\mathbf{x}$, $\mathbf{u}$";
@@ -41,34 +32,27 @@ pub(super) fn entries(
         return physical_entries(model, units, symbols, numbers);
     }
     let dim = model.latent_dim();
-    let mut list: Vec<Entry> = (0..dim)
-        .map(|index| {
-            let symbol = symbol(symbols, LatentVariable::Z(index));
-            entry(symbol, coordinate(model, index, numbers))
-        })
-        .collect();
+    let position = |index| {
+        let symbol = symbol(symbols, LatentVariable::Z(index));
+        entry(symbol, coordinate(model, index, numbers))
+    };
+    let mut list: Vec<Entry> = (0..dim).map(position).collect();
     // the map of velocities: the weights of an affine encoder, the Jacobian of another
     let map = match (model.encoder(), model.encoder_map()) {
         (Ok(_), _) => Some(r"\mathbf{W}_e"),
         (Err(_), Ok(_)) => Some(r"\mathbf{J}"),
         (Err(_), Err(_)) => None,
     };
-    let velocities = map.map(|map| {
-        format!(r", $\dot{{\mathbf{{z}}}} = {map} (\mathbf{{s}}_x \dot{{\mathbf{{x}}}})$")
-    });
-    list.push(entry(
-        range(symbols, LatentVariable::Dz, dim),
-        format!("latent velocities{}", velocities.unwrap_or_default()),
-    ));
-    let inputs = map.map(|map| {
-        format!(
+    let [mut velocities, mut inputs] = ["latent velocities", "latent inputs"].map(str::to_owned);
+    if let Some(map) = map {
+        velocities +=
+            &format!(r", $\dot{{\mathbf{{z}}}} = {map} (\mathbf{{s}}_x \dot{{\mathbf{{x}}}})$");
+        inputs += &format!(
             r", $\mathbf{{u}}_{{\mathrm{{lat}}}} = ({map}^{{\mathsf{{T}}}})^{{+}} (\mathbf{{s}}_u \mathbf{{u}})$, lifted by $\mathbf{{s}}_u \mathbf{{u}} = {map}^{{\mathsf{{T}}}} \mathbf{{u}}_{{\mathrm{{lat}}}}$"
-        )
-    });
-    list.push(entry(
-        range(symbols, LatentVariable::U, dim),
-        format!("latent inputs{}", inputs.unwrap_or_default()),
-    ));
+        );
+    }
+    list.push(entry(range(symbols, LatentVariable::Dz, dim), velocities));
+    list.push(entry(range(symbols, LatentVariable::U, dim), inputs));
     if let Ok(encoder) = model.encoder_map() {
         let state = "robot state and generalised input in SI units";
         list.push(entry(ROBOT_STATE, state));
@@ -128,10 +112,9 @@ fn symbol(symbols: &SymbolTable, variable: LatentVariable) -> String {
 /// `$z_1, \dots, z_6$`, or all of up to three.
 fn range(symbols: &SymbolTable, of: fn(usize) -> LatentVariable, dim: usize) -> String {
     let show = |index| symbol(symbols, of(index));
-    if dim <= 3 {
-        (0..dim).map(show).collect::<Vec<_>>().join(", ")
-    } else {
-        format!(r"{}, \dots, {}", show(0), show(dim - 1))
+    match dim {
+        ..=3 => (0..dim).map(show).collect::<Vec<_>>().join(", "),
+        _ => format!(r"{}, \dots, {}", show(0), show(dim - 1)),
     }
 }
 
@@ -141,8 +124,8 @@ fn coordinate(model: &ReducedModel, row: usize, numbers: NumberStyle) -> String 
         return format!("latent coordinate {}", row + 1);
     };
     let weights = encoder.weights().row(row);
-    let mut weights: Vec<(&String, f64)> =
-        state.names.iter().zip(weights.iter().copied()).collect();
+    let weights = state.names.iter().zip(weights.iter().copied());
+    let mut weights: Vec<(&String, f64)> = weights.collect();
     weights.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
     let largest = weights.first().map_or(0.0, |(_, weight)| weight.abs());
     let strongest: Vec<String> = (weights.iter().take(STRONGEST))
@@ -153,11 +136,8 @@ fn coordinate(model: &ReducedModel, row: usize, numbers: NumberStyle) -> String 
             format!(r"\texttt{{{name}}} (${weight}$)")
         })
         .collect();
-    let strongest = strongest.join(", ");
-    format!(
-        "latent coordinate {}; largest weights: {strongest}",
-        row + 1
-    )
+    let (number, strongest) = (row + 1, strongest.join(", "));
+    format!("latent coordinate {number}; largest weights: {strongest}")
 }
 
 /// A nonlinear encoder by the widths of its layers; its weights stay in the model file.

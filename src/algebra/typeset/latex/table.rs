@@ -45,26 +45,23 @@ pub(super) fn blocks(
     numbers: NumberStyle,
     width_em: f64,
 ) -> Vec<TableBlock> {
-    let cuts: Vec<(Vec<usize>, Vec<&CoefficientRow>)> = (groups(table, width_em).into_iter())
-        .flat_map(|columns| {
-            let is_shown = |row: &&CoefficientRow| {
-                columns
-                    .iter()
-                    .any(|&column| row.coefficients[column].is_some())
-            };
-            let rows: Vec<&CoefficientRow> = table.rows.iter().filter(is_shown).collect();
-            let at_once = match is_narrow(width_em) {
-                true => LONGEST,
-                false => rows.len().max(1),
-            };
-            let parts: Vec<_> = rows.chunks(at_once).map(<[_]>::to_vec).collect();
-            parts.into_iter().map(move |rows| (columns.clone(), rows))
-        })
-        .collect();
+    let mut cuts: Vec<(Vec<usize>, Vec<&CoefficientRow>)> = Vec::new();
+    for columns in groups(table, width_em) {
+        let is_active = |row: &CoefficientRow, column: usize| row.coefficients[column].is_some();
+        let rows = table.rows.iter();
+        let shown = rows.filter(|row| columns.iter().any(|&column| is_active(row, column)));
+        let rows: Vec<&CoefficientRow> = shown.collect();
+        let at_once = match is_narrow(width_em) {
+            true => LONGEST,
+            false => rows.len().max(1),
+        };
+        let parts = rows.chunks(at_once);
+        cuts.extend(parts.map(|rows| (columns.clone(), rows.to_vec())));
+    }
     let count = cuts.len();
-    let units = match table.units {
-        Some(_) => ". The unit of a coefficient is that of its column over that of its term",
-        None => "",
+    let units = match table.columns.iter().any(|(.., unit)| unit.is_some()) {
+        true => ". The unit of a coefficient is that of its column over that of its term",
+        false => "",
     };
     let name = tex_text(model_name);
     let stem = format!("tab:{}", label(model_name));
@@ -109,7 +106,7 @@ fn groups(table: &CoefficientTable, width_em: f64) -> Vec<Vec<usize>> {
     let widths: Vec<f64> = (0..table.columns.len())
         .map(|column| {
             let cells = table.rows.iter().map(|row| &row.coefficients[column]);
-            let head = table.units.as_ref().map_or(1.0, |_| UNIT_EM);
+            let head = table.columns[column].2.map_or(1.0, |_| UNIT_EM);
             ColumnWidth::of(cells).em().max(head) + COLUMN_SPACE_EM
         })
         .collect();
@@ -183,15 +180,19 @@ impl Layout<'_> {
             NumberStyle::Plain => format!(" & ${math}$"),
             NumberStyle::Siunitx => format!(" & {{${math}$}}"),
         };
-        let symbol = |&column: &usize| cell(tex_symbol(&self.table.columns[column].1));
-        let symbols: String = self.columns.iter().map(symbol).collect();
-        let heads = format!(r"Term{symbols} \\");
-        let Some(units) = &self.table.units else {
-            return heads;
+        let columns = || {
+            self.columns
+                .iter()
+                .map(|&column| &self.table.columns[column])
         };
-        let unit = |&column: &usize| cell(tex_unit(units[column]));
-        let units: String = self.columns.iter().map(unit).collect();
-        format!("{heads}\n{units} \\\\")
+        let symbols: String = columns()
+            .map(|(_, left, _)| cell(tex_symbol(left)))
+            .collect();
+        let units = columns().map(|(.., unit)| Some(cell(tex_unit((*unit)?))));
+        match units.collect::<Option<String>>() {
+            Some(units) => format!("Term{symbols} \\\\\n{units} \\\\"),
+            None => format!(r"Term{symbols} \\"),
+        }
     }
 
     fn row(&self, row: &CoefficientRow, widths: &[ColumnWidth]) -> String {
@@ -215,11 +216,7 @@ impl Layout<'_> {
                 let text = tex_number(number, self.numbers);
                 let missing = width.decimals - number.places().1;
                 // Points stand below each other when the missing digits take their space.
-                let point = if missing > 0 && !number.digits().contains('.') {
-                    "."
-                } else {
-                    ""
-                };
+                let point = if number.places().1 == 0 { "." } else { "" };
                 let pad = match (number.exponent(), missing) {
                     (Some(_), _) | (None, 0) => String::new(),
                     (None, _) => format!(r"\phantom{{{point}{}}}", "0".repeat(missing)),

@@ -4,12 +4,10 @@
 //! A [`ReducedModel`](crate::model::ReducedModel) enters, `NAME.html` leaves;
 //! [`system`] gives the `math` element of one phase to pages made elsewhere.
 
-mod escape;
 mod math;
 mod page;
 mod prose;
 
-pub use escape::HtmlText;
 pub use math::{mathml, mathml_symbol};
 pub use page::{Html, emit, system};
-pub use prose::HtmlProse;
+pub use prose::{HtmlProse, HtmlText};

@@ -11,8 +11,8 @@ use crate::typeset::{
     EQUALS, EquationSystem, Math, PrintOptions, Symbol, TypesetError, break_lines, symbol_width,
 };
 
-use super::escape::HtmlText;
 use super::math::{mathml, mathml_symbol, mathml_terms};
+use super::prose::HtmlText;
 
 /// What a continued line is set in by, in em.
 const INDENT: f64 = 2.0;
@@ -48,10 +48,9 @@ pub fn system(system: &EquationSystem, width_em: f64) -> String {
 }
 
 fn row(left: &str, right: &str, indent: f64) -> String {
-    let space = if indent > 0.0 {
-        format!("<mspace width=\"{indent}em\"/>")
-    } else {
-        String::new()
+    let space = match indent > 0.0 {
+        true => format!("<mspace width=\"{indent}em\"/>"),
+        false => String::new(),
     };
     format!(
         "<mtr><mtd style=\"text-align:right;padding-right:0\"><mrow>{left}</mrow></mtd>\

@@ -1,12 +1,38 @@
-//! Running text with the few symbols that romc's own sentences and tables use, as mathematics.
+//! The one way for text of a model file into a page, and that for romc's own sentences and tables, the few symbols of
+//! which become mathematics.
 
 use std::fmt;
 
 use crate::model::LatentVariable;
 use crate::typeset::SymbolTable;
 
-use super::escape::HtmlText;
 use super::math::mathml_symbol;
+
+/// Text from outside for the content or an attribute of an element.
+///
+/// ```
+/// use romc::typeset::mathml::HtmlText;
+/// assert_eq!(HtmlText("<b a=\"1\">&").to_string(), "&lt;b a=&quot;1&quot;&gt;&amp;");
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct HtmlText<'a>(pub &'a str);
+
+impl fmt::Display for HtmlText<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for character in self.0.chars() {
+            match character {
+                '<' => f.write_str("&lt;")?,
+                '>' => f.write_str("&gt;")?,
+                '&' => f.write_str("&amp;")?,
+                '"' => f.write_str("&quot;")?,
+                '\'' => f.write_str("&#39;")?,
+                _ if character.is_control() => f.write_str(" ")?,
+                _ => write!(f, "{character}")?,
+            }
+        }
+        Ok(())
+    }
+}
 
 /// Symbols other than the model's variables: how text spells them, and how MathML does.
 const SYMBOLS: [(&str, &str); 14] = [

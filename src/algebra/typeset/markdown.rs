@@ -1,4 +1,7 @@
-//! The Markdown file of a model.
+//! Equations for READMEs and lab notebooks: a
+//! [`ReducedModel`](crate::model::ReducedModel) enters, `NAME.md` leaves, with its
+//! mathematics as GitHub and GitLab draw it. The formulas are those of the
+//! [`latex`](crate::typeset::latex) backend.
 
 use askama::Template;
 
@@ -6,10 +9,8 @@ use crate::equations::{Equations, Unit};
 use crate::files::EmittedFile;
 use crate::typeset::latex::{tex, tex_cases, tex_symbol, tex_unit};
 use crate::typeset::page::{Markup, Page, rendered};
-use crate::typeset::words::Spelling;
+use crate::typeset::words::{Spelling, ends_line};
 use crate::typeset::{EquationSystem, Math, NumberStyle, PrintOptions, Symbol, TypesetError};
-
-use super::escape::markdown_text;
 
 /// The file `NAME.md`: each phase's equations in `math` fences, and the table of
 /// coefficients, as GitHub and GitLab show them.
@@ -60,4 +61,35 @@ impl Markup for Markdown {
 
 fn after_comma(unit: Option<Unit>) -> String {
     unit.map_or(String::new(), |unit| format!(", $`{}`$", tex_unit(unit)))
+}
+
+/// Text from outside that Markdown shows as it is: punctuation is escaped, and
+/// control characters become spaces, so that a text cannot start a new line.
+///
+/// ```
+/// use romc::typeset::markdown::markdown_text;
+/// assert_eq!(markdown_text("*a* <b>"), r"\*a\* \<b\>");
+/// ```
+pub fn markdown_text(text: &str) -> String {
+    let mut markdown = String::new();
+    for (place, character) in text.replace(ends_line, " ").chars().enumerate() {
+        // A hyphen makes a list only at the start.
+        let is_harmless = ".,:;%()=+/".contains(character) || (character == '-' && place > 0);
+        if character.is_ascii_punctuation() && !is_harmless {
+            markdown.push('\\');
+        }
+        markdown.push(character);
+    }
+    markdown
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn markdown_text_starts_no_link_code_html_or_mathematics() {
+        let text = markdown_text("[a](b) `c` <i> $d$ |e| #f\n- g");
+        assert_eq!(text, r"\[a\](b) \`c\` \<i\> \$d\$ \|e\| \#f - g");
+    }
 }
