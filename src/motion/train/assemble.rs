@@ -9,7 +9,7 @@ use super::dataset::Dataset;
 use super::dynamics_fit::Fitted;
 use super::error::TrainError;
 use super::features::FeatureValues;
-use super::latent::{EncodedSet, Latent};
+use super::latent::EncodedSet;
 use super::metrics::PLACE;
 use super::options::{EncoderOptions, TrainOptions};
 use super::report::TrainReport;
@@ -76,12 +76,13 @@ impl Task<'_> {
     pub fn assemble(
         &self,
         fitted: Fitted,
+        set: EncodedSet<'_>,
         jumps: Option<JumpPrior>,
         provenance: Map<String, Value>,
     ) -> Result<ReducedModel, TrainError> {
         let (options, robot, training) = (self.options, self.robot, &self.training);
         let (d, name) = (options.latent_dim, robot.name());
-        let given_state = self.inputs_given_states(&fitted)?;
+        let given_state = self.inputs_given_states(&fitted, set);
         let [state, input] = CoordinateNames::of_robot();
         let mut builder = ReducedModel::builder(options.name.clone(), self.library.clone())
             .description(format!("{d} latent coordinates of {name} jumps"))
@@ -120,27 +121,26 @@ impl Task<'_> {
     fn inputs_given_states(
         &self,
         fitted: &Fitted,
-    ) -> Result<Vec<Option<InputGivenState>>, TrainError> {
+        set: EncodedSet<'_>,
+    ) -> Vec<Option<InputGivenState>> {
         let Some(encoder) = fitted.encoder.as_affine() else {
-            return Ok(vec![None; fitted.xi.len()]);
+            return vec![None; fitted.xi.len()];
         };
         // Where the robot is, and which way it looks, is in `z` but says nothing of its inputs.
         let shifts = encoder.weights().select_columns(&PLACE);
-        let training = &self.training;
-        let latent = Latent::of(training, &fitted.encoder)?;
         let phases = fitted.xi.iter().enumerate();
         let given = phases.map(|(phase, xi)| {
             let blocks = || {
                 let mut values = FeatureValues::default();
-                let blocks = EncodedSet::new(training, &latent).regression_blocks(phase);
+                let blocks = set.regression_blocks(phase);
                 blocks.map(move |(variables, ddz)| {
                     let left = ddz - self.features.evaluate(&variables, &mut values) * xi;
                     (variables, left)
                 })
             };
-            InputGivenState::of_blocks(training.samples(Some(phase)), &shifts, blocks)
+            InputGivenState::of_blocks(set.dataset.samples(Some(phase)), &shifts, blocks)
         });
-        Ok(given.collect())
+        given.collect()
     }
 }
 

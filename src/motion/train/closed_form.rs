@@ -65,7 +65,7 @@ fn fit(
     };
     let basis = find_subspace(&task.moments, &task.frame, options.latent_dim, &search);
     let encoder = task.encoder_over(&basis)?.into();
-    let decoder = least_squares_decoder(&task.training, &encoder)?.into();
+    let decoder = least_squares_decoder(&task.training, &encoder, None)?.into();
     let fitted = task.fit_dynamics((encoder, decoder), watch)?;
     let report = task.seed_report(&fitted, (seed, fitted.score()), None)?;
     Ok((report, fitted))

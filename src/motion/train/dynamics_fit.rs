@@ -8,7 +8,7 @@ use super::features::Features;
 use super::joint::Losses;
 use super::judge::Judge;
 use super::latent::{EncodedSet, Latent, input_projection, lift_samples, mean_jacobian};
-use super::metrics::{Assessed, BODY_X, BODY_Z, SetMetrics, measure, measure_encoded};
+use super::metrics::{Assessed, BODY_X, BODY_Z, SetMetrics, measure};
 use super::progress::Watch;
 use super::report::{PhaseTerms, SeedReport, TrainReport};
 use super::rollout::Candidate;
@@ -28,8 +28,6 @@ pub(super) struct Fitted {
     pub xi: Vec<DMatrix<f64>>,
     /// The regression, if Xi was chosen among regressions, and how many were tried.
     pub choice: Option<(Choice, usize)>,
-    /// Metrics on the training jumps, if they were measured with the fit.
-    pub training: Option<SetMetrics>,
 }
 
 impl Fitted {
@@ -105,21 +103,13 @@ impl Task<'_> {
             knowledge: &self.knowledge,
         };
         let selected = select(target, &judge, options, watch)?;
-        let weights = match encoder.as_affine() {
-            Some(linear) => linear.weights().clone(),
-            None => mean_jacobian(&encoder, &training.gather(Quantity::X, None)),
-        };
-        let mut fitted = Fitted {
-            weights,
+        Ok(Fitted {
+            weights: mean_jacobian(&encoder, training),
             encoder,
             decoder,
             xi: selected.xi,
             choice: Some((selected.choice, selected.candidates)),
-            training: None,
-        };
-        let measured = measure_encoded(fitted.assessed(features), target.set)?;
-        fitted.training = Some(measured);
-        Ok(fitted)
+        })
     }
 
     /// The metrics of one seed.
@@ -132,6 +122,8 @@ impl Task<'_> {
         let std = self.training.state_std();
         let names = Robot::state_names();
         let rows = fitted.weights.row_iter();
+        let latent = Latent::of(self.judged(), &fitted.encoder)?;
+        let judged = EncodedSet::new(self.judged(), &latent);
         Ok(SeedReport {
             seed,
             score,
@@ -140,25 +132,25 @@ impl Task<'_> {
             dominant: rows
                 .map(|row| names[row.transpose().component_mul(&std).iamax()].clone())
                 .collect(),
-            judged: measure(fitted.assessed(&self.features), self.judged())?,
+            judged: measure(fitted.assessed(&self.features), judged)?,
         })
     }
 
-    /// The metrics of fitted numbers.
-    pub fn report(&self, fitted: &Fitted) -> Result<TrainReport, TrainError> {
-        let assessed = fitted.assessed(&self.features);
+    /// The metrics of fitted numbers: on the training jumps, which are encoded, and those of the jumps that candidates
+    /// are `judged` by.
+    pub fn report(
+        &self,
+        fitted: &Fitted,
+        set: EncodedSet<'_>,
+        judged: &SetMetrics,
+    ) -> Result<TrainReport, TrainError> {
         let names = Robot::state_names();
         let phases = self.training.phases.names().into_iter().zip(&fitted.xi);
         let (choice, candidates) = fitted.choice.clone().unzip();
         let validated = !self.validation.jumps.is_empty();
-        let training = match &fitted.training {
-            Some(measured) => measured.clone(),
-            None => measure(assessed, &self.training)?,
-        };
-        let validation = validated.then(|| measure(assessed, &self.validation));
         Ok(TrainReport {
             encoded: self.active.iter().map(|&i| names[i].clone()).collect(),
-            lift_loss: self.lift_loss(&fitted.encoder)?,
+            lift_loss: self.lift_loss(&fitted.encoder, set),
             active_terms: phases
                 .map(|(phase, xi)| PhaseTerms {
                     phase,
@@ -170,25 +162,23 @@ impl Task<'_> {
             seeds: Vec::new(),
             support_overlap: None,
             deviations: Vec::new(),
-            training,
-            validation: validation.transpose()?,
+            training: measure(fitted.assessed(&self.features), set)?,
+            validation: validated.then(|| judged.clone()),
         })
     }
 
     /// Share of the training input's energy that the latent input cannot carry.
-    fn lift_loss(&self, encoder: &StateMap) -> Result<f64, TrainError> {
+    fn lift_loss(&self, encoder: &StateMap, set: EncodedSet<'_>) -> f64 {
         if let Some(linear) = encoder.as_affine() {
             let (weights, input) = (linear.weights(), &self.moments.input);
             let carried = &input_projection(weights) * input * weights.transpose();
-            return Ok(1.0 - carried.trace() / input.trace().max(f64::MIN_POSITIVE));
+            return 1.0 - carried.trace() / input.trace().max(f64::MIN_POSITIVE);
         }
-        let training = &self.training;
-        let latent = Latent::of(training, encoder)?;
         let (mut missed, mut total) = (0.0, 0.0);
-        for (jump, samples) in training.jumps.iter().zip(&latent) {
+        for (jump, samples) in set.dataset.jumps.iter().zip(set.latent) {
             missed += (lift_samples(encoder, &jump.x, &samples.u_lat) - &jump.u).norm_squared();
             total += jump.u.norm_squared();
         }
-        Ok(missed / total.max(f64::MIN_POSITIVE))
+        missed / total.max(f64::MIN_POSITIVE)
     }
 }

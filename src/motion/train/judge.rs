@@ -211,7 +211,7 @@ fn parts_of(dataset: &Dataset, most: usize) -> impl Iterator<Item = Range<usize>
         let start = next;
         let mut samples = 0;
         while let Some(jump) = dataset.jumps.get(next) {
-            samples += jump.len();
+            samples += jump.samples();
             if next > start && samples > most {
                 break;
             }
@@ -285,7 +285,7 @@ mod tests {
         assert_eq!(together.parts(), 0..1);
         let all = errors(&together, 0).expect("no rollout diverges");
         assert_ne!(all[0], all[1]);
-        for (samples, n_parts) in [(2 * dataset.jumps[0].len(), 3), (1, 5)] {
+        for (samples, n_parts) in [(2 * dataset.jumps[0].samples(), 3), (1, 5)] {
             let judge = Judge::in_parts(&features, set, samples);
             assert_eq!(judge.parts(), 0..n_parts);
             let parts = judge.parts().map(|part| errors(&judge, part));

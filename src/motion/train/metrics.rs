@@ -83,20 +83,12 @@ pub fn assess<'a>(
         encoder: model.encoder_map()?,
         decoder: model.decoder_map()?,
     };
-    measure(assessed, &dataset)
+    let latent = Latent::of(&dataset, assessed.encoder)?;
+    measure(assessed, EncodedSet::new(&dataset, &latent))
 }
 
-/// Measures a model on a dataset.
-pub(super) fn measure(model: Assessed<'_>, dataset: &Dataset) -> Result<SetMetrics, TrainError> {
-    let latent = Latent::of(dataset, model.encoder)?;
-    measure_encoded(model, EncodedSet::new(dataset, &latent))
-}
-
-/// Measures a model on a dataset that it has encoded already.
-pub(super) fn measure_encoded(
-    model: Assessed<'_>,
-    set: EncodedSet<'_>,
-) -> Result<SetMetrics, TrainError> {
+/// Measures a model on a dataset that it has encoded.
+pub(super) fn measure(model: Assessed<'_>, set: EncodedSet<'_>) -> Result<SetMetrics, TrainError> {
     let short = restarted(set.dataset, SHORT_S);
     let [prediction_x_m, prediction_z_m] = body_rms(model, set, &short);
     let [rollout_x_m, rollout_z_m] = body_rms(model, set, &whole(set.dataset));

@@ -124,7 +124,6 @@ mod tests {
             weights,
             xi: vec![xi],
             choice: None,
-            training: None,
         }
     }
 

@@ -45,7 +45,7 @@ pub fn restarted(dataset: &Dataset, duration_s: f64) -> Vec<Window> {
     let mut windows = Vec::new();
     for (jump, samples) in dataset.jumps.iter().enumerate() {
         for window in restart_windows(&samples.time_s, Restart::Every(duration_s)) {
-            let (start, last) = (window.start, window.end.min(samples.len() - 1));
+            let (start, last) = (window.start, window.end.min(samples.time_s.len() - 1));
             if last > start {
                 let steps = last - start;
                 windows.push(Window { jump, start, steps });
@@ -61,7 +61,7 @@ pub fn whole(dataset: &Dataset) -> Vec<Window> {
     let of = |(jump, samples): (usize, &Jump)| Window {
         jump,
         start: 0,
-        steps: samples.len() - 1,
+        steps: samples.time_s.len() - 1,
     };
     jumps.map(of).collect()
 }

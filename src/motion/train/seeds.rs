@@ -6,6 +6,7 @@ use super::assemble::{Origin, provenance};
 use super::dynamics_fit::Fitted;
 use super::error::TrainError;
 use super::jumps::learn_jumps;
+use super::latent::{EncodedSet, Latent};
 use super::overlap::support_overlap;
 use super::progress::Watch;
 use super::report::{SeedReport, Trained};
@@ -54,17 +55,19 @@ impl Seeds {
         origin: &Origin,
     ) -> Result<Trained, TrainError> {
         let (best, reports, overlap) = self.best(&task.library, &task.moments.state)?;
-        let mut report = task.report(&best)?;
+        let latent = Latent::of(&task.training, &best.encoder)?;
+        let set = EncodedSet::new(&task.training, &latent);
+        let mut report = task.report(&best, set, &reports[0].judged)?;
         // A single seed without losses has nothing that the report does not say.
         if reports.len() > 1 || reports[0].losses.is_some() {
             (report.seeds, report.support_overlap) = (reports, overlap);
         }
-        let jumps = learn_jumps(&task.training, &best.encoder)?.map(|learned| {
+        let jumps = learn_jumps(set, &best.encoder)?.map(|learned| {
             report.deviations = learned.scores;
             learned.prior
         });
         let provenance = provenance(task.options, method, origin, &report);
-        let model = task.assemble(best, jumps, provenance)?;
+        let model = task.assemble(best, set, jumps, provenance)?;
         Ok(Trained { model, report })
     }
 
@@ -167,7 +170,6 @@ mod tests {
             weights: DMatrix::identity(2, 2),
             xi: vec![DMatrix::from_element(7, 2, coefficient)],
             choice: None,
-            training: None,
         };
         Ok((report, fitted))
     }

@@ -203,7 +203,7 @@ impl<'a> JointLoss<'a> {
             batch,
             weights,
         };
-        let (n, d) = (batch.len(), self.features.latent_dim());
+        let (n, d) = (batch.samples(), self.features.latent_dim());
         let xi = &parameters.xi[batch.phase];
         let variables = self.maps.encode(at);
         let theta = self.features.evaluate(&variables, &mut self.values);

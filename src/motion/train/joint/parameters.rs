@@ -84,7 +84,7 @@ impl Frame {
 
     /// `x`, `dx` and `ddx` of a batch, stacked, as the encoder takes them.
     pub fn enter(&self, batch: &Batch) -> DMatrix<f64> {
-        let n = batch.len();
+        let n = batch.samples();
         let mut stack = DMatrix::zeros(3 * n, batch.x.ncols());
         for (index, block) in [&batch.x, &batch.dx, &batch.ddx].into_iter().enumerate() {
             stack.rows_mut(index * n, n).copy_from(block);

@@ -20,9 +20,7 @@ use crate::train::data_sets::Recordings;
 use crate::train::dataset::Quantity;
 use crate::train::dynamics_fit::Fitted;
 use crate::train::error::TrainError;
-use crate::train::latent::{
-    EncodedSet, Latent, fit_affine, least_squares_decoder, map_samples, mean_jacobian,
-};
+use crate::train::latent::{EncodedSet, Latent, least_squares_decoder, map_samples, mean_jacobian};
 use crate::train::options::{TrainOptions, Transfer};
 use crate::train::progress::Watch;
 use crate::train::random::Random;
@@ -275,14 +273,12 @@ impl Trainer<'_> {
     fn published(&self, parameters: Parameters) -> Result<Fitted, TrainError> {
         let plain = LatentBasis::unchanged(self.task.options.latent_dim);
         let (encoder, decoder) = self.state_maps(&parameters, &plain)?;
-        let x = self.task.training.gather(Quantity::X, None);
         Ok(Fitted {
-            weights: mean_jacobian(&encoder, &x),
+            weights: mean_jacobian(&encoder, &self.task.training),
             encoder,
             decoder,
             xi: parameters.xi,
             choice: None,
-            training: None,
         })
     }
 
@@ -311,24 +307,31 @@ impl Trainer<'_> {
         let (task, d) = (self.task, self.task.options.latent_dim);
         let basis = task.frame.nearest(&learned, d);
         let encoder = task.encoder_over(&basis)?.into();
-        let decoder = least_squares_decoder(&task.training, &encoder)?.into();
+        let decoder = least_squares_decoder(&task.training, &encoder, None)?.into();
         Ok((encoder, decoder))
     }
 
     /// The learned networks in the canonical latent basis, the decoder's last layer by least squares.
     fn nonlinear_maps(&self, parameters: &Parameters) -> Result<(StateMap, StateMap), TrainError> {
         let plain = LatentBasis::unchanged(self.task.options.latent_dim);
-        let x = self.task.training.gather(Quantity::X, None);
-        let basis = self.basis(&self.state_maps(parameters, &plain)?.0, &x);
+        let basis = self.basis(&self.state_maps(parameters, &plain)?.0);
         let (encoder, decoder) = self.state_maps(parameters, &basis)?;
-        let decoder = with_fitted_last_layer(&decoder, &x, &map_samples(&encoder, &x))?;
-        Ok((encoder, decoder))
+        let mut layers = decoder.layers().to_vec();
+        let last = layers.pop().expect("invariant: a map has a layer");
+        let hidden = match layers.is_empty() {
+            true => None,
+            false => Some(StateMap::new("decoder", layers.clone())?),
+        };
+        let map = least_squares_decoder(&self.task.training, &encoder, hidden.as_ref())?;
+        layers.push(Layer { map, ..last });
+        Ok((encoder, StateMap::new("decoder", layers)?))
     }
 
     /// The latent basis in which `J J^T` is the identity in the mean, rotated by varimax of the mean Jacobian, with
     /// the latents in canonical order and their mean at 0.
-    fn basis(&self, encoder: &StateMap, x: &DMatrix<f64>) -> LatentBasis {
-        let d = self.task.options.latent_dim;
+    fn basis(&self, encoder: &StateMap) -> LatentBasis {
+        let (d, training) = (self.task.options.latent_dim, &self.task.training);
+        let x = training.gather(Quantity::X, None);
         let gram = x.column_iter().fold(DMatrix::zeros(d, d), |sum, x| {
             let jacobian = encoder
                 .jacobian(&x.into_owned())
@@ -340,14 +343,14 @@ impl Trainer<'_> {
             Some(inverse) => inverse,
             None => DMatrix::identity(d, d),
         };
-        let mean = &white * mean_jacobian(encoder, x);
+        let mean = &white * mean_jacobian(encoder, training);
         let (_, rotation) = self.task.canonical_basis(&mean.transpose());
         let turn = rotation.transpose() * white;
         let back = match turn.clone().try_inverse() {
             Some(back) => back,
             None => return LatentBasis::unchanged(d),
         };
-        let shift = -(&turn * map_samples(encoder, x).column_mean());
+        let shift = -(&turn * map_samples(encoder, &x).column_mean());
         LatentBasis { turn, back, shift }
     }
 
@@ -365,21 +368,4 @@ impl Trainer<'_> {
         };
         terms_at_start().err().unwrap_or(error)
     }
-}
-
-/// The decoder with its last layer, which is linear, of least square error from `z` to `x` (samples in columns).
-fn with_fitted_last_layer(
-    decoder: &StateMap,
-    x: &DMatrix<f64>,
-    z: &DMatrix<f64>,
-) -> Result<StateMap, TrainError> {
-    let mut layers: Vec<Layer> = decoder.layers().to_vec();
-    let last = layers.pop().expect("invariant: a map has a layer");
-    let hidden = match layers.is_empty() {
-        true => z.clone(),
-        false => map_samples(&StateMap::new("decoder", layers.clone())?, z),
-    };
-    let map: AffineMap = fit_affine(x, &hidden)?;
-    layers.push(Layer { map, ..last });
-    Ok(StateMap::new("decoder", layers)?)
 }

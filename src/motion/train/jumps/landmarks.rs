@@ -106,7 +106,7 @@ fn cut(training: &Dataset, jump: &Jump, rising: impl Fn(usize) -> bool) -> Optio
     }
     kind.push(landmark("flight", *flight_phase)?);
     borders.push(in_air.start);
-    let last = jump.len() - 1;
+    let last = jump.samples() - 1;
     let landed_s = jump.time_s[last] - jump.time_s[in_air.end.min(last)];
     if landed_s < LEAST_LANDING_S || last < in_air.end + LEAST_SAMPLES {
         borders.push(in_air.end - 1);

@@ -14,7 +14,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::dataset::Dataset;
 use super::error::TrainError;
-use super::latent::Latent;
+use super::latent::{EncodedSet, Latent};
 use super::metrics::{BODY_X, BODY_Z};
 use super::report::PartScore;
 use crate::model::{GOAL_DIM, GoalRange, JumpPart, JumpPrior, StateMap};
@@ -49,9 +49,13 @@ pub struct LearnedJumps {
 /// # Errors
 /// As [`Dataset::for_each`].
 pub fn learn_jumps(
-    training: &Dataset,
+    set: EncodedSet<'_>,
     encoder: &StateMap,
 ) -> Result<Option<LearnedJumps>, TrainError> {
+    let EncodedSet {
+        dataset: training,
+        latent,
+    } = set;
     let Some(affine) = encoder.as_affine() else {
         return Ok(None);
     };
@@ -65,7 +69,6 @@ pub fn learn_jumps(
     if chosen.len() < LEAST_JUMPS {
         return Ok(None);
     }
-    let latent = Latent::of(training, encoder)?;
     let counts: Vec<usize> = (0..kind.len())
         .map(|part| {
             let all = chosen.iter().map(|(_, cut)| cut.duration_s(part));
@@ -94,7 +97,7 @@ pub fn learn_jumps(
         parts,
         jumps,
         start: ends.start.map(rounded),
-        state_std: state_std(&latent, &chosen).map(rounded),
+        state_std: state_std(latent, &chosen).map(rounded),
         end_height_m: ends.end_height_m.map(rounded),
         landing_height_m: rounded(ends.landing_height_m),
     };

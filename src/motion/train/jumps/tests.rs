@@ -11,9 +11,13 @@ fn training() -> Dataset {
     go1((1..=8).map(|k| format!("train_{k:02}")))
 }
 
+fn prior_of(training: &Dataset) -> Option<LearnedJumps> {
+    let latent = Latent::of(training, &encoder()).unwrap();
+    learn_jumps(EncodedSet::new(training, &latent), &encoder()).unwrap()
+}
+
 fn learned(training: &Dataset) -> LearnedJumps {
-    let learned = learn_jumps(training, &encoder()).unwrap();
-    learned.expect("jumps of one kind")
+    prior_of(training).expect("jumps of one kind")
 }
 
 /// An encoder of the body's x and z and the front right thigh and knee.
@@ -75,7 +79,7 @@ fn deviations_know_nothing_of_where_the_robot_stands() {
 fn too_few_jumps_have_no_prior() {
     let mut training = training();
     training.jumps.truncate(LEAST_JUMPS - 1);
-    assert_eq!(learn_jumps(&training, &encoder()).unwrap(), None);
+    assert_eq!(prior_of(&training), None);
 }
 
 #[test]
