@@ -12,6 +12,7 @@ use super::judge::Judge;
 use super::knowledge::Knowledge;
 use super::progress::Watch;
 use super::rollout::Change;
+use super::sparse::active_terms;
 
 /// Weight of relative changes of the coefficients, against squared errors that start at 1 for both kinds of windows.
 pub(super) const PRIOR: f64 = 1e-3;
@@ -37,6 +38,11 @@ pub(super) struct Coefficients {
 impl Coefficients {
     pub(super) fn at(&self, (phase, term, column): Place) -> f64 {
         self.xi[phase][(term, column)]
+    }
+
+    /// Coefficients that are not zero.
+    pub(super) fn active(&self) -> usize {
+        self.xi.iter().map(active_terms).sum()
     }
 }
 
