@@ -9,7 +9,7 @@ use super::options::TrainOptions;
 use super::progress::Watch;
 use super::report::{SeedReport, Trained};
 use super::seeds::Seeds;
-use super::subspace::{SubspaceOptions, find_subspace};
+use super::subspace::find_subspace;
 use super::task::Task;
 use crate::robot::Robot;
 
@@ -57,13 +57,8 @@ fn fit(
 ) -> Result<(SeedReport, Fitted), TrainError> {
     let options = task.options;
     watch.stage("searching the latent space", 1);
-    let search = SubspaceOptions {
-        lift_weight: options.encoder.lift_weight,
-        coordinate_weights: options.encoder.coordinate_weights(),
-        restarts: options.encoder.restarts,
-        seed,
-    };
-    let basis = find_subspace(&task.moments, &task.frame, options.latent_dim, &search);
+    let (frame, d) = (&task.frame, options.latent_dim);
+    let basis = find_subspace(&task.moments, frame, d, &options.encoder, seed);
     let encoder = task.encoder_over(&basis)?.into();
     let decoder = least_squares_decoder(&task.training, &encoder, None)?.into();
     let fitted = task.fit_dynamics((encoder, decoder), watch)?;
