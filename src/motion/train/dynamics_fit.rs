@@ -8,11 +8,11 @@ use super::features::Features;
 use super::joint::Losses;
 use super::judge::Judge;
 use super::latent::{EncodedSet, Latent, input_projection, lift_samples, mean_jacobian};
-use super::metrics::{Assessed, BODY_X, BODY_Z, SetMetrics, measure};
+use super::metrics::{BODY_X, BODY_Z, SetMetrics, measure};
 use super::progress::Watch;
 use super::report::{PhaseTerms, SeedReport, TrainReport};
 use super::rollout::Candidate;
-use super::select::{Choice, Target, select};
+use super::select::{Choice, select};
 use super::sparse::active_terms;
 use super::task::Task;
 use super::varimax::{order_and_sign, varimax};
@@ -36,15 +36,13 @@ impl Fitted {
         (self.choice.as_ref()).map_or(f64::INFINITY, |(choice, _)| choice.score)
     }
 
-    fn assessed<'a>(&'a self, features: &'a Features) -> Assessed<'a> {
-        Assessed {
-            candidate: Candidate {
-                features,
-                xi: &self.xi,
-            },
-            encoder: &self.encoder,
-            decoder: &self.decoder,
-        }
+    fn measure(&self, features: &Features, set: EncodedSet<'_>) -> Result<SetMetrics, TrainError> {
+        let xi = &self.xi;
+        measure(
+            Candidate { features, xi },
+            [&self.encoder, &self.decoder],
+            set,
+        )
     }
 }
 
@@ -97,18 +95,14 @@ impl Task<'_> {
         let judged_latent = validated.as_ref().unwrap_or(&latent);
         let (options, features) = (&self.options.regression, &self.features);
         let judge = Judge::new(features, EncodedSet::new(judged, judged_latent));
-        let target = Target {
-            set: EncodedSet::new(training, &latent),
-            features,
-            knowledge: &self.knowledge,
-        };
-        let selected = select(target, &judge, options, watch)?;
+        let set = EncodedSet::new(training, &latent);
+        let (xi, choice, candidates) = select(set, &self.knowledge, &judge, options, watch)?;
         Ok(Fitted {
             weights: mean_jacobian(&encoder, training),
             encoder,
             decoder,
-            xi: selected.xi,
-            choice: Some((selected.choice, selected.candidates)),
+            xi,
+            choice: Some((choice, candidates)),
         })
     }
 
@@ -132,7 +126,7 @@ impl Task<'_> {
             dominant: rows
                 .map(|row| names[row.transpose().component_mul(&std).iamax()].clone())
                 .collect(),
-            judged: measure(fitted.assessed(&self.features), judged)?,
+            judged: fitted.measure(&self.features, judged)?,
         })
     }
 
@@ -162,7 +156,7 @@ impl Task<'_> {
             seeds: Vec::new(),
             support_overlap: None,
             deviations: Vec::new(),
-            training: measure(fitted.assessed(&self.features), set)?,
+            training: fitted.measure(&self.features, set)?,
             validation: validated.then(|| judged.clone()),
         })
     }

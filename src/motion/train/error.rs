@@ -9,7 +9,6 @@ use thiserror::Error;
 use crate::limits::OutOfRange;
 use crate::model::ModelError;
 use crate::recording::RecordingError;
-use crate::robot::RobotError;
 
 /// Why training stopped without a model.
 #[derive(Debug, Error)]
@@ -89,9 +88,6 @@ pub enum TrainError {
     /// A recording could not be turned into inputs.
     #[error(transparent)]
     Recording(#[from] RecordingError),
-    /// The robot refused.
-    #[error(transparent)]
-    Robot(#[from] RobotError),
     /// The trained numbers do not form a model.
     #[error("the trained model is refused")]
     Model(#[from] ModelError),

@@ -55,45 +55,45 @@ impl Features {
     /// For every term whether it is affine in `z`, `dz` and `u_lat`: dynamics of such terms do not run away within the
     /// time of a jump.
     pub fn affine_terms(&self) -> Vec<bool> {
+        let bent = |inside: u32| if inside == 0 { 0 } else { 2 };
         // 0 constant, 1 affine, 2 anything else
-        let mut degree: Vec<u32> = Vec::with_capacity(self.tape.steps.len());
-        for step in &self.tape.steps {
-            let of = |at: &usize| degree[*at];
-            let bent = |inside: u32| if inside == 0 { 0 } else { 2 };
-            degree.push(match step {
-                Step::Number(_) => 0,
-                Step::Variable(_) => 1,
-                Step::Sum(parts) => parts.iter().map(of).max().unwrap_or(0),
-                Step::Product(parts) => parts.iter().map(of).sum::<u32>().min(2),
-                Step::Integer(base, 1) => of(base),
-                Step::Integer(inner, _)
-                | Step::Sine(inner)
-                | Step::Cosine(inner)
-                | Step::Apply(_, inner) => bent(of(inner)),
-                Step::Power(base, exponent) => bent(of(base).max(of(exponent))),
-            });
-        }
-        let terms = self.tape.terms.iter();
-        terms.map(|&step| degree[step] < 2).collect()
+        let degrees = self.of_terms(|step, of| match step {
+            Step::Number(_) => 0,
+            Step::Variable(_) => 1,
+            Step::Sum(parts) => parts.iter().map(of).max().unwrap_or(0),
+            Step::Product(parts) => parts.iter().map(of).sum::<u32>().min(2),
+            Step::Integer(base, 1) => of(base),
+            Step::Integer(inner, _)
+            | Step::Sine(inner)
+            | Step::Cosine(inner)
+            | Step::Apply(_, inner) => bent(of(inner)),
+            Step::Power(base, exponent) => bent(of(base).max(of(exponent))),
+        });
+        degrees.iter().map(|degree| *degree < 2).collect()
     }
 
     /// For every term whether it depends on a variable, counted over `z`, `dz`, `u_lat`.
     pub fn depend_on(&self, variable: usize) -> Vec<bool> {
-        let mut depends: Vec<bool> = Vec::with_capacity(self.tape.steps.len());
+        self.of_terms(|step, of| match step {
+            Step::Number(_) => false,
+            Step::Variable(own) => *own == variable,
+            Step::Sum(parts) | Step::Product(parts) => parts.iter().any(of),
+            Step::Integer(inner, _)
+            | Step::Sine(inner)
+            | Step::Cosine(inner)
+            | Step::Apply(_, inner) => of(inner),
+            Step::Power(base, exponent) => of(base) || of(exponent),
+        })
+    }
+
+    /// For every term what `of_step` makes of its step and what it made of the steps before.
+    fn of_terms<T: Copy>(&self, of_step: impl Fn(&Step, &dyn Fn(&usize) -> T) -> T) -> Vec<T> {
+        let mut all = Vec::with_capacity(self.tape.steps.len());
         for step in &self.tape.steps {
-            let of = |at: &usize| depends[*at];
-            depends.push(match step {
-                Step::Number(_) => false,
-                Step::Variable(own) => *own == variable,
-                Step::Sum(parts) | Step::Product(parts) => parts.iter().any(of),
-                Step::Integer(inner, _)
-                | Step::Sine(inner)
-                | Step::Cosine(inner)
-                | Step::Apply(_, inner) => of(inner),
-                Step::Power(base, exponent) => of(base) || of(exponent),
-            });
+            let next = of_step(step, &|at: &usize| all[*at]);
+            all.push(next);
         }
-        self.tape.terms.iter().map(|&step| depends[step]).collect()
+        self.tape.terms.iter().map(|&step| all[step]).collect()
     }
 
     /// The term that is 1.

@@ -98,15 +98,14 @@ fn with_finite_coefficients(
     (mut report, fitted): (SeedReport, Fitted),
 ) -> Result<(SeedReport, Fitted), TrainError> {
     for xi in &fitted.xi {
-        for column in 0..xi.ncols() {
-            if let Some(row) = (0..xi.nrows()).find(|&row| !xi[(row, column)].is_finite()) {
-                return Err(TrainError::Model(ModelError::NonFinite {
-                    tensor: "xi".to_owned(),
-                    row,
-                    column,
-                    found: xi[(row, column)],
-                }));
-            }
+        if let Some(index) = xi.iter().position(|value| !value.is_finite()) {
+            let (row, column) = xi.vector_to_matrix_index(index);
+            return Err(TrainError::Model(ModelError::NonFinite {
+                tensor: "xi".to_owned(),
+                row,
+                column,
+                found: xi[index],
+            }));
         }
     }
     if report.score.is_nan() {
@@ -129,8 +128,7 @@ fn is_of_one_seed(error: &TrainError) -> bool {
         | TrainError::Option { .. }
         | TrainError::Range(_)
         | TrainError::Cancelled
-        | TrainError::Recording(_)
-        | TrainError::Robot(_) => false,
+        | TrainError::Recording(_) => false,
     }
 }
 

@@ -6,7 +6,6 @@ use nalgebra::DMatrix;
 use serde::Serialize;
 
 use super::error::TrainError;
-use super::features::Features;
 use super::growth::Growth;
 use super::judge::Judge;
 use super::knowledge::Knowledge;
@@ -53,44 +52,31 @@ pub struct Choice {
     pub active: usize,
 }
 
-/// Xi of every phase, and the choice that made it.
-#[derive(Clone, Debug)]
-pub struct Selected {
-    /// `library_dim x latent_dim` for each phase.
-    pub xi: Vec<DMatrix<f64>>,
-    /// The settings chosen.
-    pub choice: Choice,
-    /// How many candidates were tried.
-    pub candidates: usize,
-}
-
-/// What the dynamics are fitted to.
-#[derive(Clone, Copy, Debug)]
-pub struct Target<'a> {
-    /// Jumps to fit.
-    pub set: EncodedSet<'a>,
-    /// The library.
-    pub features: &'a Features,
-    /// What is known of each phase.
-    pub knowledge: &'a [Knowledge],
-}
-
 /// Fits all combinations of windows, ridges and prunings and takes, among those within the slack of the best, the
-/// sparsest.
+/// sparsest: Xi of every phase (`library_dim x latent_dim`), what it was fitted with, and how many candidates there were.
 ///
-/// The best by `judge` sets the scale: from there on errors are relative to its own.
+/// Fits the jumps of `set` with what is known of each phase, for the library of `judge`. The best by `judge` sets the scale: from there on errors are relative to its own.
 ///
 /// # Errors
 /// [`TrainError::TermValue`] for a term without a finite value at a sample,
 /// [`TrainError::NoStableModel`] if every candidate diverges. If cancelled, the search ends as soon as one does not.
 pub fn select(
-    target: Target<'_>,
+    set: EncodedSet<'_>,
+    knowledge: &[Knowledge],
     judge: &Judge<'_>,
     options: &RegressionOptions,
     watch: &mut Watch<'_>,
-) -> Result<Selected, TrainError> {
-    let regressions = &regressions(target)?;
-    let growth = &Growth::of_jumps(options.growth_per_s, target.set, target.features);
+) -> Result<(Vec<DMatrix<f64>>, Choice, usize), TrainError> {
+    let features = judge.features;
+    check_terms(set, features)?;
+    let regressions = &WINDOWS.map(|window| {
+        let of_phase = |(phase, knowledge): (usize, &Knowledge)| {
+            let (theta, ddz) = windowed_samples(set, features, phase, window);
+            Regression::new(&theta, &ddz, knowledge.clone())
+        };
+        knowledge.iter().enumerate().map(of_phase).collect()
+    });
+    let growth = &Growth::of_jumps(options.growth_per_s, set, features);
     let search = Search {
         regressions,
         growth,
@@ -99,7 +85,7 @@ pub fn select(
     let mut tried = search.all(watch);
     let candidates = tried.len();
     let reference = best_of(&tried)?.now.xi.clone();
-    let training = Judge::new(target.features, target.set).relative_to(&reference);
+    let training = Judge::new(features, set).relative_to(&reference);
     let relative = &judge.relative_to(&reference);
     for fitted in tried.iter_mut().filter(|fitted| fitted.is_stable()) {
         fitted.score_by(relative);
@@ -110,7 +96,7 @@ pub fn select(
         ..search
     };
     let refiner = Refiner {
-        knowledge: target.knowledge,
+        knowledge,
         growth,
         training: &training,
         judge: relative,
@@ -135,30 +121,14 @@ pub fn select(
     let sparsest = within.min_by_key(|fitted| fitted.now.active());
     let mut chosen = sparsest.ok_or(TrainError::NoStableModel { candidates })?;
     chosen.score_by(judge);
-    Ok(Selected {
-        choice: Choice {
-            window: chosen.window,
-            ridge: chosen.ridge,
-            pruning: chosen.pruning,
-            score: chosen.now.score,
-            active: chosen.now.active(),
-        },
-        xi: chosen.now.xi,
-        candidates,
-    })
-}
-
-/// For every window the regression of every phase.
-fn regressions(target: Target<'_>) -> Result<[Vec<Regression>; WINDOWS.len()], TrainError> {
-    let (set, features) = (target.set, target.features);
-    check_terms(set, features)?;
-    Ok(WINDOWS.map(|window| {
-        let of_phase = |(phase, knowledge): (usize, &Knowledge)| {
-            let (theta, ddz) = windowed_samples(set, features, phase, window);
-            Regression::new(&theta, &ddz, knowledge.clone())
-        };
-        target.knowledge.iter().enumerate().map(of_phase).collect()
-    }))
+    let choice = Choice {
+        window: chosen.window,
+        ridge: chosen.ridge,
+        pruning: chosen.pruning,
+        score: chosen.now.score,
+        active: chosen.now.active(),
+    };
+    Ok((chosen.now.xi, choice, candidates))
 }
 
 /// A candidate that was fitted and judged.

@@ -123,20 +123,15 @@ impl Regression {
         least: f64,
     ) -> Vec<usize> {
         loop {
-            let solution = self.solve(column, &support, ridge);
-            let kept: Vec<usize> = support
-                .iter()
-                .zip(solution.iter())
-                .filter(|&(&i, value)| {
-                    self.knowledge.kept[(i, column)]
-                        || value.abs() >= least * self.target_rms[column]
-                })
-                .map(|(&i, _)| i)
-                .collect();
-            if kept.len() == support.len() {
+            let (solution, before) = (self.solve(column, &support, ridge), support.len());
+            let mut values = solution.iter();
+            support.retain(|&i| {
+                let weighs = |value: &f64| value.abs() >= least * self.target_rms[column];
+                values.next().is_some_and(weighs) || self.knowledge.kept[(i, column)]
+            });
+            if support.len() == before {
                 return support;
             }
-            support = kept;
         }
     }
 

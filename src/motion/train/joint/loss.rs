@@ -145,11 +145,11 @@ pub struct JointLoss<'a> {
 }
 
 impl<'a> JointLoss<'a> {
-    /// The loss of parameters of the shape of `parameters`.
+    /// The loss of parameters of the shape of `parameters`; the window of (41) counts only with a weight.
     pub fn new(
         features: &'a Features,
         maps: Box<dyn Maps>,
-        weights: LossWeights,
+        (weights, unroll): (LossWeights, Unroll),
         parameters: &Parameters,
     ) -> Self {
         Self {
@@ -157,15 +157,10 @@ impl<'a> JointLoss<'a> {
             maps,
             weights,
             current: weights,
-            unroll: Unroll::default(),
+            unroll,
             values: FeatureValues::default(),
             gradient: parameters.zeros_like(),
         }
-    }
-
-    /// Sets the window of (41), which counts only with a weight.
-    pub fn with_unroll(self, unroll: Unroll) -> Self {
-        Self { unroll, ..self }
     }
 
     /// Takes the weights of an epoch of `schedule`, and returns them.
@@ -322,11 +317,12 @@ mod tests {
         maps: Box<dyn Maps>,
         parameters: &Parameters,
     ) -> JointLoss<'a> {
-        JointLoss::new(features, maps, WEIGHTS, parameters).with_unroll(Unroll {
+        let unroll = Unroll {
             window: 3,
             stride: 2,
             ..Unroll::default()
-        })
+        };
+        JointLoss::new(features, maps, (WEIGHTS, unroll), parameters)
     }
 
     fn all(parameters: &mut Parameters) -> Vec<&mut [f64]> {

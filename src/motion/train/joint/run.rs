@@ -196,8 +196,8 @@ impl Trainer<'_> {
             true => Box::new(LinearMaps::new(coordinate_weights, self.mask())),
             false => Box::new(NonlinearMaps::new(coordinate_weights, self.frame.clone())),
         };
-        let loss = JointLoss::new(&self.task.features, maps, weights, parameters);
-        loss.with_unroll(self.task.options.joint.unroll)
+        let terms = (weights, self.task.options.joint.unroll);
+        JointLoss::new(&self.task.features, maps, terms, parameters)
     }
 
     fn is_linear(&self) -> bool {

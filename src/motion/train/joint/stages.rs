@@ -140,6 +140,7 @@ mod tests {
     use crate::train::joint::loss::{LossWeights, Maps};
     use crate::train::joint::nonlinear::NonlinearMaps;
     use crate::train::joint::parameters::Frame;
+    use crate::train::joint::unroll::Unroll;
     use crate::train::oscillator::standard_library;
     use crate::train::random::Random;
 
@@ -183,7 +184,7 @@ mod tests {
         } else {
             Box::new(NonlinearMaps::new(uniform, Frame::plain(&MASK)))
         };
-        JointLoss::new(features, maps, weights, parameters)
+        JointLoss::new(features, maps, (weights, Unroll::default()), parameters)
     }
 
     fn short(epochs: usize) -> Schedule {

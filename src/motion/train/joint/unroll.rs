@@ -104,14 +104,10 @@ impl Unroll {
     ) -> f64 {
         let d = features.latent_dim();
         let reach = self.window * self.stride;
-        let Some(starts) = samples
-            .variables
-            .nrows()
-            .checked_sub(reach)
-            .filter(|n| *n > 0)
-        else {
+        let starts = samples.variables.nrows().saturating_sub(reach);
+        if starts == 0 {
             return 0.0;
-        };
+        }
         let h = samples.step_s * self.stride as f64;
         let scale = 1.0 / (self.window * starts * d) as f64;
         let mut state = samples.variables.view((0, 0), (starts, 2 * d)).into_owned();
