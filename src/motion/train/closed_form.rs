@@ -1,7 +1,6 @@
 //! Training without descent over the dynamics: encoder, decoder and Xi one after the other, in seconds.
 
 use super::assemble::Origin;
-use super::data_sets::Recordings;
 use super::dynamics_fit::Fitted;
 use super::error::TrainError;
 use super::latent::least_squares_decoder;
@@ -10,7 +9,7 @@ use super::progress::Watch;
 use super::report::{SeedReport, Trained};
 use super::seeds::Seeds;
 use super::subspace::find_subspace;
-use super::task::Task;
+use super::task::{Recordings, Task};
 use crate::robot::Robot;
 
 /// Learns a model: encoder by its row space, decoder by least squares, Xi by sparse regression.

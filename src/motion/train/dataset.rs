@@ -82,13 +82,6 @@ impl ScaleOptions {
     }
 }
 
-impl Default for ScaleOptions {
-    /// Those of inputs in world axes.
-    fn default() -> Self {
-        Self::in_frame(WrenchFrame::World)
-    }
-}
-
 /// One continuous jump (a segment of a recording); samples are columns, all in scaled units.
 #[derive(Clone, Debug)]
 pub struct Jump {

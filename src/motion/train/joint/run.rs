@@ -16,7 +16,6 @@ use super::stages::{train_decoder, train_together, train_xi};
 use crate::model::{AffineMap, Layer, ModelError, StateMap};
 use crate::robot::{Robot, STATE_DIM};
 use crate::train::assemble::Origin;
-use crate::train::data_sets::Recordings;
 use crate::train::dataset::Quantity;
 use crate::train::dynamics_fit::Fitted;
 use crate::train::error::TrainError;
@@ -26,7 +25,7 @@ use crate::train::progress::Watch;
 use crate::train::random::Random;
 use crate::train::report::{SeedReport, Trained};
 use crate::train::seeds::Seeds;
-use crate::train::task::Task;
+use crate::train::task::{Recordings, Task};
 use crate::train::weak_form::check_terms;
 
 /// Learns a model by Adam over encoder, decoder and Xi together (equations 9 to 20, steps of section IV-D).
