@@ -19,7 +19,6 @@ use crate::model::{
     CoordinateNames, InputGivenState, InputStatistics, JumpPrior, Phase, ReducedModel,
     ScaleFactors, Scaling,
 };
-use crate::recording::Recording;
 
 /// Where a training's numbers come from.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -42,13 +41,8 @@ pub struct SourceFile {
 }
 
 impl Origin {
-    /// The origin of a training on these recordings; files that can no longer be read have an empty digest.
-    pub fn new(command: impl Into<String>, recordings: &[Recording]) -> Self {
-        Self::of_files(command, recordings.iter().map(|recording| &recording.path))
-    }
-
-    /// The same, by the paths of the files.
-    pub fn of_files(
+    /// The origin of a training on these files; those that can no longer be read have an empty digest.
+    pub fn new(
         command: impl Into<String>,
         files: impl IntoIterator<Item = impl AsRef<Path>>,
     ) -> Self {

@@ -75,8 +75,16 @@ impl Latent {
         latent
     }
 
-    /// Writes `[z, dz, u_lat]` of some samples into the rows of `variables`.
-    pub fn copy_variables(&self, range: Range<usize>, variables: &mut DMatrixViewMut<'_, f64>) {
+    /// `[z, dz, u_lat]` of some samples in rows.
+    pub fn variables(&self, range: Range<usize>) -> DMatrix<f64> {
+        let n = range.len();
+        let mut variables = DMatrix::zeros(n, 3 * self.z.nrows());
+        self.copy_variables(range, &mut variables.rows_mut(0, n));
+        variables
+    }
+
+    /// Writes them into the rows of `variables`.
+    fn copy_variables(&self, range: Range<usize>, variables: &mut DMatrixViewMut<'_, f64>) {
         let d = self.z.nrows();
         for (block, source) in [&self.z, &self.dz, &self.u_lat].into_iter().enumerate() {
             variables
@@ -122,14 +130,6 @@ impl<'a> EncodedSet<'a> {
             let mut rows = target.rows_mut(at, n);
             rows.tr_copy_from(&samples.ddz.columns_range(range));
         })
-    }
-
-    /// Jump and sample of a row of [`Self::regression_blocks`], if there are so many.
-    pub fn place_of_row(self, phase: usize, row: usize) -> Option<(&'a Jump, usize)> {
-        let spans = self.dataset.spans(Some(phase));
-        let mut places = spans.flat_map(|(jump, range)| range.map(move |sample| (jump, sample)));
-        let (jump, sample) = places.nth(row)?;
-        Some((&self.dataset.jumps[jump], sample))
     }
 }
 

@@ -24,6 +24,7 @@ const SMOOTHING: usize = 11;
 
 /// Figures of one model on one set of jumps.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(Default))]
 pub struct SetMetrics {
     /// Mean square of `x - decode(encode(x))` over samples and coordinates, scaled units.
     pub decoder_mse: f64,

@@ -137,39 +137,21 @@ mod tests {
     use std::sync::atomic::AtomicBool;
 
     use super::*;
-    use crate::model::AffineMap;
     use crate::train::metrics::SetMetrics;
-    use crate::train::oscillator::standard_library;
+    use crate::train::oscillator::{fitted, standard_library};
     use crate::train::progress::Progress;
 
     fn outcome(score: f64, coefficient: f64) -> Result<(SeedReport, Fitted), TrainError> {
-        let map = |name: &'static str| {
-            AffineMap::new(name, DMatrix::identity(2, 2), nalgebra::DVector::zeros(2))
-        };
         let report = SeedReport {
             seed: 1,
             score,
             losses: None,
             active: 1,
             dominant: Vec::new(),
-            judged: SetMetrics {
-                decoder_mse: 0.0,
-                ddz_r2: Vec::new(),
-                torque_r2: 1.0,
-                prediction_x_m: 0.0,
-                prediction_z_m: 0.0,
-                rollout_x_m: None,
-                rollout_z_m: None,
-            },
+            judged: SetMetrics::default(),
         };
-        let fitted = Fitted {
-            encoder: map("encoder")?.into(),
-            decoder: map("decoder")?.into(),
-            weights: DMatrix::identity(2, 2),
-            xi: vec![DMatrix::from_element(7, 2, coefficient)],
-            choice: None,
-        };
-        Ok((report, fitted))
+        let xi = DMatrix::from_element(7, 2, coefficient);
+        Ok((report, fitted(DMatrix::identity(2, 2), xi)))
     }
 
     fn reports(
