@@ -197,12 +197,8 @@ impl Loop for Forward<'_> {
                     out.extend(earlier[*base].iter().map(|v| v.powi(*exponent)))
                 }
                 Step::Power(base, exponent) => {
-                    out.extend(
-                        earlier[*base]
-                            .iter()
-                            .zip(&earlier[*exponent])
-                            .map(|(b, e)| b.powf(*e)),
-                    );
+                    let pairs = earlier[*base].iter().zip(&earlier[*exponent]);
+                    out.extend(pairs.map(|(b, e)| b.powf(*e)));
                 }
                 Step::Sine(argument) => {
                     let (sines, cosines) = rest.split_at_mut(1);
@@ -329,11 +325,8 @@ fn add_adjoints(
             add_times(&mut earlier[*argument], adjoint, values, &[own + 1]);
         }
         Step::Cosine(argument) => {
-            for ((e, a), sine) in earlier[*argument]
-                .iter_mut()
-                .zip(adjoint)
-                .zip(&values[own - 1])
-            {
+            let target = earlier[*argument].iter_mut().zip(adjoint);
+            for ((e, a), sine) in target.zip(&values[own - 1]) {
                 *e -= a * sine;
             }
         }

@@ -69,18 +69,11 @@ impl Regression {
         self.correlation.ncols()
     }
 
-    /// Coefficients `Xi` (`library_dim x latent_dim`) by ridge regression on the normalised columns, pruned.
+    /// Coefficients `Xi` (`library_dim x latent_dim`) of the terms that are `allowed`, by ridge regression on the
+    /// normalised columns, with each of the `prunings`.
     ///
     /// Contributions, not bare coefficients, decide (STLSQ of Brunton et al. 2016 otherwise), so that the units of a
-    /// term do not matter.
-    pub fn fit(&self, ridge: f64, pruning: Pruning) -> DMatrix<f64> {
-        let all = vec![true; self.library_dim()];
-        self.fit_each(ridge, &[pruning], &all).remove(0)
-    }
-
-    /// The same for several prunings, of the terms that are `allowed`.
-    ///
-    /// Eliminations drop terms in one and the same order, which is walked once for all of them.
+    /// term do not matter. Eliminations drop terms in one and the same order, which is walked once for all of them.
     pub fn fit_each(
         &self,
         ridge: f64,
@@ -332,6 +325,14 @@ fn column_rms(matrix: &DMatrix<f64>) -> DVector<f64> {
 mod tests {
     use super::*;
     use crate::train::random::Random;
+
+    impl Regression {
+        /// With one pruning of all terms.
+        pub fn fit(&self, ridge: f64, pruning: Pruning) -> DMatrix<f64> {
+            let all = vec![true; self.library_dim()];
+            self.fit_each(ridge, &[pruning], &all).remove(0)
+        }
+    }
 
     fn unconstrained(theta: &DMatrix<f64>, target: &DMatrix<f64>) -> Regression {
         let nothing = Knowledge::nothing(theta.ncols(), target.ncols());

@@ -6,7 +6,7 @@ use std::sync::mpsc::{Sender, channel};
 use nalgebra::{DMatrix, DVector};
 
 use super::batch::{Batch, batches};
-use super::fold::{self, LatentBasis};
+use super::fold::{LatentBasis, folded};
 use super::linear::{LinearMaps, mask_rows};
 use super::loss::{JointLoss, LossWeights, Losses, Maps};
 use super::network::Network;
@@ -165,20 +165,13 @@ impl Trainer<'_> {
             false => all.clone(),
         };
         let losses = train_together(&mut parameters, &first, &mut loss, schedule, &mut listener);
-        let mut quiet = |_: usize, _: &Losses, _: usize| !cancel.load(Ordering::Relaxed);
+        let quiet = &mut |_: usize, _: &Losses, _: usize| !cancel.load(Ordering::Relaxed);
         if published {
-            train_decoder(&mut parameters, &all, &loss, schedule, &mut quiet);
+            train_decoder(&mut parameters, &all, &loss, schedule, quiet);
             for phase in 0..parameters.xi.len() {
                 let own: Vec<&Batch> = of_phase(phase).collect();
                 parameters.xi[phase].fill(options.xi_start);
-                train_xi(
-                    &mut parameters,
-                    phase,
-                    &own,
-                    &mut loss,
-                    schedule,
-                    &mut quiet,
-                );
+                train_xi(&mut parameters, phase, &own, &mut loss, schedule, quiet);
             }
         }
         Run {
@@ -289,8 +282,7 @@ impl Trainer<'_> {
     ) -> Result<(StateMap, StateMap), TrainError> {
         let (encoder, decoder) = (&parameters.encoder, &parameters.decoder);
         if !self.is_linear() {
-            let encoder = fold::encoder(encoder, &self.frame, basis)?;
-            return Ok((encoder, fold::decoder(decoder, &self.frame, basis)?));
+            return Ok(folded((encoder, decoder), &self.frame, basis)?);
         }
         let affine = |tensor, network: &Network| {
             let layer = &network.layers[0];
