@@ -1,13 +1,12 @@
 //! Training without descent over the dynamics: encoder, decoder and Xi one after the other, in seconds.
 
 use super::assemble::Origin;
-use super::dynamics_fit::Fitted;
 use super::error::TrainError;
 use super::latent::least_squares_decoder;
 use super::options::TrainOptions;
 use super::progress::Watch;
-use super::report::{SeedReport, Trained};
-use super::seeds::Seeds;
+use super::report::Trained;
+use super::seeds::{Outcome, Seeds};
 use super::subspace::find_subspace;
 use super::task::{Recordings, Task};
 use crate::robot::Robot;
@@ -49,11 +48,7 @@ pub fn closed_form(
 }
 
 /// The numbers of one seed, and its score.
-fn fit(
-    task: &Task<'_>,
-    seed: u64,
-    watch: &mut Watch<'_>,
-) -> Result<(SeedReport, Fitted), TrainError> {
+fn fit(task: &Task<'_>, seed: u64, watch: &mut Watch<'_>) -> Outcome {
     let options = task.options;
     watch.stage("searching the latent space", 1);
     let (frame, d) = (&task.frame, options.latent_dim);

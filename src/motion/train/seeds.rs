@@ -13,6 +13,9 @@ use super::report::{SeedReport, Trained};
 use super::task::Task;
 use crate::model::{Library, ModelError};
 
+/// What a seed came to and its numbers, or why it has none.
+pub(super) type Outcome = Result<(SeedReport, Fitted), TrainError>;
+
 /// Outcomes of the seeds so far.
 #[derive(Default)]
 pub(super) struct Seeds {
@@ -29,7 +32,7 @@ impl Seeds {
     pub fn add(
         &mut self,
         seed: u64,
-        outcome: Result<(SeedReport, Fitted), TrainError>,
+        outcome: Outcome,
         watch: &mut Watch<'_>,
     ) -> Result<(), TrainError> {
         match outcome.and_then(with_finite_coefficients) {
@@ -94,9 +97,7 @@ impl Seeds {
 }
 
 /// Refuses coefficients that a descent has left infinite; a score that is not a number is the worst.
-fn with_finite_coefficients(
-    (mut report, fitted): (SeedReport, Fitted),
-) -> Result<(SeedReport, Fitted), TrainError> {
+fn with_finite_coefficients((mut report, fitted): (SeedReport, Fitted)) -> Outcome {
     for xi in &fitted.xi {
         if let Some(index) = xi.iter().position(|value| !value.is_finite()) {
             let (row, column) = xi.vector_to_matrix_index(index);
@@ -141,7 +142,7 @@ mod tests {
     use crate::train::oscillator::{fitted, standard_library};
     use crate::train::progress::Progress;
 
-    fn outcome(score: f64, coefficient: f64) -> Result<(SeedReport, Fitted), TrainError> {
+    fn outcome(score: f64, coefficient: f64) -> Outcome {
         let report = SeedReport {
             seed: 1,
             score,
@@ -154,9 +155,7 @@ mod tests {
         Ok((report, fitted(DMatrix::identity(2, 2), xi)))
     }
 
-    fn reports(
-        outcomes: Vec<Result<(SeedReport, Fitted), TrainError>>,
-    ) -> Result<Vec<SeedReport>, TrainError> {
+    fn reports(outcomes: Vec<Outcome>) -> Result<Vec<SeedReport>, TrainError> {
         let (cancel, mut listener) = (AtomicBool::new(false), |_: Progress| ());
         let mut watch = Watch::new(&mut listener, &cancel);
         let mut seeds = Seeds::default();
@@ -167,7 +166,7 @@ mod tests {
         Ok(best.1)
     }
 
-    fn unstable(candidates: usize) -> Result<(SeedReport, Fitted), TrainError> {
+    fn unstable(candidates: usize) -> Outcome {
         Err(TrainError::NoStableModel { candidates })
     }
 

@@ -242,6 +242,7 @@ impl<'a> JointLoss<'a> {
             return (0.0, onto_variables);
         }
         let samples = Window {
+            features: self.features,
             variables,
             xi,
             step_s: at.batch.step_s,
@@ -250,8 +251,7 @@ impl<'a> JointLoss<'a> {
             variables: &mut onto_variables,
             xi: onto_xi,
         };
-        let weight = at.weights.bptt;
-        let bptt = (self.unroll).evaluate(self.features, samples, weight, &mut adjoints);
+        let bptt = (self.unroll).evaluate(samples, at.weights.bptt, &mut adjoints);
         (bptt, onto_variables)
     }
 }

@@ -23,8 +23,8 @@ use crate::train::latent::{EncodedSet, Latent, least_squares_decoder, map_sample
 use crate::train::options::{TrainOptions, Transfer};
 use crate::train::progress::Watch;
 use crate::train::random::Random;
-use crate::train::report::{SeedReport, Trained};
-use crate::train::seeds::Seeds;
+use crate::train::report::Trained;
+use crate::train::seeds::{Outcome, Seeds};
 use crate::train::task::{Recordings, Task};
 use crate::train::weak_form::check_terms;
 
@@ -230,12 +230,7 @@ impl Trainer<'_> {
     }
 
     /// The model numbers of a run, and its score.
-    fn finish(
-        &self,
-        run: Run,
-        judged: &[Batch],
-        watch: &mut Watch<'_>,
-    ) -> Result<(SeedReport, Fitted), TrainError> {
+    fn finish(&self, run: Run, judged: &[Batch], watch: &mut Watch<'_>) -> Outcome {
         let (fitted, score) = if self.is_published() {
             let score = self.published_score(&run.parameters, judged);
             (self.published(run.parameters)?, score)
