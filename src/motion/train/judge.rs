@@ -7,7 +7,8 @@ use nalgebra::{DMatrix, DVector};
 use super::dataset::Dataset;
 use super::features::Features;
 use super::latent::{EncodedSet, Latent};
-use super::rollout::{Candidate, Change, Window, predict, predict_changed, restarted, whole};
+use super::rollout::{Candidate, Change, Window, predict, predict_changed, windows};
+use crate::sim::Restart;
 
 /// Weight of whole-jump rollouts against predictions of 0.1 s in a score.
 const ROLLOUT_WEIGHT: f64 = 0.2;
@@ -42,7 +43,8 @@ impl<'a> Judge<'a> {
         let inverse_std: Vec<f64> = (0..set.latent_dim())
             .map(|row| 1.0 / row_std(set.latent, row).max(f64::MIN_POSITIVE))
             .collect();
-        let windows = [restarted(set.dataset, 0.1), whole(set.dataset)];
+        let windows =
+            [Restart::Every(0.1), Restart::Never].map(|restart| windows(set.dataset, restart));
         let of_jumps = |windows: &Vec<Window>, jumps: &Range<usize>| {
             let before = |jump| windows.partition_point(|window| window.jump < jump);
             before(jumps.start)..before(jumps.end)

@@ -7,11 +7,11 @@ use super::dataset::{Dataset, Rates, Scaling, mean};
 use super::error::TrainError;
 use super::features::{FeatureValues, Features};
 use super::latent::{EncodedSet, Latent, lift_samples, map_samples};
-use super::rollout::{Candidate, Window, predict, restarted, whole};
+use super::rollout::{Candidate, Window, predict, windows};
 use crate::model::{ReducedModel, StateMap};
 use crate::recording::Source;
 use crate::robot::JOINT_DIM;
-use crate::sim::phase_rule;
+use crate::sim::{Restart, phase_rule};
 
 pub(super) use crate::robot::{BODY_X, BODY_Z};
 
@@ -80,9 +80,9 @@ pub(super) fn measure(
     [encoder, decoder]: [&StateMap; 2],
     set: EncodedSet<'_>,
 ) -> Result<SetMetrics, TrainError> {
-    let rms = |windows: &[Window]| body_rms(candidate, decoder, set, windows);
-    let [prediction_x_m, prediction_z_m] = rms(&restarted(set.dataset, SHORT_S));
-    let [rollout_x_m, rollout_z_m] = rms(&whole(set.dataset));
+    let rms = |restart| body_rms(candidate, decoder, set, &windows(set.dataset, restart));
+    let [prediction_x_m, prediction_z_m] = rms(Restart::Every(SHORT_S));
+    let [rollout_x_m, rollout_z_m] = rms(Restart::Never);
     let phases = 0..set.dataset.phases.patterns.len();
     Ok(SetMetrics {
         decoder_mse: decoder_mse(decoder, set),
