@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use serde::Serialize;
 use serde_json::{Map, Value, json};
 use sha2::{Digest, Sha256};
 
@@ -30,13 +31,14 @@ pub struct Origin {
 }
 
 /// A recording and what it contained.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct SourceFile {
     /// Path as on the command line.
     pub path: String,
     /// Digest of its bytes, with the name of the algorithm in front.
     pub digest: String,
     /// The sets that its jumps came into, such as `test`, if a training divided them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub sets: Vec<&'static str>,
 }
 
@@ -155,11 +157,6 @@ pub(super) fn provenance(
     origin: &Origin,
     report: &TrainReport,
 ) -> Map<String, Value> {
-    let recordings = origin.recordings.iter();
-    let recordings = recordings.map(|file| match file.sets.is_empty() {
-        true => json!({ "path": file.path, "digest": file.digest }),
-        false => json!({ "path": file.path, "digest": file.digest, "sets": file.sets }),
-    });
     let encoder = EncoderOptions {
         coordinates: options.coordinates(),
         ..options.encoder.clone()
@@ -170,7 +167,7 @@ pub(super) fn provenance(
         ("method", json!(method)),
         ("seed", json!(options.seed)),
         ("encoder_options", json!(encoder)),
-        ("recordings", recordings.collect()),
+        ("recordings", json!(origin.recordings)),
         ("report", json!(report)),
     ];
     let entries = entries.map(|(name, value)| (name.to_owned(), value));

@@ -348,7 +348,7 @@ impl Dataset {
     /// [`TrainError::NoRecording`] without a jump, [`TrainError::PhaseSamples`] for a phase under 50 samples.
     pub fn check_for_training(&self) -> Result<(), TrainError> {
         if self.jumps.is_empty() {
-            return Err(TrainError::NoRecording { set: "training" });
+            return Err(TrainError::NoRecording);
         }
         for (index, phase) in self.phases.patterns.iter().enumerate() {
             let found = self.samples(Some(index));

@@ -14,11 +14,8 @@ use crate::recording::RecordingError;
 #[derive(Debug, Error)]
 pub enum TrainError {
     /// No recording was given.
-    #[error("no {set} recording was given")]
-    NoRecording {
-        /// `training` or `validation`.
-        set: &'static str,
-    },
+    #[error("no training recording was given")]
+    NoRecording,
     /// There are fewer jumps than sets to divide them into.
     #[error("{found} jumps cannot be divided into {expected} sets")]
     Split { found: usize, expected: usize },

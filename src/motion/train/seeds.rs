@@ -65,10 +65,8 @@ impl Seeds {
         if reports.len() > 1 || reports[0].losses.is_some() {
             (report.seeds, report.support_overlap) = (reports, overlap);
         }
-        let jumps = learn_jumps(set, &best.encoder)?.map(|learned| {
-            report.deviations = learned.scores;
-            learned.prior
-        });
+        let (jumps, deviations) = learn_jumps(set, &best.encoder)?;
+        report.deviations = deviations;
         let provenance = provenance(task.options, method, origin, &report);
         let model = task.assemble(best, set, jumps, provenance)?;
         Ok(Trained { model, report })
@@ -76,9 +74,6 @@ impl Seeds {
 
     /// The seed of least score, the reports of all that have a model, best first, and the overlap of their supports;
     /// `state_covariance` (18 x 18) is that of the training states in scaled units.
-    ///
-    /// # Errors
-    /// The first seed's if none has a model, [`TrainError::Cancelled`] if none was begun.
     fn best(
         mut self,
         library: &Library,
@@ -121,7 +116,7 @@ fn is_of_one_seed(error: &TrainError) -> bool {
         TrainError::NoStableModel { .. } | TrainError::TermValue { .. } | TrainError::Model(_) => {
             true
         }
-        TrainError::NoRecording { .. }
+        TrainError::NoRecording
         | TrainError::Split { .. }
         | TrainError::TooFewSamples { .. }
         | TrainError::PhaseSamples { .. }

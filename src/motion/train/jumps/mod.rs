@@ -1,6 +1,6 @@
 //! What the training jumps say of jumps that were not recorded: landmarks, prior, deviations.
 //!
-//! In: the training jumps and an encoder. Out: [`LearnedJumps`], or none if fewer than
+//! In: the training jumps and an encoder. Out: a [`JumpPrior`], or none if fewer than
 //! [`LEAST_JUMPS`] of them are of one kind. `landmarks` cuts each jump into parts, `nodes`
 //! samples the parts at equal shares of their durations, `regression` fits nodes and durations over
 //! the goals, and `deviations` fits how accelerations change about such a trajectory.
@@ -34,32 +34,24 @@ struct Sampled {
     parts: Vec<PartNodes>,
 }
 
-/// A prior, and how well its deviations are explained in each of its parts.
-#[derive(Debug, PartialEq)]
-pub struct LearnedJumps {
-    /// Landmarks and prior.
-    pub prior: JumpPrior,
-    /// One score per part.
-    pub scores: Vec<PartScore>,
-}
-
-/// Landmarks and prior of the training jumps; none for a nonlinear encoder or too few jumps of one
-/// kind.
+/// Landmarks and prior of the training jumps, and how well its deviations are explained in each of its parts; none for
+/// a nonlinear encoder or too few jumps of one kind.
 ///
 /// # Errors
 /// As [`Dataset::for_each`].
 pub fn learn_jumps(
     set: EncodedSet<'_>,
     encoder: &StateMap,
-) -> Result<Option<LearnedJumps>, TrainError> {
+) -> Result<(Option<JumpPrior>, Vec<PartScore>), TrainError> {
     let (training, latent) = (set.dataset, set.latent);
+    let nothing = (None, Vec::new());
     let Some(affine) = encoder.as_affine() else {
-        return Ok(None);
+        return Ok(nothing);
     };
     let cuts = landmarks::cuts(training)?;
     let chosen = of_commonest_kind(&cuts);
     if chosen.len() < LEAST_JUMPS {
-        return Ok(None);
+        return Ok(nothing);
     }
     let kind = &chosen[0].1.kind;
     let counts: Vec<usize> = (0..kind.len())
@@ -105,7 +97,7 @@ pub fn learn_jumps(
         end_height_m: range_of(end_heights),
         landing_height_m: range_of(landing_heights)[0],
     };
-    Ok(Some(LearnedJumps { prior, scores }))
+    Ok((Some(prior), scores))
 }
 
 /// Distance, rise of the body at the apex and height at the start of a jump, m.
