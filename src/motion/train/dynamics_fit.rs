@@ -16,6 +16,7 @@ use super::select::{Choice, select};
 use super::sparse::active_terms;
 use super::task::Task;
 use super::varimax::{order_and_sign, varimax};
+use super::weak_form::check_terms;
 use crate::model::{AffineMap, StateMap};
 use crate::robot::Robot;
 
@@ -96,6 +97,7 @@ impl Task<'_> {
         let (options, features) = (&self.options.regression, &self.features);
         let judge = Judge::new(features, EncodedSet::new(judged, judged_latent));
         let set = EncodedSet::new(training, &latent);
+        check_terms(set, features, &self.library)?;
         let (xi, choice, candidates) = select(set, &self.knowledge, &judge, options, watch)?;
         Ok(Fitted {
             weights: mean_jacobian(&encoder, training),

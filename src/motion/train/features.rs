@@ -15,7 +15,6 @@ use crate::train::vectors::{self, Loop};
 #[derive(Clone, Debug)]
 pub struct Features {
     tape: Tape,
-    texts: Vec<String>, // every term as the model file writes it
     latent_dim: usize,
 }
 
@@ -29,10 +28,8 @@ pub struct FeatureValues {
 impl Features {
     /// Prepares the terms of `library`.
     pub fn new(library: &Library) -> Self {
-        let texts = library.terms().iter().map(|term| term.text().to_owned());
         Self {
             tape: library.tape().clone(),
-            texts: texts.collect(),
             latent_dim: library.latent_dim(),
         }
     }
@@ -40,11 +37,6 @@ impl Features {
     /// Number of terms.
     pub fn library_dim(&self) -> usize {
         self.tape.terms.len()
-    }
-
-    /// A term as the model file writes it.
-    pub fn text(&self, term: usize) -> &str {
-        &self.texts[term]
     }
 
     /// Number of latent coordinates.

@@ -14,7 +14,7 @@ use super::options::RegressionOptions;
 use super::progress::Watch;
 use super::refine::{Coefficients, Refiner};
 use super::sparse::{Pruning, Regression};
-use super::weak_form::{check_terms, windowed_samples};
+use super::weak_form::windowed_samples;
 
 /// Windows (samples) over which the dynamics are integrated before regression; 0 means the accelerations.
 const WINDOWS: [usize; 3] = [0, 25, 50];
@@ -58,7 +58,6 @@ pub struct Choice {
 /// Fits the jumps of `set` with what is known of each phase, for the library of `judge`. The best by `judge` sets the scale: from there on errors are relative to its own.
 ///
 /// # Errors
-/// [`TrainError::TermValue`] for a term without a finite value at a sample,
 /// [`TrainError::NoStableModel`] if every candidate diverges. If cancelled, the search ends as soon as one does not.
 pub fn select(
     set: EncodedSet<'_>,
@@ -68,7 +67,6 @@ pub fn select(
     watch: &mut Watch<'_>,
 ) -> Result<(Vec<DMatrix<f64>>, Choice, usize), TrainError> {
     let features = judge.features;
-    check_terms(set, features)?;
     let regressions = &WINDOWS.map(|window| {
         let of_phase = |(phase, knowledge): (usize, &Knowledge)| {
             let (theta, ddz) = windowed_samples(set, features, phase, window);

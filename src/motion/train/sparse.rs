@@ -59,16 +59,6 @@ impl Regression {
         }
     }
 
-    /// Terms in the library.
-    pub fn library_dim(&self) -> usize {
-        self.gram.nrows()
-    }
-
-    /// Latent coordinates.
-    pub fn latent_dim(&self) -> usize {
-        self.correlation.ncols()
-    }
-
     /// Coefficients `Xi` (`library_dim x latent_dim`) of the terms that are `allowed`, by ridge regression on the
     /// normalised columns, with each of the `prunings`.
     ///
@@ -81,7 +71,7 @@ impl Regression {
         allowed: &[bool],
     ) -> Vec<DMatrix<f64>> {
         let mut fits = vec![self.knowledge.known.clone(); prunings.len()];
-        for column in (0..self.latent_dim()).filter(|&column| self.target_rms[column] > 0.0) {
+        for column in (0..self.target_rms.len()).filter(|&column| self.target_rms[column] > 0.0) {
             let informative: Vec<usize> = (self.free_terms(column))
                 .filter(|&i| self.theta_rms[i] > 0.0 && allowed[i])
                 .collect();
@@ -235,7 +225,7 @@ impl Regression {
 
     /// Terms whose coefficient in a column is not known.
     fn free_terms(&self, column: usize) -> impl Iterator<Item = usize> {
-        (0..self.library_dim()).filter(move |&i| self.knowledge.free[(i, column)])
+        (0..self.theta_rms.len()).filter(move |&i| self.knowledge.free[(i, column)])
     }
 
     /// Those of them that are active in a support.
@@ -329,7 +319,7 @@ mod tests {
     impl Regression {
         /// With one pruning of all terms.
         pub fn fit(&self, ridge: f64, pruning: Pruning) -> DMatrix<f64> {
-            let all = vec![true; self.library_dim()];
+            let all = vec![true; self.theta_rms.len()];
             self.fit_each(ridge, &[pruning], &all).remove(0)
         }
     }

@@ -6,17 +6,22 @@ use super::dataset::Jump;
 use super::error::TrainError;
 use super::features::{FeatureValues, Features};
 use super::latent::{EncodedSet, Latent};
+use crate::model::Library;
 
 /// Samples between the starts of two windows.
 const STRIDE: usize = 5;
 /// Largest magnitude of a term: sums of its squares stay finite.
 const LARGEST: f64 = 1e150;
 
-/// Complains about the first term without a finite value at a sample, or with one whose square overflows.
+/// Complains about the first term of `library` without a finite value at a sample, or with one whose square overflows.
 ///
 /// # Errors
 /// [`TrainError::TermValue`].
-pub fn check_terms(set: EncodedSet<'_>, features: &Features) -> Result<(), TrainError> {
+pub fn check_terms(
+    set: EncodedSet<'_>,
+    features: &Features,
+    library: &Library,
+) -> Result<(), TrainError> {
     let bad = |value: &f64| value.is_nan() || value.abs() > LARGEST;
     let mut values = FeatureValues::default();
     for (phase, pattern) in set.dataset.phases.patterns.iter().enumerate() {
@@ -37,7 +42,7 @@ pub fn check_terms(set: EncodedSet<'_>, features: &Features) -> Result<(), Train
         };
         return Err(TrainError::TermValue {
             path: jump.path.clone(),
-            term: features.text(term).to_owned(),
+            term: library.terms()[term].text().to_owned(),
             phase: pattern.name.clone(),
             sample,
             time_s: jump.time_s[sample],

@@ -61,10 +61,10 @@ impl LinearMaps {
     fn lift(&self, at: At<'_>, gradient: &mut Parameters) -> f64 {
         let moment = &at.batch.input_moment;
         let total = moment.trace().max(f64::MIN_POSITIVE);
-        let seen = moment * self.projection.weights(); // S V A^-1
+        let seen = moment * &self.projection.weights; // S V A^-1
         let carried = layers(at.parameters).0.weights.tr_mul(&seen);
         if at.weights.lift != 0.0 {
-            let outside = seen - self.projection.weights() * &carried;
+            let outside = seen - &self.projection.weights * &carried;
             gradient.encoder.layers[0].weights += outside * (-2.0 * at.weights.lift / total);
         }
         1.0 - carried.trace() / total
@@ -80,7 +80,7 @@ impl Maps for LinearMaps {
         let blocks = [
             (&batch.x, &encoder.weights),
             (&batch.dx, &encoder.weights),
-            (&batch.u, self.projection.weights()),
+            (&batch.u, &self.projection.weights),
         ];
         for (index, (samples, weights)) in blocks.into_iter().enumerate() {
             product_into(&mut variables, index * d, Columns::all(samples), weights);
@@ -227,7 +227,7 @@ fn theta(parameters: &Parameters, batch: &Batch, features: &Features) -> DMatrix
     let projection = InputProjection::new(encoder);
     let mut variables = encode(parameters, batch).resize(n, 3 * d, 0.0);
     (variables.columns_mut(d, d)).copy_from(&(&batch.dx * encoder));
-    (variables.columns_mut(2 * d, d)).copy_from(&(&batch.u * projection.weights()));
+    (variables.columns_mut(2 * d, d)).copy_from(&(&batch.u * &projection.weights));
     features.evaluate(&variables, &mut FeatureValues::default())
 }
 

@@ -134,9 +134,9 @@ pub trait Maps {
 
 /// The loss over one library, with its scratch space.
 pub struct JointLoss<'a> {
-    features: &'a Features,
-    maps: Box<dyn Maps>,
-    weights: LossWeights,
+    pub(super) features: &'a Features,
+    pub(super) maps: Box<dyn Maps>,
+    pub(super) weights: LossWeights,
     /// The weights in the present epoch.
     current: LossWeights,
     unroll: Unroll,
@@ -167,21 +167,6 @@ impl<'a> JointLoss<'a> {
     pub(super) fn start_epoch(&mut self, epoch: usize, schedule: &Schedule) -> LossWeights {
         self.current = schedule.weights_at(epoch, self.weights);
         self.current
-    }
-
-    /// The library.
-    pub fn features(&self) -> &'a Features {
-        self.features
-    }
-
-    /// Encoder and decoder.
-    pub fn maps(&self) -> &dyn Maps {
-        &*self.maps
-    }
-
-    /// Whether (41) has a weight.
-    pub fn has_window(&self) -> bool {
-        self.weights.bptt != 0.0
     }
 
     /// Gradient of the last [`Self::evaluate`]; of Xi only the phase of that batch has one.

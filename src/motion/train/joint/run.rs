@@ -350,7 +350,8 @@ impl Trainer<'_> {
             let plain = LatentBasis::unchanged(self.task.options.latent_dim);
             let encoder = self.state_maps(&self.start(seed), &plain)?.0;
             let latent = Latent::of(training, &encoder)?;
-            check_terms(EncodedSet::new(training, &latent), &self.task.features)
+            let set = EncodedSet::new(training, &latent);
+            check_terms(set, &self.task.features, &self.task.library)
         };
         terms_at_start().err().unwrap_or(error)
     }

@@ -59,7 +59,7 @@ pub fn train_decoder(
     listener: &mut Listener<'_>,
 ) {
     let mut losses: Vec<DecoderLoss<'_>> = (batches.iter())
-        .map(|batch| loss.maps().decoder_loss(parameters, batch))
+        .map(|batch| loss.maps.decoder_loss(parameters, batch))
         .collect();
     let decoder = &mut parameters.decoder;
     let mut maps = optimisers(decoder.blocks(), schedule);
@@ -87,9 +87,9 @@ pub fn train_xi(
     schedule: &Schedule,
     listener: &mut Listener<'_>,
 ) {
-    let xi_loss = |batch: &&Batch| (loss.maps()).xi_loss(parameters, batch, loss.features());
+    let xi_loss = |batch: &&Batch| loss.maps.xi_loss(parameters, batch, loss.features);
     let parts: Option<Vec<XiLoss>> =
-        (!loss.has_window()).then(|| batches.iter().map(xi_loss).collect());
+        (loss.weights.bptt == 0.0).then(|| batches.iter().map(xi_loss).collect());
     let mut masked = MaskedAdam::new(&parameters.xi[phase], schedule);
     for epoch in 0..schedule.total() {
         masked.start_epoch(epoch, schedule, &mut parameters.xi[phase]);

@@ -53,7 +53,7 @@ pub fn learn_jumps(
     if chosen.len() < LEAST_JUMPS {
         return Ok(nothing);
     }
-    let kind = &chosen[0].1.kind;
+    let (kind, scale) = (&chosen[0].1.kind, &training.scaling.state);
     let counts: Vec<usize> = (0..kind.len())
         .map(|part| {
             let all = chosen.iter().map(|(_, cut)| cut.duration_s(part));
@@ -72,7 +72,6 @@ pub fn learn_jumps(
         })
         .collect();
     let translation = affine.weights().column(BODY_X).into_owned();
-    let scale = &training.scaling.state;
     let heights = |jump: usize| training.jumps[jump].x.row(BODY_Z) / scale[BODY_Z];
     let mut start = DVector::zeros(scale.len());
     for &(jump, _) in &chosen {
