@@ -117,7 +117,8 @@ impl<'a> Judge<'a> {
         changes: &[Change],
         part: usize,
     ) -> Option<Vec<[DVector<f64>; 2]>> {
-        let candidate = self.candidate(xi);
+        let features = self.features;
+        let candidate = Candidate { features, xi };
         let of_kind = |kind: usize| {
             let mut errors = vec![Vec::new(); changes.len()];
             for window in self.windows_of(part, kind) {
@@ -133,11 +134,6 @@ impl<'a> Judge<'a> {
         pairs.map(|(short, long)| finite([short, long])).collect()
     }
 
-    fn candidate<'x>(&'x self, xi: &'x [DMatrix<f64>]) -> Candidate<'x> {
-        let features = self.features;
-        Candidate { features, xi }
-    }
-
     /// The windows of a part with what is predicted in them.
     fn predictions(
         &self,
@@ -145,8 +141,8 @@ impl<'a> Judge<'a> {
         part: usize,
         kind: usize,
     ) -> impl Iterator<Item = (&Window, DMatrix<f64>)> {
-        let windows = self.windows_of(part, kind);
-        let predictions = predict(self.candidate(xi), self.set, windows);
+        let (windows, features) = (self.windows_of(part, kind), self.features);
+        let predictions = predict(Candidate { features, xi }, self.set, windows);
         windows.iter().zip(predictions)
     }
 

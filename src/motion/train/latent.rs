@@ -29,16 +29,15 @@ impl Latent {
     /// # Errors
     /// As [`Dataset::for_each`].
     pub fn of(dataset: &Dataset, encoder: &StateMap) -> Result<Vec<Latent>, TrainError> {
-        let linear = encoder
-            .as_affine()
-            .map(|affine| (affine, input_projection(affine.weights())));
+        let linear = (encoder.as_affine())
+            .map(|linear| (linear.weights(), input_projection(linear.weights())));
         let mut all = Vec::with_capacity(dataset.jumps.len());
         dataset.for_each(|jump, rates| {
             all.push(match &linear {
-                Some((encoder, projection)) => Self {
-                    z: affine(encoder, &jump.x),
-                    dz: encoder.weights() * &rates.dx,
-                    ddz: encoder.weights() * &rates.ddx,
+                Some((weights, projection)) => Self {
+                    z: map_samples(encoder, &jump.x),
+                    dz: *weights * &rates.dx,
+                    ddz: *weights * &rates.ddx,
                     u_lat: projection * &jump.u,
                 },
                 None => Self::along(jump, rates, encoder),
@@ -145,19 +144,13 @@ pub fn input_projection(weights: &DMatrix<f64>) -> DMatrix<f64> {
     }
 }
 
-/// `W x + b` for samples in columns.
-pub fn affine(map: &AffineMap, samples: &DMatrix<f64>) -> DMatrix<f64> {
-    let mut mapped = map.weights() * samples;
-    for mut column in mapped.column_iter_mut() {
-        column += map.bias();
-    }
-    mapped
-}
-
 /// A map, linear or not, of samples in columns.
 pub fn map_samples(map: &StateMap, samples: &DMatrix<f64>) -> DMatrix<f64> {
     if let Some(linear) = map.as_affine() {
-        return affine(linear, samples);
+        let mut mapped = linear.weights() * samples;
+        let columns = mapped.column_iter_mut();
+        columns.for_each(|mut column| column += linear.bias());
+        return mapped;
     }
     let mut mapped = DMatrix::zeros(map.output_dim(), samples.ncols());
     for (mut column, sample) in mapped.column_iter_mut().zip(samples.column_iter()) {

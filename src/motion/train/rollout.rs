@@ -81,7 +81,7 @@ pub fn predict(
         stepper.keep(going);
         stepper.advance(step);
         for (row, &window) in order[..going].iter().enumerate() {
-            write(&mut predictions[window], step, stepper.position(row));
+            stepper.write(row, &mut predictions[window], step);
         }
     }
     predictions
@@ -122,16 +122,10 @@ pub fn predict_changed(
         }
         stepper.advance(step);
         for (prediction, row) in predictions.iter_mut().zip(&rows) {
-            write(prediction, step, stepper.position(*row));
+            stepper.write(*row, prediction, step);
         }
     }
     predictions
-}
-
-fn write(prediction: &mut DMatrix<f64>, step: usize, position: impl Iterator<Item = f64>) {
-    for (i, z) in position.enumerate() {
-        prediction[(i, step)] = z;
-    }
 }
 
 #[cfg(test)]

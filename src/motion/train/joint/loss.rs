@@ -141,7 +141,7 @@ pub struct JointLoss<'a> {
     current: LossWeights,
     unroll: Unroll,
     values: FeatureValues,
-    gradient: Parameters,
+    gradient: Parameters, // anything before the first evaluation
 }
 
 impl<'a> JointLoss<'a> {
@@ -159,7 +159,7 @@ impl<'a> JointLoss<'a> {
             current: weights,
             unroll,
             values: FeatureValues::default(),
-            gradient: parameters.zeros_like(),
+            gradient: parameters.clone(),
         }
     }
 

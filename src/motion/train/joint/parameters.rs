@@ -33,13 +33,6 @@ impl Parameters {
         }
     }
 
-    /// A gradient of zeros.
-    pub fn zeros_like(&self) -> Self {
-        let mut zeros = self.clone();
-        zeros.clear();
-        zeros
-    }
-
     /// Sets every number to zero.
     pub fn clear(&mut self) {
         self.maps_mut().for_each(|block| block.fill(0.0));

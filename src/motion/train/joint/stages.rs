@@ -63,7 +63,7 @@ pub fn train_decoder(
         .collect();
     let decoder = &mut parameters.decoder;
     let mut maps = optimisers(decoder.blocks(), schedule);
-    let mut gradient = decoder.zeros_like();
+    let mut gradient = decoder.clone();
     for epoch in 0..schedule.total() {
         let mut mean = Losses::default();
         for loss in &mut losses {
