@@ -29,14 +29,11 @@ pub(super) struct Fitted {
     pub xi: Vec<DMatrix<f64>>,
     /// The regression, if Xi was chosen among regressions, and how many were tried.
     pub choice: Option<(Choice, usize)>,
+    /// What seeds are compared by, see [`SeedReport::score`].
+    pub score: f64,
 }
 
 impl Fitted {
-    /// Score of the chosen regression, infinite without one.
-    pub fn score(&self) -> f64 {
-        (self.choice.as_ref()).map_or(f64::INFINITY, |(choice, _)| choice.score)
-    }
-
     fn measure(&self, features: &Features, set: EncodedSet<'_>) -> Result<SetMetrics, TrainError> {
         let xi = &self.xi;
         measure(
@@ -104,6 +101,7 @@ impl Task<'_> {
             encoder,
             decoder,
             xi,
+            score: choice.score,
             choice: Some((choice, candidates)),
         })
     }
@@ -112,7 +110,7 @@ impl Task<'_> {
     pub fn seed_report(
         &self,
         fitted: &Fitted,
-        (seed, score): (u64, f64),
+        seed: u64,
         losses: Option<Losses>,
     ) -> Result<SeedReport, TrainError> {
         let std = self.training.state_std();
@@ -122,7 +120,7 @@ impl Task<'_> {
         let judged = EncodedSet::new(self.judged(), &latent);
         Ok(SeedReport {
             seed,
-            score,
+            score: fitted.score,
             losses,
             active: fitted.xi.iter().map(active_terms).sum(),
             dominant: rows

@@ -270,7 +270,10 @@ impl TrainOptions {
         if let Some(rate) = regression.growth_per_s {
             table::GROWTH.check(rate)?;
         }
-        self.scaling.check()?;
+        table::STATE_SCALING.check(self.scaling.state)?;
+        table::TORQUE_SCALING.check(self.scaling.torque)?;
+        table::FORCE_SCALING.check(self.scaling.force)?;
+        table::MOMENT_SCALING.check(self.scaling.moment)?;
         if let Some((array, joint, found)) = self.actuators.as_ref().and_then(Actuators::unusable) {
             return Err(TrainError::Option {
                 option: "actuators",
@@ -329,16 +332,6 @@ impl MapOptions {
                 return Err(refused("layers at least as wide as the latent space"));
             }
         }
-        Ok(())
-    }
-}
-
-impl ScaleOptions {
-    fn check(&self) -> Result<(), TrainError> {
-        table::STATE_SCALING.check(self.state)?;
-        table::TORQUE_SCALING.check(self.torque)?;
-        table::FORCE_SCALING.check(self.force)?;
-        table::MOMENT_SCALING.check(self.moment)?;
         Ok(())
     }
 }

@@ -117,6 +117,7 @@ pub(super) fn fitted(weights: DMatrix<f64>, xi: DMatrix<f64>) -> Fitted {
         weights,
         xi: vec![xi],
         choice: None,
+        score: 0.0,
     }
 }
 

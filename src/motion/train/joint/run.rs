@@ -231,19 +231,16 @@ impl Trainer<'_> {
 
     /// The model numbers of a run, and its score.
     fn finish(&self, run: Run, judged: &[Batch], watch: &mut Watch<'_>) -> Outcome {
-        let (fitted, score) = if self.is_published() {
-            let score = self.published_score(&run.parameters, judged);
-            (self.published(run.parameters)?, score)
+        let fitted = if self.is_published() {
+            self.published(run.parameters, judged)?
         } else {
             let maps = match self.is_linear() {
                 true => self.linear_maps(&run.parameters)?,
                 false => self.nonlinear_maps(&run.parameters)?,
             };
-            let fitted = self.task.fit_dynamics(maps, watch)?;
-            let score = fitted.score();
-            (fitted, score)
+            self.task.fit_dynamics(maps, watch)?
         };
-        let report = (self.task).seed_report(&fitted, (run.seed, score), Some(run.losses))?;
+        let report = (self.task).seed_report(&fitted, run.seed, Some(run.losses))?;
         Ok((report, fitted))
     }
 
@@ -257,10 +254,11 @@ impl Trainer<'_> {
     }
 
     /// The numbers as Adam left them.
-    fn published(&self, parameters: Parameters) -> Result<Fitted, TrainError> {
+    fn published(&self, parameters: Parameters, judged: &[Batch]) -> Result<Fitted, TrainError> {
         let plain = LatentBasis::unchanged(self.task.options.latent_dim);
         let (encoder, decoder) = self.state_maps(&parameters, &plain)?;
         Ok(Fitted {
+            score: self.published_score(&parameters, judged),
             weights: mean_jacobian(&encoder, &self.task.training),
             encoder,
             decoder,
