@@ -25,6 +25,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         "paper" => TrainOptions::paper(name, latent_dim),
         _ => TrainOptions::new(name, latent_dim),
     };
+    let command = "cargo run --release --example train_model";
+    let files = training.iter().map(|recording| &recording.path);
     let train = if method == "closed-form" {
         train::closed_form
     } else {
@@ -37,7 +39,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         Recordings::new(&training, &validation),
         robot,
         &options,
-        &Origin::new("cargo run --release --example train_model", &training),
+        &Origin::new(command, files),
         &mut Watch::new(&mut listener, &cancel),
     )?;
     println!(

@@ -49,13 +49,17 @@ fn go1() -> &'static Robot {
     Robot::by_name("go1").expect("known robot")
 }
 
+fn paths(recordings: &[Recording]) -> impl Iterator<Item = &Path> {
+    recordings.iter().map(|recording| recording.path.as_path())
+}
+
 fn train_with(
     training: &[Recording],
     validation: &[Recording],
     options: &TrainOptions,
 ) -> Result<Trained, TrainError> {
     let (cancel, mut listener) = (AtomicBool::new(false), |_: Progress| ());
-    let origin = Origin::new("romc train", training);
+    let origin = Origin::new("romc train", paths(training));
     let recordings = Recordings::new(training, validation);
     train::closed_form(
         recordings,
@@ -244,7 +248,7 @@ fn training_without_flight_is_refused_with_what_is_missing() {
 #[test]
 fn training_without_recordings_is_refused() {
     let error = train_with(&[], &[], &TrainOptions::new("m", 2)).expect_err("nothing to learn");
-    assert!(matches!(error, TrainError::NoRecording { set: "training" }));
+    assert!(matches!(error, TrainError::NoRecording));
 }
 
 #[test]
@@ -339,7 +343,7 @@ fn cancelled_training_ends_without_a_model_when_none_is_complete() {
         Recordings::new(&training, &[]),
         go1(),
         &TrainOptions::new("m", 2),
-        &Origin::new("romc train", &training),
+        &Origin::new("romc train", paths(&training)),
         &mut Watch::new(&mut listener, &cancel),
     );
     assert!(matches!(result, Err(TrainError::Cancelled)));
@@ -441,7 +445,7 @@ fn joint(training: &[Recording], options: &TrainOptions, news: &mut Vec<String>)
         }
     };
     let recordings = Recordings::new(training, &[]);
-    let origin = Origin::new("romc train", training);
+    let origin = Origin::new("romc train", paths(training));
     let mut watch = Watch::new(&mut listener, &cancel);
     train::joint(recordings, go1(), options, &origin, &mut watch).expect("trains")
 }

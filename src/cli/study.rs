@@ -116,7 +116,7 @@ fn plan(
         .iter()
         .chain(validation)
         .map(|recording| &recording.path);
-    let recordings = Origin::of_files("", files).recordings.into_iter();
+    let recordings = Origin::new("", files).recordings.into_iter();
     Plan {
         latent_dims: arguments.latent_dims.0.clone(),
         seeds: arguments.seeds,

@@ -48,7 +48,7 @@ pub fn run(arguments: &TrainArguments) -> Result<(Answer, u8), Error> {
     let sets = Recordings::new(Arc::clone(training), Arc::clone(validation));
     let files = arguments.recordings.iter().chain(&arguments.validation);
     let command = command_line(arguments, &settings, method, &options);
-    let mut origin = Origin::of_files(command, files);
+    let mut origin = Origin::new(command, files);
     for file in &mut origin.recordings {
         file.sets = recorded.sets_of(&file.path);
     }

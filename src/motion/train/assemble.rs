@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use serde::Serialize;
 use serde_json::{Map, Value, json};
 use sha2::{Digest, Sha256};
 
@@ -9,7 +10,7 @@ use super::dataset::Dataset;
 use super::dynamics_fit::Fitted;
 use super::error::TrainError;
 use super::features::FeatureValues;
-use super::latent::{EncodedSet, Latent};
+use super::latent::EncodedSet;
 use super::metrics::PLACE;
 use super::options::{EncoderOptions, TrainOptions};
 use super::report::TrainReport;
@@ -19,7 +20,6 @@ use crate::model::{
     CoordinateNames, InputGivenState, InputStatistics, JumpPrior, Phase, ReducedModel,
     ScaleFactors, Scaling,
 };
-use crate::recording::Recording;
 
 /// Where a training's numbers come from.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -31,24 +31,20 @@ pub struct Origin {
 }
 
 /// A recording and what it contained.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct SourceFile {
     /// Path as on the command line.
     pub path: String,
     /// Digest of its bytes, with the name of the algorithm in front.
     pub digest: String,
     /// The sets that its jumps came into, such as `test`, if a training divided them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub sets: Vec<&'static str>,
 }
 
 impl Origin {
-    /// The origin of a training on these recordings; files that can no longer be read have an empty digest.
-    pub fn new(command: impl Into<String>, recordings: &[Recording]) -> Self {
-        Self::of_files(command, recordings.iter().map(|recording| &recording.path))
-    }
-
-    /// The same, by the paths of the files.
-    pub fn of_files(
+    /// The origin of a training on these files; those that can no longer be read have an empty digest.
+    pub fn new(
         command: impl Into<String>,
         files: impl IntoIterator<Item = impl AsRef<Path>>,
     ) -> Self {
@@ -76,12 +72,13 @@ impl Task<'_> {
     pub fn assemble(
         &self,
         fitted: Fitted,
+        set: EncodedSet<'_>,
         jumps: Option<JumpPrior>,
         provenance: Map<String, Value>,
     ) -> Result<ReducedModel, TrainError> {
         let (options, robot, training) = (self.options, self.robot, &self.training);
         let (d, name) = (options.latent_dim, robot.name());
-        let given_state = self.inputs_given_states(&fitted)?;
+        let given_state = self.inputs_given_states(&fitted, set);
         let [state, input] = CoordinateNames::of_robot();
         let mut builder = ReducedModel::builder(options.name.clone(), self.library.clone())
             .description(format!("{d} latent coordinates of {name} jumps"))
@@ -120,27 +117,26 @@ impl Task<'_> {
     fn inputs_given_states(
         &self,
         fitted: &Fitted,
-    ) -> Result<Vec<Option<InputGivenState>>, TrainError> {
+        set: EncodedSet<'_>,
+    ) -> Vec<Option<InputGivenState>> {
         let Some(encoder) = fitted.encoder.as_affine() else {
-            return Ok(vec![None; fitted.xi.len()]);
+            return vec![None; fitted.xi.len()];
         };
         // Where the robot is, and which way it looks, is in `z` but says nothing of its inputs.
         let shifts = encoder.weights().select_columns(&PLACE);
-        let training = &self.training;
-        let latent = Latent::of(training, &fitted.encoder)?;
         let phases = fitted.xi.iter().enumerate();
         let given = phases.map(|(phase, xi)| {
             let blocks = || {
                 let mut values = FeatureValues::default();
-                let blocks = EncodedSet::new(training, &latent).regression_blocks(phase);
+                let blocks = set.regression_blocks(phase);
                 blocks.map(move |(variables, ddz)| {
                     let left = ddz - self.features.evaluate(&variables, &mut values) * xi;
                     (variables, left)
                 })
             };
-            InputGivenState::of_blocks(training.samples(Some(phase)), &shifts, blocks)
+            InputGivenState::of_blocks(set.dataset.samples(Some(phase)), &shifts, blocks)
         });
-        Ok(given.collect())
+        given.collect()
     }
 }
 
@@ -161,11 +157,6 @@ pub(super) fn provenance(
     origin: &Origin,
     report: &TrainReport,
 ) -> Map<String, Value> {
-    let recordings = origin.recordings.iter();
-    let recordings = recordings.map(|file| match file.sets.is_empty() {
-        true => json!({ "path": file.path, "digest": file.digest }),
-        false => json!({ "path": file.path, "digest": file.digest, "sets": file.sets }),
-    });
     let encoder = EncoderOptions {
         coordinates: options.coordinates(),
         ..options.encoder.clone()
@@ -176,7 +167,7 @@ pub(super) fn provenance(
         ("method", json!(method)),
         ("seed", json!(options.seed)),
         ("encoder_options", json!(encoder)),
-        ("recordings", recordings.collect()),
+        ("recordings", json!(origin.recordings)),
         ("report", json!(report)),
     ];
     let entries = entries.map(|(name, value)| (name.to_owned(), value));

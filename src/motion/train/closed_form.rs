@@ -1,16 +1,14 @@
 //! Training without descent over the dynamics: encoder, decoder and Xi one after the other, in seconds.
 
 use super::assemble::Origin;
-use super::data_sets::Recordings;
-use super::dynamics_fit::Fitted;
 use super::error::TrainError;
 use super::latent::least_squares_decoder;
 use super::options::TrainOptions;
 use super::progress::Watch;
-use super::report::{SeedReport, Trained};
-use super::seeds::Seeds;
-use super::subspace::{SubspaceOptions, find_subspace};
-use super::task::Task;
+use super::report::Trained;
+use super::seeds::{Outcome, Seeds};
+use super::subspace::find_subspace;
+use super::task::{Recordings, Task};
 use crate::robot::Robot;
 
 /// Learns a model: encoder by its row space, decoder by least squares, Xi by sparse regression.
@@ -50,23 +48,14 @@ pub fn closed_form(
 }
 
 /// The numbers of one seed, and its score.
-fn fit(
-    task: &Task<'_>,
-    seed: u64,
-    watch: &mut Watch<'_>,
-) -> Result<(SeedReport, Fitted), TrainError> {
+fn fit(task: &Task<'_>, seed: u64, watch: &mut Watch<'_>) -> Outcome {
     let options = task.options;
     watch.stage("searching the latent space", 1);
-    let search = SubspaceOptions {
-        lift_weight: options.encoder.lift_weight,
-        coordinate_weights: options.encoder.coordinate_weights(),
-        restarts: options.encoder.restarts,
-        seed,
-    };
-    let basis = find_subspace(&task.moments, &task.frame, options.latent_dim, &search);
+    let (frame, d) = (&task.frame, options.latent_dim);
+    let basis = find_subspace(&task.moments, frame, d, &options.encoder, seed);
     let encoder = task.encoder_over(&basis)?.into();
-    let decoder = least_squares_decoder(&task.training, &encoder)?.into();
+    let decoder = least_squares_decoder(&task.training, &encoder, None)?.into();
     let fitted = task.fit_dynamics((encoder, decoder), watch)?;
-    let report = task.seed_report(&fitted, (seed, fitted.score()), None)?;
+    let report = task.seed_report(&fitted, seed, None)?;
     Ok((report, fitted))
 }

@@ -82,13 +82,6 @@ impl ScaleOptions {
     }
 }
 
-impl Default for ScaleOptions {
-    /// Those of inputs in world axes.
-    fn default() -> Self {
-        Self::in_frame(WrenchFrame::World)
-    }
-}
-
 /// One continuous jump (a segment of a recording); samples are columns, all in scaled units.
 #[derive(Clone, Debug)]
 pub struct Jump {
@@ -123,18 +116,13 @@ pub struct Rates {
 
 impl Jump {
     /// Number of samples.
-    pub fn len(&self) -> usize {
+    pub fn samples(&self) -> usize {
         self.time_s.len()
     }
 
     /// Samples whose torques can be the robot's.
     pub fn torque_samples(&self) -> impl Iterator<Item = usize> {
-        (0..self.len()).filter(|sample| !self.implausible.contains(sample))
-    }
-
-    /// Whether there is no sample.
-    pub fn is_empty(&self) -> bool {
-        self.time_s.is_empty()
+        (0..self.samples()).filter(|sample| !self.implausible.contains(sample))
     }
 }
 
@@ -198,7 +186,7 @@ impl Dataset {
         source.for_each(|recording| {
             for segment in &recording.segments {
                 let jump = dataset.jump(segment)?;
-                n_samples += jump.len();
+                n_samples += jump.samples();
                 dataset.jumps.push(jump);
             }
             if let Source::Files(files) = &source
@@ -242,7 +230,7 @@ impl Dataset {
     /// Samples of one quantity side by side, of one phase or of all, `18 x samples`.
     pub fn gather(&self, quantity: Quantity, phase: Option<usize>) -> DMatrix<f64> {
         let all = std::iter::once(self.samples(phase));
-        let mut gathered = self.cut(quantity, phase, all);
+        let mut gathered = self.columns(quantity, phase, all);
         gathered.next().expect("invariant: one width")
     }
 
@@ -252,32 +240,43 @@ impl Dataset {
         quantity: Quantity,
         phase: Option<usize>,
     ) -> impl Iterator<Item = DMatrix<f64>> {
-        self.cut(quantity, phase, block_widths(self.samples(phase)))
+        self.columns(quantity, phase, block_widths(self.samples(phase)))
     }
 
-    fn cut<'a>(
-        &'a self,
+    fn columns(
+        &self,
         quantity: Quantity,
         phase: Option<usize>,
         widths: impl Iterator<Item = usize>,
     ) -> impl Iterator<Item = DMatrix<f64>> {
-        let of = move |jump: &'a Jump| match quantity {
-            Quantity::X => &jump.x,
-            Quantity::U => &jump.u,
-        };
-        let spans = self.spans(phase);
-        let mut spans = spans
-            .map(move |(jump, range)| (of(&self.jumps[jump]), range))
-            .peekable();
+        let empty = |width| DMatrix::zeros(STATE_DIM, width);
+        self.cut(phase, widths, empty, move |block, at, jump, range| {
+            let samples = match quantity {
+                Quantity::X => &self.jumps[jump].x,
+                Quantity::U => &self.jumps[jump].u,
+            };
+            let mut columns = block.columns_mut(at, range.len());
+            columns.copy_from(&samples.columns_range(range));
+        })
+    }
+
+    /// Blocks of the samples of one phase or of all, as wide as `widths`: `copy` fills an `empty` one from a place on
+    /// with the samples of a jump in a range.
+    pub fn cut<B>(
+        &self,
+        phase: Option<usize>,
+        widths: impl Iterator<Item = usize>,
+        empty: impl Fn(usize) -> B,
+        copy: impl Fn(&mut B, usize, usize, Range<usize>),
+    ) -> impl Iterator<Item = B> {
+        let mut spans = self.spans(phase).peekable();
         widths.map(move |width| {
-            let mut block = DMatrix::zeros(STATE_DIM, width);
+            let mut block = empty(width);
             let mut at = 0;
             while at < width {
-                let (samples, range) = spans.peek_mut().expect("invariant: as many samples");
+                let (jump, range) = spans.peek_mut().expect("invariant: as many samples");
                 let count = range.len().min(width - at);
-                block
-                    .columns_mut(at, count)
-                    .copy_from(&samples.columns(range.start, count));
+                copy(&mut block, at, *jump, range.start..range.start + count);
                 (range.start, at) = (range.start + count, at + count);
                 if range.start == range.end {
                     spans.next();
@@ -349,7 +348,7 @@ impl Dataset {
     /// [`TrainError::NoRecording`] without a jump, [`TrainError::PhaseSamples`] for a phase under 50 samples.
     pub fn check_for_training(&self) -> Result<(), TrainError> {
         if self.jumps.is_empty() {
-            return Err(TrainError::NoRecording { set: "training" });
+            return Err(TrainError::NoRecording);
         }
         for (index, phase) in self.phases.patterns.iter().enumerate() {
             let found = self.samples(Some(index));

@@ -8,14 +8,15 @@ use super::features::Features;
 use super::joint::Losses;
 use super::judge::Judge;
 use super::latent::{EncodedSet, Latent, input_projection, lift_samples, mean_jacobian};
-use super::metrics::{Assessed, BODY_X, BODY_Z, SetMetrics, measure, measure_encoded};
+use super::metrics::{BODY_X, BODY_Z, SetMetrics, measure};
 use super::progress::Watch;
 use super::report::{PhaseTerms, SeedReport, TrainReport};
 use super::rollout::Candidate;
-use super::select::{Choice, Target, select};
+use super::select::{Choice, select};
 use super::sparse::active_terms;
 use super::task::Task;
 use super::varimax::{order_and_sign, varimax};
+use super::weak_form::check_terms;
 use crate::model::{AffineMap, StateMap};
 use crate::robot::Robot;
 
@@ -28,25 +29,18 @@ pub(super) struct Fitted {
     pub xi: Vec<DMatrix<f64>>,
     /// The regression, if Xi was chosen among regressions, and how many were tried.
     pub choice: Option<(Choice, usize)>,
-    /// Metrics on the training jumps, if they were measured with the fit.
-    pub training: Option<SetMetrics>,
+    /// What seeds are compared by, see [`SeedReport::score`].
+    pub score: f64,
 }
 
 impl Fitted {
-    /// Score of the chosen regression, infinite without one.
-    pub fn score(&self) -> f64 {
-        (self.choice.as_ref()).map_or(f64::INFINITY, |(choice, _)| choice.score)
-    }
-
-    fn assessed<'a>(&'a self, features: &'a Features) -> Assessed<'a> {
-        Assessed {
-            candidate: Candidate {
-                features,
-                xi: &self.xi,
-            },
-            encoder: &self.encoder,
-            decoder: &self.decoder,
-        }
+    fn measure(&self, features: &Features, set: EncodedSet<'_>) -> Result<SetMetrics, TrainError> {
+        let xi = &self.xi;
+        measure(
+            Candidate { features, xi },
+            [&self.encoder, &self.decoder],
+            set,
+        )
     }
 }
 
@@ -99,66 +93,58 @@ impl Task<'_> {
         let judged_latent = validated.as_ref().unwrap_or(&latent);
         let (options, features) = (&self.options.regression, &self.features);
         let judge = Judge::new(features, EncodedSet::new(judged, judged_latent));
-        let target = Target {
-            set: EncodedSet::new(training, &latent),
-            features,
-            knowledge: &self.knowledge,
-        };
-        let selected = select(target, &judge, options, watch)?;
-        let weights = match encoder.as_affine() {
-            Some(linear) => linear.weights().clone(),
-            None => mean_jacobian(&encoder, &training.gather(Quantity::X, None)),
-        };
-        let mut fitted = Fitted {
-            weights,
+        let set = EncodedSet::new(training, &latent);
+        check_terms(set, features, &self.library)?;
+        let (xi, choice, candidates) = select(set, &self.knowledge, &judge, options, watch)?;
+        Ok(Fitted {
+            weights: mean_jacobian(&encoder, training),
             encoder,
             decoder,
-            xi: selected.xi,
-            choice: Some((selected.choice, selected.candidates)),
-            training: None,
-        };
-        let measured = measure_encoded(fitted.assessed(features), target.set)?;
-        fitted.training = Some(measured);
-        Ok(fitted)
+            xi,
+            score: choice.score,
+            choice: Some((choice, candidates)),
+        })
     }
 
     /// The metrics of one seed.
     pub fn seed_report(
         &self,
         fitted: &Fitted,
-        (seed, score): (u64, f64),
+        seed: u64,
         losses: Option<Losses>,
     ) -> Result<SeedReport, TrainError> {
         let std = self.training.state_std();
         let names = Robot::state_names();
         let rows = fitted.weights.row_iter();
+        let latent = Latent::of(self.judged(), &fitted.encoder)?;
+        let judged = EncodedSet::new(self.judged(), &latent);
         Ok(SeedReport {
             seed,
-            score,
+            score: fitted.score,
             losses,
             active: fitted.xi.iter().map(active_terms).sum(),
             dominant: rows
                 .map(|row| names[row.transpose().component_mul(&std).iamax()].clone())
                 .collect(),
-            judged: measure(fitted.assessed(&self.features), self.judged())?,
+            judged: fitted.measure(&self.features, judged)?,
         })
     }
 
-    /// The metrics of fitted numbers.
-    pub fn report(&self, fitted: &Fitted) -> Result<TrainReport, TrainError> {
-        let assessed = fitted.assessed(&self.features);
+    /// The metrics of fitted numbers: on the training jumps, which are encoded, and those of the jumps that candidates
+    /// are `judged` by.
+    pub fn report(
+        &self,
+        fitted: &Fitted,
+        set: EncodedSet<'_>,
+        judged: &SetMetrics,
+    ) -> Result<TrainReport, TrainError> {
         let names = Robot::state_names();
         let phases = self.training.phases.names().into_iter().zip(&fitted.xi);
         let (choice, candidates) = fitted.choice.clone().unzip();
         let validated = !self.validation.jumps.is_empty();
-        let training = match &fitted.training {
-            Some(measured) => measured.clone(),
-            None => measure(assessed, &self.training)?,
-        };
-        let validation = validated.then(|| measure(assessed, &self.validation));
         Ok(TrainReport {
             encoded: self.active.iter().map(|&i| names[i].clone()).collect(),
-            lift_loss: self.lift_loss(&fitted.encoder)?,
+            lift_loss: self.lift_loss(&fitted.encoder, set),
             active_terms: phases
                 .map(|(phase, xi)| PhaseTerms {
                     phase,
@@ -170,25 +156,23 @@ impl Task<'_> {
             seeds: Vec::new(),
             support_overlap: None,
             deviations: Vec::new(),
-            training,
-            validation: validation.transpose()?,
+            training: fitted.measure(&self.features, set)?,
+            validation: validated.then(|| judged.clone()),
         })
     }
 
     /// Share of the training input's energy that the latent input cannot carry.
-    fn lift_loss(&self, encoder: &StateMap) -> Result<f64, TrainError> {
+    fn lift_loss(&self, encoder: &StateMap, set: EncodedSet<'_>) -> f64 {
         if let Some(linear) = encoder.as_affine() {
             let (weights, input) = (linear.weights(), &self.moments.input);
             let carried = &input_projection(weights) * input * weights.transpose();
-            return Ok(1.0 - carried.trace() / input.trace().max(f64::MIN_POSITIVE));
+            return 1.0 - carried.trace() / input.trace().max(f64::MIN_POSITIVE);
         }
-        let training = &self.training;
-        let latent = Latent::of(training, encoder)?;
         let (mut missed, mut total) = (0.0, 0.0);
-        for (jump, samples) in training.jumps.iter().zip(&latent) {
+        for (jump, samples) in set.dataset.jumps.iter().zip(set.latent) {
             missed += (lift_samples(encoder, &jump.x, &samples.u_lat) - &jump.u).norm_squared();
             total += jump.u.norm_squared();
         }
-        Ok(missed / total.max(f64::MIN_POSITIVE))
+        missed / total.max(f64::MIN_POSITIVE)
     }
 }

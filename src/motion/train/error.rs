@@ -9,17 +9,13 @@ use thiserror::Error;
 use crate::limits::OutOfRange;
 use crate::model::ModelError;
 use crate::recording::RecordingError;
-use crate::robot::RobotError;
 
 /// Why training stopped without a model.
 #[derive(Debug, Error)]
 pub enum TrainError {
     /// No recording was given.
-    #[error("no {set} recording was given")]
-    NoRecording {
-        /// `training` or `validation`.
-        set: &'static str,
-    },
+    #[error("no training recording was given")]
+    NoRecording,
     /// There are fewer jumps than sets to divide them into.
     #[error("{found} jumps cannot be divided into {expected} sets")]
     Split { found: usize, expected: usize },
@@ -89,9 +85,6 @@ pub enum TrainError {
     /// A recording could not be turned into inputs.
     #[error(transparent)]
     Recording(#[from] RecordingError),
-    /// The robot refused.
-    #[error(transparent)]
-    Robot(#[from] RobotError),
     /// The trained numbers do not form a model.
     #[error("the trained model is refused")]
     Model(#[from] ModelError),

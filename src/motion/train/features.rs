@@ -15,7 +15,6 @@ use crate::train::vectors::{self, Loop};
 #[derive(Clone, Debug)]
 pub struct Features {
     tape: Tape,
-    texts: Vec<String>, // every term as the model file writes it
     latent_dim: usize,
 }
 
@@ -29,10 +28,8 @@ pub struct FeatureValues {
 impl Features {
     /// Prepares the terms of `library`.
     pub fn new(library: &Library) -> Self {
-        let texts = library.terms().iter().map(|term| term.text().to_owned());
         Self {
             tape: library.tape().clone(),
-            texts: texts.collect(),
             latent_dim: library.latent_dim(),
         }
     }
@@ -40,11 +37,6 @@ impl Features {
     /// Number of terms.
     pub fn library_dim(&self) -> usize {
         self.tape.terms.len()
-    }
-
-    /// A term as the model file writes it.
-    pub fn text(&self, term: usize) -> &str {
-        &self.texts[term]
     }
 
     /// Number of latent coordinates.
@@ -55,45 +47,45 @@ impl Features {
     /// For every term whether it is affine in `z`, `dz` and `u_lat`: dynamics of such terms do not run away within the
     /// time of a jump.
     pub fn affine_terms(&self) -> Vec<bool> {
+        let bent = |inside: u32| if inside == 0 { 0 } else { 2 };
         // 0 constant, 1 affine, 2 anything else
-        let mut degree: Vec<u32> = Vec::with_capacity(self.tape.steps.len());
-        for step in &self.tape.steps {
-            let of = |at: &usize| degree[*at];
-            let bent = |inside: u32| if inside == 0 { 0 } else { 2 };
-            degree.push(match step {
-                Step::Number(_) => 0,
-                Step::Variable(_) => 1,
-                Step::Sum(parts) => parts.iter().map(of).max().unwrap_or(0),
-                Step::Product(parts) => parts.iter().map(of).sum::<u32>().min(2),
-                Step::Integer(base, 1) => of(base),
-                Step::Integer(inner, _)
-                | Step::Sine(inner)
-                | Step::Cosine(inner)
-                | Step::Apply(_, inner) => bent(of(inner)),
-                Step::Power(base, exponent) => bent(of(base).max(of(exponent))),
-            });
-        }
-        let terms = self.tape.terms.iter();
-        terms.map(|&step| degree[step] < 2).collect()
+        let degrees = self.of_terms(|step, of| match step {
+            Step::Number(_) => 0,
+            Step::Variable(_) => 1,
+            Step::Sum(parts) => parts.iter().map(of).max().unwrap_or(0),
+            Step::Product(parts) => parts.iter().map(of).sum::<u32>().min(2),
+            Step::Integer(base, 1) => of(base),
+            Step::Integer(inner, _)
+            | Step::Sine(inner)
+            | Step::Cosine(inner)
+            | Step::Apply(_, inner) => bent(of(inner)),
+            Step::Power(base, exponent) => bent(of(base).max(of(exponent))),
+        });
+        degrees.iter().map(|degree| *degree < 2).collect()
     }
 
     /// For every term whether it depends on a variable, counted over `z`, `dz`, `u_lat`.
     pub fn depend_on(&self, variable: usize) -> Vec<bool> {
-        let mut depends: Vec<bool> = Vec::with_capacity(self.tape.steps.len());
+        self.of_terms(|step, of| match step {
+            Step::Number(_) => false,
+            Step::Variable(own) => *own == variable,
+            Step::Sum(parts) | Step::Product(parts) => parts.iter().any(of),
+            Step::Integer(inner, _)
+            | Step::Sine(inner)
+            | Step::Cosine(inner)
+            | Step::Apply(_, inner) => of(inner),
+            Step::Power(base, exponent) => of(base) || of(exponent),
+        })
+    }
+
+    /// For every term what `of_step` makes of its step and what it made of the steps before.
+    fn of_terms<T: Copy>(&self, of_step: impl Fn(&Step, &dyn Fn(&usize) -> T) -> T) -> Vec<T> {
+        let mut all = Vec::with_capacity(self.tape.steps.len());
         for step in &self.tape.steps {
-            let of = |at: &usize| depends[*at];
-            depends.push(match step {
-                Step::Number(_) => false,
-                Step::Variable(own) => *own == variable,
-                Step::Sum(parts) | Step::Product(parts) => parts.iter().any(of),
-                Step::Integer(inner, _)
-                | Step::Sine(inner)
-                | Step::Cosine(inner)
-                | Step::Apply(_, inner) => of(inner),
-                Step::Power(base, exponent) => of(base) || of(exponent),
-            });
+            let next = of_step(step, &|at: &usize| all[*at]);
+            all.push(next);
         }
-        self.tape.terms.iter().map(|&step| depends[step]).collect()
+        self.tape.terms.iter().map(|&step| all[step]).collect()
     }
 
     /// The term that is 1.
@@ -197,12 +189,8 @@ impl Loop for Forward<'_> {
                     out.extend(earlier[*base].iter().map(|v| v.powi(*exponent)))
                 }
                 Step::Power(base, exponent) => {
-                    out.extend(
-                        earlier[*base]
-                            .iter()
-                            .zip(&earlier[*exponent])
-                            .map(|(b, e)| b.powf(*e)),
-                    );
+                    let pairs = earlier[*base].iter().zip(&earlier[*exponent]);
+                    out.extend(pairs.map(|(b, e)| b.powf(*e)));
                 }
                 Step::Sine(argument) => {
                     let (sines, cosines) = rest.split_at_mut(1);
@@ -329,11 +317,8 @@ fn add_adjoints(
             add_times(&mut earlier[*argument], adjoint, values, &[own + 1]);
         }
         Step::Cosine(argument) => {
-            for ((e, a), sine) in earlier[*argument]
-                .iter_mut()
-                .zip(adjoint)
-                .zip(&values[own - 1])
-            {
+            let target = earlier[*argument].iter_mut().zip(adjoint);
+            for ((e, a), sine) in target.zip(&values[own - 1]) {
                 *e -= a * sine;
             }
         }

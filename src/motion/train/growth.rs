@@ -6,6 +6,7 @@
 //! is stable in every phase may still grow through their sequence. Both are smooth in Xi but where eigenvalues meet.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use nalgebra::{Complex, DMatrix, DVector};
 
@@ -36,7 +37,6 @@ pub struct Growth {
 /// An eigenvalue that grows too fast, and how its rate changes with the lower half of every phase's `A`.
 struct Mode {
     value: Complex<f64>,
-    of_sequence: bool,
     excess: f64, // of its rate above what is aimed at
     slopes: Vec<DMatrix<f64>>,
 }
@@ -110,22 +110,19 @@ impl Growth {
         let Some(bound) = self.bound_per_s else {
             return [0.0; 2];
         };
-        let above = |values: Vec<Complex<f64>>, of_sequence: bool| {
-            let rates = values.iter().map(|value| self.rate(*value, of_sequence));
-            rates.fold(0.0, |most: f64, rate| most.max(rate - bound))
-        };
-        let each = lower.iter().map(|lower| above(of_phase(lower), false));
-        match each.fold(0.0, f64::max) {
-            0.0 => [0.0, above(of_sequence(&self.transitions(lower)), true)],
+        let above = |most: f64, rate: f64| most.max(rate - bound);
+        let of_phases = lower.iter().flat_map(of_phase).map(|value| value.re);
+        match of_phases.fold(0.0, above) {
+            0.0 => {
+                let values = of_sequence(&self.transitions(lower)).into_iter();
+                [0.0, values.map(|value| self.rate(value)).fold(0.0, above)]
+            }
             excess => [excess, f64::INFINITY],
         }
     }
 
-    /// 1/s.
-    fn rate(&self, value: Complex<f64>, of_sequence: bool) -> f64 {
-        if !of_sequence {
-            return value.re;
-        }
+    /// Of an eigenvalue of the sequence, 1/s.
+    fn rate(&self, value: Complex<f64>) -> f64 {
         let duration_s: f64 = self.sequence.iter().map(|(_, duration_s)| duration_s).sum();
         value.norm().max(f64::MIN_POSITIVE).ln() / duration_s.max(f64::MIN_POSITIVE)
     }
@@ -141,80 +138,66 @@ impl Growth {
     fn modes(&self, lower: &[DMatrix<f64>]) -> Vec<Mode> {
         let mut all = Vec::new();
         for phase in 0..lower.len() {
-            let mut modes = self.fast(of_phase(&lower[phase]), false, lower);
-            self.add_slopes(&mut modes, phase, lower, |changed| {
-                of_phase(&changed[phase])
-            });
-            all.extend(modes);
+            let values = |changed: &[DMatrix<f64>], _| of_phase(&changed[phase]);
+            all.extend(self.fast(lower, phase..phase + 1, values, |value| value.re));
         }
         if self.excess(lower)[0] == 0.0 {
             let transitions = self.transitions(lower);
-            let mut modes = self.fast(of_sequence(&transitions), true, lower);
-            for phase in 0..lower.len() {
-                self.add_slopes(&mut modes, phase, lower, |changed| {
-                    let mut transitions = transitions.clone();
-                    for (transition, &step) in transitions.iter_mut().zip(&self.sequence) {
-                        if step.0 == phase {
-                            *transition = self::transition(changed, step);
-                        }
+            let values = |changed: &[DMatrix<f64>], phase| {
+                let mut transitions = transitions.clone();
+                for (transition, &step) in transitions.iter_mut().zip(&self.sequence) {
+                    if step.0 == phase {
+                        *transition = self::transition(changed, step);
                     }
-                    of_sequence(&transitions)
-                });
-            }
-            all.extend(modes);
+                }
+                of_sequence(&transitions)
+            };
+            all.extend(self.fast(lower, 0..lower.len(), values, |value| self.rate(value)));
         }
         let is_finite = |slopes: &DMatrix<f64>| slopes.iter().all(|slope| slope.is_finite());
         all.retain(|mode| mode.slopes.iter().all(is_finite));
         all
     }
 
-    /// The eigenvalues that grow too fast, one of each conjugate pair, with slopes of 0.
+    /// The eigenvalues whose rate is too fast, one of each conjugate pair, and how it changes with the lower halves of
+    /// `phases`, by differences of the nearest eigenvalues; `values` gives them all once one phase has changed.
     fn fast(
         &self,
-        values: Vec<Complex<f64>>,
-        of_sequence: bool,
         lower: &[DMatrix<f64>],
+        phases: Range<usize>,
+        values: impl Fn(&[DMatrix<f64>], usize) -> Vec<Complex<f64>>,
+        rate: impl Fn(Complex<f64>) -> f64,
     ) -> Vec<Mode> {
         let aim = AIM * self.bound_per_s.unwrap_or(f64::INFINITY);
-        let each = values.into_iter().filter(|value| value.im >= 0.0);
+        let each = (values(lower, phases.start).into_iter()).filter(|value| value.im >= 0.0);
         let modes = each.map(|value| Mode {
             value,
-            of_sequence,
-            excess: self.rate(value, of_sequence) - aim,
+            excess: rate(value) - aim,
             slopes: lower.iter().map(|lower| lower.map(|_| 0.0)).collect(),
         });
-        modes
-            .filter(|mode| mode.excess.is_finite() && mode.excess > 0.0)
-            .collect()
-    }
-
-    /// How the rates of `modes` change with a phase's lower half, by differences of the nearest eigenvalues.
-    fn add_slopes(
-        &self,
-        modes: &mut [Mode],
-        phase: usize,
-        lower: &[DMatrix<f64>],
-        values: impl Fn(&[DMatrix<f64>]) -> Vec<Complex<f64>>,
-    ) {
+        let is_fast = |mode: &Mode| mode.excess.is_finite() && mode.excess > 0.0;
+        let mut modes: Vec<Mode> = modes.filter(is_fast).collect();
         if modes.is_empty() {
-            return;
+            return modes;
         }
-        let step = DIFFERENCE * lower[phase].amax().max(1.0);
-        let mut changed = lower.to_vec();
-        // Where no term is active there is none to change.
-        let active = (0..lower[phase].len()).filter(|&place| lower[phase][place] != 0.0);
-        for place in active {
-            changed[phase][place] += step;
-            let values = values(&changed);
-            changed[phase][place] = lower[phase][place];
-            for mode in &mut *modes {
-                let apart = |value: &Complex<f64>| (value - mode.value).norm();
-                let nearest = values.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)));
-                let moved = nearest.map_or(f64::NAN, |value| self.rate(*value, mode.of_sequence));
-                let rate = self.rate(mode.value, mode.of_sequence);
-                mode.slopes[phase][place] = (moved - rate) / step;
+        for phase in phases {
+            let step = DIFFERENCE * lower[phase].amax().max(1.0);
+            let mut changed = lower.to_vec();
+            // Where no term is active there is none to change.
+            let active = (0..lower[phase].len()).filter(|&place| lower[phase][place] != 0.0);
+            for place in active {
+                changed[phase][place] += step;
+                let values = values(&changed, phase);
+                changed[phase][place] = lower[phase][place];
+                for mode in &mut modes {
+                    let apart = |value: &Complex<f64>| (value - mode.value).norm();
+                    let nearest = values.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)));
+                    let moved = nearest.map_or(f64::NAN, |value| rate(*value));
+                    mode.slopes[phase][place] = (moved - rate(mode.value)) / step;
+                }
             }
         }
+        modes
     }
 
     /// The least change, as `inverse` weighs it, that takes the excess off the modes to first order.
@@ -272,15 +255,10 @@ fn dot(a: &[DMatrix<f64>], b: &[DMatrix<f64>]) -> f64 {
 
 /// Mean of `z`, `dz`, `u_lat` over the samples of a phase, 0 if there are none.
 fn mean_of(phase: usize, set: EncodedSet<'_>) -> Vec<f64> {
-    let d = set.latent_dim();
-    let mut mean = vec![0.0; 3 * d];
-    for (jump, range) in set.dataset.spans(Some(phase)) {
-        let latent = &set.latent[jump];
-        let of = [&latent.z, &latent.dz, &latent.u_lat];
-        for sample in range {
-            for (i, total) in mean.iter_mut().enumerate() {
-                *total += of[i / d][(i % d, sample)];
-            }
+    let mut mean = vec![0.0; 3 * set.latent_dim()];
+    for (variables, _) in set.regression_blocks(phase) {
+        for (total, column) in mean.iter_mut().zip(variables.column_iter()) {
+            column.iter().for_each(|value| *total += value);
         }
     }
     let samples = set.dataset.samples(Some(phase)).max(1) as f64;
@@ -351,7 +329,7 @@ mod tests {
         assert!((growth.excess(&growth.lower_halves(&driven))[0] - 1.0).abs() < 1e-9);
         // Contact for 0.238 s, flight for 0.158 s with ddz1 = -0.5 dz1: the same eigenvector.
         let values = of_sequence(&growth.transitions(&growth.lower_halves(&driven)));
-        let fastest = values.iter().map(|value| growth.rate(*value, true));
+        let fastest = values.iter().map(|value| growth.rate(*value));
         let expected = (2.0 * 0.238 - 0.5 * 0.158) / (0.238 + 0.158);
         let found = fastest.fold(f64::NEG_INFINITY, f64::max);
         assert!((found - expected).abs() < 1e-9, "{found} for {expected}");

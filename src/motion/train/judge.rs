@@ -7,7 +7,8 @@ use nalgebra::{DMatrix, DVector};
 use super::dataset::Dataset;
 use super::features::Features;
 use super::latent::{EncodedSet, Latent};
-use super::rollout::{Candidate, Change, Window, predict, predict_changed, restarted, whole};
+use super::rollout::{Candidate, Change, Window, predict, predict_changed, windows};
+use crate::sim::Restart;
 
 /// Weight of whole-jump rollouts against predictions of 0.1 s in a score.
 const ROLLOUT_WEIGHT: f64 = 0.2;
@@ -42,7 +43,8 @@ impl<'a> Judge<'a> {
         let inverse_std: Vec<f64> = (0..set.latent_dim())
             .map(|row| 1.0 / row_std(set.latent, row).max(f64::MIN_POSITIVE))
             .collect();
-        let windows = [restarted(set.dataset, 0.1), whole(set.dataset)];
+        let windows =
+            [Restart::Every(0.1), Restart::Never].map(|restart| windows(set.dataset, restart));
         let of_jumps = |windows: &Vec<Window>, jumps: &Range<usize>| {
             let before = |jump| windows.partition_point(|window| window.jump < jump);
             before(jumps.start)..before(jumps.end)
@@ -115,7 +117,8 @@ impl<'a> Judge<'a> {
         changes: &[Change],
         part: usize,
     ) -> Option<Vec<[DVector<f64>; 2]>> {
-        let candidate = self.candidate(xi);
+        let features = self.features;
+        let candidate = Candidate { features, xi };
         let of_kind = |kind: usize| {
             let mut errors = vec![Vec::new(); changes.len()];
             for window in self.windows_of(part, kind) {
@@ -131,11 +134,6 @@ impl<'a> Judge<'a> {
         pairs.map(|(short, long)| finite([short, long])).collect()
     }
 
-    fn candidate<'x>(&'x self, xi: &'x [DMatrix<f64>]) -> Candidate<'x> {
-        let features = self.features;
-        Candidate { features, xi }
-    }
-
     /// The windows of a part with what is predicted in them.
     fn predictions(
         &self,
@@ -143,8 +141,8 @@ impl<'a> Judge<'a> {
         part: usize,
         kind: usize,
     ) -> impl Iterator<Item = (&Window, DMatrix<f64>)> {
-        let windows = self.windows_of(part, kind);
-        let predictions = predict(self.candidate(xi), self.set, windows);
+        let (windows, features) = (self.windows_of(part, kind), self.features);
+        let predictions = predict(Candidate { features, xi }, self.set, windows);
         windows.iter().zip(predictions)
     }
 
@@ -211,7 +209,7 @@ fn parts_of(dataset: &Dataset, most: usize) -> impl Iterator<Item = Range<usize>
         let start = next;
         let mut samples = 0;
         while let Some(jump) = dataset.jumps.get(next) {
-            samples += jump.len();
+            samples += jump.samples();
             if next > start && samples > most {
                 break;
             }
@@ -285,7 +283,7 @@ mod tests {
         assert_eq!(together.parts(), 0..1);
         let all = errors(&together, 0).expect("no rollout diverges");
         assert_ne!(all[0], all[1]);
-        for (samples, n_parts) in [(2 * dataset.jumps[0].len(), 3), (1, 5)] {
+        for (samples, n_parts) in [(2 * dataset.jumps[0].samples(), 3), (1, 5)] {
             let judge = Judge::in_parts(&features, set, samples);
             assert_eq!(judge.parts(), 0..n_parts);
             let parts = judge.parts().map(|part| errors(&judge, part));

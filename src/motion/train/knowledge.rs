@@ -1,5 +1,7 @@
 //! What is known of the dynamics before any regression.
 
+use std::ops::Range;
+
 use nalgebra::DMatrix;
 
 use super::dataset::Dataset;
@@ -60,38 +62,36 @@ impl Knowledge {
             return each.map(|_| Self::nothing(p, d)).collect();
         }
         let gravity = -GRAVITY_M_S2 * training.scaling.state[BODY_Z];
-        let depending = |is_meant: &dyn Fn(usize) -> bool| {
-            let variables = (0..3 * d).filter(|&i| is_meant(i));
-            let of_each: Vec<_> = variables.map(|i| features.depend_on(i)).collect();
-            (0..p).filter(move |&term| of_each.iter().any(|depends| depends[term]))
-        };
         let (upwards, force_upwards) = (d + 1, 2 * d + 1);
         let one = features.constant_term();
+        // Coefficients in some columns of the terms that depend on certain variables are not free.
+        let fix =
+            |knowledge: &mut Self, columns: Range<usize>, is_meant: &dyn Fn(usize) -> bool| {
+                for variable in (0..3 * d).filter(|&i| is_meant(i)) {
+                    let depends = features.depend_on(variable);
+                    for term in (0..p).filter(|&term| depends[term]) {
+                        let mut row = knowledge.free.row_mut(term);
+                        row.columns_range_mut(columns.clone()).fill(false);
+                    }
+                }
+            };
         each.map(|phase| {
             let mut knowledge = Self::nothing(p, d);
-            for term in depending(&|i| i == 0) {
-                knowledge.free.row_mut(term).fill(false);
-            }
-            for term in depending(&|i| i < d) {
-                knowledge
-                    .free
-                    .row_mut(term)
-                    .columns_mut(0, HELD)
-                    .fill(false);
-            }
+            fix(&mut knowledge, 0..d, &|i| i == 0);
+            fix(&mut knowledge, 0..HELD, &|i| i < d);
             if phase.feet == FeetRule::None {
-                for term in depending(&|i| (2 * d..2 * d + HELD).contains(&i)) {
-                    knowledge.free.row_mut(term).fill(false);
-                }
+                fix(&mut knowledge, 0..d, &|i| {
+                    (2 * d..2 * d + HELD).contains(&i)
+                });
                 knowledge.free.column_mut(0).fill(false);
                 if let Some(one) = one {
                     knowledge.known[(one, 1)] = gravity;
                     knowledge.free.column_mut(1).fill(false);
                 }
             } else {
-                for term in depending(&|i| i != upwards && i != force_upwards) {
-                    knowledge.free[(term, 1)] = false;
-                }
+                fix(&mut knowledge, 1..2, &|i| {
+                    i != upwards && i != force_upwards
+                });
                 if let Some(one) = one {
                     knowledge.kept[(one, 1)] = true;
                 }

@@ -2,11 +2,11 @@
 
 use std::ops::Range;
 
-use nalgebra::{DMatrix, DMatrixViewMut, DVector};
+use nalgebra::{DMatrix, DMatrixViewMut};
 
 use super::dataset::{Dataset, Jump, Quantity, Rates, block_widths, centred, mean, sum_product};
 use super::error::TrainError;
-use crate::model::{AffineMap, ModelError, StateMap};
+use crate::model::{AffineMap, StateMap};
 
 const FITS: &str = "invariant: a trained or checked map takes the robot's coordinates";
 
@@ -29,16 +29,15 @@ impl Latent {
     /// # Errors
     /// As [`Dataset::for_each`].
     pub fn of(dataset: &Dataset, encoder: &StateMap) -> Result<Vec<Latent>, TrainError> {
-        let linear = encoder
-            .as_affine()
-            .map(|affine| (affine, input_projection(affine.weights())));
+        let linear = (encoder.as_affine())
+            .map(|linear| (linear.weights(), input_projection(linear.weights())));
         let mut all = Vec::with_capacity(dataset.jumps.len());
         dataset.for_each(|jump, rates| {
             all.push(match &linear {
-                Some((encoder, projection)) => Self {
-                    z: affine(encoder, &jump.x),
-                    dz: encoder.weights() * &rates.dx,
-                    ddz: encoder.weights() * &rates.ddx,
+                Some((weights, projection)) => Self {
+                    z: map_samples(encoder, &jump.x),
+                    dz: *weights * &rates.dx,
+                    ddz: *weights * &rates.ddx,
                     u_lat: projection * &jump.u,
                 },
                 None => Self::along(jump, rates, encoder),
@@ -49,14 +48,14 @@ impl Latent {
 
     /// Encodes a jump with the Jacobian at every sample.
     fn along(jump: &Jump, rates: &Rates, encoder: &StateMap) -> Self {
-        let empty = DMatrix::zeros(encoder.output_dim(), jump.len());
+        let empty = DMatrix::zeros(encoder.output_dim(), jump.samples());
         let mut latent = Self {
             z: empty.clone(),
             dz: empty.clone(),
             ddz: empty.clone(),
             u_lat: empty,
         };
-        for sample in 0..jump.len() {
+        for sample in 0..jump.samples() {
             let column = |matrix: &DMatrix<f64>| matrix.column(sample).into_owned();
             let (x, dx) = (column(&jump.x), column(&rates.dx));
             let mapped = encoder.apply_rates(&x, &dx, &column(&rates.ddx));
@@ -71,8 +70,16 @@ impl Latent {
         latent
     }
 
-    /// Writes `[z, dz, u_lat]` of some samples into the rows of `variables`.
-    pub fn copy_variables(&self, range: Range<usize>, variables: &mut DMatrixViewMut<'_, f64>) {
+    /// `[z, dz, u_lat]` of some samples in rows.
+    pub fn variables(&self, range: Range<usize>) -> DMatrix<f64> {
+        let n = range.len();
+        let mut variables = DMatrix::zeros(n, 3 * self.z.nrows());
+        self.copy_variables(range, &mut variables.rows_mut(0, n));
+        variables
+    }
+
+    /// Writes them into the rows of `variables`.
+    fn copy_variables(&self, range: Range<usize>, variables: &mut DMatrixViewMut<'_, f64>) {
         let d = self.z.nrows();
         for (block, source) in [&self.z, &self.dz, &self.u_lat].into_iter().enumerate() {
             variables
@@ -109,37 +116,15 @@ impl<'a> EncodedSet<'a> {
     ) -> impl Iterator<Item = (DMatrix<f64>, DMatrix<f64>)> {
         let Self { dataset, latent } = self;
         let d = self.latent_dim();
-        let spans = dataset.spans(Some(phase));
-        let mut spans = spans
-            .map(move |(jump, range)| (&latent[jump], range))
-            .peekable();
-        block_widths(dataset.samples(Some(phase))).map(move |width| {
-            let (mut variables, mut target) =
-                (DMatrix::zeros(width, 3 * d), DMatrix::zeros(width, d));
-            let mut at = 0;
-            while at < width {
-                let (samples, range) = spans.peek_mut().expect("invariant: as many samples");
-                let count = range.len().min(width - at);
-                let part = range.start..range.start + count;
-                samples.copy_variables(part.clone(), &mut variables.rows_mut(at, count));
-                target
-                    .rows_mut(at, count)
-                    .tr_copy_from(&samples.ddz.columns_range(part));
-                (range.start, at) = (range.start + count, at + count);
-                if range.start == range.end {
-                    spans.next();
-                }
-            }
-            (variables, target)
+        let widths = block_widths(dataset.samples(Some(phase)));
+        let empty = move |n| (DMatrix::zeros(n, 3 * d), DMatrix::zeros(n, d));
+        dataset.cut(Some(phase), widths, empty, move |block, at, jump, range| {
+            let (variables, target) = block;
+            let (samples, n) = (&latent[jump], range.len());
+            samples.copy_variables(range.clone(), &mut variables.rows_mut(at, n));
+            let mut rows = target.rows_mut(at, n);
+            rows.tr_copy_from(&samples.ddz.columns_range(range));
         })
-    }
-
-    /// Jump and sample of a row of [`Self::regression_blocks`], if there are so many.
-    pub fn place_of_row(self, phase: usize, row: usize) -> Option<(&'a Jump, usize)> {
-        let spans = self.dataset.spans(Some(phase));
-        let mut places = spans.flat_map(|(jump, range)| range.map(move |sample| (jump, sample)));
-        let (jump, sample) = places.nth(row)?;
-        Some((&self.dataset.jumps[jump], sample))
     }
 }
 
@@ -155,19 +140,13 @@ pub fn input_projection(weights: &DMatrix<f64>) -> DMatrix<f64> {
     }
 }
 
-/// `W x + b` for samples in columns.
-pub fn affine(map: &AffineMap, samples: &DMatrix<f64>) -> DMatrix<f64> {
-    let mut mapped = map.weights() * samples;
-    for mut column in mapped.column_iter_mut() {
-        column += map.bias();
-    }
-    mapped
-}
-
 /// A map, linear or not, of samples in columns.
 pub fn map_samples(map: &StateMap, samples: &DMatrix<f64>) -> DMatrix<f64> {
     if let Some(linear) = map.as_affine() {
-        return affine(linear, samples);
+        let mut mapped = linear.weights() * samples;
+        let columns = mapped.column_iter_mut();
+        columns.for_each(|mut column| column += linear.bias());
+        return mapped;
     }
     let mut mapped = DMatrix::zeros(map.output_dim(), samples.ncols());
     for (mut column, sample) in mapped.column_iter_mut().zip(samples.column_iter()) {
@@ -190,32 +169,42 @@ pub fn lift_samples(encoder: &StateMap, x: &DMatrix<f64>, u_lat: &DMatrix<f64>) 
     lifted
 }
 
-/// `W_e`, of a nonlinear encoder the mean of its Jacobian over the samples in the columns of `x`.
-pub fn mean_jacobian(encoder: &StateMap, x: &DMatrix<f64>) -> DMatrix<f64> {
+/// `W_e`, of a nonlinear encoder the mean of its Jacobian over the samples of a dataset.
+pub fn mean_jacobian(encoder: &StateMap, dataset: &Dataset) -> DMatrix<f64> {
     if let Some(linear) = encoder.as_affine() {
         return linear.weights().clone();
     }
     let (rows, columns) = encoder.shape();
     let mut sum = DMatrix::zeros(rows, columns);
-    for x in x.column_iter() {
-        sum += encoder.jacobian(&x.into_owned()).expect(FITS);
+    for block in dataset.blocks(Quantity::X, None) {
+        for x in block.column_iter() {
+            sum += encoder.jacobian(&x.into_owned()).expect(FITS);
+        }
     }
-    sum / x.ncols().max(1) as f64
+    sum / dataset.samples(None).max(1) as f64
 }
 
-/// Decoder of least mean square error over all phases: `x ~ W_d z + b_d`.
+/// Decoder of least mean square error over all phases: `x ~ W_d z + b_d`, with `z` the encoded samples after the
+/// `hidden` layers of the decoder, if it has any.
 ///
 /// # Errors
 /// [`TrainError::Model`] if a weight is not finite.
 pub fn least_squares_decoder(
     dataset: &Dataset,
     encoder: &StateMap,
+    hidden: Option<&StateMap>,
 ) -> Result<AffineMap, TrainError> {
-    let d = encoder.output_dim();
+    let d = hidden.unwrap_or(encoder).output_dim();
     let x_mean = dataset.mean(Quantity::X, None);
     let encoded = || {
         let blocks = dataset.blocks(Quantity::X, None);
-        blocks.map(|x| (map_samples(encoder, &x), x))
+        blocks.map(|x| {
+            let z = map_samples(encoder, &x);
+            match hidden {
+                Some(hidden) => (map_samples(hidden, &z), x),
+                None => (z, x),
+            }
+        })
     };
     let z_mean = mean(d, dataset.samples(None), encoded().map(|(z, _)| z));
     let mut gram = DMatrix::zeros(d, d);
@@ -225,31 +214,11 @@ pub fn least_squares_decoder(
         sum_product(&mut gram, &z, &z);
         sum_product(&mut cross, &x, &z);
     }
-    Ok(solve_affine((&gram, &cross), x_mean, &z_mean)?)
-}
-
-/// The affine map of least square error from samples `z` to samples `x`, both in columns.
-///
-/// # Errors
-/// [`ModelError::NonFinite`] if a weight is not finite.
-pub fn fit_affine(x: &DMatrix<f64>, z: &DMatrix<f64>) -> Result<AffineMap, ModelError> {
-    let (x_mean, z_mean) = (x.column_mean(), z.column_mean());
-    let (x, z) = (centred(x.clone(), &x_mean), centred(z.clone(), &z_mean));
-    let (gram, cross) = (&z * z.transpose(), x * z.transpose());
-    solve_affine((&gram, &cross), x_mean, &z_mean)
-}
-
-/// The affine map from the sums of `z z^T` and `x z^T` about the means.
-fn solve_affine(
-    (gram, cross): (&DMatrix<f64>, &DMatrix<f64>),
-    x_mean: DVector<f64>,
-    z_mean: &DVector<f64>,
-) -> Result<AffineMap, ModelError> {
     let floor = 1e-12 * gram.trace().max(f64::MIN_POSITIVE);
-    let inverse = (gram.clone())
+    let inverse = gram
         .pseudo_inverse(floor)
         .expect("the tolerance is positive");
     let weights = cross * inverse;
     let bias = x_mean - &weights * z_mean;
-    AffineMap::new("decoder", weights, bias)
+    Ok(AffineMap::new("decoder", weights, bias)?)
 }

@@ -1,17 +1,17 @@
 //! How good a model is on a set of jumps.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, DVectorView};
 use serde::Serialize;
 
 use super::dataset::{Dataset, Rates, Scaling, mean};
 use super::error::TrainError;
 use super::features::{FeatureValues, Features};
 use super::latent::{EncodedSet, Latent, lift_samples, map_samples};
-use super::rollout::{Candidate, Window, predict, restarted, whole};
+use super::rollout::{Candidate, Window, predict, windows};
 use crate::model::{ReducedModel, StateMap};
 use crate::recording::Source;
 use crate::robot::JOINT_DIM;
-use crate::sim::phase_rule;
+use crate::sim::{Restart, phase_rule};
 
 pub(super) use crate::robot::{BODY_X, BODY_Z};
 
@@ -24,6 +24,7 @@ const SMOOTHING: usize = 11;
 
 /// Figures of one model on one set of jumps.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(Default))]
 pub struct SetMetrics {
     /// Mean square of `x - decode(encode(x))` over samples and coordinates, scaled units.
     pub decoder_mse: f64,
@@ -41,17 +42,6 @@ pub struct SetMetrics {
     pub rollout_x_m: Option<f64>,
     /// The same of body z.
     pub rollout_z_m: Option<f64>,
-}
-
-/// Everything that [`measure`] needs of a model.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Assessed<'a> {
-    /// Library and coefficients.
-    pub candidate: Candidate<'a>,
-    /// Encoder, scaled units.
-    pub encoder: &'a StateMap,
-    /// Decoder, scaled units.
-    pub decoder: &'a StateMap,
 }
 
 /// Measures a finished model on recordings.
@@ -75,38 +65,29 @@ pub fn assess<'a>(
     )?;
     let features = Features::new(model.library());
     let xi: Vec<_> = (model.phases().iter().map(|phase| phase.xi.clone())).collect();
-    let assessed = Assessed {
-        candidate: Candidate {
-            features: &features,
-            xi: &xi,
-        },
-        encoder: model.encoder_map()?,
-        decoder: model.decoder_map()?,
+    let candidate = Candidate {
+        features: &features,
+        xi: &xi,
     };
-    measure(assessed, &dataset)
+    let maps = [model.encoder_map()?, model.decoder_map()?];
+    let latent = Latent::of(&dataset, maps[0])?;
+    measure(candidate, maps, EncodedSet::new(&dataset, &latent))
 }
 
-/// Measures a model on a dataset.
-pub(super) fn measure(model: Assessed<'_>, dataset: &Dataset) -> Result<SetMetrics, TrainError> {
-    let latent = Latent::of(dataset, model.encoder)?;
-    measure_encoded(model, EncodedSet::new(dataset, &latent))
-}
-
-/// Measures a model on a dataset that it has encoded already.
-pub(super) fn measure_encoded(
-    model: Assessed<'_>,
+/// Measures a model on a dataset that it has encoded.
+pub(super) fn measure(
+    candidate: Candidate<'_>,
+    [encoder, decoder]: [&StateMap; 2],
     set: EncodedSet<'_>,
 ) -> Result<SetMetrics, TrainError> {
-    let short = restarted(set.dataset, SHORT_S);
-    let [prediction_x_m, prediction_z_m] = body_rms(model, set, &short);
-    let [rollout_x_m, rollout_z_m] = body_rms(model, set, &whole(set.dataset));
+    let rms = |restart| body_rms(candidate, decoder, set, &windows(set.dataset, restart));
+    let [prediction_x_m, prediction_z_m] = rms(Restart::Every(SHORT_S));
+    let [rollout_x_m, rollout_z_m] = rms(Restart::Never);
     let phases = 0..set.dataset.phases.patterns.len();
     Ok(SetMetrics {
-        decoder_mse: decoder_mse(model, set),
-        ddz_r2: phases
-            .map(|phase| ddz_r2(model.candidate, set, phase))
-            .collect(),
-        torque_r2: torque_r2(model.encoder, set)?,
+        decoder_mse: decoder_mse(decoder, set),
+        ddz_r2: phases.map(|phase| ddz_r2(candidate, set, phase)).collect(),
+        torque_r2: torque_r2(encoder, set)?,
         prediction_x_m,
         prediction_z_m,
         rollout_x_m: rollout_x_m.is_finite().then_some(rollout_x_m),
@@ -115,12 +96,17 @@ pub(super) fn measure_encoded(
 }
 
 /// Root mean square errors of decoded body x and z, in metres, over all predicted samples of the windows.
-fn body_rms(model: Assessed<'_>, set: EncodedSet<'_>, windows: &[Window]) -> [f64; 2] {
-    let predictions = predict(model.candidate, set, windows);
+fn body_rms(
+    candidate: Candidate<'_>,
+    decoder: &StateMap,
+    set: EncodedSet<'_>,
+    windows: &[Window],
+) -> [f64; 2] {
+    let predictions = predict(candidate, set, windows);
     let mut squares = [0.0; 2];
     let mut count = 0;
     for (window, prediction) in windows.iter().zip(&predictions) {
-        let decoded = map_samples(model.decoder, prediction);
+        let decoded = map_samples(decoder, prediction);
         let x = &set.dataset.jumps[window.jump].x;
         let truth = x.columns(window.start + 1, window.steps);
         for (square, row) in squares.iter_mut().zip([BODY_X, BODY_Z]) {
@@ -133,10 +119,10 @@ fn body_rms(model: Assessed<'_>, set: EncodedSet<'_>, windows: &[Window]) -> [f6
     [rms[0] / scale[BODY_X], rms[1] / scale[BODY_Z]]
 }
 
-fn decoder_mse(model: Assessed<'_>, set: EncodedSet<'_>) -> f64 {
+fn decoder_mse(decoder: &StateMap, set: EncodedSet<'_>) -> f64 {
     let (mut square, mut count) = (0.0, 0);
     for (jump, samples) in set.dataset.jumps.iter().zip(set.latent) {
-        square += (map_samples(model.decoder, &samples.z) - &jump.x).norm_squared();
+        square += (map_samples(decoder, &samples.z) - &jump.x).norm_squared();
         count += jump.x.len();
     }
     square / count.max(1) as f64
@@ -152,7 +138,10 @@ fn ddz_r2(candidate: Candidate<'_>, set: EncodedSet<'_>, phase: usize) -> f64 {
     let mut values = FeatureValues::default();
     for (variables, target) in blocks() {
         let theta = candidate.features.evaluate(&variables, &mut values);
-        sums.add(&(theta * &candidate.xi[phase]).transpose(), &target);
+        let predicted = (theta * &candidate.xi[phase]).transpose();
+        for (predicted, target) in predicted.column_iter().zip(target.column_iter()) {
+            sums.add(predicted, target);
+        }
     }
     sums.r2()
 }
@@ -176,11 +165,8 @@ fn torque_r2(encoder: &StateMap, set: EncodedSet<'_>) -> Result<f64, TrainError>
         let samples = latent.next().expect("invariant: one of each jump");
         let lift = lift_samples(encoder, &jump.x, &samples.u_lat);
         for sample in jump.torque_samples() {
-            let torques = |u| {
-                let torque = recorded_torque(u, rates, sample);
-                DMatrix::from_column_slice(JOINT_DIM, 1, torque.as_slice())
-            };
-            sums.add(&torques(&lift), &torques(&jump.u));
+            let torque = |u| recorded_torque(u, rates, sample);
+            sums.add(torque(&lift).as_view(), torque(&jump.u).as_view());
         }
     })?;
     Ok(sums.r2())
@@ -195,7 +181,7 @@ fn recorded_torque(u: &DMatrix<f64>, rates: &Rates, sample: usize) -> DVector<f6
     }
 }
 
-/// Sums of a coefficient of determination over all rows together, each about its mean; samples are columns.
+/// Sums of a coefficient of determination over all rows together, each about its mean.
 struct Determination {
     mean: DVector<f64>,
     residual: f64,
@@ -211,11 +197,9 @@ impl Determination {
         }
     }
 
-    fn add(&mut self, predicted: &DMatrix<f64>, truth: &DMatrix<f64>) {
-        for (predicted, truth) in predicted.column_iter().zip(truth.column_iter()) {
-            self.residual += (predicted - truth).norm_squared();
-            self.spread += (truth - &self.mean).norm_squared();
-        }
+    fn add(&mut self, predicted: DVectorView<'_, f64>, truth: DVectorView<'_, f64>) {
+        self.residual += (predicted - truth).norm_squared();
+        self.spread += (truth - &self.mean).norm_squared();
     }
 
     fn r2(&self) -> f64 {

@@ -24,11 +24,9 @@ pub mod varimax;
 pub mod weak_form;
 
 mod assemble;
-mod data_sets;
 mod dynamics_fit;
 mod error;
 mod judge;
-mod map_options;
 mod options;
 #[cfg(test)]
 mod oscillator;
@@ -46,15 +44,15 @@ mod vectors;
 
 pub use assemble::{Origin, SourceFile, sha256};
 pub use closed_form::closed_form;
-pub use data_sets::Recordings;
 pub use dataset::{MIN_SAMPLES, ScaleOptions};
 pub use error::TrainError;
 pub use joint::{Integrator, Unroll, joint};
-pub use map_options::MapOptions;
 pub use metrics::{SetMetrics, assess};
 pub use options::{
-    Coordinates, EncoderOptions, JointOptions, Method, RegressionOptions, TrainOptions, Transfer,
+    Coordinates, EncoderOptions, JointOptions, MapOptions, Method, RegressionOptions, TrainOptions,
+    Transfer,
 };
 pub use progress::{Progress, Watch};
 pub use report::{PartScore, PhaseTerms, SeedReport, TrainReport, Trained};
 pub use split::Split;
+pub use task::Recordings;

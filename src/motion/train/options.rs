@@ -6,16 +6,18 @@ use serde::{Deserialize, Serialize};
 
 use super::assemble::Origin;
 use super::closed_form::closed_form;
-use super::data_sets::Recordings;
 use super::dataset::ScaleOptions;
 use super::error::TrainError;
 use super::joint::{LossWeights, Schedule, Unroll, joint};
-use super::map_options::MapOptions;
 use super::metrics::{BODY_X, BODY_Z};
 use super::progress::Watch;
 use super::report::Trained;
+use super::task::Recordings;
 use crate::limits::table;
-use crate::model::{Library, LibraryChoice, ModelError, StandardLibrary, check_name};
+use crate::model::{
+    Activation, Library, LibraryChoice, MAX_LAYER_WIDTH, MAX_LAYERS, ModelError, StandardLibrary,
+    check_name,
+};
 use crate::recording::PhaseRule;
 use crate::recording::phases::CHATTER_SAMPLES;
 use crate::recording::preprocess::BATCH_ROWS;
@@ -100,6 +102,17 @@ pub struct JointOptions {
     pub maps: MapOptions,
 }
 
+/// Layers of encoder and decoder; without hidden layers both are affine maps.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MapOptions {
+    /// Widths of the encoder's hidden layers; a linear layer to the latent coordinates follows.
+    pub encoder_layers: Vec<usize>,
+    /// Widths of the decoder's hidden layers; a linear layer to the state follows.
+    pub decoder_layers: Vec<usize>,
+    /// Activation of the hidden layers.
+    pub activation: Activation,
+}
+
 /// What follows the joint step on contact data.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Transfer {
@@ -167,7 +180,7 @@ impl TrainOptions {
             phases: PhaseRule::two_phase().with_min_samples(CHATTER_SAMPLES),
             seed: 1,
             n_seeds: 1,
-            scaling: ScaleOptions::default(),
+            scaling: ScaleOptions::in_frame(WrenchFrame::World),
             actuators: None,
             wrench_frame: WrenchFrame::World,
             encoder: EncoderOptions::default(),
@@ -258,7 +271,10 @@ impl TrainOptions {
         if let Some(rate) = regression.growth_per_s {
             table::GROWTH.check(rate)?;
         }
-        self.scaling.check()?;
+        table::STATE_SCALING.check(self.scaling.state)?;
+        table::TORQUE_SCALING.check(self.scaling.torque)?;
+        table::FORCE_SCALING.check(self.scaling.force)?;
+        table::MOMENT_SCALING.check(self.scaling.moment)?;
         if let Some((array, joint, found)) = self.actuators.as_ref().and_then(Actuators::unusable) {
             return Err(TrainError::Option {
                 option: "actuators",
@@ -290,12 +306,33 @@ impl JointOptions {
     }
 }
 
-impl ScaleOptions {
-    fn check(&self) -> Result<(), TrainError> {
-        table::STATE_SCALING.check(self.state)?;
-        table::TORQUE_SCALING.check(self.torque)?;
-        table::FORCE_SCALING.check(self.force)?;
-        table::MOMENT_SCALING.check(self.moment)?;
+impl MapOptions {
+    /// Whether encoder and decoder are affine maps.
+    pub fn is_linear(&self) -> bool {
+        self.encoder_layers.is_empty() && self.decoder_layers.is_empty()
+    }
+
+    fn check(&self, latent_dim: usize) -> Result<(), TrainError> {
+        let each = [
+            ("encoder-layers", &self.encoder_layers, latent_dim.max(1)),
+            ("decoder-layers", &self.decoder_layers, 1),
+        ];
+        for (option, widths, least) in each {
+            let refused = |expected| TrainError::Option {
+                option,
+                found: format!("{widths:?}"),
+                expected,
+            };
+            if widths.len() >= MAX_LAYERS {
+                return Err(refused("at most 15 hidden layers"));
+            }
+            if widths.iter().any(|width| *width > MAX_LAYER_WIDTH) {
+                return Err(refused("layers of at most 1024 units"));
+            }
+            if widths.iter().any(|width| *width < least) {
+                return Err(refused("layers at least as wide as the latent space"));
+            }
+        }
         Ok(())
     }
 }
@@ -303,12 +340,9 @@ impl ScaleOptions {
 impl EncoderOptions {
     /// Weight of every coordinate in the reconstruction error, 18.
     pub fn coordinate_weights(&self) -> DVector<f64> {
-        DVector::from_fn(STATE_DIM, |i, _| {
-            if (BODY_X..=BODY_Z).contains(&i) {
-                self.body_weight
-            } else {
-                1.0
-            }
+        DVector::from_fn(STATE_DIM, |i, _| match (BODY_X..=BODY_Z).contains(&i) {
+            true => self.body_weight,
+            false => 1.0,
         })
     }
 }
@@ -324,6 +358,17 @@ impl Default for JointOptions {
             unroll: Unroll::default(),
             transfer: Transfer::Chosen,
             maps: MapOptions::default(),
+        }
+    }
+}
+
+impl Default for MapOptions {
+    /// Affine maps.
+    fn default() -> Self {
+        Self {
+            encoder_layers: Vec::new(),
+            decoder_layers: Vec::new(),
+            activation: Activation::Elu,
         }
     }
 }

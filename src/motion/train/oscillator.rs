@@ -5,9 +5,10 @@ use std::fmt::Display;
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 
-use nalgebra::{DMatrix, Vector2};
+use nalgebra::{DMatrix, DVector, Vector2};
 
 use super::dataset::{Dataset, Jump, Rates, ScaleOptions};
+use super::dynamics_fit::Fitted;
 use super::features::Features;
 use super::growth::Growth;
 use super::judge::Judge;
@@ -16,7 +17,7 @@ use super::latent::{EncodedSet, Latent};
 use super::options::TrainOptions;
 use super::progress::{Progress, Watch};
 use super::refine::Refiner;
-use crate::model::{Library, StandardLibrary};
+use crate::model::{AffineMap, Library, StandardLibrary};
 use crate::recording::{PhaseRule, shipped};
 use crate::robot::{InputRule, Robot, STATE_DIM, WrenchFrame};
 
@@ -102,6 +103,22 @@ pub(super) fn jumps(n_jumps: usize) -> (Dataset, Vec<Latent>) {
         files: None,
     };
     (dataset, latent)
+}
+
+/// Numbers with the linear encoder of these weights, and Xi of one phase.
+pub(super) fn fitted(weights: DMatrix<f64>, xi: DMatrix<f64>) -> Fitted {
+    let map = |w: DMatrix<f64>| {
+        let bias = DVector::zeros(w.nrows());
+        AffineMap::new("map", w, bias).expect("finite").into()
+    };
+    Fitted {
+        decoder: map(weights.transpose()),
+        encoder: map(weights.clone()),
+        weights,
+        xi: vec![xi],
+        choice: None,
+        score: 0.0,
+    }
 }
 
 /// What `work` makes of a refiner by three jumps of the known system, watched by nobody.

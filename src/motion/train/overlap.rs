@@ -105,36 +105,18 @@ fn renamed_terms(library: &Library, partner: &[usize]) -> Vec<Option<usize>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::AffineMap;
-    use crate::train::oscillator::standard_library;
-    use nalgebra::DVector;
-
-    fn fitted(weights: DMatrix<f64>, active: &[(usize, usize)], terms: usize) -> Fitted {
-        let mut xi = DMatrix::zeros(terms, 2);
-        for &(row, column) in active {
-            xi[(row, column)] = 1.0;
-        }
-        let map = |w: DMatrix<f64>| {
-            let bias = DVector::zeros(w.nrows());
-            AffineMap::new("encoder", w, bias).expect("finite")
-        };
-        Fitted {
-            decoder: map(weights.transpose()).into(),
-            encoder: map(weights.clone()).into(),
-            weights,
-            xi: vec![xi],
-            choice: None,
-            training: None,
-        }
-    }
+    use crate::train::oscillator::{fitted, standard_library};
 
     #[test]
     fn exchanged_coordinates_overlap_fully_and_other_terms_do_not() {
         let library = standard_library(2, 2, false);
         let with = |weights: &DMatrix<f64>, active: [(&str, usize); 3]| {
             let row = |text| library.terms().iter().position(|term| term.text() == text);
-            let active = active.map(|(text, column)| (row(text).expect(text), column));
-            fitted(weights.clone(), &active, library.len())
+            let mut xi = DMatrix::zeros(library.len(), 2);
+            for (text, column) in active {
+                xi[(row(text).expect(text), column)] = 1.0;
+            }
+            fitted(weights.clone(), xi)
         };
         let straight = DMatrix::from_row_slice(2, 3, &[1.0, 0.1, 0.0, 0.0, 1.0, 0.0]);
         let exchanged = DMatrix::from_row_slice(2, 3, &[0.0, -1.0, 0.0, 1.0, 0.2, 0.0]);

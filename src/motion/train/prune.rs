@@ -2,10 +2,8 @@
 
 use nalgebra::DMatrix;
 
-use super::growth::Growth;
-use super::judge::Judge;
 use super::progress::Watch;
-use super::refine::Coefficients;
+use super::select::{Fitted, Search};
 use super::sparse::Regression;
 
 /// Share of the score that a term must bring to be added.
@@ -18,73 +16,68 @@ const ROUNDS: usize = 3;
 /// A share of the energy, and the phase, row and column of the term that it belongs to.
 type Place = (f64, usize, usize, usize);
 
-/// Coefficients of all phases with the regressions that can fit them again.
-pub(super) struct Refined<'a> {
-    /// One per phase.
-    pub regressions: &'a [Regression],
-    /// Ridge of every fit.
-    pub ridge: f64,
-    /// What they keep to.
-    pub growth: &'a Growth,
-    /// What scores them.
-    pub judge: &'a Judge<'a>,
-    /// The coefficients.
-    pub now: Coefficients,
-}
-
-impl Refined<'_> {
+impl Search<'_> {
     /// Drops terms, the least useful to the regression first, fitting the rest of their equation again, as long as
     /// the score stays within `limit`. One attempt a term.
-    pub fn sweep(&mut self, limit: f64, watch: &mut Watch<'_>) {
-        let mut order = self.places(Regression::losses);
+    pub fn sweep(&self, fitted: &mut Fitted<'_>, limit: f64, watch: &mut Watch<'_>) {
+        let mut order = fitted.places(Regression::losses);
         order.sort_by(|a, b| a.0.total_cmp(&b.0));
         watch.stage("dropping terms that predictions do not miss", order.len());
         for (attempt, place) in order.into_iter().enumerate() {
             if watch.cancelled() {
                 return;
             }
-            self.attempt(place, false, limit);
-            watch.done(attempt + 1, format!("score {:.4}", self.now.score));
+            self.attempt(fitted, place, false, limit);
+            watch.done(attempt + 1, format!("score {:.4}", fitted.now.score));
         }
     }
 
     /// Adds terms, those that explain most of the accelerations first, fitting their equation again, wherever the score
     /// falls by [`LEAST_GAIN`] or more. Goes round [`ROUNDS`] times, as terms explain less once others are there.
-    pub fn grow(&mut self, watch: &mut Watch<'_>) {
+    pub fn grow(&self, fitted: &mut Fitted<'_>, watch: &mut Watch<'_>) {
         watch.stage("adding terms that predictions gain by", ROUNDS * ATTEMPTS);
         for round in 0..ROUNDS {
-            let before = self.now.score;
-            let mut order = self.places(Regression::gains);
+            let before = fitted.now.score;
+            let mut order = fitted.places(Regression::gains);
             order.sort_by(|a, b| b.0.total_cmp(&a.0));
             for (attempt, place) in order.into_iter().take(ATTEMPTS).enumerate() {
                 if watch.cancelled() {
                     return;
                 }
-                self.attempt(place, true, (1.0 - LEAST_GAIN) * self.now.score);
+                self.attempt(fitted, place, true, (1.0 - LEAST_GAIN) * fitted.now.score);
                 let done = round * ATTEMPTS + attempt + 1;
-                watch.done(done, format!("score {:.4}", self.now.score));
+                watch.done(done, format!("score {:.4}", fitted.now.score));
             }
-            if self.now.score == before {
+            if fitted.now.score == before {
                 return;
             }
         }
     }
 
     /// Fits the equation of a term with or without it, and keeps that if the score is at most `limit`.
-    fn attempt(&mut self, (_, phase, row, column): Place, active: bool, limit: f64) {
-        let mut support = self.now.xi[phase].map(|value| value != 0.0);
+    fn attempt(
+        &self,
+        fitted: &mut Fitted<'_>,
+        (_, phase, row, column): Place,
+        active: bool,
+        limit: f64,
+    ) {
+        let xi = &mut fitted.now.xi;
+        let mut support = xi[phase].map(|value| value != 0.0);
         support[(row, column)] = active;
-        let fitted = self.regressions[phase].fit_column(column, &support, self.ridge);
-        let before = self.now.xi[phase].column(column).into_owned();
-        self.now.xi[phase].set_column(column, &fitted);
-        let score = self.judge.score_within(&self.now.xi, limit);
-        if score <= limit && self.growth.admits(&self.now.xi) {
-            self.now.score = score;
+        let tried = fitted.regressions[phase].fit_column(column, &support, fitted.ridge);
+        let before = xi[phase].column(column).into_owned();
+        xi[phase].set_column(column, &tried);
+        let score = self.judge.score_within(xi, limit);
+        if score <= limit && self.growth.admits(xi) {
+            fitted.now.score = score;
         } else {
-            self.now.xi[phase].set_column(column, &before);
+            xi[phase].set_column(column, &before);
         }
     }
+}
 
+impl Fitted<'_> {
     /// What `shares` gives for each column of every phase.
     fn places(
         &self,

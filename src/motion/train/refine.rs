@@ -12,6 +12,7 @@ use super::judge::Judge;
 use super::knowledge::Knowledge;
 use super::progress::Watch;
 use super::rollout::Change;
+use super::sparse::active_terms;
 
 /// Weight of relative changes of the coefficients, against squared errors that start at 1 for both kinds of windows.
 pub(super) const PRIOR: f64 = 1e-3;
@@ -35,8 +36,24 @@ pub(super) struct Coefficients {
 }
 
 impl Coefficients {
-    pub(super) fn at(&self, (phase, term, column): Place) -> f64 {
-        self.xi[phase][(term, column)]
+    /// Coefficients that are not zero.
+    pub(super) fn active(&self) -> usize {
+        self.xi.iter().map(active_terms).sum()
+    }
+}
+
+/// Coefficients that may change, and their sizes, which changes are relative to.
+#[derive(Clone)]
+pub(super) struct Free {
+    pub places: Vec<Place>,
+    pub scales: Vec<f64>,
+}
+
+impl Free {
+    /// Place and size of every coefficient.
+    pub fn each(&self) -> impl Iterator<Item = (Place, f64)> {
+        let scales = self.scales.iter().copied();
+        self.places.iter().copied().zip(scales)
     }
 }
 
@@ -63,34 +80,35 @@ impl Refiner<'_> {
     /// scores best on the way. Which terms are active does not change, but for those that would drive where they may
     /// only brake, nor do coefficients that are known.
     pub fn refine(&self, start: Coefficients, steps: usize, watch: &mut Watch<'_>) -> Coefficients {
-        let places = self.free_places(&start.xi);
-        let Some(weights) = self.weights(&start.xi).filter(|_| !places.is_empty()) else {
+        let free = self.free(&start.xi);
+        let Some(weights) = self.weights(&start.xi).filter(|_| !free.places.is_empty()) else {
             return start;
         };
         watch.stage("refining coefficients by rollouts", steps);
-        self.descend(start, &places, weights, steps, watch)
+        self.descend(start, &free, weights, steps, watch)
     }
 
     /// Levenberg-Marquardt on relative changes; the coefficients that `judge` scores best.
     fn descend(
         &self,
         start: Coefficients,
-        places: &[Place],
+        free: &Free,
         weights: [f64; 2],
         steps: usize,
         watch: &mut Watch<'_>,
     ) -> Coefficients {
-        let scales = relative(&start, places);
+        let n = free.places.len();
         let moved = |xi: &[DMatrix<f64>]| {
-            let change =
-                |(at, scale): (&Place, &f64)| (xi[at.0][(at.1, at.2)] - start.at(*at)) / scale;
-            DVector::from_iterator(places.len(), places.iter().zip(&scales).map(change))
+            let change = |((phase, term, k), scale): (Place, f64)| {
+                (xi[phase][(term, k)] - start.xi[phase][(term, k)]) / scale
+            };
+            DVector::from_iterator(n, free.each().map(change))
         };
         let cost = |squared_error: f64, xi: &[DMatrix<f64>]| {
             squared_error + PRIOR * moved(xi).norm_squared()
         };
         let mut current = start.xi.clone();
-        self.admit(&mut current, (places, &scales), Clone::clone);
+        self.admit(&mut current, free, Clone::clone);
         let mut best = Coefficients {
             score: self.score(&current),
             xi: current.clone(),
@@ -100,25 +118,23 @@ impl Refiner<'_> {
             if watch.cancelled() {
                 break;
             }
-            let Some(model) = self.model(&current, places, &scales, weights) else {
+            let Some(model) = self.model(&current, free, weights) else {
                 break;
             };
             let before = cost(model.squared_error, &current);
             let gradient = &model.gradient + moved(&current) * PRIOR;
             let lower = (0..ATTEMPTS).find_map(|_| {
                 let mut system = model.gram.clone();
-                for i in 0..places.len() {
+                for i in 0..n {
                     system[(i, i)] += PRIOR + damping * model.gram[(i, i)];
                 }
                 let factor = system.cholesky()?;
                 let change = -factor.solve(&gradient);
                 let mut trial = current.clone();
-                for ((at, scale), change) in places.iter().zip(&scales).zip(change.iter()) {
-                    trial[at.0][(at.1, at.2)] += change * scale;
+                for (((phase, term, k), scale), change) in free.each().zip(change.iter()) {
+                    trial[phase][(term, k)] += change * scale;
                 }
-                self.admit(&mut trial, (places, &scales), |gradient| {
-                    factor.solve(gradient)
-                });
+                self.admit(&mut trial, free, |gradient| factor.solve(gradient));
                 let squared_error = self.squared_error(&trial, weights);
                 let after = squared_error.map_or(f64::INFINITY, |error| cost(error, &trial));
                 damping *= if after < before { 0.1 } else { 10.0 };
@@ -144,20 +160,20 @@ impl Refiner<'_> {
     }
 
     /// Moves coefficients to where they brake where they may only brake, and keep the bound on growth: the least, where
-    /// `inverse` applies that of the matrix which weighs relative changes of the coefficients at `places`.
+    /// `inverse` applies that of the matrix which weighs relative changes of the `free` coefficients.
     fn admit(
         &self,
         xi: &mut [DMatrix<f64>],
-        (places, scales): (&[Place], &[f64]),
+        free: &Free,
         inverse: impl Fn(&DVector<f64>) -> DVector<f64>,
     ) {
         self.growth.hold(xi, |gradient| {
-            let each = places.iter().zip(scales);
+            let relative = free.each();
             let relative =
-                each.map(|(&(phase, term, k), scale)| gradient[phase][(term, k)] * scale);
-            let change = inverse(&DVector::from_iterator(places.len(), relative));
+                relative.map(|((phase, term, k), scale)| gradient[phase][(term, k)] * scale);
+            let change = inverse(&DVector::from_iterator(free.places.len(), relative));
             let mut all: Vec<_> = gradient.iter().map(|each| each.map(|_| 0.0)).collect();
-            for ((&(phase, term, k), scale), change) in places.iter().zip(scales).zip(&change) {
+            for (((phase, term, k), scale), change) in free.each().zip(&change) {
                 all[phase][(term, k)] = change * scale;
             }
             all
@@ -217,24 +233,24 @@ impl Refiner<'_> {
     pub(super) fn model(
         &self,
         xi: &[DMatrix<f64>],
-        places: &[Place],
-        scales: &[f64],
+        free: &Free,
         weights: [f64; 2],
     ) -> Option<Model> {
+        let n = free.places.len();
         let mut model = Model {
             squared_error: 0.0,
-            gram: DMatrix::zeros(places.len(), places.len()),
-            gradient: DVector::zeros(places.len()),
+            gram: DMatrix::zeros(n, n),
+            gradient: DVector::zeros(n),
+        };
+        let change = |(place, scale)| Change {
+            place,
+            by: STEP * scale,
         };
         for part in self.training.parts() {
             let residual = self.residual(xi, weights, part)?;
-            let mut sensitivity = DMatrix::zeros(residual.len(), places.len());
-            for first in (0..places.len()).step_by(TOGETHER) {
-                let change = |(&place, scale): (&Place, &f64)| Change {
-                    place,
-                    by: STEP * scale,
-                };
-                let each = places.iter().zip(scales).skip(first).take(TOGETHER);
+            let mut sensitivity = DMatrix::zeros(residual.len(), n);
+            for first in (0..n).step_by(TOGETHER) {
+                let each = free.each().skip(first).take(TOGETHER);
                 let changes: Vec<_> = each.map(change).collect();
                 let moved = self.training.errors_changed(xi, &changes, part)?;
                 for (column, moved) in (first..).zip(&moved) {
@@ -250,18 +266,18 @@ impl Refiner<'_> {
     }
 
     /// Every coefficient that may change.
-    pub(super) fn free_places(&self, xi: &[DMatrix<f64>]) -> Vec<Place> {
-        let mut places = Vec::new();
+    pub(super) fn free(&self, xi: &[DMatrix<f64>]) -> Free {
+        let (mut places, mut scales) = (Vec::new(), Vec::new());
         for (phase, (xi, knowledge)) in xi.iter().zip(self.knowledge).enumerate() {
-            for column in 0..xi.ncols() {
-                for row in 0..xi.nrows() {
-                    if xi[(row, column)] != 0.0 && knowledge.free[(row, column)] {
-                        places.push((phase, row, column));
-                    }
+            for (index, (value, free)) in xi.iter().zip(knowledge.free.iter()).enumerate() {
+                if *value != 0.0 && *free {
+                    let (term, column) = xi.vector_to_matrix_index(index);
+                    places.push((phase, term, column));
+                    scales.push(value.abs());
                 }
             }
         }
-        places
+        Free { places, scales }
     }
 }
 
@@ -283,11 +299,6 @@ fn add_gram(gram: &mut DMatrix<f64>, a: &DMatrix<f64>) {
             }
         }
     }
-}
-
-/// Sizes of the coefficients, which relative changes are relative to.
-pub(super) fn relative(coefficients: &Coefficients, places: &[Place]) -> Vec<f64> {
-    places.iter().map(|&at| coefficients.at(at).abs()).collect()
 }
 
 #[cfg(test)]

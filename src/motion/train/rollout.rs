@@ -4,7 +4,7 @@ use std::cmp::Reverse;
 
 use nalgebra::DMatrix;
 
-use super::dataset::{Dataset, Jump};
+use super::dataset::Dataset;
 use super::features::Features;
 use super::latent::EncodedSet;
 use super::stepper::{Row, Stepper};
@@ -39,13 +39,13 @@ pub struct Window {
     pub steps: usize,
 }
 
-/// The windows between restarts every `duration_s` of every jump ([`restart_windows`]), each up to the sample that the
-/// next one starts from.
-pub fn restarted(dataset: &Dataset, duration_s: f64) -> Vec<Window> {
+/// The windows between restarts of every jump ([`restart_windows`]), each up to the sample that the next one starts
+/// from.
+pub fn windows(dataset: &Dataset, restart: Restart) -> Vec<Window> {
     let mut windows = Vec::new();
     for (jump, samples) in dataset.jumps.iter().enumerate() {
-        for window in restart_windows(&samples.time_s, Restart::Every(duration_s)) {
-            let (start, last) = (window.start, window.end.min(samples.len() - 1));
+        for window in restart_windows(&samples.time_s, restart) {
+            let (start, last) = (window.start, window.end.min(samples.time_s.len() - 1));
             if last > start {
                 let steps = last - start;
                 windows.push(Window { jump, start, steps });
@@ -53,17 +53,6 @@ pub fn restarted(dataset: &Dataset, duration_s: f64) -> Vec<Window> {
         }
     }
     windows
-}
-
-/// One window a jump, from its first to its last sample.
-pub fn whole(dataset: &Dataset) -> Vec<Window> {
-    let jumps = dataset.jumps.iter().enumerate();
-    let of = |(jump, samples): (usize, &Jump)| Window {
-        jump,
-        start: 0,
-        steps: samples.len() - 1,
-    };
-    jumps.map(of).collect()
 }
 
 /// Latent positions predicted in every window, `latent_dim x steps` (samples `start + 1 ..= start + steps`).
@@ -92,7 +81,7 @@ pub fn predict(
         stepper.keep(going);
         stepper.advance(step);
         for (row, &window) in order[..going].iter().enumerate() {
-            write(&mut predictions[window], step, stepper.position(row));
+            stepper.write(row, &mut predictions[window], step);
         }
     }
     predictions
@@ -133,16 +122,10 @@ pub fn predict_changed(
         }
         stepper.advance(step);
         for (prediction, row) in predictions.iter_mut().zip(&rows) {
-            write(prediction, step, stepper.position(*row));
+            stepper.write(*row, prediction, step);
         }
     }
     predictions
-}
-
-fn write(prediction: &mut DMatrix<f64>, step: usize, position: impl Iterator<Item = f64>) {
-    for (i, z) in position.enumerate() {
-        prediction[(i, step)] = z;
-    }
 }
 
 #[cfg(test)]
@@ -159,7 +142,8 @@ mod tests {
         let (dataset, latent) = oscillator::jumps(2);
         let (features, xi) = oscillator::known();
         let set = EncodedSet::new(&dataset, &latent);
-        for windows in [whole(&dataset), restarted(&dataset, 0.1)] {
+        for restart in [Restart::Never, Restart::Every(0.1)] {
+            let windows = windows(&dataset, restart);
             let predictions = predict(of(&features, &xi), set, &windows);
             for (window, prediction) in windows.iter().zip(predictions) {
                 let z = &latent[window.jump].z;
@@ -172,7 +156,7 @@ mod tests {
     #[test]
     fn restarted_windows_cover_every_sample_once() {
         let (dataset, _) = oscillator::jumps(1);
-        let windows = restarted(&dataset, 0.1);
+        let windows = windows(&dataset, Restart::Every(0.1));
         let places = windows.iter().map(|window| (window.start, window.steps));
         assert!(places.eq([(0, 50), (50, 50), (100, 50), (150, 49)]));
     }
@@ -227,7 +211,7 @@ mod tests {
         let (features, mut xi) = oscillator::known();
         xi[0][(1, 0)] = 1e7;
         let set = EncodedSet::new(&dataset, &latent);
-        let predictions = predict(of(&features, &xi), set, &whole(&dataset));
+        let predictions = predict(of(&features, &xi), set, &windows(&dataset, Restart::Never));
         assert!(!predictions[0].iter().all(|value| value.is_finite()));
     }
 }

@@ -6,11 +6,15 @@ use super::assemble::{Origin, provenance};
 use super::dynamics_fit::Fitted;
 use super::error::TrainError;
 use super::jumps::learn_jumps;
+use super::latent::{EncodedSet, Latent};
 use super::overlap::support_overlap;
 use super::progress::Watch;
 use super::report::{SeedReport, Trained};
 use super::task::Task;
 use crate::model::{Library, ModelError};
+
+/// What a seed came to and its numbers, or why it has none.
+pub(super) type Outcome = Result<(SeedReport, Fitted), TrainError>;
 
 /// Outcomes of the seeds so far.
 #[derive(Default)]
@@ -28,7 +32,7 @@ impl Seeds {
     pub fn add(
         &mut self,
         seed: u64,
-        outcome: Result<(SeedReport, Fitted), TrainError>,
+        outcome: Outcome,
         watch: &mut Watch<'_>,
     ) -> Result<(), TrainError> {
         match outcome.and_then(with_finite_coefficients) {
@@ -54,25 +58,22 @@ impl Seeds {
         origin: &Origin,
     ) -> Result<Trained, TrainError> {
         let (best, reports, overlap) = self.best(&task.library, &task.moments.state)?;
-        let mut report = task.report(&best)?;
+        let latent = Latent::of(&task.training, &best.encoder)?;
+        let set = EncodedSet::new(&task.training, &latent);
+        let mut report = task.report(&best, set, &reports[0].judged)?;
         // A single seed without losses has nothing that the report does not say.
         if reports.len() > 1 || reports[0].losses.is_some() {
             (report.seeds, report.support_overlap) = (reports, overlap);
         }
-        let jumps = learn_jumps(&task.training, &best.encoder)?.map(|learned| {
-            report.deviations = learned.scores;
-            learned.prior
-        });
+        let (jumps, deviations) = learn_jumps(set, &best.encoder)?;
+        report.deviations = deviations;
         let provenance = provenance(task.options, method, origin, &report);
-        let model = task.assemble(best, jumps, provenance)?;
+        let model = task.assemble(best, set, jumps, provenance)?;
         Ok(Trained { model, report })
     }
 
     /// The seed of least score, the reports of all that have a model, best first, and the overlap of their supports;
     /// `state_covariance` (18 x 18) is that of the training states in scaled units.
-    ///
-    /// # Errors
-    /// The first seed's if none has a model, [`TrainError::Cancelled`] if none was begun.
     fn best(
         mut self,
         library: &Library,
@@ -91,19 +92,16 @@ impl Seeds {
 }
 
 /// Refuses coefficients that a descent has left infinite; a score that is not a number is the worst.
-fn with_finite_coefficients(
-    (mut report, fitted): (SeedReport, Fitted),
-) -> Result<(SeedReport, Fitted), TrainError> {
+fn with_finite_coefficients((mut report, fitted): (SeedReport, Fitted)) -> Outcome {
     for xi in &fitted.xi {
-        for column in 0..xi.ncols() {
-            if let Some(row) = (0..xi.nrows()).find(|&row| !xi[(row, column)].is_finite()) {
-                return Err(TrainError::Model(ModelError::NonFinite {
-                    tensor: "xi".to_owned(),
-                    row,
-                    column,
-                    found: xi[(row, column)],
-                }));
-            }
+        if let Some(index) = xi.iter().position(|value| !value.is_finite()) {
+            let (row, column) = xi.vector_to_matrix_index(index);
+            return Err(TrainError::Model(ModelError::NonFinite {
+                tensor: "xi".to_owned(),
+                row,
+                column,
+                found: xi[index],
+            }));
         }
     }
     if report.score.is_nan() {
@@ -118,7 +116,7 @@ fn is_of_one_seed(error: &TrainError) -> bool {
         TrainError::NoStableModel { .. } | TrainError::TermValue { .. } | TrainError::Model(_) => {
             true
         }
-        TrainError::NoRecording { .. }
+        TrainError::NoRecording
         | TrainError::Split { .. }
         | TrainError::TooFewSamples { .. }
         | TrainError::PhaseSamples { .. }
@@ -126,8 +124,7 @@ fn is_of_one_seed(error: &TrainError) -> bool {
         | TrainError::Option { .. }
         | TrainError::Range(_)
         | TrainError::Cancelled
-        | TrainError::Recording(_)
-        | TrainError::Robot(_) => false,
+        | TrainError::Recording(_) => false,
     }
 }
 
@@ -136,45 +133,24 @@ mod tests {
     use std::sync::atomic::AtomicBool;
 
     use super::*;
-    use crate::model::AffineMap;
     use crate::train::metrics::SetMetrics;
-    use crate::train::oscillator::standard_library;
+    use crate::train::oscillator::{fitted, standard_library};
     use crate::train::progress::Progress;
 
-    fn outcome(score: f64, coefficient: f64) -> Result<(SeedReport, Fitted), TrainError> {
-        let map = |name: &'static str| {
-            AffineMap::new(name, DMatrix::identity(2, 2), nalgebra::DVector::zeros(2))
-        };
+    fn outcome(score: f64, coefficient: f64) -> Outcome {
         let report = SeedReport {
             seed: 1,
             score,
             losses: None,
             active: 1,
             dominant: Vec::new(),
-            judged: SetMetrics {
-                decoder_mse: 0.0,
-                ddz_r2: Vec::new(),
-                torque_r2: 1.0,
-                prediction_x_m: 0.0,
-                prediction_z_m: 0.0,
-                rollout_x_m: None,
-                rollout_z_m: None,
-            },
+            judged: SetMetrics::default(),
         };
-        let fitted = Fitted {
-            encoder: map("encoder")?.into(),
-            decoder: map("decoder")?.into(),
-            weights: DMatrix::identity(2, 2),
-            xi: vec![DMatrix::from_element(7, 2, coefficient)],
-            choice: None,
-            training: None,
-        };
-        Ok((report, fitted))
+        let xi = DMatrix::from_element(7, 2, coefficient);
+        Ok((report, fitted(DMatrix::identity(2, 2), xi)))
     }
 
-    fn reports(
-        outcomes: Vec<Result<(SeedReport, Fitted), TrainError>>,
-    ) -> Result<Vec<SeedReport>, TrainError> {
+    fn reports(outcomes: Vec<Outcome>) -> Result<Vec<SeedReport>, TrainError> {
         let (cancel, mut listener) = (AtomicBool::new(false), |_: Progress| ());
         let mut watch = Watch::new(&mut listener, &cancel);
         let mut seeds = Seeds::default();
@@ -185,7 +161,7 @@ mod tests {
         Ok(best.1)
     }
 
-    fn unstable(candidates: usize) -> Result<(SeedReport, Fitted), TrainError> {
+    fn unstable(candidates: usize) -> Outcome {
         Err(TrainError::NoStableModel { candidates })
     }
 
@@ -205,11 +181,9 @@ mod tests {
 
     #[test]
     fn seeds_all_without_a_model_give_the_first_error() {
-        let error = reports(vec![unstable(9), outcome(1.0, f64::INFINITY)]).err();
-        assert!(
-            matches!(error, Some(TrainError::NoStableModel { candidates: 9 })),
-            "{error:?}"
-        );
+        let found = reports(vec![unstable(9), outcome(1.0, f64::INFINITY)]);
+        let first = matches!(found, Err(TrainError::NoStableModel { candidates: 9 }));
+        assert!(first, "{found:?}");
     }
 
     #[test]
@@ -218,10 +192,10 @@ mod tests {
             requested: 9,
             active: 3,
         };
-        let error = reports(vec![outcome(1.0, 1.0), Err(dimension)]).err();
+        let found = reports(vec![outcome(1.0, 1.0), Err(dimension)]);
         assert!(
-            matches!(error, Some(TrainError::LatentDim { .. })),
-            "{error:?}"
+            matches!(found, Err(TrainError::LatentDim { .. })),
+            "{found:?}"
         );
     }
 }

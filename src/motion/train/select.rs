@@ -1,20 +1,20 @@
 //! Choosing Xi: many candidates, judged by what their rollouts predict on jumps that were not fitted.
 
+use std::collections::BTreeSet;
+
 use nalgebra::DMatrix;
 use serde::Serialize;
 
 use super::error::TrainError;
-use super::features::Features;
 use super::growth::Growth;
 use super::judge::Judge;
 use super::knowledge::Knowledge;
 use super::latent::EncodedSet;
 use super::options::RegressionOptions;
 use super::progress::Watch;
-use super::prune::Refined;
 use super::refine::{Coefficients, Refiner};
-use super::sparse::{Pruning, Regression, active_terms};
-use super::weak_form::{check_terms, windowed_samples};
+use super::sparse::{Pruning, Regression};
+use super::weak_form::windowed_samples;
 
 /// Windows (samples) over which the dynamics are integrated before regression; 0 means the accelerations.
 const WINDOWS: [usize; 3] = [0, 25, 50];
@@ -52,179 +52,141 @@ pub struct Choice {
     pub active: usize,
 }
 
-/// Xi of every phase, and the choice that made it.
-#[derive(Clone, Debug)]
-pub struct Selected {
-    /// `library_dim x latent_dim` for each phase.
-    pub xi: Vec<DMatrix<f64>>,
-    /// The settings chosen.
-    pub choice: Choice,
-    /// How many candidates were tried.
-    pub candidates: usize,
-}
-
-/// What the dynamics are fitted to.
-#[derive(Clone, Copy, Debug)]
-pub struct Target<'a> {
-    /// Jumps to fit.
-    pub set: EncodedSet<'a>,
-    /// The library.
-    pub features: &'a Features,
-    /// What is known of each phase.
-    pub knowledge: &'a [Knowledge],
-}
-
 /// Fits all combinations of windows, ridges and prunings and takes, among those within the slack of the best, the
-/// sparsest.
+/// sparsest: Xi of every phase (`library_dim x latent_dim`), what it was fitted with, and how many candidates there were.
 ///
-/// The best by `judge` sets the scale: from there on errors are relative to its own.
+/// Fits the jumps of `set` with what is known of each phase, for the library of `judge`. The best by `judge` sets the scale: from there on errors are relative to its own.
 ///
 /// # Errors
-/// [`TrainError::TermValue`] for a term without a finite value at a sample,
 /// [`TrainError::NoStableModel`] if every candidate diverges. If cancelled, the search ends as soon as one does not.
 pub fn select(
-    target: Target<'_>,
+    set: EncodedSet<'_>,
+    knowledge: &[Knowledge],
     judge: &Judge<'_>,
     options: &RegressionOptions,
     watch: &mut Watch<'_>,
-) -> Result<Selected, TrainError> {
-    let regressions = regressions(target)?;
-    let growth = &Growth::of_jumps(options.growth_per_s, target.set, target.features);
-    let attempt = Attempt {
-        regressions: &regressions,
-        growth,
-        judge,
-    };
-    let mut tried = attempt.all(watch);
-    let candidates = tried.len();
-    let reference = best_of(&tried)?.xi.clone();
-    let training = Judge::new(target.features, target.set).relative_to(&reference);
-    let relative = judge.relative_to(&reference);
-    for fitted in tried.iter_mut().filter(|fitted| fitted.is_stable()) {
-        fitted.choice.score = relative.score(&fitted.xi);
-    }
-    let limit = (1.0 + options.slack) * best_of(&tried)?.choice.score;
-    let refiner = Refiner {
-        knowledge: target.knowledge,
-        growth,
-        training: &training,
-        judge: &relative,
-    };
-    let mut refined = Vec::new();
-    for start in starts(tried, limit) {
-        let Fitted {
-            mut xi,
-            choice,
-            window,
-        } = start;
-        hold(growth, &regressions[window], choice.ridge, &mut xi);
-        let mut pruned = Refined {
-            regressions: &regressions[window],
-            ridge: choice.ridge,
-            growth,
-            judge: &relative,
-            now: Coefficients {
-                score: relative.score(&xi),
-                xi,
-            },
-        };
-        pruned.sweep(limit, watch);
-        let end = refiner.refine(pruned.now, options.refinements, watch);
-        refined.push(Fitted::of(end, &choice, window));
-    }
-    let best = best_of(&refined)?;
-    let limit = (1.0 + options.slack) * best.choice.score;
-    if options.refinements > 0 {
-        let thinned = refiner.thin(best.coefficients(), limit, watch);
-        let thinned = Fitted::of(thinned, &best.choice, best.window);
-        refined.push(thinned);
-    }
-    let all = refined.into_iter();
-    let within = all.filter(|fitted| fitted.choice.score <= limit);
-    let sparsest = within.min_by_key(|fitted| fitted.choice.active);
-    let Fitted { xi, mut choice, .. } = sparsest.ok_or(TrainError::NoStableModel { candidates })?;
-    choice.score = judge.score(&xi);
-    Ok(Selected {
-        xi,
-        choice,
-        candidates,
-    })
-}
-
-/// Changes the coefficients of regressions until their growth keeps the bound, the least as their normal equations weigh
-/// it.
-fn hold(growth: &Growth, regressions: &[Regression], ridge: f64, xi: &mut [DMatrix<f64>]) {
-    let before = xi.to_vec();
-    growth.hold(xi, |gradient| {
-        let each = regressions.iter().zip(&before).zip(gradient);
-        each.map(|((regression, xi), gradient)| regression.change(xi, gradient, ridge))
-            .collect()
-    });
-}
-
-/// For every window the regression of every phase.
-fn regressions(target: Target<'_>) -> Result<[Vec<Regression>; WINDOWS.len()], TrainError> {
-    let (set, features) = (target.set, target.features);
-    check_terms(set, features)?;
-    Ok(WINDOWS.map(|window| {
+) -> Result<(Vec<DMatrix<f64>>, Choice, usize), TrainError> {
+    let features = judge.features;
+    let regressions = &WINDOWS.map(|window| {
         let of_phase = |(phase, knowledge): (usize, &Knowledge)| {
             let (theta, ddz) = windowed_samples(set, features, phase, window);
             Regression::new(&theta, &ddz, knowledge.clone())
         };
-        target.knowledge.iter().enumerate().map(of_phase).collect()
-    }))
+        knowledge.iter().enumerate().map(of_phase).collect()
+    });
+    let growth = &Growth::of_jumps(options.growth_per_s, set, features);
+    let search = Search {
+        regressions,
+        growth,
+        judge,
+    };
+    let mut tried = search.all(watch);
+    let candidates = tried.len();
+    let reference = best_of(&tried)?.now.xi.clone();
+    let training = Judge::new(features, set).relative_to(&reference);
+    let relative = &judge.relative_to(&reference);
+    for fitted in tried.iter_mut().filter(|fitted| fitted.is_stable()) {
+        fitted.score_by(relative);
+    }
+    let limit = (1.0 + options.slack) * best_of(&tried)?.now.score;
+    let search = Search {
+        judge: relative,
+        ..search
+    };
+    let refiner = Refiner {
+        knowledge,
+        growth,
+        training: &training,
+        judge: relative,
+    };
+    let mut refined = Vec::new();
+    for mut fitted in starts(tried, limit) {
+        fitted.hold(growth);
+        fitted.score_by(relative);
+        search.sweep(&mut fitted, limit, watch);
+        fitted.now = refiner.refine(fitted.now, options.refinements, watch);
+        refined.push(fitted);
+    }
+    let best = best_of(&refined)?;
+    let limit = (1.0 + options.slack) * best.now.score;
+    if options.refinements > 0 {
+        let mut thinned = best.clone();
+        thinned.now = refiner.thin(thinned.now, limit, watch);
+        refined.push(thinned);
+    }
+    let all = refined.into_iter();
+    let within = all.filter(|fitted| fitted.now.score <= limit);
+    let sparsest = within.min_by_key(|fitted| fitted.now.active());
+    let mut chosen = sparsest.ok_or(TrainError::NoStableModel { candidates })?;
+    chosen.score_by(judge);
+    let choice = Choice {
+        window: chosen.window,
+        ridge: chosen.ridge,
+        pruning: chosen.pruning,
+        score: chosen.now.score,
+        active: chosen.now.active(),
+    };
+    Ok((chosen.now.xi, choice, candidates))
 }
 
 /// A candidate that was fitted and judged.
-struct Fitted {
-    xi: Vec<DMatrix<f64>>,
-    choice: Choice,
-    window: usize, // index into the windows
+#[derive(Clone)]
+pub(super) struct Fitted<'a> {
+    pub now: Coefficients,
+    /// What it was fitted by, one a phase.
+    pub regressions: &'a [Regression],
+    pub ridge: f64,
+    window: usize,
+    pruning: Pruning,
 }
 
-impl Fitted {
-    /// Coefficients that began as a candidate's.
-    fn of(Coefficients { xi, score }: Coefficients, began: &Choice, window: usize) -> Self {
-        let choice = Choice {
-            score,
-            active: xi.iter().map(active_terms).sum(),
-            ..began.clone()
-        };
-        Self { xi, choice, window }
-    }
-
+impl Fitted<'_> {
     /// Whether its rollouts stay finite.
     fn is_stable(&self) -> bool {
-        self.choice.score.is_finite()
+        self.now.score.is_finite()
     }
 
-    fn coefficients(&self) -> Coefficients {
-        Coefficients {
-            xi: self.xi.clone(),
-            score: self.choice.score,
-        }
+    fn score_by(&mut self, judge: &Judge<'_>) {
+        self.now.score = judge.score(&self.now.xi);
+    }
+
+    /// Changes the coefficients until their growth keeps the bound, the least as the normal equations weigh it.
+    fn hold(&mut self, growth: &Growth) {
+        let before = self.now.xi.clone();
+        growth.hold(&mut self.now.xi, |gradient| {
+            let each = self.regressions.iter().zip(&before).zip(gradient);
+            each.map(|((regression, xi), gradient)| regression.change(xi, gradient, self.ridge))
+                .collect()
+        });
     }
 }
 
 /// What candidates are fitted from and judged by.
-struct Attempt<'a> {
-    regressions: &'a [Vec<Regression>],
-    growth: &'a Growth,
-    judge: &'a Judge<'a>,
+#[derive(Clone, Copy)]
+pub(super) struct Search<'a> {
+    /// Of every window, one a phase.
+    regressions: &'a [Vec<Regression>; WINDOWS.len()],
+    /// What candidates keep to.
+    pub growth: &'a Growth,
+    pub judge: &'a Judge<'a>,
 }
 
-impl Attempt<'_> {
+impl<'a> Search<'a> {
     /// Every combination of windows, ridges and prunings; where the library has terms that are not affine, also those without them, and
     /// the best of these grown by such terms: rollouts of full libraries diverge more often than not.
-    fn all(&self, watch: &mut Watch<'_>) -> Vec<Fitted> {
+    fn all(&self, watch: &mut Watch<'_>) -> Vec<Fitted<'a>> {
         let affine = self.judge.features.affine_terms();
         let has_nonlinear = affine.contains(&false);
         // The affine terms are still to come where full libraries diverge.
-        let enough = |tried: &[Fitted]| any_stable(tried) || (has_nonlinear && !tried.is_empty());
+        let enough =
+            |tried: &[Fitted<'_>]| any_stable(tried) || (has_nonlinear && !tried.is_empty());
         let mut tried = self.fit_all(&vec![true; affine.len()], enough, watch);
         if has_nonlinear && !(watch.cancelled() && any_stable(&tried)) {
             let tame = self.fit_all(&affine, any_stable, watch);
-            let grown = self.grown(&tame, watch);
+            let mut grown = best_of(&tame).ok().cloned();
+            if let Some(grown) = &mut grown {
+                self.grow(grown, watch);
+            }
             tried.extend(tame);
             tried.extend(grown);
         }
@@ -236,67 +198,53 @@ impl Attempt<'_> {
     fn fit_all(
         &self,
         allowed: &[bool],
-        enough: impl Fn(&[Fitted]) -> bool,
+        enough: impl Fn(&[Fitted<'_>]) -> bool,
         watch: &mut Watch<'_>,
-    ) -> Vec<Fitted> {
+    ) -> Vec<Fitted<'a>> {
         let mut tried = Vec::new();
         let steps = WINDOWS.len() * RIDGES.len() * PRUNINGS.len();
         watch.stage("fitting the dynamics", steps);
-        for (window, phases) in self.regressions.iter().enumerate() {
+        for (window, regressions) in WINDOWS.into_iter().zip(self.regressions) {
             for ridge in RIDGES {
                 if watch.cancelled() && enough(&tried) {
                     return tried;
                 }
-                let each = phases.iter();
+                let each = regressions.iter();
                 let fits = each.map(|regression| regression.fit_each(ridge, &PRUNINGS, allowed));
                 let fits: Vec<Vec<DMatrix<f64>>> = fits.collect();
                 for (number, pruning) in PRUNINGS.into_iter().enumerate() {
-                    let mut xi: Vec<_> = fits.iter().map(|phase| phase[number].clone()).collect();
-                    let mut score = self.judge.score(&xi);
-                    if score.is_infinite() {
-                        hold(self.growth, phases, ridge, &mut xi);
-                        score = self.judge.score(&xi);
-                    }
-                    let active = xi.iter().map(active_terms).sum();
-                    watch.done(tried.len() + 1, format!("{active} terms, score {score:.4}"));
-                    let choice = Choice {
-                        window: WINDOWS[window],
+                    let xi: Vec<_> = fits.iter().map(|phase| phase[number].clone()).collect();
+                    let score = self.judge.score(&xi);
+                    let mut fitted = Fitted {
+                        now: Coefficients { xi, score },
+                        regressions,
                         ridge,
+                        window,
                         pruning,
-                        score,
-                        active,
                     };
-                    tried.push(Fitted { xi, choice, window });
+                    if !fitted.is_stable() {
+                        fitted.hold(self.growth);
+                        fitted.score_by(self.judge);
+                    }
+                    let (active, score) = (fitted.now.active(), fitted.now.score);
+                    watch.done(tried.len() + 1, format!("{active} terms, score {score:.4}"));
+                    tried.push(fitted);
                 }
             }
         }
         tried
     }
-
-    /// The best of these with terms added that its predictions gain by; none if they all diverge.
-    fn grown(&self, tame: &[Fitted], watch: &mut Watch<'_>) -> Option<Fitted> {
-        let best = best_of(tame).ok()?;
-        let mut refined = Refined {
-            regressions: &self.regressions[best.window],
-            ridge: best.choice.ridge,
-            growth: self.growth,
-            judge: self.judge,
-            now: best.coefficients(),
-        };
-        refined.grow(watch);
-        Some(Fitted::of(refined.now, &best.choice, best.window))
-    }
 }
 
 /// Whether the rollouts of a candidate stay finite.
-fn any_stable(tried: &[Fitted]) -> bool {
+fn any_stable(tried: &[Fitted<'_>]) -> bool {
     tried.iter().any(Fitted::is_stable)
 }
 
 /// The candidate with the best score.
-fn best_of(tried: &[Fitted]) -> Result<&Fitted, TrainError> {
+fn best_of<'t, 'a>(tried: &'t [Fitted<'a>]) -> Result<&'t Fitted<'a>, TrainError> {
     let best = (tried.iter().filter(|fitted| fitted.is_stable()))
-        .min_by(|a, b| a.choice.score.total_cmp(&b.choice.score));
+        .min_by(|a, b| a.now.score.total_cmp(&b.now.score));
     best.ok_or(TrainError::NoStableModel {
         candidates: tried.len(),
     })
@@ -304,16 +252,11 @@ fn best_of(tried: &[Fitted]) -> Result<&Fitted, TrainError> {
 
 /// Candidates to prune and refine, at most [`SWEEPS`]: of every window the one with the best score, then all others
 /// within the limit, best first.
-fn starts(mut tried: Vec<Fitted>, limit: f64) -> impl Iterator<Item = Fitted> {
-    tried.retain(|fitted| fitted.choice.score <= limit);
-    tried.sort_by(|a, b| a.choice.score.total_cmp(&b.choice.score));
-    let mut seen = [false; WINDOWS.len()];
-    let ranked = tried.into_iter().map(|fitted| {
-        let is_later = std::mem::replace(&mut seen[fitted.window], true);
-        (is_later, fitted)
-    });
-    let mut ranked: Vec<(bool, Fitted)> = ranked.collect();
-    ranked.sort_by_key(|(is_later, _)| *is_later);
-    let first = ranked.into_iter().take(SWEEPS);
-    first.map(|(_, fitted)| fitted)
+fn starts<'a>(mut tried: Vec<Fitted<'a>>, limit: f64) -> impl Iterator<Item = Fitted<'a>> {
+    tried.retain(|fitted| fitted.now.score <= limit);
+    tried.sort_by(|a, b| a.now.score.total_cmp(&b.now.score));
+    let mut seen = BTreeSet::new();
+    let (first, later): (Vec<_>, Vec<_>) =
+        (tried.into_iter()).partition(|fitted| seen.insert(fitted.window));
+    first.into_iter().chain(later).take(SWEEPS)
 }

@@ -59,28 +59,11 @@ impl Regression {
         }
     }
 
-    /// Terms in the library.
-    pub fn library_dim(&self) -> usize {
-        self.gram.nrows()
-    }
-
-    /// Latent coordinates.
-    pub fn latent_dim(&self) -> usize {
-        self.correlation.ncols()
-    }
-
-    /// Coefficients `Xi` (`library_dim x latent_dim`) by ridge regression on the normalised columns, pruned.
+    /// Coefficients `Xi` (`library_dim x latent_dim`) of the terms that are `allowed`, by ridge regression on the
+    /// normalised columns, with each of the `prunings`.
     ///
     /// Contributions, not bare coefficients, decide (STLSQ of Brunton et al. 2016 otherwise), so that the units of a
-    /// term do not matter.
-    pub fn fit(&self, ridge: f64, pruning: Pruning) -> DMatrix<f64> {
-        let all = vec![true; self.library_dim()];
-        self.fit_each(ridge, &[pruning], &all).remove(0)
-    }
-
-    /// The same for several prunings, of the terms that are `allowed`.
-    ///
-    /// Eliminations drop terms in one and the same order, which is walked once for all of them.
+    /// term do not matter. Eliminations drop terms in one and the same order, which is walked once for all of them.
     pub fn fit_each(
         &self,
         ridge: f64,
@@ -88,7 +71,7 @@ impl Regression {
         allowed: &[bool],
     ) -> Vec<DMatrix<f64>> {
         let mut fits = vec![self.knowledge.known.clone(); prunings.len()];
-        for column in (0..self.latent_dim()).filter(|&column| self.target_rms[column] > 0.0) {
+        for column in (0..self.target_rms.len()).filter(|&column| self.target_rms[column] > 0.0) {
             let informative: Vec<usize> = (self.free_terms(column))
                 .filter(|&i| self.theta_rms[i] > 0.0 && allowed[i])
                 .collect();
@@ -123,20 +106,15 @@ impl Regression {
         least: f64,
     ) -> Vec<usize> {
         loop {
-            let solution = self.solve(column, &support, ridge);
-            let kept: Vec<usize> = support
-                .iter()
-                .zip(solution.iter())
-                .filter(|&(&i, value)| {
-                    self.knowledge.kept[(i, column)]
-                        || value.abs() >= least * self.target_rms[column]
-                })
-                .map(|(&i, _)| i)
-                .collect();
-            if kept.len() == support.len() {
+            let (solution, before) = (self.solve(column, &support, ridge), support.len());
+            let mut values = solution.iter();
+            support.retain(|&i| {
+                let weighs = |value: &f64| value.abs() >= least * self.target_rms[column];
+                values.next().is_some_and(weighs) || self.knowledge.kept[(i, column)]
+            });
+            if support.len() == before {
                 return support;
             }
-            support = kept;
         }
     }
 
@@ -247,7 +225,7 @@ impl Regression {
 
     /// Terms whose coefficient in a column is not known.
     fn free_terms(&self, column: usize) -> impl Iterator<Item = usize> {
-        (0..self.library_dim()).filter(move |&i| self.knowledge.free[(i, column)])
+        (0..self.theta_rms.len()).filter(move |&i| self.knowledge.free[(i, column)])
     }
 
     /// Those of them that are active in a support.
@@ -337,6 +315,14 @@ fn column_rms(matrix: &DMatrix<f64>) -> DVector<f64> {
 mod tests {
     use super::*;
     use crate::train::random::Random;
+
+    impl Regression {
+        /// With one pruning of all terms.
+        pub fn fit(&self, ridge: f64, pruning: Pruning) -> DMatrix<f64> {
+            let all = vec![true; self.theta_rms.len()];
+            self.fit_each(ridge, &[pruning], &all).remove(0)
+        }
+    }
 
     fn unconstrained(theta: &DMatrix<f64>, target: &DMatrix<f64>) -> Regression {
         let nothing = Knowledge::nothing(theta.ncols(), target.ncols());

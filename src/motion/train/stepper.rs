@@ -105,10 +105,11 @@ impl<'a> Stepper<'a> {
         self.rates = std::array::from_fn(|_| DMatrix::zeros(n, 2 * d));
     }
 
-    /// Latent position of a row.
-    pub fn position(&self, row: usize) -> impl Iterator<Item = f64> {
-        let d = self.candidate.features.latent_dim();
-        (0..d).map(move |i| self.state[(row, i)])
+    /// Writes the latent position of a row into a column of a prediction.
+    pub fn write(&self, row: usize, prediction: &mut DMatrix<f64>, column: usize) {
+        for i in 0..prediction.nrows() {
+            prediction[(i, column)] = self.state[(row, i)];
+        }
     }
 
     /// Takes step `step` of every window.

@@ -4,9 +4,11 @@
 //! orthonormal bases `Q` (`state_dim x latent_dim`, `W_e = Q^T`); the basis inside the space is chosen later
 //! (see [`super::varimax`]).
 
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use nalgebra::{DMatrix, SymmetricEigen};
 
+use super::dataset::scaled;
 use super::frame::Frame;
+use super::options::EncoderOptions;
 use super::random::Random;
 
 /// Second moments of the training samples, in scaled units.
@@ -37,19 +39,6 @@ impl Moments {
 /// Iterations of one descent.
 const ITERATIONS: usize = 2000;
 
-/// How the row space is searched.
-#[derive(Clone, Debug)]
-pub struct SubspaceOptions {
-    /// Weight of the input energy that the latent input cannot carry, against the reconstruction error.
-    pub lift_weight: f64,
-    /// Weight of every coordinate in the reconstruction error, `state_dim`.
-    pub coordinate_weights: DVector<f64>,
-    /// Random starting points besides the principal ones.
-    pub restarts: usize,
-    /// Seed of the random starting points.
-    pub seed: u64,
-}
-
 /// Finds the row space of least `reconstruction + lift_weight * lift_loss`: an orthonormal basis, in which the rows of
 /// resting coordinates are zero. The frame must have as many directions as the space has dimensions.
 ///
@@ -57,20 +46,21 @@ pub struct SubspaceOptions {
 /// orthonormal basis `Q` of the active coordinates: `reconstruction = (tr DC - tr((Q^T C Q)^-1 Q^T C D C Q)) / n` is
 /// the weighted mean square error of the least-squares decoder and `lift_loss = 1 - tr(Q^T U Q) / tr U` is `||u - W_e^T pinv(W_e^T) u||^2 / ||u||^2`.
 /// Rows that the frame holds are taken as seen: `C` is then the covariance given them. The basis returned is that of
-/// the other rows. Descent along the exact gradient on the Stiefel manifold from several starting points; the best is
-/// kept.
+/// the other rows. Descent along the exact gradient on the Stiefel manifold from several starting points, some of which
+/// are random; the best is kept.
 pub(super) fn find_subspace(
     moments: &Moments,
     frame: &Frame,
     latent_dim: usize,
-    options: &SubspaceOptions,
+    options: &EncoderOptions,
+    seed: u64,
 ) -> DMatrix<f64> {
     let objective = Objective::new(moments, frame, options);
     let mut best: Option<(f64, DMatrix<f64>)> = None;
     let count = latent_dim - frame.held.ncols();
     let starts = match count {
         0 => vec![DMatrix::zeros(frame.free.ncols(), 0)],
-        _ => starting_points(&objective, count, options),
+        _ => starting_points(&objective, count, options.restarts, seed),
     };
     for start in starts {
         let (value, basis) = objective.descend(start);
@@ -95,21 +85,16 @@ struct Objective {
 }
 
 impl Objective {
-    fn new(moments: &Moments, frame: &Frame, options: &SubspaceOptions) -> Self {
+    fn new(moments: &Moments, frame: &Frame, options: &EncoderOptions) -> Self {
+        let weights = options.coordinate_weights();
         let (given, held_input) = given_held(moments, frame);
         let columns = &given * &frame.free;
-        let mut weighted = columns.clone();
-        for (mut row, weight) in weighted
-            .row_iter_mut()
-            .zip(options.coordinate_weights.iter())
-        {
-            row *= *weight;
-        }
+        let weighted = scaled(columns.clone(), &weights);
         Self {
             state: frame.free.tr_mul(&columns),
             state_squared: columns.transpose() * weighted,
             input: frame.free.tr_mul(&(&moments.input * &frame.free)),
-            total_state: given.diagonal().dot(&options.coordinate_weights),
+            total_state: given.diagonal().dot(&weights),
             held_input,
             total_input: moments.input.trace().max(f64::MIN_POSITIVE),
             state_dim: moments.state.nrows() as f64,
@@ -220,7 +205,8 @@ fn orthonormal(matrix: DMatrix<f64>) -> DMatrix<f64> {
 fn starting_points(
     objective: &Objective,
     latent_dim: usize,
-    options: &SubspaceOptions,
+    restarts: usize,
+    seed: u64,
 ) -> Vec<DMatrix<f64>> {
     let state = &objective.state / objective.total_state.max(f64::MIN_POSITIVE);
     let input = &objective.input / objective.total_input;
@@ -228,8 +214,8 @@ fn starting_points(
         .iter()
         .map(|share| leading(&state * (1.0 - share) + &input * *share, latent_dim))
         .collect();
-    let mut random = Random::new(options.seed);
-    for _ in 0..options.restarts {
+    let mut random = Random::new(seed);
+    for _ in 0..restarts {
         let start = random.matrix(objective.state.nrows(), latent_dim, 1.0);
         starts.push(orthonormal(start));
     }
@@ -246,21 +232,15 @@ fn leading(symmetric: DMatrix<f64>, count: usize) -> DMatrix<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::robot::STATE_DIM;
     use crate::train::dataset::centred;
 
     fn moments() -> Moments {
         let mut random = Random::new(3);
-        let x = random.matrix(6, 3, 1.0) * random.matrix(3, 400, 1.0) + random.matrix(6, 400, 0.01);
-        let u = random.matrix(6, 400, 1.0);
+        let mixed = random.matrix(STATE_DIM, 3, 1.0) * random.matrix(3, 400, 1.0);
+        let x = mixed + random.matrix(STATE_DIM, 400, 0.01);
+        let u = random.matrix(STATE_DIM, 400, 1.0);
         of_samples(&x, &u)
-    }
-
-    /// A frame of six coordinates that holds nothing.
-    fn plain(active: &[usize]) -> Frame {
-        Frame {
-            held: DMatrix::zeros(6, 0),
-            free: DMatrix::identity(6, 6).select_columns(active),
-        }
     }
 
     fn of_samples(x: &DMatrix<f64>, u: &DMatrix<f64>) -> Moments {
@@ -272,19 +252,26 @@ mod tests {
         }
     }
 
-    fn options(lift_weight: f64) -> SubspaceOptions {
-        let coordinate_weights = DVector::from_vec(vec![1.0, 2.0, 0.5, 1.0, 1.0, 3.0]);
-        SubspaceOptions {
+    fn options(lift_weight: f64, body_weight: f64) -> EncoderOptions {
+        EncoderOptions {
             lift_weight,
-            coordinate_weights,
+            body_weight,
             restarts: 3,
-            seed: 1,
+            ..EncoderOptions::default()
         }
+    }
+
+    fn all() -> Frame {
+        Frame::plain(&Vec::from_iter(0..STATE_DIM))
     }
 
     #[test]
     fn gradient_agrees_with_finite_differences() {
-        let objective = Objective::new(&moments(), &plain(&[0, 1, 2, 4, 5]), &options(0.3));
+        let objective = Objective::new(
+            &moments(),
+            &Frame::plain(&[0, 1, 2, 12, 14]),
+            &options(0.3, 3.0),
+        );
         let basis = orthonormal(Random::new(5).matrix(5, 2, 1.0));
         let gradient = tangent(&basis, &objective.gradient(&basis));
         let direction = tangent(&basis, &Random::new(6).matrix(5, 2, 1.0));
@@ -297,14 +284,12 @@ mod tests {
     #[test]
     fn without_lift_and_weights_the_space_is_that_of_the_principal_components() {
         let moments = moments();
-        let mut options = options(0.0);
-        options.coordinate_weights.fill(1.0);
-        let all = plain(&[0, 1, 2, 3, 4, 5]);
-        let found = find_subspace(&moments, &all, 3, &options);
-        let found = Objective::new(&moments, &all, &options).reconstruction(&found);
+        let options = options(0.0, 1.0);
+        let found = find_subspace(&moments, &all(), 3, &options, 1);
+        let found = Objective::new(&moments, &all(), &options).reconstruction(&found);
         let mut eigenvalues = SymmetricEigen::new(moments.state).eigenvalues;
         eigenvalues.as_mut_slice().sort_by(f64::total_cmp);
-        let least = eigenvalues.rows(0, 3).sum() / 6.0;
+        let least = eigenvalues.rows(0, STATE_DIM - 3).sum() / STATE_DIM as f64;
         let close = (found - least).abs() < 1e-9 * least.max(1e-3);
         assert!(close, "{found} {least}");
     }
@@ -312,10 +297,10 @@ mod tests {
     #[test]
     fn lift_weight_turns_the_space_towards_the_inputs() {
         let moments = moments();
-        let active = plain(&[0, 1, 2, 3, 4, 5]);
         let losses = |lift_weight| {
-            let found = find_subspace(&moments, &active, 2, &options(lift_weight));
-            let objective = Objective::new(&moments, &active, &options(lift_weight));
+            let options = options(lift_weight, 3.0);
+            let found = find_subspace(&moments, &all(), 2, &options, 1);
+            let objective = Objective::new(&moments, &all(), &options);
             (
                 objective.lift_loss(&found),
                 objective.reconstruction(&found),
@@ -327,8 +312,9 @@ mod tests {
 
     #[test]
     fn masked_coordinates_get_no_weight() {
-        let found = find_subspace(&moments(), &plain(&[1, 4, 5]), 2, &options(0.1));
-        for masked in [0, 2, 3] {
+        let frame = Frame::plain(&[1, 12, 14]);
+        let found = find_subspace(&moments(), &frame, 2, &options(0.1, 3.0), 1);
+        for masked in [0, 2, 13, 17] {
             assert_eq!(found.row(masked).amax(), 0.0);
         }
     }

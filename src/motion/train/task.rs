@@ -1,6 +1,5 @@
 //! One training as every method sees it, checked before any map is learned.
 
-use super::data_sets::Recordings;
 use super::dataset::Dataset;
 use super::error::TrainError;
 use super::features::Features;
@@ -11,6 +10,25 @@ use super::subspace::Moments;
 use crate::model::Library;
 use crate::recording::Source;
 use crate::robot::Robot;
+
+/// Recordings to learn from and to choose by.
+#[derive(Clone, Debug)]
+pub struct Recordings<'a> {
+    /// Fitted.
+    pub training: Source<'a>,
+    /// Used to choose between candidates; without any, the training recordings are.
+    pub validation: Source<'a>,
+}
+
+impl<'a> Recordings<'a> {
+    /// These recordings, each in memory or in files.
+    pub fn new(training: impl Into<Source<'a>>, validation: impl Into<Source<'a>>) -> Self {
+        Self {
+            training: training.into(),
+            validation: validation.into(),
+        }
+    }
+}
 
 /// Data, library and options that all seeds share.
 pub(super) struct Task<'a> {

@@ -7,7 +7,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::progress::Watch;
-use super::refine::{Coefficients, Model, PRIOR, Place, Refiner, relative};
+use super::refine::{Coefficients, Free, Model, PRIOR, Place, Refiner};
 
 /// Damping of the changes, relative to each coefficient's own weight.
 const DAMPING: f64 = 1e-3;
@@ -25,15 +25,14 @@ impl Refiner<'_> {
             return refined;
         };
         let mut thinned = refined;
-        let total = self.free_places(&thinned.xi).len();
+        let total = self.free(&thinned.xi).places.len();
         watch.stage("dropping terms that rollouts do not miss", total);
         while !watch.cancelled() {
-            let places = self.free_places(&thinned.xi);
-            let scales = relative(&thinned, &places);
-            let model = self.model(&thinned.xi, &places, &scales, weights);
-            let about = model.and_then(|model| About::new(&thinned, places, scales, &model));
+            let free = self.free(&thinned.xi);
+            let before = free.places.len();
+            let model = self.model(&thinned.xi, &free, weights);
+            let about = model.and_then(|model| About::new(&thinned, free, &model));
             let Some(mut about) = about else { break };
-            let before = about.places.len();
             let Some(fewer) = self.drop_about(&mut about, &thinned, limit) else {
                 break;
             };
@@ -78,8 +77,8 @@ impl Refiner<'_> {
         let may_go = |(phase, term, column): Place| {
             !inputs.contains(&term) && !self.knowledge[phase].kept[(term, column)]
         };
-        let mut order: Vec<usize> = (0..about.places.len())
-            .filter(|&i| !about.gone[i] && may_go(about.places[i]))
+        let mut order: Vec<usize> = (0..about.gone.len())
+            .filter(|&i| !about.gone[i] && may_go(about.free.places[i]))
             .collect();
         order.sort_by(|&a, &b| about.loss(a).total_cmp(&about.loss(b)));
         order
@@ -89,8 +88,7 @@ impl Refiner<'_> {
 /// The quadratic form about some coefficients, some of them dropped.
 #[derive(Clone)]
 struct About {
-    places: Vec<Place>,
-    scales: Vec<f64>,
+    free: Free,
     /// Relative changes that make the coefficients zero.
     to_zero: Vec<f64>,
     /// Where the form is lowest, with those that are gone at zero.
@@ -101,25 +99,19 @@ struct About {
 }
 
 impl About {
-    fn new(
-        from: &Coefficients,
-        places: Vec<Place>,
-        scales: Vec<f64>,
-        model: &Model,
-    ) -> Option<Self> {
-        let mut system = model.gram.clone();
-        for i in 0..places.len() {
+    fn new(from: &Coefficients, free: Free, model: &Model) -> Option<Self> {
+        let (mut system, n) = (model.gram.clone(), free.places.len());
+        for i in 0..n {
             system[(i, i)] += PRIOR + DAMPING * model.gram[(i, i)];
         }
         let factor = system.cholesky()?;
-        let to_zero = (places.iter().zip(&scales)).map(|(&at, scale)| -from.at(at) / scale);
+        let to_zero = |((phase, term, k), scale): (Place, f64)| -from.xi[phase][(term, k)] / scale;
         Some(Self {
-            to_zero: to_zero.collect(),
+            to_zero: free.each().map(to_zero).collect(),
             lowest: -factor.solve(&model.gradient),
             inverse: factor.inverse(),
-            gone: vec![false; places.len()],
-            places,
-            scales,
+            gone: vec![false; n],
+            free,
         })
     }
 
@@ -141,8 +133,8 @@ impl About {
     /// The coefficients where the form is lowest.
     fn xi(&self, from: &Coefficients) -> Vec<DMatrix<f64>> {
         let mut xi = from.xi.clone();
-        for (i, &(phase, term, column)) in self.places.iter().enumerate() {
-            let change = self.lowest[i] * self.scales[i];
+        for (i, ((phase, term, column), scale)) in self.free.each().enumerate() {
+            let change = self.lowest[i] * scale;
             let coefficient = &mut xi[phase][(term, column)];
             *coefficient = match self.gone[i] {
                 true => 0.0,

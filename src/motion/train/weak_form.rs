@@ -2,44 +2,47 @@
 
 use nalgebra::DMatrix;
 
+use super::dataset::Jump;
 use super::error::TrainError;
 use super::features::{FeatureValues, Features};
 use super::latent::{EncodedSet, Latent};
+use crate::model::Library;
 
 /// Samples between the starts of two windows.
 const STRIDE: usize = 5;
 /// Largest magnitude of a term: sums of its squares stay finite.
 const LARGEST: f64 = 1e150;
 
-/// Complains about the first term without a finite value at a sample, or with one whose square overflows.
+/// Complains about the first term of `library` without a finite value at a sample, or with one whose square overflows.
 ///
 /// # Errors
 /// [`TrainError::TermValue`].
-pub fn check_terms(set: EncodedSet<'_>, features: &Features) -> Result<(), TrainError> {
+pub fn check_terms(
+    set: EncodedSet<'_>,
+    features: &Features,
+    library: &Library,
+) -> Result<(), TrainError> {
     let bad = |value: &f64| value.is_nan() || value.abs() > LARGEST;
     let mut values = FeatureValues::default();
     for (phase, pattern) in set.dataset.phases.patterns.iter().enumerate() {
-        let mut first: Option<(usize, usize, f64)> = None; // term, row, value
-        let mut above = 0;
-        for (variables, _) in set.regression_blocks(phase) {
+        let mut first: Option<(usize, &Jump, usize, f64)> = None; // term, jump, sample, value
+        for (jump, range) in set.dataset.spans(Some(phase)) {
+            let variables = set.latent[jump].variables(range.clone());
             let theta = features.evaluate(&variables, &mut values);
-            let terms = first.map_or(theta.ncols(), |(term, _, _)| term);
+            let terms = first.map_or(theta.ncols(), |(term, ..)| term);
             let found = (0..terms).find_map(|term| {
-                let (row, value) = (theta.column(term).iter().copied().enumerate())
-                    .find(|(_, value)| bad(value))?;
-                Some((term, above + row, value))
+                let mut samples = range.clone().zip(theta.column(term));
+                let (sample, value) = samples.find(|(_, value)| bad(value))?;
+                Some((term, &set.dataset.jumps[jump], sample, *value))
             });
             first = found.or(first);
-            above += variables.nrows();
         }
-        let Some((term, row, found)) = first else {
+        let Some((term, jump, sample, found)) = first else {
             continue;
         };
-        let (jump, sample) = (set.place_of_row(phase, row))
-            .expect("invariant: a row of the regression is a sample of the phase");
         return Err(TrainError::TermValue {
             path: jump.path.clone(),
-            term: features.text(term).to_owned(),
+            term: library.terms()[term].text().to_owned(),
             phase: pattern.name.clone(),
             sample,
             time_s: jump.time_s[sample],
@@ -110,8 +113,7 @@ impl Span {
         features: &Features,
     ) -> Self {
         let (start, n) = (range.start, range.len());
-        let mut variables = DMatrix::zeros(n, 3 * features.latent_dim());
-        latent.copy_variables(range.clone(), &mut variables.rows_mut(0, n));
+        let variables = latent.variables(range.clone());
         let theta = features.evaluate(&variables, &mut FeatureValues::default());
         let mut once = DMatrix::zeros(n, theta.ncols());
         let mut twice = once.clone();

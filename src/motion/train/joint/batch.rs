@@ -50,13 +50,8 @@ impl Batch {
     }
 
     /// Number of samples.
-    pub fn len(&self) -> usize {
+    pub fn samples(&self) -> usize {
         self.x.nrows()
-    }
-
-    /// Whether there is no sample.
-    pub fn is_empty(&self) -> bool {
-        self.x.is_empty()
     }
 }
 

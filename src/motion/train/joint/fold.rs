@@ -28,34 +28,27 @@ impl LatentBasis {
     }
 }
 
-/// The encoder from scaled states to latent coordinates in `basis`.
+/// Encoder and decoder between scaled states and latent coordinates in `basis`.
 ///
 /// # Errors
 /// [`ModelError`] for numbers that are not finite, as a training that diverged leaves them.
-pub fn encoder(
-    network: &Network,
+pub fn folded(
+    (encoder, decoder): (&Network, &Network),
     frame: &Frame,
     basis: &LatentBasis,
-) -> Result<StateMap, ModelError> {
+) -> Result<(StateMap, StateMap), ModelError> {
     let factors = DMatrix::from_diagonal(&frame.factors);
     let offset = -frame.factors.component_mul(&frame.mean);
     let (before, turn) = ((&factors, &offset), &basis.turn * frame.latent);
-    between("encoder", network, before, (&turn, &basis.shift))
-}
-
-/// The decoder from latent coordinates in `basis` to scaled states.
-///
-/// # Errors
-/// As [`encoder`].
-pub fn decoder(
-    network: &Network,
-    frame: &Frame,
-    basis: &LatentBasis,
-) -> Result<StateMap, ModelError> {
+    let encoder = between("encoder", encoder, before, (&turn, &basis.shift))?;
     let back = &basis.back / frame.latent;
     let offset = -(&back * &basis.shift);
     let spread = DMatrix::from_diagonal(&frame.spread);
-    between("decoder", network, (&back, &offset), (&spread, &frame.mean))
+    let after = (&spread, &frame.mean);
+    Ok((
+        encoder,
+        between("decoder", decoder, (&back, &offset), after)?,
+    ))
 }
 
 /// `y -> after(network(before(y)))` as layers; both are affine, matrix and offset.
@@ -115,8 +108,8 @@ mod tests {
             let mut back: Vec<usize> = widths.to_vec();
             back.reverse();
             let decoding = Network::random(&back, Activation::Tanh, &mut random);
-            let folded = encoder(&network, &frame, &basis).expect("finite");
-            let unfolded = decoder(&decoding, &frame, &basis).expect("finite");
+            let maps = folded((&network, &decoding), &frame, &basis);
+            let (folded, unfolded) = maps.expect("finite");
             let mut tape = Tape::default();
             let stack = network.forward(frame.enter(&batch), 3, &mut tape);
             let decoded = decoding.forward(stack.rows(0, 3).into_owned(), 3, &mut tape);

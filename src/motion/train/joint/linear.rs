@@ -61,10 +61,10 @@ impl LinearMaps {
     fn lift(&self, at: At<'_>, gradient: &mut Parameters) -> f64 {
         let moment = &at.batch.input_moment;
         let total = moment.trace().max(f64::MIN_POSITIVE);
-        let seen = moment * self.projection.weights(); // S V A^-1
+        let seen = moment * &self.projection.weights; // S V A^-1
         let carried = layers(at.parameters).0.weights.tr_mul(&seen);
         if at.weights.lift != 0.0 {
-            let outside = seen - self.projection.weights() * &carried;
+            let outside = seen - &self.projection.weights * &carried;
             gradient.encoder.layers[0].weights += outside * (-2.0 * at.weights.lift / total);
         }
         1.0 - carried.trace() / total
@@ -76,11 +76,11 @@ impl Maps for LinearMaps {
         let (encoder, batch) = (layers(at.parameters).0, at.batch);
         let d = encoder.bias.len();
         self.projection = InputProjection::new(&encoder.weights);
-        let mut variables = DMatrix::zeros(batch.len(), 3 * d);
+        let mut variables = DMatrix::zeros(batch.samples(), 3 * d);
         let blocks = [
             (&batch.x, &encoder.weights),
             (&batch.dx, &encoder.weights),
-            (&batch.u, self.projection.weights()),
+            (&batch.u, &self.projection.weights),
         ];
         for (index, (samples, weights)) in blocks.into_iter().enumerate() {
             product_into(&mut variables, index * d, Columns::all(samples), weights);
@@ -107,7 +107,7 @@ impl Maps for LinearMaps {
         let reconstruction = self.reconstruction(at, gradient);
         let (batch, decoder) = (at.batch, &layers(at.parameters).1.weights);
         let (d, state_dim) = decoder.shape();
-        let n_values = (batch.len() * state_dim) as f64;
+        let n_values = (batch.samples() * state_dim) as f64;
         let scale = 2.0 * at.weights.ddx / n_values;
         let (mut cross, mut gram) = (DMatrix::zeros(d, state_dim), DMatrix::zeros(d, d));
         let predictions = Columns::all(predicted);
@@ -152,7 +152,7 @@ impl Maps for LinearMaps {
     /// Quadratic in the decoder: the batch enters by moments that are computed once.
     fn decoder_loss<'a>(&'a self, parameters: &Parameters, batch: &'a Batch) -> DecoderLoss<'a> {
         let (n, d) = layers(parameters).0.weights.shape();
-        let count = batch.len() as f64;
+        let count = batch.samples() as f64;
         let z = encode(parameters, batch).insert_column(d, 1.0);
         let gram = z.tr_mul(&z) / count;
         let cross = z.tr_mul(&batch.x) / count;
@@ -182,7 +182,7 @@ impl Maps for LinearMaps {
         let real = theta.tr_mul(&(&batch.ddx * decoder.weights.transpose()));
         let decoder_gram = &decoder.weights * decoder.weights.transpose();
         let (ddz_energy, ddx_energy) = (ddz.norm_squared(), batch.ddx_energy);
-        let (n, state_dim) = (batch.len() as f64, batch.x.ncols() as f64);
+        let (n, state_dim) = (batch.samples() as f64, batch.x.ncols() as f64);
         Box::new(move |xi: &DMatrix<f64>, weights: LossWeights| {
             let latent_scale = 1.0 / (n * xi.ncols() as f64);
             let real_scale = 1.0 / (n * state_dim);
@@ -223,11 +223,11 @@ fn encode(parameters: &Parameters, batch: &Batch) -> DMatrix<f64> {
 /// The library on a batch, `n x library_dim`.
 fn theta(parameters: &Parameters, batch: &Batch, features: &Features) -> DMatrix<f64> {
     let encoder = &layers(parameters).0.weights;
-    let (n, d) = (batch.len(), encoder.ncols());
+    let (n, d) = (batch.samples(), encoder.ncols());
     let projection = InputProjection::new(encoder);
     let mut variables = encode(parameters, batch).resize(n, 3 * d, 0.0);
     (variables.columns_mut(d, d)).copy_from(&(&batch.dx * encoder));
-    (variables.columns_mut(2 * d, d)).copy_from(&(&batch.u * projection.weights()));
+    (variables.columns_mut(2 * d, d)).copy_from(&(&batch.u * &projection.weights));
     features.evaluate(&variables, &mut FeatureValues::default())
 }
 

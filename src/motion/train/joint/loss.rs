@@ -134,22 +134,22 @@ pub trait Maps {
 
 /// The loss over one library, with its scratch space.
 pub struct JointLoss<'a> {
-    features: &'a Features,
-    maps: Box<dyn Maps>,
-    weights: LossWeights,
+    pub(super) features: &'a Features,
+    pub(super) maps: Box<dyn Maps>,
+    pub(super) weights: LossWeights,
     /// The weights in the present epoch.
     current: LossWeights,
     unroll: Unroll,
     values: FeatureValues,
-    gradient: Parameters,
+    gradient: Parameters, // anything before the first evaluation
 }
 
 impl<'a> JointLoss<'a> {
-    /// The loss of parameters of the shape of `parameters`.
+    /// The loss of parameters of the shape of `parameters`; the window of (41) counts only with a weight.
     pub fn new(
         features: &'a Features,
         maps: Box<dyn Maps>,
-        weights: LossWeights,
+        (weights, unroll): (LossWeights, Unroll),
         parameters: &Parameters,
     ) -> Self {
         Self {
@@ -157,36 +157,16 @@ impl<'a> JointLoss<'a> {
             maps,
             weights,
             current: weights,
-            unroll: Unroll::default(),
+            unroll,
             values: FeatureValues::default(),
-            gradient: parameters.zeros_like(),
+            gradient: parameters.clone(),
         }
-    }
-
-    /// Sets the window of (41), which counts only with a weight.
-    pub fn with_unroll(self, unroll: Unroll) -> Self {
-        Self { unroll, ..self }
     }
 
     /// Takes the weights of an epoch of `schedule`, and returns them.
     pub(super) fn start_epoch(&mut self, epoch: usize, schedule: &Schedule) -> LossWeights {
         self.current = schedule.weights_at(epoch, self.weights);
         self.current
-    }
-
-    /// The library.
-    pub fn features(&self) -> &'a Features {
-        self.features
-    }
-
-    /// Encoder and decoder.
-    pub fn maps(&self) -> &dyn Maps {
-        &*self.maps
-    }
-
-    /// Whether (41) has a weight.
-    pub fn has_window(&self) -> bool {
-        self.weights.bptt != 0.0
     }
 
     /// Gradient of the last [`Self::evaluate`]; of Xi only the phase of that batch has one.
@@ -203,7 +183,7 @@ impl<'a> JointLoss<'a> {
             batch,
             weights,
         };
-        let (n, d) = (batch.len(), self.features.latent_dim());
+        let (n, d) = (batch.samples(), self.features.latent_dim());
         let xi = &parameters.xi[batch.phase];
         let variables = self.maps.encode(at);
         let theta = self.features.evaluate(&variables, &mut self.values);
@@ -247,6 +227,7 @@ impl<'a> JointLoss<'a> {
             return (0.0, onto_variables);
         }
         let samples = Window {
+            features: self.features,
             variables,
             xi,
             step_s: at.batch.step_s,
@@ -255,8 +236,7 @@ impl<'a> JointLoss<'a> {
             variables: &mut onto_variables,
             xi: onto_xi,
         };
-        let weight = at.weights.bptt;
-        let bptt = (self.unroll).evaluate(self.features, samples, weight, &mut adjoints);
+        let bptt = (self.unroll).evaluate(samples, at.weights.bptt, &mut adjoints);
         (bptt, onto_variables)
     }
 }
@@ -322,11 +302,12 @@ mod tests {
         maps: Box<dyn Maps>,
         parameters: &Parameters,
     ) -> JointLoss<'a> {
-        JointLoss::new(features, maps, WEIGHTS, parameters).with_unroll(Unroll {
+        let unroll = Unroll {
             window: 3,
             stride: 2,
             ..Unroll::default()
-        })
+        };
+        JointLoss::new(features, maps, (WEIGHTS, unroll), parameters)
     }
 
     fn all(parameters: &mut Parameters) -> Vec<&mut [f64]> {

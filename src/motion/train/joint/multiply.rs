@@ -138,31 +138,3 @@ fn dot(left: &[f64], right: &[f64]) -> f64 {
     }
     rest + sums.iter().sum::<f64>()
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::train::random::Random;
-
-    #[test]
-    fn products_equal_those_of_nalgebra() {
-        let mut random = Random::new(5);
-        for inner in [6, 7] {
-            let (a, b) = (random.matrix(37, inner, 1.0), random.matrix(inner, 4, 1.0));
-            let plain = &a * &b;
-            let mut sum = plain.clone();
-            add_product(&mut sum, -2.0, &a, &b);
-            assert!((sum + &plain).amax() < 1e-13);
-            let mut gram = DMatrix::from_element(inner, 2, 1.0);
-            let two = Columns::some(&plain, 1, 2);
-            add_transposed(&mut gram, 3.0, Columns::all(&a), two);
-            let expected = a.transpose() * plain.columns(1, 2) * 3.0;
-            assert!((gram.add_scalar(-1.0) - expected).amax() < 1e-12);
-            let mut wide = DMatrix::from_element(37, 9, 5.0);
-            product_into(&mut wide, 3, Columns::all(&a), &b);
-            assert!((wide.columns(3, 4) - &plain).amax() < 1e-13);
-            let (before, after) = (wide.columns(0, 3), wide.columns(7, 2));
-            assert!(before.iter().chain(&after).all(|v| *v == 5.0));
-        }
-    }
-}

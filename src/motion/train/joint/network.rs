@@ -76,13 +76,6 @@ impl Network {
         }
     }
 
-    /// A gradient of zeros for this network.
-    pub fn zeros_like(&self) -> Self {
-        let mut zeros = self.clone();
-        zeros.clear();
-        zeros
-    }
-
     /// Sets every number to zero.
     pub fn clear(&mut self) {
         self.blocks_mut().for_each(|block| block.fill(0.0));
@@ -372,7 +365,8 @@ mod tests {
             let mut tape = Tape::default();
             network.forward(stack.clone(), N, &mut tape);
             let jacobians = network.jacobian(&tape);
-            let mut gradient = network.zeros_like();
+            let mut gradient = network.clone();
+            gradient.clear();
             let onto = network.jacobian_adjoint(&tape, &jacobians, &on_jacobian, &mut gradient);
             let entering = network.backward(&tape, on_values.clone(), &onto, &mut gradient);
             let h = 1e-6;

@@ -35,7 +35,7 @@ struct Encoded {
 impl Encoded {
     /// (9), (11), (12) and (13) at every sample.
     fn new(parameters: &Parameters, batch: &Batch, frame: &Frame, tape: &mut Tape) -> Self {
-        let mut stack = (parameters.encoder).forward(frame.enter(batch), batch.len(), tape);
+        let mut stack = (parameters.encoder).forward(frame.enter(batch), batch.samples(), tape);
         stack *= frame.latent;
         let jacobians = parameters.encoder.jacobian(tape);
         let mut rows = jacobians.rows.clone();
@@ -83,7 +83,7 @@ impl Maps for NonlinearMaps {
     }
 
     fn residual(&self, at: At<'_>, predicted: &DMatrix<f64>) -> DMatrix<f64> {
-        let n = at.batch.len();
+        let n = at.batch.samples();
         predicted - self.encoded.stack.rows(2 * n, n)
     }
 
@@ -154,7 +154,7 @@ impl Maps for NonlinearMaps {
     }
 
     fn decoder_loss<'a>(&'a self, parameters: &Parameters, batch: &'a Batch) -> DecoderLoss<'a> {
-        let (n, frame) = (batch.len(), &self.frame);
+        let (n, frame) = (batch.samples(), &self.frame);
         let mut tape = Tape::default();
         let states = frame.enter(batch).rows(0, n).into_owned();
         let z = parameters.encoder.forward(states, n, &mut tape);
@@ -193,7 +193,7 @@ struct XiSamples {
 
 impl XiSamples {
     fn new(parameters: &Parameters, batch: &Batch, features: &Features, frame: &Frame) -> Self {
-        let (n, d, state_dim) = (batch.len(), features.latent_dim(), batch.x.ncols());
+        let (n, d, state_dim) = (batch.samples(), features.latent_dim(), batch.x.ncols());
         let mut tape = Tape::default();
         let encoded = Encoded::new(parameters, batch, frame, &mut tape);
         let theta = features.evaluate(&encoded.variables(), &mut FeatureValues::default());

@@ -33,13 +33,6 @@ impl Parameters {
         }
     }
 
-    /// A gradient of zeros.
-    pub fn zeros_like(&self) -> Self {
-        let mut zeros = self.clone();
-        zeros.clear();
-        zeros
-    }
-
     /// Sets every number to zero.
     pub fn clear(&mut self) {
         self.maps_mut().for_each(|block| block.fill(0.0));
@@ -84,7 +77,7 @@ impl Frame {
 
     /// `x`, `dx` and `ddx` of a batch, stacked, as the encoder takes them.
     pub fn enter(&self, batch: &Batch) -> DMatrix<f64> {
-        let n = batch.len();
+        let n = batch.samples();
         let mut stack = DMatrix::zeros(3 * n, batch.x.ncols());
         for (index, block) in [&batch.x, &batch.dx, &batch.ddx].into_iter().enumerate() {
             stack.rows_mut(index * n, n).copy_from(block);

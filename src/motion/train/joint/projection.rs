@@ -12,7 +12,8 @@ const DAMPING: f64 = 1e-12;
 /// `pinv(W_e^T)^T = V (V^T V)^-1` for `V = W_e^T`: latent inputs of samples in rows are `u` times this.
 #[derive(Clone, Debug, Default)]
 pub struct InputProjection {
-    weights: DMatrix<f64>,      // 18 x d
+    /// `V (V^T V)^-1`, `18 x d`.
+    pub weights: DMatrix<f64>,
     inverse_gram: DMatrix<f64>, // d x d
 }
 
@@ -29,11 +30,6 @@ impl InputProjection {
             weights: encoder * &inverse_gram,
             inverse_gram,
         }
-    }
-
-    /// `V (V^T V)^-1`, `18 x d`.
-    pub fn weights(&self) -> &DMatrix<f64> {
-        &self.weights
     }
 
     /// Adjoint of `V`, given the one of the projection.

@@ -6,7 +6,7 @@ use std::sync::mpsc::{Sender, channel};
 use nalgebra::{DMatrix, DVector};
 
 use super::batch::{Batch, batches};
-use super::fold::{self, LatentBasis};
+use super::fold::{LatentBasis, folded};
 use super::linear::{LinearMaps, mask_rows};
 use super::loss::{JointLoss, LossWeights, Losses, Maps};
 use super::network::Network;
@@ -16,19 +16,16 @@ use super::stages::{train_decoder, train_together, train_xi};
 use crate::model::{AffineMap, Layer, ModelError, StateMap};
 use crate::robot::{Robot, STATE_DIM};
 use crate::train::assemble::Origin;
-use crate::train::data_sets::Recordings;
 use crate::train::dataset::Quantity;
 use crate::train::dynamics_fit::Fitted;
 use crate::train::error::TrainError;
-use crate::train::latent::{
-    EncodedSet, Latent, fit_affine, least_squares_decoder, map_samples, mean_jacobian,
-};
+use crate::train::latent::{EncodedSet, Latent, least_squares_decoder, map_samples, mean_jacobian};
 use crate::train::options::{TrainOptions, Transfer};
 use crate::train::progress::Watch;
 use crate::train::random::Random;
-use crate::train::report::{SeedReport, Trained};
-use crate::train::seeds::Seeds;
-use crate::train::task::Task;
+use crate::train::report::Trained;
+use crate::train::seeds::{Outcome, Seeds};
+use crate::train::task::{Recordings, Task};
 use crate::train::weak_form::check_terms;
 
 /// Learns a model by Adam over encoder, decoder and Xi together (equations 9 to 20, steps of section IV-D).
@@ -168,20 +165,13 @@ impl Trainer<'_> {
             false => all.clone(),
         };
         let losses = train_together(&mut parameters, &first, &mut loss, schedule, &mut listener);
-        let mut quiet = |_: usize, _: &Losses, _: usize| !cancel.load(Ordering::Relaxed);
+        let quiet = &mut |_: usize, _: &Losses, _: usize| !cancel.load(Ordering::Relaxed);
         if published {
-            train_decoder(&mut parameters, &all, &loss, schedule, &mut quiet);
+            train_decoder(&mut parameters, &all, &loss, schedule, quiet);
             for phase in 0..parameters.xi.len() {
                 let own: Vec<&Batch> = of_phase(phase).collect();
                 parameters.xi[phase].fill(options.xi_start);
-                train_xi(
-                    &mut parameters,
-                    phase,
-                    &own,
-                    &mut loss,
-                    schedule,
-                    &mut quiet,
-                );
+                train_xi(&mut parameters, phase, &own, &mut loss, schedule, quiet);
             }
         }
         Run {
@@ -198,8 +188,8 @@ impl Trainer<'_> {
             true => Box::new(LinearMaps::new(coordinate_weights, self.mask())),
             false => Box::new(NonlinearMaps::new(coordinate_weights, self.frame.clone())),
         };
-        let loss = JointLoss::new(&self.task.features, maps, weights, parameters);
-        loss.with_unroll(self.task.options.joint.unroll)
+        let terms = (weights, self.task.options.joint.unroll);
+        JointLoss::new(&self.task.features, maps, terms, parameters)
     }
 
     fn is_linear(&self) -> bool {
@@ -240,25 +230,17 @@ impl Trainer<'_> {
     }
 
     /// The model numbers of a run, and its score.
-    fn finish(
-        &self,
-        run: Run,
-        judged: &[Batch],
-        watch: &mut Watch<'_>,
-    ) -> Result<(SeedReport, Fitted), TrainError> {
-        let (fitted, score) = if self.is_published() {
-            let score = self.published_score(&run.parameters, judged);
-            (self.published(run.parameters)?, score)
+    fn finish(&self, run: Run, judged: &[Batch], watch: &mut Watch<'_>) -> Outcome {
+        let fitted = if self.is_published() {
+            self.published(run.parameters, judged)?
         } else {
             let maps = match self.is_linear() {
                 true => self.linear_maps(&run.parameters)?,
                 false => self.nonlinear_maps(&run.parameters)?,
             };
-            let fitted = self.task.fit_dynamics(maps, watch)?;
-            let score = fitted.score();
-            (fitted, score)
+            self.task.fit_dynamics(maps, watch)?
         };
-        let report = (self.task).seed_report(&fitted, (run.seed, score), Some(run.losses))?;
+        let report = (self.task).seed_report(&fitted, run.seed, Some(run.losses))?;
         Ok((report, fitted))
     }
 
@@ -272,17 +254,16 @@ impl Trainer<'_> {
     }
 
     /// The numbers as Adam left them.
-    fn published(&self, parameters: Parameters) -> Result<Fitted, TrainError> {
+    fn published(&self, parameters: Parameters, judged: &[Batch]) -> Result<Fitted, TrainError> {
         let plain = LatentBasis::unchanged(self.task.options.latent_dim);
         let (encoder, decoder) = self.state_maps(&parameters, &plain)?;
-        let x = self.task.training.gather(Quantity::X, None);
         Ok(Fitted {
-            weights: mean_jacobian(&encoder, &x),
+            score: self.published_score(&parameters, judged),
+            weights: mean_jacobian(&encoder, &self.task.training),
             encoder,
             decoder,
             xi: parameters.xi,
             choice: None,
-            training: None,
         })
     }
 
@@ -294,8 +275,7 @@ impl Trainer<'_> {
     ) -> Result<(StateMap, StateMap), TrainError> {
         let (encoder, decoder) = (&parameters.encoder, &parameters.decoder);
         if !self.is_linear() {
-            let encoder = fold::encoder(encoder, &self.frame, basis)?;
-            return Ok((encoder, fold::decoder(decoder, &self.frame, basis)?));
+            return Ok(folded((encoder, decoder), &self.frame, basis)?);
         }
         let affine = |tensor, network: &Network| {
             let layer = &network.layers[0];
@@ -311,24 +291,31 @@ impl Trainer<'_> {
         let (task, d) = (self.task, self.task.options.latent_dim);
         let basis = task.frame.nearest(&learned, d);
         let encoder = task.encoder_over(&basis)?.into();
-        let decoder = least_squares_decoder(&task.training, &encoder)?.into();
+        let decoder = least_squares_decoder(&task.training, &encoder, None)?.into();
         Ok((encoder, decoder))
     }
 
     /// The learned networks in the canonical latent basis, the decoder's last layer by least squares.
     fn nonlinear_maps(&self, parameters: &Parameters) -> Result<(StateMap, StateMap), TrainError> {
         let plain = LatentBasis::unchanged(self.task.options.latent_dim);
-        let x = self.task.training.gather(Quantity::X, None);
-        let basis = self.basis(&self.state_maps(parameters, &plain)?.0, &x);
+        let basis = self.basis(&self.state_maps(parameters, &plain)?.0);
         let (encoder, decoder) = self.state_maps(parameters, &basis)?;
-        let decoder = with_fitted_last_layer(&decoder, &x, &map_samples(&encoder, &x))?;
-        Ok((encoder, decoder))
+        let mut layers = decoder.layers().to_vec();
+        let last = layers.pop().expect("invariant: a map has a layer");
+        let hidden = match layers.is_empty() {
+            true => None,
+            false => Some(StateMap::new("decoder", layers.clone())?),
+        };
+        let map = least_squares_decoder(&self.task.training, &encoder, hidden.as_ref())?;
+        layers.push(Layer { map, ..last });
+        Ok((encoder, StateMap::new("decoder", layers)?))
     }
 
     /// The latent basis in which `J J^T` is the identity in the mean, rotated by varimax of the mean Jacobian, with
     /// the latents in canonical order and their mean at 0.
-    fn basis(&self, encoder: &StateMap, x: &DMatrix<f64>) -> LatentBasis {
-        let d = self.task.options.latent_dim;
+    fn basis(&self, encoder: &StateMap) -> LatentBasis {
+        let (d, training) = (self.task.options.latent_dim, &self.task.training);
+        let x = training.gather(Quantity::X, None);
         let gram = x.column_iter().fold(DMatrix::zeros(d, d), |sum, x| {
             let jacobian = encoder
                 .jacobian(&x.into_owned())
@@ -340,14 +327,14 @@ impl Trainer<'_> {
             Some(inverse) => inverse,
             None => DMatrix::identity(d, d),
         };
-        let mean = &white * mean_jacobian(encoder, x);
+        let mean = &white * mean_jacobian(encoder, training);
         let (_, rotation) = self.task.canonical_basis(&mean.transpose());
         let turn = rotation.transpose() * white;
         let back = match turn.clone().try_inverse() {
             Some(back) => back,
             None => return LatentBasis::unchanged(d),
         };
-        let shift = -(&turn * map_samples(encoder, x).column_mean());
+        let shift = -(&turn * map_samples(encoder, &x).column_mean());
         LatentBasis { turn, back, shift }
     }
 
@@ -361,25 +348,9 @@ impl Trainer<'_> {
             let plain = LatentBasis::unchanged(self.task.options.latent_dim);
             let encoder = self.state_maps(&self.start(seed), &plain)?.0;
             let latent = Latent::of(training, &encoder)?;
-            check_terms(EncodedSet::new(training, &latent), &self.task.features)
+            let set = EncodedSet::new(training, &latent);
+            check_terms(set, &self.task.features, &self.task.library)
         };
         terms_at_start().err().unwrap_or(error)
     }
-}
-
-/// The decoder with its last layer, which is linear, of least square error from `z` to `x` (samples in columns).
-fn with_fitted_last_layer(
-    decoder: &StateMap,
-    x: &DMatrix<f64>,
-    z: &DMatrix<f64>,
-) -> Result<StateMap, TrainError> {
-    let mut layers: Vec<Layer> = decoder.layers().to_vec();
-    let last = layers.pop().expect("invariant: a map has a layer");
-    let hidden = match layers.is_empty() {
-        true => z.clone(),
-        false => map_samples(&StateMap::new("decoder", layers.clone())?, z),
-    };
-    let map: AffineMap = fit_affine(x, &hidden)?;
-    layers.push(Layer { map, ..last });
-    Ok(StateMap::new("decoder", layers)?)
 }

@@ -59,11 +59,11 @@ pub fn train_decoder(
     listener: &mut Listener<'_>,
 ) {
     let mut losses: Vec<DecoderLoss<'_>> = (batches.iter())
-        .map(|batch| loss.maps().decoder_loss(parameters, batch))
+        .map(|batch| loss.maps.decoder_loss(parameters, batch))
         .collect();
     let decoder = &mut parameters.decoder;
     let mut maps = optimisers(decoder.blocks(), schedule);
-    let mut gradient = decoder.zeros_like();
+    let mut gradient = decoder.clone();
     for epoch in 0..schedule.total() {
         let mut mean = Losses::default();
         for loss in &mut losses {
@@ -87,9 +87,9 @@ pub fn train_xi(
     schedule: &Schedule,
     listener: &mut Listener<'_>,
 ) {
-    let xi_loss = |batch: &&Batch| (loss.maps()).xi_loss(parameters, batch, loss.features());
+    let xi_loss = |batch: &&Batch| loss.maps.xi_loss(parameters, batch, loss.features);
     let parts: Option<Vec<XiLoss>> =
-        (!loss.has_window()).then(|| batches.iter().map(xi_loss).collect());
+        (loss.weights.bptt == 0.0).then(|| batches.iter().map(xi_loss).collect());
     let mut masked = MaskedAdam::new(&parameters.xi[phase], schedule);
     for epoch in 0..schedule.total() {
         masked.start_epoch(epoch, schedule, &mut parameters.xi[phase]);
@@ -140,6 +140,7 @@ mod tests {
     use crate::train::joint::loss::{LossWeights, Maps};
     use crate::train::joint::nonlinear::NonlinearMaps;
     use crate::train::joint::parameters::Frame;
+    use crate::train::joint::unroll::Unroll;
     use crate::train::oscillator::standard_library;
     use crate::train::random::Random;
 
@@ -183,7 +184,7 @@ mod tests {
         } else {
             Box::new(NonlinearMaps::new(uniform, Frame::plain(&MASK)))
         };
-        JointLoss::new(features, maps, weights, parameters)
+        JointLoss::new(features, maps, (weights, Unroll::default()), parameters)
     }
 
     fn short(epochs: usize) -> Schedule {

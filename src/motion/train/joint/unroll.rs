@@ -66,6 +66,8 @@ impl Integrator {
 /// Samples of one batch.
 #[derive(Clone, Copy, Debug)]
 pub struct Window<'a> {
+    /// The library.
+    pub features: &'a Features,
     /// `n x 3d`: z, dz, u_lat.
     pub variables: &'a DMatrix<f64>,
     /// `library_dim x d`.
@@ -95,29 +97,19 @@ impl Unroll {
     ///
     /// Adds `weight` times its gradient to `adjoints`. Inputs are those recorded at the time of each stage, or the sample
     /// before it.
-    pub fn evaluate(
-        &self,
-        features: &Features,
-        samples: Window<'_>,
-        weight: f64,
-        adjoints: &mut Adjoints<'_>,
-    ) -> f64 {
-        let d = features.latent_dim();
+    pub fn evaluate(&self, samples: Window<'_>, weight: f64, adjoints: &mut Adjoints<'_>) -> f64 {
+        let d = samples.features.latent_dim();
         let reach = self.window * self.stride;
-        let Some(starts) = samples
-            .variables
-            .nrows()
-            .checked_sub(reach)
-            .filter(|n| *n > 0)
-        else {
+        let starts = samples.variables.nrows().saturating_sub(reach);
+        if starts == 0 {
             return 0.0;
-        };
+        }
         let h = samples.step_s * self.stride as f64;
         let scale = 1.0 / (self.window * starts * d) as f64;
         let mut state = samples.variables.view((0, 0), (starts, 2 * d)).into_owned();
         let (mut steps, mut residuals, mut loss) = (Vec::new(), Vec::new(), 0.0);
         for step in 0..self.window {
-            steps.push(self.forward(features, samples, step, h, &mut state));
+            steps.push(self.forward(samples, step, h, &mut state));
             let target = samples
                 .variables
                 .view(((step + 1) * self.stride, 0), (starts, d));
@@ -133,7 +125,7 @@ impl Unroll {
             target -= &residual;
             let mut position = adjoint.columns_mut(0, d);
             position += residual;
-            self.backward(features, samples, (&mut stages, h), &mut adjoint, adjoints);
+            self.backward(samples, (&mut stages, h), &mut adjoint, adjoints);
         }
         let mut start = adjoints.variables.view_mut((0, 0), (starts, 2 * d));
         start += adjoint;
@@ -143,13 +135,12 @@ impl Unroll {
     /// One step of all starts; `state` is `starts x 2d`.
     fn forward(
         &self,
-        features: &Features,
         samples: Window<'_>,
         step: usize,
         h: f64,
         state: &mut DMatrix<f64>,
     ) -> Vec<Stage> {
-        let (starts, d) = (state.nrows(), features.latent_dim());
+        let (starts, d) = (state.nrows(), samples.features.latent_dim());
         let (before, mut slope) = (state.clone(), DMatrix::zeros(starts, 2 * d));
         let mut stages = Vec::new();
         for &(at, share) in self.integrator.stages() {
@@ -162,7 +153,7 @@ impl Unroll {
                 .columns_mut(2 * d, d)
                 .copy_from(&samples.variables.view((first, 2 * d), (starts, d)));
             let mut values = FeatureValues::default();
-            let theta = features.evaluate(&variables, &mut values);
+            let theta = samples.features.evaluate(&variables, &mut values);
             slope.columns_mut(0, d).copy_from(&now.columns(d, d));
             slope.columns_mut(d, d).copy_from(&(&theta * samples.xi));
             *state += &slope * (h * share);
@@ -178,13 +169,12 @@ impl Unroll {
     /// Turns the gradient with respect to the state after a step into the one before it.
     fn backward(
         &self,
-        features: &Features,
         samples: Window<'_>,
         (stages, h): (&mut [Stage], f64),
         adjoint: &mut DMatrix<f64>,
         adjoints: &mut Adjoints<'_>,
     ) {
-        let (starts, d) = (adjoint.nrows(), features.latent_dim());
+        let (starts, d) = (adjoint.nrows(), samples.features.latent_dim());
         let after = adjoint.clone();
         let mut onto_earlier = DMatrix::zeros(starts, 2 * d);
         let weights = self.integrator.stages();
@@ -194,6 +184,7 @@ impl Unroll {
             *adjoints.xi += stage.theta.tr_mul(&acceleration);
             let onto_theta = acceleration * samples.xi.transpose();
             let mut variables = DMatrix::zeros(starts, 3 * d);
+            let features = samples.features;
             features.backward(&onto_theta, &mut stage.values, &mut variables);
             let mut inputs =
                 (adjoints.variables).view_mut((stage.inputs.start, 2 * d), (starts, d));
@@ -228,13 +219,14 @@ mod tests {
         step_s: f64,
     ) -> (f64, [DMatrix<f64>; 2]) {
         let samples = Window {
+            features,
             variables,
             xi,
             step_s,
         };
         let mut gradients = [variables, xi].map(|matrix| matrix.map(|_| 0.0));
         let [variables, xi] = &mut gradients;
-        let loss = unroll.evaluate(features, samples, 0.3, &mut Adjoints { variables, xi });
+        let loss = unroll.evaluate(samples, 0.3, &mut Adjoints { variables, xi });
         (loss, gradients)
     }
 

@@ -42,10 +42,8 @@ pub fn fit_deviations(
     let mut square = DVector::zeros(d);
     let (mut unexplained, mut total) = (0.0, 0.0);
     for left_out in 0..sampled.len() {
-        let others: Vec<&Sampled> = (all.iter().enumerate())
-            .filter(|(jump, _)| *jump != left_out)
-            .map(|(_, jump)| *jump)
-            .collect();
+        let mut others = all.clone();
+        others.remove(left_out);
         let prior = fit.prior(&others);
         let xi = fit.xi(&prior, &others);
         let (variables, target) = fit.deviations(&prior, all[left_out]);
@@ -68,27 +66,27 @@ struct Fit<'a> {
     projector: DMatrix<f64>,
 }
 
-/// Tables of `z`, `dz`, `u_lat` and of mean accelerations over the intervals.
-struct PriorTables([DMatrix<f64>; 4]);
-
 impl Fit<'_> {
-    fn prior(&self, jumps: &[&Sampled]) -> PriorTables {
+    /// Tables of `z`, `dz`, `u_lat` and of mean accelerations over the intervals.
+    fn prior(&self, jumps: &[&Sampled]) -> [DMatrix<f64>; 4] {
         let regression = GoalRegression::of(jumps.iter().copied(), self.goal);
-        let table = |pick: &dyn Fn(&PartNodes) -> DMatrix<f64>| {
-            let values = jumps.iter().map(|jump| pick(&jump.parts[self.part]));
-            let values: Vec<DMatrix<f64>> = values.collect();
-            regression.table(&values.iter().collect::<Vec<_>>())
-        };
-        PriorTables([
-            table(&|nodes| nodes.z.clone()),
-            table(&|nodes| nodes.dz.clone()),
-            table(&|nodes| nodes.u_lat.clone()),
-            table(&accelerations),
-        ])
+        let parts = || jumps.iter().map(|jump| &jump.parts[self.part]);
+        let table = |pick: fn(&PartNodes) -> &DMatrix<f64>| regression.table(parts().map(pick));
+        let ddz: Vec<_> = parts().map(accelerations).collect();
+        [
+            table(|nodes| &nodes.z),
+            table(|nodes| &nodes.dz),
+            table(|nodes| &nodes.u_lat),
+            regression.table(&ddz),
+        ]
     }
 
     /// Variables, one row per interval and `3 d` columns, and accelerations of a jump about a prior.
-    fn deviations(&self, prior: &PriorTables, jump: &Sampled) -> (DMatrix<f64>, DMatrix<f64>) {
+    fn deviations(
+        &self,
+        [z, dz, u_lat, ddz]: &[DMatrix<f64>; 4],
+        jump: &Sampled,
+    ) -> (DMatrix<f64>, DMatrix<f64>) {
         let nodes = &jump.parts[self.part];
         let features = GoalRange::features(self.goal, &jump.goal);
         let at = |table: &DMatrix<f64>| {
@@ -97,7 +95,6 @@ impl Fit<'_> {
             let blocks = blocks.map(|(k, f)| table.columns(k * d, d) * *f);
             blocks.fold(DMatrix::zeros(table.nrows(), d), |sum, block| sum + block)
         };
-        let PriorTables([z, dz, u_lat, ddz]) = prior;
         let d = nodes.z.ncols();
         let n = nodes.z.nrows() - 1;
         let mut variables = DMatrix::zeros(n, 3 * d);
@@ -110,7 +107,7 @@ impl Fit<'_> {
         (variables, accelerations(nodes) - at(ddz))
     }
 
-    fn xi(&self, prior: &PriorTables, jumps: &[&Sampled]) -> DMatrix<f64> {
+    fn xi(&self, prior: &[DMatrix<f64>; 4], jumps: &[&Sampled]) -> DMatrix<f64> {
         let d = self.projector.nrows();
         let (mut gram, mut product) = (DMatrix::zeros(3 * d, 3 * d), DMatrix::zeros(3 * d, d));
         for jump in jumps {

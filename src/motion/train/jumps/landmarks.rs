@@ -106,7 +106,7 @@ fn cut(training: &Dataset, jump: &Jump, rising: impl Fn(usize) -> bool) -> Optio
     }
     kind.push(landmark("flight", *flight_phase)?);
     borders.push(in_air.start);
-    let last = jump.len() - 1;
+    let last = jump.samples() - 1;
     let landed_s = jump.time_s[last] - jump.time_s[in_air.end.min(last)];
     if landed_s < LEAST_LANDING_S || last < in_air.end + LEAST_SAMPLES {
         borders.push(in_air.end - 1);
@@ -144,10 +144,16 @@ fn feet_of(training: &Dataset, phase: usize) -> Option<ContactFlags> {
         .max_by_key(|feet| feet.iter().filter(|down| **down).count())
 }
 
-/// The parts that most jumps have.
-pub fn commonest_kind(cuts: &[Option<Cut>]) -> Option<Vec<Landmark>> {
-    let kinds = || cuts.iter().flatten().map(|cut| &cut.kind);
-    let count = |kind: &&Vec<Landmark>| kinds().filter(|other| other == kind).count();
+/// The jumps with the parts that most jumps have, and their cuts.
+pub fn of_commonest_kind(cuts: &[Option<Cut>]) -> Vec<(usize, &Cut)> {
+    let all = cuts.iter().enumerate();
+    let mut all: Vec<_> = all
+        .filter_map(|(jump, cut)| Some((jump, cut.as_ref()?)))
+        .collect();
+    let count = |kind: &[Landmark]| all.iter().filter(|(_, cut)| cut.kind == kind).count();
     // `max_by_key` takes the last of equals: reversed, the first is taken.
-    kinds().rev().max_by_key(count).cloned()
+    let commonest = all.iter().rev().max_by_key(|(_, cut)| count(&cut.kind));
+    let kind = commonest.map(|(_, cut)| &cut.kind);
+    all.retain(|(_, cut)| Some(&cut.kind) == kind);
+    all
 }

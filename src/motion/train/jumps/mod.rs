@@ -1,6 +1,6 @@
 //! What the training jumps say of jumps that were not recorded: landmarks, prior, deviations.
 //!
-//! In: the training jumps and an encoder. Out: [`LearnedJumps`], or none if fewer than
+//! In: the training jumps and an encoder. Out: a [`JumpPrior`], or none if fewer than
 //! [`LEAST_JUMPS`] of them are of one kind. `landmarks` cuts each jump into parts, `nodes`
 //! samples the parts at equal shares of their durations, `regression` fits nodes and durations over
 //! the goals, and `deviations` fits how accelerations change about such a trajectory.
@@ -14,12 +14,12 @@ use nalgebra::{DMatrix, DVector};
 
 use super::dataset::Dataset;
 use super::error::TrainError;
-use super::latent::Latent;
+use super::latent::{EncodedSet, Latent};
 use super::metrics::{BODY_X, BODY_Z};
 use super::report::PartScore;
 use crate::model::{GOAL_DIM, GoalRange, JumpPart, JumpPrior, StateMap};
 use deviations::fit_deviations;
-use landmarks::{Cut, Landmark, commonest_kind};
+use landmarks::{Cut, Landmark, of_commonest_kind};
 use nodes::{PartNodes, intervals, sample};
 use regression::GoalRegression;
 
@@ -34,38 +34,26 @@ struct Sampled {
     parts: Vec<PartNodes>,
 }
 
-/// A prior, and how well its deviations are explained in each of its parts.
-#[derive(Debug, PartialEq)]
-pub struct LearnedJumps {
-    /// Landmarks and prior.
-    pub prior: JumpPrior,
-    /// One score per part.
-    pub scores: Vec<PartScore>,
-}
-
-/// Landmarks and prior of the training jumps; none for a nonlinear encoder or too few jumps of one
-/// kind.
+/// Landmarks and prior of the training jumps, and how well its deviations are explained in each of its parts; none for
+/// a nonlinear encoder or too few jumps of one kind.
 ///
 /// # Errors
 /// As [`Dataset::for_each`].
 pub fn learn_jumps(
-    training: &Dataset,
+    set: EncodedSet<'_>,
     encoder: &StateMap,
-) -> Result<Option<LearnedJumps>, TrainError> {
+) -> Result<(Option<JumpPrior>, Vec<PartScore>), TrainError> {
+    let (training, latent) = (set.dataset, set.latent);
+    let nothing = (None, Vec::new());
     let Some(affine) = encoder.as_affine() else {
-        return Ok(None);
+        return Ok(nothing);
     };
     let cuts = landmarks::cuts(training)?;
-    let Some(kind) = commonest_kind(&cuts) else {
-        return Ok(None);
-    };
-    let chosen: Vec<(usize, &Cut)> = (cuts.iter().enumerate())
-        .filter_map(|(jump, cut)| Some((jump, cut.as_ref().filter(|cut| cut.kind == kind)?)))
-        .collect();
+    let chosen = of_commonest_kind(&cuts);
     if chosen.len() < LEAST_JUMPS {
-        return Ok(None);
+        return Ok(nothing);
     }
-    let latent = Latent::of(training, encoder)?;
+    let (kind, scale) = (&chosen[0].1.kind, &training.scaling.state);
     let counts: Vec<usize> = (0..kind.len())
         .map(|part| {
             let all = chosen.iter().map(|(_, cut)| cut.duration_s(part));
@@ -84,7 +72,17 @@ pub fn learn_jumps(
         })
         .collect();
     let translation = affine.weights().column(BODY_X).into_owned();
-    let ends = Ends::of(training, &chosen);
+    let heights = |jump: usize| training.jumps[jump].x.row(BODY_Z) / scale[BODY_Z];
+    let mut start = DVector::zeros(scale.len());
+    for &(jump, _) in &chosen {
+        let first = training.jumps[jump].x.column(0);
+        start += first.component_div(scale) / chosen.len() as f64;
+    }
+    let end_heights = chosen.iter().map(|&(jump, cut)| heights(jump)[cut.end()]);
+    let landing_heights = chosen.iter().map(|&(jump, cut)| {
+        let first = cut.landing().unwrap_or(cut.end());
+        heights(jump).columns_range(first..cut.end() + 1).min()
+    });
     let jumps: Vec<_> = sampled.iter().map(|jump| jump.goal).collect();
     let goal = GoalRange::of(&jumps);
     let (parts, scores) = (0..kind.len())
@@ -93,12 +91,12 @@ pub fn learn_jumps(
     let prior = JumpPrior {
         parts,
         jumps,
-        start: ends.start.map(rounded),
-        state_std: state_std(&latent, &chosen).map(rounded),
-        end_height_m: ends.end_height_m.map(rounded),
-        landing_height_m: rounded(ends.landing_height_m),
+        start: start.map(rounded),
+        state_std: state_std(latent, &chosen).map(rounded),
+        end_height_m: range_of(end_heights),
+        landing_height_m: range_of(landing_heights)[0],
     };
-    Ok(Some(LearnedJumps { prior, scores }))
+    Ok((Some(prior), scores))
 }
 
 /// Distance, rise of the body at the apex and height at the start of a jump, m.
@@ -124,12 +122,10 @@ fn part_of(
     let regression = GoalRegression::of(sampled, goal);
     let all: Vec<&PartNodes> = sampled.iter().map(|jump| &jump.parts[part]).collect();
     let table = |pick: fn(&PartNodes) -> &DMatrix<f64>| {
-        let values: Vec<&DMatrix<f64>> = all.iter().map(|nodes| pick(nodes)).collect();
-        regression.table(&values).map(rounded)
+        let values = all.iter().copied().map(pick);
+        regression.table(values).map(rounded)
     };
     let durations: Vec<f64> = all.iter().map(|nodes| nodes.duration_s).collect();
-    let least = durations.iter().copied().fold(f64::INFINITY, f64::min);
-    let most = durations.iter().copied().fold(0.0, f64::max);
     let deviations = fit_deviations(sampled, goal, part, translation);
     let score = PartScore {
         part: landmark.name.clone(),
@@ -140,7 +136,7 @@ fn part_of(
         phase: landmark.phase,
         feet: landmark.feet,
         duration_s: regression.numbers(&durations).map(rounded),
-        duration_range_s: [rounded(least), rounded(most)],
+        duration_range_s: range_of(durations.iter().copied()),
         z: table(|nodes| &nodes.z),
         dz: table(|nodes| &nodes.dz),
         u_lat: table(|nodes| &nodes.u_lat),
@@ -171,33 +167,11 @@ fn input_covariance(all: &[&PartNodes]) -> DMatrix<f64> {
     covariance + DMatrix::identity(d, d) * floor
 }
 
-/// Starts and ends of the jumps.
-struct Ends {
-    start: DVector<f64>,
-    end_height_m: [f64; 2],
-    landing_height_m: f64,
-}
-
-impl Ends {
-    fn of(training: &Dataset, chosen: &[(usize, &Cut)]) -> Self {
-        let scale = &training.scaling.state;
-        let mut ends = Self {
-            start: DVector::zeros(scale.len()),
-            end_height_m: [f64::INFINITY, f64::NEG_INFINITY],
-            landing_height_m: f64::INFINITY,
-        };
-        for &(jump, cut) in chosen {
-            let x = &training.jumps[jump].x;
-            ends.start += x.column(0).component_div(scale) / chosen.len() as f64;
-            let heights = x.row(BODY_Z) / scale[BODY_Z];
-            let last = heights[cut.end()];
-            let [least, most] = ends.end_height_m;
-            ends.end_height_m = [least.min(last), most.max(last)];
-            let landing = heights.columns_range(cut.landing().unwrap_or(cut.end())..cut.end() + 1);
-            ends.landing_height_m = ends.landing_height_m.min(landing.min());
-        }
-        ends
-    }
+/// The least and the most of some numbers.
+fn range_of(values: impl Iterator<Item = f64>) -> [f64; 2] {
+    let nothing = [f64::INFINITY, f64::NEG_INFINITY];
+    let range = values.fold(nothing, |[least, most], v| [least.min(v), most.max(v)]);
+    range.map(rounded)
 }
 
 /// Standard deviations of `z` and `dz` over the samples of the jumps.

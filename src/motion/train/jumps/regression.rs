@@ -38,7 +38,8 @@ impl GoalRegression {
     }
 
     /// Coefficients of one table per jump, `n x d` each: `n x (FEATURE_DIM d)`.
-    pub fn table(&self, values: &[&DMatrix<f64>]) -> DMatrix<f64> {
+    pub fn table<'a>(&self, values: impl IntoIterator<Item = &'a DMatrix<f64>>) -> DMatrix<f64> {
+        let values: Vec<_> = values.into_iter().collect();
         let (n, d) = values[0].shape();
         let mut table = DMatrix::zeros(n, FEATURE_DIM * d);
         for k in 0..FEATURE_DIM {

@@ -11,9 +11,13 @@ fn training() -> Dataset {
     go1((1..=8).map(|k| format!("train_{k:02}")))
 }
 
-fn learned(training: &Dataset) -> LearnedJumps {
-    let learned = learn_jumps(training, &encoder()).unwrap();
-    learned.expect("jumps of one kind")
+fn learned(training: &Dataset) -> (Option<JumpPrior>, Vec<PartScore>) {
+    let latent = Latent::of(training, &encoder()).unwrap();
+    learn_jumps(EncodedSet::new(training, &latent), &encoder()).unwrap()
+}
+
+fn prior_of(training: &Dataset) -> JumpPrior {
+    learned(training).0.expect("jumps of one kind")
 }
 
 /// An encoder of the body's x and z and the front right thigh and knee.
@@ -27,7 +31,7 @@ fn encoder() -> StateMap {
 
 #[test]
 fn jumps_are_cut_into_crouch_thrust_flight_and_landing() {
-    let prior = learned(&training()).prior;
+    let prior = prior_of(&training());
     let names: Vec<&str> = prior.parts.iter().map(|part| part.name.as_str()).collect();
     assert_eq!(names, ["crouch", "thrust", "flight", "landing"]);
     assert_eq!(prior.parts[2].feet, [false; 4]);
@@ -45,7 +49,7 @@ fn jumps_are_cut_into_crouch_thrust_flight_and_landing() {
 #[test]
 fn prior_at_the_goal_of_a_jump_is_nearer_to_it_than_the_mean_jump() {
     let training = training();
-    let prior = learned(&training).prior;
+    let prior = prior_of(&training);
     let latent = Latent::of(&training, &encoder()).unwrap();
     let last = prior.parts.last().unwrap();
     let error = |features: &dyn Fn(usize) -> [f64; FEATURE_DIM]| -> f64 {
@@ -63,7 +67,7 @@ fn prior_at_the_goal_of_a_jump_is_nearer_to_it_than_the_mean_jump() {
 
 #[test]
 fn deviations_know_nothing_of_where_the_robot_stands() {
-    let prior = learned(&training()).prior;
+    let prior = prior_of(&training());
     for part in &prior.parts {
         let xi = part.xi.as_ref().unwrap();
         assert!(xi.row(0).amax() < 1e-9 * xi.amax(), "{}", part.name);
@@ -75,13 +79,13 @@ fn deviations_know_nothing_of_where_the_robot_stands() {
 fn too_few_jumps_have_no_prior() {
     let mut training = training();
     training.jumps.truncate(LEAST_JUMPS - 1);
-    assert_eq!(learn_jumps(&training, &encoder()).unwrap(), None);
+    assert_eq!(learned(&training), (None, Vec::new()));
 }
 
 #[test]
 fn score_of_deviations_falls_when_inputs_belong_to_other_jumps() {
     let score = |training: &Dataset| -> f64 {
-        let scores = learned(training).scores;
+        let (_, scores) = learned(training);
         let thrust = scores.iter().find(|score| score.part == "thrust");
         thrust.expect("a thrust").ddz_r2
     };
