@@ -8,7 +8,6 @@ mod control_model;
 mod lock;
 mod sources;
 
-
 use askama::Template;
 
 use crate::codegen::interface::ModelInterface;
