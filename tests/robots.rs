@@ -61,7 +61,7 @@ fn feet_and_jacobians_are_those_of_pinocchio() {
                     names[..]
                 );
                 let q: [f64; 3] = numbers(&entry["angles"]).try_into().expect("three angles");
-                let foot = robot.hip_position(leg) + robot.foot_position(leg, &q);
+                let foot = robot.foot_from_body(leg, &q);
                 let expected = Vector3::from_vec(numbers(&entry["foot"]));
                 assert!(
                     (foot - expected).amax() < 1e-9,

@@ -91,6 +91,7 @@ impl Robot {
     }
 
     /// The same with the moments by the arms of a frame, in axes parallel to the body's.
+    #[inline]
     pub(super) fn wrench_by_arms(
         &self,
         frame: WrenchFrame,
@@ -115,6 +116,7 @@ impl Robot {
 
     /// The 6 x 12 matrix `G` of `[F_lin; F_ang] = G tau` at a posture and
     /// contact; columns of legs in the air are zero.
+    #[inline]
     pub(super) fn map_by_arms(
         &self,
         frame: WrenchFrame,
@@ -133,6 +135,7 @@ impl Robot {
         Ok(map)
     }
 
+    #[inline]
     fn arm(&self, frame: WrenchFrame, leg: Leg, q: &[f64; 3]) -> Vector3<f64> {
         match frame {
             WrenchFrame::Body => self.foot_position(leg, q),

@@ -6,10 +6,10 @@
 //! `F_k = -J_k^-T (tau_k - losses - Y_k pi + contact)`: `Y_k pi` are the torques that move the
 //! leg's own links (first and second moments `pi`, linear), and contact is the torque of a foot
 //! of radius `r` that rolls with resistance `rho`. A leg in the air obeys
-//! `tau_k = losses + Y_k pi`, joint by joint. All unknowns enter linearly; torques are taken a delay later, and a column of their rates
-//! tells by how much that delay is wrong.
+//! `tau_k = losses + Y_k pi`, joint by joint. All unknowns enter linearly; torques are taken a delay
+//! later, and a column of their rates tells by how much that delay is wrong.
 
-use nalgebra::{DMatrix, Matrix3, SMatrix, Vector3};
+use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use super::motion::{LegFrame, Motion};
 use super::parameters::{
@@ -80,10 +80,10 @@ impl SampleEquations {
             clipped_torques,
         };
         for sample in 0..n {
-            let mut body = BodyEquation::default();
-            body.add(GRAVITY, -Vector3::z());
-            body.add(TRUNK_FORWARD, -motion.trunk_axis(0, sample));
-            body.add(TRUNK_UP, -motion.trunk_axis(2, sample));
+            let mut body = BodyEquation([[0.0; BODY_ROWS]; 3]);
+            body.subtract(GRAVITY, &Vector3::z());
+            body.subtract(TRUNK_FORWARD, &motion.trunk_axis(0, sample));
+            body.subtract(TRUNK_UP, &motion.trunk_axis(2, sample));
             body.add(PARAMETER_DIM, motion.body(sample));
             for leg in Leg::ALL {
                 let first = LEG_JOINT_DIM * leg.index();
@@ -97,8 +97,8 @@ impl SampleEquations {
                     torque_rate: of(&torque_rate),
                     own: own_torques(robot, motion, leg, sample, gravity_m_s2),
                 };
-                for (moment, direction) in MOMENTS.into_iter().zip(motion.leg(leg, sample)) {
-                    body.add(moment, -direction);
+                for (moment, direction) in MOMENTS.into_iter().zip(&motion.leg(leg, sample)) {
+                    body.subtract(moment, direction);
                 }
                 if segment.feet[sample][leg.index()] {
                     let q = leg.of_joints(&segment.joints(sample));
@@ -121,21 +121,27 @@ impl SampleEquations {
             equations
                 .body
                 .column_mut(sample)
-                .copy_from_slice(body.0.as_slice());
+                .copy_from_slice(body.0.as_flattened());
         }
         equations
     }
 }
 
 /// Coefficients and left side for the trunk's acceleration at one sample, a column an axis.
-#[derive(Default)]
-struct BodyEquation(SMatrix<f64, BODY_ROWS, 3>);
+struct BodyEquation([[f64; BODY_ROWS]; 3]);
 
 impl BodyEquation {
     /// Adds a vector to the coefficients of an unknown, or to the left side.
     fn add(&mut self, unknown: usize, vector: Vector3<f64>) {
         for axis in 0..3 {
-            self.0[(unknown, axis)] += vector[axis];
+            self.0[axis][unknown] += vector[axis];
+        }
+    }
+
+    /// Takes a vector from the coefficients of an unknown.
+    fn subtract(&mut self, unknown: usize, vector: &Vector3<f64>) {
+        for axis in 0..3 {
+            self.0[axis][unknown] -= vector[axis];
         }
     }
 
@@ -143,7 +149,7 @@ impl BodyEquation {
     fn add_foot(&mut self, state: &LegSample, map: &Matrix3<f64>) {
         let force = map * state.torque;
         self.add(INVERSE_MASS, force);
-        self.add(DELAY, -(map * state.torque_rate));
+        self.subtract(DELAY, &(map * state.torque_rate));
         for kind in 0..LEG_JOINT_DIM {
             let (rate, joint) = (state.rate[kind], map.column(kind));
             self.add(VISCOUS + kind, -joint * rate);
@@ -151,7 +157,7 @@ impl BodyEquation {
             self.add(ARMATURE + kind, -joint * state.acceleration[kind]);
         }
         for (unknown, torque) in OWN.into_iter().zip(&state.own) {
-            self.add(unknown, -(map * torque));
+            self.subtract(unknown, &(map * torque));
         }
         // The force acts below the centre of the foot, and the foot rolls.
         let below = (-Vector3::z()).cross(&force);
@@ -164,7 +170,8 @@ impl BodyEquation {
     }
 }
 
-/// First moments of a leg by its directions: its share in the acceleration of the centre of mass.
+/// First moments of a leg in the order of [`Directions`](super::motion::Directions): its share in the
+/// acceleration of the centre of mass.
 const MOMENTS: [usize; 5] = [LEG_SIDE, THIGH, CALF, THIGH_FRONT, CALF_FRONT];
 
 /// Unknowns of a leg's own links in the torques of its joints.

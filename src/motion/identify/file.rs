@@ -20,7 +20,7 @@ impl Identification {
             let _ = writeln!(out, "# {}", note.replace(['\n', '\r'], " "));
         }
         let _ = writeln!(out, "robot = {:?}", self.robot);
-        numbers(&mut out, &forces(self.gravity_m_s2, self.mass_kg));
+        numbers(&mut out, &gravity_and_mass(self.gravity_m_s2, self.mass_kg));
         numbers(&mut out, &[("delay_s", self.delay_s)]);
         let _ = writeln!(out, "\n# {}\n[actuators]", JOINT_NAMES.join(" "));
         for (name, values) in self.actuators.named() {
@@ -30,7 +30,7 @@ impl Identification {
         table(
             &mut out,
             "standard_error",
-            &forces(error.gravity_m_s2, error.mass_kg),
+            &gravity_and_mass(error.gravity_m_s2, error.mass_kg),
         );
         numbers(&mut out, &[("delay_s", error.delay_s)]);
         for (name, PerKind { hx, hy, kn }) in [
@@ -46,7 +46,7 @@ impl Identification {
         table(
             &mut out,
             "force_alone",
-            &forces(alone.gravity_m_s2, alone.mass_kg),
+            &gravity_and_mass(alone.gravity_m_s2, alone.mass_kg),
         );
         table(&mut out, "force_alone.r2", &fit(alone.r2));
         let Samples { contact, flight } = self.samples;
@@ -88,7 +88,7 @@ impl Identification {
             let fault = IdentifyFault::Value { found, expected };
             Err(at(file, Place::Entry(entry.into()), fault))
         };
-        for (name, value) in forces(self.gravity_m_s2, self.mass_kg) {
+        for (name, value) in gravity_and_mass(self.gravity_m_s2, self.mass_kg) {
             if !(value.is_finite() && value > 0.0) {
                 return refuse(name.to_owned(), value, "a finite number above 0");
             }
@@ -111,7 +111,7 @@ fn at(file: &str, place: Place, fault: IdentifyFault) -> IdentifyError {
 /// A number with its name.
 type Entry = (&'static str, f64);
 
-fn forces(gravity_m_s2: f64, mass_kg: f64) -> [Entry; 2] {
+fn gravity_and_mass(gravity_m_s2: f64, mass_kg: f64) -> [Entry; 2] {
     [("gravity_m_s2", gravity_m_s2), ("mass_kg", mass_kg)]
 }
 

@@ -11,7 +11,8 @@ use crate::recording::preprocess::differences;
 use crate::robot::{JOINT_DIM, Leg, LegLinks, Robot};
 
 /// Directions of a leg in the world, or their derivatives: from the axis of abduction to the plane of the leg (side),
-/// from hip to knee (thigh), from knee to foot (calf), in front of the thigh, in front of the calf.
+/// from hip to knee (thigh), from knee to foot (calf), in front of the thigh, in front of the calf. The equations'
+/// moments of a leg have this order.
 pub type Directions = [Vector3<f64>; 5];
 
 /// Axes and directions of one leg in the world, unit vectors.
@@ -114,6 +115,7 @@ impl Motion {
         std::array::from_fn(|place| self.direction(first + 3 * place, sample))
     }
 
+    #[inline]
     fn direction(&self, row: usize, sample: usize) -> Vector3<f64> {
         self.directions.fixed_view::<3, 1>(row, sample).into_owned()
     }

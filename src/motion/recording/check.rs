@@ -338,12 +338,12 @@ fn group(coordinate: usize) -> usize {
     }
 }
 
-/// A value that is not within these bounds, or no number.
+/// The value and the bound that it breaks; none within the bounds, or for no number.
 pub(super) fn outside(value: f64, low: f64, high: f64) -> Breach {
     if value < low {
         Some((value, low))
     } else {
-        (value.is_nan() || value > high).then_some((value, high))
+        (value > high).then_some((value, high))
     }
 }
 

@@ -123,7 +123,8 @@ fn agreeing_coordinates(segment: &Segment) -> Vec<usize> {
         .collect()
 }
 
-/// Time that passed by the motion over time that passed by the stamps, if more moved than `least`.
+/// Time that passed by the motion over time that passed by the stamps, if by the stamps more moved than
+/// `least`.
 fn ratio(intervals: &[Interval], least: f64) -> Option<f64> {
     let (mut moved, mut stamped) = (0.0, 0.0);
     for interval in intervals {

@@ -56,8 +56,8 @@ pub struct ConditionOptions {
     pub smoothing: Option<(SavitzkyGolay, SmoothedRows)>,
 }
 
-/// Applies the steps in the order of [`ConditionOptions`] to a recording with these findings; also how many samples that
-/// leaves out, implausible ones and pieces between them that are too short.
+/// Applies the steps in the order of [`ConditionOptions`] to a recording with these findings; returns it with the
+/// number of samples left out: implausible ones and pieces between them that are too short.
 ///
 /// # Errors
 /// [`RecordingFault::TooShort`] if nothing long enough remains, or a segment is shorter than the filter.

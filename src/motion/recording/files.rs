@@ -74,7 +74,7 @@ pub struct RecordingFile {
     pub segments: Option<Vec<usize>>,
 }
 
-/// What the checks found in recordings, of files when they were first read.
+/// What the checks found in recordings; for files, when they were first read.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Notes {
     /// Implausible runs of samples with their files.

@@ -19,7 +19,7 @@ use serde::Serialize;
 use super::check::{check, outside};
 use super::segment::Recording;
 use crate::robot::{GRAVITY_M_S2, JOINT_DIM, Leg, Robot};
-use balance::Balance;
+pub use balance::Balance;
 use stance::{Slip, best_other_place, best_other_reading};
 
 /// Largest root mean square of the places of feet on the ground about their medians, m.
@@ -248,7 +248,7 @@ fn legs_or_signs(recording: &Recording, robot: &Robot, slip: &Slip) -> Option<Br
 }
 
 fn fall(balance: &Balance) -> Option<Broken> {
-    let (value, bound) = outside(balance.fall_m_s2?, FALL_M_S2.0, FALL_M_S2.1)?;
+    let (value, bound) = beyond(balance.fall_m_s2?, FALL_M_S2)?;
     let words = format!(
         "in flight the body accelerates by {value:.2} m/s^2 upwards, expected {} to {}: another axis, sign or \
          unit, another time, or contacts that are not the feet's",
@@ -258,7 +258,7 @@ fn fall(balance: &Balance) -> Option<Broken> {
 }
 
 fn weight(balance: &Balance, robot: &Robot) -> Option<Broken> {
-    let (value, bound) = outside(balance.weight_share?, WEIGHT_SHARE.0, WEIGHT_SHARE.1)?;
+    let (value, bound) = beyond(balance.weight_share?, WEIGHT_SHARE)?;
     let words = format!(
         "the torques carry {value:.3} of what {} kg need ({} to {} are accepted): torques in other units, of \
          other signs or other joints, or another robot",
@@ -285,7 +285,7 @@ fn hip_torques(balance: &Balance) -> Option<Broken> {
 }
 
 fn accelerations(balance: &Balance) -> Option<Broken> {
-    let (axis, value) = balance.axis.zip(balance.acceleration_offset_m_s2)?;
+    let (axis, value) = balance.acceleration_offset_m_s2?;
     (value.abs() > ACCELERATION_M_S2).then(|| {
         let words = format!(
             "the body's acceleration along {axis} differs from the slope of its velocity by {value:.2} m/s^2 in the \
@@ -325,6 +325,12 @@ fn other_robot(
         other.name()
     );
     Some((share, OTHER_WEIGHT.0.exp(), words))
+}
+
+/// A value that is not within a range, and the bound that it breaks; no number breaks the upper.
+fn beyond(value: f64, (low, high): (f64, f64)) -> Option<(f64, f64)> {
+    let of_nan = value.is_nan().then_some((value, high));
+    outside(value, low, high).or(of_nan)
 }
 
 /// Weight of a mass, N.

@@ -90,12 +90,7 @@ pub fn resampled(segment: &Segment, rows: usize) -> Result<Segment, RecordingErr
     let (start, end) = (own_s[0], own_s[n - 1]);
     let even = |i: usize| start + (end - start) * (i as f64 / (rows - 1) as f64);
     let time_s: Vec<f64> = (0..rows).map(|i| even(i).clamp(start, end)).collect();
-    // A time's sample on its left, and its share of the way to the next.
-    let place = |time: &f64| {
-        let left = own_s.partition_point(|own| own <= time).clamp(1, n - 1) - 1;
-        (left, (time - own_s[left]) / (own_s[left + 1] - own_s[left]))
-    };
-    let places: Vec<(usize, f64)> = time_s.iter().map(place).collect();
+    let places: Vec<_> = time_s.iter().map(|&time| place(own_s, time)).collect();
     let nearest = |&(left, share): &(usize, f64)| segment.feet[left + usize::from(share >= 0.5)];
     let feet = places.iter().map(nearest).collect();
     let at_places = |m: &DMatrix<f64>| {
@@ -109,6 +104,14 @@ pub fn resampled(segment: &Segment, rows: usize) -> Result<Segment, RecordingErr
         row_stride: segment.row_stride * (n - 1) as f64 / (rows - 1) as f64,
         ..segment.remade(time_s, feet, at_places)
     })
+}
+
+/// The sample on the left of a time, never the last, and the time's share of the way to the next.
+pub(super) fn place(own_s: &[f64], time_s: f64) -> (usize, f64) {
+    let after = own_s.partition_point(|own| *own <= time_s);
+    let left = after.clamp(1, own_s.len() - 1) - 1;
+    let step_s = own_s[left + 1] - own_s[left];
+    (left, (time_s - own_s[left]) / step_s)
 }
 
 /// The middle of the values; 0 if there are none.

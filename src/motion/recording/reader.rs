@@ -46,7 +46,7 @@ pub struct Reading {
 }
 
 impl Reading {
-    /// A recording as its file has it.
+    /// A recording whose clock was not mended.
     pub(super) fn as_recorded(recording: Recording, notes: Vec<String>) -> Self {
         Self {
             recording,

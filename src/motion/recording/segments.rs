@@ -54,10 +54,11 @@ pub(super) struct SegmentBuilder<'a> {
     has_force: bool,
     /// Time of the first sample if the clock counts from an epoch, else 0.
     origin_s: Option<f64>,
-    /// The segment so far: its first row, its times, its samples.
+    /// The segment so far: its first row, its times, contacts, and x, dx, ddx, torques and forces sample after sample.
     first_row: usize,
     time_s: Vec<f64>,
-    open: Vec<Sample>,
+    feet: Vec<ContactFlags>,
+    values: [Vec<f64>; 5],
     segments: Vec<Segment>,
 }
 
@@ -71,7 +72,8 @@ impl<'a> SegmentBuilder<'a> {
             origin_s: None,
             first_row: 0,
             time_s: Vec::new(),
-            open: Vec::new(),
+            feet: Vec::new(),
+            values: Default::default(),
             segments: Vec::new(),
         }
     }
@@ -85,18 +87,23 @@ impl<'a> SegmentBuilder<'a> {
         {
             self.close()?;
         }
-        if self.open.is_empty() {
+        if self.time_s.is_empty() {
             self.first_row = row;
         }
         self.time_s.push(time_s);
-        self.open.push(sample);
+        self.feet.push(sample.feet);
+        let ddx = &sample.ddx[..if self.has_acceleration { STATE_DIM } else { 0 }];
+        let force = &sample.force[..if self.has_force { BODY_DIM } else { 0 }];
+        let own = [&sample.x[..], &sample.dx, ddx, &sample.torque_nm, force];
+        for (all, own) in self.values.iter_mut().zip(own) {
+            all.extend_from_slice(own);
+        }
         Ok(())
     }
 
     fn close(&mut self) -> Result<(), RecordingError> {
         let time_s = std::mem::take(&mut self.time_s);
-        let open = std::mem::take(&mut self.open);
-        let n = open.len();
+        let n = time_s.len();
         if n < 2 {
             return Err(RecordingFault::too_short(n, 2).at(self.path, self.first_row));
         }
@@ -106,9 +113,13 @@ impl<'a> SegmentBuilder<'a> {
             let fault = RecordingFault::Sampling { found, expected };
             return Err(fault.in_cell(self.path, self.first_row, "Time"));
         }
-        let dx = columns(&open, |sample| &sample.dx);
+        let matrix = |mut all: Vec<f64>| {
+            all.shrink_to_fit();
+            DMatrix::from_vec(all.len() / n, n, all)
+        };
+        let [x, dx, ddx, torque_nm, force] = std::mem::take(&mut self.values).map(matrix);
         let ddx = match self.has_acceleration {
-            true => columns(&open, |sample| &sample.ddx),
+            true => ddx,
             false => differences(&time_s, &dx),
         };
         self.require_finite(&ddx)?;
@@ -117,12 +128,12 @@ impl<'a> SegmentBuilder<'a> {
             first_row: self.first_row,
             row_stride: 1.0,
             time_s,
-            x: columns(&open, |sample| &sample.x),
+            x,
             dx,
             ddx,
-            torque_nm: columns(&open, |sample| &sample.torque_nm),
-            feet: open.iter().map(|sample| sample.feet).collect(),
-            body_wrench: (self.has_force).then(|| columns(&open, |sample| &sample.force)),
+            torque_nm,
+            feet: std::mem::take(&mut self.feet),
+            body_wrench: self.has_force.then_some(force),
         });
         Ok(())
     }
@@ -141,17 +152,12 @@ impl<'a> SegmentBuilder<'a> {
 
     /// The segments of a file of so many columns.
     pub fn finish(mut self, columns: usize) -> Result<Vec<Segment>, RecordingError> {
-        if self.open.is_empty() {
+        if self.time_s.is_empty() {
             return Err(RecordingFault::HeaderOnly(columns).of(self.path));
         }
         self.close()?;
         Ok(self.segments)
     }
-}
-
-/// A quantity of the samples, one column a sample.
-fn columns<const N: usize>(samples: &[Sample], of: fn(&Sample) -> &[f64; N]) -> DMatrix<f64> {
-    DMatrix::from_iterator(N, samples.len(), samples.iter().flat_map(of).copied())
 }
 
 /// Whether a time belongs to a new segment: it jumps back by more than a step or to where the segment of these times

@@ -2,7 +2,7 @@
 
 use super::units::Dimension;
 use crate::recording::columns::Column;
-use crate::robot::{JOINT_DIM, JOINT_NAMES, Leg};
+use crate::robot::{JOINT_DIM, JOINT_NAMES, Leg, STATE_DIM};
 
 /// A quantity that a map places.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -93,6 +93,7 @@ impl Quantity {
     /// The recording's column of an element.
     pub(super) fn column(self, element: usize) -> Column {
         let (_, _, column, first) = self.facts();
+        debug_assert!(first + element < STATE_DIM, "w of a quaternion");
         column(first + element)
     }
 

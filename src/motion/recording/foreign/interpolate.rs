@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use crate::recording::preprocess::differences;
+use crate::recording::preprocess::{differences, place};
 
 /// How values run between two samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -41,11 +41,9 @@ pub(super) fn at_times(
         }
     };
     let mut out = DMatrix::zeros(values.nrows(), times_s.len());
-    let last = own_s.len() - 1;
     for (column, &time) in times_s.iter().enumerate() {
-        let left = own_s.partition_point(|own| *own <= time).clamp(1, last) - 1;
-        let step = own_s[left + 1] - own_s[left];
-        let share = ((time - own_s[left]) / step).clamp(0.0, 1.0);
+        let (left, share) = place(own_s, time);
+        let (step, share) = (own_s[left + 1] - own_s[left], share.clamp(0.0, 1.0));
         let (a, b) = (values.column(left), values.column(left + 1));
         let exact = match share {
             _ if share < SAME => Some(a),
@@ -53,9 +51,13 @@ pub(super) fn at_times(
             _ if between == Between::Nearest => Some(if share < 0.5 { a } else { b }),
             _ => None,
         };
+        if let Some(exact) = exact {
+            out.set_column(column, &exact);
+            continue;
+        }
         let line = a + (b - a) * share;
-        if exact.is_some() || between == Between::Straight {
-            out.set_column(column, &exact.map_or(line, |exact| exact.into_owned()));
+        if between == Between::Straight {
+            out.set_column(column, &line);
             continue;
         }
         let rest = 1.0 - share;

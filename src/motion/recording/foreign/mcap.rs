@@ -187,18 +187,16 @@ impl Open {
             (log_time_ns / 1_000_000_000) as i64,
             (log_time_ns % 1_000_000_000) as u32,
         ));
-        let values = match self.definition.values(self.layout, message, is_first) {
+        let (names, values) = match self.definition.values(self.layout, message, is_first) {
             Ok(values) => values,
             Err(fault) => return self.fault = Some(fault),
         };
-        if is_first {
-            columns.extend(values.iter().map(|(name, _)| Channel::named(name)));
-        }
+        columns.extend(names.iter().map(|name| Channel::named(name)));
         if values.len() + 1 != columns.len() {
             self.fault = Some(MessageFault::Ragged);
             return;
         }
-        for (column, (_, value)) in columns[1..].iter_mut().zip(values) {
+        for (column, value) in columns[1..].iter_mut().zip(values) {
             match value {
                 Value::Number(value) => column.values.push(value),
                 Value::Time(seconds, nanoseconds) => {

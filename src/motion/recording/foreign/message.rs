@@ -76,6 +76,9 @@ pub(super) enum Value {
     Time(i64, u32),
 }
 
+/// Names, if they are asked for, and numbers of a message.
+type Numbers = (Vec<String>, Vec<Value>);
+
 impl Definition {
     /// Reads a definition and those of its parts, as `ros2 bag` and `rosbag` store them.
     pub fn parse(name: &str, text: &str) -> Result<Self, MessageFault> {
@@ -143,15 +146,15 @@ impl Definition {
         Ok(index)
     }
 
-    /// Every number of a message and, if `named`, its name: `pose.position.x`, `motor_state[3].q`, and
+    /// The names of a message's numbers, if `named`, and the numbers: `pose.position.x`, `motor_state[3].q`, and
     /// `position[FR_hip_joint]` where a list of names goes with a list of numbers.
     pub fn values(
         &self,
         layout: Layout,
         bytes: &[u8],
         named: bool,
-    ) -> Result<Vec<(String, Value)>, MessageFault> {
-        let (mut cursor, mut out) = (Cursor::new(layout, bytes)?, Vec::new());
+    ) -> Result<Numbers, MessageFault> {
+        let (mut cursor, mut out) = (Cursor::new(layout, bytes)?, Numbers::default());
         self.message(0, &mut cursor, named, &mut String::new(), Some(&mut out))?;
         Ok(out)
     }
@@ -162,7 +165,7 @@ impl Definition {
         cursor: &mut Cursor<'_>,
         named: bool,
         path: &mut String,
-        mut out: Option<&mut Vec<(String, Value)>>,
+        mut out: Option<&mut Numbers>,
     ) -> Result<(), MessageFault> {
         let mut names: Vec<String> = Vec::new();
         let before = path.len();
@@ -217,7 +220,8 @@ impl Definition {
                 if let Some(out) = out.as_deref_mut()
                     && count <= MOST_ENTRIES
                 {
-                    out.push((path.clone(), value));
+                    out.0.extend(named.then(|| path.clone()));
+                    out.1.push(value);
                 }
             }
         }
@@ -409,15 +413,16 @@ mod tests {
             ("parts[1].b", Value::Number(-8.0)),
             ("last", Value::Number(-300.0)),
         ];
+        let owned = |(name, value): (&str, _)| (name.to_owned(), value);
+        let expected: Numbers = expected.into_iter().map(owned).unzip();
         for layout in [Layout::Ros1, Layout::Ros2] {
             let found = definition.values(layout, &message(layout), true).unwrap();
-            let found = found.iter().map(|(name, value)| (name.as_str(), *value));
-            assert_eq!(found.collect::<Vec<_>>(), expected, "{layout:?}");
+            assert_eq!(found, expected, "{layout:?}");
         }
     }
 
     #[test]
-    fn values_of_every_cut_message_is_refused() {
+    fn values_of_every_cut_message_are_refused() {
         let definition = Definition::parse("demo_msgs/msg/Demo", TEXT).unwrap();
         let whole = message(Layout::Ros2);
         for end in 0..whole.len() {

@@ -1,7 +1,7 @@
 //! Forces against weight and acceleration, falling in flight, hips' torques against the side they hold.
 
 use nalgebra::{Rotation3, Unit, Vector3};
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use super::weight_n;
 use crate::recording::preprocess::{differences, median};
@@ -27,11 +27,9 @@ pub struct Balance {
     /// Slope of each hip's abduction torque over its lever times the force along the leg; 1 for a force in the plane
     /// of the leg.
     pub hip_share: [Option<f64>; FOOT_DIM],
-    /// Largest median difference of the body's acceleration and the slope of its velocity, m/s^2.
-    pub acceleration_offset_m_s2: Option<f64>,
-    /// Its axis.
-    #[serde(skip)]
-    pub axis: Option<&'static str>,
+    /// Largest median difference of the body's acceleration and the slope of its velocity, m/s^2, after its axis.
+    #[serde(serialize_with = "without_axis")]
+    pub acceleration_offset_m_s2: Option<(&'static str, f64)>,
 }
 
 /// Sums of a balance.
@@ -54,15 +52,13 @@ impl Balance {
         }
         let (dv, flight_s) = sums.flight;
         let (impulse, needed, ground_s) = sums.ground;
-        let (axis, offset_m_s2) = acceleration_offset(recording).unzip();
         Self {
             fall_m_s2: (flight_s >= LEAST_S).then(|| dv / flight_s),
             weight_share: (ground_s >= LEAST_S && needed > 0.0).then(|| impulse / needed),
             hip_share: sums
                 .hips
                 .map(|(product, square)| (square > 0.0).then(|| product / square)),
-            acceleration_offset_m_s2: offset_m_s2,
-            axis,
+            acceleration_offset_m_s2: acceleration_offset(recording),
         }
     }
 }
@@ -125,6 +121,10 @@ impl Sums {
         let [roll, pitch, yaw] = std::array::from_fn(|i| segment.x[(JOINT_DIM + 3 + i, sample)]);
         rotation([roll, pitch, yaw]) * sum
     }
+}
+
+fn without_axis<S: Serializer>(offset: &Option<(&str, f64)>, out: S) -> Result<S::Ok, S::Error> {
+    offset.map(|(_, value)| value).serialize(out)
 }
 
 fn acceleration_offset(recording: &Recording) -> Option<(&'static str, f64)> {

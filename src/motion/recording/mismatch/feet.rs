@@ -1,4 +1,4 @@
-//! Heights of the feet: while only some are on the ground, those in the air are higher, which tells what column of
+//! Heights of the feet: while only some are on the ground, those in the air are higher, which tells which column of
 //! contact belongs to which foot; those on the ground are at height zero.
 
 use super::Broken;
@@ -60,8 +60,7 @@ pub(super) fn floor(recording: &Recording, robot: &Robot) -> Option<Broken> {
     for segment in &recording.segments {
         for (sample, feet) in segment.feet.iter().enumerate() {
             let x = segment.state(sample);
-            let standing = Leg::ALL.into_iter().filter(|leg| feet[leg.index()]);
-            heights.extend(standing.map(|leg| foot_place(robot, leg, &x, false).z));
+            heights.extend(Leg::down(*feet).map(|leg| foot_place(robot, leg, &x, false).z));
         }
     }
     // 0 where no foot ever stands.

@@ -147,7 +147,8 @@ pub(super) fn foot_place(
     if !rolled {
         return place;
     }
-    let (first, [pitch, yaw]) = (3 * leg.index(), [x[16], x[17]]);
+    let first = 3 * leg.index();
+    let [pitch, yaw] = [4, 5].map(|i| x[JOINT_DIM + i]);
     let inclination = pitch + x[first + 1] + x[first + 2];
     place - FOOT_RADIUS_M * inclination * Vector3::new(yaw.cos(), yaw.sin(), 0.0)
 }

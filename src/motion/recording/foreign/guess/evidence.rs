@@ -44,8 +44,8 @@ pub(super) fn scale(
     (best.1 < UNEXPLAINED).then_some(best)
 }
 
-/// Unit and axes of a velocity that is these rates of a position or of angles: the first of `frames` from which its
-/// values, `turned` to the rates' own, explain nearly as much as the best.
+/// Unit and axes of a velocity whose position or angles have these rates: of `frames`, the first that fits nearly as
+/// well as the best. `turned` gives the velocity, if it is in a frame, in the axes of the rates.
 pub(super) fn axes<const N: usize>(
     frames: [Frame; N],
     turned: impl Fn(Frame) -> Option<DMatrix<f64>>,
