@@ -117,16 +117,12 @@ pub fn functions(model: &ReducedModel, n_points: usize, form: Form) -> Vec<Funct
         Ok(_) | Err(_) => Kind::Affine,
     };
     let (encoder, decoder) = (kind_of(model.encoder_map()), kind_of(model.decoder_map()));
-    let maps = [
-        (Map::Encode.lower(model), &encoder),
-        (Map::EncodeVelocity.lower(model), &encoder),
-        (Map::Decode.lower(model), &decoder),
-        (Map::DecodeVelocity.lower(model), &decoder),
-        (Map::ProjectInput.lower(model), &encoder),
-        (Map::LiftInput.lower(model), &encoder),
-    ];
-    for (program, kind) in maps {
-        if let Ok(program) = program {
+    for map in Map::ALL {
+        let kind = match map {
+            Map::Decode | Map::DecodeVelocity => &decoder,
+            Map::Encode | Map::EncodeVelocity | Map::ProjectInput | Map::LiftInput => &encoder,
+        };
+        if let Ok(program) = map.lower(model) {
             let name = program.name().to_owned();
             list.push(function(name, program, kind.clone(), n_points.min(100)));
         }

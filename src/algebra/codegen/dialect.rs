@@ -73,7 +73,7 @@ pub trait Dialect {
         Precision::Double.digits(value)
     }
 
-    /// A function applied to a printed argument.
+    /// A function applied to a printed argument; never [`Unary::Neg`], which is an operator.
     fn apply(&self, function: Unary, argument: &str) -> String;
 
     /// Definition of a scalar.
@@ -124,7 +124,7 @@ pub trait Dialect {
             .collect()
     }
 
-    /// Definition of a constant table; nothing for one of vectors of four in languages that have none.
+    /// Definition of a constant table; nothing for a table that the language prints as plain numbers.
     fn table(&self, table: &ConstTable) -> Option<String>;
 }
 

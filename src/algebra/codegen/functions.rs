@@ -32,6 +32,7 @@ pub fn lanes(program: &Program, dialect: &dyn Dialect, sines: SineCosine) -> Opt
     };
     let inputs = parameters(program.inputs(), Role::Input);
     let outputs = parameters(program.outputs(), Role::Output);
+    // No statement that vectorises reads a table, so the store of tables stays empty.
     let names = Names {
         inputs: &inputs,
         outputs: &outputs,

@@ -237,7 +237,10 @@ fn map_entries(
         let program = match (map, latent) {
             (Map::ProjectInput, Some(units)) => map.of_weights(&units.project),
             (Map::LiftInput, Some(units)) => map.of_weights(&units.lift),
-            (_, _) => map.lower(model),
+            (Map::ProjectInput | Map::LiftInput, None)
+            | (Map::Encode | Map::EncodeVelocity | Map::Decode | Map::DecodeVelocity, _) => {
+                map.lower(model)
+            }
         };
         match program {
             Ok(program) => {

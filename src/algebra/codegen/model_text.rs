@@ -8,6 +8,7 @@ use super::interface::{FunctionSpec, ModelInterface, computes_angles};
 use super::printer::Printer;
 use super::sines::SineCosine;
 use super::tables::Tables;
+use crate::ir::Statement;
 
 /// What the files of all languages say of a model; `F` is what they print of a function.
 pub struct ModelText<'a, F> {
@@ -34,12 +35,12 @@ pub struct PhaseText<F> {
     pub functions: [F; 3],
     /// Body of the loop over the lanes of a batch.
     pub lanes: Option<String>,
-    /// Whether that loop has sines, whose arguments may be beyond the kernel's limit.
+    /// Whether the accelerations have sines, whose arguments may be beyond the kernel's limit.
     pub lanes_have_angles: bool,
 }
 
 impl<'a, F> ModelText<'a, F> {
-    /// All of a model without lanes. `prefix` begins each name; `print` prints a function that reads some of
+    /// Prints all of a model but lanes. `prefix` begins each name; `print` prints a function that reads some of
     /// the tables, `numbers` rows or columns of nonzeros, counted from 0.
     pub fn new(
         entries: &'a ModelInterface,
@@ -93,6 +94,16 @@ impl<'a, F> ModelText<'a, F> {
     /// Whether a batch runs in blocks.
     pub fn has_lanes(&self) -> bool {
         self.phases.iter().any(|phase| phase.lanes.is_some())
+    }
+
+    /// Whether rows of functions are added in lanes, so that wide registers read rows of tables.
+    pub fn has_rows(&self) -> bool {
+        (self.entries).has(|s| matches!(s, Statement::Separable { .. }))
+    }
+
+    /// Whether there are sums of vectors of four numbers.
+    pub fn has_fours(&self) -> bool {
+        (self.entries).has(|s| matches!(s, Statement::Quads { .. }))
     }
 
     /// Name of the first phase's accelerations, for an example of a call.

@@ -146,8 +146,8 @@ impl Translator<'_> {
         })
     }
 
-    /// Reserves elements of a new array for values, with the zeros behind them that a later
-    /// statement reads.
+    /// Reserves elements of a new array for values, with the zeros behind them that a later separable statement
+    /// reads: no other statement reads arrays that end with zeros.
     pub(super) fn local_home(&mut self, first: usize, len: usize, wanted: &str) -> Span {
         let is_here = |values: &&[ValueId]| {
             let here = values.iter().map(|value| value.index()).take(len);

@@ -183,8 +183,11 @@ impl Translator<'_> {
     /// Input parameters that no statement mentions.
     pub(super) fn unused(&self) -> impl Iterator<Item = &Ident> {
         let is_read = |wanted: usize| {
-            let program = self.program;
-            program.has(|s| matches!(s, Statement::Input { slot, .. } if *slot == wanted))
+            let mut statements = self.program.statements().iter().enumerate();
+            statements.any(|(position, statement)| {
+                matches!(statement, Statement::Input { slot, .. } if *slot == wanted)
+                    && self.n_uses[self.program.values_of(position).start] > 0
+            })
         };
         let inputs = self.names.inputs.iter().enumerate();
         inputs

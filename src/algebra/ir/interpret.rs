@@ -2,7 +2,8 @@
 //! control run.
 
 use super::program::{
-    Binary, Group, LANES, Program, QUAD, Quad, QuadSum, Slopes, Slot, Statement, Table, ValueId,
+    Binary, Group, LANES, Program, QUAD, Quad, QuadSum, Slopes, Slot, Statement, Table, Unary,
+    ValueId,
 };
 use super::real::Real;
 
@@ -17,14 +18,23 @@ pub struct Interpreter<T = f64> {
     outputs: Vec<Slot>,
     /// Positions among the values of the elements of all inputs.
     loads: Vec<usize>,
-    /// The statements that compute something, and the position of the first value of each.
-    steps: Vec<(Statement, usize)>,
+    steps: Vec<Step>,
     tables: Vec<Table<T>>,
     callees: Vec<Interpreter<T>>,
     /// The values of the elements of all outputs.
     stores: Vec<ValueId>,
     /// Constants are set once; every other value is computed before it is read.
     values: Vec<T>,
+}
+
+/// A statement that computes something, and the position of its first value. Those of one operation are small,
+/// as most steps are.
+#[derive(Clone, Debug)]
+enum Step {
+    Unary(Unary, ValueId, usize),
+    Binary(Binary, ValueId, ValueId, usize),
+    Square(ValueId, usize),
+    Array(Box<Statement>, usize),
 }
 
 impl<T: Real> Interpreter<T> {
@@ -37,9 +47,18 @@ impl<T: Real> Interpreter<T> {
             match statement {
                 Statement::Constant(constant) => values[first] = T::constant(*constant),
                 Statement::Input { .. } => loads.push(first),
-                computed => steps.push((computed.clone(), first)),
+                Statement::Unary(op, a) => steps.push(Step::Unary(*op, *a, first)),
+                Statement::Binary(Binary::Mul, a, b) if a == b => {
+                    steps.push(Step::Square(*a, first));
+                }
+                Statement::Binary(op, a, b) => steps.push(Step::Binary(*op, *a, *b, first)),
+                array => steps.push(Step::Array(Box::new(array.clone()), first)),
             }
         }
+        let len = |slots: &[Slot]| slots.iter().map(|slot| slot.len).sum::<usize>();
+        assert_eq!(loads.len(), len(program.inputs()), "one load an element");
+        let n_results = program.results().len();
+        assert_eq!(n_results, len(program.outputs()), "one result an element");
         let table = |table: &Table| {
             let entries = table.entries.iter().map(|&x| T::constant(x));
             Table::new(table.rows, table.cols, entries.collect())
@@ -83,7 +102,7 @@ impl<T: Real> Interpreter<T> {
         }
     }
 
-    /// The same with an array per input slot, which gives one per output slot.
+    /// The same for arrays, one an input slot; returns one an output slot.
     ///
     /// # Panics
     /// As [`Self::run`].
@@ -97,62 +116,74 @@ impl<T: Real> Interpreter<T> {
     }
 
     fn evaluate(&mut self) {
-        let (values, tables) = (&mut self.values, &self.tables);
-        for &(ref statement, first) in &self.steps {
-            match statement {
-                // No steps.
-                Statement::Constant(_) | Statement::Input { .. } => {}
-                Statement::Unary(op, a) => values[first] = T::unary(*op, values[a.index()]),
-                Statement::Binary(Binary::Mul, a, b) if a == b => {
-                    values[first] = values[a.index()].square();
-                }
-                Statement::Binary(op, a, b) => {
+        let values = &mut self.values;
+        for step in &self.steps {
+            match *step {
+                Step::Unary(op, a, result) => values[result] = T::unary(op, values[a.index()]),
+                Step::Square(a, result) => values[result] = values[a.index()].square(),
+                Step::Binary(op, a, b, result) => {
                     let (a, b) = (values[a.index()], values[b.index()]);
-                    values[first] = match op {
+                    values[result] = match op {
                         Binary::Add => a + b,
                         Binary::Sub => a - b,
                         Binary::Mul => a * b,
                         Binary::Div => a / b,
                     };
                 }
-                Statement::SinCos { arguments } => {
-                    for (k, argument) in arguments.iter().enumerate() {
-                        let (sine, cosine) = values[argument.index()].sin_cos();
-                        values[first + k] = sine;
-                        values[first + arguments.len() + k] = cosine;
-                    }
+                Step::Array(ref statement, first) => {
+                    array(statement, first, &self.tables, &mut self.callees, values);
                 }
-                Statement::Accumulate { table, sections } => {
-                    accumulate(&tables[table.index()], sections, first, values);
-                }
-                Statement::Quads {
-                    table,
-                    weights,
-                    sums,
-                } => quads(&tables[table.index()], weights, sums, first, values),
-                Statement::Constants { table } => {
-                    let entries = tables[table.index()].entries();
-                    values[first..first + entries.len()].copy_from_slice(entries);
-                }
-                Statement::Separable {
-                    start,
-                    base,
-                    groups,
-                    cols,
-                } => {
-                    let base = base.as_deref();
-                    separable(tables, start, base, groups, *cols, first, values);
-                }
-                Statement::Call { callee, arguments } => {
-                    let callee = &mut self.callees[*callee];
-                    for (&load, argument) in callee.loads.iter().zip(arguments) {
-                        callee.values[load] = values[argument.index()];
-                    }
-                    callee.evaluate();
-                    for (k, store) in callee.stores.iter().enumerate() {
-                        values[first + k] = callee.values[store.index()];
-                    }
-                }
+            }
+        }
+    }
+}
+
+fn array<T: Real>(
+    statement: &Statement,
+    first: usize,
+    tables: &[Table<T>],
+    callees: &mut [Interpreter<T>],
+    values: &mut [T],
+) {
+    match statement {
+        // No arrays.
+        Statement::Constant(_)
+        | Statement::Input { .. }
+        | Statement::Unary(..)
+        | Statement::Binary(..) => {}
+        Statement::SinCos { arguments } => {
+            for (k, argument) in arguments.iter().enumerate() {
+                let (sine, cosine) = values[argument.index()].sin_cos();
+                values[first + k] = sine;
+                values[first + arguments.len() + k] = cosine;
+            }
+        }
+        Statement::Accumulate { table, sections } => {
+            accumulate(&tables[table.index()], sections, first, values);
+        }
+        Statement::Quads {
+            table,
+            weights,
+            sums,
+        } => quads(&tables[table.index()], weights, sums, first, values),
+        Statement::Constants { table } => {
+            let entries = tables[table.index()].entries();
+            values[first..first + entries.len()].copy_from_slice(entries);
+        }
+        Statement::Separable {
+            start,
+            base,
+            groups,
+            cols,
+        } => separable(tables, start, base.as_deref(), groups, *cols, first, values),
+        Statement::Call { callee, arguments } => {
+            let callee = &mut callees[*callee];
+            for (&load, argument) in callee.loads.iter().zip(arguments) {
+                callee.values[load] = values[argument.index()];
+            }
+            callee.evaluate();
+            for (k, store) in callee.stores.iter().enumerate() {
+                values[first + k] = callee.values[store.index()];
             }
         }
     }

@@ -395,8 +395,11 @@ impl Program {
 
     /// Whether such a statement computes something that an output depends on.
     pub fn has(&self, is_wanted: impl Fn(&Statement) -> bool) -> bool {
-        let mut statements = self.statements.iter().zip(self.live());
-        statements.any(|(statement, live)| live && is_wanted(statement))
+        // Most programs have none, which is found sooner than what is live.
+        self.statements.iter().any(&is_wanted) && {
+            let mut statements = self.statements.iter().zip(self.live());
+            statements.any(|(statement, live)| live && is_wanted(statement))
+        }
     }
 
     /// Which statements compute something that an output depends on.

@@ -302,7 +302,7 @@ impl DenseJacobian {
                 true => width,
                 false => (last + 1).next_multiple_of(LANES),
             };
-            let padded = |values: &[ValueId]| {
+            let filled = |values: &[ValueId]| {
                 let mut values = values.to_vec();
                 values.resize(cols, zero);
                 values
@@ -314,8 +314,8 @@ impl DenseJacobian {
                 table: lowering
                     .builder
                     .table(Table::new(rows.len(), cols, rows.concat())),
-                values: padded(values),
-                slopes: slopes.map(|values| padded(values)),
+                values: filled(values),
+                slopes: slopes.map(|values| filled(values)),
             })
         };
         [

@@ -39,10 +39,6 @@ struct Source<'a> {
     m: &'a Text<'a>,
     is_library: bool,
     kernel: Option<KernelText>,
-    /// Whether rows of functions are added in eight lanes.
-    has_rows: bool,
-    /// Whether there are sums of vectors of four numbers.
-    has_fours: bool,
     sign: bool,
 }
 
@@ -80,8 +76,6 @@ pub fn emit(
         m,
         is_library: sines == SineCosine::Library,
         kernel: (entries.has(computes_angles)).then(|| KernelText::new(precision, d)),
-        has_rows: entries.has(|s| matches!(s, Statement::Separable { .. })),
-        has_fours: entries.has(|s| matches!(s, Statement::Quads { .. })),
         sign: entries.has(|s| matches!(s, Statement::Unary(Unary::Sign, _))),
     };
     let cmake = CMake {

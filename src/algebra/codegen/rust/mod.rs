@@ -15,7 +15,6 @@ use super::sin_cos::KernelText;
 use super::sines::SineCosine;
 use super::test_vectors::TestVectors;
 use crate::files::EmittedFile;
-use crate::ir::Statement;
 use dialect::RustDialect;
 use selftest::SelfTest;
 
@@ -34,10 +33,6 @@ struct Lib<'a> {
     m: ModelText<'a, String>,
     is_library: bool,
     kernel: Option<KernelText>,
-    /// Whether there are sums of vectors of four numbers.
-    has_fours: bool,
-    /// Whether rows of functions are added in eight lanes.
-    has_rows: bool,
 }
 
 /// The crate of a model; `provenance` is the text of each file's first line.
@@ -60,8 +55,6 @@ pub fn emit(
         m: text.with_lanes(&d, sines),
         is_library: sines == SineCosine::Library,
         kernel: (entries.has(computes_angles)).then(|| KernelText::new(precision, &d)),
-        has_fours: entries.has(|s| matches!(s, Statement::Quads { .. })),
-        has_rows: entries.has(|s| matches!(s, Statement::Separable { .. })),
     };
     let cargo = Cargo {
         banner: format!("# {provenance}"),
