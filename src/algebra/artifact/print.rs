@@ -9,83 +9,83 @@ const LINE_WIDTH: usize = 100;
 
 /// The value as text, with a newline at the end.
 pub(super) fn print(value: &Value) -> String {
-    lines(value, 0) + "\n"
+    let mut out = String::new();
+    push(&mut out, value, Some(0));
+    out + "\n"
 }
 
-fn lines(value: &Value, depth: usize) -> String {
-    let items: Vec<String> = match value {
-        Value::Array(items) if on_one_line(items.iter(), value) => return compact(value),
-        Value::Object(entries) if on_one_line(entries.values(), value) => return compact(value),
-        Value::Array(words) if words.iter().all(Value::is_string) => fill_lines(words),
-        Value::Array(items) => items.iter().map(|item| lines(item, depth + 1)).collect(),
+/// Pushes a value whose lines are that deep, or without a depth on one line with a space after each comma and colon.
+fn push(out: &mut String, value: &Value, depth: Option<usize>) {
+    let depth = depth.filter(|_| !is_on_one_line(value));
+    let inner = depth.map(|depth| depth + 1);
+    let lines = depth.map(|depth| {
+        let end = format!("\n{}", INDENT.repeat(depth));
+        [format!("{end}{INDENT}"), format!(",{end}{INDENT}"), end]
+    });
+    let [first, next, last] = match &lines {
+        Some(marks) => marks.each_ref().map(String::as_str),
+        None if value.as_object().is_some_and(|entries| !entries.is_empty()) => [" ", ", ", " "],
+        None => ["", ", ", ""],
+    };
+    match value {
+        Value::Array(words) if inner.is_some() && words.iter().all(Value::is_string) => {
+            let lines = fill_lines(words).join(next);
+            out.extend(["[", first, &lines, last, "]"]);
+        }
+        Value::Array(items) => {
+            out.push('[');
+            for (index, item) in items.iter().enumerate() {
+                out.push_str(if index == 0 { first } else { next });
+                push(out, item, inner);
+            }
+            out.extend([last, "]"]);
+        }
         Value::Object(entries) => {
-            let entry = |(key, item): (&String, &Value)| {
-                format!("{}: {}", quoted(key), lines(item, depth + 1))
-            };
-            entries.iter().map(entry).collect()
+            out.push('{');
+            for (index, (key, item)) in entries.iter().enumerate() {
+                out.push_str(if index == 0 { first } else { next });
+                out.extend([&Value::from(&**key).to_string(), ": "]);
+                push(out, item, inner);
+            }
+            out.extend([last, "}"]);
         }
         Value::Null | Value::Bool(_) | Value::Number(_) | Value::String(_) => {
-            return compact(value);
+            out.push_str(&value.to_string());
         }
-    };
-    let [open, close] = if value.is_array() {
-        ["[", "]"]
-    } else {
-        ["{", "}"]
-    };
-    let mut text = open.to_owned();
-    for (index, item) in items.iter().enumerate() {
-        text.push_str(if index == 0 { "\n" } else { ",\n" });
-        text.push_str(&INDENT.repeat(depth + 1));
-        text.push_str(item);
     }
-    text + "\n" + &INDENT.repeat(depth) + close
 }
 
 /// Rows of numbers stay on one line however long; other lists and objects if they are short.
-fn on_one_line<'a>(mut items: impl Iterator<Item = &'a Value> + Clone, whole: &Value) -> bool {
-    if items.clone().all(Value::is_number) {
-        return whole.is_array();
+fn is_on_one_line(value: &Value) -> bool {
+    let is_short = || {
+        let mut text = String::new();
+        push(&mut text, value, None);
+        text.len() <= LINE_WIDTH
+    };
+    let is_scalar = |item: &Value| !item.is_array() && !item.is_object();
+    match value {
+        Value::Array(items) => {
+            items.iter().all(Value::is_number) || items.iter().all(is_scalar) && is_short()
+        }
+        Value::Object(entries) => {
+            !entries.values().all(Value::is_number) && entries.values().all(is_scalar) && is_short()
+        }
+        Value::Null | Value::Bool(_) | Value::Number(_) | Value::String(_) => true,
     }
-    let scalar = |item: &Value| !item.is_array() && !item.is_object();
-    items.all(scalar) && compact(whole).len() <= LINE_WIDTH
 }
 
 /// Words with commas between them, as many on a line as fit; no comma at the end of a line.
 fn fill_lines(words: &[Value]) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
-    for text in words.iter().map(compact) {
+    for text in words.iter().map(Value::to_string) {
         match lines.last_mut() {
             Some(line) if line.len() + text.len() + 3 <= LINE_WIDTH => {
-                line.push_str(", ");
-                line.push_str(&text);
+                line.extend([", ", &text]);
             }
             _ => lines.push(text),
         }
     }
     lines
-}
-
-/// On one line, with a space after each comma and colon.
-fn compact(value: &Value) -> String {
-    match value {
-        Value::Array(items) => {
-            let items: Vec<String> = items.iter().map(compact).collect();
-            format!("[{}]", items.join(", "))
-        }
-        Value::Object(entries) if entries.is_empty() => "{}".to_owned(),
-        Value::Object(entries) => {
-            let entry =
-                |(key, item): (&String, &Value)| format!("{}: {}", quoted(key), compact(item));
-            let entries: Vec<String> = entries.iter().map(entry).collect();
-            format!("{{ {} }}", entries.join(", "))
-        }
-        Value::Null | Value::Bool(_) | Value::Number(_) | Value::String(_) => value.to_string(),
-    }
-}
-
-fn quoted(key: &str) -> String {
-    Value::String(key.to_owned()).to_string()
 }
 
 #[cfg(test)]

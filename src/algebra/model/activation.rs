@@ -96,7 +96,15 @@ impl Activation {
     fn derivative(self, a: f64, order: usize) -> f64 {
         match self {
             Self::Elu if a <= 0.0 => a.exp(),
-            every => every.jet(a)[order],
+            Self::Softplus => Self::Sigmoid.jet(a)[order - 1],
+            Self::Linear
+            | Self::Elu
+            | Self::Tanh
+            | Self::Sigmoid
+            | Self::Relu
+            | Self::Gelu
+            | Self::GeluTanh
+            | Self::Silu => self.jet(a)[order],
         }
     }
 

@@ -109,11 +109,12 @@ impl InputRule {
         net: &[f64; JOINT_DIM],
         contact: ContactFlags,
     ) -> Result<Vector6<f64>, RobotError> {
-        let joints = std::array::from_fn(|i| x[i]);
-        let wrench = (self.robot).wrench_by_arms(self.frame, &joints, net, contact)?;
+        let joints = x.first_chunk().expect("joints come first");
+        let [.., roll, pitch, yaw] = *x;
+        let wrench = (self.robot).wrench_by_arms(self.frame, joints, net, contact)?;
         Ok(match self.frame {
             WrenchFrame::Body => wrench,
-            WrenchFrame::World => generalised([x[15], x[16], x[17]]) * wrench,
+            WrenchFrame::World => generalised([roll, pitch, yaw]) * wrench,
         })
     }
 

@@ -93,8 +93,9 @@ impl Robot {
     /// The same in the world, at a state `x` of the robot.
     pub fn foot_in_world(&self, leg: Leg, x: &[f64; STATE_DIM]) -> Vector3<f64> {
         let joints = x.first_chunk().expect("joints come first");
+        let [.., x, y, z, roll, pitch, yaw] = *x;
         let foot = self.foot_from_body(leg, &leg.of_joints(joints));
-        Vector3::new(x[12], x[13], x[14]) + rotation([x[15], x[16], x[17]]) * foot
+        Vector3::new(x, y, z) + rotation([roll, pitch, yaw]) * foot
     }
 
     /// Jacobian of [`Robot::foot_position`] by the leg's joint angles, in m.

@@ -91,7 +91,6 @@ impl Robot {
     }
 
     /// The same with the moments by the arms of a frame, in axes parallel to the body's.
-    #[inline]
     pub(super) fn wrench_by_arms(
         &self,
         frame: WrenchFrame,
@@ -114,9 +113,8 @@ impl Robot {
         Ok(wrench)
     }
 
-    /// The 6 x 12 matrix `G` of `[F_lin; F_ang] = G tau` at a posture and
-    /// contact; columns of legs in the air are zero.
-    #[inline]
+    /// The 6 x 12 matrix `G` of `[F_lin; F_ang] = G tau` at a posture and contact, by the arms of a frame, in axes
+    /// parallel to the body's; columns of legs in the air are zero.
     pub(super) fn map_by_arms(
         &self,
         frame: WrenchFrame,
@@ -135,7 +133,6 @@ impl Robot {
         Ok(map)
     }
 
-    #[inline]
     fn arm(&self, frame: WrenchFrame, leg: Leg, q: &[f64; 3]) -> Vector3<f64> {
         match frame {
             WrenchFrame::Body => self.foot_position(leg, q),

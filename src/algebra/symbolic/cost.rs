@@ -147,10 +147,14 @@ impl ExprPool {
     }
 
     fn n_terms(&self, expr: ExprId) -> u64 {
-        let Node::Sum(terms) = self.node(expr) else {
-            return 1;
-        };
-        terms.len() as u64
+        match self.node(expr) {
+            Node::Sum(terms) => terms.len() as u64,
+            Node::Number(_)
+            | Node::Symbol(_)
+            | Node::Product(_)
+            | Node::Power(..)
+            | Node::Apply(..) => 1,
+        }
     }
 }
 

@@ -123,6 +123,13 @@ fn table(
     }
 }
 
+impl CoefficientTable {
+    /// Whether its columns have units: all of them or none.
+    pub(super) fn has_units(&self) -> bool {
+        self.columns.iter().any(|(.., unit)| unit.is_some())
+    }
+}
+
 impl Equation {
     /// Whether any term is taller than a line of text.
     pub fn is_tall(&self) -> bool {

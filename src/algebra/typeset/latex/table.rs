@@ -59,7 +59,7 @@ pub(super) fn blocks(
         cuts.extend(parts.map(|rows| (columns.clone(), rows.to_vec())));
     }
     let count = cuts.len();
-    let units = match table.columns.iter().any(|(.., unit)| unit.is_some()) {
+    let units = match table.has_units() {
         true => ". The unit of a coefficient is that of its column over that of its term",
         false => "",
     };
@@ -106,7 +106,8 @@ fn groups(table: &CoefficientTable, width_em: f64) -> Vec<Vec<usize>> {
     let widths: Vec<f64> = (0..table.columns.len())
         .map(|column| {
             let cells = table.rows.iter().map(|row| &row.coefficients[column]);
-            let head = table.columns[column].2.map_or(1.0, |_| UNIT_EM);
+            let (.., unit) = table.columns[column];
+            let head = unit.map_or(1.0, |_| UNIT_EM);
             ColumnWidth::of(cells).em().max(head) + COLUMN_SPACE_EM
         })
         .collect();
@@ -188,11 +189,11 @@ impl Layout<'_> {
         let symbols: String = columns()
             .map(|(_, left, _)| cell(tex_symbol(left)))
             .collect();
-        let units = columns().map(|(.., unit)| Some(cell(tex_unit((*unit)?))));
-        match units.collect::<Option<String>>() {
-            Some(units) => format!("Term{symbols} \\\\\n{units} \\\\"),
-            None => format!(r"Term{symbols} \\"),
+        if !self.table.has_units() {
+            return format!(r"Term{symbols} \\");
         }
+        let units = columns().filter_map(|(.., unit)| Some(cell(tex_unit((*unit)?))));
+        format!("Term{symbols} \\\\\n{} \\\\", units.collect::<String>())
     }
 
     fn row(&self, row: &CoefficientRow, widths: &[ColumnWidth]) -> String {

@@ -85,9 +85,11 @@ fn mathml_number(number: &Decimal) -> String {
     let size = match number.exponent() {
         None => digits,
         Some(exponent) => {
-            let power = match exponent.unsigned_abs() {
-                size if exponent < 0 => format!("<mrow><mo>{MINUS}</mo><mn>{size}</mn></mrow>"),
-                size => format!("<mn>{size}</mn>"),
+            let power = if exponent < 0 {
+                let digits = exponent.unsigned_abs();
+                format!("<mrow><mo>{MINUS}</mo><mn>{digits}</mn></mrow>")
+            } else {
+                format!("<mn>{exponent}</mn>")
             };
             format!("<mrow>{digits}<mo>\u{D7}</mo><msup><mn>10</mn>{power}</msup></mrow>")
         }

@@ -1,5 +1,5 @@
-//! The one way for text of a model file into a page, and that for romc's own sentences and tables, the few symbols of
-//! which become mathematics.
+//! The one way for text of a model file into a page. In romc's own sentences and tables a few symbols become
+//! mathematics.
 
 use std::fmt;
 
