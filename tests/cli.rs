@@ -180,6 +180,8 @@ fn report_is_one_page_without_requests_and_its_figures_are_files() {
         &page,
         "--figures",
         &figures,
+        "--clock",
+        "repaired",
     ]);
     let html = std::fs::read_to_string(&page).expect("a page");
     assert_eq!(value["bytes"], html.len());
@@ -192,6 +194,7 @@ fn report_is_one_page_without_requests_and_its_figures_are_files() {
         "ASLIP, fitted constants",
         "Copy LaTeX",
         "romc simulate",
+        "--clock repaired --restart-every",
         "body.y, body.roll and body.yaw are not modelled",
         "body.yaw, rad (not modelled)",
         "class=\"film\"",
@@ -1560,18 +1563,22 @@ fn endings_merges_and_losses_that_do_not_fit_are_refused() {
         .expect("written")
         .replace("\"go1\"", "\"go2\"");
     fs::write(&losses, of_another).expect("changed");
-    let model = path(&folder, "model.json");
+    let (model, robot) = (path(&folder, "model.json"), path(&folder, "robot.toml"));
+    done(&["robot", "go1", "--output", &robot]);
     let output = romc(&[
         "train",
         jump,
         "--latent-dim",
         "2",
+        "--robot",
+        &robot,
         "--actuators",
         &losses,
         "--output",
         &model,
     ]);
     assert_eq!(output.status.code(), Some(1));
+    assert_eq!(text(&output.stderr).matches("robot go1, ").count(), 1);
     assert!(
         text(&output.stderr).contains("robot: found go2, expected go1"),
         "{}",

@@ -9,7 +9,7 @@ use crate::files::{EmittedFile, Overwrite, write_files};
 use crate::report::{Figure, figure_files};
 use crate::robot::Robot;
 
-/// What an output file holds, which the ending of its name says: one of these.
+/// What an output file holds: the endings that it may have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Format(&'static [&'static str]);
 

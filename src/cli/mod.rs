@@ -121,16 +121,10 @@ fn execute(command: Command) -> Result<(Answer, u8), Error> {
             ("completions", Ok((manual::completions(&arguments), DONE)))
         }
     };
-    let (
-        Answer {
-            text,
-            json: entries,
-        },
-        code,
-    ) = ran?;
-    let mut json = json!({ "command": name });
-    extend(&mut json, entries);
-    Ok((Answer { text, json }, code))
+    let (mut answer, code) = ran?;
+    let entries = std::mem::replace(&mut answer.json, json!({ "command": name }));
+    extend(&mut answer.json, entries);
+    Ok((answer, code))
 }
 
 /// Prints to stdout; a reader that has gone away (`| head`) is no failure.

@@ -165,7 +165,8 @@ const LADDER_CAPTION: &str = "Size of the equations within each tolerance: activ
 
 /// The commands that reproduce the page.
 fn commands(arguments: &ReportArguments, has_control: bool) -> Vec<String> {
-    let (model, recordings) = (quoted(&arguments.model), quoted_all(&arguments.recordings));
+    let model = quoted(&arguments.model);
+    let recordings = quoted_all(&arguments.recordings) + &arguments.reading.as_flags();
     let every = arguments.restart_every;
     let flag = |name: &str, path: &Option<PathBuf>| -> String {
         let flag = |path: &PathBuf| format!(" --{name} {}", quoted(path));

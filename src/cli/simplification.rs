@@ -159,8 +159,8 @@ impl Outcome {
         }
     }
 
-    /// Adds the certificate to the emitted files, and a comment to each of them; its summary, and the same as JSON.
-    /// `equations` are those of the model as they are printed, `rounding` is how.
+    /// Adds the certificate to the emitted files and, if anything changed, a comment to those that can hold one; its
+    /// summary, and the same as JSON. `equations` are those of the model as they are printed, `rounding` is how.
     pub fn add_to(
         &self,
         files: &mut Vec<EmittedFile>,
@@ -189,11 +189,11 @@ impl Outcome {
     }
 
     /// Adds a comment to each file of equations or code that names the model it was simplified from.
-    fn comment(&self, files: &mut [EmittedFile], certificate: &str) {
+    fn comment(&self, files: &mut [EmittedFile], certificate_file: &str) {
         let lines = [
             format!("Simplified within {}", self.certificate.tolerance.words()),
             format!(
-                "from the model with digest {}; {certificate} bounds each change.",
+                "from the model with digest {}; {certificate_file} bounds each change.",
                 artifact::digest(&self.original).short()
             ),
         ];

@@ -69,7 +69,7 @@ fn trained(arguments: &StudyArguments) -> Result<Store, Error> {
     let training = read_all(of_training)?;
     let validation = read_all(of_validation)?;
     recorded.report_findings();
-    let mut base = train_settings::options(&settings, 1, String::new())?;
+    let mut base = train_settings::options(&settings, 1, String::new(), robot)?;
     train_settings::identified(&mut base, &settings, of_training, robot)?;
     settings.wrench_frame = Some(base.wrench_frame);
     settings.actuators = Some(train_settings::actuators(&settings).to_owned());

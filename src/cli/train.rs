@@ -39,7 +39,7 @@ pub fn run(arguments: &TrainArguments) -> Result<(Answer, u8), Error> {
     let method = train_settings::method(&settings);
     let robot = train_settings::robot(&settings)?;
     let name = named(arguments.name.as_deref(), &arguments.output);
-    let mut options = train_settings::options(&settings, latent_dim, name)?;
+    let mut options = train_settings::options(&settings, latent_dim, name, robot)?;
     let recorded = RecordedSets::new(arguments, &settings, robot, options.seed)?;
     let [training, validation, test] = &recorded.sets;
     train_settings::identified(&mut options, &settings, training, robot)?;

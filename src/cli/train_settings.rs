@@ -32,6 +32,7 @@ pub(super) fn options(
     settings: &TrainSettings,
     latent_dim: usize,
     name: String,
+    robot: &Robot,
 ) -> Result<TrainOptions, Error> {
     let mut options = match settings.paper {
         true => TrainOptions::paper(name, latent_dim),
@@ -76,7 +77,7 @@ pub(super) fn options(
     }
     options.actuators = match actuators(settings) {
         NONE | IDENTIFIED => None,
-        path => Some(read_actuators(Path::new(path), Some(robot(settings)?))?),
+        path => Some(read_actuators(Path::new(path), Some(robot))?),
     };
     Ok(options)
 }

@@ -58,7 +58,7 @@ fn number_after_first(token: &str) -> Option<(char, usize)> {
     Some((first, number))
 }
 
-/// Words (names, digits with points, and exponents for themselves), runs of white space, `**`, and single characters.
+/// Names, digits with points (an exponent is tokens of its own), runs of white space, `**`, and single characters.
 fn tokens(text: &str) -> impl Iterator<Item = &str> {
     let mut rest = text;
     std::iter::from_fn(move || {

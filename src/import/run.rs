@@ -46,8 +46,8 @@ pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported, ImportEr
     import_from_bytes(&file, format, &bytes, options)
 }
 
-/// The name of a file and its bytes. One more than allowed distinguishes a file that is too large from one that just
-/// fits.
+/// The name of a file and its bytes, at most one more than allowed, which tells a file that is too large from one that
+/// just fits.
 pub(super) fn read_file(path: &Path, max: u64) -> Result<(String, Vec<u8>), ImportError> {
     let file = path.display().to_string();
     let mut bytes = Vec::new();

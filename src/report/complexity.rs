@@ -93,7 +93,7 @@ mod tests {
         };
         let figures = study_figures(&summary);
         let [decoder, active] = [0, 1].map(|panel| match &figures[0].panels[panel].drawing {
-            Drawing::Lines(series, _) => series,
+            Drawing::Lines { series, .. } => series,
             other => panic!("{other:?}"),
         });
         let [bars, means] = [0, 1].map(|line| active[line].points.as_slice());

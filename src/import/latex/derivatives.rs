@@ -82,8 +82,11 @@ fn ends_product(tokens: &[Token]) -> bool {
 /// The place behind the `d` of a differential, upright or not, or its `\partial`.
 fn differential(tokens: &[Token], at: usize) -> Option<usize> {
     let is_d = |token: &Token| token.kind == Kind::Character('d') || token.is_command("partial");
-    match &tokens.get(at)?.kind {
-        _ if is_d(&tokens[at]) => Some(at + 1),
+    let first = tokens.get(at)?;
+    if is_d(first) {
+        return Some(at + 1);
+    }
+    match &first.kind {
         Kind::Command(font) if has(FONTS, font) => match argument(tokens, at + 1)? {
             ([sign], behind) if is_d(sign) => Some(behind),
             _ => None,

@@ -219,7 +219,7 @@ impl Reader<'_> {
         }
     }
 
-    /// Reads a number, a variable, a function or a group, each with its power.
+    /// Reads a function, or a number, a variable or a group with its power.
     pub(super) fn factor(&mut self, leads: bool) -> Read<Last> {
         let place = self.here();
         let Some(token) = self.peek().cloned() else {
@@ -293,7 +293,7 @@ impl Reader<'_> {
     }
 
     /// What `read` makes of the argument that comes next, between an opening text and a parenthesis.
-    pub(super) fn enclosed<T>(
+    fn enclosed<T>(
         &mut self,
         place: (usize, usize),
         open: &str,
@@ -306,7 +306,7 @@ impl Reader<'_> {
     }
 
     /// A sum in a group; whether it is a number alone. `leads` as in [`Self::sum`].
-    pub(super) fn group_sum(&mut self, leads: bool) -> Read<Last> {
+    fn group_sum(&mut self, leads: bool) -> Read<Last> {
         let first = self.at;
         self.sum(leads)?;
         let is_number = self.at == first + 1 && matches!(self.tokens[first].kind, Kind::Number(_));
@@ -321,7 +321,7 @@ impl Reader<'_> {
         }
     }
 
-    pub(super) fn absolute(&mut self, place: (usize, usize), opener: &str) -> Read<Last> {
+    fn absolute(&mut self, place: (usize, usize), opener: &str) -> Read<Last> {
         self.at += 1 + usize::from(opener == "left");
         if opener == "abs" {
             return self.enclosed_sum(place, "abs(");

@@ -136,6 +136,8 @@ fn flattened(file: &str, tokens: &[Token]) -> Result<Vec<Token>, ImportError> {
     }
 }
 
+/// Whether an environment only arranges lines. `subequations` is none of [`LAYOUTS`], which begin displays: it holds
+/// displays, and text between them.
 fn is_layout(name: &str) -> bool {
     is_one_of(LAYOUTS, name) || is_one_of("subequations", name)
 }

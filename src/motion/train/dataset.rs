@@ -260,8 +260,8 @@ impl Dataset {
         })
     }
 
-    /// Blocks of the samples of one phase or of all, as wide as `widths`: `copy` fills an `empty` one from a place on
-    /// with the samples of a jump in a range.
+    /// Blocks of the samples of one phase or of all, as wide as `widths`: `copy(block, at, jump, range)` fills an
+    /// `empty` block from column `at` on with the samples of the jump of number `jump` in `range`.
     pub fn cut<B>(
         &self,
         phase: Option<usize>,

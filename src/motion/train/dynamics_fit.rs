@@ -79,6 +79,9 @@ impl Task<'_> {
     }
 
     /// Chosen dynamics for an encoder and its decoder.
+    ///
+    /// # Errors
+    /// [`TrainError::TermValue`] for a term without a finite value at a sample, and those of [`select`].
     pub fn fit_dynamics(
         &self,
         (encoder, decoder): (StateMap, StateMap),
@@ -130,8 +133,8 @@ impl Task<'_> {
         })
     }
 
-    /// The metrics of fitted numbers: on the training jumps, which are encoded, and those of the jumps that candidates
-    /// are `judged` by.
+    /// The report of `fitted`: its metrics on the encoded training jumps; `judged` are its metrics on the jumps that
+    /// candidates are judged by, kept only if there are validation jumps.
     pub fn report(
         &self,
         fitted: &Fitted,

@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::progress::Watch;
-use super::select::{Fitted, Search};
+use super::select::{Search, Trial};
 use super::sparse::Regression;
 
 /// Share of the score that a term must bring to be added.
@@ -19,36 +19,36 @@ type Place = (f64, usize, usize, usize);
 impl Search<'_> {
     /// Drops terms, the least useful to the regression first, fitting the rest of their equation again, as long as
     /// the score stays within `limit`. One attempt a term.
-    pub fn sweep(&self, fitted: &mut Fitted<'_>, limit: f64, watch: &mut Watch<'_>) {
-        let mut order = fitted.places(Regression::losses);
+    pub fn sweep(&self, trial: &mut Trial<'_>, limit: f64, watch: &mut Watch<'_>) {
+        let mut order = trial.places(Regression::losses);
         order.sort_by(|a, b| a.0.total_cmp(&b.0));
         watch.stage("dropping terms that predictions do not miss", order.len());
         for (attempt, place) in order.into_iter().enumerate() {
             if watch.cancelled() {
                 return;
             }
-            self.attempt(fitted, place, false, limit);
-            watch.done(attempt + 1, format!("score {:.4}", fitted.now.score));
+            self.attempt(trial, place, false, limit);
+            watch.done(attempt + 1, format!("score {:.4}", trial.now.score));
         }
     }
 
     /// Adds terms, those that explain most of the accelerations first, fitting their equation again, wherever the score
     /// falls by [`LEAST_GAIN`] or more. Goes round [`ROUNDS`] times, as terms explain less once others are there.
-    pub fn grow(&self, fitted: &mut Fitted<'_>, watch: &mut Watch<'_>) {
+    pub fn grow(&self, trial: &mut Trial<'_>, watch: &mut Watch<'_>) {
         watch.stage("adding terms that predictions gain by", ROUNDS * ATTEMPTS);
         for round in 0..ROUNDS {
-            let before = fitted.now.score;
-            let mut order = fitted.places(Regression::gains);
+            let before = trial.now.score;
+            let mut order = trial.places(Regression::gains);
             order.sort_by(|a, b| b.0.total_cmp(&a.0));
             for (attempt, place) in order.into_iter().take(ATTEMPTS).enumerate() {
                 if watch.cancelled() {
                     return;
                 }
-                self.attempt(fitted, place, true, (1.0 - LEAST_GAIN) * fitted.now.score);
+                self.attempt(trial, place, true, (1.0 - LEAST_GAIN) * trial.now.score);
                 let done = round * ATTEMPTS + attempt + 1;
-                watch.done(done, format!("score {:.4}", fitted.now.score));
+                watch.done(done, format!("score {:.4}", trial.now.score));
             }
-            if fitted.now.score == before {
+            if trial.now.score == before {
                 return;
             }
         }
@@ -57,27 +57,27 @@ impl Search<'_> {
     /// Fits the equation of a term with or without it, and keeps that if the score is at most `limit`.
     fn attempt(
         &self,
-        fitted: &mut Fitted<'_>,
+        trial: &mut Trial<'_>,
         (_, phase, row, column): Place,
         active: bool,
         limit: f64,
     ) {
-        let xi = &mut fitted.now.xi;
+        let xi = &mut trial.now.xi;
         let mut support = xi[phase].map(|value| value != 0.0);
         support[(row, column)] = active;
-        let tried = fitted.regressions[phase].fit_column(column, &support, fitted.ridge);
+        let tried = trial.regressions[phase].fit_column(column, &support, trial.ridge);
         let before = xi[phase].column(column).into_owned();
         xi[phase].set_column(column, &tried);
         let score = self.judge.score_within(xi, limit);
         if score <= limit && self.growth.admits(xi) {
-            fitted.now.score = score;
+            trial.now.score = score;
         } else {
             xi[phase].set_column(column, &before);
         }
     }
 }
 
-impl Fitted<'_> {
+impl Trial<'_> {
     /// What `shares` gives for each column of every phase.
     fn places(
         &self,

@@ -74,6 +74,9 @@ impl Seeds {
 
     /// The seed of least score, the reports of all that have a model, best first, and the overlap of their supports;
     /// `state_covariance` (18 x 18) is that of the training states in scaled units.
+    ///
+    /// # Errors
+    /// The first seed's if none has a model, [`TrainError::Cancelled`] if none was begun.
     fn best(
         mut self,
         library: &Library,

@@ -53,9 +53,11 @@ pub struct Choice {
 }
 
 /// Fits all combinations of windows, ridges and prunings and takes, among those within the slack of the best, the
-/// sparsest: Xi of every phase (`library_dim x latent_dim`), what it was fitted with, and how many candidates there were.
+/// sparsest: Xi of every phase (`library_dim x latent_dim`), what it was fitted with, and how many candidates there
+/// were.
 ///
-/// Fits the jumps of `set` with what is known of each phase, for the library of `judge`. The best by `judge` sets the scale: from there on errors are relative to its own.
+/// Fits the jumps of `set` with what is known of each phase, for the library of `judge`. The best by `judge` sets the
+/// scale: from there on errors are relative to its own.
 ///
 /// # Errors
 /// [`TrainError::NoStableModel`] if every candidate diverges. If cancelled, the search ends as soon as one does not.
@@ -85,8 +87,8 @@ pub fn select(
     let reference = best_of(&tried)?.now.xi.clone();
     let training = Judge::new(features, set).relative_to(&reference);
     let relative = &judge.relative_to(&reference);
-    for fitted in tried.iter_mut().filter(|fitted| fitted.is_stable()) {
-        fitted.score_by(relative);
+    for trial in tried.iter_mut().filter(|trial| trial.is_stable()) {
+        trial.score_by(relative);
     }
     let limit = (1.0 + options.slack) * best_of(&tried)?.now.score;
     let search = Search {
@@ -100,12 +102,12 @@ pub fn select(
         judge: relative,
     };
     let mut refined = Vec::new();
-    for mut fitted in starts(tried, limit) {
-        fitted.hold(growth);
-        fitted.score_by(relative);
-        search.sweep(&mut fitted, limit, watch);
-        fitted.now = refiner.refine(fitted.now, options.refinements, watch);
-        refined.push(fitted);
+    for mut trial in starts(tried, limit) {
+        trial.hold(growth);
+        trial.score_by(relative);
+        search.sweep(&mut trial, limit, watch);
+        trial.now = refiner.refine(trial.now, options.refinements, watch);
+        refined.push(trial);
     }
     let best = best_of(&refined)?;
     let limit = (1.0 + options.slack) * best.now.score;
@@ -115,8 +117,8 @@ pub fn select(
         refined.push(thinned);
     }
     let all = refined.into_iter();
-    let within = all.filter(|fitted| fitted.now.score <= limit);
-    let sparsest = within.min_by_key(|fitted| fitted.now.active());
+    let within = all.filter(|trial| trial.now.score <= limit);
+    let sparsest = within.min_by_key(|trial| trial.now.active());
     let mut chosen = sparsest.ok_or(TrainError::NoStableModel { candidates })?;
     chosen.score_by(judge);
     let choice = Choice {
@@ -131,7 +133,7 @@ pub fn select(
 
 /// A candidate that was fitted and judged.
 #[derive(Clone)]
-pub(super) struct Fitted<'a> {
+pub(super) struct Trial<'a> {
     pub now: Coefficients,
     /// What it was fitted by, one a phase.
     pub regressions: &'a [Regression],
@@ -140,7 +142,7 @@ pub(super) struct Fitted<'a> {
     pruning: Pruning,
 }
 
-impl Fitted<'_> {
+impl Trial<'_> {
     /// Whether its rollouts stay finite.
     fn is_stable(&self) -> bool {
         self.now.score.is_finite()
@@ -172,14 +174,14 @@ pub(super) struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    /// Every combination of windows, ridges and prunings; where the library has terms that are not affine, also those without them, and
-    /// the best of these grown by such terms: rollouts of full libraries diverge more often than not.
-    fn all(&self, watch: &mut Watch<'_>) -> Vec<Fitted<'a>> {
+    /// Every combination of windows, ridges and prunings; where the library has terms that are not affine, also those
+    /// without them, and the best of these grown by such terms: rollouts of full libraries diverge more often than not.
+    fn all(&self, watch: &mut Watch<'_>) -> Vec<Trial<'a>> {
         let affine = self.judge.features.affine_terms();
         let has_nonlinear = affine.contains(&false);
         // The affine terms are still to come where full libraries diverge.
         let enough =
-            |tried: &[Fitted<'_>]| any_stable(tried) || (has_nonlinear && !tried.is_empty());
+            |tried: &[Trial<'_>]| any_stable(tried) || (has_nonlinear && !tried.is_empty());
         let mut tried = self.fit_all(&vec![true; affine.len()], enough, watch);
         if has_nonlinear && !(watch.cancelled() && any_stable(&tried)) {
             let tame = self.fit_all(&affine, any_stable, watch);
@@ -193,14 +195,14 @@ impl<'a> Search<'a> {
         tried
     }
 
-    /// Every combination of windows, ridges and prunings with the terms that are `allowed`; if cancelled, those until there are
-    /// `enough`.
+    /// Every combination of windows, ridges and prunings with the terms that are `allowed`; if cancelled, those until
+    /// there are `enough`.
     fn fit_all(
         &self,
         allowed: &[bool],
-        enough: impl Fn(&[Fitted<'_>]) -> bool,
+        enough: impl Fn(&[Trial<'_>]) -> bool,
         watch: &mut Watch<'_>,
-    ) -> Vec<Fitted<'a>> {
+    ) -> Vec<Trial<'a>> {
         let mut tried = Vec::new();
         let steps = WINDOWS.len() * RIDGES.len() * PRUNINGS.len();
         watch.stage("fitting the dynamics", steps);
@@ -215,20 +217,20 @@ impl<'a> Search<'a> {
                 for (number, pruning) in PRUNINGS.into_iter().enumerate() {
                     let xi: Vec<_> = fits.iter().map(|phase| phase[number].clone()).collect();
                     let score = self.judge.score(&xi);
-                    let mut fitted = Fitted {
+                    let mut trial = Trial {
                         now: Coefficients { xi, score },
                         regressions,
                         ridge,
                         window,
                         pruning,
                     };
-                    if !fitted.is_stable() {
-                        fitted.hold(self.growth);
-                        fitted.score_by(self.judge);
+                    if !trial.is_stable() {
+                        trial.hold(self.growth);
+                        trial.score_by(self.judge);
                     }
-                    let (active, score) = (fitted.now.active(), fitted.now.score);
+                    let (active, score) = (trial.now.active(), trial.now.score);
                     watch.done(tried.len() + 1, format!("{active} terms, score {score:.4}"));
-                    tried.push(fitted);
+                    tried.push(trial);
                 }
             }
         }
@@ -237,13 +239,13 @@ impl<'a> Search<'a> {
 }
 
 /// Whether the rollouts of a candidate stay finite.
-fn any_stable(tried: &[Fitted<'_>]) -> bool {
-    tried.iter().any(Fitted::is_stable)
+fn any_stable(tried: &[Trial<'_>]) -> bool {
+    tried.iter().any(Trial::is_stable)
 }
 
 /// The candidate with the best score.
-fn best_of<'t, 'a>(tried: &'t [Fitted<'a>]) -> Result<&'t Fitted<'a>, TrainError> {
-    let best = (tried.iter().filter(|fitted| fitted.is_stable()))
+fn best_of<'t, 'a>(tried: &'t [Trial<'a>]) -> Result<&'t Trial<'a>, TrainError> {
+    let best = (tried.iter().filter(|trial| trial.is_stable()))
         .min_by(|a, b| a.now.score.total_cmp(&b.now.score));
     best.ok_or(TrainError::NoStableModel {
         candidates: tried.len(),
@@ -252,11 +254,11 @@ fn best_of<'t, 'a>(tried: &'t [Fitted<'a>]) -> Result<&'t Fitted<'a>, TrainError
 
 /// Candidates to prune and refine, at most [`SWEEPS`]: of every window the one with the best score, then all others
 /// within the limit, best first.
-fn starts<'a>(mut tried: Vec<Fitted<'a>>, limit: f64) -> impl Iterator<Item = Fitted<'a>> {
-    tried.retain(|fitted| fitted.now.score <= limit);
+fn starts<'a>(mut tried: Vec<Trial<'a>>, limit: f64) -> impl Iterator<Item = Trial<'a>> {
+    tried.retain(|trial| trial.now.score <= limit);
     tried.sort_by(|a, b| a.now.score.total_cmp(&b.now.score));
     let mut seen = BTreeSet::new();
     let (first, later): (Vec<_>, Vec<_>) =
-        (tried.into_iter()).partition(|fitted| seen.insert(fitted.window));
+        (tried.into_iter()).partition(|trial| seen.insert(trial.window));
     first.into_iter().chain(later).take(SWEEPS)
 }

@@ -18,7 +18,7 @@ pub fn csv(figure: &Figure) -> String {
     for panel in &figure.panels {
         let title = panel.title.as_str();
         match &panel.drawing {
-            Drawing::Lines(series, _) => {
+            Drawing::Lines { series, .. } => {
                 for series in series {
                     let name = named(series.role);
                     for (x, y) in &series.points {

@@ -102,7 +102,7 @@ fn legend_marks(figure: &Figure) -> Vec<Mark> {
 pub fn draw_panel(panel: &Panel, size: (f64, f64), x_label: &str) -> Vec<Mark> {
     let title = panel.title.as_str();
     match &panel.drawing {
-        Drawing::Lines(series, shaded) => draw_lines(title, (series, shaded), size, x_label),
+        Drawing::Lines { series, shaded } => draw_lines(title, (series, shaded), size, x_label),
         Drawing::Heat(map) => draw_heat(title, map, size, x_label),
         Drawing::Sticks(plot) => draw_sticks(title, plot, size),
     }

@@ -34,8 +34,8 @@ impl Role {
         self.style().0
     }
 
-    /// That class, the colour on white, as red, green and blue from 0 to 255, and lengths of dashes and gaps, as SVG and
-    /// PDF list them, so that lines differ in grey print too; no lengths for a full line.
+    /// Class of its lines in SVG, their colour on white (red, green and blue from 0 to 255), and the lengths of dashes
+    /// and gaps as SVG and PDF list them, none for a full line; by these lines differ in grey print too.
     pub fn style(self) -> (&'static str, [u8; 3], &'static str) {
         match self {
             Self::Recorded => ("recorded", [31, 95, 168], ""),
@@ -79,8 +79,11 @@ pub struct Panel {
 /// What a panel shows.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Drawing {
-    /// Lines over one axis; ranges of x with a grey ground, such as flight.
-    Lines(Vec<Series>, Vec<(f64, f64)>),
+    /// Lines over one axis; shaded are ranges of x with a grey ground, such as flight.
+    Lines {
+        series: Vec<Series>,
+        shaded: Vec<(f64, f64)>,
+    },
     /// Magnitudes of a matrix as shades.
     Heat(HeatMap),
     /// Robots.
@@ -117,7 +120,7 @@ impl Panel {
     pub fn shaded(title: impl Into<String>, series: Vec<Series>, shaded: Vec<(f64, f64)>) -> Self {
         Self {
             title: title.into(),
-            drawing: Drawing::Lines(series, shaded),
+            drawing: Drawing::Lines { series, shaded },
         }
     }
 }

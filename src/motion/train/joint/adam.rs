@@ -54,4 +54,15 @@ mod tests {
             "{values:?}"
         );
     }
+
+    #[test]
+    fn repeated_steps_find_the_minimum_of_a_parabola() {
+        let mut values = [3.0];
+        let mut adam = Adam::new(1, 0.05);
+        for _ in 0..2000 {
+            let gradient = [2.0 * (values[0] - 0.5)];
+            adam.step(&mut values, &gradient);
+        }
+        assert!((values[0] - 0.5).abs() < 1e-3, "{values:?}");
+    }
 }
