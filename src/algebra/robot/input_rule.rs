@@ -5,7 +5,7 @@
 //! frames ([`WrenchFrame`]). A model states which rule its inputs were made by; training,
 //! simulation, control and generated code all follow it.
 
-use nalgebra::{Matrix3, Rotation3, SMatrix, Vector6};
+use nalgebra::{ArrayStorage, Matrix3, Rotation3, SMatrix, Vector6};
 
 use super::actuators::Actuators;
 use super::error::RobotError;
@@ -132,9 +132,28 @@ impl InputRule {
         let map = self.robot.map_by_arms(self.frame, joints, contact)?;
         Ok(match self.frame {
             WrenchFrame::Body => map,
-            WrenchFrame::World => generalised(attitude) * map,
+            WrenchFrame::World => product(&generalised(attitude), &map),
         })
     }
+}
+
+/// The product, to the bit as nalgebra has it, which calls a function out of line for each column and factor:
+/// every column is the sum of those of `left` by their factors, in order.
+fn product(
+    left: &SMatrix<f64, BODY_DIM, BODY_DIM>,
+    right: &SMatrix<f64, BODY_DIM, JOINT_DIM>,
+) -> SMatrix<f64, BODY_DIM, JOINT_DIM> {
+    let [first, others @ ..] = &left.data.0;
+    let columns = right.data.0.map(|factors| {
+        let mut sums = first.map(|entry| entry * factors[0]);
+        for (column, factor) in others.iter().zip(&factors[1..]) {
+            for (sum, entry) in sums.iter_mut().zip(column) {
+                *sum += entry * factor;
+            }
+        }
+        sums
+    });
+    SMatrix::from_data(ArrayStorage(columns))
 }
 
 /// Rotation from the body's axes to the world's, `R_z(yaw) R_y(pitch) R_x(roll)`.

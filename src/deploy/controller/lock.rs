@@ -4,6 +4,7 @@
 //! torques have the same bits and that it can be built from the same downloads.
 
 use std::collections::BTreeSet;
+use std::sync::LazyLock;
 
 /// romc's own lock file.
 const OWN: &str = include_str!("../../../Cargo.lock");
@@ -45,12 +46,15 @@ impl<'a> Package<'a> {
 }
 
 impl Lock<'static> {
-    /// romc's own.
-    pub fn own() -> Self {
-        let blocks = OWN.split("[[package]]\n").skip(1);
-        Self {
-            packages: blocks.filter_map(Package::parse).collect(),
-        }
+    /// romc's own, parsed once.
+    pub fn own() -> &'static Self {
+        static PARSED: LazyLock<Lock<'static>> = LazyLock::new(|| {
+            let blocks = OWN.split("[[package]]\n").skip(1);
+            Lock {
+                packages: blocks.filter_map(Package::parse).collect(),
+            }
+        });
+        &PARSED
     }
 }
 

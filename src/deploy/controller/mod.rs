@@ -19,7 +19,7 @@ use crate::files::EmittedFile;
 use crate::lower::Form;
 use crate::model::ReducedModel;
 use crate::mpc::ControlModel;
-use crate::mpc::interface::{Settings, all_codes, status_text};
+use crate::mpc::interface::{Settings, all_codes};
 use crate::robot::{InputRule, Leg, Robot, STATE_DIM, WrenchFrame};
 use control_model::ControlModelText;
 use lock::Lock;
@@ -34,7 +34,7 @@ pub(super) struct Facts<'a> {
     pub(super) state_dim: usize,
     pub(super) state_names: String,
     pub(super) input_names: String,
-    pub(super) joint_names: String,
+    joint_names: String,
     /// How `u` comes from torques, lines of a comment.
     pub(super) input_is: String,
     /// Constant and value of every code.
@@ -44,16 +44,13 @@ pub(super) struct Facts<'a> {
     pub(super) defaults: Settings,
     link_m: String,
     rust_version: &'static str,
-    clarabel: &'static str,
-    nalgebra: &'static str,
-    thiserror: &'static str,
 }
 
 impl<'a> Facts<'a> {
     pub(super) fn new(entries: &'a ModelInterface, plant: &'a ControlModel) -> Self {
-        let (name, robot, lock) = (entries.identifier.as_str(), plant.robot(), Lock::own());
-        let text = |code| (code, status_text(code).to_string_lossy().into_owned());
-        let texts: Vec<(i32, String)> = all_codes().map(text).collect();
+        let (name, robot) = (entries.identifier.as_str(), plant.robot());
+        let texts = all_codes().map(|(code, text)| (code, text.to_string_lossy().into_owned()));
+        let texts: Vec<(i32, String)> = texts.collect();
         Self {
             model: &entries.name,
             name,
@@ -72,10 +69,12 @@ impl<'a> Facts<'a> {
             defaults: Settings::default(),
             link_m: format!("{:?}", robot.geometry(Leg::FrontRight).lengths()[0]),
             rust_version: env!("CARGO_PKG_RUST_VERSION"),
-            clarabel: lock.version("clarabel"),
-            nalgebra: lock.version("nalgebra"),
-            thiserror: lock.version("thiserror"),
         }
+    }
+
+    /// The version of a package that the crate needs.
+    fn version(&self, package: &str) -> &'static str {
+        Lock::own().version(package)
     }
 }
 

@@ -34,7 +34,7 @@ use source::Source;
 /// Rows of the friction pyramid and of the slack.
 const OTHER_ROWS: usize = 5;
 
-/// What all files take from model and robot.
+/// What the C files take besides.
 struct Facts<'a> {
     controller: controller::Facts<'a>,
     banner: String,

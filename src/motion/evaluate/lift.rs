@@ -91,9 +91,9 @@ mod tests {
     fn more_latent_coordinates_lose_less_of_the_torques() {
         let jump = recording::shipped("go1/test_01");
         let [two, six] = ["go1-d2", "go1-d6"].map(|name| {
-            let mut sums = LiftSums::default();
+            let (model, mut sums) = (shipped_model(name), LiftSums::default());
             for segment in &jump.segments {
-                let added = sums.add(&shipped_model(name), segment);
+                let added = sums.add(&model, segment);
                 added.expect("legs are bent");
             }
             sums

@@ -23,13 +23,6 @@ mod remarks;
 mod round_trip;
 mod torque;
 
-/// A model of the project's own, by the name of its file.
-#[cfg(test)]
-pub(crate) fn shipped_model(name: &str) -> crate::model::ReducedModel {
-    let path = format!("{}/../../models/{name}.json", env!("CARGO_MANIFEST_DIR"));
-    crate::artifact::read(path.as_ref()).expect("a shipped model")
-}
-
 pub use along_recording::{ReferenceInput, Run, StepRow, along_recording, lift_comparison};
 pub use aslip::{Aslip, AslipRollout, AslipSums};
 pub use assessment::{Assessment, SegmentRun};
@@ -50,3 +43,10 @@ pub use prediction::PredictionError;
 pub use remarks::remarks;
 pub use round_trip::{AccelerationSlip, RoundTrip, Slip};
 pub use torque::{ByContact, Comparison, is_plausible};
+
+/// A model of the project's own, by the name of its file.
+#[cfg(test)]
+pub(crate) fn shipped_model(name: &str) -> crate::model::ReducedModel {
+    let path = format!("{}/../../models/{name}.json", env!("CARGO_MANIFEST_DIR"));
+    crate::artifact::read(path.as_ref()).expect("a shipped model")
+}

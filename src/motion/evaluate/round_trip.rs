@@ -228,27 +228,39 @@ impl<'m> Samples<'m> {
     }
 
     fn with(&self, slip: &Slip) -> Reading {
-        let mut reading = self.given();
         match slip {
-            Slip::Order(order) => reading.order = *order.places(),
-            Slip::Factor(factor) => reading.factors.fill(*factor),
-            Slip::Centred => reading.mean.clone_from(&self.mean),
-            Slip::Standardised => {
-                reading.factors = self.deviation.map(|v| 1.0 / v.max(1e-9));
-                reading.mean.clone_from(&self.mean);
-            }
+            Slip::Order(order) => Reading {
+                order: *order.places(),
+                ..self.given()
+            },
+            Slip::Factor(factor) => Reading {
+                factors: self.factors.map(|_| *factor),
+                ..self.given()
+            },
+            Slip::Centred => Reading {
+                mean: self.mean.clone(),
+                ..self.given()
+            },
+            Slip::Standardised => Reading {
+                order: std::array::from_fn(|k| k),
+                factors: self.deviation.map(|v| 1.0 / v.max(1e-9)),
+                mean: self.mean.clone(),
+            },
             Slip::Both(order, slip) => {
-                reading = self.with(slip);
+                let mut reading = self.with(slip);
                 reading.order = *order.places();
-                if **slip == Slip::Standardised {
-                    // Factors of coordinates, not of places.
-                    let places = order.places().iter();
-                    let factors = places.map(|place| reading.factors[*place]);
-                    reading.factors = DVector::from_iterator(STATE_DIM, factors);
+                match **slip {
+                    Slip::Standardised => {
+                        // Factors of coordinates, not of places.
+                        let places = order.places().iter();
+                        let factors = places.map(|place| reading.factors[*place]);
+                        reading.factors = DVector::from_iterator(STATE_DIM, factors);
+                    }
+                    Slip::Order(_) | Slip::Factor(_) | Slip::Centred | Slip::Both(..) => {}
                 }
+                reading
             }
         }
-        reading
     }
 
     /// Mean square of the round trip's residual over that of the deviation.

@@ -1,7 +1,5 @@
 //! Errors of setting up a controller.
 
-#![allow(missing_docs, reason = "each variant's message names its fields")]
-
 use std::path::PathBuf;
 
 use thiserror::Error;
@@ -17,6 +15,7 @@ use crate::recording::RecordingError;
 /// [`Status`](super::Status).
 #[derive(Debug, Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "each variant's message names its fields")]
 pub enum MpcError {
     /// The model lacks something that the controller needs.
     #[error("the model cannot be used for control")]

@@ -1,4 +1,4 @@
-//! The cost of a plan: weighted squares of deviations.
+//! The cost of a plan, weighted squares of deviations, and where the feet of a plan are.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 

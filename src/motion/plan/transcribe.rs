@@ -427,7 +427,8 @@ impl<'a> Task<'a> {
         flight.expect("invariant: checked with the model")
     }
 
-    /// The part at whose beginning feet of a part stand as they are to stay: the first, or that of the landing.
+    /// The part at whose first node the feet of `part` stand where they are to stay: the first part, or the
+    /// landing itself.
     pub fn anchor_part(&self, part: usize) -> usize {
         if part > self.flight() { part } else { 0 }
     }

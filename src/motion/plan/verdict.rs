@@ -79,27 +79,22 @@ pub fn verdict(settings: &PlanSettings, found: &Findings<'_>) -> Verdict {
         }
     }
     let margins = found.margins;
-    let share = 100.0 * margins.torque_share;
+    if margins.torque_share > 1.0 {
+        let share = 100.0 * margins.torque_share;
+        refused.push(format!(
+            "torques reach {share:.0} % of their limits between nodes"
+        ));
+    }
     let (joint, force) = (margins.beyond_joint_limit_rad, margins.beyond_friction_n);
-    let between_nodes = [
-        (
-            margins.torque_share > 1.0,
-            format!("torques reach {share:.0} % of their limits"),
-        ),
-        (
-            joint > NO_JOINT,
-            format!("a joint is {joint:.3} rad beyond its limit"),
-        ),
-        (
-            force > settings.friction_slack_n + NO_FRICTION_N,
-            format!("the force is {force:.0} N outside the friction cone"),
-        ),
-    ];
-    for (_, what) in between_nodes
-        .into_iter()
-        .filter(|(is_broken, _)| *is_broken)
-    {
-        refused.push(what + " between nodes");
+    if joint > NO_JOINT {
+        refused.push(format!(
+            "a joint is {joint:.3} rad beyond its limit between nodes"
+        ));
+    }
+    if force > settings.friction_slack_n + NO_FRICTION_N {
+        refused.push(format!(
+            "the force is {force:.0} N outside the friction cone between nodes"
+        ));
     }
     if let Some(share) = found.weight_share
         && share < LEAST_WEIGHT_SHARE

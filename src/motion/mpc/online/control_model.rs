@@ -73,8 +73,8 @@ pub struct InputMaps {
 
 /// A nonlinear encoder and decoder with their Jacobians, in SI units on the robot's side.
 ///
-/// The matrices of a [`ControlModel`](super::ControlModel) are then those at one state, and
-/// [`ControlModel::tangent_at`](super::ControlModel::tangent_at) gives the plant of another.
+/// The matrices of a [`ControlModel`] are then those at one state, and
+/// [`ControlModel::tangent_at`] gives the plant of another.
 pub trait NonlinearMaps: Debug + Send + Sync {
     /// Writes `z = E(s_x x)`.
     fn encode(&self, x: &[f64], z: &mut [f64]);

@@ -1,7 +1,5 @@
 //! Errors of setting up a controller.
 
-#![allow(missing_docs, reason = "each variant's message names its fields")]
-
 use thiserror::Error;
 
 use crate::robot::ContactFlags;
@@ -9,9 +7,10 @@ use crate::robot::ContactFlags;
 /// Why a controller could not be set up or given a reference.
 ///
 /// Once it runs, a controller does not fail: each step's command carries a
-/// [`Status`](super::Status).
+/// [`Status`](super::Status). Samples and coordinates count from zero.
 #[derive(Debug, Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "each variant's message names its fields")]
 pub enum ControlError {
     /// A matrix or vector of the plant does not fit the others.
     #[error("plant: `{name}` is {found:?}, expected {expected:?} (rows, columns)")]
@@ -38,7 +37,7 @@ pub enum ControlError {
         /// The length that the number of samples asks for.
         expected: usize,
     },
-    /// A value of a reference is infinite or not a number; samples and coordinates count from zero.
+    /// A value of a reference is infinite or not a number.
     #[error("reference `{name}`, sample {sample}, coordinate {coordinate}: {found} is not finite")]
     ReferenceValue {
         name: &'static str,

@@ -115,6 +115,7 @@ impl Layout {
                 block(rate, rates, self.input_column(before), d),
             ],
         };
+        // In the order of the fields of `StagePositions`.
         [
             block(dynamics, 2 * d, input, d),
             by_state,

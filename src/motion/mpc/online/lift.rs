@@ -25,7 +25,7 @@ use nalgebra::Matrix3;
 
 use super::control_model::ControlModel;
 use super::error::ControlError;
-use super::lift_cones::{empty_program, lift_in_cones};
+use super::lift_cones::{cone_solver, lift_in_cones};
 use super::lift_pyramids::PyramidLift;
 use super::problem::upright;
 use super::qp::{Outcome, QpSettings, QpSolver};
@@ -145,7 +145,7 @@ impl ConsistentLift {
                     tolerance: 1e-8,
                     ..settings.qp
                 };
-                Method::Cones(Box::new(QpSolver::new(empty_program(), settings)?))
+                Method::Cones(Box::new(cone_solver(settings)?))
             }
             Solver::Riccati => Method::Pyramids(Box::new(PyramidLift::new(
                 d,

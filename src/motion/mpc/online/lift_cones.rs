@@ -3,8 +3,9 @@
 use nalgebra::{Cholesky, SMatrix, SVector};
 
 use super::control_model::ControlPhase;
+use super::error::ControlError;
 use super::lift::{LiftFailure, LiftProblem, LiftRules};
-use super::qp::{Cone, ConeProgram, Outcome, QpSolver};
+use super::qp::{Cone, ConeProgram, Outcome, QpSettings, QpSolver};
 use super::sparse::SparseColumns;
 use crate::robot::{FOOT_DIM, JOINT_DIM};
 
@@ -14,8 +15,13 @@ type TorqueSquare = SMatrix<f64, JOINT_DIM, JOINT_DIM>;
 /// Rows of the two sides of the torque limits.
 const BOUND_ROWS: usize = 2 * JOINT_DIM;
 
+/// The solver of [`lift_in_cones`].
+pub(super) fn cone_solver(settings: QpSettings) -> Result<QpSolver, ControlError> {
+    QpSolver::new(empty_program(), settings)
+}
+
 /// Torques at the links, N m, and interior-point iterations: zero if the optimum without
-/// constraints keeps them; `solver` is one of [`empty_program`].
+/// constraints keeps them; `solver` is a [`cone_solver`].
 pub(super) fn lift_in_cones(
     solver: &mut QpSolver,
     phase: &ControlPhase,
@@ -113,7 +119,7 @@ fn is_allowed(torque: &Torque, problem: &LiftProblem<'_>, rules: &LiftRules) -> 
 }
 
 /// Torque bounds, and a friction cone for each foot; costs and cones are filled at each lift.
-pub(super) fn empty_program() -> ConeProgram {
+fn empty_program() -> ConeProgram {
     let upper: Vec<(usize, usize)> = (0..JOINT_DIM)
         .flat_map(|col| (0..=col).map(move |row| (row, col)))
         .collect();

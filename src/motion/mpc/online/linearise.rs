@@ -236,4 +236,32 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn step_of_a_linear_oscillator_is_the_taylor_polynomial_of_order_four() {
+        let mut stage = StageModel::zeros(1);
+        let oscillator =
+            |z: &[f64], _: &[f64], u: &[f64], ddz: &mut [f64], jacobian: &mut DMatrix<f64>| {
+                ddz[0] = -z[0] + u[0];
+                jacobian.copy_from_slice(&[-1.0, 0.0, 1.0]);
+            };
+        let h: f64 = 0.5;
+        Lineariser::new(1).stage(&[2.0, 0.0], &[0.0], h, oscillator, &mut stage);
+        let (cosine, sine) = (
+            1.0 - h.powi(2) / 2.0 + h.powi(4) / 24.0,
+            h - h.powi(3) / 6.0,
+        );
+        let found = [
+            stage.a[(0, 0)],
+            stage.a[(0, 1)],
+            stage.next[0],
+            stage.b[(0, 0)],
+        ];
+        for (found, exact) in found
+            .into_iter()
+            .zip([cosine, sine, 2.0 * cosine, 1.0 - cosine])
+        {
+            assert!((found - exact).abs() < 1e-15, "{found} {exact}");
+        }
+    }
 }

@@ -200,6 +200,7 @@ impl MpcSettings {
         if !(1..=MAX_HORIZON).contains(&self.horizon) {
             return Err(refused(("horizon", self.horizon as f64), "1 to 500 stages"));
         }
+        // Where there is none, numbers that pass the checks and are used for nothing else.
         let effectiveness = self.effectiveness.unwrap_or(Effectiveness {
             time_constant_s: 1.0,
             stiffness_nm_rad: 0.0,

@@ -90,3 +90,22 @@ impl SparseColumns {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn entries_named_twice_exist_once_and_add_up_by_position() {
+        let entries = [(1, 2), (0, 0), (1, 0), (0, 0)];
+        let mut matrix = SparseColumns::from_pattern(2, 3, &entries);
+        for ((row, col), value) in entries.into_iter().zip([5.0, 2.0, -1.0, 0.5]) {
+            let position = matrix.position(row, col).expect("an entry");
+            matrix.values_mut()[position] += value;
+        }
+        assert_eq!(matrix.csc().colptr, [0, 2, 2, 3]);
+        assert_eq!(matrix.csc().rowval, [0, 1, 1]);
+        assert_eq!(matrix.values(), [2.5, -1.0, 5.0]);
+        assert_eq!(matrix.position(0, 1), None);
+    }
+}

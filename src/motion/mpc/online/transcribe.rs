@@ -91,6 +91,7 @@ struct StagePositions {
 }
 
 impl StagePositions {
+    /// Takes [`Layout::blocks`], whose order is that of the fields.
     fn of(blocks: [Vec<(usize, usize)>; 7], a: &SparseColumns) -> Self {
         let [input, state, torque, rate, rate_before, joint, force] = blocks.map(|block| {
             let positions = block.into_iter().map(|(row, col)| a.position(row, col));

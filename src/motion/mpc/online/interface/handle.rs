@@ -257,6 +257,11 @@ mod tests {
             u: Some(Some(&zeros)),
             feet: Some(&feet),
         };
+        let short = RawReference {
+            x: Some(&x[1..]),
+            ..reference
+        };
+        assert_eq!(handle.set_reference(&short), -2);
         assert_eq!(handle.set_reference(&reference), 0);
         let measurement = RawMeasurement {
             time_s: 0.0,
