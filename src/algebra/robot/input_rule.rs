@@ -138,21 +138,22 @@ impl InputRule {
 }
 
 /// The product, to the bit as nalgebra has it, which calls a function out of line for each column and factor:
-/// every column is the sum of those of `left` by their factors, in order.
+/// every entry is the sum of its products in their order.
 fn product(
     left: &SMatrix<f64, BODY_DIM, BODY_DIM>,
     right: &SMatrix<f64, BODY_DIM, JOINT_DIM>,
 ) -> SMatrix<f64, BODY_DIM, JOINT_DIM> {
-    let [first, others @ ..] = &left.data.0;
-    let columns = right.data.0.map(|factors| {
-        let mut sums = first.map(|entry| entry * factors[0]);
-        for (column, factor) in others.iter().zip(&factors[1..]) {
-            for (sum, entry) in sums.iter_mut().zip(column) {
-                *sum += entry * factor;
+    let (left, right) = (&left.data.0, &right.data.0);
+    let mut columns = [[0.0; BODY_DIM]; JOINT_DIM];
+    for j in 0..JOINT_DIM {
+        for i in 0..BODY_DIM {
+            let mut sum = left[0][i] * right[j][0];
+            for k in 1..BODY_DIM {
+                sum += left[k][i] * right[j][k];
             }
+            columns[j][i] = sum;
         }
-        sums
-    });
+    }
     SMatrix::from_data(ArrayStorage(columns))
 }
 
