@@ -152,9 +152,9 @@ impl BodyEquation {
         self.subtract(DELAY, &(map * state.torque_rate));
         for kind in 0..LEG_JOINT_DIM {
             let (rate, joint) = (state.rate[kind], map.column(kind));
-            self.add(VISCOUS + kind, -joint * rate);
-            self.add(DRY + kind, -joint * (rate / DRY_SPEED_RAD_S).tanh());
-            self.add(ARMATURE + kind, -joint * state.acceleration[kind]);
+            self.subtract(VISCOUS + kind, &(joint * rate));
+            self.subtract(DRY + kind, &(joint * (rate / DRY_SPEED_RAD_S).tanh()));
+            self.subtract(ARMATURE + kind, &(joint * state.acceleration[kind]));
         }
         for (unknown, torque) in OWN.into_iter().zip(&state.own) {
             self.subtract(unknown, &(map * torque));

@@ -112,7 +112,8 @@ impl Motion {
     /// Second derivatives of a leg's directions, 1/s^2.
     pub fn leg(&self, leg: Leg, sample: usize) -> Directions {
         let first = TRUNK_ROWS + LEG_ROWS * leg.index();
-        std::array::from_fn(|place| self.direction(first + 3 * place, sample))
+        let of = |row| self.direction(first + row, sample);
+        [of(0), of(3), of(6), of(9), of(12)]
     }
 
     #[inline]
