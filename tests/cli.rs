@@ -860,6 +860,8 @@ fn the_command_in_the_provenance_quotes_paths_that_a_shell_would_divide() {
         "0",
         "--terms",
         "1;z1;z2;dz1;dz2;u1;u2",
+        "--name",
+        "two by two",
         "--output",
         &model,
     ]);
@@ -867,10 +869,9 @@ fn the_command_in_the_provenance_quotes_paths_that_a_shell_would_divide() {
     let command = written.provenance()["command"].as_str().expect("a command");
     let wanted = format!("romc train '{jump}' --latent-dim 2");
     assert!(command.starts_with(&wanted), "{command}");
-    assert!(
-        command.contains(" --terms '1;z1;z2;dz1;dz2;u1;u2' "),
-        "{command}"
-    );
+    for flag in [" --terms '1;z1;z2;dz1;dz2;u1;u2' ", " --name 'two by two' "] {
+        assert!(command.contains(flag), "{command}");
+    }
 }
 
 #[test]

@@ -9,7 +9,7 @@ use serde_json::json;
 use super::Answer;
 use super::args::{TrainArguments, TrainSettings};
 use super::destination::{Format, Inputs};
-use super::output::{named, note, note_repeated, quoted, quoted_all, spinner};
+use super::output::{named, note, note_repeated, quoted, quoted_all, quoted_text, spinner};
 use super::prepared_recordings::{RecordedSets, read_all};
 use super::train_settings;
 use crate::model::ReducedModel;
@@ -173,6 +173,9 @@ fn command_line(
     };
     line += &train_settings::as_flags(&settings);
     line += &arguments.reading.as_flags();
+    if let Some(name) = &arguments.name {
+        let _ = write!(line, " --name {}", quoted_text(name));
+    }
     let _ = write!(line, " --output {}", quoted(&arguments.output));
     line
 }

@@ -1,7 +1,7 @@
 //! What targets spell differently.
 
 use super::code::{ConstTable, Index, Span};
-use super::fours::Fours;
+use super::fours::{FourBlock, Fours};
 use super::lanes::Row;
 use super::precision::Precision;
 use super::printer::subscript;
@@ -62,9 +62,9 @@ pub trait Dialect {
         None
     }
 
-    /// Lines that compute sums of vectors of four numbers side by side; nothing in languages that take one number
-    /// after the other.
-    fn fours(&self, _: &Fours) -> Option<Lines> {
+    /// Lines that compute a block of sums of vectors of four numbers side by side; nothing in languages that take one
+    /// number after the other.
+    fn four_block(&self, _: &Fours, _: &FourBlock) -> Option<Lines> {
         None
     }
 

@@ -80,7 +80,9 @@ impl<'a> Printer<'a> {
                     continue;
                 }
                 Stmt::Fours(fours) => {
-                    let lines = self.dialect.fours(fours);
+                    let blocks = fours.blocks.iter();
+                    let blocks = blocks.map(|block| self.dialect.four_block(fours, block));
+                    let lines = blocks.collect::<Option<Vec<_>>>().map(|all| all.concat());
                     self.side_by_side(lines, || fours.one_by_one(), depth, text);
                     continue;
                 }

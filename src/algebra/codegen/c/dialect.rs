@@ -112,37 +112,7 @@ impl Dialect for CDialect {
         Some(lanes::row(self, row))
     }
 
-    fn fours(&self, fours: &Fours) -> Option<Lines> {
-        let blocks = fours.blocks.iter();
-        Some(
-            blocks
-                .flat_map(|block| self.four_block(fours, block))
-                .collect(),
-        )
-    }
-
-    fn table_base(&self, prefix: &str) -> String {
-        format!("{prefix}table")
-    }
-
-    fn table(&self, table: &ConstTable) -> Option<String> {
-        let rows = self.rows(table, ["    {", ",\n     ", "},"]);
-        let aligned = match table.is_in_lanes {
-            true => format!(" {}_ALIGNED", self.upper()),
-            false => String::new(),
-        };
-        Some(format!(
-            "static const {}{aligned} {}[{}][{}] = {{\n{rows}}};",
-            self.real(),
-            table.name,
-            table.values.rows(),
-            table.values.cols(),
-        ))
-    }
-}
-
-impl CDialect {
-    fn four_block(&self, fours: &Fours, block: &FourBlock) -> Lines {
+    fn four_block(&self, fours: &Fours, block: &FourBlock) -> Option<Lines> {
         let (upper, y, weights) = (self.upper(), &fours.array, &fours.weights);
         let vector = |vector: Quad| match vector {
             Quad::Row(row) => format!("{}[{row}]", fours.table.1),
@@ -174,9 +144,30 @@ impl CDialect {
             lines.push((1, format!("{upper}_STORE_FOUR(&{y}[{at}], {});", name(sum))));
         }
         lines.push((0, "}".to_owned()));
-        lines
+        Some(lines)
     }
 
+    fn table_base(&self, prefix: &str) -> String {
+        format!("{prefix}table")
+    }
+
+    fn table(&self, table: &ConstTable) -> Option<String> {
+        let rows = self.rows(table, ["    {", ",\n     ", "},"]);
+        let aligned = match table.is_in_lanes {
+            true => format!(" {}_ALIGNED", self.upper()),
+            false => String::new(),
+        };
+        Some(format!(
+            "static const {}{aligned} {}[{}][{}] = {{\n{rows}}};",
+            self.real(),
+            table.name,
+            table.values.rows(),
+            table.values.cols(),
+        ))
+    }
+}
+
+impl CDialect {
     /// An element, or that of each lane if it is the first lane's.
     fn read(&self, element: String) -> String {
         match self.in_lanes {

@@ -41,56 +41,6 @@ impl RustDialect {
         }
     }
 
-    fn four_block(&self, fours: &Fours, block: &FourBlock) -> Lines {
-        let (real, y, n_sums) = (self.real(), &fours.array, QUAD * fours.sums.len());
-        let (weights, n_weights) = (&fours.weights.array, fours.weights.of);
-        let vector = |vector: Quad| match vector {
-            Quad::Row(row) => format!("{}[{row}]", fours.table.1),
-            Quad::Sum(sum) => format!("four({y}, {})", QUAD * sum),
-        };
-        let starts = block.sums.clone().map(|sum| {
-            let start = vector(fours.sums[sum].start);
-            (2, format!("start_four({y}, {}, {start});", QUAD * sum))
-        });
-        let mut parts: Vec<Lines> = vec![starts.collect()];
-        let mut lengths = vec![0; block.sums.len()];
-        for four in &block.terms {
-            let length = &mut lengths[four.sum - block.sums.start];
-            if *length == LONGEST_CHAIN {
-                lengths.fill(0);
-                parts.push(Vec::new());
-            }
-            lengths[four.sum - block.sums.start] += 1;
-            let (at, vector) = (QUAD * four.sum, vector(four.vector));
-            let weight = format!("{weights}[{}]", fours.weights.offset + four.weight);
-            let lanes = fours.lanes(four.vector).map(u8::from);
-            let lanes = lanes.iter().rev().map(u8::to_string).collect::<String>();
-            let line = format!("add_four::<0b{lanes}, _>({y}, {at}, {vector}, {weight});");
-            parts.last_mut().expect("one part at least").push((2, line));
-        }
-        let by = if fours.weights.is_parameter { "" } else { "&" };
-        let mut lines = Vec::new();
-        for part in parts {
-            let head = format!(
-                "fn part({y}: &mut [{real}; {n_sums}], {weights}: &[{real}; {n_weights}]) {{"
-            );
-            lines.push((0, "{".to_owned()));
-            // Without wide registers the compiler adds number by number, best all in one function.
-            let avx = "target_feature = \"avx\"";
-            lines.push((1, format!("#[cfg_attr({avx}, inline(never))]")));
-            lines.push((1, format!("#[cfg_attr(not({avx}), inline(always))]")));
-            lines.push((1, head));
-            if !part.iter().any(|(_, line)| line.contains("add_four")) {
-                lines.push((2, format!("let _ = {weights};")));
-            }
-            lines.extend(part);
-            lines.push((1, "}".to_owned()));
-            lines.push((1, format!("part(&mut {y}, {by}{weights});")));
-            lines.push((0, "}".to_owned()));
-        }
-        lines
-    }
-
     /// A function with its documentation.
     pub fn definition(&self, function: &Function) -> String {
         let parameters = function.parameters.iter().map(|p| self.parameter(p));
@@ -171,13 +121,54 @@ impl Dialect for RustDialect {
         ]
     }
 
-    fn fours(&self, fours: &Fours) -> Option<Lines> {
-        let blocks = fours.blocks.iter();
-        Some(
-            blocks
-                .flat_map(|block| self.four_block(fours, block))
-                .collect(),
-        )
+    fn four_block(&self, fours: &Fours, block: &FourBlock) -> Option<Lines> {
+        let (real, y, n_sums) = (self.real(), &fours.array, QUAD * fours.sums.len());
+        let (weights, n_weights) = (&fours.weights.array, fours.weights.of);
+        let vector = |vector: Quad| match vector {
+            Quad::Row(row) => format!("{}[{row}]", fours.table.1),
+            Quad::Sum(sum) => format!("four({y}, {})", QUAD * sum),
+        };
+        let starts = block.sums.clone().map(|sum| {
+            let start = vector(fours.sums[sum].start);
+            (2, format!("start_four({y}, {}, {start});", QUAD * sum))
+        });
+        let mut parts: Vec<Lines> = vec![starts.collect()];
+        let mut lengths = vec![0; block.sums.len()];
+        for four in &block.terms {
+            let length = &mut lengths[four.sum - block.sums.start];
+            if *length == LONGEST_CHAIN {
+                lengths.fill(0);
+                parts.push(Vec::new());
+            }
+            lengths[four.sum - block.sums.start] += 1;
+            let (at, vector) = (QUAD * four.sum, vector(four.vector));
+            let weight = format!("{weights}[{}]", fours.weights.offset + four.weight);
+            let lanes = fours.lanes(four.vector).map(u8::from);
+            let lanes = lanes.iter().rev().map(u8::to_string).collect::<String>();
+            let line = format!("add_four::<0b{lanes}, _>({y}, {at}, {vector}, {weight});");
+            parts.last_mut().expect("one part at least").push((2, line));
+        }
+        let by = if fours.weights.is_parameter { "" } else { "&" };
+        let mut lines = Vec::new();
+        for part in parts {
+            let head = format!(
+                "fn part({y}: &mut [{real}; {n_sums}], {weights}: &[{real}; {n_weights}]) {{"
+            );
+            lines.push((0, "{".to_owned()));
+            // Without wide registers the compiler adds number by number, best all in one function.
+            let avx = "target_feature = \"avx\"";
+            lines.push((1, format!("#[cfg_attr({avx}, inline(never))]")));
+            lines.push((1, format!("#[cfg_attr(not({avx}), inline(always))]")));
+            lines.push((1, head));
+            if !part.iter().any(|(_, line)| line.contains("add_four")) {
+                lines.push((2, format!("let _ = {weights};")));
+            }
+            lines.extend(part);
+            lines.push((1, "}".to_owned()));
+            lines.push((1, format!("part(&mut {y}, {by}{weights});")));
+            lines.push((0, "}".to_owned()));
+        }
+        Some(lines)
     }
 
     fn table(&self, table: &ConstTable) -> Option<String> {
