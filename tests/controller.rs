@@ -14,7 +14,7 @@ use romc::recording::Segment;
 #[path = "controller/programs.rs"]
 mod programs;
 mod tools;
-use programs::{WARNINGS, has, root, shipped, succeed, with_losses};
+use programs::{WARNINGS, root, shipped, succeed, with_losses};
 
 /// What a Rust static library needs from the system.
 const SYSTEM: [&str; 4] = ["-lm", "-lpthread", "-ldl", "-lrt"];
@@ -323,7 +323,7 @@ fn generated_controllers_command_the_librarys_bits_and_survive_abuse() {
             ("cc", "-std=c99", "example.c"),
             ("c++", "-std=c++11", "example.cpp"),
         ] {
-            if !has(compiler) {
+            if !tools::is_there(compiler) {
                 continue;
             }
             let program = built.program(compiler, &[standard], &examples.join(source));
@@ -341,7 +341,7 @@ fn run_python(built: &Built) {
         built.name,
         built.library("so")
     );
-    if !has("python3") {
+    if !tools::is_there("python3") {
         return;
     }
     let output = succeed(

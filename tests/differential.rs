@@ -38,10 +38,7 @@ const SOME_MODELS: u64 = 24;
 
 /// Random models of a comparison that compiles them all for one program.
 fn n_models_a_program() -> u64 {
-    match tools::is_thorough() {
-        true => SOME_MODELS,
-        false => SOME_MODELS / 3,
-    }
+    tools::thorough_or(SOME_MODELS, SOME_MODELS / 3)
 }
 
 /// Random models of the comparison with generated code by the builds that must have the
@@ -155,7 +152,8 @@ fn check_all(what: &str, cases: &[Case], builds: impl Fn(usize) -> Vec<Build>) {
 
 #[test]
 fn generated_code_of_shipped_models_equals_the_interpreter() {
-    let cases = [Case::new(models::shipped(), 10_000, Form::Automatic)];
+    let n_points = tools::thorough_or(10_000, 1_000);
+    let cases = [Case::new(models::shipped(), n_points, Form::Automatic)];
     check_all("shipped", &cases, |_| Build::all());
 }
 
@@ -170,7 +168,7 @@ fn generated_code_of_random_models_equals_the_interpreter() {
         })
         .collect();
     check_all("random", &cases, |case| {
-        if case == 0 {
+        if case == 0 && tools::is_thorough() {
             Build::all()
         } else {
             Build::exact()
@@ -230,20 +228,25 @@ fn random_models_have_all_shapes() {
 #[test]
 fn generated_code_with_tables_equals_the_interpreter() {
     let random_models = (1000..1000 + n_models_a_program()).map(models::random);
-    let models = models::shipped().into_iter().chain(random_models).collect();
+    let shipped = tools::thorough_or(models::shipped(), Vec::new());
+    let models = shipped.into_iter().chain(random_models).collect();
     let cases = [Case::new(models, 100, Form::Tables)];
     check_all("tables", &cases, |_| {
-        let exact = Build::exact().into_iter();
-        let tables = [Build::c_scalar_lanes(), Build::c_fast()];
-        exact.chain(tables).collect()
+        let mut builds = Build::exact();
+        builds.push(Build::c_scalar_lanes());
+        builds.extend(tools::thorough_or(Some(Build::c_fast()), None));
+        builds
     });
 }
 
 #[test]
 fn generated_maps_of_nonlinear_models_equal_the_interpreter() {
-    let models = (0..8).map(models::random_nonlinear).collect();
+    let n_models = tools::thorough_or(8, 3);
+    let models = (0..n_models).map(models::random_nonlinear).collect();
     let cases = [Case::new(models, 50, Form::Automatic)];
-    check_all("nonlinear", &cases, |_| Build::all());
+    check_all("nonlinear", &cases, |_| {
+        tools::thorough_or(Build::all(), Build::exact())
+    });
     let workshop = cases[0].workshop();
     for model in &cases[0].models {
         workshop.run_c_selftest(&Build::c_plain(), model.identifier().as_str());
@@ -310,7 +313,7 @@ fn lowered_maps_of_nonlinear_models_equal_the_models_own_evaluation() {
 fn tables_and_straight_lines_agree() {
     for model in models::shipped()
         .into_iter()
-        .chain((0..SOME_MODELS).map(models::random))
+        .chain((0..n_models_a_program()).map(models::random))
     {
         let [lines, tables] =
             [Form::StraightLine, Form::Tables].map(|form| functions_of(&model, 50, form));
@@ -341,7 +344,9 @@ fn generated_code_beyond_the_reduction_limit_equals_the_interpreter() {
         }
     }
     case.interpret();
-    check_all("beyond", &[case], |_| Build::exact());
+    check_all("beyond", &[case], |_| {
+        tools::thorough_or(Build::exact(), vec![Build::c()])
+    });
 }
 
 #[test]

@@ -481,15 +481,15 @@ fn emission_is_identical_from_run_to_run() {
     );
 }
 
-/// Runs pdflatex on the preview and fails on errors and on lines that stick out. Without pdflatex
-/// it is as [`tools::answers`] says. With ROMC_KEEP_PDF=DIR the PDF is kept.
+/// Runs pdflatex on the preview and fails on errors and on lines that stick out; without LaTeX see
+/// [`tools::has_latex`]. With ROMC_KEEP_PDF=DIR the PDF is kept.
 fn typeset(files: &[EmittedFile], stem: &str) {
     typeset_document(files, &format!("{stem}-preview"));
 }
 
 /// The same for the document `NAME.tex`.
 fn typeset_document(files: &[EmittedFile], name: &str) {
-    if !tools::answers(Command::new("pdflatex").arg("--version")) {
+    if !tools::has_latex() {
         return;
     }
     let folder = tempfile::tempdir().unwrap();

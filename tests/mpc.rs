@@ -23,3 +23,4 @@ mod riccati;
 mod swing;
 #[path = "mpc/synthetic.rs"]
 mod synthetic;
+mod tools;

@@ -20,3 +20,4 @@ mod random_bytes;
 mod real_jumps;
 #[path = "recording/sheet.rs"]
 mod sheet;
+mod tools;

@@ -6,8 +6,6 @@ use std::process::{Command, Output};
 use romc::model::ReducedModel;
 use romc::robot::{Actuators, WrenchFrame};
 
-use super::tools::answers;
-
 /// Warnings that generated headers, examples and plugins must not raise, in C and C++.
 pub const WARNINGS: [&str; 6] = [
     "-Wall",
@@ -48,9 +46,4 @@ pub fn succeed(command: &mut Command) -> Output {
         String::from_utf8_lossy(&output.stderr)
     );
     output
-}
-
-/// Whether a tool is there, see [`answers`].
-pub fn has(tool: &str) -> bool {
-    answers(Command::new(tool).arg("--version"))
 }

@@ -7,7 +7,8 @@ use std::process::Command;
 use romc::codegen::Precision;
 
 use crate::emitted::Emitted;
-use crate::programs::{has, root, shipped, succeed};
+use crate::programs::{root, shipped, succeed};
+use crate::tools::has;
 
 /// Size of the sections that a linked or compiled file puts into code and into memory, bytes.
 fn sections(size: &str, file: &Path) -> (usize, usize) {

@@ -7,7 +7,8 @@ use std::process::Command;
 use romc::codegen::Precision;
 
 use crate::emitted::Emitted;
-use crate::programs::{WARNINGS, has, root, shipped, succeed};
+use crate::programs::{WARNINGS, root, shipped, succeed};
+use crate::tools::{has, has_compiler_with};
 
 fn stubs() -> PathBuf {
     root().join("tests/controller_c/ros2")
@@ -48,7 +49,7 @@ fn jump_file(folder: &Path) -> PathBuf {
 
 /// Builds the plugin and drives it along a jump, whatever it does to memory being checked by its driver and `flags`.
 fn check_efforts(compiler: &str, flags: &[&str], macros: &[&str]) {
-    if !has(compiler) {
+    if !has_compiler_with(compiler, flags) {
         return;
     }
     let emitted = Emitted::new(&shipped("go1-d4"), Precision::Double);

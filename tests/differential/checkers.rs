@@ -7,7 +7,8 @@ use romc::codegen::Precision;
 use romc::lower::Form;
 use romc::model::ReducedModel;
 
-use super::drivers::{Build, Workshop, contents, is_installed, succeed};
+use super::drivers::{Build, Workshop, contents, succeed};
+use super::tools::has;
 use super::{Case, SOME_MODELS, check_all, models};
 
 /// Builds with sanitizers and under valgrind, as far as this machine has them.
@@ -81,7 +82,7 @@ fn files(workshops: &[Workshop], ending: &str) -> Vec<PathBuf> {
 
 #[test]
 fn clang_tidy_finds_nothing_bugprone_in_generated_c() {
-    if !is_installed("clang-tidy") {
+    if !has("clang-tidy") {
         return;
     }
     // Functions take the vectors z, dz and u_lat one after the other: nobody can help that
@@ -99,7 +100,7 @@ fn clang_tidy_finds_nothing_bugprone_in_generated_c() {
 
 #[test]
 fn cppcheck_finds_nothing_in_generated_c() {
-    if !is_installed("cppcheck") {
+    if !has("cppcheck") {
         return;
     }
     let workshops = emitted();
@@ -115,7 +116,7 @@ fn cppcheck_finds_nothing_in_generated_c() {
 
 #[test]
 fn clippy_finds_nothing_in_generated_rust() {
-    if !is_installed("clippy-driver") {
+    if !has("clippy-driver") {
         return;
     }
     let workshops = emitted();

@@ -1,12 +1,9 @@
 //! Compiles generated code of many models into one program and runs it on many points;
 //! numbers pass as their bits through files.
 
-use std::collections::BTreeSet;
 use std::fs;
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::sync::Mutex;
 
 use romc::codegen::Precision;
 use romc::deploy::{EmitOptions, Target, emit};
@@ -19,7 +16,7 @@ use romc::model::ReducedModel;
 use super::agreement::Rule;
 use super::driver_text::{c_driver, rust_driver};
 use super::functions::Function;
-use super::tools::{answers, is_thorough};
+use super::tools::{has, has_compiler_with};
 
 /// A folder with the generated code of some models.
 pub struct Workshop {
@@ -344,14 +341,13 @@ impl Build {
     /// Clang without contraction.
     fn clang() -> Option<Self> {
         let flags = ["-O1", "-ffp-contract=off"];
-        is_installed("clang")
-            .then(|| Self::c_of("clang, -O1 -ffp-contract=off", "clang".to_owned(), &flags))
+        has("clang").then(|| Self::c_of("clang, -O1 -ffp-contract=off", "clang".to_owned(), &flags))
     }
 
     /// Clang with contraction.
     fn clang_fast() -> Option<Self> {
         let flags = ["-O2", "-march=native", "-ffp-contract=fast"];
-        is_installed("clang").then(|| Self {
+        has("clang").then(|| Self {
             rule: Rule::UlpsATerm,
             ..Self::c_of(
                 "clang, -O2 -march=native, contracted",
@@ -389,30 +385,15 @@ impl Build {
             "-fsanitize=address,undefined",
             "-fno-sanitize-recover=all",
         ];
-        let build = Self::c_with("C, sanitized", &flags);
-        build.links().then_some(build)
+        has_compiler_with(&cc(), &flags).then(|| Self::c_with("C, sanitized", &flags))
     }
 
     /// Under valgrind.
     pub fn valgrind() -> Option<Self> {
-        is_installed("valgrind").then(|| Self {
+        has("valgrind").then(|| Self {
             under: &["valgrind", "-q", "--error-exitcode=9", "--leak-check=full"],
             ..Self::c_with("C, valgrind", &["-O1", "-g", "-ffp-contract=off"])
         })
-    }
-
-    /// Whether checks with the build are asked for; the compiler must find what its flags need then.
-    fn links(&self) -> bool {
-        let Compiler::C { command, flags } = &self.compiler else {
-            return true;
-        };
-        let folder = tempfile::tempdir().expect("a temporary folder");
-        let source = folder.path().join("probe.c");
-        fs::write(&source, "int main(void) { return 0; }\n").expect("written");
-        let mut probe = Command::new(command);
-        probe.args(flags).arg(&source).arg("-o");
-        probe.arg(folder.path().join("probe"));
-        is_there(self.name, &mut probe)
     }
 
     /// The command that runs a program of this build.
@@ -453,26 +434,6 @@ impl Build {
 /// The C compiler of the machine.
 pub fn cc() -> String {
     std::env::var("CC").unwrap_or_else(|_| "cc".to_owned())
-}
-
-/// Whether checks with a tool are asked for; it must answer then.
-pub fn is_installed(tool: &str) -> bool {
-    is_there(tool, Command::new(tool).arg("--version"))
-}
-
-/// Whether everything is asked for, for which a probe must succeed; says so once if it is not. Then the machine's C
-/// compiler and rustc run on fewer models, within minutes.
-fn is_there(tool: &str, probe: &mut Command) -> bool {
-    if is_thorough() {
-        return answers(probe);
-    }
-    static TOLD: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
-    if TOLD.lock().expect("no panic").insert(tool.to_owned()) {
-        // not by println!, which the test harness captures
-        let told = format!("skipped: checks with `{tool}` run with ROMC_REQUIRE_TOOLS=1");
-        let _ = writeln!(std::io::stderr(), "{told}");
-    }
-    false
 }
 
 /// The crate `libm` as cargo compiled it for this test.

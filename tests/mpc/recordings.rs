@@ -9,6 +9,7 @@ use romc::recording::{Recording, Segment};
 
 use crate::outside;
 use crate::synthetic::{Equations, Trajectory, model, trajectory};
+use crate::tools::thorough_or;
 
 fn recording(trajectory: &Trajectory) -> Recording {
     let count = trajectory.time_s.len();
@@ -174,6 +175,7 @@ fn shipped_models_stay_within_limits_and_friction_at_every_step_of_every_recordi
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let recordings = go1_recordings();
     assert!(recordings.len() >= 25);
+    let taken: Vec<&Recording> = recordings.iter().step_by(thorough_or(1, 5)).collect();
     for (name, least_lift_r2) in [("go1-d4", 0.94), ("go1-d6", 0.97)] {
         let model = romc::artifact::read(&root.join(format!("models/{name}.json"))).expect("sound");
         for lift in [Lift::Transpose, Lift::Consistent] {
@@ -183,7 +185,7 @@ fn shipped_models_stay_within_limits_and_friction_at_every_step_of_every_recordi
             };
             let mut controller = Controller::new(&model, settings).expect("complete");
             let mut steps = 0;
-            for recording in &recordings {
+            for &recording in &taken {
                 let run = along_recording(
                     &mut controller,
                     recording,
@@ -205,7 +207,7 @@ fn shipped_models_stay_within_limits_and_friction_at_every_step_of_every_recordi
                     assert!(r2 >= least_lift_r2, "{name} {path}: {r2}");
                 }
             }
-            assert!(steps > 3000, "{steps}");
+            assert!(steps > 100 * taken.len(), "{steps}");
         }
     }
 }

@@ -1,11 +1,20 @@
-//! Tools of the machine that some tests need.
+//! Tools of the machine that some tests need, and how much of a comparison is asked for.
+#![allow(dead_code, reason = "each test binary uses a part")]
 
+use std::collections::BTreeSet;
+use std::fs;
 use std::io::Write as _;
 use std::process::Command;
+use std::sync::{Mutex, OnceLock};
 
 /// Whether everything is asked for, all tools included: with ROMC_REQUIRE_TOOLS=1, as `.ci/run` does.
 pub fn is_thorough() -> bool {
     std::env::var("ROMC_REQUIRE_TOOLS").is_ok_and(|value| value == "1")
+}
+
+/// `all` where everything is asked for; otherwise `few`, with which the test command stays within minutes.
+pub fn thorough_or<T>(all: T, few: T) -> T {
+    if is_thorough() { all } else { few }
 }
 
 /// Whether a tool answers to `probe`. Where it does not, the calling test says so and is skipped, or fails if
@@ -14,8 +23,80 @@ pub fn answers(probe: &mut Command) -> bool {
     let found = probe.output().is_ok_and(|output| output.status.success());
     if !found {
         assert!(!is_thorough(), "{probe:?} fails and ROMC_REQUIRE_TOOLS=1");
-        // not by println!, which the test harness captures
-        let _ = writeln!(std::io::stderr(), "skipped: {probe:?} fails");
+        say_once(format!("skipped: {probe:?} fails"));
     }
     found
+}
+
+/// Whether a program that knows `--version` is there, see [`answers`].
+pub fn is_there(tool: &str) -> bool {
+    answers(Command::new(tool).arg("--version"))
+}
+
+/// Whether checks with a tool that takes minutes are asked for, which is where everything is; `probe` must succeed then.
+/// Elsewhere a line says that they are not.
+pub fn is_asked_for(tool: &str, probe: &mut Command) -> bool {
+    if is_thorough() {
+        return answers(probe);
+    }
+    say_once(format!(
+        "skipped: checks with `{tool}` run with ROMC_REQUIRE_TOOLS=1"
+    ));
+    false
+}
+
+/// The same for a program that knows `--version`.
+pub fn has(tool: &str) -> bool {
+    is_asked_for(tool, Command::new(tool).arg("--version"))
+}
+
+/// Whether the C compiler finds the libraries that `flags` need, such as those of sanitizers, where everything is asked for.
+pub fn has_compiler_with(compiler: &str, flags: &[&str]) -> bool {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let source = folder.path().join("probe.c");
+    fs::write(&source, "int main(void) { return 0; }\n").expect("written");
+    let mut probe = Command::new(compiler);
+    probe.args(flags).arg(&source).arg("-o");
+    probe.arg(folder.path().join("probe"));
+    is_asked_for(&format!("{compiler} {}", flags.join(" ")), &mut probe)
+}
+
+/// Whether pdflatex is there with every package that emitted documents load: with some of them missing, LaTeX counts
+/// as a missing tool.
+pub fn has_latex() -> bool {
+    static FOUND: OnceLock<bool> = OnceLock::new();
+    *FOUND.get_or_init(|| {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let document = format!(
+            "\\documentclass{{article}}\n{}\\begin{{document}}$\\ddot z_1 = 0$ \\textbf{{text}}\\end{{document}}\n",
+            LATEX_PACKAGES.map(|package| format!("\\usepackage{package}\n")).concat()
+        );
+        fs::write(folder.path().join("probe.tex"), document).expect("written");
+        let mut probe = Command::new("pdflatex");
+        probe
+            .args(["-interaction=nonstopmode", "-halt-on-error", "probe.tex"])
+            .current_dir(folder.path());
+        answers(&mut probe)
+    })
+}
+
+/// What `tests/latex.rs` and the emitted previews load.
+const LATEX_PACKAGES: [&str; 9] = [
+    "[T1]{fontenc}",
+    "[utf8]{inputenc}",
+    "{lmodern}",
+    "{textcomp}",
+    "{geometry}",
+    "{amsmath}",
+    "{booktabs}",
+    "{longtable}",
+    "{siunitx}",
+];
+
+fn say_once(line: String) {
+    static SAID: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
+    if SAID.lock().expect("no panic").insert(line.clone()) {
+        // not by println!, which the test harness captures
+        let _ = writeln!(std::io::stderr(), "{line}");
+    }
 }
