@@ -157,6 +157,7 @@ impl Reader<'_> {
                 variable.to_string()
             }
             (Some(LatentVariable::Z(index)), 1) => LatentVariable::Dz(index).to_string(),
+            (None, 0) if symbol.name == "pi" => format!("{:?}", std::f64::consts::PI),
             _ => {
                 let (found, expected) = (symbol.quoted(), self.names.expected());
                 return Err(refused(self.file, symbol.place, found, expected));
