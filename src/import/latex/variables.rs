@@ -95,7 +95,10 @@ impl Reader<'_> {
                 if last != Last::Other && self.is_next(&Kind::Superscript) {
                     return self.unexpected(BARE);
                 }
-                Last::Other
+                match last {
+                    Last::BareNumber => last,
+                    _ => Last::Other,
+                }
             }
             _ => self.bare_argument()?,
         };
