@@ -342,6 +342,19 @@ mod tests {
     }
 
     #[test]
+    fn names_with_underscores_and_other_spellings_are_read() {
+        let text = "ddz_1 = 2*z_1**2 − 3·dz_1\n  + ln(z_1)*sgn (u_1) + pi";
+        let read = read("eq.txt", text.as_bytes()).expect("an equation");
+        let mut pool = ExprPool::new();
+        let equation = &read.sections[0].equations[0];
+        let found = equation
+            .parse("eq.txt", 1, &mut pool)
+            .expect("an expression");
+        let plain = "2*z1^2 - 3*dz1 + log(z1)*sign(u1) + 3.141592653589793";
+        assert_eq!(Ok(found), pool.parse(plain, &|_| true));
+    }
+
+    #[test]
     fn faults_are_reported_with_line_and_column() {
         for (text, line, column, found) in [
             ("", 1, 1, "the end of the text"),
@@ -361,6 +374,8 @@ mod tests {
             ("ddz1 = 1\nddz1 = 2", 2, 1, "`ddz1` again, as in line 1"),
             ("[a]\nddz2 = 1", 1, 1, "phase `[a]` without ddz1"),
             ("[a]\nddz1 = 1\n[b]\n", 3, 1, "phase `[b]` without ddz1"),
+            ("ddz_1 = z_1 + dz_1 + q", 1, 22, "`q`"),
+            ("ddz1 = z1²", 1, 10, "`²`"),
             ("ddz1 = z1^2000", 1, 15, "the exponent 2000"),
         ] {
             let expected = format!("eq:{line}:{column}: found {found}");

@@ -1,6 +1,5 @@
-//! Definitions of macros and environments, and conditionals.
+//! Definitions of macros and environments.
 
-use std::collections::BTreeSet;
 use std::rc::Rc;
 
 use super::super::error::ImportError;
@@ -15,9 +14,9 @@ const KERNEL: &str = "sin cos tan cot sec csc sinh cosh tanh exp log ln frac dfr
     cdot times lvert rvert vert text mathrm operatorname prime partial alpha beta gamma delta epsilon zeta eta theta \
     iota kappa lambda mu nu xi pi rho sigma tau upsilon phi chi psi omega";
 /// Definitions of macros that are followed.
-const DEFINITIONS: &str = "newcommand renewcommand providecommand DeclareRobustCommand def gdef edef xdef let DeclareMathOperator newif";
+pub(super) const DEFINITIONS: &str = "newcommand renewcommand providecommand DeclareRobustCommand def gdef edef xdef let DeclareMathOperator newif";
 /// Definitions of macros whose form is not read: the macro that comes next is unknown from there on.
-const UNREAD: &str = "chardef mathchardef font DeclarePairedDelimiter DeclarePairedDelimiterX DeclareMathSymbol \
+pub(super) const UNREAD: &str = "chardef mathchardef font DeclarePairedDelimiter DeclarePairedDelimiterX DeclareMathSymbol \
     DeclareMathAccent newcommandx renewcommandx LetLtxMacro letcs patchcmd xpatchcmd appto gappto eappto xappto preto \
     gpreto apptocmd pretocmd robustify csdef csgdef csedef csxdef @namedef g@addto@macro NewDocumentCommand \
     RenewDocumentCommand ProvideDocumentCommand DeclareDocumentCommand NewExpandableDocumentCommand NewEnviron \
@@ -25,17 +24,6 @@ const UNREAD: &str = "chardef mathchardef font DeclarePairedDelimiter DeclarePai
 /// Definitions of environments whose contents are not read.
 const VERBATIM: &str =
     "excludecomment excludeversion lstnewenvironment DefineVerbatimEnvironment newverbatim";
-/// TeX's conditionals.
-const CONDITIONALS: &str = "if ifcat ifnum ifdim ifodd ifvmode ifhmode ifmmode ifinner ifvoid ifhbox ifvbox ifx ifeof \
-    iftrue iffalse ifcase ifdefined ifcsname iffontchar ifincsname ifpdf ifxetex ifluatex ifPDFTeX ifXeTeX ifLuaTeX";
-/// Commands that begin as conditionals do and take arguments, or none.
-const WITH_ARGUMENTS: &str =
-    "ifdef ifundef ifdefempty ifdefvoid ifdefstring ifdefmacro ifdefequal ifdefcounter";
-/// Commands that keep their arguments, for elsewhere or for a condition of their own.
-const KEEPING: &str = "AtBeginDocument AtEndDocument AtEndPreamble sbox savebox setbox";
-const FOLLOWED: &str =
-    "`\\iftrue`, `\\iffalse` or a switch of `\\newif`, or the printed branch alone";
-
 /// Why a macro is not read.
 const UNREAD_FORM: (&str, &str) = (
     ", a macro of a form that is not read",
@@ -53,7 +41,6 @@ const EXPANDED: (&str, &str) = (
     ", a macro whose body is expanded where it is defined",
     "`\\def` or `\\newcommand`",
 );
-const UNDECIDED: (&str, &str) = (", a macro that is defined under a condition", FOLLOWED);
 
 impl Expander<'_> {
     /// Follows a definition; whether the command is one.
@@ -61,7 +48,19 @@ impl Expander<'_> {
         let Kind::Command(command) = &token.kind else {
             return Ok(false);
         };
-        match command.as_str() {
+        let is_definition = self.defines(command, token);
+        if self.scopes.has_changed_rows {
+            return self.refuse(
+                token,
+                " for all rows among them",
+                "a definition before the formula",
+            );
+        }
+        Ok(is_definition)
+    }
+
+    fn defines(&mut self, command: &str, token: &Token) -> bool {
+        match command {
             "newcommand" | "renewcommand" | "providecommand" | "DeclareRobustCommand" => {
                 self.new_command(command);
             }
@@ -88,7 +87,7 @@ impl Expander<'_> {
             _ if has(UNREAD, command) => {
                 self.takes(&Kind::Character('*'));
                 let Some(name) = self.target() else {
-                    return Ok(true);
+                    return true;
                 };
                 let body = self.following_groups(1).unwrap_or_default();
                 let earlier = token.with(Kind::Command(name.clone()));
@@ -96,9 +95,9 @@ impl Expander<'_> {
                     command.contains("Environ") || self.matters(&body) || self.matters(&[earlier]);
                 self.define(name, unread(UNREAD_FORM, matters));
             }
-            _ => return Ok(false),
+            _ => return false,
         }
-        Ok(true)
+        true
     }
 
     fn define(&mut self, name: String, meaning: Meaning) {
@@ -297,160 +296,9 @@ impl Expander<'_> {
                 _ => false,
             })
     }
-
-    /// Follows a conditional, or gives the token back if it is none.
-    pub(super) fn condition(&mut self, token: Token) -> Result<Option<Token>, ImportError> {
-        let Kind::Command(name) = &token.kind else {
-            return Ok(Some(token));
-        };
-        let is_negated = std::mem::take(&mut self.is_negated);
-        let value = match name.as_str() {
-            "fi" if self.branches > 0 => {
-                self.branches -= 1;
-                return Ok(None);
-            }
-            "else" | "or" if self.branches > 0 => {
-                self.branches -= 1;
-                self.skip(&token, false).map(drop)?;
-                return Ok(None);
-            }
-            "fi" | "else" => {
-                return self.refuse(
-                    &token,
-                    " without its conditional",
-                    "conditionals in pairs with `\\fi`",
-                );
-            }
-            "iftrue" => true,
-            "iffalse" => false,
-            "ifmmode" => self.scopes.formula.is_some(),
-            name if has(KEEPING, name) || name.starts_with("If") || name.starts_with("@if") => {
-                return self.undecided_arguments(&token);
-            }
-            name if has(WITH_ARGUMENTS, name) => return self.undecided_arguments(&token),
-            name if !name.starts_with("if") || name == "iff" => return Ok(Some(token)),
-            name if !has(CONDITIONALS, name) && self.is_brace_next() => {
-                return self.undecided_arguments(&token);
-            }
-            _ => {
-                let branches = self.skip(&token, false)?;
-                return self.undecided(&token, &branches);
-            }
-        };
-        if value != is_negated {
-            self.branches += 1;
-        } else {
-            self.skip(&token, true).map(drop)?;
-        }
-        Ok(None)
-    }
-
-    fn is_brace_next(&mut self) -> bool {
-        let next = self.code();
-        let is_brace = next.as_ref().is_some_and(|token| token.kind == Kind::Open);
-        self.pending.extend(next);
-        is_brace
-    }
-
-    /// Passes a branch up to its `\fi`, or to an `\else`, whose branch is then read; what is passed.
-    fn skip(&mut self, start: &Token, stops_at_else: bool) -> Result<Vec<Token>, ImportError> {
-        let mut passed = Vec::new();
-        let mut depth = 0;
-        while let Some(token) = self.raw() {
-            let Kind::Command(name) = &token.kind else {
-                passed.push(token);
-                continue;
-            };
-            let name = match self.scopes.meaning(name) {
-                None => name.as_str(),
-                Some(Meaning::Same(Kind::Command(same))) => same.as_str(),
-                Some(_) => "",
-            };
-            match name {
-                "fi" if depth == 0 => return Ok(passed),
-                "else" if depth == 0 && stops_at_else => {
-                    self.branches += 1;
-                    return Ok(passed);
-                }
-                "fi" => depth -= 1,
-                name if has(CONDITIONALS, name) => depth += 1,
-                name if name.starts_with("if") && name != "iff" && !has(WITH_ARGUMENTS, name) => {
-                    if !self.is_brace_next() {
-                        let why = " in text that is not printed";
-                        return self.refuse(
-                            &token,
-                            why,
-                            "`\\newif` for it before, or conditionals of TeX",
-                        );
-                    }
-                }
-                _ => {}
-            }
-            passed.push(token);
-        }
-        self.refuse(start, " without its end", "`\\fi`")
-    }
-
-    /// Passes what prints under a condition that is not followed.
-    fn undecided(&mut self, token: &Token, tokens: &[Token]) -> Result<Option<Token>, ImportError> {
-        let mut open = vec![tokens.to_vec()];
-        let mut seen = BTreeSet::new();
-        while let Some(tokens) = open.pop() {
-            let mut defines = false;
-            for token in &tokens {
-                let Kind::Command(name) = &token.kind else {
-                    defines &= matches!(token.kind, Kind::Open | Kind::Character('*'));
-                    continue;
-                };
-                if defines {
-                    let matters = self.matters(std::slice::from_ref(token));
-                    self.scopes
-                        .define(name.clone(), unread(UNDECIDED, matters), true);
-                }
-                defines = !defines && (has(DEFINITIONS, name) || has(UNREAD, name));
-                if let Some(Meaning::Macro(found)) = self.scopes.meaning(name)
-                    && seen.insert(name.clone())
-                {
-                    open.push(found.body.clone());
-                }
-            }
-        }
-        let matters = self.matters(tokens);
-        self.unread(
-            token,
-            ", a conditional that is not followed",
-            FOLLOWED,
-            matters,
-        )
-    }
-
-    fn undecided_arguments(&mut self, token: &Token) -> Result<Option<Token>, ImportError> {
-        match self.following_groups(6) {
-            Some(arguments) => self.undecided(token, &arguments),
-            None => Ok(Some(token.clone())),
-        }
-    }
-
-    /// The groups that follow, behind at most so many other tokens; nothing is passed if there is none.
-    fn following_groups(&mut self, most: usize) -> Option<Vec<Token>> {
-        let mut before = Vec::new();
-        while !self.is_brace_next() {
-            let token = self.code();
-            let is_last = before.len() == most || token.is_none();
-            before.extend(token);
-            if is_last {
-                self.pending.extend(before.into_iter().rev());
-                return None;
-            }
-        }
-        while self.is_brace_next() {
-            before.extend(self.argument().unwrap_or_default());
-        }
-        Some(before)
-    }
 }
 
-fn unread((why, expected): (&'static str, &'static str), matters: bool) -> Meaning {
+pub(super) fn unread((why, expected): (&'static str, &'static str), matters: bool) -> Meaning {
     Meaning::Unread {
         why,
         expected,

@@ -62,6 +62,7 @@ pub(super) fn items(file: &str, tokens: Vec<Token>, text: &str) -> Result<Vec<It
             Kind::Display => Some(display(&mut expander, &token)?),
             Kind::Command(name) if name == "[" => Some(display(&mut expander, &token)?),
             Kind::Command(name) if name == "(" => inline(&mut expander)?,
+            Kind::Begin(name) if name == "math" => inline(&mut expander)?,
             Kind::Dollar => inline(&mut expander)?,
             _ => None,
         };

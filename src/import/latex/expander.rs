@@ -19,7 +19,9 @@ const VERBATIM: &str =
 const BY_COMMAND: &str = "equation eqnarray displaymath";
 /// Commands whose argument takes room and prints nothing, and commands whose argument does not print.
 const PHANTOMS: &str = "phantom hphantom vphantom";
-const NOT_PRINTED: &str = "index typeout message hypersetup pdfbookmark nocite";
+const NOT_PRINTED: &str = "index typeout message hypersetup pdfbookmark nocite @gobble";
+/// Commands after which the text reads in another way than is followed here.
+const NOT_FOLLOWED: &str = "globaldefs aftergroup afterassignment scantokens";
 
 pub(super) struct Expander<'t> {
     pub(super) file: &'t str,
@@ -255,6 +257,10 @@ impl<'t> Expander<'t> {
             "unless" => self.is_negated = true,
             "long" | "outer" | "protected" | "expandafter" => {}
             "makeatletter" | "makeatother" => self.scopes.has_at_letters = name == "makeatletter",
+            "catcode" => return self.category(token).map(|()| None),
+            _ if has(NOT_FOLLOWED, name) => {
+                return self.refuse(&token, "", "definitions where they hold");
+            }
             "csname" => {
                 let name = self.name_to("endcsname");
                 self.pending.push(token.with(Kind::Command(name)));
@@ -289,6 +295,24 @@ impl<'t> Expander<'t> {
         }
     }
 
+    /// `\catcode`\@=11`, which makes `@` a letter; other characters stay what they are here.
+    fn category(&mut self, token: Token) -> Result<(), ImportError> {
+        self.takes(&Kind::Character('`'));
+        let is_at = |token: &Token| token.is_command("@") || token.kind == Kind::Character('@');
+        if !self.code().as_ref().is_some_and(is_at) {
+            return self.refuse(
+                &token,
+                "",
+                "characters as LaTeX reads them; `\\makeatletter` for `@`",
+            );
+        }
+        self.takes(&Kind::Character('='));
+        let [first, second] = ['1', '1'].map(|digit| self.takes(&Kind::Character(digit)));
+        self.takes(&Kind::Character('2'));
+        self.scopes.has_at_letters = first && second;
+        Ok(())
+    }
+
     /// Ends the text here.
     fn stop(&mut self) {
         self.pending.clear();
@@ -316,6 +340,11 @@ impl<'t> Expander<'t> {
             || matches!(meaning, Some(Meaning::Verbatim))
         {
             return match self.pending.is_empty() && self.lexer.skip_verbatim(name) {
+                true if name == "comment" && !self.lexer.is_at_line_end() => self.refuse(
+                    &token,
+                    " with text behind its end",
+                    "`\\end{comment}` in a line of its own",
+                ),
                 true => Ok(None),
                 false => self.refuse(
                     &token,

@@ -271,6 +271,10 @@ impl Reader<'_> {
         }
         self.at = start;
         match kind {
+            Kind::Open if self.kind(self.at + 1) == Some(&Kind::Character(',')) => {
+                self.at += 1;
+                return self.unexpected("a decimal point, or no comma between thousands");
+            }
             Kind::Open => {}
             Kind::Command(_) => {
                 return self.unexpected(

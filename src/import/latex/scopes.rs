@@ -61,6 +61,8 @@ pub(super) struct Scopes {
     pub(super) formula: Option<usize>,
     /// Whether `@` is a letter of commands.
     pub(super) has_at_letters: bool,
+    /// Whether something was defined for all the rest among the rows of a formula, which amsmath reads twice.
+    pub(super) has_changed_rows: bool,
 }
 
 impl Scopes {
@@ -74,6 +76,15 @@ impl Scopes {
         self.open.iter().rposition(is_formula).unwrap_or(0)
     }
 
+    /// Whether mathematics is read; unknown in a group inside a formula, which may be text.
+    pub(super) fn in_mathematics(&self) -> Option<bool> {
+        let Some(around) = self.formula else {
+            return Some(false);
+        };
+        let is_row = |scope: &Scope| scope.closer.is_none();
+        (self.open[around..].iter().skip(1).all(is_row)).then_some(true)
+    }
+
     pub(super) fn meaning(&self, name: &str) -> Option<&Meaning> {
         self.meanings.get(name).map(|(meaning, _)| meaning)
     }
@@ -81,6 +92,8 @@ impl Scopes {
     /// Gives a meaning to a name until the innermost scope ends, or for all the rest.
     pub(super) fn define(&mut self, name: String, meaning: Meaning, for_all: bool) {
         let level = if for_all { 0 } else { self.open.len() };
+        let formula = &self.open[self.formula.unwrap_or(self.open.len())..];
+        self.has_changed_rows |= for_all && formula.iter().any(|scope| scope.closer.is_none());
         let before = self.meanings.insert(name.clone(), (meaning, level));
         let is_outer = before.as_ref().is_none_or(|(_, earlier)| *earlier < level);
         if let (true, false, Some(scope)) = (is_outer, for_all, self.open.last_mut()) {

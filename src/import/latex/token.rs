@@ -259,6 +259,13 @@ impl<'t> Lexer<'t> {
         }
     }
 
+    /// Whether nothing but space is left of the line.
+    pub(super) fn is_at_line_end(&self) -> bool {
+        self.characters[self.next..]
+            .iter()
+            .all(|c| c.is_whitespace())
+    }
+
     fn peek(&self, ahead: usize) -> Option<char> {
         self.characters.get(self.next + ahead).copied()
     }
