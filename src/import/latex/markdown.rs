@@ -127,7 +127,7 @@ impl Markdown {
     }
 }
 
-/// The length of what begins with a backslash, or of a span of code, at the start of `text`.
+/// The length of what begins with a backslash, of a span of code, or of its marks alone, at the start of `text`.
 fn code_or_escape(text: &str) -> Option<usize> {
     if let Some(escaped) = text.strip_prefix('\\') {
         return Some(1 + escaped.chars().next().map_or(0, char::len_utf8));
@@ -136,7 +136,10 @@ fn code_or_escape(text: &str) -> Option<usize> {
     let rest = &text[length..];
     let mut from = 0;
     while length > 0 {
-        let start = from + rest[from..].find('`')?;
+        let Some(next) = rest[from..].find('`') else {
+            return Some(length);
+        };
+        let start = from + next;
         let run = rest[start..].len() - rest[start..].trim_start_matches('`').len();
         from = start + run;
         if run == length {

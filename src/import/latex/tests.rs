@@ -293,7 +293,7 @@ const PRINTED: [(&str, &str); 36] = [
     ),
     (
         r"\def\k#1.{9}\[\ddot z_1=\k 3. z_1\]",
-        r"1:26: found `\k`, a macro with delimited arguments",
+        r"1:25: found `\k`, a macro with delimited arguments",
     ),
     (
         r"\def\k{2}\edef\l{\k}\[\ddot z_1=\l z_1\]",
@@ -301,7 +301,7 @@ const PRINTED: [(&str, &str); 36] = [
     ),
     (
         r"\DeclarePairedDelimiter{\abs}{(}{)}\[\ddot z_1=\abs{z_1}\]",
-        r"1:49: found `\abs`, a macro of a form",
+        r"1:48: found `\abs`, a macro of a form",
     ),
     (
         r"{\begingroup}\[\ddot z_1=z_1\]",
@@ -330,7 +330,7 @@ const PRINTED: [(&str, &str); 36] = [
     (r"\ifpdf\def\k{3}\fi text \[\ddot z_1=z_1\]", "z1"),
     (
         r"\def\k{2}\ifpdf\def\k{3}\fi\[\ddot z_1=\k z_1\]",
-        r"1:41: found `\k`, a macro that is defined under",
+        r"1:40: found `\k`, a macro that is defined under",
     ),
     (
         r"\ifthenelse{\boolean{x}}{\[\ddot z_1=9\]}{}\[\ddot z_1=z_1\]",
