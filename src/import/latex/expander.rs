@@ -266,6 +266,9 @@ impl<'t> Expander<'t> {
                 self.pending.push(token.with(Kind::Command(name)));
             }
             "verb" | "lstinline" if self.pending.is_empty() => self.lexer.skip_verb(),
+            "url" | "href" | "nolinkurl" if self.lexer.is_at('{') && self.pending.is_empty() => {
+                self.lexer.skip_verb();
+            }
             "endinput" => self.lexer.end_after_line(),
             "stop" | "bye" => self.stop(),
             _ if has(PHANTOMS, name) => {

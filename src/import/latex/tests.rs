@@ -241,7 +241,7 @@ fn documents_are_read_with_their_macros_and_phases() {
 }
 
 /// Documents, and what is read or refused of them.
-const PRINTED: [(&str, &str); 36] = [
+const PRINTED: [(&str, &str); 37] = [
     (
         r"\newcommand{\k}{2}\begingroup\renewcommand{\k}{9}\endgroup\[\ddot z_1=\k z_1\]",
         "2*z1",
@@ -352,6 +352,7 @@ const PRINTED: [(&str, &str); 36] = [
         "\\begin{comment}\n\\[\\ddot z_1=9\\] \\fi\n\\end{comment}\n\\verb|\\iffalse|\\[\\ddot z_1=z_1\\]",
         "z1",
     ),
+    (r"{\url{a%20b}}\[\ddot z_1=z_1\]", "z1"),
     (
         r"\excludecomment{hide}\begin{hide}\[\ddot z_1=9\]\fi\end{hide}\[\ddot z_1=z_1\]",
         "z1",

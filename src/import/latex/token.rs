@@ -232,12 +232,20 @@ impl<'t> Lexer<'t> {
         self.next = self.characters.len();
     }
 
-    /// Passes `|...|` behind `\verb`.
+    pub(super) fn is_at(&self, character: char) -> bool {
+        self.peek(0) == Some(character)
+    }
+
+    /// Passes `|...|` behind `\verb`, or a group without a look into it.
     pub(super) fn skip_verb(&mut self) {
         let rest = self.characters[self.next..].iter();
         let mut rest = rest.enumerate().skip_while(|(_, c)| **c == '*');
         let Some((_, open)) = rest.next() else { return };
-        let close = if *open == '{' { '}' } else { *open };
+        let close = match open {
+            '{' => '}',
+            '[' => ']',
+            other => *other,
+        };
         let behind = rest.find(|(_, c)| **c == close);
         self.next = behind.map_or(self.characters.len(), |(at, _)| self.next + at + 1);
     }
