@@ -7,3 +7,6 @@ mod command_line;
 mod models;
 #[path = "check/papers.rs"]
 mod papers;
+#[path = "check/printed.rs"]
+mod printed;
+mod tools;

@@ -11,7 +11,7 @@
 //! ```
 //!
 //! Each section is a phase; each phase has `ddz1` to `ddzd`. A text without sections is one phase,
-//! which `--phase` names. A line without `=` continues the equation before it.
+//! which `--phase` names. A line without `=` continues the equation before it. Names may have underscores (`ddz_1`).
 
 use super::error::{ImportError, ImportFault};
 use crate::files::{Located, Place};
@@ -124,12 +124,12 @@ impl Reader<'_> {
         }
         if let Some((left, right)) = content.split_once('=') {
             let start = (number, column + left.chars().count() + 1);
-            return self.equation(place, left.trim(), (start, right.to_owned()));
+            return self.equation(place, left.trim(), pieces(start, right));
         }
         let open = self.sections.last_mut();
         match open.and_then(|section| section.equations.last_mut()) {
             Some(equation) => {
-                equation.pieces.push((place, content.to_owned()));
+                equation.pieces.extend(pieces(place, content));
                 Ok(())
             }
             None => {
@@ -167,10 +167,11 @@ impl Reader<'_> {
         &mut self,
         place: (usize, usize),
         left: &str,
-        right: Piece,
+        right: Vec<Piece>,
     ) -> Result<(), ImportError> {
         let refused = |found, expected: &str| refused(self.file, place, found, expected);
-        let variable = (left.strip_prefix('d'))
+        let name = plain_name(left).unwrap_or_else(|| left.to_owned());
+        let variable = (name.strip_prefix('d'))
             .and_then(|name| LatentVariable::from_name(name, MAX_LATENT_DIM));
         let Some(LatentVariable::Dz(output)) = variable else {
             let expected = format!("the left side `ddz1` to `ddz{MAX_LATENT_DIM}`");
@@ -189,10 +190,43 @@ impl Reader<'_> {
         section.equations.push(Equation {
             output,
             line: place.0,
-            pieces: vec![right],
+            pieces: right,
         });
         Ok(())
     }
+}
+
+/// The grammar's spelling of `dz_1` and `pi`.
+pub(super) fn plain_name(name: &str) -> Option<String> {
+    if name == "pi" {
+        return Some(format!("{:?}", std::f64::consts::PI));
+    }
+    let (stem, index) = name.split_once('_')?;
+    let is_index = !index.is_empty() && index.bytes().all(|byte| byte.is_ascii_digit());
+    (matches!(stem, "z" | "dz" | "ddz" | "u") && is_index).then(|| format!("{stem}{index}"))
+}
+
+/// A text that starts at a place, each name with another spelling in a piece of its own.
+fn pieces((line, column): (usize, usize), text: &str) -> Vec<Piece> {
+    let is_part = |c: char| c.is_ascii_alphanumeric() || "_.".contains(c);
+    let mut pieces = vec![((line, column), String::new())];
+    let (mut column, mut rest) = (column, text);
+    while let Some(first) = rest.chars().next() {
+        let length = rest
+            .find(|c| !is_part(c))
+            .unwrap_or(rest.len())
+            .max(first.len_utf8());
+        let (word, after) = rest.split_at(length);
+        let behind = column + word.chars().count();
+        match (plain_name(word), pieces.last_mut()) {
+            (Some(name), _) => {
+                pieces.extend([((line, column), name), ((line, behind), String::new())]);
+            }
+            (None, last) => last.into_iter().for_each(|(_, text)| text.push_str(word)),
+        }
+        (column, rest) = (behind, after);
+    }
+    pieces
 }
 
 /// The sections with their equations in order, if each phase has all of them.
@@ -308,6 +342,19 @@ mod tests {
     }
 
     #[test]
+    fn names_with_underscores_and_other_spellings_are_read() {
+        let text = "ddz_1 = 2*z_1**2 − 3·dz_1\n  + ln(z_1)*sgn (u_1) + pi";
+        let read = read("eq.txt", text.as_bytes()).expect("an equation");
+        let mut pool = ExprPool::new();
+        let equation = &read.sections[0].equations[0];
+        let found = equation
+            .parse("eq.txt", 1, &mut pool)
+            .expect("an expression");
+        let plain = "2*z1^2 - 3*dz1 + log(z1)*sign(u1) + 3.141592653589793";
+        assert_eq!(Ok(found), pool.parse(plain, &|_| true));
+    }
+
+    #[test]
     fn faults_are_reported_with_line_and_column() {
         for (text, line, column, found) in [
             ("", 1, 1, "the end of the text"),
@@ -327,6 +374,8 @@ mod tests {
             ("ddz1 = 1\nddz1 = 2", 2, 1, "`ddz1` again, as in line 1"),
             ("[a]\nddz2 = 1", 1, 1, "phase `[a]` without ddz1"),
             ("[a]\nddz1 = 1\n[b]\n", 3, 1, "phase `[b]` without ddz1"),
+            ("ddz_1 = z_1 + dz_1 + q", 1, 22, "`q`"),
+            ("ddz1 = z1²", 1, 10, "`²`"),
             ("ddz1 = z1^2000", 1, 15, "the exponent 2000"),
         ] {
             let expected = format!("eq:{line}:{column}: found {found}");

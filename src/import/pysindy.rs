@@ -1,5 +1,8 @@
 //! Candidate terms as PySINDy and its relatives name them: `z1 z2`, `sin(1 z1)`, `x0 u0`, `z1**2`.
 
+use super::equations::plain_name;
+use crate::symbolic::Function;
+
 /// A list of terms in romc's grammar; terms that are in it already stay as they are.
 ///
 /// Operands with a space between them are multiplied. Where a list has PySINDy's own names `x0`,
@@ -13,6 +16,7 @@ pub(super) fn readable(terms: &[String], latent_dim: usize) -> Vec<String> {
         (true, Some(('x', k))) if k < latent_dim => format!("z{}", k + 1),
         (true, Some(('x', k))) if k < 2 * latent_dim => format!("dz{}", k - latent_dim + 1),
         (true, Some(('u', k))) => format!("u{}", k + 1),
+        (false, None) => plain_name(token).unwrap_or_else(|| token.to_owned()),
         _ => token.to_owned(),
     };
     let terms = terms.iter().map(|term| readable_term(term, &name));
@@ -28,7 +32,8 @@ fn readable_term(term: &str, name: &dyn Fn(&str) -> String) -> String {
             continue;
         }
         let is_separate = text.ends_with(char::is_whitespace);
-        let ends_operand = before == ")" || is_word(before);
+        let is_call = token == "(" && Function::by_name(before).is_some();
+        let ends_operand = (before == ")" || is_word(before)) && !is_call;
         if ends_operand && is_separate && (token == "(" || is_word(token)) {
             text.truncate(text.trim_end().len());
             text.push('*');
@@ -102,6 +107,7 @@ mod tests {
             ("2.5E+2 z1", "2.5E+2*z1"),
             ("z1 - 0.5 * z2", "z1 - 0.5 * z2"),
             ("tanh(z1)*(1 + u1)", "tanh(z1)*(1 + u1)"),
+            ("sin (z1) cos (2 z_2)", "sin (z1)*cos (2*z2)"),
         ] {
             assert_eq!(read(&[name]), [expected]);
         }

@@ -53,7 +53,10 @@ pub(super) fn tokenize(text: &str) -> Result<Vec<Token<'_>>, ParseError> {
             }
             '+' => (TokenKind::Plus, 1),
             '-' => (TokenKind::Minus, 1),
+            '*' if rest.starts_with("**") => (TokenKind::Caret, 2),
             '*' => (TokenKind::Times, 1),
+            '\u{2212}' => (TokenKind::Minus, first.len_utf8()),
+            '·' | '⋅' | '×' => (TokenKind::Times, first.len_utf8()),
             '/' => (TokenKind::Divide, 1),
             '^' => (TokenKind::Caret, 1),
             '(' => (TokenKind::Open, 1),
@@ -66,8 +69,7 @@ pub(super) fn tokenize(text: &str) -> Result<Vec<Token<'_>>, ParseError> {
             position,
             text,
         });
-        // Tokens are ASCII: bytes are characters.
-        position += length;
+        position += text.chars().count();
         rest = after;
     }
     tokens.push(Token {

@@ -112,8 +112,13 @@ impl Function {
         }
     }
 
-    /// The function of that name.
+    /// The function of that name; `ln` and `sgn` are names of the logarithm and the sign too.
     pub fn by_name(name: &str) -> Option<Function> {
+        let name = match name {
+            "ln" => "log",
+            "sgn" => "sign",
+            name => name,
+        };
         Function::ALL
             .into_iter()
             .find(|function| function.name() == name)

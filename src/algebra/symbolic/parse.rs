@@ -53,7 +53,7 @@ pub struct ParseError {
 #[allow(missing_docs, reason = "each variant's message names its fields")]
 pub enum ParseErrorKind {
     /// A character that the grammar does not have.
-    #[error("found `{}`, expected numbers, names, functions and + - * / ^ ( )", .0.escape_debug())]
+    #[error("found `{}`, expected {}", .0.escape_debug(), spelling(*.0))]
     Character(char),
     /// A number that cannot be read or is too large for a float.
     #[error("found `{0}`, expected a finite number")]
@@ -87,6 +87,17 @@ impl ParseErrorKind {
             position,
             kind: self,
         }
+    }
+}
+
+/// What is written instead of a character that the grammar does not have.
+fn spelling(character: char) -> &'static str {
+    match character {
+        '²' | '³' | '⁴'..='⁹' | '⁻' => "a power such as `^2`",
+        'ż' | '\u{307}' => "a velocity such as `dz1`",
+        '₀'..='₉' => "digits such as `z1`",
+        'π' => "3.141592653589793",
+        _ => "numbers, names, functions and + - * / ^ ( )",
     }
 }
 

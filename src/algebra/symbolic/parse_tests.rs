@@ -57,6 +57,22 @@ fn functions_apply_to_their_argument_alone() {
 }
 
 #[test]
+fn other_spellings_of_operators_and_functions_are_read() {
+    for (text, plain) in [
+        ("z1**2 \u{2212} u1×z1", "z1^2 - u1*z1"),
+        ("2·ln(z1)⋅sgn (z2)", "2*log(z1)*sign(z2)"),
+    ] {
+        let mut pool = ExprPool::new();
+        let expected = pool.parse(plain, &|_| true);
+        assert_eq!(pool.parse(text, &|_| true), expected, "{text}");
+    }
+    assert_eq!(
+        error("z1·ż1").to_string(),
+        "character 4: found `ż`, expected a velocity such as `dz1`"
+    );
+}
+
+#[test]
 fn faults_have_their_place_and_what_was_found() {
     let found = |found: &str, expected| ParseErrorKind::Unexpected {
         found: found.to_owned(),

@@ -12,7 +12,7 @@ use crate::model::LatentVariable;
 /// What can stand where a factor begins.
 const FACTOR: &str = "a number, a variable, a function or a group";
 /// Commands whose argument is text.
-const WORDS: &str = "text textrm textit mbox intertext shortintertext";
+pub(super) const WORDS: &str = "text textrm textit mbox intertext shortintertext";
 
 impl Reader<'_> {
     /// The left sides `\ddot z_1 =`, each with its place and the place behind it.
@@ -180,9 +180,9 @@ impl Reader<'_> {
                         (_, Kind::Command(name)) if name == "num" => {
                             Some("an operator before the number")
                         }
-                        (_, Kind::Number(_)) => {
-                            Some("an operator before the number, or braces around a subscript")
-                        }
+                        _ if self.is_number_next() => Some(
+                            "an operator before the number, no space inside it, or braces around a subscript",
+                        ),
                         _ => self.is_lone_integer().then_some(
                             "`\\tag{...}` for the number of an equation, or `\\cdot` before a factor",
                         ),
@@ -271,6 +271,10 @@ impl Reader<'_> {
         }
         self.at = start;
         match kind {
+            Kind::Open if self.kind(self.at + 1) == Some(&Kind::Character(',')) => {
+                self.at += 1;
+                return self.unexpected("a decimal point, or no comma between thousands");
+            }
             Kind::Open => {}
             Kind::Command(_) => {
                 return self.unexpected(

@@ -1,5 +1,6 @@
 //! Numbers (literals, powers of ten, `\num`) and roots (`\sqrt{z_1}`, `\sqrt[3]{z_1}`).
 
+use super::definitions::changes_digits;
 use super::reader::{Digits, Last, Read, Reader};
 use super::token::Kind;
 
@@ -70,31 +71,55 @@ impl Reader<'_> {
         }
     }
 
-    /// `\num{-1.2e-3}`.
+    /// `\num{-1.2e-3}`, with the options and spellings of siunitx that print the number as it is.
     pub(super) fn macro_number(&mut self, place: (usize, usize)) -> Read<Last> {
         self.at += 1;
-        if self.character('[') {
-            while !self.character(']') {
-                if self.peek().is_none() {
-                    return self.unexpected("`]`");
-                }
-                self.at += 1;
+        if self.is_next(&Kind::Character('[')) {
+            let options = self.tokens[self.at..self.end].iter();
+            let length = options
+                .take_while(|token| token.kind != Kind::Character(']'))
+                .count();
+            if changes_digits(&self.tokens[self.at..self.at + length]) {
+                return self.unexpected(
+                    "the number as it is printed, without options that change its digits",
+                );
+            }
+            self.at += length;
+            if !self.character(']') {
+                return self.unexpected("`]`");
             }
         }
-        let text = self.inside(|reader| {
-            let is_negative = reader.character('-');
-            if !is_negative {
-                reader.character('+');
-            }
-            let text = reader.number("a number such as 1.2e-3")?;
-            Ok(if is_negative {
-                format!("(-{text})")
+        self.peek();
+        let first = self.at;
+        let behind = self.after_argument(first);
+        let parts = self.tokens[first..behind]
+            .iter()
+            .map(|token| match &token.kind {
+                Kind::Open | Kind::Close | Kind::Comment(_) => Some(String::new()),
+                Kind::Number(text) => Some(text.clone()),
+                Kind::Character(character) => Some(character.to_string()),
+                _ => None,
+            });
+        let text = parts.collect::<Option<String>>().unwrap_or_default();
+        let text = text.replace(',', ".").replace(['d', 'D', 'E'], "e");
+        let is_negative = text.starts_with('-');
+        let digits = text.trim_start_matches(['-', '+']);
+        let is_number = digits.starts_with(|c: char| c.is_ascii_digit() || c == '.')
+            && text.len() - digits.len() < 2
+            && digits.parse::<f64>().is_ok();
+        if !is_number {
+            self.at = first + usize::from(self.kind(first) == Some(&Kind::Open));
+            return self.unexpected("a number such as 1.2e-3");
+        }
+        self.at = behind;
+        self.push(
+            place,
+            if is_negative {
+                format!("(-{digits})")
             } else {
-                text
-            })
-        })?;
-        let is_negative = text.starts_with('(');
-        self.push(place, text);
+                digits.to_owned()
+            },
+        );
         if is_negative && self.is_next(&Kind::Superscript) {
             return self.unexpected("parentheses around the negative number");
         }

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use super::super::equations::{Piece, refused};
 use super::super::error::ImportError;
+use super::expression::WORDS;
 use super::names::SymbolNames;
 use super::token::{Kind, Token};
 
@@ -98,7 +99,7 @@ impl<'a> Reader<'a> {
     /// # Errors
     /// [`ImportError`] for braces without partner.
     pub(super) fn new(file: &'a str, names: &'a SymbolNames, tokens: &[Token]) -> Read<Self> {
-        let tokens = with_split_digits(tokens);
+        let tokens = without_split_delimiters(tokens);
         let end = tokens.len();
         let mut reader = Self {
             file,
@@ -274,6 +275,29 @@ impl Reader<'_> {
         takes
     }
 
+    /// Whether a number follows, in braces or without.
+    pub(super) fn is_number_next(&self) -> bool {
+        let mut rest = self.tokens[self.at..self.end].iter();
+        let next = rest.find(|token| token.kind != Kind::Open && !is_blank(&token.kind));
+        next.is_some_and(|token| matches!(token.kind, Kind::Number(_)))
+    }
+
+    /// The first of some places, in rising order, that is in the argument of a command for text; that command.
+    pub(super) fn in_text(&self, places: &[usize]) -> Option<&Token> {
+        const NOTES: &str = "tag footnote footnotetext";
+        let mut commands = self.tokens.iter().enumerate();
+        let found = commands.find(|(at, token)| {
+            let is_text =
+                matches!(&token.kind, Kind::Command(name) if has(WORDS, name) || has(NOTES, name));
+            let star = usize::from(self.kind(at + 1) == Some(&Kind::Character('*')));
+            let open = at + 1 + star;
+            let inside = places.partition_point(|place| *place < open);
+            let is_inside = |place: &usize| *place < self.after_argument(open);
+            is_text && places.get(inside).is_some_and(is_inside)
+        });
+        found.map(|(_, token)| token)
+    }
+
     /// Whether a fraction of two integers follows.
     pub(super) fn is_fraction_of_integers(&self) -> bool {
         let is_fraction = matches!(self.kind(self.at), Some(Kind::Command(name)) if has("frac dfrac tfrac cfrac", name));
@@ -307,28 +331,28 @@ impl Reader<'_> {
     }
 }
 
-/// The tokens with digits apart where LaTeX takes one digit as an argument: `x^12`, `\frac12`.
-fn with_split_digits(tokens: &[Token]) -> Vec<Token> {
-    let mut split: Vec<Token> = Vec::with_capacity(tokens.len());
-    for token in tokens {
-        let arguments = match split.last().map(|before| &before.kind) {
-            Some(Kind::Superscript | Kind::Subscript) => 1,
-            Some(Kind::Command(name)) if name == "sqrt" => 1,
-            Some(Kind::Command(name)) if name.ends_with("frac") => 2,
-            _ => 0,
-        };
-        let Kind::Number(text) = &token.kind else {
-            split.push(token.clone());
-            continue;
-        };
-        let digits = text.bytes().take(arguments).take_while(u8::is_ascii_digit);
-        let digits = digits.count();
-        let single = (0..digits).map(|from| (from, &text[from..=from]));
-        let rest = (digits < text.len()).then(|| (digits, &text[digits..]));
-        split.extend(single.chain(rest).map(|(from, part)| Token {
-            kind: Kind::Number(part.to_owned()),
-            place: (token.place.0, token.place.1 + from),
-        }));
+/// The tokens without `\right.` and the next `\left.`, between which a line breaks inside other delimiters.
+fn without_split_delimiters(tokens: &[Token]) -> Vec<Token> {
+    let is_empty = |at: usize, name: &str| {
+        let point = tokens.get(at + 1).map(|token| &token.kind);
+        tokens[at].is_command(name) && point == Some(&Kind::Character('.'))
+    };
+    let mut joined = Vec::with_capacity(tokens.len());
+    let mut at = 0;
+    while at < tokens.len() {
+        if is_empty(at, "right") {
+            let blanks = tokens[at + 2..]
+                .iter()
+                .take_while(|token| is_blank(&token.kind));
+            let left = at + 2 + blanks.count();
+            if left < tokens.len() && is_empty(left, "left") {
+                joined.extend_from_slice(&tokens[at + 2..left]);
+                at = left + 2;
+                continue;
+            }
+        }
+        joined.push(tokens[at].clone());
+        at += 1;
     }
-    split
+    joined
 }

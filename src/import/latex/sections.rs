@@ -2,10 +2,11 @@
 
 use super::super::equations::{Section, Sections, complete, refused, text_of};
 use super::super::error::ImportError;
-use super::document::{Item, LAYOUTS, WITH_COLUMNS, is_one_of, items};
+use super::document::{Item, LAYOUTS, WITH_COLUMNS, is_one_of, items, unread};
+use super::markdown;
 use super::names::SymbolNames;
 use super::reader::{Digits, Reader};
-use super::token::{Kind, Token, group_length, of_markdown, of_tex};
+use super::token::{Kind, Token, group_length};
 
 /// Environments that arrange lines only if whole equations are in them.
 const DISTINCTIONS: &str = "cases dcases array";
@@ -25,11 +26,10 @@ pub(in crate::import) fn read(
 ) -> Result<Sections, ImportError> {
     let text = text_of(file, bytes)?;
     let is_markdown = file.ends_with(".md") || file.ends_with(".markdown");
-    let tokens = match is_markdown {
-        true => of_markdown(text),
-        false => of_tex(text),
+    let items = match is_markdown {
+        true => items(file, markdown::tokens(text), "")?,
+        false => items(file, Vec::new(), text)?,
     };
-    let items = items(file, &tokens)?;
     let mut document = Document {
         file,
         names,
@@ -198,6 +198,9 @@ impl Document<'_> {
         let Some(dotted) = tokens.iter().find(|token| token.is_command("ddot")) else {
             return Ok(());
         };
+        if let Some((token, expected)) = unread(tokens) {
+            return Err(refused(self.file, token.place, token.quoted(), expected));
+        }
         let flat = flattened(self.file, tokens);
         let mut reader = match &flat {
             Ok(flat) => Reader::new(self.file, self.names, flat)?,
@@ -206,7 +209,14 @@ impl Document<'_> {
         (reader.alone, reader.digits) = (alone, self.digits);
         let mut left_sides = Vec::new();
         let mut strange = None;
-        for (at, symbol, after) in reader.left_sides() {
+        let found = reader.left_sides();
+        let places: Vec<usize> = found.iter().map(|(at, ..)| *at).collect();
+        if let Some(token) = reader.in_text(&places) {
+            let (place, found) = (token.place, format!("an equation in {}", token.quoted()));
+            let expected = "equations in the formula itself";
+            return Err(refused(self.file, place, found, expected));
+        }
+        for (at, symbol, after) in found {
             let token = reader.tokens[at].clone();
             match reader.output(&symbol) {
                 Some(output) => left_sides.push((output, at, after, token)),

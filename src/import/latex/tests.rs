@@ -89,6 +89,12 @@ z_1^{-2} + z_1^{1/2} + (z_1)^2 => z1^2 + z1^(-2) + sqrt(z1)
 \sinh(z_1 + 1) + \cosh^2 z_2 => (exp(z1 + 1) - exp(-(z1 + 1)))/2 + ((exp(z2) + exp(-z2))/2)^2
 0.75 sin(\dot z_1) + cos^2(z_1) - tanh\left(z_2\right) => 0.75*sin(dz1) + cos(z1)^2 - tanh(z2)
 0{,}36 z_1 + 12{,}5 => 12.5 + 0.36*z1
+0.12{345} z_1 + 1{.}5 + {0}.5 z_2 => 1.5 + 0.12345*z1 + 0.5*z2
+1{}5 z_1 + 0.\mathrm{25} z_2 + 1\text{2}\mathbf 3 => 123 + 15*z1 + 0.25*z2
+1 5 z_1 + 1.5{0} \times {1}0^{-{3}} z_2 + 1{2}^2 => 144 + 15*z1 + 0.0015*z2
+\num{1,5} z_1 + \num{1 000} z_2 + \num{1.2 d-3} => 0.0012 + 1.5*z1 + 1000*z2
+2\pi z_1 => 6.283185307179586*z1
+\left( z_1 \right. \\ \left. {} + z_2 \right) u_1 => u1*(z1 + z2)
 ";
 
 #[test]
@@ -144,7 +150,15 @@ fn unreadable_constructs_are_named_with_their_place() {
         (r"{z_1 + 1} u_1", 18, "`+`"),
         (r"z_{i}", 13, "`z_i`"),
         (r"\dot{z_1 + 1}", 17, "`{`"),
-        (r"\pi z_1", 13, "`pi`"),
+        (r"\pi_1", 13, "`pi_1`"),
+        (r"0.12{3^2}", 17, "`{`"),
+        (r"\frac{1}{2}{3} z_1", 25, "`3`"),
+        (r"z_1{2}", 17, "`2`"),
+        (r"1\,000 z_1", 16, "`000`"),
+        (r"1{e}5 z_1", 14, "`e`"),
+        (r"\sin{2} z_1", 21, "`z`"),
+        (r"\num{1.5(2)}", 18, "`1.5`"),
+        (r"\num[round-precision=1]{1.25}", 17, "`[`"),
         (r"\dots", 13, r"`\dots`"),
         (r"z_1 \text{if} z_2", 27, "`z`"),
         (r"z_3", 13, "`z3`"),
@@ -224,6 +238,185 @@ fn documents_are_read_with_their_macros_and_phases() {
             (Some("rear stance".to_owned()), texts(&["3", "4"])),
         ]
     );
+}
+
+/// Documents, and what is read or refused of them.
+const PRINTED: [(&str, &str); 37] = [
+    (
+        r"\newcommand{\k}{2}\begingroup\renewcommand{\k}{9}\endgroup\[\ddot z_1=\k z_1\]",
+        "2*z1",
+    ),
+    (
+        r"\def\k{2}{\def\k{9}}\begin{center}\def\k{9}\end{center}$\def\k{9}$\[\ddot z_1=1\k z_1\]",
+        "12*z1",
+    ),
+    (r"\def\k{2}{\gdef\k{9}}\[\ddot z_1=\k z_1\]", "9*z1"),
+    (
+        r"\def\k{2}\[\ddot z_1=\left(\def\k{9}\k z_1\right)+\frac{\def\k{8}\k}{\k}\]",
+        "4 + 9*z1",
+    ),
+    (
+        r"\def\k{2}\begin{align}\ddot z_1&=\def\k{9}\k z_1\\&+\k z_1^2\end{align}",
+        "9*z1 + 2*z1^2",
+    ),
+    (
+        r"\def\k{2}\begin{align}\ddot z_1&=\k z_1\gdef\k{9}\end{align}",
+        r"1:40: found `\gdef` for all rows",
+    ),
+    (
+        r"\def\k{2}\providecommand\k{9}\let\l\k\def\k{9}\[\ddot z_1=\l z_1\]",
+        "2*z1",
+    ),
+    (
+        r"\newcommand{\k}[2][5]{#1#2}\[\ddot z_1=\k{2}z_1+\k[3]4\]",
+        "34 + 52*z1",
+    ),
+    (
+        r"\def\m#1{\def\k##1{##1#1}}\m7\[\ddot z_1=\k3z_1\]",
+        "37*z1",
+    ),
+    (
+        r"\let\old\sin\renewcommand{\sin}[1]{\old(2#1)}\[\ddot z_1=\sin{z_1}\]",
+        "sin(2*z1)",
+    ),
+    (
+        r"\newenvironment{m}[1]{\begin{equation}\def\k{#1}}{\end{equation}}\begin{m}{7}\ddot z_1=\k z_1\end{m}",
+        "7*z1",
+    ),
+    (
+        r"\newcommand{\be}{\begin{equation}}\let\ee\endequation\be\ddot z_1=z_1\ee",
+        "z1",
+    ),
+    (
+        r"\newcommand{\k}{2}\newcommand{\k}{9}\[\ddot z_1=\k z_1\]",
+        r"1:49: found `\k`, a macro that is defined already",
+    ),
+    (
+        r"\def\k#1.{9}\[\ddot z_1=\k 3. z_1\]",
+        r"1:25: found `\k`, a macro with delimited arguments",
+    ),
+    (
+        r"\def\k{2}\edef\l{\k}\[\ddot z_1=\l z_1\]",
+        r"1:33: found `\l`, a macro whose body is expanded",
+    ),
+    (
+        r"\DeclarePairedDelimiter{\abs}{(}{)}\[\ddot z_1=\abs{z_1}\]",
+        r"1:48: found `\abs`, a macro of a form",
+    ),
+    (
+        r"{\begingroup}\[\ddot z_1=z_1\]",
+        r"1:13: found `}`, expected `\endgroup` for `\begingroup` in line 1",
+    ),
+    (
+        r"\iffalse\[\ddot z_1=9z_1\]\ifx a\else\fi\else\[\ddot z_1=z_1\]\fi",
+        "z1",
+    ),
+    (
+        r"\newif\ifa{\atrue}\[\ddot z_1=\ifa 9\else 3\fi z_1\]",
+        "3*z1",
+    ),
+    (
+        r"\newif\ifa{\global\atrue}\[\ddot z_1=\unless\ifa 9\else 3\fi z_1\]",
+        "3*z1",
+    ),
+    (
+        r"\iffalse\[\ddot z_1=9z_1\]",
+        r"1:1: found `\iffalse` without its end",
+    ),
+    (
+        r"\ifnum1>0 \[\ddot z_1=9z_1\]\fi\[\ddot z_1=z_1\]",
+        r"1:1: found `\ifnum`, a conditional that is not",
+    ),
+    (r"\ifpdf\def\k{3}\fi text \[\ddot z_1=z_1\]", "z1"),
+    (
+        r"\def\k{2}\ifpdf\def\k{3}\fi\[\ddot z_1=\k z_1\]",
+        r"1:40: found `\k`, a macro that is defined under",
+    ),
+    (
+        r"\ifthenelse{\boolean{x}}{\[\ddot z_1=9\]}{}\[\ddot z_1=z_1\]",
+        r"1:1: found `\ifthenelse`",
+    ),
+    (
+        r"\begin{document}\[\ddot z_1=z_1\]\end{document}\[\ddot z_1=9z_1\]",
+        "z1",
+    ),
+    (
+        r"\[\ddot z_1=9\]\begin{document}\[\ddot z_1=z_1\]",
+        r"1:3: found `\ddot` before `\begin{document}`",
+    ),
+    (
+        "\\[\\ddot z_1=z_1\\]\n\\endinput\n\\[\\ddot z_1=9z_1\\]",
+        "z1",
+    ),
+    (
+        "\\begin{comment}\n\\[\\ddot z_1=9\\] \\fi\n\\end{comment}\n\\verb|\\iffalse|\\[\\ddot z_1=z_1\\]",
+        "z1",
+    ),
+    (r"{\url{a%20b}}\[\ddot z_1=z_1\]", "z1"),
+    (
+        r"\excludecomment{hide}\begin{hide}\[\ddot z_1=9\]\fi\end{hide}\[\ddot z_1=z_1\]",
+        "z1",
+    ),
+    (
+        r"\phantom{$\ddot z_1=9$}\[\phantom{\ddot z_1=9}\ddot z_1=z_1\]",
+        "z1",
+    ),
+    (r"\[\ddot z_1=1\phantom{0}5\]", r"1:25: found `5`"),
+    (
+        r"\[\ddot z_1=z_1\]\[\text{with $\ddot z_2=9$}\]",
+        r"1:20: found an equation in `\text`",
+    ),
+    (
+        r"\sbox{\b}{$\ddot z_1=9$}$\ddot z_1=z_1$",
+        r"1:1: found `\sbox`, which keeps mathematics",
+    ),
+    (
+        r"\newcommand{\no}[1]{}\no{\[\ddot z_1=9\]}\[\ddot z_1=z_1\]",
+        "z1",
+    ),
+    (
+        r"\sisetup{round-mode=places}\[\ddot z_1=\num{1.25}\]",
+        r"1:40: found `\num`, with options",
+    ),
+];
+
+#[test]
+fn documents_are_read_as_tex_prints_them() {
+    for (text, expected) in PRINTED {
+        match named(text, &[]) {
+            Ok(found) => assert_eq!(found[0].1[0], expected, "{text}"),
+            Err(error) => {
+                let start = format!("paper.tex:{expected}");
+                assert!(error.to_string().starts_with(&start), "{text}: {error}");
+            }
+        }
+    }
+}
+
+#[test]
+fn markdown_has_mathematics_in_its_lines_and_code_that_is_none() {
+    for (text, expected) in [
+        (
+            "So $\\ddot z_1 = 2 z_1$, for $5 or \\$6, `$\\ddot z_2 = 9$`.",
+            &["2*z1"][..],
+        ),
+        (
+            "$`\\ddot z_1 = z_2`$ and\n$\\ddot z_2 = z_1$",
+            &["z2", "z1"],
+        ),
+        (
+            "~~~\n$$\\ddot z_1 = 9$$\n~~~\n<!--\n$$\\ddot z_1 = 9$$ -->\n$$\\ddot z_1 = z_1$$",
+            &["z1"],
+        ),
+    ] {
+        let read = read("notes.md", text.as_bytes(), &SymbolNames::default(), &[]);
+        let read = read.unwrap_or_else(|error| panic!("{text}: {error}"));
+        let equations = read.sections.iter().flat_map(|section| &section.equations);
+        let texts: Vec<String> = equations
+            .map(|equation| equation.text().replace('\n', ""))
+            .collect();
+        assert_eq!(texts, expected, "{text}");
+    }
 }
 
 #[test]

@@ -1,4 +1,7 @@
-//! Tokens of LaTeX with their places, line by line.
+//! Tokens of LaTeX with their places, as TeX takes them from a file: one after the other.
+
+use std::collections::VecDeque;
+use std::str::Lines;
 
 /// The minus of Unicode.
 const MINUS: char = '\u{2212}';
@@ -8,13 +11,15 @@ const MINUS: char = '\u{2212}';
 pub(super) struct Token {
     pub(super) kind: Kind,
     pub(super) place: (usize, usize),
+    /// Whether a space or the start of a line is before it.
+    pub(super) is_spaced: bool,
 }
 
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Kind {
     /// `\frac`, `\,`; without its backslash.
     Command(String),
-    /// `\begin{...}`.
+    /// `\begin{...}`; it, the next two and numbers are made of tokens that follow each other.
     Begin(String),
     /// `\end{...}`.
     End(String),
@@ -39,6 +44,8 @@ pub(super) enum Kind {
     /// An empty line.
     Paragraph,
     Character(char),
+    /// What TeX would follow and romc does not, and what could be there.
+    Unread(Box<str>, &'static str),
 }
 
 impl Kind {
@@ -61,6 +68,7 @@ impl Kind {
             Kind::Parameter(number) => format!("#{number}"),
             Kind::Comment(_) => "%".to_owned(),
             Kind::Paragraph => return "an empty line".to_owned(),
+            Kind::Unread(found, _) => return found.to_string(),
             Kind::Character(c) if c.is_control() => c.escape_debug().to_string(),
             Kind::Character(character) => character.to_string(),
         };
@@ -87,6 +95,7 @@ impl Kind {
             | Kind::Display
             | Kind::Number(_)
             | Kind::Parameter(_)
+            | Kind::Unread(..)
             | Kind::Character(_) => false,
         }
     }
@@ -95,8 +104,12 @@ impl Kind {
 impl Token {
     /// Another kind of token at the same place.
     pub(super) fn with(&self, kind: Kind) -> Self {
-        let place = self.place;
-        Self { kind, place }
+        let (place, is_spaced) = (self.place, self.is_spaced);
+        Self {
+            kind,
+            place,
+            is_spaced,
+        }
     }
 
     pub(super) fn quoted(&self) -> String {
@@ -124,102 +137,141 @@ pub(super) fn group_length<'t>(tokens: impl Iterator<Item = &'t Token>) -> Optio
     None
 }
 
-/// Tokens of a TeX file.
-pub(super) fn of_tex(text: &str) -> Vec<Token> {
-    let mut tokens = Vec::new();
-    for (index, line) in text.lines().enumerate() {
-        Line::new(line, index + 1, 1).read(&mut tokens);
-    }
-    tokens
-}
-
-/// Tokens of the displays in a Markdown file (`math` fences and `$$`), with its headings as
-/// comments; other text gives comments only where it speaks of the coefficients' digits.
-pub(super) fn of_markdown(text: &str) -> Vec<Token> {
-    let mut tokens = Vec::new();
-    let mut fence: Option<bool> = None;
-    let mut in_display = false;
-    for (index, line) in text.lines().enumerate() {
-        let number = index + 1;
-        let mut push = |kind| {
-            let place = (number, 1);
-            tokens.push(Token { kind, place });
-        };
-        let content = line.trim();
-        let opens = content.strip_prefix("```");
-        let opens = opens.filter(|_| fence.is_none() && !in_display);
-        if opens.is_some() || fence.is_some() && content == "```" {
-            let is_math = opens.map_or(fence == Some(true), |language| language.trim() == "math");
-            fence = opens.map(|_| is_math);
-            if is_math {
-                push(Kind::Display);
-            }
-            continue;
-        }
-        if let Some(is_math) = fence {
-            if is_math {
-                Line::new(line, number, 1).read(&mut tokens);
-            }
-            continue;
-        }
-        if !in_display && content.starts_with('#') {
-            let heading = content.trim_start_matches('#').trim();
-            push(Kind::Comment(unescaped(heading)));
-            continue;
-        }
-        let mut column = 1;
-        for (index, part) in line.split("$$").enumerate() {
-            let place = (number, column);
-            if index > 0 {
-                in_display = !in_display;
-                let (kind, place) = (Kind::Display, (number, column - 2));
-                tokens.push(Token { kind, place });
-            }
-            if in_display {
-                Line::new(part, number, column).read(&mut tokens);
-            } else if !part.trim().is_empty() {
-                let kind = Kind::Comment(part.to_owned());
-                tokens.push(Token { kind, place });
-            }
-            column += part.chars().count() + 2;
-        }
-    }
-    tokens
-}
-
-/// Markdown's backslashes before punctuation taken away.
-fn unescaped(text: &str) -> String {
-    let mut plain = String::new();
-    let mut characters = text.chars().peekable();
-    while let Some(character) = characters.next() {
-        let escapes =
-            character == '\\' && characters.peek().is_some_and(char::is_ascii_punctuation);
-        if !escapes {
-            plain.push(character);
-        } else if let Some(next) = characters.next() {
-            plain.push(next);
-        }
-    }
-    plain
-}
-
-/// One line being read.
-struct Line {
+/// The tokens of a text.
+pub(super) struct Lexer<'t> {
+    /// The lines after the one that is read.
+    lines: Lines<'t>,
     characters: Vec<char>,
     next: usize,
     number: usize,
     /// Column of the first character.
     start: usize,
+    is_spaced: bool,
+    /// What one character made besides the last token.
+    queued: VecDeque<Token>,
+    /// Whether `@` is a letter of commands.
+    pub(super) has_at_letters: bool,
 }
 
-impl Line {
-    fn new(text: &str, number: usize, start: usize) -> Self {
-        Self {
-            characters: text.chars().collect(),
-            next: 0,
-            number,
-            start,
+impl Iterator for Lexer<'_> {
+    type Item = Token;
+
+    fn next(&mut self) -> Option<Token> {
+        loop {
+            if let Some(token) = self.queued.pop_front() {
+                return Some(token);
+            }
+            let Some(first) = self.peek(0) else {
+                self.next_line()?;
+                continue;
+            };
+            if first.is_whitespace() {
+                self.next += 1;
+                self.is_spaced = true;
+                continue;
+            }
+            let place = (self.number, self.start + self.next);
+            let of_unicode = self.dotted_or_raised(first);
+            for kind in of_unicode.unwrap_or_else(|| vec![self.token(first)]) {
+                let is_spaced = std::mem::take(&mut self.is_spaced);
+                self.queued.push_back(Token {
+                    kind,
+                    place,
+                    is_spaced,
+                });
+            }
         }
+    }
+}
+
+impl<'t> Lexer<'t> {
+    /// The tokens of a TeX file.
+    pub(super) fn new(text: &'t str) -> Self {
+        Self {
+            lines: text.lines(),
+            characters: Vec::new(),
+            next: 0,
+            number: 0,
+            start: 1,
+            is_spaced: true,
+            queued: VecDeque::new(),
+            has_at_letters: false,
+        }
+    }
+
+    /// The tokens of a part of a line that starts at `place`.
+    pub(super) fn of_part(text: &'t str, (number, start): (usize, usize)) -> Self {
+        let mut lexer = Self::new(text);
+        (lexer.number, lexer.start) = (number - 1, start);
+        lexer
+    }
+
+    /// Goes to the next line; an empty one ends a paragraph.
+    fn next_line(&mut self) -> Option<()> {
+        let line = self.lines.next()?;
+        self.number += 1;
+        (self.characters, self.next, self.is_spaced) = (line.chars().collect(), 0, true);
+        if line.trim().is_empty() {
+            self.queued.push_back(Token {
+                kind: Kind::Paragraph,
+                place: (self.number, self.start),
+                is_spaced: true,
+            });
+        }
+        Some(())
+    }
+
+    /// Ends the text behind the line that is read.
+    pub(super) fn end_after_line(&mut self) {
+        self.lines = "".lines();
+    }
+
+    /// Ends the text.
+    pub(super) fn end(&mut self) {
+        self.end_after_line();
+        self.next = self.characters.len();
+    }
+
+    pub(super) fn is_at(&self, character: char) -> bool {
+        self.peek(0) == Some(character)
+    }
+
+    /// Passes `|...|` behind `\verb`, or a group without a look into it.
+    pub(super) fn skip_verb(&mut self) {
+        let rest = self.characters[self.next..].iter();
+        let mut rest = rest.enumerate().skip_while(|(_, c)| **c == '*');
+        let Some((_, open)) = rest.next() else { return };
+        let close = match open {
+            '{' => '}',
+            '[' => ']',
+            other => *other,
+        };
+        let behind = rest.find(|(_, c)| **c == close);
+        self.next = behind.map_or(self.characters.len(), |(at, _)| self.next + at + 1);
+    }
+
+    /// Passes everything up to `\end{name}` and that; whether it is there.
+    pub(super) fn skip_verbatim(&mut self, name: &str) -> bool {
+        let end = format!("\\end{{{name}}}");
+        loop {
+            let rest: String = self.characters[self.next..].iter().collect();
+            if let Some(at) = rest.find(&end) {
+                self.next += rest[..at].chars().count() + end.chars().count();
+                return true;
+            }
+            self.next = self.characters.len();
+            if self.next_line().is_none() {
+                return false;
+            }
+            self.queued.clear();
+        }
+    }
+
+    /// Whether nothing but space is left of the line.
+    pub(super) fn is_at_line_end(&self) -> bool {
+        self.characters[self.next..]
+            .iter()
+            .all(|c| c.is_whitespace())
     }
 
     fn peek(&self, ahead: usize) -> Option<char> {
@@ -234,28 +286,7 @@ impl Line {
         self.characters[start..self.next].iter().collect()
     }
 
-    fn read(mut self, tokens: &mut Vec<Token>) {
-        if self.characters.iter().all(|c| c.is_whitespace()) {
-            let (kind, place) = (Kind::Paragraph, (self.number, self.start));
-            tokens.push(Token { kind, place });
-        }
-        while let Some(first) = self.peek(0) {
-            let place = (self.number, self.start + self.next);
-            if first.is_whitespace() {
-                self.next += 1;
-                continue;
-            }
-            let of_unicode = self.dotted_or_raised(first);
-            let kinds = of_unicode.unwrap_or_else(|| vec![self.token(first)]);
-            tokens.extend(kinds.into_iter().map(|kind| Token { kind, place }));
-        }
-    }
-
     fn token(&mut self, first: char) -> Kind {
-        let starts_decimal = first == '.' && self.peek(1).is_some_and(|c| c.is_ascii_digit());
-        if first.is_ascii_digit() || starts_decimal {
-            return self.number();
-        }
         self.next += 1;
         match first {
             '\\' => self.command(),
@@ -332,39 +363,9 @@ impl Line {
         (!number.is_empty()).then_some(kinds)
     }
 
-    /// Digits, a point (or comma in braces) with digits after it, and an exponent with digits.
-    fn number(&mut self) -> Kind {
-        let digit = |c: char| c.is_ascii_digit();
-        let mut text = self.take_while(digit);
-        let decimals = |from: usize| {
-            let rest = self.characters.iter().skip(self.next + from);
-            rest.take_while(|c| digit(**c)).count()
-        };
-        // 0{,}36 is a decimal fraction; 1{,}500 may be a large number, and is none.
-        let is_decimal = text == "0" || decimals(3) != 3;
-        let point = match [0, 1, 2].map(|ahead| self.peek(ahead)) {
-            [Some('.'), ..] => 1,
-            [Some('{'), Some(','), Some('}')] if is_decimal => 3,
-            _ => 0,
-        };
-        if point > 0 && self.peek(point).is_some_and(digit) {
-            self.next += point;
-            text = format!("{text}.{}", self.take_while(digit));
-        }
-        let sign = usize::from(matches!(self.peek(1), Some('+' | '-' | MINUS)));
-        if matches!(self.peek(0), Some('e' | 'E')) && self.peek(1 + sign).is_some_and(digit) {
-            let exponent = match self.peek(1) {
-                Some('-' | MINUS) => "e-",
-                _ => "e",
-            };
-            self.next += 1 + sign;
-            text = format!("{text}{exponent}{}", self.take_while(digit));
-        }
-        Kind::Number(text)
-    }
-
     fn command(&mut self) -> Kind {
-        let name = self.take_while(|c| c.is_ascii_alphabetic());
+        let has_at_letters = self.has_at_letters;
+        let name = self.take_while(|c| c.is_ascii_alphabetic() || has_at_letters && c == '@');
         if name.is_empty() {
             let Some(symbol) = self.peek(0) else {
                 return Kind::Command(" ".to_owned());
@@ -376,21 +377,8 @@ impl Line {
             }
             return Kind::Command(symbol.to_string());
         }
-        let kind: fn(String) -> Kind = match name.as_str() {
-            "begin" => Kind::Begin,
-            "end" => Kind::End,
-            "label" => Kind::Label,
-            "newline" => return Kind::Break,
-            _ => return Kind::Command(name),
-        };
-        let rest = &self.characters[self.next..];
-        let open = rest.iter().take_while(|c| **c == ' ').count();
-        match (rest.get(open), rest.iter().position(|c| *c == '}')) {
-            (Some('{'), Some(close)) => {
-                let inside: String = rest[open + 1..close].iter().collect();
-                self.next += close + 1;
-                kind(inside.trim().to_owned())
-            }
+        match name.as_str() {
+            "newline" => Kind::Break,
             _ => Kind::Command(name),
         }
     }

@@ -95,7 +95,10 @@ impl Reader<'_> {
                 if last != Last::Other && self.is_next(&Kind::Superscript) {
                     return self.unexpected(BARE);
                 }
-                Last::Other
+                match last {
+                    Last::BareNumber => last,
+                    _ => Last::Other,
+                }
             }
             _ => self.bare_argument()?,
         };
@@ -157,6 +160,7 @@ impl Reader<'_> {
                 variable.to_string()
             }
             (Some(LatentVariable::Z(index)), 1) => LatentVariable::Dz(index).to_string(),
+            (None, 0) if symbol.name == "pi" => format!("{:?}", std::f64::consts::PI),
             _ => {
                 let (found, expected) = (symbol.quoted(), self.names.expected());
                 return Err(refused(self.file, symbol.place, found, expected));

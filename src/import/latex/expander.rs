@@ -1,0 +1,424 @@
+//! What TeX makes of a document before it prints: macros replaced, definitions followed, branches of conditionals chosen,
+//! text that is not printed left out.
+
+use std::rc::Rc;
+
+use super::super::equations::refused;
+use super::super::error::ImportError;
+use super::document::is_one_of;
+use super::reader::has;
+use super::scopes::{Macro, Meaning, Scopes};
+use super::token::{Kind, Lexer, Token};
+
+/// Most tokens that macros may make of one document.
+const MAX_EXPANDED: usize = 500_000;
+/// Environments whose contents are no LaTeX.
+const VERBATIM: &str =
+    "verbatim Verbatim BVerbatim LVerbatim lstlisting minted comment filecontents";
+/// Environments that old documents begin by their commands: `\let\be\equation`.
+const BY_COMMAND: &str = "equation eqnarray displaymath";
+/// Commands whose argument takes room and prints nothing, and commands whose argument does not print.
+const PHANTOMS: &str = "phantom hphantom vphantom";
+const NOT_PRINTED: &str = "index typeout message hypersetup pdfbookmark nocite @gobble";
+/// Commands after which the text reads in another way than is followed here.
+const NOT_FOLLOWED: &str = "globaldefs aftergroup afterassignment scantokens";
+
+pub(super) struct Expander<'t> {
+    pub(super) file: &'t str,
+    pub(super) lexer: Lexer<'t>,
+    /// Tokens before those of the lexer, the next one last.
+    pub(super) pending: Vec<Token>,
+    pub(super) scopes: Scopes,
+    /// How many branches of conditionals are being read.
+    pub(super) branches: usize,
+    budget: usize,
+    /// Whether `\global` or `\unless` stand before the command that is read.
+    pub(super) is_global: bool,
+    pub(super) is_negated: bool,
+}
+
+impl<'t> Expander<'t> {
+    /// An expander of tokens, then of a text.
+    pub(super) fn new(file: &'t str, mut tokens: Vec<Token>, text: &'t str) -> Self {
+        tokens.reverse();
+        Self {
+            file,
+            lexer: Lexer::new(text),
+            pending: tokens,
+            scopes: Scopes::default(),
+            branches: 0,
+            budget: MAX_EXPANDED,
+            is_global: false,
+            is_negated: false,
+        }
+    }
+
+    /// The next token that is printed, or opens or closes a group.
+    pub(super) fn next(&mut self) -> Result<Option<Token>, ImportError> {
+        while let Some(token) = self.raw() {
+            let printed = match &token.kind {
+                Kind::Command(name) => match self.scopes.meaning(name).cloned() {
+                    Some(Meaning::Macro(found)) => self.expand(&token, &found).map(|()| None)?,
+                    Some(Meaning::Unread {
+                        why,
+                        expected,
+                        matters,
+                    }) => self.unread(&token, why, expected, matters)?,
+                    Some(Meaning::Same(kind)) => self.primitive(token.with(kind))?,
+                    Some(Meaning::Verbatim) | None => self.primitive(token)?,
+                },
+                // The end of an environment that the document defines, behind what its end printed.
+                Kind::End(_) => {
+                    self.scopes.pass(self.file, &token)?;
+                    None
+                }
+                _ => Some(token),
+            };
+            if let Some(token) = printed {
+                (self.is_global, self.is_negated) = (false, false);
+                self.scopes.pass(self.file, &token)?;
+                return Ok(Some(token));
+            }
+        }
+        Ok(None)
+    }
+
+    /// The next token as it stands in the document or in a macro.
+    pub(super) fn raw(&mut self) -> Option<Token> {
+        self.pending.pop().or_else(|| {
+            self.lexer.has_at_letters = self.scopes.has_at_letters;
+            self.lexer.next()
+        })
+    }
+
+    /// The same without comments and empty lines.
+    pub(super) fn code(&mut self) -> Option<Token> {
+        loop {
+            let token = self.raw()?;
+            if !matches!(token.kind, Kind::Comment(_) | Kind::Paragraph) {
+                return Some(token);
+            }
+        }
+    }
+
+    /// Whether `wanted` comes next, which is passed then.
+    pub(super) fn takes(&mut self, wanted: &Kind) -> bool {
+        let Some(token) = self.code() else {
+            return false;
+        };
+        let found = token.kind == *wanted;
+        if !found {
+            self.pending.push(token);
+        }
+        found
+    }
+
+    pub(super) fn refuse<T>(
+        &self,
+        token: &Token,
+        why: &str,
+        expected: &str,
+    ) -> Result<T, ImportError> {
+        let found = format!("{}{why}", token.quoted());
+        Err(refused(self.file, token.place, found, expected))
+    }
+
+    /// What is not followed here: in a formula a token that says so, in text nothing, unless mathematics may be in it.
+    pub(super) fn unread(
+        &self,
+        token: &Token,
+        why: &str,
+        expected: &'static str,
+        matters: bool,
+    ) -> Result<Option<Token>, ImportError> {
+        if self.scopes.formula.is_some() {
+            let found = format!("{}{why}", token.quoted());
+            return Ok(Some(token.with(Kind::Unread(found.into(), expected))));
+        }
+        match matters {
+            true => self.refuse(token, why, expected),
+            false => Ok(None),
+        }
+    }
+
+    /// The tokens of a group, or one token; none at the end of the text or of the group around.
+    pub(super) fn argument(&mut self) -> Option<Vec<Token>> {
+        let first = self.code()?;
+        match first.kind {
+            Kind::Open => self.until(&Kind::Close),
+            Kind::Close => {
+                self.pending.push(first);
+                None
+            }
+            _ => Some(vec![first]),
+        }
+    }
+
+    /// Passes a group, if one comes next.
+    pub(super) fn skip_group(&mut self) {
+        if self.takes(&Kind::Open) {
+            self.until(&Kind::Close);
+        }
+    }
+
+    /// The tokens of `[...]`, if it comes next.
+    pub(super) fn optional(&mut self) -> Option<Vec<Token>> {
+        let is_next = self.takes(&Kind::Character('['));
+        is_next.then(|| self.until(&Kind::Character(']'))).flatten()
+    }
+
+    /// The tokens up to `end` outside of braces, which is passed.
+    fn until(&mut self, end: &Kind) -> Option<Vec<Token>> {
+        let mut tokens = Vec::new();
+        let mut depth = 0;
+        loop {
+            let token = self.raw()?;
+            match token.kind {
+                _ if depth == 0 && token.kind == *end => return Some(tokens),
+                Kind::Open => depth += 1,
+                Kind::Close => depth -= 1,
+                Kind::Comment(_) => continue,
+                _ => {}
+            }
+            tokens.push(token);
+        }
+    }
+
+    /// Puts the body of a macro, with its arguments, before what comes next; it stands at the place of `token`.
+    fn expand(&mut self, token: &Token, found: &Rc<Macro>) -> Result<(), ImportError> {
+        let mut arguments = Vec::with_capacity(found.parameters);
+        if let Some(default) = &found.default {
+            arguments.push(self.optional().unwrap_or_else(|| default.clone()));
+        }
+        while arguments.len() < found.parameters {
+            let Some(argument) = self.argument() else {
+                let why = ", a macro without its arguments";
+                return self.refuse(token, why, "an argument for each parameter");
+            };
+            arguments.push(argument);
+        }
+        let before = self.pending.len();
+        let mut parts = found.body.iter().rev().peekable();
+        while let Some(part) = parts.next() {
+            match &part.kind {
+                // `##1` is the parameter of a definition inside.
+                Kind::Parameter(_)
+                    if parts
+                        .next_if(|part| part.kind == Kind::Character('#'))
+                        .is_some() =>
+                {
+                    self.pending.push(part.clone());
+                }
+                Kind::Parameter(number) => {
+                    let argument = arguments.get(number.wrapping_sub(1)).into_iter().flatten();
+                    self.pending.extend(argument.rev().cloned());
+                }
+                kind => {
+                    let (kind, place) = (kind.clone(), token.place);
+                    let is_spaced = part.is_spaced;
+                    self.pending.push(Token {
+                        kind,
+                        place,
+                        is_spaced,
+                    });
+                }
+            }
+            if self.pending.len() - before > self.budget {
+                break;
+            }
+        }
+        let made = 1 + self.pending.len() - before;
+        match self.budget.checked_sub(made) {
+            Some(rest) => self.budget = rest,
+            None => {
+                return self.refuse(
+                    token,
+                    ", a macro that expands without end",
+                    "macros that end",
+                );
+            }
+        }
+        Ok(())
+    }
+
+    /// Follows a command with the meaning that LaTeX gives it.
+    fn primitive(&mut self, token: Token) -> Result<Option<Token>, ImportError> {
+        let Kind::Command(name) = &token.kind else {
+            return Ok(Some(token));
+        };
+        match name.as_str() {
+            "begin" => return self.begin(token),
+            "end" => return self.end(token),
+            "label" => return Ok(Some(self.named(token, Kind::Label))),
+            "begingroup" | "endgroup" => self.scopes.pass(self.file, &token)?,
+            "bgroup" => return Ok(Some(token.with(Kind::Open))),
+            "egroup" => return Ok(Some(token.with(Kind::Close))),
+            "global" => self.is_global = true,
+            "unless" => self.is_negated = true,
+            "long" | "outer" | "protected" | "expandafter" => {}
+            "makeatletter" | "makeatother" => self.scopes.has_at_letters = name == "makeatletter",
+            "catcode" => return self.category(token).map(|()| None),
+            _ if has(NOT_FOLLOWED, name) => {
+                return self.refuse(&token, "", "definitions where they hold");
+            }
+            "csname" => {
+                let name = self.name_to("endcsname");
+                self.pending.push(token.with(Kind::Command(name)));
+            }
+            "verb" | "lstinline" if self.pending.is_empty() => self.lexer.skip_verb(),
+            "url" | "href" | "nolinkurl" if self.lexer.is_at('{') && self.pending.is_empty() => {
+                self.lexer.skip_verb();
+            }
+            "endinput" => self.lexer.end_after_line(),
+            "stop" | "bye" => self.stop(),
+            _ if has(PHANTOMS, name) => {
+                let is_one = self.argument().is_some();
+                if self.scopes.formula.is_some() && is_one {
+                    self.pending
+                        .extend([Kind::Close, Kind::Open].map(|kind| token.with(kind)));
+                    return Ok(Some(token));
+                }
+            }
+            _ if has(NOT_PRINTED, name) => drop(self.argument()),
+            _ if has(BY_COMMAND, name) => return Ok(Some(token.with(Kind::Begin(name.clone())))),
+            _ => match name.strip_prefix("end") {
+                Some(name) if has(BY_COMMAND, name) => {
+                    return Ok(Some(token.with(Kind::End(name.to_owned()))));
+                }
+                _ => return self.assignment_or_condition(token),
+            },
+        }
+        Ok(None)
+    }
+
+    fn assignment_or_condition(&mut self, token: Token) -> Result<Option<Token>, ImportError> {
+        match self.follows_definition(&token)? {
+            true => Ok(None),
+            false => self.condition(token),
+        }
+    }
+
+    /// `\catcode`\@=11`, which makes `@` a letter; other characters stay what they are here.
+    fn category(&mut self, token: Token) -> Result<(), ImportError> {
+        self.takes(&Kind::Character('`'));
+        let is_at = |token: &Token| token.is_command("@") || token.kind == Kind::Character('@');
+        if !self.code().as_ref().is_some_and(is_at) {
+            return self.refuse(
+                &token,
+                "",
+                "characters as LaTeX reads them; `\\makeatletter` for `@`",
+            );
+        }
+        self.takes(&Kind::Character('='));
+        let [first, second] = ['1', '1'].map(|digit| self.takes(&Kind::Character(digit)));
+        self.takes(&Kind::Character('2'));
+        self.scopes.has_at_letters = first && second;
+        Ok(())
+    }
+
+    /// Ends the text here.
+    fn stop(&mut self) {
+        self.pending.clear();
+        self.lexer.end();
+    }
+
+    /// Reads `{name}` behind a command and makes its kind of token of it.
+    fn named(&mut self, token: Token, kind: fn(String) -> Kind) -> Token {
+        match self.takes(&Kind::Open) {
+            true => {
+                let name = self.until(&Kind::Close).unwrap_or_default();
+                token.with(kind(spelled(&name)))
+            }
+            false => token,
+        }
+    }
+
+    fn begin(&mut self, token: Token) -> Result<Option<Token>, ImportError> {
+        let token = self.named(token, Kind::Begin);
+        let Kind::Begin(name) = &token.kind else {
+            return Ok(Some(token));
+        };
+        let meaning = self.scopes.meaning(name);
+        if is_one_of(VERBATIM, name) && meaning.is_none()
+            || matches!(meaning, Some(Meaning::Verbatim))
+        {
+            return match self.pending.is_empty() && self.lexer.skip_verbatim(name) {
+                true if name == "comment" && !self.lexer.is_at_line_end() => self.refuse(
+                    &token,
+                    " with text behind its end",
+                    "`\\end{comment}` in a line of its own",
+                ),
+                true => Ok(None),
+                false => self.refuse(
+                    &token,
+                    " without its end",
+                    &Kind::End(name.clone()).quoted(),
+                ),
+            };
+        }
+        if name == "lrbox" {
+            return self.refuse(&token, "", "text that is printed where it stands");
+        }
+        if matches!(meaning, Some(Meaning::Macro(_) | Meaning::Unread { .. })) {
+            self.scopes
+                .enter(token.clone(), Some(Kind::End(name.clone())));
+            self.pending.push(token.with(Kind::Command(name.clone())));
+            return Ok(None);
+        }
+        Ok(Some(token))
+    }
+
+    fn end(&mut self, token: Token) -> Result<Option<Token>, ImportError> {
+        let token = self.named(token, Kind::End);
+        let Kind::End(name) = &token.kind else {
+            return Ok(Some(token));
+        };
+        if name == "document" {
+            self.stop();
+            return Ok(None);
+        }
+        if matches!(
+            self.scopes.meaning(name),
+            Some(Meaning::Macro(_) | Meaning::Unread { .. })
+        ) {
+            let end = format!("end{name}");
+            let is_defined = self.scopes.meaning(&end).is_some();
+            let end = token.with(Kind::Command(end));
+            self.pending.push(token);
+            self.pending.extend(is_defined.then_some(end));
+            return Ok(None);
+        }
+        Ok(Some(token))
+    }
+
+    /// The characters up to a command, which is passed.
+    pub(super) fn name_to(&mut self, end: &str) -> String {
+        let mut name = Vec::new();
+        while let Some(token) = self.code() {
+            if token.is_command(end) {
+                break;
+            }
+            name.push(token);
+        }
+        spelled(&name)
+    }
+}
+
+/// The characters of a name.
+pub(super) fn spelled(tokens: &[Token]) -> String {
+    let mut text = String::new();
+    for token in tokens {
+        if token.is_spaced && !text.is_empty() {
+            text.push(' ');
+        }
+        match &token.kind {
+            Kind::Command(name) => {
+                text.push('\\');
+                text.push_str(name);
+            }
+            Kind::Character(character) => text.push(*character),
+            kind => text.push_str(kind.quoted().trim_matches('`')),
+        }
+    }
+    text
+}
