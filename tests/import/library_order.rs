@@ -136,7 +136,7 @@ fn command_asks_for_the_order_and_prints_where_they_differ() {
         said.contains(&format!("rows of xi (--library-order paper): {terms}\n")),
         "{said}"
     );
-    let listed = run(&["1; z1; z2", "--library-order", "paper"]);
+    let listed = run(&["1; z1; z2", "--library-order", "paper", "--force"]);
     assert_eq!(listed.status.code(), Some(2), "{}", text(&listed.stderr));
     // Without sines the orders are one.
     let few = plain("xi_contact", &xi.rows(0, 7).into_owned());

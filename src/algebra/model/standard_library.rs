@@ -147,11 +147,17 @@ impl LibraryOrder {
         ];
         let mut orders = Self::NAMED.to_vec();
         for [a, b, c, d] in middle {
-            for groups in [[Constant, a, b, c, d], [a, b, c, d, Constant]] {
+            let places = [
+                [Constant, a, b, c, d],
+                [a, b, c, d, Constant],
+                [a, Constant, b, c, d],
+            ];
+            // The constant is between other groups only where these are not the variables.
+            for groups in &places[..if a == Linear { 2 } else { 3 }] {
                 for run in [Run::Half, Run::Single, Run::All] {
                     for functions in [["sin", "cos"], ["cos", "sin"]] {
                         orders.extend([false, true].map(|is_paired| Self {
-                            groups,
+                            groups: *groups,
                             run,
                             functions,
                             is_paired,

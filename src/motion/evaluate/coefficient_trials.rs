@@ -9,7 +9,7 @@ use crate::recording::Segment;
 use crate::sim::LatentSegment;
 
 /// Samples that are compared, spread over all recordings.
-const SAMPLES: usize = 480;
+const SAMPLES: usize = 1000;
 /// R^2 of latent accelerations at which a reading explains that those of another were worse.
 pub(super) const GOOD_R2: f64 = 0.2;
 /// How many times smaller an order that has a name makes the residual for it to be taken.
@@ -60,37 +60,20 @@ impl CoefficientTrials {
     ) -> Result<Self, EvaluateError> {
         let samples = samples(model, segments)?;
         let readings = readings(model, order)?;
-        let given = &readings[0].rows;
-        let r2 = |rows: &[usize], exchanged: Option<[usize; 2]>| {
-            let xi = |phase: usize| match exchanged {
-                Some([a, b]) if phase == a => b,
-                Some([a, b]) if phase == b => a,
-                _ => phase,
-            };
-            r2(&samples, |phase| {
-                let from = &model.phases()[xi(phase)].xi;
-                let mut to = from.clone();
-                for (&to_row, &from_row) in rows.iter().zip(given) {
-                    to.row_mut(to_row).copy_from(&from.row(from_row));
-                }
-                Some(to)
-            })
-        };
-        let n_phases = model.phases().len();
-        let pairs = (0..n_phases).flat_map(|a| (a + 1..n_phases).map(move |b| Some([a, b])));
-        let exchanges: Vec<Option<[usize; 2]>> = std::iter::once(None).chain(pairs).collect();
+        let exchanges = exchanges(model.phases().len());
         let mut by_order = Vec::new();
         let mut best = (f64::INFINITY, f64::NAN, &readings[0], None);
         for (place, reading) in readings.iter().enumerate() {
             let is_named = reading.order.is_none_or(|order| order.name().is_some());
+            let of_order = match (place, is_named) {
+                (0, _) => 1.0,
+                (_, true) => NAMED,
+                (_, false) => UNNAMED,
+            };
             for &exchanged in &exchanges[..if is_named { exchanges.len() } else { 1 }] {
-                let Some(found) = r2(&reading.rows, exchanged) else {
+                let xi = |phase| Some(read(model, phase, exchanged, [&readings[0], reading]));
+                let Some(found) = r2(&samples, xi) else {
                     continue;
-                };
-                let of_order = match (place, is_named) {
-                    (0, _) => 1.0,
-                    (_, true) => NAMED,
-                    (_, false) => UNNAMED,
                 };
                 let weight = of_order * exchanged.map_or(1.0, |_| UNNAMED);
                 let score = weight * (1.0 - found).max(NO_RESIDUAL);
@@ -103,10 +86,10 @@ impl CoefficientTrials {
             }
         }
         let (_, found, reading, exchanged) = best;
-        let is_other = reading.order != readings[0].order;
+        let other = reading.order.filter(|_| reading.order != readings[0].order);
         let name = |phase: usize| model.phases()[phase].name.clone();
         let slip = CoefficientSlip {
-            order: match reading.order.filter(|_| is_other) {
+            order: match other {
                 Some(order) => Some((order, texts(model, order)?)),
                 None => None,
             },
@@ -131,6 +114,32 @@ impl CoefficientTrials {
         let is_clear = |(_, other): &(_, f64)| residual(*other) >= NAMED * residual(r2);
         others.clone().all(is_clear).then_some(best)
     }
+}
+
+/// No exchange, then each pair of phases.
+fn exchanges(n_phases: usize) -> Vec<Option<[usize; 2]>> {
+    let pairs = (0..n_phases).flat_map(|a| (a + 1..n_phases).map(move |b| Some([a, b])));
+    std::iter::once(None).chain(pairs).collect()
+}
+
+/// The coefficients of a phase, read in another way than the one given.
+fn read(
+    model: &ReducedModel,
+    phase: usize,
+    exchanged: Option<[usize; 2]>,
+    [given, reading]: [&Reading; 2],
+) -> DMatrix<f64> {
+    let source = match exchanged {
+        Some([a, b]) if phase == a => b,
+        Some([a, b]) if phase == b => a,
+        _ => phase,
+    };
+    let from = &model.phases()[source].xi;
+    let mut to = from.clone();
+    for (&to_row, &from_row) in reading.rows.iter().zip(&given.rows) {
+        to.row_mut(to_row).copy_from(&from.row(from_row));
+    }
+    to
 }
 
 /// The order given, then the others that differ from it; those with names first.
@@ -207,13 +216,17 @@ fn r2(samples: &[PhaseSamples], xi: impl Fn(usize) -> Option<DMatrix<f64>>) -> O
     r2.is_finite().then_some(r2)
 }
 
-/// R^2 of coefficients fitted by least squares.
+/// R^2 of coefficients fitted by least squares, with a ridge for terms that are alike on the samples.
 fn fitted(samples: &[PhaseSamples]) -> Option<f64> {
+    const RIDGE: f64 = 1e-10;
     r2(samples, |phase| {
         let PhaseSamples { theta, ddz } = &samples[phase];
-        if theta.nrows() < 3 * theta.ncols() || !theta.iter().all(|value| value.is_finite()) {
+        if theta.nrows() < 3 * theta.ncols() {
             return None;
         }
-        theta.clone().svd(true, true).solve(ddz, 1e-9).ok()
+        let mut gram = theta.tr_mul(theta);
+        let ridge = RIDGE * gram.trace();
+        (0..gram.nrows()).for_each(|k| gram[(k, k)] += ridge);
+        Some(gram.cholesky()?.solve(&theta.tr_mul(ddz)))
     })
 }
