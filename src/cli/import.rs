@@ -120,22 +120,14 @@ pub fn import_compared(
         options.library_order = Some(LibraryOrder::ROMC);
     }
     let (mut imported, mut check) = compared(&options)?;
-    if is_open {
-        let decided = check.trials.decided_order().filter(|_| check.maps_fit());
-        match decided {
-            Some(order) if options.library_order == Some(order) => {}
-            Some(_) => {
-                options.library_order = decided;
-                (imported, check) = compared(&options)?;
-            }
-            // Refused below, with the reason.
-            None if check.is_refused() && !unchecked => {}
-            None => {
-                // The importer asks for the order, unless all are the same.
-                options.library_order = None;
-                imported.report = read(&options)?.report;
-            }
-        }
+    let decided = check.trials.decided_order().filter(|_| check.maps_fit());
+    if is_open && decided.is_some() && decided != options.library_order {
+        options.library_order = decided;
+        (imported, check) = compared(&options)?;
+    } else if is_open && decided.is_none() && (unchecked || !check.is_refused()) {
+        // The importer asks for the order, unless all are the same.
+        options.library_order = None;
+        read(&options)?;
     }
     let tensor = |part: &str| {
         let used = imported.report.used.iter().find(|used| used.role == part);

@@ -49,6 +49,11 @@ pub(super) fn parts(
     tensors: &TensorFile<'_>,
     options: &ImportOptions,
 ) -> Result<(Parts, ImportReport), ImportError> {
+    if matches!(options.library, Some(LibraryChoice::Terms(_))) && options.library_order.is_some() {
+        let found = "a list of terms, which has an order";
+        let expected = "--library degree=N[,trigonometric][,inputs]";
+        return Err(ImportFault::option("--library-order", found, expected));
+    }
     let assignment = assign(tensors, options)?;
     let mut assembly = Assembly {
         tensors,
@@ -208,19 +213,12 @@ impl<'a> Assembly<'a, '_> {
         library: &Library,
         phases: &mut [Phase],
     ) -> Result<Vec<String>, ImportError> {
-        let stated = self.options.library_order;
         let LibraryChoice::Standard(standard) = library.choice() else {
-            return match stated {
-                None => Ok((library.terms().iter().map(|term| term.text().to_owned())).collect()),
-                Some(_) => {
-                    let found = "a list of terms, which has an order";
-                    let expected = "--library degree=N[,trigonometric][,inputs]";
-                    Err(ImportFault::option("--library-order", found, expected))
-                }
-            };
+            let terms = library.terms().iter().map(|term| term.text().to_owned());
+            return Ok(terms.collect());
         };
         let latent_dim = library.latent_dim();
-        let order = library::order(standard, latent_dim, stated)?;
+        let order = library::order(standard, latent_dim, self.options.library_order)?;
         let rows = standard.rows_in(order, latent_dim);
         let rows = rows.map_err(|source| self.unusable(source))?;
         for phase in phases {

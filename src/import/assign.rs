@@ -52,6 +52,13 @@ pub(super) fn assign<'f>(
     let is_unused = |info: &&TensorInfo| used.iter().all(|a| a.info.name != info.name);
     let unused: Vec<&TensorInfo> = tensors.infos().iter().filter(is_unused).collect();
     check_layers(tensors, options, &unused)?;
+    if let Some(mean) = unused
+        .iter()
+        .find(|info| mentions(&info.name, "mean.input"))
+    {
+        let expected = "inputs divided by std.input alone, or a file without it: u_lat has no mean";
+        return Err(tensors.refused(Place::Whole, mean.describe(), expected));
+    }
     Ok(Assignment {
         phases,
         used,

@@ -91,19 +91,10 @@ pub(super) fn order(
 /// The shorthands that have this many terms.
 pub(super) fn standards_with(term_count: usize, latent_dim: usize) -> Vec<String> {
     let fits = |standard: &StandardLibrary| standard.term_count(latent_dim) == Some(term_count);
-    small_standards().filter(fits).map(standard_text).collect()
-}
-
-/// The standard libraries that shorthands are suggested for, the richest of a degree first.
-pub(super) fn small_standards() -> impl Iterator<Item = StandardLibrary> {
-    (0..=3).flat_map(|degree| {
-        let more = [(true, true), (true, false), (false, true), (false, false)];
-        more.map(|(trigonometric, inputs)| StandardLibrary {
-            degree,
-            trigonometric,
-            inputs,
-        })
-    })
+    StandardLibrary::small()
+        .filter(fits)
+        .map(standard_text)
+        .collect()
 }
 
 /// Reads a list of terms: a JSON list of texts, a JSON object with such a list under `library`, or

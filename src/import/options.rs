@@ -320,12 +320,11 @@ impl ImportOptions {
 
 #[cfg(test)]
 mod tests {
-    use super::super::library::small_standards;
     use super::*;
 
     #[test]
     fn shorthand_reads_back_from_its_text() {
-        for standard in small_standards() {
+        for standard in StandardLibrary::small() {
             let text = standard_text(standard);
             assert_eq!(parse_standard(&text).expect(&text), standard);
         }

@@ -85,7 +85,7 @@ const FILES: [(&str, &[u8], &str, &str); 17] = [
         "net.h5",
         b"\x89HDF\r\n\x1a\n keras_version",
         "a Keras model",
-        "getattr(v, \"path\", v.name)",
+        "f\"{k}/{v.path}\"",
     ),
     (
         "net.keras",

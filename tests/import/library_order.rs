@@ -180,8 +180,13 @@ fn fitted() -> (ReducedModel, Vec<DMatrix<f64>>) {
     (original, xi)
 }
 
-/// Imports the maps with coefficients by phase, compared with the jump.
+/// Imports the maps with coefficients by phase over a shorthand, compared with the jump.
 fn compared(original: &ReducedModel, xi: &[DMatrix<f64>], more: &[&str]) -> (Output, Value) {
+    let library = ["--library", "degree=1,trigonometric,inputs"];
+    compared_with(original, xi, &[&library[..], more].concat())
+}
+
+fn compared_with(original: &ReducedModel, xi: &[DMatrix<f64>], more: &[&str]) -> (Output, Value) {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let (encoder, decoder) = (original.encoder().unwrap(), original.decoder().unwrap());
     let mut tensors: Vec<Stored> = vec![
@@ -220,7 +225,6 @@ fn compared(original: &ReducedModel, xi: &[DMatrix<f64>], more: &[&str]) -> (Out
             &jump,
             "--json",
         ],
-        &["--library", "degree=1,trigonometric,inputs"],
         more,
     ];
     let done = romc(folder.path(), &arguments.concat());
@@ -275,6 +279,22 @@ fn order_without_a_name_is_refused_with_the_terms_in_it() {
         said.contains(&format!("expected --library \"{list}\"")),
         "{said}"
     );
+}
+
+#[test]
+fn list_in_another_order_than_the_coefficients_is_refused_with_the_one_that_fits() {
+    let (original, xi) = fitted();
+    let stored = in_order(&xi, &terms("paper", 4, 1, true));
+    let list = |order: &str| terms(order, 4, 1, true).join("; ");
+    let (wrong, _) = compared_with(&original, &stored, &["--library", &list("romc")]);
+    assert_eq!(wrong.status.code(), Some(1), "{}", text(&wrong.stderr));
+    let said = text(&wrong.stderr);
+    assert!(
+        said.contains(&format!("expected --library \"{}\"", list("paper"))),
+        "{said}"
+    );
+    let (right, _) = compared_with(&original, &stored, &["--library", &list("paper")]);
+    assert!(right.status.success(), "{}", text(&right.stderr));
 }
 
 #[test]

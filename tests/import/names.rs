@@ -180,6 +180,8 @@ fn tensors_of_an_encoder_that_are_no_linear_layer_are_refused() {
         said.contains("`net.encoder.1.running_mean` (2 x 1) in the encoder"),
         "{said}"
     );
+    stored[1].name = "mean_input".to_owned();
+    assert!(refusal(&stored, &options(TERMS)).contains("u_lat has no mean"));
     stored[1].name = "optimizer.net.encoder.0.weight".to_owned();
     assert_eq!(
         run(&stored, &options(TERMS))

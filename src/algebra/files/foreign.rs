@@ -100,11 +100,12 @@ numpy.savez(\"{folder}/model.npz\", **{name: saved.get_tensor(name) for name in 
             (b.starts_with(b"PK") && has(b, b"model.weights.h5"))
                 || (b.starts_with(HDF5_MAGIC) && has(b, b"keras_version"))
         },
-        // In Keras 3 `v.name` is `kernel` for the weights of every layer; `v.path` is unique.
+        // In Keras 3 `v.name` is `kernel` for the weights of every layer, and a loaded model's `v.path` lacks the names
+        // of the parts of the model: numbers make the names unique.
         lines: "\
 import keras, numpy
 model = keras.models.load_model(\"{file}\", compile=False)
-numpy.savez(\"{stem}.npz\", **{getattr(v, \"path\", v.name): v.numpy() for v in model.variables})",
+numpy.savez(\"{stem}.npz\", **{f\"{k}/{v.path}\": v.numpy() for k, v in enumerate(model.variables)})  # Keras 2: v.name",
     },
     Kind {
         what: "a MATLAB file of version 7.3 (HDF5)",

@@ -205,6 +205,18 @@ impl StandardLibrary {
         Some(count)
     }
 
+    /// The libraries up to degree 3, the richest of a degree first.
+    pub fn small() -> impl Iterator<Item = Self> {
+        (0..=3).flat_map(|degree| {
+            let more = [(true, true), (true, false), (false, true), (false, false)];
+            more.map(|(trigonometric, inputs)| Self {
+                degree,
+                trigonometric,
+                inputs,
+            })
+        })
+    }
+
     /// The terms in the syntax of the model file.
     pub(super) fn texts(&self, latent_dim: usize) -> Result<Vec<String>, LibraryError> {
         self.texts_in(LibraryOrder::ROMC, latent_dim)

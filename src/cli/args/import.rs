@@ -40,10 +40,12 @@ fn library_argument(text: &str) -> Result<LibraryArgument, ImportError> {
 #[derive(Debug, Args)]
 #[command(
     after_help = "Tensors are found by the names of the parts, encoder.weight, encoder.bias, decoder.weight,\n\
-                  decoder.bias, xi.PHASE (or sindy_coefficients.PHASE), mask.PHASE (or coefficient_mask.PHASE), input_mean.PHASE,\n\
-                  input_covariance.PHASE, scaling.state, scaling.input, mean.state, std.state, std.input, alone or behind names of modules (net.encoder.0.weight), with dots or\n\
-                  underscores (xi_contact); --map names the others. Statistics are of u in SI units: 18 numbers\n\
-                  and 18 x 18. The part and layout of each tensor are printed.\n\n\
+                  decoder.bias, xi.PHASE (or sindy_coefficients.PHASE), mask.PHASE (or coefficient_mask.PHASE),\n\
+                  input_mean.PHASE, input_covariance.PHASE, scaling.state, scaling.input, mean.state, std.state,\n\
+                  std.input, alone or behind names of modules (net.encoder.0.weight, encoder/dense_1/kernel), with\n\
+                  dots, slashes or underscores (xi_contact); --map names the others. Statistics are of u in SI units:\n\
+                  18 numbers and 18 x 18. The part and layout of each tensor, the tensors that are not used and the\n\
+                  terms of the rows of Xi are printed.\n\n\
                   Examples:\n  \
                   romc import net.safetensors --library degree=1,trigonometric,inputs --library-order paper \\\n      \
                   --scaling 0.1 --map xi.contact=Xi_c --map xi.flight=Xi_f --robot go1 --output my-model.json\n  \

@@ -22,8 +22,8 @@ const NO_RESIDUAL: f64 = 1e-9;
 /// How coefficients are to be read instead.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CoefficientSlip {
-    /// The order of the terms, and the terms in it.
-    pub order: Option<(LibraryOrder, Vec<String>)>,
+    /// The option that states another order of the terms.
+    pub order: Option<String>,
     /// Two phases that have each other's coefficients.
     pub exchanged: Option<[String; 2]>,
 }
@@ -52,7 +52,7 @@ struct Reading {
 }
 
 impl CoefficientTrials {
-    /// Tries all readings of a model whose file has its terms in an order; none for a list of terms.
+    /// Tries all readings of a model; `order` is that of a shorthand's terms in the file.
     pub(super) fn new(
         model: &ReducedModel,
         segments: &[&Segment],
@@ -89,10 +89,7 @@ impl CoefficientTrials {
         let other = reading.order.filter(|_| reading.order != readings[0].order);
         let name = |phase: usize| model.phases()[phase].name.clone();
         let slip = CoefficientSlip {
-            order: match other {
-                Some(order) => Some((order, texts(model, order)?)),
-                None => None,
-            },
+            order: other.map(|order| option(model, order)),
             exchanged: exchanged.map(|pair| pair.map(name)),
         };
         let is_slip = slip.order.is_some() || slip.exchanged.is_some();
@@ -144,25 +141,36 @@ fn read(
 
 /// The order given, then the others that differ from it; those with names first.
 fn readings(model: &ReducedModel, given: Option<LibraryOrder>) -> Result<Vec<Reading>, ModelError> {
-    let LibraryChoice::Standard(standard) = model.library().choice() else {
-        let rows = (0..model.library().len()).collect();
-        return Ok(vec![Reading { order: None, rows }]);
+    let library = model.library();
+    let is_list = matches!(library.choice(), LibraryChoice::Terms(_));
+    let as_listed = Reading {
+        order: None,
+        rows: (0..library.len()).collect(),
     };
-    let mut readings: Vec<Reading> = Vec::new();
-    for order in given.into_iter().chain(LibraryOrder::common()) {
-        let rows = standard.rows_in(order, model.latent_dim())?;
-        if readings.iter().all(|reading| reading.rows != rows) {
-            let order = Some(order);
-            readings.push(Reading { order, rows });
+    let mut readings: Vec<Reading> = Vec::from_iter(is_list.then_some(as_listed));
+    if let Some((standard, places)) = library.as_standard() {
+        for order in given.into_iter().chain(LibraryOrder::common()) {
+            let rows = standard.rows_in(order, library.latent_dim())?;
+            let rows: Vec<usize> = rows.iter().map(|&row| places[row]).collect();
+            if readings.iter().all(|reading| reading.rows != rows) {
+                let order = Some(order);
+                readings.push(Reading { order, rows });
+            }
         }
     }
     Ok(readings)
 }
 
-fn texts(model: &ReducedModel, order: LibraryOrder) -> Result<Vec<String>, ModelError> {
-    match model.library().choice() {
-        LibraryChoice::Standard(standard) => Ok(standard.texts_in(order, model.latent_dim())?),
-        LibraryChoice::Terms(terms) => Ok(terms),
+/// The option that states an order.
+fn option(model: &ReducedModel, order: LibraryOrder) -> String {
+    let (library, name) = (model.library(), order.name());
+    match (library.choice(), name, library.as_standard()) {
+        (LibraryChoice::Standard(_), Some(name), _) => format!("--library-order {name}"),
+        (_, _, Some((standard, _))) => {
+            let terms = standard.texts_in(order, library.latent_dim());
+            format!("--library \"{}\"", terms.unwrap_or_default().join("; "))
+        }
+        (_, _, None) => String::new(),
     }
 }
 

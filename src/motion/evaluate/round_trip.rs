@@ -203,12 +203,9 @@ impl CoefficientSlip {
                 expected.extend(tensor.map(|tensor| format!("--map {part}.{to}={tensor}")));
             }
         }
-        if let Some((order, terms)) = &self.order {
+        if let Some(option) = &self.order {
             with.push("the terms in another order".to_owned());
-            expected.push(match order.name() {
-                Some(name) => format!("--library-order {name}"),
-                None => format!("--library \"{}\"", terms.join("; ")),
-            });
+            expected.push(option.clone());
         }
         format!(
             "with {}: expected {}",
