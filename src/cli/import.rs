@@ -11,8 +11,8 @@ use super::output::{lines, named, read_recordings};
 use super::robot;
 use crate::evaluate::RoundTrip;
 use crate::import::{
-    Chosen, ImportError, ImportFault, ImportOptions, ImportReport, Imported, SymbolNames, import,
-    read_terms,
+    Chosen, Format as FileKind, ImportError, ImportFault, ImportOptions, ImportReport, Imported,
+    SymbolNames, import, read_terms,
 };
 use crate::model::{LibraryChoice, LibraryOrder, ReducedModel};
 use crate::recording::Segment;
@@ -36,6 +36,14 @@ pub fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
         .and_robot(arguments.robot.as_deref())
         .check_output(Some(&arguments.output), Format::MODEL, arguments.force)?;
     let options = options(arguments)?;
+    let kind = options
+        .format
+        .map_or_else(|| FileKind::of_path(&arguments.file), Ok);
+    let is_text = matches!(kind, Ok(FileKind::Equations | FileKind::Latex));
+    if is_text && !arguments.inputs_from.is_empty() {
+        let (found, expected) = ("a file of equations", "a file with encoder and decoder");
+        return Err(ImportFault::option("--inputs-from", found, expected).into());
+    }
     let recordings = read_recordings(&arguments.inputs_from, &arguments.reading)?;
     let segments: Vec<&Segment> = recordings.iter().flat_map(|r| &r.segments).collect();
     let read = |options: &ImportOptions| import(&arguments.file, options);

@@ -103,6 +103,9 @@ fn check_options(latent_dim: usize, options: &ImportOptions) -> Result<(), Impor
         ("--weights", options.weights.is_some()),
         ("--xi-layout", options.xi_layout.is_some()),
         ("--library-order", options.library_order.is_some()),
+        ("--activation", options.activation.is_some()),
+        ("--input-scaling", options.input_scaling.is_some()),
+        ("--order", options.order.is_some()),
     ];
     match given.iter().find(|(_, is_given)| *is_given) {
         None => Ok(()),
