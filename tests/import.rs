@@ -12,11 +12,18 @@ mod equations;
 mod faults;
 #[path = "import/foreign.rs"]
 mod foreign;
+#[path = "import/formats.rs"]
+mod formats;
 #[path = "import/hostile.rs"]
 mod hostile;
+#[path = "import/library_order.rs"]
+mod library_order;
+#[path = "import/names.rs"]
+mod names;
 #[path = "import/round_trip.rs"]
 mod round_trip;
 #[path = "import/store.rs"]
 mod store;
+mod tools;
 #[path = "import/trained.rs"]
 mod trained;

@@ -6,12 +6,11 @@ use std::path::PathBuf;
 use numpy::{PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use romc::Error;
-use romc::evaluate::RoundTrip;
+use romc::cli::{Compared, import_compared};
 use romc::import::{ImportOptions, Tensor, parse_standard};
 use romc::model::LibraryChoice;
 use romc::robot::{Actuators, Robot};
 use romc::robot_file::{ActuatorsEntry, RobotFileError, find, read_actuators};
-use romc::sim::with_input_statistics;
 
 use crate::errors::{choice, python_error, wrench_frame};
 use crate::model::Model;
@@ -26,6 +25,8 @@ pub struct ImportArguments {
     /// The shorthand, if `terms` is not given.
     library: Option<String>,
     terms: Option<Vec<String>>,
+    /// The order of the shorthand's terms.
+    library_order: Option<String>,
     latent_dim: Option<usize>,
     /// `NAME=FEET` each.
     phases: Vec<String>,
@@ -84,6 +85,9 @@ impl ImportArguments {
             name: self.name.clone(),
             description: self.description.clone(),
             library,
+            library_order: (self.library_order.as_deref())
+                .map(|name| choice(py, "library_order", name))
+                .transpose()?,
             latent_dim: self.latent_dim,
             phases: (phases.map(|text| text.parse().map_err(refused))).collect::<PyResult<_>>()?,
             mapping: (map.map(|text| text.parse().map_err(refused))).collect::<PyResult<_>>()?,
@@ -127,23 +131,14 @@ pub fn import_tensors(
         })
         .collect::<PyResult<_>>()?;
     let recordings = gather(&recordings);
-    let made = py.detach(|| -> Result<_, Error> {
-        let model = romc::import::import_tensors(source, &tensors, &options)?.model;
+    let made = py.detach(|| {
         let segments: Vec<_> = recordings.iter().flat_map(|r| &r.segments).collect();
-        if segments.is_empty() {
-            return Ok((model, None));
-        }
-        let model = with_input_statistics(model, &segments)?;
-        let check = RoundTrip::of_import(&model, &segments)?;
-        let is_refused = check.as_ref().is_some_and(RoundTrip::is_refused);
-        match check.as_ref().and_then(RoundTrip::fault) {
-            Some(fault) if is_refused && !arguments.unchecked => Err(Error::Mismatch {
-                file: source.into(),
-                fault,
-            }),
-            fault => Ok((model, fault)),
-        }
+        let read =
+            |options: &ImportOptions| romc::import::import_tensors(source, &tensors, options);
+        import_compared(read, options, &segments, arguments.unchecked)
     });
-    let (model, fault) = made.map_err(|error| python_error(py, error))?;
-    Ok((Model::new(model), fault))
+    let Compared {
+        imported, fault, ..
+    } = made.map_err(|error| python_error(py, error))?;
+    Ok((Model::new(imported.model), fault))
 }

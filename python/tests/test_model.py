@@ -314,3 +314,38 @@ def test_factors_of_inputs_stand_beside_deviations_of_states(parts):
     scaling = model.to_dict()["scaling"]
     np.testing.assert_allclose(scaling["state"], 1 / std, rtol=1e-14)
     assert scaling["input"] in (0.25, [0.25] * 18)
+
+
+def test_order_of_the_terms_is_stated_or_asked_for():
+    xi = np.random.default_rng(4).normal(size=(7, 1))
+    library = romc.Library(degree=1, trigonometric=True)
+    with pytest.raises(romc.RomcError, match=r'library_order="paper" \(cos\(z1\) in row 5\)'):
+        romc.Model.from_arrays(xi=xi, library=library)
+    rows = {"paper": [0, 1, 2, 3, 5, 4, 6], "interleaved": [0, 1, 2, 3, 5, 4, 6], "romc": range(7)}
+    for order, places in rows.items():
+        model = romc.Model.from_arrays(xi=xi, library=library, library_order=order)
+        assert model.library == ["1", "z1", "dz1", "sin(z1)", "sin(dz1)", "cos(z1)", "cos(dz1)"]
+        assert np.array_equal(model.xi["always"], xi[places])
+        stated = romc.Library(degree=1, trigonometric=True, order=order)
+        assert romc.Model.from_arrays(xi=xi, library=stated) == model
+    with pytest.raises(romc.ModelError, match="expected one order"):
+        romc.Model.from_arrays(xi=xi, library=stated, library_order="paper")
+    with pytest.raises(romc.RomcError, match="expected one of paper, interleaved, romc"):
+        romc.Model.from_arrays(xi=xi, library=library, library_order="mine")
+
+
+def test_arguments_that_are_missing_are_named_with_a_remedy():
+    with pytest.raises(romc.ModelError, match='library= degree=N|library="degree=N') as caught:
+        romc.Model.from_arrays(xi={"contact": np.ones((7, 2))})
+    assert 'library="degree=1,inputs"' in str(caught.value)
+    with pytest.raises(romc.ModelError, match="no tensor for xi.PHASE"):
+        romc.Model.from_arrays(library=romc.Library())
+
+
+def test_files_of_other_tools_are_named_with_the_lines_that_convert_them(tmp_path):
+    path = tmp_path / "net.pt"
+    path.write_bytes(b"PK\x03\x04 net/data.pkl")
+    with pytest.raises(romc.ModelError, match="found a PyTorch file") as caught:
+        romc.Model.load(path)
+    assert "Model.from_arrays, from_torch" in str(caught.value)
+    assert "\n    import torch, safetensors.torch\n" in str(caught.value)

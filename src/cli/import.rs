@@ -10,8 +10,11 @@ use super::destination::{Format, Inputs};
 use super::output::{lines, named, read_recordings};
 use super::robot;
 use crate::evaluate::RoundTrip;
-use crate::import::{Chosen, ImportOptions, ImportReport, SymbolNames, import, read_terms};
-use crate::model::{LibraryChoice, ReducedModel};
+use crate::import::{
+    Chosen, Format as FileKind, ImportError, ImportFault, ImportOptions, ImportReport, Imported,
+    SymbolNames, import, read_terms,
+};
+use crate::model::{LibraryChoice, LibraryOrder, ReducedModel};
 use crate::recording::Segment;
 use crate::robot_file::read_actuators;
 use crate::sim::with_input_statistics;
@@ -22,7 +25,7 @@ use crate::{Error, artifact};
 pub fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
     let library = match &arguments.library {
         Some(LibraryArgument::File(path)) => Some(path),
-        Some(LibraryArgument::Shorthand(_)) | None => None,
+        Some(LibraryArgument::Shorthand(_) | LibraryArgument::Terms(_)) | None => None,
     };
     Inputs::default()
         .and([&arguments.file])
@@ -32,16 +35,25 @@ pub fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
         .and(&arguments.reading.columns)
         .and_robot(arguments.robot.as_deref())
         .check_output(Some(&arguments.output), Format::MODEL, arguments.force)?;
-    let imported = import(&arguments.file, &options(arguments)?)?;
+    let options = options(arguments)?;
+    let kind = options
+        .format
+        .map_or_else(|| FileKind::of_path(&arguments.file), Ok);
+    let is_text = matches!(kind, Ok(FileKind::Equations | FileKind::Latex));
+    if is_text && !arguments.inputs_from.is_empty() {
+        let (found, expected) = ("a file of equations", "a file with encoder and decoder");
+        return Err(ImportFault::option("--inputs-from", found, expected).into());
+    }
     let recordings = read_recordings(&arguments.inputs_from, &arguments.reading)?;
     let segments: Vec<&Segment> = recordings.iter().flat_map(|r| &r.segments).collect();
-    let model = match segments.is_empty() {
-        true => imported.model,
-        false => with_input_statistics(imported.model, &segments)?,
-    };
-    let check = checked(&model, &segments, arguments)?;
+    let read = |options: &ImportOptions| import(&arguments.file, options);
+    let Compared {
+        imported: Imported { model, report },
+        check,
+        fault,
+    } = import_compared(read, options, &segments, arguments.unchecked)?;
     artifact::write(&arguments.output, &model, arguments.force)?;
-    let mut text = describe(&imported.report);
+    let mut text = describe(&report);
     let has_axes = model.robot().is_ok() && model.encoder_map().is_ok();
     let axes = (has_axes && arguments.wrench_frame.is_none()).then(|| {
         let frame = model.wrench_frame().name();
@@ -51,7 +63,11 @@ pub fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
         )
     });
     text += &lines("note: ", &axes);
-    text.extend(check.as_ref().map(describe_check));
+    text.extend(
+        check
+            .as_ref()
+            .map(|check| describe_check(check, fault.as_deref())),
+    );
     let (output, name) = (arguments.output.display().to_string(), model.name());
     let _ = writeln!(text, "{output}: model `{name}`");
     let lacking = lacking(&model);
@@ -60,30 +76,99 @@ pub fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
         "model": output,
         "name": name,
         "digest": artifact::digest(&model).to_string(),
-        "report": imported.report,
+        "report": report,
         "wrench_axes": axes,
         "lacking": lacking,
-        "check": check.as_ref().map(check_json),
+        "check": check.as_ref().map(|check| check_json(check, fault.as_deref())),
     });
     Ok(Answer { text, json })
 }
 
-/// Compares the model with the recordings, if there are any and it has both maps; refuses one that
-/// misses them.
-fn checked(
-    model: &ReducedModel,
+/// An imported model, compared with recordings if there are any.
+#[derive(Debug)]
+pub struct Compared {
+    /// The model, with the statistics of the recorded inputs.
+    pub imported: Imported,
+    /// What the recordings reveal about it.
+    pub check: Option<RoundTrip>,
+    /// What is wrong with it and no reason to refuse it.
+    pub fault: Option<String>,
+}
+
+/// Imports a model by `read` and compares it with recordings. Where the order of a standard library's terms is not
+/// stated, the recordings decide it.
+///
+/// # Errors
+/// [`Error::Mismatch`] for a model that misses the recordings, unless `unchecked`; the importer's own.
+pub fn import_compared(
+    read: impl Fn(&ImportOptions) -> Result<Imported, ImportError>,
+    mut options: ImportOptions,
     segments: &[&Segment],
-    arguments: &ImportArguments,
-) -> Result<Option<RoundTrip>, Error> {
-    let check = RoundTrip::of_import(model, segments)?;
-    let is_refused = check.as_ref().is_some_and(RoundTrip::is_refused);
-    match check.as_ref().and_then(RoundTrip::fault) {
-        Some(fault) if is_refused && !arguments.unchecked => Err(Error::Mismatch {
-            file: arguments.file.clone(),
+    unchecked: bool,
+) -> Result<Compared, Error> {
+    if segments.is_empty() {
+        let imported = read(&options)?;
+        let (check, fault) = (None, None);
+        return Ok(Compared {
+            imported,
+            check,
+            fault,
+        });
+    }
+    let compared = |options: &ImportOptions| -> Result<(Imported, RoundTrip), Error> {
+        let mut imported = read(options)?;
+        imported.model = with_input_statistics(imported.model, segments)?;
+        let check = RoundTrip::of_import(&imported.model, segments, options.library_order)?;
+        let check = check.ok_or_else(|| needs_maps(&imported.report))?;
+        Ok((imported, check))
+    };
+    let is_open = options.library_order.is_none()
+        && matches!(options.library, Some(LibraryChoice::Standard(_)));
+    if is_open {
+        options.library_order = Some(LibraryOrder::ROMC);
+    }
+    let (mut imported, mut check) = compared(&options)?;
+    let decided = check.trials.decided_order().filter(|_| check.maps_fit());
+    if is_open && decided.is_some() && decided != options.library_order {
+        options.library_order = decided;
+        (imported, check) = compared(&options)?;
+    } else if is_open && decided.is_none() && (unchecked || !check.is_refused()) {
+        // The importer asks for the order, unless all are the same.
+        options.library_order = None;
+        read(&options)?;
+    }
+    let tensor = |part: &str| {
+        let used = imported.report.used.iter().find(|used| used.role == part);
+        used.map(|used| used.tensor.clone())
+    };
+    let fault = check.fault(&tensor);
+    match fault {
+        Some(fault) if check.is_refused() && !unchecked => Err(Error::Mismatch {
+            file: imported.report.file.into(),
             fault,
         }),
-        _ => Ok(check),
+        fault => Ok(Compared {
+            check: Some(check),
+            imported,
+            fault,
+        }),
     }
+}
+
+/// A model without both maps cannot be compared with recordings.
+fn needs_maps(report: &ImportReport) -> Error {
+    let unused = report
+        .unused
+        .iter()
+        .map(|unused| format!("`{}`", unused.tensor));
+    let unused: Vec<String> = unused.collect();
+    let left = match unused.is_empty() {
+        true => "no tensor is left".to_owned(),
+        false => format!("left are {}", unused.join(", ")),
+    };
+    let found = format!("a model without encoder or decoder to compare; {left}");
+    let expected = "both (--map encoder.weight=TENSOR, --map decoder.weight=TENSOR)";
+    ImportFault::option("--inputs-from", found, expected).into()
 }
 
 /// Commands that cannot use a model, and the option that mends it.
@@ -122,7 +207,9 @@ fn options(arguments: &ImportArguments) -> Result<ImportOptions, Error> {
             None => None,
             Some(LibraryArgument::Shorthand(standard)) => Some(LibraryChoice::Standard(*standard)),
             Some(LibraryArgument::File(path)) => Some(LibraryChoice::Terms(read_terms(path)?)),
+            Some(LibraryArgument::Terms(terms)) => Some(LibraryChoice::Terms(terms.clone())),
         },
+        library_order: arguments.library_order,
         latent_dim: arguments.latent_dim,
         phases: arguments.phase.clone(),
         order: arguments.order.clone(),
@@ -158,6 +245,13 @@ fn describe(report: &ImportReport) -> String {
             .table();
         let _ = writeln!(text, "{table}");
     }
+    if !report.terms.is_empty() {
+        let order = report
+            .library_order
+            .map(|order| format!(" (--library-order {order})"));
+        let (order, terms) = (order.unwrap_or_default(), report.terms.join("; "));
+        let _ = writeln!(text, "rows of xi{order}: {terms}\n");
+    }
     if !report.equations.is_empty() {
         let table = Table::of(&report.equations)
             .column("equation", "", |equation| &equation.output)
@@ -183,7 +277,7 @@ fn shape(dims: &[usize]) -> String {
 }
 
 /// What the recordings of `--inputs-from` say of the imported model, as text.
-fn describe_check(check: &RoundTrip) -> String {
+fn describe_check(check: &RoundTrip, fault: Option<&str>) -> String {
     let mut text = format!(
         "\nOn the recordings: decode(encode(x)) misses {:.3} of the variance",
         check.error
@@ -193,17 +287,32 @@ fn describe_check(check: &RoundTrip) -> String {
             let _ = write!(text, "; R^2 of ddz in {phase} {r2:.3}");
         }
     }
-    text + "\n" + &lines("warning: ", check.fault()) + "\n"
+    if check.trials.by_order.len() > 1 {
+        let orders = check.trials.by_order.iter().map(|(order, r2)| {
+            let name = order.name().unwrap_or_default();
+            format!("{r2:.3} in the order {name}")
+        });
+        let _ = write!(
+            text,
+            "; of all phases {}",
+            orders.collect::<Vec<_>>().join(", ")
+        );
+    }
+    text + "\n" + &lines("warning: ", fault) + "\n"
 }
 
 /// The same as JSON.
-fn check_json(check: &RoundTrip) -> Value {
+fn check_json(check: &RoundTrip, fault: Option<&str>) -> Value {
+    let orders: Map<String, Value> = (check.trials.by_order.iter())
+        .map(|(order, r2)| (order.name().unwrap_or_default().to_owned(), json!(r2)))
+        .collect();
     let phases: Map<String, Value> = (check.acceleration_r2.iter())
         .map(|(phase, r2)| (phase.clone(), json!(r2)))
         .collect();
     json!({
         "reconstruction_error": check.error,
         "acceleration_r2": phases,
-        "fault": check.fault(),
+        "library_order_r2": orders,
+        "fault": fault,
     })
 }

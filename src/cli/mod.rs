@@ -28,6 +28,8 @@ mod study;
 mod train;
 mod train_settings;
 
+pub use import::{Compared, import_compared};
+
 use std::borrow::Cow;
 use std::ffi::OsString;
 use std::io::{self, Write};

@@ -49,6 +49,11 @@ pub(super) fn parts(
     tensors: &TensorFile<'_>,
     options: &ImportOptions,
 ) -> Result<(Parts, ImportReport), ImportError> {
+    if matches!(options.library, Some(LibraryChoice::Terms(_))) && options.library_order.is_some() {
+        let found = "a list of terms, which has an order";
+        let expected = "--library degree=N[,trigonometric][,inputs]";
+        return Err(ImportFault::option("--library-order", found, expected));
+    }
     let assignment = assign(tensors, options)?;
     let mut assembly = Assembly {
         tensors,
@@ -61,6 +66,9 @@ pub(super) fn parts(
         report: ImportReport::default(),
     };
     let (encoder, decoder) = assembly.maps()?;
+    if encoder.is_none() && decoder.is_none() {
+        assembly.check_options_of_maps()?;
+    }
     let (library, phases) = assembly.coefficients()?;
     let statistics = assembly.statistics()?;
     let mut parts = Parts {
@@ -193,8 +201,51 @@ impl<'a> Assembly<'a, '_> {
             phases.push(Phase { name, feet, xi });
         }
         let latent_dim = phases[0].xi.ncols();
-        let library = library::build(choice, latent_dim);
-        Ok((library.map_err(|source| self.unusable(source))?, phases))
+        let library = library::build(self.tensors.file(), choice, latent_dim)?;
+        self.report.terms = self.sort_terms(&library, &mut phases)?;
+        Ok((library, phases))
+    }
+
+    /// Brings the rows of coefficients over a standard library from the file's order into romc's;
+    /// returns the terms in the file's order.
+    fn sort_terms(
+        &mut self,
+        library: &Library,
+        phases: &mut [Phase],
+    ) -> Result<Vec<String>, ImportError> {
+        let LibraryChoice::Standard(standard) = library.choice() else {
+            let terms = library.terms().iter().map(|term| term.text().to_owned());
+            return Ok(terms.collect());
+        };
+        let latent_dim = library.latent_dim();
+        let order = library::order(standard, latent_dim, self.options.library_order)?;
+        let rows = standard.rows_in(order, latent_dim);
+        let rows = rows.map_err(|source| self.unusable(source))?;
+        for phase in phases {
+            let stored = phase.xi.clone();
+            for (place, &row) in rows.iter().enumerate() {
+                phase.xi.row_mut(row).copy_from(&stored.row(place));
+            }
+        }
+        self.report.library_order = order.name();
+        let terms = standard.texts_in(order, latent_dim);
+        terms.map_err(|source| self.unusable(source))
+    }
+
+    /// Refuses options that are of use with an encoder or decoder alone.
+    fn check_options_of_maps(&self) -> Result<(), ImportError> {
+        let Some(option) = self.options.of_maps() else {
+            return Ok(());
+        };
+        let unused = &self.assignment.unused;
+        let unused: Vec<String> = unused.iter().take(24).map(|info| info.describe()).collect();
+        let left = match unused.is_empty() {
+            true => "no tensor is left".to_owned(),
+            false => format!("left are {}", unused.join(", ")),
+        };
+        let found = format!("{option}, but no tensor for encoder.weight or decoder.weight; {left}");
+        let expected = format!("--map encoder.weight=TENSOR and so on, or no {option}");
+        Err(self.tensors.refused(Place::Whole, found, expected))
     }
 
     /// Coefficients of a phase in the file's order of terms, `library_dim x latent_dim`.

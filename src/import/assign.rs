@@ -3,7 +3,7 @@
 use super::error::{ImportError, ImportFault};
 use super::options::{ImportOptions, PhaseRule};
 use super::report::Chosen;
-use super::role::{ONLY_PHASE, Role};
+use super::role::{ONLY_PHASE, Part, Role, is_of_optimiser, mentions};
 use super::tensors::{TensorFile, TensorInfo};
 use crate::files::Place;
 
@@ -43,8 +43,6 @@ pub(super) fn assign<'f>(
     used.sort_by(|a, b| a.role.cmp(&b.role));
     let phases = phases(tensors, options, &used)?;
     check_mapped_phases(options, &phases)?;
-    let is_known = |phase: &str| phases.iter().any(|rule| rule.name == phase);
-    used.retain(|assigned| assigned.role.phase().is_none_or(is_known));
     for phase in &phases {
         let role = Role::Xi(phase.name.clone());
         if used.iter().all(|assigned| assigned.role != role) {
@@ -52,10 +50,19 @@ pub(super) fn assign<'f>(
         }
     }
     let is_unused = |info: &&TensorInfo| used.iter().all(|a| a.info.name != info.name);
+    let unused: Vec<&TensorInfo> = tensors.infos().iter().filter(is_unused).collect();
+    check_layers(tensors, options, &unused)?;
+    if let Some(mean) = unused
+        .iter()
+        .find(|info| mentions(&info.name, "mean.input"))
+    {
+        let expected = "inputs divided by std.input alone, or a file without it: u_lat has no mean";
+        return Err(tensors.refused(Place::Whole, mean.describe(), expected));
+    }
     Ok(Assignment {
         phases,
-        unused: tensors.infos().iter().filter(is_unused).collect(),
         used,
+        unused,
     })
 }
 
@@ -72,13 +79,23 @@ fn named<'f>(
             (a, b) => a == b,
         })
     };
+    let free = (tensors.infos().iter()).filter(|i| mapped.iter().all(|a| a.info.name != i.name));
+    let found = free.filter_map(|info| Some((info, Role::of_name(&info.name)?)));
+    let found = found.map(|(info, role)| (info, renamed(role, &info.name, options)));
+    let found: Vec<(&TensorInfo, Role)> = found.collect();
+    let of_xi = |role: &Role| match role {
+        Role::Xi(phase) => Some(phase.clone()),
+        _ => None,
+    };
+    let known = found.iter().map(|(_, role)| role);
+    let known = known.chain(mapped.iter().map(|assigned| &assigned.role));
+    let known: Vec<String> = known.filter_map(of_xi).collect();
     let mut named: Vec<Assigned<'f>> = Vec::new();
-    for info in tensors.infos() {
-        let is_free = mapped.iter().all(|a| a.info.name != info.name);
-        let role = Role::of_name(&info.name).filter(|role| is_free && !is_settled(role));
-        let Some(role) = role.map(|role| renamed(role, options)) else {
+    for (info, role) in found {
+        let role = in_phase(tensors, info, role, &known)?;
+        if is_settled(&role) {
             continue;
-        };
+        }
         if let Some(earlier) = named.iter().find(|assigned| assigned.role == role) {
             let (a, b) = (earlier.info.describe(), info.describe());
             let found = format!("{a}, {b} for {role}");
@@ -91,12 +108,75 @@ fn named<'f>(
     Ok(named)
 }
 
-/// Coefficients without a phase belong to the only one there is.
-fn renamed(role: Role, options: &ImportOptions) -> Role {
-    match (role, options.phases.as_slice()) {
-        (Role::Xi(phase), [only]) if phase == ONLY_PHASE => Role::Xi(only.name.clone()),
-        (role, _) => role,
+/// Coefficients without a phase belong to the one whose name their module has, or to the only one there is.
+fn renamed(role: Role, name: &str, options: &ImportOptions) -> Role {
+    if role != Role::Xi(ONLY_PHASE.to_owned()) {
+        return role;
     }
+    let given = options.phases.iter().map(|rule| rule.name.as_str());
+    let mut usual = given.chain(["contact", "flight"]);
+    match (
+        usual.find(|phase| mentions(name, phase)),
+        options.phases.as_slice(),
+    ) {
+        (Some(phase), _) => role.of_phase(phase),
+        (None, [only]) => role.of_phase(&only.name),
+        (None, _) => role,
+    }
+}
+
+/// The role in a phase that has coefficients: its own, that whose name the tensor's has, or the only one.
+fn in_phase(
+    tensors: &TensorFile<'_>,
+    info: &TensorInfo,
+    role: Role,
+    known: &[String],
+) -> Result<Role, ImportError> {
+    let is_known = |phase: &str| known.is_empty() || known.iter().any(|name| name == phase);
+    if role.phase().is_none_or(is_known) {
+        return Ok(role);
+    }
+    let mentioned = known.iter().filter(|phase| mentions(&info.name, phase));
+    match (mentioned.max_by_key(|phase| phase.len()), known) {
+        (Some(phase), _) => Ok(role.of_phase(phase)),
+        (None, [only]) if role.phase() == Some(ONLY_PHASE) => Ok(role.of_phase(only)),
+        (None, _) => {
+            let part = role.of_phase("PHASE");
+            let found = format!(
+                "{} for none of the phases {}",
+                info.describe(),
+                known.join(", ")
+            );
+            let expected = format!("--map {part}={}, or a file without it", info.name);
+            Err(tensors.refused(Place::Whole, found, expected))
+        }
+    }
+}
+
+/// Refuses a tensor in the module of an encoder or decoder that is no weight or bias of a linear layer, unless `--map`
+/// names the weights: without it the map would be another one.
+fn check_layers(
+    tensors: &TensorFile<'_>,
+    options: &ImportOptions,
+    unused: &[&TensorInfo],
+) -> Result<(), ImportError> {
+    let is_mapped = |part: Part| {
+        let mut mapped = options.mapping.iter();
+        mapped.any(|mapping| matches!(mapping.role, Role::Weights(of, _) if of == part))
+    };
+    for part in Part::ALL.into_iter().filter(|part| !is_mapped(*part)) {
+        let mut strays = unused.iter().filter(|info| part.holds(&info.name));
+        if let Some(stray) = strays.find(|info| !is_of_optimiser(&info.name)) {
+            let part = part.name();
+            let found = format!("{} in the {part}", stray.describe());
+            let expected = format!(
+                "weights and biases of linear layers alone (a normalisation folded into them), or the weights named \
+                 with --map {part}.weight=TENSOR"
+            );
+            return Err(tensors.refused(Place::Whole, found, expected));
+        }
+    }
+    Ok(())
 }
 
 /// The tensors of `--map`.

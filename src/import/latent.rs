@@ -26,9 +26,8 @@ pub(super) fn parts(
     check_options(latent_dim, options)?;
     let ordered = phases_in_order(file, sections, options)?;
     let given = (options.library.as_ref())
-        .map(|choice| library::build(choice, latent_dim))
-        .transpose()
-        .map_err(|source| ImportFault::model(file, source))?;
+        .map(|choice| library::build(file, choice, latent_dim))
+        .transpose()?;
     let mut separation = Separation {
         file,
         latent_dim,
@@ -103,6 +102,10 @@ fn check_options(latent_dim: usize, options: &ImportOptions) -> Result<(), Impor
         ("--map", !options.mapping.is_empty()),
         ("--weights", options.weights.is_some()),
         ("--xi-layout", options.xi_layout.is_some()),
+        ("--library-order", options.library_order.is_some()),
+        ("--activation", options.activation.is_some()),
+        ("--input-scaling", options.input_scaling.is_some()),
+        ("--order", options.order.is_some()),
     ];
     match given.iter().find(|(_, is_given)| *is_given) {
         None => Ok(()),

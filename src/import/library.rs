@@ -9,7 +9,7 @@ use super::options::standard_text;
 use super::pysindy;
 use super::run::{check_size, read_file};
 use crate::files::Place;
-use crate::model::{Library, LibraryChoice, LibraryError, StandardLibrary};
+use crate::model::{Library, LibraryChoice, LibraryOrder, StandardLibrary};
 
 /// Largest file with a list of terms.
 const MAX_TERMS_BYTES: u64 = 32 << 20;
@@ -22,32 +22,79 @@ pub(super) fn dim(choice: &LibraryChoice, latent_dim: usize) -> Option<usize> {
     }
 }
 
-/// The library at a latent dimension.
-pub(super) fn build(choice: &LibraryChoice, latent_dim: usize) -> Result<Library, LibraryError> {
-    match choice {
-        LibraryChoice::Terms(terms) => {
-            Library::from_terms(latent_dim, &pysindy::readable(terms, latent_dim))
-        }
-        LibraryChoice::Standard(_) => Library::of(latent_dim, choice.clone()),
+/// The library at a latent dimension; a standard one in romc's order.
+pub(super) fn build(
+    file: &str,
+    choice: &LibraryChoice,
+    latent_dim: usize,
+) -> Result<Library, ImportError> {
+    let choice = match choice {
+        LibraryChoice::Terms(terms) => LibraryChoice::Terms(
+            pysindy::readable(terms, latent_dim)
+                .map_err(|(found, expected)| ImportFault::option("--library", found, expected))?,
+        ),
+        LibraryChoice::Standard(_) => choice.clone(),
+    };
+    Library::of(latent_dim, choice).map_err(|source| ImportFault::model(file, source))
+}
+
+/// The order of a file's terms: as stated, or the only one that there is.
+pub(super) fn order(
+    standard: StandardLibrary,
+    latent_dim: usize,
+    stated: Option<LibraryOrder>,
+) -> Result<LibraryOrder, ImportError> {
+    let texts = |order| standard.texts_in(order, latent_dim);
+    let unusable = |source| ImportFault::model("", source);
+    let orders = LibraryOrder::NAMED.map(texts);
+    let [paper, interleaved, romc] = orders;
+    let orders = [
+        paper.map_err(unusable)?,
+        interleaved.map_err(unusable)?,
+        romc.map_err(unusable)?,
+    ];
+    if let Some(stated) = stated {
+        return Ok(stated);
     }
+    let differs = |a: usize, b: usize| (orders[a].iter().zip(&orders[b])).position(|(a, b)| a != b);
+    let mut rows: Vec<usize> = [(0, 1), (0, 2), (1, 2)]
+        .iter()
+        .filter_map(|&(a, b)| differs(a, b))
+        .collect();
+    rows.sort_unstable();
+    rows.dedup();
+    if rows.is_empty() {
+        return Ok(LibraryOrder::ROMC);
+    }
+    let choices = LibraryOrder::NAMED
+        .iter()
+        .zip(&orders)
+        .map(|(order, texts)| {
+            let terms = rows
+                .iter()
+                .map(|&row| format!("{} in row {}", texts[row], row + 1));
+            let terms: Vec<String> = terms.collect();
+            format!(
+                "--library-order {} ({})",
+                order.name().unwrap_or_default(),
+                terms.join(", ")
+            )
+        });
+    let expected = format!(
+        "one of {}: the order of the rows of Xi, counted from 1",
+        choices.collect::<Vec<_>>().join(", ")
+    );
+    let found = format!("no order of the terms of {}", standard_text(standard));
+    Err(ImportFault::option("--library-order", found, expected))
 }
 
 /// The shorthands that have this many terms.
 pub(super) fn standards_with(term_count: usize, latent_dim: usize) -> Vec<String> {
     let fits = |standard: &StandardLibrary| standard.term_count(latent_dim) == Some(term_count);
-    small_standards().filter(fits).map(standard_text).collect()
-}
-
-/// The standard libraries that shorthands are suggested for, the richest of a degree first.
-pub(super) fn small_standards() -> impl Iterator<Item = StandardLibrary> {
-    (0..=3).flat_map(|degree| {
-        let more = [(true, true), (true, false), (false, true), (false, false)];
-        more.map(|(trigonometric, inputs)| StandardLibrary {
-            degree,
-            trigonometric,
-            inputs,
-        })
-    })
+    StandardLibrary::small()
+        .filter(fits)
+        .map(standard_text)
+        .collect()
 }
 
 /// Reads a list of terms: a JSON list of texts, a JSON object with such a list under `library`, or

@@ -26,6 +26,9 @@ type Archive<'b> = ZipArchive<Cursor<&'b [u8]>>;
 /// Opens a file; only the headers of its arrays are read.
 pub(super) fn open<'b>(file: &str, bytes: &'b [u8]) -> Result<TensorFile<'b>, ImportError> {
     let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(|e| damaged(file, e))?;
+    if archive.has_duplicate_names() {
+        return Err(damaged(file, "two arrays of one name"));
+    }
     if archive.len() > MAX_MEMBERS {
         return Err(ImportFault::too_large(file, MAX_MEMBERS as u64, "arrays"));
     }

@@ -10,9 +10,10 @@ use super::error::{ImportError, ImportFault};
 use super::latex::SymbolNames;
 use super::report::Note;
 use super::role::{Mapping, ONLY_PHASE};
-use crate::files::Place;
+use crate::files::{ForeignFile, Place};
 use crate::model::{
-    Activation, CoordinateOrder, FeetRule, LibraryChoice, ScaleFactors, Scaling, StandardLibrary,
+    Activation, CoordinateOrder, FeetRule, LibraryChoice, LibraryOrder, ScaleFactors, Scaling,
+    StandardLibrary,
 };
 use crate::robot::{Actuators, ContactFlags, Robot, WrenchFrame};
 
@@ -36,37 +37,43 @@ impl Format {
     /// [`ImportError`], which states how to convert files of known other kinds.
     pub fn of_path(path: &Path) -> Result<Self, ImportError> {
         let ending = (path.extension()).map(|ending| ending.to_string_lossy().to_lowercase());
-        let expected = match ending.as_deref() {
+        let found = match ending.as_deref() {
             Some("safetensors") => return Ok(Format::Safetensors),
             Some("npz") => return Ok(Format::Npz),
             Some("txt" | "eq" | "equations") => return Ok(Format::Equations),
             Some("tex" | "ltx" | "md" | "markdown") => return Ok(Format::Latex),
-            Some("pt" | "pth" | "ckpt" | "bin") => {
-                "a safetensors file: in Python, safetensors.torch.save_file(model.state_dict(), \
-                 \"model.safetensors\")"
-            }
-            Some("npy") => {
-                "an .npz file with all arrays: in Python, numpy.savez(\"model.npz\", ...)"
-            }
-            Some("h5" | "hdf5" | "keras" | "pb") => {
-                "an .npz file: in Python, numpy.savez(\"model.npz\", **{v.name: v.numpy() for v in \
-                 model.variables})"
-            }
-            Some("pkl" | "pickle" | "joblib") => {
-                "an .npz file: examples/pysindy/export_pysindy.py writes one from a fitted PySINDy \
-                 model"
-            }
-            Some(_) | None => {
-                "a file that ends in .safetensors, .npz, .txt (equations), .tex or .md (LaTeX), or \
-                 --format to say what it is"
-            }
-        };
-        let found = match ending {
             Some(ending) => format!("the ending `.{ending}`"),
             None => "no ending".to_owned(),
         };
-        let file = path.display().to_string();
-        Err(ImportFault::at(&file, Place::Whole, found, expected))
+        let foreign = ForeignFile::of_path(path).and_then(|found| refusal(path, found));
+        Err(foreign.unwrap_or_else(|| {
+            let expected = match ending.as_deref() {
+                Some("json") => {
+                    "a file of tensors or equations; model files of romc need no import"
+                }
+                _ => {
+                    "a file that ends in .safetensors, .npz, .txt (equations), .tex or .md (LaTeX), \
+                     or --format to say what it is"
+                }
+            };
+            ImportFault::at(&path.display().to_string(), Place::Whole, found, expected)
+        }))
+    }
+
+    /// The kind of a file that was read: as given, else by its bytes or its ending.
+    pub(super) fn of_file(
+        path: &Path,
+        bytes: &[u8],
+        given: Option<Self>,
+    ) -> Result<Self, ImportError> {
+        let content = ForeignFile::of_content(path, bytes);
+        let is_known = content.is_some();
+        match content.and_then(|found| refusal(path, found)) {
+            Some(refused) => Err(refused),
+            None if given.is_some() || !is_known => given.map_or_else(|| Self::of_path(path), Ok),
+            None if bytes.starts_with(b"PK") => Ok(Format::Npz),
+            None => Ok(Format::Safetensors),
+        }
     }
 
     /// Name for messages.
@@ -78,6 +85,13 @@ impl Format {
             Format::Latex => "latex",
         }
     }
+}
+
+/// The refusal of a file that has to be converted first.
+pub(super) fn refusal(path: &Path, found: ForeignFile) -> Option<ImportError> {
+    let file = path.display().to_string();
+    let expected = found.remedy?;
+    Some(ImportFault::at(&file, Place::Whole, found.what, expected))
 }
 
 /// How a file stores the weights of a map.
@@ -207,6 +221,8 @@ pub struct ImportOptions {
     pub symbols: SymbolNames,
     /// The candidate terms in the order of Xi's rows; equations bring their own.
     pub library: Option<LibraryChoice>,
+    /// The order of a standard library's terms in the file: needed where it has sines, as trainers differ.
+    pub library_order: Option<LibraryOrder>,
     /// Number of latent coordinates: needed if shapes leave it open, else checked.
     pub latent_dim: Option<usize>,
     /// The phases in the order in which they are tried; `contact` and `flight` are known.
@@ -251,6 +267,19 @@ impl ImportOptions {
         }
     }
 
+    /// The first option given that is of use with an encoder or decoder alone.
+    pub(super) fn of_maps(&self) -> Option<&'static str> {
+        let given = [
+            ("--robot", self.robot.is_some()),
+            ("--scaling", self.scaling.is_some()),
+            ("--input-scaling", self.input_scaling.is_some()),
+            ("--order", self.order.is_some()),
+            ("--weights", self.weights.is_some()),
+        ];
+        let mut given = given.into_iter().filter(|(_, is_given)| *is_given);
+        given.next().map(|(option, _)| option)
+    }
+
     /// The place of a phase among those given.
     pub(super) fn given(&self, phase: &str) -> Option<usize> {
         self.phases.iter().position(|rule| rule.name == phase)
@@ -291,12 +320,11 @@ impl ImportOptions {
 
 #[cfg(test)]
 mod tests {
-    use super::super::library::small_standards;
     use super::*;
 
     #[test]
     fn shorthand_reads_back_from_its_text() {
-        for standard in small_standards() {
+        for standard in StandardLibrary::small() {
             let text = standard_text(standard);
             assert_eq!(parse_standard(&text).expect(&text), standard);
         }

@@ -5,22 +5,61 @@ use crate::symbolic::Function;
 
 /// A list of terms in romc's grammar; terms that are in it already stay as they are.
 ///
-/// Operands with a space between them are multiplied. Where a list has PySINDy's own names `x0`,
-/// `x1`, ..., these are the latent coordinates and then their velocities, and `u0` is `u1`.
-pub(super) fn readable(terms: &[String], latent_dim: usize) -> Vec<String> {
-    let is_counted_from_zero = terms
-        .iter()
-        .flat_map(|term| tokens(term))
-        .any(|token| matches!(token.strip_prefix('x'), Some(digits) if is_number(digits)));
-    let name = |token: &str| match (is_counted_from_zero, number_after_first(token)) {
-        (true, Some(('x', k))) if k < latent_dim => format!("z{}", k + 1),
-        (true, Some(('x', k))) if k < 2 * latent_dim => format!("dz{}", k - latent_dim + 1),
-        (true, Some(('u', k))) => format!("u{}", k + 1),
-        (false, None) => plain_name(token).unwrap_or_else(|| token.to_owned()),
+/// Operands with a space between them are multiplied. Where a list has names `x0`, `x1`, ..., as
+/// PySINDy has, these are the latent coordinates and then their velocities, and `u0` is `u1`; where
+/// they end in `x{2d}`, they and `u1` are counted from one. Else what was found and expected.
+pub(super) fn readable(
+    terms: &[String],
+    latent_dim: usize,
+) -> Result<Vec<String>, (String, String)> {
+    let first = first_number(terms, latent_dim)?;
+    let name = |token: &str| match (first, number_after_first(token)) {
+        (Some(first), Some(('x', k))) => match k.checked_sub(first) {
+            Some(k) if k < latent_dim => format!("z{}", k + 1),
+            Some(k) if k < 2 * latent_dim => format!("dz{}", k - latent_dim + 1),
+            _ => token.to_owned(),
+        },
+        (Some(first), Some(('u', k))) => format!("u{}", k + 1 - first),
+        (None, None) => plain_name(token).unwrap_or_else(|| token.to_owned()),
         _ => token.to_owned(),
     };
     let terms = terms.iter().map(|term| readable_term(term, &name));
-    terms.collect()
+    Ok(terms.collect())
+}
+
+/// The number from which a list counts its names `x` and `u`; none without a name `x`.
+fn first_number(terms: &[String], latent_dim: usize) -> Result<Option<usize>, (String, String)> {
+    let names = terms.iter().flat_map(|term| tokens(term));
+    let names: Vec<(char, usize)> = names.filter_map(number_after_first).collect();
+    if !names.iter().any(|(kind, _)| *kind == 'x') {
+        return Ok(None);
+    }
+    let state_dim = 2 * latent_dim;
+    let has = |wanted: &[(char, usize)]| names.iter().any(|name| wanted.contains(name));
+    let is_own = |term: &String| {
+        tokens(term).any(|token| {
+            let digits = token.strip_prefix("dz").or(token.strip_prefix('z'));
+            digits.is_some_and(is_number)
+        })
+    };
+    let from_zero = has(&[('x', 0), ('u', 0)]);
+    let from_one = has(&[('x', state_dim), ('u', latent_dim)]);
+    let found = match (from_zero, from_one) {
+        _ if terms.iter().any(is_own) => "names x and z in one list".to_owned(),
+        (true, false) => return Ok(Some(0)),
+        (false, true) => return Ok(Some(1)),
+        (true, true) => {
+            format!("names from x0 or u0 on, and x{state_dim} or u{latent_dim}, one too many")
+        }
+        (false, false) => {
+            format!("names x without x0 and x{state_dim}, which may be counted from 0 or from 1")
+        }
+    };
+    let expected = format!(
+        "z1 to z{latent_dim}, dz1 to dz{latent_dim} and u1 to u{latent_dim} in their places, in the \
+         file or list of --library"
+    );
+    Err((found, expected))
 }
 
 fn readable_term(term: &str, name: &dyn Fn(&str) -> String) -> String {
@@ -91,7 +130,7 @@ mod tests {
 
     fn read(terms: &[&str]) -> Vec<String> {
         let terms: Vec<String> = terms.iter().map(|term| (*term).to_owned()).collect();
-        readable(&terms, 2)
+        readable(&terms, 2).expect("names in one way")
     }
 
     #[test]
@@ -117,5 +156,22 @@ mod tests {
     fn names_that_count_from_zero_are_those_of_the_latent_coordinates() {
         let read = read(&["x0", "x1 x3", "sin(1 x2)", "u1", "exp(x0)"]);
         assert_eq!(read, ["z1", "z2*dz2", "sin(1*dz1)", "u2", "exp(z1)"]);
+    }
+
+    #[test]
+    fn names_that_count_from_one_are_told_by_the_last() {
+        let found = read(&["x1", "x2 x4", "u1", "u2"]);
+        assert_eq!(found, ["z1", "z2*dz2", "u1", "u2"]);
+        assert_eq!(read(&["x1", "u2"]), ["z1", "u2"]);
+        for (terms, said) in [
+            (vec!["x1", "x2", "x3"], "from 0 or from 1"),
+            (vec!["x0", "x4"], "one too many"),
+            (vec!["x1", "x2", "u0", "u2"], "one too many"),
+            (vec!["x0", "z2"], "x and z in one list"),
+        ] {
+            let terms: Vec<String> = terms.into_iter().map(str::to_owned).collect();
+            let (found, _) = readable(&terms, 2).expect_err(said);
+            assert!(found.contains(said), "{found}");
+        }
     }
 }

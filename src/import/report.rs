@@ -19,6 +19,10 @@ pub struct ImportReport {
     pub state_dim: Option<usize>,
     /// Number of candidate terms.
     pub library_dim: usize,
+    /// The order of a standard library's terms in the file, by its name.
+    pub library_order: Option<&'static str>,
+    /// The candidate terms of a file of tensors in the order of its coefficients.
+    pub terms: Vec<String>,
     /// Tensors that became part of the model.
     pub used: Vec<UsedTensor>,
     /// Tensors that did not.
@@ -107,7 +111,7 @@ pub struct ReadEquation {
 }
 
 /// A decision that a user may want to know of.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Note {
     /// A phase got the usual rule for its name.
     UsualFeet {
@@ -128,6 +132,8 @@ pub enum Note {
     FoldedMean,
     /// Coordinates were brought into romc's order from this order of the file.
     Sorted(String),
+    /// Latent states change when they are decoded and encoded: by this part of their size.
+    Unmatched(f64),
     /// A mask switched coefficients off.
     Masked {
         /// The phase.
@@ -159,6 +165,10 @@ impl fmt::Display for Note {
             Note::Sorted(order) => {
                 format!("coordinates were in the order {order}; the model has romc's")
             }
+            Note::Unmatched(change) => format!(
+                "encode(decode(z)) differs from z by {change:.2} of its size: are encoder and decoder \
+                 those of one training?"
+            ),
             Note::Masked { phase, count } => {
                 format!("the mask of phase {phase} switched {count} coefficients off")
             }

@@ -15,6 +15,15 @@ pub enum Part {
 }
 
 impl Part {
+    pub(super) const ALL: [Self; 2] = [Part::Encoder, Part::Decoder];
+
+    /// Whether a tensor lies in the module of this map.
+    pub(super) fn holds(self, name: &str) -> bool {
+        let mut modules = name.split(['.', '/']);
+        modules.next_back();
+        modules.any(|module| module.eq_ignore_ascii_case(self.name()))
+    }
+
     /// The key of the model file.
     pub fn name(self) -> &'static str {
         match self {
@@ -106,10 +115,23 @@ impl FromStr for Role {
     }
 }
 
-/// What follows the first word of a name and a dot or underscore.
+/// Characters between the words of a name.
+const SEPARATORS: [char; 3] = ['.', '_', '/'];
+/// Words of the names of what an optimiser keeps beside the tensors that it changes.
+const OF_OPTIMISERS: [&str; 6] = [
+    "adam",
+    "optimizer",
+    "momentum",
+    "momentums",
+    "rmsprop",
+    "adagrad",
+];
+
+/// What follows the first word of a name, whatever its case, and a separator.
 fn after<'t>(head: &str, text: &'t str) -> Option<&'t str> {
-    let tail = text.strip_prefix(head)?.strip_prefix(['.', '_'])?;
-    (!tail.is_empty()).then_some(tail)
+    let (first, tail) = text.split_at_checked(head.len())?;
+    let tail = tail.strip_prefix(SEPARATORS)?;
+    (first.eq_ignore_ascii_case(head) && !tail.is_empty()).then_some(tail)
 }
 
 fn read_role(text: &str) -> Option<Role> {
@@ -118,7 +140,10 @@ fn read_role(text: &str) -> Option<Role> {
             return Some(of_phase(phase.to_owned()));
         }
     }
-    if matches!(text, "xi" | "Xi" | "sindy_coefficients") {
+    if ["xi", "sindy_coefficients"]
+        .iter()
+        .any(|name| text.eq_ignore_ascii_case(name))
+    {
         return Some(Role::Xi(ONLY_PHASE.to_owned()));
     }
     let is_named = |role: &Role| {
@@ -128,28 +153,67 @@ fn read_role(text: &str) -> Option<Role> {
     if let Some(single) = SINGLE.into_iter().find(is_named) {
         return Some(single);
     }
-    let (part, tail) = [Part::Encoder, Part::Decoder]
+    let (part, tail) = Part::ALL
         .into_iter()
         .find_map(|part| Some((part, after(part.name(), text)?)))?;
-    let (layer, tensor) = match tail.split_once(['.', '_']) {
-        Some((layer, tensor)) => (Some(layer.parse().ok()?), tensor),
-        None => (None, tail),
-    };
-    match tensor {
-        "weight" | "weights" => Some(Role::Weights(part, layer)),
-        "bias" => Some(Role::Bias(part, layer)),
+    let (module, tensor) = tail.rsplit_once(SEPARATORS).unwrap_or(("", tail));
+    match tensor.to_lowercase().as_str() {
+        "weight" | "weights" | "kernel" | "w" => Some(Role::Weights(part, layer(module)?)),
+        "bias" | "biases" | "b" => Some(Role::Bias(part, layer(module)?)),
         _ => None,
+    }
+}
+
+/// The number of a layer in the names of its modules, the last that there is: 2 of `net.2` and of
+/// `dense_2`. The first `dense` of Keras has none.
+fn layer(modules: &str) -> Option<Option<usize>> {
+    let numbers = modules.split(|c: char| !c.is_ascii_digit());
+    match numbers.rev().find(|number| !number.is_empty()) {
+        Some(number) => number.parse().ok().map(Some),
+        None => Some((!modules.is_empty()).then_some(0)),
     }
 }
 
 impl Role {
     /// The part that the name of a tensor stands for: the part's own name, alone or behind the
-    /// names of the modules that hold it, as in `autoencoder.encoder.0.weight`.
+    /// names of the modules that hold it, as in `autoencoder.encoder.0.weight`. A mask has the
+    /// phase [`ONLY_PHASE`] where only its module or a word of its name is its phase's.
     pub fn of_name(name: &str) -> Option<Self> {
+        // TensorFlow's ends of names.
+        let name = name
+            .strip_suffix("/.ATTRIBUTES/VARIABLE_VALUE")
+            .unwrap_or(name);
+        let name = name.strip_suffix(":0").unwrap_or(name);
+        if is_of_optimiser(name) {
+            return None;
+        }
         let ends = name
             .match_indices(['.', '/'])
             .map(|(dot, _)| &name[dot + 1..]);
-        std::iter::once(name).chain(ends).find_map(read_role)
+        let role = std::iter::once(name).chain(ends).find_map(read_role);
+        // An array named after the map alone is its weights.
+        let last = name.rsplit(['.', '/']).next().unwrap_or(name);
+        let map = Part::ALL
+            .into_iter()
+            .find(|part| last.eq_ignore_ascii_case(part.name()));
+        let role = role.or(map.map(|part| Role::Weights(part, None)));
+        match role {
+            Some(Role::Mask(_)) => role,
+            _ if words(name).any(|word| word == "mask") => Some(Role::Mask(ONLY_PHASE.to_owned())),
+            _ => role,
+        }
+    }
+
+    /// The same for another phase.
+    pub(super) fn of_phase(&self, phase: &str) -> Self {
+        let phase = phase.to_owned();
+        match self {
+            Role::Xi(_) => Role::Xi(phase),
+            Role::Mask(_) => Role::Mask(phase),
+            Role::InputMean(_) => Role::InputMean(phase),
+            Role::InputCovariance(_) => Role::InputCovariance(phase),
+            other => other.clone(),
+        }
     }
 
     /// The phase that the tensor belongs to, if it belongs to one.
@@ -168,6 +232,22 @@ impl Role {
             | Role::InputStd => None,
         }
     }
+}
+
+fn words(name: &str) -> impl Iterator<Item = String> {
+    let words = name.split(|c: char| !c.is_ascii_alphanumeric());
+    words.map(str::to_lowercase)
+}
+
+/// Whether the words of a name contain those of another, next to each other.
+pub(super) fn mentions(name: &str, other: &str) -> bool {
+    let joined = |text: &str| format!("_{}_", words(text).collect::<Vec<_>>().join("_"));
+    joined(name).contains(&joined(other))
+}
+
+/// Whether a tensor is the state of an optimiser by its name.
+pub(super) fn is_of_optimiser(name: &str) -> bool {
+    words(name).any(|word| OF_OPTIMISERS.contains(&word.as_str()))
 }
 
 /// `--map ROLE=TENSOR`.
@@ -228,6 +308,26 @@ mod tests {
             ("encoder.weight.mean", None),
             ("encoder.running_mean", None),
             ("myencoder.weight", None),
+            ("encoder/kernel:0", Some("encoder.weight")),
+            (
+                "autoencoder/encoder/dense_1/kernel",
+                Some("encoder.1.weight"),
+            ),
+            ("encoder/dense/bias", Some("encoder.0.bias")),
+            ("encoder/kernel/Adam_1", None),
+            (
+                "encoder/layer-2/kernel/.ATTRIBUTES/VARIABLE_VALUE",
+                Some("encoder.2.weight"),
+            ),
+            (
+                "net.decoder.layers.4.linear.weight",
+                Some("decoder.4.weight"),
+            ),
+            ("net.Decoder", Some("decoder.weight")),
+            ("Xi_contact", Some("xi.contact")),
+            ("coefficient_mask", Some("mask.always")),
+            ("xi_mask", Some("mask.always")),
+            ("flight.sparsity_mask", Some("mask.always")),
             ("xi.", None),
             ("", None),
         ] {

@@ -14,10 +14,10 @@ use super::latent;
 use super::latex::{self, SymbolNames};
 use super::memory::{self, Tensor};
 use super::npz;
-use super::options::{Format, ImportOptions};
+use super::options::{Format, ImportOptions, refusal};
 use super::report::ImportReport;
 use super::safetensors;
-use crate::files::{Located, Place, hex};
+use crate::files::{ForeignFile, Located, Place, hex};
 use crate::model::{CoordinateNames, ReducedModel};
 use crate::symbolic::ExprPool;
 
@@ -38,11 +38,11 @@ pub struct Imported {
 /// # Errors
 /// [`ImportError`] with the place, what was found and what was expected.
 pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported, ImportError> {
-    let format = match options.format {
-        Some(format) => format,
-        None => Format::of_path(path)?,
-    };
-    let (file, bytes) = read_file(path, MAX_FILE_BYTES)?;
+    let (file, bytes) = read_file(path, MAX_FILE_BYTES).map_err(|fault| {
+        let foreign = ForeignFile::of_unreadable(path);
+        (foreign.and_then(|found| refusal(path, found))).unwrap_or(fault)
+    })?;
+    let format = Format::of_file(path, &bytes, options.format)?;
     import_from_bytes(&file, format, &bytes, options)
 }
 

@@ -34,7 +34,11 @@ fn text_of(model: &ReducedModel) -> String {
 }
 
 fn import(text: &str, options: &ImportOptions) -> Result<Imported, ImportError> {
-    import_from_bytes("eq.txt", Format::Equations, text.as_bytes(), options)
+    let options = ImportOptions {
+        library_order: None,
+        ..options.clone()
+    };
+    import_from_bytes("eq.txt", Format::Equations, text.as_bytes(), &options)
 }
 
 /// `(coefficient bits, term)` of an output.

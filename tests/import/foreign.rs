@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::{DMatrix, DVector};
 use romc::import::*;
-use romc::model::{LibraryChoice, Scaling, StandardLibrary};
+use romc::model::{LibraryChoice, LibraryOrder, Scaling, StandardLibrary};
 use romc::robot::Robot;
 use serde_json::Value;
 
@@ -39,6 +39,7 @@ fn options() -> ImportOptions {
     ImportOptions {
         name: "foreign".to_owned(),
         library: Some(LibraryChoice::Standard(StandardLibrary::default())),
+        library_order: Some(LibraryOrder::ROMC),
         scaling: Some(Scaling::uniform(0.1)),
         robot: Some(Robot::by_name("go1").expect("registered")),
         ..ImportOptions::default()

@@ -6,7 +6,7 @@ use std::path::Path;
 use nalgebra::DMatrix;
 use romc::artifact;
 use romc::import::*;
-use romc::model::ReducedModel;
+use romc::model::{LibraryChoice, LibraryOrder, ReducedModel};
 use safetensors::tensor::{Dtype, TensorView};
 use serde_json::Value;
 use zip::write::SimpleFileOptions;
@@ -165,6 +165,8 @@ pub fn options_of(model: &ReducedModel) -> ImportOptions {
         name: model.name().to_owned(),
         description: model.description().to_owned(),
         library: Some(model.library().choice()),
+        library_order: matches!(model.library().choice(), LibraryChoice::Standard(_))
+            .then_some(LibraryOrder::ROMC),
         phases: phases.collect(),
         scaling: model.scaling().ok().cloned(),
         robot: model.robot().ok(),

@@ -219,7 +219,7 @@ fn terms_as_pysindy_names_them_are_read_and_equal_ones_are_one_in_equations() {
     assert_eq!(n_terms, 7, "z1 and 1*z1 are one term");
 }
 
-fn jump() -> String {
+pub fn jump() -> String {
     let root = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
     root.join("examples/recordings/go1/validation_01.csv.gz")
         .display()
@@ -281,7 +281,7 @@ fn in_si(mean: &DVector<f64>, order: &CoordinateOrder) -> Vec<Stored> {
 }
 
 /// The factors of go1-d4's inputs for encoder weights in SI units, in an order.
-fn input_factors(order: &CoordinateOrder) -> String {
+pub fn input_factors(order: &CoordinateOrder) -> String {
     let factors = model("tests/fixtures/import/go1-d4.json")
         .input_factors()
         .unwrap()

@@ -22,6 +22,7 @@ class ImportOptions(TypedDict, total=False):
     order: str
     phases: Phases
     xi_layout: str
+    library_order: str
     wrench_frame: str
     actuators: Union[PathLike, Mapping[str, Sequence[float]]]
     inputs_from: Recordings

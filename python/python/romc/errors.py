@@ -32,7 +32,9 @@ def _in_python(message: str) -> str:
     message = re.sub(r"(a tensor|tensors) mean\.state and std\.state", "mean= and std=", message)
     message = message.replace("--unchecked writes", "unchecked=True takes")
     message = re.sub(r"a tensor (mean|std)\.state", r"\1=", message)
-    return _OPTION.sub(argument, message)
+    # Indented lines are to be typed as they are.
+    lines = message.splitlines()
+    return "\n".join(line if line.startswith("    ") else _OPTION.sub(argument, line) for line in lines)
 
 
 class RomcError(ValueError):

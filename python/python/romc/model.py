@@ -49,8 +49,8 @@ class Model:
     def from_arrays(
         cls,
         *,
-        xi: Union[Mapping[str, Any], Any],
-        library: LibraryLike,
+        xi: Union[Mapping[str, Any], Any, None] = None,
+        library: Optional[LibraryLike] = None,
         encoder: Any = None,
         decoder: Any = None,
         mask: Optional[Mapping[str, Any]] = None,
@@ -66,7 +66,7 @@ class Model:
           `activation`; or a fitted affine pipeline with `transform` and `inverse_transform`, as scikit-learn has.
         - `xi`: coefficients by phase, `(terms, d)` or `(d, terms)`; `mask` has 0 where training switched one off.
         - `library`: the candidate terms in the order of Xi's rows: names such as `["1", "z1", "sin(dz1)", "u1"]`, or
-          the shorthand `Library(degree=1, trigonometric=True, inputs=True)`.
+          the shorthand `Library(degree=1, trigonometric=True, inputs=True, order="paper")`.
 
         Options, which `from_torch` and `from_pysindy` take too:
 
@@ -83,6 +83,7 @@ class Model:
         - `inputs_from`: recordings that give the mean and covariance of the inputs, which the controller needs, and
           that the model is compared with: one that misses them is refused, with the usual slip that explains it;
           `unchecked=True` warns instead.
+        - `library_order`: the order of the terms of a shorthand, as `Library` describes it.
         - `xi_layout`, `sample_time` (s), `name`, `description`.
 
         Raises `ModelError` with `tensor`, `row` and `column`.
@@ -100,7 +101,7 @@ class Model:
         module: Any,
         decoder: Any = None,
         *,
-        library: LibraryLike,
+        library: Optional[LibraryLike] = None,
         xi: Union[Mapping[str, Any], Any, None] = None,
         map: Optional[Mapping[str, str]] = None,
         **options: Unpack[ImportOptions],
@@ -157,7 +158,7 @@ class Model:
         cls,
         source: str,
         tensors: Dict[str, Floats],
-        library: LibraryLike,
+        library: Optional[LibraryLike],
         parts: Mapping[str, object],
         *,
         robot: Optional[PathLike] = None,
@@ -168,6 +169,7 @@ class Model:
         order: Optional[str] = None,
         phases: Optional[Phases] = None,
         xi_layout: Optional[str] = None,
+        library_order: Optional[str] = None,
         wrench_frame: str = "body",
         actuators: Union[PathLike, Mapping[str, Sequence[float]], None] = None,
         inputs_from: Optional[Recordings] = None,
@@ -180,12 +182,19 @@ class Model:
             if value is not None:
                 tensors[key] = floats(key, value)
         # Equations alone have no robot coordinates to scale, and tensors may have the factors.
-        has_map = any(re.search(r"(^|[./])(en|de)coder[._]", key) for key in tensors)
+        has_map = any(re.search(r"(^|[./])(en|de)coder([._/]|$)", key) for key in tensors)
         has_factors = any(re.search(r"(^|[./])(scaling|std)[._](state|input)$", key) for key in tensors)
         if scaling is None and has_map and not has_factors:
             scaling = 1.0
+        if isinstance(library, Library) and library.order is not None:
+            if library_order not in (None, library.order):
+                found = f"{library_order!r} and Library(order={library.order!r})"
+                raise ModelError(f"library_order: found {found}, expected one order")
+            library_order = library.order
         shorthand = library.shorthand() if isinstance(library, Library) else library
-        terms = None if isinstance(shorthand, str) else [str(term) for term in shorthand]
+        if isinstance(shorthand, str) and ";" in shorthand:
+            shorthand = [term.strip() for term in shorthand.split(";")]
+        terms = None if shorthand is None or isinstance(shorthand, str) else [str(term) for term in shorthand]
         rules = {phase: feet if isinstance(feet, str) else ",".join(feet) for phase, feet in (phases or {}).items()}
         arguments: Dict[str, object] = {
             **dict.fromkeys(("activation", "weights", "latent_dim")),
@@ -197,6 +206,7 @@ class Model:
             "input_scaling": _factors("input_scaling", input_scaling),
             "phases": [f"{phase}={feet}" for phase, feet in rules.items()],
             "xi_layout": xi_layout,
+            "library_order": library_order,
             "robot": None if robot is None else os.fspath(robot),
             "order": order,
             "wrench_frame": wrench_frame,

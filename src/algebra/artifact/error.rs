@@ -34,6 +34,9 @@ pub enum ArtifactFault {
         column: usize,
         message: String,
     },
+    /// A file that another tool wrote.
+    #[error("found {what}, expected a model file of romc: {remedy}")]
+    Foreign { what: &'static str, remedy: String },
     /// The file follows another schema.
     #[error("`schema`: found {0}, expected \"{SCHEMA}\" or \"{SCHEMA_2}\"")]
     Schema(String),

@@ -13,6 +13,7 @@ use super::manifest::{
     GivenStateEntry, Manifest, MapEntry, PhaseEntry, RobotValue, Rows, SCHEMA, SCHEMA_2,
     SchemaProbe, StatisticsEntry, from_rows,
 };
+use crate::files::ForeignFile;
 use crate::model::{
     Activation, AffineMap, InputGivenState, InputStatistics, Layer, Library, ModelError, Phase,
     ReducedModel, StateMap,
@@ -62,7 +63,8 @@ pub fn read_from_bytes(file: &str, bytes: &[u8]) -> Result<ReducedModel, Artifac
         return Err(ArtifactFault::TooLarge(MAX_FILE_BYTES).of(file));
     }
     check_schema(file, bytes)?;
-    let manifest: Manifest = parse(file, bytes)?;
+    let manifest: Manifest =
+        parse(file, bytes).map_err(|fault| foreign(file, bytes).unwrap_or(fault))?;
     match manifest.later_key().filter(|_| manifest.schema == SCHEMA) {
         Some(key) => Err(ArtifactFault::LaterKey(key).of(file)),
         None => to_model(file, manifest),
@@ -93,6 +95,17 @@ fn parse<'de, T: serde::Deserialize<'de>>(
     let rest = deserializer.end();
     rest.map_err(|error| syntax(".".to_owned(), &error))?;
     Ok(value)
+}
+
+/// The fault of a file that is no JSON but of a kind that other tools write.
+fn foreign(file: &str, bytes: &[u8]) -> Option<ArtifactError> {
+    let is_object = bytes.trim_ascii_start().starts_with(b"{");
+    let found = ForeignFile::of(Path::new(file), bytes).filter(|_| !is_object)?;
+    let import =
+        "romc import (in Python Model.from_arrays, from_torch or from_pysindy) makes one of";
+    let source = found.remedy.unwrap_or("it".to_owned());
+    let (what, remedy) = (found.what, format!("{import} {source}"));
+    Some(ArtifactFault::Foreign { what, remedy }.of(file))
 }
 
 /// Looks at the schema first: for a file of a later version it is the fault, not unknown keys.

@@ -6,10 +6,12 @@
 //! read state the place of a fault with [`Located`].
 
 mod folder;
+mod foreign;
 mod located;
 mod part;
 mod whole;
 
 pub use folder::{FolderError, check_folder, earlier_files, hex, write_files};
+pub use foreign::ForeignFile;
 pub use located::{Located, Place};
 pub use whole::{EmittedFile, Overwrite, write_whole};

@@ -179,6 +179,26 @@ impl Library {
         }
     }
 
+    /// The standard library that has the same terms in whatever order, and for each of its terms in
+    /// romc's order the row of this library; none for other terms.
+    pub fn as_standard(&self) -> Option<(StandardLibrary, Vec<usize>)> {
+        if let Some(standard) = self.standard {
+            return Some((standard, (0..self.len()).collect()));
+        }
+        let mut pool = self.pool.clone();
+        let rows = self.terms.iter().map(CandidateTerm::expr).zip(0..);
+        let rows: HashMap<ExprId, usize> = rows.collect();
+        StandardLibrary::small().find_map(|standard| {
+            if standard.term_count(self.latent_dim) != Some(rows.len().max(self.len())) {
+                return None;
+            }
+            let texts = standard.texts(self.latent_dim).ok()?;
+            let of = |text: String| rows.get(&pool.parse(&text, &|_| true).ok()?).copied();
+            let rows: Option<Vec<usize>> = texts.into_iter().map(of).collect();
+            Some((standard, rows?))
+        })
+    }
+
     /// The terms in order.
     pub fn terms(&self) -> &[CandidateTerm] {
         &self.terms

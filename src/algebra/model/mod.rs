@@ -77,7 +77,7 @@ pub use phase::Phase;
 pub use projection::{RANK_TOLERANCE, complement};
 pub use rom::ReducedModel;
 pub use scaling::{ScaleFactors, Scaling};
-pub use standard_library::{MAX_DEGREE, StandardLibrary};
+pub use standard_library::{LibraryOrder, MAX_DEGREE, StandardLibrary};
 pub use state_map::{Layer, MAX_LAYER_WIDTH, MAX_LAYERS, StateMap};
 pub use statistics::InputStatistics;
 pub use tangent::Tangent;

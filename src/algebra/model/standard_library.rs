@@ -1,5 +1,9 @@
 //! The standard library of candidate terms, in the order of the published arrays.
 
+use std::collections::HashMap;
+
+use clap::ValueEnum;
+use clap::builder::PossibleValue;
 use serde::{Deserialize, Serialize};
 
 use super::error::LibraryError;
@@ -43,6 +47,146 @@ impl Default for StandardLibrary {
     }
 }
 
+/// A group of terms that orders of a library keep together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Group {
+    Constant,
+    Linear,
+    /// Monomials of degree 2 and more.
+    Higher,
+    Trigonometric,
+    Inputs,
+}
+
+/// How many states share a run of sines, which the run of their cosines follows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Run {
+    /// z and dz together.
+    All,
+    /// z, then dz.
+    Half,
+    /// Each by itself.
+    Single,
+}
+
+impl Run {
+    fn len(self, latent_dim: usize) -> usize {
+        match self {
+            Run::All => 2 * latent_dim,
+            Run::Half => latent_dim,
+            Run::Single => 1,
+        }
+    }
+}
+
+/// The order in which a trainer keeps the terms of a standard library.
+///
+/// ```
+/// use romc::model::{LibraryOrder, StandardLibrary};
+///
+/// let standard = StandardLibrary { degree: 1, trigonometric: true, inputs: false };
+/// let texts = standard.texts_in(LibraryOrder::PAPER, 1)?;
+/// assert_eq!(texts, ["1", "z1", "dz1", "sin(z1)", "cos(z1)", "sin(dz1)", "cos(dz1)"]);
+/// # Ok::<(), romc::model::LibraryError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LibraryOrder {
+    groups: [Group; 5],
+    run: Run,
+    functions: [&'static str; 2],
+    /// `z1, dz1, z2, dz2` in place of `z1, z2, dz1, dz2`.
+    is_paired: bool,
+}
+
+impl LibraryOrder {
+    /// That of [`StandardLibrary`]: sin z, sin dz, cos z, cos dz.
+    pub const ROMC: Self = Self {
+        groups: [
+            Group::Constant,
+            Group::Linear,
+            Group::Higher,
+            Group::Trigonometric,
+            Group::Inputs,
+        ],
+        run: Run::All,
+        functions: ["sin", "cos"],
+        is_paired: false,
+    };
+    /// Appendix B of the paper: sin z, cos z, sin dz, cos dz.
+    pub const PAPER: Self = Self {
+        run: Run::Half,
+        ..Self::ROMC
+    };
+    /// sin z1, cos z1, sin z2, ..., then dz likewise, as in PySINDy's `FourierLibrary`.
+    pub const INTERLEAVED: Self = Self {
+        run: Run::Single,
+        ..Self::ROMC
+    };
+    /// The orders that have names.
+    pub const NAMED: [Self; 3] = [Self::PAPER, Self::INTERLEAVED, Self::ROMC];
+
+    /// `paper`, `interleaved` or `romc`, for orders that have a name.
+    pub fn name(&self) -> Option<&'static str> {
+        let names = ["paper", "interleaved", "romc"];
+        let place = Self::NAMED.iter().position(|named| named == self)?;
+        Some(names[place])
+    }
+
+    /// Orders that trainers may have: those with names first, then others in which the constant or
+    /// the inputs stand elsewhere, cosines come first, or each z is followed by its dz.
+    pub fn common() -> Vec<Self> {
+        use Group::{Constant, Higher, Inputs, Linear, Trigonometric};
+        let middle = [
+            [Linear, Higher, Trigonometric, Inputs],
+            [Linear, Higher, Inputs, Trigonometric],
+            [Linear, Inputs, Higher, Trigonometric],
+            [Inputs, Linear, Higher, Trigonometric],
+            [Trigonometric, Linear, Higher, Inputs],
+            [Inputs, Trigonometric, Linear, Higher],
+            [Trigonometric, Inputs, Linear, Higher],
+        ];
+        let mut orders = Self::NAMED.to_vec();
+        for [a, b, c, d] in middle {
+            let places = [
+                [Constant, a, b, c, d],
+                [a, b, c, d, Constant],
+                [a, Constant, b, c, d],
+            ];
+            // The constant is between other groups only where these are not the variables.
+            for groups in &places[..if a == Linear { 2 } else { 3 }] {
+                for run in [Run::Half, Run::Single, Run::All] {
+                    for functions in [["sin", "cos"], ["cos", "sin"]] {
+                        orders.extend([false, true].map(|is_paired| Self {
+                            groups: *groups,
+                            run,
+                            functions,
+                            is_paired,
+                        }));
+                    }
+                }
+            }
+        }
+        orders
+    }
+}
+
+impl ValueEnum for LibraryOrder {
+    fn value_variants<'a>() -> &'a [Self] {
+        &Self::NAMED
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        let help = match self.run {
+            Run::Half => "sin z, cos z, sin dz, cos dz: Appendix B of the paper",
+            Run::Single => {
+                "sin z1, cos z1, sin z2, ..., then dz: the paper's training code, PySINDy"
+            }
+            Run::All => "sin z, sin dz, cos z, cos dz: model files of romc",
+        };
+        Some(PossibleValue::new(self.name()?).help(help))
+    }
+}
+
 impl StandardLibrary {
     /// Number of terms for `latent_dim`, without making them; `None` beyond `usize`.
     pub fn term_count(&self, latent_dim: usize) -> Option<usize> {
@@ -61,8 +205,32 @@ impl StandardLibrary {
         Some(count)
     }
 
+    /// The libraries up to degree 3, the richest of a degree first.
+    pub fn small() -> impl Iterator<Item = Self> {
+        (0..=3).flat_map(|degree| {
+            let more = [(true, true), (true, false), (false, true), (false, false)];
+            more.map(|(trigonometric, inputs)| Self {
+                degree,
+                trigonometric,
+                inputs,
+            })
+        })
+    }
+
     /// The terms in the syntax of the model file.
     pub(super) fn texts(&self, latent_dim: usize) -> Result<Vec<String>, LibraryError> {
+        self.texts_in(LibraryOrder::ROMC, latent_dim)
+    }
+
+    /// The terms in another order; the texts are the same.
+    ///
+    /// # Errors
+    /// [`LibraryError::Degree`], [`LibraryError::TooManyTerms`].
+    pub fn texts_in(
+        &self,
+        order: LibraryOrder,
+        latent_dim: usize,
+    ) -> Result<Vec<String>, LibraryError> {
         if self.degree > MAX_DEGREE {
             return Err(LibraryError::Degree { found: self.degree });
         }
@@ -70,34 +238,72 @@ impl StandardLibrary {
         if count > MAX_LIBRARY_DIM {
             return Err(LibraryError::TooManyTerms { found: count });
         }
-        let z = || (1..=latent_dim).map(|i| format!("z{i}"));
-        let dz = || (1..=latent_dim).map(|i| format!("dz{i}"));
-        let state: Vec<String> = z().chain(dz()).collect();
-        let mut texts = vec!["1".to_owned()];
-        // The monomials of one degree by their factors; with one more, none before the last.
-        let mut monomials: Vec<Vec<usize>> = vec![Vec::new()];
-        for _ in 0..self.degree {
-            let longer = monomials.iter().flat_map(|factors| {
-                let last = factors.last().copied().unwrap_or(0);
-                (last..state.len()).map(move |next| [&factors[..], &[next]].concat())
-            });
-            monomials = longer.collect();
-            texts.extend(
-                monomials
-                    .iter()
-                    .map(|factors| monomial_text(&state, factors)),
-            );
-        }
-        if self.trigonometric {
-            for function in ["sin", "cos"] {
-                texts.extend(state.iter().map(|name| format!("{function}({name})")));
+        let name = |kind: &'static str| (1..=latent_dim).map(move |i| format!("{kind}{i}"));
+        let names: Vec<String> = name("z").chain(name("dz")).collect();
+        let state: Vec<usize> = match order.is_paired {
+            false => (0..2 * latent_dim).collect(),
+            true => (0..latent_dim).flat_map(|i| [i, latent_dim + i]).collect(),
+        };
+        let mut texts = Vec::with_capacity(count);
+        for group in order.groups {
+            match group {
+                Group::Constant => texts.push("1".to_owned()),
+                Group::Linear => texts.extend(monomials(&names, &state, 1..=self.degree.min(1))),
+                Group::Higher => texts.extend(monomials(&names, &state, 2..=self.degree)),
+                Group::Trigonometric if self.trigonometric => {
+                    for run in state.chunks(order.run.len(latent_dim)) {
+                        for function in order.functions {
+                            texts.extend(run.iter().map(|&i| format!("{function}({})", names[i])));
+                        }
+                    }
+                }
+                Group::Inputs if self.inputs => texts.extend(name("u")),
+                Group::Trigonometric | Group::Inputs => {}
             }
-        }
-        if self.inputs {
-            texts.extend((1..=latent_dim).map(|i| format!("u{i}")));
         }
         Ok(texts)
     }
+
+    /// For each term in another order its row in romc's.
+    ///
+    /// # Errors
+    /// As [`Self::texts_in`].
+    pub fn rows_in(
+        &self,
+        order: LibraryOrder,
+        latent_dim: usize,
+    ) -> Result<Vec<usize>, LibraryError> {
+        let own = self.texts(latent_dim)?;
+        let rows: HashMap<&str, usize> = (own.iter().map(String::as_str)).zip(0..).collect();
+        let texts = self.texts_in(order, latent_dim)?;
+        Ok(texts.iter().map(|text| rows[text.as_str()]).collect())
+    }
+}
+
+/// Monomials of some degrees over the names in an order of the state, graded.
+fn monomials(
+    names: &[String],
+    state: &[usize],
+    degrees: std::ops::RangeInclusive<u32>,
+) -> Vec<String> {
+    let mut texts = Vec::new();
+    // The monomials of one degree by their places in the order; with one more, none before the last.
+    let mut monomials: Vec<Vec<usize>> = vec![Vec::new()];
+    for degree in 1..=*degrees.end() {
+        let longer = monomials.iter().flat_map(|factors| {
+            let last = factors.last().copied().unwrap_or(0);
+            (last..state.len()).map(move |next| [&factors[..], &[next]].concat())
+        });
+        monomials = longer.collect();
+        if degrees.contains(&degree) {
+            texts.extend(monomials.iter().map(|places| {
+                let mut factors: Vec<usize> = places.iter().map(|&place| state[place]).collect();
+                factors.sort_unstable();
+                monomial_text(names, &factors)
+            }));
+        }
+    }
+    texts
 }
 
 fn monomial_text(names: &[String], factors: &[usize]) -> String {
@@ -131,6 +337,40 @@ mod tests {
             };
             assert_eq!(standard.texts(latent_dim).unwrap().join(" "), expected);
         }
+    }
+
+    #[test]
+    fn orders_have_the_same_terms_and_rows_that_lead_back() {
+        let standard = StandardLibrary {
+            degree: 3,
+            ..StandardLibrary::default()
+        };
+        let own = standard.texts(2).unwrap();
+        for order in LibraryOrder::common() {
+            let texts = standard.texts_in(order, 2).unwrap();
+            let rows = standard.rows_in(order, 2).unwrap();
+            let back: Vec<&String> = rows.iter().map(|&row| &own[row]).collect();
+            assert_eq!(back, texts.iter().collect::<Vec<_>>());
+            let mut sorted = rows;
+            sorted.sort_unstable();
+            assert!(sorted.into_iter().eq(0..own.len()));
+        }
+        let trigonometric = |order| {
+            let library = StandardLibrary {
+                degree: 0,
+                trigonometric: true,
+                inputs: false,
+            };
+            library.texts_in(order, 2).unwrap()[1..].join(" ")
+        };
+        assert_eq!(
+            trigonometric(LibraryOrder::PAPER),
+            "sin(z1) sin(z2) cos(z1) cos(z2) sin(dz1) sin(dz2) cos(dz1) cos(dz2)"
+        );
+        assert_eq!(
+            trigonometric(LibraryOrder::INTERLEAVED),
+            "sin(z1) cos(z1) sin(z2) cos(z2) sin(dz1) cos(dz1) sin(dz2) cos(dz2)"
+        );
     }
 
     #[test]

@@ -11,7 +11,7 @@ use crate::import::{
     Format, ImportError, Mapping, PhaseRule, WeightVectors, XiLayout, parse_standard,
 };
 use crate::limits::table::{IMPORTED_LATENT_DIM, INPUT_SCALING, SAMPLE_TIME, SCALING};
-use crate::model::{Activation, CoordinateOrder, StandardLibrary};
+use crate::model::{Activation, CoordinateOrder, LibraryOrder, StandardLibrary};
 use crate::robot::WrenchFrame;
 
 /// The candidate terms of an imported model.
@@ -21,11 +21,16 @@ pub enum LibraryArgument {
     Shorthand(StandardLibrary),
     /// A file with the list of terms
     File(PathBuf),
+    /// The terms themselves
+    Terms(Vec<String>),
 }
 
 fn library_argument(text: &str) -> Result<LibraryArgument, ImportError> {
     if text.starts_with("degree=") {
         parse_standard(text).map(LibraryArgument::Shorthand)
+    } else if text.contains(';') {
+        let terms = text.split(';').map(|term| term.trim().to_owned());
+        Ok(LibraryArgument::Terms(terms.collect()))
     } else {
         Ok(LibraryArgument::File(PathBuf::from(text)))
     }
@@ -35,13 +40,15 @@ fn library_argument(text: &str) -> Result<LibraryArgument, ImportError> {
 #[derive(Debug, Args)]
 #[command(
     after_help = "Tensors are found by the names of the parts, encoder.weight, encoder.bias, decoder.weight,\n\
-                  decoder.bias, xi.PHASE (or sindy_coefficients.PHASE), mask.PHASE, input_mean.PHASE,\n\
-                  input_covariance.PHASE, scaling.state, scaling.input, mean.state, std.state, std.input, alone or behind names of modules (net.encoder.0.weight), with dots or\n\
-                  underscores (xi_contact); --map names the others. Statistics are of u in SI units: 18 numbers\n\
-                  and 18 x 18. The part and layout of each tensor are printed.\n\n\
+                  decoder.bias, xi.PHASE (or sindy_coefficients.PHASE), mask.PHASE (or coefficient_mask.PHASE),\n\
+                  input_mean.PHASE, input_covariance.PHASE, scaling.state, scaling.input, mean.state, std.state,\n\
+                  std.input, alone or behind names of modules (net.encoder.0.weight, encoder/dense_1/kernel), with\n\
+                  dots, slashes or underscores (xi_contact); --map names the others. Statistics are of u in SI units:\n\
+                  18 numbers and 18 x 18. The part and layout of each tensor, the tensors that are not used and the\n\
+                  terms of the rows of Xi are printed.\n\n\
                   Examples:\n  \
-                  romc import net.safetensors --library degree=1,trigonometric,inputs --scaling 0.1 \\\n      \
-                  --map xi.contact=Xi_c --map xi.flight=Xi_f --robot go1 --output my-model.json\n  \
+                  romc import net.safetensors --library degree=1,trigonometric,inputs --library-order paper \\\n      \
+                  --scaling 0.1 --map xi.contact=Xi_c --map xi.flight=Xi_f --robot go1 --output my-model.json\n  \
                   romc import equations.txt --phase contact=any --phase flight=none --output hopper.json\n  \
                   romc import paper.tex --symbols z1=x --symbols z2=theta --output paper.json"
 )]
@@ -70,9 +77,14 @@ pub struct ImportArguments {
     /// Another name that LaTeX has for a variable, such as z1=x or u2=F_z; can be repeated
     #[arg(long, value_name = "VARIABLE=NAME")]
     pub symbols: Vec<String>,
-    /// Candidate terms: `degree=N[,trigonometric][,inputs]`, or a file with the list of terms
+    /// Candidate terms in the order of the rows of Xi: `degree=N[,trigonometric][,inputs]`, a file with one term
+    /// per line, or the terms themselves as in "1; z1; sin(z1); u1"
     #[arg(long, value_name = "LIBRARY", value_parser = library_argument)]
     pub library: Option<LibraryArgument>,
+    /// Order of the terms of degree=N,...: 1, z, dz, products, then sines and cosines as stated here, then
+    /// inputs. Needed where the library has sines, unless the recordings of --inputs-from decide it
+    #[arg(long, value_name = "ORDER", value_enum, requires = "library")]
+    pub library_order: Option<LibraryOrder>,
     /// Number of latent coordinates d: needed if shapes leave it open
     #[arg(long, value_name = "D", value_parser = count(&IMPORTED_LATENT_DIM))]
     pub latent_dim: Option<usize>,

@@ -11,6 +11,9 @@ use super::{Assembly, Known};
 use crate::files::Place;
 use crate::model::{Activation, AffineMap, Layer, StateMap};
 
+/// How much decoding and encoding may change latent states without a note.
+const LARGEST_CHANGE: f64 = 0.5;
+
 /// Weights and bias of a layer.
 type Tensors<'a> = (&'a Assigned<'a>, Option<&'a Assigned<'a>>);
 
@@ -33,7 +36,29 @@ impl<'a> Assembly<'a, '_> {
         if has(Layout::Row) && has(Layout::Column) {
             self.report.notes.push(Note::MixedWeights);
         }
+        if let (Some(encoder), Some(decoder)) = &maps {
+            let change = self.change(encoder, decoder)?;
+            let unmatched = (change > LARGEST_CHANGE).then_some(Note::Unmatched(change));
+            self.report.notes.extend(unmatched);
+        }
         Ok(maps)
+    }
+
+    /// How much `encode(decode(z))` changes steps from `z = 0` along each coordinate, relative to them.
+    fn change(&self, encoder: &StateMap, decoder: &StateMap) -> Result<f64, ImportError> {
+        let dim = decoder.input_dim();
+        let back = |z: DVector<f64>| encoder.apply(&decoder.apply(&z)?);
+        let change = |index: Option<usize>| {
+            let z = DVector::from_fn(dim, |k, _| f64::from(Some(k) == index));
+            back(z.clone()).map(|back| back - z)
+        };
+        let origin = change(None).map_err(|source| self.unusable(source))?;
+        let mut sum = 0.0;
+        for index in 0..dim {
+            let step = change(Some(index)).map_err(|source| self.unusable(source))?;
+            sum += (step - &origin).norm_squared();
+        }
+        Ok((sum / dim as f64).sqrt())
     }
 
     /// The tensors of a map's layers, in the order of their numbers.
@@ -113,7 +138,14 @@ impl<'a> Assembly<'a, '_> {
         let first = layers[0].0;
         let shapes = layers.iter().map(|(assigned, _)| shape_of(part, assigned));
         let shapes: Vec<(usize, usize)> = shapes.collect::<Option<_>>().unwrap_or_default();
-        let ways = match (self.options.weights, first.info.shape.len()) {
+        let are_kernels = layers
+            .iter()
+            .all(|(assigned, _)| is_kernel(&assigned.info.name));
+        let given = self
+            .options
+            .weights
+            .or(are_kernels.then_some(WeightVectors::Row));
+        let ways = match (given, first.info.shape.len()) {
             (_, 1) => &[Layout::Plain][..],
             (Some(WeightVectors::Column), _) => &[Layout::Column],
             (Some(WeightVectors::Row), _) => &[Layout::Row],
@@ -125,7 +157,7 @@ impl<'a> Assembly<'a, '_> {
             .filter_map(|&layout| Some((layout, known(layout)?)));
         let fitting: Vec<(Layout, Known)> = fitting.collect();
         let expected = || match layers {
-            [_] => self.expected_weights(part),
+            [_] => self.expected_weights(part, are_kernels),
             _ => {
                 let ends = match part {
                     Part::Encoder => "n to d",
@@ -144,7 +176,7 @@ impl<'a> Assembly<'a, '_> {
         Ok(layout)
     }
 
-    fn expected_weights(&self, part: Part) -> String {
+    fn expected_weights(&self, part: Part, are_kernels: bool) -> String {
         let Known { latent, state } = self.known;
         let d = latent.map_or("d".to_owned(), |d| d.to_string());
         let n = state.map_or("n".to_owned(), |n| n.to_string());
@@ -159,9 +191,18 @@ impl<'a> Assembly<'a, '_> {
         match self.options.weights {
             Some(WeightVectors::Column) => format!("{column} (--weights column){bound}"),
             Some(WeightVectors::Row) => format!("{row} (--weights row){bound}"),
+            None if are_kernels => {
+                format!("{row} (row vectors, as Keras and Flax keep a kernel){bound}")
+            }
             None => format!("{column} (column vectors) or {row} (row vectors){bound}"),
         }
     }
+}
+
+/// Whether weights are for row vectors by their name: Keras and Flax name theirs so.
+fn is_kernel(name: &str) -> bool {
+    let name = name.trim_end_matches("/.ATTRIBUTES/VARIABLE_VALUE");
+    name.trim_end_matches(":0").ends_with("kernel")
 }
 
 /// The weights in words, for messages.

@@ -9,6 +9,7 @@ mod along_recording;
 mod aslip;
 mod assessment;
 mod baseline;
+mod coefficient_trials;
 mod control;
 mod control_metrics;
 mod coordinates;
@@ -27,6 +28,7 @@ pub use along_recording::{ReferenceInput, Run, StepRow, along_recording, lift_co
 pub use aslip::{Aslip, AslipRollout, AslipSums};
 pub use assessment::{Assessment, SegmentRun};
 pub use baseline::{Baseline, fit_aslip};
+pub use coefficient_trials::{CoefficientSlip, CoefficientTrials};
 pub use control::{StepTimes, Summary};
 pub use control_metrics::{
     Baselines, ConstantVelocity, ControlMetrics, KnowsNothing, Pushed, control_metrics,

@@ -3,10 +3,11 @@
 
 use nalgebra::DVector;
 
+use super::coefficient_trials::{CoefficientSlip, CoefficientTrials, GOOD_R2};
 use super::coordinates::PointwiseSums;
 use super::error::EvaluateError;
 use super::metrics::FitSums;
-use crate::model::{CoordinateOrder, ModelError, ReducedModel, StateMap};
+use crate::model::{CoordinateOrder, LibraryOrder, ModelError, ReducedModel, StateMap};
 use crate::recording::Segment;
 use crate::robot::STATE_DIM;
 use crate::sim::LatentSegment;
@@ -17,8 +18,6 @@ const SAMPLES: usize = 240;
 const LARGEST_ERROR: f64 = 1.0;
 /// How many times smaller the error has to get for a slip to explain it.
 const EXPLAINED: f64 = 4.0;
-/// R^2 of latent accelerations at which a slip explains that they were worse than none.
-const GOOD_R2: f64 = 0.2;
 /// How much larger than the smallest an error may be for an earlier slip to be taken: left and right
 /// differ little.
 const ALIKE: f64 = 1.5;
@@ -39,13 +38,17 @@ pub struct RoundTrip {
     pub acceleration_r2: Vec<(String, Option<f64>)>,
     /// R^2 of the latent accelerations of all phases; none without samples.
     pub all_acceleration_r2: Option<f64>,
-    /// What makes that better than zero, where it is not, and how good.
+    /// What makes that better, and how good.
     pub acceleration_slip: Option<(AccelerationSlip, f64)>,
+    /// Other readings of the coefficients.
+    pub trials: CoefficientTrials,
 }
 
 /// What spoils latent accelerations alone.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum AccelerationSlip {
+    /// Coefficients belong to other terms or to another phase.
+    Coefficients(CoefficientSlip),
     /// All inputs have to be multiplied by this.
     InputFactor(f64),
     /// The mean of the training has to be taken off states; the maps hide it where they reproduce it.
@@ -69,13 +72,14 @@ pub enum Slip {
 
 impl RoundTrip {
     /// Looks at an imported model along the recordings that came with it; none without recordings or
-    /// without both maps.
+    /// without both maps. `order` is that of a standard library's terms in the file.
     ///
     /// # Errors
     /// [`EvaluateError`] for a model without robot, or inputs that cannot be computed.
     pub fn of_import(
         model: &ReducedModel,
         segments: &[&Segment],
+        order: Option<LibraryOrder>,
     ) -> Result<Option<Self>, EvaluateError> {
         let (Ok(encoder), Ok(decoder)) = (model.encoder_map(), model.decoder_map()) else {
             return Ok(None);
@@ -90,16 +94,21 @@ impl RoundTrip {
             |found: f64| error > SMALL_ERROR && EXPLAINED * found < error && found < UNEXPLAINED;
         let still = DVector::zeros(STATE_DIM);
         let (acceleration_r2, all) = accelerations(model, segments, 1.0, &still)?;
-        let acceleration_slip = match all {
+        let trials = CoefficientTrials::new(model, segments, order)?;
+        let of_coefficients =
+            (trials.slip.clone()).map(|(slip, r2)| (AccelerationSlip::Coefficients(slip), r2));
+        let other = match all {
             Some(r2) if r2 < 0.0 => acceleration_slip(model, segments, &samples.mean)?,
             _ => None,
         };
+        let slips = of_coefficients.into_iter().chain(other);
         Ok(Some(Self {
             error,
             slip: best.filter(|(_, found)| is_explained(*found)),
             acceleration_r2,
             all_acceleration_r2: all,
-            acceleration_slip,
+            acceleration_slip: slips.max_by(|a, b| a.1.total_cmp(&b.1)),
+            trials,
         }))
     }
 
@@ -116,12 +125,12 @@ impl RoundTrip {
     /// Whether the model is not to be taken: its maps miss the recordings, or a slip explains why its
     /// equations do. Equations that miss them for no known reason may be right for other motions.
     pub fn is_refused(&self) -> bool {
-        !self.maps_fit() || (!self.equations_fit() && self.acceleration_slip.is_some())
+        !self.maps_fit() || self.acceleration_slip.is_some()
     }
 
     /// What is wrong with the model along the recordings, if anything is, and the option of an import
-    /// that mends it.
-    pub fn fault(&self) -> Option<String> {
+    /// that mends it; `tensor` has the names of tensors by their parts.
+    pub fn fault(&self, tensor: &dyn Fn(&str) -> Option<String>) -> Option<String> {
         if !self.maps_fit() {
             let found = format!(
                 "decode(encode(x)) misses the recordings by {:.3} times their variance",
@@ -130,17 +139,20 @@ impl RoundTrip {
             return Some(match &self.slip {
                 Some((slip, error)) => format!("{found}, by {error:.3} times {}", slip.advice()),
                 None => format!(
-                    "{found}, whatever the usual factors, means and orders: is it this robot, and \
-                     are these its maps?"
+                    "{found}, whatever the usual factors, means and orders: has the training \
+                     converged, is it this robot, and are these its maps?"
                 ),
             });
         }
-        if self.equations_fit() {
+        if self.equations_fit() && self.acceleration_slip.is_none() {
             return None;
         }
         let r2 = self.all_acceleration_r2.unwrap_or(f64::NAN);
         let found = format!("R^2 of the latent accelerations is {r2:.3}");
-        Some(match self.acceleration_slip {
+        Some(match &self.acceleration_slip {
+            Some((AccelerationSlip::Coefficients(slip), better)) => {
+                format!("{found}, {better:.3} {}", slip.advice(tensor))
+            }
             Some((AccelerationSlip::Centred, better)) => {
                 format!("{found}, {better:.3} {}", Slip::Centred.advice())
             }
@@ -148,11 +160,58 @@ impl RoundTrip {
                 "{found}, {better:.3} with the inputs times {factor}: expected other factors of the \
                  inputs (--input-scaling, or a tensor scaling.input or std.input)"
             ),
-            None => format!(
-                "{found}, below that of a constant: are these motions unlike the training's, or the \
-                 coefficients in another order than the candidate terms?"
-            ),
+            None => format!("{found}, below that of a constant{}", self.unexplained()),
         })
+    }
+
+    /// What may be wrong with equations that no slip explains.
+    fn unexplained(&self) -> String {
+        let (tried, or) = match self.trials.by_order.is_empty() {
+            true => (
+                "with phases exchanged too",
+                ", or the terms of --library are in another order than the coefficients",
+            ),
+            false => (
+                "in every usual order of the terms and with phases exchanged too",
+                "",
+            ),
+        };
+        let fitted = match self.trials.fitted {
+            Some(r2) => {
+                format!("; fitted to these recordings, the same terms reach {r2:.3}")
+            }
+            None => String::new(),
+        };
+        format!(
+            ", {tried}{fitted}: the training has not converged, or these motions are unlike the \
+             training's{or}"
+        )
+    }
+}
+
+impl CoefficientSlip {
+    /// What to pass where it explains the error.
+    fn advice(&self, tensor: &dyn Fn(&str) -> Option<String>) -> String {
+        let (mut with, mut expected) = (Vec::new(), Vec::new());
+        if let Some([a, b]) = &self.exchanged {
+            with.push(format!("the coefficients of {a} and {b} exchanged"));
+            for (part, [to, from]) in ["xi", "mask"]
+                .iter()
+                .flat_map(|part| [(part, [a, b]), (part, [b, a])])
+            {
+                let tensor = tensor(&format!("{part}.{from}"));
+                expected.extend(tensor.map(|tensor| format!("--map {part}.{to}={tensor}")));
+            }
+        }
+        if let Some(option) = &self.order {
+            with.push("the terms in another order".to_owned());
+            expected.push(option.clone());
+        }
+        format!(
+            "with {}: expected {}",
+            with.join(" and "),
+            expected.join(" ")
+        )
     }
 }
 
@@ -357,7 +416,7 @@ fn acceleration_slip(
     let mut best: Option<(AccelerationSlip, f64)> = None;
     for (slip, factor, mean) in slips.into_iter().chain([centred]) {
         let (_, r2) = accelerations(model, segments, factor, mean)?;
-        if let Some(r2) = r2.filter(|r2| best.is_none_or(|(_, known)| *r2 > known)) {
+        if let Some(r2) = r2.filter(|r2| best.as_ref().is_none_or(|(_, known)| r2 > known)) {
             best = Some((slip, r2));
         }
     }
