@@ -5,6 +5,11 @@
 //! `examples/robots/reference.py`.
 
 mod command_line;
+#[path = "robots/made.rs"]
+mod made;
+mod tools;
+#[path = "robots/urdf.rs"]
+mod urdf;
 
 use std::fs;
 use std::path::PathBuf;
