@@ -6,6 +6,7 @@ use nalgebra::{Point3, Vector3};
 use romc::robot::{Leg, Robot};
 use romc::robot_file::{RobotOptions, RobotReading, from_urdf, urdf_reading};
 
+use super::command_line::{romc, text};
 use super::made::{Joint, LEGS, Made, fixed};
 use super::tools::is_thorough;
 
@@ -156,6 +157,13 @@ fn frame_of_a_trunk_without_mass_is_its_own_and_the_mass_is_named() {
             "the trunk's mass is in link `inertia`, 0.02 0 -0.01 m from `trunk`, whose"
         )
     );
+    // A massless frame between the trunk and its legs is not the body's.
+    let mut made = Made::quadruped().below(&[("body", "fixed", [0.1, 0.0, 0.05], [0.0; 3])]);
+    made.links[0].1 = None;
+    made.links.last_mut().expect("body").1 = Some(5.0);
+    let found = read(&made.urdf());
+    assert_feet(&made, found.robot, "body", &mut Random(5));
+    assert_eq!(found.notes, [""; 0]);
     // Masses below a world are the robot's, those of the world are not.
     let mut made = Made::quadruped().below(&[("world", "floating", [0.0; 3], [0.0; 3])]);
     made.links.last_mut().expect("world").1 = Some(1000.0);
@@ -182,6 +190,10 @@ fn faults_name_line_element_and_remedy() {
         (joint(thigh, &|j| j.axis = [0.0; 3]), "t.urdf: line 20: joint `FR_thigh_joint`, <axis>, xyz: found \"0.0 0.0 0.0\", expected a direction, such as 0 1 0"),
         (joint(thigh, &|j| j.axis[0] = f64::NAN), "line 20: joint `FR_thigh_joint`, <axis>, xyz: found \"NaN 1.0 0.0\", expected three numbers"),
         (joint(thigh, &|j| j.xyz[1] = f64::INFINITY), "line 20: joint `FR_thigh_joint`, <origin>, xyz: found \"0.0 inf 0.0\", expected three numbers"),
+        (
+            joint(thigh, &|j| j.rpy[2] = 90.0),
+            "line 20: joint `FR_thigh_joint`, <origin>, rpy: found 0.0 0.0 90.0, expected two turns at most: rad, not degrees",
+        ),
         (edit("rpy=\"0.0 0.0 0.0\"", "rpy=\"0 0\""), "line 19: joint `FR_hip_joint`, <origin>, rpy: found \"0 0\", expected three numbers"),
         (edit("rpy=\"0.0 0.0 0.0\"", "quat_xyzw=\"0 0 0 1\""), "joint `FR_hip_joint`, <origin>: found the attribute quat_xyzw=\"0 0 0 1\", expected xyz and rpy alone"),
         (joint(thigh, &|j| j.xyz = [0.0, 80.0, 0.0]), "line 20: joint `FR_thigh_joint`, <origin>, xyz: found [0.0, 80.0, 0.0], expected three lengths of at most 10 m"),
@@ -371,6 +383,88 @@ fn robots_of_other_joints_and_feet_get_their_own_hints() {
     }
 }
 
+#[test]
+fn robot_with_the_name_of_romcs_own_is_another_and_says_what_differs() {
+    let go1 = Made::quadruped().urdf().replace("\"made\"", "\"go1\"");
+    let read = read(&go1);
+    assert_eq!(read.robot.name(), "go1-urdf");
+    let note = read.notes.join("\n");
+    assert!(note.starts_with("its numbers are not those of romc's own \"go1\" (mass_kg 11.24 instead of 12.01, FR_hip_joint at [0.2, -0.05, 0.0] instead of [0.1881, -0.04675, 0.0], "), "{note}");
+    assert!(
+        note.ends_with(
+            " more): it is called \"go1-urdf\"; --name (romc robot) gives it another name"
+        ),
+        "{note}"
+    );
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    std::fs::write(folder.path().join("go1.urdf"), &go1).expect("written");
+    let romc = |arguments: &[&str]| {
+        let done = romc(folder.path(), arguments);
+        (done.status.code(), text(&done.stdout), text(&done.stderr))
+    };
+    let (code, shown, notes) = romc(&["robot", "go1.urdf"]);
+    assert!(
+        code == Some(0) && shown.starts_with("go1-urdf: 11.24 kg"),
+        "{shown}"
+    );
+    assert!(
+        notes.contains("note: go1.urdf: its numbers are not those of romc's own"),
+        "{notes}"
+    );
+    let (code, shown, notes) = romc(&[
+        "robot",
+        "go1.urdf",
+        "--name",
+        "mine",
+        "--output",
+        "mine.toml",
+    ]);
+    assert!(
+        code == Some(0) && shown.starts_with("mine: 11.24 kg") && notes.is_empty(),
+        "{notes}"
+    );
+    let (_, shown, _) = romc(&["robot", "mine.toml", "--json"]);
+    assert!(
+        shown.contains("\"name\":\"mine\"") || shown.contains("\"name\": \"mine\""),
+        "{shown}"
+    );
+    let (code, _, error) = romc(&["robot", "go1.urdf", "--name", "go1"]);
+    assert!(
+        code == Some(1)
+            && error
+                .contains("--name: found \"go1\", romc's own robot with other numbers (mass_kg"),
+        "{error}"
+    );
+    let (code, _, error) = romc(&["robot", "go1", "--name", "mine"]);
+    assert!(
+        code == Some(1) && error.contains("--name: found romc's own go1, expected a file"),
+        "{error}"
+    );
+}
+
+#[test]
+fn commands_of_a_refused_xacro_are_words_of_a_shell() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let text_of =
+        "<robot name=\"r\" xmlns:xacro=\"http://ros.org/wiki/xacro\"><xacro:leg/></robot>";
+    for (file, line) in [
+        (
+            "my robot.urdf",
+            "`xacro 'my robot.urdf' > 'my robot-expanded.urdf'`",
+        ),
+        ("a.urdf.xacro", "`xacro a.urdf.xacro > a.urdf`"),
+        ("a.xacro", "`xacro a.xacro > a.urdf`"),
+    ] {
+        std::fs::write(folder.path().join(file), text_of).expect("written");
+        let done = romc(folder.path(), &["robot", file]);
+        let error = text(&done.stderr);
+        assert!(
+            done.status.code() == Some(1) && error.contains(line),
+            "{error}"
+        );
+    }
+}
+
 /// A deep tree is read without deep recursion.
 #[test]
 fn long_chains_of_fixed_joints_are_read() {
@@ -422,8 +516,17 @@ fn changed_robots_are_read_as_they_are_or_refused() {
                     .collect()
             })
             .collect();
-        let is_shared = |link: &&&str| paths.iter().all(|path| path.contains(*link));
-        let trunk = paths[0].iter().rfind(is_shared).expect("the root");
+        let shared = paths[0]
+            .iter()
+            .filter(|link| paths.iter().all(|path| path.contains(*link)));
+        let mass = |link: &str| {
+            made.links
+                .iter()
+                .find(|(name, _)| name == link)
+                .and_then(|(_, mass)| *mass)
+        };
+        let trunk = shared.max_by(|a, b| mass(a).unwrap_or(0.0).total_cmp(&mass(b).unwrap_or(0.0)));
+        let trunk = trunk.expect("the root");
         assert_feet(&made, robot, trunk, &mut random);
         for (name, limit) in robot.joint_names().iter().zip(robot.torque_limit_nm()) {
             let joint = made

@@ -5,10 +5,11 @@ use super::error::{RobotFileError, RobotFileFault};
 use super::legs::{Places, build};
 use super::registry::keep;
 use crate::files::{Located, Place};
-use crate::robot::{GRAVITY_M_S2, Leg, Robot};
+use crate::robot::joints::LEG_JOINT_DIM;
+use crate::robot::{GRAVITY_M_S2, JOINT_DIM, Leg, Robot};
 
-/// Largest angle of a joint, rad: two turns either way.
-const LARGEST_ANGLE_RAD: f64 = 4.0 * std::f64::consts::PI;
+/// Largest angle of a joint or frame, rad: two turns either way.
+pub(super) const LARGEST_ANGLE_RAD: f64 = 4.0 * std::f64::consts::PI;
 /// Angle beyond which a joint turns more than once either way, rad.
 const FULL_TURN_RAD: f64 = 2.0 * std::f64::consts::PI;
 /// Range of a leg's largest torque as a part of the robot's weight times the length of thigh and calf; robots that are
@@ -137,11 +138,17 @@ fn facts(joint: &JointEntry) -> [(&'static str, String); 6] {
 fn refuse_degrees(file: &str, entry: &RobotEntry, places: &Places) -> Result<(), RobotFileError> {
     for (leg, limbs) in entry.leg.iter().enumerate() {
         for (index, joint) in limbs.joint.iter().enumerate() {
-            let Some([low, high]) = joint.limits_rad else {
-                continue;
+            let (key, [low, high], unit) = match (joint.limits_rad, joint.limits_deg) {
+                (Some(limits), _) => ("limits_rad", limits, "rad"),
+                (None, limits) => ("limits_deg", limits.unwrap_or_default(), "degrees"),
             };
-            if low.abs().max(high.abs()) > LARGEST_ANGLE_RAD {
-                let (degrees, key) = (format!("{low} to {high} rad"), "limits_rad");
+            let radians = if unit == "rad" {
+                1.0
+            } else {
+                1_f64.to_radians()
+            };
+            if low.abs().max(high.abs()) * radians > LARGEST_ANGLE_RAD {
+                let found = format!("{low} to {high} {unit}");
                 let expected = match places {
                     Places::Keys => "at most two turns either way; limits_deg takes degrees",
                     Places::Elements { .. } => {
@@ -149,72 +156,62 @@ fn refuse_degrees(file: &str, entry: &RobotEntry, places: &Places) -> Result<(),
                     }
                 };
                 let place = places.of_joint(leg, index, key);
-                return Err(RobotFileError::at(file, place, degrees, expected));
+                return Err(RobotFileError::at(file, place, found, expected));
             }
         }
     }
     Ok(())
 }
 
-/// Numbers that can hardly be true, one sentence each kind.
+/// Numbers that can hardly be true, one sentence for each kind.
 fn doubts(robot: &Robot) -> Vec<String> {
-    let mut notes = Vec::new();
-    let mut note = |joints: &[usize], what: String| {
-        if let [first, rest @ ..] = joints {
-            let more = match rest.len() {
-                0 => String::new(),
-                more => format!(" and {more} more"),
-            };
-            notes.push(format!(
-                "joint `{}`{more}: {what}",
-                robot.joint_names()[*first]
-            ));
-        }
-    };
-    let joints =
-        |is: &dyn Fn(usize) -> bool| (0..12).filter(|joint| is(*joint)).collect::<Vec<_>>();
-    let weight_n = robot.mass_kg() * GRAVITY_M_S2;
+    let (torque_nm, speed_rad_s) = (robot.torque_limit_nm(), robot.joint_speed_limit_rad_s());
+    let (limits, mass_kg) = (robot.joint_limit_rad(), robot.mass_kg());
     let share = |joint: usize| {
-        let lengths = robot.geometry(Leg::ALL[joint / 3]).lengths();
-        robot.torque_limit_nm()[joint] / (weight_n * (lengths[0] + lengths[1]))
+        let [thigh, calf] = robot.geometry(Leg::ALL[joint / LEG_JOINT_DIM]).lengths();
+        torque_nm[joint] / (mass_kg * GRAVITY_M_S2 * (thigh + calf))
     };
-    let strong = joints(&|joint| share(joint) > *TORQUE_SHARE.end());
-    if let Some(first) = strong.first() {
-        let (torque, share) = (robot.torque_limit_nm()[*first], share(*first));
-        note(
-            &strong,
+    let is_weak = (0..JOINT_DIM).all(|joint| share(joint) < *TORQUE_SHARE.start());
+    let turned = |joint: usize| limits[joint].0.abs().max(limits[joint].1.abs());
+    let note = |is_doubtful: &dyn Fn(usize) -> bool, what: &dyn Fn(usize) -> String| {
+        let mut joints = (0..JOINT_DIM).filter(|joint| is_doubtful(*joint));
+        let first = joints.next()?;
+        let more = match joints.count() {
+            0 => String::new(),
+            more => format!(" and {more} more"),
+        };
+        Some(format!(
+            "joint `{}`{more}: {}",
+            robot.joint_names()[first],
+            what(first)
+        ))
+    };
+    let found = [
+        note(&|joint| share(joint) > *TORQUE_SHARE.end(), &|joint| {
             format!(
-                "a largest torque of {torque} N m, {share:.0} times the robot's weight on a stretched leg; commands stay within \
-             it: put the motors' own limit there"
-            ),
-        );
-    }
-    let weak = joints(&|joint| share(joint) < *TORQUE_SHARE.start());
-    if weak.len() == 12 {
-        let (torque, mass) = (robot.torque_limit_nm()[0], robot.mass_kg());
+                "a largest torque of {} N m, {:.0} times the robot's weight on a stretched leg; commands stay \
+                 within it: put the motors' own limit there",
+                torque_nm[joint],
+                share(joint)
+            )
+        }),
+        note(&|_| is_weak, &|joint| {
+            let torque_nm = torque_nm[joint];
+            format!(
+                "a largest torque of {torque_nm} N m cannot carry {mass_kg} kg; are masses in kg?"
+            )
+        }),
         note(
-            &weak,
-            format!("a largest torque of {torque} N m cannot carry {mass} kg; are masses in kg?"),
-        );
-    }
-    let fast = joints(&|joint| robot.joint_speed_limit_rad_s()[joint] > LARGEST_SPEED_RAD_S);
-    if let Some(first) = fast.first() {
-        let speed = robot.joint_speed_limit_rad_s()[*first];
-        note(
-            &fast,
-            format!("a largest speed of {speed} rad/s; put the motors' own limit there"),
-        );
-    }
-    let wide = joints(&|joint| {
-        let (low, high) = robot.joint_limit_rad()[joint];
-        low.abs().max(high.abs()) > FULL_TURN_RAD
-    });
-    if let Some(first) = wide.first() {
-        let (low, high) = robot.joint_limit_rad()[*first];
-        note(
-            &wide,
-            format!("limits of {low} to {high} rad are more than a turn; are they degrees?"),
-        );
-    }
-    notes
+            &|joint| speed_rad_s[joint] > LARGEST_SPEED_RAD_S,
+            &|joint| {
+                let speed_rad_s = speed_rad_s[joint];
+                format!("a largest speed of {speed_rad_s} rad/s; put the motors' own limit there")
+            },
+        ),
+        note(&|joint| turned(joint) > FULL_TURN_RAD, &|joint| {
+            let (low, high) = limits[joint];
+            format!("limits of {low} to {high} rad are more than a turn; are they degrees?")
+        }),
+    ];
+    found.into_iter().flatten().collect()
 }

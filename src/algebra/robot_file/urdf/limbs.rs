@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::tree::{Body, Tree};
-use crate::files::{Located, Place};
+use crate::files::{Located, Place, shell_word};
 use crate::robot::FOOT_DIM;
 use crate::robot::joints::LEG_JOINT_DIM;
 use crate::robot_file::error::{RobotFileError, RobotFileFault};
@@ -23,7 +23,7 @@ pub(super) struct Legs {
     pub legs: Vec<Limb>,
     /// The uppermost link of the body.
     pub top: usize,
-    /// The link whose frame is the body's: the last that all legs are below.
+    /// The link whose frame is the body's.
     pub trunk: usize,
 }
 
@@ -54,8 +54,14 @@ impl Legs {
             let link = paths[0].get(*depth);
             link.is_some() && paths.iter().all(|path| path.get(*depth) == link)
         };
-        let depth = (0..).take_while(is_shared).last();
-        let trunk = paths[0][depth.expect("all paths begin at the root")];
+        // The heaviest of the links that all legs are below; the nearest to the legs, if none has a mass.
+        let depths = (0..).take_while(is_shared);
+        let shared = depths
+            .map(|depth| paths[0][depth])
+            .skip_while(|link| *link != top);
+        let mass_kg = |link: &usize| tree.links[*link].mass_kg;
+        let trunk = shared.max_by(|a, b| mass_kg(a).total_cmp(&mass_kg(b)));
+        let trunk = trunk.unwrap_or(top);
         Ok(Self { legs, top, trunk })
     }
 }
@@ -202,8 +208,9 @@ fn foot(tree: &Tree<'_>, joints: &[usize]) -> Result<usize, RobotFileError> {
                 true => (
                     "no link on a fixed joint".to_owned(),
                     format!(
-                        "one link at the foot, or romc robot --feet {link}:x,y,z,... with the feet of all four \
-                         in the frames of their last links"
+                        "one link at the foot, or romc robot --feet {} with the feet of all four \
+                         in the frames of their last links",
+                        shell_word(&format!("{link}:x,y,z,..."))
                     ),
                 ),
                 false => (

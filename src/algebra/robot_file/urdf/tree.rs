@@ -6,6 +6,7 @@ use nalgebra::{Rotation3, Vector3};
 
 use super::element::Element;
 use crate::robot_file::error::RobotFileError;
+use crate::robot_file::identity::LARGEST_ANGLE_RAD;
 
 /// Kinds of joints; of them `fixed` alone does not move.
 const KINDS: [&str; 6] = [
@@ -243,7 +244,12 @@ fn joint<'x>(
         Some(origin) => {
             origin.only_with(&["xyz", "rpy"])?;
             let triple = |key| Ok(origin.triple(key)?.unwrap_or_default());
-            [triple("xyz")?, triple("rpy")?]
+            let turn = triple("rpy")?;
+            if turn.amax() > LARGEST_ANGLE_RAD {
+                let found = origin.attribute("rpy").unwrap_or_default();
+                return Err(origin.fault("rpy", found, "two turns at most: rad, not degrees"));
+            }
+            [triple("xyz")?, turn]
         }
     };
     Ok(Joint {
