@@ -430,14 +430,14 @@ fn robot_with_the_name_of_romcs_own_is_another_and_says_what_differs() {
     );
     let (code, _, error) = romc(&["robot", "go1.urdf", "--name", "go1"]);
     assert!(
-        code == Some(1)
+        code == Some(2)
             && error
                 .contains("--name: found \"go1\", romc's own robot with other numbers (mass_kg"),
         "{error}"
     );
     let (code, _, error) = romc(&["robot", "go1", "--name", "mine"]);
     assert!(
-        code == Some(1) && error.contains("--name: found romc's own go1, expected a file"),
+        code == Some(2) && error.contains("--name: found romc's own go1, expected a file"),
         "{error}"
     );
 }
