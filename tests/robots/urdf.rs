@@ -248,7 +248,7 @@ fn declarations_comments_and_extensions_change_nothing() {
     let text = text.replace("<robot ", "<?xml version=\"1.0\"?>\n<!-- ${old} <xacro:leg/> -->\n<robot xmlns:xacro=\"http://www.ros.org/wiki/xacro\" ");
     let text = text.replace(
         "</robot>",
-        "<gazebo><link name=\"trunk\"><inertial><mass>7</mass><mass value=\"7\"/></inertial></link></gazebo>\n\
+        "<gazebo file=\"$(find robot)/x\"><link name=\"trunk\"><inertial><mass>7</mass><mass value=\"7\"/></inertial></link></gazebo>\n\
          <transmission name=\"t\"><joint name=\"FR_hip_joint\"/></transmission></robot>",
     );
     let read = read(&text);
@@ -291,7 +291,7 @@ fn numbers_that_can_hardly_be_true_are_noted() {
         ),
         (
             limits([-10.0, 10.0, 20.0, 30.0]),
-            "joint `FR_hip_joint` and 11 more: limits of -10 to 10 rad are more than a turn",
+            "joint `FR_hip_joint` and 11 more: limits of -10 to 10 rad are more than one and a half turns",
         ),
         (
             with(&|made| {

@@ -10,8 +10,8 @@ use crate::robot::{GRAVITY_M_S2, JOINT_DIM, Leg, Robot};
 
 /// Largest angle of a joint or frame, rad: two turns either way.
 pub(super) const LARGEST_ANGLE_RAD: f64 = 4.0 * std::f64::consts::PI;
-/// Angle beyond which a joint turns more than once either way, rad.
-const FULL_TURN_RAD: f64 = 2.0 * std::f64::consts::PI;
+/// Angle that joints which are built do not exceed, rad: one and a half turns either way, as ANYmal's.
+const USUAL_ANGLE_RAD: f64 = 9.5;
 /// Range of a leg's largest torque as a part of the robot's weight times the length of thigh and calf; robots that are
 /// built have 0.2 to 1.
 const TORQUE_SHARE: std::ops::RangeInclusive<f64> = 0.02..=3.0;
@@ -208,9 +208,11 @@ fn doubts(robot: &Robot) -> Vec<String> {
                 format!("a largest speed of {speed_rad_s} rad/s; put the motors' own limit there")
             },
         ),
-        note(&|joint| turned(joint) > FULL_TURN_RAD, &|joint| {
+        note(&|joint| turned(joint) > USUAL_ANGLE_RAD, &|joint| {
             let (low, high) = limits[joint];
-            format!("limits of {low} to {high} rad are more than a turn; are they degrees?")
+            format!(
+                "limits of {low} to {high} rad are more than one and a half turns; are they degrees?"
+            )
         }),
     ];
     found.into_iter().flatten().collect()

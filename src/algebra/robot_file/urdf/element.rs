@@ -6,6 +6,15 @@ use roxmltree::{Document, Node};
 use crate::files::{Located, Place, shell_word};
 use crate::robot_file::error::{RobotFileError, RobotFileFault};
 
+/// Elements for drawings and simulators.
+const UNREAD: [&str; 5] = [
+    "visual",
+    "collision",
+    "gazebo",
+    "transmission",
+    "ros2_control",
+];
+
 /// An element of a file.
 #[derive(Clone, Copy)]
 pub(super) struct Element<'x> {
@@ -29,13 +38,19 @@ pub(super) fn document<'x>(file: &str, text: &'x str) -> Result<Document<'x>, Ro
         let place = Place::Character(at.row as usize, at.col as usize);
         Located::new(file, place, RobotFileFault::Syntax(error.to_string()))
     })?;
+    // Meshes and extensions of simulators may have signs of xacro in what romc does not read.
+    let mut unread_to = 0;
     for node in document.descendants().filter(Node::is_element) {
         let name = node.tag_name();
+        if UNREAD.contains(&name.name()) {
+            unread_to = unread_to.max(node.range().end);
+        }
         let found = match name
             .namespace()
             .is_some_and(|space| space.contains("xacro"))
         {
             true => Some(format!("<xacro:{}>", name.name())),
+            false if node.range().end <= unread_to => None,
             false => (node.attributes())
                 .find(|attribute| {
                     ["${", "$("]
