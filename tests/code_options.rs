@@ -1,4 +1,7 @@
-//! Options of generated code: units at the interface, sines of the library.
+//! Options of generated code: units at the interface, sines of the library, C++ as its language, folders of any name.
+
+mod command_line;
+mod tools;
 
 use std::fs;
 use std::path::Path;
@@ -9,6 +12,7 @@ use romc::codegen::{Precision, SineCosine, Units};
 use romc::deploy::{EmitOptions, Target, emit};
 use romc::equations::Equations;
 use romc::files::EmittedFile;
+use romc::lower::Form;
 use romc::model::ReducedModel;
 
 /// Trigonometric candidate terms in its dynamics.
@@ -68,6 +72,161 @@ fn library_sines_pass_the_self_tests_in_both_precisions() {
         run(Command::new(env!("CARGO"))
             .current_dir(folder.path().join(stem))
             .args(["test", "--offline", "--quiet", "--test", "selftest"]));
+    }
+}
+
+/// The C++ compiler of the machine.
+fn cpp() -> Option<String> {
+    let compiler = std::env::var("CXX").unwrap_or_else(|_| "c++".to_owned());
+    tools::answers(Command::new(&compiler).arg("--version")).then_some(compiler)
+}
+
+const STRICT_CPP: &str = "-x c++ -O1 -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Werror -I.";
+
+#[test]
+fn generated_c_is_cpp_and_passes_its_self_test() {
+    let Some(compiler) = cpp() else { return };
+    // Sines in lanes, tables with loops over rows, a function of every kind.
+    for (path, form, precision, standard) in [
+        (WITH_SINES, Form::Automatic, Precision::Double, "-std=c++11"),
+        (WITH_SINES, Form::Tables, Precision::Single, "-std=c++20"),
+        (
+            "tests/fixtures/models/dense-4.json",
+            Form::Tables,
+            Precision::Double,
+            "-std=c++11",
+        ),
+        (
+            "tests/fixtures/models/every-function.json",
+            Form::Automatic,
+            Precision::Single,
+            "-std=c++20",
+        ),
+    ] {
+        let model = load(path);
+        let stem = model.identifier().as_str();
+        let options = EmitOptions {
+            form,
+            precision,
+            ..EmitOptions::default()
+        };
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let files = emit(&Equations::of(&model), &[Target::C], &options).expect("emits");
+        write(folder.path(), &files);
+        run(Command::new(&compiler)
+            .current_dir(folder.path())
+            .args(STRICT_CPP.split(' '))
+            .args([
+                standard,
+                &format!("{stem}.c"),
+                &format!("{stem}_selftest.c"),
+            ])
+            .args(["-o", "program", "-lm"]));
+        let said = run(&mut Command::new(folder.path().join("program")));
+        assert!(said.contains("all functions agree"), "{said}");
+    }
+}
+
+#[test]
+fn headers_of_the_controller_in_c_are_cpp() {
+    let Some(compiler) = cpp() else { return };
+    let model = load("models/go1-d2.json");
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let files = emit(
+        &Equations::of(&model),
+        &[Target::ControllerC],
+        &EmitOptions::default(),
+    );
+    write(folder.path(), &files.expect("emits"));
+    let inside = folder.path().join("go1_d2-controller-c");
+    let headers = fs::read_dir(&inside)
+        .expect("a folder")
+        .map(|file| file.expect("a file").path());
+    let headers = headers.filter(|path| path.extension().is_some_and(|ending| ending == "h"));
+    let name = |path: std::path::PathBuf| {
+        path.file_name()
+            .expect("a name")
+            .to_string_lossy()
+            .into_owned()
+    };
+    let includes: Vec<String> = headers
+        .map(|path| format!("#include \"{}\"\n", name(path)))
+        .collect();
+    assert!(includes.len() >= 3, "{includes:?}");
+    fs::write(inside.join("all.cpp"), includes.concat()).expect("written");
+    run(Command::new(&compiler)
+        .current_dir(&inside)
+        .args(STRICT_CPP.split(' '))
+        .args(["-fsyntax-only", "all.cpp"]));
+}
+
+#[test]
+fn printed_command_builds_the_self_test_in_a_folder_of_any_name() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("models/paper-2d.json");
+    let model = root.to_str().expect("UTF-8");
+    for name in ["my out; exit 3", "it's $(exit 3)", "-o", "."] {
+        let out = format!("--out-dir={name}");
+        let done = command_line::romc(folder.path(), &["compile", model, "--emit", "c", &out]);
+        let said = command_line::text(&done.stdout);
+        assert!(
+            done.status.success(),
+            "{}",
+            command_line::text(&done.stderr)
+        );
+        let line = said
+            .lines()
+            .find(|line| line.starts_with("  cc "))
+            .expect("a command");
+        let ran = run(Command::new("sh")
+            .current_dir(folder.path())
+            .args(["-c", line]));
+        assert!(ran.contains("all functions agree"), "{line}: {ran}");
+    }
+}
+
+/// No text of a file acts in what is emitted: on its comments, its pages, or the order in which a reader sees them.
+#[test]
+fn texts_of_a_model_file_are_seen_in_every_emitted_file() {
+    use Target::{
+        C, Casadi, Controller, ControllerC, Latex, Markdown, Mathml, Matlab, Python, Rust,
+    };
+    let hostile = "a \u{202e}b\u{2066} \u{200b}\u{feff}*/ ??/ \u{e0041}<script> \\input{x}";
+    let model = load("models/go1-d2.json");
+    let model = model
+        .into_builder()
+        .description(hostile)
+        .build()
+        .expect("a model");
+    let targets = [
+        Latex,
+        C,
+        Rust,
+        Markdown,
+        Mathml,
+        Python,
+        Casadi,
+        Matlab,
+        Controller,
+        ControllerC,
+    ];
+    let files = emit(&Equations::of(&model), &targets, &EmitOptions::default()).expect("emits");
+    let with_text = files
+        .iter()
+        .filter(|file| file.contents.contains("[U+202E]"))
+        .count();
+    assert_eq!(with_text, 3, "pages and preview have the description");
+    for file in &files {
+        let acts = |c: char| hostile.contains(c) && romc::files::is_invisible(c);
+        let found = file
+            .contents
+            .find(acts)
+            .map(|at| &file.contents[at..at + 12]);
+        assert!(
+            found.is_none() && !file.contents.contains("<script>"),
+            "{}: {found:?}",
+            file.path
+        );
     }
 }
 

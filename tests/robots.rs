@@ -5,6 +5,12 @@
 //! `examples/robots/reference.py`.
 
 mod command_line;
+#[path = "robots/made.rs"]
+mod made;
+#[expect(dead_code, reason = "these tests need no tool of the machine")]
+mod tools;
+#[path = "robots/urdf.rs"]
+mod urdf;
 
 use std::fs;
 use std::path::PathBuf;
@@ -45,8 +51,16 @@ fn numbers(value: &Value) -> Vec<f64> {
 fn feet_and_jacobians_are_those_of_pinocchio() {
     let text = fs::read_to_string(root().join("tests/fixtures/robots/reference.json"));
     let reference: Value = serde_json::from_str(&text.expect("checked in")).expect("JSON");
-    for name in FILES {
-        let robot = robot(name);
+    // The world of `reference.py`, below which Pinocchio's trunk has the same legs.
+    let hare = fs::read_to_string(file("hare.urdf")).expect("an example");
+    let below_world = hare.replace(
+        "</robot>",
+        "<link name=\"world\"/><joint name=\"held\" type=\"fixed\"><parent link=\"world\"/><child link=\"torso\"/>\
+         <origin xyz=\"0.3 -0.1 2\" rpy=\"0.1 0.2 0.7\"/></joint></robot>",
+    );
+    let below_world = robot_file::from_urdf("t.urdf", &below_world, &[]).expect("reads");
+    let robots = FILES.map(|name| (name, robot(name)));
+    for (name, robot) in robots.into_iter().chain([("hare.urdf", below_world)]) {
         let mut legs = 0;
         for posture in reference[name].as_array().expect("postures") {
             for entry in posture.as_array().expect("legs") {
@@ -379,9 +393,25 @@ fn completions_offer_targets_and_robots() {
     );
 }
 
-/// A joint's name ends no comment of the header that lists it.
+/// Names of robots and joints end no comment of the header that lists them, and are seen as they are.
 #[test]
-fn names_that_would_end_a_comment_are_refused() {
+fn names_that_act_on_the_text_around_them_are_refused() {
+    let solo12 = robot_file::to_toml(robot("solo12.toml"));
+    for acts in [
+        "\u{202e}", "\u{2066}", "\u{200b}", "\u{2028}", "\n", "*/", "/*", "??/", "\\", "`",
+    ] {
+        for (name, place) in [("solo12", "name"), ("FL_HAA", "leg[1].joint[0].name")] {
+            let hostile = format!("{name}{acts}x");
+            let quoted = Value::from(hostile.as_str()).to_string();
+            let text = solo12.replace(&format!("\"{name}\""), &quoted);
+            let error = robot_file::from_toml("r.toml", &text)
+                .expect_err("a fault")
+                .to_string();
+            let found =
+                format!("r.toml: {place}: found {hostile:?}, expected a name of at most 80 bytes");
+            assert!(error.starts_with(&found), "{error}");
+        }
+    }
     let text = robot_file::to_toml(robot("solo12.toml")).replace("FL_HAA", "FL*/HAA");
     let error = robot_file::from_toml("r.toml", &text)
         .unwrap_err()

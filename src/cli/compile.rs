@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use super::Answer;
 use super::args::{CompileArguments, UnitsChoice};
 use super::destination::{Format, Inputs};
-use super::output::{lines, names, note_mismatches, read_recordings, refused};
+use super::output::{lines, names, note_mismatches, quoted, read_recordings, refused};
 use super::simplification::{self, Outcome, exact_words};
 use crate::deploy::{self, EmitOptions, PlannedJump, Target};
 use crate::equations::Equations;
@@ -108,10 +108,20 @@ fn text(
     text += &lines("simplified model: ", saved.map(Path::display));
     if arguments.emit.contains(&Target::C) {
         let name = model.identifier().as_str();
-        let folder = arguments.out_dir.display();
+        let file = |ending: &str| quoted(&arguments.out_dir.join(ending));
+        let program = file("selftest");
+        // Without a folder before it, a shell would look for the program elsewhere.
+        let run = match program.contains('/') {
+            true => program.clone(),
+            false => format!("./{program}"),
+        };
+        let (source, test) = (
+            file(&format!("{name}.c")),
+            file(&format!("{name}_selftest.c")),
+        );
         let _ = writeln!(
             text,
-            "\ncheck the C code on this machine:\n  cc -O2 -o {folder}/selftest {folder}/{name}.c {folder}/{name}_selftest.c -lm && {folder}/selftest"
+            "\ncheck the C code on this machine:\n  cc -O2 -o {program} {source} {test} -lm && {run}"
         );
     }
     text

@@ -13,7 +13,10 @@ use serde_json::Value;
 
 use super::args::ReadingArguments;
 use crate::Error;
-use crate::files::{Overwrite, write_whole};
+use crate::files::{Overwrite, is_invisible, write_whole};
+pub use crate::files::{
+    shell_path as quoted, shell_paths as quoted_all, shell_word as quoted_text,
+};
 use crate::recording::{Clocks, ColumnMap, Reader, ReadingNotes, Recording, mismatch};
 use crate::robot::Robot;
 use crate::train::sha256;
@@ -90,8 +93,8 @@ pub fn read_with(reader: &Reader, paths: &[PathBuf]) -> Result<Vec<Recording>, E
     read
 }
 
-/// A text for a terminal: control characters and marks that reverse the direction of writing, as a file's name or
-/// cell may have them, are written out. Line ends and tabs stay.
+/// A text for a terminal: characters that act instead of being shown, as a file's name or cell may have them, are
+/// written out. Line ends and tabs stay.
 pub fn printable(text: &str) -> Cow<'_, str> {
     escaped(text, |c| c.escape_unicode().to_string())
 }
@@ -140,15 +143,15 @@ pub fn warn(text: &str) {
 
 /// As [`printable`], for one JSON object.
 pub fn printable_json(text: &str) -> Cow<'_, str> {
-    // Those of JSON itself have been escaped, so that all of them are in strings; none is beyond U+FFFF.
-    escaped(text, |c| format!("\\u{:04x}", u32::from(c)))
+    // Those of JSON itself have been escaped, so that all of them are in strings.
+    escaped(text, |c| {
+        let units = c.encode_utf16(&mut [0; 2]).to_vec();
+        units.iter().map(|unit| format!("\\u{unit:04x}")).collect()
+    })
 }
 
 fn escaped(text: &str, written: impl Fn(char) -> String) -> Cow<'_, str> {
-    let acts = |c: char| {
-        (c.is_control() && !matches!(c, '\n' | '\t'))
-            || matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
-    };
+    let acts = |c: char| is_invisible(c) && !matches!(c, '\n' | '\t');
     if !text.contains(acts) {
         return Cow::Borrowed(text);
     }
@@ -177,27 +180,6 @@ pub fn lines<T: Display>(words: &str, items: impl IntoIterator<Item = T>) -> Str
 pub fn names(paths: &[PathBuf]) -> Vec<String> {
     let names = paths.iter().map(|path| path.display().to_string());
     names.collect()
-}
-
-/// A path as a shell takes it.
-pub fn quoted(path: &Path) -> String {
-    quoted_text(&path.display().to_string())
-}
-
-/// Paths as a shell takes them.
-pub fn quoted_all(paths: &[PathBuf]) -> String {
-    let words: Vec<String> = paths.iter().map(|path| quoted(path)).collect();
-    words.join(" ")
-}
-
-/// A word as a shell takes it.
-pub fn quoted_text(text: &str) -> String {
-    let plain = |letter: char| letter.is_alphanumeric() || "-_./,=:+%".contains(letter);
-    if text.chars().all(plain) {
-        text.to_owned()
-    } else {
-        format!("'{}'", text.replace('\'', r"'\''"))
-    }
 }
 
 /// `name_1`, `name_2` and so on.

@@ -1,7 +1,6 @@
 //! `--robot` of every command, and `romc robot`: what a robot's file says.
 
 use std::fmt::Write as _;
-use std::path::Path;
 
 use serde_json::json;
 
@@ -11,12 +10,13 @@ use super::destination::{Format, Inputs};
 use super::output::{note, write_file};
 use crate::Error;
 use crate::robot::{JOINT_NAMES, Leg, Robot};
-use crate::robot_file::{self, RobotEntry};
+use crate::robot_file::{self, RobotEntry, RobotOptions};
 use crate::typeset::Table;
 
 /// The robot of `--robot`; of a file, how its joints were matched goes to stderr.
 pub fn chosen(name_or_file: &str) -> Result<&'static Robot, Error> {
-    let robot = robot_file::find(name_or_file)?;
+    let read = robot_file::open(name_or_file, &RobotOptions::default())?;
+    let robot = read.robot;
     if Robot::by_name(name_or_file).is_err() {
         let joints = Leg::ALL.into_iter().zip(robot.joint_names().chunks(3));
         let matched: Vec<String> = joints
@@ -25,7 +25,14 @@ pub fn chosen(name_or_file: &str) -> Result<&'static Robot, Error> {
         let (name, matched) = (robot.name(), matched.join(", "));
         note(&format!("{name_or_file}: robot {name}, {matched}"));
     }
+    note_all(name_or_file, &read.notes);
     Ok(robot)
+}
+
+fn note_all(file: &str, notes: &[String]) {
+    notes
+        .iter()
+        .for_each(|text| note(&format!("{file}: {text}")));
 }
 
 /// Shows a robot, and writes its TOML.
@@ -33,10 +40,13 @@ pub fn run(arguments: &RobotArguments) -> Result<Answer, Error> {
     Inputs::default()
         .and_robot(Some(&arguments.robot))
         .check_output(arguments.output.as_deref(), Format::TOML, arguments.force)?;
-    let robot = match arguments.feet.as_slice() {
-        [] => robot_file::find(&arguments.robot)?,
-        feet => robot_file::read(Path::new(&arguments.robot), feet)?,
+    let options = RobotOptions {
+        feet: &arguments.feet,
+        name: arguments.name.as_deref(),
     };
+    let read = robot_file::open(&arguments.robot, &options)?;
+    let robot = read.robot;
+    note_all(&arguments.robot, &read.notes);
     let mut text = format!("{}: {} kg\n\n", robot.name(), number(robot.mass_kg()));
     let geometry = |joint: usize| robot.geometry(Leg::ALL[joint / 3]).chain();
     let limits = robot.joint_limit_rad();
@@ -65,6 +75,7 @@ pub fn run(arguments: &RobotArguments) -> Result<Answer, Error> {
     }
     let json = json!({
         "robot": RobotEntry::of(robot),
+        "notes": read.notes,
         "output": arguments.output.as_ref().map(|path| path.display().to_string()),
     });
     Ok(Answer { text, json })

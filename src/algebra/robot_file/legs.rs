@@ -4,7 +4,9 @@ use nalgebra::{Rotation3, Unit, Vector3};
 
 use super::entry::{JointEntry, LegEntry, RobotEntry};
 use super::error::RobotFileError;
+use super::identity::namesake;
 use super::registry::{keep, word};
+use crate::files::is_invisible;
 use crate::robot::joints::LEG_JOINT_DIM;
 use crate::robot::{ChainLeg, FOOT_DIM, JOINT_DIM, Leg, LegGeometry, Robot};
 
@@ -19,9 +21,74 @@ const MAX_TILT: f64 = 1e-3;
 /// Smallest sine of the angle between the first axis and the second.
 const MIN_ABDUCTION: f64 = 0.1;
 
-/// A place in the file, and the means to complain of it.
+/// How faults name the parts of an entry.
+pub(super) enum Places {
+    /// By the keys of TOML and JSON.
+    Keys,
+    /// By the elements of a URDF, legs in the entry's order.
+    Elements { robot: String, legs: Vec<LegPlaces> },
+}
+
+/// Elements of a leg, such as ``line 24: joint `knee` ``.
+pub(super) struct LegPlaces {
+    pub joints: Vec<String>,
+    pub foot: String,
+}
+
+/// Keys of a joint as a URDF spells them.
+const SPELLINGS: [(&str, &str); 5] = [
+    ("at", "<origin>, xyz"),
+    ("axis", "<axis>, xyz"),
+    ("limits_rad", "<limit>, lower and upper"),
+    ("torque_nm", "<limit>, effort"),
+    ("speed_rad_s", "<limit>, velocity"),
+];
+
+impl Places {
+    fn of_robot(&self, key: &str) -> String {
+        match self {
+            Places::Keys => key.to_owned(),
+            Places::Elements { robot, .. } if key == "name" => format!("{robot}, name"),
+            Places::Elements { .. } => match key {
+                "mass_kg" => "the masses of the links".to_owned(),
+                _ => "the tree".to_owned(),
+            },
+        }
+    }
+
+    fn of_leg(&self, leg: usize) -> String {
+        match self {
+            Places::Keys => format!("leg[{leg}]"),
+            Places::Elements { legs, .. } => format!("{}, its leg", legs[leg].joints[0]),
+        }
+    }
+
+    fn of_foot(&self, leg: usize) -> String {
+        match self {
+            Places::Keys => format!("leg[{leg}].foot"),
+            Places::Elements { legs, .. } => legs[leg].foot.clone(),
+        }
+    }
+
+    /// A key of a joint; the joint itself, if it is empty.
+    pub(super) fn of_joint(&self, leg: usize, joint: usize, key: &str) -> String {
+        match self {
+            Places::Keys if key.is_empty() => format!("leg[{leg}].joint[{joint}]"),
+            Places::Keys => format!("leg[{leg}].joint[{joint}].{key}"),
+            Places::Elements { legs, .. } => {
+                let known = SPELLINGS.iter().find(|(name, _)| *name == key);
+                let spelling = known.map_or(key, |(_, spelling)| spelling);
+                let comma = if spelling.is_empty() { "" } else { ", " };
+                format!("{}{comma}{spelling}", legs[leg].joints[joint])
+            }
+        }
+    }
+}
+
+/// A file and its parts, and the means to complain of them.
 struct Reader<'f> {
     file: &'f str,
+    places: &'f Places,
 }
 
 impl RobotEntry {
@@ -30,26 +97,33 @@ impl RobotEntry {
     /// # Errors
     /// [`RobotFileError`] with the entry that is wrong, or a name that is another robot's.
     pub fn robot(&self, file: &str) -> Result<&'static Robot, RobotFileError> {
-        let robot = build(file, self)?;
-        match Robot::by_name(&self.name) {
-            Ok(known) if *known != robot => {
-                let found = format!("{:?} with other numbers than romc's own robot", self.name);
+        let robot = build(file, self, &Places::Keys)?;
+        match namesake(&robot) {
+            None => Ok(keep(robot)),
+            Some(differences) => {
+                let found = format!(
+                    "{:?} with other numbers than romc's own robot ({differences})",
+                    self.name
+                );
                 Err(RobotFileError::at(file, "name", found, "another name"))
             }
-            Ok(_) | Err(_) => Ok(keep(robot)),
         }
     }
 }
 
 /// The robot of an entry, whatever its name.
-pub(super) fn build(file: &str, entry: &RobotEntry) -> Result<Robot, RobotFileError> {
-    let reader = Reader { file };
-    reader.name("name", &entry.name)?;
-    reader.positive("mass_kg", entry.mass_kg)?;
+pub(super) fn build(
+    file: &str,
+    entry: &RobotEntry,
+    places: &Places,
+) -> Result<Robot, RobotFileError> {
+    let reader = Reader { file, places };
+    reader.name(&places.of_robot("name"), &entry.name)?;
+    reader.positive(&places.of_robot("mass_kg"), entry.mass_kg)?;
     let found = format!("{} legs", entry.leg.len());
     let expected = "four: models, inputs and controllers are those of quadrupeds";
     reader.check(entry.leg.len() == FOOT_DIM, "leg", found, expected)?;
-    let places = reader.places(&entry.leg)?;
+    let corners = reader.corners(&entry.leg)?;
     let mut robot = Robot {
         name: word(&entry.name),
         mass_kg: entry.mass_kg,
@@ -64,25 +138,23 @@ pub(super) fn build(file: &str, entry: &RobotEntry) -> Result<Robot, RobotFileEr
         joint_speed_limit_rad_s: [0.0; JOINT_DIM],
     };
     let mut names: Vec<&str> = Vec::with_capacity(JOINT_DIM);
-    for (index, (leg, entry)) in places.iter().zip(&entry.leg).enumerate() {
-        let (k, place) = (leg.index(), format!("leg[{index}]"));
-        robot.legs[k] = LegGeometry::of_chain(reader.chain(&place, entry)?);
+    for (index, (leg, entry)) in corners.iter().zip(&entry.leg).enumerate() {
+        let k = leg.index();
+        robot.legs[k] = LegGeometry::of_chain(reader.chain(index, entry)?);
         robot.hip_position_m[k] = entry.joint[0].at;
         for (offset, joint) in entry.joint.iter().enumerate() {
-            let place = format!("{place}.joint[{offset}]");
+            let place = |key: &str| places.of_joint(index, offset, key);
             let at = LEG_JOINT_DIM * k + offset;
-            let of_name = format!("{place}.name");
-            reader.name(&of_name, &joint.name)?;
+            reader.name(&place("name"), &joint.name)?;
             let is_new = !names.contains(&joint.name.as_str());
             let found = format!("{:?} a second time", joint.name);
-            reader.check(is_new, &of_name, found, "each name once")?;
+            reader.check(is_new, &place("name"), found, "each name once")?;
             names.push(&joint.name);
             robot.joint_names[at] = word(&joint.name);
-            robot.joint_limit_rad[at] = reader.limits(&place, joint)?;
-            robot.torque_limit_nm[at] =
-                reader.positive(&format!("{place}.torque_nm"), joint.torque_nm)?;
+            robot.joint_limit_rad[at] = reader.limits(place, joint)?;
+            robot.torque_limit_nm[at] = reader.positive(&place("torque_nm"), joint.torque_nm)?;
             robot.joint_speed_limit_rad_s[at] =
-                reader.positive(&format!("{place}.speed_rad_s"), joint.speed_rad_s)?;
+                reader.positive(&place("speed_rad_s"), joint.speed_rad_s)?;
         }
     }
     Ok(robot)
@@ -104,12 +176,14 @@ impl Reader<'_> {
     }
 
     fn name(&self, place: &str, name: &str) -> Result<(), RobotFileError> {
+        // Comments and pages of generated files list names.
         let is_fine = !name.trim().is_empty()
             && name.len() <= MAX_NAME_LEN
-            && !name.chars().any(char::is_control)
-            // Generated headers list names in comments.
-            && !name.contains("*/");
-        let expected = format!("a name of at most {MAX_NAME_LEN} bytes on one line");
+            && !name.chars().any(|c| is_invisible(c) || "\\`".contains(c))
+            && !["*/", "/*", "??"].iter().any(|sign| name.contains(sign));
+        let expected = format!(
+            "a name of at most {MAX_NAME_LEN} bytes that are seen, without \\, `, /*, */ and ??"
+        );
         self.check(is_fine, place, format!("{name:?}"), expected)
     }
 
@@ -125,26 +199,33 @@ impl Reader<'_> {
         self.check(is_fine, place, format!("{vector:?}"), expected)
     }
 
-    fn limits(&self, place: &str, joint: &JointEntry) -> Result<(f64, f64), RobotFileError> {
+    fn limits(
+        &self,
+        place: impl Fn(&str) -> String,
+        joint: &JointEntry,
+    ) -> Result<(f64, f64), RobotFileError> {
         let (key, [low, high]) = match (joint.limits_rad, joint.limits_deg) {
             (Some(limits), None) => ("limits_rad", limits),
             (None, Some(limits)) => ("limits_deg", limits.map(f64::to_radians)),
             (found, _) => {
                 let found = if found.is_some() { "both" } else { "neither" };
                 let expected = "one of limits_rad and limits_deg";
-                return Err(RobotFileError::at(self.file, place, found, expected));
+                return Err(RobotFileError::at(self.file, place(""), found, expected));
             }
         };
         let is_fine = low.is_finite() && high.is_finite() && low < high;
-        let (place, found) = (format!("{place}.{key}"), format!("{low} to {high}"));
+        let (place, found) = (place(key), format!("{low} to {high}"));
         self.check(is_fine, &place, found, "the lower limit first")?;
         Ok((low, high))
     }
 
     /// Which leg each entry is, by where its first joint stands.
-    fn places(&self, legs: &[LegEntry]) -> Result<[Leg; FOOT_DIM], RobotFileError> {
+    fn corners(&self, legs: &[LegEntry]) -> Result<[Leg; FOOT_DIM], RobotFileError> {
         for (index, leg) in legs.iter().enumerate() {
-            let (place, count) = (format!("leg[{index}].joint"), leg.joint.len());
+            let (place, count) = (
+                format!("{}.joint", self.places.of_leg(index)),
+                leg.joint.len(),
+            );
             let found = format!("{count} joints");
             let expected = "three, from the trunk to the foot";
             self.check(count == LEG_JOINT_DIM, &place, found, expected)?;
@@ -168,13 +249,17 @@ impl Reader<'_> {
                 let hips = hips.collect::<Vec<_>>().join(", ");
                 let found = format!("first joints at (x, y) = {hips} m");
                 let expected = "one at each corner of the trunk: x forward, y left";
-                Err(RobotFileError::at(self.file, "leg", found, expected))
+                Err(RobotFileError::at(
+                    self.file,
+                    self.places.of_robot("leg"),
+                    found,
+                    expected,
+                ))
             }
         }
     }
 
-    fn axis(&self, place: &str, joint: &JointEntry) -> Result<Vector3<f64>, RobotFileError> {
-        let place = format!("{place}.axis");
+    fn axis(&self, place: String, joint: &JointEntry) -> Result<Vector3<f64>, RobotFileError> {
         let Some(given) = joint.axis.vector() else {
             let found = format!("{:?}", joint.axis);
             let expected = "\"x\", \"y\", \"z\", \"-x\", \"-y\", \"-z\" or three numbers";
@@ -196,14 +281,14 @@ impl Reader<'_> {
         Ok((unit * joint.sign).map(|v| v + 0.0))
     }
 
-    fn chain(&self, place: &str, leg: &LegEntry) -> Result<ChainLeg, RobotFileError> {
+    fn chain(&self, index: usize, leg: &LegEntry) -> Result<ChainLeg, RobotFileError> {
         let mut axes = [Vector3::zeros(); LEG_JOINT_DIM];
         for (offset, joint) in leg.joint.iter().enumerate() {
-            let place = format!("{place}.joint[{offset}]");
-            axes[offset] = self.axis(&place, joint)?;
-            self.vector(&format!("{place}.at"), joint.at)?;
+            let place = |key: &str| self.places.of_joint(index, offset, key);
+            axes[offset] = self.axis(place("axis"), joint)?;
+            self.vector(&place("at"), joint.at)?;
         }
-        self.vector(&format!("{place}.foot"), leg.foot)?;
+        self.vector(&self.places.of_foot(index), leg.foot)?;
         let mut links = [leg.joint[1].at, leg.joint[2].at, leg.foot].map(Vector3::from);
         // At the recorded zero each joint is turned back by its offset.
         for joint in (0..LEG_JOINT_DIM).rev() {
@@ -222,6 +307,7 @@ impl Reader<'_> {
             axes: axes.map(Into::into),
             links: links.map(|link| link.map(|v| v + 0.0).into()),
         };
+        let place = &self.places.of_leg(index);
         let names = |a: usize, b: usize| {
             let [a, b] = [a, b].map(|joint| leg.joint[joint].name.as_str());
             format!("the axes of {a} and {b}")

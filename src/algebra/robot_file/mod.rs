@@ -3,8 +3,8 @@
 //! What enters: a name, or the path or text of a file. What leaves: a checked [`Robot`] with its legs
 //! in romc's order, or file, place, what was found and what was expected. Legs are matched by where
 //! their first joints stand, joints by their order from the trunk.
-//! Read `entry.rs` first, the grammar; `legs.rs` makes a robot of it, `urdf.rs` finds the legs of a
-//! tree. `docs/robots.md` describes the file.
+//! Read `entry.rs` first, the grammar; `legs.rs` makes a robot of it, `urdf` finds the legs of a
+//! tree, `identity.rs` compares with romc's own robots and doubts numbers. `docs/robots.md` describes the file.
 //!
 //! ```
 //! use romc::robot::{Leg, Robot};
@@ -24,6 +24,7 @@
 mod actuators;
 mod entry;
 mod error;
+mod identity;
 mod legs;
 mod read;
 mod registry;
@@ -32,4 +33,5 @@ mod urdf;
 pub use actuators::{ActuatorsEntry, read_actuators};
 pub use entry::{RobotEntry, to_toml};
 pub use error::{RobotFileError, RobotFileFault};
-pub use read::{find, from_toml, from_urdf, read};
+pub use identity::RobotReading;
+pub use read::{RobotOptions, find, from_toml, from_urdf, open, read, urdf_reading};

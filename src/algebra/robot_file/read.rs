@@ -8,6 +8,8 @@ use serde::de::DeserializeOwned;
 
 use super::entry::RobotEntry;
 use super::error::{RobotFileError, RobotFileFault};
+use super::identity::{RobotReading, identified};
+use super::legs::Places;
 use super::urdf;
 use crate::files::{Located, Place};
 use crate::robot::Robot;
@@ -15,21 +17,55 @@ use crate::robot::Robot;
 /// Largest file of a robot; a URDF with meshes beside it is far smaller.
 const MAX_FILE_BYTES: u64 = 16 << 20;
 
+/// What a command says of a robot's file besides its path.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct RobotOptions<'a> {
+    /// Links of the four feet of a URDF, each with a point in its frame where that is not the foot
+    /// (`LINK:x,y,z`); empty to find them.
+    pub feet: &'a [String],
+    /// The robot's name instead of the file's.
+    pub name: Option<&'a str>,
+}
+
 /// The robot of a name, or of a file that ends in `.toml` or `.urdf`.
 ///
 /// # Errors
 /// [`RobotFileFault::Unknown`] for what is neither, else as [`read`].
 pub fn find(name_or_file: &str) -> Result<&'static Robot, RobotFileError> {
-    match Robot::by_name(name_or_file) {
-        Ok(robot) => Ok(robot),
-        Err(unknown) => match ending(Path::new(name_or_file)).as_str() {
-            "toml" | "urdf" | "xml" => read(Path::new(name_or_file), &[]),
-            _ => Err(Located::new(
-                "",
-                Place::Whole,
-                RobotFileFault::Unknown(unknown),
-            )),
-        },
+    Ok(open(name_or_file, &RobotOptions::default())?.robot)
+}
+
+/// [`find`] with options and notes.
+///
+/// # Errors
+/// As [`find`], and for options of a robot that has no file.
+pub fn open(
+    name_or_file: &str,
+    options: &RobotOptions<'_>,
+) -> Result<RobotReading, RobotFileError> {
+    let path = Path::new(name_or_file);
+    match (Robot::by_name(name_or_file), ending(path).as_str()) {
+        (Ok(robot), _) if options.feet.is_empty() && options.name.is_none() => Ok(RobotReading {
+            robot,
+            notes: Vec::new(),
+        }),
+        (Ok(_), _) => {
+            let option = if options.feet.is_empty() {
+                "--name"
+            } else {
+                "--feet"
+            };
+            Err(misplaced(
+                option,
+                format!("romc's own {name_or_file}"),
+                "a file",
+            ))
+        }
+        (Err(_), "toml" | "urdf" | "xml" | "xacro") => read_with(path, options),
+        (Err(unknown), _) => {
+            let fault = RobotFileFault::Unknown(unknown);
+            Err(Located::new("", Place::Whole, fault))
+        }
     }
 }
 
@@ -38,23 +74,32 @@ fn ending(path: &Path) -> String {
     ending.to_string_lossy().to_lowercase()
 }
 
+fn misplaced(option: &'static str, found: String, expected: &str) -> RobotFileError {
+    let expected = expected.to_owned();
+    let fault = RobotFileFault::Unexpected { found, expected };
+    Located::new("", Place::Option(option), fault)
+}
+
 /// Reads a robot from a TOML or, by its ending, a URDF file; `feet` names the links of the feet of a
 /// URDF, empty to find them.
 ///
 /// # Errors
 /// [`RobotFileError`] with the entry that is wrong or missing.
 pub fn read(path: &Path, feet: &[String]) -> Result<&'static Robot, RobotFileError> {
+    Ok(read_with(path, &RobotOptions { feet, name: None })?.robot)
+}
+
+fn read_with(path: &Path, options: &RobotOptions<'_>) -> Result<RobotReading, RobotFileError> {
     let file = path.display().to_string();
     let text = text_of(path)?;
     match ending(path).as_str() {
-        "toml" if feet.is_empty() => from_toml(&file, &text),
-        "toml" => {
-            let found = format!("{file} with links of feet");
-            let expected = "a URDF".to_owned();
-            let fault = RobotFileFault::Unexpected { found, expected };
-            Err(Located::new("", Place::Option("--feet"), fault))
-        }
-        _ => from_urdf(&file, &text, feet),
+        "toml" if options.feet.is_empty() => toml_reading(&file, &text, options.name),
+        "toml" => Err(misplaced(
+            "--feet",
+            format!("{file} with links of feet"),
+            "a URDF",
+        )),
+        _ => urdf_reading(&file, &text, options),
     }
 }
 
@@ -78,7 +123,16 @@ pub(super) fn text_of(path: &Path) -> Result<String, RobotFileError> {
 /// # Errors
 /// As [`read`].
 pub fn from_toml(file: &str, text: &str) -> Result<&'static Robot, RobotFileError> {
-    from_toml_text::<RobotEntry>(file, text)?.robot(file)
+    Ok(toml_reading(file, text, None)?.robot)
+}
+
+fn toml_reading(
+    file: &str,
+    text: &str,
+    name: Option<&str>,
+) -> Result<RobotReading, RobotFileError> {
+    let entry = from_toml_text::<RobotEntry>(file, text)?;
+    identified(file, entry, &Places::Keys, name, Vec::new())
 }
 
 /// Reads a robot from URDF; `feet` names the links of its feet, empty to find them.
@@ -90,7 +144,26 @@ pub fn from_urdf(
     text: &str,
     feet: &[String],
 ) -> Result<&'static Robot, RobotFileError> {
-    urdf::entry(file, text, feet)?.robot(file)
+    Ok(urdf_reading(file, text, &RobotOptions { feet, name: None })?.robot)
+}
+
+/// [`from_urdf`] with options and notes.
+///
+/// # Errors
+/// As [`read`].
+pub fn urdf_reading(
+    file: &str,
+    text: &str,
+    options: &RobotOptions<'_>,
+) -> Result<RobotReading, RobotFileError> {
+    let reading = urdf::read(file, text, options.feet, options.name)?;
+    identified(
+        file,
+        reading.entry,
+        &reading.places,
+        options.name,
+        reading.notes,
+    )
 }
 
 pub(super) fn from_toml_text<T: DeserializeOwned>(
@@ -167,9 +240,41 @@ mod tests {
                 .to_string();
             assert!(error.contains(said), "{error}");
         }
+    }
+
+    #[test]
+    fn another_robot_of_a_known_name_is_one_of_its_own_and_says_what_differs() {
         let a1 = to_toml(Robot::by_name("a1").unwrap()).replace("12.78", "12.79");
-        let error = from_toml("r.toml", &a1).unwrap_err().to_string();
-        assert!(error.contains("r.toml: name: found \"a1\" with other numbers"));
+        let read = toml_reading("r.toml", &a1, None).unwrap();
+        assert_eq!(
+            (read.robot.name(), read.robot.mass_kg()),
+            ("a1-toml", 12.79)
+        );
+        assert_eq!(
+            read.notes,
+            [
+                "its numbers are not those of romc's own \"a1\" (mass_kg 12.79 instead of 12.78): it is called \
+              \"a1-toml\"; --name (romc robot) gives it another name"
+            ]
+        );
+        assert_eq!(
+            toml_reading("r.toml", &a1, Some("mine"))
+                .unwrap()
+                .robot
+                .name(),
+            "mine"
+        );
+        let error = toml_reading("r.toml", &a1, Some("a1"))
+            .unwrap_err()
+            .to_string();
+        assert!(
+            error.contains("--name: found \"a1\", romc's own robot with other"),
+            "{error}"
+        );
+        // A model file's robot is what it is; it is not renamed.
+        let entry: RobotEntry = from_toml_text("r.toml", &a1).unwrap();
+        let error = entry.robot("robot").unwrap_err().to_string();
+        assert!(error.contains("(mass_kg 12.79 instead of 12.78), expected another name"));
     }
 
     #[test]

@@ -4,7 +4,8 @@ use std::collections::BTreeSet;
 use std::sync::{Mutex, OnceLock, PoisonError};
 
 use super::entry::RobotEntry;
-use super::{legs, read};
+use super::legs::{self, Places};
+use super::read;
 use crate::robot::{Robot, RobotError};
 
 /// Name and file of each robot that romc brings.
@@ -29,7 +30,7 @@ impl Robot {
         Ok(ROBOTS[at].get_or_init(|| {
             let (file, text) = KNOWN[at];
             let entry = read::from_toml_text::<RobotEntry>(file, text);
-            let robot = entry.and_then(|entry| legs::build(file, &entry));
+            let robot = entry.and_then(|entry| legs::build(file, &entry, &Places::Keys));
             keep(robot.expect("a file of romc's own, read by a test"))
         }))
     }

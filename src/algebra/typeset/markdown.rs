@@ -6,10 +6,10 @@
 use askama::Template;
 
 use crate::equations::{Equations, Unit};
-use crate::files::EmittedFile;
+use crate::files::{EmittedFile, is_invisible};
 use crate::typeset::latex::{tex, tex_cases, tex_symbol, tex_unit};
 use crate::typeset::page::{Markup, Page, rendered};
-use crate::typeset::words::{Spelling, ends_line};
+use crate::typeset::words::{Spelling, code_point, ends_line};
 use crate::typeset::{EquationSystem, Math, NumberStyle, PrintOptions, Symbol, TypesetError};
 
 /// The file `NAME.md`: each phase's equations in `math` fences, and the table of
@@ -75,6 +75,10 @@ pub fn markdown_text(text: &str) -> String {
     for (place, character) in text.replace(ends_line, " ").chars().enumerate() {
         // A hyphen makes a list only at the start.
         let is_harmless = ".,:;%()=+/".contains(character) || (character == '-' && place > 0);
+        if is_invisible(character) {
+            markdown += &code_point(character);
+            continue;
+        }
         if character.is_ascii_punctuation() && !is_harmless {
             markdown.push('\\');
         }

@@ -3,6 +3,8 @@
 use std::fmt;
 
 use super::mathml::HtmlProse;
+use super::words::code_point;
+use crate::files::is_invisible;
 
 /// A number with four significant digits; `diverged` for one that is not finite.
 pub fn significant(value: f64) -> String {
@@ -251,10 +253,11 @@ impl<T> Rows<T> {
 /// Text that Markdown shows as it is inside a cell.
 fn escaped(cell: &str) -> String {
     let escape = |letter: char| match letter {
-        '|' | '*' | '_' | '`' | '<' | '\\' | '$' => vec!['\\', letter],
-        _ => vec![letter],
+        '|' | '*' | '_' | '`' | '<' | '\\' | '$' => format!("\\{letter}"),
+        _ if is_invisible(letter) => code_point(letter),
+        _ => letter.to_string(),
     };
-    cell.chars().flat_map(escape).collect()
+    cell.chars().map(escape).collect()
 }
 
 impl fmt::Display for Table {

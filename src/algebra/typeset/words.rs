@@ -39,6 +39,11 @@ pub(super) fn ends_line(character: char) -> bool {
     character.is_control() || matches!(character, '\u{2028}' | '\u{2029}')
 }
 
+/// A character that acts instead of being shown, for a page: written out.
+pub(super) fn code_point(character: char) -> String {
+    format!("[U+{:04X}]", u32::from(character))
+}
+
 /// `1 jump`, `2 jumps`: a count before the noun that it counts.
 pub fn counted(count: usize, noun: &str) -> String {
     match count {

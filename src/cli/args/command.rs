@@ -161,14 +161,19 @@ pub struct IdentifyArguments {
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  romc robot go1\n  \
                   romc robot solo12.urdf --output solo12.toml\n  \
-                  romc robot my.urdf --feet LF_FOOT,RF_FOOT,LH_FOOT,RH_FOOT --output my.toml")]
+                  romc robot my.urdf --feet LF_FOOT,RF_FOOT,LH_FOOT,RH_FOOT --output my.toml\n  \
+                  romc robot go1.urdf --name my-go1 --output my-go1.toml")]
 pub struct RobotArguments {
     /// Robot: go1, go2, a1, or a .toml or .urdf file
     #[arg(value_name = "ROBOT")]
     pub robot: String,
-    /// Links of the four feet of a URDF, where they are not found by themselves
+    /// Links of the four feet of a URDF, where they are not found by themselves: LINK,LINK,..., or with the foot's
+    /// place in the frame of each, in m, where no link is: LINK:x,y,z,LINK:x,y,z,...
     #[arg(long, value_name = "LINKS", value_delimiter = ',')]
     pub feet: Vec<String>,
+    /// Name of the robot [default: the file's]
+    #[arg(long)]
+    pub name: Option<String>,
     /// Write the robot to this file
     #[arg(long, value_name = "FILE.toml")]
     pub output: Option<PathBuf>,

@@ -1,6 +1,7 @@
 //! The one way for text of a model file into a TeX file.
 
-use crate::typeset::words::ends_line;
+use crate::files::is_invisible;
+use crate::typeset::words::code_point;
 
 /// Text from outside, printed so that TeX shows its characters and runs none of
 /// them: every special character becomes a command, control characters and line
@@ -24,17 +25,17 @@ pub fn tex_text(text: &str) -> String {
         match escaped(character) {
             Some(command) => tex.push_str(command),
             None if is_plain(character) => tex.push(character),
-            None => tex.push_str(&format!("[U+{:04X}]", u32::from(character))),
+            None => tex.push_str(&code_point(character)),
         }
     }
     tex
 }
 
-/// Text from outside for a `%` comment: as it is, but on one line. TeX skips the
-/// rest of a comment's line without looking at it, so only a line end could let
-/// something out.
+/// Text from outside for a `%` comment: as it is, but on one line and without what changes how its
+/// reader sees the line. TeX skips the rest of a comment's line without looking at it, so only a
+/// line end could let something out.
 pub fn comment_text(text: &str) -> String {
-    text.replace(ends_line, " ")
+    text.replace(is_invisible, " ")
 }
 
 /// The command for a character that TeX would not print as it is.

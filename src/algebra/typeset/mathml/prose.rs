@@ -3,8 +3,10 @@
 
 use std::fmt;
 
+use crate::files::is_invisible;
 use crate::model::LatentVariable;
 use crate::typeset::SymbolTable;
+use crate::typeset::words::code_point;
 
 use super::math::mathml_symbol;
 
@@ -27,6 +29,7 @@ impl fmt::Display for HtmlText<'_> {
                 '"' => f.write_str("&quot;")?,
                 '\'' => f.write_str("&#39;")?,
                 _ if character.is_control() => f.write_str(" ")?,
+                _ if is_invisible(character) => f.write_str(&code_point(character))?,
                 _ => write!(f, "{character}")?,
             }
         }

@@ -1,0 +1,80 @@
+//! Text of files and arguments on its way out: characters that act instead of being shown, words of a shell.
+
+use std::path::{Path, PathBuf};
+
+/// Characters beyond control characters that act on the text around them or are not seen: separators of lines,
+/// directions of writing, joiners and spaces without width, tags (Unicode's categories Zl, Zp and what is invisible
+/// of Cf).
+const INVISIBLE: [(char, char); 10] = [
+    ('\u{ad}', '\u{ad}'),
+    ('\u{61c}', '\u{61c}'),
+    ('\u{180e}', '\u{180e}'),
+    ('\u{200b}', '\u{200f}'),
+    ('\u{2028}', '\u{202e}'),
+    ('\u{2060}', '\u{206f}'),
+    ('\u{feff}', '\u{feff}'),
+    ('\u{fff9}', '\u{fffb}'),
+    ('\u{1d173}', '\u{1d17a}'),
+    ('\u{e0000}', '\u{e007f}'),
+];
+
+/// Whether a character acts on the text around it instead of being shown: no name has one, and texts for terminals
+/// and pages have it written out.
+pub fn is_invisible(c: char) -> bool {
+    c.is_control() || (INVISIBLE.iter()).any(|(first, last)| (*first..=*last).contains(&c))
+}
+
+/// A path as a shell takes it; none is taken for an option.
+pub fn shell_path(path: &Path) -> String {
+    let text = path.display().to_string();
+    match text.starts_with('-') && text != "-" {
+        true => shell_word(&format!("./{text}")),
+        false => shell_word(&text),
+    }
+}
+
+/// Paths as a shell takes them.
+pub fn shell_paths(paths: &[PathBuf]) -> String {
+    let words: Vec<String> = paths.iter().map(|path| shell_path(path)).collect();
+    words.join(" ")
+}
+
+/// A word as a shell takes it.
+pub fn shell_word(text: &str) -> String {
+    let plain = |letter: char| letter.is_alphanumeric() || "-_./,=:+%".contains(letter);
+    match !text.is_empty() && text.chars().all(plain) {
+        true => text.to_owned(),
+        false => format!("'{}'", text.replace('\'', r"'\''")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn letters_are_shown_and_marks_of_direction_act() {
+        for c in "aé跳 ü\u{301}\u{1f916}²-_".chars() {
+            assert!(!is_invisible(c), "{c:?}");
+        }
+        for c in "\0\n\t\u{7f}\u{85}\u{ad}\u{200b}\u{202e}\u{2028}\u{2066}\u{feff}\u{e0041}".chars()
+        {
+            assert!(is_invisible(c), "{c:?}");
+        }
+    }
+
+    #[test]
+    fn words_of_a_shell_are_one_word_and_no_option() {
+        for (path, word) in [
+            ("out/a-1.c", "out/a-1.c"),
+            ("my out", "'my out'"),
+            ("", "''"),
+            ("a'b;$(c)", r"'a'\''b;$(c)'"),
+            ("-o", "./-o"),
+            ("-", "-"),
+            ("~/x", "'~/x'"),
+        ] {
+            assert_eq!(shell_path(Path::new(path)), word);
+        }
+    }
+}

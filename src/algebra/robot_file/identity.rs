@@ -1,0 +1,219 @@
+//! Which robot a file describes, and whether its numbers can be true.
+
+use super::entry::{JointEntry, RobotEntry};
+use super::error::{RobotFileError, RobotFileFault};
+use super::legs::{Places, build};
+use super::registry::keep;
+use crate::files::{Located, Place};
+use crate::robot::joints::LEG_JOINT_DIM;
+use crate::robot::{GRAVITY_M_S2, JOINT_DIM, Leg, Robot};
+
+/// Largest angle of a joint or frame, rad: two turns either way.
+pub(super) const LARGEST_ANGLE_RAD: f64 = 4.0 * std::f64::consts::PI;
+/// Angle that joints which are built do not exceed, rad: one and a half turns either way, as ANYmal's.
+const USUAL_ANGLE_RAD: f64 = 9.5;
+/// Range of a leg's largest torque as a part of the robot's weight times the length of thigh and calf; robots that are
+/// built have 0.2 to 1.
+const TORQUE_SHARE: std::ops::RangeInclusive<f64> = 0.02..=3.0;
+/// Largest speed of a joint, rad/s.
+const LARGEST_SPEED_RAD_S: f64 = 100.0;
+/// How many differences a message lists.
+const N_LISTED: usize = 4;
+
+/// A robot of a file, and what a user should know of it.
+#[derive(Clone, Debug)]
+pub struct RobotReading {
+    /// The robot.
+    pub robot: &'static Robot,
+    /// One sentence each: the frame of the body, numbers that can hardly be true, another name.
+    pub notes: Vec<String>,
+}
+
+/// How a robot that has the name of one of romc's own differs from it; nothing, if it does not.
+pub(super) fn namesake(robot: &Robot) -> Option<String> {
+    let known = Robot::by_name(robot.name()).ok()?;
+    (known != robot).then(|| differences(robot, known))
+}
+
+/// The robot of an entry from a file. Numbers other than those of romc's robot of that name make it another robot,
+/// with the kind of the file in its name.
+///
+/// # Errors
+/// [`RobotFileError`] with the part that is wrong, or for a name that a user `chose` and romc's own robot has.
+pub(super) fn identified(
+    file: &str,
+    mut entry: RobotEntry,
+    places: &Places,
+    chosen: Option<&str>,
+    mut notes: Vec<String>,
+) -> Result<RobotReading, RobotFileError> {
+    if let Some(name) = chosen {
+        entry.name = name.to_owned();
+    }
+    let mut robot = build(file, &entry, places)?;
+    if let Some(differences) = namesake(&robot) {
+        if chosen.is_some() {
+            let found = format!(
+                "{:?}, romc's own robot with other numbers ({differences})",
+                entry.name
+            );
+            let expected = "another name".to_owned();
+            let fault = RobotFileFault::Unexpected { found, expected };
+            return Err(Located::new("", Place::Option("--name"), fault));
+        }
+        let kind = match places {
+            Places::Keys => "toml",
+            Places::Elements { .. } => "urdf",
+        };
+        let (own, other) = (&entry.name, format!("{}-{kind}", entry.name));
+        notes.push(format!(
+            "its numbers are not those of romc's own {own:?} ({differences}): it is called {other:?}; --name (romc \
+             robot) gives it another name"
+        ));
+        entry.name = other;
+        robot = build(file, &entry, places)?;
+    }
+    refuse_degrees(file, &entry, places)?;
+    notes.extend(doubts(&robot));
+    Ok(RobotReading {
+        robot: keep(robot),
+        notes,
+    })
+}
+
+/// Differences of a robot from another, the first few of them.
+fn differences(robot: &Robot, other: &Robot) -> String {
+    let [own, other] = [robot, other].map(RobotEntry::of);
+    let mut found = Vec::new();
+    let mut compare = |what: String, own: String, other: String| {
+        if own != other {
+            found.push(format!("{what} {own} instead of {other}"));
+        }
+    };
+    let number = |value: f64| value.to_string();
+    compare(
+        "mass_kg".to_owned(),
+        number(own.mass_kg),
+        number(other.mass_kg),
+    );
+    for (leg, other) in own.leg.iter().zip(&other.leg) {
+        for (joint, other) in leg.joint.iter().zip(&other.joint) {
+            for ((key, own), (_, other)) in facts(joint).into_iter().zip(facts(other)) {
+                compare(format!("{} {key}", joint.name), own, other);
+            }
+        }
+        let last = leg.joint.last().map_or("", |joint| joint.name.as_str());
+        let place = format!("foot from {last}");
+        compare(
+            place,
+            format!("{:?}", leg.foot),
+            format!("{:?}", other.foot),
+        );
+    }
+    let more = found.len().saturating_sub(N_LISTED);
+    found.truncate(N_LISTED);
+    let more = match more {
+        0 => String::new(),
+        more => format!(", and {more} more"),
+    };
+    found.join(", ") + &more
+}
+
+fn facts(joint: &JointEntry) -> [(&'static str, String); 6] {
+    let axis = joint.axis.vector().unwrap_or_default();
+    [
+        ("name", joint.name.clone()),
+        ("at", format!("{:?}", joint.at)),
+        ("axis", format!("{axis:?}")),
+        (
+            "limits_rad",
+            format!("{:?}", joint.limits_rad.unwrap_or_default()),
+        ),
+        ("torque_nm", joint.torque_nm.to_string()),
+        ("speed_rad_s", joint.speed_rad_s.to_string()),
+    ]
+}
+
+/// Refuses limits of more than two turns, which are degrees, or bounds of a joint that has none.
+fn refuse_degrees(file: &str, entry: &RobotEntry, places: &Places) -> Result<(), RobotFileError> {
+    for (leg, limbs) in entry.leg.iter().enumerate() {
+        for (index, joint) in limbs.joint.iter().enumerate() {
+            let (key, [low, high], unit) = match (joint.limits_rad, joint.limits_deg) {
+                (Some(limits), _) => ("limits_rad", limits, "rad"),
+                (None, limits) => ("limits_deg", limits.unwrap_or_default(), "degrees"),
+            };
+            let radians = if unit == "rad" {
+                1.0
+            } else {
+                1_f64.to_radians()
+            };
+            if low.abs().max(high.abs()) * radians > LARGEST_ANGLE_RAD {
+                let found = format!("{low} to {high} {unit}");
+                let expected = match places {
+                    Places::Keys => "at most two turns either way; limits_deg takes degrees",
+                    Places::Elements { .. } => {
+                        "at most two turns either way: rad, not degrees; type=\"continuous\" for a joint without bounds"
+                    }
+                };
+                let place = places.of_joint(leg, index, key);
+                return Err(RobotFileError::at(file, place, found, expected));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Numbers that can hardly be true, one sentence for each kind.
+fn doubts(robot: &Robot) -> Vec<String> {
+    let (torque_nm, speed_rad_s) = (robot.torque_limit_nm(), robot.joint_speed_limit_rad_s());
+    let (limits, mass_kg) = (robot.joint_limit_rad(), robot.mass_kg());
+    let share = |joint: usize| {
+        let [thigh, calf] = robot.geometry(Leg::ALL[joint / LEG_JOINT_DIM]).lengths();
+        torque_nm[joint] / (mass_kg * GRAVITY_M_S2 * (thigh + calf))
+    };
+    let is_weak = (0..JOINT_DIM).all(|joint| share(joint) < *TORQUE_SHARE.start());
+    let turned = |joint: usize| limits[joint].0.abs().max(limits[joint].1.abs());
+    let note = |is_doubtful: &dyn Fn(usize) -> bool, what: &dyn Fn(usize) -> String| {
+        let mut joints = (0..JOINT_DIM).filter(|joint| is_doubtful(*joint));
+        let first = joints.next()?;
+        let more = match joints.count() {
+            0 => String::new(),
+            more => format!(" and {more} more"),
+        };
+        Some(format!(
+            "joint `{}`{more}: {}",
+            robot.joint_names()[first],
+            what(first)
+        ))
+    };
+    let found = [
+        note(&|joint| share(joint) > *TORQUE_SHARE.end(), &|joint| {
+            format!(
+                "a largest torque of {} N m, {:.0} times the robot's weight on a stretched leg; commands stay \
+                 within it: put the motors' own limit there",
+                torque_nm[joint],
+                share(joint)
+            )
+        }),
+        note(&|_| is_weak, &|joint| {
+            let torque_nm = torque_nm[joint];
+            format!(
+                "a largest torque of {torque_nm} N m cannot carry {mass_kg} kg; are masses in kg?"
+            )
+        }),
+        note(
+            &|joint| speed_rad_s[joint] > LARGEST_SPEED_RAD_S,
+            &|joint| {
+                let speed_rad_s = speed_rad_s[joint];
+                format!("a largest speed of {speed_rad_s} rad/s; put the motors' own limit there")
+            },
+        ),
+        note(&|joint| turned(joint) > USUAL_ANGLE_RAD, &|joint| {
+            let (low, high) = limits[joint];
+            format!(
+                "limits of {low} to {high} rad are more than one and a half turns; are they degrees?"
+            )
+        }),
+    ];
+    found.into_iter().flatten().collect()
+}

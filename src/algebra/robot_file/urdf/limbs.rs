@@ -1,0 +1,264 @@
+//! Which links of a tree are the trunk, which joints the legs, and where the feet are.
+
+use nalgebra::Vector3;
+
+use super::tree::{Body, Tree};
+use crate::files::{Located, Place, shell_word};
+use crate::robot::FOOT_DIM;
+use crate::robot::joints::LEG_JOINT_DIM;
+use crate::robot_file::error::{RobotFileError, RobotFileFault};
+
+/// Largest distance of two feet that are one, m.
+const SAME_PLACE_M: f64 = 1e-12;
+
+/// Moving joints of a leg from the trunk, the link of its foot, and the foot in that link's frame.
+pub(super) struct Limb {
+    pub joints: Vec<usize>,
+    pub foot: usize,
+    pub point: Vector3<f64>,
+}
+
+/// The legs of a robot and the body that they are on.
+pub(super) struct Legs {
+    pub legs: Vec<Limb>,
+    /// The uppermost link of the body.
+    pub top: usize,
+    /// The link whose frame is the body's.
+    pub trunk: usize,
+}
+
+/// Moving joints below a body as far as they are a chain, and whether nothing else follows.
+type Chain = (Vec<usize>, bool);
+
+impl Legs {
+    /// Finds legs, or takes those that end at these feet.
+    pub fn find(tree: &Tree<'_>, feet: &[(String, Vector3<f64>)]) -> Result<Self, RobotFileError> {
+        let top = top(tree);
+        let body = tree.body(top);
+        let legs = match feet {
+            [] => found_legs(tree, top, &body)?,
+            feet => named_legs(tree, top, &body, feet)?,
+        };
+        for joint in &tree.joints {
+            let is_free = matches!(joint.kind, "floating" | "planar");
+            if is_free && tree.path(joint.parent).contains(&top) {
+                let (found, expected) = (format!("type {:?}", joint.kind), "one above the trunk");
+                return Err(joint.element.fault("", found, expected));
+            }
+        }
+        let paths = legs
+            .iter()
+            .map(|leg| tree.path(tree.joints[leg.joints[0]].parent));
+        let paths: Vec<Vec<usize>> = paths.collect();
+        let is_shared = |depth: &usize| {
+            let link = paths[0].get(*depth);
+            link.is_some() && paths.iter().all(|path| path.get(*depth) == link)
+        };
+        // The heaviest of the links that all legs are below; the nearest to the legs, if none has a mass.
+        let depths = (0..).take_while(is_shared);
+        let shared = depths
+            .map(|depth| paths[0][depth])
+            .skip_while(|link| *link != top);
+        let mass_kg = |link: &usize| tree.links[*link].mass_kg;
+        let trunk = shared.max_by(|a, b| mass_kg(a).total_cmp(&mass_kg(b)));
+        let trunk = trunk.unwrap_or(top);
+        Ok(Self { legs, top, trunk })
+    }
+}
+
+/// The feet of `--feet`: names of links, each with a point in its frame if it is not the link's origin.
+pub(super) fn feet(list: &[String]) -> Result<Vec<(String, Vector3<f64>)>, RobotFileError> {
+    let joined = list.join(",");
+    let mut words = joined
+        .split(',')
+        .map(str::trim)
+        .filter(|word| !word.is_empty());
+    let number = |word: &str| word.trim().parse::<f64>().ok().filter(|v| v.is_finite());
+    let refused = |found: String| {
+        let expected = "four links, LINK,..., or links with points in their frames, LINK:x,y,z,...";
+        let fault = RobotFileFault::Unexpected {
+            found,
+            expected: expected.to_owned(),
+        };
+        Located::new("", Place::Option("--feet"), fault)
+    };
+    let mut feet: Vec<(String, Vector3<f64>)> = Vec::new();
+    while let Some(word) = words.next() {
+        let first = word
+            .rsplit_once(':')
+            .and_then(|(link, x)| Some((link, number(x)?)));
+        let (link, point) = match first {
+            None => (word, Vector3::zeros()),
+            Some((link, x)) => match [words.next(), words.next()].map(|word| word.and_then(number))
+            {
+                [Some(y), Some(z)] => (link, Vector3::new(x, y, z)),
+                _ => return Err(refused(format!("`{word}` without y and z"))),
+            },
+        };
+        if feet.iter().any(|(other, _)| other == link) {
+            return Err(refused(format!("`{link}` twice")));
+        }
+        feet.push((link.to_owned(), point));
+    }
+    match feet.len() {
+        0 | FOOT_DIM => Ok(feet),
+        count => Err(refused(format!("{count} feet"))),
+    }
+}
+
+/// The uppermost link of the body: the root, or what a joint without bounds, or a chain of massless links such as
+/// `world`, has below it.
+fn top(tree: &Tree<'_>) -> usize {
+    let (mut top, mut link) = (tree.root, tree.root);
+    loop {
+        let body = tree.body(link);
+        let [only] = body.moving[..] else {
+            // A chain without an end that branches is a limb.
+            return if body.moving.is_empty() { top } else { link };
+        };
+        let is_free = matches!(tree.joints[only].kind, "floating" | "planar");
+        if !is_free && tree.mass(&body.links) > 0.0 {
+            return top;
+        }
+        link = tree.joints[only].child;
+        if is_free {
+            top = link;
+        }
+    }
+}
+
+fn chain(tree: &Tree<'_>, first: usize) -> Chain {
+    let mut joints = vec![first];
+    let mut next = tree.body(tree.joints[first].child).moving;
+    while let [only] = next[..] {
+        joints.push(only);
+        next = tree.body(tree.joints[only].child).moving;
+    }
+    (joints, next.is_empty())
+}
+
+fn found_legs(tree: &Tree<'_>, top: usize, body: &Body) -> Result<Vec<Limb>, RobotFileError> {
+    let limbs = body.moving.iter().map(|joint| chain(tree, *joint));
+    let limbs: Vec<Chain> = limbs.collect();
+    let is_leg = |(joints, is_chain): &&Chain| *is_chain && joints.len() == LEG_JOINT_DIM;
+    let legs: Vec<&Chain> = limbs.iter().filter(is_leg).collect();
+    if legs.len() == FOOT_DIM {
+        let with_foot = |(joints, _): &Chain| {
+            let (joints, foot) = (joints.clone(), foot(tree, joints)?);
+            Ok(Limb {
+                joints,
+                foot,
+                point: Vector3::zeros(),
+            })
+        };
+        return legs.into_iter().map(with_foot).collect();
+    }
+    let of = |(joints, is_chain): &Chain| {
+        let more = if *is_chain { "" } else { " and branches" };
+        let (name, count) = (tree.joints[joints[0]].name, joints.len());
+        format!("{name} ({count} joints{more})")
+    };
+    let texts: Vec<String> = limbs.iter().map(of).collect();
+    let texts = match texts.is_empty() {
+        true => String::new(),
+        false => format!(": {}", texts.join(", ")),
+    };
+    let (count, name) = (limbs.len(), tree.links[top].name);
+    let found = format!("{count} limbs on `{name}`{texts}");
+    // Whether four limbs have legs in them, and whether they are legs with a joint too few.
+    let have =
+        |least: fn(&Chain) -> bool| limbs.iter().filter(|limb| least(limb)).count() >= FOOT_DIM;
+    let hint = if have(|(joints, is_chain)| joints.len() >= LEG_JOINT_DIM || !is_chain) {
+        "; --feet (romc robot) names their feet where limbs have more joints"
+    } else if have(|(joints, _)| joints.len() == 2) {
+        "; legs of two joints, as robots of eight have them, cannot be modelled"
+    } else {
+        ""
+    };
+    let expected =
+        format!("four legs of three joints each, the only robots that romc models{hint}");
+    Err(tree.refused(found, expected))
+}
+
+/// The link at the foot: of those that the last joint carries, the one whose name says so, or the only one at the end.
+fn foot(tree: &Tree<'_>, joints: &[usize]) -> Result<usize, RobotFileError> {
+    let last = &tree.joints[joints[joints.len() - 1]];
+    let held = tree.body(last.child).links.split_off(1);
+    let name = |link: &usize| tree.links[*link].name;
+    let says_so = |link: &usize| {
+        let name = name(link).to_lowercase();
+        name.contains("foot") || name.contains("toe")
+    };
+    let named: Vec<usize> = held.iter().copied().filter(says_so).collect();
+    let is_end = |link: &usize| tree.links[*link].below.is_empty();
+    let ends: Vec<usize> = held.iter().copied().filter(is_end).collect();
+    let is_same_place =
+        |a: usize, b: usize| (tree.frame(a).0 - tree.frame(b).0).norm() < SAME_PLACE_M;
+    match (&named[..], &ends[..]) {
+        ([only], _) | ([], [only]) => Ok(*only),
+        ([first, rest @ ..], _) if rest.iter().all(|link| is_same_place(*first, *link)) => {
+            Ok(*first)
+        }
+        _ => {
+            let (link, joint) = (name(&last.child), last.name);
+            let line = last.element.place();
+            let line = line.split_once(':').map_or("", |(line, _)| line);
+            let place = format!("{line}: link `{link}` beyond joint `{joint}`");
+            let (found, expected) = match held.is_empty() {
+                true => (
+                    "no link on a fixed joint".to_owned(),
+                    format!(
+                        "one link at the foot, or romc robot --feet {} with the feet of all four \
+                         in the frames of their last links",
+                        shell_word(&format!("{link}:x,y,z,..."))
+                    ),
+                ),
+                false => (
+                    held.iter().map(name).collect::<Vec<_>>().join(", "),
+                    "one link at the foot, with foot or toe in its name, or --feet (romc robot) with the \
+                     links of all four"
+                        .to_owned(),
+                ),
+            };
+            Err(RobotFileError::at(tree.file, place, found, expected))
+        }
+    }
+}
+
+/// The legs that end in these links.
+fn named_legs(
+    tree: &Tree<'_>,
+    top: usize,
+    body: &Body,
+    feet: &[(String, Vector3<f64>)],
+) -> Result<Vec<Limb>, RobotFileError> {
+    let leg = |(name, point): &(String, Vector3<f64>)| {
+        let Some(foot) = tree.links.iter().position(|link| link.name == *name) else {
+            let (place, found) = (format!("link `{name}`"), "no such link");
+            return Err(RobotFileError::at(tree.file, place, found, "a foot"));
+        };
+        let path = tree
+            .path(foot)
+            .into_iter()
+            .skip_while(|link| body.links.contains(link));
+        let above = path.filter_map(|link| tree.links[link].above);
+        let joints: Vec<usize> = above
+            .filter(|joint| tree.joints[*joint].kind != "fixed")
+            .collect();
+        if joints.len() == LEG_JOINT_DIM {
+            return Ok(Limb {
+                joints,
+                foot,
+                point: *point,
+            });
+        }
+        let names: Vec<&str> = joints
+            .iter()
+            .map(|joint| tree.joints[*joint].name)
+            .collect();
+        let found = format!("{} joints ({})", names.len(), names.join(", "));
+        let place = format!("from `{}` to `{name}`", tree.links[top].name);
+        Err(RobotFileError::at(tree.file, place, found, "three"))
+    };
+    feet.iter().map(leg).collect()
+}

@@ -1,0 +1,266 @@
+//! Links and joints of a URDF as a tree.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{Rotation3, Vector3};
+
+use super::element::Element;
+use crate::robot_file::error::RobotFileError;
+use crate::robot_file::identity::LARGEST_ANGLE_RAD;
+
+/// Kinds of joints; of them `fixed` alone does not move.
+const KINDS: [&str; 6] = [
+    "revolute",
+    "continuous",
+    "prismatic",
+    "fixed",
+    "floating",
+    "planar",
+];
+
+pub(super) struct Link<'x> {
+    pub element: Element<'x>,
+    pub name: &'x str,
+    /// kg; 0 without an `<inertial>`.
+    pub mass_kg: f64,
+    /// The joint above.
+    pub above: Option<usize>,
+    /// Joints below, in the file's order.
+    pub below: Vec<usize>,
+}
+
+pub(super) struct Joint<'x> {
+    pub element: Element<'x>,
+    pub name: &'x str,
+    pub kind: &'x str,
+    pub parent: usize,
+    pub child: usize,
+    /// The child's frame in the parent's at the zero posture.
+    pub origin: (Vector3<f64>, Rotation3<f64>),
+}
+
+pub(super) struct Tree<'x> {
+    pub file: &'x str,
+    pub links: Vec<Link<'x>>,
+    pub joints: Vec<Joint<'x>>,
+    /// The link without a joint above.
+    pub root: usize,
+}
+
+/// Links that fixed joints hold together, and moving joints on them, both in the order of the tree.
+pub(super) struct Body {
+    pub links: Vec<usize>,
+    pub moving: Vec<usize>,
+}
+
+impl<'x> Tree<'x> {
+    pub fn new(robot: Element<'x>) -> Result<Self, RobotFileError> {
+        let mut tree = Self {
+            file: robot.file,
+            links: Vec::new(),
+            joints: Vec::new(),
+            root: 0,
+        };
+        let mut names = BTreeMap::new();
+        for element in robot.children("link") {
+            let (name, mass_kg) = (element.name()?, mass(element)?);
+            if names.insert(name, tree.links.len()).is_some() {
+                return Err(element.fault("", "the name a second time", "each name once"));
+            }
+            tree.links.push(Link {
+                element,
+                name,
+                mass_kg,
+                above: None,
+                below: Vec::new(),
+            });
+        }
+        let mut seen = BTreeMap::new();
+        for element in robot.children("joint") {
+            let index = tree.joints.len();
+            let joint = joint(element, &names)?;
+            if seen.insert(joint.name, index).is_some() {
+                return Err(element.fault("", "the name a second time", "each name once"));
+            }
+            if let Some(first) = tree.links[joint.child].above {
+                let [link, first] = [tree.links[joint.child].name, tree.joints[first].name];
+                let found = format!("link `{link}` below two joints, `{first}` and this");
+                return Err(element.fault("<child>", found, "one joint above each link"));
+            }
+            tree.links[joint.child].above = Some(index);
+            tree.links[joint.parent].below.push(index);
+            tree.joints.push(joint);
+        }
+        tree.root = tree.only_root()?;
+        Ok(tree)
+    }
+
+    /// Another tree than that of a quadruped.
+    pub fn refused(&self, found: String, expected: impl Into<String>) -> RobotFileError {
+        RobotFileError::at(self.file, "the tree", found, expected)
+    }
+
+    /// The link that all others are below.
+    fn only_root(&self) -> Result<usize, RobotFileError> {
+        let roots = (0..self.links.len()).filter(|link| self.links[*link].above.is_none());
+        let roots: Vec<usize> = roots.collect();
+        let names = |links: &[usize]| {
+            let names = links
+                .iter()
+                .take(4)
+                .map(|link| format!("`{}`", self.links[*link].name));
+            names.collect::<Vec<_>>().join(", ")
+        };
+        let mut is_below = vec![false; self.links.len()];
+        for root in &roots {
+            self.below(*root, |_| true)
+                .links
+                .iter()
+                .for_each(|link| is_below[*link] = true);
+        }
+        // A link has one joint above it at most, so that what no root is above is a loop.
+        if let Some(link) = is_below.iter().position(|is_below| !is_below) {
+            let found = format!("a loop of joints through {}", names(&[link]));
+            return Err(self.links[link].element.fault("", found, "a tree"));
+        }
+        match roots[..] {
+            [root] => Ok(root),
+            [] => Err(self.refused("no link".to_owned(), "a tree of links and joints")),
+            _ => {
+                let (count, names) = (roots.len(), names(&roots));
+                let found = format!("{count} links without a joint above them ({names})");
+                Err(self.refused(found, "one, which all others are below"))
+            }
+        }
+    }
+
+    /// A link and what joints that `pass` hold to it, in the order of the tree, and the other joints on these.
+    fn below(&self, link: usize, pass: impl Fn(&Joint<'_>) -> bool) -> Body {
+        let (mut links, mut moving) = (vec![link], Vec::new());
+        let mut open: Vec<usize> = self.links[link].below.iter().rev().copied().collect();
+        while let Some(joint) = open.pop() {
+            match pass(&self.joints[joint]) {
+                false => moving.push(joint),
+                true => {
+                    let child = self.joints[joint].child;
+                    links.push(child);
+                    open.extend(self.links[child].below.iter().rev());
+                }
+            }
+        }
+        Body { links, moving }
+    }
+
+    /// The body that a link belongs to, from that link on.
+    pub fn body(&self, link: usize) -> Body {
+        self.below(link, |joint| joint.kind == "fixed")
+    }
+
+    /// Mass of a link and all below it, kg.
+    pub fn mass_below(&self, link: usize) -> f64 {
+        let mut links = self.below(link, |_| true).links;
+        // In the file's order, so that the order of joints does not change the last digit.
+        links.sort_unstable();
+        self.mass(&links)
+    }
+
+    /// Mass of links, kg.
+    pub fn mass(&self, links: &[usize]) -> f64 {
+        links.iter().map(|link| self.links[*link].mass_kg).sum()
+    }
+
+    /// The links from the root to a link.
+    pub fn path(&self, link: usize) -> Vec<usize> {
+        let mut path = vec![link];
+        while let Some(joint) = self.links[path[path.len() - 1]].above {
+            path.push(self.joints[joint].parent);
+        }
+        path.reverse();
+        path
+    }
+
+    /// Position and attitude of a link in the root's frame at the zero posture.
+    pub fn frame(&self, link: usize) -> (Vector3<f64>, Rotation3<f64>) {
+        let mut frame = (Vector3::zeros(), Rotation3::identity());
+        for link in self.path(link) {
+            if let Some(joint) = self.links[link].above {
+                let (position, turn) = self.joints[joint].origin;
+                frame = (frame.0 + frame.1 * position, frame.1 * turn);
+            }
+        }
+        frame
+    }
+}
+
+/// Mass of a link, 0 without `<inertial>`. Moments of inertia are not used, but have to be possible.
+fn mass(link: Element<'_>) -> Result<f64, RobotFileError> {
+    let Some(inertial) = link.child("inertial")? else {
+        return Ok(0.0);
+    };
+    let Some(mass) = inertial.child("mass")? else {
+        return Err(inertial.fault("", "no <mass>", "<mass value=...>"));
+    };
+    let value = mass.number("value")?;
+    if value < 0.0 {
+        return Err(mass.fault("value", value.to_string(), "a mass of 0 kg or more"));
+    }
+    if let Some(inertia) = inertial.child("inertia")? {
+        for key in ["ixx", "iyy", "izz"] {
+            if inertia.attribute(key).is_some() && inertia.number(key)? < 0.0 {
+                let found = inertia.attribute(key).unwrap_or_default();
+                return Err(inertia.fault(key, found, "0 kg m^2 or more"));
+            }
+        }
+    }
+    Ok(value)
+}
+
+fn joint<'x>(
+    element: Element<'x>,
+    links: &BTreeMap<&'x str, usize>,
+) -> Result<Joint<'x>, RobotFileError> {
+    let link = |tag: &'static str| {
+        let child = element.child(tag)?;
+        let name = child.and_then(|child| child.attribute("link"));
+        let name = name
+            .ok_or_else(|| element.fault("", format!("no <{tag}>"), format!("<{tag} link=...>")))?;
+        let known = links.get(name).copied();
+        known.ok_or_else(|| {
+            let key = format!("<{tag}>");
+            element.fault(
+                &key,
+                format!("`{name}`, which is no link"),
+                "a <link> of the file",
+            )
+        })
+    };
+    let name = element.name()?;
+    let kind = element.attribute("type").unwrap_or("");
+    if !KINDS.contains(&kind) {
+        return Err(element.fault("type", format!("{kind:?}"), KINDS.join(", ")));
+    }
+    let [position, turn] = match element.child("origin")? {
+        None => [Vector3::zeros(); 2],
+        Some(origin) => {
+            origin.only_with(&["xyz", "rpy"])?;
+            let triple = |key| Ok(origin.triple(key)?.unwrap_or_default());
+            let turn = triple("rpy")?;
+            if turn.amax() > LARGEST_ANGLE_RAD {
+                let found = origin.attribute("rpy").unwrap_or_default();
+                return Err(origin.fault("rpy", found, "two turns at most: rad, not degrees"));
+            }
+            [triple("xyz")?, turn]
+        }
+    };
+    Ok(Joint {
+        element,
+        name,
+        kind,
+        parent: link("parent")?,
+        child: link("child")?,
+        origin: (
+            position,
+            Rotation3::from_euler_angles(turn.x, turn.y, turn.z),
+        ),
+    })
+}
