@@ -1,5 +1,6 @@
 //! The shortest form of a group of summands.
 
+use super::agreement::Agreement;
 use super::search::Shortener;
 use super::units::{in_f64, in_units};
 use super::{Scaled, Summands};
@@ -62,7 +63,8 @@ impl Shortener<'_> {
         let term = |(number, expr)| (coefficient(number, expr), expr);
         let forms = shorter.into_iter();
         let mut forms = forms.map(|(_, form)| form.into_iter().map(term).collect::<Summands>());
-        forms.find(|form| form.iter().all(is_usable) && self.agrees(original, form))
+        let mut agreement = Agreement::with(self.pool, original);
+        forms.find(|form| form.iter().all(is_usable) && agreement.holds(self.pool, form))
     }
 
     /// The summands with sums of coefficient 1 or -1 as terms of their own, as they are written.
