@@ -24,7 +24,7 @@ impl Shortener<'_> {
             .map(|&(number, expr)| (number, self.single(expr)))
             .collect();
         let mut candidates = vec![collected(self.pool, &singles, Keep::Sums)];
-        if old.len() <= MAX_GROUP {
+        if old.len() <= MAX_GROUP && self.pool.affords(1) {
             candidates.extend(self.candidates(unit, &singles));
             candidates.extend(self.beside_common_factors(unit, &singles));
         }
@@ -307,7 +307,7 @@ impl Shortener<'_> {
                         choice[term] = kept;
                     }
                 }
-                if least == before {
+                if least == before || !self.pool.affords(1) {
                     break;
                 }
             }
@@ -333,6 +333,7 @@ impl Shortener<'_> {
             parts.extend(collected(self.pool, &[(number, form)], keep));
         }
         let sum = collected(self.pool, &parts, Keep::Sums);
+        self.pool.spend(parts.len());
         let length = self.length(unit, &sum);
         (sum, length)
     }

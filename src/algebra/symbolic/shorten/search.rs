@@ -11,6 +11,7 @@ use crate::symbolic::node::{ExprId, Function, Node, SymbolId};
 use crate::symbolic::number::Number;
 use crate::symbolic::order::Exponent;
 use crate::symbolic::pool::ExprPool;
+use crate::symbolic::simplify::MAX_WORK;
 
 /// Most rounds of searching for groups.
 const MAX_ROUNDS: usize = 4;
@@ -99,6 +100,9 @@ impl<'a> Shortener<'a> {
         if self.is_plain_sum(summands) && self.parts_of_powers(summands).is_empty() {
             return Vec::new();
         }
+        let searched = summands.iter().filter(|(_, expr)| !self.is_plain(*expr));
+        let n_searched = searched.count().max(1);
+        let outer = (self.pool).limit_work(2 * MAX_WORK * n_searched as u64);
         let mut blocks = blocks_of(summands);
         for _ in 0..MAX_ROUNDS {
             let mut is_changed = false;
@@ -109,6 +113,7 @@ impl<'a> Shortener<'a> {
                 break;
             }
         }
+        self.pool.restore_limit(outer);
         // What agrees step by step may not in the end: parts were variables of their own.
         let new = blocks.into_iter().filter(|block| {
             let replaced = block.positions.iter().map(|&at| summands[at]).collect();
