@@ -225,12 +225,7 @@ impl<'a> PhaseProblem<'a> {
     /// Simplifies an equation, and encloses its difference from the original anew. Should that
     /// exceed what is allowed, although the changes' own bounds do not, the search gets less, and in the end the
     /// equation stays as it is.
-    fn search(
-        &self,
-        terms: &mut Terms<'_>,
-        output: usize,
-        allowed: f64,
-    ) -> (Equation, Interval) {
+    fn search(&self, terms: &mut Terms<'_>, output: usize, allowed: f64) -> (Equation, Interval) {
         let mut budget = allowed;
         for _ in 0..MAX_RETREATS {
             let equation = self.equation(output).simplified(terms, budget);

@@ -104,7 +104,9 @@ impl CanonicalForms<'_> {
         // Rationals compare by their parts: their order is one of differences only by value.
         let largest = form.terms.keys().map(powers).max_by(|a, b| {
             let differences = a.iter().zip(b).map(|(a, b)| a + &-b.clone());
-            let first = differences.into_iter().find(|difference| !difference.is_zero());
+            let first = differences
+                .into_iter()
+                .find(|difference| !difference.is_zero());
             match first {
                 None => Ordering::Equal,
                 Some(difference) if difference.is_negative() => Ordering::Less,

@@ -39,8 +39,9 @@ struct Precision {
     round: fn(f64) -> f64,
     /// Relative distance of the inputs that are enclosed around a point.
     inputs: f64,
-    /// Relative error that evaluation far out may have.
+    /// Relative error that evaluation far out may have, beside one relative to the summands.
     evaluation: f64,
+    rounding: f64,
     /// Least number with all its digits.
     least: f64,
     /// Powers of ten of the variables, each far from all at which a power of a variable overflows.
@@ -54,6 +55,7 @@ const PRECISIONS: [Precision; 2] = [
         round: |value| value,
         inputs: 1e-13,
         evaluation: 1e-9,
+        rounding: 1e-13,
         least: f64::MIN_POSITIVE,
         powers: [300, 200, 125, 90, 68, 50],
         exponents: [1000.0, 400.0, 260.0, 200.0],
@@ -62,6 +64,7 @@ const PRECISIONS: [Precision; 2] = [
         round: |value| f64::from(value as f32),
         inputs: 1e-6,
         evaluation: 1e-3,
+        rounding: 1e-5,
         least: f32::MIN_POSITIVE as f64,
         powers: [36, 27, 16, 11, 8, 5],
         exponents: [200.0, 60.0, 35.0, 25.0],
@@ -158,7 +161,7 @@ impl Far {
 impl Precision {
     /// Whether a value is where it should be, up to rounding of summands of some size.
     fn hits(&self, bounds: Interval, value: f64, size: f64) -> bool {
-        let slack = self.evaluation * size + self.least;
+        let slack = self.evaluation * bounds.magnitude() + self.rounding * size + self.least;
         bounds.lo() - slack <= value && value <= bounds.hi() + slack
     }
 }
@@ -261,7 +264,9 @@ fn by_code(
         pairs.map(|(&a, &b)| round(function(a, b))).collect()
     };
     let chain = |base: Column, exponent: u64| {
-        map(base, &|value| power_by(value, exponent, |a, b| round(a * b)))
+        map(base, &|value| {
+            power_by(value, exponent, |a, b| round(a * b))
+        })
     };
     let divisor = |expr: ExprId| match *pool.node(expr) {
         Node::Power(base, exponent) => {
@@ -303,24 +308,18 @@ fn by_code(
                 map(both(child(exponent), logarithm, |a, b| a * b), &f64::exp)
             }
         },
-        Node::Apply(function, argument) => {
-            map(child(argument), &|value| function.evaluate(value))
-        }
+        Node::Apply(function, argument) => map(child(argument), &|value| function.evaluate(value)),
     }
 }
 
 /// Bounds of a sum over inputs within a relative distance of the points.
-fn sum_in_bounds(
-    pool: &ExprPool,
-    sum: &Summands,
-    points: &Points,
-    distance: f64,
-) -> Vec<Interval> {
+fn sum_in_bounds(pool: &ExprPool, sum: &Summands, points: &Points, distance: f64) -> Vec<Interval> {
     let n_points = points.values().next().map_or(1, |column| column.len());
     let exprs: Vec<ExprId> = sum.iter().map(|&(_, expr)| expr).collect();
     let columns = pool.fold_up(&exprs, |pool, expr, child| -> Rc<[Interval]> {
-        let operands: Vec<(ExprId, Rc<[Interval]>)> =
-            (pool.children(expr)).map(|operand| (operand, child(operand))).collect();
+        let operands: Vec<(ExprId, Rc<[Interval]>)> = (pool.children(expr))
+            .map(|operand| (operand, child(operand)))
+            .collect();
         let at = |point: usize| {
             let range_of = |symbol: SymbolId| {
                 let value = points[&symbol][point];

@@ -372,7 +372,11 @@ impl<'a> Shortener<'a> {
             let alone = vec![(1.0, expr)];
             Agreement::with(self.pool, &alone).holds(self.pool, &vec![(1.0, single)])
         };
-        let single = if single == expr || is_same() { single } else { expr };
+        let single = if single == expr || is_same() {
+            single
+        } else {
+            expr
+        };
         self.singles.insert(expr, single);
         single
     }
