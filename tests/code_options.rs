@@ -316,9 +316,9 @@ fn constants_of_single_precision_are_computed_in_double() {
         })
     };
     for (coefficient, term, spelled) in [
-        (1e-30, "exp(100)*z1", "2.688117e13"),
-        (3.0, "z1*log(1e-300)", "-2072.3267"),
-        (0.5, "sin(sqrt(exp(160)*1e-60)*z1)", "5540.6"),
+        (1e-30, "exp(100)*z1", "2688117"),
+        (3.0, "z1*log(1e-300)", "-2072.32"),
+        (0.5, "sin(sqrt(exp(160)*1e-60)*z1)", "55406"),
     ] {
         let source = in_c(coefficient, term, Precision::Single).expect("fits");
         assert!(

@@ -37,6 +37,14 @@ impl CanonicalForms<'_> {
                 }
                 return Some(split);
             }
+            if let Some((divisor, quotient)) = self.positive_divisor(&form) {
+                // sqrt(2 + 3*x + x^2) = sqrt(1 + x) sqrt(2 + x) where 1 + x is positive.
+                let (mut split, other) = (self.split(&divisor)?, self.split(&quotient)?);
+                split.scale = &split.scale * &other.scale;
+                split.factors.extend(other.factors);
+                split.exponent = split.exponent.plus(&other.exponent);
+                return Some(split);
+            }
             let (scale, factors) = match self.square_root(&form) {
                 Some((scale, root)) => (scale, vec![(self.abs(&root)?, 2)]),
                 None => (scale, vec![(form.scaled(&inverse), 1)]),

@@ -197,26 +197,37 @@ fn scales(pool: &ExprPool, sum: &Summands, precision: &Precision) -> Vec<f64> {
         .collect()
 }
 
-/// Points with all pairs of scales of the first two variables, and scales of the others as they fall.
+/// Points with all pairs of scales of two variables, for each pair of the first four; the others are ordinary at
+/// about half of them, and have scales as they fall.
 fn points(symbols: &[SymbolId], scales: &[f64], precision: &Precision) -> Points {
     let n_scales = scales.len();
-    let n_points = 2 * n_scales.pow(symbols.len().min(2) as u32);
+    let first = symbols.len().min(4);
+    let pairs: Vec<[usize; 2]> = match first {
+        0 | 1 => vec![[0, 0]],
+        _ => (0..first)
+            .flat_map(|b| (0..b).map(move |a| [a, b]))
+            .collect(),
+    };
+    let n_grid = 2 * n_scales.pow(first.min(2) as u32);
     let value = |place: usize, point: usize| {
-        let share = ((point + 1) as f64 * GOLDEN.powi(place as i32 + 1)).fract();
+        // Multiples of irrational numbers fall evenly.
+        let share = ((point + 1) as f64 * (place as f64 + 2.3).sqrt()).fract();
+        let ([a, b], at) = (pairs[point / n_grid], point % n_grid);
         let scale = match place {
-            0 => point / 2 % n_scales,
-            1 => point / 2 / n_scales,
-            _ => (share * n_scales as f64) as usize,
+            _ if place == a => at / 2 % n_scales,
+            _ if place == b => at / 2 / n_scales,
+            _ => ((2.0 * share - 1.0).max(0.0) * n_scales as f64) as usize,
         };
-        let is_negative = match place {
-            0 => point % 2 == 1,
-            _ => (share * 64.0) as usize % 2 == 1,
+        let is_negative = match place == a {
+            true => at % 2 == 1,
+            false => (share * 64.0) as usize % 2 == 1,
         };
         let size = scales[scale] * (1.0 + 0.1 * (share * 8.0).fract());
         (precision.round)(if is_negative { -size } else { size })
     };
     let column = |(place, &symbol): (usize, &SymbolId)| {
-        let values: Column = (0..n_points).map(|point| value(place, point)).collect();
+        let points = 0..n_grid * pairs.len();
+        let values: Column = points.map(|point| value(place, point)).collect();
         (symbol, values)
     };
     symbols.iter().enumerate().map(column).collect()
