@@ -3,6 +3,8 @@
 #[path = "check/command.rs"]
 mod command;
 mod command_line;
+#[path = "check/domains.rs"]
+mod domains;
 #[path = "check/models.rs"]
 mod models;
 #[path = "check/papers.rs"]

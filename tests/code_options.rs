@@ -13,7 +13,8 @@ use romc::deploy::{EmitOptions, Target, emit};
 use romc::equations::Equations;
 use romc::files::EmittedFile;
 use romc::lower::Form;
-use romc::model::ReducedModel;
+use romc::model::{FeetRule, Library, Phase, ReducedModel};
+use romc::typeset::{PrintOptions, Rounding};
 
 /// Trigonometric candidate terms in its dynamics.
 const WITH_SINES: &str = "models/paper-2d.json";
@@ -26,6 +27,18 @@ fn load(path: &str) -> ReducedModel {
 
 fn write(folder: &Path, files: &[EmittedFile]) {
     romc::files::write_files(folder, files, romc::files::Overwrite::Refuse).expect("written");
+}
+
+/// A model of one term and its coefficient.
+fn of_one_term(coefficient: f64, term: &str) -> ReducedModel {
+    let library = Library::from_terms(1, &[term.to_owned()]).expect("a term");
+    let phase = Phase {
+        name: "contact".into(),
+        feet: FeetRule::Any,
+        xi: nalgebra::DMatrix::from_element(1, 1, coefficient),
+    };
+    let builder = ReducedModel::builder("one", library).phase(phase);
+    builder.build().expect("a model")
 }
 
 /// Compiles C files strictly and runs the program; its output.
@@ -445,4 +458,80 @@ fn controller_refuses_a_phase_with_the_name_of_its_functions() {
     );
     let message = refused.expect_err("two functions of one name").to_string();
     assert!(message.contains("phase `controller`"), "{message}");
+}
+
+#[test]
+fn constants_of_single_precision_are_computed_in_double() {
+    let in_c = |coefficient: f64, term: &str, precision: Precision| {
+        let model = of_one_term(coefficient, term);
+        let options = EmitOptions {
+            precision,
+            ..EmitOptions::default()
+        };
+        let files = emit(&Equations::of(&model), &[Target::C], &options);
+        files.map(|files| {
+            let source = files.iter().find(|file| file.path.ends_with("one.c"));
+            source.expect("a source file").contents.clone()
+        })
+    };
+    for (coefficient, term, spelled) in [
+        (1e-30, "exp(100)*z1", "2688117"),
+        (3.0, "z1*log(1e-300)", "-2072.32"),
+        (0.5, "sin(sqrt(exp(160)*1e-60)*z1)", "55406"),
+    ] {
+        let source = in_c(coefficient, term, Precision::Single).expect("fits");
+        assert!(
+            !source.contains("expf") && !source.contains("logf"),
+            "{source}"
+        );
+        assert!(source.contains(spelled), "{term}: {source}");
+        let source = in_c(coefficient, term, Precision::Double).expect("fits");
+        assert!(
+            source.contains("exp(") || source.contains("log("),
+            "{source}"
+        );
+    }
+    for (coefficient, term) in [(1.0, "exp(100)*z1"), (1e39, "z1"), (1e300, "z1^2")] {
+        let refused = in_c(coefficient, term, Precision::Single).expect_err("too large");
+        let said = refused.to_string();
+        assert!(
+            said.contains("single precision") && said.contains("--precision f64"),
+            "{said}"
+        );
+    }
+}
+
+#[test]
+fn digits_that_would_round_beyond_floats_are_not_left_out() {
+    for (coefficient, digits, text) in [
+        (1.6e308, 1, "1.6"),
+        (f64::MAX, 2, "1.797"),
+        (-1.79e308, 1, "1.79"),
+    ] {
+        let options = EmitOptions {
+            print: PrintOptions {
+                rounding: Rounding::Significant(digits),
+                ..PrintOptions::default()
+            },
+            ..EmitOptions::default()
+        };
+        let model = of_one_term(coefficient, "z1");
+        let files = emit(
+            &Equations::of(&model),
+            &[Target::Latex, Target::Markdown],
+            &options,
+        );
+        for file in files.expect("emits") {
+            assert!(
+                !file.contents.contains("inf") || file.path.ends_with(".bib"),
+                "{}",
+                file.contents
+            );
+            assert!(
+                !file.path.ends_with("one.tex") || file.contents.contains(text),
+                "{}",
+                file.contents
+            );
+        }
+    }
 }

@@ -1,7 +1,12 @@
 //! Exact simplification: a table of sums with their simplest forms, and random models.
 
+#[path = "simplification/far_out.rs"]
+mod far_out;
+mod tools;
+
 use std::fs;
 use std::path::Path;
+use std::time::Instant;
 
 use nalgebra::DMatrix;
 use romc::deploy::{EmitOptions, Target, emit};
@@ -316,6 +321,36 @@ fn random_models_keep_their_values_and_never_get_longer() {
         );
     }
     assert!((50..200).contains(&n_simplified), "{n_simplified}");
+}
+
+#[test]
+fn long_products_of_functions_take_little_time() {
+    let series = |of: &str, sign: &str, count: usize| {
+        let parts = (1..=count).map(|k| of.replace('A', &format!("z1 + {k}*z2")));
+        parts.collect::<Vec<_>>().join(sign)
+    };
+    for term in [
+        series("tan(A)", "*", 9),
+        series("tan(A)", " + ", 12),
+        series("(1 + sin(A))", "*", 8),
+        series("(1 + cos(A))", "*", 12),
+        series("tanh(A)", "*", 12),
+        series("(1 + exp(A))", "*", 12),
+        series("1/(1 + exp(A))", " + ", 12),
+        series("(1 + 1/(A))", "*", 12),
+        series("(A + u1)^4", "*", 12),
+        series("sin(A)^2", "*", 12),
+        series("1/(z1 + ", "", 12) + "z2" + &")".repeat(12),
+        "(z1 + z2 + dz1 + dz2 + u1 + u2 + 1)^12".to_owned(),
+    ] {
+        let model = model_of(&[(0.7, term.clone())]);
+        let start = Instant::now();
+        let equations = Equations::of(&model);
+        let seconds = start.elapsed().as_secs_f64();
+        // As learned and in a release build it is a tenth of a second; builds for tests are slower, and share their cores.
+        assert!(seconds < 10.0, "{term}: {seconds} s");
+        check_values(&term, &Equations::as_learned(&model), &equations, true);
+    }
 }
 
 #[test]

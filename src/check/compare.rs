@@ -184,8 +184,10 @@ fn decide_with(
     options: &CheckOptions,
 ) -> (Verdict, Option<Gap>) {
     let mut pool = ExprPool::exact();
-    let whole = [0, 1].map(|side| files[side].build(ddz[side], floats, &mut pool));
-    let restrictions = pool.restrictions();
+    let read = [0, 1].map(|side| files[side].build(ddz[side], floats, &mut pool));
+    let whole = [read[0].expr, read[1].expr];
+    let guards = [&read[0].guards[..], &read[1].guards[..]];
+    let restrictions = guards.concat();
     let table = Table::of(&mut pool, whole);
     let (rows, strange) = (table.differing().collect::<Vec<_>>(), table.unexplained());
     let rest = [0, 1].map(|side| sum(&mut pool, side, &rows));
@@ -204,7 +206,7 @@ fn decide_with(
             pool: &pool,
             whole,
             rest,
-            restrictions: &restrictions,
+            guards,
             decimals: &decimals,
         };
         search(&sides, phase, &options.domain, &groups, proof.is_some())

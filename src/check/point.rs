@@ -58,8 +58,8 @@ pub(super) struct Sides<'s> {
     pub(super) whole: [ExprId; 2],
     /// The same without the terms that both have; the difference is that of the whole sides.
     pub(super) rest: [ExprId; 2],
-    /// What has to have a value where the sides are compared.
-    pub(super) restrictions: &'s [ExprId],
+    /// What has a value where each side as written has one.
+    pub(super) guards: [&'s [ExprId]; 2],
     /// The [`decimals`] of the whole sides.
     pub(super) decimals: &'s HashMap<SymbolId, (f64, f64)>,
 }
@@ -124,7 +124,6 @@ pub(super) fn search(
             .collect();
         let gap = sides.at(&values);
         match (gap.left.is_nan(), gap.right.is_nan()) {
-            (false, false) if !sides.are_defined(&values) => continue,
             (false, false) if gap.left.is_finite() && gap.right.is_finite() => {
                 search.has_common_point = true;
             }
@@ -165,14 +164,14 @@ impl Sides<'_> {
         self.pool.evaluate_all(exprs, &value_of)
     }
 
-    /// Whether all that the files write has a value, parts that cancelled too.
-    fn are_defined(&self, values: &BTreeMap<SymbolId, f64>) -> bool {
-        let all = self.values_of(self.restrictions, values);
-        !all.into_iter().any(f64::is_nan)
-    }
-
+    /// Both values; NaN for a side that has none, also if what has none cancelled.
     fn at(&self, values: &BTreeMap<SymbolId, f64>) -> Gap {
-        let both = self.values_of(&self.whole, values);
+        let both = [0, 1].map(|side| {
+            let all = [&[self.whole[side]], self.guards[side]].concat();
+            let found = self.values_of(&all, values);
+            let has_value = found.iter().all(|value| !value.is_nan());
+            if has_value { found[0] } else { f64::NAN }
+        });
         Gap {
             point: (values.iter())
                 .map(|(symbol, value)| (self.pool.symbol_name(*symbol).to_owned(), *value))

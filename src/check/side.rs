@@ -9,11 +9,15 @@ use crate::artifact;
 use crate::equations::Equations;
 use crate::import::{Format, read_equations};
 use crate::model::{LatentVariable, ReducedModel};
-use crate::symbolic::{Coefficient, ExprId, ExprPool, Number, ParseError, ParseLimits, SymbolId};
+use crate::symbolic::{
+    Coefficient, ExprId, ExprPool, Number, ParseError, ParseLimits, Reading, SymbolId,
+};
 
 /// Marks of symbols that stand for decimals: exact ones, and ones rounded in their last digit.
 const EXACT: char = '#';
 const ROUNDED: char = '~';
+/// Digits that a rounded float has at least; decimals with more digits are nearer to one float than to any other.
+const FLOAT_DIGITS: usize = 16;
 /// Below this floats hold every multiple of 1/2.
 const LARGEST_HALF: f64 = 4e15;
 
@@ -26,6 +30,8 @@ pub struct Side {
     pub latent_dim: usize,
     /// Whether its decimals stand for numbers that were rounded in the last digit.
     pub is_rounded: bool,
+    /// Whether decimals with more digits than floats hold count as they are written.
+    keeps_digits: bool,
     pub(super) phases: Vec<SidePhase>,
 }
 
@@ -100,6 +106,7 @@ impl Side {
             file: file.to_owned(),
             latent_dim: read.latent_dim,
             is_rounded: format == Format::Latex && !options.exact,
+            keeps_digits: options.exact,
             phases: (read.sections.into_iter())
                 .map(|section| SidePhase {
                     name: section.phase,
@@ -131,6 +138,7 @@ impl Side {
             file: file.to_owned(),
             latent_dim: model.latent_dim(),
             is_rounded: false,
+            keeps_digits: false,
             phases: phases.collect(),
         }
     }
@@ -157,48 +165,57 @@ impl Side {
         Ok(())
     }
 
-    fn parse(&self, text: &str, pool: &mut ExprPool) -> Result<ExprId, ParseError> {
+    fn parse(&self, text: &str, pool: &mut ExprPool) -> Result<Reading, ParseError> {
         let known = |name: &str| LatentVariable::from_name(name, self.latent_dim).is_some();
         let literal = |number: &str| self.literal_name(number);
-        pool.parse_within(text, &known, &literal, ParseLimits::default())
+        pool.parse_defined(text, &known, &literal, ParseLimits::default())
     }
 
     /// The symbol of a decimal. Integers are numbers of the pool, and multiples of 1/2 of exact
-    /// files, which floats hold exactly.
+    /// files, which floats hold exactly. Decimals of 17 digits or more are the shortest one of the same float.
     fn literal_name(&self, number: &str) -> Option<String> {
         if number.bytes().all(|byte| byte.is_ascii_digit()) && number.parse::<i64>().is_ok() {
             return None;
         }
-        let literal = Coefficient::parse(number, self.is_rounded)?;
+        let float = (number.parse::<f64>().ok())
+            .filter(|_| number.contains(['.', 'e', 'E']) && !self.keeps_digits)
+            .filter(|float| n_digits(number) > FLOAT_DIGITS && float.is_normal());
+        let (is_rounded, text) = match float {
+            Some(float) => (false, format!("{float:?}")),
+            None => (self.is_rounded, number.to_owned()),
+        };
+        let literal = Coefficient::parse(&text, is_rounded)?;
         let is_half = literal.plus(&literal).is_integer();
-        if !self.is_rounded && is_half && literal.to_f64() < LARGEST_HALF {
+        if !is_rounded && is_half && literal.to_f64() < LARGEST_HALF && float.is_none() {
             return None;
         }
-        let mark = if self.is_rounded { ROUNDED } else { EXACT };
-        Some(format!("{mark}{number}"))
+        let mark = if is_rounded { ROUNDED } else { EXACT };
+        Some(format!("{mark}{text}"))
     }
 
-    /// Builds a right side, with symbols for decimals; where a model's `floats` count as rounded, those of as many digits
+    /// Builds a right side, with symbols for decimals, and its guards; where a model's `floats` count as rounded, those of as many digits
     /// as floats have stand for all numbers near them.
     pub(super) fn build(
         &self,
         right_side: &RightSide,
         floats: Floats,
         pool: &mut ExprPool,
-    ) -> ExprId {
+    ) -> Reading {
         match right_side {
             RightSide::Text(_, text) => self
                 .parse(text, pool)
                 .expect("the text was parsed when the file was read"),
             RightSide::Summands(summands) => {
+                let mut guards = Vec::new();
                 let products: Vec<ExprId> = (summands.iter())
                     .map(|(coefficient, term)| {
                         let term = self.parse(term, pool).expect("terms of a model parse");
+                        guards.extend(term.guards);
                         let size = coefficient.abs();
                         let whole = Number::from_f64(size).filter(|number| number.is_exact());
                         let text = format!("{size:?}");
                         let (mark, text) = match floats {
-                            Floats::Rounded if has_all_digits(&text) => {
+                            Floats::Rounded if n_digits(&text) >= FLOAT_DIGITS => {
                                 (ROUNDED, format!("{size:.14e}"))
                             }
                             Floats::Rounded | Floats::Exact => (EXACT, text),
@@ -207,7 +224,7 @@ impl Side {
                             Some(number) => pool.constant(number),
                             None => pool.symbol(&format!("{mark}{text}")),
                         };
-                        let product = pool.mul(factor, term);
+                        let product = pool.mul(factor, term.expr);
                         if *coefficient < 0.0 {
                             pool.neg(product)
                         } else {
@@ -215,7 +232,8 @@ impl Side {
                         }
                     })
                     .collect();
-                pool.sum(&products)
+                let expr = pool.sum(&products);
+                Reading { expr, guards }
             }
         }
     }
@@ -230,11 +248,11 @@ pub(super) enum Floats {
     Rounded,
 }
 
-/// Whether a decimal has as many digits as a rounded float.
-fn has_all_digits(decimal: &str) -> bool {
-    let mantissa = (decimal.split_once('e')).map_or(decimal, |(mantissa, _)| mantissa);
+/// Significant digits of a decimal.
+fn n_digits(decimal: &str) -> usize {
+    let mantissa = decimal.split(['e', 'E']).next().unwrap_or_default();
     let digits = mantissa.trim_start_matches(['0', '.']);
-    digits.bytes().filter(u8::is_ascii_digit).count() >= 16
+    digits.bytes().filter(u8::is_ascii_digit).count()
 }
 
 /// The decimal that a symbol stands for.

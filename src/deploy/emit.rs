@@ -127,11 +127,13 @@ pub(super) fn compiled(
     options: &EmitOptions,
     units: Units,
 ) -> Result<ModelInterface, EmitError> {
-    let mut entries = ModelInterface::new(equations, options.form, units)?;
-    options.precision.check(&entries)?;
-    if options.precision == Precision::Single {
-        entries.state_bounds();
+    if options.precision == Precision::Double {
+        return Ok(ModelInterface::new(equations, options.form, units)?);
     }
+    let folded = equations.clone().with_constants_folded();
+    let mut entries = ModelInterface::new(&folded, options.form, units)?;
+    options.precision.check(&entries)?;
+    entries.state_bounds();
     Ok(entries)
 }
 

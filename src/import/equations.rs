@@ -16,7 +16,7 @@
 use super::error::{ImportError, ImportFault};
 use crate::files::{Located, Place};
 use crate::model::{LatentVariable, MAX_LATENT_DIM};
-use crate::symbolic::{ExprId, ExprPool, ParseErrorKind};
+use crate::symbolic::{ExprId, ExprPool, ParseErrorKind, ParseLimits};
 
 /// Largest text.
 pub(super) const MAX_TEXT_BYTES: u64 = 4 << 20;
@@ -270,7 +270,8 @@ impl Equation {
         pool: &mut ExprPool,
     ) -> Result<ExprId, ImportError> {
         let known = |name: &str| LatentVariable::from_name(name, latent_dim).is_some();
-        pool.parse(&self.text(), &known).map_err(|error| {
+        let read = pool.parse_defined(&self.text(), &known, &|_| None, ParseLimits::default());
+        read.map(|reading| reading.expr).map_err(|error| {
             let place = self.place(error.position);
             match error.kind {
                 ParseErrorKind::UnknownName(name) => {

@@ -61,16 +61,6 @@ pub enum SimplifyError {
         measured: f64,
         bound: f64,
     },
-    /// The final evaluation does not confirm the tolerance: a defect of romc.
-    #[error(
-        "internal error: in phase `{phase}`, the bound {bound:e} of ddz{output} exceeds the tolerance {allowed:e}", output = output + 1
-    )]
-    Uncertified {
-        phase: String,
-        output: usize,
-        bound: f64,
-        allowed: f64,
-    },
     /// The simplified model is not a model.
     #[error(transparent)]
     Model(#[from] ModelError),

@@ -254,6 +254,22 @@ fn left(model: &ReducedModel) -> String {
 const UNIT: (f64, f64) = (-1.0, 1.0);
 
 #[test]
+fn sign_that_is_constant_on_the_domain_is_certified() {
+    let sum = "0.9 z1*sign(z1); 1 sign(z1)";
+    let narrow = [(-50.0, -49.99), (-1.0, 1.0), (-1.0, 1.0)];
+    for tolerance in [1e-4, 1e-2, 1e-9] {
+        let found = simplified(sum, narrow, tolerance);
+        let equation = &found.certificate.phases[0].equations[0];
+        assert!(equation.bound.magnitude() <= tolerance, "{equation:?}");
+    }
+    let shorter = left(&simplified(sum, narrow, 1e-4).model);
+    assert!(
+        !shorter.contains("abs") && !shorter.contains("sign"),
+        "{shorter}"
+    );
+}
+
+#[test]
 fn near_linear_sine_becomes_its_argument_in_a_library_that_gains_the_term() {
     let made = simplified("-10 sin(z1); 1 u1", [(-0.1, 0.1), UNIT, UNIT], 0.01);
     let terms = terms_of(&made.model, 0, 0);

@@ -9,7 +9,9 @@ pub enum CodegenError {
     #[error(transparent)]
     Lower(#[from] LowerError),
     /// A constant is beyond the largest single-precision number.
-    #[error("`{function}` has the constant {value:e}, beyond what single precision holds (3.4e38)")]
+    #[error(
+        "`{function}` has the constant {value:e}, beyond what single precision holds (3.4e38); use `--precision f64`"
+    )]
     BeyondSingle {
         /// The function, without the model's name.
         function: String,

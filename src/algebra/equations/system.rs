@@ -9,7 +9,7 @@ use super::physical::LatentUnits;
 use crate::model::{
     CandidateTerm, FeetRule, LatentVariable, Library, ModelError, Phase, ReducedModel,
 };
-use crate::symbolic::{ExprPool, SymbolId};
+use crate::symbolic::{ExprId, ExprPool, SymbolId};
 
 /// One summand of an equation: `coefficient * terms[term]`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -100,6 +100,18 @@ impl<'a> Equations<'a> {
         let builder = self.model.clone().into_owned().into_builder();
         let builder = builder.library(Library::from_terms(self.latent_dim(), &texts)?);
         Ok(Cow::Owned(builder.phases(phases.collect()).build()?))
+    }
+
+    /// The same with all parts of terms that have no variable computed in double precision: `exp(100)` may be beyond
+    /// what generated code computes with, its product with a coefficient not.
+    #[must_use]
+    pub fn with_constants_folded(mut self) -> Self {
+        let exprs: Vec<ExprId> = self.terms.iter().map(CandidateTerm::expr).collect();
+        let folded = self.pool.fold_constants(&exprs);
+        for (term, expr) in self.terms.iter_mut().zip(folded) {
+            *term = CandidateTerm::new(term.text().to_owned(), expr);
+        }
+        self
     }
 
     /// The same equations with a model of their own.

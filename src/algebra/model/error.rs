@@ -139,8 +139,10 @@ pub enum LibraryError {
         text: String,
         earlier: String,
     },
-    /// A part of a term without variables has no finite value, such as `1/0`.
-    #[error("`library`[{index}]: a constant part of {text:?} has no finite value")]
+    /// A part of a term without variables is beyond the range of floats, such as `exp(1000)`.
+    #[error(
+        "`library`[{index}]: a constant part of {text:?} has no value that floats hold (up to 1.8e308)"
+    )]
     NotFinite {
         /// Index of the term, from 0.
         index: usize,

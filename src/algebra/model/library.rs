@@ -10,7 +10,7 @@ use super::error::{LibraryError, ModelError, check_shape};
 use super::evaluation::Tape;
 use super::standard_library::StandardLibrary;
 use super::variable::LatentVariable;
-use crate::symbolic::{ExprId, ExprPool, SymbolId};
+use crate::symbolic::{ExprId, ExprPool, ParseLimits, SymbolId};
 
 /// Largest number of latent coordinates.
 pub const MAX_LATENT_DIM: usize = 64;
@@ -296,7 +296,8 @@ fn parse_term(
         });
     }
     let known = |name: &str| LatentVariable::from_name(name, latent_dim).is_some();
-    pool.parse(text, &known)
+    let read = pool.parse_defined(text, &known, &|_| None, ParseLimits::default());
+    read.map(|reading| reading.expr)
         .map_err(|source| LibraryError::Parse {
             index,
             text: text.to_owned(),
@@ -319,6 +320,7 @@ fn constants_are_finite(pool: &ExprPool, expr: ExprId) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::symbolic::ParseErrorKind;
 
     fn terms(texts: &[&str]) -> Vec<String> {
         texts.iter().map(|&text| text.to_owned()).collect()
@@ -358,10 +360,13 @@ mod tests {
         for text in ["z1/0", "log(0)*z1", "z1^(1/0)", "sqrt(-1) + z1"] {
             let error = Library::from_terms(1, &terms(&[text])).unwrap_err();
             assert!(
-                matches!(error, LibraryError::NotFinite { index: 0, .. }),
+                matches!(&error, LibraryError::Parse { index: 0, source, .. }
+                    if matches!(source.kind, ParseErrorKind::NoValue(_))),
                 "{text}: {error:?}"
             );
         }
+        let error = Library::from_terms(1, &terms(&["exp(1000)*z1"])).unwrap_err();
+        assert!(matches!(error, LibraryError::NotFinite { index: 0, .. }));
         for text in ["z1+".repeat(400) + "z1", "z1\n+1".to_owned()] {
             let found = Library::from_terms(1, &[text]);
             assert!(matches!(

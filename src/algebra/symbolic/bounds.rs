@@ -17,7 +17,19 @@ impl ExprPool {
         exprs: &[ExprId],
         range_of: &dyn Fn(SymbolId) -> Interval,
     ) -> Vec<Interval> {
-        self.fold_up(exprs, |pool, expr, child| match pool.node(expr) {
+        self.fold_up(exprs, |pool, expr, child| {
+            pool.bounds_of_node(expr, range_of, child)
+        })
+    }
+
+    /// The interval of one expression, given those of its operands.
+    pub(super) fn bounds_of_node(
+        &self,
+        expr: ExprId,
+        range_of: &dyn Fn(SymbolId) -> Interval,
+        child: &dyn Fn(ExprId) -> Interval,
+    ) -> Interval {
+        match self.node(expr) {
             Node::Number(number) => enclose(*number),
             Node::Symbol(symbol) => range_of(*symbol),
             Node::Sum(terms) => terms
@@ -28,7 +40,7 @@ impl ExprPool {
                 .iter()
                 .map(|factor| child(*factor))
                 .fold(Interval::point(1.0), |a, b| a * b),
-            Node::Power(base, exponent) => match pool.as_integer(*exponent) {
+            Node::Power(base, exponent) => match self.as_integer(*exponent) {
                 Some(integer) => child(*base).powi(integer),
                 None => child(*base).pow(child(*exponent)),
             },
@@ -46,7 +58,7 @@ impl ExprPool {
                     Function::Sign => argument.sign(),
                 }
             }
-        })
+        }
     }
 
     /// An interval that contains every value of `expr` where symbols lie in the given intervals
@@ -132,7 +144,7 @@ impl ExprPool {
                 }
                 Function::Tan => range(*node) != Interval::ENTIRE,
                 Function::Log | Function::Sqrt => range(argument).lo() > 0.0,
-                Function::Sign => false,
+                Function::Sign => !range(argument).contains(0.0),
             },
         })
     }

@@ -86,6 +86,7 @@ impl ExprPool {
     /// The sum of `coefficient * rest` over `terms`, where no rest has a numeric factor.
     pub(super) fn sum_of_terms(&mut self, terms: Vec<(Number, ExprId)>) -> ExprId {
         let mut terms = terms;
+        self.spend(terms.len());
         for _ in 0..MAX_PASSES {
             terms = self.collected(terms);
             // Collecting may leave `1 * (a + b)`, which belongs into this sum.

@@ -49,7 +49,7 @@ impl ExprPool {
             let factor = self.terms_of(sum);
             for _ in 0..exponent {
                 let n_products = terms.len().saturating_mul(factor.len());
-                if n_products > *budget {
+                if n_products > *budget || !self.affords(n_products) {
                     return expr;
                 }
                 *budget -= n_products;

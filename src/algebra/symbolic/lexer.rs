@@ -122,12 +122,16 @@ fn name_length(text: &str) -> usize {
     }
 }
 
-/// The value of a number token: exact if it is written as an integer that fits.
+/// The value of a number token: exact if it is written as an integer that fits; nothing for what floats hold as
+/// infinity, or as zero although it is none.
 fn read_number(token: &str) -> Option<Number> {
     if token.bytes().all(|byte| byte.is_ascii_digit())
         && let Ok(integer) = token.parse::<i64>()
     {
         return Some(Number::integer(integer));
     }
-    Number::from_f64(token.parse().ok()?)
+    let value: f64 = token.parse().ok()?;
+    let mantissa = token.split(['e', 'E']).next()?;
+    let is_lost = value == 0.0 && mantissa.contains(|digit| ('1'..='9').contains(&digit));
+    Number::from_f64(value).filter(|_| !is_lost)
 }

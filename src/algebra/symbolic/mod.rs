@@ -9,7 +9,7 @@
 //! |---|---|
 //! | `node`, `number`, `pool`, `id_map`, `order` | what an expression is and how it is stored |
 //! | `build`, `power` | canonical constructors |
-//! | `lexer`, `parse`, `display` | the grammar of candidate terms, both ways |
+//! | `lexer`, `parse`, `defined`, `display` | the grammar of candidate terms, both ways; constants without a value |
 //! | `eval`, `interval`, `rounding`, `bounds` | values, and bounds over boxes |
 //! | `diff`, `substitute` | derivatives and substitution |
 //! | `expand`, `rational`, `perfect_power`, `trig`, `rules`, `factors` | rewriting, each way when asked |
@@ -39,6 +39,7 @@ mod bounds;
 mod build;
 mod canonical;
 mod cost;
+mod defined;
 mod diff;
 mod display;
 mod eval;
@@ -66,6 +67,7 @@ mod testing;
 mod trig;
 
 pub use canonical::{CanonicalForm, CanonicalForms, Coefficient};
+pub use defined::Reading;
 pub use display::Display;
 pub(crate) use eval::integer_power;
 pub use interval::Interval;

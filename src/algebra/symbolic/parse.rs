@@ -12,6 +12,7 @@
 //! stack, so nesting is limited by [`ParseLimits`] and never by the machine's; chains of sums and
 //! products are handed over whole, so time is near linear in the length of the text.
 
+use super::defined::{Guards, Reading};
 use super::lexer::{Token, TokenKind, tokenize};
 use super::node::{ExprId, Function};
 use super::order::Exponent;
@@ -55,9 +56,12 @@ pub enum ParseErrorKind {
     /// A character that the grammar does not have.
     #[error("found `{}`, expected {}", .0.escape_debug(), spelling(*.0))]
     Character(char),
-    /// A number that cannot be read or is too large for a float.
-    #[error("found `{0}`, expected a finite number")]
+    /// A number that cannot be read, or is too large or too small for a float.
+    #[error("found `{0}`, expected a finite number that floats hold (5e-324 to 1.8e308 in size)")]
     Number(String),
+    /// A part that has no value, such as `1/0` or `log(-2)`.
+    #[error("`{0}` has no value")]
+    NoValue(String),
     /// A token in quotes, or `end of text`, in the wrong place.
     #[error("found {found}, expected {expected}")]
     Unexpected {
@@ -135,6 +139,33 @@ impl ExprPool {
         literal: &dyn Fn(&str) -> Option<String>,
         limits: ParseLimits,
     ) -> Result<ExprId, ParseError> {
+        let reading = self.read_within(text, allowed, literal, limits, None)?;
+        Ok(reading.expr)
+    }
+
+    /// As [`parse_within`](ExprPool::parse_within), for texts that users write: constant parts that have no value, such
+    /// as `0/0` or `0*log(0)`, are refused.
+    ///
+    /// # Errors
+    /// As [`parse`](ExprPool::parse), and [`ParseErrorKind::NoValue`].
+    pub fn parse_defined(
+        &mut self,
+        text: &str,
+        allowed: &dyn Fn(&str) -> bool,
+        literal: &dyn Fn(&str) -> Option<String>,
+        limits: ParseLimits,
+    ) -> Result<Reading, ParseError> {
+        self.read_within(text, allowed, literal, limits, Some(Guards::default()))
+    }
+
+    fn read_within(
+        &mut self,
+        text: &str,
+        allowed: &dyn Fn(&str) -> bool,
+        literal: &dyn Fn(&str) -> Option<String>,
+        limits: ParseLimits,
+        guards: Option<Guards>,
+    ) -> Result<Reading, ParseError> {
         if text.len() > limits.length {
             let (found, limit) = (text.len(), limits.length);
             return Err(ParseErrorKind::TooLong { found, limit }.at(1));
@@ -144,16 +175,20 @@ impl ExprPool {
             allowed,
             literal,
             limits,
+            text,
             tokens: tokenize(text)?,
             next: 0,
             groups: vec![Group::default()],
             depth: 0,
+            guards,
         };
         loop {
             if let Some(operand) = parser.read_operand()?
-                && let Some(result) = parser.after_operand(operand)?
+                && let Some(expr) = parser.after_operand(operand)?
             {
-                return Ok(result);
+                let guards = parser.guards.map(|guards| guards.found);
+                let guards = guards.unwrap_or_default();
+                return Ok(Reading { expr, guards });
             }
         }
     }
@@ -173,6 +208,10 @@ enum Opener {
 #[derive(Default)]
 struct Group {
     opener: Opener,
+    /// Where the group, the current term and the current operand start; 0 before their first token.
+    start: usize,
+    term_start: usize,
+    operand_start: usize,
     terms: Vec<ExprId>,
     factors: Vec<ExprId>,
     /// The current term is subtracted.
@@ -191,12 +230,15 @@ struct Parser<'p> {
     /// The symbol that stands for the text of a number.
     literal: &'p dyn Fn(&str) -> Option<String>,
     limits: ParseLimits,
+    text: &'p str,
     tokens: Vec<Token<'p>>,
     /// Index of the token that is read next.
     next: usize,
     groups: Vec<Group>,
     /// Open groups and pending powers.
     depth: usize,
+    /// What has to have a value, where that is asked.
+    guards: Option<Guards>,
 }
 
 impl<'p> Parser<'p> {
@@ -208,6 +250,12 @@ impl<'p> Parser<'p> {
     /// Reads signs and one atom; `None` if it opened a group instead.
     fn read_operand(&mut self) -> Result<Option<ExprId>, ParseError> {
         let token = self.token();
+        let group = self.group();
+        for start in [&mut group.term_start, &mut group.operand_start] {
+            if *start == 0 {
+                *start = token.position;
+            }
+        }
         match token.kind {
             TokenKind::Plus => Ok(None),
             TokenKind::Minus => {
@@ -216,7 +264,13 @@ impl<'p> Parser<'p> {
                 Ok(None)
             }
             TokenKind::Number(number) => Ok(Some(match (self.literal)(token.text) {
-                Some(name) => self.pool.symbol(&name),
+                Some(name) => {
+                    if let Some(guards) = &mut self.guards {
+                        let symbol = self.pool.symbol_id(&name);
+                        guards.decimals.insert(symbol, token.text.to_owned());
+                    }
+                    self.pool.symbol(&name)
+                }
                 None => self.pool.constant(number),
             })),
             TokenKind::Open => self.open(Opener::Parenthesis, &token).map(|()| None),
@@ -270,7 +324,7 @@ impl<'p> Parser<'p> {
                     return Ok(None);
                 }
                 (TokenKind::Close, Opener::Parenthesis | Opener::Call(_)) => {
-                    operand = self.close();
+                    operand = self.close(token)?;
                 }
                 (TokenKind::End, Opener::Text) => {
                     self.finish_term();
@@ -301,21 +355,45 @@ impl<'p> Parser<'p> {
         self.deepen(token)?;
         self.groups.push(Group {
             opener,
+            start: token.position,
             ..Group::default()
         });
         Ok(())
     }
 
     /// Ends the innermost group and gives its value.
-    fn close(&mut self) -> ExprId {
+    fn close(&mut self, token: &Token) -> Result<ExprId, ParseError> {
         self.finish_term();
         let group = self.groups.pop().expect("a group with an opener is open");
         self.depth -= 1;
         let sum = self.pool.sum(&group.terms);
         match group.opener {
-            Opener::Call(function) => self.pool.apply(function, sum),
-            Opener::Parenthesis | Opener::Text => sum,
+            Opener::Call(function) => {
+                let end = token.position + token.text.len();
+                self.guarded(group.start, end, |guards, pool| {
+                    guards.call(pool, function, sum)
+                })?;
+                Ok(self.pool.apply(function, sum))
+            }
+            Opener::Parenthesis | Opener::Text => Ok(sum),
         }
+    }
+
+    /// Refuses the part of the text from `start` up to `end` if it has no value.
+    fn guarded(
+        &mut self,
+        start: usize,
+        end: usize,
+        has_value: impl FnOnce(&mut Guards, &mut ExprPool) -> bool,
+    ) -> Result<(), ParseError> {
+        let Some(guards) = &mut self.guards else {
+            return Ok(());
+        };
+        if has_value(guards, self.pool) {
+            return Ok(());
+        }
+        let found = self.text[start - 1..end - 1].trim_end();
+        Err(ParseErrorKind::NoValue(short(found)).at(start))
     }
 
     /// Applies pending powers and signs, and puts the operand among the factors.
@@ -332,11 +410,16 @@ impl<'p> Parser<'p> {
             self.group().negative = negative;
         }
         if std::mem::take(&mut self.group().divide) {
+            let start = self.group().term_start;
+            self.guarded(start, token.position, |guards, pool| {
+                guards.division(pool, value)
+            })?;
             let dividend = self.group().factors.pop();
             let dividend = dividend.expect("a divisor follows a factor");
             value = self.pool.div(dividend, value);
         }
         self.group().factors.push(value);
+        self.group().operand_start = 0;
         Ok(())
     }
 
@@ -357,6 +440,10 @@ impl<'p> Parser<'p> {
         if let Some(number) = self.pool.as_number(exponent) {
             too_large(number)?;
         }
+        let start = self.group().operand_start;
+        self.guarded(start, token.position, |guards, pool| {
+            guards.power(pool, base, exponent)
+        })?;
         let power = self.pool.pow(base, exponent);
         for factor in self.pool.factors_of(power) {
             if let (_, Exponent::Number(number)) = self.pool.base_and_exponent(*factor) {
@@ -370,6 +457,7 @@ impl<'p> Parser<'p> {
         let group = self.group();
         let factors = std::mem::take(&mut group.factors);
         let subtract = std::mem::take(&mut group.subtract);
+        group.term_start = 0;
         let term = self.pool.product(&factors);
         let term = self.pool.negated_if(subtract, term);
         self.group().terms.push(term);

@@ -38,8 +38,16 @@ pub struct ExprPool {
     symbol_ids: HashMap<String, SymbolId>,
     /// See [`ExprPool::exact`].
     is_exact: bool,
+    work: Work,
     /// Derivatives found so far; expressions never change, so entries stay valid.
     pub(super) derivatives: HashMap<(ExprId, SymbolId), ExprId, BuildIdHasher>,
+}
+
+/// What rewriting may cost: constructors that are called, and steps of about that effort.
+#[derive(Clone, Copy, Debug)]
+struct Work {
+    done: u64,
+    limit: u64,
 }
 
 #[derive(Clone, Debug)]
@@ -86,6 +94,10 @@ impl ExprPool {
             symbols: Vec::new(),
             symbol_ids: HashMap::new(),
             is_exact: false,
+            work: Work {
+                done: 0,
+                limit: u64::MAX,
+            },
             derivatives: HashMap::default(),
         };
         let zero = pool.intern(Node::Number(Number::ZERO));
@@ -108,21 +120,41 @@ impl ExprPool {
         self.is_exact
     }
 
+    /// Does something within so much work, and within what is left of a limit around it: rewriting that would exceed it
+    /// leaves expressions as they are.
+    pub(super) fn limited<T>(&mut self, work: u64, step: impl FnOnce(&mut Self) -> T) -> T {
+        let outer = self.limit_work(work);
+        let result = step(self);
+        self.work.limit = outer;
+        result
+    }
+
+    /// Lowers the limit to so much work from here on; the limit before.
+    pub(super) fn limit_work(&mut self, work: u64) -> u64 {
+        let outer = self.work.limit;
+        self.work.limit = outer.min(self.work.done.saturating_add(work));
+        outer
+    }
+
+    /// Ends a limit, given the one before.
+    pub(super) fn restore_limit(&mut self, limit: u64) {
+        self.work.limit = limit;
+    }
+
+    /// Counts some steps; whether they are within the limit.
+    pub(super) fn spend(&mut self, steps: usize) -> bool {
+        self.work.done = self.work.done.saturating_add(steps as u64);
+        self.work.done <= self.work.limit
+    }
+
+    /// Whether so many more steps are within the limit.
+    pub(super) fn affords(&self, steps: usize) -> bool {
+        self.work.done.saturating_add(steps as u64) <= self.work.limit
+    }
+
     /// A folded number, if this pool takes it.
     pub(super) fn folded(&self, number: Option<Number>) -> Option<Number> {
         number.filter(|number| number.is_exact() || !self.is_exact)
-    }
-
-    /// Every logarithm, root and power that is not an integer which was made so far, whether it is
-    /// left in an expression or not: what was read has values only where all of them have.
-    pub fn restrictions(&self) -> Vec<ExprId> {
-        let all = (0..self.nodes.len() as u32).map(ExprId);
-        let is_restriction = |expr: &ExprId| match self.node(*expr) {
-            Node::Apply(Function::Log | Function::Sqrt, _) => true,
-            Node::Power(_, exponent) => self.as_integer(*exponent).is_none(),
-            _ => false,
-        };
-        all.filter(is_restriction).collect()
     }
 
     /// The number of distinct expressions made so far.
@@ -298,6 +330,7 @@ impl ExprPool {
 
     /// The id of a node that is canonical already.
     pub(super) fn intern(&mut self, node: Node) -> ExprId {
+        self.work.done += 1;
         let mut place = match self.place_of(&node) {
             Ok(id) => return id,
             Err(free) => free,

@@ -62,7 +62,7 @@ impl ExprPool {
             }
         }
         let is_needed = |(base, _): &(ExprId, Number)| self.as_symbol(*base).is_none();
-        let is_manageable = denominators.len() <= MAX_DENOMINATORS;
+        let is_manageable = denominators.len() <= MAX_DENOMINATORS && self.affords(1);
         if !is_manageable || !denominators.iter().any(is_needed) {
             return expr;
         }
@@ -140,7 +140,7 @@ impl ExprPool {
             lowered(self.monomials(&terms[1], &bases)?),
         ];
         while !b.is_empty() {
-            (a, b) = (b.clone(), divided(a, &b)?.1);
+            (a, b) = (b.clone(), self.divided(a, &b)?.1);
         }
         let (degree, leading) = a.last_key_value()?;
         if degree[0] == 0 {
@@ -164,7 +164,7 @@ impl ExprPool {
         let bases = self.bases_of(dividend.iter().chain(&divisor))?;
         let (dividend, least) = lowered(self.monomials(&dividend, &bases)?);
         let (divisor, least_of_divisor) = lowered(self.monomials(&divisor, &bases)?);
-        let (quotient, remainder) = divided(dividend, &divisor)?;
+        let (quotient, remainder) = self.divided(dividend, &divisor)?;
         if !remainder.is_empty() {
             return None;
         }
@@ -176,6 +176,16 @@ impl ExprPool {
             .into_iter()
             .map(|(step, factor)| (place(step), factor));
         self.sum_of_monomials(&quotient.collect(), &bases)
+    }
+
+    /// See [`divided`]; nothing if that would be too much work.
+    fn divided(
+        &mut self,
+        dividend: Monomials,
+        divisor: &Monomials,
+    ) -> Option<(Monomials, Monomials)> {
+        let n_steps = dividend.len().min(MAX_STEPS) * divisor.len();
+        self.spend(n_steps).then(|| divided(dividend, divisor))?
     }
 
     /// The bases of the powers in some terms; `None` for roots of numbers and for exponents without

@@ -24,7 +24,10 @@ impl ExprPool {
             } else {
                 self.rebuild(node, |child| *rewritten.get(&child).unwrap_or(&child))
             };
-            let result = rule(self, rebuilt);
+            let result = match self.affords(1) {
+                true => rule(self, rebuilt),
+                false => rebuilt,
+            };
             rewritten.insert(node, result);
         }
         rewritten[&expr]

@@ -6,9 +6,8 @@
 //! sines for cosines angle by angle, with angles combined, with sums as powers. The one with the least
 //! [`cost`](ExprPool::cost) replaces the region, if it is shorter than what was there.
 //!
-//! **Termination.** Every accepted step lowers the cost, a natural number. The work of one step
-//! is bounded by the number of nodes and by budgets of term products; what
-//! exceeds them is left as it is.
+//! **Termination.** Every accepted step lowers the cost, a natural number. The work on one expression
+//! is bounded, counted in constructors, and so are the term products of one step; what exceeds that is left as it is.
 //!
 //! **Idempotence.** A result is returned once no further step lowers its cost, so simplifying it
 //! again returns it.
@@ -31,12 +30,19 @@ const MAX_CHOICES: usize = 4;
 /// Most divisors below each other for which it is proven that a symbol may go.
 const PROVEN_LEVELS: usize = 12;
 
+/// Most work on one expression.
+pub(super) const MAX_WORK: u64 = 120_000;
+
 /// Most rounds of rewriting on the way to a normal form.
 const MAX_ROUNDS: usize = 6;
 
 impl ExprPool {
     /// An equal expression that is shorter, or `expr` itself.
     pub fn simplify(&mut self, expr: ExprId) -> ExprId {
+        self.limited(MAX_WORK, |pool| pool.simplify_within_limit(expr))
+    }
+
+    fn simplify_within_limit(&mut self, expr: ExprId) -> ExprId {
         let mut costs = Costs::default();
         let mut best = expr;
         loop {
@@ -70,6 +76,9 @@ impl ExprPool {
     /// Forms equal to `region`, in a fixed order.
     pub(super) fn forms(&mut self, region: ExprId, budget: &mut usize) -> Vec<ExprId> {
         let normal = self.normal_form(region, budget);
+        if !self.affords(1) {
+            return vec![region];
+        }
         let mut plain = vec![normal];
         if self.has_waves(normal) {
             let rational = self.rewrite_region(normal, ExprPool::without_sine_below);
@@ -86,6 +95,9 @@ impl ExprPool {
         plain.push(region);
         // Sines and cosines may have become factors of one divisor only now.
         for form in plain.clone() {
+            if !self.affords(1) {
+                break;
+            }
             for combined in [self.combine_angles(form), self.combine_all_angles(form)] {
                 if !plain.contains(&combined) {
                     plain.push(combined);
@@ -94,6 +106,9 @@ impl ExprPool {
         }
         let mut forms = Vec::new();
         for form in plain {
+            if !self.affords(1) {
+                break;
+            }
             let compact = self.rewrite_region(form, ExprPool::compact_rules);
             let merged = self.rewrite_region(compact, ExprPool::normal_rules);
             for form in [form, compact, merged] {
@@ -151,6 +166,9 @@ impl ExprPool {
         let n_choices = 1_usize << angles.len().min(MAX_CHOICES);
         let mut forms = Vec::new();
         for choice in 1..n_choices {
+            if !self.affords(1) {
+                break;
+            }
             let is_chosen = |angle: ExprId| {
                 let place = angles.iter().position(|known| *known == angle);
                 place.is_none_or(|place| choice >> place.min(MAX_CHOICES - 1) & 1 == 1)
@@ -165,6 +183,9 @@ impl ExprPool {
     pub(super) fn normal_form(&mut self, region: ExprId, budget: &mut usize) -> ExprId {
         let mut form = region;
         for _ in 0..MAX_ROUNDS {
+            if !self.affords(1) {
+                break;
+            }
             let before = form;
             form = self.rewrite_region(form, ExprPool::normal_rules);
             if self.has_waves(form) {
@@ -192,7 +213,7 @@ impl ExprPool {
         }
         match self.levels_of_divisors(before) {
             0 | 1 => false,
-            2..=PROVEN_LEVELS => {
+            2..=PROVEN_LEVELS if self.affords(1) => {
                 let mut forms = CanonicalForms::new(self, &[before, form], &|_| None);
                 let difference = forms.of(before).minus(&forms.of(form));
                 let difference = forms.without_fractions(&difference);

@@ -39,6 +39,24 @@ impl ExprPool {
             .collect()
     }
 
+    /// The expressions with every part that has no variable but a finite value as a number: `exp(3)*x` is
+    /// `20.085536923187668*x`.
+    pub fn fold_constants(&mut self, exprs: &[ExprId]) -> Vec<ExprId> {
+        let mut folded: IdMap<ExprId> = IdMap::default();
+        for expr in self.reachable(exprs) {
+            let value = match self.is_constant(expr) && self.as_number(expr).is_none() {
+                true => self.evaluate(expr, &|_| f64::NAN),
+                false => f64::NAN,
+            };
+            let new = match value.is_finite() {
+                true => self.number(value),
+                false => self.rebuild(expr, |child| folded[&child]),
+            };
+            folded.insert(expr, new);
+        }
+        exprs.iter().map(|expr| folded[expr]).collect()
+    }
+
     /// The node of `expr` built again from other operands.
     pub(super) fn rebuild(
         &mut self,

@@ -90,7 +90,7 @@ impl ExprPool {
         let total: i64 = multiples.iter().try_fold(0_i64, |sum, (_, _, multiple)| {
             sum.checked_add(multiple.checked_abs()?)
         })?;
-        if total > MAX_MULTIPLE {
+        if total > MAX_MULTIPLE || !self.affords(1) {
             return None;
         }
         let (mut sine, mut cosine) = (ExprId::ZERO, ExprId::ONE);
@@ -269,7 +269,10 @@ impl ExprPool {
 
     /// A product of at least two sines and cosines as a sum of them.
     fn sum_of_waves(&mut self, waves: &[(Function, ExprId)]) -> Option<ExprId> {
-        if waves.len() < 2 || waves.len() > MAX_TRIG_DEGREE as usize {
+        if waves.len() < 2
+            || waves.len() > MAX_TRIG_DEGREE as usize
+            || !self.affords(1 << waves.len())
+        {
             return None;
         }
         // The product so far, as a sum of sines and cosines.

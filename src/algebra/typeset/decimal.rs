@@ -57,12 +57,15 @@ impl Decimal {
     }
 
     /// `value` rounded for print; the exact binary value is rounded, ties to even.
-    /// More than 40 digits are taken as 40.
+    /// More than 40 digits are taken as 40, and more digits than asked where fewer would round to a number
+    /// beyond the range of floats.
     pub fn rounded(value: f64, rounding: Rounding) -> Self {
         match rounding {
             Rounding::Exact => Self::exact(value),
             Rounding::Decimals(places) => Self::fixed(value, places.min(MOST_DIGITS)),
-            Rounding::Significant(digits) => Self::significant(value, digits.clamp(1, MOST_DIGITS)),
+            Rounding::Significant(digits) => {
+                Self::significant(value, finite_digits(value, digits.clamp(1, MOST_DIGITS)))
+            }
             Rounding::Adaptive => Self::adaptive(value),
         }
     }
@@ -164,6 +167,15 @@ impl Decimal {
     }
 }
 
+/// So many digits, or as many more as it takes to round a finite number to one: of 1.6e308 no fewer than two.
+pub(super) fn finite_digits(value: f64, digits: usize) -> usize {
+    let is_finite = |digits: &usize| {
+        let text = format!("{value:.*e}", digits - 1);
+        text.parse::<f64>().is_ok_and(f64::is_finite)
+    };
+    (digits..digits + 17).find(is_finite).unwrap_or(digits)
+}
+
 /// Digits and exponent of Rust's `1.25e-7` form.
 fn parts(scientific: &str) -> (&str, i32) {
     let parts = scientific.split_once('e');
@@ -206,6 +218,8 @@ mod tests {
             (51234.0, Rounding::Significant(3), "51200"),
             (9.996, Rounding::Significant(3), "10.0"),
             (-1.25e-7, Rounding::Significant(2), "-1.2e-7"),
+            (1.6e308, Rounding::Significant(1), "1.6e308"),
+            (-f64::MAX, Rounding::Significant(3), "-1.7976e308"),
         ] {
             let rounded = Decimal::rounded(value, rounding).to_string();
             assert_eq!(rounded, text, "{value} by {rounding:?}");

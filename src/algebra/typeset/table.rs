@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use super::decimal::finite_digits;
 use super::mathml::HtmlProse;
 use super::words::code_point;
 use crate::files::is_invisible;
@@ -24,7 +25,7 @@ pub fn significant(value: f64) -> String {
 
 /// The float nearest to `value` in so many significant decimal digits.
 pub fn rounded(value: f64, digits: usize) -> f64 {
-    let text = format!("{value:.*e}", digits - 1);
+    let text = format!("{value:.*e}", finite_digits(value, digits) - 1);
     text.parse().expect("a formatted float reads back")
 }
 
@@ -307,6 +308,8 @@ mod tests {
         assert_eq!(rounded(99.6, 1), 100.0);
         assert_eq!(rounded(6.02214e23, 3), 6.02e23);
         assert_eq!(rounded(0.1 + 0.2, 17), 0.1 + 0.2);
+        assert_eq!(rounded(1.6e308, 1), 1.6e308);
+        assert_eq!(rounded(-f64::MAX, 4), -1.7976e308);
     }
 
     #[test]

@@ -16,6 +16,8 @@ const MAX_FRACTIONS: usize = 4;
 const MAX_FRACTION_TRIES: usize = 300;
 /// Most atoms that are removed by multiplying out.
 const MAX_REMOVALS: usize = 40;
+/// Most sums under roots and logarithms by which others are divided.
+const MAX_SUMS: usize = 12;
 /// Largest index of a root.
 pub(super) const MAX_ROOT: i64 = 1_000;
 
@@ -28,8 +30,9 @@ pub struct CanonicalForms<'p> {
     pub(super) forms: HashMap<ExprId, CanonicalForm>,
     arguments: Vec<Argument>,
     known: HashSet<CanonicalForm>,
-    /// Atoms that are positive wherever all given expressions are defined.
+    /// Atoms that are positive wherever all given expressions are defined, and sums that are.
     pub(super) positive: HashSet<u32>,
+    pub(super) positive_sums: Vec<CanonicalForm>,
     rounding: f64,
     /// Whether any argument has radii.
     is_rounded: bool,
@@ -56,6 +59,7 @@ impl<'p> CanonicalForms<'p> {
             arguments: Vec::new(),
             known: HashSet::new(),
             positive: HashSet::new(),
+            positive_sums: Vec::new(),
             rounding: 0.0,
             is_rounded: false,
             is_contradictory: false,
@@ -69,8 +73,12 @@ impl<'p> CanonicalForms<'p> {
                 _ => {}
             }
         }
+        let mut sums = Vec::new();
         for expr in guarded {
             let form = forms.of(expr);
+            if form.terms.len() > 1 && !form.has_radius() && !sums.contains(&form) {
+                sums.push(form.clone());
+            }
             if let Some((coefficient, monomial)) = form.as_term()
                 && !coefficient.is_negative()
                 && let [(atom, power)] = monomial.powers[..]
@@ -79,9 +87,12 @@ impl<'p> CanonicalForms<'p> {
                 forms.positive.insert(atom);
             }
         }
-        if !forms.positive.is_empty() {
+        sums.sort_by_key(|sum| sum.terms.len());
+        sums.truncate(MAX_SUMS);
+        if !forms.positive.is_empty() || sums.len() > 1 {
             forms.forms.clear();
         }
+        forms.positive_sums = sums;
         forms.rounding = 0.0;
         forms
     }

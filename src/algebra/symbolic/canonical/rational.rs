@@ -79,14 +79,15 @@ impl Rational {
 
     /// The nearest float, or one beside it; infinite beyond the range of floats.
     pub(super) fn to_f64(&self) -> f64 {
-        // Both parts within the range of floats, 64 bits of the quotient kept.
-        let excess = (self.numerator.bits().max(self.denominator.bits())).saturating_sub(1_000);
-        let both = [&self.numerator, &self.denominator].map(|part| (part >> excess).to_f64());
-        match both {
-            [Some(numerator), Some(denominator)] if denominator != 0.0 => numerator / denominator,
-            _ if self.is_negative() => f64::NEG_INFINITY,
-            _ => f64::INFINITY,
-        }
+        // Each part as 64 bits times a power of two, the powers in two steps for numbers near the ends of the range.
+        let parts = [&self.numerator, &self.denominator].map(|part| {
+            let excess = part.bits().saturating_sub(64);
+            ((part >> excess).to_f64().unwrap_or(0.0), excess)
+        });
+        let [(numerator, above), (denominator, below)] = parts;
+        let power = (above as i64 - below as i64).clamp(-4_000, 4_000) as i32;
+        let half = 2_f64.powi(power / 2);
+        numerator / denominator * half * 2_f64.powi(power - power / 2)
     }
 }
 
@@ -158,5 +159,13 @@ mod tests {
         );
         assert_eq!(Rational::from(-large.clone()).to_f64(), f64::NEG_INFINITY);
         assert_eq!(Rational::new(1, large).to_f64(), 0.0);
+        for exponent in [290, 305, 308] {
+            let power = BigInt::from(10).pow(exponent);
+            let value: f64 = format!("1e{exponent}").parse().expect("a number");
+            let tiny: f64 = format!("1e-{exponent}").parse().expect("a number");
+            let near = |a: f64, b: f64| (a / b - 1.0).abs() < 1e-12;
+            assert!(near(Rational::from(power.clone()).to_f64(), value));
+            assert!(near(Rational::new(1, power).to_f64(), tiny));
+        }
     }
 }

@@ -1,5 +1,8 @@
 //! Roots, logarithms, exponentials and magnitudes of normal forms.
 
+use std::cmp::Ordering;
+use std::collections::BTreeSet;
+
 use num_bigint::BigInt;
 use num_traits::ToPrimitive;
 
@@ -17,6 +20,12 @@ impl CanonicalForms<'_> {
         let scale = form.leading()?.size();
         let inverse = Coefficient::from(scale.recip());
         let Some((coefficient, monomial)) = form.as_term() else {
+            if let Some((exponent, rest)) = self.without_exponential(&form) {
+                // log(exp(x) + 1) = x + log(1 + exp(-x)).
+                let mut split = self.split(&rest?)?;
+                split.exponent = split.exponent.plus(&exponent);
+                return Some(split);
+            }
             let shared = self.shared_powers(&form);
             if !shared.powers.is_empty() {
                 // sqrt(x + x^2) = sqrt(x) sqrt(1 + x) where x is positive.
@@ -26,6 +35,14 @@ impl CanonicalForms<'_> {
                 for &(atom, power) in &shared.powers {
                     split.factors.push((self.magnitude_of(atom)?, power));
                 }
+                return Some(split);
+            }
+            if let Some((divisor, quotient)) = self.positive_divisor(&form) {
+                // sqrt(2 + 3*x + x^2) = sqrt(1 + x) sqrt(2 + x) where 1 + x is positive.
+                let (mut split, other) = (self.split(&divisor)?, self.split(&quotient)?);
+                split.scale = &split.scale * &other.scale;
+                split.factors.extend(other.factors);
+                split.exponent = split.exponent.plus(&other.exponent);
                 return Some(split);
             }
             let (scale, factors) = match self.square_root(&form) {
@@ -75,6 +92,45 @@ impl CanonicalForms<'_> {
             factors,
             exponent,
         })
+    }
+
+    /// The exponent of the exponential of largest real part among the terms of a sum, and the sum divided by
+    /// that exponential; nothing if there is none. `exp(x) + 1` and `1 + exp(-x)` leave the same sum.
+    fn without_exponential(
+        &mut self,
+        form: &CanonicalForm,
+    ) -> Option<(CanonicalForm, Option<CanonicalForm>)> {
+        let all = form.terms.keys().flat_map(|monomial| &monomial.exponent);
+        let names: BTreeSet<&Monomial> = all.map(|(name, _)| name).collect();
+        let power = |monomial: &Monomial, name: &Monomial| {
+            let found = monomial.exponent.iter().find(|(known, _)| known == name);
+            found.map_or_else(Rational::zero, |(_, (re, _))| re.clone())
+        };
+        let powers = |monomial: &Monomial| -> Vec<Rational> {
+            names.iter().map(|name| power(monomial, name)).collect()
+        };
+        // Rationals compare by their parts: their order is one of differences only by value.
+        let largest = form.terms.keys().map(powers).max_by(|a, b| {
+            let differences = a.iter().zip(b).map(|(a, b)| a + &-b.clone());
+            let first = differences
+                .into_iter()
+                .find(|difference| !difference.is_zero());
+            match first {
+                None => Ordering::Equal,
+                Some(difference) if difference.is_negative() => Ordering::Less,
+                Some(_) => Ordering::Greater,
+            }
+        })?;
+        let mut exponent = CanonicalForm::default();
+        for (name, power) in names.into_iter().zip(largest) {
+            exponent.add(power.into(), name.clone());
+        }
+        if exponent.is_zero() {
+            return None;
+        }
+        let [_, inverse] = exponentials(&exponent, false);
+        let rest = self.product(form, &inverse);
+        Some((exponent, rest))
     }
 
     /// Whether an atom is nowhere negative where the given expressions have values.
@@ -208,6 +264,13 @@ impl CanonicalForms<'_> {
         if form.is_zero() {
             return Some(form);
         }
+        if form.terms.len() > 1
+            && let Some((exponent, rest)) = self.without_exponential(&form)
+        {
+            let [factor, _] = exponentials(&exponent, false);
+            let magnitude = self.abs(&rest?)?;
+            return self.product(&factor, &magnitude);
+        }
         let (normed, scale, _) = form.normed()?;
         let Some((_, monomial)) = normed.as_term().filter(|(c, _)| c.is_one()) else {
             return Some(self.atom(Atom::Abs(normed)).scaled(&scale));
@@ -236,6 +299,11 @@ impl CanonicalForms<'_> {
             && constant.as_real().is_some()
         {
             return Some(CanonicalForm::constant(leading.sign()));
+        }
+        if form.terms.len() > 1
+            && let Some((_, rest)) = self.without_exponential(&form)
+        {
+            return self.sign(&rest?);
         }
         let (normed, _, sign) = form.normed()?;
         let powers = (normed.as_term())

@@ -52,6 +52,46 @@ impl CanonicalForms<'_> {
     }
 }
 
+impl CanonicalForms<'_> {
+    /// A sum that is positive where it is used and divides the form, and the quotient, which is a sum too.
+    pub(super) fn positive_divisor(
+        &mut self,
+        form: &CanonicalForm,
+    ) -> Option<(CanonicalForm, CanonicalForm)> {
+        if self.positive_sums.len() < 2 || form.terms.len() > MAX_TERMS {
+            return None;
+        }
+        self.positive_sums.clone().into_iter().find_map(|divisor| {
+            let quotient = self.divided(form, &divisor)?;
+            (quotient.terms.len() > 1).then_some((divisor, quotient))
+        })
+    }
+
+    /// `form / divisor`, if the division leaves no remainder.
+    fn divided(&mut self, form: &CanonicalForm, divisor: &CanonicalForm) -> Option<CanonicalForm> {
+        let order = Order::of(&form.plus(divisor));
+        let (leading, coefficient) = order.largest(divisor)?;
+        let (inverse, factor) = (leading.reciprocal(), coefficient.reciprocal()?);
+        let (mut quotient, mut rest) = (CanonicalForm::default(), form.clone());
+        let mut last = f64::INFINITY;
+        for _ in 0..MAX_TERMS {
+            let Some((monomial, coefficient)) = order.largest(&rest) else {
+                return Some(quotient);
+            };
+            let weight = order.weight(&monomial);
+            let next = monomial.times(&inverse);
+            if weight >= last || next.powers.iter().any(|(_, power)| *power < 0) {
+                return None;
+            }
+            last = weight;
+            let term = CanonicalForm::term(coefficient.times(&factor), next);
+            rest = rest.minus(&self.product(&term, divisor)?);
+            quotient = quotient.plus(&term);
+        }
+        None
+    }
+}
+
 /// The monomial whose square this is, if powers are even.
 fn halved(monomial: &Monomial) -> Option<Monomial> {
     let half = Rational::new(1, 2);

@@ -1,5 +1,6 @@
 //! The shortest form of a group of summands.
 
+use super::agreement::Agreement;
 use super::search::Shortener;
 use super::units::{in_f64, in_units};
 use super::{Scaled, Summands};
@@ -23,7 +24,7 @@ impl Shortener<'_> {
             .map(|&(number, expr)| (number, self.single(expr)))
             .collect();
         let mut candidates = vec![collected(self.pool, &singles, Keep::Sums)];
-        if old.len() <= MAX_GROUP {
+        if old.len() <= MAX_GROUP && self.pool.affords(1) {
             candidates.extend(self.candidates(unit, &singles));
             candidates.extend(self.beside_common_factors(unit, &singles));
         }
@@ -62,7 +63,8 @@ impl Shortener<'_> {
         let term = |(number, expr)| (coefficient(number, expr), expr);
         let forms = shorter.into_iter();
         let mut forms = forms.map(|(_, form)| form.into_iter().map(term).collect::<Summands>());
-        forms.find(|form| form.iter().all(is_usable) && self.agrees(original, form))
+        let mut agreement = Agreement::with(self.pool, original);
+        forms.find(|form| form.iter().all(is_usable) && agreement.holds(self.pool, form))
     }
 
     /// The summands with sums of coefficient 1 or -1 as terms of their own, as they are written.
@@ -305,7 +307,7 @@ impl Shortener<'_> {
                         choice[term] = kept;
                     }
                 }
-                if least == before {
+                if least == before || !self.pool.affords(1) {
                     break;
                 }
             }
@@ -331,6 +333,7 @@ impl Shortener<'_> {
             parts.extend(collected(self.pool, &[(number, form)], keep));
         }
         let sum = collected(self.pool, &parts, Keep::Sums);
+        self.pool.spend(parts.len());
         let length = self.length(unit, &sum);
         (sum, length)
     }

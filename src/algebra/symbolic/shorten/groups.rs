@@ -10,6 +10,7 @@ use crate::symbolic::node::{ExprId, Function, Node};
 use crate::symbolic::number::Number;
 use crate::symbolic::perfect_power::MAX_POWER;
 use crate::symbolic::pool::ExprPool;
+use crate::symbolic::simplify::MAX_WORK;
 
 /// Most terms that can be powers of the parts of a sum.
 const MAX_PARTS: usize = 64;
@@ -140,7 +141,8 @@ impl Shortener<'_> {
     fn monomials_of(&mut self, expr: ExprId, waves: ExprId) -> Vec<ExprId> {
         let is_tangent =
             |factor: &ExprId| matches!(self.pool.node(*factor), Node::Apply(Function::Tan, _));
-        if self.plain[&expr] && !self.pool.factors_of(expr).iter().any(is_tangent) {
+        let is_alone = self.plain[&expr] && !self.pool.factors_of(expr).iter().any(is_tangent);
+        if is_alone || !self.pool.affords(1) {
             return vec![expr];
         }
         if let Some(known) = self.monomials.get(&(expr, waves)) {
@@ -222,10 +224,11 @@ impl Shortener<'_> {
     pub(super) fn normal(&mut self, expr: ExprId, waves: ExprId) -> ExprId {
         let mut budget = MAX_PRODUCTS;
         let arguments = &mut MAX_PRODUCTS.clone();
-        let expanded =
-            (self.pool).map_regions(expr, |pool, part| pool.expand_region(part, arguments));
-        let expanded = self.pool.expand_angles_like(expanded, waves);
-        self.pool.normal_form(expanded, &mut budget)
+        self.pool.limited(MAX_WORK / 2, |pool| {
+            let expanded = pool.map_regions(expr, |pool, part| pool.expand_region(part, arguments));
+            let expanded = pool.expand_angles_like(expanded, waves);
+            pool.normal_form(expanded, &mut budget)
+        })
     }
 }
 

@@ -11,12 +11,13 @@
 //! place, are taken as such multiples (`0.1` and `-0.3` are 1 and -3 times `0.1`); otherwise they
 //! are the decimal fractions that are written for them, as far as these fit, and floats beyond.
 //!
-//! **Check.** Every replacement is evaluated at some points, beside what it replaces; one that
+//! **Check.** Every replacement is evaluated at some points, also far out, beside what it replaces; one that
 //! differs by more than rounding explains, or has no value where there was one, is dropped.
 //!
 //! `search.rs` replaces group by group, `groups.rs` finds the groups, `forms.rs` the shortest form of
-//! one, `units.rs` its coefficients. Read `search.rs` first.
+//! one, `units.rs` its coefficients, `agreement.rs` compares it with what it replaces. Read `search.rs` first.
 
+mod agreement;
 mod forms;
 mod groups;
 mod search;

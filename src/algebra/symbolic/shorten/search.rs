@@ -1,7 +1,8 @@
 //! The replacements of a sum, group by group.
 
-use std::collections::{BTreeSet, HashMap};
+use std::collections::HashMap;
 
+use super::agreement::Agreement;
 use super::forms::{Keep, collected};
 use super::{Scaled, Summands};
 use crate::symbolic::cost::Costs;
@@ -10,45 +11,10 @@ use crate::symbolic::node::{ExprId, Function, Node, SymbolId};
 use crate::symbolic::number::Number;
 use crate::symbolic::order::Exponent;
 use crate::symbolic::pool::ExprPool;
+use crate::symbolic::simplify::MAX_WORK;
 
 /// Most rounds of searching for groups.
 const MAX_ROUNDS: usize = 4;
-/// Relative error that evaluation at a point may have.
-const EVALUATION: f64 = 1e-11;
-
-/// Relative error at points far out, where arguments of waves lose digits.
-const FAR_EVALUATION: f64 = 1e-3;
-
-/// Values below which one form may underflow where the other does not.
-const UNDERFLOW: f64 = 1e-150;
-
-/// A range that variables of a point are taken from.
-type Range = (f64, f64);
-
-/// Ranges where exponentials are beyond floats, and where their products and powers are.
-const FAR: [Range; 8] = [
-    (9900.0, 10100.0),
-    (-10100.0, -9900.0),
-    (390.0, 410.0),
-    (-410.0, -390.0),
-    (195.0, 205.0),
-    (-205.0, -195.0),
-    (98.0, 102.0),
-    (-102.0, -98.0),
-];
-/// Ranges of the variables beside one that is far out.
-const BESIDE: [Range; 2] = [(0.11, 1.03), (-2.71, -0.2)];
-/// Most variables that are far out one by one.
-const MAX_FAR: usize = 8;
-/// Ranges from which the variables of the points are taken.
-const POINTS: [Range; 6] = [
-    (0.11, 1.03),
-    (1.27, 2.9),
-    (-1.03, 1.4),
-    (-2.71, -0.2),
-    (-0.3, 0.1),
-    (2.13, 5.9),
-];
 
 /// Summands that a shorter form takes the place of.
 #[derive(Clone, Debug, PartialEq)]
@@ -134,6 +100,9 @@ impl<'a> Shortener<'a> {
         if self.is_plain_sum(summands) && self.parts_of_powers(summands).is_empty() {
             return Vec::new();
         }
+        let searched = summands.iter().filter(|(_, expr)| !self.is_plain(*expr));
+        let n_searched = searched.count().max(1);
+        let outer = (self.pool).limit_work(2 * MAX_WORK * n_searched as u64);
         let mut blocks = blocks_of(summands);
         for _ in 0..MAX_ROUNDS {
             let mut is_changed = false;
@@ -144,7 +113,12 @@ impl<'a> Shortener<'a> {
                 break;
             }
         }
-        let new = blocks.into_iter().filter(|block| block.is_new);
+        self.pool.restore_limit(outer);
+        // What agrees step by step may not in the end: parts were variables of their own.
+        let new = blocks.into_iter().filter(|block| {
+            let replaced = block.positions.iter().map(|&at| summands[at]).collect();
+            block.is_new && Agreement::with(self.pool, &replaced).holds(self.pool, &block.summands)
+        });
         let mut found: Vec<Shortened> = new
             .map(|block| Shortened {
                 replaced: block.positions,
@@ -394,6 +368,15 @@ impl<'a> Shortener<'a> {
             return known;
         }
         let single = self.pool.simplify(expr);
+        let is_same = || {
+            let alone = vec![(1.0, expr)];
+            Agreement::with(self.pool, &alone).holds(self.pool, &vec![(1.0, single)])
+        };
+        let single = if single == expr || is_same() {
+            single
+        } else {
+            expr
+        };
         self.singles.insert(expr, single);
         single
     }
@@ -426,45 +409,5 @@ impl<'a> Shortener<'a> {
             is_new: true,
         };
         true
-    }
-
-    /// Whether two sums have the same values, up to rounding, at all points tried where the first
-    /// has one.
-    pub(super) fn agrees(&self, old: &Summands, new: &Summands) -> bool {
-        let exprs = |summands: &Summands| -> Vec<ExprId> {
-            summands.iter().map(|&(_, expr)| expr).collect()
-        };
-        let (before, after) = (exprs(old), exprs(new));
-        let point = |range: Range, special: Option<(SymbolId, Range)>| {
-            move |symbol: SymbolId| {
-                let (low, high) = match special {
-                    Some((far, range)) if far == symbol => range,
-                    _ => range,
-                };
-                // Multiples of the golden ratio fill an interval evenly.
-                let place = (symbol.index() as f64 + 1.0) * 0.618_033_988_749_894_9;
-                low + (high - low) * (place + low.abs()).fract()
-            }
-        };
-        let value = |exprs: &[ExprId], summands: &Summands, at: &dyn Fn(SymbolId) -> f64| {
-            let values = self.pool.evaluate_all(exprs, &at);
-            let products = values.iter().zip(summands).map(|(value, (c, _))| value * c);
-            products.fold((0.0, 0.0), |(sum, size), p: f64| (sum + p, size + p.abs()))
-        };
-        let is_same = |tolerance: f64, at: &dyn Fn(SymbolId) -> f64| {
-            let ((a, size_a), (b, size_b)) = (value(&before, old, at), value(&after, new, at));
-            !a.is_finite() || (a - b).abs() <= tolerance * (size_a + size_b) + UNDERFLOW
-        };
-        let symbols: BTreeSet<SymbolId> = (before.iter().chain(&after))
-            .flat_map(|&expr| self.pool.symbols_of(expr))
-            .collect();
-        // `1 - 1/(1 + exp(z))` has values where `exp(z)/(1 + exp(z))` is infinity over infinity in floats.
-        (POINTS.iter()).all(|&range| is_same(EVALUATION, &point(range, None)))
-            && FAR.iter().all(|&far| {
-                let mut beside = (symbols.iter().take(MAX_FAR))
-                    .flat_map(|&symbol| BESIDE.map(|range| (range, Some((symbol, far)))));
-                is_same(FAR_EVALUATION, &point(far, None))
-                    && beside.all(|(range, far)| is_same(FAR_EVALUATION, &point(range, far)))
-            })
     }
 }

@@ -44,7 +44,6 @@ fn shorten_finds_the_simplest_form_of_each_family() {
         ("1 exp(x)*exp(-x) | 2 x", "1 1 | 2 x"),
         ("0.3 log(exp(x)) | 0.1 x", "0.4 x"),
         ("1.3 exp(2*log(x))", "1.3 x^2"),
-        ("0.4 log(x) | 0.4 log(y)", "0.4 log(x*y)"),
         ("0.1 x*y | -0.1 y*x", ""),
         ("0.1 sqrt(x)^2 | 0.2 x", "0.3 x"),
         ("1 sin(x + y) | 1 sin(x - y)", "2 sin(x)*cos(y)"),
@@ -82,6 +81,12 @@ fn shorten_leaves_what_is_short_already() {
         "0.37 sin(x)*cos(y) | 0.21 sin(z)*cos(x)",
         "1 1/3*x",
         "1 exp(x) | 1 tanh(y) | 0.5 sqrt(x^2 + y^2)",
+        // Shorter forms of these overflow or underflow where they do not.
+        "0.4 log(x) | 0.4 log(y)",
+        "1 exp(x)/(-y + exp(x)) | 1 exp(x)/(y + exp(x))",
+        "1 1/(x - y) | -1 1/(x + y)",
+        "1 sign(x)*sign(y)",
+        "1 sqrt(x)*sqrt(y)",
     ] {
         assert_eq!(shortest(sum), sum);
     }

@@ -1,0 +1,354 @@
+//! Whether a shorter form may take the place of a sum: it has its values, also far out.
+//!
+//! Near the origin both are evaluated in floating point. Far out the sum is enclosed in intervals, over inputs
+//! that reach a few units in the last place around a point. Where this is narrow and generated code of the sum would
+//! hit it, in 64 or in 32 bits, code of the form has to hit it as well: no form overflows, underflows or
+//! loses more digits than a change of the last digits of the inputs would cost. Sums and products of variables and
+//! bounded functions need no such test, because equal ones have the same degrees.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::rc::Rc;
+
+use super::Summands;
+use crate::symbolic::interval::Interval;
+use crate::symbolic::node::{ExprId, Function, Node, SymbolId};
+use crate::symbolic::pool::ExprPool;
+use crate::symbolic::rounding::power_by;
+
+/// Ranges from which the variables of the points near the origin are taken.
+const NEAR: [(f64, f64); 6] = [
+    (0.11, 1.03),
+    (1.27, 2.9),
+    (-1.03, 1.4),
+    (-2.71, -0.2),
+    (-0.3, 0.1),
+    (2.13, 5.9),
+];
+/// Relative error that evaluation near the origin may have.
+const EVALUATION: f64 = 1e-11;
+/// Multiples of the golden ratio fill an interval evenly.
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
+
+/// Values at many points.
+type Column = Rc<[f64]>;
+/// The values of each variable at many points.
+type Points = BTreeMap<SymbolId, Column>;
+
+/// Floating-point numbers of generated code.
+struct Precision {
+    round: fn(f64) -> f64,
+    /// Relative distance of the inputs that are enclosed around a point.
+    inputs: f64,
+    /// Relative error that evaluation far out may have, beside one relative to the summands.
+    evaluation: f64,
+    rounding: f64,
+    /// Least number with all its digits.
+    least: f64,
+    /// Powers of ten of the variables, each far from all at which a power of a variable overflows.
+    powers: [i32; 6],
+    /// Magnitudes at which exponentials of one, two, three and four times a variable overflow.
+    exponents: [f64; 4],
+}
+
+const PRECISIONS: [Precision; 2] = [
+    Precision {
+        round: |value| value,
+        inputs: 1e-13,
+        evaluation: 1e-9,
+        rounding: 1e-13,
+        least: f64::MIN_POSITIVE,
+        powers: [300, 200, 125, 90, 68, 50],
+        exponents: [1000.0, 400.0, 260.0, 200.0],
+    },
+    Precision {
+        round: |value| f64::from(value as f32),
+        inputs: 1e-6,
+        evaluation: 1e-3,
+        rounding: 1e-5,
+        least: f32::MIN_POSITIVE as f64,
+        powers: [36, 27, 16, 11, 8, 5],
+        exponents: [200.0, 60.0, 35.0, 25.0],
+    },
+];
+
+/// A sum at many points, with which its shorter forms are compared.
+pub(super) struct Agreement {
+    sum: Summands,
+    symbols: Vec<SymbolId>,
+    far: Option<[Far; 2]>,
+}
+
+/// A sum far out in one precision.
+struct Far {
+    points: Points,
+    /// Where its values lie, and how large its summands are; nothing where it is not accurate itself.
+    expected: Vec<Option<(Interval, f64)>>,
+}
+
+impl Agreement {
+    /// The comparison with `sum`.
+    pub(super) fn with(pool: &ExprPool, sum: &Summands) -> Self {
+        let symbols: BTreeSet<SymbolId> = (sum.iter())
+            .flat_map(|&(_, expr)| pool.symbols_of(expr))
+            .collect();
+        Self {
+            sum: sum.clone(),
+            symbols: symbols.into_iter().collect(),
+            far: None,
+        }
+    }
+
+    /// Whether `form` has the sum's values, up to rounding, at all points where the sum has one.
+    pub(super) fn holds(&mut self, pool: &ExprPool, form: &Summands) -> bool {
+        if !self.holds_near(pool, form) {
+            return false;
+        }
+        if is_tame(pool, &self.sum) && is_tame(pool, form) {
+            return true;
+        }
+        let (sum, symbols) = (&self.sum, &self.symbols);
+        let far = (self.far)
+            .get_or_insert_with(|| [0, 1].map(|p| Far::of(pool, sum, symbols, &PRECISIONS[p])));
+        (far.iter().zip(&PRECISIONS)).all(|(far, precision)| far.holds(pool, form, precision))
+    }
+
+    fn holds_near(&self, pool: &ExprPool, form: &Summands) -> bool {
+        let at = |&(low, high): &(f64, f64)| {
+            move |symbol: SymbolId| {
+                let place = (symbol.index() as f64 + 1.0) * GOLDEN;
+                low + (high - low) * (place + low.abs()).fract()
+            }
+        };
+        let value = |summands: &Summands, at: &dyn Fn(SymbolId) -> f64| {
+            let exprs: Vec<ExprId> = summands.iter().map(|&(_, expr)| expr).collect();
+            let values = pool.evaluate_all(&exprs, at);
+            let products = values.iter().zip(summands).map(|(value, (c, _))| value * c);
+            products.fold((0.0, 0.0), |(sum, size), p: f64| (sum + p, size + p.abs()))
+        };
+        NEAR.iter().all(|range| {
+            let at = at(range);
+            let ((a, size_a), (b, size_b)) = (value(&self.sum, &at), value(form, &at));
+            !a.is_finite() || (a - b).abs() <= EVALUATION * (size_a + size_b) + f64::MIN_POSITIVE
+        })
+    }
+}
+
+impl Far {
+    fn of(pool: &ExprPool, sum: &Summands, symbols: &[SymbolId], precision: &Precision) -> Self {
+        let points = points(symbols, &scales(pool, sum, precision), precision);
+        let (values, sizes) = sum_by_code(pool, sum, &points, precision.round);
+        let bounds = sum_in_bounds(pool, sum, &points, precision.inputs);
+        let expected = bounds.into_iter().zip(values.iter().zip(&sizes));
+        let expected = expected.map(|(bounds, (value, size))| {
+            let is_bounded = bounds.magnitude().is_finite() && !bounds.is_empty();
+            let is_accurate = is_bounded && precision.hits(bounds, *value, *size);
+            is_accurate.then_some((bounds, *size))
+        });
+        Self {
+            expected: expected.collect(),
+            points,
+        }
+    }
+
+    fn holds(&self, pool: &ExprPool, form: &Summands, precision: &Precision) -> bool {
+        let (values, _) = sum_by_code(pool, form, &self.points, precision.round);
+        (self.expected.iter().zip(&values[..])).all(|(expected, value)| {
+            expected.is_none_or(|(bounds, size)| precision.hits(bounds, *value, size))
+        })
+    }
+}
+
+impl Precision {
+    /// Whether a value is where it should be, up to rounding of summands of some size.
+    fn hits(&self, bounds: Interval, value: f64, size: f64) -> bool {
+        let slack = self.evaluation * bounds.magnitude() + self.rounding * size + self.least;
+        bounds.lo() - slack <= value && value <= bounds.hi() + slack
+    }
+}
+
+/// Whether all terms are products of variables, bounded functions of such terms, and magnitudes.
+fn is_tame(pool: &ExprPool, summands: &Summands) -> bool {
+    let roots: Vec<ExprId> = summands.iter().map(|&(_, expr)| expr).collect();
+    (pool.reachable(&roots).into_iter()).all(|expr| match *pool.node(expr) {
+        Node::Number(_) | Node::Symbol(_) | Node::Sum(_) | Node::Product(_) => true,
+        Node::Power(_, exponent) => pool.as_integer(exponent).is_some_and(|power| power > 0),
+        Node::Apply(function, _) => matches!(
+            function,
+            Function::Sin | Function::Cos | Function::Tanh | Function::Abs
+        ),
+    })
+}
+
+/// Magnitudes of the variables of a sum.
+fn scales(pool: &ExprPool, sum: &Summands, precision: &Precision) -> Vec<f64> {
+    let roots: Vec<ExprId> = sum.iter().map(|&(_, expr)| expr).collect();
+    let has_exponents = (pool.reachable(&roots).into_iter()).any(|expr| {
+        matches!(
+            pool.node(expr),
+            Node::Apply(Function::Exp | Function::Log | Function::Tanh, _)
+        )
+    });
+    let powers = precision.powers.into_iter();
+    let powers = powers.flat_map(|power| [power, -power].map(|power| 10_f64.powi(power)));
+    let exponents = precision.exponents.into_iter();
+    std::iter::once(1.0)
+        .chain(exponents.filter(|_| has_exponents))
+        .chain(powers)
+        .collect()
+}
+
+/// Points with all pairs of scales of two variables, for each pair of the first four; the others are ordinary at
+/// about half of them, and have scales as they fall.
+fn points(symbols: &[SymbolId], scales: &[f64], precision: &Precision) -> Points {
+    let n_scales = scales.len();
+    let first = symbols.len().min(4);
+    let pairs: Vec<[usize; 2]> = match first {
+        0 | 1 => vec![[0, 0]],
+        _ => (0..first)
+            .flat_map(|b| (0..b).map(move |a| [a, b]))
+            .collect(),
+    };
+    let n_grid = 2 * n_scales.pow(first.min(2) as u32);
+    let value = |place: usize, point: usize| {
+        // Multiples of irrational numbers fall evenly.
+        let share = ((point + 1) as f64 * (place as f64 + 2.3).sqrt()).fract();
+        let ([a, b], at) = (pairs[point / n_grid], point % n_grid);
+        let scale = match place {
+            _ if place == a => at / 2 % n_scales,
+            _ if place == b => at / 2 / n_scales,
+            _ => ((2.0 * share - 1.0).max(0.0) * n_scales as f64) as usize,
+        };
+        let is_negative = match place == a {
+            true => at % 2 == 1,
+            false => (share * 64.0) as usize % 2 == 1,
+        };
+        let size = scales[scale] * (1.0 + 0.1 * (share * 8.0).fract());
+        (precision.round)(if is_negative { -size } else { size })
+    };
+    let column = |(place, &symbol): (usize, &SymbolId)| {
+        let points = 0..n_grid * pairs.len();
+        let values: Column = points.map(|point| value(place, point)).collect();
+        (symbol, values)
+    };
+    symbols.iter().enumerate().map(column).collect()
+}
+
+/// The values of a sum by generated code, and the sums of the sizes of its summands.
+fn sum_by_code(
+    pool: &ExprPool,
+    sum: &Summands,
+    points: &Points,
+    round: fn(f64) -> f64,
+) -> (Vec<f64>, Vec<f64>) {
+    let n_points = points.values().next().map_or(1, |column| column.len());
+    let exprs: Vec<ExprId> = sum.iter().map(|&(_, expr)| expr).collect();
+    let columns = pool.fold_up(&exprs, |pool, expr, child| {
+        by_code(pool, expr, points, round, n_points, child)
+    });
+    let (mut values, mut sizes) = (vec![0.0; n_points], vec![0.0; n_points]);
+    for (column, &(coefficient, _)) in columns.iter().zip(sum) {
+        for (point, value) in column.iter().enumerate() {
+            let summand = round(round(coefficient) * value);
+            values[point] = round(values[point] + summand);
+            sizes[point] += summand.abs();
+        }
+    }
+    (values, sizes)
+}
+
+/// One expression in the order of operations that generated code has: factors with negative exponents form one
+/// divisor, powers are chains of products or exponentials of logarithms.
+fn by_code(
+    pool: &ExprPool,
+    expr: ExprId,
+    points: &Points,
+    round: fn(f64) -> f64,
+    n_points: usize,
+    child: &dyn Fn(ExprId) -> Column,
+) -> Column {
+    let constant = |value: f64| -> Column { vec![round(value); n_points].into() };
+    let map = |column: Column, function: &dyn Fn(f64) -> f64| -> Column {
+        column.iter().map(|&value| round(function(value))).collect()
+    };
+    let both = |a: Column, b: Column, function: fn(f64, f64) -> f64| -> Column {
+        let pairs = a.iter().zip(&b[..]);
+        pairs.map(|(&a, &b)| round(function(a, b))).collect()
+    };
+    let chain = |base: Column, exponent: u64| {
+        map(base, &|value| {
+            power_by(value, exponent, |a, b| round(a * b))
+        })
+    };
+    let divisor = |expr: ExprId| match *pool.node(expr) {
+        Node::Power(base, exponent) => {
+            let exponent = pool.as_integer(exponent).filter(|exponent| *exponent < 0)?;
+            Some(chain(child(base), exponent.unsigned_abs()))
+        }
+        _ => None,
+    };
+    match *pool.node(expr) {
+        Node::Number(number) => constant(number.to_f64()),
+        Node::Symbol(symbol) => points[&symbol].clone(),
+        Node::Sum(ref terms) => {
+            let terms = terms.iter().map(|term| child(*term));
+            let sum = terms.reduce(|sum, term| both(sum, term, |a, b| a + b));
+            sum.unwrap_or_else(|| constant(0.0))
+        }
+        Node::Product(ref factors) => {
+            let (mut over, mut under) = (constant(1.0), None);
+            for &factor in factors {
+                match (divisor(factor), under.take()) {
+                    (Some(column), None) => under = Some(column),
+                    (Some(column), Some(known)) => under = Some(both(known, column, |a, b| a * b)),
+                    (None, known) => {
+                        over = both(over, child(factor), |a, b| a * b);
+                        under = known;
+                    }
+                }
+            }
+            match under {
+                Some(under) => both(over, under, |a, b| a / b),
+                None => over,
+            }
+        }
+        Node::Power(base, exponent) => match (divisor(expr), pool.as_integer(exponent)) {
+            (Some(under), _) => map(under, &|value| 1.0 / value),
+            (None, Some(integer)) => chain(child(base), integer.unsigned_abs()),
+            (None, None) => {
+                let logarithm = map(child(base), &f64::ln);
+                map(both(child(exponent), logarithm, |a, b| a * b), &f64::exp)
+            }
+        },
+        Node::Apply(function, argument) => map(child(argument), &|value| function.evaluate(value)),
+    }
+}
+
+/// Bounds of a sum over inputs within a relative distance of the points.
+fn sum_in_bounds(pool: &ExprPool, sum: &Summands, points: &Points, distance: f64) -> Vec<Interval> {
+    let n_points = points.values().next().map_or(1, |column| column.len());
+    let exprs: Vec<ExprId> = sum.iter().map(|&(_, expr)| expr).collect();
+    let columns = pool.fold_up(&exprs, |pool, expr, child| -> Rc<[Interval]> {
+        let operands: Vec<(ExprId, Rc<[Interval]>)> = (pool.children(expr))
+            .map(|operand| (operand, child(operand)))
+            .collect();
+        let at = |point: usize| {
+            let range_of = |symbol: SymbolId| {
+                let value = points[&symbol][point];
+                let reach = distance * value.abs();
+                Interval::new(value - reach, value + reach)
+            };
+            let operand = |of: ExprId| {
+                let known = operands.iter().find(|(operand, _)| *operand == of);
+                known.map_or(Interval::ENTIRE, |(_, column)| column[point])
+            };
+            pool.bounds_of_node(expr, &range_of, &operand)
+        };
+        (0..n_points).map(at).collect()
+    });
+    let at = |point: usize| {
+        let summands = columns.iter().zip(sum);
+        let summands = summands.map(|(column, &(c, _))| Interval::point(c) * column[point]);
+        summands.fold(Interval::point(0.0), |a, b| a + b)
+    };
+    (0..n_points).map(at).collect()
+}
