@@ -7,7 +7,6 @@
 mod command_line;
 #[path = "robots/made.rs"]
 mod made;
-#[expect(dead_code, reason = "these tests need no tool of the machine")]
 mod tools;
 #[path = "robots/urdf.rs"]
 mod urdf;
