@@ -49,7 +49,8 @@ fn constant(random: &mut Random, depth: usize) -> (String, Fraction) {
         };
     }
     let (left, a) = constant(random, depth - 1);
-    let (right, b) = constant(random, random.below(depth as u64) as usize);
+    let lower = random.below(depth as u64) as usize;
+    let (right, b) = constant(random, lower);
     let both = a.zip(b);
     match random.below(5) {
         0 => (
