@@ -49,8 +49,8 @@ fn constant(random: &mut Random, depth: usize) -> (String, Fraction) {
         };
     }
     let (left, a) = constant(random, depth - 1);
-    let below = random.below(depth as u64) as usize;
-    let (right, b) = constant(random, below);
+    let lower = random.below(depth as u64) as usize;
+    let (right, b) = constant(random, lower);
     let both = a.zip(b);
     match random.below(5) {
         0 => (

@@ -219,7 +219,7 @@ mod tests {
             (9.996, Rounding::Significant(3), "10.0"),
             (-1.25e-7, Rounding::Significant(2), "-1.2e-7"),
             (1.6e308, Rounding::Significant(1), "1.6e308"),
-            (-f64::MAX, Rounding::Significant(3), "-1.7976e308"),
+            (-f64::MAX, Rounding::Significant(3), "-1.79769e308"),
         ] {
             let rounded = Decimal::rounded(value, rounding).to_string();
             assert_eq!(rounded, text, "{value} by {rounding:?}");

@@ -309,7 +309,7 @@ mod tests {
         assert_eq!(rounded(6.02214e23, 3), 6.02e23);
         assert_eq!(rounded(0.1 + 0.2, 17), 0.1 + 0.2);
         assert_eq!(rounded(1.6e308, 1), 1.6e308);
-        assert_eq!(rounded(-f64::MAX, 4), -1.7976e308);
+        assert_eq!(rounded(-f64::MAX, 4), -1.79769e308);
     }
 
     #[test]

@@ -83,7 +83,7 @@ fn shorten_leaves_what_is_short_already() {
         "1 exp(x) | 1 tanh(y) | 0.5 sqrt(x^2 + y^2)",
         // Shorter forms of these overflow or underflow where they do not.
         "0.4 log(x) | 0.4 log(y)",
-        "1 exp(x)/(-y + exp(x)) | 1 exp(x)/(y + exp(x))",
+        "1 -exp(x)/(y - exp(x)) | 1 exp(x)/(y + exp(x))",
         "1 1/(x - y) | -1 1/(x + y)",
         "1 sign(x)*sign(y)",
         "1 sqrt(x)*sqrt(y)",
