@@ -102,6 +102,10 @@ impl Expander<'_> {
                 Some(Meaning::Same(Kind::Command(same))) => same.as_str(),
                 Some(_) => "",
             };
+            let is_unknown = name.starts_with("if")
+                && name != "iff"
+                && !has(CONDITIONALS, name)
+                && !has(WITH_ARGUMENTS, name);
             match name {
                 "fi" if depth == 0 => return Ok(passed),
                 "else" if depth == 0 && stops_at_else => {
@@ -110,17 +114,11 @@ impl Expander<'_> {
                 }
                 "fi" => depth -= 1,
                 name if has(CONDITIONALS, name) => depth += 1,
-                name if name.starts_with("if") && name != "iff" && !has(WITH_ARGUMENTS, name) => {
-                    if !self.is_brace_next() {
-                        let why = " in text that is not printed";
-                        return self.refuse(
-                            &token,
-                            why,
-                            "`\\newif` for it before, or conditionals of TeX",
-                        );
-                    }
-                }
                 _ => {}
+            }
+            if is_unknown && !self.is_brace_next() {
+                let expected = "`\\newif` for it before, or conditionals of TeX";
+                return self.refuse(&token, " in text that is not printed", expected);
             }
             passed.push(token);
         }

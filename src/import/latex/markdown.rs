@@ -134,8 +134,11 @@ fn code_or_escape(text: &str) -> Option<usize> {
     }
     let length = text.len() - text.trim_start_matches('`').len();
     let rest = &text[length..];
+    if length == 0 {
+        return None;
+    }
     let mut from = 0;
-    while length > 0 {
+    loop {
         let Some(next) = rest[from..].find('`') else {
             return Some(length);
         };
@@ -146,15 +149,14 @@ fn code_or_escape(text: &str) -> Option<usize> {
             return Some(length + from);
         }
     }
-    None
 }
 
 /// Where mathematics in a line is that opens at the start of `text`, and the place behind its end: `$z_1$`, `` $`z_1`$ ``.
 /// As on GitHub, spaces are not inside next to the marks, and no digit follows (`$5 and $6`).
 fn inline(text: &str) -> Option<(std::ops::Range<usize>, usize)> {
     let inside = text.strip_prefix('$')?;
-    if inside.starts_with('`') {
-        let length = inside[1..].find("`$")?;
+    if let Some(inside) = inside.strip_prefix('`') {
+        let length = inside.find("`$")?;
         return Some((2..2 + length, length + 4));
     }
     let mut from = 0;
