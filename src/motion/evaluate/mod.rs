@@ -1,7 +1,7 @@
 //! How good a model is, in numbers.
 //!
 //! Rollouts and recordings come in; fits (root mean square in SI units, coefficient of
-//! determination), template models under the same inputs, stability and the losses of the lift leave.
+//! determination), template models under the same inputs, stability, the losses of the lift and a [`Verdict`] leave.
 //! `docs/mathematics.md` defines each figure once. Start with `assessment.rs`, then
 //! [`metrics`](Fit).
 
@@ -22,6 +22,7 @@ mod recovery;
 mod remarks;
 mod round_trip;
 mod torque;
+mod verdict;
 
 pub use along_recording::{ReferenceInput, Run, StepRow, along_recording, lift_comparison};
 pub use aslip::{Aslip, AslipRollout, AslipSums};
@@ -29,7 +30,8 @@ pub use assessment::{Assessment, SegmentRun};
 pub use baseline::{Baseline, fit_aslip};
 pub use control::{StepTimes, Summary};
 pub use control_metrics::{
-    Baselines, ConstantVelocity, ControlMetrics, KnowsNothing, Pushed, control_metrics,
+    Baselines, ConstantVelocity, ControlMetrics, NoDynamics, Pushed, control_metrics,
+    usual_settings,
 };
 pub use coordinates::{CoordinateSums, PointwiseSums};
 pub use error::EvaluateError;
@@ -43,6 +45,9 @@ pub use prediction::PredictionError;
 pub use remarks::remarks;
 pub use round_trip::{AccelerationSlip, RoundTrip, Slip};
 pub use torque::{ByContact, Comparison, is_plausible};
+pub use verdict::{
+    AFTER_A_PUSH, Bound, TORQUES_IN_CONTACT, Verdict, VerdictRow, verdict, verdict_by_default,
+};
 
 /// A model of the project's own, by the name of its file.
 #[cfg(test)]
