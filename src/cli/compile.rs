@@ -25,7 +25,8 @@ pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
         .and([model])
         .and(&arguments.plan)
         .and(&simplification.domain)
-        .and(&simplification.reading.columns);
+        .and(&simplification.reading.columns)
+        .into_folder(Some(&arguments.out_dir))?;
     // What would be the same file again may stay; it is compared once there is a model.
     match save_model {
         Some(path) if path.parent() == Some(&arguments.out_dir) => {

@@ -9,6 +9,7 @@ use std::process::Command;
 use serde_json::json;
 
 use super::args::DemoArguments;
+use super::destination::Inputs;
 use super::output::{lines, names, spinner};
 use super::simplification::RESTART_S;
 use super::{Answer, code};
@@ -16,7 +17,7 @@ use super::{mpc as mpc_command, report};
 use crate::deploy::{self, EmitOptions, Target};
 use crate::equations::Equations;
 use crate::evaluate::{Assessment, verdict};
-use crate::files::{EmittedFile, write_files};
+use crate::files::EmittedFile;
 use crate::model::ReducedModel;
 use crate::report::{
     Content, assessment_json, baseline_table, control_table, failed_runs, failures, run_table,
@@ -51,6 +52,7 @@ const REPORT_TOLERANCE: Tolerance = Tolerance::ShareOfRms(0.01);
 /// Runs the whole path and reports its files and metrics. The exit code is 1 if predictions of body x or z, the
 /// self-test or a run fail.
 pub fn run(arguments: &DemoArguments) -> Result<(Answer, u8), Error> {
+    let inputs = Inputs::default().into_folder(Some(&arguments.out_dir))?;
     let progress = spinner("reading the shipped model and recordings");
     let model = artifact::read_from_bytes(MODEL.0, MODEL.1)?;
     let jumps = (JUMPS.iter())
@@ -83,7 +85,7 @@ pub fn run(arguments: &DemoArguments) -> Result<(Answer, u8), Error> {
     };
     let report = report::page_of(&content, REPORT_TOLERANCE, vec!["romc demo".to_owned()])?;
     files.push(EmittedFile::new("report.html", report.page));
-    let made = write_files(&arguments.out_dir, &files, arguments.force)?;
+    let made = inputs.write_folder(&arguments.out_dir, &files, arguments.force)?;
     progress.set_message("checking the C code");
     let self_test = self_test(&model, &arguments.out_dir);
     progress.finish_and_clear();

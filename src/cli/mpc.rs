@@ -31,7 +31,8 @@ pub fn run(arguments: &MpcArguments) -> Result<(Answer, u8), Error> {
     let inputs = Inputs::default()
         .and([&arguments.model])
         .and(&arguments.recordings)
-        .and(&arguments.reading.columns);
+        .and(&arguments.reading.columns)
+        .into_folder(arguments.figures.as_deref())?;
     inputs.check_output(arguments.output.as_deref(), Format::TABLE, arguments.force)?;
     let model = artifact::read(&arguments.model)?;
     let settings = MpcSettings {

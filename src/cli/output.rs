@@ -18,14 +18,15 @@ use crate::recording::{Clocks, ColumnMap, Reader, ReadingNotes, Recording, misma
 use crate::robot::Robot;
 use crate::train::sha256;
 
-/// Writes a whole file, unless it is there and may not be replaced.
+/// Writes a whole file, unless it is there, also since a moment ago, and may not be replaced.
 pub fn write_file(path: &Path, contents: &[u8], overwrite: Overwrite) -> Result<(), Error> {
-    if !overwrite.allows(path) {
-        return Err(Error::Exists(path.to_owned()));
-    }
-    write_whole(path, |out| out.write_all(contents)).map_err(|source| Error::Write {
-        path: path.to_owned(),
-        source,
+    let written = write_whole(path, overwrite, |out| out.write_all(contents));
+    written.map_err(|source| match source.kind() {
+        std::io::ErrorKind::AlreadyExists => Error::Exists(path.to_owned()),
+        _ => Error::Write {
+            path: path.to_owned(),
+            source,
+        },
     })
 }
 

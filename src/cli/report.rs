@@ -31,7 +31,8 @@ pub fn run(arguments: &ReportArguments) -> Result<(Answer, u8), Error> {
         .and([&arguments.model])
         .and(&arguments.recordings)
         .and(&arguments.plan)
-        .and(&arguments.reading.columns);
+        .and(&arguments.reading.columns)
+        .into_folder(arguments.figures.as_deref())?;
     inputs.check_output(Some(&arguments.output), Format::PAGE, arguments.force)?;
     let model = artifact::read(&arguments.model)?;
     let recordings = read_recordings(&arguments.recordings, &arguments.reading)?;

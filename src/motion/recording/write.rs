@@ -16,7 +16,7 @@ use super::columns::Column;
 use super::error::{RecordingError, RecordingFault};
 use super::foreign;
 use super::segment::{Recording, Segment};
-use crate::files::write_whole;
+use crate::files::{Overwrite, write_whole};
 use crate::robot::Robot;
 
 /// Cell separator and decimal mark.
@@ -52,22 +52,24 @@ impl Default for WriteOptions {
 /// # Errors
 /// [`RecordingFault::Io`]. An existing file is replaced.
 pub fn write(path: &Path, recording: &Recording) -> Result<(), RecordingError> {
-    write_with(path, recording, None, &WriteOptions::default())
+    let options = WriteOptions::default();
+    write_with(path, recording, None, &options, Overwrite::Replace)
 }
 
 /// [`write()`] with a choice of notation and columns, and, if given, the inputs of each segment (18 x samples), as columns
 /// `Input fr.hx` and so on, which reading ignores.
 ///
 /// # Errors
-/// As [`write()`].
+/// As [`write()`], and for a file that is there and may not be replaced.
 pub fn write_with(
     path: &Path,
     recording: &Recording,
     inputs: Option<&[DMatrix<f64>]>,
     options: &WriteOptions,
+    overwrite: Overwrite,
 ) -> Result<(), RecordingError> {
     let is_gzip = (path.extension()).is_some_and(|e| e.eq_ignore_ascii_case("gz"));
-    let written = write_whole(path, |mut file| {
+    let written = write_whole(path, overwrite, |mut file| {
         if !is_gzip {
             return write_to(&mut file, recording, inputs, options);
         }
@@ -81,16 +83,17 @@ pub fn write_with(
 /// Writes a segment as an MCAP file: joint states, odometry, contact, and if given the inputs (18 x samples).
 ///
 /// # Errors
-/// [`RecordingFault::Io`]. An existing file is replaced.
+/// [`RecordingFault::Io`], also for a file that is there and may not be replaced.
 pub fn write_mcap(
     path: &Path,
     segment: &Segment,
     inputs: Option<&DMatrix<f64>>,
+    overwrite: Overwrite,
 ) -> Result<(), RecordingError> {
     let mut bytes = io::Cursor::new(Vec::new());
     foreign::write_mcap(&mut bytes, segment, inputs)
         .map_err(|error| RecordingFault::Mcap(error.to_string()).of(path))?;
-    let written = write_whole(path, |file| file.write_all(bytes.get_ref()));
+    let written = write_whole(path, overwrite, |file| file.write_all(bytes.get_ref()));
     written.map_err(|source| RecordingFault::io("write", source).of(path))
 }
 
