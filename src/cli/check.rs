@@ -12,6 +12,7 @@ use crate::check::{
     CheckDomain, CheckError, CheckOptions, Comparison, EquationComparison, Gap, Side,
     TermDifference, Verdict, compare, read_sides,
 };
+use crate::files::read_toml;
 use crate::import::SymbolNames;
 use crate::typeset::significant;
 use crate::typeset::words::counted;
@@ -46,7 +47,7 @@ fn domain(arguments: &CheckArguments) -> Result<CheckDomain, CheckError> {
     let Some(path) = &arguments.domain else {
         return Ok(CheckDomain::default());
     };
-    let text = std::fs::read_to_string(path).map_err(|source| CheckError::Io {
+    let text = read_toml(path).map_err(|source| CheckError::Io {
         path: path.clone(),
         source,
     })?;

@@ -13,7 +13,7 @@ use serde_json::Value;
 
 use super::args::ReadingArguments;
 use crate::Error;
-use crate::files::{Overwrite, write_whole};
+use crate::files::{Overwrite, read_toml, write_whole};
 use crate::recording::{Clocks, ColumnMap, Reader, ReadingNotes, Recording, mismatch};
 use crate::robot::Robot;
 use crate::train::sha256;
@@ -30,9 +30,9 @@ pub fn write_file(path: &Path, contents: &[u8], overwrite: Overwrite) -> Result<
     })
 }
 
-/// Reads a text.
+/// Reads a text of settings.
 pub fn read_text(path: &Path) -> Result<String, Error> {
-    std::fs::read_to_string(path).map_err(|source| Error::Read {
+    read_toml(path).map_err(|source| Error::Read {
         path: path.to_owned(),
         source,
     })

@@ -10,6 +10,7 @@ use serde::de::DeserializeOwned;
 use super::cell::Cell;
 use super::error::StudyError;
 use super::plan::{CellId, Plan};
+use crate::files::size::{Format, read_text_capped};
 use crate::files::{Overwrite, write_whole};
 
 const PLAN: &str = "study.json";
@@ -153,7 +154,7 @@ fn difference(found: &Plan, expected: &Plan) -> Option<&'static str> {
 }
 
 fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, StudyError> {
-    let text = fs::read_to_string(path).map_err(refused(path, "read"))?;
+    let text = read_text_capped(path, Format::Model).map_err(refused(path, "read"))?;
     serde_json::from_str(&text).map_err(|error| StudyError::Broken {
         path: path.to_owned(),
         message: error.to_string(),

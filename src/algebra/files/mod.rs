@@ -1,17 +1,21 @@
 //! Files that appear whole or not at all, and the folders that hold emitted files.
 //!
-//! Imports nothing; every stage that writes goes through here: [`write_whole`] makes or replaces one file in one
+//! Imports nothing; every stage that writes goes through here: [`write_whole`] replaces one file in one
 //! step, [`write_files`] puts [`EmittedFile`]s into a folder and lists them there with digests,
 //! so that only what romc wrote is replaced. Stages that
-//! read state the place of a fault with [`Located`].
+//! read state the place of a fault with [`Located`], and stop where [`size`] says.
+
+pub mod size;
 
 mod folder;
 mod located;
 mod part;
+mod toml_text;
 mod whole;
 
 pub use folder::{
     Begun, FolderError, check_folder, earlier_files, hex, write_files, write_files_since,
 };
 pub use located::{Located, Place};
+pub use toml_text::read_toml;
 pub use whole::{EmittedFile, Overwrite, write_whole};

@@ -9,7 +9,7 @@ use serde::de::DeserializeOwned;
 use super::entry::RobotEntry;
 use super::error::{RobotFileError, RobotFileFault};
 use super::urdf;
-use crate::files::{Located, Place};
+use crate::files::{Located, Place, read_toml};
 use crate::robot::Robot;
 
 /// Largest file of a robot; a URDF with meshes beside it is far smaller.
@@ -62,6 +62,9 @@ pub fn read(path: &Path, feet: &[String]) -> Result<&'static Robot, RobotFileErr
 pub(super) fn text_of(path: &Path) -> Result<String, RobotFileError> {
     let file = path.display().to_string();
     let fault = |fault| RobotFileError::new(&file, Place::Whole, fault);
+    if !["urdf", "xml"].contains(&ending(path).as_str()) {
+        return read_toml(path).map_err(|source| fault(RobotFileFault::Read(source)));
+    }
     let mut text = String::new();
     // One byte more than allowed distinguishes a file that is too large from one that just fits.
     File::open(path)
