@@ -106,6 +106,7 @@ fn code(is_failed: bool) -> u8 {
 /// purpose fails: files that `check` finds different; torques or control for `mpc`, predictions of body x or z for
 /// `simulate` and `demo`, every use for `report`.
 fn execute(command: Command) -> Result<(Answer, u8), Error> {
+    args::refuse_idle(&command)?;
     let done = |answer: Result<Answer, Error>| answer.map(|answer| (answer, DONE));
     let (name, ran) = match command {
         Command::Check(arguments) => ("check", check::run(&arguments)),

@@ -14,7 +14,7 @@ use serde_json::Value;
 use super::args::ReadingArguments;
 use crate::Error;
 use crate::files::{Overwrite, read_toml, write_whole};
-use crate::recording::{Clocks, ColumnMap, Reader, ReadingNotes, Recording, mismatch};
+use crate::recording::{Clocks, ColumnMap, Reader, ReadingNotes, Recording, Segment, mismatch};
 use crate::robot::Robot;
 use crate::train::sha256;
 
@@ -71,6 +71,7 @@ pub fn read_recordings(
     paths: &[PathBuf],
     arguments: &ReadingArguments,
 ) -> Result<Vec<Recording>, Error> {
+    note_repeated(&[("recordings", paths.iter().map(PathBuf::as_path).collect())]);
     read_with(&reader(arguments, Clocks::Repaired)?, paths)
 }
 
@@ -131,6 +132,17 @@ pub fn note_repeated(sets: &[(&str, Vec<&Path>)]) {
                 note(&format!("{path}: the same recording as {earlier}, {what}"));
             }
         }
+    }
+}
+
+/// Prints a note where restarts come later than every recording ends, so that restarted rollouts are whole ones.
+pub fn note_late_restarts(recordings: &[Recording], restart_every_s: f64) {
+    let segments = recordings.iter().flat_map(|recording| &recording.segments);
+    let longest_s = segments.map(Segment::duration_s).fold(0.0, f64::max);
+    if restart_every_s >= longest_s {
+        note(&format!(
+            "--restart-every {restart_every_s}: no recording is longer ({longest_s:.2} s at most), so that rollouts are never restarted"
+        ));
     }
 }
 

@@ -9,7 +9,8 @@ use super::args::ReportArguments;
 use super::destination::{Format, Inputs};
 use super::mpc::{judged, run_with_both_lifts};
 use super::output::{
-    lines, names, note_mismatches, quoted, quoted_all, read_recordings, spinner, write_file,
+    lines, names, note_late_restarts, note_mismatches, quoted, quoted_all, read_recordings,
+    spinner, write_file,
 };
 use super::{Answer, code, simplification};
 use crate::evaluate::{Assessment, LAMBDA, Verdict, verdict};
@@ -36,6 +37,7 @@ pub fn run(arguments: &ReportArguments) -> Result<(Answer, u8), Error> {
     inputs.check_output(Some(&arguments.output), Format::PAGE, arguments.force)?;
     let model = artifact::read(&arguments.model)?;
     let recordings = read_recordings(&arguments.recordings, &arguments.reading)?;
+    note_late_restarts(&recordings, arguments.restart_every);
     let study = match &arguments.study {
         None => None,
         Some(folder) => Some(Summary::of(&Store::open(folder)?.cells()?, LAMBDA)),

@@ -7,7 +7,7 @@ use serde_json::json;
 
 use super::args::SimulateArguments;
 use super::destination::{Format, Inputs};
-use super::output::{lines, numbered, read_recordings, spinner, write_file};
+use super::output::{lines, note_late_restarts, numbered, read_recordings, spinner, write_file};
 use super::{Answer, code};
 use crate::evaluate::{Assessment, verdict_by_default};
 use crate::model::ReducedModel;
@@ -27,6 +27,7 @@ pub fn run(arguments: &SimulateArguments) -> Result<(Answer, u8), Error> {
         .check_output(arguments.output.as_deref(), Format::TABLE, arguments.force)?;
     let model = artifact::read(&arguments.model)?;
     let recordings = read_recordings(&arguments.recordings, &arguments.reading)?;
+    note_late_restarts(&recordings, arguments.restart_every);
     let progress = spinner("simulating");
     let assessment = Assessment::over(&model, &recordings, arguments.restart_every)?;
     progress.set_message("judging");

@@ -299,6 +299,15 @@ pub(super) fn check_pairs(settings: &TrainSettings) -> Result<(), Error> {
             "free, or a training without `--paper`",
         );
     }
+    let of_choice = ["slack", "refinements", "growth", "no-rotation"];
+    if let (Some(name), true) = (first(settings, &of_choice), settings.paper) {
+        return refused(
+            name,
+            "set for the published training, which neither chooses terms nor turns the basis"
+                .to_owned(),
+            "a training without `--paper`",
+        );
+    }
     if settings.smooth_rows.is_some() && settings.smooth.is_none() {
         return refused(
             "smooth-rows",

@@ -79,7 +79,12 @@ pub(super) fn tiles(content: &Content<'_>) -> Vec<(String, String)> {
         }
         None => "-".to_owned(),
     };
-    let size = format!("{}, {}", model.latent_dim(), assessment.active_terms);
+    let loss = shown(assessment.combined_loss());
+    let size = format!(
+        "{}, {}, {loss}",
+        model.latent_dim(),
+        assessment.active_terms
+    );
     let lift = shown(assessment.lift.torque.r2().contact);
     let tiles = [
         (
@@ -96,7 +101,7 @@ pub(super) fn tiles(content: &Content<'_>) -> Vec<(String, String)> {
             pair(AFTER_A_PUSH, 1e3, 3),
         ),
         (
-            "size alone: latent coordinates, active terms of all phases",
+            "size alone: latent coordinates, active terms, combined loss of accuracy and size L_mod",
             size,
         ),
         (
