@@ -211,7 +211,7 @@ fn physical_units_give_the_accelerations_of_scaled_ones_for_all_shipped_models()
 fn physical_units_need_maps_and_names_of_units() {
     let model = load(WITH_SINES);
     let physical = Equations::of(&model).in_physical_units();
-    let error = physical.expect_err("a latent model has no units");
+    let error = physical.err().expect("a latent model has no units");
     assert!(matches!(error, PhysicalError::LatentOnly { .. }), "{error}");
 
     let model = load(WITH_MAPS);

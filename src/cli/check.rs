@@ -26,6 +26,13 @@ pub fn run(arguments: &CheckArguments) -> Result<(Answer, u8), Error> {
     };
     let [left, right] = read_sides([&arguments.left, &arguments.right], &options)?;
     let comparison = compare(&left, &right, &options);
+    let phases: Vec<&str> = (comparison.phases.iter().map(|phase| phase.name.as_str())).collect();
+    let latent_dim = left.latent_dim.max(right.latent_dim);
+    let foreign = options.domain.foreign(&phases, latent_dim);
+    if let (Some(path), Some(message)) = (&arguments.domain, foreign) {
+        let path = path.clone();
+        return Err(CheckError::Domain { path, message }.into());
+    }
     let is_equal = comparison.says_the_same();
     let answer = Answer {
         text: text(&left, &right, &comparison),

@@ -9,8 +9,8 @@ use super::args::ReportArguments;
 use super::destination::{Format, Inputs};
 use super::mpc::{judged, run_with_both_lifts};
 use super::output::{
-    lines, names, note_late_restarts, note_mismatches, quoted, quoted_all, read_recordings,
-    spinner, write_file,
+    lines, names, note, note_late_restarts, note_mismatches, quoted, quoted_all, read_recordings,
+    refused, spinner, write_file,
 };
 use super::{Answer, code, simplification};
 use crate::evaluate::{Assessment, LAMBDA, Verdict, verdict};
@@ -40,13 +40,26 @@ pub fn run(arguments: &ReportArguments) -> Result<(Answer, u8), Error> {
     note_late_restarts(&recordings, arguments.restart_every);
     let study = match &arguments.study {
         None => None,
-        Some(folder) => Some(Summary::of(&Store::open(folder)?.cells()?, LAMBDA)),
+        Some(folder) => {
+            let summary = Summary::of(&Store::open(folder)?.cells()?, LAMBDA);
+            if summary.dimensions.is_empty() {
+                let folder = folder.display();
+                note(&format!(
+                    "{folder}: no training of the study has a model, so that its figures are left out"
+                ));
+            }
+            Some(summary)
+        }
     };
     let plan = match &arguments.plan {
         None => None,
         Some(path) => {
             let mut read = read_recordings(std::slice::from_ref(path), &arguments.reading)?;
             note_mismatches(&read[0], model.robot()?);
+            if let found @ 2.. = read[0].segments.len() {
+                let message = format!("--plan takes one jump: found {found} segments");
+                return Err(refused(path, message));
+            }
             Some(read.swap_remove(0))
         }
     };

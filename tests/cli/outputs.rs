@@ -258,6 +258,14 @@ fn what_a_command_does_not_do_is_refused_or_noted() {
             &["compile", MODEL, "--emit", "c,c", "--out-dir", &out],
             "`c` is named twice",
         ),
+        (
+            &[&train[..], &["--lift-weight", "1", "--force"]].concat(),
+            "--lift-weight: without effect",
+        ),
+        (
+            &[&train[..], &["--seed", "2", "--force"]].concat(),
+            "same model from every start",
+        ),
     ] {
         let notes = super::text(&super::romc(arguments).stderr);
         assert!(notes.contains(reason), "{arguments:?}: {notes}");
