@@ -22,7 +22,7 @@ const JUMPS: [&str; 3] = [
 
 /// Counts, times, what maps and lift alone make of recorded inputs, and what others do: named for what they are, and
 /// not figures of the dynamics.
-const OTHERS: [&str; 11] = [
+const OTHERS: [&str; 12] = [
     "steps",
     "solved",
     "softened",
@@ -32,6 +32,7 @@ const OTHERS: [&str; 11] = [
     "implausible_steps",
     "step_us",
     "prepare_us",
+    "unplanned_share",
     "lift",
     "baseline",
 ];

@@ -1030,7 +1030,8 @@ fn mpc_limits_how_fast_torques_change_with_either_solver() {
     let folder = folder();
     let largest_change = |more: &[&str]| {
         let table = path(&folder, "commands.csv");
-        done(&[&["mpc", MODEL, JUMP, "--output", &table, "--force"], more].concat());
+        // A controller whose torques may hardly change does not bring a pushed body back.
+        judged(&[&["mpc", MODEL, JUMP, "--output", &table, "--force"], more].concat());
         let rows = fs::read_to_string(&table).expect("a table");
         let header: Vec<&str> = rows.lines().next().expect("a header").split(',').collect();
         let names = &romc::robot::Robot::input_names()[..12];

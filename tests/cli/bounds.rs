@@ -52,21 +52,21 @@ fn files_without_end_and_files_of_nothing_but_tables_are_refused_in_little_memor
     let [endless, tables, dotted, values] = files.each_ref().map(String::as_str);
     let new = at("new.json");
     let cases: [(&[&str], &str); 12] = [
-        (&["inspect", &endless_model], "at most"),
-        (&["check", &endless_model, MODEL], "at most"),
-        (&["check", &endless_text, MODEL], "at most"),
-        (&["check", MODEL, MODEL, "--domain", endless], "at most"),
+        (&["inspect", &endless_model], "more than"),
+        (&["check", &endless_model, MODEL], "more than"),
+        (&["check", &endless_text, MODEL], "more than"),
+        (&["check", MODEL, MODEL, "--domain", endless], "more than"),
         (
             &["check", MODEL, MODEL, "--domain", dotted],
             "signs of tables",
         ),
-        (&["inspect", JUMP, "--columns", endless], "at most"),
+        (&["inspect", JUMP, "--columns", endless], "more than"),
         (&["inspect", JUMP, "--columns", tables], "signs of tables"),
         (&["robot", dotted], "signs of tables"),
-        (&["robot", endless], "at most"),
+        (&["robot", endless], "more than"),
         (
             &["train", JUMP, "--output", &new, "--config", endless],
-            "at most",
+            "more than",
         ),
         (
             &["train", JUMP, "--output", &new, "--config", dotted],
