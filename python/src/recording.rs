@@ -12,7 +12,7 @@ use romc::files::{Overwrite, Place};
 use romc::recording::write::{Notation, write_to};
 use romc::recording::{
     Clocks, ColumnMap, Reader, ReadingNotes, RecordingError, RecordingFault, WriteOptions,
-    read_from_bytes, write_with,
+    read_from_bytes, write_as,
 };
 use romc::robot::{ContactFlags, FOOT_DIM, InputRule, JOINT_DIM, STATE_DIM};
 use romc::robot_file::find;
@@ -65,7 +65,7 @@ impl Recording {
     fn save(&self, py: Python<'_>, path: PathBuf, force: bool) -> PyResult<()> {
         let written = py.detach(|| {
             let (options, overwrite) = (WriteOptions::default(), Overwrite::when_forced(force));
-            let written = write_with(&path, &self.data, None, &options, overwrite);
+            let written = write_as(&path, &self.data, None, &options, overwrite);
             written.map_err(|error| match &error.kind {
                 RecordingFault::Io { source, .. } if source.kind() == ErrorKind::AlreadyExists => {
                     Error::Exists(path)

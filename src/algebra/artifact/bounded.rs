@@ -32,23 +32,15 @@ pub(super) fn object<'de, D: Deserializer<'de>>(source: D) -> Result<Map<String,
 /// A value within the number of values that are left.
 struct Bounded<'a>(&'a Cell<usize>);
 
-impl<'a> Bounded<'a> {
-    /// One value more, and what is left for those in it.
-    fn inside<E: Error>(&self) -> Result<Bounded<'a>, E> {
-        let left = self.0.get().checked_sub(1).ok_or_else(|| {
-            E::custom(format!(
-                "found more than {MOST} values, expected at most so many"
-            ))
-        })?;
-        self.0.set(left);
-        Ok(Bounded(self.0))
-    }
-}
-
 impl<'de> DeserializeSeed<'de> for Bounded<'_> {
     type Value = Value;
 
     fn deserialize<D: Deserializer<'de>>(self, source: D) -> Result<Value, D::Error> {
+        let left = self.0.get().checked_sub(1).ok_or_else(|| {
+            let text = format!("found more than {MOST} values, expected at most so many");
+            D::Error::custom(text)
+        })?;
+        self.0.set(left);
         source.deserialize_any(self)
     }
 }
@@ -86,7 +78,7 @@ impl<'de> Visitor<'de> for Bounded<'_> {
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut values: A) -> Result<Value, A::Error> {
         let mut array = Vec::new();
-        while let Some(value) = values.next_element_seed(self.inside()?)? {
+        while let Some(value) = values.next_element_seed(Bounded(self.0))? {
             array.push(value);
         }
         Ok(array.into())
@@ -95,7 +87,7 @@ impl<'de> Visitor<'de> for Bounded<'_> {
     fn visit_map<A: MapAccess<'de>>(self, mut entries: A) -> Result<Value, A::Error> {
         let mut object = Map::new();
         while let Some(key) = entries.next_key::<String>()? {
-            let value = entries.next_value_seed(self.inside()?)?;
+            let value = entries.next_value_seed(Bounded(self.0))?;
             object.insert(key, value);
         }
         Ok(object.into())
@@ -114,7 +106,7 @@ mod tests {
         assert_eq!(read(text).expect("few values"), Some(expected));
         let list = |count: usize| format!("[{}0]", "0,".repeat(count - 1));
         assert!(read(&list(MOST - 1)).is_ok());
-        let error = read(&list(MOST + 1)).expect_err("too many");
+        let error = read(&list(MOST)).expect_err("too many");
         assert!(
             error.to_string().contains("more than 100000 values"),
             "{error}"

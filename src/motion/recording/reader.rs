@@ -177,7 +177,6 @@ impl ReadingNotes {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::files::Overwrite;
     use crate::recording::segment::tests::sample_segment;
     use crate::recording::segments::DERIVED_DDX;
     use crate::recording::{WriteOptions, write_with};
@@ -217,7 +216,7 @@ mod tests {
                 accelerations,
                 ..WriteOptions::default()
             };
-            write_with(&path, &recording, None, &options, Overwrite::Refuse).unwrap();
+            write_with(&path, &recording, None, &options).unwrap();
             let notes = Reader::default().read(&path).unwrap().notes;
             let expected = [DERIVED_DDX];
             assert_eq!(notes, expected[usize::from(accelerations)..]);

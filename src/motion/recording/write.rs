@@ -52,16 +52,28 @@ impl Default for WriteOptions {
 /// # Errors
 /// [`RecordingFault::Io`]. An existing file is replaced.
 pub fn write(path: &Path, recording: &Recording) -> Result<(), RecordingError> {
-    let options = WriteOptions::default();
-    write_with(path, recording, None, &options, Overwrite::Replace)
+    write_with(path, recording, None, &WriteOptions::default())
 }
 
 /// [`write()`] with a choice of notation and columns, and, if given, the inputs of each segment (18 x samples), as columns
 /// `Input fr.hx` and so on, which reading ignores.
 ///
 /// # Errors
-/// As [`write()`], and for a file that is there and may not be replaced.
+/// As [`write()`].
 pub fn write_with(
+    path: &Path,
+    recording: &Recording,
+    inputs: Option<&[DMatrix<f64>]>,
+    options: &WriteOptions,
+) -> Result<(), RecordingError> {
+    write_as(path, recording, inputs, options, Overwrite::Replace)
+}
+
+/// [`write_with`], which may not replace a file.
+///
+/// # Errors
+/// As [`write()`], and for a file that is there and may not be replaced.
+pub fn write_as(
     path: &Path,
     recording: &Recording,
     inputs: Option<&[DMatrix<f64>]>,
@@ -83,8 +95,20 @@ pub fn write_with(
 /// Writes a segment as an MCAP file: joint states, odometry, contact, and if given the inputs (18 x samples).
 ///
 /// # Errors
-/// [`RecordingFault::Io`], also for a file that is there and may not be replaced.
+/// [`RecordingFault::Io`]. An existing file is replaced.
 pub fn write_mcap(
+    path: &Path,
+    segment: &Segment,
+    inputs: Option<&DMatrix<f64>>,
+) -> Result<(), RecordingError> {
+    write_mcap_as(path, segment, inputs, Overwrite::Replace)
+}
+
+/// [`write_mcap`], which may not replace a file.
+///
+/// # Errors
+/// As it, and for a file that is there and may not be replaced.
+pub fn write_mcap_as(
     path: &Path,
     segment: &Segment,
     inputs: Option<&DMatrix<f64>>,
