@@ -5,6 +5,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use crate::equations::PhysicalError;
 use crate::files::Place;
 use crate::robot::RobotError;
 use crate::robot_file::{RobotFileError, RobotFileFault};
@@ -80,6 +81,12 @@ pub enum Error {
     /// An output that would replace an input.
     #[error("{path}: the command reads this file{other}, and does not replace it; choose another name for the output", path = path.display(), other = other_name(path, input))]
     IsRead { path: PathBuf, input: PathBuf },
+    /// A flag that the command would ignore.
+    #[error("{flag} has no effect here; it needs {needs}")]
+    Idle {
+        flag: &'static str,
+        needs: &'static str,
+    },
     /// A map is guessed of one log at a time.
     #[error("found {0} files, expected one log to guess a map of")]
     OneLog(usize),
@@ -113,6 +120,7 @@ impl Error {
                     || matches!(error.place, Place::Option(_))
             }
             Self::Import(error) => matches!(error.place, Place::Option(_)),
+            Self::Physical(error) => matches!(error, PhysicalError::LatentOnly { .. }),
             Self::Train(error) => matches!(error, TrainError::Option { .. }),
             Self::Simplify(error) => {
                 matches!(error, SimplifyError::NoSamples | SimplifyError::Margin)
@@ -124,6 +132,7 @@ impl Error {
             | Self::OneLog(_)
             | Self::Ending { .. }
             | Self::IsRead { .. }
+            | Self::Idle { .. }
             | Self::OneSegment(_) => true,
             Self::Recording(_)
             | Self::Identify(_)
@@ -137,7 +146,6 @@ impl Error {
             | Self::Sim(_)
             | Self::Study(_)
             | Self::Evaluate(_)
-            | Self::Physical(_)
             | Self::Mpc(_)
             | Self::Plan(_)
             | Self::Distrusted(_)

@@ -10,7 +10,7 @@ use std::process::Command;
 use romc::artifact;
 use romc::codegen::{Precision, SineCosine, Units};
 use romc::deploy::{EmitOptions, Target, emit};
-use romc::equations::Equations;
+use romc::equations::{Equations, PhysicalError};
 use romc::files::EmittedFile;
 use romc::lower::Form;
 use romc::model::{FeetRule, Library, Phase, ReducedModel};
@@ -380,13 +380,11 @@ fn physical_units_give_the_accelerations_of_scaled_ones_for_all_shipped_models()
 }
 
 #[test]
-fn physical_units_need_names_of_units_and_leave_latent_models_as_they_are() {
+fn physical_units_need_maps_and_names_of_units() {
     let model = load(WITH_SINES);
-    let physical = Equations::of(&model)
-        .in_physical_units()
-        .expect("nothing to convert");
-    assert!(physical.latent_units().is_none());
-    assert_eq!(physical.phases(), Equations::of(&model).phases());
+    let physical = Equations::of(&model).in_physical_units();
+    let error = physical.err().expect("a latent model has no units");
+    assert!(matches!(error, PhysicalError::LatentOnly { .. }), "{error}");
 
     let model = load(WITH_MAPS);
     let mut state = model.state().expect("named").clone();

@@ -480,7 +480,7 @@ fn rollouts_do_not_depend_on_the_scale_of_the_coordinates() {
         let told: Value =
             serde_json::from_str(&done(&["simulate", &path, JUMP, "--json"])).expect("JSON");
         let mut numbers = Vec::new();
-        collect(&told, &mut numbers);
+        collect(&told["rollouts"], &mut numbers);
         numbers
     };
     let plain = figures(1.0);

@@ -21,7 +21,9 @@ fn romc(arguments: &[&str]) -> Value {
         .output()
         .expect("romc starts");
     let error = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{arguments:?}: {error}");
+    // 1 is a verdict on the model.
+    let is_done = matches!(output.status.code(), Some(0 | 1));
+    assert!(is_done, "{arguments:?}: {error}");
     serde_json::from_slice(&output.stdout).expect("one JSON object")
 }
 

@@ -77,7 +77,7 @@ def table(report):
         lines.append("")
     for model, gains in report["uninformed_gains"].items():
         phases = ", ".join(f"{gain:.2f} in {phase}" for phase, gain in gains.items())
-        lines.append(f"knows nothing: {model} with ddz = g u_lat, g = {phases} (scaled units)")
+        lines.append(f"no dynamics: {model} with ddz = g u_lat, g = {phases} (scaled units)")
     return "\n".join(lines)
 
 

@@ -66,7 +66,7 @@ METHODS = {
     "goal regression, PD": Method("regression", False),
     "goal regression, controller": Method("regression", True),
     "nearest jump, controller": Method("nearest", True),
-    "plan by the model that knows nothing, controller": Method("uninformed", True),
+    "plan by the no-dynamics model, controller": Method("uninformed", True),
 }
 ABLATIONS = (
     "no refit: the phases' own Xi",

@@ -1,4 +1,4 @@
-"""A copy of a model that knows nothing of the robot's dynamics: `ddz = g u_lat` in every phase.
+"""A copy of a model without the robot's dynamics: `ddz = g u_lat` in every phase.
 
 Encoder, decoder, phases and input statistics stay. The one number g of a phase is the least-squares
 fit to training jumps, in the scaled units of the model file, so that a controller on the copy has

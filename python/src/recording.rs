@@ -1,5 +1,6 @@
 //! Recordings and their segments.
 
+use std::io::ErrorKind;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -7,10 +8,11 @@ use nalgebra::DMatrix;
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use romc::Error;
-use romc::files::Place;
+use romc::files::{Overwrite, Place};
 use romc::recording::write::{Notation, write_to};
 use romc::recording::{
-    Clocks, ColumnMap, Reader, ReadingNotes, RecordingError, WriteOptions, read_from_bytes,
+    Clocks, ColumnMap, Reader, ReadingNotes, RecordingError, RecordingFault, WriteOptions,
+    read_from_bytes, write_as,
 };
 use romc::robot::{ContactFlags, FOOT_DIM, InputRule, JOINT_DIM, STATE_DIM};
 use romc::robot_file::find;
@@ -62,10 +64,14 @@ impl Recording {
     /// Writes the format of recordings; an existing file only if forced.
     fn save(&self, py: Python<'_>, path: PathBuf, force: bool) -> PyResult<()> {
         let written = py.detach(|| {
-            if path.exists() && !force {
-                return Err(Error::Exists(path));
-            }
-            Ok(romc::recording::write(&path, &self.data)?)
+            let (options, overwrite) = (WriteOptions::default(), Overwrite::when_forced(force));
+            let written = write_as(&path, &self.data, None, &options, overwrite);
+            written.map_err(|error| match &error.kind {
+                RecordingFault::Io { source, .. } if source.kind() == ErrorKind::AlreadyExists => {
+                    Error::Exists(path)
+                }
+                _ => error.into(),
+            })
         });
         written.map_err(|error| python_error(py, error))
     }

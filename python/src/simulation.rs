@@ -5,11 +5,12 @@ use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use romc::Error;
-use romc::evaluate::{Assessment, SegmentRun};
+use romc::evaluate::{Assessment, SegmentRun, verdict_by_default};
 use romc::limits::table;
 use romc::model::{ModelError, ReducedModel};
 use romc::report::assessment_json;
 use romc::sim::Rollout;
+use serde_json::json;
 
 use crate::arrays::into_rows;
 use crate::errors::{python_error, within};
@@ -79,7 +80,7 @@ fn predictions(
     Ok([z, dz, x])
 }
 
-/// Rolls the model out; returns the metrics as JSON and a dictionary of arrays per segment.
+/// Rolls the model out; returns metrics and verdict as JSON and a dictionary of arrays per segment.
 #[pyfunction]
 pub fn simulate<'py>(
     py: Python<'py>,
@@ -91,7 +92,12 @@ pub fn simulate<'py>(
     let recordings = gather(&recordings);
     let made = py.detach(|| -> Result<_, Error> {
         let assessment = Assessment::over(&model.data, &recordings, restart_every)?;
-        let metrics = assessment_json(&model.data, &assessment).to_string();
+        let (verdict, _) = verdict_by_default(&model.data, &recordings, &assessment);
+        let metrics = json!({
+            "metrics": assessment_json(&model.data, &assessment),
+            "verdict": verdict,
+        })
+        .to_string();
         let runs = assessment.runs.into_iter();
         let runs = runs.map(|run| Run::of(&model.data, run));
         Ok((metrics, runs.collect::<Result<Vec<_>, _>>()?))

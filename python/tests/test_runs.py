@@ -33,6 +33,8 @@ def test_rollouts_are_those_of_the_command_line(name, restart_every, command_lin
     answer = command_line.json("simulate", path, *PATHS, *arguments)
     simulation = romc.Model.load(path).simulate(PATHS, restart_every=restart_every)
     assert simulation.metrics == answer["rollouts"]
+    assert simulation.verdict == answer["verdict"]
+    assert simulation.verdict["failed"] == []
     columns = table(tmp_path / "run.csv")
     assert len(simulation.runs) == max(columns["segment"]) + 1
     for kind, symbol, names in [

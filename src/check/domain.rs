@@ -40,6 +40,22 @@ impl CheckDomain {
         Ok(Self { phases })
     }
 
+    /// The first phase or variable that is none of these: its ranges would be without effect.
+    pub fn foreign(&self, phases: &[&str], latent_dim: usize) -> Option<String> {
+        let foreign = self.phases.iter().find_map(|(phase, ranges)| {
+            if !phases.contains(&phase.as_str()) {
+                return Some(format!("[{phase}]"));
+            }
+            let is_foreign = |name: &&String| LatentVariable::from_name(name, latent_dim).is_none();
+            let name = ranges.keys().find(is_foreign)?;
+            Some(format!("[{phase}] `{name}`"))
+        });
+        foreign.map(|found| {
+            let phases = phases.join(", ");
+            format!("{found}: expected phases {phases}, and variables of {latent_dim} latent coordinates")
+        })
+    }
+
     /// The range of a variable; `None` where the domain says nothing.
     pub fn range(&self, phase: &str, variable: &str) -> Option<[f64; 2]> {
         self.phases.get(phase)?.get(variable).copied()

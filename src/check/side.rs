@@ -1,12 +1,12 @@
 //! One of two files that are compared, with its numbers as they are written.
 
-use std::fs;
 use std::path::Path;
 
 use super::CheckOptions;
 use super::error::CheckError;
 use crate::artifact;
 use crate::equations::Equations;
+use crate::files::size;
 use crate::import::{Format, read_equations};
 use crate::model::{LatentVariable, ReducedModel};
 use crate::symbolic::{
@@ -58,7 +58,11 @@ pub(super) enum RightSide {
 pub fn read_sides(paths: [&Path; 2], options: &CheckOptions) -> Result<[Side; 2], CheckError> {
     let is_latex = |path: &Path| matches!(Format::of_path(path), Ok(Format::Latex));
     let read = |path: &Path, known: &[String]| {
-        let bytes = fs::read(path).map_err(|source| CheckError::Io {
+        let format = match path.extension().is_some_and(|ending| ending == "json") {
+            true => size::Format::Model,
+            false => size::Format::Equations,
+        };
+        let bytes = size::read_capped(path, format).map_err(|source| CheckError::Io {
             path: path.to_owned(),
             source,
         })?;

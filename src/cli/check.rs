@@ -12,6 +12,7 @@ use crate::check::{
     CheckDomain, CheckError, CheckOptions, Comparison, EquationComparison, Gap, Side,
     TermDifference, Verdict, compare, read_sides,
 };
+use crate::files::read_toml;
 use crate::import::SymbolNames;
 use crate::typeset::significant;
 use crate::typeset::words::counted;
@@ -25,6 +26,13 @@ pub fn run(arguments: &CheckArguments) -> Result<(Answer, u8), Error> {
     };
     let [left, right] = read_sides([&arguments.left, &arguments.right], &options)?;
     let comparison = compare(&left, &right, &options);
+    let phases: Vec<&str> = (comparison.phases.iter().map(|phase| phase.name.as_str())).collect();
+    let latent_dim = left.latent_dim.max(right.latent_dim);
+    let foreign = options.domain.foreign(&phases, latent_dim);
+    if let (Some(path), Some(message)) = (&arguments.domain, foreign) {
+        let path = path.clone();
+        return Err(CheckError::Domain { path, message }.into());
+    }
     let is_equal = comparison.says_the_same();
     let answer = Answer {
         text: text(&left, &right, &comparison),
@@ -46,7 +54,7 @@ fn domain(arguments: &CheckArguments) -> Result<CheckDomain, CheckError> {
     let Some(path) = &arguments.domain else {
         return Ok(CheckDomain::default());
     };
-    let text = std::fs::read_to_string(path).map_err(|source| CheckError::Io {
+    let text = read_toml(path).map_err(|source| CheckError::Io {
         path: path.clone(),
         source,
     })?;

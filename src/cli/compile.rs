@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use super::Answer;
 use super::args::{CompileArguments, UnitsChoice};
 use super::destination::{Format, Inputs};
-use super::output::{lines, names, note_mismatches, quoted, read_recordings, refused};
+use super::output::{lines, names, note, note_mismatches, quoted, read_recordings, refused};
 use super::simplification::{self, Outcome, exact_words};
 use crate::deploy::{self, EmitOptions, PlannedJump, Target};
 use crate::equations::Equations;
@@ -25,7 +25,8 @@ pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
         .and([model])
         .and(&arguments.plan)
         .and(&simplification.domain)
-        .and(&simplification.reading.columns);
+        .and(&simplification.reading.columns)
+        .into_folder(Some(&arguments.out_dir))?;
     // What would be the same file again may stay; it is compared once there is a model.
     match save_model {
         Some(path) if path.parent() == Some(&arguments.out_dir) => {
@@ -34,6 +35,11 @@ pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
         Some(_) | None => inputs.check_output(save_model, Format::MODEL, Overwrite::Replace)?,
     }
     let read = artifact::read(&arguments.model)?;
+    note_twice(&arguments.emit);
+    if arguments.code.units == UnitsChoice::Scaled && read.encoder_map().is_err() {
+        let (flag, needs) = ("--units scaled", "a model with an encoder and a decoder");
+        return Err(Error::Idle { flag, needs });
+    }
     let form = match arguments.equations.as_learned {
         true => Equations::as_learned,
         false => Equations::of,
@@ -82,6 +88,17 @@ pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
             "earlier_files": names(&earlier),
         }),
     })
+}
+
+/// Prints a note on targets that are named twice.
+fn note_twice(targets: &[Target]) {
+    let mut named = targets.iter().enumerate();
+    if let Some((_, twice)) = named.find(|(place, target)| targets[..*place].contains(target)) {
+        note(&format!(
+            "--emit: `{}` is named twice and emitted once",
+            twice.name()
+        ));
+    }
 }
 
 /// The model and the written files as text.

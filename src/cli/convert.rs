@@ -1,5 +1,6 @@
 //! `romc convert`: recordings and logs of other programs into one format.
 
+use std::io::ErrorKind;
 use std::path::Path;
 
 use nalgebra::DMatrix;
@@ -9,7 +10,10 @@ use super::Answer;
 use super::args::ConvertArguments;
 use super::destination::{Format, Inputs};
 use super::output::{names, read_with, reader};
-use crate::recording::{Clocks, Recording, Segment, WriteOptions, write_mcap, write_with};
+use crate::files::Overwrite;
+use crate::recording::{
+    Clocks, Recording, RecordingFault, Segment, WriteOptions, write_as, write_mcap_as,
+};
 use crate::{Error, artifact};
 
 /// Reads, chains and writes.
@@ -33,7 +37,8 @@ pub fn run(arguments: &ConvertArguments) -> Result<Answer, Error> {
     let inputs = inputs.transpose()?;
     let count = segments.len();
     let samples: usize = segments.iter().map(Segment::len).sum();
-    write_recording(&arguments.output, segments, inputs.as_deref())?;
+    let inputs = inputs.as_deref();
+    write_recording(&arguments.output, segments, inputs, arguments.force)?;
     let output = arguments.output.display().to_string();
     Ok(Answer {
         text: format!("{output}: {samples} samples in {count} segments\n"),
@@ -65,27 +70,36 @@ fn chained(recordings: Vec<Recording>) -> Vec<Segment> {
 /// Writes a recording in the format that the ending of its name says.
 ///
 /// # Errors
-/// [`Error::OneSegment`] for an MCAP file of several, [`Error::Recording`] if the file system refuses.
+/// [`Error::OneSegment`] for an MCAP file of several, [`Error::Exists`], [`Error::Recording`] if the file system refuses.
 pub fn write_recording(
     path: &Path,
     segments: Vec<Segment>,
     inputs: Option<&[DMatrix<f64>]>,
+    overwrite: Overwrite,
 ) -> Result<(), Error> {
-    if (path.extension()).is_some_and(|ending| ending.eq_ignore_ascii_case("mcap")) {
+    let written = if (path.extension()).is_some_and(|ending| ending.eq_ignore_ascii_case("mcap")) {
         let [segment] = &segments[..] else {
             return Err(Error::OneSegment(segments.len()));
         };
-        return Ok(write_mcap(path, segment, inputs.map(|inputs| &inputs[0]))?);
-    }
-    let recording = Recording {
-        path: path.to_owned(),
-        segments,
-        ignored_columns: Vec::new(),
+        write_mcap_as(path, segment, inputs.map(|inputs| &inputs[0]), overwrite)
+    } else {
+        let recording = Recording {
+            path: path.to_owned(),
+            segments,
+            ignored_columns: Vec::new(),
+        };
+        write_as(
+            path,
+            &recording,
+            inputs,
+            &WriteOptions::default(),
+            overwrite,
+        )
     };
-    Ok(write_with(
-        path,
-        &recording,
-        inputs,
-        &WriteOptions::default(),
-    )?)
+    written.map_err(|error| match &error.kind {
+        RecordingFault::Io { source, .. } if source.kind() == ErrorKind::AlreadyExists => {
+            Error::Exists(path.to_owned())
+        }
+        _ => error.into(),
+    })
 }

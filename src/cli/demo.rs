@@ -9,17 +9,19 @@ use std::process::Command;
 use serde_json::json;
 
 use super::args::DemoArguments;
+use super::destination::Inputs;
 use super::output::{lines, names, spinner};
 use super::simplification::RESTART_S;
-use super::{Answer, DONE, FAILED};
+use super::{Answer, code};
 use super::{mpc as mpc_command, report};
 use crate::deploy::{self, EmitOptions, Target};
 use crate::equations::Equations;
-use crate::evaluate::Assessment;
-use crate::files::{EmittedFile, write_files};
+use crate::evaluate::{Assessment, verdict};
+use crate::files::EmittedFile;
 use crate::model::ReducedModel;
 use crate::report::{
     Content, assessment_json, baseline_table, control_table, failed_runs, failures, run_table,
+    verdict_lines,
 };
 use crate::simplify::Tolerance;
 use crate::train::sha256;
@@ -47,8 +49,10 @@ const JUMPS: [(&str, &[u8]); 3] = [
 /// The tolerance within which the report lists changes.
 const REPORT_TOLERANCE: Tolerance = Tolerance::ShareOfRms(0.01);
 
-/// Runs the whole path and reports its files and metrics. The exit code is 1 if the self-test or a run fails.
+/// Runs the whole path and reports its files and metrics. The exit code is 1 if predictions of body x or z, the
+/// self-test or a run fail.
 pub fn run(arguments: &DemoArguments) -> Result<(Answer, u8), Error> {
+    let inputs = Inputs::default().into_folder(Some(&arguments.out_dir))?;
     let progress = spinner("reading the shipped model and recordings");
     let model = artifact::read_from_bytes(MODEL.0, MODEL.1)?;
     let jumps = (JUMPS.iter())
@@ -68,9 +72,11 @@ pub fn run(arguments: &DemoArguments) -> Result<(Answer, u8), Error> {
     files.push(EmittedFile::new("commands.csv", commands));
     progress.set_message("drawing the report");
     let digests = JUMPS.map(|(name, bytes)| (PathBuf::from(name), sha256(bytes)));
+    let verdict = verdict(&model, &evaluation, &mpc_command::judged(&control[0]));
     let content = Content {
         model: &model,
         assessment: &evaluation,
+        verdict: &verdict,
         plain: &control[0],
         consistent: &control[1],
         study: None,
@@ -79,7 +85,7 @@ pub fn run(arguments: &DemoArguments) -> Result<(Answer, u8), Error> {
     };
     let report = report::page_of(&content, REPORT_TOLERANCE, vec!["romc demo".to_owned()])?;
     files.push(EmittedFile::new("report.html", report.page));
-    let made = write_files(&arguments.out_dir, &files, arguments.force)?;
+    let made = inputs.write_folder(&arguments.out_dir, &files, arguments.force)?;
     progress.set_message("checking the C code");
     let self_test = self_test(&model, &arguments.out_dir);
     progress.finish_and_clear();
@@ -94,7 +100,8 @@ pub fn run(arguments: &DemoArguments) -> Result<(Answer, u8), Error> {
     );
     let failed: Vec<String> = control.iter().flat_map(|runs| failed_runs(runs)).collect();
     text += &lines("FAILED along ", failures(&control[0]).iter().chain(&failed));
-    let is_sound = failed.is_empty() && self_test.is_ok();
+    text += &verdict_lines(&verdict);
+    let is_failed = !failed.is_empty() || self_test.is_err() || verdict.fails_predictions();
     let self_test = match self_test {
         Ok(words) => words.to_owned(),
         Err(reason) => format!("FAILED: {reason}"),
@@ -113,11 +120,12 @@ pub fn run(arguments: &DemoArguments) -> Result<(Answer, u8), Error> {
         "rollouts": assessment_json(&model, &evaluation),
         "mpc": { "transpose": plain, "consistent": consistent },
         "self_test": self_test,
+        "verdict": verdict,
         "failed": failed,
         "files": names(&made),
     });
     let answer = Answer { text, json };
-    Ok((answer, if is_sound { DONE } else { FAILED }))
+    Ok((answer, code(is_failed)))
 }
 
 /// Compiles the emitted C with the machine's compiler and runs its self-test: what became of it, or why it failed.

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::Answer;
 use super::output::names;
 use crate::Error;
-use crate::files::{EmittedFile, Overwrite, write_files};
+use crate::files::{Begun, EmittedFile, Overwrite, write_files_since};
 use crate::report::{Figure, figure_files};
 use crate::robot::Robot;
 
@@ -47,9 +47,10 @@ impl Format {
     }
 }
 
-/// The files that a command reads, none of which it may replace, forced or not.
-#[derive(Debug, Clone, Default)]
-pub struct Inputs<'a>(Vec<&'a Path>);
+/// The files that a command reads, none of which it may replace, forced or not; and the folder that it writes into, as it
+/// is when the command begins.
+#[derive(Debug, Default)]
+pub struct Inputs<'a>(Vec<&'a Path>, Option<Begun>);
 
 impl<'a> Inputs<'a> {
     /// These and more.
@@ -59,6 +60,12 @@ impl<'a> Inputs<'a> {
     ) -> Self {
         self.0.extend(more.into_iter().map(AsRef::as_ref));
         self
+    }
+
+    /// The same for a command that writes into this folder.
+    pub fn into_folder(mut self, folder: Option<&Path>) -> Result<Self, Error> {
+        self.1 = folder.map(Begun::of).transpose()?;
+        Ok(self)
     }
 
     /// These and the file of a robot, unless the name is that of one of romc's own.
@@ -128,7 +135,9 @@ impl<'a> Inputs<'a> {
         for file in files {
             self.check(&folder.join(&file.path))?;
         }
-        Ok(write_files(folder, files, overwrite)?)
+        let now = Begun::of(folder)?;
+        let begun = self.1.as_ref().unwrap_or(&now);
+        Ok(write_files_since(begun, folder, files, overwrite)?)
     }
 
     /// Writes figures into a folder, and says so in the answer.

@@ -99,9 +99,16 @@ const DONE: u8 = 0;
 const FAILED: u8 = 1;
 const WRONG_USAGE: u8 = 2;
 
-/// Runs a command; the exit code of one that ran is 0, 1 for files that `check` finds different and for an `mpc` or
-/// `demo` whose controller or self-test fails, or 130 for a training that Ctrl-C cut short.
+/// The exit code of a command that ran to its end.
+fn code(is_failed: bool) -> u8 {
+    if is_failed { FAILED } else { DONE }
+}
+
+/// Runs a command; the exit code of one that ran is 0, 130 for a training that Ctrl-C cut short, or 1 where its own
+/// purpose fails: files that `check` finds different; torques or control for `mpc`, predictions of body x or z for
+/// `simulate` and `demo`, every use for `report`.
 fn execute(command: Command) -> Result<(Answer, u8), Error> {
+    args::refuse_idle(&command)?;
     let done = |answer: Result<Answer, Error>| answer.map(|answer| (answer, DONE));
     let (name, ran) = match command {
         Command::Check(arguments) => ("check", check::run(&arguments)),
@@ -114,10 +121,10 @@ fn execute(command: Command) -> Result<(Answer, u8), Error> {
         Command::Import(arguments) => ("import", done(import::run(&arguments))),
         Command::Robot(arguments) => ("robot", done(robot::run(&arguments))),
         Command::Compile(arguments) => ("compile", done(compile::run(&arguments))),
-        Command::Simulate(arguments) => ("simulate", done(simulate::run(&arguments))),
+        Command::Simulate(arguments) => ("simulate", simulate::run(&arguments)),
         Command::Mpc(arguments) => ("mpc", mpc::run(&arguments)),
         Command::Plan(arguments) => ("plan", done(plan::run(&arguments))),
-        Command::Report(arguments) => ("report", done(report::run(&arguments))),
+        Command::Report(arguments) => ("report", report::run(&arguments)),
         Command::Manual(arguments) => ("manual", done(manual::pages(&arguments))),
         Command::Completions(arguments) => {
             ("completions", Ok((manual::completions(&arguments), DONE)))

@@ -9,23 +9,30 @@ use super::destination::{Format, Inputs};
 use super::output::{
     extend, lines, note, numbered, progress_bar, read_recordings, show_progress, write_file,
 };
-use super::{Answer, DONE, FAILED};
-use crate::evaluate::{ReferenceInput, along_recording, control_metrics, remarks};
+use super::simplification::RESTART_S;
+use super::{Answer, code};
+use crate::evaluate::{
+    Assessment, ControlMetrics, ReferenceInput, Verdict, along_recording, control_metrics,
+    usual_settings, verdict,
+};
 use crate::model::ReducedModel;
-use crate::mpc::STEP_SLACK;
 use crate::mpc::{Controller, Lift, MpcSettings};
-use crate::recording::{Recording, Segment};
-use crate::report::{NamedRun, control_figures, control_table, failed_runs, failures, run_table};
+use crate::recording::Recording;
+use crate::report::{
+    NamedRun, control_figures, control_table, failed_runs, failures, run_table, verdict_lines,
+};
 use crate::robot::{JOINT_DIM, Robot};
 use crate::typeset::Table;
 use crate::{Error, artifact};
 
-/// Runs the controller along each recording. The exit code is 1 if along one of them most steps have no plan.
+/// Runs the controller along each recording. The exit code is 1 if the model is not fit for torques or control there, or
+/// if most steps along one of them have no plan.
 pub fn run(arguments: &MpcArguments) -> Result<(Answer, u8), Error> {
     let inputs = Inputs::default()
         .and([&arguments.model])
         .and(&arguments.recordings)
-        .and(&arguments.reading.columns);
+        .and(&arguments.reading.columns)
+        .into_folder(arguments.figures.as_deref())?;
     inputs.check_output(arguments.output.as_deref(), Format::TABLE, arguments.force)?;
     let model = artifact::read(&arguments.model)?;
     let settings = MpcSettings {
@@ -38,9 +45,11 @@ pub fn run(arguments: &MpcArguments) -> Result<(Answer, u8), Error> {
     };
     let recordings = read_recordings(&arguments.recordings, &arguments.reading)?;
     let runs = run_all(&model, &recordings, settings, arguments.reference_input)?;
-    let remarks = remarks(&model, &recordings)?;
+    let assessment = Assessment::over(&model, &recordings, RESTART_S)?;
+    let verdict = verdict(&model, &assessment, &judged(&runs));
     let failed = failed_runs(&runs);
-    let mut answer = answer(arguments, &runs, &failed, &remarks);
+    let is_failed = !failed.is_empty() || verdict.fails_control();
+    let mut answer = answer(arguments, &runs, (&failed, &verdict), &assessment.remarks);
     if let Some(folder) = &arguments.figures {
         let figures = control_figures(&model, &settings, &runs);
         inputs.write_figures(folder, &figures, arguments.force, &mut answer)?;
@@ -49,7 +58,13 @@ pub fn run(arguments: &MpcArguments) -> Result<(Answer, u8), Error> {
         let table = command_table(&model, &runs);
         write_file(path, table.csv().as_bytes(), arguments.force)?;
     }
-    Ok((answer, if failed.is_empty() { DONE } else { FAILED }))
+    Ok((answer, code(is_failed)))
+}
+
+/// What the verdict takes of runs.
+pub fn judged(runs: &[NamedRun]) -> Vec<&ControlMetrics> {
+    let metrics = runs.iter().filter_map(|(_, run)| run.metrics.as_ref());
+    metrics.collect()
 }
 
 /// Runs a fresh controller along each recording.
@@ -81,25 +96,17 @@ pub fn run_with_both_lifts(
     model: &ReducedModel,
     recordings: &[Recording],
 ) -> Result<[Vec<NamedRun>; 2], Error> {
+    let usual = usual_settings(recordings);
     let default = MpcSettings::default();
-    let segments = recordings.iter().flat_map(|recording| &recording.segments);
-    let steps = segments.filter(|segment| segment.len() >= 2);
-    let slowest_s = steps.map(Segment::mean_step_s).fold(0.0, f64::max);
-    let is_slow = default.step_s < STEP_SLACK * slowest_s;
-    let step_s = if is_slow { slowest_s } else { default.step_s };
-    if is_slow {
+    if usual.step_s != default.step_s {
         note(&format!(
             "the controller acts every {:.0} ms, as often as there are samples; {:.0} ms is usual",
-            1e3 * step_s,
+            1e3 * usual.step_s,
             1e3 * default.step_s
         ));
     }
     let with = |lift| {
-        let settings = MpcSettings {
-            lift,
-            step_s,
-            ..default
-        };
+        let settings = MpcSettings { lift, ..usual };
         run_all(model, recordings, settings, ReferenceInput::Recorded)
     };
     Ok([with(Lift::Transpose)?, with(Lift::Consistent)?])
@@ -108,7 +115,7 @@ pub fn run_with_both_lifts(
 fn answer(
     arguments: &MpcArguments,
     runs: &[NamedRun],
-    failed: &[String],
+    (failed, verdict): (&[String], &Verdict),
     remarks: &[String],
 ) -> Answer {
     let mut text = format!(
@@ -120,6 +127,7 @@ fn answer(
         run_table(runs)
     );
     text += &lines("FAILED along ", failures(runs).iter().chain(failed));
+    text += &verdict_lines(verdict);
     text += &lines("note: ", remarks);
     let mut rows = runs.iter().flat_map(|(_, run)| &run.rows);
     if let Some(row) = rows.find(|row| row.command.status.has_plan()) {
@@ -135,13 +143,14 @@ fn answer(
         "step_s": arguments.step,
         "remarks": remarks,
         "failed": failed,
+        "verdict": verdict,
         "runs": runs.iter().map(run_json).collect::<Vec<_>>(),
         "output": output.map(|path| path.to_string()),
     });
     Answer { text, json }
 }
 
-/// One run: what the model is worth, and what happened.
+/// One run: figures that depend on the dynamics, and what happened.
 ///
 /// `steps` to `prepare_us` count and time the solver's work, `lift` is what the maps and the lift make of recorded inputs:
 /// none of these depends on whether the dynamics are right.

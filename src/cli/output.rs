@@ -13,28 +13,29 @@ use serde_json::Value;
 
 use super::args::ReadingArguments;
 use crate::Error;
-use crate::files::{Overwrite, is_invisible, write_whole};
+use crate::files::{Overwrite, is_invisible, read_toml, write_whole};
 pub use crate::files::{
     shell_path as quoted, shell_paths as quoted_all, shell_word as quoted_text,
 };
-use crate::recording::{Clocks, ColumnMap, Reader, ReadingNotes, Recording, mismatch};
+use crate::recording::{Clocks, ColumnMap, Reader, ReadingNotes, Recording, Segment, mismatch};
 use crate::robot::Robot;
 use crate::train::sha256;
 
-/// Writes a whole file, unless it is there and may not be replaced.
+/// Writes a whole file, unless it is there, also since a moment ago, and may not be replaced.
 pub fn write_file(path: &Path, contents: &[u8], overwrite: Overwrite) -> Result<(), Error> {
-    if !overwrite.allows(path) {
-        return Err(Error::Exists(path.to_owned()));
-    }
-    write_whole(path, |out| out.write_all(contents)).map_err(|source| Error::Write {
-        path: path.to_owned(),
-        source,
+    let written = write_whole(path, overwrite, |out| out.write_all(contents));
+    written.map_err(|source| match source.kind() {
+        std::io::ErrorKind::AlreadyExists => Error::Exists(path.to_owned()),
+        _ => Error::Write {
+            path: path.to_owned(),
+            source,
+        },
     })
 }
 
-/// Reads a text.
+/// Reads a text of settings.
 pub fn read_text(path: &Path) -> Result<String, Error> {
-    std::fs::read_to_string(path).map_err(|source| Error::Read {
+    read_toml(path).map_err(|source| Error::Read {
         path: path.to_owned(),
         source,
     })
@@ -73,6 +74,7 @@ pub fn read_recordings(
     paths: &[PathBuf],
     arguments: &ReadingArguments,
 ) -> Result<Vec<Recording>, Error> {
+    note_repeated(&[("recordings", paths.iter().map(PathBuf::as_path).collect())]);
     read_with(&reader(arguments, Clocks::Repaired)?, paths)
 }
 
@@ -133,6 +135,17 @@ pub fn note_repeated(sets: &[(&str, Vec<&Path>)]) {
                 note(&format!("{path}: the same recording as {earlier}, {what}"));
             }
         }
+    }
+}
+
+/// Prints a note where restarts come later than every recording ends, so that restarted rollouts are whole ones.
+pub fn note_late_restarts(recordings: &[Recording], restart_every_s: f64) {
+    let segments = recordings.iter().flat_map(|recording| &recording.segments);
+    let longest_s = segments.map(Segment::duration_s).fold(0.0, f64::max);
+    if restart_every_s >= longest_s {
+        note(&format!(
+            "--restart-every {restart_every_s}: no recording is longer ({longest_s:.2} s at most), so that rollouts are never restarted"
+        ));
     }
 }
 

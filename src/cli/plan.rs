@@ -26,7 +26,8 @@ pub fn run(arguments: &PlanArguments) -> Result<Answer, Error> {
         .and([&arguments.model])
         .and(&arguments.start)
         .and(&arguments.settings)
-        .and(&arguments.reading.columns);
+        .and(&arguments.reading.columns)
+        .into_folder(arguments.figures.as_deref())?;
     let output = arguments.output.as_deref();
     inputs.check_output(output, Format::RECORDING, arguments.force)?;
     let model = artifact::read(&arguments.model)?;
@@ -68,7 +69,7 @@ pub fn run(arguments: &PlanArguments) -> Result<Answer, Error> {
         inputs.write_figures(folder, &drawn, arguments.force, &mut answer)?;
     }
     if let Some(path) = output {
-        write_recording(path, vec![planned.motion.clone()], None)?;
+        write_recording(path, vec![planned.motion.clone()], None, arguments.force)?;
         let _ = writeln!(answer.text, "\nthe plan: {}", path.display());
     }
     Ok(answer)

@@ -5,45 +5,61 @@ use std::path::PathBuf;
 
 use serde_json::json;
 
-use super::Answer;
 use super::args::ReportArguments;
 use super::destination::{Format, Inputs};
-use super::mpc::run_with_both_lifts;
+use super::mpc::{judged, run_with_both_lifts};
 use super::output::{
-    lines, names, note_mismatches, quoted, quoted_all, read_recordings, spinner, write_file,
+    lines, names, note, note_late_restarts, note_mismatches, quoted, quoted_all, read_recordings,
+    refused, spinner, write_file,
 };
-use super::simplification;
-use crate::evaluate::{Assessment, LAMBDA};
+use super::{Answer, code, simplification};
+use crate::evaluate::{Assessment, LAMBDA, Verdict, verdict};
 use crate::files::EmittedFile;
 use crate::model::ReducedModel;
 use crate::recording::Recording;
 use crate::report::{
-    Content, PageOptions, Verdict, all_figures, figure_files, page, verdict, without_statistics,
+    Content, Introduction, PageOptions, all_figures, figure_files, introduction, page,
+    verdict_lines, without_statistics,
 };
 use crate::simplify::Tolerance;
 use crate::study::{Store, Summary};
 use crate::train::sha256;
 use crate::{Error, artifact};
 
-/// Writes the page, and the figures if a folder for them is given.
-pub fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
+/// Writes the page, and the figures if a folder for them is given. The exit code is 1 if the model is fit for nothing.
+pub fn run(arguments: &ReportArguments) -> Result<(Answer, u8), Error> {
     let inputs = Inputs::default()
         .and([&arguments.model])
         .and(&arguments.recordings)
         .and(&arguments.plan)
-        .and(&arguments.reading.columns);
+        .and(&arguments.reading.columns)
+        .into_folder(arguments.figures.as_deref())?;
     inputs.check_output(Some(&arguments.output), Format::PAGE, arguments.force)?;
     let model = artifact::read(&arguments.model)?;
     let recordings = read_recordings(&arguments.recordings, &arguments.reading)?;
+    note_late_restarts(&recordings, arguments.restart_every);
     let study = match &arguments.study {
         None => None,
-        Some(folder) => Some(Summary::of(&Store::open(folder)?.cells()?, LAMBDA)),
+        Some(folder) => {
+            let summary = Summary::of(&Store::open(folder)?.cells()?, LAMBDA);
+            if summary.dimensions.is_empty() {
+                let folder = folder.display();
+                note(&format!(
+                    "{folder}: no training of the study has a model, so that its figures are left out"
+                ));
+            }
+            Some(summary)
+        }
     };
     let plan = match &arguments.plan {
         None => None,
         Some(path) => {
             let mut read = read_recordings(std::slice::from_ref(path), &arguments.reading)?;
             note_mismatches(&read[0], model.robot()?);
+            if let found @ 2.. = read[0].segments.len() {
+                let message = format!("--plan takes one jump: found {found} segments");
+                return Err(refused(path, message));
+            }
             Some(read.swap_remove(0))
         }
     };
@@ -56,9 +72,10 @@ pub fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
     };
     write_file(&arguments.output, made.page.as_bytes(), arguments.force)?;
     let mut text = format!(
-        "{}\n{}\n\n{}: {} kB, {} figures\n",
-        made.verdict.headline,
-        made.verdict.sentences.join("\n"),
+        "{}\n{}\n\n{}\n{}: {} kB, {} figures\n",
+        made.introduction.headline,
+        made.introduction.sentences.join("\n"),
+        verdict_lines(&made.verdict),
         arguments.output.display(),
         made.page.len() / 1000,
         made.n_figures
@@ -75,12 +92,13 @@ pub fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
         "model": arguments.model.display().to_string(),
         "output": arguments.output.display().to_string(),
         "bytes": made.page.len(),
-        "verdict": made.verdict.headline,
-        "reasons": made.verdict.sentences,
+        "headline": made.introduction.headline,
+        "reasons": made.introduction.sentences,
+        "verdict": made.verdict,
         "figures": names(&written),
         "remarks": made.remarks,
     });
-    Ok(Answer { text, json })
+    Ok((Answer { text, json }, code(made.verdict.fit_for.is_empty())))
 }
 
 /// A report in memory.
@@ -88,6 +106,8 @@ pub struct Made {
     /// The page.
     pub page: String,
     /// Its first words.
+    pub introduction: Introduction,
+    /// What the model is fit for.
     pub verdict: Verdict,
     /// Every figure as SVG, PDF and CSV.
     pub files: Vec<EmittedFile>,
@@ -112,6 +132,7 @@ fn make(
         true => run_with_both_lifts(model, recordings)?,
         false => [Vec::new(), Vec::new()],
     };
+    let verdict = verdict(model, &assessment, &judged(&plain));
     progress.set_message("drawing");
     let paths = recordings.iter().map(|recording| &recording.path);
     let digests: Vec<(PathBuf, String)> = paths
@@ -120,6 +141,7 @@ fn make(
     let content = Content {
         model,
         assessment: &assessment,
+        verdict: &verdict,
         plain: &plain,
         consistent: &consistent,
         study,
@@ -151,10 +173,11 @@ pub fn page_of(
             changes.captioned(bounds),
         ],
     };
-    let verdict = verdict(content)?;
+    let introduction = introduction(content)?;
     Ok(Made {
-        page: page(content, &verdict, &figures, &options)?,
-        verdict,
+        page: page(content, &introduction, &figures, &options)?,
+        introduction,
+        verdict: content.verdict.clone(),
         files: figures.iter().flat_map(figure_files).collect(),
         n_figures: figures.iter().count(),
         remarks: content.assessment.remarks.clone(),

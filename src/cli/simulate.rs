@@ -5,21 +5,21 @@ use std::fmt::Write as _;
 use nalgebra::DVector;
 use serde_json::json;
 
-use super::Answer;
 use super::args::SimulateArguments;
 use super::destination::{Format, Inputs};
-use super::output::{lines, numbered, read_recordings, spinner, write_file};
-use crate::evaluate::Assessment;
+use super::output::{lines, note_late_restarts, numbered, read_recordings, spinner, write_file};
+use super::{Answer, code};
+use crate::evaluate::{Assessment, verdict_by_default};
 use crate::model::ReducedModel;
 use crate::report::{
-    assessment_json, baseline_table, coordinate_table, dynamics_table, phase_table,
+    assessment_json, baseline_table, coordinate_table, dynamics_table, phase_table, verdict_lines,
 };
 use crate::typeset::words::counted;
 use crate::typeset::{Table, significant};
 use crate::{Error, artifact};
 
-/// Rolls the model out over every segment of every recording.
-pub fn run(arguments: &SimulateArguments) -> Result<Answer, Error> {
+/// Rolls the model out over every segment of every recording. The exit code is 1 if predictions of body x or z fail.
+pub fn run(arguments: &SimulateArguments) -> Result<(Answer, u8), Error> {
     Inputs::default()
         .and([&arguments.model])
         .and(&arguments.recordings)
@@ -27,9 +27,14 @@ pub fn run(arguments: &SimulateArguments) -> Result<Answer, Error> {
         .check_output(arguments.output.as_deref(), Format::TABLE, arguments.force)?;
     let model = artifact::read(&arguments.model)?;
     let recordings = read_recordings(&arguments.recordings, &arguments.reading)?;
+    note_late_restarts(&recordings, arguments.restart_every);
     let progress = spinner("simulating");
     let assessment = Assessment::over(&model, &recordings, arguments.restart_every)?;
+    progress.set_message("judging");
+    let (verdict, unmeasured) = verdict_by_default(&model, &recordings, &assessment);
     progress.finish_and_clear();
+    let unmeasured =
+        unmeasured.map(|reason| format!("torques and control are not judged: {reason}"));
     let mut text = format!(
         "{} over {} of {}\n\n{}",
         arguments.model.display(),
@@ -37,6 +42,8 @@ pub fn run(arguments: &SimulateArguments) -> Result<Answer, Error> {
         counted(recordings.len(), "recording"),
         metrics_text(&model, &assessment)
     );
+    text += &format!("\n{}", verdict_lines(&verdict));
+    text += &lines("note: ", &unmeasured);
     if let Some(path) = &arguments.output {
         let table = trajectory_table(&model, &assessment)?;
         write_file(path, table.csv().as_bytes(), arguments.force)?;
@@ -45,9 +52,11 @@ pub fn run(arguments: &SimulateArguments) -> Result<Answer, Error> {
     let json = json!({
         "model": arguments.model.display().to_string(),
         "rollouts": assessment_json(&model, &assessment),
+        "verdict": verdict,
+        "unmeasured": unmeasured,
         "output": arguments.output.as_ref().map(|path| path.display().to_string()),
     });
-    Ok(Answer { text, json })
+    Ok((Answer { text, json }, code(verdict.fails_predictions())))
 }
 
 /// All metrics of an assessment as text.

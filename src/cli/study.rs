@@ -2,20 +2,20 @@
 
 use std::path::Path;
 
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::Answer;
 use super::args::{StudyArguments, TrainSettings};
 use super::destination::Inputs;
-use super::output::{refused, spinner};
+use super::output::{note, refused, spinner};
 use super::prepared_recordings::{RecordedSets, read_all, reader_for};
 use super::train_settings;
 use crate::Error;
 use crate::files::{EmittedFile, check_folder};
 use crate::recording::Recording;
 use crate::report::{figure_files, study_figures};
-use crate::study::{self, Plan, Shard, Spread, Store, Summary, cell_table};
-use crate::train::Origin;
+use crate::study::{self, CellId, FOLDS, Outcome, Plan, Shard, Spread, Store, Summary, cell_table};
+use crate::train::{Method, Origin};
 use crate::typeset::{Cell, Table, significant};
 
 /// The tables of a study.
@@ -42,7 +42,7 @@ pub fn run(arguments: &StudyArguments) -> Result<Answer, Error> {
         .and(&arguments.reading.columns)
         .and_robot(arguments.robot.as_deref())
         .write_folder(&arguments.out_dir, &files, arguments.force)?;
-    Ok(answer(&arguments.out_dir, &store, &summary))
+    Ok(answer(&arguments.out_dir, &store, &cells, &summary))
 }
 
 fn merged(arguments: &StudyArguments) -> Result<Store, Error> {
@@ -74,6 +74,13 @@ fn trained(arguments: &StudyArguments) -> Result<Store, Error> {
     settings.wrench_frame = Some(base.wrench_frame);
     settings.actuators = Some(train_settings::actuators(&settings).to_owned());
     let plan = plan(arguments, &settings, &training, &validation);
+    if plan.method == Method::ClosedForm && plan.seeds > FOLDS {
+        let message = "has seeds from 6 on leave out the jumps of seeds 1 to 5 again";
+        note(&format!(
+            "--seeds {}: the closed form {message}",
+            plan.seeds
+        ));
+    }
     let store = Store::create(&arguments.out_dir, plan)?;
     let bar = spinner("training");
     let total = store.plan().cells().len();
@@ -128,7 +135,7 @@ fn plan(
     }
 }
 
-fn answer(folder: &Path, store: &Store, summary: &Summary) -> Answer {
+fn answer(folder: &Path, store: &Store, cells: &[study::Cell], summary: &Summary) -> Answer {
     let spread = |Spread { mean, std }: Spread| -> Cell {
         format!("{} +- {}", significant(mean), significant(std)).into()
     };
@@ -161,12 +168,27 @@ fn answer(folder: &Path, store: &Store, summary: &Summary) -> Answer {
     if !names.is_empty() {
         text += &format!("\nnot trained yet: {}\n", names.join("; "));
     }
+    let refused = cells.iter().filter_map(|cell| match &cell.outcome {
+        Outcome::Refused(reason) => Some((cell.id, reason)),
+        Outcome::Trained(_) => None,
+    });
+    let refused: Vec<(CellId, &String)> = refused.collect();
+    for (id, reason) in &refused {
+        text += &format!(
+            "no model: d = {} seed {}: {reason}\n",
+            id.latent_dim, id.seed
+        );
+    }
+    let refused: Vec<Value> = (refused.iter())
+        .map(|(id, reason)| json!({ "latent_dim": id.latent_dim, "seed": id.seed, "reason": reason }))
+        .collect();
     let json = json!({
         "folder": folder.display().to_string(),
         "plan": store.plan(),
         "summary": summary,
         "least_combined_loss_at": best,
         "missing": missing,
+        "refused": refused,
     });
     Answer { text, json }
 }

@@ -40,6 +40,11 @@ pub fn run(arguments: &TrainArguments) -> Result<(Answer, u8), Error> {
     let robot = train_settings::robot(&settings)?;
     let name = named(arguments.name.as_deref(), &arguments.output);
     let mut options = train_settings::options(&settings, latent_dim, name, robot)?;
+    if arguments.split.is_none()
+        && let Some(words) = train_settings::without_effect(&settings, &options)
+    {
+        note(&words);
+    }
     let recorded = RecordedSets::new(arguments, &settings, robot, options.seed)?;
     let [training, validation, test] = &recorded.sets;
     train_settings::identified(&mut options, &settings, training, robot)?;

@@ -299,6 +299,15 @@ pub(super) fn check_pairs(settings: &TrainSettings) -> Result<(), Error> {
             "free, or a training without `--paper`",
         );
     }
+    let of_choice = ["slack", "refinements", "growth", "no-rotation"];
+    if let (Some(name), true) = (first(settings, &of_choice), settings.paper) {
+        return refused(
+            name,
+            "set for the published training, which neither chooses terms nor turns the basis"
+                .to_owned(),
+            "a training without `--paper`",
+        );
+    }
     if settings.smooth_rows.is_some() && settings.smooth.is_none() {
         return refused(
             "smooth-rows",
@@ -307,6 +316,23 @@ pub(super) fn check_pairs(settings: &TrainSettings) -> Result<(), Error> {
         );
     }
     Ok(())
+}
+
+/// The first setting that this training does not depend on, in words: two named coordinates are those of the
+/// centre of mass, which nothing searches, and the search of the closed form ends in one model from every start.
+pub(super) fn without_effect(settings: &TrainSettings, options: &TrainOptions) -> Option<String> {
+    let is_closed = method(settings) == Method::ClosedForm;
+    let is_held = options.coordinates() == Coordinates::Named && options.latent_dim == 2;
+    let searched = ["lift-weight", "body-weight", "no-rotation"];
+    if let (Some(name), true) = (first(settings, &searched), is_closed && is_held) {
+        return Some(format!(
+            "--{name}: without effect, as both named coordinates are those of the centre of mass"
+        ));
+    }
+    let name = first(settings, &["seed", "seeds"]).filter(|_| is_closed)?;
+    Some(format!(
+        "--{name}: the closed form finds the same model from every start; of it only --split depends on the seed"
+    ))
 }
 
 /// The settings of a file.

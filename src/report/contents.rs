@@ -7,7 +7,7 @@ use super::control::{latent_inputs, torques};
 use super::figures::{Drawing, Figure, Film, HeatMap, Panel, subscript};
 use super::jump::{Jump, Place};
 use super::tables::NamedRun;
-use crate::evaluate::{Assessment, SegmentRun};
+use crate::evaluate::{Assessment, SegmentRun, Verdict};
 use crate::model::{ModelError, ReducedModel};
 use crate::mpc::Lift;
 use crate::recording::Segment;
@@ -23,6 +23,8 @@ pub struct Content<'a> {
     pub model: &'a ReducedModel,
     /// The model compared with the recordings.
     pub assessment: &'a Assessment<'a>,
+    /// What the model is fit for on the recordings.
+    pub verdict: &'a Verdict,
     /// The controller along each recording with the plain lift; empty if it did not run.
     pub plain: &'a [NamedRun],
     /// The same with the lift that keeps torques and forces consistent.

@@ -1,12 +1,12 @@
-//! The page: a verdict, equations, jumps, sections of words, tables and figures, placed by a template.
+//! The page: an introduction, equations, jumps, sections of words, tables and figures, placed by a template.
 
 use askama::Template;
 
 use super::contents::{AllFigures, Content, JumpFigures};
 use super::figures::{Figure, panel_svg};
+use super::introduction::Introduction;
 use super::provenance::{Origin, origin};
 use super::sections::{Section, sections, tiles};
-use super::verdict::Verdict;
 use crate::artifact;
 use crate::equations::{Equations, PhaseEquations};
 use crate::model::ReducedModel;
@@ -36,7 +36,7 @@ pub struct PageOptions {
 /// [`TypesetError::Template`].
 pub fn page(
     content: &Content<'_>,
-    verdict: &Verdict,
+    introduction: &Introduction,
     figures: &AllFigures,
     options: &PageOptions,
 ) -> Result<String, TypesetError> {
@@ -47,7 +47,7 @@ pub fn page(
         model,
         version: env!("CARGO_PKG_VERSION"),
         digest: artifact::digest(model).to_string(),
-        verdict,
+        introduction,
         tiles: tiles(content),
         remarks: &content.assessment.remarks,
         phases: typeset.systems.iter().zip(equations.phases()).collect(),
@@ -68,7 +68,7 @@ struct Page<'a> {
     model: &'a ReducedModel,
     version: &'static str,
     digest: String,
-    verdict: &'a Verdict,
+    introduction: &'a Introduction,
     tiles: Vec<(String, String)>,
     remarks: &'a [String],
     phases: Vec<(&'a EquationSystem, &'a PhaseEquations)>,

@@ -6,9 +6,9 @@ use super::figures::Figure;
 use super::page::PageOptions;
 use super::tables::{
     NamedRun, baseline_table, body_rms, control_table, dynamics_table, error_table, failures,
-    invariance_table, run_table,
+    invariance_table, run_table, verdict_table,
 };
-use crate::evaluate::{CoordinateSums, Invariance};
+use crate::evaluate::{AFTER_A_PUSH, CoordinateSums, Invariance, TORQUES_IN_CONTACT};
 use crate::typeset::{Table, rounded, significant};
 
 /// A section in the template.
@@ -68,21 +68,46 @@ pub(super) fn tiles(content: &Content<'_>) -> Vec<(String, String)> {
         format!("{x}, {z} mm")
     };
     let restarted = format!("body x, z: rms error, restarted every {every} s");
-    let torque_r2 = shown(assessment.lift.torque.r2().contact);
+    let of_row = |name: &str| content.verdict.rows.iter().find(|row| row.name == name);
+    let pair = |name: &str, unit: f64, digits: usize| match of_row(name) {
+        Some(row) => {
+            let shown = |value: Option<f64>| match value {
+                Some(value) => rounded(unit * value, digits).to_string(),
+                None => "-".to_owned(),
+            };
+            format!("{}, {}", shown(row.value), shown(row.baseline))
+        }
+        None => "-".to_owned(),
+    };
     let loss = shown(assessment.combined_loss());
+    let size = format!(
+        "{}, {}, {loss}",
+        model.latent_dim(),
+        assessment.active_terms
+    );
+    let lift = shown(assessment.lift.torque.r2().contact);
     let tiles = [
-        ("latent coordinates", model.latent_dim().to_string()),
-        (
-            "active terms, all phases",
-            assessment.active_terms.to_string(),
-        ),
         (
             "body x, z: rms error over whole jumps",
             errors(&assessment.full),
         ),
-        (&restarted, errors(&assessment.restarted)),
-        ("torque R² of the plain lift, contact", torque_r2),
-        ("combined loss of accuracy and size, L_mod", loss),
+        (restarted.as_str(), errors(&assessment.restarted)),
+        (
+            "torque R² in contact that the controller finds itself: worst recording; no dynamics",
+            pair(TORQUES_IN_CONTACT, 1.0, 3),
+        ),
+        (
+            "deviation after a push, mm: worst recording; feedback off",
+            pair(AFTER_A_PUSH, 1e3, 3),
+        ),
+        (
+            "size alone: latent coordinates, active terms, combined loss of accuracy and size L_mod",
+            size,
+        ),
+        (
+            "encoder and decoder alone, whatever the dynamics: torque R² of the plain lift, contact",
+            lift,
+        ),
     ];
     tiles.map(|(name, value)| (name.to_owned(), value)).into()
 }
@@ -108,7 +133,11 @@ pub(super) fn sections<'a>(
     let physics = invariance.as_ref().map(invariance_table);
     let stability = "Phases, stability and inputs";
     let latent = "Composition of the latent coordinates";
+    let every_row = verdict_table(content.verdict);
     let mut sections = vec![
+        Section::new("verdict", "The verdict row by row", &VERDICT_WORDS).folding([
+            every_row.captioned("Every figure with its baseline and the value that it needs")
+        ]),
         Section::new("coordinates", "Errors of every coordinate", &[])
             .folding([error_table(model, assessment).captioned(by_phase)]),
         Section::new("stability", stability, &[DYNAMICS_WORDS])
@@ -199,13 +228,16 @@ fn simplification(options: &PageOptions) -> Section<'static> {
         .folding(options.simplification.iter().cloned())
 }
 
+const VERDICT_WORDS: [&str; 1] = [
+    "A model is fit for a use if every counted row of it passes; of the controller's figures those of the recording with the least margin are shown. Where predictions one stage ahead fail, other figures of the control that pass are not due to the dynamics and count as not measured.",
+];
 const ENCODER_WORDS: &str = "The darker a cell (the brighter on a dark screen), the more of that coordinate the latent one takes.";
 const DYNAMICS_WORDS: &str = "Eigenvalues belong to each phase's linearisation at its mean state: a positive real part means that small deviations grow at that rate. The input gain is the matrix by which latent inputs accelerate the latent coordinates; its rank counts singular values above 1 % of the largest.";
 const BASELINE_WORDS: &str = "The actuated spring-loaded inverted pendulum under the same forces, with the published constants and with the constants that fit the accelerations of these very recordings best.";
 const CONTROL_WORDS: [&str; 3] = [
     "At each control step the controller sees the recorded state and plans along the recording. Its commands are not fed back to a robot: these are the commands that it would have given in the states that the robot really had. With the recorded input as reference they are the lifted recorded input whatever the dynamics are, so that the torques in the figures show what the lift is worth.",
     "What the dynamics are worth is in the tables: predictions one stage ahead with the recorded input; torques where the controller has to find its input itself; and how far the body is off in the 0.2 s after a push of 0.1 m/s, where the commands act on a body with the robot's mass and feet that stay where they stand.",
-    "The model that knows nothing has the same encoder and decoder and ddz = g u for dynamics, with g fitted to this very recording. Feedback off is the same controller, given the recorded state after the push; replay is the recorded torques.",
+    "The no-dynamics baseline has the same encoder and decoder and ddz = g u, with g fitted to this very recording. Feedback off is the same controller, given the recorded state after the push; replay is the recorded torques.",
 ];
 
 const SIMPLIFICATION_WORDS: [&str; 2] = [

@@ -2,10 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
+use super::introduction::headline;
 use super::jump::modelled;
 use crate::evaluate::{
     AslipSums, Assessment, ByContact, ControlMetrics, CoordinateSums, Fit, FitSums, Invariance,
-    LinearisedPhase, PredictionError, Run,
+    LinearisedPhase, PredictionError, Run, Verdict,
 };
 use crate::model::ReducedModel;
 use crate::typeset::{Cell, Table, significant};
@@ -183,7 +184,7 @@ pub fn control_table(runs: &[NamedRun]) -> Table {
 
 fn driven(metrics: &ControlMetrics) -> [Driven<'_>; 5] {
     let (baseline, none) = (&metrics.baseline, ByContact::default());
-    let blind = &baseline.knows_nothing;
+    let blind = &baseline.no_dynamics;
     let [own, blinds, constant] = [
         &metrics.prediction_rms,
         &blind.prediction_rms,
@@ -193,25 +194,66 @@ fn driven(metrics: &ControlMetrics) -> [Driven<'_>; 5] {
     let [off, replay] = [baseline.feedback_off, baseline.replay].map(|b| b.recovery_rms_m);
     [
         ("model", own, metrics.torque_r2, metrics.recovery_rms_m),
-        (
-            "knows nothing",
-            blinds,
-            blind.torque_r2,
-            blind.recovery_rms_m,
-        ),
+        ("no dynamics", blinds, blind.torque_r2, blind.recovery_rms_m),
         ("constant velocity", constant, none, None),
         ("feedback off", None, none, off),
         ("replay", None, none, replay),
     ]
 }
 
-/// Where the model has failed along a recording, a sentence each.
+/// The rows of the verdict that fail along each recording.
 pub fn failures(runs: &[NamedRun]) -> Vec<String> {
     let failed = runs.iter().filter_map(|(path, run)| {
         let failure = run.metrics.as_ref()?.failure.as_ref()?;
         Some(format!("{}: {failure}", file_name(path)))
     });
     failed.collect()
+}
+
+/// The rows of a verdict, one by one.
+pub fn verdict_table(verdict: &Verdict) -> Table {
+    let number = |value: Option<f64>| match value {
+        Some(value) if !value.is_finite() => "diverges".to_owned(),
+        value => value.map_or("-".to_owned(), significant),
+    };
+    Table::of(&verdict.rows)
+        .column("for", "", |row| &row.of)
+        .column("figure", "", |row| match row.unit {
+            "" => row.name.clone(),
+            unit => format!("{}, {unit}", row.name),
+        })
+        .column("model", "", |row| number(row.value))
+        .column("needed", "", |row| {
+            format!("{} {}", row.bound.words(), significant(row.threshold))
+        })
+        .column("baseline", "", |row| {
+            let baseline = row.baseline.map(significant);
+            baseline.map(|baseline| format!("{baseline}, {}", row.baseline_name))
+        })
+        .column("result", "", |row| match (row.passed, row.counts) {
+            (None, _) => "not measured".to_owned(),
+            (Some(true), true) => "passed".to_owned(),
+            (Some(false), true) => "failed".to_owned(),
+            (Some(true), false) => format!("better than {}, does not count", row.baseline_name),
+            (Some(false), false) => format!("worse than {}, does not count", row.baseline_name),
+        })
+        .table()
+}
+
+/// A verdict as lines of text: fit for what, every counted row that fails, every other that is worse than its baseline.
+pub fn verdict_lines(verdict: &Verdict) -> String {
+    let mut text = format!("verdict: {}\n", headline(verdict, false));
+    for row in &verdict.rows {
+        match (row.passed, row.counts) {
+            (Some(false), true) => text += &format!("FAILED {}: {}\n", row.of, row.words()),
+            (Some(false), false) => {
+                let name = row.baseline_name;
+                text += &format!("worse than {name}, does not count: {}\n", row.words());
+            }
+            (Some(true) | None, _) => {}
+        }
+    }
+    text
 }
 
 /// The runs that controlled nothing, and why.

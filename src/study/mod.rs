@@ -14,7 +14,7 @@ mod summary;
 
 pub use cell::{Cell, Metrics, Outcome};
 pub use error::StudyError;
-pub use plan::{CellId, Plan, Shard};
+pub use plan::{CellId, FOLDS, Plan, Shard};
 pub use run::run;
 pub use store::Store;
 pub use summary::{DimensionSummary, Spread, Summary, cell_table};

@@ -1,7 +1,7 @@
 //! The folder of a study: its plan, and one file a finished training.
 
 use std::fs;
-use std::io;
+use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
@@ -10,7 +10,8 @@ use serde::de::DeserializeOwned;
 use super::cell::Cell;
 use super::error::StudyError;
 use super::plan::{CellId, Plan};
-use crate::files::write_whole;
+use crate::files::size::{Format, read_text_capped};
+use crate::files::{Overwrite, write_whole};
 
 const PLAN: &str = "study.json";
 
@@ -30,13 +31,14 @@ impl Store {
         plan.check()?;
         fs::create_dir_all(folder).map_err(refused(folder, "make the folder"))?;
         let path = folder.join(PLAN);
-        if path.exists() {
-            let found: Plan = read_json(&path)?;
-            if let Some(difference) = difference(&found, &plan) {
-                return Err(StudyError::OtherStudy { path, difference });
+        match write_json(&path, &plan, Overwrite::Refuse) {
+            Err(StudyError::File { source, .. }) if source.kind() == ErrorKind::AlreadyExists => {
+                let found: Plan = read_json(&path)?;
+                if let Some(difference) = difference(&found, &plan) {
+                    return Err(StudyError::OtherStudy { path, difference });
+                }
             }
-        } else {
-            write_json(&path, &plan)?;
+            written => written?,
         }
         let folder = folder.to_owned();
         Ok(Self { folder, plan })
@@ -83,7 +85,7 @@ impl Store {
     /// # Errors
     /// [`StudyError::File`].
     pub fn put(&self, cell: &Cell) -> Result<(), StudyError> {
-        write_json(&self.path(cell.id), cell)
+        write_json(&self.path(cell.id), cell, Overwrite::Replace)
     }
 
     /// All finished trainings in the order of the plan.
@@ -152,16 +154,20 @@ fn difference(found: &Plan, expected: &Plan) -> Option<&'static str> {
 }
 
 fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, StudyError> {
-    let text = fs::read_to_string(path).map_err(refused(path, "read"))?;
+    let text = read_text_capped(path, Format::Model).map_err(refused(path, "read"))?;
     serde_json::from_str(&text).map_err(|error| StudyError::Broken {
         path: path.to_owned(),
         message: error.to_string(),
     })
 }
 
-fn write_json<T: Serialize>(path: &Path, value: &T) -> Result<(), StudyError> {
+fn write_json<T: Serialize>(
+    path: &Path,
+    value: &T,
+    overwrite: Overwrite,
+) -> Result<(), StudyError> {
     let text = serde_json::to_string_pretty(value).map_err(io::Error::from);
-    let written = text.and_then(|text| write_whole(path, |out| writeln!(out, "{text}")));
+    let written = text.and_then(|text| write_whole(path, overwrite, |out| writeln!(out, "{text}")));
     written.map_err(refused(path, "write"))
 }
 

@@ -6,16 +6,16 @@ use serde_json::Value;
 
 use super::{JUMP, MODEL, folder, path, romc, text};
 
-/// A model whose every step overflows: coefficients 1e12 times as large.
-fn overflowing(at: &str) {
-    let shipped = fs::read_to_string(MODEL).expect("the shipped model");
+/// A copy of a shipped model with other coefficients.
+fn with_xi(name: &str, at: &str, change: impl Fn(f64) -> f64) {
+    let shipped = fs::read_to_string(format!("models/{name}.json")).expect("a shipped model");
     let mut model: Value = serde_json::from_str(&shipped).expect("JSON");
     let phases = model["phases"].as_array_mut().expect("phases");
     let rows = phases
         .iter_mut()
         .flat_map(|phase| phase["xi"].as_array_mut().expect("rows"));
     for value in rows.flat_map(|row| row.as_array_mut().expect("a row")) {
-        *value = (1e12 * value.as_f64().expect("a number")).into();
+        *value = change(value.as_f64().expect("a number")).into();
     }
     fs::write(at, model.to_string()).expect("writable");
 }
@@ -24,7 +24,7 @@ fn overflowing(at: &str) {
 fn mpc_without_a_plan_in_most_steps_ends_with_one_and_the_reason() {
     let folder = folder();
     let (model, table) = (path(&folder, "broken.json"), path(&folder, "steps.csv"));
-    overflowing(&model);
+    with_xi("go1-d4", &model, |value| 1e12 * value);
     let arguments = ["mpc", &model, JUMP, "--output", &table];
     let output = romc(&[&arguments[..], &["--json"]].concat());
     assert_eq!(output.status.code(), Some(1));
@@ -40,4 +40,56 @@ fn mpc_without_a_plan_in_most_steps_ends_with_one_and_the_reason() {
     let output = romc(&[&arguments[..], &["--force"]].concat());
     assert_eq!(output.status.code(), Some(1));
     assert!(text(&output.stdout).contains(reason));
+}
+
+/// Each command ends with 1 where its own purpose fails, with everything written, and with 0 where another's does.
+#[test]
+fn exit_codes_follow_the_purpose_of_each_command_and_the_verdict_is_the_same_in_all() {
+    let folder = folder();
+    let (broken, table, page) = (
+        path(&folder, "broken.json"),
+        path(&folder, "table.csv"),
+        path(&folder, "page.html"),
+    );
+    with_xi("go1-d4", &broken, |value| -value);
+    let without_torques = "models/go1-d2.json";
+    let all: &[&str] = &["0.1 s", "whole motion", "torques", "control"];
+    let (predictions, control) = all.split_at(2);
+    for (model, codes, fit, failed) in [
+        (MODEL, [0, 0, 0], all, &[][..]),
+        (without_torques, [0, 1, 0], predictions, control),
+        (&broken, [1, 1, 1], &[], all),
+    ] {
+        let mut verdicts = Vec::new();
+        let commands = [("simulate", &table), ("mpc", &table), ("report", &page)];
+        for ((command, output), code) in commands.into_iter().zip(codes) {
+            let arguments = [
+                command, model, JUMP, "--output", output, "--force", "--json",
+            ];
+            let run = romc(&arguments);
+            let error = text(&run.stderr);
+            assert_eq!(run.status.code(), Some(code), "{command} {model}: {error}");
+            assert!(fs::exists(output).expect("readable"), "{command} {model}");
+            fs::remove_file(output).expect("written");
+            let answer: Value = serde_json::from_str(&text(&run.stdout)).expect("one JSON value");
+            verdicts.push(answer["verdict"].clone());
+        }
+        for verdict in &verdicts {
+            assert_eq!(verdict["fit_for"], serde_json::json!(fit), "{model}");
+            assert_eq!(verdict["failed"], serde_json::json!(failed), "{model}");
+            let rows = verdict["rows"].as_array().expect("rows");
+            for key in ["name", "value", "baseline", "threshold", "passed", "counts"] {
+                assert!(rows.iter().all(|row| row.get(key).is_some()), "{key}");
+            }
+        }
+        assert_eq!(verdicts[0], verdicts[1], "{model}");
+        assert_eq!(verdicts[0], verdicts[2], "{model}");
+    }
+    let run = romc(&["mpc", without_torques, JUMP]);
+    let said = text(&run.stdout);
+    assert!(said.contains("not fit for torques and control"), "{said}");
+    assert!(
+        said.contains("worse than constant velocity, does not count: error of body.pitch"),
+        "{said}"
+    );
 }

@@ -159,3 +159,129 @@ fn a_plan_as_mcap_is_the_plan_as_csv() {
     assert_eq!(csv, gz);
     assert_eq!(mcap, csv);
 }
+
+/// Two processes with one output, again and again: one alone makes the file, and the other says so.
+#[test]
+fn of_two_commands_with_one_output_one_succeeds_and_the_other_names_the_file() {
+    let folder = folder();
+    for run in 0..8 {
+        let output = path(&folder, &format!("robot{run}.toml"));
+        let started = ["go1", "go2"].map(|robot| {
+            std::process::Command::new(env!("CARGO_BIN_EXE_romc"))
+                .args(["robot", robot, "--output", &output])
+                .stderr(std::process::Stdio::piped())
+                .stdout(std::process::Stdio::null())
+                .spawn()
+                .expect("the binary runs")
+        });
+        let ended = started.map(|process| process.wait_with_output().expect("it ends"));
+        let won = ended.each_ref().map(|ended| ended.status.success());
+        assert_ne!(won[0], won[1], "run {run}: {won:?}");
+        let written = fs::read_to_string(&output).expect("one of them");
+        let name = if won[0] { "go1" } else { "go2" };
+        assert!(
+            written.contains(&format!("\"{name}\"")),
+            "{name}: {written}"
+        );
+        let loser = &ended[usize::from(won[0])];
+        let error = super::text(&loser.stderr);
+        assert!(
+            error.contains(&output) && error.contains("already exists"),
+            "{error}"
+        );
+    }
+    let left = fs::read_dir(folder.path()).expect("a folder");
+    assert_eq!(left.count(), 8, "nothing is left beside them");
+}
+
+/// Flags and rows that would be dropped are refused or noted.
+#[test]
+fn what_a_command_does_not_do_is_refused_or_noted() {
+    let folder = folder();
+    let at = |name: &str| path(&folder, name);
+    let (out, model, study) = (at("out"), at("model.json"), at("study"));
+    let train = ["train", JUMP, "--latent-dim", "2", "--output", &model];
+    for (arguments, reason) in [
+        (
+            &[
+                "compile",
+                "models/paper-2d.json",
+                "--units",
+                "physical",
+                "--out-dir",
+                &out,
+            ][..],
+            "need an encoder and a decoder",
+        ),
+        (
+            &[
+                "compile",
+                "models/paper-2d.json",
+                "--units",
+                "scaled",
+                "--out-dir",
+                &out,
+            ],
+            "needs a model with an encoder",
+        ),
+        (
+            &[
+                "compile",
+                MODEL,
+                "--emit",
+                "c",
+                "--digits",
+                "3",
+                "--out-dir",
+                &out,
+            ],
+            "--digits",
+        ),
+        (
+            &[&train[..], &["--paper", "--refinements", "3"]].concat(),
+            "refinements",
+        ),
+    ] {
+        let error = refused(arguments);
+        assert!(error.contains(reason), "{arguments:?}: {error}");
+    }
+    let usage = super::romc(&["study", JUMP, "--latent-dims", "2,2", "--out-dir", &study]);
+    assert_eq!(usage.status.code(), Some(2));
+    assert!(super::text(&usage.stderr).contains("found 2 twice"));
+    for (arguments, reason) in [
+        (
+            &["simulate", MODEL, JUMP, "--restart-every", "5"][..],
+            "no recording is longer",
+        ),
+        (&["simulate", MODEL, JUMP, JUMP], "counts twice"),
+        (
+            &["compile", MODEL, "--emit", "c,c", "--out-dir", &out],
+            "`c` is named twice",
+        ),
+        (
+            &[&train[..], &["--lift-weight", "1", "--force"]].concat(),
+            "--lift-weight: without effect",
+        ),
+        (
+            &[&train[..], &["--seed", "2", "--force"]].concat(),
+            "same model from every start",
+        ),
+    ] {
+        let notes = super::text(&super::romc(arguments).stderr);
+        assert!(notes.contains(reason), "{arguments:?}: {notes}");
+    }
+    let arguments = [
+        "study",
+        JUMP,
+        "--latent-dims",
+        "2,10",
+        "--seeds",
+        "1",
+        "--out-dir",
+        &study,
+    ];
+    let answer = json(&arguments);
+    assert_eq!(answer["refused"][0]["latent_dim"], 10, "{answer}");
+    let said = done(&arguments);
+    assert!(said.contains("no model: d = 10 seed 1: "), "{said}");
+}

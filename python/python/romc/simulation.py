@@ -48,15 +48,19 @@ class Simulation:
     """What a model predicts along recordings.
 
     `metrics` is the object `rollouts` of `romc simulate --json`: rms (rad, m) and R^2 of each coordinate over whole
-    rollouts and restarted ones, baselines, losses. `runs` has the trajectories, one entry per segment.
+    rollouts and restarted ones, baselines, losses. `verdict` is that of every command: `fit_for`, `failed` and the `rows`
+    that decide, each with value, baseline, threshold and passed. `runs` has the trajectories, one entry per segment.
     """
 
     metrics: Dict[str, Any]
+    verdict: Dict[str, Any]
     runs: List[SimulatedSegment]
 
     def __init__(self, model: "_romc.Model", recordings: List["_romc.Recording"], restart_every: float) -> None:
         metrics, runs = _romc.simulate(model, recordings, restart_every)
-        self.metrics = json.loads(metrics)
+        results = json.loads(metrics)
+        self.metrics = results["metrics"]
+        self.verdict = results["verdict"]
         self.runs = [SimulatedSegment(arrays) for arrays in runs]
 
     def rms(self, coordinate: str, rollouts: str = "restarted") -> float:

@@ -11,6 +11,7 @@ use serde::de::{Error as _, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Map, Value};
 
+use super::bounded;
 use super::error::{ArtifactError, ArtifactFault};
 use super::jump_prior::{LandmarksEntry, PriorEntry};
 use crate::files::{Located, Place};
@@ -100,7 +101,8 @@ pub(super) struct Manifest {
     #[serde(default, deserialize_with = "present")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub prior: Option<PriorEntry>,
-    #[serde(default, skip_serializing_if = "Map::is_empty")]
+    #[serde(default, deserialize_with = "bounded::object")]
+    #[serde(skip_serializing_if = "Map::is_empty")]
     pub provenance: Map<String, Value>,
 }
 
@@ -152,6 +154,7 @@ impl<'de> Deserialize<'de> for RobotValue {
 /// Only the schema; everything else is passed over.
 #[derive(Deserialize)]
 pub(super) struct SchemaProbe {
+    #[serde(default, deserialize_with = "bounded::value")]
     pub schema: Option<Value>,
 }
 

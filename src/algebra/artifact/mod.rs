@@ -32,6 +32,7 @@
 //!
 //! [`ReducedModel`]: crate::model::ReducedModel
 
+mod bounded;
 mod error;
 mod export;
 mod jump_prior;

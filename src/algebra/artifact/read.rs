@@ -14,6 +14,7 @@ use super::manifest::{
     SchemaProbe, StatisticsEntry, from_rows,
 };
 use crate::files::ForeignFile;
+use crate::files::size::Format;
 use crate::model::{
     Activation, AffineMap, InputGivenState, InputStatistics, Layer, Library, ModelError, Phase,
     ReducedModel, StateMap,
@@ -21,7 +22,7 @@ use crate::model::{
 use crate::robot::{Robot, STATE_DIM};
 
 /// Largest model file; all of the largest model fits.
-pub const MAX_FILE_BYTES: u64 = 32 << 20;
+pub const MAX_FILE_BYTES: u64 = Format::Model.most_bytes();
 
 /// Whether the path stands for standard input: `-`.
 pub fn is_standard_input(path: &Path) -> bool {

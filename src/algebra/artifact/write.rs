@@ -2,7 +2,7 @@
 //! files name the model that they come from.
 
 use std::path::Path;
-use std::{fmt, fs};
+use std::{fmt, fs, io};
 
 use sha2::{Digest as _, Sha256};
 
@@ -40,18 +40,24 @@ fn check_text(path: &Path, text: &str, overwrite: Overwrite) -> Result<(), Artif
     }
 }
 
-/// Writes a model file: into a new file beside `path`, which is then renamed.
+/// Writes a model file: into a new file beside `path`, which is then moved there.
 ///
 /// # Errors
 /// [`ArtifactFault::Exists`] if a different file is there and `overwrite` refuses,
 /// [`ArtifactFault::Io`].
 pub fn write(path: &Path, model: &ReducedModel, overwrite: Overwrite) -> Result<(), ArtifactError> {
     let text = to_text(model);
-    check_text(path, &text, overwrite)?;
-    write_whole(path, |out| out.write_all(text.as_bytes())).map_err(|source| {
-        let action = "write";
-        ArtifactFault::Io { action, source }.of(&path.display().to_string())
-    })
+    let written = write_whole(path, overwrite, |out| out.write_all(text.as_bytes()));
+    match written {
+        Err(source) if source.kind() == io::ErrorKind::AlreadyExists => {
+            check_text(path, &text, Overwrite::Refuse)
+        }
+        Err(source) => {
+            let action = "write";
+            Err(ArtifactFault::Io { action, source }.of(&path.display().to_string()))
+        }
+        Ok(()) => Ok(()),
+    }
 }
 
 /// SHA-256 of a model in the form in which [`write()`] writes it.

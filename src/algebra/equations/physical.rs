@@ -35,6 +35,11 @@ pub enum PhysicalError {
         "physical units need an affine encoder and decoder, scale factors, and names and units of state and input"
     )]
     Maps(#[from] ModelError),
+    /// Published equations alone.
+    #[error(
+        "model `{model}`: physical units need an encoder and a decoder, which the model does not have; leave --units out"
+    )]
+    LatentOnly { model: String },
     /// State or input have no units.
     #[error(
         "model `{model}`: physical units need `{part}` with names and units, which the model does not have"
@@ -104,14 +109,13 @@ struct Scale {
 impl Equations<'_> {
     /// The same equations in metres, radians, seconds, newtons and newton metres, with the model's maps.
     ///
-    /// Equations without robot coordinates, such as published ones, come back as they are.
-    ///
     /// # Errors
-    /// [`PhysicalError`] for nonlinear maps, missing units, or values beyond floats.
+    /// [`PhysicalError`] for equations without robot coordinates, nonlinear maps, missing units, or values beyond floats.
     pub fn in_physical_units(&self) -> Result<Equations<'static>, PhysicalError> {
         let model = self.model();
         if model.encoder_map().is_err() && model.decoder_map().is_err() {
-            return Ok(self.clone().into_owned());
+            let model = model.name().to_owned();
+            return Err(PhysicalError::LatentOnly { model });
         }
         let scales = scales(model)?;
         let (terms, factors, pool) = self.substituted(&scales);

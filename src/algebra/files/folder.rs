@@ -24,6 +24,11 @@ pub enum FolderError {
     /// The folder holds a file that romc made, with other contents.
     #[error("{path}: changed since romc made it; move it away or use --force to replace it")]
     Changed { path: PathBuf },
+    /// Another command has made the file since this one began.
+    #[error(
+        "{path}: another command wrote it while this one ran, which wrote nothing; give it a folder of its own, or run it again"
+    )]
+    Concurrent { path: PathBuf },
     /// The system refused a file or folder.
     #[error("{path}")]
     Io { path: PathBuf, source: io::Error },
@@ -69,14 +74,55 @@ pub fn earlier_files(folder: &Path, files: &[EmittedFile]) -> Result<Vec<PathBuf
     Ok(list.map_or_else(Vec::new, |list| list.emitted.others(folder, files)))
 }
 
-/// Writes the files into `folder`, which is made if it does not exist. Every file is first
-/// written beside its place, then renamed; nothing is renamed before all are written.
-/// Files of earlier runs that are no longer emitted stay. Runs at the same time into one folder
-/// rename one after the other, under the lock of its list.
+/// What earlier runs wrote into a folder when a command begins.
+#[derive(Debug, Default)]
+pub struct Begun(Emitted);
+
+impl Begun {
+    /// The folder as it is now; it need not be there.
+    ///
+    /// # Errors
+    /// [`FolderError::Io`], [`FolderError::Foreign`] for a list of files that is none.
+    pub fn of(folder: &Path) -> Result<Self, FolderError> {
+        let list = List::of(folder)?;
+        Ok(Self(list.map(|list| list.emitted).unwrap_or_default()))
+    }
+
+    /// Refuses a file that another run has made since, with other contents than ours.
+    fn check(&self, folder: &Path, file: &EmittedFile, now: &Emitted) -> Result<(), FolderError> {
+        let (then, now) = (self.0.digests(&file.path), now.digests(&file.path));
+        match now == then || now.contains(&digest(file.contents.as_bytes())) {
+            true => Ok(()),
+            false => Err(FolderError::Concurrent {
+                path: folder.join(&file.path),
+            }),
+        }
+    }
+}
+
+/// [`write_files_since`] now.
 ///
 /// # Errors
-/// [`FolderError::Foreign`] and [`FolderError::Changed`] before anything is written, [`FolderError::Io`].
+/// As it.
 pub fn write_files(
+    folder: &Path,
+    files: &[EmittedFile],
+    overwrite: Overwrite,
+) -> Result<Vec<PathBuf>, FolderError> {
+    write_files_since(&Begun::of(folder)?, folder, files, overwrite)
+}
+
+/// Writes the files into `folder`, which is made if it does not exist. Every file is first
+/// written beside its place, then moved there; nothing is moved before all are written.
+/// Files of earlier runs that are no longer emitted stay. Runs at the same time into one folder
+/// move their files one after the other, under the lock of its list; of two that write other contents under one name,
+/// the second is refused, unless it may replace.
+///
+/// # Errors
+/// [`FolderError::Foreign`], [`FolderError::Changed`] and [`FolderError::Concurrent`] before anything is written,
+/// [`FolderError::Io`].
+pub fn write_files_since(
+    begun: &Begun,
     folder: &Path,
     files: &[EmittedFile],
     overwrite: Overwrite,
@@ -85,14 +131,21 @@ pub fn write_files(
     check_all(folder, named, overwrite)?;
     let mut staged = staged(folder, files)?;
     let mut list = List::begun(folder)?;
+    let mut is_there = Vec::with_capacity(files.len());
     for file in files {
+        is_there.push(folder.join(&file.path).symlink_metadata().is_ok());
         list.emitted
             .check(folder, &file.path, Some(file), overwrite)?;
+        if overwrite == Overwrite::Refuse {
+            begun.check(folder, file, &list.emitted)?;
+        }
     }
     // The list comes first: after an interruption each finished file is known as ours.
     list.extend(files)?;
-    for part in &mut staged {
-        let put = part.put();
+    for (part, is_there) in staged.iter_mut().zip(is_there) {
+        // What nobody has checked is not replaced.
+        let overwrite = Overwrite::when_forced(is_there || overwrite == Overwrite::Replace);
+        let put = part.put(overwrite);
         put.map_err(|error| io_error(&part.place, error))?;
     }
     list.settle(folder)?;
@@ -371,7 +424,7 @@ mod tests {
         let write = |own: &str, contents: &str| {
             let files = [
                 EmittedFile::new(own, contents),
-                EmittedFile::new("CMakeLists.txt", contents),
+                EmittedFile::new("CMakeLists.txt", "of all"),
             ];
             write_files(folder.path(), &files, Overwrite::Refuse).expect("written")
         };
@@ -439,6 +492,27 @@ mod tests {
         fs::write(&path, "my own").expect("written");
         let found = write_files(folder.path(), &lock("version = 6"), Overwrite::Refuse);
         assert!(matches!(found, Err(FolderError::Changed { .. })));
+    }
+
+    #[test]
+    fn of_two_commands_at_a_time_the_second_is_refused_unless_it_writes_the_same() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let begin = || Begun::of(folder.path()).expect("readable");
+        let write = |begun: &Begun, text: &str, overwrite| {
+            write_files_since(begun, folder.path(), &files(text), overwrite)
+        };
+        let before = begin();
+        write(&begin(), "one", Overwrite::Refuse).expect("the first");
+        write(&before, "one", Overwrite::Refuse).expect("the same");
+        let found = write(&before, "two", Overwrite::Refuse);
+        assert!(
+            matches!(&found, Err(FolderError::Concurrent { path }) if path.ends_with("m.c")),
+            "{found:?}"
+        );
+        let left = fs::read_to_string(folder.path().join("m/src/lib.rs"));
+        assert_eq!(left.expect("kept"), "one");
+        write(&begin(), "two", Overwrite::Refuse).expect("one after the other");
+        write(&before, "three", Overwrite::Replace).expect("forced");
     }
 
     #[test]

@@ -3,17 +3,24 @@
 //! Imports nothing; every stage that writes goes through here: [`write_whole`] replaces one file in one
 //! step, [`write_files`] puts [`EmittedFile`]s into a folder and lists them there with digests,
 //! so that only what romc wrote is replaced. Stages that
-//! read state the place of a fault with [`Located`]. `text` has what texts of files may do on a terminal or in a shell.
+//! read state the place of a fault with [`Located`], and stop where [`size`] says. `text` has what texts of files may do
+//! on a terminal or in a shell.
+
+pub mod size;
 
 mod folder;
 mod foreign;
 mod located;
 mod part;
 mod text;
+mod toml_text;
 mod whole;
 
-pub use folder::{FolderError, check_folder, earlier_files, hex, write_files};
+pub use folder::{
+    Begun, FolderError, check_folder, earlier_files, hex, write_files, write_files_since,
+};
 pub use foreign::ForeignFile;
 pub use located::{Located, Place};
 pub use text::{is_invisible, shell_path, shell_paths, shell_word};
+pub use toml_text::read_toml;
 pub use whole::{EmittedFile, Overwrite, write_whole};

@@ -7,6 +7,8 @@ use std::hash::{BuildHasher as _, Hasher as _};
 use std::io;
 use std::path::{Path, PathBuf};
 
+use super::whole::Overwrite;
+
 /// How names of parts end, after a random number in hexadecimal digits.
 const ENDING: &str = ".part";
 
@@ -62,11 +64,24 @@ impl Part {
         Err(last.unwrap_or_else(|| io::ErrorKind::AlreadyExists.into()))
     }
 
-    /// Moves the file to its place, replacing what is there in one step.
-    pub fn put(&mut self) -> io::Result<()> {
-        fs::rename(&self.path, &self.place)?;
-        self.is_placed = true;
-        Ok(())
+    /// Moves the file to its place in one step: what is there is replaced, or refused with
+    /// [`io::ErrorKind::AlreadyExists`]. Of several processes that refuse, one alone succeeds.
+    pub fn put(&mut self, overwrite: Overwrite) -> io::Result<()> {
+        if overwrite == Overwrite::Refuse {
+            match fs::hard_link(&self.path, &self.place) {
+                // The part is the second name of the file, and goes in the end.
+                Ok(()) => return Ok(()),
+                Err(error) if error.kind() == io::ErrorKind::AlreadyExists => return Err(error),
+                // A file system without links: whoever makes the file has the place.
+                Err(_) => drop(File::create_new(&self.place)?),
+            }
+        }
+        let renamed = fs::rename(&self.path, &self.place);
+        if renamed.is_err() && overwrite == Overwrite::Refuse {
+            let _ = fs::remove_file(&self.place);
+        }
+        self.is_placed = renamed.is_ok();
+        renamed
     }
 }
 
@@ -122,6 +137,28 @@ mod tests {
         let path = living.path.clone();
         drop(living);
         assert!(!path.exists());
+    }
+
+    #[test]
+    fn a_place_that_is_taken_is_refused_and_left_as_it_is() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let place = folder.path().join("m.c");
+        let part = |text: &str| {
+            let part = Part::beside(&place).expect("a part");
+            io::Write::write_all(&mut &part.file, text.as_bytes()).expect("written");
+            part
+        };
+        let [mut one, mut other] = [part("one"), part("other")];
+        one.put(Overwrite::Refuse).expect("a free place");
+        let refused = other
+            .put(Overwrite::Refuse)
+            .expect_err("a place that is taken");
+        assert_eq!(refused.kind(), io::ErrorKind::AlreadyExists);
+        drop((one, other));
+        assert_eq!(fs::read_to_string(&place).expect("kept"), "one");
+        part("new").put(Overwrite::Replace).expect("forced");
+        assert_eq!(fs::read_to_string(&place).expect("replaced"), "new");
+        assert_eq!(fs::read_dir(folder.path()).expect("a folder").count(), 1);
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! One file, written beside its place and then renamed.
+//! One file, written beside its place and then moved there.
 
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
@@ -48,15 +48,20 @@ impl Overwrite {
     }
 }
 
-/// Replaces `path` by what `fill` writes, in one step.
+/// Makes `path` of what `fill` writes, in one step, or replaces it.
 ///
 /// # Errors
-/// Those of the file system; then `path` is as it was, and nothing is left beside it. What a process that was
-/// killed has left there is removed by the next call.
+/// [`io::ErrorKind::AlreadyExists`] for a file that may not be replaced, also one that appears meanwhile, and those of the
+/// file system; then `path` is as it was, and nothing is left beside it. What a process that was killed has left there
+/// is removed by the next call.
 pub fn write_whole(
     path: &Path,
+    overwrite: Overwrite,
     fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> io::Result<()> {
+    if !overwrite.allows(path) {
+        return Err(io::ErrorKind::AlreadyExists.into());
+    }
     // What is no file, such as /dev/null or a pipe, would be gone; a link stays, its file is replaced.
     let place = match path.metadata() {
         Ok(found) if !found.is_file() => {
@@ -73,7 +78,7 @@ pub fn write_whole(
     let mut file = BufWriter::new(&part.file);
     fill(&mut file)?;
     file.into_inner()?.sync_all()?;
-    part.put()
+    part.put(overwrite)
 }
 
 #[cfg(test)]
@@ -89,11 +94,11 @@ mod tests {
         let [file, link, socket] = ["file", "link", "socket"].map(|name| folder.path().join(name));
         fs::write(&file, "old").expect("written");
         std::os::unix::fs::symlink(&file, &link).expect("linked");
-        write_whole(&link, |out| out.write_all(b"new")).expect("written");
+        write_whole(&link, Overwrite::Replace, |out| out.write_all(b"new")).expect("written");
         assert_eq!(fs::read(&file).expect("readable"), b"new");
         assert!(link.symlink_metadata().expect("there").is_symlink());
         let _listener = std::os::unix::net::UnixListener::bind(&socket).expect("a socket");
-        assert!(write_whole(&socket, |out| out.write_all(b"new")).is_err());
+        assert!(write_whole(&socket, Overwrite::Replace, |out| out.write_all(b"new")).is_err());
         assert!(!socket.metadata().expect("still there").is_file());
     }
 
@@ -101,8 +106,8 @@ mod tests {
     fn write_whole_leaves_the_old_file_when_filling_fails() {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let path = folder.path().join("model.json");
-        write_whole(&path, |out| out.write_all(b"first")).expect("a new file");
-        let failed = write_whole(&path, |out| {
+        write_whole(&path, Overwrite::Refuse, |out| out.write_all(b"first")).expect("a new file");
+        let failed = write_whole(&path, Overwrite::Replace, |out| {
             out.write_all(b"half")?;
             Err(io::Error::other("disk full"))
         });

@@ -11,7 +11,7 @@ use super::error::{RobotFileError, RobotFileFault};
 use super::identity::{RobotReading, identified};
 use super::legs::Places;
 use super::urdf;
-use crate::files::{Located, Place};
+use crate::files::{Located, Place, read_toml};
 use crate::robot::Robot;
 
 /// Largest file of a robot; a URDF with meshes beside it is far smaller.
@@ -107,6 +107,9 @@ fn read_with(path: &Path, options: &RobotOptions<'_>) -> Result<RobotReading, Ro
 pub(super) fn text_of(path: &Path) -> Result<String, RobotFileError> {
     let file = path.display().to_string();
     let fault = |fault| RobotFileError::new(&file, Place::Whole, fault);
+    if !["urdf", "xml"].contains(&ending(path).as_str()) {
+        return read_toml(path).map_err(|source| fault(RobotFileFault::Read(source)));
+    }
     let mut text = String::new();
     // One byte more than allowed distinguishes a file that is too large from one that just fits.
     File::open(path)

@@ -10,6 +10,7 @@
 
 mod command;
 mod compile;
+mod idle;
 mod import;
 mod reading;
 mod train;
@@ -21,6 +22,7 @@ pub use command::{
     ReportArguments, RobotArguments, SimulateArguments,
 };
 pub use compile::{CompileArguments, SimplifyArguments, UnitsChoice};
+pub use idle::refuse_idle;
 pub use import::{ImportArguments, LibraryArgument};
 pub use reading::ReadingArguments;
 pub use train::{PhaseSet, StudyArguments, TrainArguments, TrainSettings, Widths};

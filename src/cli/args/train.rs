@@ -301,7 +301,12 @@ fn dimensions(text: &str) -> Result<Dimensions, String> {
         None => text.split(',').map(number).collect::<Result<Vec<_>, _>>()?,
     };
     found.sort_unstable();
-    found.dedup();
+    if let Some(twice) = found.windows(2).find(|pair| pair[0] == pair[1]) {
+        return Err(format!(
+            "found {} twice in `{text}`, expected each once",
+            twice[0]
+        ));
+    }
     if found.is_empty() {
         return Err(expected());
     }

@@ -29,7 +29,7 @@ pub struct SegmentRun<'a> {
     pub baselines: Vec<AslipRollout>,
 }
 
-/// A model held against recordings.
+/// A model compared with recordings.
 #[derive(Debug, Clone)]
 pub struct Assessment<'a> {
     /// Names of the robot's coordinates.
@@ -44,6 +44,8 @@ pub struct Assessment<'a> {
     pub full: CoordinateSums,
     /// Residuals of restarted rollouts.
     pub restarted: CoordinateSums,
+    /// Residuals of a robot that keeps the velocity it has at the start, over whole segments and restarted.
+    pub constant_velocity: [CoordinateSums; 2],
     /// Decoder and latent accelerations.
     pub pointwise: PointwiseSums,
     /// Template models under the same recorded forces.
@@ -85,6 +87,7 @@ impl<'a> Assessment<'a> {
             restart_every_s,
             runs: Vec::with_capacity(segments.len()),
             restarted: full.clone(),
+            constant_velocity: [full.clone(), full.clone()],
             full,
             pointwise: PointwiseSums::new(model),
             baselines: Baseline::all(&rule, &segments)?,
@@ -100,6 +103,11 @@ impl<'a> Assessment<'a> {
             let restarted = rollout(&compiled, &latent, restart);
             (assessment.full).add_rollout(model, segment, &latent, &full)?;
             (assessment.restarted).add_rollout(model, segment, &latent, &restarted)?;
+            for (sums, rollout) in
+                (assessment.constant_velocity.iter_mut()).zip([&full, &restarted])
+            {
+                sums.add_constant_velocity(segment, &latent, rollout);
+            }
             assessment.pointwise.add(model, segment, &latent)?;
             assessment.lift.add(model, segment)?;
             let baselines = assessment.baselines.iter_mut();

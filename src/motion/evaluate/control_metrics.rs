@@ -1,4 +1,4 @@
-//! What a run along a recording says of the model: figures that a wrong model changes, beside baselines.
+//! Figures of a controller's run along a recording that depend on the dynamics, compared with baselines.
 
 use serde::Serialize;
 
@@ -7,12 +7,10 @@ use super::error::EvaluateError;
 use super::prediction::{PredictionError, prediction_error, recorded_stages, uninformed};
 use super::recovery::{Driver, Recovery, recovery};
 use super::torque::ByContact;
+use super::verdict::failure;
 use crate::model::ReducedModel;
-use crate::mpc::{Controller, MAX_STRUCTURED_DIM, MpcSettings, Solver};
-use crate::recording::Recording;
-
-/// Share of a baseline's error from which a model is no better than it.
-const NO_BETTER: f64 = 0.98;
+use crate::mpc::{Controller, MAX_STRUCTURED_DIM, MpcSettings, STEP_SLACK, Solver};
+use crate::recording::{Recording, Segment};
 
 /// A model and its baselines along one recording.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -31,7 +29,9 @@ pub struct ControlMetrics {
     pub tracking_rms: Option<f64>,
     /// The same figures of others.
     pub baseline: Baselines,
-    /// Why the model has failed here, if it has.
+    /// Share of the steps of the same run that have no plan of their own.
+    pub unplanned_share: f64,
+    /// The counted rows of the [verdict](super::Verdict) that fail along this recording, in words.
     pub failure: Option<String>,
 }
 
@@ -39,7 +39,7 @@ pub struct ControlMetrics {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Baselines {
     /// The same controller on a copy of the model with `ddz = g u_lat`, `g` fitted to this very recording.
-    pub knows_nothing: KnowsNothing,
+    pub no_dynamics: NoDynamics,
     /// The same controller, given the recorded state after the pushes.
     pub feedback_off: Pushed,
     /// The recorded torques after the pushes.
@@ -48,9 +48,9 @@ pub struct Baselines {
     pub constant_velocity: ConstantVelocity,
 }
 
-/// Figures of the model that knows nothing.
+/// Figures of the no-dynamics baseline.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct KnowsNothing {
+pub struct NoDynamics {
     /// See [`ControlMetrics::prediction_rms`].
     pub prediction_rms: Option<PredictionError>,
     /// See [`ControlMetrics::torque_r2`].
@@ -114,8 +114,9 @@ pub fn control_metrics(
         inconsistency: run.inconsistency,
         recovery_rms_m: feedback.rms_m(),
         tracking_rms: feedback.tracking_rms(),
+        unplanned_share: run.failed as f64 / run.steps as f64,
         baseline: Baselines {
-            knows_nothing: KnowsNothing {
+            no_dynamics: NoDynamics {
                 prediction_rms: predicted(Some(&blind))?,
                 torque_r2: blind_run.torque_r2,
                 torque_rms_nm: blind_run.torque_rms_nm,
@@ -133,33 +134,16 @@ pub fn control_metrics(
     Ok(metrics)
 }
 
-/// Why the model has failed: its predictions or its feedback are no better than those of a baseline.
-fn failure(metrics: &ControlMetrics) -> Option<String> {
-    let baseline = &metrics.baseline;
-    let constant = &baseline.constant_velocity.prediction_rms;
-    let blind = &baseline.knows_nothing.prediction_rms;
-    let mut reasons = Vec::new();
-    for (name, other) in [
-        ("a constant velocity", constant),
-        ("a model that knows nothing", blind),
-    ] {
-        if let (Some(own), Some(other)) = (&metrics.prediction_rms, other) {
-            let share = own.share_of(other);
-            if share.is_nan() || share > NO_BETTER {
-                reasons.push(format!(
-                    "it predicts one stage ahead with {share:.2} of the error of {name}"
-                ));
-            }
-        }
+/// The settings that a controller along these recordings has by default: recordings of fewer samples than a default
+/// stage has are followed at the rate of the slowest.
+pub fn usual_settings(recordings: &[Recording]) -> MpcSettings {
+    let default = MpcSettings::default();
+    let segments = recordings.iter().flat_map(|recording| &recording.segments);
+    let steps = segments.filter(|segment| segment.len() >= 2);
+    let slowest_s = steps.map(Segment::mean_step_s).fold(0.0, f64::max);
+    let is_slow = default.step_s < STEP_SLACK * slowest_s;
+    MpcSettings {
+        step_s: if is_slow { slowest_s } else { default.step_s },
+        ..default
     }
-    if let (Some(own), Some(off)) = (metrics.recovery_rms_m, baseline.feedback_off.recovery_rms_m)
-        && own > NO_BETTER * off
-    {
-        reasons.push(format!(
-            "after a push its feedback leaves {:.1} mm, no feedback {:.1} mm",
-            1e3 * own,
-            1e3 * off
-        ));
-    }
-    (!reasons.is_empty()).then(|| format!("the model has failed: {}", reasons.join("; ")))
 }

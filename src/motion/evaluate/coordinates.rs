@@ -1,5 +1,7 @@
 //! Rollouts against the recording, coordinate by coordinate, in SI units.
 
+use nalgebra::DVector;
+
 use super::metrics::{Fit, FitSums};
 use crate::model::{ModelError, ReducedModel};
 use crate::recording::Segment;
@@ -45,19 +47,40 @@ impl CoordinateSums {
     ) -> Result<(), ModelError> {
         for (sample, window, column) in rollout.predictions() {
             let x = model.decode(&window.z.column(column).into_owned())?;
-            let of_phase = &mut self.by_phase[latent.phase[sample]];
-            let sums = self.sums.iter_mut().zip(of_phase);
-            let recorded = segment.x.column(sample);
-            for (((sums, of_phase), &y), &y_hat) in sums.zip(recorded.iter()).zip(&x) {
-                sums.add(y, y_hat);
-                of_phase.add(y, y_hat);
-            }
+            self.add(segment, sample, latent.phase[sample], &x);
         }
         self.windows += rollout.windows.len();
         self.diverged += (rollout.windows.iter())
             .filter(|window| window.diverged_at_s.is_some())
             .count();
         Ok(())
+    }
+
+    /// Adds the residuals of a robot that keeps the recorded velocity at the start of each window, over the samples that
+    /// `rollout` predicts.
+    pub fn add_constant_velocity(
+        &mut self,
+        segment: &Segment,
+        latent: &LatentSegment,
+        rollout: &Rollout,
+    ) {
+        for (sample, window, _) in rollout.predictions() {
+            let start = window.samples.start;
+            let elapsed_s = segment.time_s[sample] - segment.time_s[start];
+            let x = segment.x.column(start) + segment.dx.column(start) * elapsed_s;
+            self.add(segment, sample, latent.phase[sample], &x);
+        }
+        self.windows += rollout.windows.len();
+    }
+
+    /// Adds the residuals of a predicted sample.
+    fn add(&mut self, segment: &Segment, sample: usize, phase: usize, x: &DVector<f64>) {
+        let sums = self.sums.iter_mut().zip(&mut self.by_phase[phase]);
+        let recorded = segment.x.column(sample);
+        for (((sums, of_phase), &y), &y_hat) in sums.zip(recorded.iter()).zip(x) {
+            sums.add(y, y_hat);
+            of_phase.add(y, y_hat);
+        }
     }
 
     /// Fit of each coordinate, in the order of the state; `None` before the first sample.

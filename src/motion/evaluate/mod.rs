@@ -1,7 +1,7 @@
 //! How good a model is, in numbers.
 //!
 //! Rollouts and recordings come in; fits (root mean square in SI units, coefficient of
-//! determination), template models under the same inputs, stability and the losses of the lift leave.
+//! determination), template models under the same inputs, stability, the losses of the lift and a [`Verdict`] leave.
 //! `docs/mathematics.md` defines each figure once. Start with `assessment.rs`, then
 //! [`metrics`](Fit).
 
@@ -23,6 +23,7 @@ mod recovery;
 mod remarks;
 mod round_trip;
 mod torque;
+mod verdict;
 
 pub use along_recording::{ReferenceInput, Run, StepRow, along_recording, lift_comparison};
 pub use aslip::{Aslip, AslipRollout, AslipSums};
@@ -31,7 +32,8 @@ pub use baseline::{Baseline, fit_aslip};
 pub use coefficient_trials::{CoefficientSlip, CoefficientTrials};
 pub use control::{StepTimes, Summary};
 pub use control_metrics::{
-    Baselines, ConstantVelocity, ControlMetrics, KnowsNothing, Pushed, control_metrics,
+    Baselines, ConstantVelocity, ControlMetrics, NoDynamics, Pushed, control_metrics,
+    usual_settings,
 };
 pub use coordinates::{CoordinateSums, PointwiseSums};
 pub use error::EvaluateError;
@@ -45,6 +47,9 @@ pub use prediction::PredictionError;
 pub use remarks::remarks;
 pub use round_trip::{AccelerationSlip, RoundTrip, Slip};
 pub use torque::{ByContact, Comparison, is_plausible};
+pub use verdict::{
+    AFTER_A_PUSH, Bound, TORQUES_IN_CONTACT, Verdict, VerdictRow, verdict, verdict_by_default,
+};
 
 /// A model of the project's own, by the name of its file.
 #[cfg(test)]

@@ -1,5 +1,5 @@
 //! Predictions one stage ahead: the recorded state and input in, where the robot is one control step later out; and
-//! a model that knows nothing, to compare with: the same maps, and latent inputs that accelerate their own coordinate.
+//! the no-dynamics baseline: the same maps, and latent inputs that accelerate their own coordinate.
 
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;

@@ -46,9 +46,9 @@ fn unexplained(model: &ReducedModel, pointwise: &PointwiseSums) -> Vec<String> {
         let r2 = r2?;
         (!phase.feet.matches([false; 4]) && r2 < bound).then(|| {
             format!(
-                "in {} the latent accelerations are further off than their mean would be (R^2 {r2:.2}): \
-                 these recordings are unlike those of the training. Another robot, other signs or \
-                 frames, or motions that it never saw? Do not rely on predictions or torques there",
+                "in {} the model's latent accelerations have a larger error than their mean (R^2 {r2:.2}). Either its \
+                 coefficients are wrong, or the recordings are of another robot, signs, axes or kind of motion than \
+                 those of the training. Do not rely on predictions or torques there",
                 phase.name
             )
         })

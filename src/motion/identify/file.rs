@@ -1,12 +1,11 @@
 //! An identification as a TOML file.
 
 use std::fmt::Write as _;
-use std::fs;
 use std::path::Path;
 
 use super::error::{IdentifyError, IdentifyFault};
 use super::identification::{Fit, Identification, Legs, PerKind, Samples};
-use crate::files::{Located, Place};
+use crate::files::{Located, Place, read_toml};
 use crate::robot::JOINT_NAMES;
 
 impl Identification {
@@ -61,7 +60,7 @@ impl Identification {
     /// value no robot has.
     pub fn read(path: &Path) -> Result<Self, IdentifyError> {
         let file = path.display().to_string();
-        let text = fs::read_to_string(path)
+        let text = read_toml(path)
             .map_err(|source| at(&file, Place::Whole, IdentifyFault::Read(source)))?;
         Self::from_toml(&file, &text)
     }

@@ -51,7 +51,7 @@ mod number;
 mod segments;
 
 pub use self::csv::{read, read_from_bytes};
-pub use self::write::{WriteOptions, write, write_mcap, write_with};
+pub use self::write::{WriteOptions, write, write_as, write_mcap, write_mcap_as, write_with};
 pub use clock::Mended;
 pub use condition::{Accelerations, ConditionOptions, ImplausibleSamples, SmoothedRows, condition};
 pub use error::{RecordingError, RecordingFault};

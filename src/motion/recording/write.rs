@@ -16,7 +16,7 @@ use super::columns::Column;
 use super::error::{RecordingError, RecordingFault};
 use super::foreign;
 use super::segment::{Recording, Segment};
-use crate::files::write_whole;
+use crate::files::{Overwrite, write_whole};
 use crate::robot::Robot;
 
 /// Cell separator and decimal mark.
@@ -66,8 +66,22 @@ pub fn write_with(
     inputs: Option<&[DMatrix<f64>]>,
     options: &WriteOptions,
 ) -> Result<(), RecordingError> {
+    write_as(path, recording, inputs, options, Overwrite::Replace)
+}
+
+/// [`write_with`], which may not replace a file.
+///
+/// # Errors
+/// As [`write()`], and for a file that is there and may not be replaced.
+pub fn write_as(
+    path: &Path,
+    recording: &Recording,
+    inputs: Option<&[DMatrix<f64>]>,
+    options: &WriteOptions,
+    overwrite: Overwrite,
+) -> Result<(), RecordingError> {
     let is_gzip = (path.extension()).is_some_and(|e| e.eq_ignore_ascii_case("gz"));
-    let written = write_whole(path, |mut file| {
+    let written = write_whole(path, overwrite, |mut file| {
         if !is_gzip {
             return write_to(&mut file, recording, inputs, options);
         }
@@ -87,10 +101,23 @@ pub fn write_mcap(
     segment: &Segment,
     inputs: Option<&DMatrix<f64>>,
 ) -> Result<(), RecordingError> {
+    write_mcap_as(path, segment, inputs, Overwrite::Replace)
+}
+
+/// [`write_mcap`], which may not replace a file.
+///
+/// # Errors
+/// As it, and for a file that is there and may not be replaced.
+pub fn write_mcap_as(
+    path: &Path,
+    segment: &Segment,
+    inputs: Option<&DMatrix<f64>>,
+    overwrite: Overwrite,
+) -> Result<(), RecordingError> {
     let mut bytes = io::Cursor::new(Vec::new());
     foreign::write_mcap(&mut bytes, segment, inputs)
         .map_err(|error| RecordingFault::Mcap(error.to_string()).of(path))?;
-    let written = write_whole(path, |file| file.write_all(bytes.get_ref()));
+    let written = write_whole(path, overwrite, |file| file.write_all(bytes.get_ref()));
     written.map_err(|source| RecordingFault::io("write", source).of(path))
 }
 

@@ -18,6 +18,7 @@ use std::path::Path;
 use serde::Deserialize;
 
 use super::elements::Quantity;
+use crate::files::read_toml;
 use crate::recording::error::{RecordingError, RecordingFault};
 
 /// A map as its file says it.
@@ -232,7 +233,7 @@ impl ColumnMap {
     /// [`RecordingFault::MapSyntax`] with line, key and what was expected; [`RecordingFault::Map`] for
     /// a key that does not apply to its table.
     pub fn read(path: &Path) -> Result<Self, RecordingError> {
-        let text = std::fs::read_to_string(path)
+        let text = read_toml(path)
             .map_err(|source| RecordingFault::unreadable("read", source).of(path))?;
         Self::parse(&path.display().to_string(), &text)
     }

@@ -1,4 +1,4 @@
-//! A report's first words: which robot and recordings, whether the model saw them, how good it is and for what.
+//! A report's first words: what the model is fit for, which robot and recordings, whether its training saw them, errors.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -8,34 +8,16 @@ use serde_json::{Value, json};
 use super::contents::{Content, jumps};
 use super::jump::modelled;
 use super::tables::{body_rms, template_rms};
-use crate::evaluate::{CoordinateSums, Fit};
+use crate::evaluate::Verdict;
 use crate::model::{ModelError, ReducedModel};
 use crate::recording::Segment;
 use crate::typeset::words::counted;
 use crate::typeset::{Table, rounded};
 
-/// Coefficient of determination from which a coordinate is predicted closely.
-const CLOSE: f64 = 0.9;
-/// Coefficient of determination from which a coordinate is predicted roughly.
-const ROUGH: f64 = 0.5;
-/// The same for predictions that start again and again from the recorded state: a standstill explains most of those.
-const CLOSE_RESTARTED: f64 = 0.99;
-
-/// How well body x and z are predicted.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Grade {
-    /// Worse than [`ROUGH`], or not at all.
-    Poor,
-    /// Between the two.
-    Rough,
-    /// At least [`CLOSE`].
-    Close,
-}
-
 /// An assessment in words.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Verdict {
-    /// One line: how good, and for what.
+pub struct Introduction {
+    /// One line: fit for what, and for what not.
     pub headline: String,
     /// Sentences that give the reasons.
     pub sentences: Vec<String>,
@@ -56,50 +38,57 @@ enum Seen {
 ///
 /// # Errors
 /// [`ModelError`] for a model without encoder or decoder.
-pub fn verdict(content: &Content<'_>) -> Result<Verdict, ModelError> {
-    let assessment = content.assessment;
-    let whole = grade(content, &assessment.full, CLOSE);
-    let short = grade(content, &assessment.restarted, CLOSE_RESTARTED);
-    let is_doubtful = !assessment.remarks.is_empty();
+pub fn introduction(content: &Content<'_>) -> Result<Introduction, ModelError> {
     let mut sentences = vec![subject(content)?, compared(content), errors(content)];
     sentences.extend(beside_pendulum(content));
     sentences.extend(commands(content));
-    Ok(Verdict {
-        headline: headline(whole, short, is_doubtful).to_owned(),
+    sentences.extend(cause(content));
+    Ok(Introduction {
+        headline: headline(content.verdict, !content.assessment.remarks.is_empty()),
         sentences,
         recordings: recordings(content)?,
     })
 }
 
-/// The worse of body x and z.
-fn grade(content: &Content<'_>, sums: &CoordinateSums, close: f64) -> Grade {
-    let of = |name| match content.assessment.fit(sums, name) {
-        Some(Fit { r2: Some(r2), .. }) if r2 >= close => Grade::Close,
-        Some(Fit { r2: Some(r2), .. }) if r2 >= ROUGH => Grade::Rough,
-        Some(_) | None => Grade::Poor,
+/// What a model is fit for, in one line.
+pub fn headline(verdict: &Verdict, is_doubtful: bool) -> String {
+    let words = |of: &String| match of.as_str() {
+        "whole motion" => "predictions of the whole motion".to_owned(),
+        "torques" | "control" => of.clone(),
+        short => format!("predictions over {short}"),
     };
-    of("body.x").min(of("body.z"))
+    let listed = |uses: &[String]| {
+        let words: Vec<String> = uses.iter().map(words).collect();
+        listed(&words)
+    };
+    let (fit, failed) = (listed(&verdict.fit_for), listed(&verdict.failed));
+    let judged = match (fit.as_str(), failed.as_str()) {
+        ("", "") => "Not judged: these recordings show nothing that it predicts.".to_owned(),
+        (fit, "") => format!("Fit for {fit}."),
+        ("", failed) => format!("Not fit for {failed}."),
+        (fit, failed) => format!("Fit for {fit}; not fit for {failed}."),
+    };
+    match is_doubtful {
+        true => format!("Do not rely on it here, see the notes. {judged}"),
+        false => judged,
+    }
 }
 
-fn headline(whole: Grade, short: Grade, is_doubtful: bool) -> &'static str {
-    if is_doubtful {
-        return "Do not rely on it here: the notes below say what is wrong with these recordings or with the model on them.";
+/// Why the model fails, where that is known: its maps lose the torques, or its training had these very recordings.
+fn cause(content: &Content<'_>) -> Option<String> {
+    let failed = &content.verdict.failed;
+    let lift_r2 = content.assessment.lift.torque.r2().contact;
+    if let Some(r2) = lift_r2.filter(|r2| *r2 < 0.5 && failed.iter().any(|of| of == "torques")) {
+        return Some(format!(
+            "Torques fail because encoder and decoder lose them: R^2 of recorded inputs projected and lifted is {r2:.2}."
+        ));
     }
-    match (short, whole) {
-        (Grade::Close, Grade::Close) => {
-            "Good: fit for control over short horizons, and for predicting whole jumps."
-        }
-        (Grade::Close, Grade::Rough) => {
-            "Good over short horizons, as control needs them; rough over whole jumps."
-        }
-        (Grade::Close, Grade::Poor) => {
-            "Good over short horizons, as control needs them; unfit for predicting whole jumps."
-        }
-        (Grade::Rough, _) => {
-            "Rough: fit for interpretation; control needs feedback at a high rate."
-        }
-        (Grade::Poor, _) => "Poor: it does not predict these jumps.",
-    }
+    let known = known_digests(content.model);
+    let mut paths = content.assessment.runs.iter().map(|run| &run.segment.path);
+    let are_known = paths.all(|path| seen(content, &known, path) == Seen::Yes);
+    (are_known && !failed.is_empty()).then(|| {
+        "The model is at fault, not the recordings: its training had these very files.".to_owned()
+    })
 }
 
 /// What the model is.
@@ -114,10 +103,12 @@ fn subject(content: &Content<'_>) -> Result<String, ModelError> {
     };
     let names = assessment.names.iter().zip(modelled);
     let absent = names.filter(|(_, is)| !is).map(|(name, _)| name.as_str());
-    let absent = match listed(&absent.collect::<Vec<_>>(), "is", "are").as_str() {
+    let absent: Vec<String> = absent.map(str::to_owned).collect();
+    let are = if absent.len() == 1 { "is" } else { "are" };
+    let absent = match listed(&absent).as_str() {
         "" => String::new(),
-        names_are => format!(
-            " {names_are} not modelled: no latent coordinate takes them in, and errors there say nothing about the dynamics."
+        names => format!(
+            " {names} {are} not modelled: no latent coordinate takes them in, and errors there say nothing about the dynamics."
         ),
     };
     Ok(format!(
@@ -128,12 +119,12 @@ fn subject(content: &Content<'_>) -> Result<String, ModelError> {
     ))
 }
 
-/// `a, b and c are`.
-fn listed(names: &[&str], one: &str, several: &str) -> String {
+/// `a, b and c`.
+fn listed(names: &[String]) -> String {
     match names {
         [] => String::new(),
-        [name] => format!("{name} {one}"),
-        [rest @ .., last] => format!("{} and {last} {several}", rest.join(", ")),
+        [name] => name.clone(),
+        [rest @ .., last] => format!("{} and {last}", rest.join(", ")),
     }
 }
 
@@ -235,8 +226,8 @@ fn beside_pendulum(content: &Content<'_>) -> Option<String> {
     ))
 }
 
-/// What the dynamics are worth to the controller: recovery from a push beside the same controller without feedback, and
-/// what became of its steps.
+/// The controller's recovery from a push, compared with the same controller without feedback, and what became of its
+/// steps.
 fn commands(content: &Content<'_>) -> Option<String> {
     let [mut steps, mut solved, mut violations] = [0; 3];
     let mut recoveries = Vec::new();
@@ -318,25 +309,33 @@ mod tests {
     use super::*;
 
     #[test]
-    fn headline_needs_both_horizons_to_be_good() {
-        let good = headline(Grade::Close, Grade::Close, false);
-        assert!(good.starts_with("Good: fit for control"));
-        for (whole, short) in [
-            (Grade::Poor, Grade::Close),
-            (Grade::Rough, Grade::Close),
-            (Grade::Close, Grade::Rough),
-            (Grade::Close, Grade::Poor),
-        ] {
-            assert_ne!(headline(whole, short, false), good);
-        }
-        assert!(headline(Grade::Close, Grade::Close, true).starts_with("Do not rely"));
-        assert!(headline(Grade::Close, Grade::Poor, false).starts_with("Poor"));
+    fn headline_lists_what_a_model_is_fit_for_and_what_not() {
+        let uses = |names: &[&str]| names.iter().map(|&name| name.to_owned()).collect();
+        let of = |fit: &[&str], failed: &[&str]| {
+            let verdict = Verdict {
+                fit_for: uses(fit),
+                failed: uses(failed),
+                rows: Vec::new(),
+            };
+            headline(&verdict, false)
+        };
+        let predictions = ["0.1 s", "whole motion"];
+        assert_eq!(
+            of(&predictions, &["torques", "control"]),
+            "Fit for predictions over 0.1 s and predictions of the whole motion; not fit for torques and control."
+        );
+        assert_eq!(of(&["control"], &[]), "Fit for control.");
+        assert_eq!(of(&[], &["torques"]), "Not fit for torques.");
+        assert!(of(&[], &[]).starts_with("Not judged"));
+        let doubtful = headline(&Verdict::default(), true);
+        assert!(doubtful.starts_with("Do not rely on it here"), "{doubtful}");
     }
 
     #[test]
     fn lists_and_counts_read_as_english() {
-        assert_eq!(listed(&["a", "b", "c"], "is", "are"), "a, b and c are");
-        assert_eq!(listed(&["a"], "is", "are"), "a is");
+        let names = ["a", "b", "c"].map(str::to_owned);
+        assert_eq!(listed(&names), "a, b and c");
+        assert_eq!(listed(&names[..1]), "a");
         assert_eq!([1, 2].map(|n| counted(n, "jump")), ["1 jump", "2 jumps"]);
     }
 }

@@ -1,0 +1,46 @@
+//! Texts of TOML files, bounded in size and in tables.
+
+use std::io;
+use std::path::Path;
+
+use super::size::{Format, read_text_capped};
+
+/// Most tables and dotted keys of a file, by their signs: a parsed table takes several hundred times the two bytes that it
+/// has in a file.
+const MOST_TABLES: usize = 20_000;
+
+/// The text of a TOML file.
+///
+/// # Errors
+/// As [`read_text_capped`], and [`io::ErrorKind::InvalidData`] for a file of more tables than any settings have.
+pub fn read_toml(path: &Path) -> io::Result<String> {
+    let text = read_text_capped(path, Format::Settings)?;
+    match text.bytes().filter(|byte| b".[{".contains(byte)).count() {
+        ..=MOST_TABLES => Ok(text),
+        found => {
+            let text = format!(
+                "found {found} signs of tables (`.`, `[`, `{{`), expected at most {MOST_TABLES}"
+            );
+            Err(io::Error::new(io::ErrorKind::InvalidData, text))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_of_too_many_tables_is_refused() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("settings.toml");
+        let read = |count: usize| {
+            std::fs::write(&path, format!("a{} = 0", ".b".repeat(count))).expect("written");
+            read_toml(&path)
+        };
+        assert_eq!(read(2).expect("settings"), "a.b.b = 0");
+        assert!(read(MOST_TABLES).is_ok());
+        let error = read(MOST_TABLES + 1).expect_err("too many");
+        assert_eq!(error.kind(), io::ErrorKind::InvalidData);
+    }
+}

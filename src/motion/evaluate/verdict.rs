@@ -1,0 +1,410 @@
+//! What a model is fit for: figures that depend on its dynamics, each compared with a baseline and a threshold.
+//!
+//! An [`Assessment`] and the controller's figures along recordings enter, a [`Verdict`] leaves. Each row has a use; a
+//! model is fit for a use if no counted row of it fails.
+
+use serde::Serialize;
+
+use super::assessment::Assessment;
+use super::control_metrics::{ControlMetrics, control_metrics, usual_settings};
+use super::coordinates::CoordinateSums;
+use super::error::EvaluateError;
+use super::linearised::LinearisedPhase;
+use crate::model::ReducedModel;
+use crate::recording::Recording;
+use crate::robot::{JOINT_DIM, Robot};
+
+/// Share of a baseline's error from which a model is no better than it.
+const NO_BETTER: f64 = 0.98;
+/// Largest error of a body coordinate over a short time, as a share of that of a constant velocity in x and z together:
+/// on its own, a coordinate that hardly accelerates would ask for more than recordings show.
+const SHORT_SHARE: f64 = 0.25;
+/// Largest error over the whole motion, as a share of that of a constant velocity in the same coordinate.
+const WHOLE_SHARE: f64 = 1.0 / 3.0;
+/// Error of a constant velocity in body x and z below which recordings hardly move the body, m.
+const STILL_M: f64 = 1e-4;
+/// Least R^2 of the torques in contact.
+const TORQUE_R2: f64 = 0.5;
+/// Most of the steps that may be without a plan.
+const UNPLANNED_SHARE: f64 = 0.5;
+/// Least number of latent directions in which inputs act on the ground: forwards and upwards.
+const LEAST_RANK: usize = 2;
+
+const WHOLE: &str = "whole motion";
+const TORQUES: &str = "torques";
+const CONTROL: &str = "control";
+/// Name of the row of torques that the controller finds itself.
+pub const TORQUES_IN_CONTACT: &str = "R^2 of torques in contact";
+/// Name of the row of feedback.
+pub const AFTER_A_PUSH: &str = "deviation after a push";
+const ONE_STAGE: &str = "error one stage ahead as a share of the baseline's";
+const CONSTANT_VELOCITY: &str = "constant velocity";
+const NO_DYNAMICS: &str = "no dynamics";
+
+/// The side of a threshold on which a value passes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub enum Bound {
+    /// Errors, shares.
+    #[serde(rename = "at most")]
+    AtMost,
+    /// Coefficients of determination, counts.
+    #[serde(rename = "at least")]
+    AtLeast,
+}
+
+impl Bound {
+    /// `at most`, `at least`.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::AtMost => "at most",
+            Self::AtLeast => "at least",
+        }
+    }
+}
+
+/// A figure of a model beside that of a baseline.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct VerdictRow {
+    /// What is measured.
+    pub name: String,
+    /// The use that the row decides on.
+    #[serde(rename = "use")]
+    pub of: String,
+    /// Unit of the numbers.
+    pub unit: &'static str,
+    /// The model's figure, that of the recording on which it is worst; infinite for a rollout that diverges, none where
+    /// recordings do not show it.
+    pub value: Option<f64>,
+    /// The same figure of the baseline.
+    pub baseline: Option<f64>,
+    /// The baseline's name.
+    pub baseline_name: &'static str,
+    /// What the value is compared with.
+    pub threshold: f64,
+    /// The side on which it passes.
+    pub bound: Bound,
+    /// Whether it passes; none without a value.
+    pub passed: Option<bool>,
+    /// Whether the verdict depends on the row.
+    pub counts: bool,
+}
+
+impl VerdictRow {
+    fn new(
+        (of, name, unit): (&str, &str, &'static str),
+        value: Option<f64>,
+        (baseline_name, baseline): (&'static str, Option<f64>),
+        (bound, threshold): (Bound, f64),
+    ) -> Self {
+        let passes = |value: f64| match bound {
+            Bound::AtMost => value <= threshold,
+            Bound::AtLeast => value >= threshold,
+        };
+        Self {
+            name: name.to_owned(),
+            of: of.to_owned(),
+            unit,
+            value,
+            baseline,
+            baseline_name,
+            threshold,
+            bound,
+            passed: value.map(passes),
+            counts: true,
+        }
+    }
+
+    fn uncounted(self) -> Self {
+        Self {
+            counts: false,
+            ..self
+        }
+    }
+
+    /// Whether the row decides that the model fails.
+    pub fn is_failed(&self) -> bool {
+        self.counts && self.passed == Some(false)
+    }
+
+    /// By how much the value passes, as a share of the threshold; infinite without one.
+    fn margin(&self) -> f64 {
+        let excess = self.value.map(|value| value - self.threshold);
+        let margin = excess.map_or(f64::INFINITY, |excess| match self.bound {
+            Bound::AtMost => -excess,
+            Bound::AtLeast => excess,
+        });
+        match margin.is_nan() {
+            true => f64::NEG_INFINITY,
+            false => margin / self.threshold.abs().max(f64::MIN_POSITIVE),
+        }
+    }
+
+    /// `deviation after a push 12.3 mm, at most 11.9 mm (feedback off: 12.1 mm)`.
+    pub fn words(&self) -> String {
+        let shown = |value: f64| match self.unit {
+            "m" => format!("{:.1} mm", 1e3 * value),
+            "" if value.fract() == 0.0 => format!("{value}"),
+            unit => format!("{value:.3} {unit}").trim_end().to_owned(),
+        };
+        let value = match self.value {
+            None => "not measured".to_owned(),
+            Some(value) if value.is_infinite() => "diverges".to_owned(),
+            Some(value) => shown(value),
+        };
+        let baseline = (self.baseline)
+            .map(|baseline| format!(" ({}: {})", self.baseline_name, shown(baseline)));
+        format!(
+            "{} {value}, {} {}{}",
+            self.name,
+            self.bound.words(),
+            shown(self.threshold),
+            baseline.unwrap_or_default()
+        )
+    }
+}
+
+/// What a model is fit for on some recordings, and why. Uses are `0.1 s` (predictions of body x and z between restarts, by
+/// their time), `whole motion` (the same from the first sample on), `torques` (those that the controller finds itself) and
+/// `control`; one that recordings or model do not allow to measure is in neither list.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Verdict {
+    /// Uses of which every counted row passes.
+    pub fit_for: Vec<String>,
+    /// Uses of which one fails.
+    pub failed: Vec<String>,
+    /// Every figure.
+    pub rows: Vec<VerdictRow>,
+}
+
+impl Verdict {
+    /// Whether predictions of body x or z fail.
+    pub fn fails_predictions(&self) -> bool {
+        let others = [TORQUES, CONTROL];
+        (self.failed.iter()).any(|of| !others.contains(&of.as_str()))
+    }
+
+    /// Whether torques or control fail.
+    pub fn fails_control(&self) -> bool {
+        let mut failed = self.failed.iter();
+        failed.any(|of| [TORQUES, CONTROL].contains(&of.as_str()))
+    }
+
+    /// Counted rows that fail.
+    pub fn failures(&self) -> impl Iterator<Item = &VerdictRow> {
+        self.rows.iter().filter(|row| row.is_failed())
+    }
+}
+
+/// The verdict on a model from its rollouts and the controller's figures along each recording; without these, torques and
+/// control are not judged.
+pub fn verdict(
+    model: &ReducedModel,
+    assessment: &Assessment<'_>,
+    control: &[&ControlMetrics],
+) -> Verdict {
+    let short = format!("{} s", assessment.restart_every_s);
+    let mut rows = prediction_rows(assessment, &short);
+    let mut of_control = worst_of(control);
+    if !control.is_empty() {
+        of_control.extend(rank_row(model, assessment));
+    }
+    without_predictions(&mut of_control);
+    rows.extend(of_control);
+    let mut verdict = Verdict::default();
+    for of in [&short, WHOLE, TORQUES, CONTROL] {
+        let mut counted = rows.iter().filter(|row| row.of == of && row.counts);
+        if counted.clone().any(VerdictRow::is_failed) {
+            verdict.failed.push(of.to_owned());
+        } else if counted.any(|row| row.passed == Some(true)) {
+            verdict.fit_for.push(of.to_owned());
+        }
+    }
+    Verdict { rows, ..verdict }
+}
+
+/// The verdict with a controller of [`usual_settings`], and why this one was not measured, if so.
+pub fn verdict_by_default(
+    model: &ReducedModel,
+    recordings: &[Recording],
+    assessment: &Assessment<'_>,
+) -> (Verdict, Option<EvaluateError>) {
+    let settings = usual_settings(recordings);
+    let measured = recordings.iter();
+    let measured = measured.map(|recording| control_metrics(model, recording, settings));
+    match measured.collect::<Result<Vec<_>, _>>() {
+        Ok(control) => {
+            let control: Vec<&ControlMetrics> = control.iter().collect();
+            (verdict(model, assessment, &control), None)
+        }
+        Err(error) => (verdict(model, assessment, &[]), Some(error)),
+    }
+}
+
+/// Rollouts compared with a constant velocity: body x and z count, pitch and legs do not.
+fn prediction_rows(assessment: &Assessment<'_>, short: &str) -> Vec<VerdictRow> {
+    let [whole, restarted] = &assessment.constant_velocity;
+    let shares = [(NO_BETTER, SHORT_SHARE), (WHOLE_SHARE, f64::INFINITY)];
+    let horizons = [
+        (short, &assessment.restarted, restarted),
+        (WHOLE, &assessment.full, whole),
+    ];
+    let mut rows = Vec::new();
+    for ((of, own, constant), (of_own, of_both)) in horizons.into_iter().zip(shares) {
+        let rms = |sums: &CoordinateSums, names: &[&str]| joint_rms(assessment, sums, names);
+        let [x, z] = ["body.x", "body.z"].map(|name| rms(constant, &[name]).unwrap_or(0.0));
+        let row = |name: &str, names: &[&str], unit, limit: &dyn Fn(f64) -> f64| {
+            let (value, baseline) = (rms(own, names)?, rms(constant, names)?);
+            let value = match own.diverged {
+                0 => Some(value).filter(|_| x.hypot(z) > STILL_M),
+                _ => Some(f64::INFINITY),
+            };
+            let name = format!("error of {name} over {}", over(of));
+            let against = (CONSTANT_VELOCITY, Some(baseline));
+            let bound = (Bound::AtMost, limit(baseline));
+            Some(VerdictRow::new((of, &name, unit), value, against, bound))
+        };
+        let limit = |baseline: f64| (of_own * baseline).min(of_both * x.hypot(z));
+        let body = ["body.x", "body.z"].map(|name| row(name, &[name], "m", &limit));
+        rows.extend(body.into_iter().flatten());
+        let names = Robot::state_names();
+        let joints: Vec<&str> = names[..JOINT_DIM].iter().map(String::as_str).collect();
+        let same = |baseline| baseline;
+        let others = [
+            row("body.pitch", &["body.pitch"], "rad", &same),
+            row("the legs", &joints, "rad", &same),
+        ];
+        rows.extend(others.into_iter().flatten().map(VerdictRow::uncounted));
+    }
+    rows
+}
+
+/// `the whole motion`, `0.1 s`.
+fn over(of: &str) -> String {
+    match of {
+        WHOLE => format!("the {of}"),
+        short => short.to_owned(),
+    }
+}
+
+/// Root mean square over these coordinates together; none if a model or recording has one of them not.
+fn joint_rms(assessment: &Assessment<'_>, sums: &CoordinateSums, names: &[&str]) -> Option<f64> {
+    let squares = names
+        .iter()
+        .map(|name| Some(assessment.fit(sums, name)?.rms.powi(2)));
+    let total: f64 = squares.collect::<Option<Vec<_>>>()?.iter().sum();
+    Some((total / names.len() as f64).sqrt())
+}
+
+/// Of each row of [`control_rows`] that of the recording along which it is worst.
+fn worst_of(control: &[&ControlMetrics]) -> Vec<VerdictRow> {
+    let mut worst: Vec<VerdictRow> = Vec::new();
+    for rows in control.iter().map(|metrics| control_rows(metrics)) {
+        match worst.is_empty() {
+            true => worst.extend(rows),
+            false => (worst.iter_mut().zip(rows))
+                .filter(|(worst, row)| row.margin() < worst.margin())
+                .for_each(|(worst, row)| *worst = row),
+        }
+    }
+    worst
+}
+
+/// Where predictions one stage ahead fail, what else passes of the control is not due to the dynamics: it counts as not
+/// measured.
+fn without_predictions(rows: &mut [VerdictRow]) {
+    if rows
+        .iter()
+        .any(|row| row.name == ONE_STAGE && row.is_failed())
+    {
+        let others = rows.iter_mut().filter(|row| row.of == CONTROL);
+        for row in others.filter(|row| row.passed == Some(true)) {
+            (row.value, row.passed) = (None, None);
+        }
+    }
+}
+
+/// Torques and control along one recording.
+fn control_rows(metrics: &ControlMetrics) -> [VerdictRow; 5] {
+    let baseline = &metrics.baseline;
+    let blind = &baseline.no_dynamics;
+    let torque = |name, own: Option<f64>, other: Option<f64>| {
+        let threshold = other.map_or(TORQUE_R2, |other| other.max(TORQUE_R2));
+        let against = (NO_DYNAMICS, other);
+        VerdictRow::new(
+            (TORQUES, name, ""),
+            own,
+            against,
+            (Bound::AtLeast, threshold),
+        )
+    };
+    let [contact, flight] = [
+        (
+            TORQUES_IN_CONTACT,
+            metrics.torque_r2.contact,
+            blind.torque_r2.contact,
+        ),
+        (
+            "R^2 of torques in flight",
+            metrics.torque_r2.flight,
+            blind.torque_r2.flight,
+        ),
+    ]
+    .map(|(name, own, other)| torque(name, own, other));
+    let stage = |name, other: &Option<_>| {
+        let share = (metrics.prediction_rms.as_ref())
+            .zip(other.as_ref())
+            .map(|(own, other)| own.share_of(other));
+        let row = (CONTROL, ONE_STAGE, "");
+        VerdictRow::new(row, share, (name, Some(1.0)), (Bound::AtMost, NO_BETTER))
+    };
+    let constant = stage(
+        CONSTANT_VELOCITY,
+        &baseline.constant_velocity.prediction_rms,
+    );
+    let uninformed = stage(NO_DYNAMICS, &blind.prediction_rms);
+    let stage = match uninformed.margin() < constant.margin() {
+        true => uninformed,
+        false => constant,
+    };
+    let off = baseline.feedback_off.recovery_rms_m;
+    let push = VerdictRow::new(
+        (CONTROL, AFTER_A_PUSH, "m"),
+        metrics.recovery_rms_m.filter(|_| off.is_some()),
+        ("feedback off", off),
+        (Bound::AtMost, NO_BETTER * off.unwrap_or(0.0)),
+    );
+    let unplanned = VerdictRow::new(
+        (CONTROL, "share of steps without a plan", ""),
+        Some(metrics.unplanned_share),
+        ("", None),
+        (Bound::AtMost, UNPLANNED_SHARE),
+    );
+    [contact, flight.uncounted(), stage, push, unplanned]
+}
+
+/// The rows that fail along a recording, in words.
+pub(super) fn failure(metrics: &ControlMetrics) -> Option<String> {
+    let rows = control_rows(metrics);
+    let failed = rows.iter().filter(|row| row.is_failed());
+    let words: Vec<String> = failed.map(VerdictRow::words).collect();
+    (!words.is_empty()).then(|| words.join("; "))
+}
+
+/// The directions in which inputs act, in the phase with feet on the ground that has fewest.
+fn rank_row(model: &ReducedModel, assessment: &Assessment<'_>) -> Option<VerdictRow> {
+    let phases = model.phases().iter().zip(&assessment.linearised);
+    let on_ground = phases.filter(|(phase, _)| !phase.feet.matches([false; 4]));
+    let ranks = on_ground.filter_map(|(_, linear)| linear.as_ref());
+    let least = ranks.map(LinearisedPhase::input_effective_rank).min()?;
+    let d = model.latent_dim();
+    Some(VerdictRow::new(
+        (
+            CONTROL,
+            "latent directions in which inputs act on the ground",
+            "",
+        ),
+        Some(least as f64),
+        (NO_DYNAMICS, Some(d as f64)),
+        (Bound::AtLeast, LEAST_RANK.min(d) as f64),
+    ))
+}

@@ -1,0 +1,163 @@
+//! Flags that a command would ignore: refused by name.
+
+use std::collections::BTreeSet;
+
+use clap::{CommandFactory as _, Parser as _};
+
+use romc::Error;
+use romc::cli::args::{Arguments, Command, refuse_idle};
+
+/// Command lines with a flag that does nothing there, and that flag.
+const IDLE: [(&str, &str); 30] = [
+    (
+        "compile m.json --out-dir o --emit latex --precision f32",
+        "--precision",
+    ),
+    (
+        "compile m.json --out-dir o --emit python --sincos library",
+        "--sincos",
+    ),
+    (
+        "compile m.json --out-dir o --emit latex --units scaled",
+        "--units scaled",
+    ),
+    (
+        "compile m.json --out-dir o --emit controller --units physical",
+        "--units physical",
+    ),
+    ("compile m.json --out-dir o --emit c --digits 3", "--digits"),
+    (
+        "compile m.json --out-dir o --emit c,rust --significant 3",
+        "--significant",
+    ),
+    (
+        "compile m.json --out-dir o --emit c --rename z1=x",
+        "--rename",
+    ),
+    (
+        "compile m.json --out-dir o --emit python --width 22",
+        "--width",
+    ),
+    (
+        "compile m.json --out-dir o --emit markdown --form align",
+        "--form",
+    ),
+    (
+        "compile m.json --out-dir o --emit mathml --siunitx",
+        "--siunitx",
+    ),
+    ("compile m.json --out-dir o --columns c.toml", "--columns"),
+    ("compile m.json --out-dir o --clock recorded", "--clock"),
+    (
+        "compile m.json --out-dir o --domain r.toml --clock recorded",
+        "--clock",
+    ),
+    ("inspect m.json --robot go2", "--robot"),
+    ("inspect m.json --columns c.toml", "--columns"),
+    ("inspect m.json --clock repaired", "--clock"),
+    ("inspect --guess log.csv --clock repaired", "--clock"),
+    ("check a.json b.txt --exact", "--exact"),
+    ("check a.json b.txt --symbols z1=x", "--symbols"),
+    (
+        "mpc m.json r.csv --lift consistent --torque-rate 100",
+        "--torque-rate",
+    ),
+    ("plan m.json --reach --columns c.toml", "--columns"),
+    (
+        "plan m.json --distance 0.3 --apex 0.1 --output p.csv --clock recorded",
+        "--clock",
+    ),
+    ("import e.txt --output m.json --symbols z1=x", "--symbols"),
+    (
+        "import e.tex --output m.json --activation elu",
+        "--activation",
+    ),
+    (
+        "import e.txt --output m.json --robot go1 --order body,fl,fr,rl,rr",
+        "--order",
+    ),
+    ("import n.npz --output m.json --columns c.toml", "--columns"),
+    ("robot go1 --feet a,b,c,d", "--feet"),
+    ("study --merge a b --columns c.toml", "--columns"),
+    ("study --merge a b --clock recorded", "--clock"),
+    ("import n.npz --output m.json --clock repaired", "--clock"),
+];
+
+/// The same flags where they do something.
+const USED: [&str; 11] = [
+    "compile m.json --out-dir o --emit c --precision f32 --units scaled --sincos library",
+    "compile m.json --out-dir o --emit latex --digits 3 --rename z1=x --form align --siunitx",
+    "compile m.json --out-dir o --emit c --digits 3 --domain r.csv --clock recorded",
+    "compile m.json --out-dir o --emit markdown --units physical --width 22",
+    "compile m.json --out-dir o --emit controller-c --plan p.csv --columns c.toml",
+    "inspect m.json r.csv --robot go2 --columns c.toml --clock repaired",
+    "check a.json b.tex --exact --symbols z1=x",
+    "mpc m.json r.csv --torque-rate 100",
+    "plan m.json --distance 0.3 --apex 0.1 --output p.csv --start r.csv --clock recorded",
+    "import n.npz --output m.json --robot go1 --order body,fl,fr,rl,rr --inputs-from r.csv --clock recorded",
+    "robot r.urdf --feet a,b,c,d",
+];
+
+fn parsed(line: &str) -> Command {
+    let words = ["romc"].into_iter().chain(line.split(' '));
+    let parsed = Arguments::try_parse_from(words);
+    parsed
+        .unwrap_or_else(|error| panic!("{line}: {error}"))
+        .command
+}
+
+#[test]
+fn a_flag_without_effect_is_refused_by_name_and_one_with_effect_is_not() {
+    for (line, idle) in IDLE {
+        match refuse_idle(&parsed(line)) {
+            Err(error @ Error::Idle { flag, .. }) => {
+                assert_eq!(flag, idle, "{line}");
+                assert!(error.is_usage());
+            }
+            other => panic!("{line}: {other:?}"),
+        }
+    }
+    for line in USED {
+        refuse_idle(&parsed(line)).unwrap_or_else(|error| panic!("{line}: {error}"));
+    }
+}
+
+/// Flags that always have an effect, or that clap itself or their command refuses where they have none.
+const ELSEWHERE: &str = "json help version force output out-dir \
+    compile: emit as-learned tolerance domain margin save-model plan \
+    inspect: guess check: domain convert: inputs-of clock columns identify: robot clock columns \
+    simulate: restart-every clock columns mpc: horizon step lift reference-input solver figures clock columns \
+    plan: distance apex start figures reach settings \
+    report: study figures plan restart-every tolerance clock columns \
+    import: format map weights xi-layout library latent-dim phase scaling input-scaling robot wrench-frame \
+    actuators sample-time inputs-from unchecked name description \
+    train: validation test split config latent-dim method robot paper seed seeds epochs encoder-layers \
+    decoder-layers activation lift-weight body-weight bptt-weight bptt-window bptt-stride bptt-decay \
+    bptt-integrator slack refinements growth no-rotation degree trigonometric terms actuators wrench-frame phases \
+    leave-out-implausible accelerations smooth smooth-rows moving-average mask-std mask-input-share coordinates state-scaling \
+    torque-scaling force-scaling moment-scaling name clock columns \
+    study: validation latent-dims seeds method paper robot config lambda shard merge";
+
+#[test]
+fn every_flag_is_in_the_table_or_known_to_be_used_or_refused_elsewhere() {
+    let mut known = BTreeSet::new();
+    let mut command = "";
+    for word in ELSEWHERE.split_whitespace() {
+        match word.strip_suffix(':') {
+            Some(name) => command = name,
+            None => drop(known.insert((command, word))),
+        }
+    }
+    for (line, flag) in IDLE {
+        let command = line.split(' ').next().expect("a command");
+        let flag = flag.trim_start_matches("--").split(' ').next();
+        known.insert((command, flag.expect("a flag")));
+    }
+    for command in Arguments::command().get_subcommands() {
+        for flag in command.get_arguments().filter_map(clap::Arg::get_long) {
+            let name = command.get_name();
+            let is_known = known.contains(&(name, flag)) || known.contains(&("", flag));
+            assert!(is_known, "--{flag} of {name}: can it be without effect?");
+        }
+    }
+}
