@@ -1,0 +1,140 @@
+//! How many bytes are read of a file, and how many those may unpack to: one table for all formats.
+//!
+//! Sizes that a file states of itself are not trusted: readers stop where the table says, whatever was announced.
+
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::Path;
+
+/// A kind of file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// Settings, maps of columns, robots: TOML and XML.
+    Settings,
+    /// Models: JSON.
+    Model,
+    /// Equations: text, LaTeX.
+    Equations,
+    /// Tensors: safetensors, npz.
+    Tensors,
+    /// Recordings and logs as text, plain or unpacked.
+    Recording,
+    /// One chunk of an MCAP log, packed or unpacked.
+    Chunk,
+}
+
+const MB: u64 = 1 << 20;
+
+impl Format {
+    /// Most bytes, and the format in words.
+    const fn facts(self) -> (u64, &'static str) {
+        match self {
+            Self::Settings => (2 * MB, "settings"),
+            Self::Model => (256 * MB, "a model"),
+            Self::Equations => (16 * MB, "equations"),
+            Self::Tensors => (4096 * MB, "tensors"),
+            Self::Recording => (4096 * MB, "a recording"),
+            Self::Chunk => (1024 * MB, "a chunk of a log"),
+        }
+    }
+
+    /// Most bytes that are read.
+    pub const fn most_bytes(self) -> u64 {
+        self.facts().0
+    }
+
+    /// Most bytes that this many packed ones may unpack to: logs of real sensors shrink to a tenth, not to a
+    /// two-hundredth.
+    pub fn most_unpacked(self, packed: u64) -> u64 {
+        const RATIO: u64 = 200;
+        const ALWAYS: u64 = 32 * MB;
+        (RATIO.saturating_mul(packed).saturating_add(ALWAYS)).min(self.most_bytes())
+    }
+
+    /// The error of a file with more bytes.
+    pub fn too_large(self, most: u64) -> io::Error {
+        let text = format!(
+            "more than {most} bytes, expected at most so many of {}",
+            self.facts().1
+        );
+        io::Error::new(io::ErrorKind::FileTooLarge, text)
+    }
+}
+
+/// A source that fails beyond a number of bytes instead of ending there.
+#[derive(Debug)]
+pub struct Capped<R> {
+    source: R,
+    format: Format,
+    most: u64,
+    left: u64,
+}
+
+impl<R: Read> Capped<R> {
+    /// At most `most` bytes of a source.
+    pub fn new(source: R, format: Format, most: u64) -> Self {
+        let left = most;
+        Self {
+            source,
+            format,
+            most,
+            left,
+        }
+    }
+}
+
+impl<R: Read> Read for Capped<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let count = self.source.read(buffer)?;
+        self.left = (self.left.checked_sub(count as u64))
+            .ok_or_else(|| self.format.too_large(self.most))?;
+        Ok(count)
+    }
+}
+
+/// The bytes of a file, or of a device or pipe, up to the most of its format.
+///
+/// # Errors
+/// Those of the file system, and [`io::ErrorKind::FileTooLarge`].
+pub fn read_capped(path: &Path, format: Format) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    let file = File::open(path)?;
+    Capped::new(file, format, format.most_bytes()).read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
+/// [`read_capped`] of a text.
+///
+/// # Errors
+/// As [`read_capped`], and [`io::ErrorKind::InvalidData`] for bytes that are not UTF-8.
+pub fn read_text_capped(path: &Path, format: Format) -> io::Result<String> {
+    let not_text = |error| io::Error::new(io::ErrorKind::InvalidData, error);
+    String::from_utf8(read_capped(path, format)?).map_err(not_text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_source_of_the_most_bytes_is_read_and_one_byte_more_is_not() {
+        let read = |count: u64| {
+            let source = io::repeat(1).take(count);
+            io::copy(&mut Capped::new(source, Format::Model, 10), &mut io::sink())
+        };
+        assert_eq!(read(10).expect("the most"), 10);
+        let error = read(11).expect_err("more");
+        assert_eq!(error.kind(), io::ErrorKind::FileTooLarge);
+        assert!(
+            error.to_string().starts_with("more than 10 bytes"),
+            "{error}"
+        );
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_device_without_end_is_refused() {
+        let error = read_capped("/dev/zero".as_ref(), Format::Settings).expect_err("endless");
+        assert_eq!(error.kind(), io::ErrorKind::FileTooLarge);
+    }
+}
