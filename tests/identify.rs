@@ -6,7 +6,7 @@ mod made;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use romc::identify::{Identification, identify};
+use romc::identify::{Identification, IdentifyError, identify};
 use romc::recording::{self, Recording};
 use romc::robot::Robot;
 use serde_json::Value;
@@ -260,4 +260,82 @@ fn values_that_the_motion_contradicts_are_told() {
         assert!(!has_note(&right, start), "{:?}", right.notes);
         assert!(has_note(&wrong, start), "{start}: {:?}", wrong.notes);
     }
+}
+
+fn read_all(names: &[&str]) -> Vec<Recording> {
+    let read = |name: &&str| recording::read(&path(name)).expect("a shipped recording");
+    names.iter().map(read).collect()
+}
+
+/// The refusal of recordings that are not of one robot.
+fn contradiction(recordings: &[Recording]) -> String {
+    let go1 = Robot::by_name("go1").expect("a known robot");
+    match identify(recordings, go1) {
+        Err(error @ IdentifyError::Contradiction { .. }) => error.to_string(),
+        Err(error) => panic!("{error}"),
+        Ok(found) => panic!("{} kg, {}", found.mass_kg, found.gravity_m_s2),
+    }
+}
+
+#[test]
+fn recordings_that_contradict_each_other_or_physics_are_refused_by_name() {
+    let names = [
+        "go1/test_01.csv.gz",
+        "go1/test_02.csv.gz",
+        "go1/test_03.csv.gz",
+    ];
+    let right = read_all(&names);
+    let spoiled = |at: usize, spoil: &dyn Fn(&mut recording::Segment)| {
+        let mut wrong = right.clone();
+        wrong[at].segments.iter_mut().for_each(spoil);
+        contradiction(&wrong)
+    };
+    for at in 0..3 {
+        let error = spoiled(at, &|segment| segment.torque_nm.fill(0.0));
+        assert!(
+            error.contains(names[at]) && error.contains("its torques carry 0.000"),
+            "{error}"
+        );
+        let error = spoiled(at, &|segment| segment.torque_nm.neg_mut());
+        assert!(
+            error.contains(names[at]) && error.contains("its torques carry -"),
+            "{error}"
+        );
+        let error = spoiled(at, &|segment| segment.torque_nm *= 1e3);
+        assert!(error.contains(names[at]), "{error}");
+        let error = spoiled(at, &|segment| {
+            for matrix in [&mut segment.x, &mut segment.dx, &mut segment.ddx] {
+                matrix.row_mut(14).scale_mut(0.5);
+            }
+        });
+        assert!(
+            error.contains(names[at]) && error.contains("in flight"),
+            "{error}"
+        );
+        let error = spoiled(at, &|segment| segment.torque_nm *= 1.2);
+        assert!(
+            error.contains(names[at]) && error.contains("its mass is"),
+            "{error}"
+        );
+    }
+    // Two robots of nearly the same geometry, as files and as segments of one.
+    let go2 = read_all(&[
+        "go2-asynchronous/train_01.csv.gz",
+        "go2-asynchronous/train_02.csv.gz",
+    ]);
+    let both = [&right[..2], &go2[..]].concat();
+    assert!(contradiction(&both).contains("its mass is"));
+    let mut one = right[0].clone();
+    one.segments.extend(go2[0].segments.iter().cloned());
+    let error = contradiction(&[one]);
+    assert!(error.contains(", segment "), "{error}");
+    // A payload, or a wrong mass in the robot's file, that all have.
+    let mut heavier = right;
+    let segments = heavier
+        .iter_mut()
+        .flat_map(|recording| &mut recording.segments);
+    segments.for_each(|segment| segment.torque_nm *= 1.3);
+    let go1 = Robot::by_name("go1").expect("a known robot");
+    let found = identify(&heavier, go1).expect("one robot");
+    assert!(found.mass_kg > 15.5, "{}", found.mass_kg);
 }

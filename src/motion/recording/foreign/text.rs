@@ -101,11 +101,10 @@ impl Sheet {
             numbers: numbers(),
             log: Log {
                 path: path.to_owned(),
-                name: String::new(),
-                clock: None,
                 columns: vec![Channel::default(); cells.len()],
                 is_named,
                 first_row: if is_named { row + 1 } else { row },
+                ..Log::default()
             },
         };
         if is_named {

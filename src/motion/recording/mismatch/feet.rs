@@ -5,7 +5,7 @@ use super::Broken;
 use super::stance::{foot_place, orders};
 use crate::recording::preprocess::median;
 use crate::recording::{Recording, Segment};
-use crate::robot::{ContactFlags, FOOT_DIM, Leg, Robot};
+use crate::robot::{ContactFlags, FOOT_DIM, JOINT_DIM, Leg, Robot};
 
 /// By how much feet in the air have to be higher in sum in another order, m, and as a share of that sum.
 ///
@@ -71,6 +71,40 @@ pub(super) fn floor(recording: &Recording, robot: &Robot) -> Option<Broken> {
              over the ground?"
         );
         (value, FLOOR_M, words)
+    })
+}
+
+/// Lowest height of the trunk's origin over the feet on the ground, m, and largest angle of its z axis to the vertical
+/// while feet are on the ground, rad.
+const TRUNK: (f64, f64) = (0.02, 1.2);
+/// Shortest time that it lies, s.
+const LIES_S: f64 = 0.1;
+
+/// Time, s, that the trunk lies on the ground or is under it, if that is long enough.
+pub(super) fn fallen(recording: &Recording, robot: &Robot) -> Option<Broken> {
+    let (mut lies_s, mut lowest, mut steepest) = (0.0, f64::INFINITY, 0.0_f64);
+    for segment in &recording.segments {
+        let grounded = (segment.feet.iter().enumerate()).filter(|(_, feet)| feet.contains(&true));
+        for (sample, feet) in grounded {
+            let x = segment.state(sample);
+            let floor = median(Leg::down(*feet).map(|leg| foot_place(robot, leg, &x, false).z));
+            let height = x[JOINT_DIM + 2] - floor.min(0.0);
+            let tilt = (x[JOINT_DIM + 3].cos() * x[JOINT_DIM + 4].cos())
+                .clamp(-1.0, 1.0)
+                .acos();
+            if height < TRUNK.0 || tilt > TRUNK.1 {
+                lies_s += segment.mean_step_s();
+            }
+            (lowest, steepest) = (lowest.min(height), steepest.max(tilt));
+        }
+    }
+    (lies_s > LIES_S).then(|| {
+        let words = format!(
+            "for {lies_s:.2} s with feet on the ground the trunk is tilted by up to {:.0} degrees and as low as \
+             {lowest:.2} m: did the robot fall? `rows` in `[text]` of a map keeps the jump alone",
+            steepest.to_degrees()
+        );
+        (lies_s, LIES_S, words)
     })
 }
 
