@@ -24,4 +24,5 @@ mod random_bytes;
 mod real_jumps;
 #[path = "recording/sheet.rs"]
 mod sheet;
+#[allow(dead_code, reason = "no tool is needed here")]
 mod tools;

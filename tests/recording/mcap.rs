@@ -9,7 +9,7 @@ use mcap::{MessageStream, WriteOptions, Writer};
 use romc::recording::{self, Clocks, ColumnMap, Reader, Reading, RecordingError, Segment};
 use romc::robot::JOINT_NAMES;
 
-use super::foreign::{difference, jump};
+use super::foreign::{difference, gyro, jump, quaternion};
 use super::tools::is_thorough;
 
 /// A message of a topic with its time of recording.
@@ -85,37 +85,97 @@ impl Bag {
     }
 }
 
-/// A joint state in CDR, little endian, as `sensor_msgs/JointState` has it.
+/// A message in CDR, little endian.
+#[derive(Default)]
+struct Cdr(Vec<u8>);
+
+impl Cdr {
+    fn put(&mut self, align: usize, bytes: &[u8]) {
+        self.0.resize(self.0.len().next_multiple_of(align), 0);
+        self.0.extend(bytes);
+    }
+
+    fn length(&mut self, length: usize) {
+        self.put(4, &(length as u32).to_le_bytes());
+    }
+
+    fn text(&mut self, text: &str) {
+        self.length(text.len() + 1);
+        self.0.extend(text.as_bytes());
+        self.0.push(0);
+    }
+
+    fn single(&mut self, value: f64) {
+        self.put(4, &(value as f32).to_le_bytes());
+    }
+
+    fn message(self) -> Vec<u8> {
+        [&[0, 1, 0, 0], &self.0[..]].concat()
+    }
+}
+
+/// A joint state, as `sensor_msgs/JointState` has it.
 fn joint_state(time_ns: u64, names: &[String], lists: [&[f64]; 3]) -> Vec<u8> {
-    let mut out = Vec::new();
-    fn put(out: &mut Vec<u8>, align: usize, bytes: &[u8]) {
-        out.resize(out.len().next_multiple_of(align), 0);
-        out.extend(bytes);
-    }
-    let text = |out: &mut Vec<u8>, text: &str| {
-        put(out, 4, &(text.len() as u32 + 1).to_le_bytes());
-        out.extend(text.as_bytes());
-        out.push(0);
-    };
-    put(
-        &mut out,
-        4,
-        &((time_ns / 1_000_000_000) as u32).to_le_bytes(),
-    );
-    put(
-        &mut out,
-        4,
-        &((time_ns % 1_000_000_000) as u32).to_le_bytes(),
-    );
-    text(&mut out, "world");
-    put(&mut out, 4, &(names.len() as u32).to_le_bytes());
-    names.iter().for_each(|name| text(&mut out, name));
+    let mut out = Cdr::default();
+    out.length((time_ns / 1_000_000_000) as usize);
+    out.length((time_ns % 1_000_000_000) as usize);
+    out.text("world");
+    out.length(names.len());
+    names.iter().for_each(|name| out.text(name));
     for list in lists {
-        put(&mut out, 4, &(list.len() as u32).to_le_bytes());
+        out.length(list.len());
         list.iter()
-            .for_each(|value| put(&mut out, 8, &value.to_le_bytes()));
+            .for_each(|value| out.put(8, &value.to_le_bytes()));
     }
-    [&[0, 1, 0, 0], &out[..]].concat()
+    out.message()
+}
+
+const LOW_STATE: &str = "IMUState imu_state\nMotorState[20] motor_state\nint16[4] foot_force\nuint32 tick\n\
+     ===\nMSG: unitree_go/IMUState\nfloat32[4] quaternion\nfloat32[3] gyroscope\nfloat32[3] accelerometer\n\
+     float32[3] rpy\nint8 temperature\n===\nMSG: unitree_go/MotorState\nuint8 mode\nfloat32 q\nfloat32 dq\n\
+     float32 ddq\nfloat32 tau_est\nfloat32 q_raw\nfloat32 dq_raw\nfloat32 ddq_raw\nint8 temperature\n\
+     uint32 lost\nuint32[2] reserve\n";
+
+/// A low-level state of Unitree's, as `unitree_go/LowState` has it in its main parts.
+fn low_state(s: &Segment, sample: usize) -> Vec<u8> {
+    let mut out = Cdr::default();
+    quaternion(s, sample)
+        .iter()
+        .for_each(|value| out.single(*value));
+    gyro(s, sample).iter().for_each(|value| out.single(*value));
+    [0.0, 0.0, 9.81].iter().for_each(|value| out.single(*value));
+    (15..18).for_each(|row| out.single(s.x[(row, sample)]));
+    out.put(1, &[40]);
+    for motor in 0..20 {
+        let of = |m: &nalgebra::DMatrix<f64>| if motor < 12 { m[(motor, sample)] } else { 0.0 };
+        out.put(1, &[1]);
+        for value in [
+            of(&s.x),
+            of(&s.dx),
+            0.0,
+            of(&s.torque_nm),
+            of(&s.x),
+            0.0,
+            0.0,
+        ] {
+            out.single(value);
+        }
+        out.put(1, &[30]);
+        (0..3).for_each(|_| out.length(0));
+    }
+    for foot in 0..4 {
+        let down = s.feet[sample][foot];
+        let force = 21
+            + foot as i16
+            + if down {
+                60 + (sample % 7) as i16
+            } else {
+                (sample % 3) as i16
+            };
+        out.put(2, &force.to_le_bytes());
+    }
+    out.length(sample);
+    out.message()
 }
 
 /// Whole numbers below a bound, the same in every run.
@@ -215,7 +275,7 @@ const STYLES: [([&str; 4], [&str; 3], &str); 5] = [
 fn joints_go_by_the_names_of_each_message() {
     let folder = tempfile::tempdir().unwrap();
     let whole = jump();
-    let jump = whole.slice(0..60);
+    let jump = whole.slice(220..280);
     let bag = Bag::of(&jump);
     let by_map = "[joint.position]\ntopic = \"/joint_states\"\ncolumns = \"position[{leg}.{joint}]\"\n\
          [joint.torque]\ntopic = \"/joint_states\"\ncolumns = \"effort[{leg}.{joint}]\"\n\
@@ -252,7 +312,7 @@ fn joints_go_by_the_names_of_each_message() {
 #[test]
 fn joints_that_are_not_the_robots_are_refused_or_left_out() {
     let folder = tempfile::tempdir().unwrap();
-    let jump = jump().slice(0..60);
+    let jump = jump().slice(220..280);
     let bag = Bag::of(&jump);
     let arm = |joints: &[(String, [f64; 3])], name: &dyn Fn(usize) -> String| {
         let renamed = joints
@@ -623,4 +683,46 @@ fn logs_of_other_formats_are_named_with_the_line_that_converts_them() {
     let path = folder.path().join("jump.bag");
     recording::write_mcap(&path, &jump, None).unwrap();
     is_the_jump(&path, &jump);
+}
+
+/// Go2s publish `/lf/lowstate` at a tenth of the rate of `/lowstate`.
+#[test]
+fn of_two_topics_the_faster_is_taken_and_the_other_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let jump = jump();
+    let mut bag = Bag::of(&jump);
+    let low = ("unitree_go/msg/LowState".to_owned(), LOW_STATE.into());
+    bag.schemas = [("/lf/lowstate", low.clone()), ("/lowstate", low)]
+        .into_iter()
+        .map(|(topic, schema)| (topic.to_owned(), schema))
+        .chain(
+            bag.schemas
+                .into_iter()
+                .filter(|(topic, _)| topic == "/odom"),
+        )
+        .collect();
+    let odometry = bag
+        .messages
+        .iter()
+        .filter(|message| message.topic == "/odom");
+    let mut messages = Vec::new();
+    for (sample, odometry) in odometry.enumerate() {
+        let state = |topic: &str| Message {
+            topic: topic.to_owned(),
+            time_ns: odometry.time_ns,
+            bytes: low_state(&jump, sample),
+        };
+        messages.extend((sample % 10 == 0).then(|| state("/lf/lowstate")));
+        messages.push(state("/lowstate"));
+        messages.push(odometry.clone());
+    }
+    let reading =
+        read(&bag.file(folder.path(), &messages)).unwrap_or_else(|error| panic!("{error}"));
+    let (state, velocity, contact) = difference(&reading.recording, &jump);
+    assert!(
+        state < 1e-5 && velocity < 1e-4 && contact,
+        "{state} {velocity} {contact}"
+    );
+    let notes = reading.notes.join("\n");
+    assert!(notes.contains("`/lf/lowstate` (50 Hz)"), "{notes}");
 }

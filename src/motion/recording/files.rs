@@ -7,7 +7,7 @@ use std::sync::{Arc, OnceLock};
 use super::check::{Finding, check};
 use super::condition::{ConditionOptions, ImplausibleSamples, SmoothedRows, condition};
 use super::error::{RecordingError, RecordingFault};
-use super::mismatch::{Balance, Mismatch, contradiction, mismatches};
+use super::mismatch::{Balance, Mismatch, MismatchKind, contradiction, mismatches};
 use super::reader::{Clocks, Reader, Reading, ReadingNotes};
 use super::segment::{Recording, Segment};
 use super::smoothing::SavitzkyGolay;
@@ -243,6 +243,13 @@ impl RecordingFiles {
                 true => mismatches(&recording, self.robot),
                 false => Vec::new(),
             };
+            if let Some(fallen) = unlike
+                .iter()
+                .find(|found| found.kind == MismatchKind::Fallen)
+            {
+                let fault = RecordingFault::Contradiction(fallen.words.clone());
+                return Err(fault.of(&recording.path));
+            }
             let balance =
                 is_first.then(|| (recording.path.clone(), Balance::of(&recording, self.robot)));
             let (recording, left_out) = condition(recording, &findings, &options)?;

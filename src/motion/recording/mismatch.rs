@@ -38,6 +38,8 @@ const FALL_M_S2: (f64, f64) = (-16.0, -6.5);
 const WEIGHT_SHARE: (f64, f64) = (0.45, 1.7);
 /// Least share of the hips' torques that hold the feet on their own side: 1 for vertical forces.
 const HIP_SHARE: f64 = -0.3;
+/// The same where both legs of one end alone are below that.
+const HIP_SHARE_OF_PAIR: f64 = -0.5;
 /// Largest median difference of the body's acceleration and the slope of its velocity, m/s^2.
 const ACCELERATION_M_S2: f64 = 2.0;
 /// Share of the weight below which torques carry nothing.
@@ -323,15 +325,16 @@ fn hip_torques(balance: &Balance) -> Option<Broken> {
         .filter_map(|(leg, share)| Some((leg, share.filter(|share| *share < HIP_SHARE)?)))
         .collect();
     let value = (wrong.iter().map(|(_, share)| *share)).min_by(f64::total_cmp)?;
-    // Both legs of one end alone pull inwards where feet stick and positions are controlled.
-    let is_of_end = |end: [Leg; 2]| wrong.iter().all(|(leg, _)| end.contains(leg));
-    if wrong.len() == 2 && Leg::ALL.chunks(2).any(|end| is_of_end([end[0], end[1]])) {
+    // Both legs of one end alone pull inwards where feet stick and positions are controlled, and less than exchanged ones.
+    let is_of_end = |end: &[Leg]| wrong.iter().all(|(leg, _)| end.contains(leg));
+    let is_pair = wrong.len() == 2 && Leg::ALL.chunks(2).any(is_of_end);
+    if is_pair && wrong.iter().any(|(_, share)| *share > HIP_SHARE_OF_PAIR) {
         return None;
     }
     let names: Vec<&str> = wrong.iter().map(|(leg, _)| leg.short_name()).collect();
     let words = format!(
         "the hips' torques of {} hold the feet on the other side of the body: are left and right legs or the \
-         torques' signs exchanged?",
+         torques' signs exchanged, or do feet stick and pull inwards?",
         names.join(", ")
     );
     Some((value, HIP_SHARE, words))

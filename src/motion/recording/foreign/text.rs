@@ -126,7 +126,14 @@ impl Sheet {
             cells.pop();
         }
         if cells.len() != expected {
-            let (found, hint) = (cells.len(), "");
+            let found = cells.len();
+            let hint = match log.len() {
+                0 if log.is_named => {
+                    "; lines before the header are left out by `skip = 1` in `[text]` of the map, which \
+                     `romc inspect --guess` finds"
+                }
+                _ => "",
+            };
             let fault = RecordingFault::RowLength {
                 found,
                 expected,

@@ -56,15 +56,7 @@ fn higher_m(feet: &ContactFlags, height: &[f64; FOOT_DIM], legs: &[Leg; FOOT_DIM
 
 /// The median height of the feet that are on the ground, if that is not the floor's.
 pub(super) fn floor(recording: &Recording, robot: &Robot) -> Option<Broken> {
-    let mut heights = Vec::new();
-    for segment in &recording.segments {
-        for (sample, feet) in segment.feet.iter().enumerate() {
-            let x = segment.state(sample);
-            heights.extend(Leg::down(*feet).map(|leg| foot_place(robot, leg, &x, false).z));
-        }
-    }
-    // 0 where no foot ever stands.
-    let value = median(heights.into_iter());
+    let value = floor_m(recording, robot);
     (value.abs() > FLOOR_M).then(|| {
         let words = format!(
             "feet on the ground are at a height of {value:.2} m ({FLOOR_M:.2} m are accepted): is z that of the trunk \
@@ -74,24 +66,36 @@ pub(super) fn floor(recording: &Recording, robot: &Robot) -> Option<Broken> {
     })
 }
 
-/// Lowest height of the trunk's origin over the feet on the ground, m, and largest angle of its z axis to the vertical
-/// while feet are on the ground, rad.
-const TRUNK: (f64, f64) = (0.02, 1.2);
+/// Median height of the feet that are on the ground, m.
+fn floor_m(recording: &Recording, robot: &Robot) -> f64 {
+    let mut heights = Vec::new();
+    for segment in &recording.segments {
+        for (sample, feet) in segment.feet.iter().enumerate() {
+            let x = segment.state(sample);
+            heights.extend(Leg::down(*feet).map(|leg| foot_place(robot, leg, &x, false).z));
+        }
+    }
+    // 0 where no foot ever stands.
+    median(heights.into_iter())
+}
+
+/// Lowest height of the trunk's origin over the floor, m, and largest angle of its z axis to the vertical while feet are
+/// on the ground, rad.
+const TRUNK: (f64, f64) = (0.05, 1.6);
 /// Shortest time that it lies, s.
 const LIES_S: f64 = 0.1;
 
-/// Time, s, that the trunk lies on the ground or is under it, if that is long enough.
+/// Time, s, that the trunk lies on the ground, or under it, or on its back, if that is long enough.
 pub(super) fn fallen(recording: &Recording, robot: &Robot) -> Option<Broken> {
+    let floor_m = floor_m(recording, robot);
     let (mut lies_s, mut lowest, mut steepest) = (0.0, f64::INFINITY, 0.0_f64);
     for segment in &recording.segments {
-        let grounded = (segment.feet.iter().enumerate()).filter(|(_, feet)| feet.contains(&true));
-        for (sample, feet) in grounded {
+        let grounded = (0..segment.len()).filter(|sample| segment.feet[*sample].contains(&true));
+        for sample in grounded {
             let x = segment.state(sample);
-            let floor = median(Leg::down(*feet).map(|leg| foot_place(robot, leg, &x, false).z));
-            let height = x[JOINT_DIM + 2] - floor.min(0.0);
-            let tilt = (x[JOINT_DIM + 3].cos() * x[JOINT_DIM + 4].cos())
-                .clamp(-1.0, 1.0)
-                .acos();
+            let height = x[JOINT_DIM + 2] - floor_m;
+            let upright = x[JOINT_DIM + 3].cos() * x[JOINT_DIM + 4].cos();
+            let tilt = upright.clamp(-1.0, 1.0).acos();
             if height < TRUNK.0 || tilt > TRUNK.1 {
                 lies_s += segment.mean_step_s();
             }

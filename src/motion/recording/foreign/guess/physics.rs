@@ -20,6 +20,8 @@ const OUTSIDE_M: f64 = 4e-3;
 const TURNED_M: f64 = 1e-4;
 /// Share of a figure, and its difference in m, by which another reading has to be better than a plainer one.
 const BETTER: (f64, f64) = (0.75, 5e-4);
+/// Least movement of feet on stiff legs that shows anything, m.
+const LEAST_MOTION_M: f64 = 3e-3;
 /// Length of the times over which forces and changes of velocity are summed, s.
 const BLOCK_S: f64 = 0.08;
 /// Share of what torques leave unexplained by which another set of signs has to be better than one sign for all.
@@ -42,6 +44,8 @@ pub(super) struct Reading {
     pub signs: [f64; JOINT_DIM],
     /// How far feet on the ground move in it, root mean square, m.
     pub slip_m: f64,
+    /// How far they would on stiff legs, which units that are too small make little of.
+    motion_m: f64,
     /// For each kind of joint whether feet on the ground show its sign.
     shown: [bool; 3],
 }
@@ -55,13 +59,19 @@ impl Reading {
             by_kind: false,
             signs: [1.0; JOINT_DIM],
             slip_m: 0.0,
+            motion_m: 0.0,
             shown: [false; 3],
         }
     }
 
-    /// Whether it is better than a plainer one by more than chance.
+    /// Whether it is better than a plainer one by more than chance: feet move less compared with what they would on stiff
+    /// legs, whatever the units.
     pub fn beats(&self, other: &Self) -> bool {
-        self.slip_m < BETTER.0 * other.slip_m && self.slip_m + BETTER.1 < other.slip_m
+        let figure = |reading: &Self| match reading.motion_m > LEAST_MOTION_M {
+            true => reading.slip_m / reading.motion_m,
+            false => 1.0,
+        };
+        figure(self) < BETTER.0 * figure(other)
     }
 
     /// Whether feet on the ground stay in place in it.
@@ -185,11 +195,35 @@ impl<'a> View<'a> {
             (codes, reading.slip_m) = (own, rms(&parts)?);
         }
         reading.signs = std::array::from_fn(|i| combination(codes[i / 3])[i % 3]);
+        reading.motion_m = self.motion_m(&reading);
         reading.shown = std::array::from_fn(|kind| {
             let turned = whole[common ^ (1 << kind)];
             whole[common] < BETTER.0 * turned && whole[common] + BETTER.1 < turned
         });
         Some(reading)
+    }
+
+    /// How far feet on the ground would move on legs that stay as they are at the beginning of each stance, root mean
+    /// square, m.
+    fn motion_m(&self, reading: &Reading) -> f64 {
+        let (mut sum, mut count) = (0.0, 0);
+        for (segment, leg, samples) in &self.stances {
+            let stiff = samples
+                .first()
+                .map(|sample| state(segment, *sample, reading));
+            let places = samples
+                .iter()
+                .zip(stiff.iter().cycle())
+                .map(|(sample, stiff)| {
+                    let mut x = state(segment, *sample, reading);
+                    x[..JOINT_DIM].copy_from_slice(&stiff[..JOINT_DIM]);
+                    foot_place(self.robot, *leg, &x, true)
+                });
+            let places: Vec<Vector3<f64>> = places.collect();
+            sum += about_median(&places);
+            count += places.len();
+        }
+        (sum / f64::from(u32::try_from(count).unwrap_or(u32::MAX).max(1))).sqrt()
     }
 
     /// Squared distances of a leg's foot from where it stands, summed, and their number.
@@ -211,11 +245,7 @@ impl<'a> View<'a> {
                     foot_place(self.robot, leg, &x, true)
                 })
                 .collect();
-            let stands = Vector3::from_fn(|axis, _| median(places.iter().map(|place| place[axis])));
-            sum += places
-                .iter()
-                .map(|place| (place - stands).norm_squared())
-                .sum::<f64>();
+            sum += about_median(&places);
             sum += OUTSIDE_M * OUTSIDE_M * outside as f64;
             count += places.len();
         }
@@ -381,6 +411,15 @@ impl<'a> View<'a> {
             _ => [common; 4],
         }
     }
+}
+
+/// Squared distances of places from their median, summed.
+fn about_median(places: &[Vector3<f64>]) -> f64 {
+    let stands = Vector3::from_fn(|axis, _| median(places.iter().map(|place| place[axis])));
+    places
+        .iter()
+        .map(|place| (place - stands).norm_squared())
+        .sum()
 }
 
 /// The state of a sample in a reading.
