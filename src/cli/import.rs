@@ -33,7 +33,7 @@ pub fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
         .and_robot(arguments.robot.as_deref())
         .check_output(Some(&arguments.output), Format::MODEL, arguments.force)?;
     let imported = import(&arguments.file, &options(arguments)?)?;
-    let recordings = read_recordings(&arguments.inputs_from, &arguments.reading)?;
+    let recordings = read_recordings(&arguments.inputs_from, &arguments.reading, None)?;
     let segments: Vec<&Segment> = recordings.iter().flat_map(|r| &r.segments).collect();
     let model = match segments.is_empty() {
         true => imported.model,

@@ -34,7 +34,11 @@ pub fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
         .and(&arguments.reading.columns);
     inputs.check_output(Some(&arguments.output), Format::PAGE, arguments.force)?;
     let model = artifact::read(&arguments.model)?;
-    let recordings = read_recordings(&arguments.recordings, &arguments.reading)?;
+    let recordings = read_recordings(
+        &arguments.recordings,
+        &arguments.reading,
+        model.robot().ok(),
+    )?;
     let study = match &arguments.study {
         None => None,
         Some(folder) => Some(Summary::of(&Store::open(folder)?.cells()?, LAMBDA)),
@@ -42,7 +46,11 @@ pub fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
     let plan = match &arguments.plan {
         None => None,
         Some(path) => {
-            let mut read = read_recordings(std::slice::from_ref(path), &arguments.reading)?;
+            let mut read = read_recordings(
+                std::slice::from_ref(path),
+                &arguments.reading,
+                model.robot().ok(),
+            )?;
             note_mismatches(&read[0], model.robot()?);
             Some(read.swap_remove(0))
         }

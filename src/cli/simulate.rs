@@ -26,7 +26,11 @@ pub fn run(arguments: &SimulateArguments) -> Result<Answer, Error> {
         .and(&arguments.reading.columns)
         .check_output(arguments.output.as_deref(), Format::TABLE, arguments.force)?;
     let model = artifact::read(&arguments.model)?;
-    let recordings = read_recordings(&arguments.recordings, &arguments.reading)?;
+    let recordings = read_recordings(
+        &arguments.recordings,
+        &arguments.reading,
+        model.robot().ok(),
+    )?;
     let progress = spinner("simulating");
     let assessment = Assessment::over(&model, &recordings, arguments.restart_every)?;
     progress.finish_and_clear();

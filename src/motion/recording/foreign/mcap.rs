@@ -97,71 +97,88 @@ impl<'a, R: Read> Scan<'a, R> {
     /// Reads all records; a note if the file ends before its end.
     fn whole(&mut self, path: &Path) -> Result<Option<String>, RecordingFault> {
         let before = self.topics.messages;
-        let mut start = self.bytes(MCAP.len() as u64)?;
-        if start != MCAP {
-            start.extend(self.bytes((MAGIC_BYTES - MCAP.len()) as u64)?);
-            return Err(match (recognised(path, &start), start.len()) {
-                (Some(format), _) => RecordingFault::OtherFormat(format),
-                (None, found) if found < MCAP.len() => {
-                    RecordingFault::Mcap(format!("it ends after {found} bytes"))
-                }
-                (None, _) => RecordingFault::Mcap("it begins with other bytes".to_owned()),
-            });
-        }
-        self.section.update(&start);
+        self.magic(path)?;
         loop {
             let at = self.offset;
-            let header = self.bytes(RECORD_HEADER as u64)?;
-            let &[kind, ref length @ ..] = &header[..] else {
+            let Some((header, body)) = self.next()? else {
                 return self.ended(before);
             };
-            let Ok(length) = <[u8; 8]>::try_from(length).map(u64::from_le_bytes) else {
-                return self.ended(before);
-            };
-            if kind == 0 && length == 0 && self.is_zero_to_the_end()? {
-                return self.ended(before);
-            }
-            let damaged = |words: String| damaged(&format!("the record at byte {at}"), words);
-            let most = Format::Chunk.most_bytes();
-            if length > most {
-                return Err(damaged(format!("{length} bytes, expected at most {most}")));
-            }
-            let body = self.bytes(length)?;
-            if body.len() as u64 != length {
-                // The end of the file is there: it was not cut off.
-                return match body.ends_with(MCAP) {
-                    true => Err(damaged(format!(
-                        "{length} bytes, which the file does not have"
-                    ))),
-                    false => self.ended(before),
-                };
-            }
-            let record = parsed(kind, &body).map_err(damaged)?;
-            let is_end = matches!(record, Some(Record::Footer(_)));
-            // What the checksum of a section covers of the record that ends it, and that checksum.
-            let end = match &record {
-                Some(Record::DataEnd(end)) => Some((0, end.data_section_crc)),
-                Some(Record::Footer(footer)) => Some((body.len() - 4, footer.summary_crc)),
-                _ => None,
-            };
-            let covered = end.map_or(body.len(), |(covered, _)| covered);
-            if covered > 0 {
-                self.section.update(&header);
-                self.section.update(&body[..covered]);
-            }
-            if let Some((_, stated)) = end {
-                let found = std::mem::take(&mut self.section).sum();
-                same_checksum(stated, found).map_err(damaged)?;
-            }
-            match record {
-                Some(Record::Chunk { header, data }) => self.chunk(&header, data, at)?,
-                Some(record) => add(self.topics, record).map_err(damaged)?,
-                None => {}
-            }
-            if is_end {
+            if self.take(&header, &body, at)? {
                 return Ok(None);
             }
         }
+    }
+
+    /// The first bytes of the file.
+    fn magic(&mut self, path: &Path) -> Result<(), RecordingFault> {
+        let mut start = self.bytes(MCAP.len() as u64)?;
+        if start == MCAP {
+            self.section.update(&start);
+            return Ok(());
+        }
+        start.extend(self.bytes((MAGIC_BYTES - MCAP.len()) as u64)?);
+        Err(match (recognised(path, &start), start.len()) {
+            (Some(format), _) => RecordingFault::OtherFormat(format),
+            (None, found) if found < MCAP.len() => {
+                RecordingFault::Mcap(format!("it ends after {found} bytes"))
+            }
+            (None, _) => RecordingFault::Mcap("it begins with other bytes".to_owned()),
+        })
+    }
+
+    /// The next record, its header and contents; none where the file ends before that.
+    fn next(&mut self) -> Result<Option<(Vec<u8>, Vec<u8>)>, RecordingFault> {
+        let at = self.offset;
+        let header = self.bytes(RECORD_HEADER as u64)?;
+        let Some(length) = header.get(1..).and_then(|length| length.try_into().ok()) else {
+            return Ok(None);
+        };
+        let length = u64::from_le_bytes(length);
+        if header[0] == 0 && length == 0 && self.is_zero_to_the_end()? {
+            return Ok(None);
+        }
+        let refused = |words: String| Err(damaged(&format!("the record at byte {at}"), words));
+        let most = Format::Chunk.most_bytes();
+        if length > most {
+            return refused(format!("{length} bytes, expected at most {most}"));
+        }
+        let body = self.bytes(length)?;
+        match body.len() as u64 == length {
+            true => Ok(Some((header, body))),
+            // The end of the file is there: it was not cut off.
+            false if body.ends_with(MCAP) => {
+                refused(format!("{length} bytes, which the file does not have"))
+            }
+            false => Ok(None),
+        }
+    }
+
+    /// Adds a record that begins at this byte; whether it is the last.
+    fn take(&mut self, header: &[u8], body: &[u8], at: u64) -> Result<bool, RecordingFault> {
+        let damaged = |words: String| damaged(&format!("the record at byte {at}"), words);
+        let record = parsed(header[0], body).map_err(damaged)?;
+        let is_last = matches!(record, Some(Record::Footer(_)));
+        // How much of a record that ends a section its checksum covers, and that checksum.
+        let end = match &record {
+            Some(Record::DataEnd(end)) => Some((0, end.data_section_crc)),
+            Some(Record::Footer(footer)) => Some((body.len() - 4, footer.summary_crc)),
+            _ => None,
+        };
+        let covered = end.map_or(body.len(), |(covered, _)| covered);
+        if end.is_none() || covered > 0 {
+            self.section.update(header);
+            self.section.update(&body[..covered]);
+        }
+        if let Some((_, stated)) = end {
+            let found = std::mem::take(&mut self.section).sum();
+            same_checksum(stated, found).map_err(damaged)?;
+        }
+        match record {
+            Some(Record::Chunk { header, data }) => self.chunk(&header, data, at)?,
+            Some(record) => add(self.topics, record).map_err(damaged)?,
+            None => {}
+        }
+        Ok(is_last)
     }
 
     /// Up to so many bytes: fewer at the end of the file.

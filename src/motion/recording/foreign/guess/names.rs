@@ -160,7 +160,8 @@ pub(super) fn read(name: &str) -> Option<Reading> {
     if has(FEET) || (is_force && axis.is_none() && joint.is_none()) {
         let element = leg.or(number.filter(|n| *n < 4));
         let is_moved = has("position pos velocity vel speed");
-        let is_place = axis.map_or(is_moved, |axis| axis != 2 || is_moved);
+        let is_contact = has("contact contacts stance touch");
+        let is_place = axis.map_or(is_moved && !is_contact, |axis| axis != 2 || is_moved);
         return match element {
             Some(element) if !is_place => reading(Quantity::Feet, element, false, leg.is_none()),
             Some(_) | None => None,

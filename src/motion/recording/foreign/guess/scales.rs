@@ -34,6 +34,17 @@ pub(super) struct Scales {
     pub notes: Vec<String>,
 }
 
+/// How the log is read.
+struct Choice {
+    /// Index among the attitudes.
+    attitude: usize,
+    reading: Reading,
+    /// Signs and unit of the torques, if these carry the robot.
+    torques: Option<([f64; JOINT_DIM], NamedUnit)>,
+    /// Other readings that fit as well.
+    as_well: Vec<Reading>,
+}
+
 /// A way to read the trunk's attitude: its lines, and roll, pitch and yaw.
 type Attitude = (Vec<String>, DMatrix<f64>);
 
@@ -47,63 +58,19 @@ impl Source<'_> {
             notes.extend(note);
         }
         let attitudes = self.attitudes();
-        let positions = self.units(
-            Quantity::BodyPosition,
-            &["mm", "cm"],
-            &LENGTHS,
-            || match reach(self.raw_of(Quantity::BodyPosition).row(2).iter().copied()) {
-                60.0.. => "mm",
-                4.0.. => "cm",
-                _ => "m",
-            },
-        );
-        let joints = self.units(
-            Quantity::JointPosition,
-            &["mrad", "rad", "deg"],
-            &["rad", "deg"],
-            || {
-                let is_large =
-                    reach(self.raw_of(Quantity::JointPosition).iter().copied()) > ANGLE_RAD;
-                if is_large { "deg" } else { "rad" }
-            },
-        );
-        let counted = self
-            .group(Quantity::JointPosition)
-            .is_some_and(|group| group.is_counted);
-        let orders: &[bool] = if counted { &[false, true] } else { &[false] };
-        let mut found: Option<(usize, Reading, Option<_>)> = None;
-        let mut as_well: Vec<Reading> = Vec::new();
-        for (at, (attitude, _)) in attitudes.iter().enumerate() {
-            let raw = self.without_scales(time, attitude, &lines);
-            let Some(recording) = raw else { continue };
-            let view = View::of(&recording, robot);
-            let Some((mut reading, others)) = view.best(&positions, &joints, orders) else {
-                continue;
-            };
-            if found
-                .as_ref()
-                .is_none_or(|(_, best, _)| reading.beats(best))
-            {
-                let torques = view.torques(&mut reading);
-                found = Some((at, reading, torques));
-                as_well = others;
-            }
-        }
-        let chosen = found.as_ref().map_or(0, |(at, ..)| *at);
-        let (reading, torques) = match found {
-            Some((_, reading, torques)) => (reading, torques),
-            None => (
-                self.by_limits(robot, positions.first(), joints.first()),
-                None,
-            ),
-        };
+        let Choice {
+            attitude,
+            reading,
+            torques,
+            as_well,
+        } = self.choice(robot, time, &attitudes, &lines);
         notes.extend(said(&reading, &as_well));
         let turned = |what: &str, signs: &[f64]| {
             sign_line(signs).map(|line| format!("{what}: {line}, as the feet and the weight show"))
         };
         notes.extend(turned("joint.position", &reading.signs));
         notes.extend(torques.and_then(|(signs, _)| turned("joint.torque", &signs)));
-        if let Some((own, angles)) = attitudes.into_iter().nth(chosen) {
+        if let Some((own, angles)) = attitudes.into_iter().nth(attitude) {
             self.trunk(own, &angles, reading.position, &mut lines);
         } else {
             self.place(None, reading.position, &mut lines);
@@ -115,6 +82,54 @@ impl Source<'_> {
             order,
             notes,
         }
+    }
+
+    /// The reading under which feet on the ground stay best in place; by the joints' limits where no feet stand.
+    fn choice(&self, robot: &Robot, time: &str, attitudes: &[Attitude], lines: &Lines) -> Choice {
+        let height = || reach(self.raw_of(Quantity::BodyPosition).row(2).iter().copied());
+        let by_height = || match height() {
+            60.0.. => "mm",
+            4.0.. => "cm",
+            _ => "m",
+        };
+        let positions = self.units(Quantity::BodyPosition, &["mm", "cm"], &LENGTHS, by_height);
+        let angle = || reach(self.raw_of(Quantity::JointPosition).iter().copied());
+        let by_size = || if angle() > ANGLE_RAD { "deg" } else { "rad" };
+        let told = ["mrad", "rad", "deg"];
+        let joints = self.units(Quantity::JointPosition, &told, &["rad", "deg"], by_size);
+        let group = self.group(Quantity::JointPosition);
+        let orders: &[bool] = match group.is_some_and(|group| group.is_counted) {
+            true => &[false, true],
+            false => &[false],
+        };
+        let mut found: Option<Choice> = None;
+        for (attitude, (own, _)) in attitudes.iter().enumerate() {
+            let Some(recording) = self.without_scales(time, own, lines) else {
+                continue;
+            };
+            let view = View::of(&recording, robot);
+            let Some((mut reading, as_well)) = view.best(&positions, &joints, orders) else {
+                continue;
+            };
+            if found
+                .as_ref()
+                .is_none_or(|best| reading.beats(&best.reading))
+            {
+                let torques = view.torques(&mut reading);
+                found = Some(Choice {
+                    attitude,
+                    reading,
+                    torques,
+                    as_well,
+                });
+            }
+        }
+        found.unwrap_or_else(|| Choice {
+            attitude: 0,
+            reading: self.by_limits(robot, positions.first(), joints.first()),
+            torques: None,
+            as_well: Vec::new(),
+        })
     }
 
     /// Values of a quantity, none without it.
