@@ -2,11 +2,15 @@
 
 #[path = "identify/made.rs"]
 mod made;
+#[allow(dead_code, reason = "folders alone")]
+mod outside;
+#[allow(dead_code, reason = "no tool is needed here")]
+mod tools;
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use romc::identify::{Identification, identify};
+use romc::identify::{Identification, IdentifyError, identify};
 use romc::recording::{self, Recording};
 use romc::robot::Robot;
 use serde_json::Value;
@@ -259,5 +263,158 @@ fn values_that_the_motion_contradicts_are_told() {
     for (wrong, start) in [(half, "the mass is "), (shrunk, "gravity is ")] {
         assert!(!has_note(&right, start), "{:?}", right.notes);
         assert!(has_note(&wrong, start), "{start}: {:?}", wrong.notes);
+    }
+}
+
+fn read_all(names: &[&str]) -> Vec<Recording> {
+    let read = |name: &&str| recording::read(&path(name)).expect("a shipped recording");
+    names.iter().map(read).collect()
+}
+
+/// The refusal of recordings that are not of one robot.
+fn contradiction(recordings: &[Recording]) -> String {
+    let go1 = Robot::by_name("go1").expect("a known robot");
+    match identify(recordings, go1) {
+        Err(error @ IdentifyError::Contradiction { .. }) => error.to_string(),
+        Err(error) => panic!("{error}"),
+        Ok(found) => panic!("{} kg, {}", found.mass_kg, found.gravity_m_s2),
+    }
+}
+
+#[test]
+fn recordings_that_contradict_each_other_or_physics_are_refused_by_name() {
+    let names = [
+        "go1/test_01.csv.gz",
+        "go1/test_02.csv.gz",
+        "go1/test_03.csv.gz",
+    ];
+    let right = read_all(&names);
+    let spoiled = |at: usize, spoil: &dyn Fn(&mut recording::Segment)| {
+        let mut wrong = right.clone();
+        wrong[at].segments.iter_mut().for_each(spoil);
+        contradiction(&wrong)
+    };
+    for at in 0..3 {
+        let error = spoiled(at, &|segment| segment.torque_nm.fill(0.0));
+        assert!(
+            error.contains(names[at]) && error.contains("its torques carry 0.000"),
+            "{error}"
+        );
+        let error = spoiled(at, &|segment| segment.torque_nm.neg_mut());
+        assert!(
+            error.contains(names[at]) && error.contains("its torques carry -"),
+            "{error}"
+        );
+        let error = spoiled(at, &|segment| segment.torque_nm *= 1e3);
+        assert!(error.contains(names[at]), "{error}");
+        let error = spoiled(at, &|segment| {
+            for matrix in [&mut segment.x, &mut segment.dx, &mut segment.ddx] {
+                matrix.row_mut(14).scale_mut(0.5);
+            }
+        });
+        assert!(
+            error.contains(names[at]) && error.contains("in flight"),
+            "{error}"
+        );
+        let error = spoiled(at, &|segment| segment.torque_nm *= 1.2);
+        assert!(
+            error.contains(names[at]) && error.contains("its mass is"),
+            "{error}"
+        );
+    }
+    // Two robots of nearly the same geometry, as files and as segments of one.
+    let go2 = read_all(&[
+        "go2-asynchronous/train_01.csv.gz",
+        "go2-asynchronous/train_02.csv.gz",
+    ]);
+    let both = [&right[..2], &go2[..]].concat();
+    assert!(contradiction(&both).contains("its mass is"));
+    let mut one = right[0].clone();
+    one.segments.extend(go2[0].segments.iter().cloned());
+    let error = contradiction(&[one]);
+    assert!(error.contains(", segment "), "{error}");
+    // A payload, or a wrong mass in the robot's file, that all have.
+    let mut heavier = right;
+    let segments = heavier
+        .iter_mut()
+        .flat_map(|recording| &mut recording.segments);
+    segments.for_each(|segment| segment.torque_nm *= 1.3);
+    let go1 = Robot::by_name("go1").expect("a known robot");
+    let found = identify(&heavier, go1).expect("one robot");
+    assert!(found.mass_kg > 15.5, "{}", found.mass_kg);
+}
+
+#[test]
+fn training_refuses_them_too_whatever_actuators_it_is_given() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let mut without = read_all(&["go1/test_02.csv.gz"]).remove(0);
+    without.segments[0].torque_nm.fill(0.0);
+    let bad = folder.path().join("without-torques.csv");
+    recording::write(&bad, &without).expect("written");
+    let actuators = folder.path().join("actuators.toml");
+    let text = "robot = \"go1\"\ngravity_m_s2 = 1.77\n[actuators]\nviscous = [1.0, 0.6, 0.6]\ndry = [0.2, 0.2, 0.2]\n\
+                armature = [0.01, 0.01, 0.01]\n";
+    std::fs::write(&actuators, text).expect("written");
+    let good = ["go1/test_01.csv.gz", "go1/test_03.csv.gz"].map(path);
+    let [good_1, good_2] = good.each_ref().map(|path| path.to_str().expect("UTF-8"));
+    let (bad, file) = (
+        bad.to_str().expect("UTF-8"),
+        actuators.to_str().expect("UTF-8"),
+    );
+    let model = folder.path().join("model.json");
+    let model = model.to_str().expect("UTF-8");
+    let train = |recordings: &[&str], more: &[&str]| {
+        let fixed = ["--robot", "go1", "--latent-dim", "2", "--output", model];
+        let (code, _, stderr) = romc(&[&["train"], recordings, more, &fixed[..]].concat());
+        assert_eq!(code, Some(1), "{stderr}");
+        stderr
+    };
+    for more in [&[][..], &["--actuators", "none"]] {
+        let error = train(&[good_1, bad, good_2], more);
+        assert!(
+            error.contains("without-torques.csv") && error.contains("its torques carry 0.000"),
+            "{error}"
+        );
+    }
+    // Among the validation recordings as well.
+    let error = train(
+        &[good_1, good_2],
+        &["--actuators", "none", "--validation", bad],
+    );
+    assert!(error.contains("without-torques.csv"), "{error}");
+    let error = train(&[good_1], &["--actuators", file]);
+    assert!(
+        error.contains("gravity_m_s2: found 1.77, expected about 9.81"),
+        "{error}"
+    );
+}
+
+/// Every set of right recordings agrees, and none is refused.
+#[test]
+fn right_recordings_are_not_refused() {
+    let sets = [
+        ("go1", "go1"),
+        ("go1-other", "go1"),
+        ("go1-noisy", "go1"),
+        ("go2-asynchronous", "go2"),
+    ];
+    let mut sets: Vec<(PathBuf, &str)> = sets.map(|(folder, robot)| (path(folder), robot)).into();
+    sets.extend(outside::beside("a1").map(|folder| (folder, "a1")));
+    if !tools::is_thorough() {
+        sets.retain(|(folder, _)| folder.ends_with("go1-noisy") || folder.ends_with("a1"));
+    }
+    for (folder, robot) in sets {
+        let entries = std::fs::read_dir(&folder)
+            .expect("recordings")
+            .map(|entry| entry.expect("one").path());
+        let files = entries.filter(|path| path.extension().is_some_and(|end| end == "gz"));
+        let recordings: Vec<Recording> = files
+            .map(|path| recording::read(&path).expect("a recording"))
+            .collect();
+        let robot = Robot::by_name(robot).expect("a known robot");
+        assert!(recordings.len() >= 4);
+        if let Err(error) = identify(&recordings, robot) {
+            panic!("{}: {error}", folder.display());
+        }
     }
 }

@@ -11,6 +11,10 @@ mod clock;
 mod foreign;
 #[path = "recording/formats.rs"]
 mod formats;
+#[path = "recording/guesses.rs"]
+mod guesses;
+#[path = "recording/mcap.rs"]
+mod mcap;
 #[path = "recording/mismatches.rs"]
 mod mismatches;
 mod outside;

@@ -159,7 +159,8 @@ fn planned(
         return Err(refused(path, message));
     }
     let reading = &arguments.simplification.reading;
-    let mut recording = read_recordings(std::slice::from_ref(path), reading)?.swap_remove(0);
+    let mut recording =
+        read_recordings(std::slice::from_ref(path), reading, model.robot().ok())?.swap_remove(0);
     note_mismatches(&recording, model.robot()?);
     if recording.segments.len() > 1 {
         let found = recording.segments.len();

@@ -24,7 +24,7 @@ pub fn run(arguments: &IdentifyArguments) -> Result<Answer, Error> {
         .and_robot(Some(&arguments.robot))
         .check_output(arguments.output.as_deref(), Format::TOML, arguments.force)?;
     let robot = robot::chosen(&arguments.robot)?;
-    let reader = reader(&arguments.reading, Clocks::Recorded)?;
+    let reader = reader(&arguments.reading, Clocks::Recorded)?.for_robot(robot);
     let recordings = read_with(&reader, &arguments.recordings)?;
     let paths = arguments.recordings.iter().map(PathBuf::as_path);
     note_repeated(&[("recordings", paths.collect())]);

@@ -18,7 +18,7 @@ pub fn run(arguments: &InspectArguments) -> Result<Answer, Error> {
     if arguments.guess {
         return guessed(arguments, robot);
     }
-    let reader = reader(&arguments.reading, Clocks::Recorded)?;
+    let reader = reader(&arguments.reading, Clocks::Recorded)?.for_robot(robot);
     let (mut texts, mut files) = (Vec::new(), Vec::new());
     for path in &arguments.files {
         let is_model =
@@ -58,10 +58,12 @@ fn guessed(arguments: &InspectArguments, robot: &Robot) -> Result<Answer, Error>
         }
         None => note(&outcome),
     }
+    guess.notes.iter().for_each(|text| note(text));
     let json = json!({
         "file": log.display().to_string(),
         "map": guess.text,
         "missing": guess.missing,
+        "notes": guess.notes,
         "samples": guess.outcome.as_ref().ok(),
         "refused": guess.outcome.as_ref().err(),
         "output": arguments.output.as_ref().map(|path| path.display().to_string()),

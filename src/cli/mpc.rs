@@ -43,7 +43,11 @@ pub fn run(arguments: &MpcArguments) -> Result<(Answer, u8), Error> {
         torque_rate_nm_s: arguments.torque_rate,
         ..MpcSettings::default()
     };
-    let recordings = read_recordings(&arguments.recordings, &arguments.reading)?;
+    let recordings = read_recordings(
+        &arguments.recordings,
+        &arguments.reading,
+        model.robot().ok(),
+    )?;
     let runs = run_all(&model, &recordings, settings, arguments.reference_input)?;
     let assessment = Assessment::over(&model, &recordings, RESTART_S)?;
     let verdict = verdict(&model, &assessment, &judged(&runs));

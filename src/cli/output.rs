@@ -69,13 +69,19 @@ pub fn reader(arguments: &ReadingArguments, clocks: Clocks) -> Result<Reader, Er
     ))
 }
 
-/// Reads recordings, showing which; what reading did besides goes to stderr.
+/// Reads recordings of a robot, if it is known, showing which; what reading did besides goes to stderr.
 pub fn read_recordings(
     paths: &[PathBuf],
     arguments: &ReadingArguments,
+    robot: Option<&'static Robot>,
 ) -> Result<Vec<Recording>, Error> {
     note_repeated(&[("recordings", paths.iter().map(PathBuf::as_path).collect())]);
-    read_with(&reader(arguments, Clocks::Repaired)?, paths)
+    let reader = reader(arguments, Clocks::Repaired)?;
+    let reader = match robot {
+        Some(robot) => reader.for_robot(robot),
+        None => reader,
+    };
+    read_with(&reader, paths)
 }
 
 /// [`read_recordings`] by a reader.

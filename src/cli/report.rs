@@ -36,7 +36,11 @@ pub fn run(arguments: &ReportArguments) -> Result<(Answer, u8), Error> {
         .into_folder(arguments.figures.as_deref())?;
     inputs.check_output(Some(&arguments.output), Format::PAGE, arguments.force)?;
     let model = artifact::read(&arguments.model)?;
-    let recordings = read_recordings(&arguments.recordings, &arguments.reading)?;
+    let recordings = read_recordings(
+        &arguments.recordings,
+        &arguments.reading,
+        model.robot().ok(),
+    )?;
     note_late_restarts(&recordings, arguments.restart_every);
     let study = match &arguments.study {
         None => None,
@@ -54,7 +58,11 @@ pub fn run(arguments: &ReportArguments) -> Result<(Answer, u8), Error> {
     let plan = match &arguments.plan {
         None => None,
         Some(path) => {
-            let mut read = read_recordings(std::slice::from_ref(path), &arguments.reading)?;
+            let mut read = read_recordings(
+                std::slice::from_ref(path),
+                &arguments.reading,
+                model.robot().ok(),
+            )?;
             note_mismatches(&read[0], model.robot()?);
             if let found @ 2.. = read[0].segments.len() {
                 let message = format!("--plan takes one jump: found {found} segments");

@@ -57,7 +57,7 @@ impl Basis {
                 margin: None,
             });
         }
-        let recordings = read_recordings(files, &arguments.reading)?;
+        let recordings = read_recordings(files, &arguments.reading, model.robot().ok())?;
         if model.encoder_map().is_err() {
             let model = model.name().to_owned();
             return Err(SimplifyError::NoEncoder { model }.into());

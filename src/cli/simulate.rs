@@ -26,7 +26,11 @@ pub fn run(arguments: &SimulateArguments) -> Result<(Answer, u8), Error> {
         .and(&arguments.reading.columns)
         .check_output(arguments.output.as_deref(), Format::TABLE, arguments.force)?;
     let model = artifact::read(&arguments.model)?;
-    let recordings = read_recordings(&arguments.recordings, &arguments.reading)?;
+    let recordings = read_recordings(
+        &arguments.recordings,
+        &arguments.reading,
+        model.robot().ok(),
+    )?;
     note_late_restarts(&recordings, arguments.restart_every);
     let progress = spinner("simulating");
     let assessment = Assessment::over(&model, &recordings, arguments.restart_every)?;

@@ -9,7 +9,7 @@ use super::args::{PhaseSet, TrainArguments, TrainSettings, Widths};
 use super::output::{note, quoted_text, read_settings, refused};
 use super::robot::chosen;
 use crate::Error;
-use crate::identify::identify;
+use crate::identify::{IdentifyError, identify};
 use crate::limits::of_training;
 use crate::limits::table::LAYER_WIDTH;
 use crate::model::{Activation, LibraryChoice, StandardLibrary};
@@ -82,19 +82,25 @@ pub(super) fn options(
     Ok(options)
 }
 
-/// Sets the actuators that the first training recordings tell, if the settings want those; where they tell none, a note
-/// on stderr says so.
+/// Sets the actuators that are identified from the first training recordings, if the settings want those; where there
+/// are none, a note on stderr says so.
+///
+/// # Errors
+/// [`IdentifyError::Contradiction`] for recordings that are not of one robot, also where no actuators are wanted.
 pub(super) fn identified(
     options: &mut TrainOptions,
     settings: &TrainSettings,
     recordings: &RecordingFiles,
     robot: &Robot,
 ) -> Result<(), Error> {
-    if actuators(settings) != IDENTIFIED {
+    let found = identify(&recordings.first(IDENTIFIED_FROM)?, robot);
+    if actuators(settings) != IDENTIFIED
+        && !matches!(found, Err(IdentifyError::Contradiction { .. }))
+    {
         return Ok(());
     }
-    let found = identify(&recordings.first(IDENTIFIED_FROM)?, robot);
     let found: Result<Actuators, String> = match found {
+        Err(refused @ IdentifyError::Contradiction { .. }) => return Err(refused.into()),
         Ok(found) => found.contradiction().map_or(Ok(found.actuators), Err),
         Err(reason) => Err(reason.to_string()),
     };

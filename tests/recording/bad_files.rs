@@ -384,8 +384,8 @@ fn text_that_is_not_utf8_names_row_byte_and_value() {
         .collect();
     let error = read_from_bytes("landing.csv", &utf16).unwrap_err();
     assert!(
-        matches!(error.kind, RecordingFault::Encoding { byte: 1, .. })
-            && error.place.row() == Some(1)
+        error.to_string().contains("found text in UTF-16"),
+        "{error}"
     );
 }
 

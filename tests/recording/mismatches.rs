@@ -191,3 +191,73 @@ fn real_jumps_have_no_mismatch() {
         assert!(found.is_empty(), "{}: {found:?}", path.display());
     }
 }
+
+/// The one note on a recording that is spoiled so.
+fn note_of(spoil: impl Fn(&mut Segment)) -> String {
+    let right = recording::read(&jumps_in("go1", 20)[0]).unwrap();
+    let mut wrong = right;
+    wrong.segments.iter_mut().for_each(spoil);
+    notes(&wrong, Robot::by_name("go1").unwrap()).join("\n")
+}
+
+#[test]
+fn rates_in_other_units_are_named_with_their_factor() {
+    for (rows, factor, words) in [
+        (15..18, DEGREES, "`unit = \"deg/s\"`"),
+        (0..12, DEGREES, "velocities of the joints are 57.3"),
+        (12..15, 1e3, "`unit = \"mm/s\"`"),
+        (0..12, -1.0, "the other sign"),
+    ] {
+        let found = note_of(|s| {
+            for row in rows.clone() {
+                s.dx.row_mut(row).scale_mut(factor);
+            }
+        });
+        assert!(found.contains(words), "{found}");
+    }
+}
+
+#[test]
+fn a_robot_that_lies_on_the_ground_is_no_jump() {
+    // It topples over after it has landed.
+    let found = note_of(|s| {
+        let n = s.len();
+        for i in n - 150..n {
+            let share = (i + 150 - n) as f64 / 149.0;
+            s.x[(16, i)] += 1.5 * share;
+            s.x[(14, i)] = 0.3 - 0.5 * share;
+        }
+    });
+    assert!(found.contains("did the robot fall?"), "{found}");
+}
+
+#[test]
+fn a_quaternion_in_another_order_is_named() {
+    let turned = |order: [usize; 4]| {
+        note_of(|s| {
+            for i in 0..s.len() {
+                let about = |axis: usize| {
+                    nalgebra::UnitQuaternion::from_scaled_axis(nalgebra::Vector3::ith(
+                        axis,
+                        s.x[(15 + axis, i)],
+                    ))
+                };
+                let q = about(2) * about(1) * about(0);
+                let q = [q.w, q.i, q.j, q.k];
+                let [w, x, y, z] = order.map(|at| q[at]);
+                s.x[(15, i)] = (2.0 * (y * z + w * x)).atan2(1.0 - 2.0 * (x * x + y * y));
+                s.x[(16, i)] = (2.0 * (w * y - x * z)).clamp(-1.0, 1.0).asin();
+                s.x[(17, i)] = (2.0 * (x * y + w * z)).atan2(1.0 - 2.0 * (y * y + z * z));
+            }
+        })
+    };
+    // A log of xyzw read as wxyz, and the other way round.
+    for (order, words) in [
+        ([1, 2, 3, 0], "xyzw instead of wxyz"),
+        ([3, 0, 1, 2], "wxyz instead of xyzw"),
+    ] {
+        let found = turned(order);
+        assert!(found.contains(words), "{found}");
+        assert!(!found.contains("columns of the feet"), "{found}");
+    }
+}

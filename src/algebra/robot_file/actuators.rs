@@ -7,7 +7,7 @@ use serde::Deserialize;
 
 use super::error::RobotFileError;
 use super::read::{from_toml_text, text_of};
-use crate::robot::{Actuators, JOINT_DIM, JOINT_NAMES, Robot};
+use crate::robot::{Actuators, GRAVITY_M_S2, JOINT_DIM, JOINT_NAMES, Robot};
 
 /// How many numbers an array has.
 const COUNT: &str = "12, or 3 for hx, hy, kn";
@@ -16,8 +16,12 @@ const COUNT: &str = "12, or 3 for hx, hy, kn";
 #[derive(Deserialize)]
 struct File {
     robot: Option<String>,
+    gravity_m_s2: Option<f64>,
     actuators: ActuatorsEntry,
 }
+
+/// Share by which the gravity that was identified with the losses may differ from the earth's.
+const GRAVITY_SHARE: f64 = 0.25;
 
 /// Joint losses as files and programs write them: twelve numbers each, or three (hx, hy, kn) that hold
 /// for every leg.
@@ -93,8 +97,21 @@ pub fn read_actuators(path: &Path, robot: Option<&Robot>) -> Result<Actuators, R
     let file = path.display().to_string();
     let File {
         robot: of,
+        gravity_m_s2: gravity,
         actuators,
     } = from_toml_text(&file, &text_of(path)?)?;
+    let is_off = |gravity: &f64| (gravity / GRAVITY_M_S2 - 1.0).abs() > GRAVITY_SHARE;
+    if let Some(gravity) = gravity.filter(is_off) {
+        let expected = format!(
+            "about {GRAVITY_M_S2}: the recordings of this file do not show the robot's losses"
+        );
+        return Err(RobotFileError::at(
+            &file,
+            "gravity_m_s2",
+            gravity.to_string(),
+            expected,
+        ));
+    }
     match (of, robot.map(Robot::name)) {
         (Some(found), Some(expected)) if found != expected => {
             let expected = format!("{expected}, whose recordings these are, or no such line");

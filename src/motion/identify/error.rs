@@ -44,6 +44,11 @@ pub enum IdentifyError {
         expected: f64,
         robot: String,
     },
+    /// A recording contradicts physics or the other recordings.
+    #[error(
+        "{recording}: {found}; expected recordings of one robot with its torques: leave this one out, or use it alone"
+    )]
+    Contradiction { recording: String, found: String },
     /// A file of an identification cannot be used.
     #[error(transparent)]
     File(#[from] Located<IdentifyFault>),

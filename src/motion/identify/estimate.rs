@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use super::agreement::{require_one_robot, require_physics};
 use super::equations::SampleEquations;
 use super::error::IdentifyError;
 use super::fit::{Estimate, Iteration, explained, force_alone};
@@ -41,21 +42,26 @@ const SETTLED: [f64; 2] = [2e-5, 1e-4];
 ///
 /// # Errors
 /// [`IdentifyError::Contact`], [`IdentifyError::Still`] for too little to go by,
-/// [`IdentifyError::Mass`] where forces do not explain the acceleration,
+/// [`IdentifyError::Mass`] where forces do not explain the acceleration, [`IdentifyError::Contradiction`] for a recording
+/// that contradicts physics or the others,
 /// [`IdentifyError::Recording`] for a segment without two samples at different times.
 pub fn identify(recordings: &[Recording], robot: &Robot) -> Result<Identification, IdentifyError> {
     let mut notes = Vec::new();
-    let mut segments = Vec::new();
+    let (mut segments, mut mended_recordings, mut ranges) = (Vec::new(), Vec::new(), Vec::new());
     for recording in recordings {
         notes.extend(implausible(recording, robot));
         let timed = recording.segments.iter().map(timed);
         let timed = timed.collect::<Result<Vec<_>, _>>()?;
         notes.extend(mended(&recording.path, &timed));
+        let own = timed.iter().map(|timed| timed.segment.clone()).collect();
+        mended_recordings.push(recording.with_segments(own));
+        ranges.push(segments.len()..segments.len() + timed.len());
         segments.extend(timed.into_iter().map(|timed| {
             let motion = Motion::of(&timed.segment, robot);
             (timed, motion)
         }));
     }
+    require_physics(&mended_recordings, robot)?;
     let mut state = State::new(robot);
     let mut windows = state.windows(&segments, robot)?;
     require_enough(&windows, recordings.len())?;
@@ -75,6 +81,8 @@ pub fn identify(recordings: &[Recording], robot: &Robot) -> Result<Identificatio
     }
     notes.extend(exclusions(&windows));
     let mut found = state.result(robot, &segments, &windows, notes);
+    let estimate = state.iteration.estimate.unwrap_or_default();
+    require_one_robot(recordings, &ranges, &windows, &estimate)?;
     found.notes.extend(found.contradiction());
     found.notes.extend(found.doubts(robot.mass_kg()));
     Ok(found)

@@ -141,6 +141,9 @@ const WORSE: f64 = 0.05;
 const GRAVITY_SHARE: f64 = 0.04;
 const MASS_SHARE: f64 = 0.3;
 
+/// Share from which on gravity is no robot's.
+const NO_GRAVITY_SHARE: f64 = 0.25;
+
 impl Identification {
     /// What is known already and was found to be otherwise, for a robot of `mass_kg`.
     pub(super) fn doubts(&self, mass_kg: f64) -> Vec<String> {
@@ -163,9 +166,15 @@ impl Identification {
         doubts
     }
 
-    /// Why these values are no robot's: the trunk moves against them, or forwards better by the feet's forces alone.
+    /// Why these values are no robot's: gravity is not the earth's, or the trunk moves against them, or forwards better by the feet's forces alone.
     /// Upwards forces alone may fit better: rounds weigh windows by their noise, and commanded torques are noisy there.
     pub fn contradiction(&self) -> Option<String> {
+        if (self.gravity_m_s2 / GRAVITY_M_S2 - 1.0).abs() > NO_GRAVITY_SHARE {
+            return Some(format!(
+                "gravity is {:.2} m/s^2, expected {GRAVITY_M_S2}: do not use these values",
+                self.gravity_m_s2
+            ));
+        }
         let alone = self.force_alone.r2;
         let axes = [
             ("forwards", self.r2.x, alone.x, alone.x - WORSE),

@@ -4,7 +4,8 @@
 //! standard error, and the file that keeps it. [`clock`](crate::recording::clock) mends segments whose time
 //! stamps disagree with their motion, [`motion`] has the directions of the links and their accelerations,
 //! [`equations`] the linear equations that these obey at every sample, [`windows`] their averages
-//! over short windows, [`fit`] the weighted least squares, [`estimate`] the loop around it,
+//! over short windows, [`fit`] the weighted least squares, [`estimate`] the loop around it, `agreement` the refusal of
+//! recordings that contradict each other or physics,
 //! [`file`](mod@file) the result on disk. Read [`estimate`] first;
 //! `docs/identify.md` has the method and measured figures.
 //!
@@ -29,6 +30,7 @@ pub mod motion;
 pub mod parameters;
 pub mod windows;
 
+mod agreement;
 mod error;
 
 pub use error::{IdentifyError, IdentifyFault};

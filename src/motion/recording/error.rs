@@ -7,6 +7,7 @@ use std::path::Path;
 
 use thiserror::Error;
 
+use crate::files::magic::OtherFormat;
 use crate::files::{Located, Place};
 use crate::robot::RobotError;
 
@@ -22,12 +23,29 @@ pub enum RecordingFault {
     /// The file does not exist.
     #[error("no such file")]
     Missing,
+    /// A file of another format, which its first bytes show.
+    #[error("found {}, expected a text table or an MCAP log; this makes one: {}", .0.what, .0.remedy)]
+    OtherFormat(OtherFormat),
+    /// A folder with this many MCAP files, but no list of them.
+    #[error(
+        "found a folder of {0} MCAP files without metadata.yaml that are not NAME_0.mcap, NAME_1.mcap and so on, \
+         expected the parts of one bag; give separate recordings one by one: FOLDER/*.mcap"
+    )]
+    Bag(usize),
     /// A damaged MCAP file, or one that packs its chunks in another way.
     #[error("no MCAP file that can be read: {0}")]
     Mcap(String),
     /// An MCAP file without a topic of numbers; the first reason in brackets, or nothing.
     #[error("found no topic of ROS messages with numbers{0}")]
     NoTopic(String),
+    /// A recording that cannot be of the robot of the others, or of any.
+    #[error("{0}; leave this recording out, or mend its map of columns")]
+    Contradiction(String),
+    /// Topics that are not a recording by their names.
+    #[error(
+        "found {found}, expected {expected}; `romc inspect --guess LOG` writes a map for --columns, to be completed"
+    )]
+    Topics { found: String, expected: String },
     /// A folder, which only a map of columns makes a recording of.
     #[error(
         "found a folder, expected a file, or `--columns` with a map that names the folder's files"

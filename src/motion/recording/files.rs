@@ -6,8 +6,8 @@ use std::sync::{Arc, OnceLock};
 
 use super::check::{Finding, check};
 use super::condition::{ConditionOptions, ImplausibleSamples, SmoothedRows, condition};
-use super::error::RecordingError;
-use super::mismatch::{Mismatch, mismatches};
+use super::error::{RecordingError, RecordingFault};
+use super::mismatch::{Balance, Mismatch, MismatchKind, contradiction, mismatches};
 use super::reader::{Clocks, Reader, Reading, ReadingNotes};
 use super::segment::{Recording, Segment};
 use super::smoothing::SavitzkyGolay;
@@ -85,6 +85,8 @@ pub struct Notes {
     pub left_out: usize,
     /// What reading did besides reading.
     pub reading: ReadingNotes,
+    /// What forces and accelerations of each recording come to, with its file.
+    balances: Vec<(PathBuf, Balance)>,
 }
 
 impl Notes {
@@ -93,6 +95,7 @@ impl Notes {
         self.findings.extend(other.findings);
         self.mismatches.extend(other.mismatches);
         self.left_out += other.left_out;
+        self.balances.extend(other.balances);
     }
 }
 
@@ -108,7 +111,7 @@ impl RecordingFiles {
             files,
             robot,
             options,
-            reader,
+            reader: reader.for_robot(robot),
             notes: OnceLock::new(),
         }
     }
@@ -147,13 +150,14 @@ impl RecordingFiles {
     /// their own where there are two cores.
     ///
     /// # Errors
-    /// The first that reading, conditioning or `take` has.
+    /// The first that reading, conditioning or `take` has; after the first pass [`RecordingFault::Contradiction`] for a
+    /// recording that contradicts physics or the others.
     pub fn for_each<E: From<RecordingError>>(
         &self,
         mut take: impl FnMut(Recording) -> Result<(), E>,
     ) -> Result<(), E> {
         let mut notes = Notes::default();
-        let result = self.in_order(|ready| {
+        let result = self.in_order::<E>(|ready| {
             let (recordings, reading) = ready?;
             notes.reading.add(&reading);
             for (recording, found) in recordings {
@@ -162,8 +166,13 @@ impl RecordingFiles {
             }
             Ok(())
         });
+        let (paths, balances): (Vec<_>, Vec<_>) = notes.balances.drain(..).unzip();
         self.notes.get_or_init(|| notes);
-        result
+        result?;
+        match contradiction(&balances) {
+            None => Ok(()),
+            Some((at, found)) => Err(RecordingFault::Contradiction(found).of(&paths[at]).into()),
+        }
     }
 
     fn in_order<E: From<RecordingError>>(
@@ -234,6 +243,15 @@ impl RecordingFiles {
                 true => mismatches(&recording, self.robot),
                 false => Vec::new(),
             };
+            if let Some(fallen) = unlike
+                .iter()
+                .find(|found| found.kind == MismatchKind::Fallen)
+            {
+                let fault = RecordingFault::Contradiction(fallen.words.clone());
+                return Err(fault.of(&recording.path));
+            }
+            let balance =
+                is_first.then(|| (recording.path.clone(), Balance::of(&recording, self.robot)));
             let (recording, left_out) = condition(recording, &findings, &options)?;
             let path = || recording.path.clone();
             let notes = Notes {
@@ -241,6 +259,7 @@ impl RecordingFiles {
                 mismatches: unlike.into_iter().map(|found| (path(), found)).collect(),
                 left_out,
                 reading: ReadingNotes::default(),
+                balances: balance.into_iter().collect(),
             };
             Ok::<_, RecordingError>((recording, notes))
         });

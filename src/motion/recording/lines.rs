@@ -1,12 +1,14 @@
 //! Lines of a file in bounded memory, and their cells.
 
-use std::fs::File;
+use std::fs::{self, File};
 use std::io::{self, BufRead, BufReader, Read};
 use std::path::Path;
 
 use flate2::bufread::MultiGzDecoder;
 
 use super::error::{RecordingError, RecordingFault};
+use crate::files::magic::{MAGIC_BYTES, recognised};
+use crate::files::size::{Capped, Format};
 
 /// Longest line accepted, in bytes: some thirty times a row of 71 columns.
 pub(super) const MAX_LINE_BYTES: usize = 1 << 16;
@@ -18,7 +20,7 @@ const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
 
 /// The rows of a text, without line ends, byte order mark or trailing blanks.
 pub(super) struct Lines<'a> {
-    source: Box<dyn BufRead + 'a>,
+    source: BufReader<Box<dyn Read + 'a>>,
     path: &'a Path,
     compressed: bool,
     row: usize,
@@ -32,29 +34,53 @@ impl<'a> Lines<'a> {
     pub fn open(path: &'a Path) -> Result<Self, RecordingError> {
         let file = File::open(path)
             .map_err(|source| RecordingFault::unreadable("open", source).of(path))?;
-        Self::of(path, file)
+        let size = file.metadata().ok().filter(fs::Metadata::is_file);
+        Self::packed(path, file, size.map_or(u64::MAX, |size| size.len()))
     }
 
     /// Of any source, plain or gzip, found from the first two bytes; `path` stands for it in messages.
-    pub fn of(path: &'a Path, mut source: impl Read + 'a) -> Result<Self, RecordingError> {
-        let mut start = Vec::with_capacity(2);
+    pub fn of(path: &'a Path, source: impl Read + 'a) -> Result<Self, RecordingError> {
+        Self::packed(path, source, u64::MAX)
+    }
+
+    /// A source of so many bytes, which bound what they may unpack to.
+    fn packed(
+        path: &'a Path,
+        mut source: impl Read + 'a,
+        size: u64,
+    ) -> Result<Self, RecordingError> {
+        let mut start = Vec::with_capacity(MAGIC_BYTES);
         (&mut source)
-            .take(2)
+            .take(MAGIC_BYTES as u64)
             .read_to_end(&mut start)
             .map_err(|source| RecordingFault::io("read", source).of(path))?;
-        let compressed = start == GZIP_MAGIC;
-        let source = BufReader::new(io::Cursor::new(start).chain(source));
-        Ok(Lines {
-            source: match compressed {
-                true => Box::new(BufReader::new(MultiGzDecoder::new(source))),
-                false => Box::new(source),
-            },
+        let compressed = start.starts_with(&GZIP_MAGIC);
+        let plain = recognised(path, &start).filter(|_| !compressed);
+        let source = io::Cursor::new(start).chain(source);
+        let format = Format::Recording;
+        let source: Box<dyn Read> = match compressed {
+            true => {
+                let unpacked = MultiGzDecoder::new(BufReader::new(source));
+                Box::new(Capped::new(unpacked, format, format.most_unpacked(size)))
+            }
+            false => Box::new(Capped::new(source, format, format.most_bytes())),
+        };
+        let mut lines = Lines {
+            source: BufReader::new(source),
             path,
             compressed,
             row: 0,
             blank: [0; 2],
             buffer: Vec::new(),
-        })
+        };
+        let unpacked = match compressed {
+            true => lines.source.fill_buf().map(|start| recognised(path, start)),
+            false => Ok(None),
+        };
+        match plain.or(unpacked.map_err(|source| lines.read_error(source))?) {
+            Some(format) => Err(RecordingFault::OtherFormat(format).of(path)),
+            None => Ok(lines),
+        }
     }
 
     /// The next row's number and text; `None` at the end of the file.
@@ -111,9 +137,9 @@ impl<'a> Lines<'a> {
         }
     }
 
-    fn read_error(&self, source: std::io::Error) -> RecordingError {
-        match self.compressed {
-            true => RecordingFault::Gzip(source).at(self.path, self.row),
+    fn read_error(&self, source: io::Error) -> RecordingError {
+        match self.compressed && source.kind() != io::ErrorKind::FileTooLarge {
+            true => RecordingFault::Gzip(source).at(self.path, self.row.max(1)),
             false => RecordingFault::io("read", source).of(self.path),
         }
     }

@@ -17,10 +17,12 @@ use std::fmt;
 use serde::Serialize;
 
 use super::check::{check, outside};
+use super::preprocess::{differences, median};
 use super::segment::Recording;
-use crate::robot::{GRAVITY_M_S2, JOINT_DIM, Leg, Robot};
+use crate::robot::{GRAVITY_M_S2, JOINT_DIM, Leg, Robot, STATE_DIM};
 pub use balance::Balance;
 use stance::{Slip, best_other_place, best_other_reading};
+pub(super) use stance::{foot_place, stances};
 
 /// Largest root mean square of the places of feet on the ground about their medians, m.
 const SLIP_M: f64 = 0.025;
@@ -36,8 +38,14 @@ const FALL_M_S2: (f64, f64) = (-16.0, -6.5);
 const WEIGHT_SHARE: (f64, f64) = (0.45, 1.7);
 /// Least share of the hips' torques that hold the feet on their own side: 1 for vertical forces.
 const HIP_SHARE: f64 = -0.3;
+/// The same where both legs of one end alone are below that.
+const HIP_SHARE_OF_PAIR: f64 = -0.5;
 /// Largest median difference of the body's acceleration and the slope of its velocity, m/s^2.
 const ACCELERATION_M_S2: f64 = 2.0;
+/// Share of the weight below which torques carry nothing.
+const NOTHING_CARRIED: f64 = 0.02;
+/// How many times more or less of the weight the torques of one recording may carry than those of most.
+const OTHER_SHARE: f64 = 2.0;
 /// Logarithm of the share of the weight from which another robot may explain it, and up to which it does.
 const OTHER_WEIGHT: (f64, f64) = (0.17, 0.1);
 /// How much worse feet may stay in place with the geometry of a robot that explains the weight.
@@ -70,6 +78,10 @@ pub enum MismatchKind {
     Origin,
     /// Feet on the ground are not at height zero.
     Floor,
+    /// The trunk lies on the ground, or is under it.
+    Fallen,
+    /// Velocities are in another unit or of another sign than positions.
+    Rates,
 }
 
 /// Something about a whole recording that cannot be true of the robot.
@@ -96,16 +108,19 @@ impl fmt::Display for Mismatch {
 pub fn mismatches(recording: &Recording, robot: &Robot) -> Vec<Mismatch> {
     let slip = Slip::of(recording, robot);
     let balance = Balance::of(recording, robot);
+    let (place, is_attitude) = place(recording, robot, &slip).unzip();
+    // In another attitude the feet's heights say nothing of their columns.
+    let of_feet = || feet::columns(recording, robot);
     let found = [
-        (
-            MismatchKind::FootSlip,
-            place(recording, robot, &slip).or_else(|| foot_slip(&slip)),
-        ),
+        (MismatchKind::FootSlip, place.or_else(|| foot_slip(&slip))),
         (
             MismatchKind::LegsOrSigns,
             legs_or_signs(recording, robot, &slip),
         ),
-        (MismatchKind::FeetColumns, feet::columns(recording, robot)),
+        (
+            MismatchKind::FeetColumns,
+            (is_attitude != Some(true)).then(of_feet).flatten(),
+        ),
         (MismatchKind::Fall, fall(&balance)),
         (MismatchKind::Weight, weight(&balance, robot)),
         (MismatchKind::HipTorques, hip_torques(&balance)),
@@ -116,6 +131,8 @@ pub fn mismatches(recording: &Recording, robot: &Robot) -> Vec<Mismatch> {
         ),
         (MismatchKind::Origin, origin(recording)),
         (MismatchKind::Floor, feet::floor(recording, robot)),
+        (MismatchKind::Fallen, feet::fallen(recording, robot)),
+        (MismatchKind::Rates, rates(recording)),
     ];
     let mismatch = |(kind, broken): (MismatchKind, Option<Broken>)| {
         broken.map(|(value, bound, words)| Mismatch {
@@ -156,6 +173,38 @@ impl Figures {
             balance: Balance::of(recording, robot),
         }
     }
+}
+
+/// What cannot be true of any robot, or of one robot beside the others of these recordings, with the index of the recording
+/// and in words: torques that carry nothing, a body that does not fall in flight, torques that carry another share of
+/// the weight than most.
+pub fn contradiction(balances: &[Balance]) -> Option<(usize, String)> {
+    let each = || balances.iter().enumerate();
+    let shares = || each().filter_map(|(at, balance)| Some((at, balance.weight_share?)));
+    let empty = shares().find(|(_, share)| share.abs() < NOTHING_CARRIED);
+    if let Some((at, share)) = empty {
+        let words = format!(
+            "its feet bear weight, and its torques carry {share:.3} of it: torques that were not recorded, or in other units"
+        );
+        return Some((at, words));
+    }
+    // Velocities may be broken where heights are right.
+    let by_height = |balance: &Balance| beyond(balance.fall_by_height_m_s2?, FALL_M_S2);
+    let falls = each().filter(|(_, balance)| by_height(balance).is_some());
+    let falls = falls.filter_map(|(at, balance)| Some((at, fall(balance)?.2)));
+    if let Some(found) = falls.into_iter().next() {
+        return Some(found);
+    }
+    // Of several recordings, those that differ from the median; all may be off alike, by units or a payload.
+    let most = median(shares().map(|(_, share)| share));
+    let (low, high) = (most / OTHER_SHARE, most * OTHER_SHARE);
+    let (at, share) =
+        shares().find(|(_, share)| !(low.min(high)..=low.max(high)).contains(share))?;
+    let words = format!(
+        "its torques carry {share:.2} of the robot's weight, and those of most of these recordings {most:.2}: signs, units \
+         or order of the torques, or another robot"
+    );
+    Some((at, words))
 }
 
 /// Impulse of the feet over what the robot's weight and change of velocity need; none without stance.
@@ -217,7 +266,8 @@ fn foot_slip(slip: &Slip) -> Option<Broken> {
     })
 }
 
-fn place(recording: &Recording, robot: &Robot, slip: &Slip) -> Option<Broken> {
+/// The body's place or attitude read otherwise, and whether it is the attitude.
+fn place(recording: &Recording, robot: &Robot, slip: &Slip) -> Option<(Broken, bool)> {
     let value = slip.rms_m()?;
     let (best, reading) = best_other_place(recording, robot)?;
     let bound = PLACE.0 * best + PLACE.1;
@@ -228,7 +278,7 @@ fn place(recording: &Recording, robot: &Robot, slip: &Slip) -> Option<Broken> {
             1e3 * value,
             1e3 * best
         );
-        (value, bound, words)
+        ((value, bound, words), reading.is_of_quaternion())
     })
 }
 
@@ -275,13 +325,74 @@ fn hip_torques(balance: &Balance) -> Option<Broken> {
         .filter_map(|(leg, share)| Some((leg, share.filter(|share| *share < HIP_SHARE)?)))
         .collect();
     let value = (wrong.iter().map(|(_, share)| *share)).min_by(f64::total_cmp)?;
+    // Both legs of one end alone pull inwards where feet stick and positions are controlled, and less than exchanged ones.
+    let is_of_end = |end: &[Leg]| wrong.iter().all(|(leg, _)| end.contains(leg));
+    let is_pair = wrong.len() == 2 && Leg::ALL.chunks(2).any(is_of_end);
+    if is_pair && wrong.iter().any(|(_, share)| *share > HIP_SHARE_OF_PAIR) {
+        return None;
+    }
     let names: Vec<&str> = wrong.iter().map(|(leg, _)| leg.short_name()).collect();
     let words = format!(
         "the hips' torques of {} hold the feet on the other side of the body: are left and right legs or the \
-         torques' signs exchanged?",
+         torques' signs exchanged, or do feet stick and pull inwards?",
         names.join(", ")
     );
     Some((value, HIP_SHARE, words))
+}
+
+/// Factors by which velocities may be off, with what they come from.
+const FACTORS: [(f64, &str); 6] = [
+    (
+        57.2958,
+        "degrees where radians are expected (`unit = \"deg/s\"` in a map of columns)",
+    ),
+    (
+        0.017_453_3,
+        "positions in degrees and velocities in radians",
+    ),
+    (
+        1000.0,
+        "millimetres where metres are expected (`unit = \"mm/s\"` in a map of columns)",
+    ),
+    (
+        100.0,
+        "centimetres where metres are expected (`unit = \"cm/s\"` in a map of columns)",
+    ),
+    (
+        0.001,
+        "velocities per millisecond, or positions in millimetres",
+    ),
+    (-1.0, "the other sign"),
+];
+/// Distance from such a factor, as a share of it.
+const FACTOR_SHARE: f64 = 0.1;
+
+/// Velocities that are a multiple of the changes of their positions.
+fn rates(recording: &Recording) -> Option<Broken> {
+    const GROUPS: [(std::ops::Range<usize>, &str); 3] = [
+        (0..JOINT_DIM, "the joints"),
+        (JOINT_DIM..JOINT_DIM + 3, "the body"),
+        (JOINT_DIM + 3..STATE_DIM, "roll, pitch and yaw"),
+    ];
+    GROUPS.into_iter().find_map(|(rows, what)| {
+        let (mut product, mut squares, mut own) = (0.0, 0.0, 0.0);
+        for segment in &recording.segments {
+            let rows = |matrix: &nalgebra::DMatrix<f64>| matrix.rows(rows.start, rows.len()).into_owned();
+            let (slopes, rates) = (differences(&segment.time_s, &rows(&segment.x)), rows(&segment.dx));
+            product += slopes.dot(&rates);
+            squares += slopes.norm_squared();
+            own += rates.norm_squared();
+        }
+        let factor = product / squares;
+        // Rates that do not follow the changes at all are another fault.
+        let follows = product * product > 0.5 * squares * own;
+        let known = |(known, _): &&(f64, &str)| (factor / known - 1.0).abs() < FACTOR_SHARE;
+        let (known, why) = FACTORS.iter().find(known).filter(|_| follows)?;
+        let words = format!(
+            "velocities of {what} are {factor:.3} times the changes of their positions, about {known}: {why}?"
+        );
+        Some((factor, 1.0, words))
+    })
 }
 
 fn accelerations(balance: &Balance) -> Option<Broken> {

@@ -115,7 +115,7 @@ pub(super) fn place(own_s: &[f64], time_s: f64) -> (usize, f64) {
 }
 
 /// The middle of the values; 0 if there are none.
-pub(in crate::recording) fn median(values: impl Iterator<Item = f64>) -> f64 {
+pub(crate) fn median(values: impl Iterator<Item = f64>) -> f64 {
     let mut sorted: Vec<f64> = values.collect();
     sorted.sort_by(f64::total_cmp);
     sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)

@@ -11,7 +11,7 @@ use super::csv;
 use super::error::{RecordingError, RecordingFault};
 use super::foreign::guess::guess_of;
 use super::foreign::map::ColumnMap;
-use super::foreign::{assemble, read_mcap, read_texts};
+use super::foreign::{assemble, is_mcap, read_mcap, read_texts};
 use super::segment::Recording;
 use crate::robot::Robot;
 
@@ -31,6 +31,7 @@ pub enum Clocks {
 #[derive(Debug, Clone, Default)]
 pub struct Reader {
     map: Option<Arc<ColumnMap>>,
+    robot: Option<&'static Robot>,
     pub(super) clocks: Clocks,
 }
 
@@ -61,7 +62,16 @@ impl Reader {
     pub fn new(map: Option<ColumnMap>, clocks: Clocks) -> Self {
         Self {
             map: map.map(Arc::new),
+            robot: None,
             clocks,
+        }
+    }
+
+    /// The reader for recordings of a robot, whose names of joints it knows; the Go1's otherwise.
+    pub fn for_robot(self, robot: &'static Robot) -> Self {
+        Self {
+            robot: Some(robot),
+            ..self
         }
     }
 
@@ -73,8 +83,11 @@ impl Reader {
         let mut reading = match &self.map {
             Some(map) if is_mcap(path) => assemble(path, &read_mcap(path)?, map)?,
             Some(map) => assemble(path, &read_texts(path, map)?, map)?,
+            None if is_mcap(path) => {
+                let go1 = || Robot::by_name("go1").expect("a known robot");
+                by_guess(path, self.robot.unwrap_or_else(go1))?
+            }
             None if path.is_dir() => return Err(RecordingFault::Folder.of(path)),
-            None if is_mcap(path) => by_guess(path)?,
             None => csv::read_noted(path)?,
         };
         if self.clocks == Clocks::Repaired {
@@ -88,21 +101,36 @@ impl Reader {
     }
 }
 
-/// Whether a file is an MCAP log by its name.
-pub(super) fn is_mcap(path: &Path) -> bool {
-    path.extension()
-        .is_some_and(|ending| ending.eq_ignore_ascii_case("mcap"))
-}
-
 /// An MCAP file by the names of its topics and fields.
-fn by_guess(path: &Path) -> Result<Reading, RecordingError> {
+fn by_guess(path: &Path, robot: &Robot) -> Result<Reading, RecordingError> {
     let logs = read_mcap(path)?;
-    let robot = Robot::by_name("go1").expect("a known robot");
-    let text = guess_of(path, &logs, robot)?.text;
-    let map = ColumnMap::parse(&format!("{}: the guessed map", path.display()), &text)?;
+    let guess = guess_of(path, &logs, robot)?;
+    if !guess.missing.is_empty() {
+        let topics = logs.iter().map(|log| match &log.fault {
+            None => format!("`{}` with {}", log.name, log.summary()),
+            Some(fault) => format!("`{}` ({fault})", log.name),
+        });
+        let topics: Vec<String> = topics.collect();
+        let found = format!(
+            "no {} among {}",
+            guess.missing.join(", "),
+            topics.join("; ")
+        );
+        let expected = format!(
+            "topics of the robot: joints named as fr.hx, FR_hip_joint, LF_HAA or {}",
+            robot.joint_names()[0]
+        );
+        return Err(RecordingFault::Topics { found, expected }.of(path));
+    }
+    if !guess.open.is_empty() {
+        let (found, expected) = (guess.open.join("; "), "one reading by names".to_owned());
+        return Err(RecordingFault::Topics { found, expected }.of(path));
+    }
+    let map = ColumnMap::parse(&format!("{}: the guessed map", path.display()), &guess.text)?;
     let mut reading = assemble(path, &logs, &map)?;
     let note = "topics are taken by their names (`romc inspect --guess` prints the map)";
     reading.notes.push(note.to_owned());
+    reading.notes.extend(guess.notes);
     Ok(reading)
 }
 

@@ -39,9 +39,16 @@ pub(in crate::recording) fn assemble(
         Some(source) => source.epoch_s()?,
         None => None,
     };
-    let mut signals = BTreeMap::new();
+    let (mut signals, mut notes) = (BTreeMap::new(), Vec::new());
     for quantity in Quantity::ALL {
         if let Some(source) = find(quantity)? {
+            let new = source
+                .log()
+                .notes
+                .iter()
+                .filter(|note| !notes.contains(note));
+            let new: Vec<&String> = new.collect();
+            notes.extend(new);
             signals.insert(quantity, source.take(epoch_s.unwrap_or(0))?);
         }
     }
@@ -55,7 +62,7 @@ pub(in crate::recording) fn assemble(
         times_s: base.times_s.clone(),
         ranges: Vec::new(),
         signals,
-        notes: Vec::new(),
+        notes: notes.into_iter().cloned().collect(),
     };
     rows.angles()?;
     rows.contacts()?;

@@ -10,7 +10,7 @@ use crate::robot::input_rule::rotation;
 const UPRIGHT: f64 = 1e-6;
 
 /// Roll, pitch and yaw of quaternions (w, x, y, z), R = Rz Ry Rx; the length of a quaternion does not matter.
-pub(super) fn angles_of_quaternions(quaternions: &DMatrix<f64>) -> DMatrix<f64> {
+pub(in crate::recording) fn angles_of_quaternions(quaternions: &DMatrix<f64>) -> DMatrix<f64> {
     let mut out = DMatrix::zeros(3, quaternions.ncols());
     for (mut angles, q) in out.column_iter_mut().zip(quaternions.column_iter()) {
         let norm = q.norm();

@@ -7,7 +7,7 @@ use crate::recording::columns::folded;
 use crate::recording::instant::Instant;
 
 /// One file or topic.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(in crate::recording) struct Log {
     /// The file.
     pub path: PathBuf,
@@ -21,6 +21,10 @@ pub(in crate::recording) struct Log {
     pub is_named: bool,
     /// Line of the first sample, 1 for the first message of a topic.
     pub first_row: usize,
+    /// Why a topic is no table; it has no columns then.
+    pub fault: Option<String>,
+    /// What reading did to it besides reading.
+    pub notes: Vec<String>,
 }
 
 /// One column.
@@ -60,6 +64,16 @@ impl Log {
         self.columns
             .first()
             .map_or(0, |channel| channel.values.len())
+    }
+
+    /// Makes these rows, in this order, the rows.
+    pub fn choose(&mut self, rows: &[usize]) {
+        for column in &mut self.columns {
+            column.values = rows.iter().map(|row| column.values[*row]).collect();
+            if let Some(instants) = &mut column.instants {
+                *instants = rows.iter().map(|row| instants[*row]).collect();
+            }
+        }
     }
 
     /// The column of a name or number: an exact name before one that differs in case and blanks.

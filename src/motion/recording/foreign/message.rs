@@ -4,6 +4,10 @@ use std::collections::BTreeMap;
 
 /// Longest array whose entries become columns: an image is no column.
 const MOST_ENTRIES: usize = 64;
+/// Most numbers of a message.
+const MOST_NUMBERS: usize = 4096;
+/// Most fields of a message without bytes of their own: empty messages.
+const MOST_EMPTY: usize = 100_000;
 /// Deepest nesting of messages.
 const MOST_LEVELS: usize = 16;
 
@@ -19,9 +23,21 @@ pub enum MessageFault {
     /// Too short.
     #[error("message: {0} bytes, which end before its fields do")]
     Short(usize),
-    /// Lists that are longer in one message than in another.
-    #[error("messages whose lists change in length, expected tables")]
-    Ragged,
+    /// Lists that are longer in one message than in another, or have other names, in too many ways.
+    #[error("messages of more than {0} lengths or sets of names, expected tables")]
+    Ragged(usize),
+    /// More messages than a table has rows.
+    #[error("more than {0} messages, expected shorter recordings")]
+    Long(usize),
+    /// More numbers than a table has columns.
+    #[error("message: more than {0} numbers")]
+    Wide(usize),
+    /// A joint state with another number of values than of names.
+    #[error("message: {0} names and {1} values of `{2}`")]
+    Lengths(usize, usize, String),
+    /// Two numbers of one name.
+    #[error("message: `{0}` twice")]
+    Twice(String),
     /// Another encoding than those that are read.
     #[error("encoding `{0}`, expected cdr with ros2msg or ros1 with ros1msg")]
     Encoding(String),
@@ -76,8 +92,16 @@ pub(super) enum Value {
     Time(i64, u32),
 }
 
-/// Names, if they are asked for, and numbers of a message.
-type Numbers = (Vec<String>, Vec<Value>);
+/// The numbers of a message.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(super) struct Numbers {
+    /// Their names, if these are asked for.
+    pub names: Vec<String>,
+    /// The numbers.
+    pub values: Vec<Value>,
+    /// Lengths and names of its lists: messages of one type that agree in them have the same numbers in the same order.
+    pub lists: Vec<u8>,
+}
 
 impl Definition {
     /// Reads a definition and those of its parts, as `ros2 bag` and `rosbag` store them.
@@ -169,21 +193,36 @@ impl Definition {
     ) -> Result<(), MessageFault> {
         let mut names: Vec<String> = Vec::new();
         let before = path.len();
-        for field in &self.types[index].1 {
+        let (of_type, fields) = &self.types[index];
+        for field in fields {
             let count = match field.count {
                 Count::One => 1,
                 Count::Fixed(count) => count,
                 Count::Any => cursor.length()?,
             };
+            if let (Some(out), Count::Any) = (out.as_deref_mut(), field.count) {
+                let count = count.min(MOST_ENTRIES + 1) as u32;
+                out.lists.extend(count.to_le_bytes());
+            }
             let is_list = field.count != Count::One;
             let is_named = field.count == Count::Any && !matches!(field.kind, Kind::Message(_));
             if field.kind == Kind::Text && is_list && field.name.starts_with("name") {
                 names = (0..count)
                     .map(|_| cursor.text())
                     .collect::<Result<_, _>>()?;
+                if let Some(out) = out.as_deref_mut() {
+                    let ended = names.iter().flat_map(|name| [name.as_bytes(), &[0]]);
+                    ended.for_each(|bytes| out.lists.extend(bytes));
+                }
                 continue;
             }
+            let others = ![0, names.len()].contains(&count) && !names.is_empty();
+            if is_named && others && of_type.ends_with("/JointState") {
+                let field = field.name.clone();
+                return Err(MessageFault::Lengths(names.len(), count, field));
+            }
             for entry in 0..count {
+                cursor.count_field()?;
                 if named {
                     path.truncate(before);
                     if before > 0 {
@@ -220,8 +259,11 @@ impl Definition {
                 if let Some(out) = out.as_deref_mut()
                     && count <= MOST_ENTRIES
                 {
-                    out.0.extend(named.then(|| path.clone()));
-                    out.1.push(value);
+                    if out.values.len() == MOST_NUMBERS {
+                        return Err(MessageFault::Wide(MOST_NUMBERS));
+                    }
+                    out.names.extend(named.then(|| path.clone()));
+                    out.values.push(value);
                 }
             }
         }
@@ -282,6 +324,8 @@ struct Cursor<'a> {
     big_endian: bool,
     /// Largest alignment.
     align: usize,
+    /// Fields so far.
+    fields: usize,
 }
 
 impl<'a> Cursor<'a> {
@@ -304,7 +348,17 @@ impl<'a> Cursor<'a> {
             layout,
             big_endian,
             align,
+            fields: 0,
         })
+    }
+
+    /// Counts a field: each has a byte at least, but for empty messages.
+    fn count_field(&mut self) -> Result<(), MessageFault> {
+        self.fields += 1;
+        match self.fields <= self.bytes.len() + MOST_EMPTY {
+            true => Ok(()),
+            false => Err(MessageFault::Short(self.bytes.len())),
+        }
     }
 
     fn take(&mut self, count: usize) -> Result<&'a [u8], MessageFault> {
@@ -414,10 +468,13 @@ mod tests {
             ("last", Value::Number(-300.0)),
         ];
         let owned = |(name, value): (&str, _)| (name.to_owned(), value);
-        let expected: Numbers = expected.into_iter().map(owned).unzip();
+        let (names, values): (Vec<_>, Vec<_>) = expected.into_iter().map(owned).unzip();
         for layout in [Layout::Ros1, Layout::Ros2] {
             let found = definition.values(layout, &message(layout), true).unwrap();
-            assert_eq!(found, expected, "{layout:?}");
+            assert_eq!(found.names, names, "{layout:?}");
+            assert_eq!(found.values, values, "{layout:?}");
+            let unnamed = definition.values(layout, &message(layout), false).unwrap();
+            assert_eq!((unnamed.lists, unnamed.names.len()), (found.lists, 0));
         }
     }
 

@@ -38,13 +38,19 @@ impl<'a> Source<'a> {
         let Some(table) = map.table(quantity) else {
             return Ok(None);
         };
-        let found = match &table.file {
-            Some(name) => logs.iter().find(|log| log.name == *name),
-            None if logs.len() == 1 => logs.first(),
-            None => logs.iter().find(|log| log.name.is_empty()),
-        };
+        let name = table.file.as_deref().unwrap_or_default();
+        let named = |log: &&Log| log.name == name || (table.file.is_none() && logs.len() == 1);
+        let columns = table.columns(&map.names, quantity);
+        let has_all = |log: &&Log| columns.iter().all(|name| log.column(name).is_some());
+        // A topic whose messages have several sets of names has several tables.
+        let found = (logs.iter().filter(named).find(has_all)).or_else(|| logs.iter().find(named));
+        if let Some(fault) = found.and_then(|log| log.fault.as_ref()) {
+            let found = format!("`{name}`, which cannot be read ({fault})");
+            return Err(map.fault(&quantity.at("topic"), found, "a topic of numbers"));
+        }
         let log = found.ok_or_else(|| {
-            let names: Vec<String> = logs.iter().map(|l| format!("`{}`", l.name)).collect();
+            let mut names: Vec<String> = logs.iter().map(|l| format!("`{}`", l.name)).collect();
+            names.dedup();
             let expected = format!("one of {}", names.join(", "));
             let found = (table.file.as_ref()).map_or("nothing".to_owned(), |f| format!("`{f}`"));
             map.fault(&quantity.at("file"), found, expected)
@@ -55,6 +61,11 @@ impl<'a> Source<'a> {
             table,
             log,
         }))
+    }
+
+    /// The log, and what reading did to it.
+    pub fn log(&self) -> &'a Log {
+        self.log
     }
 
     /// The quantity, its times in s from `epoch_s`, the whole seconds that all clocks count from.

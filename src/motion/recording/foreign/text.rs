@@ -101,11 +101,10 @@ impl Sheet {
             numbers: numbers(),
             log: Log {
                 path: path.to_owned(),
-                name: String::new(),
-                clock: None,
                 columns: vec![Channel::default(); cells.len()],
                 is_named,
                 first_row: if is_named { row + 1 } else { row },
+                ..Log::default()
             },
         };
         if is_named {
@@ -127,7 +126,14 @@ impl Sheet {
             cells.pop();
         }
         if cells.len() != expected {
-            let (found, hint) = (cells.len(), "");
+            let found = cells.len();
+            let hint = match log.len() {
+                0 if log.is_named => {
+                    "; lines before the header are left out by `skip = 1` in `[text]` of the map, which \
+                     `romc inspect --guess` finds"
+                }
+                _ => "",
+            };
             let fault = RecordingFault::RowLength {
                 found,
                 expected,

@@ -1,6 +1,6 @@
 //! Forces against weight and acceleration, falling in flight, hips' torques against the side they hold.
 
-use nalgebra::{Rotation3, Unit, Vector3};
+use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
 use serde::{Serialize, Serializer};
 
 use super::weight_n;
@@ -22,6 +22,9 @@ const LEAST_FORCE: f64 = 0.02;
 pub struct Balance {
     /// Mean vertical acceleration in flight, upwards, m/s^2.
     pub fall_m_s2: Option<f64>,
+    /// The same by the heights alone, the median over the flights.
+    #[serde(skip)]
+    pub fall_by_height_m_s2: Option<f64>,
     /// Impulse of the feet over what the robot's weight and change of velocity need.
     pub weight_share: Option<f64>,
     /// Slope of each hip's abduction torque over its lever times the force along the leg; 1 for a force in the plane
@@ -47,13 +50,16 @@ impl Balance {
     /// Over all segments of a recording; torques beyond the robot's limits count as the limits.
     pub fn of(recording: &Recording, robot: &Robot) -> Self {
         let mut sums = Sums::default();
+        let mut falls = Vec::new();
         for segment in &recording.segments {
             sums.add(segment, robot);
+            falls.extend(falls_of(segment));
         }
         let (dv, flight_s) = sums.flight;
         let (impulse, needed, ground_s) = sums.ground;
         Self {
             fall_m_s2: (flight_s >= LEAST_S).then(|| dv / flight_s),
+            fall_by_height_m_s2: (!falls.is_empty()).then(|| median(falls.into_iter())),
             weight_share: (ground_s >= LEAST_S && needed > 0.0).then(|| impulse / needed),
             hip_share: sums
                 .hips
@@ -121,6 +127,27 @@ impl Sums {
         let [roll, pitch, yaw] = std::array::from_fn(|i| segment.x[(JOINT_DIM + 3 + i, sample)]);
         rotation([roll, pitch, yaw]) * sum
     }
+}
+
+/// Vertical acceleration of each flight by a parabola through its heights.
+fn falls_of(segment: &Segment) -> Vec<f64> {
+    let is_grounded = |sample: usize| segment.feet[sample].contains(&true);
+    let runs = stretches(0..segment.len(), |a, b| is_grounded(a) == is_grounded(b));
+    let flights = runs.into_iter().filter(|run| !is_grounded(run.start));
+    let fall = |run: std::ops::Range<usize>| {
+        let middle = 0.5 * (segment.time_s[run.start] + segment.time_s[run.end - 1]);
+        let length = segment.time_s[run.end - 1] - segment.time_s[run.start];
+        let (mut matrix, mut side) = (Matrix3::zeros(), Vector3::zeros());
+        for sample in run {
+            let t = segment.time_s[sample] - middle;
+            let powers = Vector3::new(1.0, t, 0.5 * t * t);
+            matrix += powers * powers.transpose();
+            side += powers * segment.x[(HEIGHT, sample)];
+        }
+        let solved = (length >= LEAST_S).then(|| matrix.lu().solve(&side));
+        solved.flatten().map(|solution| solution[2])
+    };
+    flights.filter_map(fall).collect()
 }
 
 fn without_axis<S: Serializer>(offset: &Option<(&str, f64)>, out: S) -> Result<S::Ok, S::Error> {

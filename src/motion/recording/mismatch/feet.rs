@@ -5,7 +5,7 @@ use super::Broken;
 use super::stance::{foot_place, orders};
 use crate::recording::preprocess::median;
 use crate::recording::{Recording, Segment};
-use crate::robot::{ContactFlags, FOOT_DIM, Leg, Robot};
+use crate::robot::{ContactFlags, FOOT_DIM, JOINT_DIM, Leg, Robot};
 
 /// By how much feet in the air have to be higher in sum in another order, m, and as a share of that sum.
 ///
@@ -56,6 +56,18 @@ fn higher_m(feet: &ContactFlags, height: &[f64; FOOT_DIM], legs: &[Leg; FOOT_DIM
 
 /// The median height of the feet that are on the ground, if that is not the floor's.
 pub(super) fn floor(recording: &Recording, robot: &Robot) -> Option<Broken> {
+    let value = floor_m(recording, robot);
+    (value.abs() > FLOOR_M).then(|| {
+        let words = format!(
+            "feet on the ground are at a height of {value:.2} m ({FLOOR_M:.2} m are accepted): is z that of the trunk \
+             over the ground?"
+        );
+        (value, FLOOR_M, words)
+    })
+}
+
+/// Median height of the feet that are on the ground, m.
+fn floor_m(recording: &Recording, robot: &Robot) -> f64 {
     let mut heights = Vec::new();
     for segment in &recording.segments {
         for (sample, feet) in segment.feet.iter().enumerate() {
@@ -64,13 +76,39 @@ pub(super) fn floor(recording: &Recording, robot: &Robot) -> Option<Broken> {
         }
     }
     // 0 where no foot ever stands.
-    let value = median(heights.into_iter());
-    (value.abs() > FLOOR_M).then(|| {
+    median(heights.into_iter())
+}
+
+/// Lowest height of the trunk's origin over the floor, m, and largest angle of its z axis to the vertical while feet are
+/// on the ground, rad.
+const TRUNK: (f64, f64) = (0.05, 1.6);
+/// Shortest time that it lies, s.
+const LIES_S: f64 = 0.1;
+
+/// Time, s, that the trunk lies on the ground, or under it, or on its back, if that is long enough.
+pub(super) fn fallen(recording: &Recording, robot: &Robot) -> Option<Broken> {
+    let floor_m = floor_m(recording, robot);
+    let (mut lies_s, mut lowest, mut steepest) = (0.0, f64::INFINITY, 0.0_f64);
+    for segment in &recording.segments {
+        let grounded = (0..segment.len()).filter(|sample| segment.feet[*sample].contains(&true));
+        for sample in grounded {
+            let x = segment.state(sample);
+            let height = x[JOINT_DIM + 2] - floor_m;
+            let upright = x[JOINT_DIM + 3].cos() * x[JOINT_DIM + 4].cos();
+            let tilt = upright.clamp(-1.0, 1.0).acos();
+            if height < TRUNK.0 || tilt > TRUNK.1 {
+                lies_s += segment.mean_step_s();
+            }
+            (lowest, steepest) = (lowest.min(height), steepest.max(tilt));
+        }
+    }
+    (lies_s > LIES_S).then(|| {
         let words = format!(
-            "feet on the ground are at a height of {value:.2} m ({FLOOR_M:.2} m are accepted): is z that of the trunk \
-             over the ground?"
+            "for {lies_s:.2} s with feet on the ground the trunk is tilted by up to {:.0} degrees and as low as \
+             {lowest:.2} m: did the robot fall? `rows` in `[text]` of a map keeps the jump alone",
+            steepest.to_degrees()
         );
-        (value, FLOOR_M, words)
+        (lies_s, LIES_S, words)
     })
 }
 

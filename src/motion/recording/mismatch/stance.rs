@@ -3,8 +3,9 @@
 use std::fmt;
 use std::ops::Range;
 
-use nalgebra::Vector3;
+use nalgebra::{DMatrix, UnitQuaternion, Vector3};
 
+use crate::recording::foreign::angles_of_quaternions;
 use crate::recording::preprocess::median;
 use crate::recording::segment::stretches;
 use crate::recording::{Recording, Segment};
@@ -28,6 +29,8 @@ pub(super) enum Reading {
     Negated(&'static [usize], &'static str),
     /// What body x and y are made of, and what that is.
     Placed([[f64; 2]; 2], &'static str),
+    /// Elements of the quaternion as read of which its real part and x, y, z are made, and what that is.
+    Turned([usize; 4], &'static str),
 }
 
 impl Reading {
@@ -42,7 +45,23 @@ impl Reading {
                     x[JOINT_DIM + axis] = row[0] * place[0] + row[1] * place[1];
                 }
             }
+            Self::Turned(elements, _) => {
+                let about = |axis: usize| {
+                    let angle = x[JOINT_DIM + 3 + axis];
+                    UnitQuaternion::from_scaled_axis(Vector3::ith(axis, angle))
+                };
+                let read = about(2) * about(1) * about(0);
+                let read = [read.w, read.i, read.j, read.k];
+                let meant = DMatrix::from_iterator(4, 1, elements.map(|element| read[element]));
+                let angles = angles_of_quaternions(&meant);
+                x[JOINT_DIM + 3..].copy_from_slice(angles.as_slice());
+            }
         }
+    }
+
+    /// Whether it is another order of a quaternion.
+    pub fn is_of_quaternion(&self) -> bool {
+        matches!(self, Self::Turned(..))
     }
 }
 
@@ -50,7 +69,7 @@ impl fmt::Display for Reading {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Negated(_, name) => write!(f, "with {name} of the other sign"),
-            Self::Placed(_, words) => f.write_str(words),
+            Self::Placed(_, words) | Self::Turned(_, words) => f.write_str(words),
             Self::Legs(legs) => {
                 let names = legs.map(Leg::short_name).join(", ");
                 write!(f, "with the joints of fr, fl, rr, rl taken from {names}")
@@ -70,8 +89,8 @@ const SIGNS: [Reading; 4] = [
     Reading::Negated(&[0, 3, 6, 9], "hip abduction"),
 ];
 
-/// Frames and orders in which the place of a body is easily recorded, its attitude being right.
-const PLACES: [Reading; 6] = [
+/// Frames and orders in which the place of a body is easily recorded, its attitude being right, or the attitude.
+const PLACES: [Reading; 8] = [
     Reading::Placed([[-1.0, 0.0], [0.0, 1.0]], "with body x of the other sign"),
     Reading::Placed([[1.0, 0.0], [0.0, -1.0]], "with body y of the other sign"),
     Reading::Placed([[0.0, 1.0], [1.0, 0.0]], "with body x and y exchanged"),
@@ -86,6 +105,14 @@ const PLACES: [Reading; 6] = [
     Reading::Placed(
         [[0.0, -1.0], [1.0, 0.0]],
         "with body x and y turned by a right angle",
+    ),
+    Reading::Turned(
+        [3, 0, 1, 2],
+        "with the quaternion in the order xyzw instead of wxyz",
+    ),
+    Reading::Turned(
+        [1, 2, 3, 0],
+        "with the quaternion in the order wxyz instead of xyzw",
     ),
 ];
 
@@ -137,7 +164,7 @@ pub(super) fn orders() -> Vec<[Leg; FOOT_DIM]> {
 }
 
 /// Place of a leg's foot in the world, m, in a state `x`; `rolled` without what the foot's sphere has rolled.
-pub(super) fn foot_place(
+pub(in crate::recording) fn foot_place(
     robot: &Robot,
     leg: Leg,
     x: &[f64; STATE_DIM],
@@ -247,7 +274,7 @@ fn root_mean((sum, count): (f64, usize)) -> Option<f64> {
 }
 
 /// Each foot's times on the ground without their edges.
-fn stances(segment: &Segment) -> Vec<(Leg, Range<usize>)> {
+pub(in crate::recording) fn stances(segment: &Segment) -> Vec<(Leg, Range<usize>)> {
     let step_s = segment.mean_step_s();
     if step_s <= 0.0 {
         return Vec::new();

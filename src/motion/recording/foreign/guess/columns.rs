@@ -1,11 +1,11 @@
 //! Columns sorted into quantities, and the clock among them.
 
-use super::super::elements::Quantity;
+use super::super::elements::{QUATERNION, Quantity};
 use super::super::log::{Channel, Log};
 use super::super::units::Dimension;
 use super::names::{Reading, is_time, read, unit};
 use crate::recording::preprocess::median;
-use crate::robot::JOINT_DIM;
+use crate::robot::{JOINT_DIM, Robot};
 
 /// The columns of one quantity.
 #[derive(Debug, Clone)]
@@ -18,6 +18,12 @@ pub(super) struct Group {
     pub is_quaternion: bool,
     /// Whether elements were counted rather than named.
     pub is_counted: bool,
+    /// Other columns that are this quantity by their names, in words.
+    pub others: Vec<String>,
+    /// Whether one of these fits no less than the columns, which are only the first.
+    pub is_tie: bool,
+    is_wanted: bool,
+    family: Vec<String>,
 }
 
 /// The clock of the log, if it is a column.
@@ -27,14 +33,127 @@ pub(super) struct Clock {
     pub unit: &'static str,
 }
 
-/// The quantities that the names say, the first complete family of columns of each.
-pub(super) fn groups(logs: &[Log]) -> Vec<Group> {
-    let mut families: Vec<(usize, Vec<(usize, Reading)>)> = Vec::new();
+/// The quantities that the names say: of several complete families of columns those that were measured, of the log and the
+/// words of the others, sampled most often.
+pub(super) fn groups(logs: &[Log], robot: &Robot) -> Vec<Group> {
+    let rates: Vec<Option<i32>> = logs.iter().map(rate_class).collect();
+    let all = complete(&families(logs, robot));
+    let of = |quantity: Quantity| all.iter().filter(move |group| group.quantity == quantity);
+    // Words that the families of a first choice have in common with those of other quantities.
+    let fellows = |one: &Group| -> usize {
+        let of_quantity = |quantity| of(quantity).map(|other| shared(one, other)).max();
+        Quantity::ALL.into_iter().filter_map(of_quantity).sum()
+    };
+    let rate = |group: &Group| std::cmp::Reverse(rates[group.log].unwrap_or_default());
+    let first = |quantity| {
+        of(quantity).min_by_key(|group| {
+            (
+                group.is_wanted,
+                rate(group),
+                std::cmp::Reverse(fellows(group)),
+                group.family.len(),
+            )
+        })
+    };
+    let [joints, body] = [Quantity::JointPosition, Quantity::BodyPosition].map(first);
+    let chosen = Quantity::ALL.into_iter().filter_map(|quantity| {
+        let is_of_body = !quantity.is_of_joints() && quantity != Quantity::Feet;
+        let base = if is_of_body {
+            body.or(joints)
+        } else {
+            joints.or(body)
+        };
+        let rank = |group: &Group| {
+            let alike = base.map_or((true, 0), |base| {
+                (base.log == group.log, shared(base, group))
+            });
+            let is_first = base.is_some_and(|base| std::ptr::eq(base, group));
+            let (same_log, words) = (std::cmp::Reverse(alike.0), std::cmp::Reverse(alike.1));
+            let plain = (group.is_quaternion, group.family.len());
+            (
+                !is_first,
+                group.is_wanted,
+                same_log,
+                rate(group),
+                words,
+                plain,
+            )
+        };
+        let best = of(quantity).min_by_key(|group| rank(group))?;
+        let measured = of(quantity).filter(|group| group.is_wanted == best.is_wanted);
+        let others = measured.filter(|group| !std::ptr::eq(*group, best));
+        let others: Vec<&Group> = others
+            .filter(|o| o.is_quaternion == best.is_quaternion)
+            .collect();
+        let rank_of = |group: &Group| {
+            let (_, _, log, rate, words, plain) = rank(group);
+            let words = if std::ptr::eq(best, base.unwrap_or(group)) {
+                Default::default()
+            } else {
+                words
+            };
+            (log, rate, words, plain)
+        };
+        let ties = |other: &&Group| rank_of(other) == rank_of(best) && differ(logs, best, other);
+        let tie = others.iter().copied().any(|other| ties(&other));
+        Some(Group {
+            is_tie: tie,
+            others: others.iter().map(|other| in_words(logs, other)).collect(),
+            ..best.clone()
+        })
+    });
+    chosen.collect()
+}
+
+/// A family of columns: its first column, topic and rate.
+fn in_words(logs: &[Log], group: &Group) -> String {
+    let log = &logs[group.log];
+    let name = |at: usize| &log.columns[group.columns[at]].name;
+    let columns = format!("`{}` to `{}`", name(0), name(group.columns.len() - 1));
+    match (log.name.is_empty(), rate_hz(log)) {
+        (true, _) => columns,
+        (false, None) => format!("{columns} of `{}`", log.name),
+        (false, Some(rate)) => format!("{columns} of `{}` ({rate:.0} Hz)", log.name),
+    }
+}
+
+/// Samples per second of a topic, which has a clock.
+fn rate_hz(log: &Log) -> Option<f64> {
+    let times = log.columns[log.clock?].times();
+    let span = times.last()? - times.first()?;
+    (span > 0.0).then(|| (times.len() - 1) as f64 / span)
+}
+
+/// Rates that differ by less than a tenth are of the same class.
+fn rate_class(log: &Log) -> Option<i32> {
+    rate_hz(log).map(|rate| (10.0 * rate.ln()).round() as i32)
+}
+
+/// How many words the names of two groups have in common.
+fn shared(one: &Group, other: &Group) -> usize {
+    one.family
+        .iter()
+        .filter(|word| other.family.contains(word))
+        .count()
+}
+
+/// Whether two groups have other numbers.
+fn differ(logs: &[Log], one: &Group, other: &Group) -> bool {
+    let values = |group: &Group, at: usize| &logs[group.log].columns[group.columns[at]].values;
+    (0..one.columns.len()).any(|at| values(one, at) != values(other, at))
+}
+
+/// Columns by the quantity, topic and words of their names.
+type Families = Vec<(usize, Vec<(usize, Reading)>)>;
+
+fn families(logs: &[Log], robot: &Robot) -> Families {
+    let mut families: Families = Vec::new();
     for (index, log) in logs.iter().enumerate() {
         for (column, channel) in log.columns.iter().enumerate() {
             // What a column alone does not say its topic may: `/foot_contacts` of `position[fr]`.
             let in_topic = || read(&format!("{} {}", log.name, channel.name));
-            let Some(reading) = read(&channel.name).or_else(in_topic) else {
+            let of_robot = of_robot(&channel.name, robot);
+            let Some(reading) = of_robot.or_else(|| read(&channel.name)).or_else(in_topic) else {
                 continue;
             };
             let same = |(own, members): &&mut (usize, Vec<(usize, Reading)>)| {
@@ -54,33 +173,56 @@ pub(super) fn groups(logs: &[Log]) -> Vec<Group> {
         lists_of_three(members);
         bare_hips(members);
     }
-    let mut out = Vec::new();
-    for quantity in Quantity::ALL {
-        let complete = families.iter().filter_map(|(log, members)| {
-            let first = &members[0].1;
-            let count = match first.is_quaternion {
-                true => 4,
-                false => quantity.elements().len(),
-            };
-            let column = |element| {
-                let mut found = members.iter().filter(|(_, own)| own.element == element);
-                found.next().map(|(column, _)| *column)
-            };
-            let columns: Option<Vec<usize>> = (0..count).map(column).collect();
-            let group = Group {
-                quantity,
-                log: *log,
-                columns: columns?,
-                is_quaternion: first.is_quaternion,
-                is_counted: members.iter().any(|(_, reading)| reading.is_counted),
-            };
-            (first.quantity == quantity).then_some((first.is_wanted, group))
-        });
-        // What was measured before what was asked for, angles before quaternions.
-        let chosen = complete.min_by_key(|(is_wanted, group)| (*is_wanted, group.is_quaternion));
-        out.extend(chosen.map(|(_, group)| group));
+    families
+}
+
+/// What a name says that contains the name of one of the robot's joints.
+fn of_robot(name: &str, robot: &Robot) -> Option<Reading> {
+    let low = name.to_lowercase();
+    let names = robot.joint_names().iter().map(|joint| joint.to_lowercase());
+    let found = names
+        .enumerate()
+        .filter(|(_, joint)| !joint.is_empty() && low.contains(&joint[..]));
+    // `joint_11` contains `joint_1`.
+    let (element, joint) = found.max_by_key(|(_, joint)| joint.len())?;
+    let rest = low.replacen(&joint[..], " ", 1);
+    let is_cut = |c: Option<char>| c.is_some_and(char::is_alphanumeric);
+    let at = low.find(&joint[..])?;
+    if is_cut(low[..at].chars().next_back()) || is_cut(low[at + joint.len()..].chars().next()) {
+        return None;
     }
-    out
+    // The rest of the name as it would be of a joint that is known.
+    let reading = read(&format!("fr {rest} hx"))?;
+    let is_joint = reading.quantity.elements().len() == JOINT_DIM;
+    is_joint.then_some(Reading { element, ..reading })
+}
+
+/// The families that have every element of their quantity.
+fn complete(families: &Families) -> Vec<Group> {
+    let complete = families.iter().filter_map(|(log, members)| {
+        let first = &members[0].1;
+        let count = match first.is_quaternion {
+            true => QUATERNION.len(),
+            false => first.quantity.elements().len(),
+        };
+        let column = |element| {
+            let mut found = members.iter().filter(|(_, own)| own.element == element);
+            found.next().map(|(column, _)| *column)
+        };
+        let columns: Option<Vec<usize>> = (0..count).map(column).collect();
+        Some(Group {
+            quantity: first.quantity,
+            log: *log,
+            columns: columns?,
+            is_quaternion: first.is_quaternion,
+            is_counted: members.iter().any(|(_, reading)| reading.is_counted),
+            others: Vec::new(),
+            is_tie: false,
+            is_wanted: first.is_wanted,
+            family: first.family.split_whitespace().map(str::to_owned).collect(),
+        })
+    });
+    complete.collect()
 }
 
 /// Hips without a word for which one are the second joints where the first have another name: `abad hip knee`.

@@ -1,24 +1,31 @@
 //! A first map for an unknown log: from the names of its columns, then checked and completed by its numbers.
 //!
-//! `names` says what a name means, `columns` sorts them into quantities; `evidence` compares positions with velocities
-//! to find units, signs, axes and the order of a quaternion; `write` prints the map with what it rests on.
+//! `names` says what a name means, `columns` sorts them into quantities; `scales` finds units, signs, axes and orders:
+//! `evidence` compares positions with velocities, `physics` tries readings on the robot's geometry and weight, `feet`
+//! divides forces; `write` prints the map with what it rests on.
 
 mod columns;
 mod evidence;
+mod feet;
 mod names;
+mod physics;
+mod scales;
 mod write;
 
 use std::path::Path;
 
-use self::write::map_text;
 use super::assemble::assemble;
 use super::log::Log;
 use super::map::{ColumnMap, TextFormat};
-use super::mcap::read_mcap;
+use super::mcap::{is_mcap, read_mcap};
 use super::text::read_text;
 use crate::recording::error::{RecordingError, RecordingFault};
-use crate::recording::reader::is_mcap;
 use crate::robot::Robot;
+
+/// Most lines before the header of a text.
+const MOST_SKIPPED: usize = 20;
+/// Fewest columns of a table.
+const LEAST_COLUMNS: usize = 3;
 
 /// A first map of a log.
 #[derive(Debug, Clone)]
@@ -29,6 +36,10 @@ pub struct Guess {
     pub missing: Vec<&'static str>,
     /// What the map gives when the log is read by it: samples, or why it cannot be read.
     pub outcome: Result<usize, String>,
+    /// Where other readings of the log fit as well, or none fits.
+    pub notes: Vec<String>,
+    /// What names and numbers do not decide, for a log that is read without asking.
+    pub(in crate::recording) open: Vec<String>,
 }
 
 /// Guesses the map of a text or MCAP file.
@@ -36,11 +47,32 @@ pub struct Guess {
 /// # Errors
 /// [`RecordingError`] for a file that is no table, or whose columns have no names.
 pub fn guess(path: &Path, robot: &Robot) -> Result<Guess, RecordingError> {
-    let logs = match is_mcap(path) {
-        true => read_mcap(path)?,
-        false => vec![read_text(path, &TextFormat::default())?],
+    if is_mcap(path) {
+        return guess_of(path, &read_mcap(path)?, robot);
+    }
+    let mut format = TextFormat::default();
+    let log = loop {
+        match read_text(path, &format) {
+            Ok(log) if format.skip == 0 || log.columns.len() >= LEAST_COLUMNS => break log,
+            Err(error)
+                if format.skip == 0 && !matches!(error.kind, RecordingFault::RowLength { .. }) =>
+            {
+                return Err(error);
+            }
+            // Lines before the header have other numbers of cells.
+            Ok(_) | Err(_) if format.skip < MOST_SKIPPED => format.skip += 1,
+            Ok(_) | Err(_) => break read_text(path, &TextFormat::default())?,
+        }
     };
-    guess_of(path, &logs, robot)
+    let mut guess = guess_of(path, &[log], robot)?;
+    if format.skip > 0 {
+        let skip = format!(
+            "[text]\nskip = {}   # lines before the header\n\n[time]\n",
+            format.skip
+        );
+        guess.text = guess.text.replacen("[time]\n", &skip, 1);
+    }
+    Ok(guess)
 }
 
 /// Guesses the map of logs that are one recording.
@@ -52,14 +84,10 @@ pub(in crate::recording) fn guess_of(
     if logs.iter().all(|log| !log.is_named) {
         return Err(RecordingFault::Unnamed.of(path));
     }
-    let (text, missing) = map_text(path, logs, robot);
-    let outcome = ColumnMap::parse("the guessed map", &text)
+    let mut guess = write::guessed(path, logs, robot);
+    guess.outcome = ColumnMap::parse("the guessed map", &guess.text)
         .and_then(|map| assemble(path, logs, &map))
         .map(|made| made.recording.sample_count())
         .map_err(|error| error.to_string());
-    Ok(Guess {
-        text,
-        missing,
-        outcome,
-    })
+    Ok(guess)
 }

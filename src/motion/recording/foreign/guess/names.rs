@@ -156,9 +156,12 @@ pub(super) fn read(name: &str) -> Option<Reading> {
         );
         return reading(quantity, element, is_quaternion, is_counted);
     }
-    if has(FEET) || (has("force forces") && axis.is_none()) {
+    let is_force = has("force forces") || (has("f fn load pressure") && leg.is_some());
+    if has(FEET) || (is_force && axis.is_none() && joint.is_none()) {
         let element = leg.or(number.filter(|n| *n < 4));
-        let is_place = axis.is_some_and(|axis| axis != 2 || has("position pos velocity"));
+        let is_moved = has("position pos velocity vel speed");
+        let is_contact = has("contact contacts stance touch");
+        let is_place = axis.map_or(is_moved && !is_contact, |axis| axis != 2 || is_moved);
         return match element {
             Some(element) if !is_place => reading(Quantity::Feet, element, false, leg.is_none()),
             Some(_) | None => None,
@@ -375,6 +378,11 @@ mod tests {
             ("theta", (Quantity::Orientation, 1)),
             ("psi_dot", (Quantity::AngularVelocity, 2)),
             ("Fz RF", (Quantity::Feet, 0)),
+            ("F_RL [N]", (Quantity::Feet, 3)),
+            ("FL load (N)", (Quantity::Feet, 1)),
+            ("tau_RR_knee [Nm]", (Quantity::JointTorque, 8)),
+            ("base vx [m/s]", (Quantity::BodyVelocity, 0)),
+            ("pitch rate [deg/s]", (Quantity::AngularVelocity, 1)),
             ("c_2", (Quantity::Feet, 2)),
         ] {
             assert_eq!(said(name), Some(expected), "{name}");
@@ -387,6 +395,8 @@ mod tests {
             "wireless_remote[0]",
             "temperature",
             "FR_foot_position_x",
+            "foot_position_body[2]",
+            "foot_speed_body[1]",
             "battery",
             "mode",
             "tick",

@@ -1,0 +1,433 @@
+//! What the robot's geometry says of a log: units, order and signs under which feet on the ground stay where they are,
+//! and signs and unit of torques under which the feet carry the body.
+//!
+//! Everything is tried on one recording that is read without scales; its rows are scaled here.
+
+use nalgebra::{Rotation3, Unit, Vector3};
+
+use super::super::units::Dimension;
+use crate::recording::mismatch::{foot_place, stances};
+use crate::recording::preprocess::median;
+use crate::recording::segment::stretches;
+use crate::recording::{Recording, Segment};
+use crate::robot::input_rule::rotation;
+use crate::robot::{GRAVITY_M_S2, JOINT_DIM, Leg, Robot, STATE_DIM};
+
+/// Most stances of a leg, and most samples of a stance, that are looked at.
+const MOST: (usize, usize) = (40, 24);
+/// Distance, m, that a joint outside of its limits counts as, and the same for each sign that is not the first choice.
+const OUTSIDE_M: f64 = 4e-3;
+const TURNED_M: f64 = 1e-4;
+/// Share of a figure, and its difference in m, by which another reading has to be better than a plainer one.
+const BETTER: (f64, f64) = (0.75, 5e-4);
+/// Least movement of feet on stiff legs that shows anything, m.
+const LEAST_MOTION_M: f64 = 3e-3;
+/// Length of the times over which forces and changes of velocity are summed, s.
+const BLOCK_S: f64 = 0.08;
+/// Share of what torques leave unexplained by which another set of signs has to be better than one sign for all.
+const OTHER_SIGNS: f64 = 0.5;
+/// Slope of the hips' torques over what holds the feet on their side that decides their sign.
+const HIP_SHARE: f64 = 0.3;
+/// Largest movement of feet on the ground in a reading that fits, m.
+const FITS_M: f64 = 0.05;
+
+/// A unit and its factor.
+pub(super) type NamedUnit = (&'static str, f64);
+
+/// How columns are read: units of the trunk's position and the joints' angles, whether joints are grouped by their kind,
+/// and the sign of each joint in romc's order.
+#[derive(Debug, Clone)]
+pub(super) struct Reading {
+    pub position: NamedUnit,
+    pub joint: NamedUnit,
+    pub by_kind: bool,
+    pub signs: [f64; JOINT_DIM],
+    /// How far feet on the ground move in it, root mean square, m.
+    pub slip_m: f64,
+    /// How far they would on stiff legs, which units that are too small make little of.
+    motion_m: f64,
+    /// For each kind of joint whether feet on the ground show its sign.
+    shown: [bool; 3],
+}
+
+impl Reading {
+    /// With these units, nothing turned or exchanged.
+    pub fn plain(position: NamedUnit, joint: NamedUnit) -> Self {
+        Self {
+            position,
+            joint,
+            by_kind: false,
+            signs: [1.0; JOINT_DIM],
+            slip_m: 0.0,
+            motion_m: 0.0,
+            shown: [false; 3],
+        }
+    }
+
+    /// Whether it is better than a plainer one by more than chance: feet move less compared with what they would on stiff
+    /// legs, whatever the units.
+    pub fn beats(&self, other: &Self) -> bool {
+        let figure = |reading: &Self| match reading.motion_m > LEAST_MOTION_M {
+            true => reading.slip_m / reading.motion_m,
+            false => 1.0,
+        };
+        figure(self) < BETTER.0 * figure(other)
+    }
+
+    /// Whether feet on the ground stay in place in it.
+    pub fn fits(&self) -> bool {
+        self.slip_m < FITS_M
+    }
+
+    /// The row of a joint among the columns.
+    pub fn row(&self, joint: usize) -> usize {
+        match self.by_kind {
+            true => 4 * (joint % 3) + joint / 3,
+            false => joint,
+        }
+    }
+}
+
+/// A recording without scales, and the samples of its stances that are looked at.
+pub(super) struct View<'a> {
+    robot: &'a Robot,
+    recording: &'a Recording,
+    stances: Vec<(&'a Segment, Leg, Vec<usize>)>,
+}
+
+impl<'a> View<'a> {
+    pub fn of(recording: &'a Recording, robot: &'a Robot) -> Self {
+        let all = recording.segments.iter();
+        let all = all.flat_map(|segment| {
+            stances(segment)
+                .into_iter()
+                .map(move |stance| (segment, stance))
+        });
+        let all: Vec<_> = all.collect();
+        let every = all.len().div_ceil(4 * MOST.0).max(1);
+        let chosen = all
+            .into_iter()
+            .step_by(every)
+            .map(|(segment, (leg, samples))| {
+                let step = samples.len().div_ceil(MOST.1).max(1);
+                (segment, leg, samples.step_by(step).collect())
+            });
+        Self {
+            robot,
+            recording,
+            stances: chosen.collect(),
+        }
+    }
+
+    /// The best reading with one of these units and orders, the first choice of each unless another is clearly better;
+    /// none without stances. Also others that fit as well.
+    pub fn best(
+        &self,
+        positions: &[NamedUnit],
+        joints: &[NamedUnit],
+        orders: &[bool],
+    ) -> Option<(Reading, Vec<Reading>)> {
+        let mut all = Vec::new();
+        for position in positions {
+            for joint in joints {
+                for by_kind in orders {
+                    all.push(self.signed(*position, *joint, *by_kind)?);
+                }
+            }
+        }
+        let mut best = 0;
+        for at in 1..all.len() {
+            if all[at].beats(&all[best]) {
+                best = at;
+            }
+        }
+        let chosen = all.swap_remove(best);
+        let as_well = |other: &Reading| other.fits() && !chosen.beats(other);
+        all.retain(as_well);
+        Some((chosen, all))
+    }
+
+    /// A reading with the signs under which feet stay best in place.
+    fn signed(&self, position: NamedUnit, joint: NamedUnit, by_kind: bool) -> Option<Reading> {
+        let mut reading = Reading {
+            by_kind,
+            ..Reading::plain(position, joint)
+        };
+        let of_legs = |reading: &Reading| Leg::ALL.map(|leg| self.moved(reading, leg));
+        let combination = |code: usize| -> [f64; 3] {
+            std::array::from_fn(|kind| if code >> kind & 1 == 1 { -1.0 } else { 1.0 })
+        };
+        // Sums of squares and counts by leg, for the same signs on all legs.
+        let tried: Vec<[(f64, usize); 4]> = (0..8)
+            .map(|code| {
+                let signs = combination(code);
+                reading.signs = std::array::from_fn(|i| signs[i % 3]);
+                of_legs(&reading)
+            })
+            .collect();
+        let rms = |parts: &[(f64, usize)]| {
+            let (sum, count) = parts
+                .iter()
+                .fold((0.0, 0), |all, part| (all.0 + part.0, all.1 + part.1));
+            (count > 0).then(|| (sum / count as f64).sqrt())
+        };
+        let whole: Vec<f64> = tried
+            .iter()
+            .map(|parts| rms(parts))
+            .collect::<Option<_>>()?;
+        let least = |figures: &[f64]| {
+            let best = (0..8).min_by(|a, b| figures[*a].total_cmp(&figures[*b]));
+            best.expect("invariant: eight figures")
+        };
+        let common = least(&whole);
+        let mut codes = [common; 4];
+        reading.slip_m = whole[common];
+        // Legs with axes of their own, where those are clearly better.
+        let own = Leg::ALL.map(|leg| {
+            let figures: Option<Vec<f64>> = tried
+                .iter()
+                .map(|parts| rms(&parts[leg.index()..=leg.index()]))
+                .collect();
+            figures.map_or(common, |figures| least(&figures))
+        });
+        let parts = Leg::ALL.map(|leg| tried[own[leg.index()]][leg.index()]);
+        if rms(&parts)? < BETTER.0 * whole[common] - BETTER.1 {
+            (codes, reading.slip_m) = (own, rms(&parts)?);
+        }
+        reading.signs = std::array::from_fn(|i| combination(codes[i / 3])[i % 3]);
+        reading.motion_m = self.motion_m(&reading);
+        reading.shown = std::array::from_fn(|kind| {
+            let turned = whole[common ^ (1 << kind)];
+            whole[common] < BETTER.0 * turned && whole[common] + BETTER.1 < turned
+        });
+        Some(reading)
+    }
+
+    /// How far feet on the ground would move on legs that stay as they are at the beginning of each stance, root mean
+    /// square, m.
+    fn motion_m(&self, reading: &Reading) -> f64 {
+        let (mut sum, mut count) = (0.0, 0);
+        for (segment, leg, samples) in &self.stances {
+            let stiff = samples
+                .first()
+                .map(|sample| state(segment, *sample, reading));
+            let places = samples
+                .iter()
+                .zip(stiff.iter().cycle())
+                .map(|(sample, stiff)| {
+                    let mut x = state(segment, *sample, reading);
+                    x[..JOINT_DIM].copy_from_slice(&stiff[..JOINT_DIM]);
+                    foot_place(self.robot, *leg, &x, true)
+                });
+            let places: Vec<Vector3<f64>> = places.collect();
+            sum += about_median(&places);
+            count += places.len();
+        }
+        (sum / f64::from(u32::try_from(count).unwrap_or(u32::MAX).max(1))).sqrt()
+    }
+
+    /// Squared distances of a leg's foot from where it stands, summed, and their number.
+    fn moved(&self, reading: &Reading, leg: Leg) -> (f64, usize) {
+        let (mut sum, mut count) = (0.0, 0);
+        let limits = self.robot.joint_limit_rad();
+        for (segment, _, samples) in self.stances.iter().filter(|(_, own, _)| *own == leg) {
+            let mut outside = 0;
+            let places: Vec<Vector3<f64>> = (samples.iter())
+                .map(|&sample| {
+                    let x = state(segment, sample, reading);
+                    outside += (0..3)
+                        .filter(|kind| {
+                            let joint = 3 * leg.index() + kind;
+                            let (low, high) = limits[joint];
+                            !(low - 0.1..=high + 0.1).contains(&x[joint])
+                        })
+                        .count();
+                    foot_place(self.robot, leg, &x, true)
+                })
+                .collect();
+            sum += about_median(&places);
+            sum += OUTSIDE_M * OUTSIDE_M * outside as f64;
+            count += places.len();
+        }
+        let turned = (0..3)
+            .filter(|kind| reading.signs[3 * leg.index() + kind] < 0.0)
+            .count();
+        (sum + TURNED_M * TURNED_M * (turned * count) as f64, count)
+    }
+
+    /// Signs of the torques in romc's order and their unit: those under which feet carry the body; none where they carry
+    /// nothing. Signs of the reading that feet in place do not show become those of the torques.
+    pub fn torques(&self, reading: &mut Reading) -> Option<([f64; JOINT_DIM], NamedUnit)> {
+        let blocks = self.blocks(reading);
+        let explained = |signs: [f64; 2]| {
+            let mut sums = [0.0; 3];
+            for (forces, needed) in &blocks {
+                let force = forces[0] * signs[0] + forces[1] * signs[1];
+                sums[0] += force.dot(needed);
+                sums[1] += force.norm_squared();
+                sums[2] += needed.norm_squared();
+            }
+            let [product, square, whole] = sums;
+            let left = 1.0 - product * product / (square * whole);
+            (product > 0.0 && left.is_finite()).then_some((left, product / square))
+        };
+        let tried = [[1.0, 1.0], [-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0]];
+        let tried = tried.map(|signs| (signs, explained(signs)));
+        let best = |all: &[([f64; 2], Option<(f64, f64)>)]| {
+            let known = all
+                .iter()
+                .filter_map(|(signs, found)| Some((*signs, (*found)?)));
+            known.min_by(|one, other| one.1.0.total_cmp(&other.1.0))
+        };
+        let common = best(&tried[..2]);
+        let other = best(&tried[2..]);
+        let (signs, (_, scale)) = match (common, other) {
+            (Some(common), Some(other)) if other.1.0 < OTHER_SIGNS * common.1.0 => other,
+            (Some(common), _) => common,
+            (None, other) => other?,
+        };
+        let hips = self.hips(reading, signs);
+        let torque = std::array::from_fn(|i| {
+            let of_kind = [hips[i / 3], signs[0], signs[1]];
+            reading.signs[i] * of_kind[i % 3]
+        });
+        // An axis that points the other way turns angles and torques; one sign of all torques is that of who pushes whom.
+        if !reading.shown[0] && signs[0] == signs[1] {
+            for leg in 0..4 {
+                reading.signs[3 * leg] *= hips[leg] * signs[1];
+            }
+        }
+        const UNITS: [&str; 3] = ["N m", "N cm", "N mm"];
+        let units = UNITS.map(|unit| (unit, Dimension::Torque.factor(unit).unwrap_or(1.0)));
+        let nearest = |one: &NamedUnit, other: &NamedUnit| {
+            let off = |unit: &NamedUnit| (unit.1 / scale).ln().abs();
+            off(one).total_cmp(&off(other))
+        };
+        Some((torque, units.into_iter().min_by(nearest)?))
+    }
+
+    /// Over times with feet on the ground, the impulses that flexions and knees give, and what weight and change of
+    /// velocity need, forwards and upwards.
+    fn blocks(&self, reading: &Reading) -> Vec<([Vector3<f64>; 2], Vector3<f64>)> {
+        let mut out = Vec::new();
+        let forwards_and_up = |v: Vector3<f64>| Vector3::new(v.x, 0.0, v.z);
+        for segment in &self.recording.segments {
+            let grounded = |sample: usize| segment.feet[sample].contains(&true);
+            let step_s = segment.mean_step_s();
+            let length = ((BLOCK_S / step_s).round() as usize).max(2);
+            for run in stretches(0..segment.len(), |a, b| grounded(a) == grounded(b)) {
+                let starts = run.clone().step_by(length);
+                for start in starts.filter(|start| grounded(*start) && start + length < run.end) {
+                    let mut forces = [Vector3::zeros(); 2];
+                    for sample in start..start + length {
+                        let x = state(segment, sample, reading);
+                        let turn = rotation([15, 16, 17].map(|i| x[i]));
+                        for leg in Leg::down(segment.feet[sample]) {
+                            let Some((map, tau)) = self.leg(segment, sample, leg, &x, reading)
+                            else {
+                                continue;
+                            };
+                            for kind in [1, 2] {
+                                forces[kind - 1] += turn * map.column(kind) * (tau[kind] * step_s);
+                            }
+                        }
+                    }
+                    let velocity = |sample: usize| {
+                        Vector3::from_fn(|axis, _| {
+                            segment.dx[(JOINT_DIM + axis, sample)] * reading.position.1
+                        })
+                    };
+                    let time_s = segment.time_s[start + length] - segment.time_s[start];
+                    let mut needed = velocity(start + length) - velocity(start);
+                    needed.z += GRAVITY_M_S2 * time_s;
+                    out.push((
+                        forces.map(forwards_and_up),
+                        forwards_and_up(self.robot.mass_kg() * needed),
+                    ));
+                }
+            }
+        }
+        out
+    }
+
+    /// Map from a leg's torques to the force of its foot on the body, in the body's axes, and those torques.
+    fn leg(
+        &self,
+        segment: &Segment,
+        sample: usize,
+        leg: Leg,
+        x: &[f64; STATE_DIM],
+        reading: &Reading,
+    ) -> Option<(nalgebra::Matrix3<f64>, [f64; 3])> {
+        let first = 3 * leg.index();
+        let map = self
+            .robot
+            .damped_force_map(leg, &[x[first], x[first + 1], x[first + 2]])
+            .ok()?;
+        let torque = |kind: usize| {
+            let joint = first + kind;
+            reading.signs[joint] * segment.torque_nm[(reading.row(joint), sample)]
+        };
+        Some((map, std::array::from_fn(torque)))
+    }
+
+    /// Signs of the hips' torques by leg: feet are held on their own side of the body; those of the knees where that is not
+    /// clear. Axes of the hips may be mirrored from right to left; other patterns come from feet that stick.
+    fn hips(&self, reading: &Reading, signs: [f64; 2]) -> [f64; 4] {
+        let mut sums = [(0.0, 0.0); 4];
+        for (segment, leg, samples) in &self.stances {
+            let (product, square) = &mut sums[leg.index()];
+            for &sample in samples {
+                let x = state(segment, sample, reading);
+                let Some((map, tau)) = self.leg(segment, sample, *leg, &x, reading) else {
+                    continue;
+                };
+                let force =
+                    map.column(1) * (signs[0] * tau[1]) + map.column(2) * (signs[1] * tau[2]);
+                let first = 3 * leg.index();
+                let jacobian = self
+                    .robot
+                    .foot_jacobian(*leg, &[x[first], x[first + 1], x[first + 2]]);
+                // What flexion and knee give lies in the leg's plane.
+                let links = self.robot.geometry(*leg).links();
+                let axis = Unit::new_normalize(links.abduction);
+                let normal = Rotation3::from_axis_angle(&axis, x[first]) * links.flexion;
+                let lever = -jacobian
+                    .column(0)
+                    .dot(&(force - normal * normal.dot(&force)));
+                *product += tau[0] * lever;
+                *square += lever * lever;
+            }
+        }
+        let sign = |legs: &[usize]| -> Option<f64> {
+            let sum =
+                |of: fn(&(f64, f64)) -> f64| legs.iter().map(|leg| of(&sums[*leg])).sum::<f64>();
+            let share = sum(|sums| sums.0) / sum(|sums| sums.1);
+            (share.abs() > HIP_SHARE).then_some(share.signum())
+        };
+        let common = sign(&[0, 1, 2, 3]).unwrap_or(signs[1]);
+        match (sign(&[0, 2]), sign(&[1, 3])) {
+            (Some(right), Some(left)) => [right, left, right, left],
+            _ => [common; 4],
+        }
+    }
+}
+
+/// Squared distances of places from their median, summed.
+fn about_median(places: &[Vector3<f64>]) -> f64 {
+    let stands = Vector3::from_fn(|axis, _| median(places.iter().map(|place| place[axis])));
+    places
+        .iter()
+        .map(|place| (place - stands).norm_squared())
+        .sum()
+}
+
+/// The state of a sample in a reading.
+fn state(segment: &Segment, sample: usize, reading: &Reading) -> [f64; STATE_DIM] {
+    let raw = segment.state(sample);
+    std::array::from_fn(|i| match i {
+        0..JOINT_DIM => reading.signs[i] * reading.joint.1 * raw[reading.row(i)],
+        12..15 => reading.position.1 * raw[i],
+        _ => raw[i],
+    })
+}

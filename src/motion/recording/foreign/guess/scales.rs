@@ -1,0 +1,455 @@
+//! Units, signs, axes and orders of the guessed map: by names, by derivatives, and by what the robot's geometry says.
+
+use nalgebra::DMatrix;
+
+use super::super::assemble::assemble;
+use super::super::attitude::{angle_rates, angles_of_quaternions, in_world, unwrap};
+use super::super::elements::Quantity;
+use super::super::map::{ColumnMap, Frame};
+use super::super::units::Dimension;
+use super::columns::Group;
+use super::evidence::{Scale, axes, reach, scale, slopes};
+use super::feet::force_lines;
+use super::physics::{NamedUnit, Reading, View};
+use super::write::{Lines, Source, unit_line};
+use crate::robot::{JOINT_DIM, JOINT_NAMES, Robot};
+
+const ANGLE: [(&str, f64); 3] = [
+    ("rad", 1.0),
+    ("deg", std::f64::consts::PI / 180.0),
+    ("rpm", std::f64::consts::PI / 30.0),
+];
+const LENGTHS: [&str; 3] = ["m", "cm", "mm"];
+/// Largest angle of a joint within its turn, rad: beyond, degrees are the first choice.
+const ANGLE_RAD: f64 = std::f64::consts::TAU;
+/// Largest pitch for which radians are the first choice.
+const PITCH_RAD: f64 = 1.6;
+
+/// What the scales of a map rest on.
+pub(super) struct Scales {
+    /// Lines by quantity.
+    pub lines: Lines,
+    /// The order of the joints' columns, if they are counted and grouped by kind.
+    pub order: Option<&'static str>,
+    pub notes: Vec<String>,
+}
+
+/// How the log is read.
+struct Choice {
+    /// Index among the attitudes.
+    attitude: usize,
+    reading: Reading,
+    /// Signs and unit of the torques, if these carry the robot.
+    torques: Option<([f64; JOINT_DIM], NamedUnit)>,
+    /// Other readings that fit as well.
+    as_well: Vec<Reading>,
+}
+
+/// A way to read the trunk's attitude: its lines, and roll, pitch and yaw.
+type Attitude = (Vec<String>, DMatrix<f64>);
+
+impl Source<'_> {
+    /// The scales of all quantities.
+    pub fn scales(&self, robot: &Robot, time: &str) -> Scales {
+        let (mut lines, mut notes) = (Lines::new(), Vec::new());
+        if let Some(feet) = self.group(Quantity::Feet) {
+            let (own, note) = force_lines(&self.raw(feet));
+            lines.insert(Quantity::Feet, own);
+            notes.extend(note);
+        }
+        let attitudes = self.attitudes();
+        let Choice {
+            attitude,
+            reading,
+            torques,
+            as_well,
+        } = self.choice(robot, time, &attitudes, &lines);
+        notes.extend(said(&reading, &as_well));
+        let turned = |what: &str, signs: &[f64]| {
+            sign_line(signs).map(|line| format!("{what}: {line}, as the feet and the weight show"))
+        };
+        notes.extend(turned("joint.position", &reading.signs));
+        notes.extend(torques.and_then(|(signs, _)| turned("joint.torque", &signs)));
+        if let Some((own, angles)) = attitudes.into_iter().nth(attitude) {
+            self.trunk(own, &angles, reading.position, &mut lines);
+        } else {
+            self.place(None, reading.position, &mut lines);
+        }
+        self.joints(&reading, torques, &mut lines);
+        let order = reading.by_kind.then_some("*.hx *.hy *.kn");
+        Scales {
+            lines,
+            order,
+            notes,
+        }
+    }
+
+    /// The reading under which feet on the ground stay best in place; by the joints' limits where no feet stand.
+    fn choice(&self, robot: &Robot, time: &str, attitudes: &[Attitude], lines: &Lines) -> Choice {
+        let height = || reach(self.raw_of(Quantity::BodyPosition).row(2).iter().copied());
+        let by_height = || match height() {
+            60.0.. => "mm",
+            4.0.. => "cm",
+            _ => "m",
+        };
+        let positions = self.units(Quantity::BodyPosition, &["mm", "cm"], &LENGTHS, by_height);
+        let angle = || reach(self.raw_of(Quantity::JointPosition).iter().copied());
+        let by_size = || if angle() > ANGLE_RAD { "deg" } else { "rad" };
+        let told = ["mrad", "rad", "deg"];
+        let joints = self.units(Quantity::JointPosition, &told, &["rad", "deg"], by_size);
+        let group = self.group(Quantity::JointPosition);
+        let orders: &[bool] = match group.is_some_and(|group| group.is_counted) {
+            true => &[false, true],
+            false => &[false],
+        };
+        let mut found: Option<Choice> = None;
+        for (attitude, (own, _)) in attitudes.iter().enumerate() {
+            let Some(recording) = self.without_scales(time, own, lines) else {
+                continue;
+            };
+            let view = View::of(&recording, robot);
+            let Some((mut reading, as_well)) = view.best(&positions, &joints, orders) else {
+                continue;
+            };
+            if found
+                .as_ref()
+                .is_none_or(|best| reading.beats(&best.reading))
+            {
+                let torques = view.torques(&mut reading);
+                found = Some(Choice {
+                    attitude,
+                    reading,
+                    torques,
+                    as_well,
+                });
+            }
+        }
+        found.unwrap_or_else(|| Choice {
+            attitude: 0,
+            reading: self.by_limits(robot, positions.first(), joints.first()),
+            torques: None,
+            as_well: Vec::new(),
+        })
+    }
+
+    /// Values of a quantity, none without it.
+    fn raw_of(&self, quantity: Quantity) -> DMatrix<f64> {
+        match self.group(quantity) {
+            Some(group) => self.raw(group),
+            None => DMatrix::zeros(quantity.elements().len(), 1),
+        }
+    }
+
+    /// The units that a quantity may have, the first choice first: the one of its name, else all of `units`.
+    fn units(
+        &self,
+        quantity: Quantity,
+        named: &[&'static str],
+        units: &[&'static str],
+        first: impl Fn() -> &'static str,
+    ) -> Vec<NamedUnit> {
+        let factor = |unit: &'static str| (unit, quantity.dimension().factor(unit).unwrap_or(1.0));
+        if let Some(told) = self
+            .group(quantity)
+            .and_then(|group| self.told(group, named))
+        {
+            return vec![factor(told)];
+        }
+        let first = first();
+        let others = units.iter().copied().filter(|unit| *unit != first);
+        [first].into_iter().chain(others).map(factor).collect()
+    }
+
+    /// The ways in which the trunk's attitude may be read, the first choice first.
+    fn attitudes(&self) -> Vec<Attitude> {
+        let Some(group) = self.group(Quantity::Orientation) else {
+            return Vec::new();
+        };
+        let values = self.raw(group);
+        if group.is_quaternion {
+            let order = |last: bool, why: &str| {
+                let (name, order) = if last {
+                    ("xyzw", [3, 0, 1, 2])
+                } else {
+                    ("wxyz", [0, 1, 2, 3])
+                };
+                let angles = angles_of_quaternions(&values.select_rows(&order));
+                (vec![format!("order = \"{name}\"{why}")], angles)
+            };
+            if !group.is_counted {
+                return vec![order(false, "")];
+            }
+            // The real part of a robot on its feet is the largest, unless it looks backwards.
+            let size = |row: usize| values.row(row).abs().sum();
+            let last = size(3) > size(0);
+            let why = "   # feet on the ground stay in place";
+            return vec![order(last, why), order(!last, why)];
+        }
+        let of_unit = |(unit, factor): NamedUnit| (vec![unit_line(unit, "")], &values * factor);
+        let units = self.units(
+            Quantity::Orientation,
+            &["rad", "deg"],
+            &["rad", "deg"],
+            || {
+                let is_steep = reach(values.row(1).iter().copied()) > PITCH_RAD;
+                if is_steep { "deg" } else { "rad" }
+            },
+        );
+        units.into_iter().map(of_unit).collect()
+    }
+
+    /// The log read with this attitude and these lines of the feet, everything else as its numbers are; none without
+    /// what stands of feet rest on.
+    fn without_scales(
+        &self,
+        time: &str,
+        attitude: &[String],
+        lines: &Lines,
+    ) -> Option<crate::recording::Recording> {
+        let mut text = format!("[time]\n{time}\n");
+        for quantity in Quantity::ALL
+            .into_iter()
+            .filter(|quantity| quantity.is_required())
+        {
+            // Torques need not be there to see feet stand.
+            let stands_in =
+                Some(Quantity::JointPosition).filter(|_| quantity == Quantity::JointTorque);
+            let group = self.group(quantity).or_else(|| self.group(stands_in?))?;
+            let mut own = self.columns(group);
+            match quantity {
+                Quantity::Orientation => own.extend(attitude.iter().cloned()),
+                Quantity::Feet => own.extend(lines.get(&quantity).into_iter().flatten().cloned()),
+                _ => {}
+            }
+            text += &format!("[{}]\n{}\n", quantity.key(), own.join("\n"));
+        }
+        let map = ColumnMap::parse("the guessed map", &text).ok()?;
+        let read = assemble(self.path, self.logs, &map).ok()?;
+        let mut recording = read.recording;
+        if self.group(Quantity::JointTorque).is_none() {
+            recording
+                .segments
+                .iter_mut()
+                .for_each(|segment| segment.torque_nm.fill(0.0));
+        }
+        Some(recording)
+    }
+
+    /// Signs by the limits of the joints, where nothing else shows them.
+    fn by_limits(
+        &self,
+        robot: &Robot,
+        position: Option<&NamedUnit>,
+        joint: Option<&NamedUnit>,
+    ) -> Reading {
+        let joint = joint.copied().unwrap_or(ANGLE[0]);
+        let mut reading = Reading::plain(position.copied().unwrap_or(("m", 1.0)), joint);
+        let values = self.raw_of(Quantity::JointPosition) * joint.1;
+        for (row, (low, high)) in robot.joint_limit_rad().iter().enumerate() {
+            let inside = |sign: f64| {
+                let range = low - 0.1..=high + 0.1;
+                let values = values.row(row);
+                (values.iter())
+                    .filter(|v| range.contains(&(sign * **v)))
+                    .count()
+            };
+            if inside(-1.0) > 2 * inside(1.0) {
+                reading.signs[row] = -1.0;
+            }
+        }
+        reading
+    }
+
+    /// Lines of the joints' quantities.
+    fn joints(
+        &self,
+        reading: &Reading,
+        torques: Option<([f64; JOINT_DIM], NamedUnit)>,
+        lines: &mut Lines,
+    ) {
+        let Some(group) = self.group(Quantity::JointPosition) else {
+            return;
+        };
+        let in_order = |rows: DMatrix<f64>| {
+            let order: [usize; JOINT_DIM] = std::array::from_fn(|joint| reading.row(joint));
+            rows.select_rows(&order)
+        };
+        let mut position = in_order(self.raw(group) * reading.joint.1);
+        for (mut row, sign) in position.row_iter_mut().zip(reading.signs) {
+            row *= sign;
+        }
+        let all =
+            |unit: String, signs: &[f64]| [unit].into_iter().chain(sign_line(signs)).collect();
+        let why = match self.told(group, &["mrad", "rad", "deg"]) {
+            None if reading.joint.0 != "rad" => "   # by their size and the feet",
+            Some(_) | None => "",
+        };
+        lines.insert(
+            Quantity::JointPosition,
+            all(unit_line(reading.joint.0, why), &reading.signs),
+        );
+        if let Some((velocity, times)) = self.beside(Quantity::JointVelocity, group) {
+            let velocity = in_order(velocity);
+            let rates = slopes(&times, &position);
+            let mut own = reading.signs;
+            let mut units = Vec::new();
+            for row in 0..JOINT_DIM {
+                let rows = |m: &DMatrix<f64>| m.rows(row, 1).into_owned();
+                if let Some((Scale { unit, sign, .. }, _)) =
+                    scale(&rows(&rates), &rows(&velocity), &ANGLE)
+                {
+                    own[row] = sign;
+                    units.push(unit);
+                }
+            }
+            let most = ANGLE.iter().map(|(unit, _)| *unit);
+            let most = most.max_by_key(|unit| units.iter().filter(|own| own == &unit).count());
+            let unit = most
+                .filter(|_| !units.is_empty())
+                .unwrap_or(reading.joint.0);
+            let why = "   # by the change of the positions";
+            lines.insert(Quantity::JointVelocity, all(unit_line(unit, why), &own));
+        }
+        if let Some(group) = self.group(Quantity::JointTorque) {
+            let told = self.told(group, &["nmm", "mnm", "ncm"]);
+            let (signs, unit) = match torques {
+                Some((signs, (unit, _))) => (signs, told.unwrap_or(unit)),
+                None => (reading.signs, told.unwrap_or("N m")),
+            };
+            let why = match torques {
+                Some(_) => "   # unit and signs by the weight that the feet carry",
+                None => "   # signs as of the angles: the torques carry nothing",
+            };
+            lines.insert(Quantity::JointTorque, all(unit_line(unit, why), &signs));
+        }
+    }
+
+    /// Lines of the trunk's quantities.
+    fn trunk(
+        &self,
+        own: Vec<String>,
+        angles: &DMatrix<f64>,
+        position: NamedUnit,
+        lines: &mut Lines,
+    ) {
+        lines.insert(Quantity::Orientation, own);
+        let group = self.group(Quantity::Orientation);
+        if let Some((raw, times)) =
+            group.and_then(|group| self.beside(Quantity::AngularVelocity, group))
+        {
+            let mut own = angles.clone();
+            unwrap(&mut own);
+            let rates = slopes(&times, &own);
+            let frames = [Frame::Angles, Frame::Body, Frame::World];
+            let turned = |frame| angle_rates(&own, &raw, frame).ok();
+            let scale = axes(frames, turned, &rates, &ANGLE[..2]);
+            let own = velocity_lines(scale, "the angles");
+            lines.insert(Quantity::AngularVelocity, own);
+        }
+        self.place(Some(angles), position, lines);
+    }
+
+    /// Lines of the trunk's position and velocity.
+    fn place(&self, angles: Option<&DMatrix<f64>>, (unit, factor): NamedUnit, lines: &mut Lines) {
+        let Some(group) = self.group(Quantity::BodyPosition) else {
+            return;
+        };
+        let values = self.raw(group);
+        let height = reach(values.row(2).iter().copied());
+        let line = unit_line(unit, &format!("   # z reaches {height:.3}"));
+        lines.insert(Quantity::BodyPosition, vec![line]);
+        if let Some((raw, times)) = self.beside(Quantity::BodyVelocity, group) {
+            let rates = slopes(&times, &(values * factor));
+            let angles = angles.filter(|angles| angles.ncols() == raw.ncols());
+            let turned = |frame| match frame {
+                Frame::Body => Some(in_world(angles?, &raw)),
+                Frame::World | Frame::Angles => Some(raw.clone()),
+            };
+            let frames = [Frame::World, Frame::Body];
+            let scale = axes(frames, turned, &rates, Dimension::Length.units());
+            let own = velocity_lines(scale, "the position");
+            lines.insert(Quantity::BodyVelocity, own);
+        }
+    }
+}
+
+/// Where the chosen reading does not fit, or others fit as well.
+fn said(reading: &Reading, as_well: &[Reading]) -> Vec<String> {
+    let mut notes = Vec::new();
+    if !reading.fits() {
+        notes.push(format!(
+            "feet on the ground move by {:.0} mm in the best reading that was found: check order, signs, offsets and \
+             contact",
+            1e3 * reading.slip_m
+        ));
+    }
+    let others = as_well.iter().map(|other| {
+        let order = if other.by_kind {
+            ", joints grouped by kind"
+        } else {
+            ""
+        };
+        format!(
+            "positions in {}, angles in {}{order}",
+            other.position.0, other.joint.0
+        )
+    });
+    let others: Vec<String> = others.collect();
+    if !others.is_empty() {
+        notes.push(format!(
+            "feet on the ground stay in place as well with {}",
+            others.join("; ")
+        ));
+    }
+    notes
+}
+
+/// The signs of joints, if any is negative.
+fn sign_line(signs: &[f64]) -> Option<String> {
+    let negative: Vec<usize> = (0..signs.len()).filter(|i| signs[*i] < 0.0).collect();
+    if negative.is_empty() {
+        return None;
+    }
+    if negative.len() == signs.len() {
+        return Some("sign = -1".to_owned());
+    }
+    let names = negative
+        .iter()
+        .map(|i| format!("\"{}\" = -1", JOINT_NAMES[*i]));
+    let names: Vec<String> = names.collect();
+    Some(format!("sign = {{ {} }}", names.join(", ")))
+}
+
+/// NamedUnit, sign and axes of a velocity of the trunk.
+fn velocity_lines(found: Option<(Scale, Frame)>, of: &str) -> Vec<String> {
+    let Some((scale, axes)) = found else {
+        return vec![format!(
+            "# frame = \"body\"   # unknown: it does not follow {of}"
+        )];
+    };
+    let mut lines = vec![unit_line(
+        scale.unit,
+        &format!("   # by the change of {of}"),
+    )];
+    if scale.sign < 0.0 {
+        lines.push("sign = -1".to_owned());
+    }
+    match axes {
+        Frame::Body => lines.push("frame = \"body\"".to_owned()),
+        Frame::World if of == "the angles" => lines.push("frame = \"world\"".to_owned()),
+        Frame::World | Frame::Angles => {}
+    }
+    lines
+}
+
+/// The order of a quantity of joints whose columns are counted.
+pub(super) fn order_line(order: Option<&str>, group: &Group) -> Option<String> {
+    match order {
+        Some(order) => Some(format!(
+            "order = \"{order}\"   # feet on the ground stay in place"
+        )),
+        None => group.is_counted.then(|| {
+            "order = \"fr.* fl.* rr.* rl.*\"   # assumed: the columns are only counted".to_owned()
+        }),
+    }
+}

@@ -1,0 +1,344 @@
+//! Topics of an MCAP log as tables: numbers by the names that each message gives them, rows in order of time.
+//!
+//! A message whose lists have the names of an earlier one in another order belongs to the same table; one with other
+//! names, or lists of other lengths, to another table of the topic. Rows are sorted by the time of recording, late
+//! stamps into their place, and exact repeats are dropped; a note says so.
+
+use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
+
+use mcap::records::{Channel as Declared, SchemaHeader};
+
+use super::log::{Channel, Log};
+use super::message::{Definition, Layout, MessageFault, Value};
+use crate::recording::csv::MAX_ROWS;
+use crate::recording::error::RecordingFault;
+use crate::recording::instant::Instant;
+
+/// Most tables of a topic.
+const MOST_TABLES: usize = 16;
+/// Most arrangements of lists that are kept in mind.
+const MOST_ARRANGEMENTS: usize = 64;
+/// Most messages in a row with earlier stamps than one before them, for which they count as late; more are another run
+/// of a simulator.
+const MOST_LATE: usize = 20;
+
+/// The topics of the files of a log.
+#[derive(Default)]
+pub(super) struct Topics {
+    schemas: BTreeMap<u16, (SchemaHeader, Vec<u8>)>,
+    /// Topics of the channels of the present file.
+    channels: BTreeMap<u16, usize>,
+    topics: Vec<Topic>,
+    /// Messages read.
+    pub messages: usize,
+}
+
+/// A topic by its name and the definition of its messages.
+struct Topic {
+    name: String,
+    definition: Result<(Layout, Definition), MessageFault>,
+    /// Encodings and definition, as declared.
+    declared: (String, String, String, Vec<u8>),
+    tables: Vec<Table>,
+    /// By lists of a message: its table, and the columns of its numbers.
+    arrangements: BTreeMap<Vec<u8>, (usize, Vec<usize>)>,
+    fault: Option<MessageFault>,
+}
+
+/// Messages with the same names.
+struct Table {
+    log: Log,
+    /// Times of recording, ns.
+    times_ns: Vec<u64>,
+}
+
+impl Topics {
+    /// Forgets the channels of the last file: numbers of channels hold within one.
+    pub fn begin_file(&mut self) {
+        self.schemas.clear();
+        self.channels.clear();
+    }
+
+    pub fn schema(&mut self, header: SchemaHeader, text: Vec<u8>) {
+        self.schemas.insert(header.id, (header, text));
+    }
+
+    /// A declared channel.
+    ///
+    /// # Errors
+    /// In words, for a channel that was declared otherwise.
+    pub fn channel(&mut self, channel: &Declared) -> Result<(), String> {
+        let schema = self.schemas.get(&channel.schema_id);
+        let (header, text) = schema.map_or((None, &[][..]), |(header, text)| (Some(header), text));
+        let of =
+            |text: fn(&SchemaHeader) -> &String| header.map_or(String::new(), |h| text(h).clone());
+        let declared = (
+            channel.message_encoding.clone(),
+            of(|header| &header.encoding),
+            of(|header| &header.name),
+            text.to_vec(),
+        );
+        let same = |topic: &Topic| topic.name == channel.topic && topic.declared == declared;
+        let index = (self.topics.iter().position(same)).unwrap_or_else(|| {
+            let definition = definition(channel, header.is_some(), &declared);
+            self.topics.push(Topic {
+                name: channel.topic.clone(),
+                definition,
+                declared,
+                tables: Vec::new(),
+                arrangements: BTreeMap::new(),
+                fault: None,
+            });
+            self.topics.len() - 1
+        });
+        match self.channels.entry(channel.id) {
+            Entry::Vacant(free) => _ = free.insert(index),
+            Entry::Occupied(known) if *known.get() == index => {}
+            Entry::Occupied(known) => {
+                let (one, other) = (&self.topics[*known.get()].name, &channel.topic);
+                return Err(format!(
+                    "channel {} is of `{one}` and of `{other}`",
+                    channel.id
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// A message.
+    ///
+    /// # Errors
+    /// In words, for one of a channel that was not declared.
+    pub fn message(&mut self, channel: u16, time_ns: u64, bytes: &[u8]) -> Result<(), String> {
+        let index = self.channels.get(&channel);
+        let index = index
+            .ok_or_else(|| format!("a message of channel {channel}, which is not declared"))?;
+        let topic = &mut self.topics[*index];
+        self.messages += 1;
+        if topic.fault.is_none()
+            && let Err(fault) = topic.push(time_ns, bytes)
+        {
+            topic.fault = Some(fault);
+            topic.tables.clear();
+        }
+        Ok(())
+    }
+
+    /// The tables, and topics that are none, each with its fault.
+    ///
+    /// # Errors
+    /// [`RecordingFault::NoTopic`] without any table.
+    pub fn logs(self) -> Result<Vec<Log>, RecordingFault> {
+        let mut logs = Vec::new();
+        for topic in self.topics {
+            let messages: usize = topic.tables.iter().map(|table| table.times_ns.len()).sum();
+            for table in topic.tables {
+                let others = messages - table.times_ns.len();
+                let mut log = table.finished();
+                if others > 0 {
+                    log.notes.push(format!(
+                        "`{}`: {others} of {messages} messages have other names or lengths and are left out",
+                        log.name
+                    ));
+                }
+                logs.push(log);
+            }
+            logs.extend(topic.fault.map(|fault| Log {
+                name: topic.name,
+                fault: Some(fault.to_string()),
+                ..Log::default()
+            }));
+        }
+        if logs.iter().all(|log| log.fault.is_some()) {
+            let refused = (logs.iter()).find_map(|log| Some((&log.name, log.fault.as_ref()?)));
+            let why = refused.map(|(topic, fault)| format!(" (`{topic}`: {fault})"));
+            return Err(RecordingFault::NoTopic(why.unwrap_or_default()));
+        }
+        Ok(logs)
+    }
+}
+
+/// How the messages of a channel are read.
+fn definition(
+    channel: &Declared,
+    has_schema: bool,
+    (message, encoding, name, text): &(String, String, String, Vec<u8>),
+) -> Result<(Layout, Definition), MessageFault> {
+    let layout = match (&message[..], &encoding[..]) {
+        ("cdr", "ros2msg") => Layout::Ros2,
+        ("ros1", "ros1msg") => Layout::Ros1,
+        (message, schema) => {
+            return Err(MessageFault::Encoding(format!("{message} with {schema}")));
+        }
+    };
+    if !has_schema {
+        return Err(MessageFault::Undefined(channel.topic.clone()));
+    }
+    Ok((
+        layout,
+        Definition::parse(name, &String::from_utf8_lossy(text))?,
+    ))
+}
+
+impl Topic {
+    fn push(&mut self, time_ns: u64, message: &[u8]) -> Result<(), MessageFault> {
+        let (layout, definition) = self.definition.as_ref().map_err(Clone::clone)?;
+        let found = definition.values(*layout, message, false)?;
+        if !self.arrangements.contains_key(&found.lists) {
+            let names = definition.values(*layout, message, true)?.names;
+            let arrangement = self.arranged(names)?;
+            if self.arrangements.len() == MOST_ARRANGEMENTS {
+                self.arrangements.clear();
+            }
+            self.arrangements.insert(found.lists.clone(), arrangement);
+        }
+        let (table, order) = &self.arrangements[&found.lists];
+        let table = &mut self.tables[*table];
+        if table.times_ns.len() == MAX_ROWS {
+            return Err(MessageFault::Long(MAX_ROWS));
+        }
+        table.times_ns.push(time_ns);
+        let (seconds, rest) = (time_ns / 1_000_000_000, time_ns % 1_000_000_000);
+        let columns = &mut table.log.columns;
+        columns[0].push_instant(instant(seconds as i64, rest as u32));
+        for (column, value) in order.iter().zip(found.values) {
+            match value {
+                Value::Number(value) => columns[*column].values.push(value),
+                Value::Time(seconds, nanoseconds) => {
+                    columns[*column].push_instant(instant(seconds, nanoseconds));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The table of numbers of these names, made if there is none, and their columns in it.
+    fn arranged(&mut self, names: Vec<String>) -> Result<(usize, Vec<usize>), MessageFault> {
+        let mut sorted: Vec<&String> = names.iter().collect();
+        sorted.sort_unstable();
+        if let Some(twice) = sorted.windows(2).find(|pair| pair[0] == pair[1]) {
+            return Err(MessageFault::Twice(twice[0].clone()));
+        }
+        let columns_in = |table: &Table| {
+            let columns = &table.log.columns[1..];
+            let places: BTreeMap<&String, usize> = columns
+                .iter()
+                .enumerate()
+                .map(|(i, column)| (&column.name, i + 1))
+                .collect();
+            let found = names.iter().map(|name| places.get(name).copied());
+            found
+                .collect::<Option<Vec<usize>>>()
+                .filter(|found| found.len() == columns.len())
+        };
+        let mut known = self.tables.iter().enumerate();
+        if let Some(found) = known.find_map(|(table, of)| Some((table, columns_in(of)?))) {
+            return Ok(found);
+        }
+        if self.tables.len() == MOST_TABLES {
+            return Err(MessageFault::Ragged(MOST_TABLES));
+        }
+        let order = (1..=names.len()).collect();
+        let columns = ["log_time".to_owned()].into_iter().chain(names);
+        let log = Log {
+            name: self.name.clone(),
+            columns: columns.map(|name| Channel::named(&name)).collect(),
+            is_named: true,
+            first_row: 1,
+            ..Log::default()
+        };
+        let times_ns = Vec::new();
+        self.tables.push(Table { log, times_ns });
+        Ok((self.tables.len() - 1, order))
+    }
+}
+
+fn instant(seconds: i64, nanoseconds: u32) -> Instant {
+    Instant {
+        whole: seconds,
+        rest: 1e-9 * f64::from(nanoseconds),
+    }
+}
+
+impl Table {
+    /// The table by the stamps of its messages, or the time of recording if they have none, with rows in order.
+    fn finished(self) -> Log {
+        let Self { mut log, times_ns } = self;
+        let is_stamp = |channel: &Channel| {
+            channel.name == "header.stamp" && channel.values.iter().any(|time| *time != 0.0)
+        };
+        let clock = log.columns.iter().position(is_stamp).unwrap_or(0);
+        log.clock = Some(clock);
+        let say = |log: &mut Log, count: usize, what: &str| {
+            let note = format!(
+                "`{}`: {count} of {} messages {what}",
+                log.name,
+                times_ns.len()
+            );
+            log.notes.push(note);
+        };
+        let early = late(&times_ns);
+        if early > 0 {
+            let mut order = Vec::from_iter(0..times_ns.len());
+            order.sort_by_key(|row| times_ns[*row]);
+            log.choose(&order);
+            say(
+                &mut log,
+                early,
+                "were out of order and are sorted by their time of recording",
+            );
+        }
+        let stamps = log.columns[clock].times();
+        let mut runs = stamps
+            .iter()
+            .scan((f64::NEG_INFINITY, 0), |(latest, run), &time| {
+                *run = if time < *latest { *run + 1 } else { 0 };
+                *latest = latest.max(time);
+                Some(*run)
+            });
+        let count = late(&stamps);
+        if count > 0 && runs.all(|run| run <= MOST_LATE) {
+            let mut order = Vec::from_iter(0..stamps.len());
+            order.sort_by(|one, other| stamps[*one].total_cmp(&stamps[*other]));
+            log.choose(&order);
+            say(&mut log, count, "had late stamps and are sorted by these");
+        }
+        let kept = distinct(&log, clock);
+        let repeated = log.len() - kept.len();
+        if repeated > 0 {
+            log.choose(&kept);
+            say(&mut log, repeated, "were exact repeats and are left out");
+        }
+        log
+    }
+}
+
+/// How many of some times are earlier than one before them.
+fn late<T: PartialOrd + Copy>(times: &[T]) -> usize {
+    let mut latest = times.first().copied();
+    let is_late = |time: &&T| {
+        let found = latest.is_some_and(|latest| **time < latest);
+        latest = if found { latest } else { Some(**time) };
+        found
+    };
+    times.iter().filter(is_late).count()
+}
+
+/// The rows that do not repeat one of the same time in all columns but that of the recording.
+fn distinct(log: &Log, clock: usize) -> Vec<usize> {
+    let times = log.columns[clock].times();
+    let others = &log.columns[1..];
+    let same = |one: usize, other: usize| {
+        (others.iter()).all(|column| column.values[one].to_bits() == column.values[other].to_bits())
+    };
+    let mut kept: Vec<usize> = Vec::new();
+    for row in 0..times.len() {
+        let before = kept.iter().rev().take(MOST_LATE);
+        let mut before = before.take_while(|kept| times[**kept] == times[row]);
+        if !before.any(|kept| same(*kept, row)) {
+            kept.push(row);
+        }
+    }
+    kept
+}

@@ -1,0 +1,303 @@
+//! Guessed maps where names do not decide: signs, units, thresholds and topics by what the robot can have done.
+
+use std::f64::consts::TAU;
+use std::fs;
+use std::path::Path;
+
+use nalgebra::DMatrix;
+use romc::recording::foreign::guess::{Guess, guess};
+use romc::recording::{self, Clocks, ColumnMap, Reader, Recording, Segment};
+use romc::robot::Robot;
+
+use super::foreign::{Log, difference, gyro, jump, quaternion};
+use super::mcap::Dice;
+use super::tools::is_thorough;
+
+fn guessed(path: &Path) -> (Guess, Recording) {
+    let guess = guess(path, Robot::by_name("go1").unwrap()).unwrap();
+    assert_eq!(guess.missing, Vec::<&str>::new(), "{}", guess.text);
+    let map = ColumnMap::parse("guessed.toml", &guess.text).unwrap();
+    let read = Reader::new(Some(map), Clocks::Recorded).read(path);
+    let recording = read
+        .unwrap_or_else(|error| panic!("{error}\n{}", guess.text))
+        .recording;
+    (guess, recording)
+}
+
+const LEGS: [&str; 4] = ["FR", "FL", "RR", "RL"];
+const KINDS: [&str; 3] = ["hip", "thigh", "calf"];
+const DEGREE: f64 = TAU / 360.0;
+
+/// How a log writes what the robot did.
+#[derive(Debug, Clone, Copy)]
+struct Convention {
+    /// Directions of the joints' axes; those of the hips on the left may be mirrored.
+    axes: [f64; 3],
+    mirrored: bool,
+    /// -1 for the torques of the links on the motors.
+    action: f64,
+    angle: f64,
+    speed: Option<f64>,
+    torque: f64,
+    length: f64,
+    /// 0: wxyz by number, 1: xyzw by number, 2: by name, 3: angles in rad, 4: angles in degrees.
+    attitude: usize,
+    gyro: Option<f64>,
+    /// Forces at the feet: in the air, and on the ground on top of that; none for flags.
+    force: Option<(f64, f64)>,
+    milliseconds: bool,
+}
+
+impl Convention {
+    fn random(dice: &mut Dice) -> Self {
+        let mut either = |one: f64, other: f64| if dice.below(2) == 0 { one } else { other };
+        let axes = [0; 3].map(|_| either(1.0, -1.0));
+        let action = either(1.0, -1.0);
+        let angle = either(1.0, 1.0 / DEGREE);
+        let torque = either(1.0, 1000.0);
+        let speed = [None, Some(1.0), Some(1.0 / DEGREE)][dice.below(3)];
+        Self {
+            axes,
+            mirrored: dice.below(4) == 0,
+            action,
+            angle,
+            speed,
+            torque,
+            length: [1.0, 100.0, 1000.0][dice.below(3)],
+            attitude: dice.below(5),
+            gyro: [None, Some(1.0), Some(1.0 / DEGREE)][dice.below(3)],
+            force: [
+                None,
+                Some((0.0, 60.0)),
+                Some((100.0, 60.0)),
+                Some((30.0, 400.0)),
+            ][dice.below(4)],
+            milliseconds: dice.below(2) == 0,
+        }
+    }
+
+    /// The log, its columns in any order.
+    fn write(&self, path: &Path, s: &Segment, dice: &mut Dice) {
+        let mut log = Log::default();
+        let row = |m: &DMatrix<f64>, i: usize, factor: f64| -> Vec<f64> {
+            m.row(i).iter().map(|value| factor * value).collect()
+        };
+        for i in 0..12 {
+            let side = if self.mirrored && i % 3 == 0 && i / 3 % 2 == 1 {
+                -1.0
+            } else {
+                1.0
+            };
+            let axis = side * self.axes[i % 3];
+            let name = |what: &str| format!("{}_{}_{what}", LEGS[i / 3], KINDS[i % 3]);
+            log.add(name("position"), row(&s.x, i, axis * self.angle));
+            if let Some(speed) = self.speed {
+                log.add(name("velocity"), row(&s.dx, i, axis * speed));
+            }
+            log.add(
+                name("torque"),
+                row(&s.torque_nm, i, axis * self.action * self.torque),
+            );
+        }
+        for (i, axis) in ["x", "y", "z"].into_iter().enumerate() {
+            log.add(format!("base_p{axis}"), row(&s.x, 12 + i, self.length));
+            if let Some(factor) = self.gyro {
+                log.add(
+                    format!("gyro_{axis}"),
+                    (0..s.len()).map(|k| factor * gyro(s, k)[i]),
+                );
+            }
+        }
+        let of_quaternion = |element: usize| (0..s.len()).map(move |k| quaternion(s, k)[element]);
+        for place in 0..4 {
+            match self.attitude {
+                0 => log.add(format!("imu.quaternion[{place}]"), of_quaternion(place)),
+                1 => log.add(
+                    format!("imu.quaternion[{place}]"),
+                    of_quaternion((place + 1) % 4),
+                ),
+                2 => log.add(
+                    format!("quat_{}", ["w", "x", "y", "z"][place]),
+                    of_quaternion(place),
+                ),
+                unit if place < 3 => {
+                    let factor = if unit == 4 { 1.0 / DEGREE } else { 1.0 };
+                    log.add(
+                        ["roll", "pitch", "yaw"][place],
+                        row(&s.x, 15 + place, factor),
+                    );
+                }
+                _ => {}
+            }
+        }
+        for foot in 0..4 {
+            let down = s.feet.iter().enumerate().map(|(k, feet)| (k, feet[foot]));
+            let value = down.map(|(k, down)| match self.force {
+                None => f64::from(u8::from(down)),
+                Some((rest, load)) => {
+                    let ripple = 1.0 + 0.4 * ((k * 37 + foot * 5) % 23) as f64 / 23.0;
+                    rest + 0.02 * load * ripple + if down { load * ripple } else { 0.0 }
+                }
+            });
+            let name = if self.force.is_some() {
+                "foot_force"
+            } else {
+                "contact"
+            };
+            log.add(format!("{name}_{}", LEGS[foot]), value.collect::<Vec<_>>());
+        }
+        let mut order: Vec<usize> = (0..log.names.len()).collect();
+        dice.shuffled(&mut order);
+        log.names = order.iter().map(|at| log.names[*at].clone()).collect();
+        log.columns = order.iter().map(|at| log.columns[*at].clone()).collect();
+        let scale = if self.milliseconds { 1e3 } else { 1.0 };
+        log.names.insert(0, "time".to_owned());
+        let times = s.time_s.iter().map(|time| format!("{:?}", scale * time));
+        log.columns.insert(0, times.collect());
+        log.write(path, ",", true);
+    }
+}
+
+#[test]
+fn signs_and_units_of_any_convention_are_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("log.csv");
+    let names = if is_thorough() {
+        vec!["test_01", "test_03", "train_02"]
+    } else {
+        vec!["test_01"]
+    };
+    let jumps: Vec<Segment> = (names.iter())
+        .map(|name| {
+            let file = format!("examples/recordings/go1/{name}.csv.gz");
+            let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(file);
+            recording::read(&file).unwrap().segments.remove(0)
+        })
+        .collect();
+    let mut wrong = Vec::new();
+    let count = if is_thorough() { 500 } else { 50 };
+    for seed in 0..count {
+        let mut dice = Dice(seed);
+        let convention = Convention::random(&mut dice);
+        let jump = &jumps[dice.below(jumps.len())];
+        convention.write(&path, jump, &mut dice);
+        let (guess, found) = guessed(&path);
+        let (state, _, contact) = difference(&found, jump);
+        if state > 1e-8 || !contact {
+            wrong.push(format!(
+                "{seed}: {state} {contact} {convention:?}\n{}",
+                guess.text
+            ));
+        }
+    }
+    assert!(
+        wrong.is_empty(),
+        "{} of {count}: {}",
+        wrong.len(),
+        wrong.join("\n")
+    );
+}
+
+/// MIT's Mini Cheetah and others have their hips' and knees' axes along -y: knees are positive, and their torques
+/// negative while it stands.
+#[test]
+fn axes_to_the_other_side_are_turned_with_their_torques() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("log.csv");
+    let plain = Convention {
+        axes: [1.0, -1.0, -1.0],
+        mirrored: false,
+        action: 1.0,
+        angle: 1.0,
+        speed: Some(1.0),
+        torque: 1.0,
+        length: 1.0,
+        attitude: 2,
+        gyro: Some(1.0),
+        force: None,
+        milliseconds: false,
+    };
+    let jump = jump();
+    for action in [1.0, -1.0] {
+        Convention { action, ..plain }.write(&path, &jump, &mut Dice(3));
+        let (guess, found) = guessed(&path);
+        assert!(difference(&found, &jump).0 < 1e-9, "{}", guess.text);
+    }
+}
+
+#[test]
+fn whole_turns_of_joints_and_trunk_stay_radians() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("log.csv");
+    let mut turned = jump();
+    for (row, turns) in [(1, 1.0), (2, -1.0), (5, 2.0), (16, 1.0)] {
+        turned.x.row_mut(row).add_scalar_mut(TAU * turns);
+    }
+    let convention = Convention {
+        axes: [1.0; 3],
+        mirrored: false,
+        action: 1.0,
+        angle: 1.0,
+        speed: None,
+        torque: 1.0,
+        length: 1.0,
+        attitude: 3,
+        gyro: None,
+        force: None,
+        milliseconds: false,
+    };
+    convention.write(&path, &turned, &mut Dice(1));
+    let (guess, found) = guessed(&path);
+    assert!(difference(&found, &turned).0 < 1e-9, "{}", guess.text);
+}
+
+#[test]
+fn columns_of_one_family_are_taken_and_the_others_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("log.csv");
+    let s = jump();
+    let row = |m: &DMatrix<f64>, i: usize, factor: f64| -> Vec<f64> {
+        m.row(i).iter().map(|value| factor * value).collect()
+    };
+    let mut log = Log::default();
+    log.add("time", s.time_s.clone());
+    for i in 0..12 {
+        let joint = format!("{}_{}", LEGS[i / 3], KINDS[i % 3]);
+        log.add(format!("q_sim_{joint}"), row(&s.x, i, 0.9));
+        log.add(format!("q_real_{joint}"), row(&s.x, i, 1.0));
+        log.add(format!("dq_real_{joint}"), row(&s.dx, i, 1.0));
+        log.add(format!("tau_sim_{joint}"), row(&s.torque_nm, i, 0.8));
+        log.add(format!("tau_real_{joint}"), row(&s.torque_nm, i, 1.0));
+    }
+    for (i, axis) in ["x", "y", "z"].into_iter().enumerate() {
+        log.add(format!("base_p{axis}"), row(&s.x, 12 + i, 1.0));
+        log.add(["roll", "pitch", "yaw"][i], row(&s.x, 15 + i, 1.0));
+    }
+    for foot in 0..4 {
+        let down = s.feet.iter().map(|feet| f64::from(u8::from(feet[foot])));
+        log.add(format!("contact_{}", LEGS[foot]), down.collect::<Vec<_>>());
+    }
+    log.write(&path, ",", true);
+    let (guess, found) = guessed(&path);
+    assert!(difference(&found, &s).0 < 1e-9, "{}", guess.text);
+    let notes = guess.notes.join("\n");
+    for name in ["q_sim_FR_hip", "tau_sim_FR_hip"] {
+        assert!(
+            notes.contains(name) && guess.text.contains(name),
+            "{notes}\n{}",
+            guess.text
+        );
+    }
+    // Lines before the header.
+    let text = fs::read_to_string(&path).unwrap();
+    for comment in [
+        "# jumps of Tuesday\n",
+        "robot 3, firmware 1.2\n# q in rad\n",
+    ] {
+        fs::write(&path, format!("{comment}{text}")).unwrap();
+        let (guess, found) = guessed(&path);
+        let skip = format!("skip = {}", comment.lines().count());
+        assert!(guess.text.contains(&skip), "{}", guess.text);
+        assert!(difference(&found, &s).0 < 1e-9, "{}", guess.text);
+    }
+}
