@@ -12,6 +12,7 @@
 //! | `lexer`, `parse`, `display` | the grammar of candidate terms, both ways |
 //! | `eval`, `interval`, `rounding`, `bounds` | values, and bounds over boxes |
 //! | `diff`, `substitute` | derivatives and substitution |
+//! | `slope`, `germ` | derivatives with values where roots, magnitudes and signs have kinks |
 //! | `expand`, `rational`, `perfect_power`, `trig`, `rules`, `factors` | rewriting, each way when asked |
 //! | `simplify`, `shorten`, `cost`, `region` | choosing the shortest of equal forms |
 //! | `canonical/` | a normal form with exact coefficients, to decide equality |
@@ -44,6 +45,7 @@ mod display;
 mod eval;
 mod expand;
 mod factors;
+mod germ;
 mod id_map;
 mod interval;
 mod lexer;
@@ -60,6 +62,7 @@ mod rounding;
 mod rules;
 mod shorten;
 mod simplify;
+mod slope;
 mod substitute;
 #[cfg(test)]
 mod testing;

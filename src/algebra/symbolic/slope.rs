@@ -1,0 +1,338 @@
+//! Derivatives that have values wherever the function has slopes.
+//!
+//! The rules of differentiation give `g'/(2 sqrt(g))` for a root, which is `0/0` where `g` and `g'` vanish, and
+//! `0*inf` behind a factor that vanishes with `g`. The slope of an expression is what its values have:
+//!
+//! - the derivative, where it exists;
+//! - otherwise the limit of slopes from above, or from below where there are no values above;
+//! - an infinity of the right sign where that limit is infinite;
+//! - where the function jumps, the limit of the slopes beside the jump: a jump itself adds nothing.
+//!
+//! Which of them applies is decided at run time by selections: the derivative by the rules where no argument of a root,
+//! magnitude, sign or power is zero, a slope from series (see `germ.rs`) where one is.
+
+use std::cmp::Ordering;
+
+use super::germ::{Germs, LAST_ORDER, Stop};
+use super::node::{ExprId, Function, Node, SymbolId};
+use super::number::Number;
+use super::pool::{ExprPool, Sign};
+
+/// Most selections of one slope; what is beyond them is the derivative by the rules.
+const MOST_SELECTIONS: usize = 200;
+
+/// The slope of an expression by a symbol.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Slope {
+    expr: ExprId,
+    /// Whether it is infinite somewhere.
+    has_infinity: bool,
+}
+
+/// What is assumed about a point.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Facts {
+    /// The first expression that is zero.
+    first_zero: Option<ExprId>,
+    zero: Vec<ExprId>,
+    nonzero: Vec<ExprId>,
+    /// Symbols that equal a number or another symbol.
+    values: Vec<(SymbolId, ExprId)>,
+}
+
+impl Facts {
+    /// An expression with the known values of symbols.
+    pub fn at(&self, pool: &mut ExprPool, expr: ExprId) -> ExprId {
+        pool.substitute(expr, &self.values)
+    }
+
+    /// Whether an expression is zero.
+    pub fn is_zero(&self, pool: &mut ExprPool, expr: ExprId) -> Result<bool, Stop> {
+        let test = self.at(pool, expr);
+        let mut factors = Vec::new();
+        for factor in pool.factors_of(test).to_vec() {
+            match self.known(pool, factor) {
+                Some(true) => return Ok(true),
+                Some(false) => {}
+                None => factors.push(factor),
+            }
+        }
+        if factors.is_empty() {
+            return Ok(false);
+        }
+        let test = pool.product(&factors);
+        self.known(pool, test).ok_or(Stop::Undecided(test))
+    }
+
+    /// Whether an expression that is not zero is positive.
+    pub fn is_positive(&self, pool: &mut ExprPool, expr: ExprId) -> Result<bool, Stop> {
+        let expr = self.at(pool, expr);
+        if let Some(number) = pool.as_number(expr) {
+            return Ok(!number.is_negative());
+        }
+        if pool.sign(expr) != Sign::Any {
+            return Ok(true);
+        }
+        let magnitude = pool.apply(Function::Abs, expr);
+        let below = pool.sub(expr, magnitude);
+        self.is_zero(pool, below)
+    }
+
+    fn known(&self, pool: &ExprPool, expr: ExprId) -> Option<bool> {
+        let core = core(pool, expr);
+        if let Some(number) = pool.as_number(core) {
+            return Some(number.is_zero());
+        }
+        if self.zero.contains(&core) {
+            return Some(true);
+        }
+        let is_nonzero = |expr: ExprId| {
+            let core = self::core(pool, expr);
+            pool.sign(core) == Sign::Positive || self.nonzero.contains(&core)
+        };
+        let is_other = match pool.node(core) {
+            Node::Sum(terms) => {
+                let is_signed = |term: &ExprId| pool.sign(*term) != Sign::Any;
+                terms.iter().all(is_signed) && terms.iter().any(|term| is_nonzero(*term))
+            }
+            Node::Power(_, exponent) => pool.as_number(*exponent).is_some(),
+            _ => false,
+        };
+        (is_other || is_nonzero(core)).then_some(false)
+    }
+
+    /// These facts and whether `test` is zero.
+    fn with(&self, pool: &mut ExprPool, test: ExprId, is_zero: bool) -> Facts {
+        let mut facts = self.clone();
+        if !is_zero {
+            facts.nonzero.push(core(pool, test));
+            return facts;
+        }
+        facts.first_zero.get_or_insert(test);
+        let mut pending = vec![test];
+        while let Some(expr) = pending.pop() {
+            let expr = core(pool, expr);
+            facts.zero.push(expr);
+            if let Node::Sum(terms) = pool.node(expr)
+                && terms.iter().all(|term| pool.sign(*term) != Sign::Any)
+            {
+                pending.extend(terms.iter());
+            }
+            if let Some((symbol, value)) = value_of_symbol(pool, expr) {
+                facts.set(pool, symbol, value);
+            }
+        }
+        facts
+    }
+
+    fn set(&mut self, pool: &mut ExprPool, symbol: SymbolId, value: ExprId) {
+        let value = self.at(pool, value);
+        let lists = [&mut self.zero, &mut self.nonzero];
+        for expr in lists.into_iter().flatten() {
+            let known = pool.substitute(*expr, &[(symbol, value)]);
+            *expr = core(pool, known);
+        }
+        for (_, known) in &mut self.values {
+            *known = pool.substitute(*known, &[(symbol, value)]);
+        }
+        self.values.push((symbol, value));
+    }
+}
+
+/// What is zero exactly where an expression is.
+fn core(pool: &ExprPool, expr: ExprId) -> ExprId {
+    let mut core = pool.split(expr).1;
+    if pool.as_number(expr).is_some() {
+        return expr;
+    }
+    loop {
+        core = match *pool.node(core) {
+            Node::Power(base, exponent) if pool.sign(exponent) == Sign::Positive => base,
+            Node::Apply(Function::Abs | Function::Sqrt | Function::Sign | Function::Tanh, inner) => inner,
+            _ => return core,
+        };
+        core = pool.split(core).1;
+    }
+}
+
+/// The value that a symbol has where an expression is zero: of `x`, `x - 1` and `x - y`.
+fn value_of_symbol(pool: &mut ExprPool, expr: ExprId) -> Option<(SymbolId, ExprId)> {
+    if let Some(symbol) = pool.as_symbol(expr) {
+        return Some((symbol, ExprId::ZERO));
+    }
+    let [(a, first), (b, second)] = pool.terms_of(expr)[..] else {
+        return None;
+    };
+    let is_unit = |number: Number| number.abs().is_one();
+    let is_plain = |expr| expr == ExprId::ONE || pool.as_symbol(expr).is_some();
+    let symbol = pool.as_symbol(second)?;
+    let is_exact = is_unit(b) && is_plain(first) && (is_unit(a) || first == ExprId::ONE);
+    let value = pool.scale(if b.is_negative() { a } else { -a }, first);
+    is_exact.then_some((symbol, value))
+}
+
+/// What the values beside a point have.
+enum Outcome {
+    /// The derivative by the rules.
+    Regular,
+    Finite(ExprId),
+    /// An infinity with the sign of an expression.
+    Infinite(ExprId),
+}
+
+impl ExprPool {
+    /// The slope of `expr` by `symbol`: its derivative, with selections where that has no value although
+    /// `expr` has; see the module. To be evaluated, not to be differentiated or rewritten.
+    pub fn slope(&mut self, expr: ExprId, symbol: SymbolId) -> ExprId {
+        self.full_slope(expr, symbol).expr
+    }
+
+    /// Whether the slope of `expr` may be infinite where `expr` has a value, by an argument that is zero.
+    pub fn may_be_steep(&mut self, expr: ExprId, symbol: SymbolId) -> bool {
+        self.full_slope(expr, symbol).has_infinity
+    }
+
+    fn full_slope(&mut self, expr: ExprId, symbol: SymbolId) -> Slope {
+        if let Some(&known) = self.slopes.get(&(expr, symbol)) {
+            return known;
+        }
+        let wanted = |node| self.may_contain(node, symbol);
+        let nodes = self.walk(&[expr], wanted, |_| true);
+        let slope = match nodes.into_iter().any(|node| self.has_kink(node)) {
+            true => {
+                let mut left = MOST_SELECTIONS;
+                self.selected(expr, symbol, &Facts::default(), &mut left)
+            }
+            false => Slope {
+                expr: self.derivative(expr, symbol),
+                has_infinity: false,
+            },
+        };
+        self.slopes.insert((expr, symbol), slope);
+        slope
+    }
+
+    /// Whether a node is not smooth where an operand is zero.
+    fn has_kink(&self, node: ExprId) -> bool {
+        match self.node(node) {
+            Node::Power(_, exponent) => !matches!(self.as_integer(*exponent), Some(0..)),
+            Node::Apply(Function::Abs | Function::Sign | Function::Sqrt, _) => true,
+            _ => false,
+        }
+    }
+
+    /// The slope at all points of which some facts hold. Its depth is bounded by the number of selections.
+    fn selected(
+        &mut self,
+        expr: ExprId,
+        symbol: SymbolId,
+        facts: &Facts,
+        left: &mut usize,
+    ) -> Slope {
+        let outcome = match self.outcome(expr, symbol, facts) {
+            Err(test) if *left > 0 => {
+                *left -= 1;
+                let [zero, other] = [true, false].map(|is_zero| {
+                    let facts = facts.with(self, test, is_zero);
+                    self.selected(expr, symbol, &facts, left)
+                });
+                return Slope {
+                    expr: self.select(test, zero.expr, other.expr),
+                    has_infinity: zero.has_infinity || other.has_infinity,
+                };
+            }
+            known => known.unwrap_or(Outcome::Regular),
+        };
+        let regular = self.derivative(expr, symbol);
+        let has_infinity = matches!(outcome, Outcome::Infinite(_));
+        let expr = match (outcome, facts.first_zero) {
+            (Outcome::Finite(slope), _) if self.is_reached(regular, slope, facts) => regular,
+            (Outcome::Finite(slope), _) => slope,
+            (Outcome::Infinite(sign), Some(zero)) => {
+                let magnitude = self.apply(Function::Abs, zero);
+                self.div(sign, magnitude)
+            }
+            (Outcome::Regular | Outcome::Infinite(_), _) => regular,
+        };
+        Slope { expr, has_infinity }
+    }
+
+    /// Whether the derivative by the rules has the slope's value in the numbers of a computer, without `0*inf`.
+    fn is_reached(&mut self, regular: ExprId, slope: ExprId, facts: &Facts) -> bool {
+        let is_by_values = facts.zero.iter().all(|zero| *zero == ExprId::ZERO);
+        if !is_by_values || facts.at(self, regular) != slope {
+            return false;
+        }
+        let free = |symbol: SymbolId| 0.7 + 0.1 * (symbol.index() % 7) as f64;
+        let value_of = |symbol: SymbolId| {
+            let known = facts.values.iter().find(|(other, _)| *other == symbol);
+            known.map_or(free(symbol), |&(_, value)| self.evaluate(value, &free))
+        };
+        self.evaluate(regular, &value_of).is_finite()
+    }
+
+    fn outcome(&mut self, expr: ExprId, symbol: SymbolId, facts: &Facts) -> Result<Outcome, ExprId> {
+        for side in [Number::ONE, Number::MINUS_ONE] {
+            let mut order = 2;
+            let stop = loop {
+                match Germs::new(self, facts, symbol, side, order).slope(expr) {
+                    Ok(outcome) => return Ok(outcome),
+                    Err(Stop::Order) if order < LAST_ORDER => order *= 2,
+                    Err(stop) => break stop,
+                }
+            };
+            match stop {
+                Stop::Undecided(test) => return Err(test),
+                Stop::Undefined => {}
+                Stop::Order | Stop::Unknown => return Ok(Outcome::Regular),
+            }
+        }
+        // An isolated point.
+        Ok(Outcome::Finite(ExprId::ZERO))
+    }
+
+    /// `zero` where `test` is zero, `other` elsewhere (also where it is not a number): for programs, behind a symbol
+    /// that only values look into.
+    fn select(&mut self, test: ExprId, zero: ExprId, other: ExprId) -> ExprId {
+        if zero == other {
+            return zero;
+        }
+        self.selection_symbol([test, zero, other])
+    }
+}
+
+impl Germs<'_> {
+    fn slope(&mut self, expr: ExprId) -> Result<Outcome, Stop> {
+        let Some(mut series) = self.of(expr)? else {
+            return Ok(Outcome::Regular);
+        };
+        if series.has_pole(self.pool) {
+            return Ok(Outcome::Regular);
+        }
+        series.keep_up_to_one(self.pool);
+        while !series.is_zero() {
+            let Some((exponent, coefficient)) = self.lead(&mut series)? else {
+                break;
+            };
+            let coefficient = self.pool.scale(self.side, coefficient);
+            match self.compare(exponent, ExprId::ONE)? {
+                Ordering::Greater => break,
+                Ordering::Equal => return Ok(Outcome::Finite(coefficient)),
+                Ordering::Less => {}
+            }
+            match self.compare(exponent, ExprId::ZERO)? {
+                Ordering::Greater => {
+                    let sign = self.pool.apply(Function::Sign, coefficient);
+                    return Ok(Outcome::Infinite(sign));
+                }
+                Ordering::Equal => {}
+                Ordering::Less => return Ok(Outcome::Regular),
+            }
+        }
+        Ok(Outcome::Finite(ExprId::ZERO))
+    }
+}
+
+#[cfg(test)]
+#[path = "slope_tests.rs"]
+mod tests;
