@@ -2,7 +2,7 @@
 
 use super::interface::{FunctionSpec, PhaseInterface};
 use super::precision::Precision;
-use crate::ir::{Interpreter, Statement, Unary};
+use crate::ir::{Binary, Interpreter, Statement, Unary};
 use crate::robot::JOINT_DIM;
 use crate::robot::joints::LEG_JOINT_DIM;
 
@@ -124,7 +124,10 @@ impl BatchPoints {
     pub fn new(phase: &PhaseInterface, precision: Precision) -> Self {
         let overflows = phase.dynamics.program.statements().iter().any(|statement| {
             use Unary::{Exp, Log, Tan, Tanh};
-            matches!(statement, Statement::Unary(Exp | Tan | Tanh | Log, _))
+            matches!(
+                statement,
+                Statement::Unary(Exp | Tan | Tanh | Log, _) | Statement::Binary(Binary::Pow, ..)
+            )
         });
         let far_angle = match (overflows, precision) {
             (true, _) => 0.125,

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use crate::symbolic::{ExprId, ExprPool, SymbolId};
+use crate::symbolic::{ExprId, ExprPool, Number, SymbolId};
 
 /// `constant + sum_i coefficient_i expr_i`; the expressions are distinct, not sums and
 /// without numeric factor.
@@ -38,12 +38,26 @@ impl Combination {
         result
     }
 
-    /// The derivative by one variable.
+    /// The slope by one variable. Terms whose slopes may be infinite count as one: infinities of both signs
+    /// can have a finite sum.
     pub fn derivative(&self, pool: &mut ExprPool, by: SymbolId) -> Self {
-        let summands: Vec<_> = self
-            .items
-            .iter()
-            .map(|&(coefficient, expr)| (coefficient, pool.derivative(expr, by)))
+        let items = self.items.iter().copied();
+        let (mut steep, mut items): (Vec<_>, Vec<_>) =
+            items.partition(|&(_, expr)| pool.may_be_steep(expr, by));
+        if steep.len() > 1 {
+            let terms = steep.iter().map(|&(coefficient, expr)| {
+                let number = Number::from_f64(coefficient)?;
+                Some(pool.scale(number, expr))
+            });
+            let terms: Option<Vec<ExprId>> = terms.collect();
+            if let Some(terms) = terms {
+                steep = vec![(1.0, pool.sum(&terms))];
+            }
+        }
+        items.extend(steep);
+        let summands: Vec<_> = items
+            .into_iter()
+            .map(|(coefficient, expr)| (coefficient, pool.slope(expr, by)))
             .filter(|&(_, expr)| expr != ExprId::ZERO)
             .collect();
         Self::collect(pool, summands)

@@ -15,6 +15,8 @@ use super::slope::Facts;
 
 /// Differences of exponents that count as zero: 0.1 + 0.9 and 1 are the same.
 const SAME_EXPONENT: f64 = 1e-12;
+/// Coefficients from this exponent on are taken not to vanish by chance with all before them.
+const RARE: f64 = 3.0;
 /// Most terms of a composition; the rest is left open.
 const MOST_TERMS: i64 = 24;
 /// Largest exponent up to which series are computed.
@@ -65,6 +67,12 @@ impl Series {
         let number = |exponent| pool.as_number(exponent).map(Number::to_f64);
         let is_small = |exponent| number(exponent).is_some_and(|n| n > 1.0 + SAME_EXPONENT);
         (self.terms).retain(|&(exponent, _)| exponent != ExprId::ZERO && !is_small(exponent));
+        for (exponent, _) in &mut self.terms {
+            let difference = number(*exponent).map(|n| n - 1.0);
+            if difference.is_some_and(|d| d.abs() <= SAME_EXPONENT) {
+                *exponent = ExprId::ONE;
+            }
+        }
         self.rest.retain(|&exponent| !is_small(exponent));
     }
 }
@@ -248,28 +256,49 @@ impl<'a> Germs<'a> {
         }
     }
 
-    /// Without terms from the order on; of the numeric exponents of the rest the least.
+    /// Without terms from the order on, counted from zero or, of exponents that vary with the point, from the least of
+    /// those that differ by numbers; of what is left out the first terms.
     fn cut(&mut self, mut series: Series) -> Series {
-        let order = self.order as f64;
-        let n_terms = series.terms.len();
-        let is_kept = |&(exponent, _): &(ExprId, ExprId)| {
-            self.number_of(exponent).is_none_or(|number| number < order)
-        };
-        series.terms.retain(is_kept);
-        if series.terms.len() < n_terms {
-            series.rest.push(self.pool.integer(self.order));
+        let exponents: Vec<ExprId> = series.terms.iter().map(|term| term.0).collect();
+        let order = self.pool.constant(Number::integer(self.order));
+        let mut ends = vec![order];
+        for &first in &exponents {
+            if self.number_of(first).is_some() {
+                continue;
+            }
+            let mut is_later =
+                |&other: &ExprId| self.difference(first, other).is_some_and(|d| d > 0.0);
+            if !exponents.iter().any(&mut is_later) {
+                ends.push(self.pool.add(first, order));
+            }
         }
-        let (numbers, mut rest): (Vec<ExprId>, Vec<ExprId>) =
-            (series.rest.iter()).partition(|exponent| self.number_of(**exponent).is_some());
-        let least = numbers.into_iter().min_by(|a, b| {
-            let [a, b] = [a, b].map(|e| self.number_of(*e).unwrap_or(f64::INFINITY));
-            a.total_cmp(&b)
-        });
-        rest.sort_unstable();
-        rest.dedup();
-        rest.extend(least);
-        series.rest = rest;
+        for end in ends {
+            let n_terms = series.terms.len();
+            let is_kept = |&(exponent, _): &(ExprId, ExprId)| {
+                self.difference(exponent, end).is_none_or(|d| d < -SAME_EXPONENT)
+            };
+            series.terms.retain(is_kept);
+            if series.terms.len() < n_terms {
+                series.rest.push(end);
+            }
+        }
+        series.rest.sort_unstable();
+        series.rest.dedup();
+        let all = series.rest.clone();
+        (series.rest).retain(|&rest| !all.iter().any(|&other| self.difference(rest, other).is_some_and(|d| d > 0.0)));
         series
+    }
+
+    /// `a - b` where that is a number.
+    fn difference(&mut self, a: ExprId, b: ExprId) -> Option<f64> {
+        match self.number_of(a).zip(self.number_of(b)) {
+            Some((a, b)) => Some(a - b),
+            None if self.pool.is_constant(a) || self.pool.is_constant(b) => None,
+            None => {
+                let difference = self.pool.sub(a, b);
+                self.number_of(difference)
+            }
+        }
     }
 
     fn plus(&mut self, mut a: Series, b: Series) -> Series {
@@ -357,13 +386,27 @@ impl<'a> Germs<'a> {
             }
             let coefficient = self.pool.sum(&coefficients);
             let coefficient = self.facts.at(self.pool, coefficient);
-            if !self.vanishes(coefficient)? {
+            let vanishes = match self.vanishes(coefficient) {
+                Err(Stop::Undecided(_)) if self.number_of(least).is_some_and(|n| n >= RARE) => false,
+                known => known?,
+            };
+            if !vanishes {
                 return Ok(Some((least, coefficient)));
             }
         }
         match series.rest.is_empty() || self.order >= LAST_ORDER {
             true => Ok(None),
             false => Err(Stop::Order),
+        }
+    }
+
+    /// The coefficient of `t`, if no smaller exponent is left.
+    pub fn linear(&mut self, series: &Series) -> Result<Option<ExprId>, Stop> {
+        let is_one = |&(exponent, _): &(ExprId, ExprId)| exponent == ExprId::ONE;
+        match series.terms.iter().all(is_one) {
+            false => Ok(None),
+            true if !series.rest.is_empty() => Err(self.too_short()),
+            true => Ok(Some(series.terms.first().map_or(ExprId::ZERO, |term| term.1))),
         }
     }
 
@@ -477,10 +520,13 @@ impl<'a> Germs<'a> {
             };
         }
         let sign = self.pool.apply(Function::Sign, coefficient);
-        Ok(match function {
-            Function::Abs => self.shifted(&argument, ExprId::ZERO, sign),
-            _ => Series::constant(sign),
-        })
+        if function == Function::Sign {
+            return Ok(Series::constant(sign));
+        }
+        let mut series = self.shifted(&behind, ExprId::ZERO, sign);
+        let magnitude = self.pool.apply(Function::Abs, coefficient);
+        self.push(&mut series, (exponent, magnitude));
+        Ok(series)
     }
 
     /// `(c t^r (1 + G))^e = c^e t^(r e) sum_k binomial(e, k) G^k` for an exponent that does not vary.

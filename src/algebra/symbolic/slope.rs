@@ -46,59 +46,81 @@ impl Facts {
         pool.substitute(expr, &self.values)
     }
 
-    /// Whether an expression is zero.
+    /// Whether an expression is zero; a product, factor by factor.
     pub fn is_zero(&self, pool: &mut ExprPool, expr: ExprId) -> Result<bool, Stop> {
-        let test = self.at(pool, expr);
-        let mut factors = Vec::new();
-        for factor in pool.factors_of(test).to_vec() {
+        let expr = self.at(pool, expr);
+        let mut undecided = None;
+        for factor in pool.factors_of(expr).to_vec() {
             match self.known(pool, factor) {
                 Some(true) => return Ok(true),
                 Some(false) => {}
-                None => factors.push(factor),
+                None => undecided = undecided.or(Some(factor)),
             }
         }
-        if factors.is_empty() {
-            return Ok(false);
+        match undecided {
+            None => Ok(false),
+            Some(test) => Err(Stop::Undecided(self.simplest(pool, test))),
         }
-        let test = pool.product(&factors);
-        self.known(pool, test).ok_or(Stop::Undecided(test))
+    }
+
+    /// A symbol of a test that makes it zero by being zero, or the test: what is known of symbols is known of all
+    /// expressions.
+    fn simplest(&self, pool: &mut ExprPool, test: ExprId) -> ExprId {
+        for symbol in pool.symbols_of(test) {
+            let variable = pool.symbol_expr(symbol);
+            if !self.nonzero.contains(&variable)
+                && core(pool, test) != variable
+                && pool.substitute(test, &[(symbol, ExprId::ZERO)]) == ExprId::ZERO
+            {
+                return variable;
+            }
+        }
+        test
     }
 
     /// Whether an expression that is not zero is positive.
     pub fn is_positive(&self, pool: &mut ExprPool, expr: ExprId) -> Result<bool, Stop> {
         let expr = self.at(pool, expr);
-        if let Some(number) = pool.as_number(expr) {
-            return Ok(!number.is_negative());
+        if pool.is_constant(expr) {
+            return Ok(pool.evaluate(expr, &|_| f64::NAN) > 0.0);
         }
         if pool.sign(expr) != Sign::Any {
             return Ok(true);
         }
-        let magnitude = pool.apply(Function::Abs, expr);
-        let below = pool.sub(expr, magnitude);
-        self.is_zero(pool, below)
+        let (content, rest) = content(pool, expr);
+        let sign = pool.apply(Function::Sign, rest);
+        let below = pool.sub(sign, ExprId::ONE);
+        Ok(self.is_zero(pool, below)? != content.is_negative())
     }
 
-    fn known(&self, pool: &ExprPool, expr: ExprId) -> Option<bool> {
+    fn known(&self, pool: &mut ExprPool, expr: ExprId) -> Option<bool> {
         let core = core(pool, expr);
-        if let Some(number) = pool.as_number(core) {
-            return Some(number.is_zero());
+        if pool.is_constant(core) {
+            return Some(pool.evaluate(core, &|_| f64::NAN) == 0.0);
         }
         if self.zero.contains(&core) {
             return Some(true);
         }
-        let is_nonzero = |expr: ExprId| {
+        let mut is_nonzero = |pool: &mut ExprPool, expr: ExprId| {
             let core = self::core(pool, expr);
             pool.sign(core) == Sign::Positive || self.nonzero.contains(&core)
         };
-        let is_other = match pool.node(core) {
+        let is_other = match pool.node(core).clone() {
             Node::Sum(terms) => {
                 let is_signed = |term: &ExprId| pool.sign(*term) != Sign::Any;
-                terms.iter().all(is_signed) && terms.iter().any(|term| is_nonzero(*term))
+                terms.iter().all(is_signed) && terms.iter().any(|term| is_nonzero(pool, *term))
             }
-            Node::Power(_, exponent) => pool.as_number(*exponent).is_some(),
+            Node::Power(_, exponent) => pool.as_number(exponent).is_some(),
+            Node::Product(factors) => {
+                let known: Vec<_> = factors.iter().map(|f| self.known(pool, *f)).collect();
+                if known.contains(&Some(true)) {
+                    return Some(true);
+                }
+                known.iter().all(|known| *known == Some(false))
+            }
             _ => false,
         };
-        (is_other || is_nonzero(core)).then_some(false)
+        (is_other || is_nonzero(pool, core)).then_some(false)
     }
 
     /// These facts and whether `test` is zero.
@@ -113,7 +135,7 @@ impl Facts {
         while let Some(expr) = pending.pop() {
             let expr = core(pool, expr);
             facts.zero.push(expr);
-            if let Node::Sum(terms) = pool.node(expr)
+            if let Node::Sum(terms) = pool.node(expr).clone()
                 && terms.iter().all(|term| pool.sign(*term) != Sign::Any)
             {
                 pending.extend(terms.iter());
@@ -139,19 +161,44 @@ impl Facts {
     }
 }
 
-/// What is zero exactly where an expression is.
-fn core(pool: &ExprPool, expr: ExprId) -> ExprId {
-    let mut core = pool.split(expr).1;
+/// Splits an expression into a number and the rest, which is the same for all its multiples.
+fn content(pool: &mut ExprPool, expr: ExprId) -> (Number, ExprId) {
+    let (mut number, mut rest) = pool.split(expr);
+    loop {
+        let terms = pool.terms_of(rest);
+        let first = terms.first().map_or(Number::ONE, |term| term.0);
+        if terms.len() < 2 || first.is_one() {
+            return (number, rest);
+        }
+        let quotients = terms.iter().map(|&(n, rest)| Some((n.checked_div(first)?, rest)));
+        let Some(terms) = quotients.collect() else {
+            return (number, rest);
+        };
+        let Some(product) = number.checked_mul(first) else {
+            return (number, rest);
+        };
+        // A part that is no longer multiplied may be a sum itself.
+        (number, rest) = (product, pool.sum_of_terms(terms));
+    }
+}
+
+/// What is zero exactly where an expression is, in floats: none but zero is a multiple of pi.
+fn core(pool: &mut ExprPool, expr: ExprId) -> ExprId {
     if pool.as_number(expr).is_some() {
         return expr;
     }
+    let mut core = content(pool, expr).1;
     loop {
         core = match *pool.node(core) {
             Node::Power(base, exponent) if pool.sign(exponent) == Sign::Positive => base,
-            Node::Apply(Function::Abs | Function::Sqrt | Function::Sign | Function::Tanh, inner) => inner,
+            Node::Apply(function, inner) => match function {
+                Function::Abs | Function::Sign | Function::Sqrt => inner,
+                Function::Sin | Function::Tan | Function::Tanh => inner,
+                Function::Cos | Function::Exp | Function::Log => return core,
+            },
             _ => return core,
         };
-        core = pool.split(core).1;
+        core = content(pool, core).1;
     }
 }
 
@@ -163,12 +210,13 @@ fn value_of_symbol(pool: &mut ExprPool, expr: ExprId) -> Option<(SymbolId, ExprI
     let [(a, first), (b, second)] = pool.terms_of(expr)[..] else {
         return None;
     };
-    let is_unit = |number: Number| number.abs().is_one();
-    let is_plain = |expr| expr == ExprId::ONE || pool.as_symbol(expr).is_some();
     let symbol = pool.as_symbol(second)?;
-    let is_exact = is_unit(b) && is_plain(first) && (is_unit(a) || first == ExprId::ONE);
-    let value = pool.scale(if b.is_negative() { a } else { -a }, first);
-    is_exact.then_some((symbol, value))
+    let quotient = (-a).checked_div(b)?;
+    let is_exact = match pool.as_symbol(first) {
+        Some(_) => quotient.abs().is_one(),
+        None => first == ExprId::ONE && Number::from_f64(quotient.to_f64())? == quotient,
+    };
+    is_exact.then(|| (symbol, pool.scale(quotient, first)))
 }
 
 /// What the values beside a point have.
@@ -232,7 +280,8 @@ impl ExprPool {
         let outcome = match self.outcome(expr, symbol, facts) {
             Err(test) if *left > 0 => {
                 *left -= 1;
-                let [zero, other] = [true, false].map(|is_zero| {
+                // The way to the derivative by the rules first.
+                let [other, zero] = [false, true].map(|is_zero| {
                     let facts = facts.with(self, test, is_zero);
                     self.selected(expr, symbol, &facts, left)
                 });
@@ -263,7 +312,14 @@ impl ExprPool {
         if !is_by_values || facts.at(self, regular) != slope {
             return false;
         }
-        let free = |symbol: SymbolId| 0.7 + 0.1 * (symbol.index() % 7) as f64;
+        let varies = |node: ExprId| match self.node(node) {
+            Node::Power(_, exponent) => self.as_number(*exponent).is_none(),
+            _ => false,
+        };
+        if self.reachable(&[regular]).into_iter().any(varies) {
+            return false;
+        }
+        let free = |symbol: SymbolId| 0.613 + 0.0937 * (symbol.index() % 7) as f64;
         let value_of = |symbol: SymbolId| {
             let known = facts.values.iter().find(|(other, _)| *other == symbol);
             known.map_or(free(symbol), |&(_, value)| self.evaluate(value, &free))
@@ -311,6 +367,9 @@ impl Germs<'_> {
         }
         series.keep_up_to_one(self.pool);
         while !series.is_zero() {
+            if let Some(coefficient) = self.linear(&series)? {
+                return Ok(Outcome::Finite(self.pool.scale(self.side, coefficient)));
+            }
             let Some((exponent, coefficient)) = self.lead(&mut series)? else {
                 break;
             };
