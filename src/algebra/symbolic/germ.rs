@@ -402,12 +402,16 @@ impl<'a> Germs<'a> {
 
     /// The coefficient of `t`, if no smaller exponent is left.
     pub fn linear(&mut self, series: &Series) -> Result<Option<ExprId>, Stop> {
-        let is_one = |&(exponent, _): &(ExprId, ExprId)| exponent == ExprId::ONE;
-        match series.terms.iter().all(is_one) {
-            false => Ok(None),
-            true if !series.rest.is_empty() => Err(self.too_short()),
-            true => Ok(Some(series.terms.first().map_or(ExprId::ZERO, |term| term.1))),
+        if !series.terms.iter().all(|term| term.0 == ExprId::ONE) {
+            return Ok(None);
         }
+        for &rest in &series.rest {
+            if self.compare(rest, ExprId::ONE)?.is_le() {
+                return Err(self.too_short());
+            }
+        }
+        let coefficient = series.terms.first().map(|term| term.1);
+        Ok(Some(coefficient.unwrap_or(ExprId::ZERO)))
     }
 
     fn too_short(&self) -> Stop {

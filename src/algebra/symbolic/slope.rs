@@ -110,7 +110,9 @@ impl Facts {
                 let is_signed = |term: &ExprId| pool.sign(*term) != Sign::Any;
                 terms.iter().all(is_signed) && terms.iter().any(|term| is_nonzero(pool, *term))
             }
-            Node::Power(_, exponent) => pool.as_number(exponent).is_some(),
+            Node::Power(base, exponent) => {
+                pool.as_number(exponent).is_some() || is_nonzero(pool, base)
+            }
             Node::Product(factors) => {
                 let known: Vec<_> = factors.iter().map(|f| self.known(pool, *f)).collect();
                 if known.contains(&Some(true)) {
@@ -281,10 +283,12 @@ impl ExprPool {
             Err(test) if *left > 0 => {
                 *left -= 1;
                 // The way to the derivative by the rules first.
-                let [other, zero] = [false, true].map(|is_zero| {
-                    let facts = facts.with(self, test, is_zero);
-                    self.selected(expr, symbol, &facts, left)
-                });
+                let mut share = *left - *left / 4;
+                *left -= share;
+                let facts_of = [false, true].map(|is_zero| facts.with(self, test, is_zero));
+                let other = self.selected(expr, symbol, &facts_of[0], &mut share);
+                *left += share;
+                let zero = self.selected(expr, symbol, &facts_of[1], left);
                 return Slope {
                     expr: self.select(test, zero.expr, other.expr),
                     has_infinity: zero.has_infinity || other.has_infinity,
