@@ -214,7 +214,9 @@ impl<'a> Printer<'a> {
                 // its parentheses, because floating-point sums do not associate.
                 let (own, right) = match op {
                     Binary::Add | Binary::Sub => (Precedence::Sum, Precedence::Product),
-                    Binary::Mul | Binary::Div | Binary::Pow => (Precedence::Product, Precedence::Atom),
+                    Binary::Mul | Binary::Div | Binary::Pow => {
+                        (Precedence::Product, Precedence::Atom)
+                    }
                 };
                 let right = if starts_with_minus(b) {
                     Precedence::Atom

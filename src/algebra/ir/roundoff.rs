@@ -256,7 +256,10 @@ impl Real for Rounded {
         if [zero, other].iter().any(|value| value.is_unbounded()) {
             return Self::UNBOUNDED;
         }
-        let (exact, computed) = (zero.exact.hull(other.exact), zero.computed.hull(other.computed));
+        let (exact, computed) = (
+            zero.exact.hull(other.exact),
+            zero.computed.hull(other.computed),
+        );
         let apart = (computed.high - exact.low).max(exact.high - computed.low);
         Self {
             exact,

@@ -56,7 +56,10 @@ impl Gradient {
         // Terms whose slopes may be infinite are added before they are differentiated.
         let mut is_steep = |by: &SymbolId| {
             let steep = terms.others.iter();
-            steep.filter(|(expr, _)| pool.may_be_steep(*expr, *by)).count() > 1
+            steep
+                .filter(|(expr, _)| pool.may_be_steep(*expr, *by))
+                .count()
+                > 1
         };
         if terms.monomials.keys().all(|monomial| monomial.len() < 2)
             || columns.iter().any(&mut is_steep)

@@ -275,7 +275,8 @@ impl<'a> Germs<'a> {
         for end in ends {
             let n_terms = series.terms.len();
             let is_kept = |&(exponent, _): &(ExprId, ExprId)| {
-                self.difference(exponent, end).is_none_or(|d| d < -SAME_EXPONENT)
+                self.difference(exponent, end)
+                    .is_none_or(|d| d < -SAME_EXPONENT)
             };
             series.terms.retain(is_kept);
             if series.terms.len() < n_terms {
@@ -285,7 +286,10 @@ impl<'a> Germs<'a> {
         series.rest.sort_unstable();
         series.rest.dedup();
         let all = series.rest.clone();
-        (series.rest).retain(|&rest| !all.iter().any(|&other| self.difference(rest, other).is_some_and(|d| d > 0.0)));
+        (series.rest).retain(|&rest| {
+            !all.iter()
+                .any(|&other| self.difference(rest, other).is_some_and(|d| d > 0.0))
+        });
         series
     }
 
@@ -387,7 +391,9 @@ impl<'a> Germs<'a> {
             let coefficient = self.pool.sum(&coefficients);
             let coefficient = self.facts.at(self.pool, coefficient);
             let vanishes = match self.vanishes(coefficient) {
-                Err(Stop::Undecided(_)) if self.number_of(least).is_some_and(|n| n >= RARE) => false,
+                Err(Stop::Undecided(_)) if self.number_of(least).is_some_and(|n| n >= RARE) => {
+                    false
+                }
                 known => known?,
             };
             if !vanishes {
@@ -424,8 +430,9 @@ impl<'a> Germs<'a> {
     /// The value at `t = 0` and the terms that vanish there; the leading coefficient as an error where there is
     /// a pole.
     fn split(&mut self, mut series: Series) -> Result<Result<(ExprId, Series), ExprId>, Stop> {
-        let numbers: Option<Vec<f64>> =
-            (series.terms.iter()).map(|&(e, _)| self.number_of(e)).collect();
+        let numbers: Option<Vec<f64>> = (series.terms.iter())
+            .map(|&(e, _)| self.number_of(e))
+            .collect();
         if numbers.is_some_and(|numbers| numbers.iter().all(|&number| number >= 0.0)) {
             let is_constant = |&(e, _): &(ExprId, ExprId)| e == ExprId::ZERO;
             let at = series.terms.iter().position(is_constant);
@@ -452,8 +459,9 @@ impl<'a> Germs<'a> {
         mut coefficient: impl FnMut(&mut Self, i64) -> ExprId,
     ) -> Series {
         let mut result = Series::constant(coefficient(self, 0));
-        let numbers: Option<Vec<f64>> =
-            (inner.terms.iter()).map(|&(e, _)| self.number_of(e)).collect();
+        let numbers: Option<Vec<f64>> = (inner.terms.iter())
+            .map(|&(e, _)| self.number_of(e))
+            .collect();
         let most = if numbers.is_some() { MOST_TERMS } else { 1 };
         let mut power = Series::constant(ExprId::ONE);
         for k in 1.. {
@@ -497,7 +505,9 @@ impl<'a> Germs<'a> {
         Ok(self.composed(&inner, |germs, k| {
             if k > 0 {
                 derivative = germs.pool.derivative(derivative, symbol);
-                factor = factor.checked_div(Number::integer(k)).unwrap_or(Number::ZERO);
+                factor = factor
+                    .checked_div(Number::integer(k))
+                    .unwrap_or(Number::ZERO);
             }
             let at_value = germs.pool.substitute(derivative, &[(symbol, value)]);
             germs.pool.scale(factor, at_value)

@@ -74,6 +74,7 @@ pub(crate) use eval::integer_power;
 pub use interval::Interval;
 pub use node::{ExprId, Function, Node, Parity, SymbolId};
 pub use number::Number;
+pub(crate) use number::sum_of_floats;
 pub use parse::{ParseError, ParseErrorKind, ParseLimits};
 pub use pool::ExprPool;
 pub use shorten::{Shortened, Shortener};

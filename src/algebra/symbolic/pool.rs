@@ -144,7 +144,10 @@ impl ExprPool {
     /// The symbol of a selection: no variable, but `[test, zero, other]`, the value of `zero` where `test` is zero
     /// and that of `other` elsewhere.
     pub(super) fn selection_symbol(&mut self, parts: [ExprId; 3]) -> ExprId {
-        let id = self.symbol_for(&format!("selection {:?}", parts.map(ExprId::index)), Some(parts));
+        let id = self.symbol_for(
+            &format!("selection {:?}", parts.map(ExprId::index)),
+            Some(parts),
+        );
         self.symbol_expr(id)
     }
 

@@ -101,7 +101,7 @@ impl Facts {
         if self.zero.contains(&core) {
             return Some(true);
         }
-        let mut is_nonzero = |pool: &mut ExprPool, expr: ExprId| {
+        let is_nonzero = |pool: &mut ExprPool, expr: ExprId| {
             let core = self::core(pool, expr);
             pool.sign(core) == Sign::Positive || self.nonzero.contains(&core)
         };
@@ -172,7 +172,9 @@ fn content(pool: &mut ExprPool, expr: ExprId) -> (Number, ExprId) {
         if terms.len() < 2 || first.is_one() {
             return (number, rest);
         }
-        let quotients = terms.iter().map(|&(n, rest)| Some((n.checked_div(first)?, rest)));
+        let quotients = terms
+            .iter()
+            .map(|&(n, rest)| Some((n.checked_div(first)?, rest)));
         let Some(terms) = quotients.collect() else {
             return (number, rest);
         };
@@ -331,7 +333,12 @@ impl ExprPool {
         self.evaluate(regular, &value_of).is_finite()
     }
 
-    fn outcome(&mut self, expr: ExprId, symbol: SymbolId, facts: &Facts) -> Result<Outcome, ExprId> {
+    fn outcome(
+        &mut self,
+        expr: ExprId,
+        symbol: SymbolId,
+        facts: &Facts,
+    ) -> Result<Outcome, ExprId> {
         for side in [Number::ONE, Number::MINUS_ONE] {
             let mut order = 2;
             let stop = loop {

@@ -46,7 +46,10 @@ fn slope_has_the_value_that_the_function_has() {
     ];
     for (text, expected) in at_zero {
         let found = slope_at(text, &[]);
-        assert!(found == expected || (found - expected).abs() < 1e-12, "{text}: {found}, {expected}");
+        assert!(
+            found == expected || (found - expected).abs() < 1e-12,
+            "{text}: {found}, {expected}"
+        );
     }
 }
 
@@ -71,7 +74,11 @@ fn slope_follows_exponents_and_other_variables() {
         assert_eq!(found, expected, "{text} at y = {y}");
     }
     for (text, expected) in [("sqrt(abs(x - y))*(x - y)", 0.0), ("abs(x - y)", 1.0)] {
-        assert_eq!(slope_at(text, &[("x", 0.7), ("y", 0.7)]), expected, "{text}");
+        assert_eq!(
+            slope_at(text, &[("x", 0.7), ("y", 0.7)]),
+            expected,
+            "{text}"
+        );
     }
     assert_eq!(slope_at("sqrt(1 - x)*(1 - x)", &[("x", 1.0)]), 0.0);
     assert_eq!(slope_at("sqrt(1 - x)", &[("x", 1.0)]), f64::NEG_INFINITY);
@@ -81,7 +88,15 @@ fn slope_follows_exponents_and_other_variables() {
 fn slope_of_what_has_none_of_these_points_is_the_derivative() {
     let mut pool = ExprPool::new();
     let x = pool.symbol_id("x");
-    for text in ["x^2*y", "y/(1 + x)", "sin(x)/x", "x*abs(x)", "x^1.5", "exp(x)/(exp(x) - y)", "log(x)*y"] {
+    for text in [
+        "x^2*y",
+        "y/(1 + x)",
+        "sin(x)/x",
+        "x*abs(x)",
+        "x^1.5",
+        "exp(x)/(exp(x) - y)",
+        "log(x)*y",
+    ] {
         let expr = pool.parsed(text);
         assert_eq!(pool.slope(expr, x), pool.derivative(expr, x), "{text}");
     }
