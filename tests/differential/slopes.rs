@@ -139,3 +139,38 @@ fn slopes_at_kinks_are_no_nan_in_single_precision() {
     }
     case.check("f32", SINGLE, &found);
 }
+
+/// The distance of two floats in units of the last place.
+fn ulps(a: f64, b: f64) -> u64 {
+    a.to_bits().abs_diff(b.to_bits())
+}
+
+#[test]
+fn sign_of_nan_is_nan_and_powers_of_ten_are_near() {
+    let model = model("special", 2, &["sign(z1) + abs(z1)", "10^z2"]);
+    let all = functions(&model, 1, Form::Automatic);
+    let dynamics = all.into_iter().find(|f| f.kind == Kind::Dynamics(0));
+    let mut dynamics = dynamics.expect("accelerations");
+    let exponents = (-300..=300).step_by(7);
+    let exact: Vec<f64> = exponents
+        .clone()
+        .map(|k| format!("1e{k}").parse().expect("a number"))
+        .collect();
+    let points = exponents.map(|k| [f64::NAN, f64::from(k), 0.0, 0.0, 0.0, 0.0]);
+    let points: Vec<f64> = points.flatten().collect();
+    dynamics.n_points = exact.len();
+    let workshop = Workshop::new(&[model], Form::Automatic);
+    let (functions, points) = ([dynamics], [points]);
+    let mut found = vec![functions[0].interpret(&points[0])];
+    for build in [Build::c(), Build::rust()] {
+        found.extend(workshop.run(&build, &functions, &points));
+    }
+    for (found, exact) in found.iter().flat_map(|found| found.chunks(2).zip(&exact)) {
+        assert!(found[0].is_nan(), "{found:?}");
+        assert!(ulps(found[1], *exact) <= 2, "{found:?} {exact}");
+    }
+    let pairs = found[1..].iter().flatten().zip(found[0].iter().cycle());
+    for (found, interpreted) in pairs.filter(|(_, interpreted)| !interpreted.is_nan()) {
+        assert_eq!(found.to_bits(), interpreted.to_bits());
+    }
+}

@@ -146,6 +146,7 @@ fn case(file: &Path, mut function: Function, given: &[Vec<f64>]) -> Option<Value
         "model": function.model,
         "function": function.name,
         "is_step": function.is_step(),
+        "is_smooth": given.is_empty(),
         "names": inputs.iter().map(|slot| slot.name.as_str()).collect::<Vec<_>>(),
         "points": points.len() / from,
         "inputs": points.chunks(from).map(|p| split(p, &lens(inputs))).collect::<Vec<_>>(),
