@@ -10,10 +10,14 @@ mod driver_text;
 mod drivers;
 #[path = "differential/functions.rs"]
 mod functions;
+#[path = "differential/kinks.rs"]
+mod kinks;
 #[path = "differential/models.rs"]
 mod models;
 #[path = "differential/single.rs"]
 mod single;
+#[path = "differential/slopes.rs"]
+mod slopes;
 #[path = "differential/terms.rs"]
 mod terms;
 mod tools;

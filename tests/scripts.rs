@@ -4,6 +4,8 @@
 mod checkers;
 #[path = "differential/functions.rs"]
 mod functions;
+#[path = "differential/kinks.rs"]
+mod kinks;
 #[path = "differential/models.rs"]
 mod models;
 mod tools;
@@ -48,4 +50,30 @@ fn casadi_functions_equal_the_interpreter() {
 #[test]
 fn matlab_files_equal_the_interpreter_in_octave() {
     every_function(Target::Matlab);
+}
+
+/// The Jacobians of expressions with kinks at these.
+fn slopes_at_kinks(target: Target) {
+    let kinks = kinks::kinks().into_iter();
+    let models = kinks.enumerate().map(|(k, kink)| {
+        let points = kink.points.iter().map(|point| point.inputs(1)).collect();
+        let model = kinks::model(&format!("kink{k}"), 1, &[&kink.expression]);
+        (model, Form::Automatic, points)
+    });
+    checkers::check_at(target, models.collect());
+}
+
+#[test]
+fn numpy_slopes_at_kinks_equal_the_interpreter() {
+    slopes_at_kinks(Target::Python);
+}
+
+#[test]
+fn casadi_slopes_at_kinks_equal_the_interpreter() {
+    slopes_at_kinks(Target::Casadi);
+}
+
+#[test]
+fn matlab_slopes_at_kinks_equal_the_interpreter_in_octave() {
+    slopes_at_kinks(Target::Matlab);
 }

@@ -6,6 +6,7 @@ use std::cell::Cell;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use nalgebra::DMatrix;
 use romc::artifact;
 use romc::evaluate::{Assessment, ReferenceInput, along_recording};
 use romc::files::Overwrite;
@@ -188,6 +189,64 @@ fn net_torques_predict_better_and_command_what_was_recorded() {
         let mut ignorant = Controller::new(&ignorant, MpcSettings::default()).expect("complete");
         let run = along_recording(&mut ignorant, &test[0], along, |_, _| {}).expect("runs");
         assert!(run.summary.torque_r2.contact.expect("contact") != found);
+    }
+}
+
+/// A jump with 0.2 s of rest before and after it: its first and last state, their torques held.
+fn with_rest(mut jump: Recording) -> Recording {
+    let segment = &mut jump.segments[0];
+    let (count, step_s) = (segment.len(), segment.mean_step_s());
+    let n_rest = (0.2 / step_s).round() as usize;
+    let source = |k: usize| k.saturating_sub(n_rest).min(count - 1);
+    let padded = |values: &DMatrix<f64>, at_rest: f64| {
+        DMatrix::from_fn(values.nrows(), count + 2 * n_rest, |row, k| {
+            let moves = (n_rest..n_rest + count).contains(&k);
+            values[(row, source(k))] * if moves { 1.0 } else { at_rest }
+        })
+    };
+    segment.dx = padded(&segment.dx, 0.0);
+    segment.ddx = padded(&segment.ddx, 0.0);
+    segment.x = padded(&segment.x, 1.0);
+    segment.torque_nm = padded(&segment.torque_nm, 1.0);
+    segment.body_wrench = segment
+        .body_wrench
+        .as_ref()
+        .map(|wrench| padded(wrench, 1.0));
+    segment.feet = (0..count + 2 * n_rest)
+        .map(|k| segment.feet[source(k)])
+        .collect();
+    let start_s = segment.time_s[0];
+    segment.time_s = (0..count + 2 * n_rest)
+        .map(|k| start_s + step_s * k as f64)
+        .collect();
+    jump
+}
+
+#[test]
+fn model_with_quadratic_drag_is_controlled_at_rest() {
+    let drag = ["dz1*sqrt(dz1^2+dz2^2)", "dz2*sqrt(dz1^2+dz2^2)"];
+    let terms = ["1", "z1", "z2", "dz1", "dz2", "u1", "u2"]
+        .into_iter()
+        .chain(drag);
+    let options = TrainOptions {
+        library: LibraryChoice::Terms(terms.map(str::to_owned).collect()),
+        ..TrainOptions::new("drag", 2)
+    };
+    let trained =
+        train_with(&jumps("train", 4), &jumps("validation", 1), &options).expect("trains");
+    let phase = &trained.model.phases()[0];
+    assert!(
+        phase.xi.rows(7, 2).amax() > 0.0,
+        "drag was learned: {}",
+        phase.xi
+    );
+    let jump = jumps("test", 1).remove(0);
+    for jump in [jump.clone(), with_rest(jump)] {
+        let mut controller =
+            Controller::new(&trained.model, MpcSettings::default()).expect("complete");
+        let along = ReferenceInput::Recorded;
+        let run = along_recording(&mut controller, &jump, along, |_, _| {}).expect("runs");
+        assert_eq!(run.summary.failed, 0, "{:?}", run.summary);
     }
 }
 

@@ -8,7 +8,7 @@
 //!   (`terms.rs`). Outputs of curved layers, of the solve behind their inputs' projection, the
 //!   feet's forces and the motors' torques are no such sums: 1e-11 of the largest output.
 
-use romc::ir::{Program, Statement, Unary};
+use romc::ir::{Binary, Program, Statement, Unary};
 use romc::model::ReducedModel;
 
 use super::functions::Function;
@@ -112,9 +112,10 @@ fn is_transcendental(program: &Program) -> bool {
             Statement::Unary(op, _) => {
                 matches!(op, Unary::Tan | Unary::Tanh | Unary::Exp | Unary::Log)
             }
+            Statement::Binary(op, ..) => *op == Binary::Pow,
             Statement::Constant(_)
             | Statement::Input { .. }
-            | Statement::Binary(..)
+            | Statement::Select(_)
             | Statement::Accumulate { .. }
             | Statement::Quads { .. }
             | Statement::Constants { .. }

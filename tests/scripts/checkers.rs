@@ -11,7 +11,7 @@ use romc::lower::Form;
 use romc::model::ReducedModel;
 use serde_json::{Value, json};
 
-use super::functions::{Function, Random, functions as functions_of};
+use super::functions::{Function, Kind, Random, functions as functions_of};
 use super::tools;
 
 /// Points at which each function is compared.
@@ -24,6 +24,20 @@ const MAX_DRAWN: usize = 4000;
 /// and returns, unless everything is asked for. The functions that were left out because no point was found at which
 /// they are finite; `None` without the language.
 pub fn check(target: Target, models: Vec<(ReducedModel, Form)>) -> Option<Vec<String>> {
+    let models = models.into_iter();
+    check_at(
+        target,
+        models
+            .map(|(model, form)| (model, form, Vec::new()))
+            .collect(),
+    )
+}
+
+/// The same with points `(z, dz, u_lat)` for the Jacobian of each model, random ones if there are none.
+pub fn check_at(
+    target: Target,
+    models: Vec<(ReducedModel, Form, Vec<Vec<f64>>)>,
+) -> Option<Vec<String>> {
     let python = |library| {
         move |cases: &Path| {
             let mut command = python();
@@ -70,10 +84,10 @@ fn cases(
     folder: &Path,
     target: Target,
     ending: &str,
-    models: Vec<(ReducedModel, Form)>,
+    models: Vec<(ReducedModel, Form, Vec<Vec<f64>>)>,
 ) -> (Vec<Value>, Vec<String>) {
     let (mut cases, mut left_out) = (Vec::new(), Vec::new());
-    for (model, form) in models {
+    for (model, form, points) in models {
         let options = EmitOptions {
             form,
             ..EmitOptions::default()
@@ -87,7 +101,12 @@ fn cases(
         // Arrays of points are the caller's loop in these languages.
         for function in functions.into_iter().filter(|f| !f.is_batch()) {
             let full_name = format!("{name}_{}", function.name);
-            match case(&file, function) {
+            let points = match &function.kind {
+                Kind::Jacobian(..) => points.as_slice(),
+                _ if points.is_empty() => &[],
+                _ => continue,
+            };
+            match case(&file, function, points) {
                 Some(case) => cases.push(case),
                 None => left_out.push(full_name),
             }
@@ -97,23 +116,27 @@ fn cases(
 }
 
 /// A function at points where its results are finite, if there are any.
-fn case(file: &Path, mut function: Function) -> Option<Value> {
+fn case(file: &Path, mut function: Function, given: &[Vec<f64>]) -> Option<Value> {
     let (from, to) = (function.input_len(), function.output_len());
     let mut random = Random(31);
     let (mut points, mut results) = (Vec::new(), Vec::new());
     function.n_points = 1;
-    for _ in 0..MAX_DRAWN {
-        let point = function.points(&mut random);
+    for drawn in 0..given.len().max(MAX_DRAWN) {
+        let point = match given.get(drawn) {
+            Some(point) => point.clone(),
+            None if given.is_empty() => function.points(&mut random),
+            None => break,
+        };
         let result = function.interpret(&point);
         if result.iter().all(|value| value.is_finite()) {
             points.extend(point);
             results.extend(result);
         }
-        if points.len() == N_POINTS * from {
+        if given.is_empty() && points.len() == N_POINTS * from {
             break;
         }
     }
-    if points.len() < N_POINTS * from {
+    if points.len() < from * N_POINTS.min(given.len().max(1)) {
         return None;
     }
     let (inputs, outputs) = (function.program.inputs(), function.program.outputs());
@@ -123,8 +146,9 @@ fn case(file: &Path, mut function: Function) -> Option<Value> {
         "model": function.model,
         "function": function.name,
         "is_step": function.is_step(),
+        "is_smooth": given.is_empty(),
         "names": inputs.iter().map(|slot| slot.name.as_str()).collect::<Vec<_>>(),
-        "points": N_POINTS,
+        "points": points.len() / from,
         "inputs": points.chunks(from).map(|p| split(p, &lens(inputs))).collect::<Vec<_>>(),
         "outputs": results.chunks(to).map(|p| split(p, &lens(outputs))).collect::<Vec<_>>(),
         "flat_inputs": points,
@@ -148,7 +172,7 @@ fn run(
     target: Target,
     ending: &str,
     probe: &mut Command,
-    models: Vec<(ReducedModel, Form)>,
+    models: Vec<(ReducedModel, Form, Vec<Vec<f64>>)>,
     checker: impl Fn(&Path) -> Command,
 ) -> Option<Vec<String>> {
     if !tools::answers(probe) {
@@ -171,7 +195,7 @@ fn run(
 
 /// The Python to use: of the environment that `ROMC_PYTHON` names, or of the path.
 fn python() -> Command {
-    Command::new(std::env::var("ROMC_PYTHON").unwrap_or_else(|_| "python3".to_owned()))
+    tools::python()
 }
 
 fn octave() -> Command {

@@ -17,6 +17,11 @@ pub fn thorough_or<T>(all: T, few: T) -> T {
     if is_thorough() { all } else { few }
 }
 
+/// The Python to use: of the environment that `ROMC_PYTHON` names, or of the path.
+pub fn python() -> Command {
+    Command::new(std::env::var("ROMC_PYTHON").unwrap_or_else(|_| "python3".to_owned()))
+}
+
 /// Whether a tool answers to `probe`. Where it does not, the calling test says so and is skipped, or fails if
 /// everything is asked for.
 pub fn answers(probe: &mut Command) -> bool {

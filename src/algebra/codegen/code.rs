@@ -62,6 +62,8 @@ pub enum Expr {
     Unary(Unary, Box<Expr>),
     /// `a op b`
     Infix(Binary, Box<Expr>, Box<Expr>),
+    /// The second where the first is zero, else the third.
+    Select(Box<[Expr; 3]>),
 }
 
 impl Expr {

@@ -43,8 +43,15 @@ pub trait Dialect {
             Binary::Sub => " - ",
             Binary::Mul => "*",
             Binary::Div => "/",
+            Binary::Pow => unreachable!("powers are functions"),
         }
     }
+
+    /// A power of printed operands.
+    fn power(&self, base: &str, exponent: &str) -> String;
+
+    /// The second printed operand where the first is zero, else the third.
+    fn select(&self, operands: [String; 3]) -> String;
 
     /// An element of an array.
     fn element(&self, array: &str, index: &Index) -> String {

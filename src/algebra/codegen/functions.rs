@@ -7,7 +7,7 @@ use super::interface::{FunctionSpec, computes_angles};
 use super::sines::SineCosine;
 use super::tables::Tables;
 use super::translate::{Names, translate};
-use crate::ir::{Program, Slot, Statement, Unary};
+use crate::ir::{Binary, Program, Slot, Statement, Unary};
 
 /// The body of the loop over the lanes of a block of points; arrays are called `z_lanes` and so on, the
 /// loop variable `lane`. Nothing if the program is better run point by point: it loops over tables itself,
@@ -45,15 +45,14 @@ pub fn lanes(program: &Program, dialect: &dyn Dialect, sines: SineCosine) -> Opt
 
 fn vectorises(statement: &Statement) -> bool {
     match statement {
-        Statement::Constant(_)
-        | Statement::Input { .. }
-        | Statement::Binary(..)
-        | Statement::SinCos { .. } => true,
+        Statement::Constant(_) | Statement::Input { .. } | Statement::SinCos { .. } => true,
+        Statement::Binary(op, ..) => *op != Binary::Pow,
         Statement::Unary(op, _) => match op {
             Unary::Neg | Unary::Sqrt | Unary::Abs => true,
             Unary::Sign | Unary::Tan | Unary::Tanh | Unary::Exp | Unary::Log => false,
         },
-        Statement::Accumulate { .. }
+        Statement::Select(_)
+        | Statement::Accumulate { .. }
         | Statement::Quads { .. }
         | Statement::Constants { .. }
         | Statement::Separable { .. }

@@ -103,6 +103,6 @@ fn joined(a: Option<Expr>, op: Binary, b: Expr) -> Expr {
     match (a, op) {
         (Some(a), op) => Expr::infix(op, a, b),
         (None, Binary::Sub) => Expr::Unary(Unary::Neg, Box::new(b)),
-        (None, Binary::Add | Binary::Mul | Binary::Div) => b,
+        (None, Binary::Add | Binary::Mul | Binary::Div | Binary::Pow) => b,
     }
 }

@@ -199,6 +199,13 @@ impl<'a> Printer<'a> {
             Expr::Entry(table, row, col) => self.dialect.entry(&table.to_string(), row, col),
             Expr::Unary(Unary::Neg, a) => format!("-{}", self.operand(a, Precedence::Atom)),
             Expr::Unary(function, a) => self.dialect.apply(*function, &self.expression(a)),
+            Expr::Select(operands) => {
+                let operands = operands.each_ref().map(|operand| self.expression(operand));
+                self.dialect.select(operands)
+            }
+            Expr::Infix(Binary::Pow, a, b) => {
+                self.dialect.power(&self.expression(a), &self.expression(b))
+            }
             Expr::Infix(op, a, b) => {
                 if let Some(fused) = self.multiply_added(*op, a, b) {
                     return fused;
@@ -207,7 +214,9 @@ impl<'a> Printer<'a> {
                 // its parentheses, because floating-point sums do not associate.
                 let (own, right) = match op {
                     Binary::Add | Binary::Sub => (Precedence::Sum, Precedence::Product),
-                    Binary::Mul | Binary::Div => (Precedence::Product, Precedence::Atom),
+                    Binary::Mul | Binary::Div | Binary::Pow => {
+                        (Precedence::Product, Precedence::Atom)
+                    }
                 };
                 let right = if starts_with_minus(b) {
                     Precedence::Atom
@@ -236,7 +245,8 @@ impl<'a> Printer<'a> {
                 let negated = format!("-{}", self.operand(b, Precedence::Atom));
                 (self.expression(x), y, negated)
             }
-            (Binary::Add | Binary::Sub, None, None) | (Binary::Mul | Binary::Div, ..) => {
+            (Binary::Add | Binary::Sub, None, None)
+            | (Binary::Mul | Binary::Div | Binary::Pow, ..) => {
                 return None;
             }
         };
@@ -264,7 +274,9 @@ fn precedence(expr: &Expr) -> Precedence {
         | Expr::Name(_)
         | Expr::Element(..)
         | Expr::Entry(..)
-        | Expr::Unary(..) => Precedence::Atom,
+        | Expr::Unary(..)
+        | Expr::Select(_)
+        | Expr::Infix(Binary::Pow, ..) => Precedence::Atom,
         Expr::Infix(Binary::Add | Binary::Sub, ..) => Precedence::Sum,
         Expr::Infix(Binary::Mul | Binary::Div, ..) => Precedence::Product,
     }
@@ -283,7 +295,8 @@ fn starts_with_minus(expr: &Expr) -> bool {
         Expr::Literal(value) => value.is_sign_negative(),
         Expr::Unary(op, _) => *op == Unary::Neg,
         Expr::Infix(Binary::Mul | Binary::Div, a, _) => starts_with_minus(a),
-        Expr::Infix(Binary::Add | Binary::Sub, ..)
+        Expr::Infix(Binary::Add | Binary::Sub | Binary::Pow, ..)
+        | Expr::Select(_)
         | Expr::Name(_)
         | Expr::Element(..)
         | Expr::Entry(..) => false,

@@ -154,8 +154,13 @@ fn vectors(
         parameters: parameters.collect(),
         is_defined: false,
     };
-    for _ in 0..N_POINTS {
+    for position in 0..N_POINTS {
         let point = point(entry, precision, &mut random);
+        let point = match N_POINTS - position {
+            1 => point.at_rest(entry, precision, &["z", "dz", "u_lat"]),
+            2 => point.at_rest(entry, precision, &["dz", "u_lat"]),
+            _ => point,
+        };
         vectors.is_defined |= point.is_defined();
         let tolerances = match precision {
             Precision::Double => vec![0.0; point.outputs.len()],

@@ -118,6 +118,12 @@ impl Translator<'_> {
                 let expr = Expr::infix(*op, a, b);
                 self.define(first, expr, left.max(right) + 1);
             }
+            Statement::Select(operands) => {
+                let read = operands.map(|operand| self.read(operand));
+                let depth = read.iter().map(|(_, depth)| depth + 1).max();
+                let expr = Expr::Select(Box::new(read.map(|(expr, _)| expr)));
+                self.define(first, expr, depth.unwrap_or(1));
+            }
             Statement::SinCos { arguments } => self.sin_cos(first, arguments),
             Statement::Accumulate { table, sections } => self.accumulate(first, *table, sections),
             Statement::Quads {

@@ -14,6 +14,7 @@ enum Key {
     Constant(u64),
     Unary(Unary, ValueId),
     Binary(Binary, ValueId, ValueId),
+    Select([ValueId; 3]),
 }
 
 /// Appends statements in order of evaluation and numbers values, so that a scalar
@@ -68,7 +69,7 @@ impl ProgramBuilder {
     pub fn binary(&mut self, op: Binary, a: ValueId, b: ValueId) -> ValueId {
         let (low, high) = match op {
             Binary::Add | Binary::Mul => (a.min(b), a.max(b)),
-            Binary::Sub | Binary::Div => (a, b),
+            Binary::Sub | Binary::Div | Binary::Pow => (a, b),
         };
         self.numbered(Key::Binary(op, low, high), Statement::Binary(op, a, b))
     }
@@ -91,6 +92,12 @@ impl ProgramBuilder {
     /// `a / b`.
     pub fn div(&mut self, a: ValueId, b: ValueId) -> ValueId {
         self.binary(Binary::Div, a, b)
+    }
+
+    /// `zero` where `test` is zero, else `other`.
+    pub fn select(&mut self, test: ValueId, zero: ValueId, other: ValueId) -> ValueId {
+        let operands = [test, zero, other];
+        self.numbered(Key::Select(operands), Statement::Select(operands))
     }
 
     /// Sines and cosines of all arguments.

@@ -34,6 +34,7 @@ enum Step {
     Unary(Unary, ValueId, usize),
     Binary(Binary, ValueId, ValueId, usize),
     Square(ValueId, usize),
+    Select([ValueId; 3], usize),
     Array(Box<Statement>, usize),
 }
 
@@ -52,6 +53,7 @@ impl<T: Real> Interpreter<T> {
                     steps.push(Step::Square(*a, first));
                 }
                 Statement::Binary(op, a, b) => steps.push(Step::Binary(*op, *a, *b, first)),
+                Statement::Select(operands) => steps.push(Step::Select(*operands, first)),
                 array => steps.push(Step::Array(Box::new(array.clone()), first)),
             }
         }
@@ -128,7 +130,12 @@ impl<T: Real> Interpreter<T> {
                         Binary::Sub => a - b,
                         Binary::Mul => a * b,
                         Binary::Div => a / b,
+                        Binary::Pow => a.power(b),
                     };
+                }
+                Step::Select(operands, result) => {
+                    let [test, zero, other] = operands.map(|operand| values[operand.index()]);
+                    values[result] = T::select(test, zero, other);
                 }
                 Step::Array(ref statement, first) => {
                     array(statement, first, &self.tables, &mut self.callees, values);
@@ -150,7 +157,8 @@ fn array<T: Real>(
         Statement::Constant(_)
         | Statement::Input { .. }
         | Statement::Unary(..)
-        | Statement::Binary(..) => {}
+        | Statement::Binary(..)
+        | Statement::Select(_) => {}
         Statement::SinCos { arguments } => {
             for (k, argument) in arguments.iter().enumerate() {
                 let (sine, cosine) = values[argument.index()].sin_cos();
@@ -383,10 +391,12 @@ mod tests {
     }
 
     #[test]
-    fn sign_is_zero_at_zero_and_for_nan() {
+    fn sign_is_zero_at_zero_and_nan_of_nan() {
         assert_eq!(
-            [-2.0, -0.0, 0.0, 3.0, f64::NAN].map(|a| f64::unary(Unary::Sign, a)),
-            [-1.0, 0.0, 0.0, 1.0, 0.0]
+            [-2.0, -0.0, 0.0, 3.0].map(|a| f64::unary(Unary::Sign, a)),
+            [-1.0, 0.0, 0.0, 1.0]
         );
+        assert!(f64::unary(Unary::Sign, f64::NAN).is_nan());
+        assert!(f32::unary(Unary::Sign, f32::NAN).is_nan());
     }
 }

@@ -92,7 +92,7 @@ pub enum Unary {
     Sqrt,
     /// Absolute value.
     Abs,
-    /// `1`, `-1` or `0` as `a` is positive, negative or neither (zero, NaN).
+    /// `1`, `-1` or `0` as `a` is positive, negative or zero; NaN of NaN.
     Sign,
     /// Tangent of the target's library.
     Tan,
@@ -104,7 +104,7 @@ pub enum Unary {
     Log,
 }
 
-/// Operations on two scalars, each rounded once.
+/// Operations on two scalars, each rounded once except powers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Binary {
     /// `a + b`
@@ -115,6 +115,8 @@ pub enum Binary {
     Mul,
     /// `a / b`
     Div,
+    /// `a ^ b` of the target's library, for exponents that are no integers.
+    Pow,
 }
 
 /// Derivatives of a group of functions, one a column.
@@ -200,6 +202,9 @@ pub enum Statement {
     Unary(Unary, ValueId),
     /// A scalar operation on two values.
     Binary(Binary, ValueId, ValueId),
+    /// The second value where the first one is zero, of either sign; the third elsewhere, also where the first is
+    /// NaN. Both are computed.
+    Select([ValueId; 3]),
     /// Sine and cosine of all arguments by [`super::sin_cos::sin_cos`]:
     /// defines the n sines, then the n cosines.
     SinCos {
@@ -276,6 +281,7 @@ impl Statement {
             Self::Constant(_) | Self::Input { .. } | Self::Constants { .. } => Vec::new(),
             Self::Unary(_, a) => vec![*a],
             Self::Binary(_, a, b) => vec![*a, *b],
+            Self::Select(operands) => operands.to_vec(),
             Self::SinCos { arguments } | Self::Call { arguments, .. } => arguments.clone(),
             Self::Accumulate { sections, .. } => sections.concat(),
             Self::Quads { weights, .. } => weights.clone(),
@@ -308,6 +314,7 @@ impl Statement {
             | Self::Input { .. }
             | Self::Unary(..)
             | Self::Binary(..)
+            | Self::Select(_)
             | Self::SinCos { .. }
             | Self::Accumulate { .. }
             | Self::Quads { .. }

@@ -31,6 +31,12 @@ pub trait Real:
     /// A function of one number.
     fn unary(op: Unary, a: Self) -> Self;
 
+    /// `self ^ exponent`.
+    fn power(self, exponent: Self) -> Self;
+
+    /// `zero` where `test` is zero, else `other`.
+    fn select(test: Self, zero: Self, other: Self) -> Self;
+
     /// Sine and cosine by the kernel of this precision.
     fn sin_cos(self) -> (Self, Self);
 }
@@ -50,12 +56,25 @@ macro_rules! real {
                     Unary::Neg => -a,
                     Unary::Sqrt => a.sqrt(),
                     Unary::Abs => a.abs(),
-                    Unary::Sign => $float::from(i8::from(a > 0.0) - i8::from(a < 0.0)),
+                    Unary::Sign if a > 0.0 => 1.0,
+                    Unary::Sign if a < 0.0 => -1.0,
+                    // 0 of either zero, NaN of NaN.
+                    Unary::Sign => a - a,
                     Unary::Tan => a.tan(),
                     Unary::Tanh => a.tanh(),
                     Unary::Exp => a.exp(),
                     Unary::Log => a.ln(),
                 }
+            }
+
+            #[inline]
+            fn power(self, exponent: $float) -> $float {
+                self.powf(exponent)
+            }
+
+            #[inline]
+            fn select(test: $float, zero: $float, other: $float) -> $float {
+                if test == 0.0 { zero } else { other }
             }
 
             #[inline]

@@ -243,6 +243,34 @@ impl Real for Rounded {
         }
     }
 
+    /// As `exp(exponent log(self))`, whose errors are larger.
+    fn power(self, exponent: Self) -> Self {
+        Self::unary(Unary::Exp, exponent * Self::unary(Unary::Log, self))
+    }
+
+    /// Both values where the test may be zero in one arithmetic and not in the other.
+    fn select(test: Self, zero: Self, other: Self) -> Self {
+        if !test.hull().has_zero() {
+            return other;
+        }
+        if [zero, other].iter().any(|value| value.is_unbounded()) {
+            return Self::UNBOUNDED;
+        }
+        let (exact, computed) = (
+            zero.exact.hull(other.exact),
+            zero.computed.hull(other.computed),
+        );
+        let apart = (computed.high - exact.low).max(exact.high - computed.low);
+        Self {
+            exact,
+            computed,
+            error: match test.error > 0.0 {
+                true => apart,
+                false => zero.error.max(other.error),
+            },
+        }
+    }
+
     fn sin_cos(self) -> (Self, Self) {
         if self.is_unbounded() {
             return (Self::UNBOUNDED, Self::UNBOUNDED);

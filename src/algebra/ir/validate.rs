@@ -209,6 +209,7 @@ fn check_shape(program: &Program, statement: &Statement) -> Result<(), Fault> {
         Statement::Input { .. }
         | Statement::Unary(..)
         | Statement::Binary(..)
+        | Statement::Select(_)
         | Statement::SinCos { .. } => Ok(()),
     }
 }

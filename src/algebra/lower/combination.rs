@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use crate::symbolic::{ExprId, ExprPool, SymbolId};
+use crate::symbolic::{ExprId, ExprPool, Number, SymbolId, sum_of_floats};
 
 /// `constant + sum_i coefficient_i expr_i`; the expressions are distinct, not sums and
 /// without numeric factor.
@@ -16,34 +16,53 @@ impl Combination {
     /// Collects `sum_i coefficient_i expr_i`; sums are taken apart, equal expressions
     /// merged in order of first appearance, and what cancels exactly is left out.
     pub fn collect(pool: &ExprPool, summands: impl IntoIterator<Item = (f64, ExprId)>) -> Self {
-        let mut result = Self::default();
+        let mut constants = Vec::new();
+        let mut items: Vec<(Vec<f64>, ExprId)> = Vec::new();
         let mut position = HashMap::new();
         for (coefficient, expr) in summands {
             for (number, rest) in pool.terms_of(expr) {
                 let product = coefficient * number.to_f64();
                 if rest == ExprId::ONE {
-                    result.constant += product;
+                    constants.push(product);
                     continue;
                 }
-                let next = result.items.len();
-                let at = *position.entry(rest).or_insert(next);
-                if at == next {
-                    result.items.push((product, rest));
-                } else {
-                    result.items[at].0 += product;
+                let at = *position.entry(rest).or_insert(items.len());
+                match items.get_mut(at) {
+                    Some((products, _)) => products.push(product),
+                    None => items.push((vec![product], rest)),
                 }
             }
         }
-        result.items.retain(|&(coefficient, _)| coefficient != 0.0);
-        result
+        let items = items.into_iter();
+        let items = items.map(|(products, expr)| (sum_of_floats(&products), expr));
+        Self {
+            constant: sum_of_floats(&constants),
+            items: items
+                .filter(|&(coefficient, _)| coefficient != 0.0)
+                .collect(),
+        }
     }
 
-    /// The derivative by one variable.
+    /// The slope by one variable. Terms whose slopes may be infinite count as one: infinities of both signs
+    /// can have a finite sum.
     pub fn derivative(&self, pool: &mut ExprPool, by: SymbolId) -> Self {
-        let summands: Vec<_> = self
-            .items
-            .iter()
-            .map(|&(coefficient, expr)| (coefficient, pool.derivative(expr, by)))
+        let mut items = self.items.clone();
+        let mut is_steep = |item: &(f64, ExprId)| pool.may_be_steep(item.1, by);
+        let steep: Vec<_> = items.iter().copied().filter(&mut is_steep).collect();
+        if steep.len() > 1 {
+            let terms = steep.iter().map(|&(coefficient, expr)| {
+                let number = Number::from_f64(coefficient)?;
+                Some(pool.scale(number, expr))
+            });
+            let terms: Option<Vec<ExprId>> = terms.collect();
+            if let Some(terms) = terms {
+                items.retain(|item| !steep.contains(item));
+                items.push((1.0, pool.sum(&terms)));
+            }
+        }
+        let summands: Vec<_> = items
+            .into_iter()
+            .map(|(coefficient, expr)| (coefficient, pool.slope(expr, by)))
             .filter(|&(_, expr)| expr != ExprId::ZERO)
             .collect();
         Self::collect(pool, summands)

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use super::combination::Combination;
 use super::nested::Nested;
 use super::sums::{Term, linear_combination, scaled};
-use crate::ir::{ProgramBuilder, Unary, ValueId};
+use crate::ir::{Binary, ProgramBuilder, Unary, ValueId};
 use crate::symbolic::{ExprId, ExprPool, Function, Node, SymbolId};
 
 /// Turns expressions of one pool into values of one program; an expression that occurs
@@ -99,10 +99,16 @@ impl<'a> ExpressionLowering<'a> {
         let pool = self.pool;
         let value = match pool.node(expr) {
             Node::Number(number) => self.builder.constant(number.to_f64()),
-            Node::Symbol(symbol) => *self
-                .variables
-                .get(symbol)
-                .expect("every variable of a model's pool is an input"),
+            Node::Symbol(symbol) => match pool.selection(*symbol) {
+                Some(parts) => {
+                    let [test, zero, other] = parts.map(|part| self.value(part));
+                    self.builder.select(test, zero, other)
+                }
+                None => *self
+                    .variables
+                    .get(symbol)
+                    .expect("every variable of a model's pool is an input"),
+            },
             Node::Sum(_) => {
                 let combination = Combination::collect(pool, [(1.0, expr)]);
                 self.combination(&combination)
@@ -213,14 +219,12 @@ impl<'a> ExpressionLowering<'a> {
             }
             _ => {
                 let (base, exponent) = (self.value(base), self.value(exponent));
-                let logarithm = self.builder.unary(Unary::Log, base);
-                let product = self.builder.mul(exponent, logarithm);
-                self.builder.unary(Unary::Exp, product)
+                self.builder.binary(Binary::Pow, base, exponent)
             }
         }
     }
 
-    /// A chain of squarings and products; never `pow`, whose rounding differs by platform.
+    /// A chain of squarings and products; not `pow`, whose rounding differs by platform.
     fn integer_power(&mut self, base: ValueId, exponent: u32) -> ValueId {
         match exponent {
             0 => self.builder.constant(1.0),

@@ -53,7 +53,17 @@ impl Gradient {
             return None;
         }
         let terms = Terms::new(pool, equations, columns);
-        if terms.monomials.keys().all(|monomial| monomial.len() < 2) {
+        // Terms whose slopes may be infinite are added before they are differentiated.
+        let mut is_steep = |by: &SymbolId| {
+            let steep = terms.others.iter();
+            steep
+                .filter(|(expr, _)| pool.may_be_steep(*expr, *by))
+                .count()
+                > 1
+        };
+        if terms.monomials.keys().all(|monomial| monomial.len() < 2)
+            || columns.iter().any(&mut is_steep)
+        {
             return None;
         }
         let gradient = Division::default().gradient(pool, &terms, columns);
@@ -291,7 +301,7 @@ impl Division {
             }
         }
         for (expr, column) in &terms.others {
-            let derivative = pool.derivative(*expr, columns[k]);
+            let derivative = pool.slope(*expr, columns[k]);
             for (number, expr) in pool.terms_of(derivative) {
                 let scaled = column.iter().map(|entry| number.to_f64() * entry + 0.0);
                 tails.push((self.weight(expr), scaled.collect()));

@@ -76,10 +76,10 @@ impl Activation {
             Self::Elu => a.exp_m1(),
             Self::Tanh => a.tanh(),
             Self::Sigmoid => sigmoid(a),
-            Self::Relu => a.max(0.0),
+            Self::Relu => positive_part(a),
             Self::Gelu => a * normal_cumulative(a),
             Self::GeluTanh | Self::Silu => self.jet(a)[0],
-            Self::Softplus => a.max(0.0) + (1.0 + (-a.abs()).exp()).ln(),
+            Self::Softplus => positive_part(a) + (1.0 + (-a.abs()).exp()).ln(),
         }
     }
 
@@ -130,11 +130,18 @@ impl Activation {
                 let third = slope * (1.0 - 6.0 * slope);
                 [s, slope, slope * (1.0 - 2.0 * s), third]
             }
-            Self::Relu => [a.max(0.0), f64::from(u8::from(a > 0.0)), 0.0, 0.0],
+            Self::Relu if a.is_nan() => [a; 4],
+            Self::Relu => [positive_part(a), f64::from(u8::from(a > 0.0)), 0.0, 0.0],
             Self::Gelu => {
                 let (cumulative, density) = (normal_cumulative(a), normal_density(a));
                 // Far out the density is zero, and the powers of a before it need not be finite.
-                let far = |factor: f64| if density > 0.0 { density * factor } else { 0.0 };
+                let far = |factor: f64| {
+                    if density == 0.0 {
+                        0.0
+                    } else {
+                        density * factor
+                    }
+                };
                 let slope = cumulative + far(a);
                 [
                     a * cumulative,
@@ -159,6 +166,11 @@ impl Activation {
             }
         }
     }
+}
+
+/// The larger of `a` and zero; NaN of NaN.
+fn positive_part(a: f64) -> f64 {
+    if a < 0.0 { 0.0 } else { a }
 }
 
 fn sigmoid(a: f64) -> f64 {
@@ -248,6 +260,17 @@ mod tests {
                 assert!(phi.value(a).is_finite(), "{phi} at {a}");
                 assert!(phi.slope(a).is_finite(), "{phi} at {a}");
             }
+        }
+    }
+
+    #[test]
+    fn value_and_slope_of_nan_are_nan() {
+        for phi in Activation::ALL
+            .into_iter()
+            .filter(|phi| *phi != Activation::Linear)
+        {
+            assert!(phi.value(f64::NAN).is_nan(), "{phi}");
+            assert!(phi.slope(f64::NAN).is_nan(), "{phi}");
         }
     }
 

@@ -1,7 +1,7 @@
 //! Canonical constructors of numbers, sums and products.
 
 use super::node::{ExprId, Node};
-use super::number::Number;
+use super::number::{Number, exact_sum};
 use super::order::Exponent;
 use super::pool::ExprPool;
 use super::power::half_integer;
@@ -73,7 +73,7 @@ impl ExprPool {
 
     /// The sum of all operands: flat, like terms collected, sorted.
     ///
-    /// Coefficients of like terms are added in an order of their own, so the result does not
+    /// Coefficients of like terms are added exactly and rounded once, so the result does not
     /// depend on the order of `operands`. Other coefficients keep their bits.
     pub fn sum(&mut self, operands: &[ExprId]) -> ExprId {
         let mut terms = Vec::with_capacity(operands.len());
@@ -125,7 +125,11 @@ impl ExprPool {
                 collected.push(*only);
                 continue;
             }
-            let numbers = group.iter().map(|(coefficient, _)| *coefficient).collect();
+            let numbers: Vec<Number> = group.iter().map(|(coefficient, _)| *coefficient).collect();
+            if let Some(sum) = exact_sum(&numbers).filter(|_| !self.is_exact()) {
+                collected.push((sum, group[0].1));
+                continue;
+            }
             let sums = fold(numbers, add, Number::is_negative);
             collected.extend(sums.into_iter().map(|sum| (sum, group[0].1)));
         }

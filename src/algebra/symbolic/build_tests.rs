@@ -143,3 +143,20 @@ fn long_chains_are_flat_and_deep_ones_do_not_overflow_the_stack() {
     let negative = pool.neg(deep);
     assert_eq!(pool.add(deep, negative), ExprId::ZERO);
 }
+
+#[test]
+fn sum_loses_no_small_term_between_large_ones() {
+    let mut pool = ExprPool::new();
+    for (text, expected) in [
+        ("1e16*x + x - 1e16*x", "x"),
+        ("x - 1e16*x + 1e16*x", "x"),
+        ("1e300*x + 0.1*x - 1e300*x", "0.1*x"),
+        (
+            "0.12345678901234567*x + 1e17*x + 3*x - 1e17*x - 3*x",
+            "0.12345678901234567*x",
+        ),
+    ] {
+        let (found, expected) = (pool.parsed(text), pool.parsed(expected));
+        assert_eq!(found, expected, "{text}: {}", pool.display(found));
+    }
+}

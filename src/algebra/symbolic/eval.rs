@@ -18,7 +18,11 @@ impl ExprPool {
     pub fn evaluate_all(&self, exprs: &[ExprId], value_of: &dyn Fn(SymbolId) -> f64) -> Vec<f64> {
         self.fold_up(exprs, |pool, expr, child| match pool.node(expr) {
             Node::Number(number) => number.to_f64(),
-            Node::Symbol(symbol) => value_of(*symbol),
+            Node::Symbol(symbol) => match pool.selection(*symbol) {
+                Some([test, zero, _]) if child(test) == 0.0 => child(zero),
+                Some([_, _, other]) => child(other),
+                None => value_of(*symbol),
+            },
             Node::Sum(terms) => terms.iter().map(|term| child(*term)).sum(),
             Node::Product(factors) => factors.iter().map(|factor| child(*factor)).product(),
             Node::Power(base, exponent) => match pool.as_integer(*exponent) {

@@ -12,6 +12,7 @@
 //! | `lexer`, `parse`, `defined`, `display` | the grammar of candidate terms, both ways; constants without a value |
 //! | `eval`, `interval`, `rounding`, `bounds` | values, and bounds over boxes |
 //! | `diff`, `substitute` | derivatives and substitution |
+//! | `slope`, `germ` | derivatives with values where roots, magnitudes and signs have kinks |
 //! | `expand`, `rational`, `perfect_power`, `trig`, `rules`, `factors` | rewriting, each way when asked |
 //! | `simplify`, `shorten`, `cost`, `region` | choosing the shortest of equal forms |
 //! | `canonical/` | a normal form with exact coefficients, to decide equality |
@@ -45,6 +46,7 @@ mod display;
 mod eval;
 mod expand;
 mod factors;
+mod germ;
 mod id_map;
 mod interval;
 mod lexer;
@@ -61,6 +63,7 @@ mod rounding;
 mod rules;
 mod shorten;
 mod simplify;
+mod slope;
 mod substitute;
 #[cfg(test)]
 mod testing;
@@ -73,6 +76,7 @@ pub(crate) use eval::integer_power;
 pub use interval::Interval;
 pub use node::{ExprId, Function, Node, Parity, SymbolId};
 pub use number::Number;
+pub(crate) use number::sum_of_floats;
 pub use parse::{ParseError, ParseErrorKind, ParseLimits};
 pub use pool::ExprPool;
 pub use shorten::{Shortened, Shortener};

@@ -248,6 +248,51 @@ impl Number {
     }
 }
 
+/// The sum of numbers, rounded once: a small one between large ones that cancel is not lost. `None` for sums of fewer
+/// than three, which need no such care, and on overflow.
+pub(super) fn exact_sum(numbers: &[Number]) -> Option<Number> {
+    if numbers.len() < 3 || numbers.iter().all(|number| number.is_exact()) {
+        return None;
+    }
+    let mut decimals = numbers.iter().map(|number| number.decimal());
+    let sum = decimals.try_fold(Number::ZERO, |sum, next| {
+        sum.checked_add(next?).filter(|sum| sum.is_exact())
+    });
+    let is_short = |part: i64| part.unsigned_abs() <= EXACT_INTEGER as u64;
+    match sum.and_then(Number::as_rational) {
+        Some((n, d)) if is_short(n) && is_short(d) => Number::from_f64(n as f64 / d as f64),
+        _ => {
+            let floats: Vec<f64> = numbers.iter().map(|number| number.to_f64()).collect();
+            Number::from_f64(sum_of_floats(&floats))
+        }
+    }
+}
+
+/// The sum of floats, rounded once (Shewchuk, Adaptive precision floating-point arithmetic, 1997): what is lost by
+/// each addition is kept.
+pub(crate) fn sum_of_floats(values: &[f64]) -> f64 {
+    let plain = values.iter().fold(0.0, |sum, value| sum + value);
+    if values.len() < 3 || !plain.is_finite() {
+        return plain;
+    }
+    // Parts that do not overlap, the smallest first.
+    let mut parts: Vec<f64> = Vec::new();
+    for &value in values {
+        let mut sum = value;
+        parts.retain_mut(|part| {
+            let (large, small) = match sum.abs() < part.abs() {
+                true => (*part, sum),
+                false => (sum, *part),
+            };
+            sum = large + small;
+            *part = small - (sum - large);
+            *part != 0.0
+        });
+        parts.push(sum);
+    }
+    parts.iter().sum()
+}
+
 /// The number of a float that is zero or has all its digits; `None` for anything else.
 fn normal(value: f64) -> Option<Number> {
     Number::from_f64(value).filter(|_| value.is_normal())

@@ -7,6 +7,7 @@ use super::id_map::{BuildIdHasher, IdSet};
 use super::node::{ExprId, Function, Node, SymbolId};
 use super::number::Number;
 use super::order::SymbolKey;
+use super::slope::Slope;
 
 /// Owner of hash-consed, canonical expressions.
 ///
@@ -41,6 +42,8 @@ pub struct ExprPool {
     work: Work,
     /// Derivatives found so far; expressions never change, so entries stay valid.
     pub(super) derivatives: HashMap<(ExprId, SymbolId), ExprId, BuildIdHasher>,
+    /// Slopes found so far.
+    pub(super) slopes: HashMap<(ExprId, SymbolId), Slope, BuildIdHasher>,
 }
 
 /// What rewriting may cost: constructors that are called, and steps of about that effort.
@@ -54,6 +57,8 @@ struct Work {
 struct Symbol {
     key: SymbolKey,
     expr: ExprId,
+    /// What it stands for, see [`ExprPool::selection`].
+    selection: Option<[ExprId; 3]>,
 }
 
 /// What is known about a node without looking at its children.
@@ -99,6 +104,7 @@ impl ExprPool {
                 limit: u64::MAX,
             },
             derivatives: HashMap::default(),
+            slopes: HashMap::default(),
         };
         let zero = pool.intern(Node::Number(Number::ZERO));
         let one = pool.intern(Node::Number(Number::ONE));
@@ -164,6 +170,26 @@ impl ExprPool {
 
     /// The variable of that name, made at its first mention.
     pub fn symbol_id(&mut self, name: &str) -> SymbolId {
+        self.symbol_for(name, None)
+    }
+
+    /// The symbol of a selection: no variable, but `[test, zero, other]`, the value of `zero` where `test` is zero
+    /// and that of `other` elsewhere.
+    pub(super) fn selection_symbol(&mut self, parts: [ExprId; 3]) -> ExprId {
+        let id = self.symbol_for(
+            &format!("selection {:?}", parts.map(ExprId::index)),
+            Some(parts),
+        );
+        self.symbol_expr(id)
+    }
+
+    /// The parts of a symbol that stands for a selection of [`ExprPool::slope`]: test, value where the
+    /// test is zero, value elsewhere.
+    pub fn selection(&self, symbol: SymbolId) -> Option<[ExprId; 3]> {
+        self.symbols[symbol.index()].selection
+    }
+
+    fn symbol_for(&mut self, name: &str, selection: Option<[ExprId; 3]>) -> SymbolId {
         if let Some(&id) = self.symbol_ids.get(name) {
             return id;
         }
@@ -174,6 +200,7 @@ impl ExprPool {
         self.symbols.push(Symbol {
             key: SymbolKey::of(name),
             expr: ExprId::ZERO,
+            selection,
         });
         self.symbols[id.index()].expr = self.intern(Node::Symbol(id));
         id
@@ -264,7 +291,10 @@ impl ExprPool {
 
     /// The operands of the top level, left to right.
     pub fn children(&self, expr: ExprId) -> impl Iterator<Item = ExprId> + '_ {
-        self.node(expr).operands()
+        let symbol = self.as_symbol(expr);
+        let selection = symbol.and_then(|symbol| self.selection(symbol));
+        let operands = self.node(expr).operands();
+        operands.chain(selection.into_iter().flatten())
     }
 
     /// Every expression that `roots` are made of, each once, operands before what uses them.
@@ -415,7 +445,10 @@ impl ExprPool {
     fn symbols_in(&self, node: &Node) -> u64 {
         let of = |expr: ExprId| self.facts[expr.index()].symbols;
         match node {
-            Node::Symbol(symbol) => symbol_bit(*symbol),
+            Node::Symbol(symbol) => match self.selection(*symbol) {
+                Some(parts) => parts.into_iter().fold(0, |mask, part| mask | of(part)),
+                None => symbol_bit(*symbol),
+            },
             _ => node.operands().fold(0, |mask, operand| mask | of(operand)),
         }
     }

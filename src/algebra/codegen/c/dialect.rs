@@ -27,7 +27,7 @@ const RESERVED: &str = "
     int long register restrict return short signed sizeof static struct switch typedef union
     unsigned void volatile while bool true false catch class delete explicit export friend mutable
     namespace new noexcept nullptr operator private protected public template this throw try typeid
-    typename using virtual and or not xor main sin cos tan tanh exp log sqrt fabs memcpy size_t
+    typename using virtual and or not xor main sin cos tan tanh exp log pow sqrt fabs memcpy size_t
     uint64_t y0 y1 yn j0 j1 jn gamma signgam abs asm typeof constexpr concept requires import module
     alignas alignof static_assert thread_local decltype div index time erf I NULL errno stdin stdout
     stderr
@@ -49,6 +49,14 @@ impl Dialect for CDialect {
             named => name(named),
         };
         format!("{name}{}({argument})", self.suffix())
+    }
+
+    fn power(&self, base: &str, exponent: &str) -> String {
+        format!("{}_pow({base}, {exponent})", self.name)
+    }
+
+    fn select(&self, [test, zero, other]: [String; 3]) -> String {
+        format!("{}_select({test}, {zero}, {other})", self.name)
     }
 
     fn let_scalar(&self, name: &str, value: &str) -> String {

@@ -16,7 +16,7 @@ use super::sines::SineCosine;
 use super::tables::Tables;
 use super::test_vectors::TestVectors;
 use crate::files::EmittedFile;
-use crate::ir::{Statement, Unary};
+use crate::ir::{Binary, Statement, Unary};
 use dialect::CDialect;
 use selftest::SelfTest;
 
@@ -40,6 +40,8 @@ struct Source<'a> {
     is_library: bool,
     kernel: Option<KernelText>,
     sign: bool,
+    pow: bool,
+    select: bool,
 }
 
 #[derive(Template)]
@@ -77,6 +79,8 @@ pub fn emit(
         is_library: sines == SineCosine::Library,
         kernel: (entries.has(computes_angles)).then(|| KernelText::new(precision, d)),
         sign: entries.has(|s| matches!(s, Statement::Unary(Unary::Sign, _))),
+        pow: entries.has(|s| matches!(s, Statement::Binary(Binary::Pow, ..))),
+        select: entries.has(|s| matches!(s, Statement::Select(_))),
     };
     let cmake = CMake {
         banner: format!("# {provenance}"),

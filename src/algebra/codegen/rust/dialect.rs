@@ -72,6 +72,14 @@ impl Dialect for RustDialect {
         format!("math::{}({argument})", name(function))
     }
 
+    fn power(&self, base: &str, exponent: &str) -> String {
+        format!("math::pow({base}, {exponent})")
+    }
+
+    fn select(&self, [test, zero, other]: [String; 3]) -> String {
+        format!("math::select({test}, {zero}, {other})")
+    }
+
     fn let_scalar(&self, name: &str, value: &str) -> String {
         format!("let {name} = {value};")
     }

@@ -15,6 +15,8 @@ pub struct FunctionText {
     pub docs: Vec<String>,
     /// Its statements.
     pub body: String,
+    /// Whether values that are not numbers are computed and not selected.
+    pub selects: bool,
     /// Tables that the statements read, by name.
     pub tables: Vec<String>,
 }
@@ -32,6 +34,7 @@ impl FunctionText {
             name: function.name.to_string(),
             docs: comment_lines(&function.docs, 90),
             tables: names.filter(is_read).collect(),
+            selects: body.contains("np.where("),
             body,
         }
     }

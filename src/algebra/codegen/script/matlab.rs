@@ -13,7 +13,7 @@ use crate::codegen::model_text::ModelText;
 use crate::codegen::printer::subscript;
 use crate::codegen::tables::Tables;
 use crate::files::EmittedFile;
-use crate::ir::{Binary, Unary};
+use crate::ir::{Binary, Statement, Unary};
 
 /// MATLAB without toolboxes; Octave runs the same.
 #[derive(Clone, Copy, Debug)]
@@ -25,6 +25,7 @@ const RESERVED: &str = "
     parfor persistent return spmd switch try while do until unwind_protect end_try_catch endif
     endfor endwhile endfunction endswitch methods properties events enumeration columns rows_of
     model n zeros size numel repmat cell max error nargin sin cos tan tanh exp log sqrt abs sign
+    power select
 ";
 
 impl Dialect for MatlabDialect {
@@ -50,7 +51,16 @@ impl Dialect for MatlabDialect {
             Binary::Sub => " - ",
             Binary::Mul => ".*",
             Binary::Div => "./",
+            Binary::Pow => unreachable!("powers are functions"),
         }
+    }
+
+    fn power(&self, base: &str, exponent: &str) -> String {
+        format!("power({base}, {exponent})")
+    }
+
+    fn select(&self, [test, zero, other]: [String; 3]) -> String {
+        format!("select({test}, {zero}, {other})")
     }
 
     fn element(&self, array: &str, index: &Index) -> String {
@@ -124,6 +134,7 @@ fn span_text(span: &Span) -> String {
 struct MatlabFile<'a> {
     banner: String,
     file: &'a str,
+    selects: bool,
     m: ModelText<'a, FunctionText>,
 }
 
@@ -137,6 +148,7 @@ pub fn emit(entries: &ModelInterface, provenance: &str) -> Result<Vec<EmittedFil
     let file = MatlabFile {
         banner: format!("% {provenance}"),
         file: &stem,
+        selects: entries.has(|s| matches!(s, Statement::Select(_))),
         m: ModelText::new(entries, &MatlabDialect, "", print, column),
     };
     Ok(vec![EmittedFile::new(

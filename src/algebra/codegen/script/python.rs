@@ -42,6 +42,15 @@ const MODULES: &str = "
     tokenize traceback types typing unittest urllib
 ";
 
+impl Library {
+    fn module(self) -> &'static str {
+        match self {
+            Library::NumPy => "np",
+            Library::Casadi => "casadi",
+        }
+    }
+}
+
 impl Dialect for Library {
     fn reserved(&self) -> &'static str {
         RESERVED
@@ -60,15 +69,22 @@ impl Dialect for Library {
     }
 
     fn apply(&self, function: Unary, argument: &str) -> String {
-        let library = match self {
-            Library::NumPy => "np",
-            Library::Casadi => "casadi",
-        };
         let name = match (function, self) {
             (Unary::Abs, Library::Casadi) => "fabs",
             (named, _) => name(named),
         };
-        format!("{library}.{name}({argument})")
+        format!("{}.{name}({argument})", self.module())
+    }
+
+    fn power(&self, base: &str, exponent: &str) -> String {
+        format!("{}.power({base}, {exponent})", self.module())
+    }
+
+    fn select(&self, [test, zero, other]: [String; 3]) -> String {
+        match self {
+            Library::NumPy => format!("np.where(np.equal({test}, 0.0), {zero}, {other})"),
+            Library::Casadi => format!("casadi.if_else(casadi.eq({test}, 0.0), {zero}, {other})"),
+        }
     }
 
     fn let_array(&self, name: &str, elements: &[String]) -> String {

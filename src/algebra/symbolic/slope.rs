@@ -1,0 +1,408 @@
+//! Derivatives that have values wherever the function has slopes.
+//!
+//! The rules of differentiation give `g'/(2 sqrt(g))` for a root, which is `0/0` where `g` and `g'` vanish, and
+//! `0*inf` behind a factor that vanishes with `g`. The slope of an expression is what its values have:
+//!
+//! - the derivative, where it exists;
+//! - otherwise the limit of slopes from above, or from below where there are no values above;
+//! - an infinity of the right sign where that limit is infinite;
+//! - where the function jumps, the limit of the slopes beside the jump: a jump itself adds nothing.
+//!
+//! Which of them applies is decided at run time by selections: the derivative by the rules where no argument of a root,
+//! magnitude, sign or power is zero, a slope from series (see `germ.rs`) where one is.
+
+use std::cmp::Ordering;
+
+use super::germ::{Germs, LAST_ORDER, Stop};
+use super::node::{ExprId, Function, Node, SymbolId};
+use super::number::Number;
+use super::pool::{ExprPool, Sign};
+
+/// Most selections of one slope; what is beyond them is the derivative by the rules.
+const MOST_SELECTIONS: usize = 200;
+
+/// The slope of an expression by a symbol.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Slope {
+    expr: ExprId,
+    /// Whether it is infinite somewhere.
+    has_infinity: bool,
+}
+
+/// What is assumed about a point.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Facts {
+    /// The first expression that is zero.
+    first_zero: Option<ExprId>,
+    zero: Vec<ExprId>,
+    nonzero: Vec<ExprId>,
+    /// Symbols that equal a number or another symbol.
+    values: Vec<(SymbolId, ExprId)>,
+}
+
+impl Facts {
+    /// An expression with the known values of symbols.
+    pub fn at(&self, pool: &mut ExprPool, expr: ExprId) -> ExprId {
+        pool.substitute(expr, &self.values)
+    }
+
+    /// Whether an expression is zero; a product, factor by factor.
+    pub fn is_zero(&self, pool: &mut ExprPool, expr: ExprId) -> Result<bool, Stop> {
+        let expr = self.at(pool, expr);
+        let mut undecided = None;
+        for factor in pool.factors_of(expr).to_vec() {
+            match self.known(pool, factor) {
+                Some(true) => return Ok(true),
+                Some(false) => {}
+                None => undecided = undecided.or(Some(factor)),
+            }
+        }
+        match undecided {
+            None => Ok(false),
+            Some(test) => Err(Stop::Undecided(self.simplest(pool, test))),
+        }
+    }
+
+    /// A symbol of a test that makes it zero by being zero, or the test: what is known of symbols is known of all
+    /// expressions.
+    fn simplest(&self, pool: &mut ExprPool, test: ExprId) -> ExprId {
+        for symbol in pool.symbols_of(test) {
+            let variable = pool.symbol_expr(symbol);
+            if !self.nonzero.contains(&variable)
+                && core(pool, test) != variable
+                && pool.substitute(test, &[(symbol, ExprId::ZERO)]) == ExprId::ZERO
+            {
+                return variable;
+            }
+        }
+        test
+    }
+
+    /// Whether an expression that is not zero is positive.
+    pub fn is_positive(&self, pool: &mut ExprPool, expr: ExprId) -> Result<bool, Stop> {
+        let expr = self.at(pool, expr);
+        if pool.is_constant(expr) {
+            return Ok(pool.evaluate(expr, &|_| f64::NAN) > 0.0);
+        }
+        if pool.sign(expr) != Sign::Any {
+            return Ok(true);
+        }
+        let (content, rest) = content(pool, expr);
+        let sign = pool.apply(Function::Sign, rest);
+        let below = pool.sub(sign, ExprId::ONE);
+        Ok(self.is_zero(pool, below)? != content.is_negative())
+    }
+
+    fn known(&self, pool: &mut ExprPool, expr: ExprId) -> Option<bool> {
+        let core = core(pool, expr);
+        if pool.is_constant(core) {
+            return Some(pool.evaluate(core, &|_| f64::NAN) == 0.0);
+        }
+        if self.zero.contains(&core) {
+            return Some(true);
+        }
+        let is_nonzero = |pool: &mut ExprPool, expr: ExprId| {
+            let core = self::core(pool, expr);
+            pool.sign(core) == Sign::Positive || self.nonzero.contains(&core)
+        };
+        let is_other = match pool.node(core).clone() {
+            Node::Sum(terms) => {
+                let is_signed = |term: &ExprId| pool.sign(*term) != Sign::Any;
+                terms.iter().all(is_signed) && terms.iter().any(|term| is_nonzero(pool, *term))
+            }
+            Node::Power(base, exponent) => {
+                pool.as_number(exponent).is_some() || is_nonzero(pool, base)
+            }
+            Node::Product(factors) => {
+                let known: Vec<_> = factors.iter().map(|f| self.known(pool, *f)).collect();
+                if known.contains(&Some(true)) {
+                    return Some(true);
+                }
+                known.iter().all(|known| *known == Some(false))
+            }
+            _ => false,
+        };
+        (is_other || is_nonzero(pool, core)).then_some(false)
+    }
+
+    /// These facts and whether `test` is zero.
+    fn with(&self, pool: &mut ExprPool, test: ExprId, is_zero: bool) -> Facts {
+        let mut facts = self.clone();
+        if !is_zero {
+            facts.nonzero.push(core(pool, test));
+            return facts;
+        }
+        facts.first_zero.get_or_insert(test);
+        let mut pending = vec![test];
+        while let Some(expr) = pending.pop() {
+            let expr = core(pool, expr);
+            facts.zero.push(expr);
+            if let Node::Sum(terms) = pool.node(expr).clone()
+                && terms.iter().all(|term| pool.sign(*term) != Sign::Any)
+            {
+                pending.extend(terms.iter());
+            }
+            if let Some((symbol, value)) = value_of_symbol(pool, expr) {
+                facts.set(pool, symbol, value);
+            }
+        }
+        facts
+    }
+
+    fn set(&mut self, pool: &mut ExprPool, symbol: SymbolId, value: ExprId) {
+        let value = self.at(pool, value);
+        let lists = [&mut self.zero, &mut self.nonzero];
+        for expr in lists.into_iter().flatten() {
+            let known = pool.substitute(*expr, &[(symbol, value)]);
+            *expr = core(pool, known);
+        }
+        for (_, known) in &mut self.values {
+            *known = pool.substitute(*known, &[(symbol, value)]);
+        }
+        self.values.push((symbol, value));
+    }
+}
+
+/// Splits an expression into a number and the rest, which is the same for all its multiples.
+fn content(pool: &mut ExprPool, expr: ExprId) -> (Number, ExprId) {
+    let (mut number, mut rest) = pool.split(expr);
+    loop {
+        let terms = pool.terms_of(rest);
+        let first = terms.first().map_or(Number::ONE, |term| term.0);
+        if terms.len() < 2 || first.is_one() {
+            return (number, rest);
+        }
+        let quotients = terms
+            .iter()
+            .map(|&(n, rest)| Some((n.checked_div(first)?, rest)));
+        let Some(terms) = quotients.collect() else {
+            return (number, rest);
+        };
+        let Some(product) = number.checked_mul(first) else {
+            return (number, rest);
+        };
+        // A part that is no longer multiplied may be a sum itself.
+        (number, rest) = (product, pool.sum_of_terms(terms));
+    }
+}
+
+/// What is zero exactly where an expression is, in floats: none but zero is a multiple of pi.
+fn core(pool: &mut ExprPool, expr: ExprId) -> ExprId {
+    if pool.as_number(expr).is_some() {
+        return expr;
+    }
+    let mut core = content(pool, expr).1;
+    loop {
+        core = match *pool.node(core) {
+            Node::Power(base, exponent) if pool.sign(exponent) == Sign::Positive => base,
+            Node::Apply(function, inner) => match function {
+                Function::Abs | Function::Sign | Function::Sqrt => inner,
+                Function::Sin | Function::Tan | Function::Tanh => inner,
+                Function::Cos | Function::Exp | Function::Log => return core,
+            },
+            _ => return core,
+        };
+        core = content(pool, core).1;
+    }
+}
+
+/// The value that a symbol has where an expression is zero: of `x`, `x - 1` and `x - y`.
+fn value_of_symbol(pool: &mut ExprPool, expr: ExprId) -> Option<(SymbolId, ExprId)> {
+    if let Some(symbol) = pool.as_symbol(expr) {
+        return Some((symbol, ExprId::ZERO));
+    }
+    let [(a, first), (b, second)] = pool.terms_of(expr)[..] else {
+        return None;
+    };
+    let symbol = pool.as_symbol(second)?;
+    let quotient = (-a).checked_div(b)?;
+    let is_exact = match pool.as_symbol(first) {
+        Some(_) => quotient.abs().is_one(),
+        None => first == ExprId::ONE && Number::from_f64(quotient.to_f64())? == quotient,
+    };
+    is_exact.then(|| (symbol, pool.scale(quotient, first)))
+}
+
+/// What the values beside a point have.
+enum Outcome {
+    /// The derivative by the rules.
+    Regular,
+    Finite(ExprId),
+    /// An infinity with the sign of an expression.
+    Infinite(ExprId),
+}
+
+impl ExprPool {
+    /// The slope of `expr` by `symbol`: its derivative, with selections where that has no value although
+    /// `expr` has; see the module. To be evaluated, not to be differentiated or rewritten.
+    pub fn slope(&mut self, expr: ExprId, symbol: SymbolId) -> ExprId {
+        self.full_slope(expr, symbol).expr
+    }
+
+    /// Whether the slope of `expr` may be infinite where `expr` has a value, by an argument that is zero.
+    pub fn may_be_steep(&mut self, expr: ExprId, symbol: SymbolId) -> bool {
+        self.full_slope(expr, symbol).has_infinity
+    }
+
+    fn full_slope(&mut self, expr: ExprId, symbol: SymbolId) -> Slope {
+        if let Some(&known) = self.slopes.get(&(expr, symbol)) {
+            return known;
+        }
+        let wanted = |node| self.may_contain(node, symbol);
+        let nodes = self.walk(&[expr], wanted, |_| true);
+        let slope = match nodes.into_iter().any(|node| self.has_kink(node)) {
+            true => {
+                let mut left = MOST_SELECTIONS;
+                self.selected(expr, symbol, &Facts::default(), &mut left)
+            }
+            false => Slope {
+                expr: self.derivative(expr, symbol),
+                has_infinity: false,
+            },
+        };
+        self.slopes.insert((expr, symbol), slope);
+        slope
+    }
+
+    /// Whether a node is not smooth where an operand is zero.
+    fn has_kink(&self, node: ExprId) -> bool {
+        match self.node(node) {
+            Node::Power(_, exponent) => !matches!(self.as_integer(*exponent), Some(0..)),
+            Node::Apply(Function::Abs | Function::Sign | Function::Sqrt, _) => true,
+            _ => false,
+        }
+    }
+
+    /// The slope at all points of which some facts hold. Its depth is bounded by the number of selections.
+    fn selected(
+        &mut self,
+        expr: ExprId,
+        symbol: SymbolId,
+        facts: &Facts,
+        left: &mut usize,
+    ) -> Slope {
+        let outcome = match self.outcome(expr, symbol, facts) {
+            Err(test) if *left > 0 => {
+                *left -= 1;
+                // The way to the derivative by the rules first.
+                let mut share = *left - *left / 4;
+                *left -= share;
+                let facts_of = [false, true].map(|is_zero| facts.with(self, test, is_zero));
+                let other = self.selected(expr, symbol, &facts_of[0], &mut share);
+                *left += share;
+                let zero = self.selected(expr, symbol, &facts_of[1], left);
+                return Slope {
+                    expr: self.select(test, zero.expr, other.expr),
+                    has_infinity: zero.has_infinity || other.has_infinity,
+                };
+            }
+            known => known.unwrap_or(Outcome::Regular),
+        };
+        let regular = self.derivative(expr, symbol);
+        let has_infinity = matches!(outcome, Outcome::Infinite(_));
+        let expr = match (outcome, facts.first_zero) {
+            (Outcome::Finite(slope), _) if self.is_reached(regular, slope, facts) => regular,
+            (Outcome::Finite(slope), _) => slope,
+            (Outcome::Infinite(sign), Some(zero)) => {
+                let magnitude = self.apply(Function::Abs, zero);
+                self.div(sign, magnitude)
+            }
+            (Outcome::Regular | Outcome::Infinite(_), _) => regular,
+        };
+        Slope { expr, has_infinity }
+    }
+
+    /// Whether the derivative by the rules has the slope's value in the numbers of a computer, without `0*inf`.
+    fn is_reached(&mut self, regular: ExprId, slope: ExprId, facts: &Facts) -> bool {
+        let is_by_values = facts.zero.iter().all(|zero| *zero == ExprId::ZERO);
+        if !is_by_values || facts.at(self, regular) != slope {
+            return false;
+        }
+        let varies = |node: ExprId| match self.node(node) {
+            Node::Power(_, exponent) => self.as_number(*exponent).is_none(),
+            _ => false,
+        };
+        if self.reachable(&[regular]).into_iter().any(varies) {
+            return false;
+        }
+        let free = |symbol: SymbolId| 0.613 + 0.0937 * (symbol.index() % 7) as f64;
+        let value_of = |symbol: SymbolId| {
+            let known = facts.values.iter().find(|(other, _)| *other == symbol);
+            known.map_or(free(symbol), |&(_, value)| self.evaluate(value, &free))
+        };
+        self.evaluate(regular, &value_of).is_finite()
+    }
+
+    fn outcome(
+        &mut self,
+        expr: ExprId,
+        symbol: SymbolId,
+        facts: &Facts,
+    ) -> Result<Outcome, ExprId> {
+        for side in [Number::ONE, Number::MINUS_ONE] {
+            let mut order = 2;
+            let stop = loop {
+                match Germs::new(self, facts, symbol, side, order).slope(expr) {
+                    Ok(outcome) => return Ok(outcome),
+                    Err(Stop::Order) if order < LAST_ORDER => order *= 2,
+                    Err(stop) => break stop,
+                }
+            };
+            match stop {
+                Stop::Undecided(test) => return Err(test),
+                Stop::Undefined => {}
+                Stop::Order | Stop::Unknown => return Ok(Outcome::Regular),
+            }
+        }
+        // An isolated point.
+        Ok(Outcome::Finite(ExprId::ZERO))
+    }
+
+    /// `zero` where `test` is zero, `other` elsewhere (also where it is not a number): for programs, behind a symbol
+    /// that only values look into.
+    fn select(&mut self, test: ExprId, zero: ExprId, other: ExprId) -> ExprId {
+        if zero == other {
+            return zero;
+        }
+        self.selection_symbol([test, zero, other])
+    }
+}
+
+impl Germs<'_> {
+    fn slope(&mut self, expr: ExprId) -> Result<Outcome, Stop> {
+        let Some(mut series) = self.of(expr)? else {
+            return Ok(Outcome::Regular);
+        };
+        if series.has_pole(self.pool) {
+            return Ok(Outcome::Regular);
+        }
+        series.keep_up_to_one(self.pool);
+        while !series.is_zero() {
+            if let Some(coefficient) = self.linear(&series)? {
+                return Ok(Outcome::Finite(self.pool.scale(self.side, coefficient)));
+            }
+            let Some((exponent, coefficient)) = self.lead(&mut series)? else {
+                break;
+            };
+            let coefficient = self.pool.scale(self.side, coefficient);
+            match self.compare(exponent, ExprId::ONE)? {
+                Ordering::Greater => break,
+                Ordering::Equal => return Ok(Outcome::Finite(coefficient)),
+                Ordering::Less => {}
+            }
+            match self.compare(exponent, ExprId::ZERO)? {
+                Ordering::Greater => {
+                    let sign = self.pool.apply(Function::Sign, coefficient);
+                    return Ok(Outcome::Infinite(sign));
+                }
+                Ordering::Equal => {}
+                Ordering::Less => return Ok(Outcome::Regular),
+            }
+        }
+        Ok(Outcome::Finite(ExprId::ZERO))
+    }
+}
+
+#[cfg(test)]
+#[path = "slope_tests.rs"]
+mod tests;

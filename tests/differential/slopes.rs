@@ -1,0 +1,176 @@
+//! Jacobians at points where the rules of differentiation give `0/0`, against limits.
+
+use std::collections::HashMap;
+
+use romc::ir::Interpreter;
+use romc::lower::Form;
+use romc::model::ReducedModel;
+
+use super::drivers::{Build, Workshop};
+use super::functions::{Function, Kind, functions};
+use super::kinks::{Kink, columns, kinks, model};
+use super::tools;
+
+/// Expressions of one model.
+const PER_MODEL: usize = 20;
+/// Largest difference of a slope, relative to the larger of one and its magnitude.
+const DOUBLE: f64 = 1e-9;
+const SINGLE: f64 = 2e-3;
+
+/// The Jacobians of models that have many expressions each.
+struct Case {
+    models: Vec<ReducedModel>,
+    functions: Vec<Function>,
+    points: Vec<Vec<f64>>,
+    kinks: Vec<Vec<Kink>>,
+}
+
+impl Case {
+    fn new() -> Self {
+        let mut kinks = kinks().into_iter().peekable();
+        let mut case = Case {
+            models: Vec::new(),
+            functions: Vec::new(),
+            points: Vec::new(),
+            kinks: Vec::new(),
+        };
+        while kinks.peek().is_some() {
+            let part: Vec<Kink> = kinks.by_ref().take(PER_MODEL).collect();
+            let expressions: Vec<&str> = part.iter().map(|kink| kink.expression.as_str()).collect();
+            let model = model(
+                &format!("kinks{}", case.models.len()),
+                PER_MODEL,
+                &expressions,
+            );
+            let points = part.iter().flat_map(|kink| &kink.points);
+            let points: Vec<f64> = points.flat_map(|point| point.inputs(PER_MODEL)).collect();
+            let n_points = points.len() / (3 * PER_MODEL);
+            let all = functions(&model, n_points, Form::Automatic);
+            let jacobian = all
+                .into_iter()
+                .find(|f| matches!(f.kind, Kind::Jacobian(..)));
+            case.functions.push(jacobian.expect("a Jacobian"));
+            case.models.push(model);
+            case.points.push(points);
+            case.kinks.push(part);
+        }
+        case
+    }
+
+    /// Compares the entries of a result, found at all points of all models.
+    fn check(&self, by: &str, tolerance: f64, found: &[Vec<f64>]) {
+        let (mut wrong, mut all) = (Vec::new(), 0);
+        for ((function, kinks), found) in self.functions.iter().zip(&self.kinks).zip(found) {
+            let Kind::Jacobian(_, pattern) = &function.kind else {
+                panic!("{} is no Jacobian", function.name);
+            };
+            let places = pattern.rows.iter().zip(&pattern.cols).enumerate();
+            let places: HashMap<_, _> = places.map(|(k, (row, col))| ((*row, *col), k)).collect();
+            let mut results = found.chunks(function.output_len());
+            for (row, kink) in kinks.iter().enumerate() {
+                for point in &kink.points {
+                    let result = &results.next().expect("one result a point")[PER_MODEL..];
+                    for (col, expected) in columns(PER_MODEL).into_iter().zip(point.slopes) {
+                        let found = places.get(&(row, col)).map_or(0.0, |place| result[*place]);
+                        all += 1;
+                        let allowed = tolerance * expected.abs().max(1.0);
+                        if found != expected && !((found - expected).abs() <= allowed) {
+                            let at = (point.at, col, found, expected);
+                            wrong.push(format!("{} {at:?}", kink.expression));
+                        }
+                    }
+                }
+            }
+        }
+        let few: Vec<&String> = wrong.iter().take(5).collect();
+        assert!(
+            wrong.is_empty(),
+            "{by}: {} of {all} slopes: {few:#?}",
+            wrong.len()
+        );
+        println!("{by}: {all} slopes within {tolerance}");
+    }
+}
+
+#[test]
+fn slopes_at_kinks_are_limits_in_the_interpreter_c_and_rust() {
+    let case = Case::new();
+    let pairs = case.functions.iter().zip(&case.points);
+    let expected: Vec<Vec<f64>> = pairs.map(|(f, points)| f.interpret(points)).collect();
+    case.check("interpreter", DOUBLE, &expected);
+
+    let workshop = Workshop::new(&case.models, Form::Automatic);
+    let builds = match tools::is_thorough() {
+        true => Build::all(),
+        false => vec![Build::c(), Build::rust()],
+    };
+    for build in builds {
+        let found = workshop.run(&build, &case.functions, &case.points);
+        case.check(build.name, DOUBLE, &found);
+        if Build::exact().iter().any(|exact| exact.name == build.name) {
+            for (found, expected) in found.iter().flatten().zip(expected.iter().flatten()) {
+                let is_same = found.to_bits() == expected.to_bits();
+                assert!(
+                    is_same || found.is_nan() && expected.is_nan(),
+                    "{}",
+                    build.name
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn slopes_at_kinks_are_no_nan_in_single_precision() {
+    let case = Case::new();
+    let mut found = Vec::new();
+    for (function, points) in case.functions.iter().zip(&case.points) {
+        let mut interpreter = Interpreter::<f32>::new(&function.program);
+        let mut results = Vec::new();
+        for point in points.chunks(3 * PER_MODEL) {
+            let parts = point.chunks(PER_MODEL);
+            let inputs: Vec<Vec<f32>> = parts
+                .map(|part| part.iter().map(|x| *x as f32).collect())
+                .collect();
+            let outputs = interpreter.results(&inputs).concat();
+            results.extend(outputs.into_iter().map(f64::from));
+        }
+        found.push(results);
+    }
+    case.check("f32", SINGLE, &found);
+}
+
+/// The distance of two floats in units of the last place.
+fn ulps(a: f64, b: f64) -> u64 {
+    a.to_bits().abs_diff(b.to_bits())
+}
+
+#[test]
+fn sign_of_nan_is_nan_and_powers_of_ten_are_near() {
+    let model = model("special", 2, &["sign(z1) + abs(z1)", "10^z2"]);
+    let all = functions(&model, 1, Form::Automatic);
+    let dynamics = all.into_iter().find(|f| f.kind == Kind::Dynamics(0));
+    let mut dynamics = dynamics.expect("accelerations");
+    let exponents = (-300..=300).step_by(7);
+    let exact: Vec<f64> = exponents
+        .clone()
+        .map(|k| format!("1e{k}").parse().expect("a number"))
+        .collect();
+    let points = exponents.map(|k| [f64::NAN, f64::from(k), 0.0, 0.0, 0.0, 0.0]);
+    let points: Vec<f64> = points.flatten().collect();
+    dynamics.n_points = exact.len();
+    let workshop = Workshop::new(&[model], Form::Automatic);
+    let (functions, points) = ([dynamics], [points]);
+    let mut found = vec![functions[0].interpret(&points[0])];
+    for build in [Build::c(), Build::rust()] {
+        found.extend(workshop.run(&build, &functions, &points));
+    }
+    for (found, exact) in found.iter().flat_map(|found| found.chunks(2).zip(&exact)) {
+        assert!(found[0].is_nan(), "{found:?}");
+        assert!(ulps(found[1], *exact) <= 2, "{found:?} {exact}");
+    }
+    let pairs = found[1..].iter().flatten().zip(found[0].iter().cycle());
+    for (found, interpreted) in pairs.filter(|(_, interpreted)| !interpreted.is_nan()) {
+        assert_eq!(found.to_bits(), interpreted.to_bits());
+    }
+}
