@@ -3,6 +3,8 @@
 
 use std::path::Path;
 
+use super::shell_path;
+
 /// Bytes that [`recognised`] needs of a file.
 pub const MAGIC_BYTES: usize = 512;
 
@@ -154,25 +156,30 @@ pub fn recognised(path: &Path, start: &[u8]) -> Option<OtherFormat> {
         }
         Some(_) | None => (what, line),
     };
-    let input = path.display().to_string();
-    let output = path.with_extension("").display().to_string();
+    let stem = path.with_extension("");
     let remedy = match line.strip_prefix(':') {
         None => line
-            .replace("<in>", &quoted(&input))
-            .replace("<out>", &quoted(&output)),
-        Some(code) => format!(
-            "python3 -c \"import sys, numpy as np, pandas as pd; {code}{}\" {} {}",
-            if code.ends_with("index=False)") {
-                ""
-            } else {
-                TO_COLUMNS
-            },
-            quoted(&input),
-            quoted(&match format!("{output}.csv") {
-                same if same == input => format!("{output}-table.csv"),
+            .replace("<in>", &shell_path(path))
+            .replace("<out>", &shell_path(&stem)),
+        Some(code) => {
+            let columns = match code.ends_with("index=False)") {
+                true => "",
+                false => TO_COLUMNS,
+            };
+            let with_ending = |end: &str| {
+                let name = stem.file_name().unwrap_or_default().to_string_lossy();
+                stem.with_file_name(format!("{name}{end}"))
+            };
+            let table = match with_ending(".csv") {
+                same if same == path => with_ending("-table.csv"),
                 other => other,
-            })
-        ),
+            };
+            format!(
+                "python3 -c \"import sys, numpy as np, pandas as pd; {code}{columns}\" {} {}",
+                shell_path(path),
+                shell_path(&table)
+            )
+        }
     };
     Some(OtherFormat { what, remedy })
 }
@@ -186,15 +193,6 @@ const TO_COLUMNS: &str = "; c = {k: np.squeeze(a[k]) for k in a if k[:2] != '__'
 fn first_member(start: &[u8]) -> Option<&[u8]> {
     let length = start.strip_prefix(b"PK\x03\x04")?.get(22..24)?;
     start.get(30..30 + usize::from(u16::from_le_bytes([length[0], length[1]])))
-}
-
-/// A file's name as a shell reads it.
-fn quoted(name: &str) -> String {
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || "/._-+=:@%".contains(c);
-    match !name.is_empty() && name.chars().all(is_plain) {
-        true => name.to_owned(),
-        false => format!("'{}'", name.replace('\'', r"'\''")),
-    }
 }
 
 #[cfg(test)]
