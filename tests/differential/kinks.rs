@@ -87,8 +87,8 @@ pub fn kinks() -> Vec<Kink> {
 /// A model whose accelerations are expressions, and zero behind them; of two coordinates at least.
 pub fn model(name: &str, latent_dim: usize, expressions: &[&str]) -> ReducedModel {
     let d = latent_dim.max(2);
-    let texts: Vec<String> = expressions.iter().map(|&text| text.to_owned()).collect();
-    let library = Library::from_terms(d, &texts).expect("terms parse");
+    let terms: Vec<String> = expressions.iter().map(|&text| text.to_owned()).collect();
+    let library = Library::from_terms(d, &terms).expect("terms parse");
     let xi = DMatrix::from_fn(expressions.len(), d, |term, row| {
         f64::from(u8::from(term == row))
     });

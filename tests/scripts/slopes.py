@@ -197,11 +197,25 @@ def line(node, values):
     return "\t".join([text(node), *(repr(number) for number in numbers)])
 
 
+def fingerprint(node):
+    """Values by which equal expressions are known; a model has no term twice, and none that is zero."""
+    values = []
+    for point in ([0.31, 0.47, 0.83, 0.59], [-0.31, 0.47, -0.83, 0.59], [0.31, -0.47, 0.83, -0.59], [-0.37, -0.41, -0.7, -0.9]):
+        try:
+            values.append(float(f"{float(evaluate(node, dict(zip(VARIABLES, map(mpf, point))), Exact)):.9g}"))
+        except Undefined:
+            values.append(0.0)
+    return tuple(values)
+
+
 def main(count, seed):
     choose = random.Random(seed)
-    done = 0
+    done, seen = 0, {(0.0,) * 4}
     while done < count:
         node = expression(choose, 2)
+        if fingerprint(node) in seen:
+            continue
+        seen.add(fingerprint(node))
         points = {tuple(values.values()): values for values in (point(choose) for _ in range(6))}
         lines = [found for values in points.values() if (found := line(node, values))]
         if lines:

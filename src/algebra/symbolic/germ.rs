@@ -219,7 +219,7 @@ impl<'a> Germs<'a> {
             }
             let coefficient = self.facts.at(self.pool, derivative);
             let coefficient = self.pool.scale(factor.unwrap_or(Number::ZERO), coefficient);
-            if coefficient != ExprId::ZERO {
+            if self.facts.known(self.pool, coefficient) != Some(true) {
                 let exponent = self.pool.integer(order);
                 series.terms.push((exponent, coefficient));
             }

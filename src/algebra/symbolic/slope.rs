@@ -18,8 +18,8 @@ use super::node::{ExprId, Function, Node, SymbolId};
 use super::number::Number;
 use super::pool::{ExprPool, Sign};
 
-/// Most selections of one slope; what is beyond them is the derivative by the rules.
-const MOST_SELECTIONS: usize = 200;
+/// Most cases of one slope; those that are not decided have the derivative by the rules.
+const MOST_CASES: usize = 400;
 
 /// The slope of an expression by a symbol.
 #[derive(Clone, Copy, Debug)]
@@ -29,7 +29,7 @@ pub(super) struct Slope {
     has_infinity: bool,
 }
 
-/// What is assumed about a point.
+/// What is assumed about the points of a case.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Facts {
     /// The first expression that is zero.
@@ -93,7 +93,8 @@ impl Facts {
         Ok(self.is_zero(pool, below)? != content.is_negative())
     }
 
-    fn known(&self, pool: &mut ExprPool, expr: ExprId) -> Option<bool> {
+    /// Whether an expression is zero, as far as that is known.
+    pub fn known(&self, pool: &mut ExprPool, expr: ExprId) -> Option<bool> {
         let core = core(pool, expr);
         if pool.is_constant(core) {
             return Some(pool.evaluate(core, &|_| f64::NAN) == 0.0);
@@ -251,10 +252,7 @@ impl ExprPool {
         let wanted = |node| self.may_contain(node, symbol);
         let nodes = self.walk(&[expr], wanted, |_| true);
         let slope = match nodes.into_iter().any(|node| self.has_kink(node)) {
-            true => {
-                let mut left = MOST_SELECTIONS;
-                self.selected(expr, symbol, &Facts::default(), &mut left)
-            }
+            true => self.selected(expr, symbol),
             false => Slope {
                 expr: self.derivative(expr, symbol),
                 has_infinity: false,
@@ -273,31 +271,47 @@ impl ExprPool {
         }
     }
 
-    /// The slope at all points of which some facts hold. Its depth is bounded by the number of selections.
-    fn selected(
+    /// The slope at all points: cases are divided by what is undecided, the first ones first.
+    fn selected(&mut self, expr: ExprId, symbol: SymbolId) -> Slope {
+        let mut cases = vec![Facts::default()];
+        // Of each case its test and the first of its two parts, or its outcome.
+        let mut known: Vec<Result<Outcome, (ExprId, usize)>> = Vec::new();
+        while let Some(facts) = cases.get(known.len()).cloned() {
+            let first_part = cases.len();
+            known.push(match self.outcome(expr, symbol, &facts) {
+                Err(test) if first_part < MOST_CASES => {
+                    let parts = [true, false].map(|is_zero| facts.with(self, test, is_zero));
+                    cases.extend(parts);
+                    Err((test, first_part))
+                }
+                outcome => Ok(outcome.unwrap_or(Outcome::Regular)),
+            });
+        }
+        let mut slopes: Vec<Slope> = Vec::new();
+        for (facts, known) in cases.iter().zip(known).rev() {
+            slopes.push(match known {
+                Ok(outcome) => self.slope_of_case(expr, symbol, facts, outcome),
+                Err((test, first_part)) => {
+                    // Slopes are in the reverse order of cases.
+                    let part = |position: usize| slopes[cases.len() - 1 - position];
+                    let (zero, other) = (part(first_part), part(first_part + 1));
+                    Slope {
+                        expr: self.select(test, zero.expr, other.expr),
+                        has_infinity: zero.has_infinity || other.has_infinity,
+                    }
+                }
+            });
+        }
+        slopes[cases.len() - 1]
+    }
+
+    fn slope_of_case(
         &mut self,
         expr: ExprId,
         symbol: SymbolId,
         facts: &Facts,
-        left: &mut usize,
+        outcome: Outcome,
     ) -> Slope {
-        let outcome = match self.outcome(expr, symbol, facts) {
-            Err(test) if *left > 0 => {
-                *left -= 1;
-                // The way to the derivative by the rules first.
-                let mut share = *left - *left / 4;
-                *left -= share;
-                let facts_of = [false, true].map(|is_zero| facts.with(self, test, is_zero));
-                let other = self.selected(expr, symbol, &facts_of[0], &mut share);
-                *left += share;
-                let zero = self.selected(expr, symbol, &facts_of[1], left);
-                return Slope {
-                    expr: self.select(test, zero.expr, other.expr),
-                    has_infinity: zero.has_infinity || other.has_infinity,
-                };
-            }
-            known => known.unwrap_or(Outcome::Regular),
-        };
         let regular = self.derivative(expr, symbol);
         let has_infinity = matches!(outcome, Outcome::Infinite(_));
         let expr = match (outcome, facts.first_zero) {
@@ -318,19 +332,20 @@ impl ExprPool {
         if !is_by_values || facts.at(self, regular) != slope {
             return false;
         }
-        let varies = |node: ExprId| match self.node(node) {
-            Node::Power(_, exponent) => self.as_number(*exponent).is_none(),
-            _ => false,
-        };
-        if self.reachable(&[regular]).into_iter().any(varies) {
-            return false;
+        // No divisor may vanish at other points of the case.
+        for node in self.reachable(&[regular]) {
+            let base = match *self.node(node) {
+                Node::Power(_, exponent) if matches!(self.as_integer(exponent), Some(0..)) => {
+                    continue;
+                }
+                Node::Power(base, _) | Node::Apply(Function::Log, base) => facts.at(self, base),
+                _ => continue,
+            };
+            if facts.known(self, base) != Some(false) {
+                return false;
+            }
         }
-        let free = |symbol: SymbolId| 0.613 + 0.0937 * (symbol.index() % 7) as f64;
-        let value_of = |symbol: SymbolId| {
-            let known = facts.values.iter().find(|(other, _)| *other == symbol);
-            known.map_or(free(symbol), |&(_, value)| self.evaluate(value, &free))
-        };
-        self.evaluate(regular, &value_of).is_finite()
+        true
     }
 
     fn outcome(
