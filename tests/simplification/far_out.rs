@@ -66,6 +66,9 @@ impl Wide {
     }
 
     fn of(value: f64) -> Self {
+        if value == 0.0 {
+            return Self::new(0.0, 0, 0.0);
+        }
         let half = value.abs().log2().floor() as i32 / 2;
         let scale = 2_f64.powi(-half);
         Self::new(value * scale * scale, 2 * i64::from(half), 0.0)
