@@ -199,7 +199,7 @@ fn decide_with(
         [0, 1]
     };
     let proof = proof(&pool, &restrictions, rest, order);
-    let decimals = decimals(&pool, whole);
+    let decimals = decimals(&pool, &[&whole[..], &restrictions].concat());
     let searched = |rest: [ExprId; 2], rows: &[&Row]| {
         let groups: Vec<ExprId> = rows.iter().map(|row| row.rest).collect();
         let sides = Sides {

@@ -60,13 +60,13 @@ pub(super) struct Sides<'s> {
     pub(super) rest: [ExprId; 2],
     /// What has a value where each side as written has one.
     pub(super) guards: [&'s [ExprId]; 2],
-    /// The [`decimals`] of the whole sides.
+    /// The [`decimals`] of the whole sides and their guards.
     pub(super) decimals: &'s HashMap<SymbolId, (f64, f64)>,
 }
 
 /// Value and radius of each symbol that stands for a decimal.
-pub(super) fn decimals(pool: &ExprPool, sides: [ExprId; 2]) -> HashMap<SymbolId, (f64, f64)> {
-    let symbols = sides.iter().flat_map(|side| pool.symbols_of(*side));
+pub(super) fn decimals(pool: &ExprPool, exprs: &[ExprId]) -> HashMap<SymbolId, (f64, f64)> {
+    let symbols = exprs.iter().flat_map(|expr| pool.symbols_of(*expr));
     let decimals = symbols.filter_map(|symbol| {
         let literal = literal(pool, symbol)?;
         Some((symbol, (literal.to_f64(), literal.radius())))
@@ -85,7 +85,8 @@ pub(super) fn search(
 ) -> Search {
     let pool = sides.pool;
     let variables: Vec<SymbolId> = (sides.whole.iter())
-        .flat_map(|side| pool.symbols_of(*side))
+        .chain(sides.guards.into_iter().flatten())
+        .flat_map(|expr| pool.symbols_of(*expr))
         .filter(|symbol| !sides.decimals.contains_key(symbol))
         .collect::<BTreeSet<_>>()
         .into_iter()

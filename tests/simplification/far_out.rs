@@ -66,6 +66,9 @@ impl Wide {
     }
 
     fn of(value: f64) -> Self {
+        if value == 0.0 {
+            return Self::new(0.0, 0, 0.0);
+        }
         let half = value.abs().log2().floor() as i32 / 2;
         let scale = 2_f64.powi(-half);
         Self::new(value * scale * scale, 2 * i64::from(half), 0.0)
@@ -232,7 +235,8 @@ fn compared(count: usize, is_single: bool) -> (Vec<Compared>, usize) {
             let is_known = exact.error <= 0.1 * evaluation * exact.mantissa.abs();
             let smallest = if is_single { 1e-36 } else { 1e-300 };
             let is_ordinary = value.abs() > smallest && value.is_finite() && size.is_finite();
-            if !is_known || !is_ordinary || (a - value).abs() > evaluation * value.abs() {
+            let is_accurate = (a - value).abs() <= evaluation * value.abs();
+            if !(is_known && is_ordinary && is_accurate) {
                 continue;
             }
             let name = format!(

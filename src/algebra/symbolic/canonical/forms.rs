@@ -89,7 +89,7 @@ impl<'p> CanonicalForms<'p> {
         }
         sums.sort_by_key(|sum| sum.terms.len());
         sums.truncate(MAX_SUMS);
-        if !forms.positive.is_empty() || sums.len() > 1 {
+        if !forms.positive.is_empty() || !sums.is_empty() {
             forms.forms.clear();
         }
         forms.positive_sums = sums;

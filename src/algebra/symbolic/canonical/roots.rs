@@ -271,7 +271,10 @@ impl CanonicalForms<'_> {
             let magnitude = self.abs(&rest?)?;
             return self.product(&factor, &magnitude);
         }
-        let (normed, scale, _) = form.normed()?;
+        let (normed, scale, sign) = form.normed()?;
+        if let Some(known) = self.known_sign(&normed) {
+            return Some(form.scaled(&sign.times(&known)));
+        }
         let Some((_, monomial)) = normed.as_term().filter(|(c, _)| c.is_one()) else {
             return Some(self.atom(Atom::Abs(normed)).scaled(&scale));
         };
@@ -306,6 +309,9 @@ impl CanonicalForms<'_> {
             return self.sign(&rest?);
         }
         let (normed, _, sign) = form.normed()?;
+        if let Some(known) = self.known_sign(&normed) {
+            return Some(CanonicalForm::constant(sign.times(&known)));
+        }
         let powers = (normed.as_term())
             .filter(|(coefficient, _)| coefficient.is_one())
             .map(|(_, monomial)| monomial.powers.clone());
@@ -327,6 +333,13 @@ impl CanonicalForms<'_> {
             product = self.product(&product, &factor)?;
         }
         Some(product)
+    }
+
+    /// The sign of a sum that stands under a root or logarithm, up to a factor, divided by its leading coefficient.
+    fn known_sign(&self, normed: &CanonicalForm) -> Option<Coefficient> {
+        let sums = self.positive_sums.iter().filter_map(CanonicalForm::normed);
+        let mut signs = sums.filter_map(|(sum, _, sign)| (sum == *normed).then_some(sign));
+        signs.next()
     }
 
     /// Whether each factor has a sign that can be told from that of the others.
