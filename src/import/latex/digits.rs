@@ -53,12 +53,27 @@ impl Wanted {
 /// A brace or bracket that is open.
 struct Group {
     start: usize,
+    is_brace: bool,
     /// What is wanted behind it.
     behind: Wanted,
     is_argument: bool,
     font: Option<usize>,
     /// Whether only digits and points are in it so far.
     is_numeric: bool,
+}
+
+impl Group {
+    fn new(start: usize, mut behind: Wanted, is_brace: bool) -> Self {
+        let font = behind.font.filter(|_| is_brace);
+        Self {
+            start,
+            is_brace,
+            is_argument: is_brace && behind.take(),
+            behind,
+            font,
+            is_numeric: is_brace,
+        }
+    }
 }
 
 /// The tokens without the braces and fonts around digits, and with the digits that are arguments as numbers.
@@ -79,53 +94,27 @@ fn without_braces(mut tokens: Vec<Token>) -> Vec<Token> {
                 wanted = before
             }
             Kind::Open => {
-                let mut behind = before;
-                let is_argument = behind.take();
-                open.push(Group {
-                    start: at,
-                    behind,
-                    is_argument,
-                    font: before.font,
-                    is_numeric: true,
-                });
+                open.push(Group::new(at, before, true));
                 continue;
             }
             Kind::Character('[') if is_optional => {
-                open.push(Group {
-                    start: at,
-                    behind: before,
-                    is_argument: true,
-                    font: None,
-                    is_numeric: false,
-                });
+                open.push(Group::new(at, before, false));
                 continue;
             }
-            Kind::Character(']')
-                if open
-                    .last()
-                    .is_some_and(|group| !opens_brace(&tokens[group.start])) =>
-            {
+            Kind::Character(']') if open.last().is_some_and(|group| !group.is_brace) => {
                 wanted = open.pop().map_or(wanted, |group| group.behind);
                 continue;
             }
             Kind::Close => {
                 // A bracket without its end.
-                while open
-                    .last()
-                    .is_some_and(|group| !opens_brace(&tokens[group.start]))
-                {
-                    open.pop();
-                }
+                while open.pop_if(|group| !group.is_brace).is_some() {}
                 let Some(group) = open.pop() else { continue };
                 is_numeric = group.is_numeric
                     && before.count == 0
                     && (!group.is_argument || group.font.is_some() && at > group.start + 1);
                 if is_numeric {
                     (is_kept[group.start], is_kept[at]) = (false, false);
-                    group
-                        .font
-                        .into_iter()
-                        .for_each(|font| is_kept[font] = false);
+                    is_kept[group.font.unwrap_or(at)] = false;
                 }
                 wanted = group.behind;
             }
@@ -150,10 +139,6 @@ fn without_braces(mut tokens: Vec<Token>) -> Vec<Token> {
     let mut is_kept = is_kept.into_iter();
     tokens.retain(|_| is_kept.next() == Some(true));
     tokens
-}
-
-fn opens_brace(token: &Token) -> bool {
-    token.kind == Kind::Open
 }
 
 /// The tokens with one number for digits that follow each other: digits with at most one point, or comma in braces, and
