@@ -177,7 +177,7 @@ fn layer(modules: &str) -> Option<Option<usize>> {
 impl Role {
     /// The part that the name of a tensor stands for: the part's own name, alone or behind the
     /// names of the modules that hold it, as in `autoencoder.encoder.0.weight`. A mask has the
-    /// phase [`ONLY_PHASE`] where only its module or a word of its name is its phase's.
+    /// phase `always` where its phase is at most a word of its name.
     pub fn of_name(name: &str) -> Option<Self> {
         // TensorFlow's ends of names.
         let name = name
