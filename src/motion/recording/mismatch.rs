@@ -109,6 +109,7 @@ pub fn mismatches(recording: &Recording, robot: &Robot) -> Vec<Mismatch> {
     let slip = Slip::of(recording, robot);
     let balance = Balance::of(recording, robot);
     let (place, is_attitude) = place(recording, robot, &slip).unzip();
+    let floor_m = feet::floor_m(recording, robot);
     // In another attitude the feet's heights say nothing of their columns.
     let of_feet = || feet::columns(recording, robot);
     let found = [
@@ -130,8 +131,8 @@ pub fn mismatches(recording: &Recording, robot: &Robot) -> Vec<Mismatch> {
             other_robot(recording, robot, &slip, &balance),
         ),
         (MismatchKind::Origin, origin(recording)),
-        (MismatchKind::Floor, feet::floor(recording, robot)),
-        (MismatchKind::Fallen, feet::fallen(recording, robot)),
+        (MismatchKind::Floor, feet::floor(floor_m)),
+        (MismatchKind::Fallen, feet::fallen(recording, floor_m)),
         (MismatchKind::Rates, rates(recording)),
     ];
     let mismatch = |(kind, broken): (MismatchKind, Option<Broken>)| {
@@ -268,7 +269,8 @@ fn foot_slip(slip: &Slip) -> Option<Broken> {
 
 /// The body's place or attitude read otherwise, and whether it is the attitude.
 fn place(recording: &Recording, robot: &Robot, slip: &Slip) -> Option<(Broken, bool)> {
-    let value = slip.rms_m()?;
+    // The bound is at least this.
+    let value = slip.rms_m().filter(|value| *value > PLACE.1)?;
     let (best, reading) = best_other_place(recording, robot)?;
     let bound = PLACE.0 * best + PLACE.1;
     (value > bound).then(|| {

@@ -55,8 +55,7 @@ fn higher_m(feet: &ContactFlags, height: &[f64; FOOT_DIM], legs: &[Leg; FOOT_DIM
 }
 
 /// The median height of the feet that are on the ground, if that is not the floor's.
-pub(super) fn floor(recording: &Recording, robot: &Robot) -> Option<Broken> {
-    let value = floor_m(recording, robot);
+pub(super) fn floor(value: f64) -> Option<Broken> {
     (value.abs() > FLOOR_M).then(|| {
         let words = format!(
             "feet on the ground are at a height of {value:.2} m ({FLOOR_M:.2} m are accepted): is z that of the trunk \
@@ -67,7 +66,7 @@ pub(super) fn floor(recording: &Recording, robot: &Robot) -> Option<Broken> {
 }
 
 /// Median height of the feet that are on the ground, m.
-fn floor_m(recording: &Recording, robot: &Robot) -> f64 {
+pub(super) fn floor_m(recording: &Recording, robot: &Robot) -> f64 {
     let mut heights = Vec::new();
     for segment in &recording.segments {
         for (sample, feet) in segment.feet.iter().enumerate() {
@@ -86,8 +85,7 @@ const TRUNK: (f64, f64) = (0.05, 1.6);
 const LIES_S: f64 = 0.1;
 
 /// Time, s, that the trunk lies on the ground, or under it, or on its back, if that is long enough.
-pub(super) fn fallen(recording: &Recording, robot: &Robot) -> Option<Broken> {
-    let floor_m = floor_m(recording, robot);
+pub(super) fn fallen(recording: &Recording, floor_m: f64) -> Option<Broken> {
     let (mut lies_s, mut lowest, mut steepest) = (0.0, f64::INFINITY, 0.0_f64);
     for segment in &recording.segments {
         let grounded = (0..segment.len()).filter(|sample| segment.feet[*sample].contains(&true));
