@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use super::Answer;
 use super::args::{CompileArguments, UnitsChoice};
 use super::destination::{Format, Inputs};
-use super::output::{lines, names, note, note_mismatches, quoted, read_recordings, refused};
+use super::output::{lines, names, note_mismatches, quoted, read_recordings, refused};
 use super::simplification::{self, Outcome, exact_words};
 use crate::deploy::{self, EmitOptions, PlannedJump, Target};
 use crate::equations::Equations;
@@ -35,7 +35,6 @@ pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
         Some(_) | None => inputs.check_output(save_model, Format::MODEL, Overwrite::Replace)?,
     }
     let read = artifact::read(&arguments.model)?;
-    note_twice(&arguments.emit);
     if arguments.code.units == UnitsChoice::Scaled && read.encoder_map().is_err() {
         let (flag, needs) = ("--units scaled", "a model with an encoder and a decoder");
         return Err(Error::Idle { flag, needs });
@@ -70,7 +69,8 @@ pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
         artifact::write(path, model, arguments.force)?;
     }
     Ok(Answer {
-        text: exact_words(&exact)
+        text: twice(&arguments.emit)
+            + &exact_words(&exact)
             + &summary
             + &text(arguments, equations, &written)
             + &earlier_in_words(&earlier),
@@ -90,15 +90,13 @@ pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
     })
 }
 
-/// Prints a note on targets that are named twice.
-fn note_twice(targets: &[Target]) {
+/// A note on a target that is named twice.
+fn twice(targets: &[Target]) -> String {
     let mut named = targets.iter().enumerate();
-    if let Some((_, twice)) = named.find(|(place, target)| targets[..*place].contains(target)) {
-        note(&format!(
-            "--emit: `{}` is named twice and emitted once",
-            twice.name()
-        ));
-    }
+    let twice = named.find(|(place, target)| targets[..*place].contains(target));
+    let note =
+        twice.map(|(_, target)| format!("`{}` is named twice and emitted once", target.name()));
+    lines("note: ", note)
 }
 
 /// The model and the written files as text.

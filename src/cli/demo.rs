@@ -107,12 +107,7 @@ pub fn run(arguments: &DemoArguments) -> Result<(Answer, u8), Error> {
         Err(reason) => format!("FAILED: {reason}"),
     };
     let _ = writeln!(text, "\nself-test of the emitted C: {self_test}\n");
-    let _ = writeln!(text, "made in {}:", arguments.out_dir.display());
-    for (path, file) in made.iter().zip(&files) {
-        let name = path.strip_prefix(&arguments.out_dir).unwrap_or(path);
-        let (name, bytes) = (name.display(), file.contents.len());
-        let _ = writeln!(text, "  {name} ({bytes} bytes)");
-    }
+    text += &made_in(&arguments.out_dir, &made, &files);
     let [plain, consistent] =
         (control.each_ref()).map(|runs| runs.iter().map(mpc_command::run_json).collect::<Vec<_>>());
     let json = json!({
@@ -126,6 +121,17 @@ pub fn run(arguments: &DemoArguments) -> Result<(Answer, u8), Error> {
     });
     let answer = Answer { text, json };
     Ok((answer, code(is_failed)))
+}
+
+/// The files, a line each.
+fn made_in(folder: &Path, made: &[PathBuf], files: &[EmittedFile]) -> String {
+    let mut text = format!("made in {}:\n", folder.display());
+    for (path, file) in made.iter().zip(files) {
+        let name = path.strip_prefix(folder).unwrap_or(path);
+        let (name, bytes) = (name.display(), file.contents.len());
+        let _ = writeln!(text, "  {name} ({bytes} bytes)");
+    }
+    text
 }
 
 /// Compiles the emitted C with the machine's compiler and runs its self-test: what became of it, or why it failed.

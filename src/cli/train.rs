@@ -40,11 +40,6 @@ pub fn run(arguments: &TrainArguments) -> Result<(Answer, u8), Error> {
     let robot = train_settings::robot(&settings)?;
     let name = named(arguments.name.as_deref(), &arguments.output);
     let mut options = train_settings::options(&settings, latent_dim, name, robot)?;
-    if arguments.split.is_none()
-        && let Some(words) = train_settings::without_effect(&settings, &options)
-    {
-        note(&words);
-    }
     let recorded = RecordedSets::new(arguments, &settings, robot, options.seed)?;
     let [training, validation, test] = &recorded.sets;
     train_settings::identified(&mut options, &settings, training, robot)?;
@@ -93,6 +88,11 @@ pub fn run(arguments: &TrainArguments) -> Result<(Answer, u8), Error> {
     let mut answer = answer(arguments, &trained, tested.as_ref());
     let notes = notes(&trained.report, tested.as_ref(), &recorded)?;
     notes.iter().for_each(|text| note(text));
+    if arguments.split.is_none()
+        && let Some(words) = train_settings::without_effect(&settings, &options)
+    {
+        note(&words);
+    }
     answer.json["notes"] = notes.into();
     answer.json["interrupted"] = is_interrupted.into();
     answer.json["recordings"] = recorded.findings_json();

@@ -267,7 +267,8 @@ fn what_a_command_does_not_do_is_refused_or_noted() {
             "same model from every start",
         ),
     ] {
-        let notes = super::text(&super::romc(arguments).stderr);
+        let output = super::romc(arguments);
+        let notes = super::text(&output.stderr) + &super::text(&output.stdout);
         assert!(notes.contains(reason), "{arguments:?}: {notes}");
     }
     let arguments = [
