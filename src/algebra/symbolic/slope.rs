@@ -19,7 +19,7 @@ use super::number::Number;
 use super::pool::{ExprPool, Sign};
 
 /// Most cases of one slope; those that are not decided have the derivative by the rules.
-const MOST_CASES: usize = 400;
+const MOST_CASES: usize = 256;
 
 /// The slope of an expression by a symbol.
 #[derive(Clone, Copy, Debug)]
