@@ -2,9 +2,10 @@
 
 use std::collections::HashMap;
 
+use nalgebra::DMatrix;
 use romc::ir::Interpreter;
-use romc::lower::Form;
-use romc::model::ReducedModel;
+use romc::lower::{CompiledModel, Form};
+use romc::model::{FeetRule, Library, Phase, ReducedModel};
 
 use super::drivers::{Build, Workshop};
 use super::functions::{Function, Kind, functions};
@@ -104,6 +105,11 @@ fn slopes_at_kinks_are_limits_in_the_interpreter_c_and_rust() {
         true => Build::all(),
         false => vec![Build::c(), Build::rust()],
     };
+    // It visits states at rest, where all of these have kinks.
+    workshop.run_c_selftest(&Build::c(), case.models[0].identifier().as_str());
+    if tools::is_thorough() {
+        workshop.run_rust_selftest(case.models[0].identifier().as_str());
+    }
     for build in builds {
         let found = workshop.run(&build, &case.functions, &case.points);
         case.check(build.name, DOUBLE, &found);
@@ -138,6 +144,22 @@ fn slopes_at_kinks_are_no_nan_in_single_precision() {
         found.push(results);
     }
     case.check("f32", SINGLE, &found);
+}
+
+#[test]
+fn infinite_slopes_of_two_terms_cancel() {
+    let terms = ["sqrt(z1)", "sqrt(sin(z1))"].map(str::to_owned);
+    let phase = Phase {
+        name: "phase".to_owned(),
+        feet: FeetRule::Any,
+        xi: DMatrix::from_column_slice(2, 1, &[1.5, -1.5]),
+    };
+    let library = Library::from_terms(1, &terms).expect("terms parse");
+    let model = ReducedModel::builder("roots", library).phase(phase).build();
+    let mut compiled = CompiledModel::new(&model.expect("a model")).expect("lowers");
+    let (mut ddz, mut jacobian) = ([f64::NAN], DMatrix::from_element(1, 3, f64::NAN));
+    compiled.jacobian(0, &[0.0], &[0.0], &[0.0], &mut ddz, &mut jacobian);
+    assert_eq!((ddz[0], jacobian[(0, 0)]), (0.0, 0.0));
 }
 
 /// The distance of two floats in units of the last place.

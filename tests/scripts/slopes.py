@@ -126,7 +126,7 @@ def kinked(choose, depth):
         lambda: ("^", inner, ("number", power)),
         lambda: ("^", ("abs", inner), ("variable", choose.choice(VARIABLES))),
         lambda: ("sqrt", ("+", ("abs", inner), ("abs", smooth(choose)))),
-        lambda: ("sqrt", ("+", ("^", ("abs", inner), ("number", "2")), ("^", smooth(choose), ("number", "2")))),
+        lambda: ("sqrt", ("+", ("^", smooth(choose), ("number", "2")), ("^", smooth(choose), ("number", "2")))),
     ])()
 
 
@@ -141,8 +141,8 @@ def expression(choose, depth):
         lambda: ("-", ("sqrt", ("variable", "z1")), ("sqrt", ("*", ("number", "2"), part()))),
         lambda: (choose.choice(["cos", "tanh", "exp", "sin"]), part()),
         lambda: ("*", (choose.choice(["cos", "tanh", "exp", "sin"]), part()), part()),
-        # Of a magnitude: sqrt(x)^2 is x also where x is negative.
-        lambda: ("^", ("abs", part()), ("number", choose.choice(["2", "3"]))),
+        # Not of a root: sqrt(x)^2 is x also where x is negative.
+        lambda: ("^", smooth(choose), ("number", choose.choice(["2", "3"]))),
         lambda: ("/", part(), ("+", ("number", "1"), ("abs", part()))),
     ])()
 

@@ -12,7 +12,7 @@
 //! | `lexer`, `parse`, `defined`, `display` | the grammar of candidate terms, both ways; constants without a value |
 //! | `eval`, `interval`, `rounding`, `bounds` | values, and bounds over boxes |
 //! | `diff`, `substitute` | derivatives and substitution |
-//! | `slope`, `germ` | derivatives with values where roots, magnitudes and signs have kinks |
+//! | `slope`, `germ`, `series` | derivatives with values where roots, magnitudes and signs have kinks |
 //! | `expand`, `rational`, `perfect_power`, `trig`, `rules`, `factors` | rewriting, each way when asked |
 //! | `simplify`, `shorten`, `cost`, `region` | choosing the shortest of equal forms |
 //! | `canonical/` | a normal form with exact coefficients, to decide equality |
@@ -61,6 +61,7 @@ mod rational;
 mod region;
 mod rounding;
 mod rules;
+mod series;
 mod shorten;
 mod simplify;
 mod slope;

@@ -19,7 +19,9 @@ use super::number::Number;
 use super::pool::{ExprPool, Sign};
 
 /// Most cases of one slope; those that are not decided have the derivative by the rules.
-const MOST_CASES: usize = 400;
+const MOST_CASES: usize = 256;
+/// Expressions that one slope may add to the pool before its remaining cases are left undecided.
+const MOST_NODES: usize = 60_000;
 
 /// The slope of an expression by a symbol.
 #[derive(Clone, Copy, Debug)]
@@ -274,12 +276,13 @@ impl ExprPool {
     /// The slope at all points: cases are divided by what is undecided, the first ones first.
     fn selected(&mut self, expr: ExprId, symbol: SymbolId) -> Slope {
         let mut cases = vec![Facts::default()];
+        let most_nodes = self.n_nodes() + MOST_NODES;
         // Of each case its test and the first of its two parts, or its outcome.
         let mut known: Vec<Result<Outcome, (ExprId, usize)>> = Vec::new();
         while let Some(facts) = cases.get(known.len()).cloned() {
             let first_part = cases.len();
             known.push(match self.outcome(expr, symbol, &facts) {
-                Err(test) if first_part < MOST_CASES => {
+                Err(test) if first_part < MOST_CASES && self.n_nodes() < most_nodes => {
                     let parts = [true, false].map(|is_zero| facts.with(self, test, is_zero));
                     cases.extend(parts);
                     Err((test, first_part))
