@@ -83,16 +83,20 @@ impl Wide {
     }
 
     fn plus(self, other: Self) -> Self {
-        let (high, low) = match self.exponent >= other.exponent || other.mantissa == 0.0 {
+        let (high, low) = match self.exponent >= other.exponent || other.is_zero() {
             true => (self, other),
             false => (other, self),
         };
-        if high.mantissa == 0.0 {
+        if high.is_zero() {
             return low;
         }
         let scale = 2_f64.powi((low.exponent - high.exponent).clamp(-1_074, 0) as i32);
         let error = high.error + low.error * scale + f64::EPSILON * high.mantissa.abs();
         Self::new(high.mantissa + low.mantissa * scale, high.exponent, error)
+    }
+
+    fn is_zero(self) -> bool {
+        self.mantissa == 0.0 && self.error == 0.0
     }
 
     fn recip(self) -> Self {
