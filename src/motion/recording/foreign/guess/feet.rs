@@ -10,8 +10,11 @@ const DEVIATIONS: f64 = 4.0;
 const BINS: usize = 64;
 /// Share of the samples within a bin of where two groups are divided, at most.
 const VALLEY: f64 = 0.02;
-/// Least distance of two groups, and least difference of two sensors in the air that matters, as shares of the range.
+/// Least distance of two groups, as a share of the range.
 const APART: f64 = 0.1;
+/// Largest spread of a sensor in the air, as a share of what loads it.
+const SPREAD: f64 = 0.35;
+/// Least difference of two sensors in the air that matters, as a share of the range.
 const ALIKE: f64 = 0.05;
 
 /// A sensor in the air.
@@ -91,14 +94,17 @@ pub(super) fn force_lines(values: &DMatrix<f64>) -> (Vec<String>, Option<String>
 /// What a sensor shows in the air: the lowest group of its values, if they fall into groups.
 fn resting(values: Vec<f64>, range: f64) -> Option<Rest> {
     let mut group = sorted(values.into_iter());
-    let all = group.len();
+    let mut loaded = None;
     while let Some(count) = divided(&group, range) {
+        loaded = Some(at_share(&group[count..], 0.5));
         group.truncate(count);
     }
-    if group.len() == all || group.is_empty() {
+    let level = at_share(&group, 0.5);
+    // A foot that swings its load is not in the air where it bears less.
+    let spread = at_share(&group, 0.95) - at_share(&group, 0.05);
+    if spread > SPREAD * (loaded? - level) {
         return None;
     }
-    let level = at_share(&group, 0.5);
     let off = sorted(group.iter().map(|value| (value - level).abs()));
     let deviation = 1.48 * at_share(&off, 0.5);
     Some(Rest { level, deviation })
