@@ -233,13 +233,10 @@ fn model_with_quadratic_drag_is_controlled_at_rest() {
         ..TrainOptions::new("drag", 2)
     };
     let trained =
-        train_with(&jumps("train", 4), &jumps("validation", 1), &options).expect("trains");
-    let phase = &trained.model.phases()[0];
-    assert!(
-        phase.xi.rows(7, 2).amax() > 0.0,
-        "drag was learned: {}",
-        phase.xi
-    );
+        train_with(&jumps("train", 14), &jumps("validation", 3), &options).expect("trains");
+    let mut phases = trained.model.phases().iter();
+    let has_drag = phases.any(|phase| phase.xi.rows(7, 2).amax() > 0.0);
+    assert!(has_drag, "{:?}", trained.model.phases());
     let jump = jumps("test", 1).remove(0);
     for jump in [jump.clone(), with_rest(jump)] {
         let mut controller =

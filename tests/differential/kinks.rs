@@ -21,6 +21,7 @@ pub struct Kink {
 /// Values of z1, z2, dz1 and u1, and the slopes by them.
 pub struct KinkPoint {
     pub at: [f64; N_VARIABLES],
+    #[allow(dead_code, reason = "scripts are compared with the interpreter")]
     pub slopes: [f64; N_VARIABLES],
 }
 

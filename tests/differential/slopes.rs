@@ -75,7 +75,8 @@ impl Case {
                         let found = places.get(&(row, col)).map_or(0.0, |place| result[*place]);
                         all += 1;
                         let allowed = tolerance * expected.abs().max(1.0);
-                        if found != expected && !((found - expected).abs() <= allowed) {
+                        let is_near = (found - expected).abs() <= allowed;
+                        if found != expected && !is_near {
                             let at = (point.at, col, found, expected);
                             wrong.push(format!("{} {at:?}", kink.expression));
                         }
