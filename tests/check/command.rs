@@ -126,7 +126,7 @@ fn unreadable_files_exit_with_2_and_name_the_place() {
             "error: d.toml: [contact] `x`: expected z1",
         ),
         (
-            vec!["b.txt", "b.txt", "--symbols", "y=x"],
+            vec!["a.tex", "b.txt", "--symbols", "y=x"],
             "error: `y=x`: expected `VARIABLE=NAME`",
         ),
     ] {

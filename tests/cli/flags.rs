@@ -129,7 +129,7 @@ const ELSEWHERE: &str = "json help version force output out-dir \
     simulate: restart-every clock columns mpc: horizon step lift reference-input solver figures clock columns \
     plan: distance apex start figures reach settings \
     report: study figures plan restart-every tolerance clock columns \
-    import: format map weights xi-layout library latent-dim phase scaling input-scaling robot wrench-frame \
+    import: format map weights xi-layout library library-order latent-dim phase scaling input-scaling robot wrench-frame \
     actuators sample-time inputs-from unchecked name description \
     train: validation test split config latent-dim method robot paper seed seeds epochs encoder-layers \
     decoder-layers activation lift-weight body-weight bptt-weight bptt-window bptt-stride bptt-decay \
