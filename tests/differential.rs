@@ -49,7 +49,7 @@ fn n_models_a_program() -> u64 {
 /// interpreter's bits; `.ci/run` asks for 200.
 fn n_random_models() -> u64 {
     let asked = std::env::var("ROMC_RANDOM_MODELS").ok();
-    asked.map_or(2 * n_models_a_program(), |count| {
+    asked.map_or(tools::thorough_or(2, 1) * n_models_a_program(), |count| {
         count.parse().expect("ROMC_RANDOM_MODELS is a number")
     })
 }
@@ -357,7 +357,7 @@ fn generated_code_beyond_the_reduction_limit_equals_the_interpreter() {
 fn selftests_of_generated_code_pass() {
     let models = models::shipped();
     let workshop = Workshop::new(&models, Form::default());
-    for model in &models {
+    for model in models.iter().step_by(tools::thorough_or(1, 3)) {
         workshop.run_c_selftest(&Build::c_plain(), model.identifier().as_str());
     }
     for model in models.iter().filter(|model| model.latent_dim() <= 2) {
