@@ -4,7 +4,6 @@
 mod made;
 #[allow(dead_code, reason = "folders alone")]
 mod outside;
-#[allow(dead_code, reason = "no tool is needed here")]
 mod tools;
 
 use std::path::{Path, PathBuf};
