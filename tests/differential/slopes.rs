@@ -17,6 +17,8 @@ const PER_MODEL: usize = 20;
 /// Largest difference of a slope, relative to the larger of one and its magnitude.
 const DOUBLE: f64 = 1e-9;
 const SINGLE: f64 = 2e-3;
+/// The same of many random expressions, some of which have angles of 1e5 rad.
+const SINGLE_OF_MANY: f64 = 5e-2;
 
 /// The Jacobians of models that have many expressions each.
 struct Case {
@@ -114,7 +116,8 @@ fn slopes_at_kinks_are_limits_in_the_interpreter_c_and_rust() {
     for build in builds {
         let found = workshop.run(&build, &case.functions, &case.points);
         case.check(build.name, DOUBLE, &found);
-        if Build::exact().iter().any(|exact| exact.name == build.name) {
+        // Of many expressions some have functions of constants, which C compilers compute themselves.
+        if !tools::is_thorough() {
             for (found, expected) in found.iter().flatten().zip(expected.iter().flatten()) {
                 let is_same = found.to_bits() == expected.to_bits();
                 assert!(
@@ -144,7 +147,7 @@ fn slopes_at_kinks_are_no_nan_in_single_precision() {
         }
         found.push(results);
     }
-    case.check("f32", SINGLE, &found);
+    case.check("f32", tools::thorough_or(SINGLE_OF_MANY, SINGLE), &found);
 }
 
 #[test]
