@@ -11,7 +11,7 @@ pub struct ForeignFile {
     pub remedy: Option<String>,
 }
 
-/// A row of the table: what a file is called, its endings, how its bytes reveal it, and the lines
+/// A row of the table: name of the format, its endings, the test of its bytes, and the lines
 /// that convert it. `{file}` stands for the file, `{stem}` for its name without the ending.
 struct Kind {
     what: &'static str,

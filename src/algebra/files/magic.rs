@@ -11,7 +11,7 @@ pub const MAGIC_BYTES: usize = 512;
 /// First bytes of an MCAP file.
 pub const MCAP: &[u8] = b"\x89MCAP0\r\n";
 
-/// A row: where bytes stand, which, what the file is, and the line that converts it, in which `<in>` is the file, `<out>` its
+/// A row: offset of the bytes, the bytes, name of the format, and the line that converts it, in which `<in>` is the file, `<out>` its
 /// name without ending; a line that begins with `:` is Python with NumPy and pandas, up to the table or the arrays `a`.
 type Row = (usize, &'static [u8], &'static str, &'static str);
 
@@ -136,7 +136,7 @@ const TABLE: &[Row] = &[
     (0, b"<html", "a web page", WEB_PAGE),
 ];
 
-/// A file of another format: what it is, and a line to type that converts it.
+/// Another format: its name, and a line to type that converts it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct OtherFormat {
     /// What it is, with its article.

@@ -20,7 +20,7 @@ const LARGEST_SPEED_RAD_S: f64 = 100.0;
 /// How many differences a message lists.
 const N_LISTED: usize = 4;
 
-/// A robot of a file, and what a user should know of it.
+/// A robot of a file, and notes for the user.
 #[derive(Clone, Debug)]
 pub struct RobotReading {
     /// The robot.
