@@ -1,0 +1,282 @@
+//! Transcripts of commands: what was printed, the exit code, what was written; and how two of them differ.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::fs::{self, File};
+use std::hash::{DefaultHasher, Hasher as _};
+use std::io::{Read as _, Write as _};
+use std::path::Path;
+use std::process::Command;
+
+use flate2::Compression;
+use flate2::read::GzDecoder;
+use flate2::write::GzEncoder;
+
+/// Files whose text is recorded; of others, the digest of their numbers, or of code, the name.
+const TEXTS: [&str; 7] = ["tex", "md", "html", "toml", "txt", "mathml", "json"];
+const CODE: [&str; 10] = [
+    "c", "h", "rs", "py", "m", "cpp", "hpp", "lock", "yaml", "xml",
+];
+const LONGEST_TEXT: usize = 40_000;
+
+/// Lines of one entry: `$ command`, `1 ` and `2 ` before what went to stdout and stderr, `exit CODE`, `file PATH` with
+/// `| ` before its text.
+pub struct Transcript {
+    name: String,
+    lines: Vec<String>,
+}
+
+impl Transcript {
+    pub fn of(name: &str, text: &str) -> Self {
+        Self {
+            name: name.to_owned(),
+            lines: text.lines().map(str::to_owned).collect(),
+        }
+    }
+
+    /// The transcript with `~` for each token that is another one in a second run.
+    pub fn masked(&self, again: &Self) -> Self {
+        assert_eq!(
+            self.lines.len(),
+            again.lines.len(),
+            "{}: a second run has other lines",
+            self.name
+        );
+        let lines = self.lines.iter().zip(&again.lines).map(|(first, second)| {
+            if first == second {
+                return first.clone();
+            }
+            let (first, second) = (tokens(first), tokens(second));
+            assert_eq!(
+                first.len(),
+                second.len(),
+                "{}: {first:?} {second:?}",
+                self.name
+            );
+            let pairs = first.iter().zip(&second);
+            pairs
+                .map(|(a, b)| if a == b { *a } else { "~" })
+                .collect::<Vec<_>>()
+                .join(" ")
+        });
+        Self {
+            name: self.name.clone(),
+            lines: lines.collect(),
+        }
+    }
+
+    /// Lines that differ, numbers by their digits, whatever the space between tokens; `pairs` of texts apply to
+    /// the recorded lines.
+    pub fn differences(&self, now: &Self, pairs: &[(String, String)]) -> Vec<String> {
+        let expected: Vec<String> = self.compared().map(|line| renamed(line, pairs)).collect();
+        let found: Vec<&str> = now.compared().collect();
+        let agree = |a: &str, b: &str| {
+            let (a, b) = (tokens(a), tokens(b));
+            a.len() == b.len() && a.iter().zip(&b).all(|(a, b)| a == b || *a == "~")
+        };
+        let mut differences: Vec<String> = expected
+            .iter()
+            .zip(&found)
+            .filter(|(a, b)| !agree(a, b))
+            .take(6)
+            .map(|(a, b)| format!("{}:\n  before {a}\n  now    {b}", self.name))
+            .collect();
+        if expected.len() != found.len() {
+            differences.push(format!(
+                "{}: {} lines before, {} now",
+                self.name,
+                expected.len(),
+                found.len()
+            ));
+        }
+        differences
+    }
+
+    /// All lines but the texts of self-tests, which are compared by running them.
+    fn compared(&self) -> impl Iterator<Item = &str> {
+        self.lines
+            .iter()
+            .map(String::as_str)
+            .filter(|line| !line.starts_with("> "))
+    }
+
+    /// Recorded self-tests: path and text.
+    fn self_tests(&self) -> Vec<(&str, String)> {
+        let mut tests: Vec<(&str, String)> = Vec::new();
+        for line in &self.lines {
+            if let Some(path) = line
+                .strip_prefix("file ")
+                .filter(|path| path.ends_with("_selftest.c"))
+            {
+                tests.push((path, String::new()));
+            } else if let (Some(text), Some((_, test))) =
+                (line.strip_prefix("> "), tests.last_mut())
+            {
+                writeln!(test, "{text}").expect("text");
+            }
+        }
+        tests
+    }
+}
+
+fn renamed(line: &str, pairs: &[(String, String)]) -> String {
+    pairs
+        .iter()
+        .fold(line.to_owned(), |line, (old, new)| line.replace(old, new))
+}
+
+/// Words and numbers of a line: parts between spaces, and between the marks of JSON and HTML.
+fn tokens(line: &str) -> Vec<&str> {
+    line.split([' ', ',', ':', '{', '}', '[', ']', '<', '>', '(', ')', ';'])
+        .filter(|token| !token.is_empty())
+        .collect()
+}
+
+/// Appends the files of a folder to a transcript, in the order of their names.
+pub fn written(place: &Path, folder: &Path, text: &mut String) {
+    let listed = fs::read_dir(place.join(folder)).expect("a folder");
+    let mut entries: Vec<_> = listed.map(|entry| entry.expect("an entry")).collect();
+    entries.sort_by_key(fs::DirEntry::file_name);
+    for entry in entries {
+        let path = folder.join(entry.file_name());
+        if entry.path().is_dir() {
+            written(place, &path, text);
+            continue;
+        }
+        let name = path.to_str().expect("UTF-8");
+        let Some((_, ending)) = name
+            .rsplit_once('.')
+            .filter(|(stem, _)| !stem.ends_with('/'))
+        else {
+            continue;
+        };
+        writeln!(text, "file {name}").expect("text");
+        let bytes = fs::read(entry.path()).expect("a file");
+        if name.ends_with("_selftest.c") {
+            for line in String::from_utf8(bytes).expect("UTF-8").lines() {
+                writeln!(text, "> {line}").expect("text");
+            }
+        } else if TEXTS.contains(&ending) && bytes.len() < LONGEST_TEXT {
+            for line in String::from_utf8(bytes).expect("UTF-8").lines() {
+                writeln!(text, "| {line}").expect("text");
+            }
+        } else if !CODE.contains(&ending) {
+            for line in digests(name, &bytes) {
+                writeln!(text, "| {line}").expect("text");
+            }
+        }
+    }
+}
+
+/// Digests of the numbers of a file as they are printed: of a table one per column, since some hold times.
+fn digests(name: &str, bytes: &[u8]) -> Vec<String> {
+    let mut unpacked = Vec::new();
+    if name.ends_with(".gz") {
+        GzDecoder::new(bytes)
+            .read_to_end(&mut unpacked)
+            .expect("gzip");
+    } else {
+        unpacked.extend_from_slice(bytes);
+    }
+    let Ok(text) = String::from_utf8(unpacked) else {
+        return vec!["not text".to_owned()];
+    };
+    let of_numbers = |text: &mut dyn Iterator<Item = &str>| {
+        let (mut hash, mut count) = (DefaultHasher::new(), 0);
+        let numbers = text.flat_map(|part| {
+            part.split(|c: char| !(c.is_ascii_alphanumeric() || "+-.".contains(c)))
+        });
+        for number in numbers.filter(|word| word.parse::<f64>().is_ok()) {
+            hash.write(number.as_bytes());
+            hash.write_u8(0);
+            count += 1;
+        }
+        format!("{count} numbers {:016x}", hash.finish())
+    };
+    if !name.contains(".csv") {
+        return vec![of_numbers(&mut text.lines())];
+    }
+    let mut rows = text.lines().filter(|line| !line.starts_with('#'));
+    let columns = rows.next().unwrap_or_default().split(',').enumerate();
+    let digest = |(index, column)| {
+        let cells = rows.clone().filter_map(|row| row.split(',').nth(index));
+        format!("column {column} {}", of_numbers(&mut { cells }))
+    };
+    columns.map(digest).collect()
+}
+
+/// Compiles the C of today with the recorded self-tests, and runs them.
+pub fn self_tests_pass(before: &Transcript, place: &Path) -> Vec<String> {
+    let mut failures = Vec::new();
+    for (path, text) in before.self_tests() {
+        fs::write(place.join(path), text).expect("written");
+        let stem = path.strip_suffix("_selftest.c").expect("a self-test");
+        let model = stem.strip_suffix("_controller").unwrap_or(stem);
+        let sources = [stem, model]
+            .into_iter()
+            .take(if stem == model { 1 } else { 2 });
+        let mut compiler = Command::new("cc");
+        compiler
+            .current_dir(place)
+            .args(["-O1", "-ffp-contract=off", "-o", "selftest", path]);
+        compiler
+            .args(sources.map(|source| format!("{source}.c")))
+            .arg("-lm");
+        let compiled = compiler.output().expect("a C compiler");
+        if !compiled.status.success() {
+            failures.push(format!(
+                "{path}: {}",
+                String::from_utf8_lossy(&compiled.stderr)
+            ));
+            continue;
+        }
+        let run = Command::new(place.join("selftest"))
+            .output()
+            .expect("a program");
+        if !run.status.success() {
+            failures.push(format!("{path}: {}", String::from_utf8_lossy(&run.stdout)));
+        }
+    }
+    failures
+}
+
+/// Pairs of texts, `old => new`, one per line.
+pub fn changed(path: &Path) -> Vec<(String, String)> {
+    let text = fs::read_to_string(path).expect("pairs of texts");
+    let lines = text.lines().filter(|line| !line.starts_with('#'));
+    let pairs = lines.map(|line| {
+        line.split_once(" => ")
+            .unwrap_or_else(|| panic!("{line}: expected `old => new`"))
+    });
+    pairs
+        .map(|(old, new)| (old.to_owned(), new.to_owned()))
+        .collect()
+}
+
+pub fn read_recorded(path: &Path) -> BTreeMap<String, Transcript> {
+    let mut text = "\n".to_owned();
+    let file = File::open(path).expect("recorded output");
+    GzDecoder::new(file)
+        .read_to_string(&mut text)
+        .expect("gzip");
+    let entries = text
+        .split("\n== ")
+        .filter_map(|entry| entry.trim_end().split_once('\n'));
+    entries
+        .map(|(name, lines)| (name.to_owned(), Transcript::of(name, lines)))
+        .collect()
+}
+
+pub fn write_recorded(path: &Path, recorded: &[Transcript]) {
+    let mut file = GzEncoder::new(File::create(path).expect("a file"), Compression::best());
+    for transcript in recorded {
+        writeln!(
+            file,
+            "== {}\n{}",
+            transcript.name,
+            transcript.lines.join("\n")
+        )
+        .expect("written");
+    }
+    file.finish().expect("written");
+}
