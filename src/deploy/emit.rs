@@ -121,7 +121,7 @@ pub fn emit(
     Ok(files)
 }
 
-/// What C and Rust are generated from, with the error of single precision in the documentation.
+/// What C and Rust are generated from.
 pub(super) fn compiled(
     equations: &Equations<'_>,
     options: &EmitOptions,
@@ -131,9 +131,8 @@ pub(super) fn compiled(
         return Ok(ModelInterface::new(equations, options.form, units)?);
     }
     let folded = equations.clone().with_constants_folded();
-    let mut entries = ModelInterface::new(&folded, options.form, units)?;
+    let entries = ModelInterface::new(&folded, options.form, units)?;
     options.precision.check(&entries)?;
-    entries.state_bounds();
     Ok(entries)
 }
 

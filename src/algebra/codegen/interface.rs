@@ -2,7 +2,6 @@
 
 use super::code::{Parameter, Role};
 use super::map_equations::{in_matrices, points, titles, without_factors};
-use super::precision::stated_bounds;
 use super::units::Units;
 use crate::equations::{Equations, LatentUnits, Unit, summand_words};
 use crate::ir::{Program, Slot, Statement};
@@ -89,17 +88,6 @@ impl ModelInterface {
             },
             phases,
         })
-    }
-
-    /// Adds to the documentation of each function how far single precision may be off.
-    pub fn state_bounds(&mut self) {
-        let phases = self.phases.iter_mut();
-        let of_phases =
-            phases.flat_map(|phase| [&mut phase.dynamics, &mut phase.jacobian, &mut phase.step]);
-        for entry in self.maps.iter_mut().chain(of_phases) {
-            let bounds = stated_bounds(entry);
-            entry.docs.push(bounds);
-        }
     }
 
     /// The units of latent and robot quantities.

@@ -37,6 +37,6 @@ mod units;
 
 pub use error::CodegenError;
 pub use interface::ModelInterface;
-pub use precision::{Precision, worst_errors};
+pub use precision::Precision;
 pub use sines::SineCosine;
 pub use units::Units;

@@ -1,8 +1,8 @@
 //! In which floating-point numbers generated code computes.
 
 use super::error::CodegenError;
-use super::interface::{FunctionSpec, ModelInterface};
-use crate::ir::{Program, Range, Statement, rounding_errors};
+use super::interface::ModelInterface;
+use crate::ir::{Program, Statement};
 
 /// Floating-point numbers of generated code.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
@@ -11,7 +11,7 @@ pub enum Precision {
     #[default]
     #[value(name = "f64")]
     Double,
-    /// 32 bits: `float` and `f32`; each function states the bound of its rounding errors.
+    /// 32 bits: `float` and `f32`.
     #[value(name = "f32")]
     Single,
 }
@@ -96,66 +96,6 @@ fn beyond_single(program: &Program) -> Option<f64> {
         .chain(entries.copied())
         .find(|value| (*value as f32).is_infinite())
         .or(inner)
-}
-
-/// Longest step for which the bound of a Runge-Kutta step is stated, in seconds.
-const LONGEST_STEP_S: f64 = 0.01;
-
-/// Magnitudes of inputs for which bounds are stated.
-const MAGNITUDES: [f64; 2] = [1.0, 10.0];
-
-/// A sentence that bounds what single precision loses in a function, for its documentation.
-///
-/// The bounds are those of [`rounding_errors`] over all inputs up to a magnitude.
-pub fn stated_bounds(entry: &FunctionSpec) -> String {
-    let has_step = entry.parameters.iter().any(|p| p.name == "h");
-    let of_magnitude = |magnitude: f64| -> String {
-        let outputs = worst_errors(&entry.program, |name| match name {
-            "h" => Range {
-                low: 0.0,
-                high: LONGEST_STEP_S,
-            },
-            _ => Range::within(magnitude),
-        });
-        let bounds = outputs.iter().map(|(name, bound)| match bound {
-            Some(bound) => format!("{name} {}", rounded_up(*bound)),
-            None => format!("{name} without bound"),
-        });
-        bounds.collect::<Vec<_>>().join(", ")
-    };
-    let [small, large] = MAGNITUDES.map(of_magnitude);
-    let step = if has_step {
-        format!(" and h up to {LONGEST_STEP_S}")
-    } else {
-        String::new()
-    };
-    format!(
-        "Largest error of single precision, for inputs up to {} in magnitude{step}: {small}; up to {}: {large}.",
-        MAGNITUDES[0], MAGNITUDES[1]
-    )
-}
-
-/// Largest error of single precision in each output of a program, over the given ranges of the inputs; outputs
-/// without elements are left out.
-pub fn worst_errors(
-    program: &Program,
-    range: impl Fn(&str) -> Range,
-) -> Vec<(String, Option<f64>)> {
-    let ranges: Vec<Vec<Range>> = program
-        .inputs()
-        .iter()
-        .map(|slot| vec![range(&slot.name); slot.len])
-        .collect();
-    rounding_errors(program, &ranges)
-        .into_iter()
-        .zip(program.outputs())
-        .map(|(bounds, slot)| {
-            let worst = bounds
-                .into_iter()
-                .try_fold(0.0, |worst: f64, bound| bound.map(|bound| worst.max(bound)));
-            (slot.name.clone(), worst)
-        })
-        .collect()
 }
 
 /// Two significant digits, never less than the number.

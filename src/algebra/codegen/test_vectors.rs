@@ -5,7 +5,7 @@ use super::dialect::Dialect;
 use super::interface::{FunctionSpec, ModelInterface, PhaseInterface};
 use super::precision::{Precision, rounded_up};
 use super::test_points::{BatchPoints, N_BATCH, Random, point};
-use crate::ir::{Range, rounding_errors};
+use crate::ir::Interpreter;
 
 /// Points at which each function is compared.
 pub const N_POINTS: usize = 6;
@@ -110,8 +110,7 @@ pub struct ParameterVectors {
     pub before: Vec<Vec<String>>,
     /// Values after the call with all digits in either precision, a row a point; empty for inputs.
     pub after: Vec<Vec<String>>,
-    /// Largest accepted difference of single precision at these points: the bound of the rounding
-    /// errors, or a share of the largest value where there is none.
+    /// Largest accepted difference of single precision at these points, see [`tolerances`].
     pub tolerance_single: f64,
 }
 
@@ -127,8 +126,12 @@ impl ParameterVectors {
     }
 }
 
-/// Share of the largest value by which single precision may be off where its errors have no bound.
-const TOLERANCE_UNBOUNDED: f64 = 1e-3;
+/// Accepted share of one plus the largest value of an output in single precision.
+const TOLERANCE_F32: f64 = 1e-4;
+
+/// Accepted multiple of the error that the interpreter has in single precision: other libraries and fused operations
+/// round otherwise.
+const ERROR_MARGIN: f64 = 16.0;
 
 /// The vectors of all parameters of an entry, at points where its results are finite if such points are found;
 /// inputs are numbers of the precision.
@@ -164,11 +167,7 @@ fn vectors(
         vectors.is_defined |= point.is_defined();
         let tolerances = match precision {
             Precision::Double => vec![0.0; point.outputs.len()],
-            Precision::Single => {
-                let at = |slot: &Vec<f64>| slot.iter().map(|&x| Range::point(x)).collect();
-                let points: Vec<Vec<Range>> = point.inputs.iter().map(at).collect();
-                tolerances(entry, &points, &point.outputs)
-            }
+            Precision::Single => tolerances(entry, &point.inputs, &point.outputs),
         };
         for parameter in &mut vectors.parameters {
             let slots = entry.program.inputs().iter().zip(&point.inputs);
@@ -186,41 +185,33 @@ fn vectors(
     vectors
 }
 
-/// Largest accepted difference between a batch and single calls in single precision, both of which
-/// may be off.
+/// Largest accepted difference between a batch and single calls in single precision, both of which have errors.
 fn batch_tolerance(phase: &PhaseInterface, points: &BatchPoints) -> f64 {
-    let mut worst = 0.0_f64;
-    for point in 0..N_BATCH {
+    let of_point = |point| {
         let point = points.at(phase, point, Precision::Single);
-        // Compilers may round these inputs differently.
-        let near = |&x: &f64| Range {
-            low: x - 1e-7,
-            high: x + 1e-7,
-        };
-        let ranges: Vec<Vec<Range>> = (point.inputs.iter())
-            .map(|slot| slot.iter().map(near).collect())
-            .collect();
-        let at_point = tolerances(&phase.dynamics, &ranges, &point.outputs);
-        worst = at_point.into_iter().fold(worst, f64::max);
-    }
-    2.0 * worst
+        tolerances(&phase.dynamics, &point.inputs, &point.outputs)
+    };
+    2.0 * (0..N_BATCH).flat_map(of_point).fold(0.0, f64::max)
 }
 
-/// Largest accepted difference of each output in single precision.
-fn tolerances(entry: &FunctionSpec, inputs: &[Vec<Range>], outputs: &[Vec<f64>]) -> Vec<f64> {
-    let bounds = rounding_errors(&entry.program, inputs);
-    bounds
-        .into_iter()
-        .zip(outputs)
-        .map(|(bounds, values)| {
-            let finite = values
-                .iter()
-                .filter(|value| Precision::Single.holds(**value));
-            let unbounded = TOLERANCE_UNBOUNDED * finite.fold(1.0, |m: f64, x| m.max(x.abs()));
-            let bounds = bounds
-                .into_iter()
-                .map(|bound| bound.filter(|b| b.is_finite()).unwrap_or(unbounded));
-            bounds.fold(0.0, f64::max)
-        })
-        .collect()
+/// Largest accepted difference of each output in single precision: a share of one plus its largest value, or a multiple
+/// of the interpreter's own error there, which is larger where terms cancel.
+fn tolerances(entry: &FunctionSpec, inputs: &[Vec<f64>], outputs: &[Vec<f64>]) -> Vec<f64> {
+    let nearest = |slot: &Vec<f64>| slot.iter().map(|&x| x as f32).collect();
+    let inputs: Vec<Vec<f32>> = inputs.iter().map(nearest).collect();
+    let single = Interpreter::<f32>::new(&entry.program).results(&inputs);
+    let of_output = |(single, exact): (Vec<f32>, &Vec<f64>)| {
+        let held = |value: &&f64| Precision::Single.holds(**value);
+        let largest = exact
+            .iter()
+            .filter(held)
+            .fold(0.0, |m: f64, x| m.max(x.abs()));
+        let errors = single
+            .iter()
+            .zip(exact)
+            .map(|(s, x)| (f64::from(*s) - x).abs());
+        let error = errors.filter(|error| error.is_finite()).fold(0.0, f64::max);
+        (TOLERANCE_F32 * (1.0 + largest)).max(ERROR_MARGIN * error)
+    };
+    single.into_iter().zip(outputs).map(of_output).collect()
 }

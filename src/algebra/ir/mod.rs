@@ -22,9 +22,7 @@
 mod build;
 mod interpret;
 mod program;
-mod range;
 mod real;
-mod roundoff;
 pub mod sin_cos;
 pub mod sin_cos_f32;
 mod validate;
@@ -35,7 +33,5 @@ pub use program::{
     Binary, Group, LANES, Program, QUAD, Quad, QuadSum, ResultEntry, Slopes, Slot, Statement,
     Table, TableId, Unary, ValueId,
 };
-pub use range::Range;
 pub use real::Real;
-pub use roundoff::{Rounded, rounding_errors};
 pub use validate::{Fault, IrError};

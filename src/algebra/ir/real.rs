@@ -6,8 +6,7 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 use super::program::Unary;
 use super::{sin_cos, sin_cos_f32};
 
-/// A number that programs compute with: `f64`, `f32`, or [`Rounded`](super::Rounded), which
-/// bounds what `f32` loses.
+/// A number that programs compute with: `f64` or `f32`.
 ///
 /// Each operator rounds once, as generated code does with contraction off.
 pub trait Real:
