@@ -359,6 +359,55 @@ fn joints_that_are_not_the_robots_are_refused_or_left_out() {
         notes.contains("60 of 120 messages have other names"),
         "{notes}"
     );
+    // Messages with further joints, or without values that nothing needs, are of the same robot.
+    for further in [0, 20, 59] {
+        let messages = with_joints(&bag, &jump, |sample, time_ns, mut joints| {
+            if sample >= further {
+                joints.insert(0, ("gripper".to_owned(), [9.0; 3]));
+            }
+            vec![encoded(time_ns, &joints)]
+        });
+        let notes = is_the_jump(&bag.file(folder.path(), &messages), &jump);
+        assert!(!notes.contains("left out"), "{notes}");
+    }
+    // An arm with a topic of its own at the same rate or a higher one; commands of the same names.
+    for (topic, names) in [
+        ("/arm/joint_states", Some(names[0])),
+        ("/joint_commands", None),
+    ] {
+        let mut bag = Bag::of(&jump);
+        let schema = bag.schemas[recording::foreign::JOINT_TOPIC].clone();
+        bag.schemas.insert(topic.to_owned(), schema);
+        let messages = with_joints(&bag, &jump, |_, time_ns, joints| {
+            let other = match names {
+                Some(names) => arm(&joints, names),
+                None => joints
+                    .iter()
+                    .map(|(name, values)| (name.clone(), values.map(|v| 2.0 * v)))
+                    .collect(),
+            };
+            vec![
+                encoded(time_ns, &joints),
+                encoded(time_ns, &other),
+                encoded(time_ns + 1_000_000, &other),
+            ]
+        });
+        let mut count = 0;
+        let messages: Vec<Message> = messages
+            .into_iter()
+            .map(|mut message| {
+                if message.topic == recording::foreign::JOINT_TOPIC {
+                    count += 1;
+                    if count % 3 != 1 {
+                        message.topic = topic.to_owned();
+                        message.time_ns += if count % 3 == 0 { 1_000_000 } else { 0 };
+                    }
+                }
+                message
+            })
+            .collect();
+        is_the_jump(&bag.file(folder.path(), &messages), &jump);
+    }
     // Lists that do not go with the names.
     let messages = with_joints(&bag, &jump, |_, time_ns, joints| {
         let names: Vec<String> = joints.iter().map(|(name, _)| name.clone()).collect();

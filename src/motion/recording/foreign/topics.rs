@@ -51,6 +51,8 @@ struct Table {
     log: Log,
     /// Times of recording, ns.
     times_ns: Vec<u64>,
+    /// Whether a narrower table has its rows.
+    is_part: bool,
 }
 
 impl Topics {
@@ -131,12 +133,17 @@ impl Topics {
     /// [`RecordingFault::NoTopic`] without any table.
     pub fn logs(self) -> Result<Vec<Log>, RecordingFault> {
         let mut logs = Vec::new();
-        for topic in self.topics {
+        for mut topic in self.topics {
             let messages: usize = topic.tables.iter().map(|table| table.times_ns.len()).sum();
+            topic.tables.sort_by_key(|table| table.log.columns.len());
+            for at in 0..topic.tables.len() {
+                let (tables, wider) = topic.tables.split_at_mut(at + 1);
+                wider.iter_mut().for_each(|table| tables[at].add(table));
+            }
             for table in topic.tables {
-                let others = messages - table.times_ns.len();
+                let (others, is_part) = (messages - table.times_ns.len(), table.is_part);
                 let mut log = table.finished();
-                if others > 0 {
+                if others > 0 && !is_part {
                     log.notes.push(format!(
                         "`{}`: {others} of {messages} messages have other names or lengths and are left out",
                         log.name
@@ -248,8 +255,11 @@ impl Topic {
             first_row: 1,
             ..Log::default()
         };
-        let times_ns = Vec::new();
-        self.tables.push(Table { log, times_ns });
+        self.tables.push(Table {
+            log,
+            times_ns: Vec::new(),
+            is_part: false,
+        });
         Ok((self.tables.len() - 1, order))
     }
 }
@@ -262,9 +272,32 @@ fn instant(seconds: i64, nanoseconds: u32) -> Instant {
 }
 
 impl Table {
+    /// Adds the rows of a table that has all columns of this one and more: messages with further joints or values.
+    fn add(&mut self, wider: &mut Self) {
+        let columns = self.log.columns.iter();
+        let place = |column: &Channel| {
+            let mut own = wider.log.columns.iter();
+            own.position(|other| other.name == column.name)
+        };
+        let Some(places) = columns.map(place).collect::<Option<Vec<usize>>>() else {
+            return;
+        };
+        for (column, place) in self.log.columns.iter_mut().zip(places) {
+            let other = &wider.log.columns[place];
+            column.values.extend(&other.values);
+            if let (Some(own), Some(others)) = (&mut column.instants, &other.instants) {
+                own.extend(others);
+            }
+        }
+        self.times_ns.extend(&wider.times_ns);
+        wider.is_part = true;
+    }
+
     /// The table by the stamps of its messages, or the time of recording if they have none, with rows in order.
     fn finished(self) -> Log {
-        let Self { mut log, times_ns } = self;
+        let Self {
+            mut log, times_ns, ..
+        } = self;
         let is_stamp = |channel: &Channel| {
             channel.name == "header.stamp" && channel.values.iter().any(|time| *time != 0.0)
         };

@@ -3,7 +3,7 @@
 use super::super::elements::{QUATERNION, Quantity};
 use super::super::log::{Channel, Log};
 use super::super::units::Dimension;
-use super::names::{Reading, is_time, read, unit};
+use super::names::{Reading, is_time, is_wanted, read, unit};
 use crate::recording::preprocess::median;
 use crate::robot::{JOINT_DIM, Robot};
 
@@ -45,10 +45,16 @@ pub(super) fn groups(logs: &[Log], robot: &Robot) -> Vec<Group> {
         Quantity::ALL.into_iter().filter_map(of_quantity).sum()
     };
     let rate = |group: &Group| std::cmp::Reverse(rates[group.log].unwrap_or_default());
+    // An arm's twelve joints are counted among others, the robot's have names.
+    let is_unnamed = |group: &Group| {
+        let is_by_leg = group.quantity.is_of_joints() || group.quantity == Quantity::Feet;
+        group.is_counted && is_by_leg && !is_unitree(&logs[group.log])
+    };
     let first = |quantity| {
         of(quantity).min_by_key(|group| {
             (
                 group.is_wanted,
+                is_unnamed(group),
                 rate(group),
                 std::cmp::Reverse(fellows(group)),
                 group.family.len(),
@@ -72,7 +78,7 @@ pub(super) fn groups(logs: &[Log], robot: &Robot) -> Vec<Group> {
             let plain = (group.is_quaternion, group.family.len());
             (
                 !is_first,
-                group.is_wanted,
+                (group.is_wanted, is_unnamed(group)),
                 same_log,
                 rate(group),
                 words,
@@ -86,13 +92,13 @@ pub(super) fn groups(logs: &[Log], robot: &Robot) -> Vec<Group> {
             .filter(|o| o.is_quaternion == best.is_quaternion)
             .collect();
         let rank_of = |group: &Group| {
-            let (_, _, log, rate, words, plain) = rank(group);
+            let (_, (_, unnamed), log, rate, words, plain) = rank(group);
             let words = if std::ptr::eq(best, base.unwrap_or(group)) {
                 Default::default()
             } else {
                 words
             };
-            (log, rate, words, plain)
+            (unnamed, log, rate, words, plain)
         };
         let ties = |other: &&Group| rank_of(other) == rank_of(best) && differ(logs, best, other);
         let tie = others.iter().copied().any(|other| ties(&other));
@@ -103,6 +109,12 @@ pub(super) fn groups(logs: &[Log], robot: &Robot) -> Vec<Group> {
         })
     });
     chosen.collect()
+}
+
+/// Whether a log is a low-level state of Unitree's, which counts legs in romc's order.
+pub(super) fn is_unitree(log: &Log) -> bool {
+    let is_motor = |name: &str| name.starts_with("motor_state[") || name.starts_with("motorState[");
+    log.columns.iter().any(|column| is_motor(&column.name))
 }
 
 /// A family of columns: its first column, topic and rate.
@@ -153,9 +165,11 @@ fn families(logs: &[Log], robot: &Robot) -> Families {
             // What a column alone does not say its topic may: `/foot_contacts` of `position[fr]`.
             let in_topic = || read(&format!("{} {}", log.name, channel.name));
             let of_robot = of_robot(&channel.name, robot);
-            let Some(reading) = of_robot.or_else(|| read(&channel.name)).or_else(in_topic) else {
+            let Some(mut reading) = of_robot.or_else(|| read(&channel.name)).or_else(in_topic)
+            else {
                 continue;
             };
+            reading.is_wanted |= is_wanted(&log.name);
             let same = |(own, members): &&mut (usize, Vec<(usize, Reading)>)| {
                 let first = &members[0].1;
                 *own == index

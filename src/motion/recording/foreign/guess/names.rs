@@ -29,8 +29,8 @@ const FEET: &str = "foot feet contact contacts grf touch stance toe fz";
 const JOINT_ARRAYS: &str = "motor motors joint joints q dq ddq qd qdd qdot tau torque torques effort efforts position \
      velocity dof ctrl actuator angle angles theta";
 /// Words of values that a controller asked for rather than measured.
-const WANTED: &str = "des desired ref reference cmd command target setpoint goal raw lost temperature mode \
-     covariance ff kp kd";
+const WANTED: &str = "des desired ref reference references cmd cmds command commands commanded target targets setpoint \
+     setpoints goal raw lost temperature mode covariance ff kp kd";
 const TIME: &str = "time timestamp stamp t sec secs seconds clock datetime date";
 
 /// What a name says.
@@ -82,6 +82,11 @@ pub(super) fn words(name: &str) -> Vec<String> {
 /// Whether a word is one of some with blanks between them.
 fn is_one(word: &str, of: &str) -> bool {
     of.split(' ').any(|known| known == word)
+}
+
+/// Whether the name of a column or topic says that its values were asked for rather than measured.
+pub(super) fn is_wanted(name: &str) -> bool {
+    words(name).iter().any(|word| is_one(word, WANTED))
 }
 
 /// Whether a name is one of a clock.

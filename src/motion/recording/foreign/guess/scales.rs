@@ -1,5 +1,8 @@
 //! Units, signs, axes and orders of the guessed map: by names, by derivatives, and by what the robot's geometry says.
 
+use std::cmp::Ordering;
+use std::f64::consts::TAU;
+
 use nalgebra::DMatrix;
 
 use super::super::assemble::assemble;
@@ -20,8 +23,6 @@ const ANGLE: [(&str, f64); 3] = [
     ("rpm", std::f64::consts::PI / 30.0),
 ];
 const LENGTHS: [&str; 3] = ["m", "cm", "mm"];
-/// Largest angle of a joint within its turn, rad: beyond, degrees are the first choice.
-const ANGLE_RAD: f64 = std::f64::consts::TAU;
 /// Largest pitch for which radians are the first choice.
 const PITCH_RAD: f64 = 1.6;
 
@@ -93,8 +94,7 @@ impl Source<'_> {
             _ => "m",
         };
         let positions = self.units(Quantity::BodyPosition, &["mm", "cm"], &LENGTHS, by_height);
-        let angle = || reach(self.raw_of(Quantity::JointPosition).iter().copied());
-        let by_size = || if angle() > ANGLE_RAD { "deg" } else { "rad" };
+        let by_size = || self.angle_by_limits(robot);
         let told = ["mrad", "rad", "deg"];
         let joints = self.units(Quantity::JointPosition, &told, &["rad", "deg"], by_size);
         let group = self.group(Quantity::JointPosition);
@@ -233,6 +233,28 @@ impl Source<'_> {
                 .for_each(|segment| segment.torque_nm.fill(0.0));
         }
         Some(recording)
+    }
+
+    /// The unit of angles in which more of them are within the joints' limits, apart from whole turns and signs; where
+    /// limits do not decide, degrees for angles beyond a turn.
+    fn angle_by_limits(&self, robot: &Robot) -> &'static str {
+        let values = self.raw_of(Quantity::JointPosition);
+        let inside = |factor: f64| -> usize {
+            let rows = values.row_iter().zip(robot.joint_limit_rad());
+            let of_row = rows.map(|(row, (low, high))| {
+                let is_inside = |angle: f64| (angle - low).rem_euclid(TAU) <= high - low;
+                let angles = row.iter().map(|value| factor * value);
+                angles
+                    .filter(|angle| is_inside(*angle) || is_inside(-angle))
+                    .count()
+            });
+            of_row.sum()
+        };
+        let is_degrees = match inside(ANGLE[1].1).cmp(&inside(ANGLE[0].1)) {
+            Ordering::Equal => reach(values.iter().copied()) > TAU,
+            order => order.is_gt(),
+        };
+        if is_degrees { "deg" } else { "rad" }
     }
 
     /// Signs by the limits of the joints, where nothing else shows them.
