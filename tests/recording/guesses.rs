@@ -274,6 +274,13 @@ fn short_parts_of_jumps_keep_their_signs() {
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    // Noise hides the axes of small velocities; those of an odometry are the body's.
+    let noisy = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let noisy = noisy.join("examples/recordings/go1-noisy/test_01.csv.gz");
+    let noisy = recording::read(&noisy).unwrap().segments.remove(0);
+    recording::write_mcap(&path, &noisy, None).unwrap();
+    let read = Reader::new(None, Clocks::Recorded).read(&path).unwrap();
+    assert!(difference(&read.recording, &noisy).1 < 1e-9);
 }
 
 /// In flight nothing stands, so that the joints' limits show the unit.
@@ -352,6 +359,19 @@ fn columns_of_one_family_are_taken_and_the_others_named() {
             guess.text
         );
     }
+    // Plain names before those with further words.
+    let mut plain = Log::default();
+    let names = log.names.iter().map(|name| name.replace("_real", ""));
+    (plain.names, plain.columns) = (names.collect(), log.columns.clone());
+    plain.write(&path, ",", true);
+    let (guess, found) = guessed(&path);
+    assert!(difference(&found, &s).0 < 1e-9, "{}", guess.text);
+    assert!(
+        guess.notes.join("\n").contains("q_sim_FR_hip"),
+        "{:?}",
+        guess.notes
+    );
+    log.write(&path, ",", true);
     // Lines before the header.
     let text = fs::read_to_string(&path).unwrap();
     for comment in [

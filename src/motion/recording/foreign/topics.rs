@@ -43,6 +43,8 @@ struct Topic {
     tables: Vec<Table>,
     /// By lists of a message: its table, and the columns of its numbers.
     arrangements: BTreeMap<Vec<u8>, (usize, Vec<usize>)>,
+    /// Messages read.
+    arrived: usize,
     fault: Option<MessageFault>,
 }
 
@@ -51,6 +53,8 @@ struct Table {
     log: Log,
     /// Times of recording, ns.
     times_ns: Vec<u64>,
+    /// Numbers of the messages within their topic.
+    arrivals: Vec<usize>,
     /// Whether a narrower table has its rows.
     is_part: bool,
 }
@@ -90,6 +94,7 @@ impl Topics {
                 declared,
                 tables: Vec::new(),
                 arrangements: BTreeMap::new(),
+                arrived: 0,
                 fault: None,
             });
             self.topics.len() - 1
@@ -141,13 +146,15 @@ impl Topics {
                 wider.iter_mut().for_each(|table| tables[at].add(table));
             }
             for table in topic.tables {
-                let (others, is_part) = (messages - table.times_ns.len(), table.is_part);
+                let others = messages - table.times_ns.len();
+                let what = match table.is_part {
+                    true => "lack values that the others have",
+                    false => "have other names or lengths and are left out",
+                };
                 let mut log = table.finished();
-                if others > 0 && !is_part {
-                    log.notes.push(format!(
-                        "`{}`: {others} of {messages} messages have other names or lengths and are left out",
-                        log.name
-                    ));
+                if others > 0 {
+                    let note = format!("`{}`: {others} of {messages} messages {what}", log.name);
+                    log.notes.push(note);
                 }
                 logs.push(log);
             }
@@ -206,6 +213,8 @@ impl Topic {
             return Err(MessageFault::Long(MAX_ROWS));
         }
         table.times_ns.push(time_ns);
+        table.arrivals.push(self.arrived);
+        self.arrived += 1;
         let (seconds, rest) = (time_ns / 1_000_000_000, time_ns % 1_000_000_000);
         let columns = &mut table.log.columns;
         columns[0].push_instant(instant(seconds as i64, rest as u32));
@@ -258,6 +267,7 @@ impl Topic {
         self.tables.push(Table {
             log,
             times_ns: Vec::new(),
+            arrivals: Vec::new(),
             is_part: false,
         });
         Ok((self.tables.len() - 1, order))
@@ -290,6 +300,12 @@ impl Table {
             }
         }
         self.times_ns.extend(&wider.times_ns);
+        self.arrivals.extend(&wider.arrivals);
+        let mut rows = Vec::from_iter(0..self.arrivals.len());
+        rows.sort_by_key(|row| self.arrivals[*row]);
+        self.log.choose(&rows);
+        self.times_ns = rows.iter().map(|row| self.times_ns[*row]).collect();
+        self.arrivals.sort_unstable();
         wider.is_part = true;
     }
 

@@ -3,7 +3,7 @@
 use super::super::elements::{QUATERNION, Quantity};
 use super::super::log::{Channel, Log};
 use super::super::units::Dimension;
-use super::names::{Reading, is_time, is_wanted, read, unit};
+use super::names::{Reading, is_quantity, is_time, is_wanted, read, unit};
 use crate::recording::preprocess::median;
 use crate::robot::{JOINT_DIM, Robot};
 
@@ -26,6 +26,13 @@ pub(super) struct Group {
     family: Vec<String>,
 }
 
+impl Group {
+    /// The words of the names that do not say which quantity it is.
+    fn qualifiers(&self) -> impl Iterator<Item = &String> {
+        self.family.iter().filter(|word| !is_quantity(word))
+    }
+}
+
 /// The clock of the log, if it is a column.
 #[derive(Debug, Clone)]
 pub(super) struct Clock {
@@ -39,10 +46,13 @@ pub(super) fn groups(logs: &[Log], robot: &Robot) -> Vec<Group> {
     let rates: Vec<Option<i32>> = logs.iter().map(rate_class).collect();
     let all = complete(&families(logs, robot));
     let of = |quantity: Quantity| all.iter().filter(move |group| group.quantity == quantity);
-    // Words that the families of a first choice have in common with those of other quantities.
+    // Quantities of joints, or of the body, in the same words: of `q_sim`, `q` and `tau` the last two belong together.
     let fellows = |one: &Group| -> usize {
-        let of_quantity = |quantity| of(quantity).map(|other| shared(one, other)).max();
-        Quantity::ALL.into_iter().filter_map(of_quantity).sum()
+        let others = Quantity::ALL.into_iter().filter(|other| {
+            *other != one.quantity && other.is_of_joints() == one.quantity.is_of_joints()
+        });
+        let is_alike = |other: &Group| other.qualifiers().eq(one.qualifiers());
+        others.filter(|other| of(*other).any(is_alike)).count()
     };
     let rate = |group: &Group| std::cmp::Reverse(rates[group.log].unwrap_or_default());
     // An arm's twelve joints are counted among others, the robot's have names.
@@ -93,14 +103,18 @@ pub(super) fn groups(logs: &[Log], robot: &Robot) -> Vec<Group> {
             .collect();
         let rank_of = |group: &Group| {
             let (_, (_, unnamed), log, rate, words, plain) = rank(group);
-            let words = if std::ptr::eq(best, base.unwrap_or(group)) {
-                Default::default()
-            } else {
-                words
-            };
-            (unnamed, log, rate, words, plain)
+            // The base is alike to nothing but itself.
+            let alike = (log, words);
+            let is_base = std::ptr::eq(best, base.unwrap_or(group));
+            let alike = if is_base { Default::default() } else { alike };
+            (unnamed, alike, rate, plain)
         };
-        let ties = |other: &&Group| rank_of(other) == rank_of(best) && differ(logs, best, other);
+        // Tables of one topic hold the same messages.
+        let is_apart =
+            |other: &Group| other.log == best.log || logs[other.log].name != logs[best.log].name;
+        let ties = |other: &&Group| {
+            is_apart(other) && rank_of(other) == rank_of(best) && differ(logs, best, other)
+        };
         let tie = others.iter().copied().any(|other| ties(&other));
         Some(Group {
             is_tie: tie,

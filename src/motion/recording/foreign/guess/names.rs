@@ -84,6 +84,22 @@ fn is_one(word: &str, of: &str) -> bool {
     of.split(' ').any(|known| known == word)
 }
 
+/// Whether a word is one of quantities.
+pub(super) fn is_quantity(word: &str) -> bool {
+    let known = [
+        TORQUE,
+        ACCELERATION,
+        VELOCITY,
+        ANGULAR_VELOCITY,
+        ANGULAR,
+        QUATERNION,
+        PLACE,
+        FEET,
+        JOINT_ARRAYS,
+    ];
+    known.iter().any(|known| is_one(word, known))
+}
+
 /// Whether the name of a column or topic says that its values were asked for rather than measured.
 pub(super) fn is_wanted(name: &str) -> bool {
     words(name).iter().any(|word| is_one(word, WANTED))

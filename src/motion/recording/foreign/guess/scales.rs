@@ -346,6 +346,14 @@ impl Source<'_> {
         }
     }
 
+    /// Whether a velocity is the twist of an odometry, which is in the body's frame unless the numbers show another.
+    fn is_odometry(&self, quantity: Quantity) -> bool {
+        self.group(quantity).is_some_and(|group| {
+            let first = &self.logs[group.log].columns[group.columns[0]];
+            first.name.starts_with("twist.twist.")
+        })
+    }
+
     /// Lines of the trunk's quantities.
     fn trunk(
         &self,
@@ -362,10 +370,14 @@ impl Source<'_> {
             let mut own = angles.clone();
             unwrap(&mut own);
             let rates = slopes(&times, &own);
-            let frames = [Frame::Angles, Frame::Body, Frame::World];
+            let is_odometry = self.is_odometry(Quantity::AngularVelocity);
+            let frames = match is_odometry {
+                true => [Frame::Body, Frame::Angles, Frame::World],
+                false => [Frame::Angles, Frame::Body, Frame::World],
+            };
             let turned = |frame| angle_rates(&own, &raw, frame).ok();
             let scale = axes(frames, turned, &rates, &ANGLE[..2]);
-            let own = velocity_lines(scale, "the angles");
+            let own = velocity_lines(scale, "the angles", is_odometry);
             lines.insert(Quantity::AngularVelocity, own);
         }
         self.place(Some(angles), position, lines);
@@ -387,9 +399,13 @@ impl Source<'_> {
                 Frame::Body => Some(in_world(angles?, &raw)),
                 Frame::World | Frame::Angles => Some(raw.clone()),
             };
-            let frames = [Frame::World, Frame::Body];
+            let is_odometry = self.is_odometry(Quantity::BodyVelocity);
+            let frames = match is_odometry {
+                true => [Frame::Body, Frame::World],
+                false => [Frame::World, Frame::Body],
+            };
             let scale = axes(frames, turned, &rates, Dimension::Length.units());
-            let own = velocity_lines(scale, "the position");
+            let own = velocity_lines(scale, "the position", is_odometry);
             lines.insert(Quantity::BodyVelocity, own);
         }
     }
@@ -442,11 +458,15 @@ fn sign_line(signs: &[f64]) -> Option<String> {
     Some(format!("sign = {{ {} }}", names.join(", ")))
 }
 
-/// NamedUnit, sign and axes of a velocity of the trunk.
-fn velocity_lines(found: Option<(Scale, Frame)>, of: &str) -> Vec<String> {
+/// Unit, sign and axes of a velocity of the trunk.
+fn velocity_lines(found: Option<(Scale, Frame)>, of: &str, is_odometry: bool) -> Vec<String> {
     let Some((scale, axes)) = found else {
+        let (sign, what) = match is_odometry {
+            true => ("", "an odometry's"),
+            false => ("# ", "unknown"),
+        };
         return vec![format!(
-            "# frame = \"body\"   # unknown: it does not follow {of}"
+            "{sign}frame = \"body\"   # {what}: it does not follow {of}"
         )];
     };
     let mut lines = vec![unit_line(
