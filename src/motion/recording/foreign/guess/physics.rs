@@ -182,7 +182,15 @@ impl<'a> View<'a> {
             let best = (0..8).min_by(|a, b| figures[*a].total_cmp(&figures[*b]));
             best.expect("invariant: eight figures")
         };
-        let common = least(&whole);
+        let best = least(&whole);
+        let shown = std::array::from_fn(|kind| {
+            let turned = whole[best ^ (1 << kind)];
+            whole[best] < BETTER.0 * turned && whole[best] + BETTER.1 < turned
+        });
+        // A sign that they do not show is the plain one.
+        let common = (0..3)
+            .filter(|kind| shown[*kind])
+            .fold(0, |code, kind| code | best & (1 << kind));
         let mut codes = [common; 4];
         reading.slip_m = whole[common];
         // Legs with axes of their own, where those are clearly better.
@@ -199,10 +207,7 @@ impl<'a> View<'a> {
         }
         reading.signs = std::array::from_fn(|i| combination(codes[i / 3])[i % 3]);
         reading.motion_m = self.motion_m(&reading);
-        reading.shown = std::array::from_fn(|kind| {
-            let turned = whole[common ^ (1 << kind)];
-            whole[common] < BETTER.0 * turned && whole[common] + BETTER.1 < turned
-        });
+        reading.shown = shown;
         Some(reading)
     }
 
