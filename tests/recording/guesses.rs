@@ -323,6 +323,37 @@ fn whole_turns_of_joints_and_trunk_stay_radians() {
 }
 
 #[test]
+fn joints_and_feet_are_counted_from_0_or_1() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("log.csv");
+    let s = jump();
+    let row = |m: &DMatrix<f64>, i: usize| m.row(i).iter().copied().collect::<Vec<f64>>();
+    for first in [0, 1] {
+        let mut log = Log::default();
+        log.add("time", s.time_s.clone());
+        for i in 0..12 {
+            log.add(format!("q{}", i + first), row(&s.x, i));
+            log.add(format!("tau_{}", i + first), row(&s.torque_nm, i));
+        }
+        for (i, axis) in ["x", "y", "z"].into_iter().enumerate() {
+            log.add(format!("base_p{axis}"), row(&s.x, 12 + i));
+            log.add(["roll", "pitch", "yaw"][i], row(&s.x, 15 + i));
+        }
+        for foot in 0..4 {
+            let down = s.feet.iter().map(|feet| f64::from(u8::from(feet[foot])));
+            log.add(
+                format!("contact_{}", foot + first),
+                down.collect::<Vec<_>>(),
+            );
+        }
+        log.write(&path, ",", true);
+        let (guess, found) = guessed(&path);
+        let (state, _, contact) = difference(&found, &s);
+        assert!(state < 1e-9 && contact, "{}", guess.text);
+    }
+}
+
+#[test]
 fn columns_of_one_family_are_taken_and_the_others_named() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("log.csv");

@@ -475,6 +475,11 @@ fn robot_with_the_name_of_romcs_own_is_another_and_says_what_differs() {
                 .contains("--name: found \"go1\", romc's own robot with other numbers (mass_kg"),
         "{error}"
     );
+    let (code, _, error) = romc(&["robot", "go1.urdf", "--name", "a*/b"]);
+    assert!(
+        code == Some(2) && error.contains("--name: found \"a*/b\", expected a name"),
+        "{error}"
+    );
     let (code, _, error) = romc(&["robot", "go1", "--name", "mine"]);
     assert!(
         code == Some(2) && error.contains("--name: found romc's own go1, expected a file"),

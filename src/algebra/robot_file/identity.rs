@@ -52,7 +52,14 @@ pub(super) fn identified(
     if let Some(name) = chosen {
         entry.name = name.to_owned();
     }
-    let mut robot = build(file, &entry, places)?;
+    let name_place = Place::Entry(places.of_robot("name").into());
+    let built = build(file, &entry, places);
+    let mut robot = built.map_err(
+        |error| match chosen.is_some() && error.place == name_place {
+            true => Located::new("", Place::Option("--name"), error.kind),
+            false => error,
+        },
+    )?;
     if let Some(differences) = namesake(&robot) {
         if chosen.is_some() {
             let found = format!(

@@ -198,6 +198,7 @@ fn families(logs: &[Log], robot: &Robot) -> Families {
         }
     }
     for (_, members) in &mut families {
+        from_zero(members);
         lists_of_three(members);
         bare_hips(members);
     }
@@ -263,6 +264,19 @@ fn bare_hips(members: &mut [(usize, Reading)]) {
             .iter_mut()
             .filter(|(_, reading)| reading.is_bare_hip);
         hips.for_each(|(_, reading)| reading.element += 1);
+    }
+}
+
+/// What is counted from 1 is counted from 0.
+fn from_zero(members: &mut [(usize, Reading)]) {
+    let last = members[0].1.quantity.elements().len();
+    let has = |number: usize| {
+        let mut counted = members.iter().filter(|(_, reading)| reading.is_counted);
+        counted.any(|(_, reading)| reading.element == number)
+    };
+    if has(last) && !has(0) {
+        let counted = members.iter_mut().filter(|(_, reading)| reading.is_counted);
+        counted.for_each(|(_, reading)| reading.element -= 1);
     }
 }
 

@@ -38,7 +38,7 @@ const TIME: &str = "time timestamp stamp t sec secs seconds clock datetime date"
 pub(super) struct Reading {
     /// The quantity; a quaternion and angles are both orientations.
     pub quantity: Quantity,
-    /// The element, in romc's order; of a quaternion 0 is w.
+    /// The element, in romc's order; of a quaternion 0 is w. The number of elements for the last of those counted from 1.
     pub element: usize,
     /// Whether the element is one of a quaternion.
     pub is_quaternion: bool,
@@ -179,7 +179,7 @@ pub(super) fn read(name: &str) -> Option<Reading> {
     }
     let is_force = has("force forces") || (has("f fn load pressure") && leg.is_some());
     if has(FEET) || (is_force && axis.is_none() && joint.is_none()) {
-        let element = leg.or(number.filter(|n| *n < 4));
+        let element = leg.or(number.filter(|n| *n <= 4));
         let is_moved = has("position pos velocity vel speed");
         let is_contact = has("contact contacts stance touch");
         let is_place = axis.map_or(is_moved && !is_contact, |axis| axis != 2 || is_moved);
@@ -197,7 +197,7 @@ pub(super) fn read(name: &str) -> Option<Reading> {
     {
         return reading(kind, 3 * leg + joint, false, true);
     }
-    let in_array = number.filter(|number| *number < 12);
+    let in_array = number.filter(|number| *number <= 12);
     let of_body = has("imu body base trunk com torso pose odom twist");
     let of_axes = has(QUATERNION) && !has("q") || has(ANGULAR) || has("gyro gyroscope omega");
     if let Some(number) = in_array
