@@ -28,6 +28,10 @@ pub fn run(arguments: &ConvertArguments) -> Result<Answer, Error> {
         Some(path) => Some(artifact::read(path)?.input_rule()?),
     };
     let reader = reader(&arguments.reading, Clocks::Recorded)?;
+    let reader = match &rule {
+        Some(rule) => reader.for_robot(rule.robot()),
+        None => reader,
+    };
     let recordings = read_with(&reader, &arguments.recordings)?;
     let segments = chained(recordings);
     let inputs = rule.as_ref().map(|rule| {

@@ -44,7 +44,7 @@ pub fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
         let (found, expected) = ("a file of equations", "a file with encoder and decoder");
         return Err(ImportFault::option("--inputs-from", found, expected).into());
     }
-    let recordings = read_recordings(&arguments.inputs_from, &arguments.reading, None)?;
+    let recordings = read_recordings(&arguments.inputs_from, &arguments.reading, options.robot)?;
     let segments: Vec<&Segment> = recordings.iter().flat_map(|r| &r.segments).collect();
     let read = |options: &ImportOptions| import(&arguments.file, options);
     let Compared {

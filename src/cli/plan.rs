@@ -9,8 +9,8 @@ use super::args::PlanArguments;
 use super::convert::write_recording;
 use super::destination::{Format, Inputs};
 use super::output::{
-    extend, lines, note_mismatches, progress_bar, read_settings, reader, show_progress, spinner,
-    warn,
+    extend, lines, note_mismatches, progress_bar, read_settings, read_with, reader, show_progress,
+    spinner, warn,
 };
 use crate::files::Overwrite;
 use crate::plan::{self, Goal, Plan, PlanSettings, Reach, Verdict};
@@ -76,7 +76,7 @@ pub fn run(arguments: &PlanArguments) -> Result<Answer, Error> {
 }
 
 /// The goal of the arguments.
-fn goal(arguments: &PlanArguments, robot: &Robot) -> Result<Goal, Error> {
+fn goal(arguments: &PlanArguments, robot: &'static Robot) -> Result<Goal, Error> {
     let (Some(distance_m), Some(apex_m)) = (arguments.distance, arguments.apex) else {
         unreachable!("clap asks for both without --reach");
     };
@@ -84,9 +84,10 @@ fn goal(arguments: &PlanArguments, robot: &Robot) -> Result<Goal, Error> {
     let Some(path) = &arguments.start else {
         return Ok(goal);
     };
-    let reader = reader(&arguments.reading, Clocks::Recorded)?;
-    let recording = reader.read(path)?.recording;
-    note_mismatches(&recording, robot);
+    let reader = reader(&arguments.reading, Clocks::Recorded)?.for_robot(robot);
+    let recordings = read_with(&reader, std::slice::from_ref(path))?;
+    let recording = &recordings[0];
+    note_mismatches(recording, robot);
     let first = &recording.segments[0];
     let column = |rows: &nalgebra::DMatrix<f64>| rows.column(0).into_owned();
     Ok(goal.from_start(column(&first.x), column(&first.dx)))

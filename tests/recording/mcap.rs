@@ -359,6 +359,80 @@ fn joints_that_are_not_the_robots_are_refused_or_left_out() {
         notes.contains("60 of 120 messages have other names"),
         "{notes}"
     );
+    // Messages with further joints, or without values that nothing needs, are of the same robot.
+    for further in [0, 20, 59] {
+        let messages = with_joints(&bag, &jump, |sample, time_ns, mut joints| {
+            if sample >= further {
+                joints.insert(0, ("gripper".to_owned(), [9.0; 3]));
+            }
+            vec![encoded(time_ns, &joints)]
+        });
+        let notes = is_the_jump(&bag.file(folder.path(), &messages), &jump);
+        assert!(
+            !notes.contains("left out") && !notes.contains("out of order"),
+            "{notes}"
+        );
+    }
+    // Two topics of the same names and rate with other numbers.
+    let mut two = Bag::of(&jump);
+    let schema = two.schemas[recording::foreign::JOINT_TOPIC].clone();
+    two.schemas.insert("/a/joint_states".to_owned(), schema);
+    let mut messages = with_joints(&two, &jump, |_, time_ns, joints| {
+        let other = joints
+            .iter()
+            .map(|(name, values)| (name.clone(), values.map(|v| 1.01 * v)));
+        let other: Vec<_> = other.collect();
+        vec![encoded(time_ns, &joints), encoded(time_ns, &other)]
+    });
+    let states = messages.iter_mut();
+    let states = states.filter(|message| message.topic == recording::foreign::JOINT_TOPIC);
+    states
+        .skip(1)
+        .step_by(2)
+        .for_each(|message| message.topic = "/a/joint_states".to_owned());
+    let error = refused(&two.file(folder.path(), &messages));
+    assert!(
+        error.contains("by their names also") && error.contains("joint_states` (500 Hz)"),
+        "{error}"
+    );
+    // An arm with a topic of its own at the same rate or a higher one; commands of the same names.
+    for (topic, names) in [
+        ("/arm/joint_states", Some(names[0])),
+        ("/joint_commands", None),
+    ] {
+        let mut bag = Bag::of(&jump);
+        let schema = bag.schemas[recording::foreign::JOINT_TOPIC].clone();
+        bag.schemas.insert(topic.to_owned(), schema);
+        let messages = with_joints(&bag, &jump, |_, time_ns, joints| {
+            let other = match names {
+                Some(names) => arm(&joints, names),
+                None => joints
+                    .iter()
+                    .map(|(name, values)| (name.clone(), values.map(|v| 2.0 * v)))
+                    .collect(),
+            };
+            vec![
+                encoded(time_ns, &joints),
+                encoded(time_ns, &other),
+                encoded(time_ns + 1_000_000, &other),
+            ]
+        });
+        let mut count = 0;
+        let messages: Vec<Message> = messages
+            .into_iter()
+            .map(|mut message| {
+                if message.topic == recording::foreign::JOINT_TOPIC {
+                    count += 1;
+                    if count % 3 != 1 {
+                        message.topic = topic.to_owned();
+                        message.time_ns += if count % 3 == 0 { 1_000_000 } else { 0 };
+                    }
+                }
+                message
+            })
+            .collect();
+        is_the_jump(&bag.file(folder.path(), &messages), &jump);
+    }
     // Lists that do not go with the names.
     let messages = with_joints(&bag, &jump, |_, time_ns, joints| {
         let names: Vec<String> = joints.iter().map(|(name, _)| name.clone()).collect();
@@ -546,6 +620,22 @@ fn folders_of_bags_are_one_recording() {
     assert!(
         error.contains("11 MCAP files without metadata.yaml"),
         "{error}"
+    );
+    fs::rename(own.join("other.mcap"), folder.path().join("elsewhere")).unwrap();
+    let error = refused(&own);
+    assert!(error.contains("bag_3.mcap: no such file"), "{error}");
+    fs::rename(folder.path().join("elsewhere"), own.join("bag_3.mcap")).unwrap();
+    // A last file that a loss of power left empty, and one that the list does not have.
+    for bytes in [&[][..], &[0; 4096], b"\x89MC"] {
+        fs::write(own.join("bag_11.mcap"), bytes).unwrap();
+        let notes = is_the_jump(&own, &jump);
+        assert!(notes.contains("bag_11.mcap: it ends after"), "{notes}");
+    }
+    fs::write(&metadata, format!("relative_file_paths:\n{list}")).unwrap();
+    let notes = is_the_jump(&own, &jump);
+    assert!(
+        notes.contains("bag_11.mcap: not in metadata.yaml"),
+        "{notes}"
     );
     // Bags of other kinds.
     for (name, bytes, words) in [

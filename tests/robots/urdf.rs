@@ -233,6 +233,8 @@ fn faults_name_line_element_and_remedy() {
         (edit("<joint name=\"FR_foot_fixed\"", "<joint name=\"FR_foot_fixed\" note=\"${l}\""), "line 22: found note=\"${l}\": a xacro that is not expanded, expected a URDF: `xacro t.urdf > t-expanded.urdf` makes it"),
         ("<robot name=\"r\" xmlns:xacro=\"http://ros.org/wiki/xacro\">\n<xacro:include filename=\"legs.xacro\"/></robot>".to_owned(), "line 2: found <xacro:include>: a xacro"),
         ("<robot name=\"r\">\n<xacro:leg/></robot>".to_owned(), "line 2: found an element of xacro: a xacro"),
+        ("<robot name=\"r\" xmlns:xacro=\"http://wiki.ros.org/macros\">\n<xacro:leg/></robot>".to_owned(), "line 2: found <xacro:leg>: a xacro"),
+        (edit("</robot>", "<macro name=\"leg\" params=\"x\"/></robot>"), "found <xacro:macro>: a xacro"),
         ("<robot name=\"r\"/>".to_owned(), "the tree: found no link, expected a tree of links and joints"),
     ] {
         let error = refusal(&text);
@@ -248,7 +250,7 @@ fn declarations_comments_and_extensions_change_nothing() {
     let text = text.replace("<robot ", "<?xml version=\"1.0\"?>\n<!-- ${old} <xacro:leg/> -->\n<robot xmlns:xacro=\"http://www.ros.org/wiki/xacro\" ");
     let text = text.replace(
         "</robot>",
-        "<gazebo file=\"$(find robot)/x\"><link name=\"trunk\"><inertial><mass>7</mass><mass value=\"7\"/></inertial></link></gazebo>\n\
+        "<gazebo file=\"$(find robot)/x\"><property name=\"p\"/><link name=\"trunk\"><inertial><mass>7</mass><mass value=\"7\"/></inertial></link></gazebo>\n\
          <transmission name=\"t\"><joint name=\"FR_hip_joint\"/></transmission></robot>",
     );
     let read = read(&text);
@@ -305,6 +307,15 @@ fn numbers_that_can_hardly_be_true_are_noted() {
             with(&|made| (made.links[3].1, made.links[4].1) = (None, None)),
             "the links FR_calf have no mass",
         ),
+        (
+            with(&|made| {
+                *made = made
+                    .clone()
+                    .below(&[("stand", "fixed", [0.0, 0.0, 0.4], [0.0; 3])]);
+                made.links.last_mut().expect("the stand").1 = Some(30.0);
+            }),
+            "the middle of the hips is at 0 0 0.4 m, beyond the legs",
+        ),
     ] {
         assert!(
             notes.len() == 1 && notes[0].contains(said),
@@ -329,6 +340,35 @@ fn robots_of_other_joints_and_feet_get_their_own_hints() {
     assert!(
         !error.contains("--feet")
             && error.contains("found 4 limbs on `trunk`: FR_thigh_joint (2 joints)")
+    );
+    // Six legs of three joints.
+    let mut six = Made::quadruped();
+    for (from, to) in [("FR", "MR"), ("FL", "ML")] {
+        let rename = |name: &str| name.replace(from, to);
+        let links = six
+            .links
+            .clone()
+            .into_iter()
+            .filter(|(name, _)| name.starts_with(from));
+        six.links
+            .extend(links.map(|(name, mass)| (rename(&name), mass)));
+        let joints = six
+            .joints
+            .clone()
+            .into_iter()
+            .filter(|joint| joint.name.starts_with(from));
+        six.joints.extend(joints.map(|mut joint| {
+            for name in [&mut joint.name, &mut joint.parent, &mut joint.child] {
+                *name = rename(name);
+            }
+            joint.xyz[0] = 0.0;
+            joint
+        }));
+    }
+    let error = refusal(&six.urdf());
+    assert!(
+        error.contains("found 6 limbs") && !error.contains("--feet"),
+        "{error}"
     );
     // Without links of feet, points of the calves.
     let mut made = Made::quadruped();
@@ -435,6 +475,11 @@ fn robot_with_the_name_of_romcs_own_is_another_and_says_what_differs() {
                 .contains("--name: found \"go1\", romc's own robot with other numbers (mass_kg"),
         "{error}"
     );
+    let (code, _, error) = romc(&["robot", "go1.urdf", "--name", "a*/b"]);
+    assert!(
+        code == Some(2) && error.contains("--name: found \"a*/b\", expected a name"),
+        "{error}"
+    );
     let (code, _, error) = romc(&["robot", "go1", "--name", "mine"]);
     assert!(
         code == Some(2) && error.contains("--name: found romc's own go1, expected a file"),
@@ -460,6 +505,24 @@ fn commands_of_a_refused_xacro_are_words_of_a_shell() {
         let error = text(&done.stderr);
         assert!(
             done.status.code() == Some(1) && error.contains(line),
+            "{error}"
+        );
+    }
+}
+
+#[test]
+fn files_in_place_of_robots_are_named() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    for file in ["a b.urdf", "a.toml"] {
+        let pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n";
+        std::fs::write(folder.path().join(file), pointer).expect("written");
+        let done = romc(folder.path(), &["robot", file]);
+        let (error, line) = (
+            text(&done.stderr),
+            format!("git lfs pull --include {}", romc::files::shell_word(file)),
+        );
+        assert!(
+            error.contains("a pointer of git LFS") && error.contains(&line),
             "{error}"
         );
     }

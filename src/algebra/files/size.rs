@@ -6,11 +6,15 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
+use super::magic::{OtherFormat, recognised};
+
 /// A kind of file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
-    /// Settings, maps of columns, robots: TOML and XML.
+    /// Settings, maps of columns, robots as TOML.
     Settings,
+    /// Robots as XML.
+    Robot,
     /// Models: JSON.
     Model,
     /// Equations: text, LaTeX.
@@ -30,6 +34,7 @@ impl Format {
     const fn facts(self) -> (u64, &'static str) {
         match self {
             Self::Settings => (2 * MB, "settings"),
+            Self::Robot => (16 * MB, "a URDF"),
             Self::Model => (32 * MB, "a model"),
             Self::Equations => (16 * MB, "equations"),
             Self::Tensors => (4096 * MB, "tensors"),
@@ -106,10 +111,16 @@ pub fn read_capped(path: &Path, format: Format) -> io::Result<Vec<u8>> {
 /// [`read_capped`] of a text.
 ///
 /// # Errors
-/// As [`read_capped`], and [`io::ErrorKind::InvalidData`] for bytes that are not UTF-8.
+/// As [`read_capped`], and [`io::ErrorKind::InvalidData`] for another format or bytes that are not UTF-8.
 pub fn read_text_capped(path: &Path, format: Format) -> io::Result<String> {
-    let not_text = |error| io::Error::new(io::ErrorKind::InvalidData, error);
-    String::from_utf8(read_capped(path, format)?).map_err(not_text)
+    let bytes = read_capped(path, format)?;
+    let invalid = |text: String| io::Error::new(io::ErrorKind::InvalidData, text);
+    if let Some(OtherFormat { what, remedy }) = recognised(path, &bytes) {
+        let expected = format.facts().1;
+        let text = format!("found {what}, expected {expected}; this makes the text: {remedy}");
+        return Err(invalid(text));
+    }
+    String::from_utf8(bytes).map_err(|error| invalid(error.to_string()))
 }
 
 #[cfg(test)]

@@ -21,9 +21,6 @@ pub enum RobotFileFault {
     /// The file system refused.
     #[error("cannot read the file")]
     Read(#[source] io::Error),
-    /// The file is larger than any robot.
-    #[error("found more than {0} bytes, which no robot needs")]
-    TooLarge(u64),
     /// The file breaks the syntax of its format, or a key is unknown, missing or of another type.
     #[error("{0}")]
     Syntax(String),

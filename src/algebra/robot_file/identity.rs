@@ -1,5 +1,7 @@
 //! Which robot a file describes, and whether its numbers can be true.
 
+use nalgebra::Vector3;
+
 use super::entry::{JointEntry, RobotEntry};
 use super::error::{RobotFileError, RobotFileFault};
 use super::legs::{Places, build};
@@ -50,7 +52,14 @@ pub(super) fn identified(
     if let Some(name) = chosen {
         entry.name = name.to_owned();
     }
-    let mut robot = build(file, &entry, places)?;
+    let name_place = Place::Entry(places.of_robot("name").into());
+    let built = build(file, &entry, places);
+    let mut robot = built.map_err(
+        |error| match chosen.is_some() && error.place == name_place {
+            true => Located::new("", Place::Option("--name"), error.kind),
+            false => error,
+        },
+    )?;
     if let Some(differences) = namesake(&robot) {
         if chosen.is_some() {
             let found = format!(
@@ -186,7 +195,21 @@ fn doubts(robot: &Robot) -> Vec<String> {
             what(first)
         ))
     };
+    let hips = Leg::ALL.map(|leg| robot.hip_position(leg));
+    let middle = hips.iter().sum::<Vector3<f64>>() / hips.len() as f64;
+    let reach = hips
+        .iter()
+        .map(|hip| (hip - middle).norm())
+        .fold(0.0, f64::max);
+    let far = (middle.norm() > reach).then(|| {
+        let [x, y, z] = middle.map(|v| (1e3 * v).round() / 1e3).into();
+        format!(
+            "the middle of the hips is at {x} {y} {z} m, beyond the legs: recordings have to have the position of that \
+             frame's origin, not of the trunk"
+        )
+    });
     let found = [
+        far,
         note(&|joint| share(joint) > *TORQUE_SHARE.end(), &|joint| {
             format!(
                 "a largest torque of {} N m, {:.0} times the robot's weight on a stretched leg; commands stay \

@@ -45,7 +45,7 @@ const SPELLINGS: [(&str, &str); 5] = [
 ];
 
 impl Places {
-    fn of_robot(&self, key: &str) -> String {
+    pub(super) fn of_robot(&self, key: &str) -> String {
         match self {
             Places::Keys => key.to_owned(),
             Places::Elements { robot, .. } if key == "name" => format!("{robot}, name"),

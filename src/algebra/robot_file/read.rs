@@ -1,7 +1,5 @@
 //! From a name or a file to a robot.
 
-use std::fs::File;
-use std::io::Read;
 use std::path::Path;
 
 use serde::de::DeserializeOwned;
@@ -11,11 +9,9 @@ use super::error::{RobotFileError, RobotFileFault};
 use super::identity::{RobotReading, identified};
 use super::legs::Places;
 use super::urdf;
+use crate::files::size::{Format, read_text_capped};
 use crate::files::{Located, Place, read_toml};
 use crate::robot::Robot;
-
-/// Largest file of a robot; a URDF with meshes beside it is far smaller.
-const MAX_FILE_BYTES: u64 = 16 << 20;
 
 /// What a command says of a robot's file besides its path.
 #[derive(Clone, Copy, Debug, Default)]
@@ -107,18 +103,11 @@ fn read_with(path: &Path, options: &RobotOptions<'_>) -> Result<RobotReading, Ro
 pub(super) fn text_of(path: &Path) -> Result<String, RobotFileError> {
     let file = path.display().to_string();
     let fault = |fault| RobotFileError::new(&file, Place::Whole, fault);
-    if !["urdf", "xml"].contains(&ending(path).as_str()) {
-        return read_toml(path).map_err(|source| fault(RobotFileFault::Read(source)));
-    }
-    let mut text = String::new();
-    // One byte more than allowed distinguishes a file that is too large from one that just fits.
-    File::open(path)
-        .and_then(|open| open.take(MAX_FILE_BYTES + 1).read_to_string(&mut text))
-        .map_err(|source| fault(RobotFileFault::Read(source)))?;
-    match text.len() as u64 > MAX_FILE_BYTES {
-        true => Err(fault(RobotFileFault::TooLarge(MAX_FILE_BYTES))),
-        false => Ok(text),
-    }
+    let text = match ending(path).as_str() {
+        "toml" => read_toml(path),
+        _ => read_text_capped(path, Format::Robot),
+    };
+    text.map_err(|source| fault(RobotFileFault::Read(source)))
 }
 
 /// Reads a robot from TOML; `file` names it in errors.

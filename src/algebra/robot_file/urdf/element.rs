@@ -15,6 +15,9 @@ const UNREAD: [&str; 5] = [
     "ros2_control",
 ];
 
+/// Elements of xacro without its prefix, none of which a URDF has.
+const UNPREFIXED: [&str; 4] = ["macro", "include", "property", "insert_block"];
+
 /// An element of a file.
 #[derive(Clone, Copy)]
 pub(super) struct Element<'x> {
@@ -45,10 +48,14 @@ pub(super) fn document<'x>(file: &str, text: &'x str) -> Result<Document<'x>, Ro
         if UNREAD.contains(&name.name()) {
             unread_to = unread_to.max(node.range().end);
         }
-        let found = match name
-            .namespace()
-            .is_some_and(|space| space.contains("xacro"))
-        {
+        // The address that the prefix stands for differs; old xacros have no prefix.
+        let is_xacro =
+            |space: &str| space.contains("xacro") || node.lookup_prefix(space) == Some("xacro");
+        let is_macro = match name.namespace() {
+            Some(space) => is_xacro(space),
+            None => node.range().end > unread_to && UNPREFIXED.contains(&name.name()),
+        };
+        let found = match is_macro {
             true => Some(format!("<xacro:{}>", name.name())),
             false if node.range().end <= unread_to => None,
             false => (node.attributes())

@@ -168,7 +168,9 @@ fn found_legs(tree: &Tree<'_>, top: usize, body: &Body) -> Result<Vec<Limb>, Rob
     // Whether four limbs have legs in them, and whether they are legs with a joint too few.
     let have =
         |least: fn(&Chain) -> bool| limbs.iter().filter(|limb| least(limb)).count() >= FOOT_DIM;
-    let hint = if have(|(joints, is_chain)| joints.len() >= LEG_JOINT_DIM || !is_chain) {
+    let has_more = |(joints, is_chain): &Chain| joints.len() > LEG_JOINT_DIM || !is_chain;
+    let may_be_legs = have(|(joints, is_chain)| joints.len() >= LEG_JOINT_DIM || !is_chain);
+    let hint = if may_be_legs && limbs.iter().any(has_more) {
         "; --feet (romc robot) names their feet where limbs have more joints"
     } else if have(|(joints, _)| joints.len() == 2) {
         "; legs of two joints, as robots of eight have them, cannot be modelled"

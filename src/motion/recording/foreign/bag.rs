@@ -16,22 +16,31 @@ pub(super) fn is_bag(path: &Path) -> bool {
     path.is_dir() && (path.join(METADATA).is_file() || !parts(path).is_empty())
 }
 
-/// The files of a log: the path itself, or those of the bag that the folder is.
+/// The files of a log: the path itself, or those of the bag that the folder is; and notes on files that are left out.
 ///
 /// # Errors
-/// [`RecordingFault::Missing`] for a file that the bag lists, [`RecordingFault::Bag`] for a folder of other recordings.
-pub(super) fn files(path: &Path) -> Result<Vec<PathBuf>, RecordingError> {
+/// [`RecordingFault::Missing`] for a file that the bag lists or counts, [`RecordingFault::Bag`] for a folder of other
+/// recordings.
+pub(super) fn files(path: &Path) -> Result<(Vec<PathBuf>, Vec<String>), RecordingError> {
     if !path.is_dir() {
-        return Ok(vec![path.to_owned()]);
+        return Ok((vec![path.to_owned()], Vec::new()));
     }
     let listed = listed(path)?;
     if let Some(absent) = listed.iter().find(|file| !file.is_file()) {
         return Err(RecordingFault::Missing.of(absent));
     }
-    let mut files = if listed.is_empty() {
-        parts(path)
-    } else {
-        listed
+    let is_listed = !listed.is_empty();
+    let (mut files, unlisted) = match is_listed {
+        false => (parts(path), Vec::new()),
+        true => {
+            let others = parts(path)
+                .into_iter()
+                .filter(|file| !listed.contains(file));
+            let note =
+                |file: PathBuf| format!("{}: not in {METADATA}, and left out", file.display());
+            let notes = others.map(note).collect();
+            (listed, notes)
+        }
     };
     // rosbag2 calls the parts of a bag NAME_0.mcap, NAME_1.mcap and so on.
     let part = |file: &Path| -> Option<(String, usize)> {
@@ -47,9 +56,19 @@ pub(super) fn files(path: &Path) -> Result<Vec<PathBuf>, RecordingError> {
         let [one, other] = [&pair[0], &pair[1]].map(|file| part(file).map(|(name, _)| name));
         one.is_some() && one == other
     };
-    match files.is_empty() || (!path.join(METADATA).is_file() && !files.windows(2).all(is_one)) {
-        true => Err(RecordingFault::Bag(files.len()).of(path)),
-        false => Ok(files),
+    if files.is_empty() || (!path.join(METADATA).is_file() && !files.windows(2).all(is_one)) {
+        return Err(RecordingFault::Bag(files.len()).of(path));
+    }
+    // Without a list, a number that is left out is a file that is lost.
+    let lost = files.windows(2).filter(|_| !is_listed).find_map(|pair| {
+        let ((name, one), (_, other)) = (part(&pair[0])?, part(&pair[1])?);
+        let file = pair[0].file_name()?.to_str()?;
+        let ending = file.strip_prefix(&format!("{name}_{one}"))?;
+        (other > one + 1).then(|| path.join(format!("{name}_{}{ending}", one + 1)))
+    });
+    match lost {
+        Some(lost) => Err(RecordingFault::Missing.of(&lost)),
+        None => Ok((files, unlisted)),
     }
 }
 

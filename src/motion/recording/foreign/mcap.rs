@@ -47,17 +47,26 @@ pub(in crate::recording) fn is_mcap(path: &Path) -> bool {
 /// [`RecordingFault::Mcap`] for a damaged file, [`RecordingFault::OtherFormat`] for another one,
 /// [`RecordingFault::NoTopic`] if nothing can be read.
 pub(in crate::recording) fn read_mcap(path: &Path) -> Result<Vec<Log>, RecordingError> {
-    let (mut topics, mut notes) = (Topics::default(), Vec::new());
-    for file in bag::files(path)? {
+    let mut topics = Topics::default();
+    let (files, mut notes) = bag::files(path)?;
+    for file in files {
         let open = File::open(&file);
         let open = open.map_err(|source| RecordingFault::unreadable("read", source).of(&file))?;
         topics.begin_file();
         let mut scan = Scan::new(BufReader::new(open), &mut topics);
         let ended = scan.whole(&file).map_err(|fault| fault.of(&file))?;
-        notes.extend(ended.map(|note| match path == file {
+        let note = match ended {
+            Ended::Whole => continue,
+            // Nothing of a recording's last file may have come to the disk.
+            Ended::Empty(words) if topics.messages == 0 => {
+                return Err(RecordingFault::Mcap(words).of(&file));
+            }
+            Ended::Early(words) | Ended::Empty(words) => words,
+        };
+        notes.push(match path == file {
             true => note,
             false => format!("{}: {note}", file.display()),
-        }));
+        });
     }
     let mut logs = topics.logs().map_err(|fault| fault.of(path))?;
     for log in &mut logs {
@@ -65,6 +74,16 @@ pub(in crate::recording) fn read_mcap(path: &Path) -> Result<Vec<Log>, Recording
         log.notes.splice(0..0, notes.iter().cloned());
     }
     Ok(logs)
+}
+
+/// How a file ends.
+enum Ended {
+    /// At its end.
+    Whole,
+    /// Before it, in words.
+    Early(String),
+    /// Before its first message, in words.
+    Empty(String),
 }
 
 /// One pass over a file.
@@ -94,35 +113,39 @@ impl<'a, R: Read> Scan<'a, R> {
         }
     }
 
-    /// Reads all records; a note if the file ends before its end.
-    fn whole(&mut self, path: &Path) -> Result<Option<String>, RecordingFault> {
+    /// Reads all records.
+    fn whole(&mut self, path: &Path) -> Result<Ended, RecordingFault> {
         let before = self.topics.messages;
-        self.magic(path)?;
+        if !self.magic(path)? {
+            return Ok(self.ended(before));
+        }
         loop {
             let at = self.offset;
             let Some((header, body)) = self.next()? else {
-                return self.ended(before);
+                return Ok(self.ended(before));
             };
             if self.take(&header, &body, at)? {
-                return Ok(None);
+                return Ok(Ended::Whole);
             }
         }
     }
 
-    /// The first bytes of the file.
-    fn magic(&mut self, path: &Path) -> Result<(), RecordingFault> {
+    /// The first bytes of the file; none if it ends within them or holds zeros alone.
+    fn magic(&mut self, path: &Path) -> Result<bool, RecordingFault> {
         let mut start = self.bytes(MCAP.len() as u64)?;
         if start == MCAP {
             self.section.update(&start);
-            return Ok(());
+            return Ok(true);
+        }
+        if MCAP.starts_with(&start)
+            || (start.iter().all(|byte| *byte == 0) && self.is_zero_to_the_end()?)
+        {
+            return Ok(false);
         }
         start.extend(self.bytes((MAGIC_BYTES - MCAP.len()) as u64)?);
-        Err(match (recognised(path, &start), start.len()) {
-            (Some(format), _) => RecordingFault::OtherFormat(format),
-            (None, found) if found < MCAP.len() => {
-                RecordingFault::Mcap(format!("it ends after {found} bytes"))
-            }
-            (None, _) => RecordingFault::Mcap("it begins with other bytes".to_owned()),
+        Err(match recognised(path, &start) {
+            Some(format) => RecordingFault::OtherFormat(format),
+            None => RecordingFault::Mcap("it begins with other bytes".to_owned()),
         })
     }
 
@@ -204,16 +227,17 @@ impl<'a, R: Read> Scan<'a, R> {
     }
 
     /// A file that ends before its end.
-    fn ended(&self, before: usize) -> Result<Option<String>, RecordingFault> {
+    fn ended(&self, before: usize) -> Ended {
         let messages = self.topics.messages - before;
         let (offset, chunks) = (self.offset, self.chunks);
-        if messages == 0 {
-            let words = format!("it ends after {offset} bytes, before a whole chunk with messages");
-            return Err(RecordingFault::Mcap(words));
+        match messages {
+            0 => Ended::Empty(format!(
+                "it ends after {offset} bytes, before a whole chunk with messages"
+            )),
+            _ => Ended::Early(format!(
+                "the file ends early, after {offset} bytes: {messages} messages are read, of {chunks} whole chunks"
+            )),
         }
-        Ok(Some(format!(
-            "the file ends early, after {offset} bytes: {messages} messages are read, of {chunks} whole chunks"
-        )))
     }
 
     /// The records of a chunk.

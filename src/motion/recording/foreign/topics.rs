@@ -43,6 +43,8 @@ struct Topic {
     tables: Vec<Table>,
     /// By lists of a message: its table, and the columns of its numbers.
     arrangements: BTreeMap<Vec<u8>, (usize, Vec<usize>)>,
+    /// Messages read.
+    arrived: usize,
     fault: Option<MessageFault>,
 }
 
@@ -51,6 +53,10 @@ struct Table {
     log: Log,
     /// Times of recording, ns.
     times_ns: Vec<u64>,
+    /// Numbers of the messages within their topic.
+    arrivals: Vec<usize>,
+    /// Whether a narrower table has its rows.
+    is_part: bool,
 }
 
 impl Topics {
@@ -88,6 +94,7 @@ impl Topics {
                 declared,
                 tables: Vec::new(),
                 arrangements: BTreeMap::new(),
+                arrived: 0,
                 fault: None,
             });
             self.topics.len() - 1
@@ -131,16 +138,23 @@ impl Topics {
     /// [`RecordingFault::NoTopic`] without any table.
     pub fn logs(self) -> Result<Vec<Log>, RecordingFault> {
         let mut logs = Vec::new();
-        for topic in self.topics {
+        for mut topic in self.topics {
             let messages: usize = topic.tables.iter().map(|table| table.times_ns.len()).sum();
+            topic.tables.sort_by_key(|table| table.log.columns.len());
+            for at in 0..topic.tables.len() {
+                let (tables, wider) = topic.tables.split_at_mut(at + 1);
+                wider.iter_mut().for_each(|table| tables[at].add(table));
+            }
             for table in topic.tables {
                 let others = messages - table.times_ns.len();
+                let what = match table.is_part {
+                    true => "lack values that the others have",
+                    false => "have other names or lengths and are left out",
+                };
                 let mut log = table.finished();
                 if others > 0 {
-                    log.notes.push(format!(
-                        "`{}`: {others} of {messages} messages have other names or lengths and are left out",
-                        log.name
-                    ));
+                    let note = format!("`{}`: {others} of {messages} messages {what}", log.name);
+                    log.notes.push(note);
                 }
                 logs.push(log);
             }
@@ -199,6 +213,8 @@ impl Topic {
             return Err(MessageFault::Long(MAX_ROWS));
         }
         table.times_ns.push(time_ns);
+        table.arrivals.push(self.arrived);
+        self.arrived += 1;
         let (seconds, rest) = (time_ns / 1_000_000_000, time_ns % 1_000_000_000);
         let columns = &mut table.log.columns;
         columns[0].push_instant(instant(seconds as i64, rest as u32));
@@ -248,8 +264,12 @@ impl Topic {
             first_row: 1,
             ..Log::default()
         };
-        let times_ns = Vec::new();
-        self.tables.push(Table { log, times_ns });
+        self.tables.push(Table {
+            log,
+            times_ns: Vec::new(),
+            arrivals: Vec::new(),
+            is_part: false,
+        });
         Ok((self.tables.len() - 1, order))
     }
 }
@@ -262,9 +282,38 @@ fn instant(seconds: i64, nanoseconds: u32) -> Instant {
 }
 
 impl Table {
+    /// Adds the rows of a table that has all columns of this one and more: messages with further joints or values.
+    fn add(&mut self, wider: &mut Self) {
+        let columns = self.log.columns.iter();
+        let place = |column: &Channel| {
+            let mut own = wider.log.columns.iter();
+            own.position(|other| other.name == column.name)
+        };
+        let Some(places) = columns.map(place).collect::<Option<Vec<usize>>>() else {
+            return;
+        };
+        for (column, place) in self.log.columns.iter_mut().zip(places) {
+            let other = &wider.log.columns[place];
+            column.values.extend(&other.values);
+            if let (Some(own), Some(others)) = (&mut column.instants, &other.instants) {
+                own.extend(others);
+            }
+        }
+        self.times_ns.extend(&wider.times_ns);
+        self.arrivals.extend(&wider.arrivals);
+        let mut rows = Vec::from_iter(0..self.arrivals.len());
+        rows.sort_by_key(|row| self.arrivals[*row]);
+        self.log.choose(&rows);
+        self.times_ns = rows.iter().map(|row| self.times_ns[*row]).collect();
+        self.arrivals.sort_unstable();
+        wider.is_part = true;
+    }
+
     /// The table by the stamps of its messages, or the time of recording if they have none, with rows in order.
     fn finished(self) -> Log {
-        let Self { mut log, times_ns } = self;
+        let Self {
+            mut log, times_ns, ..
+        } = self;
         let is_stamp = |channel: &Channel| {
             channel.name == "header.stamp" && channel.values.iter().any(|time| *time != 0.0)
         };

@@ -3,7 +3,7 @@
 use super::super::elements::{QUATERNION, Quantity};
 use super::super::log::{Channel, Log};
 use super::super::units::Dimension;
-use super::names::{Reading, is_time, read, unit};
+use super::names::{Reading, is_quantity, is_time, is_wanted, read, unit};
 use crate::recording::preprocess::median;
 use crate::robot::{JOINT_DIM, Robot};
 
@@ -26,6 +26,13 @@ pub(super) struct Group {
     family: Vec<String>,
 }
 
+impl Group {
+    /// The words of the names that do not say which quantity it is.
+    fn qualifiers(&self) -> impl Iterator<Item = &String> {
+        self.family.iter().filter(|word| !is_quantity(word))
+    }
+}
+
 /// The clock of the log, if it is a column.
 #[derive(Debug, Clone)]
 pub(super) struct Clock {
@@ -39,16 +46,25 @@ pub(super) fn groups(logs: &[Log], robot: &Robot) -> Vec<Group> {
     let rates: Vec<Option<i32>> = logs.iter().map(rate_class).collect();
     let all = complete(&families(logs, robot));
     let of = |quantity: Quantity| all.iter().filter(move |group| group.quantity == quantity);
-    // Words that the families of a first choice have in common with those of other quantities.
+    // Quantities of joints, or of the body, in the same words: of `q_sim`, `q` and `tau` the last two belong together.
     let fellows = |one: &Group| -> usize {
-        let of_quantity = |quantity| of(quantity).map(|other| shared(one, other)).max();
-        Quantity::ALL.into_iter().filter_map(of_quantity).sum()
+        let others = Quantity::ALL.into_iter().filter(|other| {
+            *other != one.quantity && other.is_of_joints() == one.quantity.is_of_joints()
+        });
+        let is_alike = |other: &Group| other.qualifiers().eq(one.qualifiers());
+        others.filter(|other| of(*other).any(is_alike)).count()
     };
     let rate = |group: &Group| std::cmp::Reverse(rates[group.log].unwrap_or_default());
+    // An arm's twelve joints are counted among others, the robot's have names.
+    let is_unnamed = |group: &Group| {
+        let is_by_leg = group.quantity.is_of_joints() || group.quantity == Quantity::Feet;
+        group.is_counted && is_by_leg && !is_unitree(&logs[group.log])
+    };
     let first = |quantity| {
         of(quantity).min_by_key(|group| {
             (
                 group.is_wanted,
+                is_unnamed(group),
                 rate(group),
                 std::cmp::Reverse(fellows(group)),
                 group.family.len(),
@@ -72,7 +88,7 @@ pub(super) fn groups(logs: &[Log], robot: &Robot) -> Vec<Group> {
             let plain = (group.is_quaternion, group.family.len());
             (
                 !is_first,
-                group.is_wanted,
+                (group.is_wanted, is_unnamed(group)),
                 same_log,
                 rate(group),
                 words,
@@ -86,15 +102,19 @@ pub(super) fn groups(logs: &[Log], robot: &Robot) -> Vec<Group> {
             .filter(|o| o.is_quaternion == best.is_quaternion)
             .collect();
         let rank_of = |group: &Group| {
-            let (_, _, log, rate, words, plain) = rank(group);
-            let words = if std::ptr::eq(best, base.unwrap_or(group)) {
-                Default::default()
-            } else {
-                words
-            };
-            (log, rate, words, plain)
+            let (_, (_, unnamed), log, rate, words, plain) = rank(group);
+            // The base is alike to nothing but itself.
+            let alike = (log, words);
+            let is_base = std::ptr::eq(best, base.unwrap_or(group));
+            let alike = if is_base { Default::default() } else { alike };
+            (unnamed, alike, rate, plain)
         };
-        let ties = |other: &&Group| rank_of(other) == rank_of(best) && differ(logs, best, other);
+        // Tables of one topic hold the same messages.
+        let is_apart =
+            |other: &Group| other.log == best.log || logs[other.log].name != logs[best.log].name;
+        let ties = |other: &&Group| {
+            is_apart(other) && rank_of(other) == rank_of(best) && differ(logs, best, other)
+        };
         let tie = others.iter().copied().any(|other| ties(&other));
         Some(Group {
             is_tie: tie,
@@ -103,6 +123,12 @@ pub(super) fn groups(logs: &[Log], robot: &Robot) -> Vec<Group> {
         })
     });
     chosen.collect()
+}
+
+/// Whether a log is a low-level state of Unitree's, which counts legs in romc's order.
+pub(super) fn is_unitree(log: &Log) -> bool {
+    let is_motor = |name: &str| name.starts_with("motor_state[") || name.starts_with("motorState[");
+    log.columns.iter().any(|column| is_motor(&column.name))
 }
 
 /// A family of columns: its first column, topic and rate.
@@ -153,9 +179,11 @@ fn families(logs: &[Log], robot: &Robot) -> Families {
             // What a column alone does not say its topic may: `/foot_contacts` of `position[fr]`.
             let in_topic = || read(&format!("{} {}", log.name, channel.name));
             let of_robot = of_robot(&channel.name, robot);
-            let Some(reading) = of_robot.or_else(|| read(&channel.name)).or_else(in_topic) else {
+            let Some(mut reading) = of_robot.or_else(|| read(&channel.name)).or_else(in_topic)
+            else {
                 continue;
             };
+            reading.is_wanted |= is_wanted(&log.name);
             let same = |(own, members): &&mut (usize, Vec<(usize, Reading)>)| {
                 let first = &members[0].1;
                 *own == index
@@ -170,6 +198,7 @@ fn families(logs: &[Log], robot: &Robot) -> Families {
         }
     }
     for (_, members) in &mut families {
+        from_zero(members);
         lists_of_three(members);
         bare_hips(members);
     }
@@ -235,6 +264,19 @@ fn bare_hips(members: &mut [(usize, Reading)]) {
             .iter_mut()
             .filter(|(_, reading)| reading.is_bare_hip);
         hips.for_each(|(_, reading)| reading.element += 1);
+    }
+}
+
+/// What is counted from 1 is counted from 0.
+fn from_zero(members: &mut [(usize, Reading)]) {
+    let last = members[0].1.quantity.elements().len();
+    let has = |number: usize| {
+        let mut counted = members.iter().filter(|(_, reading)| reading.is_counted);
+        counted.any(|(_, reading)| reading.element == number)
+    };
+    if has(last) && !has(0) {
+        let counted = members.iter_mut().filter(|(_, reading)| reading.is_counted);
+        counted.for_each(|(_, reading)| reading.element -= 1);
     }
 }
 

@@ -29,8 +29,8 @@ const FEET: &str = "foot feet contact contacts grf touch stance toe fz";
 const JOINT_ARRAYS: &str = "motor motors joint joints q dq ddq qd qdd qdot tau torque torques effort efforts position \
      velocity dof ctrl actuator angle angles theta";
 /// Words of values that a controller asked for rather than measured.
-const WANTED: &str = "des desired ref reference cmd command target setpoint goal raw lost temperature mode \
-     covariance ff kp kd";
+const WANTED: &str = "des desired ref reference references cmd cmds command commands commanded target targets setpoint \
+     setpoints goal raw lost temperature mode covariance ff kp kd";
 const TIME: &str = "time timestamp stamp t sec secs seconds clock datetime date";
 
 /// What a name says.
@@ -38,7 +38,7 @@ const TIME: &str = "time timestamp stamp t sec secs seconds clock datetime date"
 pub(super) struct Reading {
     /// The quantity; a quaternion and angles are both orientations.
     pub quantity: Quantity,
-    /// The element, in romc's order; of a quaternion 0 is w.
+    /// The element, in romc's order; of a quaternion 0 is w. The number of elements for the last of those counted from 1.
     pub element: usize,
     /// Whether the element is one of a quaternion.
     pub is_quaternion: bool,
@@ -82,6 +82,27 @@ pub(super) fn words(name: &str) -> Vec<String> {
 /// Whether a word is one of some with blanks between them.
 fn is_one(word: &str, of: &str) -> bool {
     of.split(' ').any(|known| known == word)
+}
+
+/// Whether a word is one of quantities.
+pub(super) fn is_quantity(word: &str) -> bool {
+    let known = [
+        TORQUE,
+        ACCELERATION,
+        VELOCITY,
+        ANGULAR_VELOCITY,
+        ANGULAR,
+        QUATERNION,
+        PLACE,
+        FEET,
+        JOINT_ARRAYS,
+    ];
+    known.iter().any(|known| is_one(word, known))
+}
+
+/// Whether the name of a column or topic says that its values were asked for rather than measured.
+pub(super) fn is_wanted(name: &str) -> bool {
+    words(name).iter().any(|word| is_one(word, WANTED))
 }
 
 /// Whether a name is one of a clock.
@@ -158,7 +179,7 @@ pub(super) fn read(name: &str) -> Option<Reading> {
     }
     let is_force = has("force forces") || (has("f fn load pressure") && leg.is_some());
     if has(FEET) || (is_force && axis.is_none() && joint.is_none()) {
-        let element = leg.or(number.filter(|n| *n < 4));
+        let element = leg.or(number.filter(|n| *n <= 4));
         let is_moved = has("position pos velocity vel speed");
         let is_contact = has("contact contacts stance touch");
         let is_place = axis.map_or(is_moved && !is_contact, |axis| axis != 2 || is_moved);
@@ -176,7 +197,7 @@ pub(super) fn read(name: &str) -> Option<Reading> {
     {
         return reading(kind, 3 * leg + joint, false, true);
     }
-    let in_array = number.filter(|number| *number < 12);
+    let in_array = number.filter(|number| *number <= 12);
     let of_body = has("imu body base trunk com torso pose odom twist");
     let of_axes = has(QUATERNION) && !has("q") || has(ANGULAR) || has("gyro gyroscope omega");
     if let Some(number) = in_array

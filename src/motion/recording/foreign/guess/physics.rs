@@ -24,8 +24,11 @@ const BETTER: (f64, f64) = (0.75, 5e-4);
 const LEAST_MOTION_M: f64 = 3e-3;
 /// Length of the times over which forces and changes of velocity are summed, s.
 const BLOCK_S: f64 = 0.08;
-/// Share of what torques leave unexplained by which another set of signs has to be better than one sign for all.
+/// Share of what torques leave unexplained by which another set of signs has to be better than one sign for all, where
+/// feet on the ground do not show the signs of flexions and knees.
 const OTHER_SIGNS: f64 = 0.5;
+/// Share of weight and change of velocity that torques may leave unexplained.
+const UNCARRIED: f64 = 0.8;
 /// Slope of the hips' torques over what holds the feet on their side that decides their sign.
 const HIP_SHARE: f64 = 0.3;
 /// Largest movement of feet on the ground in a reading that fits, m.
@@ -179,7 +182,15 @@ impl<'a> View<'a> {
             let best = (0..8).min_by(|a, b| figures[*a].total_cmp(&figures[*b]));
             best.expect("invariant: eight figures")
         };
-        let common = least(&whole);
+        let best = least(&whole);
+        let shown = std::array::from_fn(|kind| {
+            let turned = whole[best ^ (1 << kind)];
+            whole[best] < BETTER.0 * turned && whole[best] + BETTER.1 < turned
+        });
+        // A sign that they do not show is the plain one.
+        let common = (0..3)
+            .filter(|kind| shown[*kind])
+            .fold(0, |code, kind| code | best & (1 << kind));
         let mut codes = [common; 4];
         reading.slip_m = whole[common];
         // Legs with axes of their own, where those are clearly better.
@@ -196,10 +207,7 @@ impl<'a> View<'a> {
         }
         reading.signs = std::array::from_fn(|i| combination(codes[i / 3])[i % 3]);
         reading.motion_m = self.motion_m(&reading);
-        reading.shown = std::array::from_fn(|kind| {
-            let turned = whole[common ^ (1 << kind)];
-            whole[common] < BETTER.0 * turned && whole[common] + BETTER.1 < turned
-        });
+        reading.shown = shown;
         Some(reading)
     }
 
@@ -269,7 +277,7 @@ impl<'a> View<'a> {
             }
             let [product, square, whole] = sums;
             let left = 1.0 - product * product / (square * whole);
-            (product > 0.0 && left.is_finite()).then_some((left, product / square))
+            (product > 0.0 && left < UNCARRIED).then_some((left, product / square))
         };
         let tried = [[1.0, 1.0], [-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0]];
         let tried = tried.map(|signs| (signs, explained(signs)));
@@ -280,7 +288,9 @@ impl<'a> View<'a> {
             known.min_by(|one, other| one.1.0.total_cmp(&other.1.0))
         };
         let common = best(&tried[..2]);
-        let other = best(&tried[2..]);
+        // Flexions alone carry so little that chance decides their sign, in short recordings above all.
+        let is_shown = reading.shown[1] && reading.shown[2];
+        let other = best(&tried[2..]).filter(|_| !is_shown);
         let (signs, (_, scale)) = match (common, other) {
             (Some(common), Some(other)) if other.1.0 < OTHER_SIGNS * common.1.0 => other,
             (Some(common), _) => common,

@@ -1,5 +1,8 @@
 //! Units, signs, axes and orders of the guessed map: by names, by derivatives, and by what the robot's geometry says.
 
+use std::cmp::Ordering;
+use std::f64::consts::TAU;
+
 use nalgebra::DMatrix;
 
 use super::super::assemble::assemble;
@@ -20,8 +23,6 @@ const ANGLE: [(&str, f64); 3] = [
     ("rpm", std::f64::consts::PI / 30.0),
 ];
 const LENGTHS: [&str; 3] = ["m", "cm", "mm"];
-/// Largest angle of a joint within its turn, rad: beyond, degrees are the first choice.
-const ANGLE_RAD: f64 = std::f64::consts::TAU;
 /// Largest pitch for which radians are the first choice.
 const PITCH_RAD: f64 = 1.6;
 
@@ -93,8 +94,7 @@ impl Source<'_> {
             _ => "m",
         };
         let positions = self.units(Quantity::BodyPosition, &["mm", "cm"], &LENGTHS, by_height);
-        let angle = || reach(self.raw_of(Quantity::JointPosition).iter().copied());
-        let by_size = || if angle() > ANGLE_RAD { "deg" } else { "rad" };
+        let by_size = || self.angle_by_limits(robot);
         let told = ["mrad", "rad", "deg"];
         let joints = self.units(Quantity::JointPosition, &told, &["rad", "deg"], by_size);
         let group = self.group(Quantity::JointPosition);
@@ -235,6 +235,28 @@ impl Source<'_> {
         Some(recording)
     }
 
+    /// The unit of angles in which more of them are within the joints' limits, apart from whole turns and signs; where
+    /// limits do not decide, degrees for angles beyond a turn.
+    fn angle_by_limits(&self, robot: &Robot) -> &'static str {
+        let values = self.raw_of(Quantity::JointPosition);
+        let inside = |factor: f64| -> usize {
+            let rows = values.row_iter().zip(robot.joint_limit_rad());
+            let of_row = rows.map(|(row, (low, high))| {
+                let is_inside = |angle: f64| (angle - low).rem_euclid(TAU) <= high - low;
+                let angles = row.iter().map(|value| factor * value);
+                angles
+                    .filter(|angle| is_inside(*angle) || is_inside(-angle))
+                    .count()
+            });
+            of_row.sum()
+        };
+        let is_degrees = match inside(ANGLE[1].1).cmp(&inside(ANGLE[0].1)) {
+            Ordering::Equal => reach(values.iter().copied()) > TAU,
+            order => order.is_gt(),
+        };
+        if is_degrees { "deg" } else { "rad" }
+    }
+
     /// Signs by the limits of the joints, where nothing else shows them.
     fn by_limits(
         &self,
@@ -324,6 +346,14 @@ impl Source<'_> {
         }
     }
 
+    /// Whether a velocity is the twist of an odometry, which is in the body's frame unless the numbers show another.
+    fn is_odometry(&self, quantity: Quantity) -> bool {
+        self.group(quantity).is_some_and(|group| {
+            let first = &self.logs[group.log].columns[group.columns[0]];
+            first.name.starts_with("twist.twist.")
+        })
+    }
+
     /// Lines of the trunk's quantities.
     fn trunk(
         &self,
@@ -340,10 +370,14 @@ impl Source<'_> {
             let mut own = angles.clone();
             unwrap(&mut own);
             let rates = slopes(&times, &own);
-            let frames = [Frame::Angles, Frame::Body, Frame::World];
+            let is_odometry = self.is_odometry(Quantity::AngularVelocity);
+            let frames = match is_odometry {
+                true => [Frame::Body, Frame::Angles, Frame::World],
+                false => [Frame::Angles, Frame::Body, Frame::World],
+            };
             let turned = |frame| angle_rates(&own, &raw, frame).ok();
             let scale = axes(frames, turned, &rates, &ANGLE[..2]);
-            let own = velocity_lines(scale, "the angles");
+            let own = velocity_lines(scale, "the angles", is_odometry);
             lines.insert(Quantity::AngularVelocity, own);
         }
         self.place(Some(angles), position, lines);
@@ -365,9 +399,13 @@ impl Source<'_> {
                 Frame::Body => Some(in_world(angles?, &raw)),
                 Frame::World | Frame::Angles => Some(raw.clone()),
             };
-            let frames = [Frame::World, Frame::Body];
+            let is_odometry = self.is_odometry(Quantity::BodyVelocity);
+            let frames = match is_odometry {
+                true => [Frame::Body, Frame::World],
+                false => [Frame::World, Frame::Body],
+            };
             let scale = axes(frames, turned, &rates, Dimension::Length.units());
-            let own = velocity_lines(scale, "the position");
+            let own = velocity_lines(scale, "the position", is_odometry);
             lines.insert(Quantity::BodyVelocity, own);
         }
     }
@@ -420,11 +458,15 @@ fn sign_line(signs: &[f64]) -> Option<String> {
     Some(format!("sign = {{ {} }}", names.join(", ")))
 }
 
-/// NamedUnit, sign and axes of a velocity of the trunk.
-fn velocity_lines(found: Option<(Scale, Frame)>, of: &str) -> Vec<String> {
+/// Unit, sign and axes of a velocity of the trunk.
+fn velocity_lines(found: Option<(Scale, Frame)>, of: &str, is_odometry: bool) -> Vec<String> {
     let Some((scale, axes)) = found else {
+        let (sign, what) = match is_odometry {
+            true => ("", "an odometry's"),
+            false => ("# ", "unknown"),
+        };
         return vec![format!(
-            "# frame = \"body\"   # unknown: it does not follow {of}"
+            "{sign}frame = \"body\"   # {what}: it does not follow {of}"
         )];
     };
     let mut lines = vec![unit_line(

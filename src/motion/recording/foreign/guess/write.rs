@@ -10,7 +10,7 @@ use super::super::log::Log;
 use super::super::map::Name;
 use super::super::units::Dimension;
 use super::Guess;
-use super::columns::{Clock, Group, clock, groups};
+use super::columns::{Clock, Group, clock, groups, is_unitree};
 use super::evidence::{scale, slopes};
 use super::names::unit;
 use super::scales::{Scales, order_line};
@@ -103,12 +103,6 @@ pub(super) fn guessed(path: &Path, logs: &[Log], robot: &Robot) -> Guess {
         notes,
         open,
     }
-}
-
-/// Whether a log is a low-level state of Unitree's, which counts legs in romc's order.
-fn is_unitree(log: &Log) -> bool {
-    let is_motor = |name: &str| name.starts_with("motor_state[") || name.starts_with("motorState[");
-    log.columns.iter().any(|column| is_motor(&column.name))
 }
 
 fn quoted(name: &str) -> String {
