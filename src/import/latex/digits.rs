@@ -116,6 +116,11 @@ fn without_braces(mut tokens: Vec<Token>) -> Vec<Token> {
                     (is_kept[group.start], is_kept[at]) = (false, false);
                     is_kept[group.font.unwrap_or(at)] = false;
                 }
+                // `{\times}`, for less space around the sign.
+                if group.start + 2 == at && !group.is_argument && is_operator(&tokens[at - 1].kind)
+                {
+                    (is_kept[group.start], is_kept[at]) = (false, false);
+                }
                 wanted = group.behind;
             }
             Kind::Character(c) if c.is_ascii_digit() || *c == '.' => {
@@ -166,6 +171,14 @@ fn joined(tokens: &[Token]) -> Vec<Token> {
         at = number.at;
     }
     joined
+}
+
+fn is_operator(kind: &Kind) -> bool {
+    match kind {
+        Kind::Character(c) => "+-*/=".contains(*c),
+        Kind::Command(name) => has("times cdot ast", name),
+        _ => false,
+    }
 }
 
 fn is_comment(token: &Token) -> bool {

@@ -378,6 +378,48 @@ const PRINTED: [(&str, &str); 37] = [
         r"\sisetup{round-mode=places}\[\ddot z_1=\num{1.25}\]",
         r"1:40: found `\num`, with options",
     ),
+    (
+        r"\[\ddot z_1=\num[exponent-base=2]{1.5e3}\]",
+        r"1:17: found `[`, expected the number as it is printed",
+    ),
+    (
+        r"\newcommand\k{2}\input{macros}\[\ddot z_1=\k z_1\]",
+        r"1:17: found `\input`, which prints a file that is not read, expected the document in one file: latexpand paper.tex",
+    ),
+    (r"\iffalse\input{old}\fi\[\ddot z_1=z_1\]", "z1"),
+    (
+        r"\newenvironment{h}{\setbox0\vbox\bgroup}{\egroup}\[\ddot z_1=z_1\]\begin{h}\[\ddot z_2=9\]\end{h}",
+        r"1:69: found `\setbox`, which keeps mathematics",
+    ),
+    (
+        r"\setbox1=\hbox to 3cm{$\ddot z_1=9$}$\ddot z_1=z_1$",
+        r"1:1: found `\setbox`, which keeps mathematics",
+    ),
+    (
+        r"\mathcode`\+=`\-\[\ddot z_1=1+z_1\]",
+        r"1:1: found `\mathcode`",
+    ),
+    (
+        r"\[\ddot z_1=z_1\text{ + 3}\]",
+        r"1:24: found `+`, expected words behind the equation",
+    ),
+    (
+        r"\[\ddot z_1=z_1\text{$+z_1^2$}\]",
+        r"1:22: found `$`, expected words behind the equation",
+    ),
+    (r"\[\ddot z_1=z_1\text{ for all } \mbox{$z_1$}.\]", "z1"),
+    (
+        r"\[\ddot z_1=1.5{\times}10^{-3}z_1{+}2{\cdot}3{-}{z_1^{-}}\]",
+        r"1:60: found `}`",
+    ),
+    (
+        r"\[\ddot z_1{=}1.5{\times}10^{3}z_1{-}2{\cdot}3z_1^{2}\]",
+        "1500*z1 - 6*z1^2",
+    ),
+    (
+        r"\newcommand{\k}{\ensuremath{2}}\[\ddot z_1=1\textcolor{red}{3}\protect\k z_1\]",
+        "132*z1",
+    ),
 ];
 
 #[test]
