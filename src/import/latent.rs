@@ -100,14 +100,16 @@ fn check_options(latent_dim: usize, options: &ImportOptions) -> Result<(), Impor
     }
     let given = [
         ("--map", !options.mapping.is_empty()),
+        ("--weights", options.weights.is_some()),
         ("--xi-layout", options.xi_layout.is_some()),
         ("--library-order", options.library_order.is_some()),
         ("--activation", options.activation.is_some()),
+        ("--input-scaling", options.input_scaling.is_some()),
+        ("--order", options.order.is_some()),
     ];
-    let given = given.iter().find(|(_, is_given)| *is_given);
-    match given.map(|(option, _)| *option).or(options.of_maps()) {
+    match given.iter().find(|(_, is_given)| *is_given) {
         None => Ok(()),
-        Some(option) => {
+        Some((option, _)) => {
             let (found, expected) = ("a file of equations", "a file of tensors");
             Err(ImportFault::option(option, found, expected))
         }

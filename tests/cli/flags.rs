@@ -68,6 +68,8 @@ const IDLE: [(&str, &str); 30] = [
         "--clock",
     ),
     ("import e.txt --output m.json --symbols z1=x", "--symbols"),
+    ("import e.tex --output m.json --robot go1", "--robot"),
+    ("import e.txt --output m.json --scaling 0.1", "--scaling"),
     (
         "import e.tex --output m.json --activation elu",
         "--activation",

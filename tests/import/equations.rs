@@ -226,11 +226,6 @@ fn equations_that_do_not_fit_the_options_are_refused() {
         ..base.clone()
     };
     assert!(refusal("[contact]\nddz1 = z1\n", mapped).starts_with("--map: found a file of"));
-    let scaled = ImportOptions {
-        scaling: Some(romc::model::Scaling::uniform(0.1)),
-        ..base.clone()
-    };
-    assert!(refusal("[contact]\nddz1 = z1\n", scaled).starts_with("--scaling: found a file of"));
     let more = ImportOptions {
         phases: vec![
             "contact=any".parse().expect("a rule"),

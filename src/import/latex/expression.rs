@@ -92,8 +92,9 @@ impl Reader<'_> {
                     let (at, after) = (self.at, self.after_argument(self.at + 1));
                     let end = std::mem::replace(&mut self.end, after);
                     self.at = at + 1 + usize::from(self.kind(at + 1) == Some(&Kind::Open));
+                    self.takes(&Kind::Dollar);
                     let is_formula = match self.next_kind() {
-                        Some(Kind::Number(_) | Kind::Dollar) => true,
+                        Some(Kind::Number(_)) => true,
                         Some(Kind::Character(c)) => "+-*/=".contains(c) || c.is_ascii_digit(),
                         _ => false,
                     };
