@@ -241,7 +241,7 @@ fn documents_are_read_with_their_macros_and_phases() {
 }
 
 /// Documents, and what is read or refused of them.
-const PRINTED: [(&str, &str); 50] = [
+const PRINTED: [(&str, &str); 51] = [
     (
         r"\newcommand{\k}{2}\begingroup\renewcommand{\k}{9}\endgroup\[\ddot z_1=\k z_1\]",
         "2*z1",
@@ -415,6 +415,10 @@ const PRINTED: [(&str, &str); 50] = [
     (
         r"\[\ddot z_1{=}1.5{\times}10^{3}z_1{-}2{\cdot}10^{1}{\cdot}z_1^{2}\]",
         "1500*z1 - 20*z1^2",
+    ),
+    (
+        r"\[\ddot z_1=z_1\] as in $\ddot z_1=z_1$, and $\ddot z_2=3$",
+        r"1:47: found `\ddot z_2` in a line of the text",
     ),
     (r"\[\ddot z_1=0{\cdot}5z_1\]", r"1:15: found `\cdot`"),
     (
