@@ -12,7 +12,20 @@ use crate::recording::foreign::guess::guess;
 use crate::robot::Robot;
 use crate::{Error, artifact};
 
-/// Inspects each file: those that end in `.json` as models, all others as recordings.
+/// Endings of models; those of other tools are refused with the lines that convert them.
+const OF_MODELS: [&str; 9] = [
+    "json",
+    "safetensors",
+    "pt",
+    "pth",
+    "ckpt",
+    "keras",
+    "onnx",
+    "tflite",
+    "msgpack",
+];
+
+/// Inspects each file: those with an ending of models as such, all others as recordings.
 pub fn run(arguments: &InspectArguments) -> Result<Answer, Error> {
     let robot = robot::chosen(&arguments.robot)?;
     if arguments.guess {
@@ -21,8 +34,10 @@ pub fn run(arguments: &InspectArguments) -> Result<Answer, Error> {
     let reader = reader(&arguments.reading, Clocks::Recorded)?.for_robot(robot);
     let (mut texts, mut files) = (Vec::new(), Vec::new());
     for path in &arguments.files {
-        let is_model =
-            artifact::is_standard_input(path) || path.extension().is_some_and(|e| e == "json");
+        let is_model = artifact::is_standard_input(path)
+            || OF_MODELS
+                .iter()
+                .any(|of| path.extension().is_some_and(|e| e == *of));
         let Answer { text, json } = match is_model {
             true => inspect_model::describe(path, &artifact::read(path)?)?,
             false => inspect_recording::describe(&reader.read(path)?, robot)?,

@@ -10,8 +10,8 @@ use super::error::{ImportError, ImportFault, shape_text};
 use super::library;
 use super::options::{ImportOptions, PhaseRule, XiLayout, standard_text};
 use super::report::{ImportReport, Layout, Note, UnusedTensor, UsedTensor};
-use super::role::Role;
-use super::tensors::{Element, TensorFile};
+use super::role::{Part, Role, is_of_optimiser};
+use super::tensors::{Element, TensorFile, TensorInfo};
 use crate::files::Place;
 use crate::model::{InputStatistics, Library, LibraryChoice, ModelError, Phase, Scaling, StateMap};
 use crate::robot::STATE_DIM;
@@ -70,6 +70,7 @@ pub(super) fn parts(
         assembly.check_options_of_maps()?;
     }
     let (library, phases) = assembly.coefficients()?;
+    assembly.check_left_over([&encoder, &decoder], &phases)?;
     let statistics = assembly.statistics()?;
     let mut parts = Parts {
         library,
@@ -246,6 +247,63 @@ impl<'a> Assembly<'a, '_> {
         let found = format!("{option}, but no tensor for encoder.weight or decoder.weight; {left}");
         let expected = format!("--map encoder.weight=TENSOR and so on, or no {option}");
         Err(self.tensors.refused(Place::Whole, found, expected))
+    }
+
+    /// Refuses unused tensors that by shape are a missing encoder or decoder, or by their numbers a mask.
+    fn check_left_over(
+        &self,
+        maps: [&Option<StateMap>; 2],
+        phases: &[Phase],
+    ) -> Result<(), ImportError> {
+        let is_of_model = |info: &&&TensorInfo| !is_of_optimiser(&info.name);
+        let mut unused = self.assignment.unused.iter().filter(is_of_model);
+        let other = maps.iter().find_map(|map| map.as_ref());
+        for (part, map) in Part::ALL.into_iter().zip(maps) {
+            let (None, Some(other)) = (map, other) else {
+                continue;
+            };
+            let (a, b) = (other.input_dim(), other.output_dim());
+            let mut fitting = unused
+                .clone()
+                .filter(|info| info.shape == [a, b] || info.shape == [b, a]);
+            if let Some(info) = fitting.next() {
+                let name = part.name();
+                let found = format!(
+                    "no {name}, and {} unused, which has its shape",
+                    info.describe()
+                );
+                let expected = format!("--map {name}.weight={}, or a file without it", info.name);
+                return Err(self.tensors.refused(Place::Whole, found, expected));
+            }
+        }
+        let Some(mask) = unused.find(|info| self.is_mask(info, &phases[0].xi)) else {
+            return Ok(());
+        };
+        let (phase, described) = (&phases[0].name, mask.describe());
+        let found = format!("{described} unused, zeros and ones in the shape of xi.{phase}");
+        let expected = format!(
+            "--map mask.{phase}={} (0 switches a coefficient off), or a file without it",
+            mask.name
+        );
+        Err(self.tensors.refused(Place::Whole, found, expected))
+    }
+
+    /// Whether a tensor has the shape of coefficients and holds zeros and ones, both of them.
+    fn is_mask(&self, info: &TensorInfo, xi: &DMatrix<f64>) -> bool {
+        let (terms, latent) = xi.shape();
+        let shape = match info.shape[..] {
+            [rows, columns] if [(terms, latent), (latent, terms)].contains(&(rows, columns)) => {
+                (rows, columns)
+            }
+            _ => return false,
+        };
+        let place = |_: &[usize]| Place::Whole;
+        (self.tensors.read(info, shape, place)).is_ok_and(|values| {
+            [0.0, 1.0]
+                .iter()
+                .all(|flag| values.iter().any(|v| v == flag))
+                && values.iter().all(|&value| value == 0.0 || value == 1.0)
+        })
     }
 
     /// Coefficients of a phase in the file's order of terms, `library_dim x latent_dim`.

@@ -157,7 +157,10 @@ fn read_role(text: &str) -> Option<Role> {
         .into_iter()
         .find_map(|part| Some((part, after(part.name(), text)?)))?;
     let (module, tensor) = tail.rsplit_once(SEPARATORS).unwrap_or(("", tail));
-    match tensor.to_lowercase().as_str() {
+    // A layer's number may end the name, as in `encoder_W0`.
+    let stem = tensor.trim_end_matches(|c: char| c.is_ascii_digit());
+    let module = if stem == tensor { module } else { tensor };
+    match stem.to_lowercase().as_str() {
         "weight" | "weights" | "kernel" | "w" => Some(Role::Weights(part, layer(module)?)),
         "bias" | "biases" | "b" => Some(Role::Bias(part, layer(module)?)),
         _ => None,
@@ -199,7 +202,9 @@ impl Role {
         let role = role.or(map.map(|part| Role::Weights(part, None)));
         match role {
             Some(Role::Mask(_)) => role,
-            _ if words(name).any(|word| word == "mask") => Some(Role::Mask(ONLY_PHASE.to_owned())),
+            _ if words(name).any(|word| matches!(word.as_str(), "mask" | "masks")) => {
+                Some(Role::Mask(ONLY_PHASE.to_owned()))
+            }
             _ => role,
         }
     }

@@ -119,7 +119,17 @@ fn sections(
 ) -> Result<Sections, ImportError> {
     check_size(file, bytes, equations::MAX_TEXT_BYTES)?;
     match format {
-        Format::Latex => latex::read(file, bytes, symbols, known),
+        Format::Latex => {
+            let read = latex::read(file, bytes, symbols, known)?;
+            match symbols.beyond(read.latent_dim) {
+                None => Ok(read),
+                Some(found) => {
+                    let of = read.latent_dim;
+                    let expected = format!("variables of the {of} latent coordinates of {file}");
+                    Err(ImportFault::option("--symbols", found, expected))
+                }
+            }
+        }
         Format::Equations | Format::Safetensors | Format::Npz => equations::read(file, bytes),
     }
 }

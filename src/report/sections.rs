@@ -229,7 +229,7 @@ fn simplification(options: &PageOptions) -> Section<'static> {
 }
 
 const VERDICT_WORDS: [&str; 1] = [
-    "A model is fit for a use if every counted row of it passes; of the controller's figures those of the recording with the least margin are shown. Where predictions one stage ahead fail, other figures of the control that pass are not due to the dynamics and count as not measured.",
+    "A model is fit for a use if every counted row of it passes; of the controller's figures those of the recording with the least margin are shown. Where predictions one stage ahead or between restarts fail, other figures of the control that pass are not due to the dynamics and count as not measured.",
 ];
 const ENCODER_WORDS: &str = "The darker a cell (the brighter on a dark screen), the more of that coordinate the latent one takes.";
 const DYNAMICS_WORDS: &str = "Eigenvalues belong to each phase's linearisation at its mean state: a positive real part means that small deviations grow at that rate. The input gain is the matrix by which latent inputs accelerate the latent coordinates; its rank counts singular values above 1 % of the largest.";

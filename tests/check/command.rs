@@ -139,6 +139,25 @@ fn unreadable_files_exit_with_2_and_name_the_place() {
 }
 
 #[test]
+fn names_of_variables_that_a_paper_does_not_have_are_refused() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    fs::write(folder.path().join("a.tex"), r"\[\ddot x = x + u_1\]").expect("writable");
+    let symbols = ["--symbols", "z1=x", "--symbols", "u2=F"];
+    for command in [
+        &["check", "a.tex", "a.tex"][..],
+        &["import", "a.tex", "--output", "m.json"],
+    ] {
+        let run = romc(folder.path(), &[command, &symbols].concat());
+        assert_eq!(run.status.code(), Some(2));
+        let said = text(&run.stderr);
+        assert!(
+            said.contains("--symbols: found u2=F, expected variables of the 1 latent"),
+            "{said}"
+        );
+    }
+}
+
+#[test]
 fn papers_become_models() {
     let folder = tempfile::tempdir().expect("a folder");
     let paper = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/papers/align.tex");

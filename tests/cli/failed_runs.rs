@@ -53,12 +53,25 @@ fn exit_codes_follow_the_purpose_of_each_command_and_the_verdict_is_the_same_in_
     );
     with_xi("go1-d4", &broken, |value| -value);
     let without_torques = "models/go1-d2.json";
+    // Positions that are decoded wrongly do not enter the lift, so that feedback alone would pass.
+    let doubled = path(&folder, "doubled.json");
+    let shipped = fs::read_to_string(MODEL).expect("a shipped model");
+    let mut model: Value = serde_json::from_str(&shipped).expect("JSON");
+    let rows = model["decoder"]["weights"].as_array_mut().expect("rows");
+    for value in rows
+        .iter_mut()
+        .flat_map(|row| row.as_array_mut().expect("a row"))
+    {
+        *value = (2.0 * value.as_f64().expect("a number")).into();
+    }
+    fs::write(&doubled, model.to_string()).expect("writable");
     let all: &[&str] = &["0.1 s", "whole motion", "torques", "control"];
     let (predictions, control) = all.split_at(2);
     for (model, codes, fit, failed) in [
         (MODEL, [0, 0, 0], all, &[][..]),
         (without_torques, [0, 1, 0], predictions, control),
         (&broken, [1, 1, 1], &[], all),
+        (&doubled, [1, 0, 0], &["torques"], predictions),
     ] {
         let mut verdicts = Vec::new();
         let commands = [("simulate", &table), ("mpc", &table), ("report", &page)];

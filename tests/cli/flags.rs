@@ -8,7 +8,7 @@ use romc::Error;
 use romc::cli::args::{Arguments, Command, refuse_idle};
 
 /// Command lines with a flag that does nothing there, and that flag.
-const IDLE: [(&str, &str); 30] = [
+const IDLE: [(&str, &str); 32] = [
     (
         "compile m.json --out-dir o --emit latex --precision f32",
         "--precision",
@@ -68,6 +68,8 @@ const IDLE: [(&str, &str); 30] = [
         "--clock",
     ),
     ("import e.txt --output m.json --symbols z1=x", "--symbols"),
+    ("import e.tex --output m.json --robot go1", "--robot"),
+    ("import e.txt --output m.json --scaling 0.1", "--scaling"),
     (
         "import e.tex --output m.json --activation elu",
         "--activation",
@@ -129,7 +131,7 @@ const ELSEWHERE: &str = "json help version force output out-dir \
     simulate: restart-every clock columns mpc: horizon step lift reference-input solver figures clock columns \
     plan: distance apex start figures reach settings \
     report: study figures plan restart-every tolerance clock columns \
-    import: format map weights xi-layout library library-order latent-dim phase scaling input-scaling robot wrench-frame \
+    import: format map weights xi-layout library library-order latent-dim phase input-scaling wrench-frame \
     actuators sample-time inputs-from unchecked name description \
     train: validation test split config latent-dim method robot paper seed seeds epochs encoder-layers \
     decoder-layers activation lift-weight body-weight bptt-weight bptt-window bptt-stride bptt-decay \

@@ -159,6 +159,53 @@ fn files_of_other_tools_are_named_with_the_lines_that_convert_them() {
 }
 
 #[test]
+fn files_that_are_packed_or_another_are_named_with_the_line_for_a_shell() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    for (name, bytes, what, line) in [
+        (
+            "net.npz",
+            &b"\n<!DOCTYPE HTML>"[..],
+            "a web page",
+            "curl -L -o \"net.npz\"",
+        ),
+        ("eq.txt", b"<html>", "a web page", "curl -L -o \"eq.txt\""),
+        (
+            "net.npz.gz",
+            b"\x1f\x8b\x08",
+            "packed by gzip",
+            "gunzip -c \"net.npz.gz\" > \"net.npz\"",
+        ),
+        (
+            "eq.tex",
+            b"\xff\xfe\\\0",
+            "text in UTF-16",
+            "mv utf8.tmp \"eq.tex\"",
+        ),
+    ] {
+        fs::write(folder.path().join(name), bytes).expect("writable");
+        for arguments in [
+            &["import", name, "--output", "m.json"][..],
+            &["compile", name, "--out-dir", "out"],
+        ] {
+            let refused = romc(folder.path(), arguments);
+            assert_eq!(refused.status.code(), Some(1), "{name}");
+            let said = text(&refused.stderr);
+            assert!(said.contains(what) && said.contains(line), "{name}: {said}");
+        }
+    }
+    fs::write(folder.path().join("net.msgpack"), b"\x82\xa6params").expect("writable");
+    let refused = romc(
+        folder.path(),
+        &["import", "net.msgpack", "--output", "m.json"],
+    );
+    assert!(text(&refused.stderr).contains("flax.serialization.msgpack_restore"));
+    // A network is no log.
+    fs::write(folder.path().join("net.pt"), b"PK\x03\x04 net/data.pkl").expect("writable");
+    let said = romc(folder.path(), &["inspect", "net.pt"]);
+    assert!(text(&said.stderr).contains("found a PyTorch file, expected a model file of romc"));
+}
+
+#[test]
 fn model_files_that_are_none_are_named() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     fs::write(folder.path().join("net.pt"), b"PK\x03\x04 net/data.pkl").expect("writable");

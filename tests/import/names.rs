@@ -169,6 +169,66 @@ fn options_of_maps_are_refused_without_one_and_the_tensors_left_are_named() {
 }
 
 #[test]
+fn a_layers_number_may_end_the_name_of_its_tensors() {
+    // As the code of Champion et al. names them.
+    let mut stored = vec![plain("sindy_coefficients", &wave(4, 2, 0.2))];
+    for (name, widths) in [("encoder", [5, 4, 2]), ("decoder", [2, 4, 5])] {
+        for layer in 0..2 {
+            let (inputs, outputs) = (widths[layer], widths[layer + 1]);
+            let seed = 0.3 + layer as f64;
+            stored.push(plain(
+                &format!("{name}_W{layer}"),
+                &wave(inputs, outputs, seed),
+            ));
+            stored.push(list(&format!("{name}_b{layer}"), &vec![0.1; outputs]));
+        }
+    }
+    let options = ImportOptions {
+        activation: Some(Activation::Sigmoid),
+        phases: vec!["always=always".parse().expect("a rule")],
+        ..options(TERMS)
+    };
+    let found = run(&stored, &options).expect("a chain of layers");
+    assert!(found.report.unused.is_empty());
+    let x = DVector::from_row_slice(&[3.0, -4.0, 1.0, 7.0, -2.0]);
+    let hidden = wave(5, 4, 0.3).transpose() * &x * 0.1 + DVector::from_element(4, 0.1);
+    let hidden = hidden.map(|a| 1.0 / (1.0 + (-a).exp()));
+    let expected = wave(4, 2, 1.3).transpose() * hidden + DVector::from_element(2, 0.1);
+    assert!((found.model.encode(&x).expect("fits") - expected).amax() < 1e-14);
+}
+
+#[test]
+fn unused_tensors_that_are_a_missing_map_or_a_mask_are_refused() {
+    let mut stored = vec![
+        plain("decoder.weight", &wave(5, 2, 0.1)),
+        plain("xi_contact", &wave(4, 2, 0.2)),
+    ];
+    run(&stored, &options(TERMS)).expect("a decoder alone");
+    stored.push(plain("Adam/encode.weight/m", &wave(2, 5, 0.3)));
+    run(&stored, &options(TERMS)).expect("what an optimiser keeps is no map");
+    stored.push(plain("encode.weight", &wave(2, 5, 0.3)));
+    assert_eq!(
+        refusal(&stored, &options(TERMS)),
+        "net.npz: found no encoder, and `encode.weight` (2 x 5) unused, which has its shape, expected --map \
+         encoder.weight=encode.weight, or a file without it"
+    );
+    stored.truncate(2);
+    let flags = DMatrix::from_fn(2, 4, |i, j| f64::from(u8::from(i == j)));
+    stored.push(plain("support", &flags));
+    assert_eq!(
+        refusal(&stored, &options(TERMS)),
+        "net.npz: found `support` (2 x 4) unused, zeros and ones in the shape of xi.contact, expected --map \
+         mask.contact=support (0 switches a coefficient off), or a file without it"
+    );
+    stored[2] = plain("support", &DMatrix::from_element(2, 4, 1.0));
+    run(&stored, &options(TERMS)).expect("ones alone switch nothing off");
+    stored[2] = plain("coefficient_masks", &flags);
+    let found = run(&stored, &options(TERMS)).expect("a mask by its name");
+    let kept = found.model.phases()[0].xi.iter().filter(|v| **v != 0.0);
+    assert_eq!(kept.count(), 2);
+}
+
+#[test]
 fn tensors_of_an_encoder_that_are_no_linear_layer_are_refused() {
     let mut stored = vec![
         plain("net.encoder.0.weight", &wave(2, 5, 0.1)),

@@ -105,7 +105,11 @@ fn foreign(file: &str, bytes: &[u8]) -> Option<ArtifactError> {
     let import =
         "romc import (in Python Model.from_arrays, from_torch or from_pysindy) makes one of";
     let source = found.remedy.unwrap_or("it".to_owned());
-    let (what, remedy) = (found.what, format!("{import} {source}"));
+    let remedy = match source.starts_with("the file itself") {
+        true => source,
+        false => format!("{import} {source}"),
+    };
+    let what = found.what;
     Some(ArtifactFault::Foreign { what, remedy }.of(file))
 }
 

@@ -34,7 +34,7 @@ h5py.File(\"{file}\").visititems(lambda name, entry: found.update({name: entry[(
 numpy.savez(\"{stem}.npz\", **found)";
 
 /// The kinds, by content in this order, then by ending.
-const KINDS: [Kind; 17] = [
+const KINDS: [Kind; 21] = [
     Kind {
         what: "NumPy arrays (.npz)",
         endings: &[],
@@ -183,6 +183,37 @@ numpy.savez(\"{stem}.npz\", **{t.name: onnx.numpy_helper.to_array(t) for t in on
         is_content: |b| b.starts_with(b"version https://git-lfs"),
         lines: "git lfs pull --include \"{file}\"",
     },
+    Kind {
+        what: "a web page in place of the file",
+        endings: &[],
+        is_content: |b| {
+            let start = b.trim_ascii_start();
+            let is = |tag: &[u8]| (start.get(..tag.len())).is_some_and(|s| s.eq_ignore_ascii_case(tag));
+            is(b"<!doctype html") || is(b"<html")
+        },
+        lines: "curl -L -o \"{file}\" ADDRESS_OF_THE_RAW_FILE",
+    },
+    Kind {
+        what: "a file packed by gzip",
+        endings: &[],
+        is_content: |b| b.starts_with(b"\x1f\x8b"),
+        lines: "gunzip -c \"{file}\" > \"{stem}\"",
+    },
+    Kind {
+        what: "text in UTF-16",
+        endings: &[],
+        is_content: |b| b.starts_with(b"\xff\xfe") || b.starts_with(b"\xfe\xff"),
+        lines: "iconv -f UTF-16 -t UTF-8 \"{file}\" > utf8.tmp && mv utf8.tmp \"{file}\"",
+    },
+    Kind {
+        what: "a Flax file",
+        endings: &["msgpack"],
+        is_content: NEVER,
+        lines: "\
+import flax, numpy
+saved = flax.serialization.msgpack_restore(open(\"{file}\", \"rb\").read())
+numpy.savez(\"{stem}.npz\", **flax.traverse_util.flatten_dict(saved, sep=\"/\"))",
+    },
 ];
 
 const HDF5_MAGIC: &[u8] = b"\x89HDF\r\n\x1a\n";
@@ -244,9 +275,9 @@ impl Kind {
             .replace("{file}", &text(path))
             .replace("{stem}", &text(&path.with_extension("")));
         let lines: String = lines.lines().map(|line| format!("\n    {line}")).collect();
-        let intent = match self.lines.starts_with("git") {
-            true => "the file itself; in a shell",
-            false => "an .npz or .safetensors file; in Python",
+        let intent = match self.lines.starts_with("import") {
+            true => "an .npz or .safetensors file; in Python",
+            false => "the file itself; in a shell",
         };
         ForeignFile {
             what: self.what,

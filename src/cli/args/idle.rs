@@ -172,6 +172,13 @@ fn of_import(arguments: &ImportArguments) -> Vec<Row> {
             tensors,
         ),
         ("--order", arguments.order.is_some(), has_tensors, tensors),
+        ("--robot", arguments.robot.is_some(), has_tensors, tensors),
+        (
+            "--scaling",
+            !arguments.scaling.is_empty(),
+            has_tensors,
+            tensors,
+        ),
     ];
     rows.extend(reading(
         &arguments.reading,

@@ -163,9 +163,13 @@ impl Expander<'_> {
         token: &Token,
         why: (&'static str, &'static str),
     ) -> Result<Option<Token>, ImportError> {
-        match self.following_groups(6) {
-            Some(arguments) => self.undecided(token, &arguments, why),
-            None => Ok(Some(token.clone())),
+        let is_kept = why == KEPT;
+        match self.following_groups(if is_kept { 16 } else { 6 }) {
+            Some(passed) if !is_kept || !passed.iter().any(|token| token.is_command("bgroup")) => {
+                self.undecided(token, &passed, why)
+            }
+            None if !is_kept => Ok(Some(token.clone())),
+            _ => self.refuse(token, why.0, why.1),
         }
     }
 

@@ -309,7 +309,6 @@ pub(super) fn unread((why, expected): (&'static str, &'static str), matters: boo
 /// Whether options of siunitx print other digits than are written.
 pub(super) fn changes_digits(options: &[Token]) -> bool {
     let text = spelled(options);
-    ["round", "input", "parse", "drop", "fixed-exponent"]
-        .iter()
-        .any(|key| text.contains(key))
+    let keys = "round input parse drop fixed-exponent exponent-base evaluate";
+    keys.split(' ').any(|key| text.contains(key))
 }

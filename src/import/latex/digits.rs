@@ -116,6 +116,11 @@ fn without_braces(mut tokens: Vec<Token>) -> Vec<Token> {
                     (is_kept[group.start], is_kept[at]) = (false, false);
                     is_kept[group.font.unwrap_or(at)] = false;
                 }
+                // `{\times}`, for less space around the sign.
+                let is_alone = group.start + 2 == at && !group.is_argument;
+                if is_alone && is_operator(&tokens[at - 1].kind, &tokens[at + 1..]) {
+                    (is_kept[group.start], is_kept[at]) = (false, false);
+                }
                 wanted = group.behind;
             }
             Kind::Character(c) if c.is_ascii_digit() || *c == '.' => {
@@ -166,6 +171,22 @@ fn joined(tokens: &[Token]) -> Vec<Token> {
         at = number.at;
     }
     joined
+}
+
+/// Whether a token is an operator also without the space around it: `0{\cdot}5` may be a decimal fraction.
+fn is_operator(kind: &Kind, behind: &[Token]) -> bool {
+    let digit = |at: usize| match behind.get(at).map(|token| &token.kind) {
+        Some(Kind::Character(c)) if c.is_ascii_digit() => Some(*c),
+        _ => None,
+    };
+    match kind {
+        Kind::Character(c) => "+-*/=".contains(*c),
+        Kind::Command(name) if name == "cdot" => {
+            digit(0).is_none() || [0, 1, 2].map(digit) == [Some('1'), Some('0'), None]
+        }
+        Kind::Command(name) => has("times ast", name),
+        _ => false,
+    }
 }
 
 fn is_comment(token: &Token) -> bool {

@@ -21,7 +21,11 @@ const BY_COMMAND: &str = "equation eqnarray displaymath";
 const PHANTOMS: &str = "phantom hphantom vphantom";
 const NOT_PRINTED: &str = "index typeout message hypersetup pdfbookmark nocite @gobble";
 /// Commands after which the text reads in another way than is followed here.
-const NOT_FOLLOWED: &str = "globaldefs aftergroup afterassignment scantokens";
+const NOT_FOLLOWED: &str =
+    "globaldefs aftergroup afterassignment scantokens mathcode everymath everydisplay";
+/// Commands that print another file.
+const OTHER_FILES: &str = "input include subfile subfileinclude subinputfrom import subimport inputfrom includefrom \
+    InputIfFileExists @input";
 
 pub(super) struct Expander<'t> {
     pub(super) file: &'t str,
@@ -255,11 +259,22 @@ impl<'t> Expander<'t> {
             "egroup" => return Ok(Some(token.with(Kind::Close))),
             "global" => self.is_global = true,
             "unless" => self.is_negated = true,
-            "long" | "outer" | "protected" | "expandafter" => {}
+            "long" | "outer" | "protected" | "expandafter" | "protect" | "ensuremath" => {}
+            "textcolor" | "mathcolor" => {
+                self.optional();
+                self.argument();
+            }
             "makeatletter" | "makeatother" => self.scopes.has_at_letters = name == "makeatletter",
             "catcode" => return self.category(token).map(|()| None),
             _ if has(NOT_FOLLOWED, name) => {
                 return self.refuse(&token, "", "definitions where they hold");
+            }
+            _ if has(OTHER_FILES, name) => {
+                let expected = format!(
+                    "the document in one file: latexpand {} > whole.tex",
+                    self.file
+                );
+                return self.refuse(&token, ", which prints a file that is not read", &expected);
             }
             "csname" => {
                 let name = self.name_to("endcsname");

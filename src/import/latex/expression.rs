@@ -89,7 +89,21 @@ impl Reader<'_> {
                 None => return Ok(()),
                 Some(Kind::Character(',' | '.' | ';')) => self.at += 1,
                 Some(Kind::Command(name)) if has(WORDS, &name) => {
-                    self.at = self.after_argument(self.at + 1);
+                    let (at, after) = (self.at, self.after_argument(self.at + 1));
+                    let end = std::mem::replace(&mut self.end, after);
+                    self.at = at + 1 + usize::from(self.kind(at + 1) == Some(&Kind::Open));
+                    self.takes(&Kind::Dollar);
+                    let is_formula = match self.next_kind() {
+                        Some(Kind::Number(_)) => true,
+                        Some(Kind::Character(c)) => "+-*/=".contains(c) || c.is_ascii_digit(),
+                        _ => false,
+                    };
+                    if is_formula {
+                        return self.unexpected(
+                            "words behind the equation, or mathematics outside of the text",
+                        );
+                    }
+                    (self.at, self.end) = (after, end);
                 }
                 Some(_) => return self.unexpected("an operator or the end of the equation"),
             }

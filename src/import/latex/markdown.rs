@@ -2,13 +2,32 @@
 
 use super::token::{Kind, Lexer, Token};
 
-/// Tokens of the displays (`math` fences and `$$`) and of the mathematics in the lines (`$`), with headings and the
-/// text around as comments. Code, and comments of HTML, are passed over.
+/// What stretches over lines, with its ends: displays, and what is not printed as mathematics.
+const STRETCHES: [(&str, &str); 6] = [
+    ("$$", "$$"),
+    ("\\[", "\\]"),
+    ("<!--", "-->"),
+    ("<pre", "</pre>"),
+    ("<code", "</code>"),
+    ("<script", "</script>"),
+];
+
+/// Tokens of the displays (`math` fences, `$$`, `\[`) and of the mathematics in the lines (`$`, `\(`), with headings and
+/// the text around as comments. Code, comments, references and what stands before the text are passed over.
 pub(super) fn tokens(text: &str) -> Vec<Token> {
     let mut markdown = Markdown::default();
     // The mark and length of an open fence, and whether mathematics is in it.
     let mut fence: Option<(char, usize, bool)> = None;
-    for (index, line) in text.lines().enumerate() {
+    let mut indented = Indented::default();
+    let mut lines = text.lines().map(str::trim_end);
+    let has_metadata = lines.next() == Some("---") && lines.next().is_some_and(|l| l.contains(':'));
+    let metadata = if has_metadata {
+        lines.position(|line| line == "---")
+    } else {
+        None
+    };
+    let first = metadata.map_or(0, |length| length + 3);
+    for (index, line) in text.lines().enumerate().skip(first) {
         let place = (index + 1, 1);
         let content = line.trim();
         let mark = content.chars().next().filter(|c| "`~".contains(*c));
@@ -25,7 +44,7 @@ pub(super) fn tokens(text: &str) -> Vec<Token> {
                 fence = fence.filter(|_| !closes);
             }
             None if markdown.skips.is_none() && length >= 3 && !rest.contains('`') => {
-                let is_math = rest == "math";
+                let is_math = matches!(rest, "math" | "{math}");
                 fence = mark.map(|mark| (mark, length, is_math));
                 if is_math {
                     markdown.push(Kind::Display, place);
@@ -35,6 +54,8 @@ pub(super) fn tokens(text: &str) -> Vec<Token> {
                 let heading = content.trim_start_matches('#').trim();
                 markdown.push(Kind::Comment(unescaped(heading)), place);
             }
+            None if markdown.skips.is_none()
+                && (indented.is_code(line) || is_reference(content)) => {}
             None => markdown.line(line, place),
         }
     }
@@ -71,12 +92,13 @@ impl Markdown {
             (number, counted.1)
         };
         let (mut at, mut text_from) = (0, 0);
+        let [last_round, last_square] = ["\\)", "\\]"].map(|end| line.rfind(end));
         while at < line.len() {
             let rest = &line[at..];
             if let Some(end) = self.skips {
                 let length = rest.find(end).unwrap_or(rest.len());
                 let is_closed = length < rest.len();
-                if end == "$$" {
+                if is_display(end) {
                     self.mathematics(&rest[..length], place(at));
                     if is_closed {
                         self.push(Kind::Display, place(at + length));
@@ -88,21 +110,31 @@ impl Markdown {
                 continue;
             }
             let first = rest.chars().next().map_or(1, char::len_utf8);
-            let span = code_or_escape(rest);
-            let (open, inline) = (["$$", "<!--"], inline(rest));
-            let opened = open.into_iter().find(|open| rest.starts_with(open));
-            if span.is_none() && (opened.is_some() || inline.is_some()) {
+            // Ends are looked for once, so that long lines stay cheap.
+            let inline = match rest.starts_with("\\(") && last_round <= Some(at) {
+                true => None,
+                false => inline(rest),
+            };
+            let opened = STRETCHES.into_iter().find(|(open, _)| {
+                let inside = rest.strip_prefix(open);
+                // A bracket with a backslash may also be one that is printed.
+                let is_end = |inside: &str| last_square > Some(at) || inside.trim().is_empty();
+                inside.is_some_and(|inside| *open != "\\[" || is_end(inside))
+            });
+            let span = match opened.is_some() || inline.is_some() {
+                true => None,
+                false => code_or_escape(rest),
+            };
+            if opened.is_some() || inline.is_some() {
                 self.text(&line[text_from..at], place(text_from));
             }
             match (span, opened, inline) {
                 (Some(length), ..) => at += length,
-                (None, Some("$$"), _) => {
-                    self.push(Kind::Display, place(at));
-                    self.skips = Some("$$");
-                    at += 2;
-                }
-                (None, Some(open), _) => {
-                    self.skips = Some("-->");
+                (None, Some((open, end)), _) => {
+                    if is_display(end) {
+                        self.push(Kind::Display, place(at));
+                    }
+                    self.skips = Some(end);
                     at += open.len();
                 }
                 (None, None, Some((inside, behind))) => {
@@ -124,6 +156,49 @@ impl Markdown {
         if !text.trim().is_empty() {
             self.push(Kind::Comment(text.to_owned()), place);
         }
+    }
+}
+
+fn is_display(end: &str) -> bool {
+    matches!(end, "$$" | "\\]")
+}
+
+/// A line such as `[name]: address`, which prints nothing.
+fn is_reference(content: &str) -> bool {
+    content.starts_with('[')
+        && content
+            .split_once("]:")
+            .is_some_and(|(name, _)| !name[1..].contains('['))
+}
+
+/// Finds code by its indentation, outside of lists.
+#[derive(Default)]
+struct Indented {
+    is_behind_text: bool,
+    is_in_list: bool,
+}
+
+impl Indented {
+    /// Whether a line is code.
+    fn is_code(&mut self, line: &str) -> bool {
+        let content = line.trim_start();
+        let is_indented = line.starts_with("    ") || line.starts_with('\t');
+        if content.is_empty() {
+            self.is_behind_text = false;
+            return false;
+        }
+        let number = content.trim_start_matches(|c: char| c.is_ascii_digit());
+        let is_item = ["- ", "* ", "+ "]
+            .iter()
+            .any(|mark| content.starts_with(mark))
+            || number.len() < content.len() && number.starts_with(['.', ')']);
+        let is_code = is_indented && !self.is_behind_text && !self.is_in_list;
+        if !is_code {
+            let goes_on = self.is_in_list && (self.is_behind_text || line.starts_with([' ', '\t']));
+            self.is_in_list = is_item || goes_on;
+            self.is_behind_text = true;
+        }
+        is_code
     }
 }
 
@@ -152,8 +227,12 @@ fn code_or_escape(text: &str) -> Option<usize> {
 }
 
 /// Where mathematics in a line is that opens at the start of `text`, and the place behind its end: `$z_1$`, `` $`z_1`$ ``.
-/// As on GitHub, spaces are not inside next to the marks, and no digit follows (`$5 and $6`).
+/// As on GitHub, spaces are not inside next to the marks, and no digit follows (`$5 and $6`). `\(z_1\)` as well.
 fn inline(text: &str) -> Option<(std::ops::Range<usize>, usize)> {
+    if let Some(inside) = text.strip_prefix("\\(") {
+        let length = inside.find("\\)")?;
+        return Some((2..2 + length, length + 4));
+    }
     let inside = text.strip_prefix('$')?;
     if let Some(inside) = inside.strip_prefix('`') {
         let length = inside.find("`$")?;

@@ -82,6 +82,16 @@ impl SymbolNames {
             .filter(|variable| self.names.values().all(|renamed| renamed != variable))
     }
 
+    /// The first entry whose variable equations of so many latent coordinates do not have.
+    pub(in super::super) fn beyond(&self, latent_dim: usize) -> Option<String> {
+        let is_beyond = |variable: &LatentVariable| match variable {
+            LatentVariable::Z(k) | LatentVariable::Dz(k) | LatentVariable::U(k) => *k >= latent_dim,
+        };
+        let mut entries = self.names.iter();
+        let (name, variable) = entries.find(|(_, variable)| is_beyond(variable))?;
+        Some(format!("{variable}={name}"))
+    }
+
     /// What can stand in an expression, for messages.
     pub(super) fn expected(&self) -> String {
         let renamed: Vec<&str> = self.names.keys().map(String::as_str).collect();

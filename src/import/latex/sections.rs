@@ -48,6 +48,7 @@ pub(in crate::import) fn read(
     // Equations in the lines of the text count where there are no others.
     for in_lines in [false, true] {
         if !document.sections.is_empty() {
+            refuse_others_in_lines(&document, &items)?;
             break;
         }
         (document.digits, document.phase, document.starts_phase) = (stated, None, false);
@@ -65,8 +66,35 @@ pub(in crate::import) fn read(
         let expected = format!("\\ddot z_1 and so on, with {}", names.expected());
         return Err(refused(file, token.place, found, expected));
     }
-    let expected = "an equation such as \\begin{align} \\ddot z_1 &= 0.5 z_1 + u_1 \\end{align}";
+    let expected = match is_markdown {
+        true => "an equation such as $$ \\ddot z_1 = 0.5 z_1 + u_1 $$",
+        false => "an equation such as \\begin{align} \\ddot z_1 &= 0.5 z_1 + u_1 \\end{align}",
+    };
     complete(file, document.sections, text.lines().count(), expected)
+}
+
+/// Refuses equations in the lines of the text for coordinates that no display has: they would be dropped.
+fn refuse_others_in_lines(document: &Document<'_>, items: &[Item]) -> Result<(), ImportError> {
+    let equations = document
+        .sections
+        .iter()
+        .flat_map(|section| &section.equations);
+    let outputs: Vec<usize> = equations.map(|equation| equation.output).collect();
+    for tokens in items.iter().filter_map(|item| item.equations(true)) {
+        let Ok(mut reader) = Reader::new(document.file, document.names, tokens) else {
+            continue;
+        };
+        let left_sides = reader.left_sides();
+        let mut symbols = left_sides.iter().map(|(_, symbol, _)| symbol);
+        let other =
+            symbols.find(|symbol| reader.output(symbol).is_some_and(|k| !outputs.contains(&k)));
+        if let Some(symbol) = other {
+            let found = format!("{} in a line of the text", symbol.quoted());
+            let expected = "a display for it, as for the other equations";
+            return Err(refused(document.file, symbol.place, found, expected));
+        }
+    }
+    Ok(())
 }
 
 /// Whether a left side `\ddot z_1` has an index, so that `z` alone is no coordinate.

@@ -241,7 +241,7 @@ fn documents_are_read_with_their_macros_and_phases() {
 }
 
 /// Documents, and what is read or refused of them.
-const PRINTED: [(&str, &str); 37] = [
+const PRINTED: [(&str, &str); 51] = [
     (
         r"\newcommand{\k}{2}\begingroup\renewcommand{\k}{9}\endgroup\[\ddot z_1=\k z_1\]",
         "2*z1",
@@ -378,6 +378,53 @@ const PRINTED: [(&str, &str); 37] = [
         r"\sisetup{round-mode=places}\[\ddot z_1=\num{1.25}\]",
         r"1:40: found `\num`, with options",
     ),
+    (
+        r"\[\ddot z_1=\num[exponent-base=2]{1.5e3}\]",
+        r"1:17: found `[`, expected the number as it is printed",
+    ),
+    (
+        r"\newcommand\k{2}\input{macros}\[\ddot z_1=\k z_1\]",
+        r"1:17: found `\input`, which prints a file that is not read, expected the document in one file: latexpand paper.tex",
+    ),
+    (r"\iffalse\input{old}\fi\[\ddot z_1=z_1\]", "z1"),
+    (
+        r"\newenvironment{h}{\setbox0\vbox\bgroup}{\egroup}\[\ddot z_1=z_1\]\begin{h}\[\ddot z_2=9\]\end{h}",
+        r"1:67: found `\setbox`, which keeps mathematics",
+    ),
+    (
+        r"\setbox1=\hbox to 3cm{$\ddot z_1=9$}$\ddot z_1=z_1$",
+        r"1:1: found `\setbox`, which keeps mathematics",
+    ),
+    (
+        r"\mathcode`\+=`\-\[\ddot z_1=1+z_1\]",
+        r"1:1: found `\mathcode`",
+    ),
+    (
+        r"\[\ddot z_1=z_1\text{ + 3}\]",
+        r"1:23: found `+`, expected words behind the equation",
+    ),
+    (
+        r"\[\ddot z_1=z_1\text{$+z_1^2$}\]",
+        r"1:23: found `+`, expected words behind the equation",
+    ),
+    (r"\[\ddot z_1=z_1\text{ for all } \mbox{$z_1$}.\]", "z1"),
+    (
+        r"\[\ddot z_1=1.5{\times}10^{-3}z_1{+}2{\cdot}z_1{-}{z_1^{-}}\]",
+        r"1:58: found `}`",
+    ),
+    (
+        r"\[\ddot z_1{=}1.5{\times}10^{3}z_1{-}2{\cdot}10^{1}{\cdot}z_1^{2}\]",
+        "1500*z1 - 20*z1^2",
+    ),
+    (
+        r"\[\ddot z_1=z_1\] as in $\ddot z_1=z_1$, and $\ddot z_2=3$",
+        r"1:47: found `\ddot z_2` in a line of the text",
+    ),
+    (r"\[\ddot z_1=0{\cdot}5z_1\]", r"1:15: found `\cdot`"),
+    (
+        r"\newcommand{\k}{\ensuremath{2}}\[\ddot z_1=1\textcolor{red}{3}\protect\k z_1\]",
+        "132*z1",
+    ),
 ];
 
 #[test]
@@ -403,6 +450,18 @@ fn markdown_has_mathematics_in_its_lines_and_code_that_is_none() {
         (
             "$`\\ddot z_1 = z_2`$ and\n$\\ddot z_2 = z_1$",
             &["z2", "z1"],
+        ),
+        (
+            "---\ntitle: $\\ddot z_1 = 9$\n---\n[//]: # ($\\ddot z_1 = 9$)\nSo \\(\\ddot z_1 = z_1\\).\n\n    $\\ddot z_1 = 9$\n",
+            &["z1"],
+        ),
+        (
+            "1. One\n\n    \\[\\ddot z_1 = z_2\\]\n\nas \\[1\\] and \\[2 say\n<pre>$$\\ddot z_1 = 9$$\n</pre>\n\\[\n\\ddot z_2 = z_1\n\\]\n\n\t$$\\ddot z_1 = 9$$\n",
+            &["z2", "z1"],
+        ),
+        (
+            "```{math}\n\\ddot z_1 = z_1\n```\n<code>$$\\ddot z_1 = 9$$</code>",
+            &["z1"],
         ),
         (
             "~~~\n$$\\ddot z_1 = 9$$\n~~~\n<!--\n$$\\ddot z_1 = 9$$ -->\n$$\\ddot z_1 = z_1$$",

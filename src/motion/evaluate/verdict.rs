@@ -208,7 +208,8 @@ pub fn verdict(
     if !control.is_empty() {
         of_control.extend(rank_row(model, assessment));
     }
-    without_predictions(&mut of_control);
+    let fails_soon = (rows.iter()).any(|row| row.of == short && row.is_failed());
+    without_predictions(&mut of_control, fails_soon);
     rows.extend(of_control);
     let mut verdict = Verdict::default();
     for of in [&short, WHOLE, TORQUES, CONTROL] {
@@ -309,13 +310,11 @@ fn worst_of(control: &[&ControlMetrics]) -> Vec<VerdictRow> {
     worst
 }
 
-/// Where predictions one stage ahead fail, what else passes of the control is not due to the dynamics: it counts as not
-/// measured.
-fn without_predictions(rows: &mut [VerdictRow]) {
-    if rows
-        .iter()
-        .any(|row| row.name == ONE_STAGE && row.is_failed())
-    {
+/// Where predictions one stage ahead fail, or those between restarts, what passes of the control is not due to the
+/// dynamics, or due to errors that cancel: it counts as not measured.
+fn without_predictions(rows: &mut [VerdictRow], fails_soon: bool) {
+    let mut one_stage = rows.iter().filter(|row| row.name == ONE_STAGE);
+    if fails_soon || one_stage.any(VerdictRow::is_failed) {
         let others = rows.iter_mut().filter(|row| row.of == CONTROL);
         for row in others.filter(|row| row.passed == Some(true)) {
             (row.value, row.passed) = (None, None);
