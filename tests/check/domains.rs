@@ -198,7 +198,7 @@ fn sides_with_values_at_different_points_are_equal_with_a_note() {
         let (left, right, is_alone) = PAIRS[number % PAIRS.len()];
         let [a, b] = [0, 1].map(|_| {
             let variable = random.of(&["z1", "z2", "u1", "dz2"]);
-            let factor = random.of(&["", "2*", "0.3*", "1/3*"]);
+            let factor = random.of(&["", "2*", "0.3*", "1/3*", "-", "-0.7*"]);
             match random.below(2) {
                 0 => format!("{factor}{variable}"),
                 _ => format!(
@@ -217,6 +217,31 @@ fn sides_with_values_at_different_points_are_equal_with_a_note() {
             matches!(verdict, Verdict::Different(_)),
             "{left} and {wrong}: {verdict:?}"
         );
+    }
+}
+
+#[test]
+fn a_side_without_a_value_somewhere_is_noted() {
+    for (left, right) in [
+        ("z1/z1", "1"),
+        ("z1^2/z1", "z1"),
+        ("log(z1)/log(z1)*z1", "z1"),
+        ("sqrt(1 - z1)^2", "1 - z1"),
+        ("((1 - z1)^3)^(1/3)", "1 - z1"),
+        ("sqrt(z1 + 30)^2", "z1 + 30"),
+    ] {
+        for (left, right) in [(left, right), (right, left)] {
+            let (verdict, has_note) = decided(left, right);
+            assert!(verdict.is_equal(), "{left} and {right}: {verdict:?}");
+            assert!(has_note, "{left} and {right}");
+        }
+    }
+    // Overflow is no lack of a value.
+    for (left, right) in [
+        ("exp(800)*exp(-800)*z1", "z1"),
+        ("exp(z1 + 800)*exp(-800)", "exp(z1)"),
+    ] {
+        assert!(!decided(left, right).1, "{left} and {right}");
     }
 }
 
