@@ -161,7 +161,8 @@ impl Far {
         let bounds = sum_in_bounds(pool, sum, &points, precision.inputs);
         let expected = bounds.into_iter().zip(values.iter().zip(&sizes));
         let expected = expected.map(|(bounds, (value, size))| {
-            let is_bounded = bounds.magnitude().is_finite() && !bounds.is_empty();
+            let numbers = [bounds.magnitude(), *value, *size];
+            let is_bounded = !bounds.is_empty() && numbers.iter().all(|number| number.is_finite());
             let is_accurate = is_bounded && precision.hits(bounds, *value, *size);
             is_accurate.then_some((bounds, *size))
         });
