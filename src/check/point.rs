@@ -75,7 +75,7 @@ pub(super) fn decimals(pool: &ExprPool, exprs: &[ExprId]) -> HashMap<SymbolId, (
 }
 
 /// Tries points of a fixed sequence: all variables at once, and single groups of them with the
-/// others zero, so that one small term can be seen beside large ones.
+/// others zero, so that one small term can be seen beside large ones. The last point has zeros alone.
 pub(super) fn search(
     sides: &Sides<'_>,
     phase: &str,
@@ -99,14 +99,18 @@ pub(super) fn search(
     let mut random = ChaCha8Rng::seed_from_u64(12);
     let mut search = Search::default();
     let mut best = 0.0;
-    for attempt in 0..if is_proven { POINTS_OF_EQUALS } else { POINTS } {
+    let last = if is_proven { POINTS_OF_EQUALS } else { POINTS };
+    let nothing = BTreeSet::new();
+    for attempt in 0..=last {
         let scale = match has_domain {
             true => 1.0,
             false => SCALES[attempt % SCALES.len()],
         };
-        let group = (attempt % 3 == 2)
-            .then(|| groups.get(attempt / 3 % groups.len().max(1)))
-            .flatten();
+        let group = match attempt % 3 {
+            _ if attempt == last => Some(&nothing),
+            2 => groups.get(attempt / 3 % groups.len().max(1)),
+            _ => None,
+        };
         let values: BTreeMap<SymbolId, f64> = (variables.iter().zip(&ranges))
             .map(|(symbol, range)| {
                 let share = random.next_u32() as f64 / f64::from(u32::MAX);
@@ -124,16 +128,17 @@ pub(super) fn search(
             })
             .collect();
         let gap = sides.at(&values);
-        match (gap.left.is_nan(), gap.right.is_nan()) {
-            (false, false) if gap.left.is_finite() && gap.right.is_finite() => {
-                search.has_common_point = true;
+        if !(gap.left.is_finite() && gap.right.is_finite()) {
+            let is_one_sided = match [gap.left, gap.right] {
+                [none, value] | [value, none] if none.is_nan() => value.is_finite(),
+                _ => false,
+            };
+            if is_one_sided && search.one_sided.is_none() {
+                search.one_sided = Some(gap);
             }
-            (true, false) | (false, true) if scale <= 1.0 => {
-                search.one_sided.get_or_insert(gap);
-                continue;
-            }
-            _ => continue,
+            continue;
         }
+        search.has_common_point = true;
         let size = gap.size() / (1.0 + gap.left.abs().max(gap.right.abs()));
         if sides.are_apart(&values) {
             if search.gap.is_none() || size > best {
@@ -165,13 +170,21 @@ impl Sides<'_> {
         self.pool.evaluate_all(exprs, &value_of)
     }
 
-    /// Both values; NaN for a side that has none, also if what has none cancelled.
+    /// Both values; NaN for a side that has none, also if what has none cancelled, and an infinity where floats
+    /// overflow.
     fn at(&self, values: &BTreeMap<SymbolId, f64>) -> Gap {
         let both = [0, 1].map(|side| {
             let all = [&[self.whole[side]], self.guards[side]].concat();
             let found = self.values_of(&all, values);
-            let has_value = found.iter().all(|value| !value.is_nan());
-            if has_value { found[0] } else { f64::NAN }
+            if found.iter().all(|value| value.is_finite()) {
+                return found[0];
+            }
+            let bounds = self.bounds_of(&all, values);
+            let mut parts = found.iter().zip(bounds);
+            match parts.any(|(value, bounds)| !value.is_finite() && bounds.is_empty()) {
+                true => f64::NAN,
+                false => f64::INFINITY,
+            }
         });
         Gap {
             point: (values.iter())
@@ -182,15 +195,20 @@ impl Sides<'_> {
         }
     }
 
-    /// Whether the bounds of both sides, rounding of decimals included, have no number in common.
-    fn are_apart(&self, values: &BTreeMap<SymbolId, f64>) -> bool {
+    /// Bounds with the rounding of decimals.
+    fn bounds_of(&self, exprs: &[ExprId], values: &BTreeMap<SymbolId, f64>) -> Vec<Interval> {
         let range_of = |symbol: SymbolId| match self.decimals.get(&symbol) {
             Some((value, radius)) => {
                 Interval::new((value - radius).next_down(), (value + radius).next_up())
             }
             None => Interval::point(values.get(&symbol).copied().unwrap_or(0.0)),
         };
-        let bounds = self.pool.evaluate_intervals(&self.rest, &range_of);
+        self.pool.evaluate_intervals(exprs, &range_of)
+    }
+
+    /// Whether the bounds of both sides have no number in common.
+    fn are_apart(&self, values: &BTreeMap<SymbolId, f64>) -> bool {
+        let bounds = self.bounds_of(&self.rest, values);
         let [left, right] = [bounds[0], bounds[1]];
         !left.is_empty() && !right.is_empty() && (left.hi() < right.lo() || right.hi() < left.lo())
     }

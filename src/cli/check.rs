@@ -160,12 +160,21 @@ fn verdict_text(verdict: &Verdict) -> String {
 fn gap_text(gap: &Gap) -> String {
     let Gap { left, right, .. } = gap;
     let (at, difference) = (place(gap), significant(left - right));
+    let [left, right] = [*left, *right].map(number);
     format!(" at {at}\n    A = {left}, B = {right}, A - B = {difference}")
+}
+
+/// A number with all its digits, but not with hundreds of zeros.
+fn number(value: f64) -> String {
+    match value.abs() {
+        0.0 | 1e-5..1e16 => value.to_string(),
+        _ => format!("{value:e}"),
+    }
 }
 
 fn place(gap: &Gap) -> String {
     let values: Vec<String> = (gap.point.iter())
-        .map(|(name, value)| format!("{name} = {value}"))
+        .map(|(name, value)| format!("{name} = {}", number(*value)))
         .collect();
     match values.is_empty() {
         true => "every point".to_owned(),
@@ -177,7 +186,7 @@ fn terms_text(terms: &[TermDifference]) -> String {
     // A term that is not there has the coefficient 0.
     let coefficient = |value: f64, file: &str| match value {
         0.0 => format!("not in {file}"),
-        _ => format!("{value} in {file}"),
+        _ => format!("{} in {file}", number(value)),
     };
     let lines = terms.iter().map(|term| {
         let (left, right) = (coefficient(term.left, "A"), coefficient(term.right, "B"));

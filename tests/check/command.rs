@@ -42,6 +42,21 @@ fn equal_files_exit_with_0_and_say_how_far_rounding_reaches() {
 }
 
 #[test]
+fn tiny_and_huge_numbers_are_printed_without_rows_of_zeros() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (name, equation) in [("a.txt", "1e-320*z1 + 3e305*u1"), ("b.txt", "2e-320*z1")] {
+        let contents = format!("ddz1 = {equation}\n");
+        fs::write(folder.path().join(name), contents).expect("written");
+    }
+    let output = check(folder.path(), &["a.txt", "b.txt"]);
+    assert_eq!(output.status.code(), Some(1));
+    let found = text(&output.stdout);
+    assert!(found.contains("z1: 1e-320 in A, 2e-320 in B"), "{found}");
+    assert!(found.contains("u1: 3e305 in A"), "{found}");
+    assert!(!found.contains("00000000"), "{found}");
+}
+
+#[test]
 fn different_files_exit_with_1_and_a_point_inside_the_domain() {
     let folder = tempfile::tempdir().expect("a folder");
     let write = |name: &str, contents: &str| {

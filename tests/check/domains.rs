@@ -125,6 +125,8 @@ fn constants_without_a_value_are_refused_by_name() {
         ("1/(0.1*3-0.3)", "1/(0.1*3-0.3)"),
         ("1/(sin(1)^2+cos(1)^2-1)", "1/(sin(1)^2+cos(1)^2-1)"),
         ("1/(sqrt(2)*sqrt(3)-sqrt(6))", "1/(sqrt(2)*sqrt(3)-sqrt(6))"),
+        ("z1 + 0*sqrt(-1-abs(z1))", "sqrt(-1-abs(z1))"),
+        ("(-2-u1^2)^0.5*z1", "(-2-u1^2)^0.5"),
     ] {
         assert!(is_refused(term), "{term}");
         let text = format!("ddz1 = {term}");
@@ -141,6 +143,8 @@ fn constants_without_a_value_are_refused_by_name() {
         "log(1e-300)*z1",
         "1/(0.1*3 - 0.2)*z1",
         "tan(1.5707963267948966)*z1",
+        "sqrt(-z1^2)",
+        "(-8)^z1",
     ] {
         assert!(!is_refused(term), "{term}");
     }
@@ -198,7 +202,7 @@ fn sides_with_values_at_different_points_are_equal_with_a_note() {
         let (left, right, is_alone) = PAIRS[number % PAIRS.len()];
         let [a, b] = [0, 1].map(|_| {
             let variable = random.of(&["z1", "z2", "u1", "dz2"]);
-            let factor = random.of(&["", "2*", "0.3*", "1/3*"]);
+            let factor = random.of(&["", "2*", "0.3*", "1/3*", "-", "-0.7*"]);
             match random.below(2) {
                 0 => format!("{factor}{variable}"),
                 _ => format!(
@@ -217,6 +221,31 @@ fn sides_with_values_at_different_points_are_equal_with_a_note() {
             matches!(verdict, Verdict::Different(_)),
             "{left} and {wrong}: {verdict:?}"
         );
+    }
+}
+
+#[test]
+fn a_side_without_a_value_somewhere_is_noted() {
+    for (left, right) in [
+        ("z1/z1", "1"),
+        ("z1^2/z1", "z1"),
+        ("log(z1)/log(z1)*z1", "z1"),
+        ("sqrt(1 - z1)^2", "1 - z1"),
+        ("((1 - z1)^3)^(1/3)", "1 - z1"),
+        ("sqrt(z1 + 30)^2", "z1 + 30"),
+    ] {
+        for (left, right) in [(left, right), (right, left)] {
+            let (verdict, has_note) = decided(left, right);
+            assert!(verdict.is_equal(), "{left} and {right}: {verdict:?}");
+            assert!(has_note, "{left} and {right}");
+        }
+    }
+    // Overflow is no lack of a value.
+    for (left, right) in [
+        ("exp(800)*exp(-800)*z1", "z1"),
+        ("exp(z1 + 800)*exp(-800)", "exp(z1)"),
+    ] {
+        assert!(!decided(left, right).1, "{left} and {right}");
     }
 }
 

@@ -297,6 +297,14 @@ fn reported_sums_keep_their_values_far_out() {
                 [1e30, 2e29, 1e28],
             ],
         ),
+        (
+            "2 z1*log(u1)/(z1*log(u1) - cos(z1^2)) ; 1 z1*log(u1)/(z1*log(u1) + cos(z1^2))",
+            [[1e154, 0.0, 1e5], [1.7e19, 0.0, 1e19], [1e19, 0.0, 83.0]],
+        ),
+        (
+            "1 tanh(z2)*exp(u1)*z1 ; 2 tanh(z2)/(exp(u1)*z1) ; 3 tanh(z2)",
+            [[6e19, 1.0, -89.0], [1e10, 1.0, -715.0], [1e-10, 1.0, 715.0]],
+        ),
     ] {
         let model = model_of(&parsed(sum));
         let [learned, simplified] = [Equations::as_learned(&model), Equations::of(&model)]
@@ -310,6 +318,45 @@ fn reported_sums_keep_their_values_far_out() {
                     "{sum} at {point:?}: {b}, as learned {a}"
                 );
             }
+        }
+    }
+}
+
+#[test]
+fn jacobians_of_shorter_forms_are_numbers_where_those_of_the_learned_terms_are() {
+    for (sum, is_single, point) in [
+        (
+            "2 exp(-z1)/(exp(-z1) - exp(z2)) ; 1 exp(-z1)/(exp(-z1) + exp(z2))",
+            true,
+            [101.1, 1.0, 10.6],
+        ),
+        (
+            "3 exp(-z1)/(exp(-z1) - abs(z1*u1)) ; 3 exp(-z1)/(exp(-z1) + abs(z1*u1))",
+            true,
+            [137.2, 0.5, 178.4],
+        ),
+    ] {
+        let model = model_of(&parsed(sum));
+        for equations in [Equations::as_learned(&model), Equations::of(&model)] {
+            let (program, _) =
+                lower::dynamics_jacobian(&equations, 0, Form::default()).expect("lowers");
+            let inputs = [[point[0], point[1]], [0.0; 2], [point[2], 0.0]];
+            let found: Vec<f64> = match is_single {
+                false => Interpreter::<f64>::new(&program)
+                    .results(&inputs.map(Vec::from))
+                    .concat(),
+                true => {
+                    let inputs = inputs.map(|part| part.map(|value| value as f32).to_vec());
+                    let found = Interpreter::<f32>::new(&program).results(&inputs).concat();
+                    found.into_iter().map(f64::from).collect()
+                }
+            };
+            let are_numbers = found.iter().all(|value| value.is_finite());
+            assert!(
+                are_numbers,
+                "{} at {point:?}: {found:?}",
+                printed(&equations)
+            );
         }
     }
 }

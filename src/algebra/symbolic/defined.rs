@@ -78,13 +78,12 @@ impl Guards {
         is_real && (!number.is_negative() || self.division(pool, base))
     }
 
-    /// Adds a guard; whether it has a value anywhere, as far as bounds of constants show it.
+    /// Adds a guard; whether it has a value anywhere, as far as bounds show it.
     fn note(&mut self, pool: &ExprPool, guard: ExprId) -> bool {
-        if self.is_constant(pool, guard) {
-            return !self.bounds(pool, guard).is_empty();
+        if !self.is_constant(pool, guard) {
+            self.found.push(guard);
         }
-        self.found.push(guard);
-        true
+        !self.bounds(pool, guard).is_empty()
     }
 
     fn is_constant(&self, pool: &ExprPool, expr: ExprId) -> bool {

@@ -22,7 +22,7 @@ pub(super) const LAST_ORDER: i64 = 8;
 pub(super) enum Stop {
     /// It depends on whether this expression is zero.
     Undecided(ExprId),
-    /// More terms are needed.
+    /// More terms are needed, or more work than there may be.
     Order,
     /// The expression has no values on this side of the point.
     Undefined,
@@ -72,6 +72,9 @@ impl<'a> Germs<'a> {
         let symbol = self.symbol;
         let wanted = |node| self.pool.may_contain(node, symbol);
         for node in self.pool.walk(&[root], wanted, |_| true) {
+            if !self.pool.affords(1) {
+                return Err(Stop::Order);
+            }
             let germ = match self.germ_of_node(node)? {
                 Some(series) => Germ::Series(self.cut(series)),
                 None => Germ::Smooth,

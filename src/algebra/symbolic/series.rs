@@ -209,7 +209,7 @@ impl Germs<'_> {
             }
             for position in 0..series.rest.len() {
                 if self.compare(series.rest[position], least)?.is_le() {
-                    return Err(self.too_short());
+                    return Err(Stop::Order);
                 }
             }
             let mut coefficients = Vec::new();
@@ -244,18 +244,11 @@ impl Germs<'_> {
         }
         for &rest in &series.rest {
             if self.compare(rest, ExprId::ONE)?.is_le() {
-                return Err(self.too_short());
+                return Err(Stop::Order);
             }
         }
         let coefficient = series.terms.first().map(|term| term.1);
         Ok(Some(coefficient.unwrap_or(ExprId::ZERO)))
-    }
-
-    fn too_short(&self) -> Stop {
-        match self.order < LAST_ORDER {
-            true => Stop::Order,
-            false => Stop::Unknown,
-        }
     }
 
     /// The value at `t = 0` and the terms that vanish there; the leading coefficient as an error where there is

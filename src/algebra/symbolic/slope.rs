@@ -9,7 +9,8 @@
 //! - where the function jumps, the limit of the slopes beside the jump: a jump itself adds nothing.
 //!
 //! Which of them applies is decided at run time by selections: the derivative by the rules where no argument of a root,
-//! magnitude, sign or power is zero, a slope from series (see `germ.rs`) where one is.
+//! magnitude, sign or power is zero, a slope from series (see `germ.rs`) where one is. Where that takes too many cases, a
+//! difference of values replaces a derivative that is not a number.
 
 use std::cmp::Ordering;
 
@@ -18,10 +19,12 @@ use super::node::{ExprId, Function, Node, SymbolId};
 use super::number::Number;
 use super::pool::{ExprPool, Sign};
 
-/// Most cases of one slope; those that are not decided have the derivative by the rules.
+/// Most cases of one slope; those that are not decided have the derivative by the rules, or a difference.
 const MOST_CASES: usize = 256;
-/// Expressions that one slope may add to the pool before its remaining cases are left undecided.
-const MOST_NODES: usize = 60_000;
+/// Work on one slope, counted in constructors, after which its remaining cases are left undecided.
+const MOST_WORK: u64 = 300_000;
+/// The step of differences, a compromise of both precisions.
+const STEP: f64 = 1.0 / 8192.0;
 
 /// The slope of an expression by a symbol.
 #[derive(Clone, Copy, Debug)]
@@ -233,6 +236,8 @@ enum Outcome {
     Finite(ExprId),
     /// An infinity with the sign of an expression.
     Infinite(ExprId),
+    /// Not found.
+    Open,
 }
 
 impl ExprPool {
@@ -254,7 +259,7 @@ impl ExprPool {
         let wanted = |node| self.may_contain(node, symbol);
         let nodes = self.walk(&[expr], wanted, |_| true);
         let slope = match nodes.into_iter().any(|node| self.has_kink(node)) {
-            true => self.selected(expr, symbol),
+            true => self.limited(MOST_WORK, |pool| pool.selected(expr, symbol)),
             false => Slope {
                 expr: self.derivative(expr, symbol),
                 has_infinity: false,
@@ -276,18 +281,17 @@ impl ExprPool {
     /// The slope at all points: cases are divided by what is undecided, the first ones first.
     fn selected(&mut self, expr: ExprId, symbol: SymbolId) -> Slope {
         let mut cases = vec![Facts::default()];
-        let most_nodes = self.n_nodes() + MOST_NODES;
         // Of each case its test and the first of its two parts, or its outcome.
         let mut known: Vec<Result<Outcome, (ExprId, usize)>> = Vec::new();
         while let Some(facts) = cases.get(known.len()).cloned() {
             let first_part = cases.len();
             known.push(match self.outcome(expr, symbol, &facts) {
-                Err(test) if first_part < MOST_CASES && self.n_nodes() < most_nodes => {
+                Err(test) if first_part < MOST_CASES && self.affords(1) => {
                     let parts = [true, false].map(|is_zero| facts.with(self, test, is_zero));
                     cases.extend(parts);
                     Err((test, first_part))
                 }
-                outcome => Ok(outcome.unwrap_or(Outcome::Regular)),
+                outcome => Ok(outcome.unwrap_or(Outcome::Open)),
             });
         }
         let mut slopes: Vec<Slope> = Vec::new();
@@ -324,9 +328,32 @@ impl ExprPool {
                 let magnitude = self.apply(Function::Abs, zero);
                 self.div(sign, magnitude)
             }
+            (Outcome::Open, _) => self.guarded(expr, symbol, regular),
             (Outcome::Regular | Outcome::Infinite(_), _) => regular,
         };
         Slope { expr, has_infinity }
+    }
+
+    /// The derivative by the rules; where that is not a number, the difference to the value a step above.
+    fn guarded(&mut self, expr: ExprId, symbol: SymbolId, regular: ExprId) -> ExprId {
+        let (variable, step) = (self.symbol_expr(symbol), self.number(STEP));
+        let above = self.add(variable, step);
+        let above = self.substitute(expr, &[(symbol, above)]);
+        let rise = self.sub(above, expr);
+        let difference = self.div(rise, step);
+        // The sign of a number is the cube of itself.
+        let sign = self.apply(Function::Sign, regular);
+        let cube = self.powi(sign, 3);
+        let is_number = self.sub(cube, sign);
+        self.select(is_number, regular, difference)
+    }
+
+    /// Whether a constant part has no value, or an infinite one: neither has the whole, and not all targets run it.
+    fn has_pole(&self, expr: ExprId) -> bool {
+        let parts = self.reachable(&[expr]).into_iter();
+        parts
+            .filter(|part| self.is_constant(*part))
+            .any(|part| !self.evaluate(part, &|_| f64::NAN).is_finite())
     }
 
     /// Whether the derivative by the rules has the slope's value in the numbers of a computer, without `0*inf`.
@@ -361,15 +388,21 @@ impl ExprPool {
             let mut order = 2;
             let stop = loop {
                 match Germs::new(self, facts, symbol, side, order).slope(expr) {
+                    Ok(Outcome::Finite(slope) | Outcome::Infinite(slope))
+                        if self.has_pole(slope) =>
+                    {
+                        return Ok(Outcome::Regular);
+                    }
                     Ok(outcome) => return Ok(outcome),
-                    Err(Stop::Order) if order < LAST_ORDER => order *= 2,
+                    Err(Stop::Order) if order < LAST_ORDER && self.affords(1) => order *= 2,
                     Err(stop) => break stop,
                 }
             };
             match stop {
                 Stop::Undecided(test) => return Err(test),
                 Stop::Undefined => {}
-                Stop::Order | Stop::Unknown => return Ok(Outcome::Regular),
+                Stop::Order => return Ok(Outcome::Open),
+                Stop::Unknown => return Ok(Outcome::Regular),
             }
         }
         // An isolated point.

@@ -101,3 +101,62 @@ fn slope_of_what_has_none_of_these_points_is_the_derivative() {
         assert_eq!(pool.slope(expr, x), pool.derivative(expr, x), "{text}");
     }
 }
+
+#[test]
+fn slope_of_what_has_no_value_in_a_case_has_no_divisor_zero() {
+    let mut pool = ExprPool::new();
+    let x = pool.symbol_id("x");
+    for text in [
+        "sqrt(x^2 + y^2)/y",
+        "sqrt(x^2 + y^2)/x",
+        "sqrt(abs(x*y))*log(y)",
+        "abs(exp(y) - 1)^(-0.5)*sqrt(abs(y*x))",
+        "abs(y)^x/(y*(1 - y))",
+    ] {
+        let expr = pool.parsed(text);
+        let slope = pool.slope(expr, x);
+        for part in pool.reachable(&[slope]) {
+            let value = pool.evaluate(part, &|_| f64::NAN);
+            assert!(
+                !pool.is_constant(part) || value.is_finite(),
+                "{text}: {value}"
+            );
+        }
+    }
+    for (at, expected) in [([3.0, 4.0], 0.15), ([0.0, 2.0], 0.0)] {
+        let values = [("x", at[0]), ("y", at[1])];
+        let found = slope_at("sqrt(x^2 + y^2)/y", &values);
+        assert!((found - expected).abs() < 1e-15, "{found} at {at:?}");
+    }
+}
+
+#[test]
+fn slope_with_too_many_cases_is_a_difference_instead_of_no_number() {
+    let nested = "sqrt(abs(tan(x)/(1 + abs(abs(x^2 + x^2)^w))) + abs(y))*(1 - cos(x))";
+    let found = slope_at(nested, &[("w", 1.0)]);
+    assert!(found.abs() < 1e-3, "{found}");
+    let nested = "abs(abs(abs(x)^u + sin(y)*x^2)^v - abs(abs(y)^w - x)^u)^w*x";
+    let found = slope_at(nested, &[("u", 1.5), ("v", 0.5), ("w", 2.0)]);
+    assert!(found.abs() < 1e-3, "{found}");
+}
+
+#[test]
+fn slope_of_many_kinks_takes_bounded_work() {
+    let factors: Vec<String> = (1..12)
+        .map(|k| format!("sqrt(1 + sin(x + {k}*y))"))
+        .collect();
+    let mut pool = ExprPool::new();
+    let expr = pool.parsed(&factors.join("*"));
+    let x = pool.symbol_id("x");
+    let slope = pool.slope(expr, x);
+    let n_parts = pool.n_nodes();
+    assert!(n_parts < 50_000, "{n_parts} expressions were made");
+    let at = |x: f64| {
+        let of = |factor: u32| (1.0 + (x + 0.5 * f64::from(factor)).sin()).sqrt();
+        (1..12).map(of).product::<f64>()
+    };
+    let value = |symbol: SymbolId| if symbol == x { 0.3 } else { 0.5 };
+    let difference = (at(0.3 + 1e-6) - at(0.3 - 1e-6)) / 2e-6;
+    let found = pool.evaluate(slope, &value);
+    assert!((found - difference).abs() < 1e-6, "{found}, {difference}");
+}

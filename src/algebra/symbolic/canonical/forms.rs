@@ -9,6 +9,7 @@ use super::coefficient::Coefficient;
 use super::polynomial::{CanonicalForm, Monomial};
 use super::rational::Rational;
 use crate::symbolic::node::{ExprId, Function, Node, SymbolId};
+use crate::symbolic::number::Number;
 use crate::symbolic::pool::ExprPool;
 
 /// Most fractions of two arguments that are compared by multiplying out, and most such comparisons.
@@ -33,6 +34,8 @@ pub struct CanonicalForms<'p> {
     /// Atoms that are positive wherever all given expressions are defined, and sums that are.
     pub(super) positive: HashSet<u32>,
     pub(super) positive_sums: Vec<CanonicalForm>,
+    /// Atoms that are negative there.
+    pub(super) negative: HashSet<u32>,
     rounding: f64,
     /// Whether any argument has radii.
     is_rounded: bool,
@@ -59,6 +62,7 @@ impl<'p> CanonicalForms<'p> {
             arguments: Vec::new(),
             known: HashSet::new(),
             positive: HashSet::new(),
+            negative: HashSet::new(),
             positive_sums: Vec::new(),
             rounding: 0.0,
             is_rounded: false,
@@ -75,21 +79,24 @@ impl<'p> CanonicalForms<'p> {
         }
         let mut sums = Vec::new();
         for expr in guarded {
-            let form = forms.of(expr);
+            let (sign, base) = of_odd_power(pool, expr);
+            let form = forms.of(base).scaled(&Coefficient::integer(sign));
             if form.terms.len() > 1 && !form.has_radius() && !sums.contains(&form) {
                 sums.push(form.clone());
             }
             if let Some((coefficient, monomial)) = form.as_term()
-                && !coefficient.is_negative()
                 && let [(atom, power)] = monomial.powers[..]
                 && power % 2 != 0
             {
-                forms.positive.insert(atom);
+                match coefficient.is_negative() {
+                    true => forms.negative.insert(atom),
+                    false => forms.positive.insert(atom),
+                };
             }
         }
         sums.sort_by_key(|sum| sum.terms.len());
         sums.truncate(MAX_SUMS);
-        if !forms.positive.is_empty() || !sums.is_empty() {
+        if !(forms.positive.is_empty() && forms.negative.is_empty() && sums.is_empty()) {
             forms.forms.clear();
         }
         forms.positive_sums = sums;
@@ -395,6 +402,24 @@ impl Argument {
         }
         self.room = room;
         Some(largest)
+    }
+}
+
+/// The sign and the base of an odd power: it is positive where their product is. Anything else is its own base.
+fn of_odd_power(pool: &ExprPool, mut expr: ExprId) -> (i64, ExprId) {
+    let mut sign = 1;
+    loop {
+        expr = match (pool.factors_of(expr), pool.node(expr)) {
+            (&[number, factor], _) if pool.as_number(number).is_some() => {
+                let is_negative = pool.as_number(number).is_some_and(Number::is_negative);
+                sign *= if is_negative { -1 } else { 1 };
+                factor
+            }
+            (_, &Node::Power(base, exponent)) if matches!(pool.as_integer(exponent), Some(odd @ 1..) if odd % 2 != 0) => {
+                base
+            }
+            _ => return (sign, expr),
+        }
     }
 }
 

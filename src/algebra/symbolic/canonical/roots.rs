@@ -146,6 +146,7 @@ impl CanonicalForms<'_> {
             Atom::Sum(sum) if self.is_positive(atom) => Some(sum),
             Atom::Sum(sum) => self.abs(&sum),
             _ if self.is_positive(atom) => Some(base),
+            _ if self.negative.contains(&atom) => Some(base.scaled(&Coefficient::integer(-1))),
             _ => Some(self.atom(Atom::Abs(base))),
         }
     }
@@ -321,6 +322,11 @@ impl CanonicalForms<'_> {
         let mut product = CanonicalForm::constant(sign);
         for (atom, power) in powers {
             if self.positive.contains(&atom) {
+                continue;
+            }
+            if self.negative.contains(&atom) {
+                let sign = if power % 2 == 0 { 1 } else { -1 };
+                product = product.scaled(&Coefficient::integer(sign));
                 continue;
             }
             let base = CanonicalForm::atom(atom);

@@ -3,7 +3,8 @@
 //! Near the origin both are evaluated in floating point. Far out the sum is enclosed in intervals, over inputs
 //! that reach a few units in the last place around a point. Where this is narrow and generated code of the sum would
 //! hit it, in 64 or in 32 bits, code of the form has to hit it as well: no form overflows, underflows or
-//! loses more digits than a change of the last digits of the inputs would cost. Sums and products of variables and
+//! loses more digits than a change of the last digits of the inputs would cost, and its derivatives are numbers where
+//! those of the sum are accurate. Sums and products of variables and
 //! bounded functions need no such test, because equal ones have the same degrees.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -44,10 +45,12 @@ struct Precision {
     rounding: f64,
     /// Least number with all its digits.
     least: f64,
-    /// Powers of ten of the variables, each far from all at which a power of a variable overflows.
-    powers: [i32; 6],
-    /// Magnitudes at which exponentials of one, two, three and four times a variable overflow.
-    exponents: [f64; 4],
+    /// Powers of ten of the variables: one at which squares are about to overflow, the others far from all at which a
+    /// power of a variable does.
+    powers: [f64; 7],
+    /// Magnitudes at which exponentials of one, two, three and four times a variable overflow, and at which those of
+    /// one overflow that did not underflow yet.
+    exponents: [f64; 5],
 }
 
 const PRECISIONS: [Precision; 2] = [
@@ -57,8 +60,8 @@ const PRECISIONS: [Precision; 2] = [
         evaluation: 1e-9,
         rounding: 1e-13,
         least: f64::MIN_POSITIVE,
-        powers: [300, 200, 125, 90, 68, 50],
-        exponents: [1000.0, 400.0, 260.0, 200.0],
+        powers: [300.0, 200.0, 125.0, 90.0, 68.0, 50.0, 154.08],
+        exponents: [1000.0, 400.0, 260.0, 200.0, 712.0],
     },
     Precision {
         round: |value| f64::from(value as f32),
@@ -66,8 +69,8 @@ const PRECISIONS: [Precision; 2] = [
         evaluation: 1e-3,
         rounding: 1e-5,
         least: f32::MIN_POSITIVE as f64,
-        powers: [36, 27, 16, 11, 8, 5],
-        exponents: [200.0, 60.0, 35.0, 25.0],
+        powers: [36.0, 27.0, 16.0, 11.0, 8.0, 5.0, 19.22],
+        exponents: [200.0, 60.0, 35.0, 25.0, 89.0],
     },
 ];
 
@@ -99,7 +102,7 @@ impl Agreement {
     }
 
     /// Whether `form` has the sum's values, up to rounding, at all points where the sum has one.
-    pub(super) fn holds(&mut self, pool: &ExprPool, form: &Summands) -> bool {
+    pub(super) fn holds(&mut self, pool: &mut ExprPool, form: &Summands) -> bool {
         if !self.holds_near(pool, form) {
             return false;
         }
@@ -109,7 +112,25 @@ impl Agreement {
         let (sum, symbols) = (&self.sum, &self.symbols);
         let far = (self.far)
             .get_or_insert_with(|| [0, 1].map(|p| Far::of(pool, sum, symbols, &PRECISIONS[p])));
-        (far.iter().zip(&PRECISIONS)).all(|(far, precision)| far.holds(pool, form, precision))
+        let mut far = far.iter().zip(&PRECISIONS);
+        far.all(|(far, precision)| far.holds(pool, form, precision)) && self.slopes_hold(pool, form)
+    }
+
+    /// Whether derivatives of `form` are numbers where generated code of those of the sum is accurate.
+    fn slopes_hold(&self, pool: &mut ExprPool, form: &Summands) -> bool {
+        self.symbols.iter().all(|&symbol| {
+            let [of_sum, of_form] = [&self.sum, form].map(|summands| -> Summands {
+                let slopes = (summands.iter()).map(|&(c, expr)| (c, pool.derivative(expr, symbol)));
+                slopes.filter(|slope| slope.1 != ExprId::ZERO).collect()
+            });
+            is_tame(pool, &of_form)
+                || PRECISIONS.iter().all(|precision| {
+                    let far = Far::of(pool, &of_sum, &self.symbols, precision);
+                    let (values, _) = sum_by_code(pool, &of_form, &far.points, precision.round);
+                    let mut known = far.expected.iter().zip(&values);
+                    known.all(|(expected, value)| expected.is_none() || value.is_finite())
+                })
+        })
     }
 
     fn holds_near(&self, pool: &ExprPool, form: &Summands) -> bool {
@@ -140,7 +161,8 @@ impl Far {
         let bounds = sum_in_bounds(pool, sum, &points, precision.inputs);
         let expected = bounds.into_iter().zip(values.iter().zip(&sizes));
         let expected = expected.map(|(bounds, (value, size))| {
-            let is_bounded = bounds.magnitude().is_finite() && !bounds.is_empty();
+            let numbers = [bounds.magnitude(), *value, *size];
+            let is_bounded = !bounds.is_empty() && numbers.iter().all(|number| number.is_finite());
             let is_accurate = is_bounded && precision.hits(bounds, *value, *size);
             is_accurate.then_some((bounds, *size))
         });
@@ -189,7 +211,7 @@ fn scales(pool: &ExprPool, sum: &Summands, precision: &Precision) -> Vec<f64> {
         )
     });
     let powers = precision.powers.into_iter();
-    let powers = powers.flat_map(|power| [power, -power].map(|power| 10_f64.powi(power)));
+    let powers = powers.flat_map(|power| [power, -power].map(|power| 10_f64.powf(power)));
     let exponents = precision.exponents.into_iter();
     std::iter::once(1.0)
         .chain(exponents.filter(|_| has_exponents))

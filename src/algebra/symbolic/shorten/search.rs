@@ -368,7 +368,7 @@ impl<'a> Shortener<'a> {
             return known;
         }
         let single = self.pool.simplify(expr);
-        let is_same = || {
+        let mut is_same = || {
             let alone = vec![(1.0, expr)];
             Agreement::with(self.pool, &alone).holds(self.pool, &vec![(1.0, single)])
         };
