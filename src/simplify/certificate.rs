@@ -45,8 +45,6 @@ pub enum ChangeKind {
     Constant,
     /// A straight line took its place: multiples of variables, perhaps with a constant.
     Linear,
-    /// A parabola took its place.
-    Quadratic,
     /// Its coefficient has fewer digits.
     Rounded {
         /// Significant digits that are left.
@@ -258,7 +256,6 @@ fn kind<S: Serializer>(kind: &ChangeKind, to: S) -> Result<S::Ok, S::Error> {
         ChangeKind::Dropped => ("dropped", None),
         ChangeKind::Constant => ("constant", None),
         ChangeKind::Linear => ("linear", None),
-        ChangeKind::Quadratic => ("quadratic", None),
         ChangeKind::Rounded { digits } => ("rounded", Some(digits)),
     };
     json!({ "kind": kind, "digits": digits }).serialize(to)

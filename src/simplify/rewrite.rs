@@ -1,8 +1,8 @@
-//! Replacements of a term: nothing, a constant, a straight line, a parabola.
+//! Replacements of a term: nothing, a constant, a straight line.
 
 use super::certificate::ChangeKind;
 use super::ranges::Ranges;
-use super::workspace::{Workspace, has_function};
+use super::workspace::Workspace;
 use crate::symbolic::{ExprId, Interval, SymbolId};
 
 /// Terms of more variables than this are not made linear.
@@ -36,23 +36,18 @@ pub(super) fn rewrites(workspace: &Workspace, ranges: &mut Ranges, row: usize) -
         return all;
     }
     all.extend(centred(workspace, ChangeKind::Constant, Vec::new(), range));
-    let (expr, sides) = (ranges.expr(row), ranges.sides(ranges.expr(row)));
-    let lines = slopes(workspace, ranges, row, &sides);
-    let parabola = parabola(workspace, ranges, expr, &sides);
-    for (kind, parts) in [
-        (ChangeKind::Linear, lines),
-        (ChangeKind::Quadratic, parabola),
-    ] {
-        let Some(parts) = parts else { continue };
-        let mut difference = vec![(row, Interval::point(1.0))];
-        let negated = parts
-            .iter()
-            .map(|&(row, factor)| (row, Interval::point(-factor)));
-        difference.extend(negated);
-        let error = ranges.combination(&difference);
-        if !error.magnitude().is_finite() {
-            continue;
-        }
+    let sides = ranges.sides(ranges.expr(row));
+    let Some(parts) = slopes(workspace, ranges, row, &sides) else {
+        return all;
+    };
+    let mut difference = vec![(row, Interval::point(1.0))];
+    let negated = parts
+        .iter()
+        .map(|&(row, factor)| (row, Interval::point(-factor)));
+    difference.extend(negated);
+    let error = ranges.combination(&difference);
+    if error.magnitude().is_finite() {
+        let kind = ChangeKind::Linear;
         let with_constant = centred(workspace, kind, parts.clone(), error);
         all.extend(with_constant.or(Some(Rewrite { kind, parts, error })));
     }
@@ -100,38 +95,10 @@ fn slopes(
         if half == 0.0 || rise.abs() <= WORTHWHILE * size {
             continue;
         }
-        parts.push((workspace.power(Some(symbol), 1)?, rise / (2.0 * half)));
+        parts.push((workspace.variable(symbol)?, rise / (2.0 * half)));
     }
     let is_line = !parts.is_empty() && parts.iter().all(|part| part.1.is_finite());
     is_line.then_some(parts)
-}
-
-/// The parabola through the ends and the middle of the range of a function of one variable, without
-/// its constant.
-fn parabola(
-    workspace: &Workspace,
-    ranges: &mut Ranges,
-    expr: ExprId,
-    sides: &[(SymbolId, f64, f64)],
-) -> Option<Vec<(usize, f64)>> {
-    let &[(symbol, centre, half)] = sides else {
-        return None;
-    };
-    if half == 0.0 || !has_function(ranges.pool(), expr) {
-        return None;
-    }
-    let mut at = |step| value(ranges, expr, sides, 0, step);
-    let (low, middle, high) = (at(-1.0), at(0.0), at(1.0));
-    let curvature = (high + low - 2.0 * middle) / (2.0 * half * half);
-    let slope = (high - low) / (2.0 * half) - 2.0 * curvature * centre;
-    if !curvature.is_finite() || !slope.is_finite() || curvature == 0.0 {
-        return None;
-    }
-    let mut parts = vec![(workspace.power(Some(symbol), 2)?, curvature)];
-    if slope.abs() > 1e-9 * (curvature * half).abs() {
-        parts.push((workspace.power(Some(symbol), 1)?, slope));
-    }
-    Some(parts)
 }
 
 /// The value where one variable is `step` half widths from its centre and the others at theirs.

@@ -83,7 +83,6 @@ fn change_words(change: &Change) -> String {
         ChangeKind::Dropped => "dropped".to_owned(),
         ChangeKind::Constant => format!("into the constant ({})", others()),
         ChangeKind::Linear => format!("made linear ({})", others()),
-        ChangeKind::Quadratic => format!("made a parabola ({})", others()),
         ChangeKind::Rounded { digits: 1 } => "rounded to 1 digit".to_owned(),
         ChangeKind::Rounded { digits } => format!("rounded to {digits} digits"),
     }

@@ -111,7 +111,7 @@ impl Random {
 
 #[test]
 fn no_point_of_a_random_box_is_off_by_more_than_certified() {
-    let mut kinds = [0usize; 5];
+    let mut kinds = [0usize; 4];
     let mut tightest: f64 = 0.0;
     for seed in 0..CASES {
         let mut random = Random::new(seed);
@@ -155,8 +155,7 @@ fn no_point_of_a_random_box_is_off_by_more_than_certified() {
                         ChangeKind::Dropped => 0,
                         ChangeKind::Constant => 1,
                         ChangeKind::Linear => 2,
-                        ChangeKind::Quadratic => 3,
-                        ChangeKind::Rounded { .. } => 4,
+                        ChangeKind::Rounded { .. } => 3,
                     }] += 1;
                 }
             }
@@ -309,7 +308,7 @@ fn term_off_centre_leaves_its_middle_in_the_constant() {
 
 #[test]
 fn term_without_finite_values_on_the_domain_is_never_touched() {
-    let kept = "0.000000001 1/z1; 0.1234567 log(z1); 0.1 log(-2 - z1^2)";
+    let kept = "0.000000001 1/z1; 0.1234567 log(z1); 0.1 log(z1 - 2)";
     let made = simplified(&format!("{kept}; 0.001 u1"), [UNIT, UNIT, UNIT], 1.0);
     assert_eq!(left(&made.model), kept);
 }

@@ -10,19 +10,18 @@ use crate::equations::Equations;
 use crate::model::{LatentVariable, Library, LibraryError, ReducedModel};
 use crate::symbolic::{ExprId, ExprPool, Interval, Node, SymbolId};
 
-/// A library of terms, counted by rows, and the rows of `1`, of variables and of their squares.
+/// A library of terms, counted by rows, and the rows of `1` and of variables.
 #[derive(Clone, Debug)]
 pub(super) struct Workspace {
     library: Library,
     /// Number of the equations' own terms; the others are appended.
     original: usize,
-    /// Rows by variable and exponent.
-    powers: BTreeMap<(Option<SymbolId>, i64), usize>,
+    /// The rows of variables, and of the constant under none.
+    rows: BTreeMap<Option<SymbolId>, usize>,
 }
 
 impl Workspace {
-    /// The terms of `equations`, extended by `1`, by every variable of those summands that are not
-    /// affine, and by the squares of variables that such a summand takes a function of.
+    /// The terms of `equations`, extended by `1` and by every variable of those summands that are not affine.
     ///
     /// # Errors
     /// [`LibraryError`] if the equations' own terms are refused, which equations exclude.
@@ -34,7 +33,7 @@ impl Workspace {
         for text in wanted(equations) {
             let expr = pool
                 .parse(&text, &|_| true)
-                .expect("constants, variables and their squares parse");
+                .expect("constants and variables parse");
             if !known.contains(&expr) {
                 texts.push(text);
             }
@@ -46,7 +45,7 @@ impl Workspace {
         }?;
         Ok(Self {
             original: own.len(),
-            powers: powers(&library),
+            rows: rows(&library),
             library,
         })
     }
@@ -66,14 +65,14 @@ impl Workspace {
         self.library.terms()[row].text()
     }
 
-    /// The row of a power of a variable, 1 or 2, or of the constant, the power 0 of none.
-    pub fn power(&self, of: Option<SymbolId>, exponent: i64) -> Option<usize> {
-        self.powers.get(&(of, exponent)).copied()
+    /// The row of a variable.
+    pub fn variable(&self, symbol: SymbolId) -> Option<usize> {
+        self.rows.get(&Some(symbol)).copied()
     }
 
     /// The row of `1`.
     pub fn constant(&self) -> Option<usize> {
-        self.power(None, 0)
+        self.rows.get(&None).copied()
     }
 
     /// Ranges over a box, `3 latent_dim` intervals.
@@ -126,21 +125,16 @@ impl Workspace {
     }
 }
 
-/// The rows of `1`, of variables and of their squares.
-fn powers(library: &Library) -> BTreeMap<(Option<SymbolId>, i64), usize> {
+/// The rows of `1` and of variables.
+fn rows(library: &Library) -> BTreeMap<Option<SymbolId>, usize> {
     let mut pool = library.pool().clone();
-    let mut exprs = vec![((None, 0), pool.number(1.0))];
-    for variable in LatentVariable::all(library.latent_dim()) {
-        let Some(symbol) = library.symbol(variable) else {
-            continue;
-        };
-        let expr = pool.symbol_expr(symbol);
-        exprs.push(((Some(symbol), 1), expr));
-        exprs.push(((Some(symbol), 2), pool.powi(expr, 2)));
-    }
+    let mut exprs = vec![(None, pool.number(1.0))];
+    let variables = LatentVariable::all(library.latent_dim());
+    let symbols = variables.filter_map(|variable| library.symbol(variable));
+    exprs.extend(symbols.map(|symbol| (Some(symbol), pool.symbol_expr(symbol))));
     let terms = library.terms().iter().enumerate();
     let rows: BTreeMap<ExprId, usize> = terms.map(|(row, term)| (term.expr(), row)).collect();
-    let row = |(power, expr)| Some((power, *rows.get(&expr)?));
+    let row = |(of, expr)| Some((of, *rows.get(&expr)?));
     exprs.into_iter().filter_map(row).collect()
 }
 
@@ -160,10 +154,7 @@ fn wanted(equations: &Equations<'_>) -> Vec<String> {
         }
         let symbols = pool.symbols_of(term.expr());
         let names = symbols.iter().map(|&symbol| pool.symbol_name(symbol));
-        texts.extend(names.clone().map(str::to_owned));
-        if symbols.len() == 1 && has_function(pool, term.expr()) {
-            texts.extend(names.map(|name| format!("{name}^2")));
-        }
+        texts.extend(names.map(str::to_owned));
     }
     let mut seen = BTreeSet::new();
     texts.retain(|text| seen.insert(text.clone()));
