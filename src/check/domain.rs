@@ -8,7 +8,7 @@ use crate::model::{LatentVariable, MAX_LATENT_DIM};
 
 /// A range per variable and phase; -1 to 1 where there is none.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct CheckDomain {
+pub(crate) struct CheckDomain {
     phases: BTreeMap<String, BTreeMap<String, [f64; 2]>>,
 }
 
@@ -17,7 +17,7 @@ impl CheckDomain {
     ///
     /// # Errors
     /// [`CheckError::Domain`] for other keys and for ranges without a finite width of at least 0.
-    pub fn from_toml(path: &Path, text: &str) -> Result<Self, CheckError> {
+    pub(crate) fn from_toml(path: &Path, text: &str) -> Result<Self, CheckError> {
         let refused = |message: String| CheckError::Domain {
             path: path.to_owned(),
             message,
@@ -41,7 +41,7 @@ impl CheckDomain {
     }
 
     /// The first phase or variable that is none of these: its ranges would be without effect.
-    pub fn foreign(&self, phases: &[&str], latent_dim: usize) -> Option<String> {
+    pub(crate) fn foreign(&self, phases: &[&str], latent_dim: usize) -> Option<String> {
         let foreign = self.phases.iter().find_map(|(phase, ranges)| {
             if !phases.contains(&phase.as_str()) {
                 return Some(format!("[{phase}]"));
@@ -57,7 +57,7 @@ impl CheckDomain {
     }
 
     /// The range of a variable; `None` where the domain says nothing.
-    pub fn range(&self, phase: &str, variable: &str) -> Option<[f64; 2]> {
+    pub(crate) fn range(&self, phase: &str, variable: &str) -> Option<[f64; 2]> {
         self.phases.get(phase)?.get(variable).copied()
     }
 }

@@ -27,13 +27,14 @@ mod error;
 mod point;
 mod side;
 
-pub use compare::{
-    Comparison, Difference, EquationComparison, PhaseComparison, TermDifference, Verdict, compare,
-};
-pub use domain::CheckDomain;
+pub(crate) use compare::TermDifference;
+pub use compare::{Comparison, Difference, EquationComparison, PhaseComparison, Verdict, compare};
+pub(crate) use domain::CheckDomain;
 pub use error::CheckError;
-pub use point::{Gap, Point};
-pub use side::{Side, read_sides};
+pub use point::Gap;
+pub(crate) use point::Point;
+pub use side::Side;
+pub(crate) use side::read_sides;
 
 use crate::import::SymbolNames;
 

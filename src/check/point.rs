@@ -19,7 +19,7 @@ const ENOUGH: usize = 200;
 const SCALES: [f64; 8] = [1.0, 1.0, 1.0, 0.3, 3.0, 0.03, 10.0, 100.0];
 
 /// Values of variables by name.
-pub type Point = BTreeMap<String, f64>;
+pub(crate) type Point = BTreeMap<String, f64>;
 
 /// Both sides at a point.
 #[derive(Clone, Debug, PartialEq)]

@@ -55,7 +55,10 @@ pub(super) enum RightSide {
 ///
 /// # Errors
 /// [`CheckError`] for the first that cannot be read.
-pub fn read_sides(paths: [&Path; 2], options: &CheckOptions) -> Result<[Side; 2], CheckError> {
+pub(crate) fn read_sides(
+    paths: [&Path; 2],
+    options: &CheckOptions,
+) -> Result<[Side; 2], CheckError> {
     let is_latex = |path: &Path| matches!(Format::of_path(path), Ok(Format::Latex));
     let read = |path: &Path, known: &[String]| {
         let format = match path.extension().is_some_and(|ending| ending == "json") {
@@ -148,7 +151,7 @@ impl Side {
     }
 
     /// Names of the phases that have one.
-    pub fn phase_names(&self) -> Vec<String> {
+    pub(crate) fn phase_names(&self) -> Vec<String> {
         let names = self.phases.iter().map(|phase| phase.name.clone());
         names.flatten().collect()
     }

@@ -45,4 +45,4 @@ mod planned;
 
 pub use emit::{EmitOptions, Target, emit};
 pub use error::EmitError;
-pub use planned::PlannedJump;
+pub(crate) use planned::PlannedJump;

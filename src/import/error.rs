@@ -62,7 +62,7 @@ impl ImportFault {
     }
 
     /// An option that cannot be followed.
-    pub fn option(
+    pub(crate) fn option(
         option: &'static str,
         found: impl Into<Box<str>>,
         expected: impl Into<Box<str>>,

@@ -35,7 +35,7 @@ impl Format {
     ///
     /// # Errors
     /// [`ImportError`], which states how to convert files of known other kinds.
-    pub fn of_path(path: &Path) -> Result<Self, ImportError> {
+    pub(crate) fn of_path(path: &Path) -> Result<Self, ImportError> {
         let ending = (path.extension()).map(|ending| ending.to_string_lossy().to_lowercase());
         let found = match ending.as_deref() {
             Some("safetensors") => return Ok(Format::Safetensors),
@@ -77,7 +77,7 @@ impl Format {
     }
 
     /// Name for messages.
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Format::Safetensors => "safetensors",
             Format::Npz => "npz",

@@ -181,7 +181,7 @@ impl Role {
     /// The part that the name of a tensor stands for: the part's own name, alone or behind the
     /// names of the modules that hold it, as in `autoencoder.encoder.0.weight`. A mask has the
     /// phase `always` where its phase is at most a word of its name.
-    pub fn of_name(name: &str) -> Option<Self> {
+    pub(crate) fn of_name(name: &str) -> Option<Self> {
         // TensorFlow's ends of names.
         let name = name
             .strip_suffix("/.ATTRIBUTES/VARIABLE_VALUE")
@@ -222,7 +222,7 @@ impl Role {
     }
 
     /// The phase that the tensor belongs to, if it belongs to one.
-    pub fn phase(&self) -> Option<&str> {
+    pub(crate) fn phase(&self) -> Option<&str> {
         match self {
             Role::Xi(phase)
             | Role::Mask(phase)

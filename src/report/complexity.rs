@@ -10,7 +10,7 @@ const LEGEND: [(Role, &str); 2] = [
 
 /// Figures 10 (decoder error and active coefficients) and 11 (combined loss) of a study; bars are one standard deviation
 /// over the seeds to either side.
-pub fn study_figures(summary: &Summary) -> Vec<Figure> {
+pub(crate) fn study_figures(summary: &Summary) -> Vec<Figure> {
     let figure = |id: &str, caption: &str, panels: Vec<Panel>| Figure {
         x_label: "latent coordinates".to_owned(),
         panel_size: (360.0, 210.0),

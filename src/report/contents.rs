@@ -18,7 +18,7 @@ const MAX_JUMPS: usize = 3;
 
 /// The model and results that a report shows.
 #[derive(Debug, Clone, Copy)]
-pub struct Content<'a> {
+pub(crate) struct Content<'a> {
     /// The model.
     pub model: &'a ReducedModel,
     /// The model compared with the recordings.
@@ -39,7 +39,7 @@ pub struct Content<'a> {
 
 /// Figures by section of the page.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct AllFigures {
+pub(crate) struct AllFigures {
     /// The encoder's weights.
     pub encoder: Vec<Figure>,
     /// The first jumps of the recordings.
@@ -50,7 +50,7 @@ pub struct AllFigures {
 
 /// The figures of one jump.
 #[derive(Debug, Clone, PartialEq)]
-pub struct JumpFigures {
+pub(crate) struct JumpFigures {
     /// The jump, in words.
     pub title: String,
     /// Root mean square errors of body x and z over the whole jump, in m.
@@ -66,7 +66,7 @@ pub struct JumpFigures {
 
 impl AllFigures {
     /// All figures, in the order of the page.
-    pub fn iter(&self) -> impl Iterator<Item = &Figure> {
+    pub(crate) fn iter(&self) -> impl Iterator<Item = &Figure> {
         let jumps = self.jumps.iter();
         let jumps = jumps.flat_map(|jump| {
             let folded = jump.folded.iter().map(|(_, figure)| figure);
@@ -81,7 +81,7 @@ impl AllFigures {
 ///
 /// # Errors
 /// [`ModelError`] for a model without encoder or decoder.
-pub fn all_figures(content: &Content<'_>) -> Result<AllFigures, ModelError> {
+pub(crate) fn all_figures(content: &Content<'_>) -> Result<AllFigures, ModelError> {
     let mut figures = AllFigures::default();
     let (model, assessment) = (content.model, content.assessment);
     if let Some(run) = assessment.runs.first() {

@@ -11,7 +11,7 @@ use crate::robot::{JOINT_DIM, Robot};
 
 /// The figures of each run, numbered in their names: torques, latent inputs, latent tracking and
 /// solve times.
-pub fn control_figures(
+pub(crate) fn control_figures(
     model: &ReducedModel,
     settings: &MpcSettings,
     runs: &[NamedRun],
@@ -29,7 +29,7 @@ pub fn control_figures(
 }
 
 /// The first phase without input statistics, by which the controller weighs inputs.
-pub fn without_statistics(model: &ReducedModel) -> Option<&str> {
+pub(crate) fn without_statistics(model: &ReducedModel) -> Option<&str> {
     let mut phases = model.phases().iter().enumerate();
     let without = phases.find(|&(index, _)| model.input_statistics(index).is_err());
     without.map(|(_, phase)| phase.name.as_str())

@@ -16,7 +16,7 @@ use crate::typeset::{Table, rounded};
 
 /// An assessment in words.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Introduction {
+pub(crate) struct Introduction {
     /// One line: fit for what, and for what not.
     pub headline: String,
     /// Sentences that give the reasons.
@@ -38,7 +38,7 @@ enum Seen {
 ///
 /// # Errors
 /// [`ModelError`] for a model without encoder or decoder.
-pub fn introduction(content: &Content<'_>) -> Result<Introduction, ModelError> {
+pub(crate) fn introduction(content: &Content<'_>) -> Result<Introduction, ModelError> {
     let mut sentences = vec![subject(content)?, compared(content), errors(content)];
     sentences.extend(beside_pendulum(content));
     sentences.extend(commands(content));
@@ -51,7 +51,7 @@ pub fn introduction(content: &Content<'_>) -> Result<Introduction, ModelError> {
 }
 
 /// What a model is fit for, in one line.
-pub fn headline(verdict: &Verdict, is_doubtful: bool) -> String {
+pub(crate) fn headline(verdict: &Verdict, is_doubtful: bool) -> String {
     let words = |of: &String| match of.as_str() {
         "whole motion" => "predictions of the whole motion".to_owned(),
         "torques" | "control" => of.clone(),

@@ -26,7 +26,10 @@ pub(super) fn heading_rad(segment: &Segment) -> f64 {
 ///
 /// # Errors
 /// [`ModelError`] for a model without encoder.
-pub fn modelled(model: &ReducedModel, run: &SegmentRun<'_>) -> Result<Vec<bool>, ModelError> {
+pub(crate) fn modelled(
+    model: &ReducedModel,
+    run: &SegmentRun<'_>,
+) -> Result<Vec<bool>, ModelError> {
     let weights = model.encoder_jacobian(&run.segment.x.column(0).into_owned())?;
     let columns = weights.column_iter();
     Ok(columns.map(|column| column.amax() != 0.0).collect())
@@ -42,7 +45,7 @@ pub(super) struct Place {
 
 impl Place {
     /// A recording.
-    pub fn of_recording(index: usize, path: &Path) -> Self {
+    pub(crate) fn of_recording(index: usize, path: &Path) -> Self {
         let name = file_name(path);
         let stem = name.trim_end_matches(".gz").trim_end_matches(".csv");
         Self {
@@ -66,7 +69,10 @@ pub(super) struct Jump<'a> {
 impl Jump<'_> {
     /// The robot as it moved and as the model predicts it over the whole jump, as a strip and as an animation; none for a
     /// model without a robot.
-    pub fn motion(&self, plan: Option<&Segment>) -> Result<Option<(Figure, Film)>, ModelError> {
+    pub(crate) fn motion(
+        &self,
+        plan: Option<&Segment>,
+    ) -> Result<Option<(Figure, Film)>, ModelError> {
         let Ok(robot) = self.model.robot() else {
             return Ok(None);
         };
@@ -176,7 +182,7 @@ impl Jump<'_> {
     }
 
     /// Figures 7, 13 and 14 of the paper: joints, then body.
-    pub fn coordinates(&self) -> Result<[Figure; 2], ModelError> {
+    pub(crate) fn coordinates(&self) -> Result<[Figure; 2], ModelError> {
         let (names, units) = (&self.assessment.names, &self.assessment.units);
         let full = self.decoded(&self.run.full)?;
         let restarted = self.decoded(&self.run.restarted)?;
@@ -207,7 +213,7 @@ impl Jump<'_> {
     }
 
     /// Figure 12 of the paper.
-    pub fn accelerations(&self) -> Result<Figure, ModelError> {
+    pub(crate) fn accelerations(&self) -> Result<Figure, ModelError> {
         let latent = &self.run.latent;
         let ddz = |k: usize, z: &DVector<f64>, dz: &DVector<f64>| {
             let u_lat = latent.u_lat.column(k).into_owned();
@@ -229,7 +235,7 @@ impl Jump<'_> {
     }
 
     /// Figure 8 of the paper, with the fitted pendulum beside the published one.
-    pub fn baselines(&self) -> Result<Figure, ModelError> {
+    pub(crate) fn baselines(&self) -> Result<Figure, ModelError> {
         let run = self.run;
         let full = self.decoded(&run.full)?;
         let roles = [Role::Baseline, Role::SecondBaseline];
@@ -266,7 +272,7 @@ impl Jump<'_> {
     }
 
     /// Root mean square errors of body x and z over the whole jump, in m; none where the rollout arrives nowhere.
-    pub fn body_rms_m(&self) -> Result<[Option<f64>; 2], ModelError> {
+    pub(crate) fn body_rms_m(&self) -> Result<[Option<f64>; 2], ModelError> {
         let predicted = self.decoded(&self.run.full)?;
         let of = |row: usize| {
             let mut sums = FitSums::default();

@@ -17,15 +17,15 @@ mod provenance;
 mod sections;
 mod tables;
 
-pub use complexity::study_figures;
-pub use contents::{Content, all_figures};
-pub use control::{control_figures, without_statistics};
-pub use figures::{Figure, figure_files};
-pub use introduction::{Introduction, headline, introduction};
+pub(crate) use complexity::study_figures;
+pub(crate) use contents::{Content, all_figures};
+pub(crate) use control::{control_figures, without_statistics};
+pub(crate) use figures::{Figure, figure_files};
+pub(crate) use introduction::{Introduction, headline, introduction};
 pub use json::{assessment_json, plan_json};
-pub use page::{PageOptions, page};
-pub use plan::{plan_figures, reach_figure};
-pub use tables::{
+pub(crate) use page::{PageOptions, page};
+pub(crate) use plan::{plan_figures, reach_figure};
+pub(crate) use tables::{
     NamedRun, baseline_table, control_table, coordinate_table, dynamics_table, failed_runs,
     failures, invariance_table, phase_table, run_table, verdict_lines,
 };

@@ -22,7 +22,7 @@ const WIDTH_EM: f64 = 44.0;
 
 /// The parts of the page that do not follow from its [`Content`].
 #[derive(Debug, Clone, Default)]
-pub struct PageOptions {
+pub(crate) struct PageOptions {
     /// Effects of simplification within several tolerances, and every change of the chosen one; tables without rows
     /// are left out.
     pub simplification: Vec<Table>,
@@ -34,7 +34,7 @@ pub struct PageOptions {
 ///
 /// # Errors
 /// [`TypesetError::Template`].
-pub fn page(
+pub(crate) fn page(
     content: &Content<'_>,
     introduction: &Introduction,
     figures: &AllFigures,

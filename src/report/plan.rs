@@ -12,7 +12,7 @@ const FRAMES: usize = 8;
 const CROSS_M: f64 = 0.004;
 
 /// The figures of a plan for a robot.
-pub fn plan_figures(plan: &Plan, robot: &Robot) -> Vec<Figure> {
+pub(crate) fn plan_figures(plan: &Plan, robot: &Robot) -> Vec<Figure> {
     let motion = &plan.motion;
     let [distance_m, apex_m] = plan.goal_m;
     let goal = format!("a planned jump of {distance_m} m, {apex_m} m high");
@@ -122,7 +122,7 @@ fn torques(plan: &Plan, robot: &Robot, goal: &str) -> Figure {
 }
 
 /// Distances and apexes that can be planned, with the recorded jumps.
-pub fn reach_figure(reach: &Reach, prior: &JumpPrior) -> Figure {
+pub(crate) fn reach_figure(reach: &Reach, prior: &JumpPrior) -> Figure {
     let crosses = prior.jumps.iter().flat_map(|&[distance, apex, _]| {
         let at = |x: f64, y: f64| (distance + x * CROSS_M, Some(apex + 0.25 * y * CROSS_M));
         [

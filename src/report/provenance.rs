@@ -12,7 +12,7 @@ const DIGEST: usize = 12;
 
 /// The origin of a model, ready for a page.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Origin {
+pub(crate) struct Origin {
     /// Name and value of each entry that fits a cell.
     pub facts: Vec<(String, String)>,
     /// The others as tables with their names as captions: objects by place and value, lists of objects by their keys.
@@ -20,7 +20,7 @@ pub struct Origin {
 }
 
 /// The entries of a provenance in their order.
-pub fn origin(provenance: &Map<String, Value>) -> Origin {
+pub(crate) fn origin(provenance: &Map<String, Value>) -> Origin {
     let mut origin = Origin::default();
     for (key, value) in provenance {
         match value {

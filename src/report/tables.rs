@@ -12,7 +12,7 @@ use crate::model::ReducedModel;
 use crate::typeset::{Cell, Table, significant};
 
 /// A recording and the controller's run along it.
-pub type NamedRun = (PathBuf, Run);
+pub(crate) type NamedRun = (PathBuf, Run);
 
 fn rms(fit: Option<Fit>) -> Option<f64> {
     fit.map(|fit| fit.rms)
@@ -32,7 +32,7 @@ fn coordinates(assessment: &Assessment<'_>) -> Table {
 }
 
 /// Fit of every coordinate, whole and restarted; a coordinate that no latent one takes in is marked.
-pub fn coordinate_table(model: &ReducedModel, assessment: &Assessment<'_>) -> Table {
+pub(crate) fn coordinate_table(model: &ReducedModel, assessment: &Assessment<'_>) -> Table {
     let every = format!("restarted every {} s", assessment.restart_every_s);
     let mut table = coordinates(assessment);
     let first = assessment.runs.first();
@@ -55,12 +55,12 @@ pub fn coordinate_table(model: &ReducedModel, assessment: &Assessment<'_>) -> Ta
 }
 
 /// Fit of every coordinate, and its restarted residuals in each phase.
-pub fn error_table(model: &ReducedModel, assessment: &Assessment<'_>) -> Table {
+pub(crate) fn error_table(model: &ReducedModel, assessment: &Assessment<'_>) -> Table {
     with_phases(coordinate_table(model, assessment), model, assessment)
 }
 
 /// Restarted residuals of every coordinate, one column per phase.
-pub fn phase_table(model: &ReducedModel, assessment: &Assessment<'_>) -> Table {
+pub(crate) fn phase_table(model: &ReducedModel, assessment: &Assessment<'_>) -> Table {
     with_phases(coordinates(assessment), model, assessment)
 }
 
@@ -73,17 +73,17 @@ fn with_phases(mut table: Table, model: &ReducedModel, assessment: &Assessment<'
 }
 
 /// Root mean square errors of body x and z.
-pub fn body_rms(assessment: &Assessment<'_>, sums: &CoordinateSums) -> [Option<f64>; 2] {
+pub(crate) fn body_rms(assessment: &Assessment<'_>, sums: &CoordinateSums) -> [Option<f64>; 2] {
     ["body.x", "body.z"].map(|name| rms(assessment.fit(sums, name)))
 }
 
 /// The same of a template model.
-pub fn template_rms(sums: &AslipSums) -> [Option<f64>; 2] {
+pub(crate) fn template_rms(sums: &AslipSums) -> [Option<f64>; 2] {
     [sums.x, sums.z].map(|sums| rms(sums.fit()))
 }
 
 /// The model beside the template models, body x and z.
-pub fn baseline_table(assessment: &Assessment<'_>) -> Table {
+pub(crate) fn baseline_table(assessment: &Assessment<'_>) -> Table {
     let every = format!("restarted every {} s", assessment.restart_every_s);
     let titles = ["body.x", "body.z"]
         .into_iter()
@@ -104,7 +104,7 @@ pub fn baseline_table(assessment: &Assessment<'_>) -> Table {
 }
 
 /// Latent accelerations, stability and input gain of each phase.
-pub fn dynamics_table(model: &ReducedModel, assessment: &Assessment<'_>) -> Table {
+pub(crate) fn dynamics_table(model: &ReducedModel, assessment: &Assessment<'_>) -> Table {
     let fits = assessment.pointwise.acceleration.iter().map(FitSums::fit);
     let phases = model.phases().iter();
     let linearised = assessment.linearised.iter().map(Option::as_ref);
@@ -131,7 +131,7 @@ pub fn dynamics_table(model: &ReducedModel, assessment: &Assessment<'_>) -> Tabl
 }
 
 /// What a model says of known physics, one row per phase.
-pub fn invariance_table(invariance: &Invariance) -> Table {
+pub(crate) fn invariance_table(invariance: &Invariance) -> Table {
     let shown = |value: Option<f64>| value.map_or("-".to_owned(), significant);
     let words = format!(
         "What the model says of physics that is known: gravity in flight {} m/s^2, mass {} kg; decoded joints \
@@ -159,7 +159,7 @@ type Driven<'a> = (
 );
 
 /// The model and its baselines along each recording: figures that a wrong model changes.
-pub fn control_table(runs: &[NamedRun]) -> Table {
+pub(crate) fn control_table(runs: &[NamedRun]) -> Table {
     let judged = (runs.iter()).filter_map(|(path, run)| Some((path, run.metrics.as_ref()?)));
     let rows = judged.flat_map(|(path, metrics)| driven(metrics).map(|row| (path, row)));
     let stage =
@@ -202,7 +202,7 @@ fn driven(metrics: &ControlMetrics) -> [Driven<'_>; 5] {
 }
 
 /// The rows of the verdict that fail along each recording.
-pub fn failures(runs: &[NamedRun]) -> Vec<String> {
+pub(crate) fn failures(runs: &[NamedRun]) -> Vec<String> {
     let failed = runs.iter().filter_map(|(path, run)| {
         let failure = run.metrics.as_ref()?.failure.as_ref()?;
         Some(format!("{}: {failure}", file_name(path)))
@@ -211,7 +211,7 @@ pub fn failures(runs: &[NamedRun]) -> Vec<String> {
 }
 
 /// The rows of a verdict, one by one.
-pub fn verdict_table(verdict: &Verdict) -> Table {
+pub(crate) fn verdict_table(verdict: &Verdict) -> Table {
     let number = |value: Option<f64>| match value {
         Some(value) if !value.is_finite() => "diverges".to_owned(),
         value => value.map_or("-".to_owned(), significant),
@@ -241,7 +241,7 @@ pub fn verdict_table(verdict: &Verdict) -> Table {
 }
 
 /// A verdict as lines of text: fit for what, every counted row that fails, every other that is worse than its baseline.
-pub fn verdict_lines(verdict: &Verdict) -> String {
+pub(crate) fn verdict_lines(verdict: &Verdict) -> String {
     let mut text = format!("verdict: {}\n", headline(verdict, false));
     for row in &verdict.rows {
         match (row.passed, row.counts) {
@@ -257,7 +257,7 @@ pub fn verdict_lines(verdict: &Verdict) -> String {
 }
 
 /// The runs that controlled nothing, and why.
-pub fn failed_runs(runs: &[NamedRun]) -> Vec<String> {
+pub(crate) fn failed_runs(runs: &[NamedRun]) -> Vec<String> {
     let failed = (runs.iter())
         .filter_map(|(path, run)| Some(format!("{}: {}", file_name(path), run.failure()?)));
     failed.collect()
@@ -270,7 +270,7 @@ pub(super) fn file_name(path: &Path) -> String {
 
 /// The solver's work along each recording, and what the lift makes of recorded inputs, one row per run: whether the
 /// dynamics are right changes none of it.
-pub fn run_table(runs: &[NamedRun]) -> Table {
+pub(crate) fn run_table(runs: &[NamedRun]) -> Table {
     let rows = runs.iter().map(|(path, run)| (path, &run.summary));
     let whole = |us: f64| format!("{us:.0}");
     Table::of(rows)

@@ -13,7 +13,7 @@ use crate::symbolic::Interval;
 
 /// A count before and after simplification.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct BeforeAfter {
+pub(crate) struct BeforeAfter {
     /// In the model.
     pub before: usize,
     /// In the simplified model.
@@ -38,7 +38,7 @@ impl std::iter::Sum for BeforeAfter {
 
 /// The kind of a change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ChangeKind {
+pub(crate) enum ChangeKind {
     /// It is gone.
     Dropped,
     /// A constant took its place.
@@ -54,7 +54,7 @@ pub enum ChangeKind {
 
 /// Another coefficient that a change altered.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Effect {
+pub(crate) struct Effect {
     /// The term in the library's syntax.
     pub term: String,
     /// Its coefficient before the change.
@@ -65,7 +65,7 @@ pub struct Effect {
 
 /// One change of one equation.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Change {
+pub(crate) struct Change {
     /// Its kind.
     #[serde(flatten, serialize_with = "kind")]
     pub kind: ChangeKind,
@@ -87,7 +87,7 @@ pub struct Change {
 
 /// One equation of one phase; all errors in scaled units per second squared.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct EquationCertificate {
+pub(crate) struct EquationCertificate {
     /// Index of the latent coordinate.
     #[serde(rename = "equation", serialize_with = "equation")]
     pub output: usize,
@@ -114,7 +114,7 @@ pub struct EquationCertificate {
 
 /// One phase.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct PhaseCertificate {
+pub(crate) struct PhaseCertificate {
     /// The phase's name.
     pub name: String,
     /// The box: each variable's name and range. `None` if there is no sample of the phase, so that
@@ -167,32 +167,32 @@ impl Certificate {
     }
 
     /// Active terms, all phases together.
-    pub fn terms(&self) -> BeforeAfter {
+    pub(crate) fn terms(&self) -> BeforeAfter {
         self.equations().map(|(_, equation)| equation.terms).sum()
     }
 
     /// Significant decimal digits of all coefficients, added up.
-    pub fn digits(&self) -> BeforeAfter {
+    pub(crate) fn digits(&self) -> BeforeAfter {
         self.equations().map(|(_, equation)| equation.digits).sum()
     }
 
     /// Operations of the straight-line code of `ddz`, all phases together.
-    pub fn operations(&self) -> BeforeAfter {
+    pub(crate) fn operations(&self) -> BeforeAfter {
         self.phases.iter().map(|phase| phase.operations).sum()
     }
 
     /// The largest bound as a share of the root mean square of its `ddz`.
-    pub fn largest_bound_share(&self) -> Option<f64> {
+    pub(crate) fn largest_bound_share(&self) -> Option<f64> {
         self.largest_share(|equation| Some(equation.bound.magnitude()))
     }
 
     /// The largest error at a recorded sample as a share of the root mean square of its `ddz`.
-    pub fn largest_measured_share(&self) -> Option<f64> {
+    pub(crate) fn largest_measured_share(&self) -> Option<f64> {
         self.largest_share(|equation| equation.measured.map(|measured| measured.max))
     }
 
     /// The largest root mean square error as a share of the root mean square of its `ddz`.
-    pub fn largest_rms_share(&self) -> Option<f64> {
+    pub(crate) fn largest_rms_share(&self) -> Option<f64> {
         self.largest_share(|equation| equation.measured.map(|measured| measured.rms))
     }
 

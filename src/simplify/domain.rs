@@ -56,7 +56,7 @@ impl Domain {
     ///
     /// # Errors
     /// [`SimplifyError::PhaseCount`], [`SimplifyError::BoxDimension`], [`SimplifyError::Range`].
-    pub fn new(
+    pub(crate) fn new(
         model: &ReducedModel,
         boxes: Vec<Option<Vec<Interval>>>,
     ) -> Result<Self, SimplifyError> {
@@ -168,7 +168,7 @@ impl Domain {
     ///
     /// # Panics
     /// If there is no such phase.
-    pub fn phase(&self, phase: usize) -> Option<&[Interval]> {
+    pub(crate) fn phase(&self, phase: usize) -> Option<&[Interval]> {
         self.boxes[phase].as_deref()
     }
 
@@ -176,7 +176,7 @@ impl Domain {
     ///
     /// # Panics
     /// If there is no such phase.
-    pub fn contains(&self, phase: usize, point: impl Iterator<Item = f64>) -> bool {
+    pub(crate) fn contains(&self, phase: usize, point: impl Iterator<Item = f64>) -> bool {
         let is_inside = |ranges: &[Interval]| {
             (ranges.iter().zip(point)).all(|(range, value)| range.contains(value))
         };

@@ -42,7 +42,7 @@ pub(super) struct Terms<'a> {
 }
 
 impl<'a> Terms<'a> {
-    pub fn new(workspace: &'a Workspace, ranges: Ranges) -> Self {
+    pub(crate) fn new(workspace: &'a Workspace, ranges: Ranges) -> Self {
         Self {
             workspace,
             ranges,
@@ -71,7 +71,7 @@ pub(super) struct Equation {
 
 impl Equation {
     /// An equation as it is.
-    pub fn new(xi: Vec<f64>, known: Option<usize>) -> Self {
+    pub(crate) fn new(xi: Vec<f64>, known: Option<usize>) -> Self {
         Self {
             xi,
             steps: Vec::new(),
@@ -81,7 +81,7 @@ impl Equation {
     }
 
     /// Simplifies an equation so that the sum of its changes' errors stays within `allowed`.
-    pub fn simplified(mut self, terms: &mut Terms<'_>, allowed: f64) -> Self {
+    pub(crate) fn simplified(mut self, terms: &mut Terms<'_>, allowed: f64) -> Self {
         self.remove_terms(terms, REMOVAL_SHARE * allowed);
         self.fold_functions(terms, REMOVAL_SHARE * allowed);
         self.round(terms, allowed);

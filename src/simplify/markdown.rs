@@ -14,7 +14,7 @@ use crate::model::ReducedModel;
 use crate::typeset::Table;
 
 /// What phases no longer depend on, a sentence each without its stop.
-pub fn lost_words(certificate: &Certificate) -> Vec<String> {
+pub(crate) fn lost_words(certificate: &Certificate) -> Vec<String> {
     let phases = (certificate.phases.iter()).filter(|phase| !phase.lost.is_empty());
     let sentence = |phase: &PhaseCertificate| {
         let names: Vec<String> = phase.lost.iter().map(ToString::to_string).collect();

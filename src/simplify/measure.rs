@@ -8,7 +8,7 @@ use crate::symbolic::Interval;
 
 /// How large an error is at recorded samples (scaled units per second squared).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Measured {
+pub(crate) struct Measured {
     /// Largest magnitude.
     pub max: f64,
     /// Root mean square.
@@ -17,7 +17,7 @@ pub struct Measured {
 
 impl Measured {
     /// Of these errors; `None` without any.
-    pub fn of(errors: impl IntoIterator<Item = f64>) -> Option<Self> {
+    pub(crate) fn of(errors: impl IntoIterator<Item = f64>) -> Option<Self> {
         let (mut count, mut square, mut max) = (0usize, 0.0, 0.0f64);
         for error in errors {
             count += 1;
@@ -37,14 +37,14 @@ pub(super) struct Differences(pub Vec<(usize, f64, f64)>);
 
 impl Differences {
     /// The rows in which two equations differ.
-    pub fn between(before: &[f64], after: &[f64]) -> Self {
+    pub(crate) fn between(before: &[f64], after: &[f64]) -> Self {
         let rows = before.iter().zip(after).enumerate();
         let rows = rows.map(|(row, (&before, &after))| (row, before, after));
         Self(rows.filter(|(_, before, after)| before != after).collect())
     }
 
     /// Contains the equation before minus the equation after at every point of the box.
-    pub fn bound(&self, ranges: &mut Ranges) -> Interval {
+    pub(crate) fn bound(&self, ranges: &mut Ranges) -> Interval {
         let parts = self
             .0
             .iter()
@@ -53,7 +53,7 @@ impl Differences {
     }
 
     /// The same at samples; `theta` has one row per sample and one column per term.
-    pub fn measured(&self, theta: &DMatrix<f64>) -> Option<Measured> {
+    pub(crate) fn measured(&self, theta: &DMatrix<f64>) -> Option<Measured> {
         let at = |sample: usize| -> f64 {
             let parts = self.0.iter();
             parts

@@ -53,16 +53,19 @@ mod workspace;
 #[cfg(test)]
 mod tests;
 
-pub use certificate::{
-    BeforeAfter, Certificate, Change, ChangeKind, Effect, EquationCertificate, PhaseCertificate,
-    certificate_json,
+pub(crate) use certificate::{
+    BeforeAfter, Change, ChangeKind, Effect, EquationCertificate, PhaseCertificate,
 };
+pub use certificate::{Certificate, certificate_json};
 pub use domain::{Domain, MARGIN, Samples};
 pub use error::SimplifyError;
-pub use markdown::{lost_words, markdown};
-pub use measure::Measured;
-pub use printing::{PrintedEquation, printed};
-pub use rollouts::{RolloutBasis, RolloutEffect, RolloutErrors, rollouts_json};
+pub(crate) use markdown::lost_words;
+pub use markdown::markdown;
+pub(crate) use measure::Measured;
+pub use printing::PrintedEquation;
+pub(crate) use printing::printed;
+pub use rollouts::RolloutEffect;
+pub(crate) use rollouts::{RolloutBasis, RolloutErrors, rollouts_json};
 pub use run::{Simplified, simplify};
-pub use tables::{bound_words, change_table, equation_table, rollout_table};
+pub(crate) use tables::{bound_words, change_table, equation_table, rollout_table};
 pub use tolerance::{Tolerance, ToleranceError};

@@ -26,7 +26,7 @@ pub struct PrintedEquation {
 ///
 /// # Errors
 /// [`SimplifyError::Model`] for samples of another model.
-pub fn printed(
+pub(crate) fn printed(
     equations: &Equations<'_>,
     domain: &Domain,
     samples: Option<&Samples>,

@@ -29,7 +29,11 @@ pub(super) struct Ranges {
 
 impl Ranges {
     /// Over the box `domain`, for these terms of `pool`.
-    pub fn new(pool: ExprPool, domain: Vec<(SymbolId, Interval)>, terms: Vec<ExprId>) -> Self {
+    pub(crate) fn new(
+        pool: ExprPool,
+        domain: Vec<(SymbolId, Interval)>,
+        terms: Vec<ExprId>,
+    ) -> Self {
         Self {
             pool,
             domain,
@@ -39,18 +43,18 @@ impl Ranges {
     }
 
     /// The pool with all terms.
-    pub fn pool(&mut self) -> &mut ExprPool {
+    pub(crate) fn pool(&mut self) -> &mut ExprPool {
         &mut self.pool
     }
 
     /// A term of the pool.
-    pub fn expr(&self, row: usize) -> ExprId {
+    pub(crate) fn expr(&self, row: usize) -> ExprId {
         self.terms[row]
     }
 
     /// Centre and half width of each symbol's range that `expr` has, in floating point: where to
     /// look, not what to prove.
-    pub fn sides(&self, expr: ExprId) -> Vec<(SymbolId, f64, f64)> {
+    pub(crate) fn sides(&self, expr: ExprId) -> Vec<(SymbolId, f64, f64)> {
         let sides = self.restricted(expr).into_iter();
         sides
             .map(|(symbol, range)| (symbol, range.middle(), 0.5 * range.width()))
@@ -58,7 +62,7 @@ impl Ranges {
     }
 
     /// All values of a term.
-    pub fn term(&mut self, row: usize) -> Interval {
+    pub(crate) fn term(&mut self, row: usize) -> Interval {
         if let Some(range) = self.known[row] {
             return range;
         }
@@ -73,7 +77,7 @@ impl Ranges {
     /// variables are bounded together, with the middles of the intervals as coefficients. Where
     /// those are many, it is sharper to bound together only what has the very same variables;
     /// both are done.
-    pub fn combination(&mut self, parts: &[Part]) -> Interval {
+    pub(crate) fn combination(&mut self, parts: &[Part]) -> Interval {
         let connected = self.sum_of_groups(self.connected(parts));
         let alike = self.sum_of_groups(self.alike(parts));
         connected.intersection(alike)
@@ -140,7 +144,7 @@ impl Ranges {
 
     /// All values of an expression over the box: bounded over ever smaller parts of the box, the
     /// parts that reach furthest first, until values of the function come close to the bounds.
-    pub fn range(&mut self, expr: ExprId) -> Interval {
+    pub(crate) fn range(&mut self, expr: ExprId) -> Interval {
         let domain = self.restricted(expr);
         if self.is_single_use(expr) {
             return self.pool.bound_by_slopes(expr, &[], &domain);

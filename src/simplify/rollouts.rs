@@ -15,7 +15,7 @@ const BODY: &str = "body.";
 
 /// Errors of a model's rollouts in the robot's body coordinates.
 #[derive(Clone, Debug, PartialEq)]
-pub struct RolloutErrors {
+pub(crate) struct RolloutErrors {
     /// Root mean squares of each coordinate: whole jumps, restarted.
     pub rms: Vec<[Option<f64>; 2]>,
     /// Windows that diverged: whole jumps, restarted.
@@ -42,7 +42,7 @@ pub struct RolloutEffect {
 
 /// Recordings to roll out over.
 #[derive(Clone, Debug)]
-pub struct RolloutBasis<'a> {
+pub(crate) struct RolloutBasis<'a> {
     /// Where bounds hold.
     pub domain: &'a Domain,
     /// Recorded samples.
@@ -58,7 +58,7 @@ impl RolloutBasis<'_> {
     ///
     /// # Errors
     /// [`EvaluateError::Model`] for a latent-only model, [`EvaluateError::Sim`] if the integrator refuses.
-    pub fn effect(
+    pub(crate) fn effect(
         &self,
         model: &ReducedModel,
         simplified: &ReducedModel,
@@ -77,7 +77,7 @@ impl RolloutBasis<'_> {
     ///
     /// # Errors
     /// As [`RolloutBasis::effect`].
-    pub fn errors(&self, model: &ReducedModel) -> Result<RolloutErrors, EvaluateError> {
+    pub(crate) fn errors(&self, model: &ReducedModel) -> Result<RolloutErrors, EvaluateError> {
         let coordinates: Vec<usize> = body(model).map(|(index, _, _)| index).collect();
         let compiled = CompiledModel::new(model)?;
         let mut errors = RolloutErrors {
@@ -127,7 +127,7 @@ fn body(model: &ReducedModel) -> impl Iterator<Item = (usize, String, String)> +
 }
 
 /// The effect on rollouts; keys are the coordinates' names.
-pub fn rollouts_json(effect: &RolloutEffect) -> Value {
+pub(crate) fn rollouts_json(effect: &RolloutEffect) -> Value {
     let of = |errors: &RolloutErrors| -> Map<String, Value> {
         let named = effect.names.iter().zip(&errors.rms);
         let entry = |rms: &[Option<f64>; 2]| json!({ "full": rms[0], "restarted": rms[1] });

@@ -7,7 +7,7 @@ use crate::symbolic::Interval;
 use crate::typeset::{Cell, Table, rounded_up, significant};
 
 /// Terms, root mean square, allowed, certified and measured error of each equation.
-pub fn equation_table(certificate: &Certificate) -> Table {
+pub(crate) fn equation_table(certificate: &Certificate) -> Table {
     Table::of(certificate.equations())
         .column("phase, equation", "", |(phase, e)| name(phase, e.output))
         .column("terms", "", |(_, e)| e.terms.to_string())
@@ -22,7 +22,7 @@ pub fn equation_table(certificate: &Certificate) -> Table {
 }
 
 /// Every change with its bound and its error at the recorded samples.
-pub fn change_table(certificate: &Certificate) -> Table {
+pub(crate) fn change_table(certificate: &Certificate) -> Table {
     let changes = certificate.equations().flat_map(|(phase, equation)| {
         let name = name(phase, equation.output);
         let changes = equation.changes.iter();
@@ -41,7 +41,7 @@ pub fn change_table(certificate: &Certificate) -> Table {
 }
 
 /// Root mean square errors of rollouts before and after.
-pub fn rollout_table(effect: &RolloutEffect) -> Table {
+pub(crate) fn rollout_table(effect: &RolloutEffect) -> Table {
     let names = effect.names.iter().zip(&effect.units);
     let names = names.map(|(name, unit)| format!("{name}, {unit}"));
     let every = format!("restarted every {} s", effect.restart_every_s);
@@ -57,7 +57,7 @@ pub fn rollout_table(effect: &RolloutEffect) -> Table {
 }
 
 /// Errors of equations whose coefficients are rounded for print.
-pub fn printing_table(printed: &[PrintedEquation]) -> Table {
+pub(crate) fn printing_table(printed: &[PrintedEquation]) -> Table {
     Table::of(printed)
         .column("phase, equation", "", |e| name(&e.phase, e.output))
         .column("bound", "", |e| e.bound.map(interval_words))
@@ -89,13 +89,13 @@ fn change_words(change: &Change) -> String {
 }
 
 /// An interval of four-digit numbers that contains the interval.
-pub fn interval_words(interval: Interval) -> String {
+pub(crate) fn interval_words(interval: Interval) -> String {
     let [below, hi] = [-interval.lo(), interval.hi()].map(|end| rounded_up(end, 4));
     format!("[{}, {}]", significant(-below), significant(hi))
 }
 
 /// A bound in four digits, never below it.
-pub fn bound_words(bound: f64) -> String {
+pub(crate) fn bound_words(bound: f64) -> String {
     significant(rounded_up(bound, 4))
 }
 

@@ -38,7 +38,7 @@ impl Tolerance {
     }
 
     /// Whether nothing may change.
-    pub fn is_zero(self) -> bool {
+    pub(crate) fn is_zero(self) -> bool {
         match self {
             Tolerance::ShareOfRms(value) | Tolerance::Absolute(value) => value == 0.0,
         }

@@ -25,7 +25,7 @@ impl Workspace {
     ///
     /// # Errors
     /// [`LibraryError`] if the equations' own terms are refused, which equations exclude.
-    pub fn new(equations: &Equations<'_>) -> Result<Self, LibraryError> {
+    pub(crate) fn new(equations: &Equations<'_>) -> Result<Self, LibraryError> {
         let own = equations.terms();
         let mut texts: Vec<String> = own.iter().map(|term| term.text().to_owned()).collect();
         let mut pool = equations.pool().clone();
@@ -51,32 +51,32 @@ impl Workspace {
     }
 
     /// Number of terms.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.library.len()
     }
 
     /// The library with the appended terms.
-    pub fn library(&self) -> &Library {
+    pub(crate) fn library(&self) -> &Library {
         &self.library
     }
 
     /// The text of a term.
-    pub fn text(&self, row: usize) -> &str {
+    pub(crate) fn text(&self, row: usize) -> &str {
         self.library.terms()[row].text()
     }
 
     /// The row of a variable.
-    pub fn variable(&self, symbol: SymbolId) -> Option<usize> {
+    pub(crate) fn variable(&self, symbol: SymbolId) -> Option<usize> {
         self.rows.get(&Some(symbol)).copied()
     }
 
     /// The row of `1`.
-    pub fn constant(&self) -> Option<usize> {
+    pub(crate) fn constant(&self) -> Option<usize> {
         self.rows.get(&None).copied()
     }
 
     /// Ranges over a box, `3 latent_dim` intervals.
-    pub fn ranges(&self, domain: &[Interval]) -> Ranges {
+    pub(crate) fn ranges(&self, domain: &[Interval]) -> Ranges {
         let variables = LatentVariable::all(self.library.latent_dim());
         let symbols = variables.filter_map(|variable| self.library.symbol(variable));
         let terms = self.library.terms().iter().map(|term| term.expr());
@@ -88,7 +88,7 @@ impl Workspace {
     }
 
     /// The coefficients of a phase with zeros for the appended terms, one row per term.
-    pub fn coefficients(&self, equations: &Equations<'_>, phase: usize) -> DMatrix<f64> {
+    pub(crate) fn coefficients(&self, equations: &Equations<'_>, phase: usize) -> DMatrix<f64> {
         let added = self.len() - self.original;
         let own = equations.coefficients(phase);
         own.insert_rows(self.original, added, 0.0)
@@ -99,7 +99,7 @@ impl Workspace {
     ///
     /// # Errors
     /// [`SimplifyError::Model`] if a coefficient is not finite.
-    pub fn finish(
+    pub(crate) fn finish(
         &self,
         model: ReducedModel,
         xi: &[DMatrix<f64>],

@@ -9,7 +9,7 @@ use crate::train::{SetMetrics, TrainReport};
 /// One training and its outcome.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Cell {
+pub(crate) struct Cell {
     /// Which training.
     pub id: CellId,
     /// Its outcome.
@@ -19,7 +19,7 @@ pub struct Cell {
 /// Metrics, or the reason why there are none.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Outcome {
+pub(crate) enum Outcome {
     /// A model was found.
     Trained(Metrics),
     /// Training refused, for this reason; the same settings would refuse again.
@@ -29,7 +29,7 @@ pub enum Outcome {
 /// Metrics of one model, on the validation jumps where there are any, else on the training jumps.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Metrics {
+pub(crate) struct Metrics {
     /// Mean square of `x - decode(encode(x))`, scaled units (16).
     pub decoder_mse: f64,
     /// Active coefficients in the first phase (contact), as the paper counts them.
@@ -46,7 +46,7 @@ pub struct Metrics {
 
 impl Metrics {
     /// The metrics of a finished training.
-    pub fn of(report: &TrainReport) -> Self {
+    pub(crate) fn of(report: &TrainReport) -> Self {
         let set: &SetMetrics = report.validation.as_ref().unwrap_or(&report.training);
         let active = report.active_terms.iter().map(|phase| phase.active);
         Self {
@@ -60,7 +60,7 @@ impl Metrics {
     }
 
     /// Whether all of them are numbers.
-    pub fn is_finite(&self) -> bool {
+    pub(crate) fn is_finite(&self) -> bool {
         let [x, z] = [self.prediction_x_m, self.prediction_z_m];
         let values = [x, z, self.decoder_mse, self.torque_r2];
         values.into_iter().all(f64::is_finite)
@@ -68,7 +68,7 @@ impl Metrics {
 
     /// `L_mod = 2 E_dec + 2 lambda ln |Xi|` (29), over the active coefficients of all phases; without any, the
     /// logarithm counts as 0.
-    pub fn combined_loss(&self, lambda: f64) -> f64 {
+    pub(crate) fn combined_loss(&self, lambda: f64) -> f64 {
         combined_loss(self.decoder_mse, self.active_all_phases.max(1), lambda)
             .expect("at least one coefficient")
     }

@@ -4,7 +4,7 @@
 //! study goes on where it was and parts computed on several machines can be joined; and their [`Summary`]. Read
 //! [`plan`] first, then [`run()`](run()).
 
-pub mod plan;
+pub(crate) mod plan;
 
 mod cell;
 mod error;
@@ -12,9 +12,9 @@ mod run;
 mod store;
 mod summary;
 
-pub use cell::{Cell, Metrics, Outcome};
-pub use error::StudyError;
-pub use plan::{CellId, FOLDS, Plan, Shard};
-pub use run::run;
-pub use store::Store;
-pub use summary::{DimensionSummary, Spread, Summary, cell_table};
+pub(crate) use cell::{Cell, Metrics, Outcome};
+pub(crate) use error::StudyError;
+pub(crate) use plan::{CellId, FOLDS, Plan, Shard};
+pub(crate) use run::run;
+pub(crate) use store::Store;
+pub(crate) use summary::{DimensionSummary, Spread, Summary, cell_table};

@@ -8,12 +8,12 @@ use crate::robot::STATE_DIM;
 use crate::train::Method;
 
 /// Seeds of the closed form leave out every jump whose number has this remainder of the seed.
-pub const FOLDS: usize = 5;
+pub(crate) const FOLDS: usize = 5;
 
 /// The trainings of a study; parts of one study have equal plans.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Plan {
+pub(crate) struct Plan {
     /// Latent dimensions, ascending.
     pub latent_dims: Vec<usize>,
     /// Seeds, counted from 1.
@@ -33,7 +33,7 @@ pub struct Plan {
 /// One training of a study.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct CellId {
+pub(crate) struct CellId {
     /// Number of latent coordinates.
     pub latent_dim: usize,
     /// Seed, from 1.
@@ -45,7 +45,7 @@ impl Plan {
     ///
     /// # Errors
     /// [`StudyError::Range`].
-    pub fn check(&self) -> Result<(), StudyError> {
+    pub(crate) fn check(&self) -> Result<(), StudyError> {
         let refuse =
             |found: String, expected: &'static str| Err(StudyError::Range { found, expected });
         if self.latent_dims.is_empty() || self.seeds == 0 {
@@ -62,7 +62,7 @@ impl Plan {
     }
 
     /// All trainings, by dimension and then seed.
-    pub fn cells(&self) -> Vec<CellId> {
+    pub(crate) fn cells(&self) -> Vec<CellId> {
         let seeds = 1..=self.seeds as u64;
         let of = |&latent_dim: &usize| seeds.clone().map(move |seed| CellId { latent_dim, seed });
         self.latent_dims.iter().flat_map(of).collect()
@@ -71,20 +71,20 @@ impl Plan {
 
 /// Part `index` (from 1) of `count` parts of a study.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Shard {
+pub(crate) struct Shard {
     index: usize,
     count: usize,
 }
 
 impl Shard {
     /// The whole study.
-    pub const WHOLE: Self = Self { index: 1, count: 1 };
+    pub(crate) const WHOLE: Self = Self { index: 1, count: 1 };
 
     /// Reads `3/8`.
     ///
     /// # Errors
     /// The expected form, if it is anything else.
-    pub fn parse(text: &str) -> Result<Self, String> {
+    pub(crate) fn parse(text: &str) -> Result<Self, String> {
         let expected = || format!("found `{text}`, expected a part such as 3/8");
         let (index, count) = text.split_once('/').ok_or_else(expected)?;
         let number = |text: &str| text.parse::<usize>().map_err(|_| expected());
@@ -96,7 +96,7 @@ impl Shard {
     }
 
     /// The cells of this part: every `count`-th, so that all parts have dimensions of all sizes.
-    pub fn of(self, cells: &[CellId]) -> Vec<CellId> {
+    pub(crate) fn of(self, cells: &[CellId]) -> Vec<CellId> {
         let own = cells.iter().skip(self.index - 1).step_by(self.count);
         own.copied().collect()
     }

@@ -20,7 +20,7 @@ use crate::train::{Method, Origin, Recordings, TrainError, TrainOptions, Trained
 ///
 /// # Errors
 /// [`StudyError::File`], one of several if more than one file fails. A training that refuses is an outcome, not an error.
-pub fn run(
+pub(crate) fn run(
     store: &Store,
     shard: Shard,
     [training, validation]: [&[Recording]; 2],

@@ -17,7 +17,7 @@ const PLAN: &str = "study.json";
 
 /// A folder with the finished trainings of one plan.
 #[derive(Clone, Debug)]
-pub struct Store {
+pub(crate) struct Store {
     folder: PathBuf,
     plan: Plan,
 }
@@ -27,7 +27,7 @@ impl Store {
     ///
     /// # Errors
     /// [`StudyError::OtherStudy`] if the folder has trainings of another plan, [`StudyError::File`].
-    pub fn create(folder: &Path, plan: Plan) -> Result<Self, StudyError> {
+    pub(crate) fn create(folder: &Path, plan: Plan) -> Result<Self, StudyError> {
         plan.check()?;
         fs::create_dir_all(folder).map_err(refused(folder, "make the folder"))?;
         let path = folder.join(PLAN);
@@ -48,7 +48,7 @@ impl Store {
     ///
     /// # Errors
     /// [`StudyError::File`] and [`StudyError::Broken`] for its plan.
-    pub fn open(folder: &Path) -> Result<Self, StudyError> {
+    pub(crate) fn open(folder: &Path) -> Result<Self, StudyError> {
         let plan: Plan = read_json(&folder.join(PLAN))?;
         plan.check()?;
         let folder = folder.to_owned();
@@ -56,7 +56,7 @@ impl Store {
     }
 
     /// The plan of the study.
-    pub fn plan(&self) -> &Plan {
+    pub(crate) fn plan(&self) -> &Plan {
         &self.plan
     }
 
@@ -64,7 +64,7 @@ impl Store {
     ///
     /// # Errors
     /// [`StudyError::Broken`] if the file holds something else.
-    pub fn get(&self, id: CellId) -> Result<Option<Cell>, StudyError> {
+    pub(crate) fn get(&self, id: CellId) -> Result<Option<Cell>, StudyError> {
         let path = self.path(id);
         if !path.exists() {
             return Ok(None);
@@ -84,7 +84,7 @@ impl Store {
     ///
     /// # Errors
     /// [`StudyError::File`].
-    pub fn put(&self, cell: &Cell) -> Result<(), StudyError> {
+    pub(crate) fn put(&self, cell: &Cell) -> Result<(), StudyError> {
         write_json(&self.path(cell.id), cell, Overwrite::Replace)
     }
 
@@ -92,13 +92,13 @@ impl Store {
     ///
     /// # Errors
     /// As [`Self::get`].
-    pub fn cells(&self) -> Result<Vec<Cell>, StudyError> {
+    pub(crate) fn cells(&self) -> Result<Vec<Cell>, StudyError> {
         let ids = self.plan.cells().into_iter();
         ids.filter_map(|id| self.get(id).transpose()).collect()
     }
 
     /// Trainings of the plan that are not finished.
-    pub fn missing(&self) -> Vec<CellId> {
+    pub(crate) fn missing(&self) -> Vec<CellId> {
         let cells = self.plan.cells().into_iter();
         cells.filter(|id| !self.path(*id).exists()).collect()
     }
@@ -107,7 +107,7 @@ impl Store {
     ///
     /// # Errors
     /// [`StudyError::OtherStudy`], [`StudyError::Contradiction`].
-    pub fn merge(&self, part: &Store) -> Result<(), StudyError> {
+    pub(crate) fn merge(&self, part: &Store) -> Result<(), StudyError> {
         if let Some(difference) = difference(&part.plan, &self.plan) {
             let path = part.folder.join(PLAN);
             return Err(StudyError::OtherStudy { path, difference });

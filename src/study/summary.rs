@@ -7,7 +7,7 @@ use crate::typeset::Table;
 
 /// Mean and standard deviation over seeds.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Spread {
+pub(crate) struct Spread {
     /// Mean.
     pub mean: f64,
     /// Standard deviation (divided by n - 1), 0 for one seed.
@@ -16,7 +16,7 @@ pub struct Spread {
 
 impl Spread {
     /// Of some values; `None` without any.
-    pub fn of(values: &[f64]) -> Option<Self> {
+    pub(crate) fn of(values: &[f64]) -> Option<Self> {
         let n = values.len() as f64;
         let mean = values.iter().sum::<f64>() / n;
         let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
@@ -29,7 +29,7 @@ impl Spread {
 
 /// Metrics of one latent dimension over its seeds.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct DimensionSummary {
+pub(crate) struct DimensionSummary {
     /// Number of latent coordinates.
     pub latent_dim: usize,
     /// Trainings that gave a model.
@@ -52,7 +52,7 @@ pub struct DimensionSummary {
 
 /// A whole study by latent dimension.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Summary {
+pub(crate) struct Summary {
     /// Weight of the complexity in (29).
     pub lambda: f64,
     /// Ascending; dimensions without any model are left out.
@@ -61,7 +61,7 @@ pub struct Summary {
 
 impl Summary {
     /// Of finished trainings.
-    pub fn of(cells: &[Cell], lambda: f64) -> Self {
+    pub(crate) fn of(cells: &[Cell], lambda: f64) -> Self {
         let mut dims: Vec<usize> = cells.iter().map(|cell| cell.id.latent_dim).collect();
         dims.sort_unstable();
         dims.dedup();
@@ -73,7 +73,7 @@ impl Summary {
     }
 
     /// The latent dimension of least combined loss (29).
-    pub fn best(&self) -> Option<usize> {
+    pub(crate) fn best(&self) -> Option<usize> {
         let loss = |row: &&DimensionSummary| row.combined_loss.mean;
         let rows = self.dimensions.iter();
         let best = rows.min_by(|a, b| loss(a).total_cmp(&loss(b)));
@@ -81,7 +81,7 @@ impl Summary {
     }
 
     /// One row per latent dimension: means and standard deviations.
-    pub fn table(&self) -> Table {
+    pub(crate) fn table(&self) -> Table {
         let mut table = Table::of(&self.dimensions)
             .column("latent_dim", "", |row| row.latent_dim)
             .column("trained", "", |row| row.trained)
@@ -108,7 +108,7 @@ impl Summary {
 }
 
 /// One row per training, in the order of the plan.
-pub fn cell_table(cells: &[Cell], lambda: f64) -> Table {
+pub(crate) fn cell_table(cells: &[Cell], lambda: f64) -> Table {
     let columns = "latent_dim,seed,decoder_mse,active,active_all_phases,combined_loss,torque_r2,prediction_x_m,prediction_z_m,refused";
     let mut table = Table::new(columns.split(','));
     for Cell { id, outcome } in cells {

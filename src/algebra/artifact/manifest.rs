@@ -22,11 +22,11 @@ use crate::robot::{Actuators, JOINT_DIM, WrenchFrame};
 use crate::robot_file::RobotEntry;
 
 /// Name and version of the format of a model without the keys of [`SCHEMA_2`].
-pub const SCHEMA: &str = "romc-model/1";
+pub(crate) const SCHEMA: &str = "romc-model/1";
 
 /// The format with `actuators`, `wrench_frame`, `landmarks`, `prior`, inputs given states, and a
 /// `robot` that is described.
-pub const SCHEMA_2: &str = "romc-model/2";
+pub(crate) const SCHEMA_2: &str = "romc-model/2";
 
 /// Rows of a matrix.
 pub(super) type Rows = Vec<Vec<f64>>;

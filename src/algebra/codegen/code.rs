@@ -7,7 +7,7 @@ use crate::ir::{Binary, Table, Unary};
 
 /// A subscript `offset + sum_i stride_i * name_i`.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Index {
+pub(crate) struct Index {
     /// Strides and the variables that they multiply.
     pub terms: Vec<(usize, Ident)>,
     /// What is added.
@@ -16,7 +16,7 @@ pub struct Index {
 
 impl Index {
     /// A constant subscript.
-    pub fn fixed(offset: usize) -> Self {
+    pub(crate) fn fixed(offset: usize) -> Self {
         Self {
             terms: Vec::new(),
             offset,
@@ -24,24 +24,24 @@ impl Index {
     }
 
     /// A loop variable.
-    pub fn variable(name: &Ident) -> Self {
+    pub(crate) fn variable(name: &Ident) -> Self {
         Self::fixed(0).plus(1, name)
     }
 
     /// With `stride * name` added.
-    pub fn plus(mut self, stride: usize, name: &Ident) -> Self {
+    pub(crate) fn plus(mut self, stride: usize, name: &Ident) -> Self {
         self.terms.push((stride, name.clone()));
         self
     }
 
     /// With a constant added.
-    pub fn shifted(mut self, by: usize) -> Self {
+    pub(crate) fn shifted(mut self, by: usize) -> Self {
         self.offset += by;
         self
     }
 
     /// With another subscript added.
-    pub fn sum(mut self, other: &Self) -> Self {
+    pub(crate) fn sum(mut self, other: &Self) -> Self {
         self.terms.extend_from_slice(&other.terms);
         self.shifted(other.offset)
     }
@@ -49,7 +49,7 @@ impl Index {
 
 /// An expression.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Expr {
+pub(crate) enum Expr {
     /// A finite number.
     Literal(f64),
     /// A scalar variable.
@@ -68,14 +68,14 @@ pub enum Expr {
 
 impl Expr {
     /// `a op b`
-    pub fn infix(op: Binary, a: Expr, b: Expr) -> Self {
+    pub(crate) fn infix(op: Binary, a: Expr, b: Expr) -> Self {
         Self::Infix(op, Box::new(a), Box::new(b))
     }
 }
 
 /// `len` elements of an array from `offset` on, handed to a function.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Span {
+pub(crate) struct Span {
     pub array: Ident,
     /// First element.
     pub offset: usize,
@@ -89,14 +89,14 @@ pub struct Span {
 
 impl Span {
     /// Whether the span is the whole array.
-    pub fn is_whole(&self) -> bool {
+    pub(crate) fn is_whole(&self) -> bool {
         self.offset == 0 && self.len == self.of
     }
 }
 
 /// A statement.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Stmt {
+pub(crate) enum Stmt {
     /// A named scalar that never changes.
     Let(Ident, Expr),
     /// A named array that never changes.
@@ -149,7 +149,7 @@ pub enum Role {
 
 /// A parameter of a generated function, in a language or, with a text for a name, in any.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Parameter<N = Ident> {
+pub(crate) struct Parameter<N = Ident> {
     pub name: N,
     /// Number of elements; an output may have none.
     pub len: usize,
@@ -159,7 +159,7 @@ pub struct Parameter<N = Ident> {
 
 /// A constant matrix with static storage.
 #[derive(Clone, Debug, PartialEq)]
-pub struct ConstTable {
+pub(crate) struct ConstTable {
     pub name: Ident,
     pub values: Table,
     /// Whether rows are read in lanes.

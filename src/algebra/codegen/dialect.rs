@@ -8,11 +8,11 @@ use super::printer::subscript;
 use crate::ir::{Binary, Unary};
 
 /// Lines, each with its depth of indentation.
-pub type Lines = Vec<(usize, String)>;
+pub(crate) type Lines = Vec<(usize, String)>;
 
 /// Spelling of a target language. The printer owns precedence and parentheses, the
 /// dialect everything that differs between languages.
-pub trait Dialect {
+pub(crate) trait Dialect {
     /// Words that no variable may be called, with blanks between them.
     fn reserved(&self) -> &'static str;
 
@@ -136,7 +136,7 @@ pub trait Dialect {
 }
 
 /// What most targets call a function.
-pub fn name(function: Unary) -> &'static str {
+pub(crate) fn name(function: Unary) -> &'static str {
     match function {
         Unary::Neg => unreachable!("the printer spells negation as an operator"),
         Unary::Sqrt => "sqrt",

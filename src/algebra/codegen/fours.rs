@@ -7,11 +7,11 @@ use super::ident::Ident;
 use crate::ir::{Binary, QUAD, Quad, QuadSum, Table};
 
 /// Sums that are added side by side: what the registers hold beside a weight.
-pub const SUMS_AT_ONCE: usize = 12;
+pub(crate) const SUMS_AT_ONCE: usize = 12;
 
 /// [`Statement::Quads`](crate::ir::Statement) where its numbers live.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Fours {
+pub(crate) struct Fours {
     /// The local array that the sums go to.
     pub array: Ident,
     pub sums: Vec<QuadSum>,
@@ -28,7 +28,7 @@ pub struct Fours {
 
 /// Neighbouring sums that do not need each other.
 #[derive(Clone, Debug, PartialEq)]
-pub struct FourBlock {
+pub(crate) struct FourBlock {
     pub sums: Range<usize>,
     /// What is added to them, by weights as far as each sum's order allows.
     pub terms: Vec<Four>,
@@ -36,7 +36,7 @@ pub struct FourBlock {
 
 /// A vector times a weight.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Four {
+pub(crate) struct Four {
     /// The sum that it is added to.
     pub sum: usize,
     /// Position among the weights.
@@ -46,7 +46,7 @@ pub struct Four {
 
 impl FourBlock {
     /// Divides the sums of a statement.
-    pub fn divide(sums: &[QuadSum]) -> Vec<Self> {
+    pub(crate) fn divide(sums: &[QuadSum]) -> Vec<Self> {
         let mut blocks = Vec::new();
         let mut first = 0;
         for end in 1..=sums.len() {
@@ -90,7 +90,7 @@ fn needs(sum: &QuadSum, first: usize) -> bool {
 
 impl Fours {
     /// Which numbers of each sum may be other than zero.
-    pub fn filled(table: &Table, sums: &[QuadSum]) -> Vec<[bool; QUAD]> {
+    pub(crate) fn filled(table: &Table, sums: &[QuadSum]) -> Vec<[bool; QUAD]> {
         let mut filled: Vec<[bool; QUAD]> = Vec::new();
         for sum in sums {
             let mut lanes = [false; QUAD];
@@ -104,13 +104,13 @@ impl Fours {
     }
 
     /// Which numbers of a vector may be other than zero.
-    pub fn lanes(&self, vector: Quad) -> [bool; QUAD] {
+    pub(crate) fn lanes(&self, vector: Quad) -> [bool; QUAD] {
         filled_lanes(&self.table.0, &self.filled, vector)
     }
 
     /// The statements for languages in which numbers are added one by one; products with coefficients of
     /// zero are left out.
-    pub fn one_by_one(&self) -> Vec<Stmt> {
+    pub(crate) fn one_by_one(&self) -> Vec<Stmt> {
         let mut statements = Vec::new();
         for (position, sum) in self.sums.iter().enumerate() {
             for lane in 0..QUAD {

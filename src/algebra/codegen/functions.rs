@@ -12,7 +12,11 @@ use crate::ir::{Binary, Program, Slot, Statement, Unary};
 /// The body of the loop over the lanes of a block of points; arrays are called `z_lanes` and so on, the
 /// loop variable `lane`. Nothing if the program is better run point by point: it loops over tables itself,
 /// or calls functions that no compiler vectorises.
-pub fn lanes(program: &Program, dialect: &dyn Dialect, sines: SineCosine) -> Option<Vec<Stmt>> {
+pub(crate) fn lanes(
+    program: &Program,
+    dialect: &dyn Dialect,
+    sines: SineCosine,
+) -> Option<Vec<Stmt>> {
     let is_by_library = sines == SineCosine::Library && program.has(computes_angles);
     if is_by_library || !program.statements().iter().all(vectorises) {
         return None;
@@ -61,7 +65,7 @@ fn vectorises(statement: &Statement) -> bool {
 }
 
 /// The function of an entry, with the functions that it calls.
-pub fn function(
+pub(crate) fn function(
     entry: &FunctionSpec,
     name: Ident,
     dialect: &dyn Dialect,

@@ -5,7 +5,7 @@ use std::fmt;
 
 /// A name that is an identifier of the target and unique in its scope; minted by [`Namer`].
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Ident(String);
+pub(crate) struct Ident(String);
 
 impl fmt::Display for Ident {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -15,13 +15,13 @@ impl fmt::Display for Ident {
 
 /// Mints the names of one scope: identifiers, no keyword, none twice.
 #[derive(Clone, Debug)]
-pub struct Namer {
+pub(crate) struct Namer {
     used: BTreeSet<String>,
 }
 
 impl Namer {
     /// A scope in which the words of the target are taken, which are a text with blanks between them.
-    pub fn new(reserved: &str) -> Self {
+    pub(crate) fn new(reserved: &str) -> Self {
         let used = reserved.split_whitespace().map(str::to_owned).collect();
         Self { used }
     }
@@ -29,7 +29,7 @@ impl Namer {
     /// The wanted name if it is free, otherwise the name with the first free number.
     ///
     /// Characters that no identifier may have become underscores.
-    pub fn mint(&mut self, wanted: &str) -> Ident {
+    pub(crate) fn mint(&mut self, wanted: &str) -> Ident {
         let mut base: String = wanted
             .chars()
             .map(|c| if c.is_ascii_alphanumeric() { c } else { '_' })

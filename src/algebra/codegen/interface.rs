@@ -15,7 +15,7 @@ const MOST_TERMS: usize = 40;
 
 /// A function to be generated from a program.
 #[derive(Clone, Debug)]
-pub struct FunctionSpec {
+pub(crate) struct FunctionSpec {
     /// Name without the model's, such as `contact_dynamics`.
     pub name: String,
     /// The program.
@@ -107,7 +107,7 @@ impl ModelInterface {
     }
 
     /// All entries in the order in which they are generated.
-    pub fn all(&self) -> impl Iterator<Item = &FunctionSpec> {
+    pub(crate) fn all(&self) -> impl Iterator<Item = &FunctionSpec> {
         let phases = self
             .phases
             .iter()

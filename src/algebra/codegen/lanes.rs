@@ -9,7 +9,7 @@ use crate::ir::{Binary, Group, LANES, Slopes, Unary};
 
 /// One row of [`Statement::Separable`](crate::ir::Statement) where its numbers live.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Row {
+pub(crate) struct Row {
     /// The variable for the row.
     pub row: Ident,
     /// Names for a column, a block of columns, a lane, the terms of all columns and the sums of the lanes.
@@ -30,7 +30,7 @@ pub struct Row {
 
 impl Row {
     /// Runs of blocks of [`LANES`] columns, one after the other, whose columns have terms alike.
-    pub fn runs(&self) -> Vec<Range<usize>> {
+    pub(crate) fn runs(&self) -> Vec<Range<usize>> {
         let ends = self.groups.iter().map(|group| group.values.len);
         let mut ends: Vec<usize> = ends
             .chain(self.base.iter().map(|base| base.stride))
@@ -43,7 +43,7 @@ impl Row {
     }
 
     /// The term of a column of a run, where its slope goes, and its slope.
-    pub fn column(&self, run: &Range<usize>, at: &Index) -> [Expr; 3] {
+    pub(crate) fn column(&self, run: &Range<usize>, at: &Index) -> [Expr; 3] {
         let from = LANES * run.start;
         let base = self.base.as_ref().filter(|base| base.stride > from);
         let mut slope = base.map(|base| base.element(&self.row, at));
@@ -67,7 +67,7 @@ impl Row {
     }
 
     /// Statements that take column after column, then add what the lanes would.
-    pub fn in_columns(&self) -> Vec<Stmt> {
+    pub(crate) fn in_columns(&self) -> Vec<Stmt> {
         let [column, _, lane, terms, sums] = &self.names;
         let width = self.n_slopes.next_multiple_of(LANES);
         // Without lanes arrays are declared as zeros, also behind the last column.

@@ -2,13 +2,13 @@
 
 /// `{a, b, c}`, broken with `indent` after every eight elements of a long list; an `indent`
 /// without a newline leaves breaking to the printer.
-pub fn braced(elements: &[String], indent: &str) -> String {
+pub(crate) fn braced(elements: &[String], indent: &str) -> String {
     let lines: Vec<String> = elements.chunks(8).map(|line| line.join(", ")).collect();
     format!("{{{}}}", lines.join(&format!(",{indent}")))
 }
 
 /// Each paragraph as [`wrapped`]; continued lines are indented by two spaces.
-pub fn comment_lines(paragraphs: &[String], width: usize) -> Vec<String> {
+pub(crate) fn comment_lines(paragraphs: &[String], width: usize) -> Vec<String> {
     let paragraphs = paragraphs.iter();
     paragraphs
         .flat_map(|text| wrapped(text, width, " "))

@@ -11,7 +11,7 @@ use super::tables::Tables;
 use crate::ir::Statement;
 
 /// What the files of all languages say of a model; `F` is what they print of a function.
-pub struct ModelText<'a, F> {
+pub(crate) struct ModelText<'a, F> {
     /// What is generated.
     pub entries: &'a ModelInterface,
     /// Constant tables.
@@ -22,7 +22,7 @@ pub struct ModelText<'a, F> {
 }
 
 /// A phase in the templates; `F` is what they print of a function.
-pub struct PhaseText<F> {
+pub(crate) struct PhaseText<F> {
     /// Name of the phase as an identifier.
     pub identifier: String,
     /// The same in upper case, the beginning of its constants.
@@ -42,7 +42,7 @@ pub struct PhaseText<F> {
 impl<'a, F> ModelText<'a, F> {
     /// Prints all of a model but lanes. `prefix` begins each name; `print` prints a function that reads some of
     /// the tables, `numbers` rows or columns of nonzeros, counted from 0.
-    pub fn new(
+    pub(crate) fn new(
         entries: &'a ModelInterface,
         dialect: &dyn Dialect,
         prefix: &str,
@@ -83,7 +83,7 @@ impl<'a, F> ModelText<'a, F> {
     }
 
     /// The same with the loops over the lanes of batches that run in blocks.
-    pub fn with_lanes(mut self, dialect: &dyn Dialect, sines: SineCosine) -> Self {
+    pub(crate) fn with_lanes(mut self, dialect: &dyn Dialect, sines: SineCosine) -> Self {
         for (text, phase) in self.phases.iter_mut().zip(&self.entries.phases) {
             let lanes = lanes(&phase.dynamics.program, dialect, sines);
             text.lanes = lanes.map(|lanes| Printer::new(dialect).statements(&lanes, 3));
@@ -92,22 +92,22 @@ impl<'a, F> ModelText<'a, F> {
     }
 
     /// Whether a batch runs in blocks.
-    pub fn has_lanes(&self) -> bool {
+    pub(crate) fn has_lanes(&self) -> bool {
         self.phases.iter().any(|phase| phase.lanes.is_some())
     }
 
     /// Whether rows of functions are added in lanes, so that wide registers read rows of tables.
-    pub fn has_rows(&self) -> bool {
+    pub(crate) fn has_rows(&self) -> bool {
         (self.entries).has(|s| matches!(s, Statement::Separable { .. }))
     }
 
     /// Whether there are sums of vectors of four numbers.
-    pub fn has_fours(&self) -> bool {
+    pub(crate) fn has_fours(&self) -> bool {
         (self.entries).has(|s| matches!(s, Statement::Quads { .. }))
     }
 
     /// Name of the first phase's accelerations, for an example of a call.
-    pub fn example(&self) -> &str {
+    pub(crate) fn example(&self) -> &str {
         let first = self.entries.phases.first();
         first.map_or("", |phase| &phase.dynamics.name)
     }

@@ -18,7 +18,7 @@ pub enum Precision {
 
 impl Precision {
     /// Bits of a number.
-    pub fn bits(self) -> usize {
+    pub(crate) fn bits(self) -> usize {
         match self {
             Self::Double => 64,
             Self::Single => 32,
@@ -27,7 +27,7 @@ impl Precision {
 
     /// A finite number with the fewest digits that read back to the nearest number of this precision, always with
     /// a point or an exponent, so that it is no integer in any target.
-    pub fn digits(self, value: f64) -> String {
+    pub(crate) fn digits(self, value: f64) -> String {
         assert!(value.is_finite(), "numbers of programs are finite");
         match self {
             Self::Double => format!("{value:?}"),
@@ -36,7 +36,7 @@ impl Precision {
     }
 
     /// Points of a block of a batch: what the widest common registers hold.
-    pub fn lanes(self) -> usize {
+    pub(crate) fn lanes(self) -> usize {
         match self {
             Self::Double => 8,
             Self::Single => 16,
@@ -44,12 +44,12 @@ impl Precision {
     }
 
     /// Whether numbers have 32 bits.
-    pub fn is_single(self) -> bool {
+    pub(crate) fn is_single(self) -> bool {
         self == Self::Single
     }
 
     /// A number as a program in this precision holds it.
-    pub fn nearest(self, value: f64) -> f64 {
+    pub(crate) fn nearest(self, value: f64) -> f64 {
         match self {
             Self::Double => value,
             Self::Single => f64::from(value as f32),
@@ -57,7 +57,7 @@ impl Precision {
     }
 
     /// Whether a number is finite, and well within the range of this precision.
-    pub fn holds(self, value: f64) -> bool {
+    pub(crate) fn holds(self, value: f64) -> bool {
         let largest = match self {
             Self::Double => f64::MAX,
             Self::Single => f64::from(f32::MAX) / 16.0,
@@ -99,7 +99,7 @@ fn beyond_single(program: &Program) -> Option<f64> {
 }
 
 /// Two significant digits, never less than the number.
-pub fn rounded_up(bound: f64) -> String {
+pub(crate) fn rounded_up(bound: f64) -> String {
     format!("{:.1e}", crate::typeset::rounded_up(bound, 2))
 }
 

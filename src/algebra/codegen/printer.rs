@@ -19,7 +19,7 @@ enum Precedence {
 
 /// Prints statements in one dialect.
 #[derive(Clone, Copy)]
-pub struct Printer<'a> {
+pub(crate) struct Printer<'a> {
     dialect: &'a dyn Dialect,
     /// Function that sums with a product are printed with.
     multiply_add: Option<&'static str>,
@@ -27,7 +27,7 @@ pub struct Printer<'a> {
 
 impl<'a> Printer<'a> {
     /// A printer for a dialect.
-    pub fn new(dialect: &'a dyn Dialect) -> Self {
+    pub(crate) fn new(dialect: &'a dyn Dialect) -> Self {
         Self {
             dialect,
             multiply_add: None,
@@ -36,7 +36,7 @@ impl<'a> Printer<'a> {
 
     /// A function behind its head, with a mention of each parameter that nothing reads; ends without
     /// a newline.
-    pub fn function(
+    pub(crate) fn function(
         &self,
         head: &str,
         mention: impl Fn(&Ident) -> String,
@@ -60,7 +60,7 @@ impl<'a> Printer<'a> {
     }
 
     /// Statements of a loop's body at a depth of indentation; ends with a newline.
-    pub fn statements(&self, statements: &[Stmt], depth: usize) -> String {
+    pub(crate) fn statements(&self, statements: &[Stmt], depth: usize) -> String {
         let mut text = String::new();
         self.in_loop().block(statements, depth, &mut text);
         text
@@ -304,7 +304,7 @@ fn starts_with_minus(expr: &Expr) -> bool {
 }
 
 /// A subscript such as `4*i + 3`.
-pub fn subscript(index: &Index) -> String {
+pub(crate) fn subscript(index: &Index) -> String {
     let terms = index.terms.iter().filter(|(stride, _)| *stride != 0);
     let terms = terms.map(|(stride, name)| match stride {
         1 => name.to_string(),

@@ -6,7 +6,7 @@ use crate::ir::{sin_cos, sin_cos_f32};
 
 /// Spelled constants, in the order in which kernels use them.
 #[derive(Clone, Debug)]
-pub struct KernelText {
+pub(crate) struct KernelText {
     /// Largest magnitude of an argument.
     pub limit: String,
     /// 2/pi.
@@ -25,7 +25,7 @@ pub struct KernelText {
 
 impl KernelText {
     /// The constants in a precision, spelled in a language.
-    pub fn new(precision: Precision, dialect: &dyn Dialect) -> Self {
+    pub(crate) fn new(precision: Precision, dialect: &dyn Dialect) -> Self {
         let wide = |values: [f32; 3]| values.map(f64::from);
         let (single, lists) = match precision {
             Precision::Double => {

@@ -11,7 +11,7 @@ const LONGEST_LIST: usize = 24;
 
 /// Where the rows of a matrix of values live: `stride` apart in an array, from the home's first element on.
 #[derive(Clone, Debug, PartialEq)]
-pub struct MatrixStorage {
+pub(crate) struct MatrixStorage {
     /// Where the first row begins.
     pub home: Span,
     /// From one row to the next.
@@ -20,7 +20,7 @@ pub struct MatrixStorage {
 
 impl MatrixStorage {
     /// The entry at a loop variable and a subscript.
-    pub fn element(&self, row: &Ident, col: &Index) -> Expr {
+    pub(crate) fn element(&self, row: &Ident, col: &Index) -> Expr {
         let row = Index::fixed(self.home.offset).plus(self.stride, row);
         Expr::Element(self.home.array.clone(), row.sum(col))
     }

@@ -6,7 +6,7 @@ use crate::ir::Table;
 
 /// The constant tables of a file; equal tables are stored once.
 #[derive(Debug)]
-pub struct Tables {
+pub(crate) struct Tables {
     namer: Namer,
     base: String,
     known: Vec<ConstTable>,
@@ -14,7 +14,7 @@ pub struct Tables {
 
 impl Tables {
     /// No table yet; names begin with `base`.
-    pub fn new(namer: Namer, base: &str) -> Self {
+    pub(crate) fn new(namer: Namer, base: &str) -> Self {
         Self {
             namer,
             base: base.to_owned(),
@@ -23,12 +23,12 @@ impl Tables {
     }
 
     /// All tables, in the order of their first use.
-    pub fn iter(&self) -> impl Iterator<Item = &ConstTable> {
+    pub(crate) fn iter(&self) -> impl Iterator<Item = &ConstTable> {
         self.known.iter()
     }
 
     /// A table, which is stored if it is new.
-    pub fn stored(&mut self, table: &Table) -> &mut ConstTable {
+    pub(crate) fn stored(&mut self, table: &Table) -> &mut ConstTable {
         let known = self.known.iter().position(|known| known.values == *table);
         let place = known.unwrap_or_else(|| {
             let place = self.known.len();

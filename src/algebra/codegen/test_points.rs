@@ -14,7 +14,7 @@ const REACHES: [f64; 6] = [1.0, 3.0, 0.3, 10.0, 0.1, 0.01];
 
 /// Inputs of a function and what it computes from them.
 #[derive(Clone, Debug)]
-pub struct TestPoint {
+pub(crate) struct TestPoint {
     /// An array per input of the program.
     pub inputs: Vec<Vec<f64>>,
     /// An array per output of the program.
@@ -37,7 +37,7 @@ impl TestPoint {
     /// The point with some arrays at zero, as a robot that stands still has them, if the function of the state
     /// has kinks and finite results there. A slope that is not a number there although the accelerations are counts as zero, so that the
     /// test fails.
-    pub fn at_rest(self, entry: &FunctionSpec, precision: Precision, zero: &[&str]) -> Self {
+    pub(crate) fn at_rest(self, entry: &FunctionSpec, precision: Precision, zero: &[&str]) -> Self {
         let is_of_state = entry.program.inputs().iter().any(|slot| slot.name == "dz");
         if !is_of_state || !entry.program.has(has_kink) {
             return self;
@@ -63,7 +63,7 @@ impl TestPoint {
     }
 
     /// Whether every result is finite.
-    pub fn is_defined(&self) -> bool {
+    pub(crate) fn is_defined(&self) -> bool {
         self.undefined == 0
     }
 }
@@ -80,7 +80,7 @@ fn has_kink(statement: &Statement) -> bool {
 
 /// A point between -1 and 1. Where the function is not finite there, points around it are tried: all elements
 /// positive, all drawn again, a few of the best point changed; the best is returned.
-pub fn point(entry: &FunctionSpec, precision: Precision, random: &mut Random) -> TestPoint {
+pub(crate) fn point(entry: &FunctionSpec, precision: Precision, random: &mut Random) -> TestPoint {
     let slots = entry.program.inputs().iter();
     let drawn = slots.map(|slot| match slot.name.as_str() {
         "h" => vec![precision.nearest(0.002)],
@@ -141,12 +141,12 @@ fn element(entry: &FunctionSpec, slot: &str, k: usize, random: f64) -> f64 {
 }
 
 /// Points of the batch that self-tests run.
-pub const N_BATCH: usize = 21;
+pub(crate) const N_BATCH: usize = 21;
 
 /// The inputs of that batch: element `i` of its arrays is `z + 0.01 (i mod 97)`, `dz - 0.01 (i mod 89)` and
 /// `u_lat + 0.01 (i mod 83)`, except for `far_angle` in point 3 of `z1` and in the last but one of `dz1`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BatchPoints {
+pub(crate) struct BatchPoints {
     /// First element of `z`.
     pub z: f64,
     /// First element of `dz`.
@@ -159,7 +159,7 @@ pub struct BatchPoints {
 
 impl BatchPoints {
     /// Numbers of both signs, or positive ones where the accelerations are finite at more of these.
-    pub fn new(phase: &PhaseInterface, precision: Precision) -> Self {
+    pub(crate) fn new(phase: &PhaseInterface, precision: Precision) -> Self {
         let overflows = phase.dynamics.program.statements().iter().any(|statement| {
             use Unary::{Exp, Log, Tan, Tanh};
             matches!(
@@ -191,7 +191,12 @@ impl BatchPoints {
     }
 
     /// A point of the batch.
-    pub fn at(&self, phase: &PhaseInterface, point: usize, precision: Precision) -> TestPoint {
+    pub(crate) fn at(
+        &self,
+        phase: &PhaseInterface,
+        point: usize,
+        precision: Precision,
+    ) -> TestPoint {
         let element = |slot: &str, k: usize| {
             let i = k * N_BATCH + point;
             let cycle = |modulus: usize| 0.01 * (i % modulus) as f64;
@@ -210,11 +215,11 @@ impl BatchPoints {
 }
 
 /// Numbers between -1 and 1 with three decimals, the same in every run.
-pub struct Random(u64);
+pub(crate) struct Random(u64);
 
 impl Random {
     /// The numbers of every self-test.
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self(0x5eed)
     }
 

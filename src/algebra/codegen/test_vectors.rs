@@ -8,15 +8,15 @@ use super::test_points::{BatchPoints, N_BATCH, Random, point};
 use crate::ir::Interpreter;
 
 /// Points at which each function is compared.
-pub const N_POINTS: usize = 6;
+pub(crate) const N_POINTS: usize = 6;
 
 /// Largest accepted difference, relative to one plus the largest magnitude of the
 /// expected vector: room for another mathematics library and for fused operations,
 /// none for a wrong coefficient.
-pub const TOLERANCE_F64: f64 = 1e-11;
+pub(crate) const TOLERANCE_F64: f64 = 1e-11;
 
 /// What the self-test of a model compares.
-pub struct TestVectors<'a> {
+pub(crate) struct TestVectors<'a> {
     /// Of each function.
     pub functions: Vec<FunctionVectors>,
     /// Of the batch of each phase.
@@ -26,7 +26,7 @@ pub struct TestVectors<'a> {
 impl<'a> TestVectors<'a> {
     /// The vectors of all functions in a precision, with numbers as a language spells them and its words for
     /// what is not a number or infinite.
-    pub fn new(
+    pub(crate) fn new(
         entries: &'a ModelInterface,
         dialect: &dyn Dialect,
         precision: Precision,
@@ -56,7 +56,7 @@ impl<'a> TestVectors<'a> {
 }
 
 /// The batch of a phase.
-pub struct Batch<'a> {
+pub(crate) struct Batch<'a> {
     /// Name of the phase as an identifier.
     pub phase: &'a str,
     /// First elements of the arrays, and an angle that the batch meets.
@@ -81,7 +81,7 @@ impl<'a> Batch<'a> {
 
 /// The vectors of a function.
 #[derive(Clone, Debug, PartialEq)]
-pub struct FunctionVectors {
+pub(crate) struct FunctionVectors {
     /// Name of the function without the model's.
     pub name: String,
     /// Those of its parameters, in order.
@@ -92,7 +92,7 @@ pub struct FunctionVectors {
 
 impl FunctionVectors {
     /// The arguments of a call, each as `spell` prints it.
-    pub fn arguments(&self, spell: impl Fn(&ParameterVectors) -> String) -> String {
+    pub(crate) fn arguments(&self, spell: impl Fn(&ParameterVectors) -> String) -> String {
         let arguments: Vec<String> = self.parameters.iter().map(spell).collect();
         arguments.join(", ")
     }
@@ -100,7 +100,7 @@ impl FunctionVectors {
 
 /// What a parameter holds at each point: before the call, and what is expected after it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct ParameterVectors {
+pub(crate) struct ParameterVectors {
     /// What it is for.
     pub role: Role,
     pub name: String,
@@ -116,12 +116,12 @@ pub struct ParameterVectors {
 
 impl ParameterVectors {
     /// Whether the function writes it.
-    pub fn is_written(&self) -> bool {
+    pub(crate) fn is_written(&self) -> bool {
         matches!(self.role, Role::Output | Role::InOut)
     }
 
     /// The tolerance of single precision in print.
-    pub fn tolerance(&self) -> String {
+    pub(crate) fn tolerance(&self) -> String {
         rounded_up(self.tolerance_single)
     }
 }

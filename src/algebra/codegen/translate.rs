@@ -11,7 +11,7 @@ use crate::ir::{Program, Statement, ValueId};
 const DEEPEST: usize = 48;
 
 /// How a program's slots, callees and tables are called where it is translated.
-pub struct Names<'a> {
+pub(crate) struct Names<'a> {
     /// Parameter of each input slot.
     pub inputs: &'a [Parameter],
     /// Parameter of each output slot; one that is also an input (role `InOut`) is assigned

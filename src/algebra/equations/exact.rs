@@ -52,7 +52,7 @@ impl ExactStep {
 }
 
 /// A coefficient times a term: `0.5*sin(z1)`, `2.0*(z1 + z2)`, `3.0`.
-pub fn summand_words(coefficient: f64, term: &str) -> String {
+pub(crate) fn summand_words(coefficient: f64, term: &str) -> String {
     match term {
         "1" => format!("{coefficient:?}"),
         _ if term.contains(['+', '-']) => format!("{coefficient:?}*({term})"),
@@ -80,7 +80,7 @@ type Place = (usize, usize);
 impl Equations<'_> {
     /// The equations in their shortest form; what is shortest already keeps its bits.
     #[must_use]
-    pub fn simplified(mut self) -> Self {
+    pub(crate) fn simplified(mut self) -> Self {
         let mut new = NewTerms::default();
         let mut pool = std::mem::take(&mut self.pool);
         let mut shortener = Shortener::new(&mut pool);

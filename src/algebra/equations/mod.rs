@@ -33,7 +33,8 @@ mod physical;
 mod system;
 mod unit;
 
-pub use exact::{ExactStep, summand_words};
+pub use exact::ExactStep;
+pub(crate) use exact::summand_words;
 pub use physical::{LatentUnits, PhysicalError};
 pub use system::{Equations, PhaseEquations, Summand};
 pub use unit::Unit;

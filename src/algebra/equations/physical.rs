@@ -69,7 +69,7 @@ pub struct LatentUnits {
 
 impl LatentUnits {
     /// The unit of a variable of the equations.
-    pub fn of(&self, variable: LatentVariable) -> Unit {
+    pub(crate) fn of(&self, variable: LatentVariable) -> Unit {
         match variable {
             LatentVariable::Z(i) => self.position[i],
             LatentVariable::Dz(i) => self.position[i].per_second(),
@@ -78,13 +78,13 @@ impl LatentUnits {
     }
 
     /// The unit of a latent acceleration.
-    pub fn acceleration(&self, output: usize) -> Unit {
+    pub(crate) fn acceleration(&self, output: usize) -> Unit {
         self.position[output].per_second().per_second()
     }
 
     /// The unit of a term: that of a product of powers of variables; anything else counts as a pure number,
     /// whose inner numbers carry the units.
-    pub fn of_term(&self, pool: &ExprPool, term: ExprId) -> Unit {
+    pub(crate) fn of_term(&self, pool: &ExprPool, term: ExprId) -> Unit {
         let factors = pool.factors_of(term).iter().map(|&factor| {
             let (base, exponent) = match pool.node(factor) {
                 Node::Power(base, exponent) => (*base, pool.as_number(*exponent)?.as_integer()?),

@@ -115,7 +115,7 @@ impl<'a> Equations<'a> {
     }
 
     /// The same equations with a model of their own.
-    pub fn into_owned(self) -> Equations<'static> {
+    pub(crate) fn into_owned(self) -> Equations<'static> {
         Equations {
             model: Cow::Owned(self.model.into_owned()),
             pool: self.pool,

@@ -19,7 +19,7 @@ const NEWTON_METRE: Unit = Unit([2, 0, 1, -2]);
 impl Unit {
     /// The unit of a position or generalised force that a model file names, if it is one of
     /// `m`, `rad`, `N`, `N m`.
-    pub fn from_name(name: &str) -> Option<Self> {
+    pub(crate) fn from_name(name: &str) -> Option<Self> {
         match name {
             "m" => Some(METRE),
             "rad" => Some(RADIAN),
@@ -30,7 +30,7 @@ impl Unit {
     }
 
     /// The unit of the generalised force that does work along a position: N for m, N m for rad.
-    pub fn dual(self) -> Option<Self> {
+    pub(crate) fn dual(self) -> Option<Self> {
         match self {
             METRE => Some(NEWTON),
             RADIAN => Some(NEWTON_METRE),
@@ -39,17 +39,17 @@ impl Unit {
     }
 
     /// The unit of the derivative by time.
-    pub fn per_second(self) -> Self {
+    pub(crate) fn per_second(self) -> Self {
         self / SECOND
     }
 
     /// The unit of a power.
-    pub fn power(self, exponent: i8) -> Self {
+    pub(crate) fn power(self, exponent: i8) -> Self {
         Self(self.0.map(|own| own.saturating_mul(exponent)))
     }
 
     /// The unit with this text between factors, and powers above 1 in this spelling.
-    pub fn spelled(self, between: &str, power: impl Fn(i8) -> String) -> String {
+    pub(crate) fn spelled(self, between: &str, power: impl Fn(i8) -> String) -> String {
         let product = |factors: &[(&str, i8)]| {
             let factors = factors.iter().map(|&(symbol, exponent)| match exponent {
                 1 => symbol.to_owned(),

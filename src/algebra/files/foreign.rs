@@ -232,7 +232,7 @@ fn has(bytes: &[u8], text: &[u8]) -> bool {
 
 impl ForeignFile {
     /// The kind of a file by its bytes, else by its ending.
-    pub fn of(path: &Path, bytes: &[u8]) -> Option<Self> {
+    pub(crate) fn of(path: &Path, bytes: &[u8]) -> Option<Self> {
         Self::of_content(path, bytes).or_else(|| Self::of_path(path))
     }
 

@@ -33,7 +33,7 @@ pub(super) struct Part {
 
 impl Part {
     /// Beside `place`. A link or file of that name that somebody else has put there is never opened.
-    pub fn beside(place: &Path) -> io::Result<Self> {
+    pub(crate) fn beside(place: &Path) -> io::Result<Self> {
         let name = place.file_name().ok_or(io::ErrorKind::InvalidFilename)?;
         let mut last = None;
         for _ in 0..MAX_TRIED {
@@ -66,7 +66,7 @@ impl Part {
 
     /// Moves the file to its place in one step: what is there is replaced, or refused with
     /// [`io::ErrorKind::AlreadyExists`]. Of several processes that refuse, one alone succeeds.
-    pub fn put(&mut self, overwrite: Overwrite) -> io::Result<()> {
+    pub(crate) fn put(&mut self, overwrite: Overwrite) -> io::Result<()> {
         if overwrite == Overwrite::Refuse {
             match fs::hard_link(&self.path, &self.place) {
                 // The part is the second name of the file, and goes in the end.

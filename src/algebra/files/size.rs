@@ -57,7 +57,7 @@ impl Format {
     }
 
     /// The error of a file with more bytes.
-    pub fn too_large(self, most: u64) -> io::Error {
+    pub(crate) fn too_large(self, most: u64) -> io::Error {
         let text = format!(
             "more than {most} bytes, expected at most so many of {}",
             self.facts().1

@@ -20,14 +20,14 @@ enum Key {
 /// Appends statements in order of evaluation and numbers values, so that a scalar
 /// computation which is asked for twice is made once.
 #[derive(Debug)]
-pub struct ProgramBuilder {
+pub(crate) struct ProgramBuilder {
     program: Program,
     known: HashMap<Key, ValueId>,
 }
 
 impl ProgramBuilder {
     /// An empty program.
-    pub fn new(name: &str) -> Self {
+    pub(crate) fn new(name: &str) -> Self {
         Self {
             program: Program {
                 name: name.to_owned(),
@@ -44,7 +44,7 @@ impl ProgramBuilder {
     }
 
     /// Declares an input array and returns its elements.
-    pub fn input(&mut self, name: &str, len: usize) -> Vec<ValueId> {
+    pub(crate) fn input(&mut self, name: &str, len: usize) -> Vec<ValueId> {
         let slot = self.program.inputs.len();
         self.program.inputs.push(Slot {
             name: name.to_owned(),
@@ -56,17 +56,17 @@ impl ProgramBuilder {
     }
 
     /// A constant.
-    pub fn constant(&mut self, value: f64) -> ValueId {
+    pub(crate) fn constant(&mut self, value: f64) -> ValueId {
         self.numbered(Key::Constant(value.to_bits()), Statement::Constant(value))
     }
 
     /// A scalar operation on one value.
-    pub fn unary(&mut self, op: Unary, a: ValueId) -> ValueId {
+    pub(crate) fn unary(&mut self, op: Unary, a: ValueId) -> ValueId {
         self.numbered(Key::Unary(op, a), Statement::Unary(op, a))
     }
 
     /// A scalar operation on two values.
-    pub fn binary(&mut self, op: Binary, a: ValueId, b: ValueId) -> ValueId {
+    pub(crate) fn binary(&mut self, op: Binary, a: ValueId, b: ValueId) -> ValueId {
         let (low, high) = match op {
             Binary::Add | Binary::Mul => (a.min(b), a.max(b)),
             Binary::Sub | Binary::Div | Binary::Pow => (a, b),
@@ -75,27 +75,27 @@ impl ProgramBuilder {
     }
 
     /// `a + b`.
-    pub fn add(&mut self, a: ValueId, b: ValueId) -> ValueId {
+    pub(crate) fn add(&mut self, a: ValueId, b: ValueId) -> ValueId {
         self.binary(Binary::Add, a, b)
     }
 
     /// `a - b`.
-    pub fn sub(&mut self, a: ValueId, b: ValueId) -> ValueId {
+    pub(crate) fn sub(&mut self, a: ValueId, b: ValueId) -> ValueId {
         self.binary(Binary::Sub, a, b)
     }
 
     /// `a * b`.
-    pub fn mul(&mut self, a: ValueId, b: ValueId) -> ValueId {
+    pub(crate) fn mul(&mut self, a: ValueId, b: ValueId) -> ValueId {
         self.binary(Binary::Mul, a, b)
     }
 
     /// `a / b`.
-    pub fn div(&mut self, a: ValueId, b: ValueId) -> ValueId {
+    pub(crate) fn div(&mut self, a: ValueId, b: ValueId) -> ValueId {
         self.binary(Binary::Div, a, b)
     }
 
     /// `zero` where `test` is zero, else `other`.
-    pub fn select(&mut self, test: ValueId, zero: ValueId, other: ValueId) -> ValueId {
+    pub(crate) fn select(&mut self, test: ValueId, zero: ValueId, other: ValueId) -> ValueId {
         let operands = [test, zero, other];
         self.numbered(Key::Select(operands), Statement::Select(operands))
     }
@@ -111,19 +111,19 @@ impl ProgramBuilder {
     }
 
     /// A constant table for groups of functions.
-    pub fn table(&mut self, table: Table) -> TableId {
+    pub(crate) fn table(&mut self, table: Table) -> TableId {
         TableId(place_of(&mut self.program.tables, &table) as u32)
     }
 
     /// Matrix-vector accumulation, see [`Statement::Accumulate`].
-    pub fn accumulate(&mut self, table: Table, sections: Vec<Vec<ValueId>>) -> Vec<ValueId> {
+    pub(crate) fn accumulate(&mut self, table: Table, sections: Vec<Vec<ValueId>>) -> Vec<ValueId> {
         let cols = table.cols;
         let table = self.table(table);
         self.push_array(Statement::Accumulate { table, sections }, cols)
     }
 
     /// Sums of vectors, see [`Statement::Quads`]; defines [`QUAD`] values per sum.
-    pub fn quads(
+    pub(crate) fn quads(
         &mut self,
         table: Table,
         weights: Vec<ValueId>,
@@ -139,7 +139,7 @@ impl ProgramBuilder {
     }
 
     /// All entries of a constant table, row-major.
-    pub fn constants(&mut self, table: Table) -> Vec<ValueId> {
+    pub(crate) fn constants(&mut self, table: Table) -> Vec<ValueId> {
         let n = table.entries.len();
         let table = self.table(table);
         self.push_array(Statement::Constants { table }, n)
@@ -147,7 +147,7 @@ impl ProgramBuilder {
 
     /// Sums of functions of one variable each, and their slopes, see
     /// [`Statement::Separable`].
-    pub fn separable(
+    pub(crate) fn separable(
         &mut self,
         start: Vec<ValueId>,
         base: Option<Vec<ValueId>>,
@@ -166,7 +166,7 @@ impl ProgramBuilder {
     }
 
     /// Evaluates another program; returns the values of each of its outputs.
-    pub fn call(&mut self, callee: &Program, arguments: &[ValueId]) -> Vec<Vec<ValueId>> {
+    pub(crate) fn call(&mut self, callee: &Program, arguments: &[ValueId]) -> Vec<Vec<ValueId>> {
         let position = place_of(&mut self.program.callees, callee);
         let n = callee.outputs.iter().map(|slot| slot.len).sum();
         let statement = Statement::Call {
@@ -182,7 +182,7 @@ impl ProgramBuilder {
     }
 
     /// Declares an output array that takes the given values.
-    pub fn output(&mut self, name: &str, values: &[ValueId]) {
+    pub(crate) fn output(&mut self, name: &str, values: &[ValueId]) {
         let slot = self.program.outputs.len();
         self.program.outputs.push(Slot {
             name: name.to_owned(),
@@ -196,7 +196,7 @@ impl ProgramBuilder {
 
     /// Whether `b` follows `a` in an input array or in an array that a statement defines, so that
     /// generated loops can read both in place.
-    pub fn are_adjacent(&self, a: ValueId, b: ValueId) -> bool {
+    pub(crate) fn are_adjacent(&self, a: ValueId, b: ValueId) -> bool {
         let program = &self.program;
         let ((first, at), (second, next)) = (program.definition(a), program.definition(b));
         match (&program.statements[first], &program.statements[second]) {
@@ -220,7 +220,7 @@ impl ProgramBuilder {
     /// # Errors
     /// What validation finds: a value used before its definition, a non-finite
     /// constant, a table whose shape does not fit its statement, a slot without elements.
-    pub fn finish(self) -> Result<Program, IrError> {
+    pub(crate) fn finish(self) -> Result<Program, IrError> {
         validate(&self.program)?;
         Ok(self.program)
     }

@@ -24,14 +24,13 @@ mod interpret;
 mod program;
 mod real;
 pub mod sin_cos;
-pub mod sin_cos_f32;
+pub(crate) mod sin_cos_f32;
 mod validate;
 
-pub use build::ProgramBuilder;
+pub(crate) use build::ProgramBuilder;
 pub use interpret::Interpreter;
-pub use program::{
-    Binary, Group, LANES, Program, QUAD, Quad, QuadSum, ResultEntry, Slopes, Slot, Statement,
-    Table, TableId, Unary, ValueId,
-};
-pub use real::Real;
-pub use validate::{Fault, IrError};
+pub use program::{Binary, Program, Slot, Statement, Unary, ValueId};
+pub(crate) use program::{Group, LANES, QUAD, Quad, QuadSum, ResultEntry, Slopes, Table, TableId};
+pub(crate) use real::Real;
+pub(crate) use validate::Fault;
+pub use validate::IrError;

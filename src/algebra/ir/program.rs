@@ -4,10 +4,10 @@ use std::ops::Range;
 
 /// Neighbouring columns that [`Statement::Separable`] adds side by side: what the widest common
 /// registers hold.
-pub const LANES: usize = 8;
+pub(crate) const LANES: usize = 8;
 
 /// Numbers that [`Statement::Quads`] adds side by side: one register of most processors.
-pub const QUAD: usize = 4;
+pub(crate) const QUAD: usize = 4;
 
 /// A named, contiguous array of scalars that enters or leaves a program.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -24,25 +24,25 @@ pub struct ValueId(pub(super) u32);
 
 impl ValueId {
     /// Position of the value in schedule order.
-    pub fn index(self) -> usize {
+    pub(crate) fn index(self) -> usize {
         self.0 as usize
     }
 }
 
 /// One constant table of a program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct TableId(pub(super) u32);
+pub(crate) struct TableId(pub(super) u32);
 
 impl TableId {
     /// Position of the table in [`Program::tables`].
-    pub fn index(self) -> usize {
+    pub(crate) fn index(self) -> usize {
         self.0 as usize
     }
 }
 
 /// A constant matrix, row-major.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Table<T = f64> {
+pub(crate) struct Table<T = f64> {
     pub(super) rows: usize,
     pub(super) cols: usize,
     pub(super) entries: Vec<T>,
@@ -53,7 +53,7 @@ impl<T> Table<T> {
     ///
     /// # Panics
     /// If the number of entries is not `rows * cols`; a caller's defect.
-    pub fn new(rows: usize, cols: usize, entries: Vec<T>) -> Self {
+    pub(crate) fn new(rows: usize, cols: usize, entries: Vec<T>) -> Self {
         assert_eq!(entries.len(), rows * cols, "table entries fill the shape");
         Self {
             rows,
@@ -63,22 +63,22 @@ impl<T> Table<T> {
     }
 
     /// Number of rows.
-    pub fn rows(&self) -> usize {
+    pub(crate) fn rows(&self) -> usize {
         self.rows
     }
 
     /// Number of columns.
-    pub fn cols(&self) -> usize {
+    pub(crate) fn cols(&self) -> usize {
         self.cols
     }
 
     /// One row, `cols` entries.
-    pub fn row(&self, row: usize) -> &[T] {
+    pub(crate) fn row(&self, row: usize) -> &[T] {
         &self.entries[row * self.cols..(row + 1) * self.cols]
     }
 
     /// All entries, row-major.
-    pub fn entries(&self) -> &[T] {
+    pub(crate) fn entries(&self) -> &[T] {
         &self.entries
     }
 }
@@ -121,7 +121,7 @@ pub enum Binary {
 
 /// Derivatives of a group of functions, one a column.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Slopes<V = Vec<ValueId>> {
+pub(crate) enum Slopes<V = Vec<ValueId>> {
     /// All are one: the group is the variables themselves.
     One,
     /// These values.
@@ -132,7 +132,7 @@ pub enum Slopes<V = Vec<ValueId>> {
 
 impl<V> Slopes<V> {
     /// The values that are read, if any.
-    pub fn values(&self) -> Option<&V> {
+    pub(crate) fn values(&self) -> Option<&V> {
         match self {
             Self::One => None,
             Self::Plus(values) | Self::Minus(values) => Some(values),
@@ -140,7 +140,7 @@ impl<V> Slopes<V> {
     }
 
     /// The same with other values.
-    pub fn map<W>(&self, of: impl FnOnce(&V) -> W) -> Slopes<W> {
+    pub(crate) fn map<W>(&self, of: impl FnOnce(&V) -> W) -> Slopes<W> {
         match self {
             Self::One => Slopes::One,
             Self::Plus(values) => Slopes::Plus(of(values)),
@@ -151,7 +151,7 @@ impl<V> Slopes<V> {
 
 /// Functions of one variable each, one a column of a table.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Group<T = TableId, V = Vec<ValueId>> {
+pub(crate) struct Group<T = TableId, V = Vec<ValueId>> {
     /// Coefficients, a multiple of [`LANES`] columns.
     pub table: T,
     /// Value of each function; zero behind the last variable, as the coefficients are.
@@ -162,7 +162,7 @@ pub struct Group<T = TableId, V = Vec<ValueId>> {
 
 /// A vector of [`QUAD`] numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Quad {
+pub(crate) enum Quad {
     /// A row of the statement's table.
     Row(usize),
     /// An earlier sum of the statement.
@@ -171,7 +171,7 @@ pub enum Quad {
 
 /// One sum of [`Statement::Quads`].
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct QuadSum {
+pub(crate) struct QuadSum {
     /// What the sum begins with.
     pub start: Quad,
     /// What is added: positions of weights, and the vectors that they scale.
@@ -180,7 +180,7 @@ pub struct QuadSum {
 
 impl QuadSum {
     /// The vectors that are added, then that of the start.
-    pub fn vectors(&self) -> impl Iterator<Item = Quad> {
+    pub(crate) fn vectors(&self) -> impl Iterator<Item = Quad> {
         let added = self.terms.iter().map(|&(_, vector)| vector);
         added.chain([self.start])
     }
@@ -276,7 +276,7 @@ pub enum Statement {
 
 impl Statement {
     /// The values that the statement reads, in order.
-    pub fn operands(&self) -> Vec<ValueId> {
+    pub(crate) fn operands(&self) -> Vec<ValueId> {
         match self {
             Self::Constant(_) | Self::Input { .. } | Self::Constants { .. } => Vec::new(),
             Self::Unary(_, a) => vec![*a],
@@ -303,7 +303,7 @@ impl Statement {
     }
 
     /// The values that a separable statement reads as arrays, one a group's functions and slopes.
-    pub fn arrays(&self) -> Vec<&[ValueId]> {
+    pub(crate) fn arrays(&self) -> Vec<&[ValueId]> {
         match self {
             Self::Separable { groups, .. } => groups
                 .iter()
@@ -326,7 +326,7 @@ impl Statement {
 
 /// One element of an output slot and the value that it takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ResultEntry {
+pub(crate) struct ResultEntry {
     /// Which output.
     pub slot: usize,
     /// Which element of it.
@@ -372,7 +372,7 @@ impl Program {
     }
 
     /// Constant tables of the array statements.
-    pub fn tables(&self) -> &[Table] {
+    pub(crate) fn tables(&self) -> &[Table] {
         &self.tables
     }
 
@@ -382,17 +382,17 @@ impl Program {
     }
 
     /// What is stored where: each output element once, ordered by slot and index.
-    pub fn results(&self) -> &[ResultEntry] {
+    pub(crate) fn results(&self) -> &[ResultEntry] {
         &self.results
     }
 
     /// Number of scalar values.
-    pub fn n_values(&self) -> usize {
+    pub(crate) fn n_values(&self) -> usize {
         self.first.last().map_or(0, |&count| count as usize)
     }
 
     /// How many of the values, from the last on, are the constant zero.
-    pub fn n_zeros_behind(&self, values: &[ValueId]) -> usize {
+    pub(crate) fn n_zeros_behind(&self, values: &[ValueId]) -> usize {
         let is_zero = |value: &&ValueId| {
             let (statement, _) = self.definition(**value);
             matches!(self.statements[statement], Statement::Constant(x) if x.to_bits() == 0)
@@ -401,7 +401,7 @@ impl Program {
     }
 
     /// Whether such a statement computes something that an output depends on.
-    pub fn has(&self, is_wanted: impl Fn(&Statement) -> bool) -> bool {
+    pub(crate) fn has(&self, is_wanted: impl Fn(&Statement) -> bool) -> bool {
         // Most programs have none, which is found sooner than what is live.
         self.statements.iter().any(&is_wanted) && {
             let mut statements = self.statements.iter().zip(self.live());
@@ -410,7 +410,7 @@ impl Program {
     }
 
     /// Which statements compute something that an output depends on.
-    pub fn live(&self) -> Vec<bool> {
+    pub(crate) fn live(&self) -> Vec<bool> {
         let mut live = vec![false; self.statements.len()];
         for entry in &self.results {
             live[self.definition(entry.value).0] = true;
@@ -432,7 +432,7 @@ impl Program {
 
     /// Statement that defines a value, and the value's position among those that
     /// the statement defines.
-    pub fn definition(&self, value: ValueId) -> (usize, usize) {
+    pub(crate) fn definition(&self, value: ValueId) -> (usize, usize) {
         let statement = self.first.partition_point(|&first| first <= value.0) - 1;
         (statement, (value.0 - self.first[statement]) as usize)
     }

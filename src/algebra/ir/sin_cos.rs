@@ -13,18 +13,18 @@
 /// Largest magnitude that the reduction takes, in rad.
 pub const LIMIT: f64 = 8192.0;
 /// 2/pi.
-pub const TWO_OVER_PI: f64 = std::f64::consts::FRAC_2_PI;
+pub(crate) const TWO_OVER_PI: f64 = std::f64::consts::FRAC_2_PI;
 /// 1.5 x 2^52: adding it rounds to an integer, which the low bits then hold.
-pub const ROUND: f64 = 6_755_399_441_055_744.0;
+pub(crate) const ROUND: f64 = 6_755_399_441_055_744.0;
 /// pi/2 in parts of 40, 40 and 53 bits, each cut off rather than rounded: the first two times
 /// a multiple up to 2^13 are exact, and a positive tail keeps the sign of zero.
-pub const PI_2: [f64; 3] = [
+pub(crate) const PI_2: [f64; 3] = [
     1.570_796_326_794_152_3,
     7.443547480480255e-13,
     6.36831716351095e-25,
 ];
 /// (r - sin r) / r^3 in powers of r^2.
-pub const SIN: [f64; 6] = [
+pub(crate) const SIN: [f64; 6] = [
     0.166_666_666_666_666_3,
     -0.008_333_333_333_321_84,
     0.000_198_412_698_293_588_23,
@@ -33,7 +33,7 @@ pub const SIN: [f64; 6] = [
     -1.589_544_451_671_563_3e-10,
 ];
 /// (cos r - 1 + r^2/2) / r^4 in powers of r^2.
-pub const COS: [f64; 6] = [
+pub(crate) const COS: [f64; 6] = [
     0.041_666_666_666_666_595,
     -0.001_388_888_888_887_334,
     2.480_158_728_899_962_3e-5,

@@ -6,18 +6,18 @@
 //! operation is wider than 32 bits, so processors without double precision lose nothing.
 
 /// Largest magnitude that the reduction takes, in rad.
-pub const LIMIT: f32 = 128.0;
+pub(crate) const LIMIT: f32 = 128.0;
 /// 2/pi.
-pub const TWO_OVER_PI: f32 = std::f32::consts::FRAC_2_PI;
+pub(crate) const TWO_OVER_PI: f32 = std::f32::consts::FRAC_2_PI;
 /// 1.5 x 2^23: adding it rounds to an integer, which the low bits then hold.
-pub const ROUND: f32 = 12_582_912.0;
+pub(crate) const ROUND: f32 = 12_582_912.0;
 /// pi/2 in parts of 17, 17 and 24 bits, each cut off rather than rounded: the first two times a
 /// multiple up to 2^7 are exact, and a positive tail keeps the sign of zero.
-pub const PI_2: [f32; 3] = [1.570_785_5, 1.080_427_3e-5, 6.0771e-11];
+pub(crate) const PI_2: [f32; 3] = [1.570_785_5, 1.080_427_3e-5, 6.0771e-11];
 /// (r - sin r) / r^3 in powers of r^2.
-pub const SIN: [f32; 3] = [0.166_666_55, -0.008_332_187, 0.000_195_178_97];
+pub(crate) const SIN: [f32; 3] = [0.166_666_55, -0.008_332_187, 0.000_195_178_97];
 /// (cos r - 1 + r^2/2) / r^4 in powers of r^2.
-pub const COS: [f32; 3] = [0.041_666_646, -0.001_388_731, 2.443_232_7e-5];
+pub(crate) const COS: [f32; 3] = [0.041_666_646, -0.001_388_731, 2.443_232_7e-5];
 
 /// Sine and cosine of `x` rad, each within 1 ulp for |x| up to [`LIMIT`].
 ///
@@ -33,7 +33,7 @@ pub fn sin_cos(x: f32) -> (f32, f32) {
 
 /// Sine and cosine of `x` rad with `|x|` up to [`LIMIT`], without a branch.
 #[inline(always)]
-pub fn reduced_sin_cos(x: f32) -> (f32, f32) {
+pub(crate) fn reduced_sin_cos(x: f32) -> (f32, f32) {
     let shifted = x * TWO_OVER_PI + ROUND;
     let quadrant = shifted.to_bits();
     let multiple = shifted - ROUND;

@@ -37,7 +37,7 @@ pub enum IrError {
 
 /// What is wrong with a statement.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum Fault {
+pub(crate) enum Fault {
     /// It reads this value, which is not defined before it.
     #[error("reads value {0}, defined only later")]
     UndefinedValue(usize),
@@ -66,7 +66,7 @@ pub enum Fault {
 ///
 /// # Errors
 /// The first promise that is broken, in schedule order.
-pub fn validate(program: &Program) -> Result<(), IrError> {
+pub(crate) fn validate(program: &Program) -> Result<(), IrError> {
     check_slots(program)?;
     let at = |statement: usize, found: Result<(), Fault>| {
         found.map_err(|fault| IrError::Statement {

@@ -15,7 +15,10 @@ pub(super) struct Combination {
 impl Combination {
     /// Collects `sum_i coefficient_i expr_i`; sums are taken apart, equal expressions
     /// merged in order of first appearance, and what cancels exactly is left out.
-    pub fn collect(pool: &ExprPool, summands: impl IntoIterator<Item = (f64, ExprId)>) -> Self {
+    pub(crate) fn collect(
+        pool: &ExprPool,
+        summands: impl IntoIterator<Item = (f64, ExprId)>,
+    ) -> Self {
         let mut constants = Vec::new();
         let mut items: Vec<(Vec<f64>, ExprId)> = Vec::new();
         let mut position = HashMap::new();
@@ -45,7 +48,7 @@ impl Combination {
 
     /// The slope by one variable. Terms whose slopes may be infinite count as one: infinities of both signs
     /// can have a finite sum.
-    pub fn derivative(&self, pool: &mut ExprPool, by: SymbolId) -> Self {
+    pub(crate) fn derivative(&self, pool: &mut ExprPool, by: SymbolId) -> Self {
         let mut items = self.items.clone();
         let mut is_steep = |item: &(f64, ExprId)| pool.may_be_steep(item.1, by);
         let steep: Vec<_> = items.iter().copied().filter(&mut is_steep).collect();
@@ -69,12 +72,12 @@ impl Combination {
     }
 
     /// Whether the combination is the number zero.
-    pub fn is_zero(&self) -> bool {
+    pub(crate) fn is_zero(&self) -> bool {
         self.items.is_empty() && self.constant == 0.0
     }
 
     /// The first number of the combination that is not finite.
-    pub fn non_finite(&self) -> Option<f64> {
+    pub(crate) fn non_finite(&self) -> Option<f64> {
         std::iter::once(self.constant)
             .chain(self.items.iter().map(|&(coefficient, _)| coefficient))
             .find(|value| !value.is_finite())

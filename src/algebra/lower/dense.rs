@@ -163,7 +163,11 @@ pub(super) struct DenseJacobian {
 
 impl DenseJacobian {
     /// Divides the equations; `pool` takes the derivatives.
-    pub fn new(pool: &mut ExprPool, equations: &[Combination], columns: &[SymbolId]) -> Self {
+    pub(crate) fn new(
+        pool: &mut ExprPool,
+        equations: &[Combination],
+        columns: &[SymbolId],
+    ) -> Self {
         let mut curved_set = BTreeSet::new();
         let mut has_angles = false;
         for expr in distinct(equations) {
@@ -211,7 +215,7 @@ impl DenseJacobian {
     }
 
     /// All expressions that the code needs besides the equations.
-    pub fn expressions(&self) -> Vec<ExprId> {
+    pub(crate) fn expressions(&self) -> Vec<ExprId> {
         distinct(&self.rest_slopes)
     }
 

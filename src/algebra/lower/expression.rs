@@ -23,7 +23,7 @@ pub(super) struct ExpressionLowering<'a> {
 
 impl<'a> ExpressionLowering<'a> {
     /// Starts with the values that the variables of the pool take.
-    pub fn new(
+    pub(crate) fn new(
         pool: &'a ExprPool,
         builder: ProgramBuilder,
         variables: HashMap<SymbolId, ValueId>,
@@ -40,7 +40,7 @@ impl<'a> ExpressionLowering<'a> {
 
     /// Computes all sines and cosines that occur in the expressions, as few array
     /// statements as their nesting allows.
-    pub fn prepare(&mut self, roots: &[ExprId]) {
+    pub(crate) fn prepare(&mut self, roots: &[ExprId]) {
         let mut levels: BTreeMap<usize, Vec<ExprId>> = BTreeMap::new();
         let mut nesting: HashMap<ExprId, usize> = HashMap::new();
         let mut seen = HashSet::new();
@@ -72,7 +72,7 @@ impl<'a> ExpressionLowering<'a> {
     }
 
     /// Computes the sines and cosines that are still missing, in one statement.
-    pub fn sines_and_cosines(&mut self, arguments: &[ExprId]) {
+    pub(crate) fn sines_and_cosines(&mut self, arguments: &[ExprId]) {
         let mut missing = arguments.to_vec();
         missing.retain(|argument| !self.angles.contains_key(argument));
         if missing.is_empty() {
@@ -92,7 +92,7 @@ impl<'a> ExpressionLowering<'a> {
     }
 
     /// The value of an expression; its sines and cosines have been prepared.
-    pub fn value(&mut self, expr: ExprId) -> ValueId {
+    pub(crate) fn value(&mut self, expr: ExprId) -> ValueId {
         if let Some(&value) = self.values.get(&expr) {
             return value;
         }
@@ -122,7 +122,7 @@ impl<'a> ExpressionLowering<'a> {
     }
 
     /// The value of a linear combination.
-    pub fn combination(&mut self, combination: &Combination) -> ValueId {
+    pub(crate) fn combination(&mut self, combination: &Combination) -> ValueId {
         let terms = self.terms(combination);
         linear_combination(&mut self.builder, combination.constant, &terms)
     }
@@ -138,7 +138,11 @@ impl<'a> ExpressionLowering<'a> {
 
     /// The value of a nested sum and of the `single` part of each of its groups; `shared` is
     /// the part that is known already.
-    pub fn nested(&mut self, nested: &Nested, shared: Option<ValueId>) -> (ValueId, Vec<ValueId>) {
+    pub(crate) fn nested(
+        &mut self,
+        nested: &Nested,
+        shared: Option<ValueId>,
+    ) -> (ValueId, Vec<ValueId>) {
         let mut terms = self.terms(&nested.flat);
         terms.extend(shared.map(|value| Term {
             coefficient: 1.0,
@@ -258,7 +262,7 @@ impl<'a> ExpressionLowering<'a> {
     }
 
     /// Sine and cosine of an argument.
-    pub fn angle(&mut self, argument: ExprId) -> (ValueId, ValueId) {
+    pub(crate) fn angle(&mut self, argument: ExprId) -> (ValueId, ValueId) {
         self.sines_and_cosines(&[argument]);
         self.angles[&argument]
     }

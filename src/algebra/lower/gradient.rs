@@ -42,7 +42,7 @@ pub(super) struct Gradient {
 impl Gradient {
     /// Divides the equations; nothing if another form is asked for or expected to run faster. `n_terms` is
     /// the number of coefficients of equations and derivatives.
-    pub fn new(
+    pub(crate) fn new(
         form: Form,
         pool: &mut ExprPool,
         equations: &[Combination],
@@ -74,7 +74,7 @@ impl Gradient {
     }
 
     /// All expressions that the code needs.
-    pub fn expressions(&self) -> &[ExprId] {
+    pub(crate) fn expressions(&self) -> &[ExprId] {
         &self.vectors.weights
     }
 

@@ -86,7 +86,7 @@ impl Map {
     ///
     /// # Errors
     /// [`LowerError::Program`] if a weight is not finite.
-    pub fn of_weights(self, weights: &DMatrix<f64>) -> Result<Program, LowerError> {
+    pub(crate) fn of_weights(self, weights: &DMatrix<f64>) -> Result<Program, LowerError> {
         affine(self, weights, None)
     }
 }

@@ -42,7 +42,7 @@ pub(super) struct Group {
 
 impl Nested {
     /// The group whose terms, divided by their `factor`, all occur in `derivative`.
-    pub fn part_of(&self, factor: ExprId, derivative: &Combination) -> Option<usize> {
+    pub(crate) fn part_of(&self, factor: ExprId, derivative: &Combination) -> Option<usize> {
         let occurs = |item: &(f64, ExprId)| derivative.items.contains(item);
         let is_part = |group: &Group| {
             let items = &group.single.items;
@@ -52,7 +52,7 @@ impl Nested {
     }
 
     /// All expressions that are multiplied by a coefficient or taken out.
-    pub fn expressions(&self) -> impl Iterator<Item = ExprId> + '_ {
+    pub(crate) fn expressions(&self) -> impl Iterator<Item = ExprId> + '_ {
         let sums = self.groups.iter().flat_map(|g| [&g.single, &g.repeated]);
         let factors = self.groups.iter().map(|group| group.factor);
         let items = sums.chain([&self.flat]).flat_map(|sum| &sum.items);
@@ -83,7 +83,10 @@ struct Quotient {
 
 impl Demand {
     /// Counts the products of all sums, and those that remain when a factor is taken out.
-    pub fn new<'a>(pool: &mut ExprPool, sums: impl IntoIterator<Item = &'a Combination>) -> Self {
+    pub(crate) fn new<'a>(
+        pool: &mut ExprPool,
+        sums: impl IntoIterator<Item = &'a Combination>,
+    ) -> Self {
         let mut uses: HashMap<ExprId, usize> = HashMap::new();
         for sum in sums {
             for &(_, expr) in &sum.items {
@@ -113,7 +116,7 @@ impl Demand {
     }
 
     /// Takes factors out of a sum wherever that saves multiplications.
-    pub fn nest(&self, pool: &mut ExprPool, sum: &Combination) -> Nested {
+    pub(crate) fn nest(&self, pool: &mut ExprPool, sum: &Combination) -> Nested {
         let item = |&(coefficient, expr): &(f64, ExprId)| Item {
             coefficient,
             expr,

@@ -17,30 +17,30 @@ pub(super) struct Number<'b> {
 }
 
 impl<'b> Number<'b> {
-    pub fn new(sheet: &'b Sheet<'b>, id: ValueId) -> Self {
+    pub(crate) fn new(sheet: &'b Sheet<'b>, id: ValueId) -> Self {
         Self { id, sheet }
     }
 
-    pub fn known(sheet: &'b Sheet<'b>, value: f64) -> Self {
+    pub(crate) fn known(sheet: &'b Sheet<'b>, value: f64) -> Self {
         Self::new(sheet, sheet.borrow_mut().constant(value))
     }
 
     /// A constant of the same program.
-    pub fn constant(self, value: f64) -> Self {
+    pub(crate) fn constant(self, value: f64) -> Self {
         Self::known(self.sheet, value)
     }
 
     /// `coefficient * self` without needless operations.
-    pub fn scaled(self, coefficient: f64) -> Self {
+    pub(crate) fn scaled(self, coefficient: f64) -> Self {
         let id = scaled(&mut self.sheet.borrow_mut(), coefficient, self.id);
         Self::new(self.sheet, id)
     }
 
-    pub fn unary(self, op: Unary) -> Self {
+    pub(crate) fn unary(self, op: Unary) -> Self {
         Self::new(self.sheet, self.sheet.borrow_mut().unary(op, self.id))
     }
 
-    pub fn abs(self) -> Self {
+    pub(crate) fn abs(self) -> Self {
         self.unary(Unary::Abs)
     }
 

@@ -35,9 +35,9 @@ pub enum Activation {
 }
 
 /// sqrt(2/pi), of [`Activation::GeluTanh`].
-pub const GELU_RATE: f64 = 0.797_884_560_802_865_4;
+pub(crate) const GELU_RATE: f64 = 0.797_884_560_802_865_4;
 /// Of [`Activation::GeluTanh`].
-pub const GELU_CUBIC: f64 = 0.044_715;
+pub(crate) const GELU_CUBIC: f64 = 0.044_715;
 
 impl Activation {
     /// All activations, in the order in which they are listed.
@@ -54,7 +54,7 @@ impl Activation {
     ];
 
     /// The name in model files and on the command line.
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Linear => "linear",
             Self::Elu => "elu",
@@ -69,7 +69,7 @@ impl Activation {
     }
 
     /// `phi(a)`.
-    pub fn value(self, a: f64) -> f64 {
+    pub(crate) fn value(self, a: f64) -> f64 {
         match self {
             Self::Linear => a,
             Self::Elu if a > 0.0 => a,
@@ -84,12 +84,12 @@ impl Activation {
     }
 
     /// `phi'(a)`.
-    pub fn slope(self, a: f64) -> f64 {
+    pub(crate) fn slope(self, a: f64) -> f64 {
         self.derivative(a, 1)
     }
 
     /// `phi''(a)`; of elu at zero, where it jumps, that of the negative side.
-    pub fn curvature(self, a: f64) -> f64 {
+    pub(crate) fn curvature(self, a: f64) -> f64 {
         self.derivative(a, 2)
     }
 

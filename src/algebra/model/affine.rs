@@ -48,7 +48,7 @@ impl AffineMap {
     }
 
     /// Rows of `W`.
-    pub fn output_dim(&self) -> usize {
+    pub(crate) fn output_dim(&self) -> usize {
         self.weights.nrows()
     }
 
@@ -56,7 +56,7 @@ impl AffineMap {
     ///
     /// # Errors
     /// [`ModelError::Dimension`] if `x` is not `input_dim` long.
-    pub fn apply(&self, x: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
+    pub(crate) fn apply(&self, x: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
         Ok(self.apply_linear(x)? + &self.bias)
     }
 
@@ -64,7 +64,7 @@ impl AffineMap {
     ///
     /// # Errors
     /// [`ModelError::Dimension`] if `dx` is not `input_dim` long.
-    pub fn apply_linear(&self, dx: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
+    pub(crate) fn apply_linear(&self, dx: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
         ModelError::check_dimension("argument of an affine map", dx.len(), self.input_dim())?;
         Ok(&self.weights * dx)
     }

@@ -34,7 +34,7 @@ impl CoordinateNames {
     }
 
     /// Number of coordinates.
-    pub fn dim(&self) -> usize {
+    pub(crate) fn dim(&self) -> usize {
         self.names.len()
     }
 

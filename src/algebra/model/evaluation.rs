@@ -32,7 +32,7 @@ pub enum Step {
 
 impl Tape {
     /// The steps for `terms`; `symbols` holds the variables in order.
-    pub fn new(pool: &ExprPool, terms: &[ExprId], symbols: &[SymbolId]) -> Self {
+    pub(crate) fn new(pool: &ExprPool, terms: &[ExprId], symbols: &[SymbolId]) -> Self {
         let mut builder = Builder {
             pool,
             symbols,
@@ -50,7 +50,7 @@ impl Tape {
     /// Computes all terms; `values` is scratch space, one entry per step.
     ///
     /// Integer powers are multiplication chains, as everywhere in romc.
-    pub fn run(&self, variables: &[f64], values: &mut [f64], theta: &mut [f64]) {
+    pub(crate) fn run(&self, variables: &[f64], values: &mut [f64], theta: &mut [f64]) {
         for (index, step) in self.steps.iter().enumerate() {
             values[index] = match step {
                 Step::Number(value) => *value,

@@ -7,7 +7,7 @@ use thiserror::Error;
 use super::error::ModelError;
 
 /// Longest identifier in bytes, so that names made of model, phase and function stay readable.
-pub const MAX_IDENTIFIER_LEN: usize = 40;
+pub(crate) const MAX_IDENTIFIER_LEN: usize = 40;
 
 /// A name which is an identifier in C, C++ and Rust, and neither a keyword nor reserved there.
 ///
@@ -68,7 +68,7 @@ impl Identifier {
     ///
     /// # Errors
     /// Each variant of [`IdentifierError`]; keywords and taken names are compared without case.
-    pub fn from_name(name: &str) -> Result<Self, IdentifierError> {
+    pub(crate) fn from_name(name: &str) -> Result<Self, IdentifierError> {
         let first = name.chars().next().ok_or(IdentifierError::Empty)?;
         if name.len() > MAX_IDENTIFIER_LEN {
             return Err(IdentifierError::TooLong { found: name.len() });
@@ -110,7 +110,7 @@ impl Identifier {
     }
 
     /// The identifier in upper case, as macros are written.
-    pub fn upper(&self) -> String {
+    pub(crate) fn upper(&self) -> String {
         self.0.to_ascii_uppercase()
     }
 }

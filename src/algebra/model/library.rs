@@ -15,9 +15,9 @@ use crate::symbolic::{ExprId, ExprPool, ParseLimits, SymbolId};
 /// Largest number of latent coordinates.
 pub const MAX_LATENT_DIM: usize = 64;
 /// Largest number of candidate terms.
-pub const MAX_LIBRARY_DIM: usize = 20_000;
+pub(crate) const MAX_LIBRARY_DIM: usize = 20_000;
 /// Longest candidate term in bytes.
-pub const MAX_TERM_LEN: usize = 1_000;
+pub(crate) const MAX_TERM_LEN: usize = 1_000;
 
 /// One column of Theta.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -28,7 +28,7 @@ pub struct CandidateTerm {
 
 impl CandidateTerm {
     /// A term of a pool with its text in the syntax of the model file.
-    pub fn new(text: String, expr: ExprId) -> Self {
+    pub(crate) fn new(text: String, expr: ExprId) -> Self {
         Self { text, expr }
     }
 
@@ -164,7 +164,7 @@ impl Library {
     }
 
     /// Whether there is no term; never true of a library that was built.
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.terms.is_empty()
     }
 
@@ -217,7 +217,7 @@ impl Library {
     }
 
     /// The variable that a symbol of the library's pool stands for.
-    pub fn variable(&self, symbol: SymbolId) -> Option<LatentVariable> {
+    pub(crate) fn variable(&self, symbol: SymbolId) -> Option<LatentVariable> {
         let position = self.symbols.binary_search(&symbol).ok()?;
         LatentVariable::all(self.latent_dim).nth(position)
     }

@@ -59,7 +59,7 @@ impl ReducedModel {
     ///
     /// # Errors
     /// [`ModelError::Missing`] for a latent-only model, [`ModelError::Nonlinear`].
-    pub fn input_projection(&self) -> Result<&DMatrix<f64>, ModelError> {
+    pub(crate) fn input_projection(&self) -> Result<&DMatrix<f64>, ModelError> {
         self.encoder()?;
         let projection = self.input_projection.as_ref();
         self.require(projection, "encoder", "projecting inputs")

@@ -59,25 +59,28 @@ mod variable;
 mod tests;
 
 pub use crate::robot::FeetRule;
-pub use activation::{Activation, GELU_CUBIC, GELU_RATE};
+pub use activation::Activation;
+pub(crate) use activation::{GELU_CUBIC, GELU_RATE};
 pub use affine::AffineMap;
 pub use builder::ModelBuilder;
 pub use coordinate_names::CoordinateNames;
 pub use error::{LibraryError, ModelError};
 pub use evaluation::{Step, Tape};
 pub use given_state::InputGivenState;
-pub use identifier::{Identifier, IdentifierError, MAX_IDENTIFIER_LEN, check_name};
+pub(crate) use identifier::MAX_IDENTIFIER_LEN;
+pub use identifier::{Identifier, IdentifierError, check_name};
 pub use jump_prior::{FEATURE_DIM, GOAL_DIM, GoalFeatures, GoalRange, JumpPart, JumpPrior};
-pub use library::{
-    CandidateTerm, Library, LibraryChoice, MAX_LATENT_DIM, MAX_LIBRARY_DIM, MAX_TERM_LEN,
-};
-pub use normal::{DENSITY_AT_ZERO, TAIL};
+pub use library::{CandidateTerm, Library, LibraryChoice, MAX_LATENT_DIM};
+pub(crate) use library::{MAX_LIBRARY_DIM, MAX_TERM_LEN};
+pub(crate) use normal::{DENSITY_AT_ZERO, TAIL};
 pub use order::CoordinateOrder;
 pub use phase::Phase;
-pub use projection::{RANK_TOLERANCE, complement};
+pub(crate) use projection::RANK_TOLERANCE;
+pub use projection::complement;
 pub use rom::ReducedModel;
 pub use scaling::{ScaleFactors, Scaling};
-pub use standard_library::{LibraryOrder, MAX_DEGREE, StandardLibrary};
+pub(crate) use standard_library::MAX_DEGREE;
+pub use standard_library::{LibraryOrder, StandardLibrary};
 pub use state_map::{Layer, MAX_LAYER_WIDTH, MAX_LAYERS, StateMap};
 pub use statistics::InputStatistics;
 pub use tangent::Tangent;

@@ -5,7 +5,7 @@
 //! it needs no branch, so that generated code computes the same.
 
 /// Chebyshev coefficients of `q`: those of its interpolation at 22 nodes.
-pub const TAIL: [f64; 22] = [
+pub(crate) const TAIL: [f64; 22] = [
     0.577_033_738_616_469_7,
     0.355_436_921_270_498_5,
     0.065_095_158_828_786_53,
@@ -31,10 +31,10 @@ pub const TAIL: [f64; 22] = [
 ];
 
 /// `1/sqrt(2 pi)`.
-pub const DENSITY_AT_ZERO: f64 = 0.398_942_280_401_432_7;
+pub(crate) const DENSITY_AT_ZERO: f64 = 0.398_942_280_401_432_7;
 
 /// Probability that a normal number is below `a`.
-pub fn normal_cumulative(a: f64) -> f64 {
+pub(crate) fn normal_cumulative(a: f64) -> f64 {
     let t = 2.0 / (2.0 + a.abs() * std::f64::consts::FRAC_1_SQRT_2);
     let w = 2.0 * t - 1.0;
     // Clenshaw's recurrence.
@@ -51,7 +51,7 @@ pub fn normal_cumulative(a: f64) -> f64 {
 }
 
 /// Density of the normal distribution at `a`.
-pub fn normal_density(a: f64) -> f64 {
+pub(crate) fn normal_density(a: f64) -> f64 {
     DENSITY_AT_ZERO * (-0.5 * a * a).exp()
 }
 

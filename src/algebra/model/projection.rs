@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 use super::error::{ModelError, check_finite};
 
 /// An encoder has full row rank if its smallest singular value is above this share of the largest.
-pub const RANK_TOLERANCE: f64 = 1e-10;
+pub(crate) const RANK_TOLERANCE: f64 = 1e-10;
 
 /// `pinv(W_e^T)`, `latent_dim x state_dim`, from the singular values of `W_e = U S V^T`:
 /// `pinv(W_e^T) = U S^-1 V^T`.

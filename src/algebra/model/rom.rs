@@ -254,7 +254,7 @@ impl ReducedModel {
     ///
     /// # Errors
     /// [`ModelError::PhaseIndex`].
-    pub fn phase(&self, phase: usize) -> Result<&Phase, ModelError> {
+    pub(crate) fn phase(&self, phase: usize) -> Result<&Phase, ModelError> {
         self.parts.phases.get(phase).ok_or(ModelError::PhaseIndex {
             found: phase,
             count: self.parts.phases.len(),

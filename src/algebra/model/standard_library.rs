@@ -10,7 +10,7 @@ use super::error::LibraryError;
 use super::library::MAX_LIBRARY_DIM;
 
 /// Largest polynomial degree of the standard library.
-pub const MAX_DEGREE: u32 = 8;
+pub(crate) const MAX_DEGREE: u32 = 8;
 
 /// The shorthand of the model file: which groups of terms a library has.
 ///
@@ -113,12 +113,12 @@ impl LibraryOrder {
         is_paired: false,
     };
     /// Appendix B of the paper: sin z, cos z, sin dz, cos dz.
-    pub const PAPER: Self = Self {
+    pub(crate) const PAPER: Self = Self {
         run: Run::Half,
         ..Self::ROMC
     };
     /// sin z1, cos z1, sin z2, ..., then dz likewise, as in PySINDy's `FourierLibrary`.
-    pub const INTERLEAVED: Self = Self {
+    pub(crate) const INTERLEAVED: Self = Self {
         run: Run::Single,
         ..Self::ROMC
     };

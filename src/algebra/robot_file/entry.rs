@@ -21,7 +21,7 @@ pub struct RobotEntry {
 /// A leg.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct LegEntry {
+pub(crate) struct LegEntry {
     /// Its three joints, from the trunk to the foot.
     pub joint: Vec<JointEntry>,
     /// From the last joint to the foot at the zero posture, m, along the body's axes.
@@ -31,7 +31,7 @@ pub struct LegEntry {
 /// A joint.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct JointEntry {
+pub(crate) struct JointEntry {
     /// The maker's name.
     pub name: String,
     /// From the joint before, the first from the body's origin, at the zero posture, m.
@@ -71,7 +71,7 @@ fn is_zero(value: &f64) -> bool {
 /// `"x"`, `"-y"` and so on, or a vector of any length.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
-pub enum Axis {
+pub(crate) enum Axis {
     /// By name.
     Name(String),
     /// By its components.
@@ -90,7 +90,7 @@ const NAMED: [(&str, [f64; 3]); 6] = [
 
 impl Axis {
     /// The axis of a vector, by name where it has one.
-    pub fn of(vector: [f64; 3]) -> Self {
+    pub(crate) fn of(vector: [f64; 3]) -> Self {
         let named = NAMED.iter().find(|(_, known)| *known == vector);
         named.map_or(Axis::Vector(vector), |(name, _)| {
             Axis::Name((*name).to_owned())
@@ -98,7 +98,7 @@ impl Axis {
     }
 
     /// The components as given; none for an unknown name.
-    pub fn vector(&self) -> Option<[f64; 3]> {
+    pub(crate) fn vector(&self) -> Option<[f64; 3]> {
         match self {
             Axis::Vector(vector) => Some(*vector),
             Axis::Name(name) => {

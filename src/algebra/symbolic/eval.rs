@@ -60,7 +60,7 @@ impl ExprPool {
 
 /// `base ^ exponent` by squaring.
 #[inline]
-pub fn integer_power(base: f64, exponent: i64) -> f64 {
+pub(crate) fn integer_power(base: f64, exponent: i64) -> f64 {
     let power = power_by(base, exponent.unsigned_abs(), |a, b| a * b);
     if exponent < 0 { 1.0 / power } else { power }
 }

@@ -50,7 +50,7 @@ pub(super) struct Germs<'a> {
 }
 
 impl<'a> Germs<'a> {
-    pub fn new(
+    pub(crate) fn new(
         pool: &'a mut ExprPool,
         facts: &'a Facts,
         symbol: SymbolId,
@@ -68,7 +68,7 @@ impl<'a> Germs<'a> {
     }
 
     /// The series of an expression; nothing if it is smooth.
-    pub fn of(&mut self, root: ExprId) -> Result<Option<Series>, Stop> {
+    pub(crate) fn of(&mut self, root: ExprId) -> Result<Option<Series>, Stop> {
         let symbol = self.symbol;
         let wanted = |node| self.pool.may_contain(node, symbol);
         for node in self.pool.walk(&[root], wanted, |_| true) {

@@ -24,7 +24,7 @@ pub struct Interval {
 
 impl Interval {
     /// All reals.
-    pub const ENTIRE: Interval = Interval::between(f64::NEG_INFINITY, f64::INFINITY);
+    pub(crate) const ENTIRE: Interval = Interval::between(f64::NEG_INFINITY, f64::INFINITY);
     /// No points: the value of an expression that is defined nowhere in its domain.
     pub const EMPTY: Interval = Interval::between(f64::INFINITY, f64::NEG_INFINITY);
     const NON_NEGATIVE: Interval = Interval::between(0.0, f64::INFINITY);
@@ -104,7 +104,7 @@ impl Interval {
     }
 
     /// `1/x` for the points other than zero.
-    pub fn recip(self) -> Interval {
+    pub(crate) fn recip(self) -> Interval {
         if self.is_empty() || (self.lo == 0.0 && self.hi == 0.0) {
             return Interval::EMPTY;
         }
@@ -117,7 +117,7 @@ impl Interval {
     }
 
     /// `|x|`.
-    pub fn abs(self) -> Interval {
+    pub(crate) fn abs(self) -> Interval {
         if self.is_empty() || self.lo >= 0.0 {
             self
         } else if self.hi <= 0.0 {
@@ -128,7 +128,7 @@ impl Interval {
     }
 
     /// `-1`, `0` or `1`.
-    pub fn sign(self) -> Interval {
+    pub(crate) fn sign(self) -> Interval {
         if self.is_empty() {
             return self;
         }
@@ -137,7 +137,7 @@ impl Interval {
     }
 
     /// `x^exponent`.
-    pub fn powi(self, exponent: i64) -> Interval {
+    pub(crate) fn powi(self, exponent: i64) -> Interval {
         if self.is_empty() {
             return self;
         }
@@ -164,7 +164,7 @@ impl Interval {
 
     /// `x^exponent`, for all pairs of points for which that is real: exponents of a negative base
     /// are integers.
-    pub fn pow(self, exponent: Interval) -> Interval {
+    pub(crate) fn pow(self, exponent: Interval) -> Interval {
         if self.is_empty() || exponent.is_empty() {
             return Interval::EMPTY;
         }
@@ -189,7 +189,7 @@ impl Interval {
     }
 
     /// Square roots of the points that are not negative.
-    pub fn sqrt(self) -> Interval {
+    pub(crate) fn sqrt(self) -> Interval {
         let inside = self.intersection(Interval::NON_NEGATIVE);
         if inside.is_empty() {
             return inside;
@@ -205,13 +205,13 @@ impl Interval {
     }
 
     /// `exp(x)`.
-    pub fn exp(self) -> Interval {
+    pub(crate) fn exp(self) -> Interval {
         self.increasing(f64::exp)
             .intersection(Interval::NON_NEGATIVE)
     }
 
     /// Natural logarithms of the positive points.
-    pub fn log(self) -> Interval {
+    pub(crate) fn log(self) -> Interval {
         let inside = self.intersection(Interval::NON_NEGATIVE);
         if inside.hi == 0.0 {
             return Interval::EMPTY;
@@ -220,23 +220,23 @@ impl Interval {
     }
 
     /// `tanh(x)`.
-    pub fn tanh(self) -> Interval {
+    pub(crate) fn tanh(self) -> Interval {
         self.increasing(f64::tanh)
             .intersection(Interval::new(-1.0, 1.0))
     }
 
     /// `sin(x)`.
-    pub fn sin(self) -> Interval {
+    pub(crate) fn sin(self) -> Interval {
         self.oscillation(f64::sin, 0.5)
     }
 
     /// `cos(x)`.
-    pub fn cos(self) -> Interval {
+    pub(crate) fn cos(self) -> Interval {
         self.oscillation(f64::cos, 0.0)
     }
 
     /// `tan(x)`: all reals if a pole may lie inside.
-    pub fn tan(self) -> Interval {
+    pub(crate) fn tan(self) -> Interval {
         if self.is_empty() {
             return self;
         }

@@ -19,7 +19,7 @@ impl ExprId {
     pub const ONE: ExprId = ExprId(1);
 
     /// Position in the pool, for tables indexed by expression.
-    pub fn index(self) -> usize {
+    pub(crate) fn index(self) -> usize {
         self.0 as usize
     }
 }
@@ -98,7 +98,7 @@ impl Function {
     ];
 
     /// The name in the term grammar.
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Function::Sin => "sin",
             Function::Cos => "cos",
@@ -125,7 +125,7 @@ impl Function {
     }
 
     /// How the function answers a change of its argument's sign.
-    pub fn parity(self) -> Parity {
+    pub(crate) fn parity(self) -> Parity {
         match self {
             Function::Sin | Function::Tan | Function::Tanh | Function::Sign => Parity::Odd,
             Function::Cos | Function::Abs => Parity::Even,
@@ -159,7 +159,7 @@ impl fmt::Display for Function {
 
 /// Symmetry of a function under a change of sign.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Parity {
+pub(crate) enum Parity {
     /// `f(-x) = f(x)`.
     Even,
     /// `f(-x) = -f(x)`.

@@ -40,12 +40,12 @@ impl Number {
     /// The exact `1`.
     pub const ONE: Number = Number::integer(1);
     /// The exact `-1`.
-    pub const MINUS_ONE: Number = Number::integer(-1);
+    pub(crate) const MINUS_ONE: Number = Number::integer(-1);
     /// The exact `1/2`.
-    pub const HALF: Number = Number(Repr::Rational(1, 2));
+    pub(crate) const HALF: Number = Number(Repr::Rational(1, 2));
 
     /// The exact integer `value` (`i64::MIN` is taken one higher, the range being symmetric).
-    pub const fn integer(value: i64) -> Number {
+    pub(crate) const fn integer(value: i64) -> Number {
         let numerator = if value == i64::MIN { -i64::MAX } else { value };
         Number(Repr::Rational(numerator, 1))
     }
@@ -108,7 +108,7 @@ impl Number {
     }
 
     /// Whether the value is below zero.
-    pub fn is_negative(self) -> bool {
+    pub(crate) fn is_negative(self) -> bool {
         match self.0 {
             Repr::Rational(numerator, _) => numerator < 0,
             Repr::Float(bits) => f64::from_bits(bits) < 0.0,
@@ -116,7 +116,7 @@ impl Number {
     }
 
     /// The exact fraction in lowest terms, `(numerator, denominator)`.
-    pub fn as_rational(self) -> Option<(i64, i64)> {
+    pub(crate) fn as_rational(self) -> Option<(i64, i64)> {
         match self.0 {
             Repr::Rational(numerator, denominator) => Some((numerator, denominator)),
             Repr::Float(_) => None,
@@ -138,12 +138,12 @@ impl Number {
     }
 
     /// Whether this is an exact even integer.
-    pub fn is_even(self) -> bool {
+    pub(crate) fn is_even(self) -> bool {
         self.as_integer().is_some_and(|value| value % 2 == 0)
     }
 
     /// The magnitude.
-    pub fn abs(self) -> Number {
+    pub(crate) fn abs(self) -> Number {
         if self.is_negative() { -self } else { self }
     }
 
@@ -206,7 +206,7 @@ impl Number {
     }
 
     /// `self / other`; `None` for a zero divisor, overflow or underflow.
-    pub fn checked_div(self, other: Number) -> Option<Number> {
+    pub(crate) fn checked_div(self, other: Number) -> Option<Number> {
         match self.fractions(other) {
             Some([a, b, c, d]) => Number::from_ratio(a * d, b * c),
             _ if other.is_zero() => None,
@@ -219,7 +219,7 @@ impl Number {
 
     /// `self ^ exponent` as a multiplication chain (`0^0 = 1`); `None` for zero to a negative
     /// power, overflow or underflow.
-    pub fn checked_powi(self, exponent: i64) -> Option<Number> {
+    pub(crate) fn checked_powi(self, exponent: i64) -> Option<Number> {
         if self.abs().is_one() {
             return Some(if exponent % 2 == 0 { Number::ONE } else { self });
         }
@@ -233,7 +233,7 @@ impl Number {
 
     /// The non-negative `root`-th root if it is exact, or correctly rounded (square root of a
     /// float); `None` otherwise.
-    pub fn checked_root(self, root: u32) -> Option<Number> {
+    pub(crate) fn checked_root(self, root: u32) -> Option<Number> {
         if self.is_negative() || root == 0 {
             return None;
         }

@@ -185,7 +185,7 @@ impl ExprPool {
 
     /// The parts of a symbol that stands for a selection of [`ExprPool::slope`]: test, value where the
     /// test is zero, value elsewhere.
-    pub fn selection(&self, symbol: SymbolId) -> Option<[ExprId; 3]> {
+    pub(crate) fn selection(&self, symbol: SymbolId) -> Option<[ExprId; 3]> {
         self.symbols[symbol.index()].selection
     }
 

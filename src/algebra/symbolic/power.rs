@@ -28,7 +28,7 @@ impl ExprPool {
     }
 
     /// `base ^ exponent` for a constant exponent.
-    pub fn pow_number(&mut self, base: ExprId, exponent: Number) -> ExprId {
+    pub(crate) fn pow_number(&mut self, base: ExprId, exponent: Number) -> ExprId {
         let exponent = half_integer(exponent);
         if exponent.is_zero() {
             return ExprId::ONE;

@@ -47,12 +47,12 @@ pub(super) struct Facts {
 
 impl Facts {
     /// An expression with the known values of symbols.
-    pub fn at(&self, pool: &mut ExprPool, expr: ExprId) -> ExprId {
+    pub(crate) fn at(&self, pool: &mut ExprPool, expr: ExprId) -> ExprId {
         pool.substitute(expr, &self.values)
     }
 
     /// Whether an expression is zero; a product, factor by factor.
-    pub fn is_zero(&self, pool: &mut ExprPool, expr: ExprId) -> Result<bool, Stop> {
+    pub(crate) fn is_zero(&self, pool: &mut ExprPool, expr: ExprId) -> Result<bool, Stop> {
         let expr = self.at(pool, expr);
         let mut undecided = None;
         for factor in pool.factors_of(expr).to_vec() {
@@ -84,7 +84,7 @@ impl Facts {
     }
 
     /// Whether an expression that is not zero is positive.
-    pub fn is_positive(&self, pool: &mut ExprPool, expr: ExprId) -> Result<bool, Stop> {
+    pub(crate) fn is_positive(&self, pool: &mut ExprPool, expr: ExprId) -> Result<bool, Stop> {
         let expr = self.at(pool, expr);
         if pool.is_constant(expr) {
             return Ok(pool.evaluate(expr, &|_| f64::NAN) > 0.0);
@@ -99,7 +99,7 @@ impl Facts {
     }
 
     /// Whether an expression is zero, as far as that is known.
-    pub fn known(&self, pool: &mut ExprPool, expr: ExprId) -> Option<bool> {
+    pub(crate) fn known(&self, pool: &mut ExprPool, expr: ExprId) -> Option<bool> {
         let core = core(pool, expr);
         if pool.is_constant(core) {
             return Some(pool.evaluate(core, &|_| f64::NAN) == 0.0);
@@ -243,12 +243,12 @@ enum Outcome {
 impl ExprPool {
     /// The slope of `expr` by `symbol`: its derivative, with selections where that has no value although
     /// `expr` has; see the module. To be evaluated, not to be differentiated or rewritten.
-    pub fn slope(&mut self, expr: ExprId, symbol: SymbolId) -> ExprId {
+    pub(crate) fn slope(&mut self, expr: ExprId, symbol: SymbolId) -> ExprId {
         self.full_slope(expr, symbol).expr
     }
 
     /// Whether the slope of `expr` may be infinite where `expr` has a value, by an argument that is zero.
-    pub fn may_be_steep(&mut self, expr: ExprId, symbol: SymbolId) -> bool {
+    pub(crate) fn may_be_steep(&mut self, expr: ExprId, symbol: SymbolId) -> bool {
         self.full_slope(expr, symbol).has_infinity
     }
 

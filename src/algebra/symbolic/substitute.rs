@@ -13,7 +13,7 @@ impl ExprPool {
     }
 
     /// As [`substitute`](ExprPool::substitute) for several expressions with common parts.
-    pub fn substitute_all(
+    pub(crate) fn substitute_all(
         &mut self,
         exprs: &[ExprId],
         replacements: &[(SymbolId, ExprId)],
@@ -41,7 +41,7 @@ impl ExprPool {
 
     /// The expressions with every part that has no variable but a finite value as a number: `exp(3)*x` is
     /// `20.085536923187668*x`.
-    pub fn fold_constants(&mut self, exprs: &[ExprId]) -> Vec<ExprId> {
+    pub(crate) fn fold_constants(&mut self, exprs: &[ExprId]) -> Vec<ExprId> {
         let mut folded: IdMap<ExprId> = IdMap::default();
         for expr in self.reachable(exprs) {
             let value = match self.is_constant(expr) && self.as_number(expr).is_none() {

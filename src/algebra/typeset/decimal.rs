@@ -27,7 +27,7 @@ pub struct Decimal {
 }
 
 /// Most digits that are ever printed of a fixed number of them.
-pub const MOST_DIGITS: usize = 40;
+pub(crate) const MOST_DIGITS: usize = 40;
 /// Fewest places after the point of [`Rounding::Adaptive`].
 pub(super) const LEAST_DECIMALS: usize = 2;
 /// Places after the point beyond which it turns to powers of ten.
@@ -41,7 +41,7 @@ const SMALL: f64 = 1e-4;
 
 impl Decimal {
     /// The shortest text that reads back as `value`, which must be finite.
-    pub fn exact(value: f64) -> Self {
+    pub(crate) fn exact(value: f64) -> Self {
         debug_assert!(value.is_finite());
         let size = value.abs();
         if size != 0.0 && !(SMALL..LARGE).contains(&size) {
@@ -52,7 +52,7 @@ impl Decimal {
     }
 
     /// An integer with all its digits.
-    pub fn integer(value: i64) -> Self {
+    pub(crate) fn integer(value: i64) -> Self {
         Self::plain(value as f64, value.unsigned_abs().to_string())
     }
 
@@ -128,22 +128,22 @@ impl Decimal {
     }
 
     /// Whether it prints as nothing but zeros.
-    pub fn is_zero(&self) -> bool {
+    pub(crate) fn is_zero(&self) -> bool {
         !self.digits.contains(|digit| ('1'..='9').contains(&digit))
     }
 
     /// Whether it prints as one.
-    pub fn is_one(&self) -> bool {
+    pub(crate) fn is_one(&self) -> bool {
         self.exponent.is_none() && self.value().abs() == 1.0
     }
 
     /// Whether it is below zero.
-    pub fn is_negative(&self) -> bool {
+    pub(crate) fn is_negative(&self) -> bool {
         self.negative
     }
 
     /// The number without its sign.
-    pub fn magnitude(&self) -> Self {
+    pub(crate) fn magnitude(&self) -> Self {
         Self {
             negative: false,
             ..self.clone()
@@ -151,7 +151,7 @@ impl Decimal {
     }
 
     /// The digits with their point, without sign and power of ten.
-    pub fn digits(&self) -> &str {
+    pub(crate) fn digits(&self) -> &str {
         &self.digits
     }
 
@@ -162,7 +162,7 @@ impl Decimal {
     }
 
     /// The power of ten that the digits are multiplied with, if one is printed.
-    pub fn exponent(&self) -> Option<i32> {
+    pub(crate) fn exponent(&self) -> Option<i32> {
         self.exponent
     }
 }

@@ -32,7 +32,7 @@ pub struct Equation {
 
 /// Every candidate term that is printed somewhere, with its coefficients.
 #[derive(Clone, Debug, PartialEq)]
-pub struct CoefficientTable {
+pub(crate) struct CoefficientTable {
     /// Column heads: the acceleration, with the phase it belongs to, and its unit where that is physical.
     pub columns: Vec<(String, Symbol, Option<Unit>)>,
     /// One row a candidate term, in library order.
@@ -41,7 +41,7 @@ pub struct CoefficientTable {
 
 /// One candidate term and its coefficient in each column.
 #[derive(Clone, Debug, PartialEq)]
-pub struct CoefficientRow {
+pub(crate) struct CoefficientRow {
     /// The term.
     pub term: Math,
     /// Unit of the term, for equations in physical units; that of a coefficient is the column's over this.
@@ -132,7 +132,7 @@ impl CoefficientTable {
 
 impl Equation {
     /// Whether any term is taller than a line of text.
-    pub fn is_tall(&self) -> bool {
+    pub(crate) fn is_tall(&self) -> bool {
         self.terms.iter().any(|term| term.math.is_tall())
     }
 

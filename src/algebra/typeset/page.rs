@@ -38,7 +38,7 @@ pub(super) struct Page {
 
 impl Page {
     /// The page of a model's equations.
-    pub fn new<M: Markup>(equations: &Equations<'_>, options: &PrintOptions) -> Self {
+    pub(crate) fn new<M: Markup>(equations: &Equations<'_>, options: &PrintOptions) -> Self {
         let model = equations.model();
         let width_em = options.width_em.unwrap_or(WIDTH_EM);
         let typeset = Typeset::new(equations, &options.symbols, options.rounding);

@@ -67,7 +67,7 @@ impl SymbolTable {
     }
 
     /// How the acceleration of a latent coordinate is written, its index counted from 0.
-    pub fn acceleration(&self, output: usize) -> Symbol {
+    pub(crate) fn acceleration(&self, output: usize) -> Symbol {
         self.derivative(output, 2)
     }
 

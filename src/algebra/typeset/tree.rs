@@ -48,7 +48,7 @@ pub struct Signed {
 
 impl Signed {
     /// `math` with a plus.
-    pub fn plus(math: Math) -> Self {
+    pub(crate) fn plus(math: Math) -> Self {
         Self {
             negative: false,
             math,
@@ -78,7 +78,7 @@ pub struct Symbol {
 
 /// A letter or word inside a symbol.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Glyph {
+pub(crate) enum Glyph {
     /// One Latin letter, italic.
     Letter(char),
     /// A Greek letter, by its place in [`GREEK`].
@@ -90,7 +90,7 @@ pub enum Glyph {
 }
 
 /// The Greek letters that a symbol can be renamed to: TeX's name and the character.
-pub const GREEK: [(&str, char); 34] = [
+pub(crate) const GREEK: [(&str, char); 34] = [
     ("alpha", 'α'),
     ("beta", 'β'),
     ("gamma", 'γ'),
@@ -138,7 +138,7 @@ pub(super) fn function_name(function: Function) -> &'static str {
 
 impl Math {
     /// Whether it is taller than a line of text, so that delimiters must grow.
-    pub fn is_tall(&self) -> bool {
+    pub(crate) fn is_tall(&self) -> bool {
         match self {
             Math::Number(_) | Math::Symbol(_) | Math::Dot => false,
             Math::Fraction(..) | Math::Root(..) => true,

@@ -13,13 +13,13 @@ const PARENTHESIS: f64 = 0.39;
 /// A binary plus or minus with its spaces.
 const OPERATOR: f64 = 1.222;
 /// An equals sign with its spaces.
-pub const EQUALS: f64 = 1.333;
+pub(crate) const EQUALS: f64 = 1.333;
 const MINUS: f64 = 0.778;
 /// Of a character in a script of the same, whose font is wider than the large one scaled to its size.
 const SCRIPT: f64 = 0.8;
 
 /// The width of `math` in em.
-pub fn width(math: &Math) -> f64 {
+pub(crate) fn width(math: &Math) -> f64 {
     match math {
         Math::Number(number) => {
             let points = number.digits().bytes().filter(|byte| *byte == b'.').count() as f64;
@@ -67,7 +67,7 @@ fn sum_width(terms: &[Signed]) -> f64 {
 }
 
 /// The width of a symbol in em.
-pub fn symbol_width(symbol: &Symbol) -> f64 {
+pub(crate) fn symbol_width(symbol: &Symbol) -> f64 {
     let commas = symbol.subscript.len().saturating_sub(1) as f64 * POINT;
     let subscript: f64 = symbol.subscript.iter().map(glyph_width).sum();
     glyph_width(&symbol.glyph) + SCRIPT * (subscript + commas) + 0.05
@@ -83,7 +83,12 @@ fn glyph_width(glyph: &Glyph) -> f64 {
 /// Splits `terms` into lines no wider than `available` em where that is
 /// possible: greedily, and only before a sign. `first` em of the first line and
 /// `indent` em of each further line are taken by what stands before the terms.
-pub fn break_lines(terms: &[Signed], available: f64, first: f64, indent: f64) -> Vec<&[Signed]> {
+pub(crate) fn break_lines(
+    terms: &[Signed],
+    available: f64,
+    first: f64,
+    indent: f64,
+) -> Vec<&[Signed]> {
     let mut lines = Vec::new();
     let mut start = 0;
     let mut used = first;

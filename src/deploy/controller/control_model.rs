@@ -17,7 +17,7 @@ const WIDTH: usize = 5;
     path = "controller/control_model.askama",
     config = "templates/askama.toml"
 )]
-pub struct ControlModelText<'a> {
+pub(crate) struct ControlModelText<'a> {
     banner: String,
     model: &'a str,
     name: &'a str,
@@ -52,7 +52,11 @@ fn array<R: Dim, C: Dim, S: RawStorage<f64, R, C>>(
 
 impl<'a> ControlModelText<'a> {
     /// The text for a plant.
-    pub fn new(entries: &'a ModelInterface, plant: &'a ControlModel, banner: String) -> Self {
+    pub(crate) fn new(
+        entries: &'a ModelInterface,
+        plant: &'a ControlModel,
+        banner: String,
+    ) -> Self {
         let rule = plant.input_rule();
         let pairs = entries.phases.iter().zip(plant.phases());
         Self {

@@ -14,7 +14,7 @@ const DIRECT: [&str; 3] = ["clarabel", "nalgebra", "thiserror"];
 
 /// Locked packages.
 #[derive(Debug, Clone)]
-pub struct Lock<'a> {
+pub(crate) struct Lock<'a> {
     packages: Vec<Package<'a>>,
 }
 
@@ -47,7 +47,7 @@ impl<'a> Package<'a> {
 
 impl Lock<'static> {
     /// romc's own, parsed once.
-    pub fn own() -> &'static Self {
+    pub(crate) fn own() -> &'static Self {
         static PARSED: LazyLock<Lock<'static>> = LazyLock::new(|| {
             let blocks = OWN.split("[[package]]\n").skip(1);
             Lock {
@@ -60,12 +60,12 @@ impl Lock<'static> {
 
 impl<'a> Lock<'a> {
     /// The version of a direct dependency of romc.
-    pub fn version(&self, name: &str) -> &'a str {
+    pub(crate) fn version(&self, name: &str) -> &'a str {
         self.packages[self.position(self.direct(name))].version
     }
 
     /// The lock file of a controller whose model's crate is `name`.
-    pub fn text(&self, banner: &str, name: &str) -> String {
+    pub(crate) fn text(&self, banner: &str, name: &str) -> String {
         let mut dependencies = DIRECT.map(|name| self.direct(name)).to_vec();
         let mut needed = BTreeSet::new();
         let mut open = dependencies.clone();

@@ -4,7 +4,7 @@
 const TESTS: &str = "\n#[cfg(test)]\nmod tests";
 
 /// The licences of these sources.
-pub const LICENCES: [(&str, &str); 2] = [
+pub(crate) const LICENCES: [(&str, &str); 2] = [
     ("LICENSE-APACHE", include_str!("../../../LICENSE-APACHE")),
     ("LICENSE-MIT", include_str!("../../../LICENSE-MIT")),
 ];

@@ -4,33 +4,33 @@ use crate::mpc::{Cone, ConeProgram, SparseColumns};
 
 /// `constant + sum of factor times variable`.
 #[derive(Clone, Debug, Default)]
-pub struct Affine {
+pub(crate) struct Affine {
     pub terms: Vec<(usize, f64)>,
     pub constant: f64,
 }
 
 impl Affine {
     /// A constant.
-    pub fn of(constant: f64) -> Self {
+    pub(crate) fn of(constant: f64) -> Self {
         let terms = Vec::new();
         Self { terms, constant }
     }
 
     /// Adds `factor` times a variable.
-    pub fn add(&mut self, variable: usize, factor: f64) {
+    pub(crate) fn add(&mut self, variable: usize, factor: f64) {
         if factor != 0.0 {
             self.terms.push((variable, factor));
         }
     }
 
     /// The expression with `factor` times a variable on top.
-    pub fn plus(mut self, variable: usize, factor: f64) -> Self {
+    pub(crate) fn plus(mut self, variable: usize, factor: f64) -> Self {
         self.add(variable, factor);
         self
     }
 
     /// Adds `factor` times another expression.
-    pub fn add_scaled(&mut self, other: &Affine, factor: f64) {
+    pub(crate) fn add_scaled(&mut self, other: &Affine, factor: f64) {
         self.constant += factor * other.constant;
         for &(variable, f) in &other.terms {
             self.add(variable, factor * f);
@@ -38,14 +38,14 @@ impl Affine {
     }
 
     /// The value at `y`.
-    pub fn at(&self, y: &[f64]) -> f64 {
+    pub(crate) fn at(&self, y: &[f64]) -> f64 {
         self.constant + self.terms.iter().map(|&(i, f)| f * y[i]).sum::<f64>()
     }
 }
 
 /// A program under construction: half the sum of weighted squares, linear costs, rows.
 #[derive(Default)]
-pub struct Builder {
+pub(crate) struct Builder {
     cost: Vec<(usize, usize, f64)>,
     linear: Vec<(usize, f64)>,
     equal: Vec<Affine>,
@@ -54,7 +54,7 @@ pub struct Builder {
 
 impl Builder {
     /// Adds `weight/2 (expression)^2` to the cost.
-    pub fn square(&mut self, expression: &Affine, weight: f64) {
+    pub(crate) fn square(&mut self, expression: &Affine, weight: f64) {
         let mut terms = expression.terms.clone();
         terms.sort_unstable_by_key(|&(variable, _)| variable);
         terms.dedup_by(|next, before| {
@@ -71,22 +71,22 @@ impl Builder {
     }
 
     /// Adds `factor` times a variable to the cost.
-    pub fn linear(&mut self, variable: usize, factor: f64) {
+    pub(crate) fn linear(&mut self, variable: usize, factor: f64) {
         self.linear.push((variable, factor));
     }
 
     /// Adds the row `expression = 0`.
-    pub fn equal(&mut self, expression: Affine) {
+    pub(crate) fn equal(&mut self, expression: Affine) {
         self.equal.push(expression);
     }
 
     /// Adds the row `expression <= 0`.
-    pub fn at_most(&mut self, expression: Affine) {
+    pub(crate) fn at_most(&mut self, expression: Affine) {
         self.at_most.push(expression);
     }
 
     /// The program over so many variables.
-    pub fn program(self, variables: usize) -> ConeProgram {
+    pub(crate) fn program(self, variables: usize) -> ConeProgram {
         let mut q = vec![0.0; variables];
         for (variable, factor) in self.linear {
             q[variable] += factor;

@@ -14,14 +14,14 @@ const FIRST_OF_POSTURE: usize = 2;
 
 /// Adds the cost about an iterate; half the sum of squares each, so that weights are as documented
 /// up to a common factor.
-pub fn add(task: &Task<'_>, y: &[f64], builder: &mut Builder) {
+pub(crate) fn add(task: &Task<'_>, y: &[f64], builder: &mut Builder) {
     for (expression, weight) in squares(task, y) {
         builder.square(&expression, weight);
     }
 }
 
 /// The cost of a point: the sum of weighted squares.
-pub fn value(task: &Task<'_>, y: &[f64]) -> f64 {
+pub(crate) fn value(task: &Task<'_>, y: &[f64]) -> f64 {
     let squares = squares(task, y).into_iter();
     squares.fold(0.0, |total, (expression, weight)| {
         total + weight * expression.at(y).powi(2)
@@ -98,7 +98,7 @@ fn add_feet(task: &Task<'_>, y: &[f64], part: usize, out: &mut Vec<(Affine, f64)
 }
 
 /// How far a foot is from where it is in the prior, along the floor and above it, m.
-pub fn moved_foot(
+pub(crate) fn moved_foot(
     task: &Task<'_>,
     y: &[f64],
     leg: Leg,

@@ -45,7 +45,7 @@ impl Goal {
     }
 
     /// Distance and rise of the body, m.
-    pub fn goal_m(&self) -> [f64; 2] {
+    pub(crate) fn goal_m(&self) -> [f64; 2] {
         self.goal_m
     }
 

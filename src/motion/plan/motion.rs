@@ -37,7 +37,7 @@ pub struct Margins {
 ///
 /// # Errors
 /// [`PlanError::Recording`] if a sample makes no input.
-pub fn motion(
+pub(crate) fn motion(
     task: &Task<'_>,
     y: &[f64],
     sample_time_s: f64,

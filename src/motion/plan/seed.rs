@@ -10,7 +10,7 @@ use crate::model::{JumpPart, JumpPrior, ReducedModel};
 use crate::robot::{BODY_NAMES, BODY_Z, InputRule, JOINT_DIM, JOINT_NAMES, STATE_DIM};
 
 /// Pitch of the body in the state.
-pub const PITCH: usize = 16;
+pub(crate) const PITCH: usize = 16;
 
 /// Difference of an angle of the start to its decoded one that is told, rad.
 const LOST_ANGLE_RAD: f64 = 0.15;
@@ -18,7 +18,7 @@ const LOST_ANGLE_RAD: f64 = 0.15;
 const LOST_PLACE_M: f64 = 0.03;
 
 /// Everything that the program of one goal is made of.
-pub struct Seed<'a> {
+pub(crate) struct Seed<'a> {
     pub prior: &'a JumpPrior,
     pub rule: InputRule,
     pub latent_dim: usize,
@@ -36,7 +36,7 @@ pub struct Seed<'a> {
 }
 
 /// A part of the prior at the clipped goal; vectors in scaled units, one per node or interval.
-pub struct SeedPart<'a> {
+pub(crate) struct SeedPart<'a> {
     pub part: &'a JumpPart,
     pub duration_s: f64,
     pub z: Vec<DVector<f64>>,
@@ -54,12 +54,12 @@ pub struct SeedPart<'a> {
 
 impl SeedPart<'_> {
     /// Number of intervals.
-    pub fn intervals(&self) -> usize {
+    pub(crate) fn intervals(&self) -> usize {
         self.z.len() - 1
     }
 
     /// Whether a foot is on the ground.
-    pub fn is_grounded(&self) -> bool {
+    pub(crate) fn is_grounded(&self) -> bool {
         self.part.feet.contains(&true)
     }
 }
@@ -70,7 +70,7 @@ impl<'a> Seed<'a> {
     /// # Errors
     /// [`PlanError::Model`] if the model lacks a prior, [`PlanError::Goal`] for goals out of all
     /// proportion, [`PlanError::Lower`].
-    pub fn new(
+    pub(crate) fn new(
         model: &'a ReducedModel,
         goal: &Goal,
         settings: &PlanSettings,
@@ -107,7 +107,7 @@ impl<'a> Seed<'a> {
     }
 
     /// A coordinate of the decoded state.
-    pub fn decoded(&self, z: &DVector<f64>) -> [f64; STATE_DIM] {
+    pub(crate) fn decoded(&self, z: &DVector<f64>) -> [f64; STATE_DIM] {
         let x = &self.decode * z + &self.decode_bias;
         std::array::from_fn(|i| x[i])
     }

@@ -29,7 +29,7 @@ use crate::mpc::ConeProgram;
 use crate::robot::{BODY_X, BODY_Z, GRAVITY_M_S2, JOINT_DIM};
 
 /// Change of a duration that the variable `tau` counts as one.
-pub const DURATION_SHARE: f64 = 0.15;
+pub(crate) const DURATION_SHARE: f64 = 0.15;
 /// Bounds on `tau`, and on its change from one program to the next.
 const DURATION_BOUND: f64 = 3.0;
 const DURATION_STEP: f64 = 2.0;
@@ -43,7 +43,7 @@ const FAR_JOINT_RAD: f64 = 0.3;
 
 /// Bounds whose violation is a variable of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Bound {
+pub(crate) enum Bound {
     /// Torques, as shares of their limits.
     Torque,
     /// Joint angles, rad.
@@ -56,7 +56,7 @@ pub enum Bound {
 
 impl Bound {
     /// All of them.
-    pub const ALL: [Self; 4] = [Self::Torque, Self::Joint, Self::Friction, Self::Height];
+    pub(crate) const ALL: [Self; 4] = [Self::Torque, Self::Joint, Self::Friction, Self::Height];
 }
 
 /// Places of the variables.
@@ -70,7 +70,7 @@ pub struct Layout {
 
 impl Layout {
     /// The layout of a seed's program.
-    pub fn new(seed: &Seed<'_>) -> Self {
+    pub(crate) fn new(seed: &Seed<'_>) -> Self {
         let d = seed.latent_dim;
         let mut first = Vec::new();
         let mut next = 0;
@@ -87,35 +87,35 @@ impl Layout {
     }
 
     /// Number of variables.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.slacks + Bound::ALL.len()
     }
 
     /// First of the `3 latent_dim` variables of a node.
-    pub fn node(&self, part: usize, node: usize) -> usize {
+    pub(crate) fn node(&self, part: usize, node: usize) -> usize {
         self.first[part] + 3 * self.latent_dim * node
     }
 
     /// The variable of a part's duration.
-    pub fn duration(&self, part: usize) -> usize {
+    pub(crate) fn duration(&self, part: usize) -> usize {
         self.durations + part
     }
 
     /// The violation of a kind of bounds.
-    pub fn slack(&self, bound: Bound) -> usize {
+    pub(crate) fn slack(&self, bound: Bound) -> usize {
         self.slacks + bound as usize
     }
 }
 
 /// Values of a node at an iterate.
-pub struct NodeValues {
+pub(crate) struct NodeValues {
     pub z: DVector<f64>,
     pub dz: DVector<f64>,
     pub u_lat: DVector<f64>,
 }
 
 /// A seed, its layout and the settings.
-pub struct Task<'a> {
+pub(crate) struct Task<'a> {
     pub seed: &'a Seed<'a>,
     pub layout: Layout,
     pub settings: &'a PlanSettings,
@@ -125,7 +125,7 @@ pub struct Task<'a> {
 
 impl<'a> Task<'a> {
     /// The program of a seed, its apex where the prior has it.
-    pub fn new(seed: &'a Seed<'a>, settings: &'a PlanSettings) -> Self {
+    pub(crate) fn new(seed: &'a Seed<'a>, settings: &'a PlanSettings) -> Self {
         let mut task = Self {
             layout: Layout::new(seed),
             seed,
@@ -137,13 +137,13 @@ impl<'a> Task<'a> {
     }
 
     /// Duration of a part at an iterate, s.
-    pub fn duration_s(&self, part: usize, y: &[f64]) -> f64 {
+    pub(crate) fn duration_s(&self, part: usize, y: &[f64]) -> f64 {
         let tau = y[self.layout.duration(part)];
         self.seed.parts[part].duration_s * (1.0 + DURATION_SHARE * tau)
     }
 
     /// Values of a node at an iterate.
-    pub fn values(&self, part: usize, node: usize, y: &[f64]) -> NodeValues {
+    pub(crate) fn values(&self, part: usize, node: usize, y: &[f64]) -> NodeValues {
         let d = self.layout.latent_dim;
         let of = &self.seed.parts[part];
         let at = self.layout.node(part, node);
@@ -157,7 +157,7 @@ impl<'a> Task<'a> {
     }
 
     /// Mean acceleration over an interval as an expression.
-    pub fn acceleration(&self, part: usize, interval: usize, i: usize) -> Affine {
+    pub(crate) fn acceleration(&self, part: usize, interval: usize, i: usize) -> Affine {
         let of = &self.seed.parts[part];
         let mut sum = Affine::of(of.ddz[interval][i]);
         for node in [interval, interval + 1] {
@@ -170,7 +170,7 @@ impl<'a> Task<'a> {
     }
 
     /// Latent position `i` of a node, from `latent_dim` on a velocity.
-    pub fn latent(&self, part: usize, node: usize, i: usize) -> Affine {
+    pub(crate) fn latent(&self, part: usize, node: usize, i: usize) -> Affine {
         let of = &self.seed.parts[part];
         let prior = match i.checked_sub(self.layout.latent_dim) {
             None => of.z[node][i],
@@ -191,7 +191,7 @@ impl<'a> Task<'a> {
     }
 
     /// A coordinate of the decoded velocity at a node.
-    pub fn dx(&self, part: usize, node: usize, coordinate: usize) -> Affine {
+    pub(crate) fn dx(&self, part: usize, node: usize, coordinate: usize) -> Affine {
         let (mut value, d) = (Affine::default(), self.layout.latent_dim);
         for i in 0..d {
             let factor = self.seed.decode[(coordinate, i)];
@@ -201,7 +201,7 @@ impl<'a> Task<'a> {
     }
 
     /// An entry of the lifted input at a node, SI units.
-    pub fn input(&self, part: usize, node: usize, entry: usize) -> Affine {
+    pub(crate) fn input(&self, part: usize, node: usize, entry: usize) -> Affine {
         let of = &self.seed.parts[part];
         let d = self.layout.latent_dim;
         let row = self.seed.lift.row(entry);
@@ -214,7 +214,7 @@ impl<'a> Task<'a> {
     }
 
     /// What the joints take at a node of an iterate, N m.
-    pub fn losses(&self, part: usize, node: usize, y: &[f64]) -> [f64; JOINT_DIM] {
+    pub(crate) fn losses(&self, part: usize, node: usize, y: &[f64]) -> [f64; JOINT_DIM] {
         let d = self.layout.latent_dim;
         let of = &self.seed.parts[part];
         let rates = &self.seed.decode * self.values(part, node, y).dz;
@@ -232,7 +232,7 @@ impl<'a> Task<'a> {
     }
 
     /// The program about an iterate.
-    pub fn program(&self, y: &[f64]) -> ConeProgram {
+    pub(crate) fn program(&self, y: &[f64]) -> ConeProgram {
         let mut builder = Builder::default();
         costs::add(self, y, &mut builder);
         for part in 0..self.seed.parts.len() {
@@ -292,7 +292,7 @@ impl<'a> Task<'a> {
     }
 
     /// Largest violation of an equation at a point, in standard deviations of its coordinate.
-    pub fn defect(&self, y: &[f64]) -> f64 {
+    pub(crate) fn defect(&self, y: &[f64]) -> f64 {
         let mut worst = 0.0_f64;
         for (part, of) in self.seed.parts.iter().enumerate() {
             let step = self.duration_s(part, y) / of.intervals() as f64;
@@ -353,13 +353,13 @@ impl<'a> Task<'a> {
     }
 
     /// The last node.
-    pub fn last(&self) -> (usize, usize) {
+    pub(crate) fn last(&self) -> (usize, usize) {
         let part = self.seed.parts.len() - 1;
         (part, self.seed.parts[part].intervals())
     }
 
     /// A coordinate at the start, as the decoder has it.
-    pub fn start_x(&self, coordinate: usize) -> f64 {
+    pub(crate) fn start_x(&self, coordinate: usize) -> f64 {
         self.seed.decoded(&self.seed.start[0])[coordinate]
     }
 
@@ -412,7 +412,7 @@ impl<'a> Task<'a> {
     }
 
     /// Takes the apex at the node of the flight where the body is highest at an iterate.
-    pub fn place_apex(&mut self, y: &[f64]) {
+    pub(crate) fn place_apex(&mut self, y: &[f64]) {
         let flight = self.flight();
         let height = |node: usize| self.x(flight, node, BODY_Z).at(y);
         let nodes = 0..=self.seed.parts[flight].intervals();
@@ -421,7 +421,7 @@ impl<'a> Task<'a> {
     }
 
     /// The part in the air.
-    pub fn flight(&self) -> usize {
+    pub(crate) fn flight(&self) -> usize {
         let mut parts = self.seed.parts.iter();
         let flight = parts.position(|part| !part.is_grounded());
         flight.expect("invariant: checked with the model")
@@ -429,7 +429,7 @@ impl<'a> Task<'a> {
 
     /// The part at whose first node the feet of `part` stand where they are to stay: the first part, or the
     /// landing itself.
-    pub fn anchor_part(&self, part: usize) -> usize {
+    pub(crate) fn anchor_part(&self, part: usize) -> usize {
         if part > self.flight() { part } else { 0 }
     }
 
@@ -447,7 +447,7 @@ impl<'a> Task<'a> {
     }
 
     /// The variables of the prior itself: all zero.
-    pub fn prior_point(&self) -> Vec<f64> {
+    pub(crate) fn prior_point(&self) -> Vec<f64> {
         vec![0.0; self.layout.len()]
     }
 }

@@ -47,7 +47,7 @@ impl Verdict {
 }
 
 /// What is known of a plan.
-pub struct Findings<'a> {
+pub(crate) struct Findings<'a> {
     pub input_deviation: f64,
     pub slack: [(Bound, f64); 4],
     pub margins: &'a Margins,
@@ -60,7 +60,7 @@ pub struct Findings<'a> {
 }
 
 /// The verdict over the findings.
-pub fn verdict(settings: &PlanSettings, found: &Findings<'_>) -> Verdict {
+pub(crate) fn verdict(settings: &PlanSettings, found: &Findings<'_>) -> Verdict {
     let mut refused = Vec::new();
     for (bound, slack) in found.slack {
         if slack > NO_SLACK {

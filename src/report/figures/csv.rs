@@ -5,7 +5,7 @@ use super::sticks::Sticks;
 use crate::typeset::Table;
 
 /// A figure as CSV in long form: `panel,line,x,y`, or `panel,row,column,value` for shades.
-pub fn csv(figure: &Figure) -> String {
+pub(crate) fn csv(figure: &Figure) -> String {
     let is_heat = (figure.panels.iter()).all(|panel| matches!(panel.drawing, Drawing::Heat(_)));
     let mut table = Table::new(match is_heat {
         true => ["panel", "row", "column", "value"],

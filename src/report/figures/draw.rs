@@ -17,7 +17,7 @@ pub(super) const FONT: f64 = 9.0;
 
 /// Where a text is held.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Anchor {
+pub(crate) enum Anchor {
     Start,
     Middle,
     End,
@@ -25,7 +25,7 @@ pub enum Anchor {
 
 /// With what a mark is drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Paint {
+pub(crate) enum Paint {
     /// The frame.
     Axis,
     /// Lines across the frame.
@@ -38,7 +38,7 @@ pub enum Paint {
 
 /// One thing to draw.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Mark {
+pub(crate) enum Mark {
     /// A filled rectangle: corner, width, height.
     Rectangle([f64; 4], Paint),
     /// A straight line between two points.
@@ -99,7 +99,7 @@ fn legend_marks(figure: &Figure) -> Vec<Mark> {
 
 /// Draws one panel in the given size, the first mark below the others; `x_label` stands below its
 /// axis.
-pub fn draw_panel(panel: &Panel, size: (f64, f64), x_label: &str) -> Vec<Mark> {
+pub(crate) fn draw_panel(panel: &Panel, size: (f64, f64), x_label: &str) -> Vec<Mark> {
     let title = panel.title.as_str();
     match &panel.drawing {
         Drawing::Lines { series, shaded } => draw_lines(title, (series, shaded), size, x_label),

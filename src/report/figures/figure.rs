@@ -20,7 +20,7 @@ pub enum Role {
 }
 
 impl Role {
-    pub const ALL: [Self; 6] = [
+    pub(crate) const ALL: [Self; 6] = [
         Self::Recorded,
         Self::Full,
         Self::Restarted,
@@ -30,13 +30,13 @@ impl Role {
     ];
 
     /// Class of its lines in SVG.
-    pub fn class(self) -> &'static str {
+    pub(crate) fn class(self) -> &'static str {
         self.style().0
     }
 
     /// Class of its lines in SVG, their colour on white (red, green and blue from 0 to 255), and the lengths of dashes
     /// and gaps as SVG and PDF list them, none for a full line; by these lines differ in grey print too.
-    pub fn style(self) -> (&'static str, [u8; 3], &'static str) {
+    pub(crate) fn style(self) -> (&'static str, [u8; 3], &'static str) {
         match self {
             Self::Recorded => ("recorded", [31, 95, 168], ""),
             Self::Full => ("full", [194, 87, 12], "6 2.5"),
@@ -50,19 +50,22 @@ impl Role {
 
 /// One line: points in the order of x; a point without y breaks the line.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Series {
+pub(crate) struct Series {
     pub role: Role,
     pub points: Vec<(f64, Option<f64>)>,
 }
 
 impl Series {
     /// A value of every sample over its time.
-    pub fn over(role: Role, time_s: &[f64], value: impl Fn(usize) -> Option<f64>) -> Self {
+    pub(crate) fn over(role: Role, time_s: &[f64], value: impl Fn(usize) -> Option<f64>) -> Self {
         let times = time_s.iter().enumerate();
         Self::through(role, times.map(|(sample, &time)| (time, value(sample))))
     }
 
-    pub fn through(role: Role, points: impl IntoIterator<Item = (f64, Option<f64>)>) -> Self {
+    pub(crate) fn through(
+        role: Role,
+        points: impl IntoIterator<Item = (f64, Option<f64>)>,
+    ) -> Self {
         let points = points.into_iter().collect();
         Self { role, points }
     }
@@ -70,7 +73,7 @@ impl Series {
 
 /// One frame of a figure.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Panel {
+pub(crate) struct Panel {
     /// The quantity with its unit, such as `body.x, m`, or the instant, such as `0.12 s`.
     pub title: String,
     pub drawing: Drawing,
@@ -78,7 +81,7 @@ pub struct Panel {
 
 /// What a panel shows.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Drawing {
+pub(crate) enum Drawing {
     /// Lines over one axis; shaded are ranges of x with a grey ground, such as flight.
     Lines {
         series: Vec<Series>,
@@ -92,7 +95,7 @@ pub enum Drawing {
 
 /// Magnitudes of a matrix as shades.
 #[derive(Debug, Clone, PartialEq)]
-pub struct HeatMap {
+pub(crate) struct HeatMap {
     pub rows: Vec<String>,
     pub columns: Vec<String>,
     /// Row by row.
@@ -101,7 +104,7 @@ pub struct HeatMap {
 
 /// Robots as sticks in a vertical plane, one length for a metre in both directions.
 #[derive(Debug, Clone, PartialEq)]
-pub struct StickPlot {
+pub(crate) struct StickPlot {
     /// The robots, the first below the others.
     pub sticks: Vec<(Role, Sticks)>,
     /// The part of the plane that is in sight.
@@ -112,12 +115,16 @@ pub struct StickPlot {
 
 impl Panel {
     /// Lines over one axis, without shaded ranges.
-    pub fn lines(title: impl Into<String>, series: Vec<Series>) -> Self {
+    pub(crate) fn lines(title: impl Into<String>, series: Vec<Series>) -> Self {
         Self::shaded(title, series, Vec::new())
     }
 
     /// Lines over one axis, some ranges of which are shaded.
-    pub fn shaded(title: impl Into<String>, series: Vec<Series>, shaded: Vec<(f64, f64)>) -> Self {
+    pub(crate) fn shaded(
+        title: impl Into<String>,
+        series: Vec<Series>,
+        shaded: Vec<(f64, f64)>,
+    ) -> Self {
         Self {
             title: title.into(),
             drawing: Drawing::Lines { series, shaded },
@@ -127,7 +134,7 @@ impl Panel {
 
 /// Panels that belong together, with a caption and a legend.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Figure {
+pub(crate) struct Figure {
     /// Stem of its files.
     pub id: String,
     /// Caption, as in a paper.
@@ -146,7 +153,7 @@ pub struct Figure {
 
 impl Figure {
     /// Small panels over time, three side by side; the legend explains the lines.
-    pub fn over_time(
+    pub(crate) fn over_time(
         id: impl Into<String>,
         caption: impl Into<String>,
         panels: Vec<Panel>,

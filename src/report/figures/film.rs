@@ -12,7 +12,7 @@ const MOST_FRAMES: usize = 72;
 
 /// An animation: the drawing at its first instant in sight, and the lines of every instant.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Film {
+pub(crate) struct Film {
     /// An `svg` element with a `g` for each motion, which holds a polyline for each of [`Sticks::NAMES`].
     pub svg: String,
     /// JSON: `{"time": [s], "lines": [[motion][instant]]}` with the points of all lines of a motion at an instant, joined
@@ -48,7 +48,7 @@ fn middle(sticks: &Sticks) -> (f64, f64) {
 }
 
 /// The animation of `motions` over `time_s`, seen from the right of a robot that looks along `heading_rad`.
-pub fn film(
+pub(crate) fn film(
     robot: &Robot,
     (time_s, motions): (&[f64], &[Motion]),
     (heading_rad, floor_m): (f64, f64),

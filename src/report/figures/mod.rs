@@ -13,16 +13,17 @@ mod sticks;
 mod svg;
 mod ticks;
 
-pub use figure::{Drawing, Figure, HeatMap, Panel, Role, Series};
-pub use film::{Film, film};
-pub use sticks::{Motion, film_strip, floor_m};
-pub use svg::panel_svg;
-pub use ticks::subscript;
+pub use figure::Role;
+pub(crate) use figure::{Drawing, Figure, HeatMap, Panel, Series};
+pub(crate) use film::{Film, film};
+pub(crate) use sticks::{Motion, film_strip, floor_m};
+pub(crate) use svg::panel_svg;
+pub(crate) use ticks::subscript;
 
 use crate::files::EmittedFile;
 
 /// A figure as SVG, PDF and CSV, named after it.
-pub fn figure_files(figure: &Figure) -> [EmittedFile; 3] {
+pub(crate) fn figure_files(figure: &Figure) -> [EmittedFile; 3] {
     let file = |ending, contents| EmittedFile::new(format!("{}.{ending}", figure.id), contents);
     [
         file("svg", svg::standalone_svg(figure)),

@@ -6,7 +6,7 @@ use super::draw::{Anchor, FONT, Mark, Paint, figure_size, placed_marks};
 use super::figure::Figure;
 
 /// A figure as a PDF file (version 1.4).
-pub fn pdf(figure: &Figure) -> String {
+pub(crate) fn pdf(figure: &Figure) -> String {
     let size = figure_size(figure);
     let mut content = String::from("1 J 1 j\n");
     for (marks, corner) in placed_marks(figure) {

@@ -16,21 +16,21 @@ const MARGIN_M: f64 = 0.04;
 
 /// A robot's lines in a vertical plane: pairs of forward and up, in m.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Sticks {
+pub(crate) struct Sticks {
     /// The trunk as a closed box, then hip, knee and foot of each leg, as named in [`Sticks::NAMES`].
     pub lines: Vec<Vec<(f64, f64)>>,
 }
 
 impl Sticks {
     /// Names of the lines.
-    pub const NAMES: [&str; 1 + FOOT_DIM] = ["trunk", "fr", "fl", "rr", "rl"];
+    pub(crate) const NAMES: [&str; 1 + FOOT_DIM] = ["trunk", "fr", "fl", "rr", "rl"];
 
     /// `robot` at the state `x` (18: joint angles in rad, body position in m, roll, pitch and yaw in rad), projected on
     /// the vertical plane that contains the direction `heading_rad`.
     ///
     /// # Panics
     /// If `x` does not have 18 entries.
-    pub fn of(robot: &Robot, x: &[f64], heading_rad: f64) -> Self {
+    pub(crate) fn of(robot: &Robot, x: &[f64], heading_rad: f64) -> Self {
         assert_eq!(x.len(), STATE_DIM, "a state of the robot");
         let joints: [f64; JOINT_DIM] = std::array::from_fn(|joint| x[joint]);
         let [px, py, pz, roll, pitch, yaw]: [f64; 6] = std::array::from_fn(|k| x[JOINT_DIM + k]);
@@ -60,7 +60,7 @@ impl Sticks {
 
 /// A part of a vertical plane, in m.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Extent {
+pub(crate) struct Extent {
     /// Least and largest distance forward.
     pub forward_m: (f64, f64),
     /// Least and largest height.
@@ -69,7 +69,7 @@ pub struct Extent {
 
 impl Extent {
     /// The smallest part with a margin that shows all `sticks` and the floor.
-    pub fn around<'a>(sticks: impl IntoIterator<Item = &'a Sticks>, floor_m: f64) -> Self {
+    pub(crate) fn around<'a>(sticks: impl IntoIterator<Item = &'a Sticks>, floor_m: f64) -> Self {
         let lines = sticks.into_iter().flat_map(|sticks| &sticks.lines);
         let (forward, mut up): (Vec<f64>, Vec<f64>) = lines.flatten().copied().unzip();
         up.push(floor_m);
@@ -86,7 +86,7 @@ impl Extent {
 
 /// A motion of a robot.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Motion {
+pub(crate) struct Motion {
     /// The line that it is drawn with.
     pub role: Role,
     /// Its name in the legend.
@@ -97,7 +97,7 @@ pub struct Motion {
 
 impl Motion {
     /// What was recorded of a segment.
-    pub fn recorded(segment: &Segment) -> Self {
+    pub(crate) fn recorded(segment: &Segment) -> Self {
         Self {
             role: Role::Recorded,
             words: "recorded".to_owned(),
@@ -106,7 +106,7 @@ impl Motion {
     }
 
     /// A plan at the times of the jump that follows it, from where that jump begins; none after the plan's end.
-    pub fn planned(plan: &Segment, followed: &Segment) -> Self {
+    pub(crate) fn planned(plan: &Segment, followed: &Segment) -> Self {
         let (starts, times) = ([plan, followed].map(|s| s.time_s.first()), &followed.time_s);
         let state = |time: f64| {
             let [Some(plan_start), Some(start)] = starts else {
@@ -133,7 +133,7 @@ impl Motion {
     }
 
     /// The robot at a sample, for drawing.
-    pub fn sticks(&self, robot: &Robot, heading_rad: f64, sample: usize) -> Option<Sticks> {
+    pub(crate) fn sticks(&self, robot: &Robot, heading_rad: f64, sample: usize) -> Option<Sticks> {
         let state = self.states.get(sample)?.as_ref()?;
         Some(Sticks::of(robot, state.as_slice(), heading_rad))
     }
@@ -147,7 +147,7 @@ impl Motion {
 
 /// Height of the floor, in m: the median over samples of the lowest foot in contact; of the lowest foot where no sample
 /// has one.
-pub fn floor_m(robot: &Robot, segment: &Segment) -> f64 {
+pub(crate) fn floor_m(robot: &Robot, segment: &Segment) -> f64 {
     let lowest = |k: usize, all: bool| {
         let sticks = Sticks::of(robot, segment.x.column(k).as_slice(), 0.0);
         let feet = sticks.lines[1..].iter().zip(segment.feet[k]);
@@ -165,7 +165,7 @@ pub fn floor_m(robot: &Robot, segment: &Segment) -> f64 {
 
 /// Motions at `n_frames` instants, evenly chosen from the first to the last of `time_s`, side by side to one scale, seen
 /// from the right of a robot that looks along `heading_rad`.
-pub fn film_strip(
+pub(crate) fn film_strip(
     robot: &Robot,
     (id, caption): (String, String),
     (time_s, motions): (&[f64], &[Motion]),

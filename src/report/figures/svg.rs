@@ -7,7 +7,7 @@ use super::figure::{Figure, Panel, Role};
 use crate::typeset::mathml::HtmlText;
 
 /// One panel as an `svg` element that takes its colours from the page.
-pub fn panel_svg(figure: &Figure, panel: &Panel) -> String {
+pub(crate) fn panel_svg(figure: &Figure, panel: &Panel) -> String {
     let (width, height) = figure.panel_size;
     let title = HtmlText(&panel.title);
     let mut text = format!(
@@ -21,7 +21,7 @@ pub fn panel_svg(figure: &Figure, panel: &Panel) -> String {
 }
 
 /// A figure as a file of its own, with legend and colours for paper.
-pub fn standalone_svg(figure: &Figure) -> String {
+pub(crate) fn standalone_svg(figure: &Figure) -> String {
     let (width, height) = figure_size(figure);
     let mut text = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}pt\" height=\"{height}pt\" \

@@ -1,7 +1,7 @@
 //! Round numbers along an axis.
 
 /// Round values within `low..=high`, about `count` of them, and the decimal places that they need.
-pub fn ticks(low: f64, high: f64, count: usize) -> (Vec<f64>, usize) {
+pub(crate) fn ticks(low: f64, high: f64, count: usize) -> (Vec<f64>, usize) {
     let rough = (high - low) / count.max(1) as f64;
     if !rough.is_finite() || rough <= 0.0 {
         return (vec![low], 2);
@@ -20,12 +20,12 @@ pub fn ticks(low: f64, high: f64, count: usize) -> (Vec<f64>, usize) {
 }
 
 /// A value along an axis or in a title, with so many decimal places and a minus of the width of a plus.
-pub fn number(value: f64, places: usize) -> String {
+pub(crate) fn number(value: f64, places: usize) -> String {
     format!("{value:.places$}").replace('-', "\u{2212}")
 }
 
 /// An index below the line.
-pub fn subscript(index: usize) -> String {
+pub(crate) fn subscript(index: usize) -> String {
     let below = |digit: char| match digit.to_digit(10) {
         Some(value) => char::from_u32(0x2080 + value).unwrap_or(digit),
         None => digit,
@@ -34,14 +34,14 @@ pub fn subscript(index: usize) -> String {
 }
 
 /// The least and the largest of some values; infinities in reverse where there is none.
-pub fn range(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
+pub(crate) fn range(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
     let none = (f64::INFINITY, f64::NEG_INFINITY);
     let values = values.into_iter();
     values.fold(none, |(low, high), value| (low.min(value), high.max(value)))
 }
 
 /// The range of values with a margin; a range around a constant.
-pub fn padded(values: impl Iterator<Item = f64>) -> (f64, f64) {
+pub(crate) fn padded(values: impl Iterator<Item = f64>) -> (f64, f64) {
     let (low, high) = range(values.filter(|value| value.is_finite()));
     if low > high {
         return (0.0, 1.0);

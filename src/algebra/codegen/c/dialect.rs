@@ -12,7 +12,7 @@ use crate::ir::{QUAD, Quad, Unary};
 
 /// C99 with the names of one model.
 #[derive(Clone, Debug)]
-pub struct CDialect {
+pub(crate) struct CDialect {
     /// Identifier of the model, the beginning of all external and helper names.
     pub name: String,
     /// Floating-point numbers of the code.
@@ -185,12 +185,12 @@ impl CDialect {
     }
 
     /// What macros begin with.
-    pub fn upper(&self) -> String {
+    pub(crate) fn upper(&self) -> String {
         self.name.to_ascii_uppercase()
     }
 
     /// The definition of a function; the header has its documentation.
-    pub fn definition(&self, function: &Function) -> String {
+    pub(crate) fn definition(&self, function: &Function) -> String {
         // Without `restrict` on what lanes assign, gcc keeps in registers what it has read for them;
         // with it, it reads tables once for each use.
         let head = self.head(function, |parameter| {
@@ -221,7 +221,7 @@ impl CDialect {
     }
 
     /// The type of numbers.
-    pub fn real(&self) -> &'static str {
+    pub(crate) fn real(&self) -> &'static str {
         match self.precision {
             Precision::Double => "double",
             Precision::Single => "float",
@@ -229,7 +229,7 @@ impl CDialect {
     }
 
     /// What literals and library functions of that type end with.
-    pub fn suffix(&self) -> &'static str {
+    pub(crate) fn suffix(&self) -> &'static str {
         match self.precision {
             Precision::Double => "",
             Precision::Single => "f",
@@ -238,14 +238,14 @@ impl CDialect {
 
     /// The documented prototype for the header; `restrict` is left to the definition, so
     /// that C++ can include it.
-    pub fn prototype(&self, function: &Function) -> String {
+    pub(crate) fn prototype(&self, function: &Function) -> String {
         let signature = self.head(function, |_| "");
         format!("{}{signature};", documentation(&function.docs))
     }
 }
 
 /// A documentation comment, one paragraph a line.
-pub fn documentation(lines: &[String]) -> String {
+pub(crate) fn documentation(lines: &[String]) -> String {
     let body: Vec<String> = comment_lines(lines, 94)
         .iter()
         .map(|line| format!(" * {}", line.replace("*/", "* /")))

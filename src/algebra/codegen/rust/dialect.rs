@@ -13,14 +13,14 @@ const LONGEST_CHAIN: usize = 10;
 
 /// Rust without `std` or allocation.
 #[derive(Clone, Copy, Debug)]
-pub struct RustDialect {
+pub(crate) struct RustDialect {
     /// Floating-point numbers of the code.
     pub precision: Precision,
 }
 
 impl RustDialect {
     /// The type of numbers.
-    pub fn real(&self) -> &'static str {
+    pub(crate) fn real(&self) -> &'static str {
         match self.precision {
             Precision::Double => "f64",
             Precision::Single => "f32",
@@ -28,7 +28,7 @@ impl RustDialect {
     }
 
     /// The type of integers as wide.
-    pub fn bits(&self) -> String {
+    pub(crate) fn bits(&self) -> String {
         format!("u{}", self.precision.bits())
     }
 
@@ -42,7 +42,7 @@ impl RustDialect {
     }
 
     /// A function with its documentation.
-    pub fn definition(&self, function: &Function) -> String {
+    pub(crate) fn definition(&self, function: &Function) -> String {
         let parameters = function.parameters.iter().map(|p| self.parameter(p));
         let parameters = parameters.collect::<Vec<_>>().join(", ");
         let docs = documentation(&function.docs);

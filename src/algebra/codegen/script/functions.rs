@@ -7,7 +7,7 @@ use crate::codegen::printer::Printer;
 use crate::codegen::tables::Tables;
 
 /// A function of a script. A parameter that is read and written is taken and returned.
-pub struct FunctionText {
+pub(crate) struct FunctionText {
     parameters: Vec<Parameter>,
     /// Its name.
     pub name: String,
@@ -23,7 +23,7 @@ pub struct FunctionText {
 
 impl FunctionText {
     /// The text of a function that reads some of the tables.
-    pub fn new(function: Function, tables: &Tables, dialect: &dyn Dialect) -> Self {
+    pub(crate) fn new(function: Function, tables: &Tables, dialect: &dyn Dialect) -> Self {
         let body = Printer::new(dialect).statements(&function.body, 1);
         let names = tables.iter().map(|table| table.name.to_string());
         let is_read = |name: &String| {
@@ -46,37 +46,37 @@ impl FunctionText {
     }
 
     /// What it takes.
-    pub fn inputs(&self) -> Vec<&Parameter> {
+    pub(crate) fn inputs(&self) -> Vec<&Parameter> {
         self.of(&[Role::Input, Role::InOut, Role::Scalar])
     }
 
     /// What it returns.
-    pub fn outputs(&self) -> Vec<&Parameter> {
+    pub(crate) fn outputs(&self) -> Vec<&Parameter> {
         self.of(&[Role::Output, Role::InOut])
     }
 
     /// The parameters that are arrays.
-    pub fn arrays(&self) -> Vec<&Parameter> {
+    pub(crate) fn arrays(&self) -> Vec<&Parameter> {
         self.of(&[Role::Input, Role::InOut])
     }
 
     /// What is taken and returned.
-    pub fn copied(&self) -> Vec<&Parameter> {
+    pub(crate) fn copied(&self) -> Vec<&Parameter> {
         self.of(&[Role::InOut])
     }
 
     /// What is returned and not taken, so that the body has to begin with it.
-    pub fn created(&self) -> Vec<&Parameter> {
+    pub(crate) fn created(&self) -> Vec<&Parameter> {
         self.of(&[Role::Output])
     }
 }
 
 /// Joins what is printed of each element.
-pub fn list<T>(elements: &[T], print: impl Fn(&T) -> String) -> String {
+pub(crate) fn list<T>(elements: &[T], print: impl Fn(&T) -> String) -> String {
     elements.iter().map(print).collect::<Vec<_>>().join(", ")
 }
 
 /// Names of parameters.
-pub fn names(parameters: Vec<&Parameter>) -> String {
+pub(crate) fn names(parameters: Vec<&Parameter>) -> String {
     list(&parameters, |parameter| parameter.name.to_string())
 }

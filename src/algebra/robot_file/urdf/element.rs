@@ -89,23 +89,23 @@ fn unexpanded(file: &str, row: u32, found: &str) -> RobotFileError {
 }
 
 impl<'x> Element<'x> {
-    pub fn root(file: &'x str, document: &'x Document<'x>) -> Self {
+    pub(crate) fn root(file: &'x str, document: &'x Document<'x>) -> Self {
         let node = document.root_element();
         Self { file, node }
     }
 
-    pub fn tag(&self) -> &'x str {
+    pub(crate) fn tag(&self) -> &'x str {
         self.node.tag_name().name()
     }
 
     /// The children of a kind.
-    pub fn children(self, tag: &'static str) -> impl Iterator<Item = Self> {
+    pub(crate) fn children(self, tag: &'static str) -> impl Iterator<Item = Self> {
         let nodes = (self.node.children()).filter(move |node| node.has_tag_name(tag));
         nodes.map(move |node| Self { node, ..self })
     }
 
     /// The child of a kind, which may be there once.
-    pub fn child(self, tag: &'static str) -> Result<Option<Self>, RobotFileError> {
+    pub(crate) fn child(self, tag: &'static str) -> Result<Option<Self>, RobotFileError> {
         let mut found = self.children(tag);
         let first = found.next();
         match found.next() {
@@ -114,18 +114,18 @@ impl<'x> Element<'x> {
         }
     }
 
-    pub fn attribute(&self, key: &str) -> Option<&'x str> {
+    pub(crate) fn attribute(&self, key: &str) -> Option<&'x str> {
         self.node.attribute(key)
     }
 
     /// The attribute `name`, without which nothing can refer to the element.
-    pub fn name(&self) -> Result<&'x str, RobotFileError> {
+    pub(crate) fn name(&self) -> Result<&'x str, RobotFileError> {
         let name = self.attribute("name").filter(|name| !name.is_empty());
         name.ok_or_else(|| self.fault("", "no name", "name=\"...\""))
     }
 
     /// A finite number.
-    pub fn number(&self, key: &str) -> Result<f64, RobotFileError> {
+    pub(crate) fn number(&self, key: &str) -> Result<f64, RobotFileError> {
         let text = self.attribute(key);
         let value = text.and_then(|text| text.trim().parse::<f64>().ok());
         value.filter(|value| value.is_finite()).ok_or_else(|| {
@@ -135,7 +135,7 @@ impl<'x> Element<'x> {
     }
 
     /// Three finite numbers of an attribute; none if it is not there.
-    pub fn triple(&self, key: &str) -> Result<Option<Vector3<f64>>, RobotFileError> {
+    pub(crate) fn triple(&self, key: &str) -> Result<Option<Vector3<f64>>, RobotFileError> {
         let Some(text) = self.attribute(key) else {
             return Ok(None);
         };
@@ -148,7 +148,7 @@ impl<'x> Element<'x> {
     }
 
     /// Refuses attributes other than these, such as `quat_xyzw` of other dialects, that would change the result.
-    pub fn only_with(&self, keys: &[&str]) -> Result<(), RobotFileError> {
+    pub(crate) fn only_with(&self, keys: &[&str]) -> Result<(), RobotFileError> {
         let other = |name: &str| !keys.contains(&name);
         match self
             .node
@@ -164,7 +164,7 @@ impl<'x> Element<'x> {
     }
 
     /// The line of the file and the element, such as ``line 24: joint `knee`, <limit>``.
-    pub fn place(&self) -> String {
+    pub(crate) fn place(&self) -> String {
         let at = self.node.document().text_pos_at(self.node.range().start);
         let mut inner = String::new();
         for node in self.node.ancestors().filter(Node::is_element) {
@@ -180,7 +180,7 @@ impl<'x> Element<'x> {
     }
 
     /// `found` at an attribute of the element (at the element, if the key is empty), where `expected` should be.
-    pub fn fault(
+    pub(crate) fn fault(
         &self,
         key: &str,
         found: impl Into<String>,

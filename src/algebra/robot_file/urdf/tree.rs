@@ -54,7 +54,7 @@ pub(super) struct Body {
 }
 
 impl<'x> Tree<'x> {
-    pub fn new(robot: Element<'x>) -> Result<Self, RobotFileError> {
+    pub(crate) fn new(robot: Element<'x>) -> Result<Self, RobotFileError> {
         let mut tree = Self {
             file: robot.file,
             links: Vec::new(),
@@ -96,7 +96,7 @@ impl<'x> Tree<'x> {
     }
 
     /// Another tree than that of a quadruped.
-    pub fn refused(&self, found: String, expected: impl Into<String>) -> RobotFileError {
+    pub(crate) fn refused(&self, found: String, expected: impl Into<String>) -> RobotFileError {
         RobotFileError::at(self.file, "the tree", found, expected)
     }
 
@@ -152,12 +152,12 @@ impl<'x> Tree<'x> {
     }
 
     /// The body that a link belongs to, from that link on.
-    pub fn body(&self, link: usize) -> Body {
+    pub(crate) fn body(&self, link: usize) -> Body {
         self.below(link, |joint| joint.kind == "fixed")
     }
 
     /// Mass of a link and all below it, kg.
-    pub fn mass_below(&self, link: usize) -> f64 {
+    pub(crate) fn mass_below(&self, link: usize) -> f64 {
         let mut links = self.below(link, |_| true).links;
         // In the file's order, so that the order of joints does not change the last digit.
         links.sort_unstable();
@@ -165,12 +165,12 @@ impl<'x> Tree<'x> {
     }
 
     /// Mass of links, kg.
-    pub fn mass(&self, links: &[usize]) -> f64 {
+    pub(crate) fn mass(&self, links: &[usize]) -> f64 {
         links.iter().map(|link| self.links[*link].mass_kg).sum()
     }
 
     /// The links from the root to a link.
-    pub fn path(&self, link: usize) -> Vec<usize> {
+    pub(crate) fn path(&self, link: usize) -> Vec<usize> {
         let mut path = vec![link];
         while let Some(joint) = self.links[path[path.len() - 1]].above {
             path.push(self.joints[joint].parent);
@@ -180,7 +180,7 @@ impl<'x> Tree<'x> {
     }
 
     /// Position and attitude of a link in the root's frame at the zero posture.
-    pub fn frame(&self, link: usize) -> (Vector3<f64>, Rotation3<f64>) {
+    pub(crate) fn frame(&self, link: usize) -> (Vector3<f64>, Rotation3<f64>) {
         let mut frame = (Vector3::zeros(), Rotation3::identity());
         for link in self.path(link) {
             if let Some(joint) = self.links[link].above {

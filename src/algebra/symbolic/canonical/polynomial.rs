@@ -220,7 +220,7 @@ impl CanonicalForm {
     }
 
     /// `self + other`.
-    pub fn plus(&self, other: &Self) -> Self {
+    pub(crate) fn plus(&self, other: &Self) -> Self {
         let (mut sum, rest) = match self.terms.len() >= other.terms.len() {
             true => (self.clone(), other),
             false => (other.clone(), self),

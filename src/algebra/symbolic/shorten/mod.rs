@@ -26,7 +26,7 @@ mod units;
 #[cfg(test)]
 mod tests;
 
-pub use search::{Shortened, Shortener};
+pub(crate) use search::{Shortened, Shortener};
 
 use super::node::ExprId;
 use super::number::Number;

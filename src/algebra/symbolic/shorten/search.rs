@@ -18,7 +18,7 @@ const MAX_ROUNDS: usize = 4;
 
 /// Summands that a shorter form takes the place of.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Shortened {
+pub(crate) struct Shortened {
     /// Positions of the replaced summands, ascending.
     pub replaced: Vec<usize>,
     /// What they are together; nothing if they cancel.
@@ -27,7 +27,7 @@ pub struct Shortened {
 
 /// Shortens sums over one pool, and remembers what it found about their terms.
 #[derive(Debug)]
-pub struct Shortener<'a> {
+pub(crate) struct Shortener<'a> {
     pub(super) pool: &'a mut ExprPool,
     pub(super) costs: Costs,
     singles: IdMap<ExprId>,
@@ -79,7 +79,7 @@ pub(super) struct Block {
 
 impl<'a> Shortener<'a> {
     /// A shortener of sums over `pool`.
-    pub fn new(pool: &'a mut ExprPool) -> Self {
+    pub(crate) fn new(pool: &'a mut ExprPool) -> Self {
         Self {
             pool,
             costs: Costs::default(),
@@ -90,13 +90,13 @@ impl<'a> Shortener<'a> {
     }
 
     /// The pool, with the expressions that were made.
-    pub fn pool(&self) -> &ExprPool {
+    pub(crate) fn pool(&self) -> &ExprPool {
         self.pool
     }
 
     /// The replacements that make `sum coefficient * expr` shortest, in the order of the first
     /// positions they replace; none if it is short already.
-    pub fn shorten(&mut self, summands: &[(f64, ExprId)]) -> Vec<Shortened> {
+    pub(crate) fn shorten(&mut self, summands: &[(f64, ExprId)]) -> Vec<Shortened> {
         if self.is_plain_sum(summands) && self.parts_of_powers(summands).is_empty() {
             return Vec::new();
         }

@@ -31,7 +31,7 @@ pub(super) struct Block {
 
 impl Block {
     /// What `\ref` and `\eqref` can name.
-    pub fn labels(&self) -> String {
+    pub(crate) fn labels(&self) -> String {
         let label = &self.label;
         match (self.aligned, self.count) {
             (true, 2..) => format!("{label}:1 to {label}:{}", self.count),

@@ -6,7 +6,7 @@ use crate::typeset::tree::function_name;
 use crate::typeset::{Decimal, GREEK, Glyph, Math, NumberStyle, Signed, Symbol};
 
 /// A typeset tree with its numbers in one style.
-pub fn tex(math: &Math, numbers: NumberStyle) -> String {
+pub(crate) fn tex(math: &Math, numbers: NumberStyle) -> String {
     let inner = |math: &Math| tex(math, numbers);
     // Exponents are structure, not measured values: no siunitx.
     let exponent_of = |math| script(tex(math, NumberStyle::Plain));
@@ -44,7 +44,7 @@ pub fn tex(math: &Math, numbers: NumberStyle) -> String {
 
 /// Signed terms one after the other: `0.36 - 0.16\dot{z}_1`; the first sign may be a binary operator that
 /// continues a line above.
-pub fn tex_terms(terms: &[Signed], numbers: NumberStyle, continues: bool) -> String {
+pub(crate) fn tex_terms(terms: &[Signed], numbers: NumberStyle, continues: bool) -> String {
     let mut text = String::new();
     for (place, term) in terms.iter().enumerate() {
         text.push_str(match (place, term.negative, continues) {
@@ -61,7 +61,7 @@ pub fn tex_terms(terms: &[Signed], numbers: NumberStyle, continues: bool) -> Str
 }
 
 /// A number with its sign.
-pub fn tex_number(number: &Decimal, numbers: NumberStyle) -> String {
+pub(crate) fn tex_number(number: &Decimal, numbers: NumberStyle) -> String {
     match (numbers, number.exponent()) {
         (NumberStyle::Plain, None) => number.to_string(),
         (NumberStyle::Plain, Some(exponent)) => {
@@ -73,7 +73,7 @@ pub fn tex_number(number: &Decimal, numbers: NumberStyle) -> String {
 }
 
 /// A symbol: `\ddot{z}_{10}`.
-pub fn tex_symbol(symbol: &Symbol) -> String {
+pub(crate) fn tex_symbol(symbol: &Symbol) -> String {
     let base = glyph(&symbol.glyph);
     let dotted = match symbol.dots {
         0 => base,
@@ -126,7 +126,7 @@ fn function(function: Function) -> String {
 }
 
 /// A unit in upright letters: `\mathrm{m/s^{2}}`.
-pub fn tex_unit(unit: Unit) -> String {
+pub(crate) fn tex_unit(unit: Unit) -> String {
     let unit = unit.spelled(r"\,", |power| format!("^{{{power}}}"));
     format!(r"\mathrm{{{unit}}}")
 }

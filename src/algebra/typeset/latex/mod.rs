@@ -41,6 +41,6 @@ mod nomenclature;
 mod table;
 
 pub use document::emit;
-pub use escape::{label, tex_text};
+pub(crate) use escape::{label, tex_text};
 pub use lines::tex_cases;
-pub use math::{tex, tex_symbol, tex_unit};
+pub(crate) use math::{tex, tex_symbol, tex_unit};

@@ -63,7 +63,7 @@ pub fn mathml(math: &Math) -> String {
 }
 
 /// Signed terms one after the other; the first sign may continue a line above.
-pub fn mathml_terms(terms: &[Signed], continues: bool) -> String {
+pub(crate) fn mathml_terms(terms: &[Signed], continues: bool) -> String {
     let mut text = String::new();
     for (place, term) in terms.iter().enumerate() {
         let sign = if term.negative { MINUS } else { "+" };
@@ -101,7 +101,7 @@ fn mathml_number(number: &Decimal) -> String {
 }
 
 /// A symbol with its dots and subscript.
-pub fn mathml_symbol(symbol: &Symbol) -> String {
+pub(crate) fn mathml_symbol(symbol: &Symbol) -> String {
     let base = accented(symbol);
     match symbol.subscript.is_empty() {
         true => base,

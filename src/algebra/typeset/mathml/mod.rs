@@ -8,6 +8,7 @@ mod math;
 mod page;
 mod prose;
 
-pub use math::{mathml, mathml_symbol};
+pub use math::mathml;
+pub(crate) use math::mathml_symbol;
 pub use page::{Html, emit, system};
 pub use prose::{HtmlProse, HtmlText};
