@@ -13,7 +13,7 @@ use crate::symbolic::Interval;
 
 /// A count before and after simplification.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub(crate) struct BeforeAfter {
+pub struct BeforeAfter {
     /// In the model.
     pub before: usize,
     /// In the simplified model.
@@ -38,7 +38,7 @@ impl std::iter::Sum for BeforeAfter {
 
 /// The kind of a change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum ChangeKind {
+pub enum ChangeKind {
     /// It is gone.
     Dropped,
     /// A constant took its place.
@@ -54,7 +54,7 @@ pub(crate) enum ChangeKind {
 
 /// Another coefficient that a change altered.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub(crate) struct Effect {
+pub struct Effect {
     /// The term in the library's syntax.
     pub term: String,
     /// Its coefficient before the change.
@@ -65,7 +65,7 @@ pub(crate) struct Effect {
 
 /// One change of one equation.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub(crate) struct Change {
+pub struct Change {
     /// Its kind.
     #[serde(flatten, serialize_with = "kind")]
     pub kind: ChangeKind,
@@ -87,7 +87,7 @@ pub(crate) struct Change {
 
 /// One equation of one phase; all errors in scaled units per second squared.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub(crate) struct EquationCertificate {
+pub struct EquationCertificate {
     /// Index of the latent coordinate.
     #[serde(rename = "equation", serialize_with = "equation")]
     pub output: usize,
@@ -114,7 +114,7 @@ pub(crate) struct EquationCertificate {
 
 /// One phase.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub(crate) struct PhaseCertificate {
+pub struct PhaseCertificate {
     /// The phase's name.
     pub name: String,
     /// The box: each variable's name and range. `None` if there is no sample of the phase, so that

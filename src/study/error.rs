@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 /// Why a study stopped.
 #[derive(Debug, thiserror::Error)]
-pub(crate) enum StudyError {
+pub enum StudyError {
     /// A range of dimensions or seeds that cannot be trained.
     #[error("{found}, expected {expected}")]
     Range {

@@ -71,7 +71,7 @@ impl Plan {
 
 /// Part `index` (from 1) of `count` parts of a study.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Shard {
+pub struct Shard {
     index: usize,
     count: usize,
 }

@@ -5,7 +5,7 @@ use std::fmt;
 
 /// A name that is an identifier of the target and unique in its scope; minted by [`Namer`].
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct Ident(String);
+pub struct Ident(String);
 
 impl fmt::Display for Ident {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

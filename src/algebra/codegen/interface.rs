@@ -15,7 +15,7 @@ const MOST_TERMS: usize = 40;
 
 /// A function to be generated from a program.
 #[derive(Clone, Debug)]
-pub(crate) struct FunctionSpec {
+pub struct FunctionSpec {
     /// Name without the model's, such as `contact_dynamics`.
     pub name: String,
     /// The program.

@@ -31,7 +31,7 @@ impl ValueId {
 
 /// One constant table of a program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub(crate) struct TableId(pub(super) u32);
+pub struct TableId(pub(super) u32);
 
 impl TableId {
     /// Position of the table in [`Program::tables`].
@@ -121,7 +121,7 @@ pub enum Binary {
 
 /// Derivatives of a group of functions, one a column.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) enum Slopes<V = Vec<ValueId>> {
+pub enum Slopes<V = Vec<ValueId>> {
     /// All are one: the group is the variables themselves.
     One,
     /// These values.
@@ -151,7 +151,7 @@ impl<V> Slopes<V> {
 
 /// Functions of one variable each, one a column of a table.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Group<T = TableId, V = Vec<ValueId>> {
+pub struct Group<T = TableId, V = Vec<ValueId>> {
     /// Coefficients, a multiple of [`LANES`] columns.
     pub table: T,
     /// Value of each function; zero behind the last variable, as the coefficients are.
@@ -162,7 +162,7 @@ pub(crate) struct Group<T = TableId, V = Vec<ValueId>> {
 
 /// A vector of [`QUAD`] numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Quad {
+pub enum Quad {
     /// A row of the statement's table.
     Row(usize),
     /// An earlier sum of the statement.
@@ -171,7 +171,7 @@ pub(crate) enum Quad {
 
 /// One sum of [`Statement::Quads`].
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct QuadSum {
+pub struct QuadSum {
     /// What the sum begins with.
     pub start: Quad,
     /// What is added: positions of weights, and the vectors that they scale.

@@ -9,7 +9,7 @@ use super::{sin_cos, sin_cos_f32};
 /// A number that programs compute with: `f64` or `f32`.
 ///
 /// Each operator rounds once, as generated code does with contraction off.
-pub(crate) trait Real:
+pub trait Real:
     Copy
     + Debug
     + Add<Output = Self>

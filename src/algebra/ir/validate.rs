@@ -37,7 +37,7 @@ pub enum IrError {
 
 /// What is wrong with a statement.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub(crate) enum Fault {
+pub enum Fault {
     /// It reads this value, which is not defined before it.
     #[error("reads value {0}, defined only later")]
     UndefinedValue(usize),

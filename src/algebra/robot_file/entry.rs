@@ -21,7 +21,7 @@ pub struct RobotEntry {
 /// A leg.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct LegEntry {
+pub struct LegEntry {
     /// Its three joints, from the trunk to the foot.
     pub joint: Vec<JointEntry>,
     /// From the last joint to the foot at the zero posture, m, along the body's axes.
@@ -31,7 +31,7 @@ pub(crate) struct LegEntry {
 /// A joint.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct JointEntry {
+pub struct JointEntry {
     /// The maker's name.
     pub name: String,
     /// From the joint before, the first from the body's origin, at the zero posture, m.
@@ -71,7 +71,7 @@ fn is_zero(value: &f64) -> bool {
 /// `"x"`, `"-y"` and so on, or a vector of any length.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
-pub(crate) enum Axis {
+pub enum Axis {
     /// By name.
     Name(String),
     /// By its components.
