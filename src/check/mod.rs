@@ -32,7 +32,6 @@ pub use compare::{Comparison, Difference, EquationComparison, PhaseComparison, V
 pub(crate) use domain::CheckDomain;
 pub use error::CheckError;
 pub use point::Gap;
-pub(crate) use point::Point;
 pub use side::Side;
 pub(crate) use side::read_sides;
 

@@ -21,7 +21,7 @@ pub(crate) use complexity::study_figures;
 pub(crate) use contents::{Content, all_figures};
 pub(crate) use control::{control_figures, without_statistics};
 pub(crate) use figures::{Figure, figure_files};
-pub(crate) use introduction::{Introduction, headline, introduction};
+pub(crate) use introduction::{Introduction, introduction};
 pub use json::{assessment_json, plan_json};
 pub(crate) use page::{PageOptions, page};
 pub(crate) use plan::{plan_figures, reach_figure};

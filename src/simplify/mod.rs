@@ -53,19 +53,15 @@ mod workspace;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use certificate::{
-    BeforeAfter, Change, ChangeKind, Effect, EquationCertificate, PhaseCertificate,
-};
 pub use certificate::{Certificate, certificate_json};
 pub use domain::{Domain, MARGIN, Samples};
 pub use error::SimplifyError;
 pub(crate) use markdown::lost_words;
 pub use markdown::markdown;
-pub(crate) use measure::Measured;
 pub use printing::PrintedEquation;
 pub(crate) use printing::printed;
 pub use rollouts::RolloutEffect;
-pub(crate) use rollouts::{RolloutBasis, RolloutErrors, rollouts_json};
+pub(crate) use rollouts::{RolloutBasis, rollouts_json};
 pub use run::{Simplified, simplify};
 pub(crate) use tables::{bound_words, change_table, equation_table, rollout_table};
 pub use tolerance::{Tolerance, ToleranceError};

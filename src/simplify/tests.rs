@@ -6,6 +6,7 @@ use chacha20::ChaCha8Rng;
 use chacha20::rand_core::{Rng, SeedableRng};
 use nalgebra::{DMatrix, DVector};
 
+use super::certificate::ChangeKind;
 use super::*;
 use crate::equations::Equations;
 use crate::model::{FeetRule, LatentVariable, Library, Phase, ReducedModel};

@@ -12,7 +12,7 @@ mod run;
 mod store;
 mod summary;
 
-pub(crate) use cell::{Cell, Metrics, Outcome};
+pub(crate) use cell::{Cell, Outcome};
 pub(crate) use error::StudyError;
 pub(crate) use plan::{CellId, FOLDS, Plan, Shard};
 pub(crate) use run::run;

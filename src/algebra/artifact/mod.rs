@@ -42,6 +42,5 @@ mod read;
 mod write;
 
 pub use error::{ArtifactError, ArtifactFault, describe};
-pub(crate) use manifest::{SCHEMA, SCHEMA_2};
 pub use read::{MAX_FILE_BYTES, is_standard_input, read, read_from_bytes};
 pub use write::{Digest, check_place, digest, to_text, write};

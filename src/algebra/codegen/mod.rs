@@ -36,7 +36,6 @@ mod translate_arrays;
 mod units;
 
 pub use error::CodegenError;
-pub(crate) use interface::ModelInterface;
 pub use precision::Precision;
 pub use sines::SineCosine;
 pub use units::Units;

@@ -79,11 +79,6 @@ impl ProgramBuilder {
         self.binary(Binary::Add, a, b)
     }
 
-    /// `a - b`.
-    pub(crate) fn sub(&mut self, a: ValueId, b: ValueId) -> ValueId {
-        self.binary(Binary::Sub, a, b)
-    }
-
     /// `a * b`.
     pub(crate) fn mul(&mut self, a: ValueId, b: ValueId) -> ValueId {
         self.binary(Binary::Mul, a, b)

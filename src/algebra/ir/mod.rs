@@ -30,7 +30,5 @@ mod validate;
 pub(crate) use build::ProgramBuilder;
 pub use interpret::Interpreter;
 pub use program::{Binary, Program, Slot, Statement, Unary, ValueId};
-pub(crate) use program::{Group, LANES, QUAD, Quad, QuadSum, ResultEntry, Slopes, Table, TableId};
-pub(crate) use real::Real;
-pub(crate) use validate::Fault;
+pub(crate) use program::{Group, LANES, QUAD, Quad, QuadSum, Slopes, Table, TableId};
 pub use validate::IrError;

@@ -164,7 +164,7 @@ impl Library {
     }
 
     /// Whether there is no term; never true of a library that was built.
-    pub(crate) fn is_empty(&self) -> bool {
+    pub fn is_empty(&self) -> bool {
         self.terms.is_empty()
     }
 
@@ -214,12 +214,6 @@ impl Library {
     /// `None` if its index is not below `latent_dim`.
     pub fn symbol(&self, variable: LatentVariable) -> Option<SymbolId> {
         Some(self.symbols[variable.place(self.latent_dim)?])
-    }
-
-    /// The variable that a symbol of the library's pool stands for.
-    pub(crate) fn variable(&self, symbol: SymbolId) -> Option<LatentVariable> {
-        let position = self.symbols.binary_search(&symbol).ok()?;
-        LatentVariable::all(self.latent_dim).nth(position)
     }
 
     /// Theta at one point: the value of each term, in order.
@@ -324,16 +318,6 @@ mod tests {
 
     fn terms(texts: &[&str]) -> Vec<String> {
         texts.iter().map(|&text| text.to_owned()).collect()
-    }
-
-    #[test]
-    fn library_symbols_map_to_variables_and_back() {
-        let library = Library::from_terms(3, &terms(&["u3*dz2", "z1"])).unwrap();
-        for variable in LatentVariable::all(3) {
-            let symbol = library.symbol(variable).unwrap();
-            assert_eq!(library.variable(symbol), Some(variable));
-        }
-        assert_eq!(library.symbol(LatentVariable::U(3)), None);
     }
 
     #[test]

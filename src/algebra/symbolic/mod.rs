@@ -75,7 +75,6 @@ pub use defined::Reading;
 pub use display::Display;
 pub(crate) use eval::integer_power;
 pub use interval::Interval;
-pub(crate) use node::Parity;
 pub use node::{ExprId, Function, Node, SymbolId};
 pub use number::Number;
 pub(crate) use number::sum_of_floats;

@@ -41,6 +41,5 @@ mod nomenclature;
 mod table;
 
 pub use document::emit;
-pub(crate) use escape::{label, tex_text};
 pub use lines::tex_cases;
 pub(crate) use math::{tex, tex_symbol, tex_unit};

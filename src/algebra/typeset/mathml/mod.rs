@@ -9,6 +9,5 @@ mod page;
 mod prose;
 
 pub use math::mathml;
-pub(crate) use math::mathml_symbol;
 pub use page::{Html, emit, system};
 pub use prose::{HtmlProse, HtmlText};
