@@ -129,7 +129,7 @@ impl Transcript {
 
 /// A line with `~` for times: of a control step in the last two columns of a row, of programs in words, in JSON.
 fn without_times(line: &str, is_timed_row: bool) -> String {
-    const NAMES: [&str; 4] = ["\"p50\"", "\"p99\"", "\"max\"", "\"solve_ms\""];
+    const NAMES: [&str; 5] = ["\"p50\"", "\"p99\"", "\"max\"", "\"solve_ms\"", "\"bytes\""];
     let is_of_programs = line.contains(" convex programs, ");
     // A table with times has another length in each run.
     let is_of_files = line.ends_with(" bytes)");
