@@ -77,11 +77,6 @@ impl<'a> Facts<'a> {
         }
     }
 
-    /// Names of the settings that are whole numbers, or of the others, in Python.
-    fn quoted_names(&self, is_whole: bool) -> String {
-        quoted_names(&self.settings, is_whole)
-    }
-
     /// The version of a package that the crate needs.
     fn version(&self, package: &str) -> &'static str {
         Lock::own().version(package)

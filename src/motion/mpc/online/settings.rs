@@ -110,7 +110,7 @@ pub struct Effectiveness {
 pub const MAX_HORIZON: usize = 500;
 
 /// What a setting may be.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub enum Accepts {
     /// A whole number from the first to the second, in words; the generated C checks these by hand.
     Whole(usize, usize, &'static str),
@@ -120,15 +120,13 @@ pub enum Accepts {
     NotNegative,
     /// A positive number, or none, which is zero in C.
     Optional,
-    /// As [`Self::Optional`], zero alone where the generated C is compiled without this switch.
+    /// As [`Self::Optional`]; none where the generated C is compiled without this switch.
     Compiled(&'static str),
     /// Zero or a positive number; not looked at where this setting is zero.
     With(&'static str),
 }
 
 impl Accepts {
-    /// # Errors
-    /// [`ControlError::Setting`] if a number is refused; none, which is zero in C, has to be left out.
     fn check(self, name: &'static str, found: f64) -> Result<(), ControlError> {
         let is_positive = found.is_finite() && found > 0.0;
         let (is_accepted, expected) = match self {
@@ -142,18 +140,16 @@ impl Accepts {
                 (is_positive || found == 0.0, "zero or a positive number")
             }
         };
-        match is_accepted {
-            true => Ok(()),
-            false => Err(ControlError::Setting {
-                name,
-                found,
-                expected,
-            }),
-        }
+        let refused = ControlError::Setting {
+            name,
+            found,
+            expected,
+        };
+        is_accepted.then_some(()).ok_or(refused)
     }
 }
 
-/// A setting that interfaces in C have too.
+/// A setting that interfaces in C have too. In descriptions `UPPER` stands for the model's name.
 #[derive(Debug, Clone, Copy)]
 pub struct Setting {
     /// Its name in C, Python and ROS.
@@ -162,131 +158,71 @@ pub struct Setting {
     pub kind: &'static str,
     /// Its range.
     pub accepts: Accepts,
-    /// Its description in the header of the generated crate. `UPPER` stands for the model's name.
+    /// Its description, for the header of the generated crate.
     pub text: &'static str,
-    /// Its description in the header of the generated C; empty if it is not there.
+    /// The same for the header of the generated C; empty if it is not there.
     pub in_c: &'static str,
-    /// Its description as a parameter of the ros2_control plugin, if it is one.
+    /// The same for a parameter of the ros2_control plugin, if it is one.
     pub in_ros: Option<&'static str>,
 }
 
 type Real = f64;
 
-/// A field of the settings as its numbers in C.
+/// A field of [`MpcSettings`] as its numbers in C.
 trait InC<const N: usize>: Sized {
-    fn numbers(&self) -> [f64; N];
+    /// The numbers, all `none` where there is none.
+    fn numbers(self, none: f64) -> [f64; N];
 
     fn of(numbers: [f64; N]) -> Self;
-
-    /// The same, with numbers that are accepted instead of those of nothing.
-    fn checked(&self) -> [f64; N] {
-        self.numbers()
-    }
 }
 
-impl InC<1> for f64 {
-    fn numbers(&self) -> [f64; 1] {
-        [*self]
-    }
-
-    fn of([number]: [f64; 1]) -> Self {
-        number
-    }
-}
-
-impl InC<1> for usize {
-    fn numbers(&self) -> [f64; 1] {
-        [*self as f64]
-    }
-
-    fn of([number]: [f64; 1]) -> Self {
-        number as usize
-    }
-}
-
-impl InC<1> for Option<f64> {
-    fn numbers(&self) -> [f64; 1] {
-        [self.unwrap_or(0.0)]
-    }
-
-    fn of([number]: [f64; 1]) -> Self {
-        (number != 0.0).then_some(number)
-    }
-
-    fn checked(&self) -> [f64; 1] {
-        [self.unwrap_or(1.0)]
-    }
-}
-
-impl InC<1> for QpSettings {
-    fn numbers(&self) -> [f64; 1] {
-        [f64::from(self.max_iterations)]
-    }
-
-    fn of([number]: [f64; 1]) -> Self {
-        Self {
-            max_iterations: number as u32,
-            ..Self::default()
-        }
-    }
-}
-
-impl InC<3> for Option<Effectiveness> {
-    fn numbers(&self) -> [f64; 3] {
-        self.map_or([0.0; 3], |estimate| {
-            [
-                estimate.time_constant_s,
-                estimate.stiffness_nm_rad,
-                estimate.damping_nm_s_rad,
-            ]
-        })
-    }
-
-    fn of([time_constant_s, stiffness_nm_rad, damping_nm_s_rad]: [f64; 3]) -> Self {
-        (time_constant_s != 0.0).then_some(Effectiveness {
-            time_constant_s,
-            stiffness_nm_rad,
-            damping_nm_s_rad,
-        })
-    }
-
-    fn checked(&self) -> [f64; 3] {
-        self.map_or([1.0, 0.0, 0.0], |_| self.numbers())
-    }
-}
-
-/// Choices by their numbers.
-macro_rules! choices {
-    ($($choice:ident: $first:ident $second:ident;)*) => {$(
-        impl InC<1> for $choice {
-            fn numbers(&self) -> [f64; 1] {
-                [f64::from(*self as u8)]
+macro_rules! in_c {
+    ($($type:ty, $n:literal: ($value:ident, $none:ident) $to:expr, $numbers:pat => $of:expr;)*) => {$(
+        impl InC<$n> for $type {
+            fn numbers(self, $none: f64) -> [f64; $n] {
+                let $value = self;
+                $to
             }
 
-            fn of([number]: [f64; 1]) -> Self {
-                if number == 0.0 { Self::$first } else { Self::$second }
+            fn of($numbers: [f64; $n]) -> Self {
+                $of
             }
         }
     )*};
 }
 
-choices! {
-    Lift: Transpose Consistent;
-    Linearisation: Reference LastPlan;
-    Solver: Clarabel Riccati;
+in_c! {
+    f64, 1: (value, _none) [value], [number] => number;
+    usize, 1: (value, _none) [value as f64], [number] => number as usize;
+    Option<f64>, 1: (value, none) [value.unwrap_or(none)],
+        [number] => (number != 0.0).then_some(number);
+    Lift, 1: (value, _none) [f64::from(value as u8)],
+        [number] => [Self::Transpose, Self::Consistent][number as usize];
+    Linearisation, 1: (value, _none) [f64::from(value as u8)],
+        [number] => [Self::Reference, Self::LastPlan][number as usize];
+    Solver, 1: (value, _none) [f64::from(value as u8)],
+        [number] => [Self::Clarabel, Self::Riccati][number as usize];
+    QpSettings, 1: (value, _none) [f64::from(value.max_iterations)],
+        [number] => Self { max_iterations: number as u32, ..Self::default() };
+    Option<Effectiveness>, 3:
+        (value, none) value.map_or([none; 3], |e| [e.time_constant_s, e.stiffness_nm_rad, e.damping_nm_s_rad]),
+        [time_constant_s, stiffness_nm_rad, damping_nm_s_rad] => {
+            let estimate = Effectiveness { time_constant_s, stiffness_nm_rad, damping_nm_s_rad };
+            (time_constant_s != 0.0).then_some(estimate)
+        };
 }
 
-/// Makes the structures of Rust and C and [`SETTINGS`] of a table. Its first rows are fields of [`MpcSettings`], each with
-/// what C has for it: name, type, range and description, which `in_c` replaces in the generated C and `in_ros` repeats
-/// for a parameter of ROS. Rows of `rust` are for Rust alone.
+/// Makes the structures of Rust and C and [`SETTINGS`] of a table. Rows of `c` are fields of [`MpcSettings`], each with
+/// what C has for it: name, type, range and description, which `in_c` replaces in the generated C and `in_ros` for a
+/// parameter of ROS. Rows of `rust` are for Rust alone.
 macro_rules! settings {
     (
         c {$(
             $(#[$doc:meta])*
-            $field:ident: $type:ty = $default:expr => {$(
+            $field:ident: $type:ty = $default:expr => $(
                 $name:ident: $kind:ident, $accepts:expr, $text:literal
-                    $(, in_c $in_c:literal)? $(, in_ros $in_ros:literal)?;
-            )*}
+                    $(, in_c $in_c:literal)? $(, in_ros $in_ros:literal)?
+            )|+;
         )*}
         rust {$(
             $(#[$rust_doc:meta])*
@@ -296,7 +232,7 @@ macro_rules! settings {
         /// Settings of the controller.
         #[derive(Debug, Clone, Copy, PartialEq)]
         pub struct MpcSettings {
-            $($(#[$doc])* pub $field: $type,)*
+            $($(#[doc = $text])* $(#[$doc])* pub $field: $type,)*
             $($(#[$rust_doc])* pub $rust_field: $rust_type,)*
         }
 
@@ -306,16 +242,7 @@ macro_rules! settings {
             }
         }
 
-        impl MpcSettings {
-            /// The numbers to be checked, in the order of [`SETTINGS`].
-            fn checked(&self) -> Vec<f64> {
-                let mut numbers = Vec::with_capacity(SETTINGS.len());
-                $(numbers.extend(self.$field.checked());)*
-                numbers
-            }
-        }
-
-        /// Settings as C has them; zero leaves free what [`MpcSettings`] has as none.
+        /// Settings as C has them; zero is none.
         #[repr(C)]
         #[derive(Debug, Clone, Copy, PartialEq)]
         pub struct Settings {
@@ -325,7 +252,7 @@ macro_rules! settings {
         impl Default for Settings {
             fn default() -> Self {
                 let settings = MpcSettings::default();
-                $(let [$($name),*] = settings.$field.numbers();)*
+                $(let [$($name),*] = settings.$field.numbers(0.0);)*
                 Self { $($($name: $name as $kind,)*)* }
             }
         }
@@ -354,7 +281,19 @@ macro_rules! settings {
             }
         }
 
-        /// The settings that C has, in the order of its structures.
+        impl MpcSettings {
+            fn check_table(&self) -> Result<(), ControlError> {
+                let mut settings = SETTINGS.iter();
+                // One, where there is none, passes every check.
+                $(for found in self.$field.numbers(1.0) {
+                    let setting = settings.next().expect("a row for each number");
+                    setting.accepts.check(setting.name, found)?;
+                })*
+                Ok(())
+            }
+        }
+
+        /// The settings that C has, in the order of its structure.
         pub const SETTINGS: &[Setting] = &[$($(Setting {
             name: stringify!($name),
             kind: stringify!($kind),
@@ -368,94 +307,61 @@ macro_rules! settings {
 
 settings! {
     c {
-        /// Stages of the horizon, `N`.
-        horizon: usize = 20 => {
-            horizon: i32, Accepts::Whole(1, MAX_HORIZON, "1 to 500 stages"), "stages, 1 to 500",
-                in_c "stages, 1 to UPPER_MAX_HORIZON";
-        }
-        /// The conic solver, and cap and accepted residual of the structured one.
-        qp: QpSettings = QpSettings::default() => {
+        horizon: usize = 20 => horizon: i32, Accepts::Whole(1, MAX_HORIZON, "1 to 500 stages"), "stages, 1 to 500",
+            in_c "stages, 1 to UPPER_MAX_HORIZON";
+        /// Beside it tolerance and accepted residual of the conic solver, the residual also of the structured one.
+        qp: QpSettings = QpSettings::default() =>
             max_iterations: i32, Accepts::Whole(0, i32::MAX as usize, "a positive number"),
-                "interior-point iterations, the deadline of a step";
-        }
-        /// How torques are made from the latent input.
-        lift: Lift = Lift::Transpose => {
-            lift: i32, Accepts::Whole(0, 1, "0 (transpose) or 1 (consistent)"),
-                "UPPER_LIFT_TRANSPOSE (default) or _CONSISTENT", in_c "UPPER_LIFT_TRANSPOSE or _CONSISTENT";
-        }
-        /// About what the dynamics are linearised.
-        linearisation: Linearisation = Linearisation::Reference => {
+            "interior-point iterations, the deadline of a step";
+        lift: Lift = Lift::Transpose => lift: i32, Accepts::Whole(0, 1, "0 (transpose) or 1 (consistent)"),
+            "UPPER_LIFT_TRANSPOSE (default) or _CONSISTENT", in_c "UPPER_LIFT_TRANSPOSE or _CONSISTENT";
+        linearisation: Linearisation = Linearisation::Reference =>
             linearisation: i32, Accepts::Whole(0, 1, "0 (the reference) or 1 (the last plan)"),
-                "UPPER_ABOUT_REFERENCE (default) or _LAST_PLAN", in_c "UPPER_ABOUT_REFERENCE or _ABOUT_LAST_PLAN";
-        }
-        /// What solves the program of a step, and that of the consistent lift.
-        solver: Solver = Solver::Clarabel => {
-            solver: i32, Accepts::Whole(0, 1, "0 (clarabel) or 1 (Riccati)"),
-                "UPPER_CLARABEL (default) or _RICCATI", in_c "";
-        }
-        /// Duration of a stage, s; the input is held over it.
-        step_s: f64 = 0.01 => { step_s: f64, Accepts::Positive, "duration of a stage, s"; }
-        /// Weight `w_u` of the input deviation, measured by the inverse covariance of the training
-        /// inputs. Along a recording it hardly matters; in closed loop (`examples/mujoco/closed_loop.py`)
-        /// a weight of one follows errors of the model into a fall, a weight of hundreds is the reference
-        /// input without feedback.
-        input_weight: f64 = 10.0 => {
-            input_weight: Real, Accepts::Positive, "weight of deviations from the reference's input";
-        }
-        /// Weight of velocities against positions, `w_v`. In closed loop small weights let a jump that is
-        /// under-powered, by a payload or weak motors, end short; see `docs/control.md`.
-        velocity_weight: f64 = 0.1 => {
-            velocity_weight: Real, Accepts::Positive, "weight of velocities against positions";
-        }
-        /// Factor on the state weights of the last stage.
-        terminal_weight: f64 = 1.0 => {
-            terminal_weight: Real, Accepts::Positive, "factor on the weights of the last stage";
-        }
-        /// Price of leaving the joint limits by their whole half range at one stage.
-        joint_penalty: f64 = 100.0 => {
-            joint_penalty: Real, Accepts::Positive, "price of leaving the joint limits";
-        }
-        /// Friction coefficient of the lifted body force in contact; none leaves it free.
-        body_friction: Option<f64> = None => {
-            body_friction: Real, Accepts::Optional,
-                "friction coefficient of the lifted body force, 0 leaves it free",
-                in_c "friction coefficient of the lifted body force, by the pyramid inside its cone; 0 leaves it free",
-                in_ros "friction coefficient of the body's force; 0 leaves it free";
-        }
-        /// Friction coefficient of each foot in the consistent lift.
-        foot_friction: f64 = 0.6 => {
-            foot_friction: Real, Accepts::Positive, "friction coefficient of each foot, consistent lift",
-                in_c "friction coefficient of each foot in the consistent lift";
-        }
-        /// Weight of the consistent lift's prior against its reproduction of the latent input.
-        lift_prior_weight: f64 = 1e-3 => {
-            lift_prior_weight: Real, Accepts::Positive, "weight of the training torques, consistent lift",
-                in_c "weight of the training's torques in the consistent lift";
-        }
-        /// Largest change of a plainly lifted torque, N m/s; none leaves it free. What the consistent lift
-        /// makes of the same latent input is not limited.
-        torque_rate_nm_s: Option<f64> = None => {
-            torque_rate_nm_s: Real, Accepts::Compiled("TORQUE_RATES"),
-                "largest change of a torque, N m/s, plain lift; 0 leaves it free",
-                in_c "largest change of a torque of LIFT_TRANSPOSE, N m/s; 0 leaves it free, as it must if UPPER_TORQUE_RATES is 0",
-                in_ros "largest change of a torque of the plain lift, N m/s, where the controller is compiled with \
-                        `UPPER_TORQUE_RATES=1`; 0 leaves it free";
-        }
-        /// Estimates how much of the input arrives, and makes up for it; none trusts the motors.
-        effectiveness: Option<Effectiveness> = None => {
-            effectiveness_time_s: Real, Accepts::Optional,
-                "time constant of the estimate of how much of the input arrives, s; 0 for none",
-                in_ros "time constant of the estimate of the share of the input that arrives; 0 for none";
-            drive_stiffness_nm_rad: Real, Accepts::With("effectiveness_time_s"),
-                "joint PD that holds joint_position, for that estimate";
-            drive_damping_nm_s_rad: Real, Accepts::With("effectiveness_time_s"), "of joint_velocity";
-        }
-        /// Share of the body's error of pitch that the commanded legs are turned against in flight: 0 leaves
-        /// them where the reference has them from the body, 1 where it has them from the ground.
-        swing_turn: f64 = 1.0 => {
-            swing_turn: Real, Accepts::NotNegative,
-                "share of the error of pitch that joint_position turns the legs against in flight";
-        }
+            "UPPER_ABOUT_REFERENCE (default) or _LAST_PLAN", in_c "UPPER_ABOUT_REFERENCE or _ABOUT_LAST_PLAN";
+        /// It solves the program of a step, and that of the consistent lift.
+        solver: Solver = Solver::Clarabel => solver: i32, Accepts::Whole(0, 1, "0 (clarabel) or 1 (Riccati)"),
+            "UPPER_CLARABEL (default) or _RICCATI", in_c "";
+        /// The input is held over it.
+        step_s: f64 = 0.01 => step_s: f64, Accepts::Positive, "duration of a stage, s";
+        /// (`w_u`), measured by the inverse covariance of the training inputs. Along a recording it hardly
+        /// matters; in closed loop (`examples/mujoco/closed_loop.py`) a weight of one follows errors of the
+        /// model into a fall, a weight of hundreds is the reference input without feedback.
+        input_weight: f64 = 10.0 => input_weight: Real, Accepts::Positive,
+            "weight of deviations from the reference's input";
+        /// (`w_v`). In closed loop small weights let a jump that is under-powered, by a payload or weak motors,
+        /// end short; see `docs/control.md`.
+        velocity_weight: f64 = 0.1 => velocity_weight: Real, Accepts::Positive,
+            "weight of velocities against positions";
+        terminal_weight: f64 = 1.0 => terminal_weight: Real, Accepts::Positive,
+            "factor on the weights of the last stage";
+        /// by their whole half range at one stage.
+        joint_penalty: f64 = 100.0 => joint_penalty: Real, Accepts::Positive, "price of leaving the joint limits";
+        body_friction: Option<f64> = None => body_friction: Real, Accepts::Optional,
+            "friction coefficient of the lifted body force, 0 leaves it free",
+            in_c "friction coefficient of the lifted body force, by the pyramid inside its cone; 0 leaves it free",
+            in_ros "friction coefficient of the body's force; 0 leaves it free";
+        foot_friction: f64 = 0.6 => foot_friction: Real, Accepts::Positive,
+            "friction coefficient of each foot, consistent lift",
+            in_c "friction coefficient of each foot in the consistent lift";
+        /// Weighed against the reproduction of the latent input.
+        lift_prior_weight: f64 = 1e-3 => lift_prior_weight: Real, Accepts::Positive,
+            "weight of the training torques, consistent lift",
+            in_c "weight of the training's torques in the consistent lift";
+        /// What the consistent lift makes of the same latent input is not limited.
+        torque_rate_nm_s: Option<f64> = None => torque_rate_nm_s: Real, Accepts::Compiled("TORQUE_RATES"),
+            "largest change of a torque, N m/s, plain lift; 0 leaves it free",
+            in_c "largest change of a torque of LIFT_TRANSPOSE, N m/s; 0 leaves it free, as it must if UPPER_TORQUE_RATES is 0",
+            in_ros "largest change of a torque of the plain lift, N m/s, where the controller is compiled with \
+                    `UPPER_TORQUE_RATES=1`; 0 leaves it free";
+        effectiveness: Option<Effectiveness> = None => effectiveness_time_s: Real, Accepts::Optional,
+            "time constant of the estimate of how much of the input arrives, s; 0 for none",
+            in_ros "time constant of the estimate of the share of the input that arrives; 0 for none"
+            | drive_stiffness_nm_rad: Real, Accepts::With("effectiveness_time_s"),
+            "joint PD that holds joint_position, for that estimate"
+            | drive_damping_nm_s_rad: Real, Accepts::With("effectiveness_time_s"), "of joint_velocity";
+        /// Zero leaves them where the reference has them from the body, 1 where it has them from the ground.
+        swing_turn: f64 = 1.0 => swing_turn: Real, Accepts::NotNegative,
+            "share of the error of pitch that joint_position turns the legs against in flight";
     }
     rust {
         /// What stands for the reference's own dynamics.
@@ -475,9 +381,7 @@ impl MpcSettings {
     /// # Errors
     /// [`ControlError::Setting`] names the first one that is out of its range.
     pub fn check(&self) -> Result<(), ControlError> {
-        for (setting, found) in SETTINGS.iter().zip(self.checked()) {
-            setting.accepts.check(setting.name, found)?;
-        }
+        self.check_table()?;
         let (qp, fallback) = (&self.qp, &self.fallback);
         for (name, found) in [
             ("qp.tolerance", qp.tolerance),
