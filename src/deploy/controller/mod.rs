@@ -24,8 +24,7 @@ use crate::mpc::interface::{Settings, all_codes};
 use crate::robot::{InputRule, Leg, Robot, STATE_DIM, WrenchFrame};
 use control_model::ControlModelText;
 use lock::Lock;
-pub(super) use settings::SettingText;
-use settings::{quoted_names, setting_texts};
+use settings::{SettingText, quoted_names};
 
 /// What the files of a controller, as a crate or in C, take from the model, the robot and romc.
 pub(super) struct Facts<'a> {
@@ -71,7 +70,7 @@ impl<'a> Facts<'a> {
                 .collect(),
             texts,
             defaults: Settings::default(),
-            settings: setting_texts(&name.to_ascii_uppercase()),
+            settings: SettingText::all(),
             link_m: format!("{:?}", robot.geometry(Leg::FrontRight).lengths()[0]),
             rust_version: env!("CARGO_PKG_RUST_VERSION"),
         }

@@ -61,15 +61,6 @@ impl<'a> Deref for Facts<'a> {
     }
 }
 
-impl Facts<'_> {
-    /// Declarations of the settings.
-    fn settings_in_c(&self) -> impl Iterator<Item = String> {
-        self.settings
-            .iter()
-            .filter_map(|setting| setting.in_c(self.real))
-    }
-}
-
 templates! {
     #[derive(askama::Template)]
     Header: "controller_c/header.askama",

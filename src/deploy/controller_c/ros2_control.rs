@@ -3,7 +3,6 @@
 use std::ops::Deref;
 
 use crate::deploy::EmitError;
-use crate::deploy::controller::SettingText;
 use crate::mpc::STEP_SLACK;
 use crate::recording::check::{BODY_SPEED_M_S, JOINT_MARGIN_RAD};
 
@@ -20,17 +19,6 @@ impl<'a> Deref for Facts<'a> {
 
     fn deref(&self) -> &super::Facts<'a> {
         self.controller
-    }
-}
-
-impl Facts<'_> {
-    /// The settings that are parameters, with their descriptions.
-    fn parameters(&self) -> impl Iterator<Item = (&SettingText, String)> {
-        let texts = self
-            .settings
-            .iter()
-            .map(|setting| Some((setting, setting.in_ros()?)));
-        texts.flatten()
     }
 }
 
