@@ -1,5 +1,5 @@
 //! The rooms of `src` and of the crates in it import only what the table of ARCHITECTURE.md allows, and only from rows above
-//! their own.
+//! their own; a setting of the controller stands in few files.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -249,6 +249,42 @@ fn rooms_import_only_what_the_table_of_architecture_allows() {
         above.insert(row.room.clone());
     }
     assert!(faults.is_empty(), "{}", faults.join("\n"));
+}
+
+/// Files below a folder that name a word, but for unit tests and documentation.
+fn naming(folder: &Path, word: &str, found: &mut Vec<PathBuf>) {
+    for entry in fs::read_dir(folder).expect("a readable folder") {
+        let path = entry.expect("an entry").path();
+        if path.is_dir() {
+            naming(&path, word, found);
+        } else if let Ok(text) = fs::read_to_string(&path)
+            && !path.ends_with("readme.askama")
+        {
+            let is_end = |c: char| !(c.is_alphanumeric() || c == '_');
+            let code = text.split("\n#[cfg(test)]\nmod tests").next();
+            if code.is_some_and(|code| code.split(is_end).any(|found| found == word)) {
+                found.push(path);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_setting_of_the_controller_stands_in_at_most_four_files() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    for setting in [
+        "swing_turn",
+        "lift_prior_weight",
+        "joint_penalty",
+        "effectiveness_time_s",
+        "drive_stiffness_nm_rad",
+    ] {
+        let mut found = Vec::new();
+        for folder in ["src", "templates", "python/src", "python/python"] {
+            naming(&root.join(folder), setting, &mut found);
+        }
+        assert!((1..=4).contains(&found.len()), "{setting}: {found:?}");
+    }
 }
 
 #[test]

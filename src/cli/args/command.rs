@@ -13,7 +13,7 @@ use super::value::{RobotParser, count, overwrite, real};
 use crate::evaluate::ReferenceInput;
 use crate::files::Overwrite;
 use crate::limits::table::{APEX, DISTANCE, HORIZON, RESTART_EVERY, STEP, TORQUE_RATE};
-use crate::mpc::{Lift, Solver};
+use crate::mpc::{Lift, MpcSettings, Solver};
 use crate::simplify::Tolerance;
 
 /// The reduced-order model compiler: from recorded jumps to equations, code and torques.
@@ -251,19 +251,19 @@ pub struct MpcArguments {
     #[arg(required = true, value_name = "RECORDING")]
     pub recordings: Vec<PathBuf>,
     /// Number of stages
-    #[arg(long, value_name = "N", default_value_t = 20, value_parser = count(&HORIZON))]
+    #[arg(long, value_name = "N", default_value_t = MpcSettings::default().horizon, value_parser = count(&HORIZON))]
     pub horizon: usize,
     /// Length of a stage in seconds
-    #[arg(long, value_name = "SECONDS", default_value_t = 0.01, value_parser = real(&STEP))]
+    #[arg(long, value_name = "SECONDS", default_value_t = MpcSettings::default().step_s, value_parser = real(&STEP))]
     pub step: f64,
     /// How latent inputs become joint torques
-    #[arg(long, value_enum, default_value = "transpose")]
+    #[arg(long, value_enum, default_value_t = MpcSettings::default().lift)]
     pub lift: Lift,
     /// Where the input reference comes from
     #[arg(long, value_enum, default_value = "recorded")]
     pub reference_input: ReferenceInput,
     /// What solves the quadratic program of a step
-    #[arg(long, value_enum, default_value = "clarabel")]
+    #[arg(long, value_enum, default_value_t = MpcSettings::default().solver)]
     pub solver: Solver,
     /// Largest change of a torque that the transpose lift gives, in N m/s [default: none]
     #[arg(long, value_name = "N_M_PER_S", value_parser = real(&TORQUE_RATE))]

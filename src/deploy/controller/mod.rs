@@ -6,6 +6,7 @@
 
 mod control_model;
 mod lock;
+mod settings;
 mod sources;
 
 use askama::Template;
@@ -23,6 +24,7 @@ use crate::mpc::interface::{Settings, all_codes};
 use crate::robot::{InputRule, Leg, Robot, STATE_DIM, WrenchFrame};
 use control_model::ControlModelText;
 use lock::Lock;
+use settings::{SettingText, quoted_names};
 
 /// What the files of a controller, as a crate or in C, take from the model, the robot and romc.
 pub(super) struct Facts<'a> {
@@ -42,6 +44,7 @@ pub(super) struct Facts<'a> {
     /// Every code with its text.
     pub(super) texts: Vec<(i32, String)>,
     pub(super) defaults: Settings,
+    pub(super) settings: Vec<SettingText>,
     link_m: String,
     rust_version: &'static str,
 }
@@ -67,6 +70,7 @@ impl<'a> Facts<'a> {
                 .collect(),
             texts,
             defaults: Settings::default(),
+            settings: SettingText::all(),
             link_m: format!("{:?}", robot.geometry(Leg::FrontRight).lengths()[0]),
             rust_version: env!("CARGO_PKG_RUST_VERSION"),
         }

@@ -23,7 +23,7 @@ const SOURCES: &[(&str, &str)] = sources! {
     "motion/mpc/online":
         command control_model controller dense effectiveness engine error estimate fallback horizon;
     "motion/mpc/online/interface":
-        codes handle mod settings;
+        codes handle mod;
     "motion/mpc/online":
         layout lift lift_cones lift_pyramids linearise mod plan problem prune qp reference
         settings sparse step structured swing transcribe;

@@ -10,6 +10,7 @@ use super::legs::Legs;
 use super::numbers::{Numbers, integers, nested};
 use crate::codegen::Precision;
 use crate::codegen::interface::{ModelInterface, PhaseInterface};
+use crate::mpc::interface::Accepts;
 use crate::mpc::problem::{Row, pairs};
 use crate::mpc::shared::{
     DEVIATION_FLOOR, EFFECTIVENESS_RANGE, GAP, HALF_WINDOW_S, LARGEST_WEIGHT, LIFT_CURVATURE,

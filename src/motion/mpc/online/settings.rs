@@ -1,4 +1,5 @@
-//! Settings of the controller and their defaults.
+//! Settings of the controller: the one table of names, defaults, ranges and descriptions, from which the structures in Rust
+//! and C, their checks, the headers, the Python binding and the parameters of ROS are made.
 
 use super::error::ControlError;
 use super::qp::QpSettings;
@@ -105,86 +106,274 @@ pub struct Effectiveness {
     pub damping_nm_s_rad: f64,
 }
 
-/// Settings of the controller.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct MpcSettings {
-    /// Stages of the horizon, `N`.
-    pub horizon: usize,
-    /// Duration of a stage, s; the input is held over it.
-    pub step_s: f64,
-    /// How torques are made from the latent input.
-    pub lift: Lift,
-    /// Weight `w_u` of the input deviation, measured by the inverse covariance of the training
-    /// inputs. Along a recording it hardly matters; in closed loop (`examples/mujoco/closed_loop.py`)
-    /// a weight of one follows errors of the model into a fall, a weight of hundreds is the reference
-    /// input without feedback.
-    pub input_weight: f64,
-    /// Weight of velocities against positions, `w_v`. In closed loop small weights let a jump that is
-    /// under-powered, by a payload or weak motors, end short; see `docs/control.md`.
-    pub velocity_weight: f64,
-    /// Factor on the state weights of the last stage.
-    pub terminal_weight: f64,
-    /// About what the dynamics are linearised.
-    pub linearisation: Linearisation,
-    /// What stands for the reference's own dynamics.
-    pub drift: Drift,
-    /// What stands for the reference's input if it has none.
-    pub missing_input: MissingInput,
-    /// Price of leaving the joint limits by their whole half range at one stage.
-    pub joint_penalty: f64,
-    /// Friction coefficient of the lifted body force in contact; none leaves it free.
-    pub body_friction: Option<f64>,
-    /// Friction coefficient of each foot in the consistent lift.
-    pub foot_friction: f64,
-    /// Weight of the consistent lift's prior against its reproduction of the latent input.
-    pub lift_prior_weight: f64,
-    /// Largest change of a plainly lifted torque, N m/s; none leaves it free. What the consistent lift
-    /// makes of the same latent input is not limited.
-    pub torque_rate_nm_s: Option<f64>,
-    /// Estimates how much of the input arrives, and makes up for it; none trusts the motors.
-    pub effectiveness: Option<Effectiveness>,
-    /// Share of the body's error of pitch that the commanded legs are turned against in flight: 0 leaves
-    /// them where the reference has them from the body, 1 where it has them from the ground.
-    pub swing_turn: f64,
-    /// Which rows of the constraints are kept.
-    pub rows: RowSelection,
-    /// What solves the program of a step, and that of the consistent lift.
-    pub solver: Solver,
-    /// The conic solver, and cap and accepted residual of the structured one.
-    pub qp: QpSettings,
-    /// What happens without a plan.
-    pub fallback: FallbackSettings,
+/// Longest horizon that is accepted.
+pub const MAX_HORIZON: usize = 500;
+
+/// What a setting may be.
+#[derive(Debug, Clone, Copy)]
+pub enum Accepts {
+    /// A whole number from the first to the second, in words; the generated C checks these by hand.
+    Whole(usize, usize, &'static str),
+    /// A positive number.
+    Positive,
+    /// Zero or a positive number.
+    NotNegative,
+    /// A positive number, or none, which is zero in C.
+    Optional,
+    /// As [`Self::Optional`]; none where the generated C is compiled without this switch.
+    Compiled(&'static str),
+    /// Zero or a positive number; not looked at where this setting is zero.
+    With(&'static str),
 }
 
-impl Default for MpcSettings {
-    fn default() -> Self {
-        Self {
-            horizon: 20,
-            step_s: 0.01,
-            lift: Lift::Transpose,
-            input_weight: 10.0,
-            velocity_weight: 0.1,
-            terminal_weight: 1.0,
-            linearisation: Linearisation::Reference,
-            drift: Drift::Automatic,
-            missing_input: MissingInput::Estimate,
-            joint_penalty: 100.0,
-            body_friction: None,
-            foot_friction: 0.6,
-            lift_prior_weight: 1e-3,
-            torque_rate_nm_s: None,
-            effectiveness: None,
-            swing_turn: 1.0,
-            rows: RowSelection::Needed,
-            solver: Solver::Clarabel,
-            qp: QpSettings::default(),
-            fallback: FallbackSettings::default(),
-        }
+impl Accepts {
+    fn check(self, name: &'static str, found: f64) -> Result<(), ControlError> {
+        let is_positive = found.is_finite() && found > 0.0;
+        let (is_accepted, expected) = match self {
+            Self::Whole(least, most, expected) => {
+                ((least as f64..=most as f64).contains(&found), expected)
+            }
+            Self::Positive | Self::Optional | Self::Compiled(_) => {
+                (is_positive, "a positive number")
+            }
+            Self::NotNegative | Self::With(_) => {
+                (is_positive || found == 0.0, "zero or a positive number")
+            }
+        };
+        let refused = ControlError::Setting {
+            name,
+            found,
+            expected,
+        };
+        is_accepted.then_some(()).ok_or(refused)
     }
 }
 
-/// Longest horizon that is accepted.
-pub const MAX_HORIZON: usize = 500;
+/// A setting that interfaces in C have too. In descriptions `UPPER` stands for the model's name.
+#[derive(Debug, Clone, Copy)]
+pub struct Setting {
+    /// Its name in C, Python and ROS.
+    pub name: &'static str,
+    /// `i32`, `f64`, or `Real` for what has the precision of the generated C.
+    pub kind: &'static str,
+    /// Its range.
+    pub accepts: Accepts,
+    /// Its description, for the header of the generated crate.
+    pub text: &'static str,
+    /// The same for the header of the generated C; empty if it is not there.
+    pub in_c: &'static str,
+    /// The same for a parameter of the ros2_control plugin, if it is one.
+    pub in_ros: Option<&'static str>,
+}
+
+type Real = f64;
+
+/// A field of [`MpcSettings`] as its numbers in C.
+trait InC<const N: usize>: Sized {
+    /// The numbers, all `none` where there is none.
+    fn numbers(self, none: f64) -> [f64; N];
+
+    fn of(numbers: [f64; N]) -> Self;
+}
+
+macro_rules! in_c {
+    ($($type:ty, $n:literal: ($value:ident, $none:ident) $to:expr, $numbers:pat => $of:expr;)*) => {$(
+        impl InC<$n> for $type {
+            fn numbers(self, $none: f64) -> [f64; $n] {
+                let $value = self;
+                $to
+            }
+
+            fn of($numbers: [f64; $n]) -> Self {
+                $of
+            }
+        }
+    )*};
+}
+
+in_c! {
+    f64, 1: (value, _none) [value], [number] => number;
+    usize, 1: (value, _none) [value as f64], [number] => number as usize;
+    Option<f64>, 1: (value, none) [value.unwrap_or(none)],
+        [number] => (number != 0.0).then_some(number);
+    Lift, 1: (value, _none) [f64::from(value as u8)],
+        [number] => [Self::Transpose, Self::Consistent][number as usize];
+    Linearisation, 1: (value, _none) [f64::from(value as u8)],
+        [number] => [Self::Reference, Self::LastPlan][number as usize];
+    Solver, 1: (value, _none) [f64::from(value as u8)],
+        [number] => [Self::Clarabel, Self::Riccati][number as usize];
+    QpSettings, 1: (value, _none) [f64::from(value.max_iterations)],
+        [number] => Self { max_iterations: number as u32, ..Self::default() };
+    Option<Effectiveness>, 3:
+        (value, none) value.map_or([none; 3], |e| [e.time_constant_s, e.stiffness_nm_rad, e.damping_nm_s_rad]),
+        [time_constant_s, stiffness_nm_rad, damping_nm_s_rad] => {
+            let estimate = Effectiveness { time_constant_s, stiffness_nm_rad, damping_nm_s_rad };
+            (time_constant_s != 0.0).then_some(estimate)
+        };
+}
+
+/// Makes the structures of Rust and C and [`SETTINGS`] of a table. Rows of `c` are fields of [`MpcSettings`], each with
+/// what C has for it: name, type, range and description, which `in_c` replaces in the generated C and `in_ros` for a
+/// parameter of ROS. Rows of `rust` are for Rust alone.
+macro_rules! settings {
+    (
+        c {$(
+            $(#[$doc:meta])*
+            $field:ident: $type:ty = $default:expr => $(
+                $name:ident: $kind:ident, $accepts:expr, $text:literal
+                    $(, in_c $in_c:literal)? $(, in_ros $in_ros:literal)?
+            )|+;
+        )*}
+        rust {$(
+            $(#[$rust_doc:meta])*
+            $rust_field:ident: $rust_type:ty = $rust_default:expr;
+        )*}
+    ) => {
+        /// Settings of the controller.
+        #[derive(Debug, Clone, Copy, PartialEq)]
+        pub struct MpcSettings {
+            $($(#[doc = $text])* $(#[$doc])* pub $field: $type,)*
+            $($(#[$rust_doc])* pub $rust_field: $rust_type,)*
+        }
+
+        impl Default for MpcSettings {
+            fn default() -> Self {
+                Self { $($field: $default,)* $($rust_field: $rust_default,)* }
+            }
+        }
+
+        /// Settings as C has them; zero is none.
+        #[repr(C)]
+        #[derive(Debug, Clone, Copy, PartialEq)]
+        pub struct Settings {
+            $($(#[doc = $text] pub $name: $kind,)*)*
+        }
+
+        impl Default for Settings {
+            fn default() -> Self {
+                let settings = MpcSettings::default();
+                $(let [$($name),*] = settings.$field.numbers(0.0);)*
+                Self { $($($name: $name as $kind,)*)* }
+            }
+        }
+
+        impl Settings {
+            /// Its numbers, in the order of [`SETTINGS`].
+            pub fn numbers(&self) -> Vec<f64> {
+                vec![$($(self.$name as f64),*),*]
+            }
+
+            /// The same for the controller.
+            ///
+            /// # Errors
+            /// [`ControlError::Setting`] for a choice or a count that does not exist; other ranges are
+            /// checked when the controller is built.
+            pub fn to_mpc(&self) -> Result<MpcSettings, ControlError> {
+                for (setting, found) in SETTINGS.iter().zip(self.numbers()) {
+                    if let Accepts::Whole(..) = setting.accepts {
+                        setting.accepts.check(setting.name, found)?;
+                    }
+                }
+                Ok(MpcSettings {
+                    $($field: InC::of([$(self.$name as f64),*]),)*
+                    ..MpcSettings::default()
+                })
+            }
+        }
+
+        impl MpcSettings {
+            fn check_table(&self) -> Result<(), ControlError> {
+                let mut settings = SETTINGS.iter();
+                // One, where there is none, passes every check.
+                $(for found in self.$field.numbers(1.0) {
+                    let setting = settings.next().expect("a row for each number");
+                    setting.accepts.check(setting.name, found)?;
+                })*
+                Ok(())
+            }
+        }
+
+        /// The settings that C has, in the order of its structure.
+        pub const SETTINGS: &[Setting] = &[$($(Setting {
+            name: stringify!($name),
+            kind: stringify!($kind),
+            accepts: $accepts,
+            text: $text,
+            in_c: [$($in_c,)? $text][0],
+            in_ros: [$(Some($in_ros),)? None][0],
+        }),*),*];
+    };
+}
+
+settings! {
+    c {
+        horizon: usize = 20 => horizon: i32, Accepts::Whole(1, MAX_HORIZON, "1 to 500 stages"), "stages, 1 to 500",
+            in_c "stages, 1 to UPPER_MAX_HORIZON";
+        /// Beside it tolerance and accepted residual of the conic solver, the residual also of the structured one.
+        qp: QpSettings = QpSettings::default() =>
+            max_iterations: i32, Accepts::Whole(0, i32::MAX as usize, "a positive number"),
+            "interior-point iterations, the deadline of a step";
+        lift: Lift = Lift::Transpose => lift: i32, Accepts::Whole(0, 1, "0 (transpose) or 1 (consistent)"),
+            "UPPER_LIFT_TRANSPOSE (default) or _CONSISTENT", in_c "UPPER_LIFT_TRANSPOSE or _CONSISTENT";
+        linearisation: Linearisation = Linearisation::Reference =>
+            linearisation: i32, Accepts::Whole(0, 1, "0 (the reference) or 1 (the last plan)"),
+            "UPPER_ABOUT_REFERENCE (default) or _LAST_PLAN", in_c "UPPER_ABOUT_REFERENCE or _ABOUT_LAST_PLAN";
+        /// It solves the program of a step, and that of the consistent lift.
+        solver: Solver = Solver::Clarabel => solver: i32, Accepts::Whole(0, 1, "0 (clarabel) or 1 (Riccati)"),
+            "UPPER_CLARABEL (default) or _RICCATI", in_c "";
+        /// The input is held over it.
+        step_s: f64 = 0.01 => step_s: f64, Accepts::Positive, "duration of a stage, s";
+        /// (`w_u`), measured by the inverse covariance of the training inputs. Along a recording it hardly
+        /// matters; in closed loop (`examples/mujoco/closed_loop.py`) a weight of one follows errors of the
+        /// model into a fall, a weight of hundreds is the reference input without feedback.
+        input_weight: f64 = 10.0 => input_weight: Real, Accepts::Positive,
+            "weight of deviations from the reference's input";
+        /// (`w_v`). In closed loop small weights let a jump that is under-powered, by a payload or weak motors,
+        /// end short; see `docs/control.md`.
+        velocity_weight: f64 = 0.1 => velocity_weight: Real, Accepts::Positive,
+            "weight of velocities against positions";
+        terminal_weight: f64 = 1.0 => terminal_weight: Real, Accepts::Positive,
+            "factor on the weights of the last stage";
+        /// by their whole half range at one stage.
+        joint_penalty: f64 = 100.0 => joint_penalty: Real, Accepts::Positive, "price of leaving the joint limits";
+        body_friction: Option<f64> = None => body_friction: Real, Accepts::Optional,
+            "friction coefficient of the lifted body force, 0 leaves it free",
+            in_c "friction coefficient of the lifted body force, by the pyramid inside its cone; 0 leaves it free",
+            in_ros "friction coefficient of the body's force; 0 leaves it free";
+        foot_friction: f64 = 0.6 => foot_friction: Real, Accepts::Positive,
+            "friction coefficient of each foot, consistent lift",
+            in_c "friction coefficient of each foot in the consistent lift";
+        /// Weighed against the reproduction of the latent input.
+        lift_prior_weight: f64 = 1e-3 => lift_prior_weight: Real, Accepts::Positive,
+            "weight of the training torques, consistent lift",
+            in_c "weight of the training's torques in the consistent lift";
+        /// What the consistent lift makes of the same latent input is not limited.
+        torque_rate_nm_s: Option<f64> = None => torque_rate_nm_s: Real, Accepts::Compiled("TORQUE_RATES"),
+            "largest change of a torque, N m/s, plain lift; 0 leaves it free",
+            in_c "largest change of a torque of LIFT_TRANSPOSE, N m/s; 0 leaves it free, as it must if UPPER_TORQUE_RATES is 0",
+            in_ros "largest change of a torque of the plain lift, N m/s, where the controller is compiled with \
+                    `UPPER_TORQUE_RATES=1`; 0 leaves it free";
+        effectiveness: Option<Effectiveness> = None => effectiveness_time_s: Real, Accepts::Optional,
+            "time constant of the estimate of how much of the input arrives, s; 0 for none",
+            in_ros "time constant of the estimate of the share of the input that arrives; 0 for none"
+            | drive_stiffness_nm_rad: Real, Accepts::With("effectiveness_time_s"),
+            "joint PD that holds joint_position, for that estimate"
+            | drive_damping_nm_s_rad: Real, Accepts::With("effectiveness_time_s"), "of joint_velocity";
+        /// Zero leaves them where the reference has them from the body, 1 where it has them from the ground.
+        swing_turn: f64 = 1.0 => swing_turn: Real, Accepts::NotNegative,
+            "share of the error of pitch that joint_position turns the legs against in flight";
+    }
+    rust {
+        /// What stands for the reference's own dynamics.
+        drift: Drift = Drift::Automatic;
+        /// What stands for the reference's input if it has none.
+        missing_input: MissingInput = MissingInput::Estimate;
+        /// Which rows of the constraints are kept.
+        rows: RowSelection = RowSelection::Needed;
+        /// What happens without a plan.
+        fallback: FallbackSettings = FallbackSettings::default();
+    }
+}
 
 impl MpcSettings {
     /// Checks every number.
@@ -192,54 +381,45 @@ impl MpcSettings {
     /// # Errors
     /// [`ControlError::Setting`] names the first one that is out of its range.
     pub fn check(&self) -> Result<(), ControlError> {
-        let refused = |(name, found), expected| ControlError::Setting {
-            name,
-            found,
-            expected,
-        };
-        if !(1..=MAX_HORIZON).contains(&self.horizon) {
-            return Err(refused(("horizon", self.horizon as f64), "1 to 500 stages"));
+        self.check_table()?;
+        let (qp, fallback) = (&self.qp, &self.fallback);
+        for (name, found) in [
+            ("qp.tolerance", qp.tolerance),
+            ("qp.accepted_residual", qp.accepted_residual),
+            ("qp.max_iterations", f64::from(qp.max_iterations)),
+            ("fallback.torque_decay_s", fallback.torque_decay_s),
+            ("fallback.jump_deviations", fallback.jump_deviations),
+        ] {
+            Accepts::Positive.check(name, found)?;
         }
-        // Where there is none, numbers that pass the checks and are used for nothing else.
-        let effectiveness = self.effectiveness.unwrap_or(Effectiveness {
-            time_constant_s: 1.0,
-            stiffness_nm_rad: 0.0,
-            damping_nm_s_rad: 0.0,
-        });
-        let positive = [
-            ("step_s", self.step_s),
-            ("input_weight", self.input_weight),
-            ("velocity_weight", self.velocity_weight),
-            ("terminal_weight", self.terminal_weight),
-            ("joint_penalty", self.joint_penalty),
-            ("foot_friction", self.foot_friction),
-            ("lift_prior_weight", self.lift_prior_weight),
-            ("body_friction", self.body_friction.unwrap_or(1.0)),
-            ("torque_rate_nm_s", self.torque_rate_nm_s.unwrap_or(1.0)),
-            ("effectiveness_time_s", effectiveness.time_constant_s),
-            ("qp.tolerance", self.qp.tolerance),
-            ("qp.accepted_residual", self.qp.accepted_residual),
-            ("qp.max_iterations", f64::from(self.qp.max_iterations)),
-            ("fallback.torque_decay_s", self.fallback.torque_decay_s),
-            ("fallback.jump_deviations", self.fallback.jump_deviations),
-        ];
-        let not_negative = [
-            ("fallback.damping_nm_s", self.fallback.damping_nm_s),
-            ("swing_turn", self.swing_turn),
-            ("drive_stiffness_nm_rad", effectiveness.stiffness_nm_rad),
-            ("drive_damping_nm_s_rad", effectiveness.damping_nm_s_rad),
-        ];
-        let is_positive = |found: f64| found.is_finite() && found > 0.0;
-        if let Some(wrong) = positive.into_iter().find(|(_, found)| !is_positive(*found)) {
-            return Err(refused(wrong, "a positive number"));
-        }
-        let is_allowed = |found: f64| found == 0.0 || is_positive(found);
-        match not_negative
-            .into_iter()
-            .find(|(_, found)| !is_allowed(*found))
-        {
-            Some(wrong) => Err(refused(wrong, "zero or a positive number")),
-            None => Ok(()),
+        Accepts::NotNegative.check("fallback.damping_nm_s", fallback.damping_nm_s)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn default_settings_are_those_of_the_library() {
+        let settings = Settings::default().to_mpc().expect("sound");
+        assert_eq!(settings, MpcSettings::default());
+    }
+
+    #[test]
+    fn choices_come_back_by_their_numbers() {
+        for choices in [
+            (Lift::Transpose, Linearisation::Reference, Solver::Clarabel),
+            (Lift::Consistent, Linearisation::LastPlan, Solver::Riccati),
+        ] {
+            let settings = Settings {
+                lift: choices.0 as i32,
+                linearisation: choices.1 as i32,
+                solver: choices.2 as i32,
+                ..Settings::default()
+            };
+            let read = settings.to_mpc().expect("sound");
+            assert_eq!((read.lift, read.linearisation, read.solver), choices);
         }
     }
 }

@@ -6,9 +6,8 @@ use super::super::command::{Command, Status};
 use super::super::controller::{Controller, Measurement};
 use super::super::error::ControlError;
 use super::super::reference::ReferenceSamples;
-use super::super::settings::MpcSettings;
+use super::super::settings::{MpcSettings, Settings};
 use super::codes::{BAD_POINTER, INTERNAL, guarded, report};
-use super::settings::Settings;
 use crate::robot::{ContactFlags, FOOT_DIM, JOINT_DIM, Robot};
 
 /// What a robot's low-level interface takes, as C has it; `D` latent coordinates.

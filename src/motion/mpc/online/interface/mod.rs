@@ -6,11 +6,10 @@
 
 mod codes;
 mod handle;
-mod settings;
 
+pub use super::settings::{Accepts, SETTINGS, Setting, Settings};
 pub use codes::{
     BAD_POINTER, BAD_SETTING, INTERNAL, SOLVER_REFUSED, TIME_ORDER, UNKNOWN_FEET, all_codes,
     last_error, report, status_text,
 };
 pub use handle::{Handle, RawCommand, RawMeasurement, RawReference};
-pub use settings::Settings;
