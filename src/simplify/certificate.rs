@@ -140,7 +140,7 @@ pub struct PhaseCertificate {
 ///
 /// For every phase with a domain, every point `(z, dz, u_lat)` of it at which the model is defined,
 /// and every latent coordinate `i`, in real numbers: `ddz_i - ddz_i,simplified` lies in
-/// [`EquationCertificate::bound`]. The rounding of the floating-point evaluation, about 1e-16 of the
+/// `EquationCertificate::bound`. The rounding of the floating-point evaluation, about 1e-16 of the
 /// largest summand, comes on top for both models.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Certificate {

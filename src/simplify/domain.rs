@@ -94,7 +94,7 @@ impl Domain {
     /// The smallest boxes that hold all samples, each side moved out by `margin` times the width.
     ///
     /// # Errors
-    /// As [`Domain::new`], for samples of another model.
+    /// As `Domain::new`, for samples of another model.
     pub fn around(
         model: &ReducedModel,
         samples: &Samples,
@@ -114,7 +114,7 @@ impl Domain {
     ///
     /// # Errors
     /// [`SimplifyError::DomainFile`] for a phase or variable that the model does not have or that
-    /// has no range, and as [`Domain::new`].
+    /// has no range, and as `Domain::new`.
     pub fn from_toml(model: &ReducedModel, path: &Path, text: &str) -> Result<Self, SimplifyError> {
         let refused = |message: String| SimplifyError::DomainFile {
             path: path.to_owned(),

@@ -1,6 +1,6 @@
 //! From programs to source code: C, Rust, Python, CasADi, MATLAB.
 //!
-//! A [`ModelInterface`] enters: every function that is generated for a model, as a program. Text leaves.
+//! A `ModelInterface` enters: every function that is generated for a model, as a program. Text leaves.
 //! `interface` lists the functions, `translate` turns programs into the statements of `code`, `printer`
 //! prints them with what a `dialect` spells, templates place them. Nothing mathematical is decided here.
 

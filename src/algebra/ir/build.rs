@@ -20,14 +20,14 @@ enum Key {
 /// Appends statements in order of evaluation and numbers values, so that a scalar
 /// computation which is asked for twice is made once.
 #[derive(Debug)]
-pub(crate) struct ProgramBuilder {
+pub struct ProgramBuilder {
     program: Program,
     known: HashMap<Key, ValueId>,
 }
 
 impl ProgramBuilder {
     /// An empty program.
-    pub(crate) fn new(name: &str) -> Self {
+    pub fn new(name: &str) -> Self {
         Self {
             program: Program {
                 name: name.to_owned(),
@@ -44,7 +44,7 @@ impl ProgramBuilder {
     }
 
     /// Declares an input array and returns its elements.
-    pub(crate) fn input(&mut self, name: &str, len: usize) -> Vec<ValueId> {
+    pub fn input(&mut self, name: &str, len: usize) -> Vec<ValueId> {
         let slot = self.program.inputs.len();
         self.program.inputs.push(Slot {
             name: name.to_owned(),
@@ -56,17 +56,17 @@ impl ProgramBuilder {
     }
 
     /// A constant.
-    pub(crate) fn constant(&mut self, value: f64) -> ValueId {
+    pub fn constant(&mut self, value: f64) -> ValueId {
         self.numbered(Key::Constant(value.to_bits()), Statement::Constant(value))
     }
 
     /// A scalar operation on one value.
-    pub(crate) fn unary(&mut self, op: Unary, a: ValueId) -> ValueId {
+    pub fn unary(&mut self, op: Unary, a: ValueId) -> ValueId {
         self.numbered(Key::Unary(op, a), Statement::Unary(op, a))
     }
 
     /// A scalar operation on two values.
-    pub(crate) fn binary(&mut self, op: Binary, a: ValueId, b: ValueId) -> ValueId {
+    pub fn binary(&mut self, op: Binary, a: ValueId, b: ValueId) -> ValueId {
         let (low, high) = match op {
             Binary::Add | Binary::Mul => (a.min(b), a.max(b)),
             Binary::Sub | Binary::Div | Binary::Pow => (a, b),
@@ -177,7 +177,7 @@ impl ProgramBuilder {
     }
 
     /// Declares an output array that takes the given values.
-    pub(crate) fn output(&mut self, name: &str, values: &[ValueId]) {
+    pub fn output(&mut self, name: &str, values: &[ValueId]) {
         let slot = self.program.outputs.len();
         self.program.outputs.push(Slot {
             name: name.to_owned(),
@@ -215,7 +215,7 @@ impl ProgramBuilder {
     /// # Errors
     /// What validation finds: a value used before its definition, a non-finite
     /// constant, a table whose shape does not fit its statement, a slot without elements.
-    pub(crate) fn finish(self) -> Result<Program, IrError> {
+    pub fn finish(self) -> Result<Program, IrError> {
         validate(&self.program)?;
         Ok(self.program)
     }

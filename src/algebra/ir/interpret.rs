@@ -10,7 +10,7 @@ use super::real::Real;
 /// Runs one program as often as asked; owns the memory of all its values, so that
 /// a run allocates nothing.
 ///
-/// Numbers are `f64` unless another [`Real`] is named: `Interpreter::<f32>::new(&program)` is the
+/// Numbers are `f64` unless another `Real` is named: `Interpreter::<f32>::new(&program)` is the
 /// reference for generated code in single precision.
 #[derive(Clone, Debug)]
 pub struct Interpreter<T = f64> {

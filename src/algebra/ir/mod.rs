@@ -27,7 +27,7 @@ pub mod sin_cos;
 pub(crate) mod sin_cos_f32;
 mod validate;
 
-pub(crate) use build::ProgramBuilder;
+pub use build::ProgramBuilder;
 pub use interpret::Interpreter;
 pub use program::{Binary, Program, Slot, Statement, Unary, ValueId};
 pub(crate) use program::{Group, LANES, QUAD, Quad, QuadSum, Slopes, Table, TableId};

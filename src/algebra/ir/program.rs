@@ -152,7 +152,7 @@ impl<V> Slopes<V> {
 /// Functions of one variable each, one a column of a table.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Group<T = TableId, V = Vec<ValueId>> {
-    /// Coefficients, a multiple of [`LANES`] columns.
+    /// Coefficients, a multiple of `LANES` columns.
     pub table: T,
     /// Value of each function; zero behind the last variable, as the coefficients are.
     pub values: V,
@@ -160,7 +160,7 @@ pub struct Group<T = TableId, V = Vec<ValueId>> {
     pub slopes: Slopes<V>,
 }
 
-/// A vector of [`QUAD`] numbers.
+/// A vector of `QUAD` numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quad {
     /// A row of the statement's table.
@@ -224,12 +224,12 @@ pub enum Statement {
         /// One weight a row after the first, in sections.
         sections: Vec<Vec<ValueId>>,
     },
-    /// Sums of vectors of [`QUAD`] numbers, `y_s = start_s + sum_i w_i v_i`, where each `v_i` is a constant
+    /// Sums of vectors of `QUAD` numbers, `y_s = start_s + sum_i w_i v_i`, where each `v_i` is a constant
     /// or an earlier sum of the statement.
     ///
     /// Association: from `start` on, one term after the other, each product rounded before it is added.
     /// No coefficient is `-0` and each chain of starts ends with a constant, so no sum is ever `-0`: with
-    /// finite weights, products with coefficients of zero may be left out. Defines [`QUAD`] values per sum.
+    /// finite weights, products with coefficients of zero may be left out. Defines `QUAD` values per sum.
     Quads {
         /// The constant vectors, one per row.
         table: TableId,
@@ -256,7 +256,7 @@ pub enum Statement {
     Separable {
         /// One value a row.
         start: Vec<ValueId>,
-        /// What the slopes of the first columns begin with, row-major, a multiple of [`LANES`] values a
+        /// What the slopes of the first columns begin with, row-major, a multiple of `LANES` values a
         /// row; nothing if absent.
         base: Option<Vec<ValueId>>,
         /// At least one group.

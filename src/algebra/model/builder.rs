@@ -184,7 +184,7 @@ impl ModelBuilder {
     ///
     /// # Errors
     /// The first of the [`ModelError`]s that applies: names, shapes, finite values, scale factors,
-    /// rank of the encoder (singular values, [`super::RANK_TOLERANCE`]), reachable phases, covariances.
+    /// rank of the encoder (singular values, `RANK_TOLERANCE`), reachable phases, covariances.
     pub fn build(mut self) -> Result<ReducedModel, ModelError> {
         let identifier = identifier_of("model name", &self.name)?;
         let phase_identifiers = self.check_phase_names()?;

@@ -68,7 +68,7 @@ impl Identifier {
     ///
     /// # Errors
     /// Each variant of [`IdentifierError`]; keywords and taken names are compared without case.
-    pub(crate) fn from_name(name: &str) -> Result<Self, IdentifierError> {
+    pub fn from_name(name: &str) -> Result<Self, IdentifierError> {
         let first = name.chars().next().ok_or(IdentifierError::Empty)?;
         if name.len() > MAX_IDENTIFIER_LEN {
             return Err(IdentifierError::TooLong { found: name.len() });

@@ -113,7 +113,7 @@ impl LibraryOrder {
         is_paired: false,
     };
     /// Appendix B of the paper: sin z, cos z, sin dz, cos dz.
-    pub(crate) const PAPER: Self = Self {
+    pub const PAPER: Self = Self {
         run: Run::Half,
         ..Self::ROMC
     };

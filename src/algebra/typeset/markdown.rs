@@ -70,7 +70,7 @@ fn after_comma(unit: Option<Unit>) -> String {
 /// use romc::typeset::markdown::markdown_text;
 /// assert_eq!(markdown_text("*a* <b>"), r"\*a\* \<b\>");
 /// ```
-pub(crate) fn markdown_text(text: &str) -> String {
+pub fn markdown_text(text: &str) -> String {
     let mut markdown = String::new();
     for (place, character) in text.replace(ends_line, " ").chars().enumerate() {
         // A hyphen makes a list only at the start.

@@ -3,7 +3,7 @@
 //! A [`ReducedModel`](crate::model::ReducedModel) enters; a [`Typeset`] leaves: one
 //! [`EquationSystem`] a phase, made of [`Math`] trees in which fractions, roots,
 //! parentheses, signs and rounded coefficients have their final place. [`latex`],
-//! [`markdown`] and [`mathml`] spell the same trees. Read [`tree`] first, then
+//! [`markdown`] and [`mathml`] spell the same trees. Read `tree` first, then
 //! [`expression()`] (from the algebra to the tree) and [`equations`].
 
 mod decimal;

@@ -13,7 +13,7 @@ use crate::typeset::words::code_point;
 /// use romc::typeset::latex::tex_text;
 /// assert_eq!(tex_text(r"50% \input{x}"), r"50\% \textbackslash{}input\{x\}");
 /// ```
-pub(crate) fn tex_text(text: &str) -> String {
+pub fn tex_text(text: &str) -> String {
     let mut tex = String::new();
     let mut previous = ' ';
     for character in text.chars() {
@@ -93,7 +93,7 @@ fn is_plain(character: char) -> bool {
 /// use romc::typeset::latex::label;
 /// assert_eq!(label(r"rear stance_2}\b%"), "rear-stance-2--b-");
 /// ```
-pub(crate) fn label(name: &str) -> String {
+pub fn label(name: &str) -> String {
     name.chars()
         .map(|c| if c.is_ascii_alphanumeric() { c } else { '-' })
         .collect()

@@ -3,7 +3,7 @@
 //!
 //! Read [`document`](self::emit) first: it names the files. The layout of terms
 //! and the rounding are done by [`typeset`](crate::typeset); here it gets
-//! its spelling ([`tex`]), its line breaks, tables and comments. Names from a
+//! its spelling (`tex`), its line breaks, tables and comments. Names from a
 //! model file pass through [`tex_text`] and nothing else.
 //!
 //! ```
@@ -41,5 +41,6 @@ mod nomenclature;
 mod table;
 
 pub use document::emit;
+pub use escape::{label, tex_text};
 pub use lines::tex_cases;
 pub(crate) use math::{tex, tex_symbol, tex_unit};
