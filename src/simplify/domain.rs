@@ -56,7 +56,7 @@ impl Domain {
     ///
     /// # Errors
     /// [`SimplifyError::PhaseCount`], [`SimplifyError::BoxDimension`], [`SimplifyError::Range`].
-    pub(crate) fn new(
+    pub fn new(
         model: &ReducedModel,
         boxes: Vec<Option<Vec<Interval>>>,
     ) -> Result<Self, SimplifyError> {
