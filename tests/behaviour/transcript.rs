@@ -73,8 +73,10 @@ impl Transcript {
     /// Lines that differ, numbers by their digits, whatever the space between tokens; `pairs` of texts apply to
     /// the recorded lines.
     pub fn differences(&self, now: &Self, pairs: &[(String, String)]) -> Vec<String> {
-        let expected: Vec<String> = self.compared().map(|line| renamed(line, pairs)).collect();
-        let found: Vec<&str> = now.compared().collect();
+        let expected: Vec<String> = (self.compared().into_iter())
+            .map(|line| renamed(line, pairs))
+            .collect();
+        let found = now.compared();
         let agree = |a: &str, b: &str| {
             let (a, b) = (tokens(a), tokens(b));
             a.len() == b.len()
@@ -101,10 +103,17 @@ impl Transcript {
     }
 
     /// All lines but the texts of self-tests, which are compared by running them, and the names of a controller's own
-    /// sources, which are romc's.
-    fn compared(&self) -> impl Iterator<Item = &str> {
+    /// sources, which are romc's. Parameters in a table of Markdown count in any order.
+    fn compared(&self) -> Vec<&str> {
         let lines = self.lines.iter().map(String::as_str);
-        lines.filter(|line| !line.starts_with("> ") && !line.contains("-controller/src/"))
+        let mut lines: Vec<&str> = lines
+            .filter(|line| !line.starts_with("> ") && !line.contains("-controller/src/"))
+            .collect();
+        let is_parameter = |line: &&str| line.starts_with("| | `");
+        for run in lines.chunk_by_mut(|a, b| is_parameter(a) && is_parameter(b)) {
+            run.sort_unstable();
+        }
+        lines
     }
 
     /// Recorded self-tests: path and text.
