@@ -210,7 +210,12 @@ fn roots() -> ReducedModel {
 
 /// A function that is a real number nowhere, beside terms that are.
 fn undefined() -> ReducedModel {
-    over_terms("undefined", 1, &["(-1 - z1^2)^0.5", "dz1", "u1"], 1.0)
+    over_terms(
+        "undefined",
+        1,
+        &["(z1*dz1 - z1^2 - dz1^2 - 1)^0.5", "dz1", "u1"],
+        1.0,
+    )
 }
 
 /// Functions and coefficients beyond the largest number at most points.
