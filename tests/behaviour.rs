@@ -1,4 +1,4 @@
-//! What commands print and write, compared with what an earlier version printed and wrote (`behaviour/recorded.txt.gz`).
+//! Output and files of commands, compared with a recording of an earlier version (`behaviour/recorded.txt.gz`).
 //!
 //! Numbers must agree to the last printed digit, emitted C by its values (the recorded self-tests pass with the code of
 //! today), texts but for the pairs in `behaviour/changed.txt`. `ROMC_RECORD=1` records anew; tokens that differ

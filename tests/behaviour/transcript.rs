@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::fs::{self, File};
-use std::hash::{DefaultHasher, Hasher as _};
 use std::io::{Read as _, Write as _};
 use std::path::Path;
 use std::process::Command;
@@ -73,10 +72,8 @@ impl Transcript {
     /// Lines that differ, numbers by their digits, whatever the space between tokens; `pairs` of texts apply to
     /// the recorded lines.
     pub fn differences(&self, now: &Self, pairs: &[(String, String)]) -> Vec<String> {
-        let expected: Vec<String> = (self.compared().into_iter())
-            .map(|line| renamed(line, pairs))
-            .collect();
-        let found = now.compared();
+        let expected: Vec<String> = self.compared().map(|line| renamed(line, pairs)).collect();
+        let found: Vec<&str> = now.compared().collect();
         let agree = |a: &str, b: &str| {
             let (a, b) = (tokens(a), tokens(b));
             a.len() == b.len()
@@ -103,17 +100,10 @@ impl Transcript {
     }
 
     /// All lines but the texts of self-tests, which are compared by running them, and the names of a controller's own
-    /// sources, which are romc's. Parameters in a table of Markdown count in any order.
-    fn compared(&self) -> Vec<&str> {
+    /// sources, which are romc's.
+    fn compared(&self) -> impl Iterator<Item = &str> {
         let lines = self.lines.iter().map(String::as_str);
-        let mut lines: Vec<&str> = lines
-            .filter(|line| !line.starts_with("> ") && !line.contains("-controller/src/"))
-            .collect();
-        let is_parameter = |line: &&str| line.starts_with("| | `");
-        for run in lines.chunk_by_mut(|a, b| is_parameter(a) && is_parameter(b)) {
-            run.sort_unstable();
-        }
-        lines
+        lines.filter(|line| !line.starts_with("> ") && !line.contains("-controller/src/"))
     }
 
     /// Recorded self-tests: path and text.
@@ -223,16 +213,18 @@ fn digests(name: &str, bytes: &[u8]) -> Vec<String> {
         return vec!["not text".to_owned()];
     };
     let of_numbers = |text: &mut dyn Iterator<Item = &str>| {
-        let (mut hash, mut count) = (DefaultHasher::new(), 0);
+        let (mut hash, mut count) = (0xcbf2_9ce4_8422_2325_u64, 0);
         let numbers = text.flat_map(|part| {
             part.split(|c: char| !(c.is_ascii_alphanumeric() || "+-.".contains(c)))
         });
         for number in numbers.filter(|word| word.parse::<f64>().is_ok()) {
-            hash.write(number.as_bytes());
-            hash.write_u8(0);
+            // FNV-1a, the same in every release of Rust.
+            for byte in number.bytes().chain([0]) {
+                hash = (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3);
+            }
             count += 1;
         }
-        format!("{count} numbers {:016x}", hash.finish())
+        format!("{count} numbers {hash:016x}")
     };
     if !name.contains(".csv") {
         return vec![of_numbers(&mut text.lines())];

@@ -105,7 +105,7 @@ fn foreign(file: &str, bytes: &[u8]) -> Option<ArtifactError> {
     let import =
         "romc import (in Python Model.from_arrays, from_torch or from_pysindy) makes one of";
     let source = found.remedy.unwrap_or("it".to_owned());
-    let remedy = match source.starts_with("the file itself") {
+    let remedy = match found.is_packed {
         true => source,
         false => format!("{import} {source}"),
     };

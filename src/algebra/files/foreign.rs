@@ -9,6 +9,8 @@ pub struct ForeignFile {
     pub what: &'static str,
     /// What to do, with the lines to type; `None` for files that `romc import` reads.
     pub remedy: Option<String>,
+    /// Whether the lines make the file that was meant rather than arrays for `romc import`.
+    pub(crate) is_packed: bool,
 }
 
 /// A row of the table: name of the format, its endings, the test of its bytes, and the lines
@@ -261,11 +263,20 @@ impl ForeignFile {
 
 impl Kind {
     fn named(&self, path: &Path) -> ForeignFile {
+        let is_packed = !self.lines.is_empty() && !self.lines.starts_with("import");
+        // Within double quotes a shell expands `$` and backticks, Python does not.
+        let escaped: &[char] = if is_packed {
+            &['\\', '"', '$', '`']
+        } else {
+            &['\\', '"']
+        };
         let text = |path: &Path| {
-            path.display()
-                .to_string()
-                .replace('\\', "\\\\")
-                .replace('"', "\\\"")
+            let mut text = String::new();
+            for character in path.display().to_string().chars() {
+                text.extend(escaped.contains(&character).then_some('\\'));
+                text.push(character);
+            }
+            text
         };
         let folder = path
             .parent()
@@ -275,13 +286,14 @@ impl Kind {
             .replace("{file}", &text(path))
             .replace("{stem}", &text(&path.with_extension("")));
         let lines: String = lines.lines().map(|line| format!("\n    {line}")).collect();
-        let intent = match self.lines.starts_with("import") {
-            true => "an .npz or .safetensors file; in Python",
-            false => "the file itself; in a shell",
+        let intent = match is_packed {
+            true => "the file itself; in a shell",
+            false => "an .npz or .safetensors file; in Python",
         };
         ForeignFile {
             what: self.what,
             remedy: (!lines.is_empty()).then(|| format!("{intent}:{lines}")),
+            is_packed,
         }
     }
 }
@@ -316,5 +328,8 @@ mod tests {
             "{remedy}"
         );
         assert!(remedy.contains("savez(\"run/net.ckpt.npz\""), "{remedy}");
+        let found = ForeignFile::of(Path::new("$(x)`y`.gz"), b"\x1f\x8b").expect("packed");
+        let remedy = found.remedy.expect("a line");
+        assert!(remedy.contains(r#""\$(x)\`y\`.gz""#), "{remedy}");
     }
 }

@@ -118,7 +118,7 @@ const TABLE: &[Row] = &[
     (
         0,
         b"\x1f\x8b",
-        "a file packed by gzip twice",
+        "a file packed by gzip",
         "gunzip -c <in> > <out>",
     ),
     (0, b"7z\xbc\xaf\x27\x1c", "a 7z archive", "7z x <in>"),

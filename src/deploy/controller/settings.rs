@@ -49,7 +49,7 @@ impl SettingText {
         format!("{kind} {name:<width$}/**< {text}{default} */")
     }
 
-    /// When the generated C refuses a number, and what it accepts instead.
+    /// The condition under which the generated C refuses a value, and the accepted range in words.
     pub(in crate::deploy) fn refused(&self) -> (String, &'static str) {
         let number = format!("settings->{}", self.setting.name);
         let (positive, other) = ("a positive number", "zero or a positive number");

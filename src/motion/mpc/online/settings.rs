@@ -109,7 +109,7 @@ pub struct Effectiveness {
 /// Longest horizon that is accepted.
 pub const MAX_HORIZON: usize = 500;
 
-/// What a setting may be.
+/// Accepted values of a setting.
 #[derive(Debug, Clone, Copy)]
 pub enum Accepts {
     /// A whole number from the first to the second, in words; the generated C checks these by hand.
@@ -152,17 +152,17 @@ impl Accepts {
 /// A setting that interfaces in C have too. In descriptions `UPPER` stands for the model's name.
 #[derive(Debug, Clone, Copy)]
 pub struct Setting {
-    /// Its name in C, Python and ROS.
+    /// Name in C, Python and ROS.
     pub name: &'static str,
     /// `i32`, `f64`, or `Real` for what has the precision of the generated C.
     pub kind: &'static str,
-    /// Its range.
+    /// Accepted range.
     pub accepts: Accepts,
-    /// Its description, for the header of the generated crate.
+    /// Description in the header of the generated crate.
     pub text: &'static str,
-    /// The same for the header of the generated C; empty if it is not there.
+    /// Description in the header of the generated C; empty if the setting is not in it.
     pub in_c: &'static str,
-    /// The same for a parameter of the ros2_control plugin, if it is one.
+    /// Description as a parameter of the ros2_control plugin; `None` if it is not one.
     pub in_ros: Option<&'static str>,
 }
 
@@ -229,7 +229,7 @@ macro_rules! settings {
             $rust_field:ident: $rust_type:ty = $rust_default:expr;
         )*}
     ) => {
-        /// Settings of the controller.
+        /// Settings of the controller. `UPPER` stands for the model's name in capitals, in C.
         #[derive(Debug, Clone, Copy, PartialEq)]
         pub struct MpcSettings {
             $($(#[doc = $text])* $(#[$doc])* pub $field: $type,)*
