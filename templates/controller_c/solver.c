@@ -310,10 +310,25 @@ static inline const real *solver_cost_state_at(solver_cost *self, int stage, int
     return stage + 1 == horizon ? self->terminal : self->state;
 }
 
-/* out += M x, each row summed in the order of its entries. */
+/* out += M x, each row summed in the order of its entries; four rows at a time, as their sums do not wait for each
+ * other. */
 static inline void solver_add_product_nx_nx(real matrix[NX][NX], const real x[NX], real out[restrict NX])
 {
-    for (int i = 0; i < NX; ++i) {
+    for (int i = 0; i < NX - NX % 4; i += 4) {
+        real sums[4] = {0};
+        for (int r = 0; r < 4; ++r) {
+            sums[r] = out[i + r];
+        }
+        for (int j = 0; j < NX; ++j) {
+            for (int r = 0; r < 4; ++r) {
+                sums[r] += matrix[i + r][j] * x[j];
+            }
+        }
+        for (int r = 0; r < 4; ++r) {
+            out[i + r] = sums[r];
+        }
+    }
+    for (int i = NX - NX % 4; i < NX; ++i) {
         real sum = out[i];
         for (int j = 0; j < NX; ++j) {
             sum += matrix[i][j] * x[j];
@@ -712,22 +727,63 @@ static inline bool solver_program_prepare(solver_program *self)
     return true;
 }
 
-/* Input from the state at the stage's beginning: -feed - K x. */
-static inline void solver_stage_answer(solver_stage *self, const real x[NX], real v[restrict NU])
+/* out += M x, each row summed in the order of its entries; four rows at a time, as their sums do not wait for each
+ * other. */
+static inline void solver_add_product_nu_nx(real matrix[NU][NX], const real x[NX], real out[restrict NU])
 {
-    for (int i = 0; i < NU; ++i) {
-        real sum = self->feed[i];
-        for (int j = 0; j < NX; ++j) {
-            sum += self->gain[i][j] * x[j];
+    for (int i = 0; i < NU - NU % 4; i += 4) {
+        real sums[4] = {0};
+        for (int r = 0; r < 4; ++r) {
+            sums[r] = out[i + r];
         }
-        v[i] = -sum;
+        for (int j = 0; j < NX; ++j) {
+            for (int r = 0; r < 4; ++r) {
+                sums[r] += matrix[i + r][j] * x[j];
+            }
+        }
+        for (int r = 0; r < 4; ++r) {
+            out[i + r] = sums[r];
+        }
+    }
+    for (int i = NU - NU % 4; i < NU; ++i) {
+        real sum = out[i];
+        for (int j = 0; j < NX; ++j) {
+            sum += matrix[i][j] * x[j];
+        }
+        out[i] = sum;
     }
 }
 
-/* out += M x, each row summed in the order of its entries. */
+/* Input from the state at the stage's beginning: -feed - K x. */
+static inline void solver_stage_answer(solver_stage *self, const real x[NX], real v[restrict NU])
+{
+    real sum[NU];
+    memcpy(sum, self->feed, sizeof sum);
+    solver_add_product_nu_nx(self->gain, x, sum);
+    for (int i = 0; i < NU; ++i) {
+        v[i] = -sum[i];
+    }
+}
+
+/* out += M x, each row summed in the order of its entries; four rows at a time, as their sums do not wait for each
+ * other. */
 static inline void solver_add_product_nx_nu(real matrix[NX][NU], const real x[NU], real out[restrict NX])
 {
-    for (int i = 0; i < NX; ++i) {
+    for (int i = 0; i < NX - NX % 4; i += 4) {
+        real sums[4] = {0};
+        for (int r = 0; r < 4; ++r) {
+            sums[r] = out[i + r];
+        }
+        for (int j = 0; j < NU; ++j) {
+            for (int r = 0; r < 4; ++r) {
+                sums[r] += matrix[i + r][j] * x[j];
+            }
+        }
+        for (int r = 0; r < 4; ++r) {
+            out[i + r] = sums[r];
+        }
+    }
+    for (int i = NX - NX % 4; i < NX; ++i) {
         real sum = out[i];
         for (int j = 0; j < NU; ++j) {
             sum += matrix[i][j] * x[j];
@@ -933,19 +989,6 @@ static inline void solver_program_take_gains(solver_program *self)
     }
 }
 
-/* Writes the columns of the dynamics. */
-static inline void solver_stage_write_columns(solver_stage *self)
-{
-    for (int i = 0; i < NX; ++i) {
-        for (int j = 0; j < NX; ++j) {
-            self->a_columns[j][i] = self->a[i][j];
-        }
-        for (int j = 0; j < NU; ++j) {
-            self->b_columns[j][i] = self->b[i][j];
-        }
-    }
-}
-
 /* First point of the iterations, to be centred: the guess, or the point of the gains. */
 static inline void solver_program_start(solver_program *restrict self, const real x0[NX], bool is_warm)
 {
@@ -964,7 +1007,6 @@ static inline void solver_program_start(solver_program *restrict self, const rea
         solver_stage_end(stage, x, stage->v, end);
         memcpy(stage->x, end, sizeof(real[NX]));
         memcpy(x, end, sizeof(real[NX]));
-        solver_stage_write_columns(stage);
         if (!is_warm) {
             solver_rows rows = solver_program_rows_of(self, k);
             solver_rows_write_multipliers(&rows, shape.soft, solver_shape_slack_row(&shape), price);
@@ -1615,14 +1657,6 @@ static inline void solver_answer_before(real gain[NU][NU], const real before[NU]
     }
 }
 
-/* out += M^T y. */
-static inline void solver_add_transposed_nu_nx(real matrix[NU][NX], const real y[NU], real out[restrict NX])
-{
-    for (int k = 0; k < NU; ++k) {
-        solver_add_multiple_nx(y[k], matrix[k], out);
-    }
-}
-
 /* The same of either step, of rows that are softened. */
 static inline void solver_rows_change_softened(solver_rows *self, real softness)
 {
@@ -1686,8 +1720,8 @@ static inline solver_reach solver_program_advance(solver_program *self, real lef
             solver_answer_before(self->links.gains[at], before, dv);
         }
         real end[NX] = {0};
-        solver_add_transposed_nx_nx(stage->a_columns, dx, end);
-        solver_add_transposed_nu_nx(stage->b_columns, dv, end);
+        solver_add_product_nx_nx(stage->a, dx, end);
+        solver_add_product_nx_nu(stage->b, dv, end);
         memcpy(dx, end, sizeof(real[NX]));
         memcpy(stage->dv, dv, sizeof(real[NU]));
         memcpy(stage->dx, dx, sizeof(real[NX]));

@@ -35,8 +35,5 @@ typedef struct {
     real soft_inverse;
     /* Input of the optimum without rows, of the last program. */
     real plain[NU];
-    /* Columns of a and b, with which sums over rows are sums of vectors. */
-    real a_columns[NX][NX];
-    real b_columns[NU][NX];
 } solver_stage;
 

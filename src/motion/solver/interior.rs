@@ -4,7 +4,7 @@ use super::links::{Before, answer_before, pull_before, take_answer};
 use super::lower::Lower;
 use super::point::{Centring, Point, boundary_share};
 use super::problem::{Program, Settings, Stage};
-use super::riccati::{Products, add_multiple, add_transposed, eliminate};
+use super::riccati::{Products, add_multiple, add_product, eliminate};
 use super::rows::{Rows, add_weighted, dot, largest_of, part, part_mut, sum_of};
 use super::scalar::Real;
 
@@ -36,7 +36,6 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
             stage.end(&x, &stage.v, &mut end);
             stage.x = end;
             x = end;
-            stage.write_columns();
             if !is_warm {
                 let mut rows = self.rows_of(k);
                 rows.write_multipliers(shape.soft, shape.slack_row(), price);
@@ -330,8 +329,8 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
                 answer_before(&self.links.gains[at], &before, &mut dv);
             }
             let mut end = [T::ZERO; NX];
-            add_transposed(&stage.a_columns, &dx, &mut end);
-            add_transposed(&stage.b_columns, &dv, &mut end);
+            add_product(&stage.a, &dx, &mut end);
+            add_product(&stage.b, &dv, &mut end);
             dx = end;
             stage.dv = dv;
             stage.dx = dx;

@@ -38,9 +38,6 @@ pub struct Stage<T, const NX: usize, const NU: usize> {
     pub(super) soft_inverse: T,
     /// Input of the optimum without rows, of the last program.
     pub(super) plain: [T; NU],
-    /// Columns of `a` and `b`, with which sums over rows are sums of vectors.
-    pub(super) a_columns: [[T; NX]; NX],
-    pub(super) b_columns: [[T; NX]; NU],
 }
 
 impl<T: Real, const NX: usize, const NU: usize> Stage<T, NX, NU> {
@@ -66,21 +63,6 @@ impl<T: Real, const NX: usize, const NU: usize> Stage<T, NX, NU> {
             soft_pull: [z; NU],
             soft_inverse: z,
             plain: [z; NU],
-            a_columns: [[z; NX]; NX],
-            b_columns: [[z; NX]; NU],
-        }
-    }
-
-    /// Writes the columns of the dynamics.
-    #[inline(always)]
-    pub(super) fn write_columns(&mut self) {
-        for i in 0..NX {
-            for j in 0..NX {
-                self.a_columns[j][i] = self.a[i][j];
-            }
-            for j in 0..NU {
-                self.b_columns[j][i] = self.b[i][j];
-            }
         }
     }
 }

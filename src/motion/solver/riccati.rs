@@ -328,14 +328,29 @@ pub(super) fn add_transposed<T: Real, const ROWS: usize, const COLS: usize>(
     }
 }
 
-/// `out += M x`, each row summed in the order of its entries.
+/// `out += M x`, each row summed in the order of its entries; four rows at a time, as their sums do not wait for each
+/// other.
 #[inline(always)]
 pub(super) fn add_product<T: Real, const ROWS: usize, const COLS: usize>(
     matrix: &[[T; COLS]; ROWS],
     x: &[T; COLS],
     out: &mut [T; ROWS],
 ) {
-    for i in 0..ROWS {
+    for i in (0..ROWS - ROWS % 4).step_by(4) {
+        let mut sums = [T::ZERO; 4];
+        for r in 0..4 {
+            sums[r] = out[i + r];
+        }
+        for j in 0..COLS {
+            for r in 0..4 {
+                sums[r] += matrix[i + r][j] * x[j];
+            }
+        }
+        for r in 0..4 {
+            out[i + r] = sums[r];
+        }
+    }
+    for i in ROWS - ROWS % 4..ROWS {
         let mut sum = out[i];
         for j in 0..COLS {
             sum += matrix[i][j] * x[j];
@@ -376,12 +391,10 @@ impl<T: Real, const NX: usize, const NU: usize> Stage<T, NX, NU> {
     /// Input from the state at the stage's beginning: `−feed − K x`.
     #[inline(always)]
     pub(super) fn answer(&self, x: &[T; NX], v: &mut [T; NU]) {
+        let mut sum = self.feed;
+        add_product(&self.gain, x, &mut sum);
         for i in 0..NU {
-            let mut sum = self.feed[i];
-            for j in 0..NX {
-                sum += self.gain[i][j] * x[j];
-            }
-            v[i] = -sum;
+            v[i] = -sum[i];
         }
     }
 }
