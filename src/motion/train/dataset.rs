@@ -2,19 +2,15 @@
 
 use std::ops::Range;
 use std::path::PathBuf;
-use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 
 use super::error::TrainError;
 use super::subspace::Moments;
 use crate::evaluate::is_plausible;
-use crate::files::Place;
 use crate::model::InputStatistics;
 use crate::recording::smoothing::moving_average;
-use crate::recording::{
-    PhaseRule, RecordingError, RecordingFault, RecordingFiles, Segment, Source,
-};
+use crate::recording::{PhaseRule, Recording, Segment};
 use crate::robot::{FeetRule, InputRule, JOINT_DIM, STATE_DIM, WrenchFrame};
 
 /// Fewest samples of a segment, and of a phase over all segments.
@@ -93,8 +89,8 @@ pub struct Jump {
     pub x: DMatrix<f64>,
     /// Inputs `[tau; F; M]`, `18 x n`.
     pub u: DMatrix<f64>,
-    /// Velocities and accelerations; `None` where the dataset reads them again when they are needed.
-    pub rates: Option<Rates>,
+    /// Velocities and accelerations.
+    pub rates: Rates,
     /// Index of the model's phase at every sample.
     pub phase: Vec<usize>,
     /// Maximal runs of one phase.
@@ -139,8 +135,6 @@ pub struct Dataset {
     pub(super) smoothing: usize,
     /// How inputs are made of recordings.
     pub(super) rule: InputRule,
-    /// Where rates that are not held are read again.
-    pub(super) files: Option<Arc<RecordingFiles>>,
 }
 
 /// Which quantity of a [`Jump`] to gather.
@@ -152,8 +146,6 @@ pub enum Quantity {
     U,
 }
 
-/// Samples of a set of files whose rates are held in memory (some 20 MB); those of larger sets are read again.
-const HELD_SAMPLES: usize = 65_536;
 /// Columns of a block of samples: a multiple of the depth of the blocks in which products are summed, so that a sum over
 /// blocks has the bits of the sum over all samples.
 const BLOCK: usize = 8192;
@@ -165,66 +157,26 @@ impl Dataset {
     ///
     /// # Errors
     /// [`TrainError::TooFewSamples`] for a segment under 50 samples; [`TrainError::Recording`] where no phase
-    /// matches, a value is not finite, or a file cannot be read.
-    pub fn new<'a>(
-        recordings: impl Into<Source<'a>>,
+    /// matches or a value is not finite.
+    pub fn new(
+        recordings: &[Recording],
         rule: &InputRule,
         phases: &PhaseRule,
         scaling: &Scaling,
         smoothing: usize,
     ) -> Result<Self, TrainError> {
-        let source = recordings.into();
         let mut dataset = Self {
             jumps: Vec::new(),
             phases: phases.clone(),
             scaling: scaling.clone(),
             smoothing,
             rule: rule.clone(),
-            files: None,
         };
-        let mut n_samples = 0;
-        source.for_each(|recording| {
-            for segment in &recording.segments {
-                let jump = dataset.jump(segment)?;
-                n_samples += jump.samples();
-                dataset.jumps.push(jump);
-            }
-            if let Source::Files(files) = &source
-                && n_samples > HELD_SAMPLES
-            {
-                let jumps = dataset.jumps.iter_mut();
-                jumps.for_each(|jump| jump.rates = None);
-                dataset.files = Some(Arc::clone(files));
-            }
-            Ok::<_, TrainError>(())
-        })?;
+        for segment in recordings.iter().flat_map(|recording| &recording.segments) {
+            let jump = dataset.jump(segment)?;
+            dataset.jumps.push(jump);
+        }
         Ok(dataset)
-    }
-
-    /// Passes every jump with its rates to `take`.
-    ///
-    /// # Errors
-    /// [`TrainError::Recording`] for a file that can no longer be read, or has other samples than before.
-    pub fn for_each(&self, mut take: impl FnMut(&Jump, &Rates)) -> Result<(), TrainError> {
-        let Some(files) = &self.files else {
-            for jump in &self.jumps {
-                take(jump, jump.rates.as_ref().expect("invariant: held"));
-            }
-            return Ok(());
-        };
-        let mut jumps = self.jumps.iter();
-        files.for_each(|recording| {
-            for segment in &recording.segments {
-                let jump = jumps.next().filter(|jump| jump.time_s == segment.time_s);
-                let changed = || {
-                    let file = recording.path.display().to_string();
-                    RecordingError::new(&file, Place::Whole, RecordingFault::Changed)
-                };
-                let jump = jump.ok_or_else(changed)?;
-                take(jump, &self.rates(segment, &jump.spans));
-            }
-            Ok(())
-        })
     }
 
     /// Samples of one quantity side by side, of one phase or of all, `18 x samples`.
@@ -389,7 +341,7 @@ impl Dataset {
             time_s: segment.time_s.clone(),
             x: scaled(segment.x.clone(), &self.scaling.state),
             u: scaled(segment.input(&self.rule)?, &self.scaling.input),
-            rates: (self.files.is_none()).then(|| self.rates(segment, &spans)),
+            rates: self.rates(segment, &spans),
             phase,
             spans,
             implausible: (0..n)

@@ -88,10 +88,10 @@ impl Task<'_> {
         watch: &mut Watch<'_>,
     ) -> Result<Fitted, TrainError> {
         let (training, judged) = (&self.training, self.judged());
-        let latent = Latent::of(training, &encoder)?;
+        let latent = Latent::of(training, &encoder);
         let validated = match self.validation.jumps.is_empty() {
             true => None,
-            false => Some(Latent::of(judged, &encoder)?),
+            false => Some(Latent::of(judged, &encoder)),
         };
         let judged_latent = validated.as_ref().unwrap_or(&latent);
         let (options, features) = (&self.options.regression, &self.features);
@@ -119,7 +119,7 @@ impl Task<'_> {
         let std = self.training.state_std();
         let names = Robot::state_names();
         let rows = fitted.weights.row_iter();
-        let latent = Latent::of(self.judged(), &fitted.encoder)?;
+        let latent = Latent::of(self.judged(), &fitted.encoder);
         let judged = EncodedSet::new(self.judged(), &latent);
         Ok(SeedReport {
             seed,

@@ -58,7 +58,7 @@ impl Frame {
         }
         let (body, held): (&[usize], _) = match latent_dim {
             0 | 1 => (&[BODY_X, BODY_Z], DMatrix::zeros(STATE_DIM, 0)),
-            _ => (&[], centre_of_mass(training, robot)?),
+            _ => (&[], centre_of_mass(training, robot)),
         };
         let single = body.iter().chain(&[PITCH]).filter(|i| active.contains(i));
         let mut free: Vec<DVector<f64>> = single.map(|&i| unit(i)).collect();
@@ -116,21 +116,22 @@ fn mirrored_joints(active: &[usize], robot: &Robot) -> Vec<DVector<f64>> {
 /// Nothing pushes the robot in flight, so its centre of mass falls freely: `ddx + c_x^T ddq = 0` and
 /// `ddz + c_z^T ddq = -g`. The regression of the body's accelerations on those of the joints (mirrored, ridge) over
 /// all flights therefore tells the part `c` that the legs have in the centre of mass, to first order in `q`.
-fn centre_of_mass(training: &Dataset, robot: &Robot) -> Result<DMatrix<f64>, TrainError> {
+fn centre_of_mass(training: &Dataset, robot: &Robot) -> DMatrix<f64> {
     let all: Vec<usize> = (0..JOINT_DIM).collect();
     let joints = DMatrix::from_columns(&mirrored_joints(&all, robot));
     let mut body = DMatrix::from_columns(&[unit(BODY_X), unit(BODY_Z)]);
     let mut accelerations = Vec::new();
-    training
-        .for_each(|jump, rates| flight_accelerations(training, jump, rates, &mut accelerations))?;
+    for jump in &training.jumps {
+        flight_accelerations(training, jump, &jump.rates, &mut accelerations);
+    }
     if accelerations.len() < LEAST_WINDOWS {
-        return Ok(body);
+        return body;
     }
     let samples = DMatrix::from_columns(&accelerations);
     let (of_joints, n) = (joints.tr_mul(&samples), samples.ncols() as f64);
     let mean_square = of_joints.norm_squared() / of_joints.len() as f64;
     if mean_square <= 0.0 {
-        return Ok(body);
+        return body;
     }
     let gram = &of_joints * of_joints.transpose() / n
         + DMatrix::identity(joints.ncols(), joints.ncols()) * (RIDGE * mean_square);
@@ -144,7 +145,7 @@ fn centre_of_mass(training: &Dataset, robot: &Robot) -> Result<DMatrix<f64>, Tra
         let moved = body.column(column) - &joints * part;
         body.set_column(column, &moved);
     }
-    Ok(body)
+    body
 }
 
 /// Appends the accelerations over every window in the flights of a jump, scaled units.
@@ -189,8 +190,9 @@ mod tests {
     /// Mean and standard deviation of the acceleration along a row over the windows in flight, m/s^2.
     fn in_flight(dataset: &Dataset, row: DVector<f64>) -> (f64, f64) {
         let mut all = Vec::new();
-        (dataset.for_each(|jump, rates| flight_accelerations(dataset, jump, rates, &mut all)))
-            .expect("held in memory");
+        for jump in &dataset.jumps {
+            flight_accelerations(dataset, jump, &jump.rates, &mut all);
+        }
         let scale = dataset.scaling.state[BODY_Z];
         let values: Vec<f64> = all.iter().map(|ddx| row.dot(ddx) / scale).collect();
         let values = DVector::from_vec(values);
@@ -199,7 +201,7 @@ mod tests {
 
     #[test]
     fn centre_of_mass_learned_from_one_jump_falls_freely_in_another_where_the_body_does_not() {
-        let rows = centre_of_mass(&go1(["train_01"]), robot()).expect("held in memory");
+        let rows = centre_of_mass(&go1(["train_01"]), robot());
         let other = go1(["test_02"]);
         let (mean, spread) = in_flight(&other, rows.column(1).into_owned());
         assert!(

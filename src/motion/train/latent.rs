@@ -25,25 +25,19 @@ pub struct Latent {
 
 impl Latent {
     /// Encodes every jump.
-    ///
-    /// # Errors
-    /// As [`Dataset::for_each`].
-    pub fn of(dataset: &Dataset, encoder: &StateMap) -> Result<Vec<Latent>, TrainError> {
+    pub fn of(dataset: &Dataset, encoder: &StateMap) -> Vec<Latent> {
         let linear = (encoder.as_affine())
             .map(|linear| (linear.weights(), input_projection(linear.weights())));
-        let mut all = Vec::with_capacity(dataset.jumps.len());
-        dataset.for_each(|jump, rates| {
-            all.push(match &linear {
-                Some((weights, projection)) => Self {
-                    z: map_samples(encoder, &jump.x),
-                    dz: *weights * &rates.dx,
-                    ddz: *weights * &rates.ddx,
-                    u_lat: projection * &jump.u,
-                },
-                None => Self::along(jump, rates, encoder),
-            });
-        })?;
-        Ok(all)
+        let of_jump = |jump: &Jump| match &linear {
+            Some((weights, projection)) => Self {
+                z: map_samples(encoder, &jump.x),
+                dz: *weights * &jump.rates.dx,
+                ddz: *weights * &jump.rates.ddx,
+                u_lat: projection * &jump.u,
+            },
+            None => Self::along(jump, &jump.rates, encoder),
+        };
+        dataset.jumps.iter().map(of_jump).collect()
     }
 
     /// Encodes a jump with the Jacobian at every sample.

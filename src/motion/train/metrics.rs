@@ -9,7 +9,7 @@ use super::features::{FeatureValues, Features};
 use super::latent::{EncodedSet, Latent, lift_samples, map_samples};
 use super::rollout::{Candidate, Window, predict, windows};
 use crate::model::{ReducedModel, StateMap};
-use crate::recording::Source;
+use crate::recording::Recording;
 use crate::robot::JOINT_DIM;
 use crate::sim::{Restart, phase_rule};
 
@@ -48,10 +48,7 @@ pub struct SetMetrics {
 ///
 /// # Errors
 /// [`TrainError`] if the model has no encoder, decoder, scaling or robot, or the recordings do not fit it.
-pub fn assess<'a>(
-    model: &ReducedModel,
-    recordings: impl Into<Source<'a>>,
-) -> Result<SetMetrics, TrainError> {
+pub fn assess(model: &ReducedModel, recordings: &[Recording]) -> Result<SetMetrics, TrainError> {
     let scaling = Scaling {
         state: model.state_factors()?,
         input: model.input_factors()?,
@@ -70,7 +67,7 @@ pub fn assess<'a>(
         xi: &xi,
     };
     let maps = [model.encoder_map()?, model.decoder_map()?];
-    let latent = Latent::of(&dataset, maps[0])?;
+    let latent = Latent::of(&dataset, maps[0]);
     measure(candidate, maps, EncodedSet::new(&dataset, &latent))
 }
 
@@ -153,22 +150,20 @@ fn torque_r2(encoder: &StateMap, set: EncodedSet<'_>) -> Result<f64, TrainError>
         .map(|jump| jump.torque_samples().count())
         .sum();
     let mut mean = DVector::zeros(JOINT_DIM);
-    dataset.for_each(|jump, rates| {
+    for jump in &dataset.jumps {
         for sample in jump.torque_samples() {
-            let torque = recorded_torque(&jump.u, rates, sample);
+            let torque = recorded_torque(&jump.u, &jump.rates, sample);
             mean.axpy(1.0 / n as f64, &torque, 1.0);
         }
-    })?;
+    }
     let mut sums = Determination::about(mean);
-    let mut latent = set.latent.iter();
-    dataset.for_each(|jump, rates| {
-        let samples = latent.next().expect("invariant: one of each jump");
+    for (jump, samples) in dataset.jumps.iter().zip(set.latent) {
         let lift = lift_samples(encoder, &jump.x, &samples.u_lat);
         for sample in jump.torque_samples() {
-            let torque = |u| recorded_torque(u, rates, sample);
+            let torque = |u| recorded_torque(u, &jump.rates, sample);
             sums.add(torque(&lift).as_view(), torque(&jump.u).as_view());
         }
-    })?;
+    }
     Ok(sums.r2())
 }
 

@@ -83,11 +83,11 @@ pub(super) fn jumps(n_jumps: usize) -> (Dataset, Vec<Latent>) {
             time_s: (0..n).map(|i| i as f64 * STEP_S).collect(),
             x: lift(&samples.z),
             u: lift(&samples.u_lat),
-            rates: Some(Rates {
+            rates: Rates {
                 dx: lift(&samples.dz),
                 ddx: lift(&samples.ddz),
                 losses: None,
-            }),
+            },
             phase: (0..n).map(|i| usize::from(i >= LIFT_OFF)).collect(),
             spans: vec![(0, 0..LIFT_OFF), (1, LIFT_OFF..n)],
             implausible: Vec::new(),
@@ -100,7 +100,6 @@ pub(super) fn jumps(n_jumps: usize) -> (Dataset, Vec<Latent>) {
         rule: InputRule::new(robot, None, WrenchFrame::World),
         scaling: ScaleOptions::uniform(1.0).factors(),
         smoothing: 1,
-        files: None,
     };
     (dataset, latent)
 }

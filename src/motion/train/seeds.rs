@@ -58,7 +58,7 @@ impl Seeds {
         origin: &Origin,
     ) -> Result<Trained, TrainError> {
         let (best, reports, overlap) = self.best(&task.library, &task.moments.state)?;
-        let latent = Latent::of(&task.training, &best.encoder)?;
+        let latent = Latent::of(&task.training, &best.encoder);
         let set = EncodedSet::new(&task.training, &latent);
         let mut report = task.report(&best, set, &reports[0].judged)?;
         // A single seed without losses has nothing that the report does not say.

@@ -43,9 +43,9 @@ pub fn joint(
     origin: &Origin,
     watch: &mut Watch<'_>,
 ) -> Result<Trained, TrainError> {
-    let task = Task::new(recordings.clone(), robot, options)?;
+    let task = Task::new(recordings, robot, options)?;
     let cut = |set| batches(set, &task.training);
-    let training = cut(&recordings.training)?;
+    let training = cut(recordings.training)?;
     let trainer = Trainer {
         task: &task,
         batches: &training,
@@ -53,7 +53,7 @@ pub fn joint(
     };
     let runs = trainer.run_seeds(watch);
 
-    let validation = cut(&recordings.validation)?;
+    let validation = cut(recordings.validation)?;
     let judged = if validation.is_empty() {
         &training
     } else {
@@ -347,7 +347,7 @@ impl Trainer<'_> {
         let terms_at_start = || {
             let plain = LatentBasis::unchanged(self.task.options.latent_dim);
             let encoder = self.state_maps(&self.start(seed), &plain)?.0;
-            let latent = Latent::of(training, &encoder)?;
+            let latent = Latent::of(training, &encoder);
             let set = EncodedSet::new(training, &latent);
             check_terms(set, &self.task.features, &self.task.library)
         };

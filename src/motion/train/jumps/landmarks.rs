@@ -3,7 +3,6 @@
 use std::ops::Range;
 
 use super::super::dataset::{Dataset, Jump};
-use super::super::error::TrainError;
 use super::super::metrics::BODY_Z;
 use crate::robot::{ContactFlags, FeetRule};
 
@@ -59,17 +58,14 @@ impl Cut {
 }
 
 /// The cut of every jump; none where a jump has no flight with contact before it.
-///
-/// # Errors
-/// As [`Dataset::for_each`].
-pub fn cuts(training: &Dataset) -> Result<Vec<Option<Cut>>, TrainError> {
-    let mut all = Vec::new();
+pub fn cuts(training: &Dataset) -> Vec<Option<Cut>> {
     let scale = training.scaling.state[BODY_Z];
-    training.for_each(|jump, rates| {
-        let rising = |sample: usize| rates.dx[(BODY_Z, sample)] / scale > THRUST_SPEED_M_S;
-        all.push(cut(training, jump, rising));
-    })?;
-    Ok(all)
+    let of_jump = |jump: &Jump| {
+        let dx = &jump.rates.dx;
+        let rising = |sample: usize| dx[(BODY_Z, sample)] / scale > THRUST_SPEED_M_S;
+        cut(training, jump, rising)
+    };
+    training.jumps.iter().map(of_jump).collect()
 }
 
 fn cut(training: &Dataset, jump: &Jump, rising: impl Fn(usize) -> bool) -> Option<Cut> {

@@ -48,7 +48,7 @@ pub fn learn_jumps(
     let Some(affine) = encoder.as_affine() else {
         return Ok(nothing);
     };
-    let cuts = landmarks::cuts(training)?;
+    let cuts = landmarks::cuts(training);
     let chosen = of_commonest_kind(&cuts);
     if chosen.len() < LEAST_JUMPS {
         return Ok(nothing);
