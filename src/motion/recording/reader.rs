@@ -12,6 +12,7 @@ use super::error::{RecordingError, RecordingFault};
 use super::foreign::guess::guess_of;
 use super::foreign::map::ColumnMap;
 use super::foreign::{assemble, is_mcap, read_mcap, read_texts};
+use super::lines::Lines;
 use super::segment::Recording;
 use crate::robot::Robot;
 
@@ -88,7 +89,7 @@ impl Reader {
                 by_guess(path, self.robot.unwrap_or_else(go1))?
             }
             None if path.is_dir() => return Err(RecordingFault::Folder.of(path)),
-            None => csv::read_noted(path)?,
+            None => csv::read_noted(path, Lines::open(path)?)?,
         };
         if self.clocks == Clocks::Repaired {
             for segment in &mut reading.recording.segments {

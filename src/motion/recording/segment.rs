@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use nalgebra::DMatrix;
 
+use super::columns::Column;
 use super::error::{RecordingError, RecordingFault};
 use super::smoothing::moving_average;
 use crate::robot::{BODY_DIM, ContactFlags, InputRule, JOINT_DIM, Robot, STATE_DIM};
@@ -137,6 +138,42 @@ impl Segment {
             torque_nm: samples(&self.torque_nm),
             feet,
             body_wrench: self.body_wrench.as_ref().map(samples),
+        }
+    }
+
+    /// Sets all samples of a column; a foot with 1 is down.
+    pub(super) fn set(&mut self, column: Column, values: impl Iterator<Item = f64>) {
+        let n = self.len();
+        let (matrix, row) = match column {
+            Column::Time => return self.time_s = values.collect(),
+            Column::Foot(i) => {
+                let feet = self.feet.iter_mut().zip(values);
+                return feet.for_each(|(feet, value)| feet[i] = value == 1.0);
+            }
+            Column::Position(i) => (&mut self.x, i),
+            Column::Velocity(i) => (&mut self.dx, i),
+            Column::Acceleration(i) => (&mut self.ddx, i),
+            Column::Torque(i) => (&mut self.torque_nm, i),
+            Column::Force(i) => {
+                let empty = || DMatrix::zeros(BODY_DIM, n);
+                (self.body_wrench.get_or_insert_with(empty), i)
+            }
+        };
+        for (cell, value) in matrix.row_mut(row).iter_mut().zip(values) {
+            *cell = value;
+        }
+    }
+
+    /// A sample of a column; 0 of a wrench that is not there.
+    pub(super) fn get(&self, column: Column, sample: usize) -> f64 {
+        match column {
+            Column::Time => self.time_s[sample],
+            Column::Position(i) => self.x[(i, sample)],
+            Column::Velocity(i) => self.dx[(i, sample)],
+            Column::Acceleration(i) => self.ddx[(i, sample)],
+            Column::Torque(i) => self.torque_nm[(i, sample)],
+            Column::Force(i) => self.body_wrench.as_ref().map_or(0.0, |w| w[(i, sample)]),
+            Column::Foot(i) => f64::from(u8::from(self.feet[sample][i])),
         }
     }
 

@@ -149,7 +149,10 @@ pub fn write_to(
         for sample in 0..segment.len() {
             line.clear();
             for column in &columns {
-                push_cell(&mut line, segment, *column, sample);
+                match (column, segment.get(*column, sample)) {
+                    (Column::Foot(_), down) => line.push(if down == 1.0 { '1' } else { '0' }),
+                    (_, value) => push_number(&mut line, value),
+                }
                 line.push_str(separator);
             }
             if let Some(inputs) = inputs {
@@ -168,22 +171,6 @@ pub fn write_to(
         }
     }
     Ok(())
-}
-
-fn push_cell(out: &mut String, segment: &Segment, column: Column, sample: usize) {
-    let value = match column {
-        Column::Time => segment.time_s[sample],
-        Column::Position(i) => segment.x[(i, sample)],
-        Column::Velocity(i) => segment.dx[(i, sample)],
-        Column::Acceleration(i) => segment.ddx[(i, sample)],
-        Column::Torque(i) => segment.torque_nm[(i, sample)],
-        Column::Force(i) => segment.body_wrench.as_ref().map_or(0.0, |w| w[(i, sample)]),
-        Column::Foot(i) => {
-            out.push(if segment.feet[sample][i] { '1' } else { '0' });
-            return;
-        }
-    };
-    push_number(out, value);
 }
 
 fn push_number(out: &mut String, value: f64) {

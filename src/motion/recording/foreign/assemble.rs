@@ -10,12 +10,11 @@ use super::interpolate::{Between, at_times};
 use super::log::Log;
 use super::map::{ColumnMap, Frame, Origin};
 use super::signal::{Signal, Source};
-use crate::recording::columns::Column;
 use crate::recording::error::{RecordingError, RecordingFault};
 use crate::recording::preprocess::differences_within;
 use crate::recording::reader::Reading;
-use crate::recording::segment::Recording;
-use crate::recording::segments::{DERIVED_DDX, EPOCH_S, Sample, SegmentBuilder, begins_segment};
+use crate::recording::segment::{Recording, Segment};
+use crate::recording::segments::{DERIVED_DDX, EPOCH_S, divided, ranges};
 use crate::robot::FOOT_DIM;
 
 /// Largest distance between samples of a topic that is interpolated, in s.
@@ -173,16 +172,8 @@ impl Rows<'_> {
             self.ranges.push(0..self.times_s.len());
             return Ok(());
         }
-        let mut start = 0;
-        for i in 1..self.times_s.len() {
-            if begins_segment(&self.times_s[start..i], self.times_s[i])
-                .map_err(|fault| fault.in_cell(self.path, self.first_row + i, "Time"))?
-            {
-                self.ranges.push(start..i);
-                start = i;
-            }
-        }
-        self.ranges.push(start..self.times_s.len());
+        self.ranges = ranges(&self.times_s)
+            .map_err(|(at, fault)| fault.in_cell(self.path, self.first_row + at, "Time"))?;
         Ok(())
     }
 
@@ -380,21 +371,19 @@ impl Rows<'_> {
         } else {
             (self.notes).push(DERIVED_DDX.to_owned());
         }
-        let mut builder = SegmentBuilder::new(self.path, has_acceleration, false);
-        for i in kept {
-            let mut sample = Sample::default();
-            sample.set(Column::Time, self.times_s[i]);
-            for (quantity, signal) in &self.signals {
-                for (element, value) in signal.values.column(i).iter().enumerate() {
-                    sample.set(quantity.column(element), *value);
-                }
+        let mut whole = Segment {
+            first_row: self.first_row + kept.start,
+            ..Segment::still(self.path, self.times_s[kept.clone()].to_vec())
+        };
+        for (quantity, signal) in &self.signals {
+            for (element, row) in signal.values.row_iter().enumerate() {
+                let values = row.iter().skip(kept.start).copied();
+                whole.set(quantity.column(element), values);
             }
-            builder.push(self.first_row + i, sample)?;
         }
-        let columns = self.logs.iter().map(|log| log.columns.len()).sum();
         let recording = Recording {
             path: self.path.to_owned(),
-            segments: builder.finish(columns)?,
+            segments: divided(whole, has_acceleration)?,
             ignored_columns: Vec::new(),
         };
         Ok(Reading::as_recorded(recording, self.notes))

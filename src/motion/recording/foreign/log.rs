@@ -59,6 +59,12 @@ impl Channel {
 }
 
 impl Log {
+    /// The columns' names.
+    pub fn names(&self) -> Vec<String> {
+        let names = self.columns.iter().map(|channel| channel.name.clone());
+        names.collect()
+    }
+
     /// Number of samples.
     pub fn len(&self) -> usize {
         self.columns

@@ -53,6 +53,9 @@ pub struct TextFormat {
     pub blank: bool,
     /// First and last sample to keep, counted from 1.
     pub rows: Option<[usize; 2]>,
+    /// romc's own columns: none is left to guess, and each cell that is read has a finite number.
+    #[serde(skip)]
+    pub(in crate::recording) own: bool,
 }
 
 /// Separator of cells.

@@ -31,4 +31,4 @@ pub(super) use attitude::angles_of_quaternions;
 pub(super) use mcap::{is_mcap, read_mcap};
 pub(super) use mcap_write::write_mcap;
 pub use mcap_write::{BODY_TOPIC, FEET_TOPIC, INPUT_TOPIC, JOINT_TOPIC};
-pub(super) use text::read_texts;
+pub(super) use text::{read_lines, read_texts};

@@ -1,9 +1,11 @@
-//! Text files as logs: any separator, with or without header.
+//! Text files as logs: any separator, with or without header; or romc's own format, in which every cell that has a
+//! meaning is a finite number.
 
 use std::path::{Path, PathBuf};
 
 use super::log::{Channel, Log};
 use super::map::{ColumnMap, Delimiter, TextFormat};
+use crate::recording::columns::Column;
 use crate::recording::csv::MAX_ROWS;
 use crate::recording::error::{RecordingError, RecordingFault, shortened};
 use crate::recording::instant::Instant;
@@ -56,24 +58,38 @@ pub(in crate::recording) fn read_text(
     path: &Path,
     format: &TextFormat,
 ) -> Result<Log, RecordingError> {
-    let mut lines = Lines::open(path)?;
+    read_lines(path, Lines::open(path)?, format)
+}
+
+/// [`read_text`] of the lines of a file.
+pub(in crate::recording) fn read_lines(
+    path: &Path,
+    mut lines: Lines<'_>,
+    format: &TextFormat,
+) -> Result<Log, RecordingError> {
     let mut sheet: Option<Sheet> = None;
+    let mut blank = None;
     while let Some((row, line)) = lines.next_row()? {
         if row <= format.skip || line.trim().is_empty() {
+            blank.get_or_insert(row);
             continue;
         }
-        match &mut sheet {
-            None => sheet = Some(Sheet::begin(path, row, line, format)),
-            Some(Sheet { log, .. }) if log.len() == MAX_ROWS => {
-                return Err(RecordingFault::TooManyRows(MAX_ROWS).at(path, log.first_row));
+        let blank = blank.filter(|_| format.own);
+        match (&mut sheet, blank) {
+            (None, None) => sheet = Some(Sheet::begin(path, row, line, format)?),
+            (None, Some(_)) => {
+                let fault = RecordingFault::delimiter("", "`;`, a tab or `,` in a header");
+                return Err(fault.at(path, row - 1));
             }
-            Some(sheet) => sheet.push(row, line)?,
+            // Blank lines may end a file of romc's, but not divide it.
+            (Some(sheet), Some(blank)) => return Err(sheet.length_fault(blank, 0)),
+            (Some(sheet), None) => sheet.push(row, line)?,
         }
     }
-    let log = sheet.ok_or_else(|| RecordingFault::Empty.of(path))?.log;
-    match log.len() {
-        0 => Err(RecordingFault::HeaderOnly(log.columns.len()).of(path)),
-        _ => Ok(log),
+    let sheet = sheet.ok_or_else(|| RecordingFault::Empty.of(path))?;
+    match sheet.count {
+        0 => Err(RecordingFault::HeaderOnly(sheet.log.columns.len()).of(path)),
+        _ => Ok(sheet.log),
     }
 }
 
@@ -82,77 +98,126 @@ struct Sheet {
     delimiter: Delimiter,
     numbers: NumberReader,
     log: Log,
+    count: usize,
+    /// Meaning of each column in romc's own format.
+    own: Option<Vec<Option<Column>>>,
 }
 
 impl Sheet {
     /// From the first line: names, or already numbers.
-    fn begin(path: &Path, row: usize, line: &str, format: &TextFormat) -> Self {
+    fn begin(
+        path: &Path,
+        row: usize,
+        line: &str,
+        format: &TextFormat,
+    ) -> Result<Self, RecordingError> {
         // NumPy and MATLAB write headers as comments.
-        let header = line.trim_start().trim_start_matches(['#', '%']);
-        let delimiter = format.delimiter.unwrap_or_else(|| delimiter_of(header));
-        let numbers = || NumberReader::new(character(delimiter));
-        let (cells, mut reader) = (cells(header, delimiter), numbers());
-        let is_value = |cell: &String| {
-            cell.is_empty() || reader.parse(cell).is_some() || Instant::from_iso(cell).is_some()
+        let header = match format.own {
+            true => line,
+            false => line.trim_start().trim_start_matches(['#', '%']),
         };
-        let is_named = format.header.unwrap_or_else(|| !cells.iter().all(is_value));
+        let delimiter = match (format.delimiter, delimiter_of(header)) {
+            (None, Delimiter::Blank) if format.own => {
+                let fault = RecordingFault::delimiter(line, "`;`, a tab or `,`");
+                return Err(fault.at(path, row));
+            }
+            (given, found) => given.unwrap_or(found),
+        };
+        let cells = cells(header, delimiter);
+        let mut numbers = NumberReader::new(character(delimiter));
+        let is_value = |cell: &&str| {
+            cell.is_empty() || numbers.parse(cell).is_some() || Instant::from_iso(cell).is_some()
+        };
+        let is_named = (format.header).unwrap_or_else(|| format.own || !cells.iter().all(is_value));
+        let named = |cell: &&str| Channel::named(if is_named { cell } else { "" });
+        let log = Log {
+            path: path.to_owned(),
+            columns: cells.iter().map(named).collect(),
+            is_named,
+            first_row: if is_named { row + 1 } else { row },
+            ..Log::default()
+        };
+        let own = format.own.then(|| Column::arranged(path, &log.names()));
         let mut sheet = Self {
             delimiter,
-            numbers: numbers(),
-            log: Log {
-                path: path.to_owned(),
-                columns: vec![Channel::default(); cells.len()],
-                is_named,
-                first_row: if is_named { row + 1 } else { row },
-                ..Log::default()
-            },
+            numbers: NumberReader::new(character(delimiter)),
+            log,
+            count: 0,
+            own: own.transpose()?,
         };
-        if is_named {
-            for (column, name) in sheet.log.columns.iter_mut().zip(cells) {
-                column.name = name;
-            }
-        } else {
-            sheet.push_cells(cells);
+        if !is_named {
+            sheet.push_cells(row, cells)?;
         }
-        sheet
+        Ok(sheet)
     }
 
     fn push(&mut self, row: usize, line: &str) -> Result<(), RecordingError> {
-        let log = &mut self.log;
+        if self.count == MAX_ROWS {
+            return Err(RecordingFault::TooManyRows(MAX_ROWS).at(&self.log.path, row));
+        }
         let mut cells = cells(line, self.delimiter);
-        let expected = log.columns.len();
+        let expected = self.log.columns.len();
+        let is_own = self.own.is_some();
         // A separator at the end of each line is no column.
-        if cells.len() == expected + 1 && cells.last().is_some_and(String::is_empty) {
+        if !is_own && cells.len() == expected + 1 && cells.last().is_some_and(|c| c.is_empty()) {
             cells.pop();
         }
         if cells.len() != expected {
-            let found = cells.len();
-            let hint = match log.len() {
-                0 if log.is_named => {
-                    "; lines before the header are left out by `skip = 1` in `[text]` of the map, which \
-                     `romc inspect --guess` finds"
-                }
-                _ => "",
+            let (other, separator) = match self.delimiter {
+                Delimiter::Semicolon => (',', "`;`"),
+                _ => (';', "`,`"),
             };
-            let fault = RecordingFault::RowLength {
-                found,
-                expected,
-                hint,
-            };
-            let name = log.columns.get(found).map_or("", |column| &column.name);
-            return Err(fault.in_cell(&log.path, row, name));
+            if is_own && cells.len() == 1 && line.contains(other) {
+                return Err(RecordingFault::delimiter(line, separator).at(&self.log.path, row));
+            }
+            return Err(self.length_fault(row, cells.len()));
         }
-        if log.len() == 0 {
-            log.first_row = row;
+        if self.count == 0 {
+            self.log.first_row = row;
         }
-        self.push_cells(cells);
+        self.push_cells(row, cells)
+    }
+
+    fn push_cells(&mut self, row: usize, cells: Vec<&str>) -> Result<(), RecordingError> {
+        let own = self.own.as_deref();
+        for (place, cell) in cells.into_iter().enumerate() {
+            let channel = &mut self.log.columns[place];
+            match own.map(|columns| columns[place]) {
+                None => channel.push(cell, &mut self.numbers),
+                Some(None) => {}
+                Some(Some(column)) => (channel.push_own(column, cell, &mut self.numbers))
+                    .map_err(|fault| fault.in_cell(&self.log.path, row, &channel.name))?,
+            }
+        }
+        self.count += 1;
         Ok(())
     }
 
-    fn push_cells(&mut self, cells: Vec<String>) {
-        for (column, cell) in self.log.columns.iter_mut().zip(cells) {
-            column.push(&cell, &mut self.numbers);
-        }
+    /// The fault of a row with another number of cells than the header.
+    fn length_fault(&self, row: usize, found: usize) -> RecordingError {
+        let columns = &self.log.columns;
+        let is_own = self.own.is_some();
+        let hint = match self.delimiter {
+            Delimiter::Comma if is_own && found > columns.len() => {
+                "; where numbers have decimal commas, cells are separated by `;`"
+            }
+            _ if !is_own && self.count == 0 && self.log.is_named => {
+                "; lines before the header are left out by `skip = 1` in `[text]` of the map, which \
+                 `romc inspect --guess` finds"
+            }
+            _ => "",
+        };
+        let last = columns.last().filter(|_| is_own);
+        let name = columns
+            .get(found)
+            .or(last)
+            .map_or("", |column| &column.name);
+        let fault = RecordingFault::RowLength {
+            found,
+            expected: columns.len(),
+            hint,
+        };
+        fault.in_cell(&self.log.path, row, name)
     }
 }
 
@@ -189,6 +254,40 @@ impl Channel {
         }
     }
 
+    /// Adds a cell of romc's own format: a date, 0 or 1 of a foot, or a finite number.
+    fn push_own(
+        &mut self,
+        column: Column,
+        cell: &str,
+        numbers: &mut NumberReader,
+    ) -> Result<(), RecordingFault> {
+        let is_foot = matches!(column, Column::Foot(_));
+        if column == Column::Time
+            && let Some(date) = Instant::from_iso(cell)
+        {
+            self.push_instant(date);
+            return Ok(());
+        }
+        let value = match cell {
+            "True" | "true" | "TRUE" if is_foot => Some(1.0),
+            "False" | "false" | "FALSE" if is_foot => Some(0.0),
+            _ => numbers.parse(cell),
+        };
+        let expected = match value {
+            Some(value) if is_foot && value.is_finite() && value != 0.0 && value != 1.0 => {
+                return Err(RecordingFault::Contact(value));
+            }
+            Some(value) if value.is_finite() => {
+                self.values.push(value);
+                return Ok(());
+            }
+            Some(_) => "a finite number",
+            None => numbers.expected(),
+        };
+        let found = shortened(cell);
+        Err(RecordingFault::Number { found, expected })
+    }
+
     /// Adds a time; earlier values become times as well.
     pub fn push_instant(&mut self, instant: Instant) {
         let earlier = |value: &f64| Instant::of(*value).unwrap_or(instant);
@@ -217,13 +316,11 @@ fn character(delimiter: Delimiter) -> char {
     }
 }
 
-fn cells(line: &str, delimiter: Delimiter) -> Vec<String> {
+fn cells(line: &str, delimiter: Delimiter) -> Vec<&str> {
     match delimiter {
-        Delimiter::Blank => line.split_whitespace().map(str::to_owned).collect(),
+        Delimiter::Blank => line.split_whitespace().collect(),
         Delimiter::Tab | Delimiter::Comma | Delimiter::Semicolon => {
-            lines::cells(line, character(delimiter))
-                .map(str::to_owned)
-                .collect()
+            lines::cells(line, character(delimiter)).collect()
         }
     }
 }
