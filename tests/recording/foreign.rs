@@ -808,3 +808,27 @@ fn mcap_files_are_read_without_a_map_and_damaged_ones_are_refused() {
         );
     }
 }
+
+const REQUIRED: &str = "[time]\ncolumn = 1\n[joint.position]\ncolumns = \"{leg}-{joint}\"\n\
+     [joint.torque]\ncolumns = \"tau{1}\"\n[body.position]\ncolumns = \"p{axis}\"\n\
+     [body.orientation]\ncolumns = [7, \"2..4\"]\norder = \"wxyz\"\n[feet]\ncolumns = \"f_{leg}\"\n";
+
+#[test]
+fn parse_faults_name_key_found_and_expected() {
+    let message = |text: &str| ColumnMap::parse("m.toml", text).unwrap_err().to_string();
+    assert_eq!(
+        message(""),
+        "m.toml: `joint.position`: found no such table, expected the columns of fr.hx Position"
+    );
+    let unknown = message(&format!("{REQUIRED}[foots]\n"));
+    assert!(
+        unknown.contains("foots") && unknown.starts_with("m.toml"),
+        "{unknown}"
+    );
+    let release = message(&format!("{REQUIRED}release = 3.0\n"));
+    assert!(release.contains("`feet.release`"), "{release}");
+    let frame = message(&format!("{REQUIRED}frame = \"body\"\n"));
+    assert!(frame.contains("`feet.frame`"), "{frame}");
+    let step = message(&REQUIRED.replace("column = 1\n", "sample_time_s = 0.0\n"));
+    assert!(step.contains("`time.sample_time_s`: found 0"), "{step}");
+}

@@ -381,6 +381,3 @@ fn disagrees(time_s: &[f64], values: &[f64], rates: &[f64], j: usize, slack: f64
     let (low, high) = (left.min(right), left.max(right));
     outside(rates[j], low - slack, high + slack).map(|_| (rates[j], rates[j].clamp(low, high)))
 }
-
-#[cfg(test)]
-mod tests;

@@ -252,15 +252,3 @@ pub(super) fn shortened(text: &str) -> String {
     }
     out
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn shortened_cuts_long_text_and_hides_control_characters() {
-        assert_eq!(shortened("a\u{1b}b"), "a\u{fffd}b");
-        assert_eq!(shortened("Time\tfeet"), "Time\\tfeet");
-        assert_eq!(shortened(&"é".repeat(50)).chars().count(), 41);
-    }
-}

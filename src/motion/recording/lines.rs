@@ -183,17 +183,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn cells_quoted_delimiter_does_not_separate() {
-        for (line, delimiter, expected) in [
-            ("\"0,5\", 1 ,\"a\"", ',', &["0,5", "1", "a"][..]),
-            ("a;;b;", ';', &["a", "", "b", ""]),
-            ("\"a;b", ';', &["\"a;b"]),
-        ] {
-            assert_eq!(cells(line, delimiter).collect::<Vec<_>>(), expected);
-        }
-    }
-
-    #[test]
     fn next_row_longest_line_is_read_and_one_byte_more_is_not() {
         let read = |ones: usize| {
             let text = [vec![b'1'; ones], b"\n".to_vec()].concat();

@@ -62,35 +62,3 @@ impl NumberReader {
         Some(value)
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn unknown() -> NumberReader {
-        NumberReader::new(';')
-    }
-
-    #[test]
-    fn parse_reads_either_mark_and_keeps_to_the_first() {
-        let mut reader = unknown();
-        assert_eq!(reader.parse("3"), Some(3.0));
-        assert_eq!(reader.expected(), "a number");
-        assert_eq!(reader.parse("-1,5e-3"), Some(-0.0015));
-        assert_eq!(reader.expected(), "a number with a decimal comma");
-        assert_eq!(reader.parse("1.5"), None);
-        let mut reader = unknown();
-        assert_eq!(reader.parse("1.5"), Some(1.5));
-        assert_eq!(reader.parse("1,5"), None);
-        assert_eq!(reader.parse("2"), Some(2.0));
-    }
-
-    #[test]
-    fn parse_text_thousands_and_two_marks_are_no_numbers() {
-        for cell in [
-            "", "x", "1.234,5", "1,234.5", "1,234,5", "1 2", "0x10", "--1", ",", "1,é",
-        ] {
-            assert_eq!(unknown().parse(cell), None, "{cell}");
-        }
-    }
-}

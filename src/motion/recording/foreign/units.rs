@@ -62,20 +62,3 @@ impl Dimension {
         names.join(", ")
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn factor_rates_blanks_and_case_do_not_matter() {
-        let degree = std::f64::consts::PI / 180.0;
-        assert_eq!(Dimension::Angle.factor("deg/s"), Some(degree));
-        assert_eq!(Dimension::Angle.factor("Deg / s^2"), Some(degree));
-        assert_eq!(Dimension::Torque.factor("N mm"), Some(1e-3));
-        assert_eq!(Dimension::Torque.factor("N·m"), Some(1.0));
-        assert_eq!(Dimension::Length.factor("mm/s"), Some(1e-3));
-        assert_eq!(Dimension::Time.factor("ms"), Some(1e-3));
-        assert_eq!(Dimension::Length.factor("deg"), None);
-    }
-}

@@ -355,58 +355,50 @@ mod tests {
 
     #[test]
     fn read_names_of_many_loggers() {
-        for (name, expected) in [
-            ("FR_hip_joint/position", (Quantity::JointPosition, 0)),
-            ("position[RL_calf_joint]", (Quantity::JointPosition, 11)),
-            ("effort[LF_HFE]", (Quantity::JointTorque, 4)),
-            ("motor_state[4].dq", (Quantity::JointVelocity, 4)),
-            ("q_11", (Quantity::JointPosition, 11)),
-            ("tau3", (Quantity::JointTorque, 3)),
-            ("front_right.knee.vel", (Quantity::JointVelocity, 2)),
-            ("RearLeft thigh angle (deg)", (Quantity::JointPosition, 10)),
-            ("fl.hip_pitch.torque", (Quantity::JointTorque, 4)),
-            ("pose.pose.position.z", (Quantity::BodyPosition, 2)),
-            ("pose.pose.orientation.w", (Quantity::Orientation, 0)),
-            ("pose.pose.orientation.z", (Quantity::Orientation, 3)),
-            ("twist.twist.linear.y", (Quantity::BodyVelocity, 1)),
-            ("twist.twist.angular.y", (Quantity::AngularVelocity, 1)),
-            ("imu_state.quaternion[2]", (Quantity::Orientation, 2)),
-            ("imu_state.gyroscope[0]", (Quantity::AngularVelocity, 0)),
-            ("qw", (Quantity::Orientation, 0)),
-            ("qx", (Quantity::Orientation, 1)),
-            ("body_vx", (Quantity::BodyVelocity, 0)),
-            ("wz", (Quantity::AngularVelocity, 2)),
-            ("base_pitch", (Quantity::Orientation, 1)),
-            ("yaw_rate", (Quantity::AngularVelocity, 2)),
-            ("foot_force[3]", (Quantity::Feet, 3)),
-            ("contact_RL", (Quantity::Feet, 3)),
-            ("fr Foot", (Quantity::Feet, 0)),
-            ("Body angular Position z", (Quantity::Orientation, 2)),
-            ("Body linear Velocity x", (Quantity::BodyVelocity, 0)),
-            ("com_z", (Quantity::BodyPosition, 2)),
-            ("CoM Z", (Quantity::BodyPosition, 2)),
-            ("p_y", (Quantity::BodyPosition, 1)),
-            ("qpos[2]", (Quantity::BodyPosition, 2)),
-            ("qpos[3]", (Quantity::Orientation, 0)),
-            ("qpos[18]", (Quantity::JointPosition, 11)),
-            ("qvel_5", (Quantity::AngularVelocity, 2)),
-            ("qvel_6", (Quantity::JointVelocity, 0)),
-            ("ctrl[4]", (Quantity::JointTorque, 4)),
-            ("dof_vel[7]", (Quantity::JointVelocity, 7)),
-            ("leg1_joint2_torque", (Quantity::JointTorque, 5)),
-            ("FRHipPos", (Quantity::JointPosition, 0)),
-            ("dQ_3", (Quantity::JointVelocity, 3)),
-            ("theta", (Quantity::Orientation, 1)),
-            ("psi_dot", (Quantity::AngularVelocity, 2)),
-            ("Fz RF", (Quantity::Feet, 0)),
-            ("F_RL [N]", (Quantity::Feet, 3)),
-            ("FL load (N)", (Quantity::Feet, 1)),
-            ("tau_RR_knee [Nm]", (Quantity::JointTorque, 8)),
-            ("base vx [m/s]", (Quantity::BodyVelocity, 0)),
-            ("pitch rate [deg/s]", (Quantity::AngularVelocity, 1)),
-            ("c_2", (Quantity::Feet, 2)),
+        for (quantity, names) in [
+            (
+                Quantity::JointPosition,
+                "FR_hip_joint/position = 0; position[RL_calf_joint] = 11; q_11 = 11; RearLeft thigh angle \
+                 (deg) = 10; qpos[18] = 11; FRHipPos = 0",
+            ),
+            (
+                Quantity::JointTorque,
+                "effort[LF_HFE] = 4; tau3 = 3; fl.hip_pitch.torque = 4; ctrl[4] = 4; leg1_joint2_torque = \
+                 5; tau_RR_knee [Nm] = 8",
+            ),
+            (
+                Quantity::JointVelocity,
+                "motor_state[4].dq = 4; front_right.knee.vel = 2; qvel_6 = 0; dof_vel[7] = 7; dQ_3 = 3",
+            ),
+            (
+                Quantity::BodyPosition,
+                "pose.pose.position.z = 2; com_z = 2; CoM Z = 2; p_y = 1; qpos[2] = 2",
+            ),
+            (
+                Quantity::Orientation,
+                "pose.pose.orientation.w = 0; pose.pose.orientation.z = 3; imu_state.quaternion[2] = 2; qw \
+                 = 0; qx = 1; base_pitch = 1; Body angular Position z = 2; qpos[3] = 0; theta = 1",
+            ),
+            (
+                Quantity::BodyVelocity,
+                "twist.twist.linear.y = 1; body_vx = 0; Body linear Velocity x = 0; base vx [m/s] = 0",
+            ),
+            (
+                Quantity::AngularVelocity,
+                "twist.twist.angular.y = 1; imu_state.gyroscope[0] = 0; wz = 2; yaw_rate = 2; qvel_5 = 2; \
+                 psi_dot = 2; pitch rate [deg/s] = 1",
+            ),
+            (
+                Quantity::Feet,
+                "foot_force[3] = 3; contact_RL = 3; fr Foot = 0; Fz RF = 0; F_RL [N] = 3; FL load (N) = 1; \
+                 c_2 = 2",
+            ),
         ] {
-            assert_eq!(said(name), Some(expected), "{name}");
+            for entry in names.split("; ") {
+                let (name, element) = entry.rsplit_once(" = ").expect("an element");
+                let element = element.parse().expect("a number");
+                assert_eq!(said(name), Some((quantity, element)), "{name}");
+            }
         }
     }
 
