@@ -602,7 +602,7 @@ fn topics_with_clocks_of_their_own_agree_to_1e_4() {
         "unit = \"ms\"\nmax_gap_s = 0.003\n[joint",
     );
     let error = read_by(&small).unwrap_err();
-    assert!(matches!(error.kind, RecordingFault::Gap { .. }), "{error}");
+    assert!(error.to_string().contains("found no sample for"), "{error}");
 }
 
 #[test]

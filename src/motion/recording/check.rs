@@ -160,7 +160,7 @@ pub fn check(recording: &Recording, robot: &Robot) -> Vec<Finding> {
 /// a single sample goes too.
 ///
 /// # Errors
-/// [`RecordingFault::TooShort`] if nothing remains.
+/// [`RecordingFault::Unexpected`] if nothing remains.
 pub fn without(
     recording: &Recording,
     findings: &[Finding],

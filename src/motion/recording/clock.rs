@@ -58,7 +58,7 @@ pub struct Mended {
 /// angular rates where they disagree with the angles.
 ///
 /// # Errors
-/// [`TooShort`](crate::recording::RecordingFault::TooShort) if fewer than two samples remain.
+/// [`RecordingFault::Unexpected`](crate::recording::RecordingFault::Unexpected) if fewer than two samples remain.
 pub fn timed(segment: &Segment) -> Result<Timed, RecordingError> {
     let elapsed = Interval::all(segment, &agreeing_coordinates(segment));
     let elapsed_ratio = ratio(&elapsed, 0.0).unwrap_or(1.0);

@@ -60,7 +60,7 @@ pub struct ConditionOptions {
 /// number of samples left out: implausible ones and pieces between them that are too short.
 ///
 /// # Errors
-/// [`RecordingFault::TooShort`] if nothing long enough remains, or a segment is shorter than the filter.
+/// [`RecordingFault::Unexpected`] if nothing long enough remains, or a segment is shorter than the filter.
 pub fn condition(
     recording: Recording,
     findings: &[Finding],

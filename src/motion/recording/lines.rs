@@ -78,7 +78,7 @@ impl<'a> Lines<'a> {
             false => Ok(None),
         };
         match plain.or(unpacked.map_err(|source| lines.read_error(source))?) {
-            Some(format) => Err(RecordingFault::OtherFormat(format).of(path)),
+            Some(format) => Err(RecordingFault::other_format(&format).of(path)),
             None => Ok(lines),
         }
     }
@@ -102,7 +102,9 @@ impl<'a> Lines<'a> {
             }
         }
         if self.buffer.len() > MAX_LINE_BYTES {
-            return Err(RecordingFault::LineTooLong(MAX_LINE_BYTES).at(self.path, self.row));
+            let found = format!("a line of more than {MAX_LINE_BYTES} bytes");
+            let fault = RecordingFault::unexpected(found, "a recording");
+            return Err(fault.at(self.path, self.row));
         }
         self.count_blank()?;
         let bytes = match self.buffer.strip_prefix(b"\xef\xbb\xbf") {
@@ -112,9 +114,9 @@ impl<'a> Lines<'a> {
         match std::str::from_utf8(bytes) {
             Ok(text) => Ok(Some((self.row, text))),
             Err(error) => {
-                let found = bytes[error.valid_up_to()];
-                let byte = error.valid_up_to() + 1;
-                Err(RecordingFault::Encoding { byte, found }.at(self.path, self.row))
+                let at = error.valid_up_to();
+                let found = format!("0x{:02x} as byte {}", bytes[at], at + 1);
+                Err(RecordingFault::unexpected(found, "UTF-8 text").at(self.path, self.row))
             }
         }
     }
@@ -132,7 +134,11 @@ impl<'a> Lines<'a> {
         };
         let filled = self.row - *all;
         match *since > MAX_BLANK_ROWS || *all > filled.saturating_add(MAX_BLANK_ROWS) {
-            true => Err(RecordingFault::TooManyBlankRows(MAX_BLANK_ROWS).at(self.path, self.row)),
+            true => {
+                let found = format!("more than {MAX_BLANK_ROWS} empty lines");
+                let fault = RecordingFault::unexpected(found, "samples or the end");
+                Err(fault.at(self.path, self.row))
+            }
             false => Ok(()),
         }
     }
@@ -191,7 +197,7 @@ mod tests {
         };
         assert!(read(MAX_LINE_BYTES).unwrap());
         let error = read(MAX_LINE_BYTES + 1).unwrap_err();
-        assert!(matches!(error.kind, RecordingFault::LineTooLong(_)));
+        assert!(error.to_string().contains("found a line of more than"));
         assert_eq!(error.place.row(), Some(1));
     }
 }

@@ -17,7 +17,7 @@ pub const BATCH_ROWS: usize = 100;
 /// The phases of every segment of a recording, each with its samples resampled to a multiple of [`BATCH_ROWS`].
 ///
 /// # Errors
-/// [`RecordingFault::TooShort`] for a span of one sample, [`RecordingFault::NoPhase`].
+/// [`RecordingFault::Unexpected`] for a span of one sample, [`RecordingFault::NoPhase`].
 pub fn prepare(
     recording: &Recording,
     rule: &PhaseRule,
@@ -80,7 +80,7 @@ pub(super) fn differences_within(
 /// Contact flags are those of the nearest sample.
 ///
 /// # Errors
-/// [`RecordingFault::TooShort`] if it has one sample or `rows` is below 2.
+/// [`RecordingFault::Unexpected`] if it has one sample or `rows` is below 2.
 pub fn resampled(segment: &Segment, rows: usize) -> Result<Segment, RecordingError> {
     let n = segment.len();
     if n < 2 || rows < 2 {

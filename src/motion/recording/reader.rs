@@ -88,7 +88,10 @@ impl Reader {
                 let go1 = || Robot::by_name("go1").expect("a known robot");
                 by_guess(path, self.robot.unwrap_or_else(go1))?
             }
-            None if path.is_dir() => return Err(RecordingFault::Folder.of(path)),
+            None if path.is_dir() => {
+                let expected = "a file, or `--columns` with a map that names the folder's files";
+                return Err(RecordingFault::unexpected("a folder", expected).of(path));
+            }
             None => csv::read_noted(path, Lines::open(path)?)?,
         };
         if self.clocks == Clocks::Repaired {
@@ -101,6 +104,10 @@ impl Reader {
         Ok(reading)
     }
 }
+
+/// Advice for topics that are not a recording by their names.
+const TO_COMPLETE: &str =
+    "; `romc inspect --guess LOG` writes a map for --columns, to be completed";
 
 /// An MCAP file by the names of its topics and fields.
 fn by_guess(path: &Path, robot: &Robot) -> Result<Reading, RecordingError> {
@@ -121,11 +128,11 @@ fn by_guess(path: &Path, robot: &Robot) -> Result<Reading, RecordingError> {
             "topics of the robot: joints named as fr.hx, FR_hip_joint, LF_HAA or {}",
             robot.joint_names()[0]
         );
-        return Err(RecordingFault::Topics { found, expected }.of(path));
+        return Err(RecordingFault::unexpected(found, expected + TO_COMPLETE).of(path));
     }
     if !guess.open.is_empty() {
-        let (found, expected) = (guess.open.join("; "), "one reading by names".to_owned());
-        return Err(RecordingFault::Topics { found, expected }.of(path));
+        let expected = format!("one reading by names{TO_COMPLETE}");
+        return Err(RecordingFault::unexpected(guess.open.join("; "), expected).of(path));
     }
     let map = ColumnMap::parse(&format!("{}: the guessed map", path.display()), &guess.text)?;
     let mut reading = assemble(path, &logs, &map)?;

@@ -40,8 +40,10 @@ pub(super) fn divided(
             return Err(RecordingFault::too_short(n, 2).at(&segment.path, row));
         }
         if step_s > LARGEST_STEP_S {
-            let (found, expected) = (step_s, LARGEST_STEP_S);
-            let fault = RecordingFault::Sampling { found, expected };
+            let fault = RecordingFault::unexpected(
+                format!("a sample every {step_s} s on average"),
+                format!("at most {LARGEST_STEP_S} s; is `Time` in milliseconds?"),
+            );
             return Err(fault.in_cell(&segment.path, row, "Time"));
         }
         if !has_acceleration {
@@ -50,9 +52,8 @@ pub(super) fn divided(
         // Differences of huge velocities over tiny steps can overflow.
         if let Some(place) = segment.ddx.iter().position(|value| !value.is_finite()) {
             let found = format!("{} from differences", segment.ddx[place]);
-            let expected = "a finite number";
             let column = Column::Acceleration(place % STATE_DIM).name();
-            let fault = RecordingFault::Number { found, expected };
+            let fault = RecordingFault::number(&found, "a finite number");
             return Err(fault.in_cell(&segment.path, row + place / STATE_DIM, &column));
         }
     }
@@ -63,7 +64,7 @@ pub(super) fn divided(
 /// stretch began, or far ahead.
 ///
 /// # Errors
-/// [`RecordingFault::Time`] with the sample at which time stands still, or steps back by less.
+/// The fault with the sample at which time stands still, or steps back by less.
 pub(super) fn ranges(times_s: &[f64]) -> Result<Vec<Range<usize>>, (usize, RecordingFault)> {
     let mut ranges = Vec::new();
     let mut start = 0;
@@ -77,7 +78,7 @@ pub(super) fn ranges(times_s: &[f64]) -> Result<Vec<Range<usize>>, (usize, Recor
         let is_new = match step > 0.0 {
             true => step > GAP_STEPS * before,
             false if step < 0.0 && (found <= times_s[start] || -step > 1.5 * before) => true,
-            false => return Err((at, RecordingFault::Time { found, previous })),
+            false => return Err((at, RecordingFault::time(found, previous))),
         };
         if is_new {
             ranges.push(start..at);

@@ -106,7 +106,7 @@ impl Rows<'_> {
     /// Quaternions become angles, and angles do not jump by whole turns.
     ///
     /// # Errors
-    /// [`RecordingFault::Number`] for a quaternion whose length is far from one.
+    /// [`RecordingFault::Unexpected`] for a quaternion whose length is far from one.
     fn angles(&mut self) -> Result<(), RecordingError> {
         let path = self.path;
         let signal = self.required(Quantity::Orientation);
@@ -116,7 +116,7 @@ impl Rows<'_> {
                 if norm.is_nan() || (1.0 - norm).abs() > QUATERNION_TOLERANCE {
                     let found = format!("a quaternion of length {norm:.3}");
                     let expected = "one of length 1";
-                    let fault = RecordingFault::Number { found, expected };
+                    let fault = RecordingFault::number(&found, expected);
                     return Err(fault.in_cell(path, signal.first_row + sample, "orientation"));
                 }
             }
@@ -153,7 +153,7 @@ impl Rows<'_> {
                         let path = file.map_or(path, |log| &log.path);
                         let row = signal.first_row + sample;
                         let name = Quantity::Feet.column(foot).name();
-                        return Err(RecordingFault::Contact(value).in_cell(path, row, &name));
+                        return Err(RecordingFault::contact(value).in_cell(path, row, &name));
                     }
                 };
                 signal.values[(foot, sample)] = f64::from(u8::from(down));
@@ -187,10 +187,11 @@ impl Rows<'_> {
             for i in 1..times.len() {
                 let (found, previous) = (times[i], times[i - 1]);
                 let fault = if found <= previous {
-                    RecordingFault::Time { found, previous }
+                    RecordingFault::time(found, previous)
                 } else if found - previous > max_gap_s {
-                    let (found, expected) = (found - previous, max_gap_s);
-                    RecordingFault::Gap { found, expected }
+                    let found = format!("no sample for {} s", found - previous);
+                    let expected = format!("at most {max_gap_s} s (`max_gap_s` in `[time]`)");
+                    RecordingFault::unexpected(found, expected)
                 } else {
                     continue;
                 };
@@ -217,7 +218,9 @@ impl Rows<'_> {
             Some(_) => Vec::new(),
         };
         if times.len() < 2 {
-            return Err(RecordingFault::NoOverlap.of(self.path));
+            let found = "clocks that do not overlap";
+            let fault = RecordingFault::unexpected(found, "topics of the same time");
+            return Err(fault.of(self.path));
         }
         self.notes.push(match time.resample_s {
             Some(step) => format!("all quantities are brought to even steps of {step} s"),
@@ -294,7 +297,9 @@ impl Rows<'_> {
             let turned = angle_rates(&angles, &signal.values, frame.unwrap_or(Frame::Angles));
             signal.values = turned.map_err(|sample| {
                 let row = self.first_row + sample;
-                RecordingFault::Upright.at(self.path, row)
+                let expected = "less where rates come from angular velocities";
+                let fault = RecordingFault::unexpected("a pitch of 90 degrees", expected);
+                fault.at(self.path, row)
             })?;
         }
         Ok(())

@@ -233,7 +233,7 @@ impl ColumnMap {
     /// Reads a map.
     ///
     /// # Errors
-    /// [`RecordingFault::MapSyntax`] with line, key and what was expected; [`RecordingFault::Map`] for
+    /// [`RecordingFault::MapSyntax`] with line, key and what was expected; [`RecordingFault::Unexpected`] for
     /// a key that does not apply to its table.
     pub fn read(path: &Path) -> Result<Self, RecordingError> {
         let text = read_toml(path)
@@ -294,8 +294,11 @@ impl ColumnMap {
         expected: impl Into<String>,
     ) -> RecordingError {
         let place = crate::files::Place::Entry(format!("`{key}`").into());
-        let (found, expected) = (found.into(), expected.into());
-        RecordingError::new(&self.file, place, RecordingFault::Map { found, expected })
+        RecordingError::new(
+            &self.file,
+            place,
+            RecordingFault::unexpected(found, expected),
+        )
     }
 }
 

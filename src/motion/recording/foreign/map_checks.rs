@@ -9,7 +9,7 @@ const MAX_COLUMNS: usize = 10_000;
 
 impl ColumnMap {
     /// # Errors
-    /// [`RecordingFault::Map`](crate::recording::RecordingFault::Map) with the key.
+    /// [`RecordingFault::Unexpected`](crate::recording::RecordingFault::Unexpected) with the key.
     pub(super) fn require_applicable(&self) -> Result<(), RecordingError> {
         for quantity in Quantity::ALL {
             let Some(table) = self.table(quantity) else {

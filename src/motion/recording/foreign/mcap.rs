@@ -44,7 +44,7 @@ pub(in crate::recording) fn is_mcap(path: &Path) -> bool {
 /// Reads every topic whose messages are numbers; others have their fault.
 ///
 /// # Errors
-/// [`RecordingFault::Mcap`] for a damaged file, [`RecordingFault::OtherFormat`] for another one,
+/// [`RecordingFault::Mcap`] for a damaged file, [`RecordingFault::Unexpected`] for another one,
 /// [`RecordingFault::NoTopic`] if nothing can be read.
 pub(in crate::recording) fn read_mcap(path: &Path) -> Result<Vec<Log>, RecordingError> {
     let mut topics = Topics::default();
@@ -144,7 +144,7 @@ impl<'a, R: Read> Scan<'a, R> {
         }
         start.extend(self.bytes((MAGIC_BYTES - MCAP.len()) as u64)?);
         Err(match recognised(path, &start) {
-            Some(format) => RecordingFault::OtherFormat(format),
+            Some(format) => RecordingFault::other_format(&format),
             None => RecordingFault::Mcap("it begins with other bytes".to_owned()),
         })
     }

@@ -258,7 +258,7 @@ impl<'a> Source<'a> {
         };
         let expected =
             "a finite number (for cells left empty on purpose: `blank = true` in `[text]`)";
-        let fault = RecordingFault::Number { found, expected };
+        let fault = RecordingFault::number(&found, expected);
         Err(fault.in_cell(&log.path, log.first_row + row, &name))
     }
 

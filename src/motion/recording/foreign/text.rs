@@ -27,9 +27,8 @@ pub(in crate::recording) fn read_texts(
 ) -> Result<Vec<Log>, RecordingError> {
     let named = map.files();
     if path.is_dir() && named.is_empty() {
-        let found = "a folder".to_owned();
         let expected = format!("a file, or the names of its files in {}", map.file);
-        return Err(RecordingFault::Map { found, expected }.of(path));
+        return Err(RecordingFault::unexpected("a folder", expected).of(path));
     }
     let mut logs = Vec::new();
     if !path.is_dir() {
@@ -153,7 +152,9 @@ impl Sheet {
 
     fn push(&mut self, row: usize, line: &str) -> Result<(), RecordingError> {
         if self.count == MAX_ROWS {
-            return Err(RecordingFault::TooManyRows(MAX_ROWS).at(&self.log.path, row));
+            let found = format!("more than {MAX_ROWS} samples");
+            let fault = RecordingFault::unexpected(found, "shorter recordings");
+            return Err(fault.at(&self.log.path, row));
         }
         let mut cells = cells(line, self.delimiter);
         let expected = self.log.columns.len();
@@ -275,7 +276,7 @@ impl Channel {
         };
         let expected = match value {
             Some(value) if is_foot && value.is_finite() && value != 0.0 && value != 1.0 => {
-                return Err(RecordingFault::Contact(value));
+                return Err(RecordingFault::contact(value));
             }
             Some(value) if value.is_finite() => {
                 self.values.push(value);
@@ -284,8 +285,7 @@ impl Channel {
             Some(_) => "a finite number",
             None => numbers.expected(),
         };
-        let found = shortened(cell);
-        Err(RecordingFault::Number { found, expected })
+        Err(RecordingFault::number(cell, expected))
     }
 
     /// Adds a time; earlier values become times as well.
