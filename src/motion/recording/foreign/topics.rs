@@ -10,7 +10,7 @@ use std::collections::btree_map::Entry;
 use mcap::records::{Channel as Declared, SchemaHeader};
 
 use super::log::{Channel, Log};
-use super::message::{Definition, Layout, MessageFault, Value};
+use super::message::{Definition, Layout, Value, undefined, unknown_encoding};
 use crate::recording::csv::MAX_ROWS;
 use crate::recording::error::RecordingFault;
 use crate::recording::instant::Instant;
@@ -37,7 +37,7 @@ pub(super) struct Topics {
 /// A topic by its name and the definition of its messages.
 struct Topic {
     name: String,
-    definition: Result<(Layout, Definition), MessageFault>,
+    definition: Result<(Layout, Definition), String>,
     /// Encodings and definition, as declared.
     declared: (String, String, String, Vec<u8>),
     tables: Vec<Table>,
@@ -45,7 +45,7 @@ struct Topic {
     arrangements: BTreeMap<Vec<u8>, (usize, Vec<usize>)>,
     /// Messages read.
     arrived: usize,
-    fault: Option<MessageFault>,
+    fault: Option<String>,
 }
 
 /// Messages with the same names.
@@ -160,7 +160,7 @@ impl Topics {
             }
             logs.extend(topic.fault.map(|fault| Log {
                 name: topic.name,
-                fault: Some(fault.to_string()),
+                fault: Some(fault),
                 ..Log::default()
             }));
         }
@@ -178,16 +178,16 @@ fn definition(
     channel: &Declared,
     has_schema: bool,
     (message, encoding, name, text): &(String, String, String, Vec<u8>),
-) -> Result<(Layout, Definition), MessageFault> {
+) -> Result<(Layout, Definition), String> {
     let layout = match (&message[..], &encoding[..]) {
         ("cdr", "ros2msg") => Layout::Ros2,
         ("ros1", "ros1msg") => Layout::Ros1,
         (message, schema) => {
-            return Err(MessageFault::Encoding(format!("{message} with {schema}")));
+            return Err(unknown_encoding(&format!("{message} with {schema}")));
         }
     };
     if !has_schema {
-        return Err(MessageFault::Undefined(channel.topic.clone()));
+        return Err(undefined(&channel.topic));
     }
     Ok((
         layout,
@@ -196,7 +196,7 @@ fn definition(
 }
 
 impl Topic {
-    fn push(&mut self, time_ns: u64, message: &[u8]) -> Result<(), MessageFault> {
+    fn push(&mut self, time_ns: u64, message: &[u8]) -> Result<(), String> {
         let (layout, definition) = self.definition.as_ref().map_err(Clone::clone)?;
         let found = definition.values(*layout, message, false)?;
         if !self.arrangements.contains_key(&found.lists) {
@@ -210,7 +210,9 @@ impl Topic {
         let (table, order) = &self.arrangements[&found.lists];
         let table = &mut self.tables[*table];
         if table.times_ns.len() == MAX_ROWS {
-            return Err(MessageFault::Long(MAX_ROWS));
+            return Err(format!(
+                "more than {MAX_ROWS} messages, expected shorter recordings"
+            ));
         }
         table.times_ns.push(time_ns);
         table.arrivals.push(self.arrived);
@@ -230,11 +232,11 @@ impl Topic {
     }
 
     /// The table of numbers of these names, made if there is none, and their columns in it.
-    fn arranged(&mut self, names: Vec<String>) -> Result<(usize, Vec<usize>), MessageFault> {
+    fn arranged(&mut self, names: Vec<String>) -> Result<(usize, Vec<usize>), String> {
         let mut sorted: Vec<&String> = names.iter().collect();
         sorted.sort_unstable();
         if let Some(twice) = sorted.windows(2).find(|pair| pair[0] == pair[1]) {
-            return Err(MessageFault::Twice(twice[0].clone()));
+            return Err(format!("message: `{}` twice", twice[0]));
         }
         let columns_in = |table: &Table| {
             let columns = &table.log.columns[1..];
@@ -253,7 +255,9 @@ impl Topic {
             return Ok(found);
         }
         if self.tables.len() == MOST_TABLES {
-            return Err(MessageFault::Ragged(MOST_TABLES));
+            return Err(format!(
+                "messages of more than {MOST_TABLES} lengths or sets of names, expected tables"
+            ));
         }
         let order = (1..=names.len()).collect();
         let columns = ["log_time".to_owned()].into_iter().chain(names);
