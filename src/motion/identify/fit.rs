@@ -30,7 +30,6 @@ pub struct Iteration {
     deviations: Option<[f64; Group::COUNT]>,
 }
 
-/// Normal equations `matrix x = side`.
 #[derive(Debug, Clone, Default)]
 struct Normal {
     matrix: Square,
@@ -243,7 +242,6 @@ impl Iteration {
     }
 }
 
-/// Weight of a residual in deviations.
 fn huber(residual: f64) -> f64 {
     HUBER / residual.abs().max(HUBER)
 }

@@ -90,7 +90,6 @@ pub struct Windows {
     pub singular_samples: usize,
     /// Torques above the robot's limits, which count as the limit.
     pub clipped_torques: usize,
-    /// Number of segments.
     segments: usize,
 }
 
@@ -233,7 +232,6 @@ impl Windows {
     }
 }
 
-/// A stretch of samples of a segment.
 struct Averaged<'a> {
     segment: &'a Segment,
     equations: &'a SampleEquations,

@@ -5,9 +5,7 @@ use super::lines::count;
 /// A time as whole units and the rest, so that nanoseconds since 1970 lose nothing in differences.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Instant {
-    /// Whole units of the clock.
     pub whole: i64,
-    /// The rest, from 0 to 1.
     pub rest: f64,
 }
 
@@ -26,7 +24,6 @@ impl Instant {
         (self.whole - start.whole) as f64 + (self.rest - start.rest)
     }
 
-    /// The time as one number.
     pub fn value(self) -> f64 {
         self.whole as f64 + self.rest
     }
@@ -68,7 +65,6 @@ impl Instant {
     }
 }
 
-/// The clock's digits and the offset of its zone from UTC, in s.
 fn without_zone(time: &str) -> Option<(&str, i64)> {
     if let Some(clock) = time.strip_suffix(['Z', 'z']) {
         return Some((clock, 0));

@@ -170,7 +170,6 @@ pub(super) fn cells(line: &str, delimiter: char) -> impl Iterator<Item = &str> {
     })
 }
 
-/// How often an ASCII character is in a line.
 pub(super) fn count(line: &str, character: char) -> usize {
     let wanted = character as u8;
     line.bytes().filter(|byte| *byte == wanted).count()

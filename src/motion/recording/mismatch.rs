@@ -446,7 +446,6 @@ fn beyond(value: f64, (low, high): (f64, f64)) -> Option<(f64, f64)> {
     outside(value, low, high).or(of_nan)
 }
 
-/// Weight of a mass, N.
 fn weight_n(mass_kg: f64) -> f64 {
     GRAVITY_M_S2 * mass_kg
 }

@@ -1,6 +1,5 @@
 //! Cells as numbers, with a decimal point or a decimal comma.
 
-/// A decimal mark.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Mark {
     Point,
@@ -25,7 +24,6 @@ impl NumberReader {
         }
     }
 
-    /// What a number looks like, for messages.
     pub fn expected(&self) -> &'static str {
         match self.mark {
             None => "a number",

@@ -164,7 +164,6 @@ impl Segment {
         }
     }
 
-    /// A sample of a column; 0 of a wrench that is not there.
     pub(super) fn get(&self, column: Column, sample: usize) -> f64 {
         match column {
             Column::Time => self.time_s[sample],

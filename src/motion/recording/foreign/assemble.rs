@@ -92,13 +92,11 @@ struct Rows<'a> {
 }
 
 impl Rows<'_> {
-    /// A quantity that every map has.
     fn required(&mut self, quantity: Quantity) -> &mut Signal {
         let signal = self.signals.get_mut(&quantity);
         signal.expect("a map has what is required")
     }
 
-    /// The axes that the map gives to a velocity.
     fn frame(&self, quantity: Quantity) -> Option<Frame> {
         self.map.table(quantity).and_then(|table| table.frame)
     }
@@ -352,7 +350,6 @@ impl Rows<'_> {
         }
     }
 
-    /// The segments.
     fn recording(mut self) -> Result<Reading, RecordingError> {
         let kept = match self.map.text.rows {
             None => 0..self.times_s.len(),

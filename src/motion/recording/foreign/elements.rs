@@ -80,7 +80,6 @@ impl Quantity {
         self.facts().0
     }
 
-    /// A key of its table.
     pub(super) fn at(self, key: &str) -> String {
         format!("{}.{key}", self.key())
     }
@@ -158,7 +157,6 @@ pub(super) fn ordered(words: &[String], elements: &[String]) -> Result<Vec<usize
     Ok(out)
 }
 
-/// The elements that one word names.
 pub(super) fn named(word: &str, elements: &[String]) -> Vec<usize> {
     let word = word.trim().to_lowercase();
     let matches = |element: &String| match word.split_once('*') {

@@ -9,25 +9,20 @@ use crate::recording::instant::Instant;
 /// One file or topic.
 #[derive(Debug, Clone, Default)]
 pub(in crate::recording) struct Log {
-    /// The file.
     pub path: PathBuf,
     /// Name of the file in a map, or of the topic; empty for the only file.
     pub name: String,
     /// Column of the clock, in s, that every message of a topic has.
     pub clock: Option<usize>,
-    /// The columns in the order of the file.
     pub columns: Vec<Channel>,
-    /// Whether the columns have names.
     pub is_named: bool,
     /// Line of the first sample, 1 for the first message of a topic.
     pub first_row: usize,
     /// Why a topic is no table; it has no columns then.
     pub fault: Option<String>,
-    /// What reading did to it besides reading.
     pub notes: Vec<String>,
 }
 
-/// One column.
 #[derive(Debug, Clone, Default)]
 pub(in crate::recording) struct Channel {
     /// Its name; empty without a header.
@@ -41,7 +36,6 @@ pub(in crate::recording) struct Channel {
 }
 
 impl Channel {
-    /// A column of this name without values.
     pub fn named(name: &str) -> Self {
         Self {
             name: name.to_owned(),
@@ -59,7 +53,6 @@ impl Channel {
 }
 
 impl Log {
-    /// The columns' names.
     pub fn names(&self) -> Vec<String> {
         let names = self.columns.iter().map(|channel| channel.name.clone());
         names.collect()
@@ -72,7 +65,6 @@ impl Log {
             .map_or(0, |channel| channel.values.len())
     }
 
-    /// Makes these rows, in this order, the rows.
     pub fn choose(&mut self, rows: &[usize]) {
         for column in &mut self.columns {
             column.values = rows.iter().map(|row| column.values[*row]).collect();
@@ -95,7 +87,6 @@ impl Log {
         }
     }
 
-    /// The first columns by name, for messages.
     pub fn summary(&self) -> String {
         const MOST: usize = 6;
         if !self.is_named {

@@ -76,26 +76,19 @@ pub(in crate::recording) fn read_mcap(path: &Path) -> Result<Vec<Log>, Recording
     Ok(logs)
 }
 
-/// How a file ends.
 enum Ended {
-    /// At its end.
     Whole,
-    /// Before it, in words.
     Early(String),
-    /// Before its first message, in words.
     Empty(String),
 }
 
-/// One pass over a file.
 struct Scan<'a, R> {
     source: R,
     topics: &'a mut Topics,
-    /// Bytes read.
     offset: u64,
     /// Checksum of the present section: the data, or the summary behind it.
     section: Crc,
     chunks: usize,
-    /// Bytes of chunks, packed and unpacked.
     packed: u64,
     unpacked: u64,
 }
@@ -113,7 +106,6 @@ impl<'a, R: Read> Scan<'a, R> {
         }
     }
 
-    /// Reads all records.
     fn whole(&mut self, path: &Path) -> Result<Ended, RecordingFault> {
         let before = self.topics.messages;
         if !self.magic(path)? {
@@ -226,7 +218,6 @@ impl<'a, R: Read> Scan<'a, R> {
         }
     }
 
-    /// A file that ends before its end.
     fn ended(&self, before: usize) -> Ended {
         let messages = self.topics.messages - before;
         let (offset, chunks) = (self.offset, self.chunks);
@@ -240,7 +231,6 @@ impl<'a, R: Read> Scan<'a, R> {
         }
     }
 
-    /// The records of a chunk.
     fn chunk(
         &mut self,
         header: &ChunkHeader,
@@ -329,7 +319,6 @@ fn same_checksum(stated: u32, found: u32) -> Result<(), String> {
     }
 }
 
-/// The bytes of a chunk, at most `left`.
 fn unpacked<'a>(
     header: &ChunkHeader,
     data: Cow<'a, [u8]>,
@@ -360,7 +349,6 @@ fn unpacked<'a>(
     exact(Cow::Owned(out), size)
 }
 
-/// Bytes that are as many as a chunk states.
 fn exact(bytes: Cow<'_, [u8]>, size: u64) -> Result<Cow<'_, [u8]>, String> {
     match bytes.len() as u64 == size {
         true => Ok(bytes),

@@ -12,7 +12,6 @@ const MOST_EMPTY: usize = 100_000;
 /// Deepest nesting of messages.
 const MOST_LEVELS: usize = 16;
 
-/// How the bytes of a message are laid out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Layout {
     /// Packed, little endian.
@@ -53,7 +52,6 @@ pub(super) struct Definition {
     types: Vec<(String, Vec<Field>)>,
 }
 
-/// One number of a message.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Value {
     Number(f64),
@@ -61,12 +59,10 @@ pub(super) enum Value {
     Time(i64, u32),
 }
 
-/// The numbers of a message.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Numbers {
     /// Their names, if these are asked for.
     pub names: Vec<String>,
-    /// The numbers.
     pub values: Vec<Value>,
     /// Lengths and names of its lists: messages of one type that agree in them have the same numbers in the same order.
     pub lists: Vec<u8>,
@@ -90,7 +86,6 @@ impl Definition {
         Ok(definition)
     }
 
-    /// Adds a type and its parts; its index.
     fn add(
         &mut self,
         name: &str,
@@ -263,7 +258,6 @@ fn is_constant(rest: &str) -> bool {
     rest[name.len()..].trim_start().starts_with('=')
 }
 
-/// A type without its brackets, and how many there are.
 fn counted(kind: &str) -> Option<(&str, Count)> {
     let Some((base, count)) = kind.split_once('[') else {
         return Some((kind.split("<=").next()?, Count::One));
@@ -302,9 +296,7 @@ struct Cursor<'a> {
     place: usize,
     layout: Layout,
     big_endian: bool,
-    /// Largest alignment.
     align: usize,
-    /// Fields so far.
     fields: usize,
 }
 

@@ -14,13 +14,10 @@ use crate::recording::instant::Instant;
 pub(super) struct Signal {
     /// One row an element in romc's order, one column a sample; a quaternion has four rows, w first.
     pub values: DMatrix<f64>,
-    /// Times of the samples, in s.
     pub times_s: Vec<f64>,
-    /// Line of the first sample.
     pub first_row: usize,
 }
 
-/// A quantity's table in a map, and the log that it speaks of.
 pub(super) struct Source<'a> {
     map: &'a ColumnMap,
     quantity: Quantity,
@@ -63,7 +60,6 @@ impl<'a> Source<'a> {
         }))
     }
 
-    /// The log, and what reading did to it.
     pub fn log(&self) -> &'a Log {
         self.log
     }
@@ -114,7 +110,6 @@ impl<'a> Source<'a> {
         Ok(first.map(|instant| instant.whole.div_euclid(times.per_second)))
     }
 
-    /// Whether so many columns are a quaternion.
     fn is_quaternion(&self, columns: usize) -> bool {
         self.quantity == Quantity::Orientation && columns == QUATERNION.len()
     }
@@ -156,7 +151,6 @@ impl<'a> Source<'a> {
         })
     }
 
-    /// For each column the element that it is.
     fn order(&self, elements: &[String], columns: usize) -> Result<Vec<usize>, RecordingError> {
         let key = self.quantity.at("order");
         let words = match &self.table.order {
@@ -192,7 +186,6 @@ impl<'a> Source<'a> {
         })
     }
 
-    /// A number for each column.
     fn numbers(
         &self,
         factors: &Option<Factors>,
@@ -292,7 +285,6 @@ impl<'a> Source<'a> {
     }
 }
 
-/// The clock of a log.
 struct Times<'a> {
     column: Option<usize>,
     channel: Option<&'a Channel>,

@@ -60,7 +60,6 @@ pub(in crate::recording) fn read_text(
     read_lines(path, Lines::open(path)?, format)
 }
 
-/// [`read_text`] of the lines of a file.
 pub(in crate::recording) fn read_lines(
     path: &Path,
     mut lines: Lines<'_>,
@@ -92,7 +91,6 @@ pub(in crate::recording) fn read_lines(
     }
 }
 
-/// The rows read so far.
 struct Sheet {
     delimiter: Delimiter,
     numbers: NumberReader,
@@ -194,7 +192,6 @@ impl Sheet {
         Ok(())
     }
 
-    /// The fault of a row with another number of cells than the header.
     fn length_fault(&self, row: usize, found: usize) -> RecordingError {
         let columns = &self.log.columns;
         let is_own = self.own.is_some();

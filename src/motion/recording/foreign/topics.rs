@@ -23,27 +23,21 @@ const MOST_ARRANGEMENTS: usize = 64;
 /// of a simulator.
 const MOST_LATE: usize = 20;
 
-/// The topics of the files of a log.
 #[derive(Default)]
 pub(super) struct Topics {
     schemas: BTreeMap<u16, (SchemaHeader, Vec<u8>)>,
-    /// Topics of the channels of the present file.
     channels: BTreeMap<u16, usize>,
     topics: Vec<Topic>,
-    /// Messages read.
     pub messages: usize,
 }
 
-/// A topic by its name and the definition of its messages.
 struct Topic {
     name: String,
     definition: Result<(Layout, Definition), String>,
-    /// Encodings and definition, as declared.
     declared: (String, String, String, Vec<u8>),
     tables: Vec<Table>,
     /// By lists of a message: its table, and the columns of its numbers.
     arrangements: BTreeMap<Vec<u8>, (usize, Vec<usize>)>,
-    /// Messages read.
     arrived: usize,
     fault: Option<String>,
 }
@@ -51,7 +45,6 @@ struct Topic {
 /// Messages with the same names.
 struct Table {
     log: Log,
-    /// Times of recording, ns.
     times_ns: Vec<u64>,
     /// Numbers of the messages within their topic.
     arrivals: Vec<usize>,
@@ -173,7 +166,6 @@ impl Topics {
     }
 }
 
-/// How the messages of a channel are read.
 fn definition(
     channel: &Declared,
     has_schema: bool,
@@ -367,7 +359,6 @@ impl Table {
     }
 }
 
-/// How many of some times are earlier than one before them.
 fn late<T: PartialOrd + Copy>(times: &[T]) -> usize {
     let mut latest = times.first().copied();
     let is_late = |time: &&T| {

@@ -56,7 +56,6 @@ impl Dimension {
         known.map(|(_, factor)| *factor)
     }
 
-    /// The units by name, for messages.
     pub fn names(self) -> String {
         let names: Vec<&str> = self.units().iter().map(|(name, _)| *name).collect();
         names.join(", ")

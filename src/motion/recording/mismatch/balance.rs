@@ -10,7 +10,6 @@ use crate::recording::{Recording, Segment};
 use crate::robot::input_rule::rotation;
 use crate::robot::{BODY_NAMES, BODY_Z, FOOT_DIM, JOINT_DIM, Leg, Robot};
 
-/// Row of the body's height.
 const HEIGHT: usize = BODY_Z;
 /// Shortest flight, and shortest time on the ground in all, that counts, s.
 const LEAST_S: f64 = 0.04;
@@ -35,7 +34,6 @@ pub struct Balance {
     pub acceleration_offset_m_s2: Option<(&'static str, f64)>,
 }
 
-/// Sums of a balance.
 #[derive(Debug, Clone, Copy, Default)]
 struct Sums {
     /// Change of velocity and time in flight.

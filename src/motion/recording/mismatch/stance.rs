@@ -78,7 +78,6 @@ impl fmt::Display for Reading {
     }
 }
 
-/// The columns as they are.
 const AS_RECORDED: Reading = Reading::Legs(Leg::ALL);
 
 /// Coordinates that are easily recorded with the other sign.
@@ -140,7 +139,6 @@ pub(super) fn best_other_reading(recording: &Recording, robot: &Robot) -> Option
     best(of_orders.chain(of_signs))
 }
 
-/// The reading with the least of these figures.
 fn best(judged: impl IntoIterator<Item = (Option<f64>, Reading)>) -> Option<(f64, Reading)> {
     let known = judged
         .into_iter()
@@ -149,7 +147,6 @@ fn best(judged: impl IntoIterator<Item = (Option<f64>, Reading)>) -> Option<(f64
     finite.min_by(|one, other| one.0.total_cmp(&other.0))
 }
 
-/// All orders of the legs.
 pub(super) fn orders() -> Vec<[Leg; FOOT_DIM]> {
     let mut out = Vec::new();
     for code in 0..FOOT_DIM.pow(FOOT_DIM as u32) {
@@ -180,7 +177,6 @@ pub(in crate::recording) fn foot_place(
     place - FOOT_RADIUS_M * inclination * Vector3::new(yaw.cos(), yaw.sin(), 0.0)
 }
 
-/// How far feet on the ground are from where they stand.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Slip {
     absolute: (f64, usize),

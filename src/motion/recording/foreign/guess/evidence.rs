@@ -12,7 +12,6 @@ const UNEXPLAINED: f64 = 0.5;
 /// Times the least residual below which a plainer explanation is preferred.
 const AS_GOOD: f64 = 1.1;
 
-/// A unit and sign for all rows.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Scale {
     pub unit: &'static str,

@@ -33,22 +33,17 @@ const WANTED: &str = "des desired ref reference references cmd cmds command comm
      setpoints goal raw lost temperature mode covariance ff kp kd";
 const TIME: &str = "time timestamp stamp t sec secs seconds clock datetime date";
 
-/// What a name says.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Reading {
     /// The quantity; a quaternion and angles are both orientations.
     pub quantity: Quantity,
     /// The element, in romc's order; of a quaternion 0 is w. The number of elements for the last of those counted from 1.
     pub element: usize,
-    /// Whether the element is one of a quaternion.
     pub is_quaternion: bool,
-    /// Whether the place was counted rather than named.
     pub is_counted: bool,
     /// The words that all elements of one quantity share.
     pub family: String,
-    /// Whether it is something that was asked for rather than measured.
     pub is_wanted: bool,
-    /// Whether the joint is a `hip` without a word for which one.
     pub is_bare_hip: bool,
 }
 
@@ -79,12 +74,10 @@ pub(super) fn words(name: &str) -> Vec<String> {
     out
 }
 
-/// Whether a word is one of some with blanks between them.
 fn is_one(word: &str, of: &str) -> bool {
     of.split(' ').any(|known| known == word)
 }
 
-/// Whether a word is one of quantities.
 pub(super) fn is_quantity(word: &str) -> bool {
     let known = [
         TORQUE,
@@ -105,7 +98,6 @@ pub(super) fn is_wanted(name: &str) -> bool {
     words(name).iter().any(|word| is_one(word, WANTED))
 }
 
-/// Whether a name is one of a clock.
 pub(super) fn is_time(name: &str) -> bool {
     words(name).iter().any(|word| is_one(word, TIME))
 }
@@ -123,7 +115,6 @@ pub(super) fn unit(name: &str, units: &[&'static str]) -> Option<&'static str> {
     found.copied()
 }
 
-/// What the name of a column says, if it says enough.
 pub(super) fn read(name: &str) -> Option<Reading> {
     let mut words = words(name);
     join_pairs(&mut words);
@@ -211,7 +202,6 @@ pub(super) fn read(name: &str) -> Option<Reading> {
     body(&words, axis, number, kind, reading)
 }
 
-/// The number behind a word.
 fn after(words: &[String], known: &str) -> Option<usize> {
     let pair = words.windows(2).find(|pair| is_one(&pair[0], known))?;
     pair[1].parse().ok()
@@ -231,7 +221,6 @@ fn in_list(list: &str, number: usize) -> Option<(Quantity, usize, bool)> {
     })
 }
 
-/// The joint that words name.
 fn joint(words: &[String]) -> Option<usize> {
     let of = |word: &String| JOINTS.iter().position(|known| is_one(word, known));
     let has = |word: &str| words.iter().any(|own| own == word);
@@ -242,7 +231,6 @@ fn joint(words: &[String]) -> Option<usize> {
     words.iter().find_map(of)
 }
 
-/// The element of a quantity of the trunk.
 fn body(
     words: &[String],
     axis: Option<usize>,

@@ -34,7 +34,6 @@ const HIP_SHARE: f64 = 0.3;
 /// Largest movement of feet on the ground in a reading that fits, m.
 const FITS_M: f64 = 0.05;
 
-/// A unit and its factor.
 pub(super) type NamedUnit = (&'static str, f64);
 
 /// How columns are read: units of the trunk's position and the joints' angles, whether joints are grouped by their kind,
@@ -54,7 +53,6 @@ pub(super) struct Reading {
 }
 
 impl Reading {
-    /// With these units, nothing turned or exchanged.
     pub fn plain(position: NamedUnit, joint: NamedUnit) -> Self {
         Self {
             position,
@@ -77,12 +75,10 @@ impl Reading {
         figure(self) < BETTER.0 * figure(other)
     }
 
-    /// Whether feet on the ground stay in place in it.
     pub fn fits(&self) -> bool {
         self.slip_m < FITS_M
     }
 
-    /// The row of a joint among the columns.
     pub fn row(&self, joint: usize) -> usize {
         match self.by_kind {
             true => 4 * (joint % 3) + joint / 3,
@@ -91,7 +87,6 @@ impl Reading {
     }
 }
 
-/// A recording without scales, and the samples of its stances that are looked at.
 pub(super) struct View<'a> {
     robot: &'a Robot,
     recording: &'a Recording,
@@ -150,7 +145,6 @@ impl<'a> View<'a> {
         Some((chosen, all))
     }
 
-    /// A reading with the signs under which feet stay best in place.
     fn signed(&self, position: NamedUnit, joint: NamedUnit, by_kind: bool) -> Option<Reading> {
         let mut reading = Reading {
             by_kind,
@@ -423,7 +417,6 @@ impl<'a> View<'a> {
     }
 }
 
-/// Squared distances of places from their median, summed.
 fn about_median(places: &[Vector3<f64>]) -> f64 {
     let stands = Vector3::from_fn(|axis, _| median(places.iter().map(|place| place[axis])));
     places
@@ -432,7 +425,6 @@ fn about_median(places: &[Vector3<f64>]) -> f64 {
         .sum()
 }
 
-/// The state of a sample in a reading.
 fn state(segment: &Segment, sample: usize, reading: &Reading) -> [f64; STATE_DIM] {
     let raw = segment.state(sample);
     std::array::from_fn(|i| match i {

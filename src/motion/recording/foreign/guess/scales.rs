@@ -26,23 +26,18 @@ const LENGTHS: [&str; 3] = ["m", "cm", "mm"];
 /// Largest pitch for which radians are the first choice.
 const PITCH_RAD: f64 = 1.6;
 
-/// What the scales of a map rest on.
 pub(super) struct Scales {
-    /// Lines by quantity.
     pub lines: Lines,
     /// The order of the joints' columns, if they are counted and grouped by kind.
     pub order: Option<&'static str>,
     pub notes: Vec<String>,
 }
 
-/// How the log is read.
 struct Choice {
-    /// Index among the attitudes.
     attitude: usize,
     reading: Reading,
     /// Signs and unit of the torques, if these carry the robot.
     torques: Option<([f64; JOINT_DIM], NamedUnit)>,
-    /// Other readings that fit as well.
     as_well: Vec<Reading>,
 }
 
@@ -50,7 +45,6 @@ struct Choice {
 type Attitude = (Vec<String>, DMatrix<f64>);
 
 impl Source<'_> {
-    /// The scales of all quantities.
     pub fn scales(&self, robot: &Robot, time: &str) -> Scales {
         let (mut lines, mut notes) = (Lines::new(), Vec::new());
         if let Some(feet) = self.group(Quantity::Feet) {
@@ -132,7 +126,6 @@ impl Source<'_> {
         })
     }
 
-    /// Values of a quantity, none without it.
     fn raw_of(&self, quantity: Quantity) -> DMatrix<f64> {
         match self.group(quantity) {
             Some(group) => self.raw(group),
@@ -160,7 +153,6 @@ impl Source<'_> {
         [first].into_iter().chain(others).map(factor).collect()
     }
 
-    /// The ways in which the trunk's attitude may be read, the first choice first.
     fn attitudes(&self) -> Vec<Attitude> {
         let Some(group) = self.group(Quantity::Orientation) else {
             return Vec::new();
@@ -282,7 +274,6 @@ impl Source<'_> {
         reading
     }
 
-    /// Lines of the joints' quantities.
     fn joints(
         &self,
         reading: &Reading,
@@ -354,7 +345,6 @@ impl Source<'_> {
         })
     }
 
-    /// Lines of the trunk's quantities.
     fn trunk(
         &self,
         own: Vec<String>,
@@ -383,7 +373,6 @@ impl Source<'_> {
         self.place(Some(angles), position, lines);
     }
 
-    /// Lines of the trunk's position and velocity.
     fn place(&self, angles: Option<&DMatrix<f64>>, (unit, factor): NamedUnit, lines: &mut Lines) {
         let Some(group) = self.group(Quantity::BodyPosition) else {
             return;
@@ -442,7 +431,6 @@ fn said(reading: &Reading, as_well: &[Reading]) -> Vec<String> {
     notes
 }
 
-/// The signs of joints, if any is negative.
 fn sign_line(signs: &[f64]) -> Option<String> {
     let negative: Vec<usize> = (0..signs.len()).filter(|i| signs[*i] < 0.0).collect();
     if negative.is_empty() {
@@ -458,7 +446,6 @@ fn sign_line(signs: &[f64]) -> Option<String> {
     Some(format!("sign = {{ {} }}", names.join(", ")))
 }
 
-/// Unit, sign and axes of a velocity of the trunk.
 fn velocity_lines(found: Option<(Scale, Frame)>, of: &str, is_odometry: bool) -> Vec<String> {
     let Some((scale, axes)) = found else {
         let (sign, what) = match is_odometry {
@@ -484,7 +471,6 @@ fn velocity_lines(found: Option<(Scale, Frame)>, of: &str, is_odometry: bool) ->
     lines
 }
 
-/// The order of a quantity of joints whose columns are counted.
 pub(super) fn order_line(order: Option<&str>, group: &Group) -> Option<String> {
     match order {
         Some(order) => Some(format!(

@@ -16,7 +16,6 @@ use super::names::unit;
 use super::scales::{Scales, order_line};
 use crate::robot::Robot;
 
-/// The lines of tables.
 pub(super) type Lines = BTreeMap<Quantity, Vec<String>>;
 
 /// The guessed map of logs; what reading by it gives is not known yet.
@@ -110,7 +109,6 @@ fn quoted(name: &str) -> String {
     serde_json::Value::from(name).to_string()
 }
 
-/// The log and what its names say.
 pub(super) struct Source<'a> {
     pub path: &'a Path,
     pub logs: &'a [Log],
@@ -127,7 +125,6 @@ impl Source<'_> {
         self.groups.iter().find(|group| group.quantity == quantity)
     }
 
-    /// The unit that the names of a group carry.
     pub fn told(&self, group: &Group, units: &[&'static str]) -> Option<&'static str> {
         let columns = &self.logs[group.log].columns;
         unit(&columns[group.columns[0]].name, units)
@@ -148,7 +145,6 @@ impl Source<'_> {
         })
     }
 
-    /// Times of a log in s.
     pub fn times_s(&self, log: usize) -> Option<Vec<f64>> {
         let (log, clock) = (&self.logs[log], self.clock?);
         let (column, factor) = match log.clock {
@@ -162,7 +158,6 @@ impl Source<'_> {
         Some(times.into_iter().map(|time| factor * time).collect())
     }
 
-    /// The file and the columns of a group.
     pub fn columns(&self, group: &Group) -> Vec<String> {
         let log = &self.logs[group.log];
         let mut lines = Vec::new();
