@@ -4,6 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use nalgebra::{DMatrix, Vector3};
+use romc::files::Overwrite;
 use romc::recording::foreign::guess::guess;
 use romc::recording::{self, Clocks, ColumnMap, Reader, Recording, RecordingFault, Segment};
 use romc::robot::input_rule::rotation;
@@ -375,7 +376,7 @@ fn cases(folder: &Path, s: &Segment) -> Vec<Case> {
 
     // ROS 2 messages.
     let path = folder.join("jump.mcap");
-    recording::write_mcap(&path, s, None).unwrap();
+    recording::write_mcap(&path, s, None, Overwrite::Replace).unwrap();
     let joint = |key: &str, field: &str| {
         format!(
             "[joint.{key}]\ntopic = \"/joint_states\"\ncolumns = \"{field}[{{leg}}.{{joint}}]\"\n"
@@ -785,7 +786,7 @@ fn mcap_files_are_read_without_a_map_and_damaged_ones_are_refused() {
     let path = folder.path().join("jump.mcap");
     let jump = jump();
     let inputs = DMatrix::from_fn(18, jump.len(), |i, k| (i * k) as f64);
-    recording::write_mcap(&path, &jump, Some(&inputs)).unwrap();
+    recording::write_mcap(&path, &jump, Some(&inputs), Overwrite::Replace).unwrap();
     let reading = Reader::new(None, Clocks::Recorded).read(&path).unwrap();
     let (state, velocity, contact) = difference(&reading.recording, &jump);
     assert!(

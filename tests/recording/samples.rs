@@ -1,6 +1,7 @@
 //! What is done with samples after they are read: inputs, preprocessing, smoothing, writing, notes.
 
 use nalgebra::DMatrix;
+use romc::files::Overwrite;
 use romc::recording::{Recording, RecordingFault, Segment};
 use romc::robot::{JOINT_DIM, Robot, STATE_DIM};
 
@@ -201,7 +202,7 @@ mod writing {
 }
 
 mod reading {
-    use romc::recording::{Mended, Reader, Reading, ReadingNotes, WriteOptions, write_with};
+    use romc::recording::{Mended, Reader, Reading, ReadingNotes, WriteOptions, write_as};
 
     use super::*;
 
@@ -240,7 +241,7 @@ mod reading {
                 accelerations,
                 ..WriteOptions::default()
             };
-            write_with(&path, &recording, None, &options).unwrap();
+            write_as(&path, &recording, None, &options, Overwrite::Replace).unwrap();
             let notes = Reader::default().read(&path).unwrap().notes;
             let expected = ["accelerations are differences of velocities"];
             assert_eq!(notes, expected[usize::from(accelerations)..]);

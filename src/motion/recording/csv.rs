@@ -8,8 +8,7 @@ use std::path::Path;
 
 use super::columns::Column;
 use super::error::RecordingError;
-use super::foreign::map::TextFormat;
-use super::foreign::read_lines;
+use super::foreign::{TextFormat, read_lines};
 use super::lines::Lines;
 use super::reader::Reading;
 use super::segment::{Recording, Segment};

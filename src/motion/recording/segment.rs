@@ -205,25 +205,16 @@ impl Segment {
     }
 
     /// Joint angles of a sample, in rad.
-    ///
-    /// # Panics
-    /// If there is no such sample.
     pub fn joints(&self, sample: usize) -> [f64; JOINT_DIM] {
         std::array::from_fn(|i| self.x[(i, sample)])
     }
 
     /// State of a sample, in rad and m.
-    ///
-    /// # Panics
-    /// If there is no such sample.
     pub fn state(&self, sample: usize) -> [f64; STATE_DIM] {
         std::array::from_fn(|i| self.x[(i, sample)])
     }
 
     /// Joint torques of a sample, in N m.
-    ///
-    /// # Panics
-    /// If there is no such sample.
     pub fn torque(&self, sample: usize) -> [f64; JOINT_DIM] {
         std::array::from_fn(|i| self.torque_nm[(i, sample)])
     }
@@ -277,11 +268,7 @@ impl Segment {
         self.input_of(rule, &self.torque_nm)
     }
 
-    /// The same of torques that the robot's motors can give: recorded ones beyond a limit count as
-    /// the limit.
-    ///
-    /// # Errors
-    /// As [`Segment::input`].
+    /// [`Segment::input`] of [`Segment::torque_within_limits`].
     pub fn input_within_limits(&self, rule: &InputRule) -> Result<DMatrix<f64>, RecordingError> {
         self.input_of(rule, &self.torque_within_limits(rule.robot()))
     }
@@ -325,9 +312,6 @@ impl Segment {
     }
 
     /// The samples of a range as a segment of their own.
-    ///
-    /// # Panics
-    /// If the range leaves the segment, as indexing a slice does.
     pub fn slice(&self, range: Range<usize>) -> Segment {
         let (time_s, feet) = (&self.time_s[range.clone()], &self.feet[range.clone()]);
         Segment {

@@ -52,24 +52,12 @@ impl Default for WriteOptions {
 /// # Errors
 /// [`RecordingFault::Io`]. An existing file is replaced.
 pub fn write(path: &Path, recording: &Recording) -> Result<(), RecordingError> {
-    write_with(path, recording, None, &WriteOptions::default())
+    let options = WriteOptions::default();
+    write_as(path, recording, None, &options, Overwrite::Replace)
 }
 
 /// [`write()`] with a choice of notation and columns, and, if given, the inputs of each segment (18 x samples), as columns
 /// `Input fr.hx` and so on, which reading ignores.
-///
-/// # Errors
-/// As [`write()`].
-pub fn write_with(
-    path: &Path,
-    recording: &Recording,
-    inputs: Option<&[DMatrix<f64>]>,
-    options: &WriteOptions,
-) -> Result<(), RecordingError> {
-    write_as(path, recording, inputs, options, Overwrite::Replace)
-}
-
-/// [`write_with`], which may not replace a file.
 ///
 /// # Errors
 /// As [`write()`], and for a file that is there and may not be replaced.
@@ -95,20 +83,8 @@ pub fn write_as(
 /// Writes a segment as an MCAP file: joint states, odometry, contact, and if given the inputs (18 x samples).
 ///
 /// # Errors
-/// [`RecordingFault::Io`]. An existing file is replaced.
+/// As [`write_as`].
 pub fn write_mcap(
-    path: &Path,
-    segment: &Segment,
-    inputs: Option<&DMatrix<f64>>,
-) -> Result<(), RecordingError> {
-    write_mcap_as(path, segment, inputs, Overwrite::Replace)
-}
-
-/// [`write_mcap`], which may not replace a file.
-///
-/// # Errors
-/// As it, and for a file that is there and may not be replaced.
-pub fn write_mcap_as(
     path: &Path,
     segment: &Segment,
     inputs: Option<&DMatrix<f64>>,
@@ -121,7 +97,7 @@ pub fn write_mcap_as(
     written.map_err(|source| RecordingFault::io("write", source).of(path))
 }
 
-/// Writes a recording as text, its inputs as [`write_with`].
+/// Writes a recording as text, its inputs as [`write_as`].
 ///
 /// The wrench is written if every segment carries one.
 ///

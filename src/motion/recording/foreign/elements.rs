@@ -6,24 +6,17 @@ use crate::robot::{JOINT_DIM, JOINT_NAMES, Leg, STATE_DIM};
 
 /// A quantity that a map places.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Quantity {
-    /// Joint angles.
+pub(super) enum Quantity {
     JointPosition,
-    /// Joint velocities.
     JointVelocity,
-    /// Joint accelerations.
     JointAcceleration,
-    /// Joint torques.
     JointTorque,
-    /// Position of the trunk.
     BodyPosition,
     /// Attitude of the trunk: a quaternion, or roll, pitch and yaw.
     Orientation,
-    /// Velocity of the trunk.
     BodyVelocity,
     /// Angular velocity of the trunk, or rates of roll, pitch and yaw.
     AngularVelocity,
-    /// Acceleration of the trunk.
     BodyAcceleration,
     /// Second derivatives of roll, pitch and yaw.
     AngularAcceleration,
@@ -32,7 +25,7 @@ pub enum Quantity {
 }
 
 impl Quantity {
-    /// All, in the order of a map.
+    /// In the order of a map.
     pub const ALL: [Self; 11] = [
         Self::JointPosition,
         Self::JointVelocity,
@@ -48,7 +41,7 @@ impl Quantity {
     ];
 
     /// Accelerations, each with the velocity whose derivative it is.
-    pub(super) const ACCELERATIONS: [(Self, Self); 3] = [
+    pub const ACCELERATIONS: [(Self, Self); 3] = [
         (Self::JointAcceleration, Self::JointVelocity),
         (Self::BodyAcceleration, Self::BodyVelocity),
         (Self::AngularAcceleration, Self::AngularVelocity),
@@ -80,24 +73,24 @@ impl Quantity {
         self.facts().0
     }
 
-    pub(super) fn at(self, key: &str) -> String {
+    pub fn at(self, key: &str) -> String {
         format!("{}.{key}", self.key())
     }
 
     /// What its units measure.
-    pub(super) const fn dimension(self) -> Dimension {
+    pub const fn dimension(self) -> Dimension {
         self.facts().1
     }
 
     /// The recording's column of an element.
-    pub(super) fn column(self, element: usize) -> Column {
+    pub fn column(self, element: usize) -> Column {
         let (_, _, column, first) = self.facts();
         debug_assert!(first + element < STATE_DIM, "w of a quaternion");
         column(first + element)
     }
 
     /// Whether a recording cannot be without it.
-    pub(super) const fn is_required(self) -> bool {
+    pub const fn is_required(self) -> bool {
         matches!(
             self,
             Self::JointPosition
@@ -109,7 +102,7 @@ impl Quantity {
     }
 
     /// Whether the quantity is one of joints.
-    pub(super) const fn is_of_joints(self) -> bool {
+    pub const fn is_of_joints(self) -> bool {
         matches!(
             self,
             Self::JointPosition | Self::JointVelocity | Self::JointAcceleration | Self::JointTorque
@@ -117,7 +110,7 @@ impl Quantity {
     }
 
     /// Names of its elements in romc's order; a quaternion has [`QUATERNION`] instead.
-    pub(super) fn elements(self) -> Vec<String> {
+    pub fn elements(self) -> Vec<String> {
         let owned = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
         match self {
             _ if self.is_of_joints() => owned(&JOINT_NAMES),

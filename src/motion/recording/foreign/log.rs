@@ -75,7 +75,7 @@ impl Log {
     }
 
     /// The column of a name or number: an exact name before one that differs in case and blanks.
-    pub fn column(&self, name: &Name) -> Option<usize> {
+    pub(in crate::recording::foreign) fn column(&self, name: &Name) -> Option<usize> {
         match name {
             Name::Number(number) => number.checked_sub(1).filter(|i| *i < self.columns.len()),
             Name::Text(text) => {

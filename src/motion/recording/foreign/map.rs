@@ -21,29 +21,26 @@ use super::elements::Quantity;
 use crate::files::read_toml;
 use crate::recording::error::{RecordingError, RecordingFault};
 
-/// A map as its file says it.
+/// A map as its file states it.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ColumnMap {
-    /// How text files are laid out.
-    pub text: TextFormat,
+    pub(super) text: TextFormat,
     /// The clock of all tables that have none of their own.
-    pub time: TimeMap,
-    /// Words that stand for legs, joints and axes in patterns of names.
-    pub names: Names,
+    pub(super) time: TimeMap,
+    pub(super) names: Names,
     joint: JointTables,
     body: BodyTables,
     feet: Option<Table>,
     /// The file that the map was read from, for messages.
     #[serde(skip)]
-    pub file: String,
+    pub(super) file: String,
 }
 
 /// How text files are laid out; what is absent is found from the file.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct TextFormat {
-    /// Separator of cells.
+pub(in crate::recording) struct TextFormat {
     pub delimiter: Option<Delimiter>,
     /// Whether the first line has names.
     pub header: Option<bool>,
@@ -55,48 +52,41 @@ pub struct TextFormat {
     pub rows: Option<[usize; 2]>,
     /// romc's own columns: none is left to guess, and each cell that is read has a finite number.
     #[serde(skip)]
-    pub(in crate::recording) own: bool,
+    pub own: bool,
 }
 
 /// Separator of cells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Delimiter {
-    /// One tab.
+pub(in crate::recording) enum Delimiter {
     Tab,
     /// Any number of blanks or tabs.
     Blank,
-    /// `,`
     Comma,
-    /// `;`
     Semicolon,
 }
 
-/// The clock.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct TimeMap {
-    /// Its column; absent with `sample_time_s`.
+pub(super) struct TimeMap {
+    /// Absent with `sample_time_s`.
     pub column: Option<Name>,
-    /// Its unit, s unless given; dates and times of day are found by themselves.
+    /// [default: s]; dates and times of day are found by themselves.
     pub unit: Option<String>,
-    /// Distance of samples without a clock, in s.
+    /// Distance of samples without a clock.
     pub sample_time_s: Option<f64>,
-    /// Even steps to bring the recording to, in s.
+    /// Even steps to bring the recording to.
     pub resample_s: Option<f64>,
-    /// Largest distance between samples of a topic that is interpolated, in s; 0.05 unless given.
+    /// Largest distance between samples of a topic that is interpolated [default: 0.05].
     pub max_gap_s: Option<f64>,
 }
 
 /// Words that stand for `{leg}`, `{joint}`, `{axis}` in patterns of names, in romc's order.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct Names {
-    /// fr, fl, rr, rl.
+pub(super) struct Names {
     pub legs: [String; 4],
-    /// hx, hy, kn.
     pub joints: [String; 3],
-    /// x, y, z.
     pub axes: [String; 3],
 }
 
@@ -133,85 +123,72 @@ struct BodyTables {
 /// Where one quantity stands: `value = sign x unit x raw + offset`.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Table {
-    /// Columns: names, numbers from 1, ranges such as `"4..6"`, or one pattern.
+pub(super) struct Table {
+    /// Names, numbers from 1, ranges such as `"4..6"`, or one pattern.
     pub columns: Columns,
-    /// The file or topic that they are in; the only one unless given.
+    /// The file or topic that they are in [default: the only one].
     #[serde(alias = "topic")]
     pub file: Option<String>,
     /// Column of a clock of their own.
     pub time: Option<Name>,
-    /// Unit of that clock.
     pub time_unit: Option<String>,
-    /// Added to the clock, in s.
+    /// Added to the clock.
     #[serde(default)]
     pub time_offset_s: f64,
-    /// Unit; SI unless given.
+    /// [default: SI]
     pub unit: Option<String>,
-    /// 1 or -1: for all, for each column, or by the names of elements.
+    /// 1 or -1.
     pub sign: Option<Factors>,
-    /// Added after sign and unit, in SI units: for all, for each column, or by the names of elements.
+    /// Added after sign and unit, in SI units.
     pub offset: Option<Factors>,
-    /// What each column is; romc's order unless given.
+    /// What each column is [default: romc's order].
     pub order: Option<Words>,
-    /// Axes of velocities: `world` (unless given) or `body`; of angular velocities also `angles`, rates of
-    /// roll, pitch and yaw (unless given).
+    /// Axes of velocities [default: `world`]; of angular velocities [default: `angles`].
     pub frame: Option<Frame>,
-    /// `start`: x and y count from the first sample.
     pub origin: Option<Origin>,
     /// Force from which a foot is on the ground, in the table's unit; absent for flags.
     pub threshold: Option<f64>,
-    /// Force below which it is in the air again; the threshold unless given.
+    /// Force below which it is in the air again [default: the threshold].
     pub release: Option<f64>,
 }
 
 /// A column: its name, or its number from 1.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 #[serde(untagged)]
-pub enum Name {
-    /// Counted from 1.
+pub(super) enum Name {
     Number(usize),
-    /// As in the header.
     Text(String),
 }
 
-/// The columns of a quantity.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 #[serde(untagged)]
-pub enum Columns {
+pub(super) enum Columns {
     /// One name, range or pattern.
     One(Name),
-    /// Several.
     Many(Vec<Name>),
 }
 
 /// Words, also in one text with blanks between them.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 #[serde(untagged)]
-pub enum Words {
-    /// With blanks.
+pub(super) enum Words {
     One(String),
-    /// One by one.
     Many(Vec<String>),
 }
 
-/// A number for all columns, for each, or by name (`*.kn`).
+/// A number for all columns, for each in their order, or by the names of elements (`*.kn`).
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(untagged)]
-pub enum Factors {
-    /// For all.
+pub(super) enum Factors {
     All(f64),
-    /// For each column, in the order of the columns.
     Each(Vec<f64>),
-    /// By the names of elements.
     Named(BTreeMap<String, f64>),
 }
 
 /// Axes of a velocity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Frame {
-    /// Fixed axes.
+pub(super) enum Frame {
     World,
     /// The trunk's own.
     Body,
@@ -222,7 +199,7 @@ pub enum Frame {
 /// Where positions count from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Origin {
+pub(super) enum Origin {
     /// The first sample, for x and y.
     Start,
     /// As logged.
@@ -256,7 +233,7 @@ impl ColumnMap {
     }
 
     /// Where a quantity stands.
-    pub fn table(&self, quantity: Quantity) -> Option<&Table> {
+    pub(super) fn table(&self, quantity: Quantity) -> Option<&Table> {
         let (joint, body) = (&self.joint, &self.body);
         match quantity {
             Quantity::JointPosition => &joint.position,

@@ -7,16 +7,14 @@
 //! `assemble` brings all quantities to one clock, turns quaternions and rates of the body's own axes
 //! into roll, pitch, yaw and their rates (`attitude`), and makes segments; `guess` writes a first map.
 
-pub mod guess;
-pub mod map;
-
 mod assemble;
 mod attitude;
 mod bag;
 mod elements;
-
+pub mod guess;
 mod interpolate;
 mod log;
+mod map;
 mod map_checks;
 mod mcap;
 mod mcap_write;
@@ -28,6 +26,8 @@ mod units;
 
 pub(super) use assemble::assemble;
 pub(super) use attitude::angles_of_quaternions;
+pub use map::ColumnMap;
+pub(super) use map::TextFormat;
 pub(super) use mcap::{is_mcap, read_mcap};
 pub(super) use mcap_write::write_mcap;
 pub use mcap_write::{BODY_TOPIC, FEET_TOPIC, INPUT_TOPIC, JOINT_TOPIC};
