@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use super::check::{Finding, check};
 use super::condition::{ConditionOptions, SmoothedRows, condition};
 use super::error::{RecordingError, RecordingFault};
-use super::mismatch::{Balance, Mismatch, MismatchKind, contradiction, mismatches};
+use super::mismatch::{Balance, Mismatch, contradiction, mismatches};
 use super::reader::{Clocks, Reader, Reading, ReadingNotes};
 use super::segment::{Recording, Segment};
 use super::smoothing::SavitzkyGolay;
@@ -124,7 +124,7 @@ fn read_file(
         let path = recording.path.clone();
         let findings = check(&recording, robot);
         for found in mismatches(&recording, robot) {
-            if found.kind == MismatchKind::Fallen {
+            if found.kind == "fallen" {
                 return Err(RecordingFault::Contradiction(found.words).of(&path));
             }
             set.mismatches.push((path.clone(), found));
