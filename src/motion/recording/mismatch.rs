@@ -21,8 +21,9 @@ use super::preprocess::{differences, median};
 use super::segment::Recording;
 use crate::robot::{GRAVITY_M_S2, JOINT_DIM, Leg, Robot, STATE_DIM};
 pub use balance::Balance;
+pub(super) use balance::hip_torque;
 use stance::{Slip, best_other_place, best_other_reading};
-pub(super) use stance::{foot_place, stances};
+pub(super) use stance::{foot_place, median_place, stances};
 
 /// Largest root mean square of the places of feet on the ground about their medians, m.
 const SLIP_M: f64 = 0.025;

@@ -230,7 +230,7 @@ impl Stances {
                     foot_place(robot, leg, &x, true)
                 };
                 let places: Vec<Vector3<f64>> = samples.clone().map(place).collect();
-                let stands = Vector3::from_fn(|axis, _| median(places.iter().map(|p| p[axis])));
+                let stands = median_place(&places);
                 let about = samples.clone().zip(places);
                 moved.extend(about.map(|(sample, place)| (sample, leg, from, place - stands)));
             }
@@ -263,6 +263,10 @@ impl Stances {
             }
         }
     }
+}
+
+pub(in crate::recording) fn median_place(places: &[Vector3<f64>]) -> Vector3<f64> {
+    Vector3::from_fn(|axis, _| median(places.iter().map(|place| place[axis])))
 }
 
 fn root_mean((sum, count): (f64, usize)) -> Option<f64> {

@@ -3,11 +3,10 @@
 //!
 //! Everything is tried on one recording that is read without scales; its rows are scaled here.
 
-use nalgebra::{Rotation3, Unit, Vector3};
+use nalgebra::Vector3;
 
 use super::super::units::Dimension;
-use crate::recording::mismatch::{foot_place, stances};
-use crate::recording::preprocess::median;
+use crate::recording::mismatch::{foot_place, hip_torque, median_place, stances};
 use crate::recording::segment::stretches;
 use crate::recording::{Recording, Segment};
 use crate::robot::input_rule::rotation;
@@ -210,20 +209,15 @@ impl<'a> View<'a> {
     fn motion_m(&self, reading: &Reading) -> f64 {
         let (mut sum, mut count) = (0.0, 0);
         for (segment, leg, samples) in &self.stances {
-            let stiff = samples
-                .first()
-                .map(|sample| state(segment, *sample, reading));
-            let places = samples
-                .iter()
-                .zip(stiff.iter().cycle())
-                .map(|(sample, stiff)| {
-                    let mut x = state(segment, *sample, reading);
-                    x[..JOINT_DIM].copy_from_slice(&stiff[..JOINT_DIM]);
-                    foot_place(self.robot, *leg, &x, true)
-                });
-            let places: Vec<Vector3<f64>> = places.collect();
-            sum += about_median(&places);
-            count += places.len();
+            let mut states = states(segment, samples, reading);
+            if let Some((first, others)) = states.split_first_mut() {
+                let stiff = &first[..JOINT_DIM];
+                others
+                    .iter_mut()
+                    .for_each(|x| x[..JOINT_DIM].copy_from_slice(stiff));
+            }
+            sum += self.about_median(*leg, &states);
+            count += samples.len();
         }
         (sum / f64::from(u32::try_from(count).unwrap_or(u32::MAX).max(1))).sqrt()
     }
@@ -231,30 +225,33 @@ impl<'a> View<'a> {
     /// Squared distances of a leg's foot from where it stands, summed, and their number.
     fn moved(&self, reading: &Reading, leg: Leg) -> (f64, usize) {
         let (mut sum, mut count) = (0.0, 0);
-        let limits = self.robot.joint_limit_rad();
+        let of_leg = 3 * leg.index()..3 * leg.index() + 3;
+        let limits = &self.robot.joint_limit_rad()[of_leg.clone()];
         for (segment, _, samples) in self.stances.iter().filter(|(_, own, _)| *own == leg) {
-            let mut outside = 0;
-            let places: Vec<Vector3<f64>> = (samples.iter())
-                .map(|&sample| {
-                    let x = state(segment, sample, reading);
-                    outside += (0..3)
-                        .filter(|kind| {
-                            let joint = 3 * leg.index() + kind;
-                            let (low, high) = limits[joint];
-                            !(low - 0.1..=high + 0.1).contains(&x[joint])
-                        })
-                        .count();
-                    foot_place(self.robot, leg, &x, true)
-                })
-                .collect();
-            sum += about_median(&places);
+            let states = states(segment, samples, reading);
+            let angles = states
+                .iter()
+                .flat_map(|x| joints_of(leg, x).into_iter().zip(limits));
+            let outside = angles.filter(|(q, (low, high))| !(low - 0.1..=high + 0.1).contains(q));
+            let outside = outside.count();
+            sum += self.about_median(leg, &states);
             sum += OUTSIDE_M * OUTSIDE_M * outside as f64;
-            count += places.len();
+            count += samples.len();
         }
-        let turned = (0..3)
-            .filter(|kind| reading.signs[3 * leg.index() + kind] < 0.0)
-            .count();
-        (sum + TURNED_M * TURNED_M * (turned * count) as f64, count)
+        let turned = reading.signs[of_leg].iter().filter(|sign| **sign < 0.0);
+        (
+            sum + TURNED_M * TURNED_M * (turned.count() * count) as f64,
+            count,
+        )
+    }
+
+    /// Squared distances of the places of a leg's foot in these states from their median, summed.
+    fn about_median(&self, leg: Leg, states: &[[f64; STATE_DIM]]) -> f64 {
+        let places = states.iter().map(|x| foot_place(self.robot, leg, x, true));
+        let places: Vec<Vector3<f64>> = places.collect();
+        let stands = median_place(&places);
+        let squares = places.iter().map(|place| (place - stands).norm_squared());
+        squares.sum()
     }
 
     /// Signs of the torques in romc's order and their unit: those under which feet carry the body; none where they carry
@@ -363,13 +360,9 @@ impl<'a> View<'a> {
         x: &[f64; STATE_DIM],
         reading: &Reading,
     ) -> Option<(nalgebra::Matrix3<f64>, [f64; 3])> {
-        let first = 3 * leg.index();
-        let map = self
-            .robot
-            .damped_force_map(leg, &[x[first], x[first + 1], x[first + 2]])
-            .ok()?;
+        let map = (self.robot.damped_force_map(leg, &joints_of(leg, x))).ok()?;
         let torque = |kind: usize| {
-            let joint = first + kind;
+            let joint = 3 * leg.index() + kind;
             reading.signs[joint] * segment.torque_nm[(reading.row(joint), sample)]
         };
         Some((map, std::array::from_fn(torque)))
@@ -388,17 +381,8 @@ impl<'a> View<'a> {
                 };
                 let force =
                     map.column(1) * (signs[0] * tau[1]) + map.column(2) * (signs[1] * tau[2]);
-                let first = 3 * leg.index();
-                let jacobian = self
-                    .robot
-                    .foot_jacobian(*leg, &[x[first], x[first + 1], x[first + 2]]);
                 // What flexion and knee give lies in the leg's plane.
-                let links = self.robot.geometry(*leg).links();
-                let axis = Unit::new_normalize(links.abduction);
-                let normal = Rotation3::from_axis_angle(&axis, x[first]) * links.flexion;
-                let lever = -jacobian
-                    .column(0)
-                    .dot(&(force - normal * normal.dot(&force)));
+                let lever = hip_torque(self.robot, *leg, &joints_of(*leg, &x), &force);
                 *product += tau[0] * lever;
                 *square += lever * lever;
             }
@@ -417,12 +401,13 @@ impl<'a> View<'a> {
     }
 }
 
-fn about_median(places: &[Vector3<f64>]) -> f64 {
-    let stands = Vector3::from_fn(|axis, _| median(places.iter().map(|place| place[axis])));
-    places
-        .iter()
-        .map(|place| (place - stands).norm_squared())
-        .sum()
+fn joints_of(leg: Leg, x: &[f64; STATE_DIM]) -> [f64; 3] {
+    std::array::from_fn(|kind| x[3 * leg.index() + kind])
+}
+
+fn states(segment: &Segment, samples: &[usize], reading: &Reading) -> Vec<[f64; STATE_DIM]> {
+    let of = |sample: &usize| state(segment, *sample, reading);
+    samples.iter().map(of).collect()
 }
 
 fn state(segment: &Segment, sample: usize, reading: &Reading) -> [f64; STATE_DIM] {
