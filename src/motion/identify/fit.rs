@@ -11,7 +11,6 @@ use nalgebra::{Cholesky, DMatrix, DVector, SMatrix, SVector};
 use super::parameters::{DELAY, GRAVITY, INVERSE_MASS, NOT_NEGATIVE, PARAMETER_DIM, Prior};
 use super::windows::{Group, OVERLAP, Row};
 
-/// Unknowns, per mass except gravity.
 pub type Estimate = SVector<f64, PARAMETER_DIM>;
 type Square = SMatrix<f64, PARAMETER_DIM, PARAMETER_DIM>;
 
@@ -125,7 +124,6 @@ pub fn residual(row: &Row, estimate: &Estimate, mass_kg: f64) -> f64 {
     left(row, mass_kg) - product
 }
 
-/// The left side per mass: joint equations are divided by it.
 fn left(row: &Row, mass_kg: f64) -> f64 {
     match row.group {
         Group::Contact(_) | Group::Flight(_) => row.left,

@@ -35,7 +35,6 @@ const SIDEWAYS: usize = 1;
 /// Speed that a joint in the air keeps over a window for the same reason, rad/s.
 const TURNING_RAD_S: f64 = 0.15;
 
-/// Which equation a row is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Group {
     /// Trunk's acceleration along an axis (x, y, z) with feet on the ground.
@@ -50,7 +49,6 @@ impl Group {
     /// Number of groups.
     pub const COUNT: usize = 9;
 
-    /// Place among the groups.
     pub fn index(self) -> usize {
         match self {
             Self::Contact(axis) => axis,
@@ -60,14 +58,11 @@ impl Group {
     }
 }
 
-/// One equation over a window.
 #[derive(Debug, Clone)]
 pub struct Row {
-    /// Coefficients of the unknowns.
     pub coefficients: [f64; PARAMETER_DIM],
     /// Left side: m/s^2, or N m for a joint.
     pub left: f64,
-    /// Which equation.
     pub group: Group,
     /// Block of time that it belongs to, counted over all segments.
     pub block: usize,
@@ -75,10 +70,8 @@ pub struct Row {
     pub moving: bool,
 }
 
-/// The windows of all segments.
 #[derive(Debug, Clone, Default)]
 pub struct Windows {
-    /// All equations.
     pub rows: Vec<Row>,
     /// The segment that each block lies in, counted from zero.
     pub blocks: Vec<usize>,

@@ -337,14 +337,6 @@ impl Source<'_> {
         }
     }
 
-    /// Whether a velocity is the twist of an odometry, which is in the body's frame unless the numbers show another.
-    fn is_odometry(&self, quantity: Quantity) -> bool {
-        self.group(quantity).is_some_and(|group| {
-            let first = &self.logs[group.log].columns[group.columns[0]];
-            first.name.starts_with("twist.twist.")
-        })
-    }
-
     fn trunk(
         &self,
         own: Vec<String>,
@@ -353,22 +345,14 @@ impl Source<'_> {
         lines: &mut Lines,
     ) {
         lines.insert(Quantity::Orientation, own);
-        let group = self.group(Quantity::Orientation);
-        if let Some((raw, times)) =
-            group.and_then(|group| self.beside(Quantity::AngularVelocity, group))
-        {
+        if let Some(group) = self.group(Quantity::Orientation) {
             let mut own = angles.clone();
             unwrap(&mut own);
-            let rates = slopes(&times, &own);
-            let is_odometry = self.is_odometry(Quantity::AngularVelocity);
-            let frames = match is_odometry {
-                true => [Frame::Body, Frame::Angles, Frame::World],
-                false => [Frame::Angles, Frame::Body, Frame::World],
-            };
-            let turned = |frame| angle_rates(&own, &raw, frame).ok();
-            let scale = axes(frames, turned, &rates, &ANGLE[..2]);
-            let own = velocity_lines(scale, "the angles", is_odometry);
-            lines.insert(Quantity::AngularVelocity, own);
+            let turned = |raw: &DMatrix<f64>, frame| angle_rates(&own, raw, frame).ok();
+            let frames = [Frame::Angles, Frame::Body, Frame::World];
+            let of = (group, &own, "the angles");
+            let velocity = (Quantity::AngularVelocity, &ANGLE[..2]);
+            self.velocity(velocity, of, &frames, turned, lines);
         }
         self.place(Some(angles), position, lines);
     }
@@ -381,22 +365,41 @@ impl Source<'_> {
         let height = reach(values.row(2).iter().copied());
         let line = unit_line(unit, &format!("   # z reaches {height:.3}"));
         lines.insert(Quantity::BodyPosition, vec![line]);
-        if let Some((raw, times)) = self.beside(Quantity::BodyVelocity, group) {
-            let rates = slopes(&times, &(values * factor));
-            let angles = angles.filter(|angles| angles.ncols() == raw.ncols());
-            let turned = |frame| match frame {
-                Frame::Body => Some(in_world(angles?, &raw)),
-                Frame::World | Frame::Angles => Some(raw.clone()),
-            };
-            let is_odometry = self.is_odometry(Quantity::BodyVelocity);
-            let frames = match is_odometry {
-                true => [Frame::Body, Frame::World],
-                false => [Frame::World, Frame::Body],
-            };
-            let scale = axes(frames, turned, &rates, Dimension::Length.units());
-            let own = velocity_lines(scale, "the position", is_odometry);
-            lines.insert(Quantity::BodyVelocity, own);
-        }
+        let turned = |raw: &DMatrix<f64>, frame| match frame {
+            Frame::Body => {
+                let angles = angles.filter(|angles| angles.ncols() == raw.ncols())?;
+                Some(in_world(angles, raw))
+            }
+            Frame::World | Frame::Angles => Some(raw.clone()),
+        };
+        let velocity = (Quantity::BodyVelocity, Dimension::Length.units());
+        let of = (group, &(values * factor), "the position");
+        self.velocity(velocity, of, &[Frame::World, Frame::Body], turned, lines);
+    }
+
+    /// Lines of a velocity of the trunk, whose positions have this group and these values: unit, sign and axes, of
+    /// `frames` the first that fits nearly as well as the best.
+    fn velocity(
+        &self,
+        (velocity, units): (Quantity, &[NamedUnit]),
+        (group, positions, of): (&Group, &DMatrix<f64>, &str),
+        frames: &[Frame],
+        turned: impl Fn(&DMatrix<f64>, Frame) -> Option<DMatrix<f64>>,
+        lines: &mut Lines,
+    ) {
+        let Some((raw, times)) = self.beside(velocity, group) else {
+            return;
+        };
+        // The twist of an odometry is in the body's frame unless the numbers show another.
+        let is_odometry = self.group(velocity).is_some_and(|group| {
+            let first = &self.logs[group.log].columns[group.columns[0]];
+            first.name.starts_with("twist.twist.")
+        });
+        let mut frames = frames.to_vec();
+        frames.sort_by_key(|frame| is_odometry && *frame != Frame::Body);
+        let rates = slopes(&times, positions);
+        let found = axes(&frames, |frame| turned(&raw, frame), &rates, units);
+        lines.insert(velocity, velocity_lines(found, of, is_odometry));
     }
 }
 
