@@ -21,7 +21,7 @@ const WINDOW_S: f64 = 0.03;
 /// Distance of windows from a change of the feet on the ground, s.
 const MARGIN_S: f64 = 0.02;
 /// Windows a window's length: neighbours overlap.
-pub const OVERLAP: usize = 4;
+pub(crate) const OVERLAP: usize = 4;
 /// Length of the blocks that are left out in turn for standard errors, s.
 const BLOCK_S: f64 = 0.1;
 /// Fewest jumps that are left out in turn, too, and the largest share of all equations that one of them may have.
@@ -36,7 +36,7 @@ const SIDEWAYS: usize = 1;
 const TURNING_RAD_S: f64 = 0.15;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Group {
+pub(crate) enum Group {
     /// Trunk's acceleration along an axis (x, y, z) with feet on the ground.
     Contact(usize),
     /// The same in flight.
@@ -47,9 +47,9 @@ pub enum Group {
 
 impl Group {
     /// Number of groups.
-    pub const COUNT: usize = 9;
+    pub(crate) const COUNT: usize = 9;
 
-    pub fn index(self) -> usize {
+    pub(crate) fn index(self) -> usize {
         match self {
             Self::Contact(axis) => axis,
             Self::Flight(axis) => 3 + axis,
@@ -59,7 +59,7 @@ impl Group {
 }
 
 #[derive(Debug, Clone)]
-pub struct Row {
+pub(crate) struct Row {
     pub coefficients: [f64; PARAMETER_DIM],
     /// Left side: m/s^2, or N m for a joint.
     pub left: f64,
@@ -71,7 +71,7 @@ pub struct Row {
 }
 
 #[derive(Debug, Clone, Default)]
-pub struct Windows {
+pub(crate) struct Windows {
     pub rows: Vec<Row>,
     /// The segment that each block lies in, counted from zero.
     pub blocks: Vec<usize>,
@@ -91,7 +91,7 @@ impl Windows {
     ///
     /// # Errors
     /// [`IdentifyError::Recording`] if the filter cannot be made for the segment's time step.
-    pub fn add(
+    pub(crate) fn add(
         &mut self,
         segment: &Segment,
         equations: &SampleEquations,
@@ -139,7 +139,7 @@ impl Windows {
     /// Ways to divide the blocks into groups that are left out in turn for standard errors: the group of every block.
     /// Blocks by themselves; and whole segments, which are jumps, where there are at least six and none has more than
     /// a third of the equations of the fit.
-    pub fn groupings(&self) -> Vec<Vec<usize>> {
+    pub(crate) fn groupings(&self) -> Vec<Vec<usize>> {
         let mut groupings = vec![(0..self.blocks.len()).collect()];
         let mut counts = vec![0; self.segments];
         for row in self.rows.iter().filter(|row| row.moving) {

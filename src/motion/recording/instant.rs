@@ -11,7 +11,7 @@ pub(super) struct Instant {
 
 impl Instant {
     /// A time of a clock whose values need no care.
-    pub fn of(value: f64) -> Option<Self> {
+    pub(crate) fn of(value: f64) -> Option<Self> {
         let whole = value.floor();
         (whole.abs() < 9e18).then_some(Instant {
             whole: whole as i64,
@@ -20,16 +20,16 @@ impl Instant {
     }
 
     /// Units from `start` to this time.
-    pub fn since(self, start: Instant) -> f64 {
+    pub(crate) fn since(self, start: Instant) -> f64 {
         (self.whole - start.whole) as f64 + (self.rest - start.rest)
     }
 
-    pub fn value(self) -> f64 {
+    pub(crate) fn value(self) -> f64 {
         self.whole as f64 + self.rest
     }
 
     /// A decimal number of any length, with a decimal point; `None` for other text.
-    pub fn from_decimal(text: &str) -> Option<Self> {
+    pub(crate) fn from_decimal(text: &str) -> Option<Self> {
         let (whole, rest) = text.split_once('.').unwrap_or((text, "0"));
         if !is_digits(rest) {
             return None;
@@ -42,7 +42,7 @@ impl Instant {
 
     /// A date and time as ISO 8601 writes it, in s since 1970: `2026-03-01T12:00:00.002Z`, with a blank for
     /// the `T` and `+01:00` for the `Z` if need be; or a time of day alone, `12:00:00.002`.
-    pub fn from_iso(text: &str) -> Option<Self> {
+    pub(crate) fn from_iso(text: &str) -> Option<Self> {
         if count(text, ':') == 0 {
             return None;
         }

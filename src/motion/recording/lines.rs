@@ -31,7 +31,7 @@ pub(super) struct Lines<'a> {
 
 impl<'a> Lines<'a> {
     /// Of a file, plain or gzip.
-    pub fn open(path: &'a Path) -> Result<Self, RecordingError> {
+    pub(crate) fn open(path: &'a Path) -> Result<Self, RecordingError> {
         let file = File::open(path)
             .map_err(|source| RecordingFault::unreadable("open", source).of(path))?;
         let size = file.metadata().ok().filter(fs::Metadata::is_file);
@@ -39,7 +39,7 @@ impl<'a> Lines<'a> {
     }
 
     /// Of any source, plain or gzip, found from the first two bytes; `path` stands for it in messages.
-    pub fn of(path: &'a Path, source: impl Read + 'a) -> Result<Self, RecordingError> {
+    pub(crate) fn of(path: &'a Path, source: impl Read + 'a) -> Result<Self, RecordingError> {
         Self::packed(path, source, u64::MAX)
     }
 
@@ -84,7 +84,7 @@ impl<'a> Lines<'a> {
     }
 
     /// The next row's number and text; `None` at the end of the file.
-    pub fn next_row(&mut self) -> Result<Option<(usize, &str)>, RecordingError> {
+    pub(crate) fn next_row(&mut self) -> Result<Option<(usize, &str)>, RecordingError> {
         self.row += 1;
         self.buffer.clear();
         let most = MAX_LINE_BYTES as u64 + 1;

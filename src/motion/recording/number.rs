@@ -17,14 +17,14 @@ pub(super) struct NumberReader {
 
 impl NumberReader {
     /// Of cells that are separated by this character: between commas the mark is a point.
-    pub fn new(delimiter: char) -> Self {
+    pub(crate) fn new(delimiter: char) -> Self {
         NumberReader {
             mark: (delimiter == ',').then_some(Mark::Point),
             pointed: String::new(),
         }
     }
 
-    pub fn expected(&self) -> &'static str {
+    pub(crate) fn expected(&self) -> &'static str {
         match self.mark {
             None => "a number",
             Some(Mark::Point) => "a number with a decimal point",
@@ -34,7 +34,7 @@ impl NumberReader {
 
     /// The value of a cell, or `None` if it is no number in this notation.
     /// May be infinite or NaN.
-    pub fn parse(&mut self, cell: &str) -> Option<f64> {
+    pub(crate) fn parse(&mut self, cell: &str) -> Option<f64> {
         let Some(place) = cell.bytes().position(|b| b == b'.' || b == b',') else {
             return cell.parse().ok();
         };

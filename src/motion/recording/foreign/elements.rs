@@ -26,7 +26,7 @@ pub(super) enum Quantity {
 
 impl Quantity {
     /// In the order of a map.
-    pub const ALL: [Self; 11] = [
+    pub(crate) const ALL: [Self; 11] = [
         Self::JointPosition,
         Self::JointVelocity,
         Self::JointAcceleration,
@@ -41,7 +41,7 @@ impl Quantity {
     ];
 
     /// Accelerations, each with the velocity whose derivative it is.
-    pub const ACCELERATIONS: [(Self, Self); 3] = [
+    pub(crate) const ACCELERATIONS: [(Self, Self); 3] = [
         (Self::JointAcceleration, Self::JointVelocity),
         (Self::BodyAcceleration, Self::BodyVelocity),
         (Self::AngularAcceleration, Self::AngularVelocity),
@@ -69,28 +69,28 @@ impl Quantity {
     }
 
     /// Its table in a map.
-    pub const fn key(self) -> &'static str {
+    pub(crate) const fn key(self) -> &'static str {
         self.facts().0
     }
 
-    pub fn at(self, key: &str) -> String {
+    pub(crate) fn at(self, key: &str) -> String {
         format!("{}.{key}", self.key())
     }
 
     /// What its units measure.
-    pub const fn dimension(self) -> Dimension {
+    pub(crate) const fn dimension(self) -> Dimension {
         self.facts().1
     }
 
     /// The recording's column of an element.
-    pub fn column(self, element: usize) -> Column {
+    pub(crate) fn column(self, element: usize) -> Column {
         let (_, _, column, first) = self.facts();
         debug_assert!(first + element < STATE_DIM, "w of a quaternion");
         column(first + element)
     }
 
     /// Whether a recording cannot be without it.
-    pub const fn is_required(self) -> bool {
+    pub(crate) const fn is_required(self) -> bool {
         matches!(
             self,
             Self::JointPosition
@@ -102,7 +102,7 @@ impl Quantity {
     }
 
     /// Whether the quantity is one of joints.
-    pub const fn is_of_joints(self) -> bool {
+    pub(crate) const fn is_of_joints(self) -> bool {
         matches!(
             self,
             Self::JointPosition | Self::JointVelocity | Self::JointAcceleration | Self::JointTorque
@@ -110,7 +110,7 @@ impl Quantity {
     }
 
     /// Names of its elements in romc's order; a quaternion has [`QUATERNION`] instead.
-    pub fn elements(self) -> Vec<String> {
+    pub(crate) fn elements(self) -> Vec<String> {
         let owned = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
         match self {
             _ if self.is_of_joints() => owned(&JOINT_NAMES),

@@ -36,7 +36,7 @@ pub(in crate::recording) struct Channel {
 }
 
 impl Channel {
-    pub fn named(name: &str) -> Self {
+    pub(crate) fn named(name: &str) -> Self {
         Self {
             name: name.to_owned(),
             ..Self::default()
@@ -44,7 +44,7 @@ impl Channel {
     }
 
     /// Its values as times, from the first on where one number does not hold them.
-    pub fn times(&self) -> Vec<f64> {
+    pub(crate) fn times(&self) -> Vec<f64> {
         match &self.instants {
             Some(all) => all.iter().map(|instant| instant.since(all[0])).collect(),
             None => self.values.clone(),
@@ -53,19 +53,19 @@ impl Channel {
 }
 
 impl Log {
-    pub fn names(&self) -> Vec<String> {
+    pub(crate) fn names(&self) -> Vec<String> {
         let names = self.columns.iter().map(|channel| channel.name.clone());
         names.collect()
     }
 
     /// Number of samples.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.columns
             .first()
             .map_or(0, |channel| channel.values.len())
     }
 
-    pub fn choose(&mut self, rows: &[usize]) {
+    pub(crate) fn choose(&mut self, rows: &[usize]) {
         for column in &mut self.columns {
             column.values = rows.iter().map(|row| column.values[*row]).collect();
             if let Some(instants) = &mut column.instants {
@@ -87,7 +87,7 @@ impl Log {
         }
     }
 
-    pub fn summary(&self) -> String {
+    pub(crate) fn summary(&self) -> String {
         const MOST: usize = 6;
         if !self.is_named {
             return format!("{} columns without names", self.columns.len());

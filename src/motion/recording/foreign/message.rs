@@ -70,7 +70,7 @@ pub(super) struct Numbers {
 
 impl Definition {
     /// Reads a definition and those of its parts, as `ros2 bag` and `rosbag` store them.
-    pub fn parse(name: &str, text: &str) -> Result<Self, String> {
+    pub(crate) fn parse(name: &str, text: &str) -> Result<Self, String> {
         let mut texts: BTreeMap<String, Vec<&str>> = BTreeMap::new();
         let mut current = short(name);
         for line in text.lines() {
@@ -136,7 +136,12 @@ impl Definition {
 
     /// The names of a message's numbers, if `named`, and the numbers: `pose.position.x`, `motor_state[3].q`, and
     /// `position[FR_hip_joint]` where a list of names goes with a list of numbers.
-    pub fn values(&self, layout: Layout, bytes: &[u8], named: bool) -> Result<Numbers, String> {
+    pub(crate) fn values(
+        &self,
+        layout: Layout,
+        bytes: &[u8],
+        named: bool,
+    ) -> Result<Numbers, String> {
         let (mut cursor, mut out) = (Cursor::new(layout, bytes)?, Numbers::default());
         self.message(0, &mut cursor, named, &mut String::new(), Some(&mut out))?;
         Ok(out)

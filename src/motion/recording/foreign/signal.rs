@@ -27,7 +27,7 @@ pub(super) struct Source<'a> {
 
 impl<'a> Source<'a> {
     /// Where a quantity stands; `None` if the map does not have it.
-    pub fn find(
+    pub(crate) fn find(
         logs: &'a [Log],
         map: &'a ColumnMap,
         quantity: Quantity,
@@ -60,12 +60,12 @@ impl<'a> Source<'a> {
         }))
     }
 
-    pub fn log(&self) -> &'a Log {
+    pub(crate) fn log(&self) -> &'a Log {
         self.log
     }
 
     /// The quantity, its times in s from `epoch_s`, the whole seconds that all clocks count from.
-    pub fn take(&self, epoch_s: i64) -> Result<Signal, RecordingError> {
+    pub(crate) fn take(&self, epoch_s: i64) -> Result<Signal, RecordingError> {
         let columns = self.columns()?;
         let elements = match self.is_quaternion(columns.len()) {
             true => QUATERNION.map(str::to_owned).to_vec(),
@@ -103,7 +103,7 @@ impl<'a> Source<'a> {
     }
 
     /// First instant of the clock where that counts from an epoch, in whole seconds.
-    pub fn epoch_s(&self) -> Result<Option<i64>, RecordingError> {
+    pub(crate) fn epoch_s(&self) -> Result<Option<i64>, RecordingError> {
         let times = self.times()?;
         let instants = times.channel.and_then(|channel| channel.instants.as_ref());
         let first = instants.and_then(|instants| instants.first());

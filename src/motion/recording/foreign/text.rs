@@ -286,7 +286,7 @@ impl Channel {
     }
 
     /// Adds a time; earlier values become times as well.
-    pub fn push_instant(&mut self, instant: Instant) {
+    pub(crate) fn push_instant(&mut self, instant: Instant) {
         let earlier = |value: &f64| Instant::of(*value).unwrap_or(instant);
         self.instants
             .get_or_insert_with(|| self.values.iter().map(earlier).collect())

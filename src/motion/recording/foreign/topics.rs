@@ -54,12 +54,12 @@ struct Table {
 
 impl Topics {
     /// Forgets the channels of the last file: numbers of channels hold within one.
-    pub fn begin_file(&mut self) {
+    pub(crate) fn begin_file(&mut self) {
         self.schemas.clear();
         self.channels.clear();
     }
 
-    pub fn schema(&mut self, header: SchemaHeader, text: Vec<u8>) {
+    pub(crate) fn schema(&mut self, header: SchemaHeader, text: Vec<u8>) {
         self.schemas.insert(header.id, (header, text));
     }
 
@@ -67,7 +67,7 @@ impl Topics {
     ///
     /// # Errors
     /// In words, for a channel that was declared otherwise.
-    pub fn channel(&mut self, channel: &Declared) -> Result<(), String> {
+    pub(crate) fn channel(&mut self, channel: &Declared) -> Result<(), String> {
         let schema = self.schemas.get(&channel.schema_id);
         let (header, text) = schema.map_or((None, &[][..]), |(header, text)| (Some(header), text));
         let of =
@@ -110,7 +110,12 @@ impl Topics {
     ///
     /// # Errors
     /// In words, for one of a channel that was not declared.
-    pub fn message(&mut self, channel: u16, time_ns: u64, bytes: &[u8]) -> Result<(), String> {
+    pub(crate) fn message(
+        &mut self,
+        channel: u16,
+        time_ns: u64,
+        bytes: &[u8],
+    ) -> Result<(), String> {
         let index = self.channels.get(&channel);
         let index = index
             .ok_or_else(|| format!("a message of channel {channel}, which is not declared"))?;
@@ -129,7 +134,7 @@ impl Topics {
     ///
     /// # Errors
     /// [`RecordingFault::NoTopic`] without any table.
-    pub fn logs(self) -> Result<Vec<Log>, RecordingFault> {
+    pub(crate) fn logs(self) -> Result<Vec<Log>, RecordingFault> {
         let mut logs = Vec::new();
         for mut topic in self.topics {
             let messages: usize = topic.tables.iter().map(|table| table.times_ns.len()).sum();

@@ -12,7 +12,7 @@ pub(super) enum Dimension {
 
 impl Dimension {
     /// Units with their factors to rad, m, N m, N or s.
-    pub const fn units(self) -> &'static [(&'static str, f64)] {
+    pub(crate) const fn units(self) -> &'static [(&'static str, f64)] {
         const DEGREE: f64 = std::f64::consts::PI / 180.0;
         const TURN: f64 = 2.0 * std::f64::consts::PI;
         match self {
@@ -43,7 +43,7 @@ impl Dimension {
     }
 
     /// The factor of a unit such as `deg/s`, `mm`, `N mm`; case, blanks and `/s` do not matter.
-    pub fn factor(self, text: &str) -> Option<f64> {
+    pub(crate) fn factor(self, text: &str) -> Option<f64> {
         let folded: String = (text.chars())
             .filter(|c| !c.is_whitespace() && !matches!(c, '*' | '.' | '·'))
             .flat_map(char::to_lowercase)
@@ -56,7 +56,7 @@ impl Dimension {
         known.map(|(_, factor)| *factor)
     }
 
-    pub fn names(self) -> String {
+    pub(crate) fn names(self) -> String {
         let names: Vec<&str> = self.units().iter().map(|(name, _)| *name).collect();
         names.join(", ")
     }

@@ -52,7 +52,7 @@ pub(super) struct Reading {
 }
 
 impl Reading {
-    pub fn plain(position: NamedUnit, joint: NamedUnit) -> Self {
+    pub(crate) fn plain(position: NamedUnit, joint: NamedUnit) -> Self {
         Self {
             position,
             joint,
@@ -66,7 +66,7 @@ impl Reading {
 
     /// Whether it is better than a plainer one by more than chance: feet move less compared with what they would on stiff
     /// legs, whatever the units.
-    pub fn beats(&self, other: &Self) -> bool {
+    pub(crate) fn beats(&self, other: &Self) -> bool {
         let figure = |reading: &Self| match reading.motion_m > LEAST_MOTION_M {
             true => reading.slip_m / reading.motion_m,
             false => 1.0,
@@ -74,11 +74,11 @@ impl Reading {
         figure(self) < BETTER.0 * figure(other)
     }
 
-    pub fn fits(&self) -> bool {
+    pub(crate) fn fits(&self) -> bool {
         self.slip_m < FITS_M
     }
 
-    pub fn row(&self, joint: usize) -> usize {
+    pub(crate) fn row(&self, joint: usize) -> usize {
         match self.by_kind {
             true => 4 * (joint % 3) + joint / 3,
             false => joint,
@@ -93,7 +93,7 @@ pub(super) struct View<'a> {
 }
 
 impl<'a> View<'a> {
-    pub fn of(recording: &'a Recording, robot: &'a Robot) -> Self {
+    pub(crate) fn of(recording: &'a Recording, robot: &'a Robot) -> Self {
         let all = recording.segments.iter();
         let all = all.flat_map(|segment| {
             stances(segment)
@@ -118,7 +118,7 @@ impl<'a> View<'a> {
 
     /// The best reading with one of these units and orders, the first choice of each unless another is clearly better;
     /// none without stances. Also others that fit as well.
-    pub fn best(
+    pub(crate) fn best(
         &self,
         positions: &[NamedUnit],
         joints: &[NamedUnit],
@@ -256,7 +256,7 @@ impl<'a> View<'a> {
 
     /// Signs of the torques in romc's order and their unit: those under which feet carry the body; none where they carry
     /// nothing. Signs of the reading that feet in place do not show become those of the torques.
-    pub fn torques(&self, reading: &mut Reading) -> Option<([f64; JOINT_DIM], NamedUnit)> {
+    pub(crate) fn torques(&self, reading: &mut Reading) -> Option<([f64; JOINT_DIM], NamedUnit)> {
         let blocks = self.blocks(reading);
         let explained = |signs: [f64; 2]| {
             let mut sums = [0.0; 3];

@@ -45,7 +45,7 @@ struct Choice {
 type Attitude = (Vec<String>, DMatrix<f64>);
 
 impl Source<'_> {
-    pub fn scales(&self, robot: &Robot, time: &str) -> Scales {
+    pub(crate) fn scales(&self, robot: &Robot, time: &str) -> Scales {
         let (mut lines, mut notes) = (Lines::new(), Vec::new());
         if let Some(feet) = self.group(Quantity::Feet) {
             let (own, note) = force_lines(&self.raw(feet));

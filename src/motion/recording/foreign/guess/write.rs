@@ -121,23 +121,27 @@ pub(super) fn unit_line(unit: &str, why: &str) -> String {
 }
 
 impl Source<'_> {
-    pub fn group(&self, quantity: Quantity) -> Option<&Group> {
+    pub(crate) fn group(&self, quantity: Quantity) -> Option<&Group> {
         self.groups.iter().find(|group| group.quantity == quantity)
     }
 
-    pub fn told(&self, group: &Group, units: &[&'static str]) -> Option<&'static str> {
+    pub(crate) fn told(&self, group: &Group, units: &[&'static str]) -> Option<&'static str> {
         let columns = &self.logs[group.log].columns;
         unit(&columns[group.columns[0]].name, units)
     }
 
     /// Values of a group and their times, if they share the log of `with`.
-    pub fn beside(&self, quantity: Quantity, with: &Group) -> Option<(DMatrix<f64>, Vec<f64>)> {
+    pub(crate) fn beside(
+        &self,
+        quantity: Quantity,
+        with: &Group,
+    ) -> Option<(DMatrix<f64>, Vec<f64>)> {
         let group = self.group(quantity).filter(|group| group.log == with.log)?;
         Some((self.raw(group), self.times_s(group.log)?))
     }
 
     /// Values of a group in the units of the log, one row a column.
-    pub fn raw(&self, group: &Group) -> DMatrix<f64> {
+    pub(crate) fn raw(&self, group: &Group) -> DMatrix<f64> {
         let log = &self.logs[group.log];
         DMatrix::from_fn(group.columns.len(), log.len(), |row, sample| {
             let value = log.columns[group.columns[row]].values[sample];
@@ -145,7 +149,7 @@ impl Source<'_> {
         })
     }
 
-    pub fn times_s(&self, log: usize) -> Option<Vec<f64>> {
+    pub(crate) fn times_s(&self, log: usize) -> Option<Vec<f64>> {
         let (log, clock) = (&self.logs[log], self.clock?);
         let (column, factor) = match log.clock {
             Some(column) => (column, 1.0),
@@ -158,7 +162,7 @@ impl Source<'_> {
         Some(times.into_iter().map(|time| factor * time).collect())
     }
 
-    pub fn columns(&self, group: &Group) -> Vec<String> {
+    pub(crate) fn columns(&self, group: &Group) -> Vec<String> {
         let log = &self.logs[group.log];
         let mut lines = Vec::new();
         if self.logs.len() > 1 {
