@@ -25,7 +25,7 @@ use crate::robot::joints::LEG_JOINT_DIM;
 use crate::robot::{JOINT_DIM, Leg, Robot};
 
 /// Smallest `|det J|` over the volume of its links at which a foot's force is taken from torques.
-pub const LEAST_MANIPULABILITY: f64 = 0.04;
+pub(crate) const LEAST_MANIPULABILITY: f64 = 0.04;
 /// Speed within which rolling resistance changes its sign, in rad/s.
 const ROLLING_SPEED_RAD_S: f64 = 0.05;
 

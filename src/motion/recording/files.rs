@@ -82,7 +82,7 @@ impl RecordingSet {
     }
 
     /// Adds other recordings and what was found in them, but not what reading them did.
-    pub fn append(&mut self, other: Self) {
+    pub(crate) fn append(&mut self, other: Self) {
         self.recordings.extend(other.recordings);
         self.findings.extend(other.findings);
         self.mismatches.extend(other.mismatches);

@@ -20,7 +20,7 @@ use super::check::{check, outside};
 use super::preprocess::{differences, median};
 use super::segment::Recording;
 use crate::robot::{GRAVITY_M_S2, JOINT_DIM, Leg, Robot, STATE_DIM};
-pub use balance::Balance;
+pub(crate) use balance::Balance;
 pub(super) use balance::hip_torque;
 use stance::{Slip, best_other_place, best_other_reading};
 pub(super) use stance::{foot_place, median_place, stances};
@@ -120,15 +120,14 @@ pub fn mismatches(recording: &Recording, robot: &Robot) -> Vec<Mismatch> {
 /// The figures that [`mismatches`] compares with its bounds; none where a recording has too little of what they need.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Figures {
-    /// Root mean square of the places of feet on the ground about the medians of their stances, m.
-    pub foot_slip_m: Option<f64>,
-    /// The same of what feet that stand together do not have in common, m.
-    pub relative_foot_slip_m: Option<f64>,
-    /// That for the best other order of the legs or sign of an angle, m.
-    pub other_reading_m: Option<f64>,
-    /// What forces and accelerations come to.
+    /// Root mean square of the places of feet on the ground about the medians of their stances.
+    foot_slip_m: Option<f64>,
+    /// The same of what feet that stand together do not have in common.
+    relative_foot_slip_m: Option<f64>,
+    /// That for the best other order of the legs or sign of an angle.
+    other_reading_m: Option<f64>,
     #[serde(flatten)]
-    pub balance: Balance,
+    balance: Balance,
 }
 
 impl Figures {
@@ -147,7 +146,7 @@ impl Figures {
 /// What cannot be true of any robot, or of one robot beside the others of these recordings, with the index of the recording
 /// and in words: torques that carry nothing, a body that does not fall in flight, torques that carry another share of
 /// the weight than most.
-pub fn contradiction(balances: &[Balance]) -> Option<(usize, String)> {
+pub(crate) fn contradiction(balances: &[Balance]) -> Option<(usize, String)> {
     let each = || balances.iter().enumerate();
     let shares = || each().filter_map(|(at, balance)| Some((at, balance.weight_share?)));
     if let Some((at, share)) = shares().find(|(_, share)| share.abs() < NOTHING_CARRIED) {

@@ -47,7 +47,6 @@ pub mod write;
 mod error;
 mod instant;
 mod lines;
-mod number;
 mod segments;
 
 pub use self::csv::{read, read_from_bytes};

@@ -12,7 +12,7 @@ use crate::robot::{BODY_DIM, ContactFlags, InputRule, JOINT_DIM, Robot, STATE_DI
 
 /// Time over which accelerations of joints are averaged before the inertia of the motors counts, in
 /// s: 11 samples at 500 Hz.
-pub const ACCELERATION_WINDOW_S: f64 = 0.02;
+const ACCELERATION_WINDOW_S: f64 = 0.02;
 
 /// What a file holds.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,7 +27,7 @@ pub struct Recording {
 
 impl Recording {
     /// These segments as a recording of the same file.
-    pub fn with_segments(&self, segments: Vec<Segment>) -> Self {
+    pub(crate) fn with_segments(&self, segments: Vec<Segment>) -> Self {
         Self {
             path: self.path.clone(),
             segments,
@@ -220,7 +220,7 @@ impl Segment {
     }
 
     /// Accelerations of the joints, 12 x n, in rad/s^2: [`Self::ddx`] averaged over
-    /// [`ACCELERATION_WINDOW_S`] within stretches of equal contact (a foot down, or none), so that
+    /// 20 ms within stretches of equal contact (a foot down, or none), so that
     /// the noise of differences and the spikes of landings do not become torques.
     pub fn joint_accelerations(&self) -> DMatrix<f64> {
         let half = match self.mean_step_s() {
@@ -274,7 +274,7 @@ impl Segment {
     }
 
     /// The recorded torques, N m; those beyond a limit of the robot count as the limit.
-    pub fn torque_within_limits(&self, robot: &Robot) -> DMatrix<f64> {
+    pub(crate) fn torque_within_limits(&self, robot: &Robot) -> DMatrix<f64> {
         let mut torque_nm = self.torque_nm.clone();
         for (mut row, limit) in torque_nm.row_iter_mut().zip(robot.torque_limit_nm()) {
             row.apply(|torque| *torque = torque.clamp(-limit, *limit));

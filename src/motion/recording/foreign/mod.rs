@@ -1,6 +1,6 @@
 //! Logs of other programs: columns and topics of any name, unit, order and clock become a recording.
 //!
-//! `map` is the file that says what stands where, `units` and `elements` the words in it;
+//! `map` is the file that says what stands where, `elements` the words in it;
 //! `log` holds what was read, `text` reads it from text files, `mcap` from MCAP files and folders of them (`bag`)
 //! by the definitions of their messages (`message`), one table per topic and set of names (`topics`), `mcap_write` writes
 //! those; `signal` takes a quantity from it;
@@ -15,14 +15,12 @@ pub mod guess;
 mod interpolate;
 mod log;
 mod map;
-mod map_checks;
 mod mcap;
 mod mcap_write;
 mod message;
 mod signal;
 mod text;
 mod topics;
-mod units;
 
 pub(super) use assemble::assemble;
 pub(super) use attitude::angles_of_quaternions;

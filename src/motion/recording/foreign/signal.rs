@@ -2,10 +2,10 @@
 
 use nalgebra::DMatrix;
 
+use super::elements::Dimension;
 use super::elements::{QUATERNION, Quantity, named, ordered};
 use super::log::{Channel, Log};
 use super::map::{ColumnMap, Factors, Name, Table, Words};
-use super::units::Dimension;
 use crate::recording::error::{RecordingError, RecordingFault};
 use crate::recording::instant::Instant;
 

@@ -9,8 +9,7 @@ use crate::recording::columns::Column;
 use crate::recording::csv::MAX_ROWS;
 use crate::recording::error::{RecordingError, RecordingFault, shortened};
 use crate::recording::instant::Instant;
-use crate::recording::lines::{self, Lines};
-use crate::recording::number::NumberReader;
+use crate::recording::lines::{self, Lines, NumberReader};
 
 /// Numbers from which a column is kept as times: beyond, one number does not hold a microsecond.
 const LARGE: f64 = 1e8;

@@ -60,7 +60,7 @@ impl Reading {
     }
 
     /// Whether it is another order of a quaternion.
-    pub fn is_of_quaternion(&self) -> bool {
+    pub(crate) fn is_of_quaternion(&self) -> bool {
         matches!(self, Self::Turned(..))
     }
 }
@@ -199,12 +199,12 @@ impl Slip {
     }
 
     /// Root mean square of places about the median of their stance, m; none for fewer than [`LEAST_SAMPLES`].
-    pub fn rms_m(&self) -> Option<f64> {
+    pub(crate) fn rms_m(&self) -> Option<f64> {
         root_mean(self.absolute)
     }
 
     /// The same of what feet that stand together do not have in common, m.
-    pub fn relative_rms_m(&self) -> Option<f64> {
+    pub(crate) fn relative_rms_m(&self) -> Option<f64> {
         root_mean(self.relative)
     }
 }

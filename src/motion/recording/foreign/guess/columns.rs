@@ -1,8 +1,8 @@
 //! Columns sorted into quantities, and the clock among them.
 
+use super::super::elements::Dimension;
 use super::super::elements::{QUATERNION, Quantity};
 use super::super::log::{Channel, Log};
-use super::super::units::Dimension;
 use super::names::{Reading, is_quantity, is_time, is_wanted, read, unit};
 use crate::recording::preprocess::median;
 use crate::robot::{JOINT_DIM, Robot};

@@ -5,7 +5,7 @@
 
 use nalgebra::Vector3;
 
-use super::super::units::Dimension;
+use super::super::elements::Dimension;
 use crate::recording::mismatch::{foot_place, hip_torque, median_place, stances};
 use crate::recording::segment::stretches;
 use crate::recording::{Recording, Segment};

@@ -7,9 +7,9 @@ use nalgebra::DMatrix;
 
 use super::super::assemble::assemble;
 use super::super::attitude::{angle_rates, angles_of_quaternions, in_world, unwrap};
+use super::super::elements::Dimension;
 use super::super::elements::Quantity;
 use super::super::map::{ColumnMap, Frame};
-use super::super::units::Dimension;
 use super::columns::Group;
 use super::evidence::{Scale, axes, reach, scale, slopes};
 use super::feet::force_lines;

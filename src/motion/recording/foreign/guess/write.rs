@@ -5,10 +5,10 @@ use std::path::Path;
 
 use nalgebra::DMatrix;
 
+use super::super::elements::Dimension;
 use super::super::elements::Quantity;
 use super::super::log::Log;
 use super::super::map::Name;
-use super::super::units::Dimension;
 use super::Guess;
 use super::columns::{Clock, Group, clock, groups, is_unitree};
 use super::evidence::{scale, slopes};
