@@ -141,14 +141,29 @@ fn by_guess(path: &Path, robot: &Robot) -> Result<Reading, RecordingError> {
     Ok(reading)
 }
 
+/// Repairs of clocks, in words; `{}` is the range of [`Mended::elapsed_ratio`].
+const REPAIRS: [(fn(&Mended) -> bool, &str); 3] = [
+    (
+        |mended| mended.elapsed_ratio.is_some(),
+        "times are rebuilt from the motion, which takes {} s in a recorded second",
+    ),
+    (
+        |mended| mended.elapsed_ratio.is_none() && mended.resampled,
+        "uneven steps are resampled",
+    ),
+    (
+        |mended| mended.rates_replaced,
+        "angular rates, which disagree with the angles, are differences of these",
+    ),
+];
+
 /// What was done to several recordings besides reading.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ReadingNotes {
     recordings: usize,
-    rebuilt: usize,
-    ratios: Option<(f64, f64)>,
-    resampled: usize,
-    rates_replaced: usize,
+    ratios: Vec<f64>,
+    /// Recordings by [`REPAIRS`].
+    repaired: [usize; 3],
     others: Vec<(String, usize)>,
 }
 
@@ -156,14 +171,11 @@ impl ReadingNotes {
     /// Counts one recording.
     pub fn add(&mut self, reading: &Reading) {
         self.recordings += 1;
-        let any = |of: fn(&Mended) -> bool| usize::from(reading.mended.iter().any(of));
-        self.rebuilt += any(|mended| mended.elapsed_ratio.is_some());
-        self.resampled += any(|mended| mended.elapsed_ratio.is_none() && mended.resampled);
-        self.rates_replaced += any(|mended| mended.rates_replaced);
-        for ratio in reading.mended.iter().filter_map(|m| m.elapsed_ratio) {
-            let (least, most) = self.ratios.unwrap_or((ratio, ratio));
-            self.ratios = Some((least.min(ratio), most.max(ratio)));
+        for (count, (is_made, _)) in self.repaired.iter_mut().zip(REPAIRS) {
+            *count += usize::from(reading.mended.iter().any(is_made));
         }
+        let ratios = reading.mended.iter().filter_map(|m| m.elapsed_ratio);
+        self.ratios.extend(ratios);
         for note in &reading.notes {
             match self.others.iter_mut().find(|(known, _)| known == note) {
                 Some((_, count)) => *count += 1,
@@ -174,37 +186,30 @@ impl ReadingNotes {
 
     /// The notes as lines: one for clocks and rates, one for each other note.
     pub fn lines(&self) -> Vec<String> {
-        let of = |count: usize| match self.recordings {
-            1 => String::new(),
-            all => format!(" in {count} of {all} recordings"),
+        let counted = |note: &str, count: usize| match self.recordings {
+            1 => note.to_owned(),
+            all => format!("{note} in {count} of {all} recordings"),
         };
-        let mut clocks = Vec::new();
-        if let Some((least, most)) = self.ratios {
-            let ratio = match [least, most].map(|ratio| format!("{ratio:.2}")) {
-                [least, most] if least == most => most,
-                [least, most] => format!("{least} to {most}"),
-            };
-            clocks.push(format!(
-                "times are rebuilt from the motion, which takes {ratio} s in a recorded second{}",
-                of(self.rebuilt)
-            ));
-        }
-        if self.resampled > 0 {
-            clocks.push(format!("uneven steps are resampled{}", of(self.resampled)));
-        }
-        if self.rates_replaced > 0 {
-            clocks.push(format!(
-                "angular rates, which disagree with the angles, are differences of these{}",
-                of(self.rates_replaced)
-            ));
-        }
+        let end = |of: fn(f64, f64) -> f64| self.ratios.iter().copied().reduce(of).unwrap_or(1.0);
+        let [least, most] = [end(f64::min), end(f64::max)].map(|ratio| format!("{ratio:.2}"));
+        let range = match least == most {
+            true => most,
+            false => format!("{least} to {most}"),
+        };
+        let repairs = self.repaired.iter().zip(REPAIRS);
+        let repairs = repairs.filter(|(count, _)| **count > 0);
+        let repairs: Vec<String> = repairs
+            .map(|(count, (_, words))| counted(&words.replace("{}", &range), *count))
+            .collect();
         let mut lines = Vec::new();
-        if !clocks.is_empty() {
-            let clocks = clocks.join("; ");
-            lines.push(format!("{clocks} (--clock recorded: as recorded)"));
+        if !repairs.is_empty() {
+            lines.push(format!(
+                "{} (--clock recorded: as recorded)",
+                repairs.join("; ")
+            ));
         }
         let others = self.others.iter();
-        lines.extend(others.map(|(note, count)| format!("{note}{}", of(*count))));
+        lines.extend(others.map(|(note, count)| counted(note, *count)));
         lines
     }
 }

@@ -196,36 +196,23 @@ impl Definition {
                         path.push('.');
                     }
                     path.push_str(&field.name);
-                    if is_list {
-                        let own = names.get(entry);
-                        let own = own.filter(|_| is_named && names.len() == count);
-                        let entry = own.map_or(entry.to_string(), String::clone);
-                        path.push_str(&format!("[{entry}]"));
+                    let own = names.get(entry);
+                    let own = own.filter(|_| is_named && names.len() == count);
+                    match (is_list, own) {
+                        (true, Some(own)) => path.push_str(&format!("[{own}]")),
+                        (true, None) => path.push_str(&format!("[{entry}]")),
+                        (false, _) => {}
                     }
                 }
+                let out = out.as_deref_mut().filter(|_| count <= MOST_ENTRIES);
                 let value = match field.kind {
                     Kind::Message(part) => {
-                        let out = out.as_deref_mut().filter(|_| count <= MOST_ENTRIES);
                         self.message(part, cursor, named, path, out)?;
                         continue;
                     }
-                    Kind::Text => {
-                        cursor.text()?;
-                        continue;
-                    }
-                    Kind::Time => Value::Time(cursor.signed(4)?, cursor.unsigned(4)? as u32),
-                    Kind::Bool => Value::Number(f64::from(u8::from(cursor.unsigned(1)? != 0))),
-                    Kind::Unsigned(size) => Value::Number(cursor.unsigned(size)? as f64),
-                    Kind::Signed(size) => Value::Number(cursor.signed(size)? as f64),
-                    Kind::Float(4) => {
-                        let bits = cursor.unsigned(4)? as u32;
-                        Value::Number(f64::from(f32::from_bits(bits)))
-                    }
-                    Kind::Float(_) => Value::Number(f64::from_bits(cursor.unsigned(8)?)),
+                    kind => cursor.value(kind)?,
                 };
-                if let Some(out) = out.as_deref_mut()
-                    && count <= MOST_ENTRIES
-                {
+                if let (Some(out), Some(value)) = (out, value) {
                     if out.values.len() == MOST_NUMBERS {
                         return Err(format!("message: more than {MOST_NUMBERS} numbers"));
                     }
@@ -359,6 +346,26 @@ impl<'a> Cursor<'a> {
     fn signed(&mut self, size: usize) -> Result<i64, String> {
         let unused = 64 - 8 * size as u32;
         Ok((self.unsigned(size)? << unused) as i64 >> unused)
+    }
+
+    /// The next number; none of a text.
+    fn value(&mut self, kind: Kind) -> Result<Option<Value>, String> {
+        let number = match kind {
+            Kind::Text | Kind::Message(_) => {
+                self.text()?;
+                return Ok(None);
+            }
+            Kind::Time => {
+                let time = Value::Time(self.signed(4)?, self.unsigned(4)? as u32);
+                return Ok(Some(time));
+            }
+            Kind::Bool => f64::from(u8::from(self.unsigned(1)? != 0)),
+            Kind::Unsigned(size) => self.unsigned(size)? as f64,
+            Kind::Signed(size) => self.signed(size)? as f64,
+            Kind::Float(4) => f64::from(f32::from_bits(self.unsigned(4)? as u32)),
+            Kind::Float(_) => f64::from_bits(self.unsigned(8)?),
+        };
+        Ok(Some(Value::Number(number)))
     }
 
     fn length(&mut self) -> Result<usize, String> {

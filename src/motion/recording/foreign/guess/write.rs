@@ -56,20 +56,9 @@ pub(super) fn guessed(path: &Path, logs: &[Log], robot: &Robot) -> Guess {
     let mut open = Vec::new();
     for group in &sound {
         let key = group.quantity.key();
-        let mut lines = source.columns(group);
-        if group.quantity == Quantity::Feet && group.is_counted {
-            let order = "order = \"fr fl rr rl\"   # assumed: the columns are only counted";
-            lines.push(order.to_owned());
-        } else if group.quantity.is_of_joints() {
-            lines.extend(order_line(order, group));
-        }
-        lines.extend(scales.remove(&group.quantity).unwrap_or_default());
-        lines.extend(
-            group
-                .others
-                .iter()
-                .map(|other| format!("# by their names also: {other}")),
-        );
+        let scales = scales.remove(&group.quantity).unwrap_or_default();
+        let lines = source.lines(group, order, scales).join("\n");
+        text.push_str(&format!("\n[{key}]\n{lines}\n"));
         if !group.others.is_empty() {
             let note = format!("{key}: by their names also {}", group.others.join(", "));
             open.extend(group.is_tie.then(|| note.clone()));
@@ -82,8 +71,6 @@ pub(super) fn guessed(path: &Path, logs: &[Log], robot: &Robot) -> Guess {
                 "{key}: columns such as `{name}`, which are only counted"
             ));
         }
-        let lines = lines.join("\n");
-        text.push_str(&format!("\n[{key}]\n{lines}\n"));
     }
     let is_missing = |quantity: &Quantity| {
         quantity.is_required() && sound.iter().all(|group| group.quantity != *quantity)
@@ -178,6 +165,21 @@ impl Source<'_> {
             [row] => format!("columns = [{row}]"),
             _ => format!("columns = [\n    {},\n]", rows.join(",\n    ")),
         });
+        lines
+    }
+
+    /// The lines of a group's table.
+    fn lines(&self, group: &Group, order: Option<&str>, scales: Vec<String>) -> Vec<String> {
+        let mut lines = self.columns(group);
+        if group.quantity == Quantity::Feet && group.is_counted {
+            let order = "order = \"fr fl rr rl\"   # assumed: the columns are only counted";
+            lines.push(order.to_owned());
+        } else if group.quantity.is_of_joints() {
+            lines.extend(order_line(order, group));
+        }
+        lines.extend(scales);
+        let others = group.others.iter();
+        lines.extend(others.map(|other| format!("# by their names also: {other}")));
         lines
     }
 
