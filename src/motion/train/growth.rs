@@ -255,15 +255,12 @@ fn dot(a: &[DMatrix<f64>], b: &[DMatrix<f64>]) -> f64 {
 
 /// Mean of `z`, `dz`, `u_lat` over the samples of a phase, 0 if there are none.
 fn mean_of(phase: usize, set: EncodedSet<'_>) -> Vec<f64> {
-    let mut mean = vec![0.0; 3 * set.latent_dim()];
-    for (variables, _) in set.regression_blocks(phase) {
-        for (total, column) in mean.iter_mut().zip(variables.column_iter()) {
-            column.iter().for_each(|value| *total += value);
-        }
-    }
-    let samples = set.dataset.samples(Some(phase)).max(1) as f64;
-    mean.iter_mut().for_each(|total| *total /= samples);
-    mean
+    let (variables, _) = set.regression_samples(phase);
+    let samples = variables.nrows().max(1) as f64;
+    let columns = variables.column_iter();
+    columns
+        .map(|column| column.iter().fold(0.0, |sum, value| sum + value) / samples)
+        .collect()
 }
 
 /// `d theta / d (z, dz)` (`library_dim x 2 latent_dim`) at a state and input, by central differences; 0 where a term has

@@ -6,7 +6,6 @@ use super::assemble::{Origin, provenance};
 use super::dynamics_fit::Fitted;
 use super::error::TrainError;
 use super::jumps::learn_jumps;
-use super::latent::{EncodedSet, Latent};
 use super::overlap::support_overlap;
 use super::progress::Watch;
 use super::report::{SeedReport, Trained};
@@ -58,17 +57,17 @@ impl Seeds {
         origin: &Origin,
     ) -> Result<Trained, TrainError> {
         let (best, reports, overlap) = self.best(&task.library, &task.moments.state)?;
-        let latent = Latent::of(&task.training, &best.encoder)?;
-        let set = EncodedSet::new(&task.training, &latent);
-        let mut report = task.report(&best, set, &reports[0].judged)?;
+        let maps = &best.maps;
+        let set = maps.training_set(&task);
+        let mut report = task.report(&best, &reports[0].judged);
         // A single seed without losses has nothing that the report does not say.
         if reports.len() > 1 || reports[0].losses.is_some() {
             (report.seeds, report.support_overlap) = (reports, overlap);
         }
-        let (jumps, deviations) = learn_jumps(set, &best.encoder)?;
+        let (jumps, deviations) = learn_jumps(set, &maps.encoder);
         report.deviations = deviations;
         let provenance = provenance(task.options, method, origin, &report);
-        let model = task.assemble(best, set, jumps, provenance)?;
+        let model = task.assemble(best, jumps, provenance)?;
         Ok(Trained { model, report })
     }
 

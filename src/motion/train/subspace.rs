@@ -245,7 +245,7 @@ mod tests {
 
     fn of_samples(x: &DMatrix<f64>, u: &DMatrix<f64>) -> Moments {
         let n = x.ncols() as f64;
-        let deviations = centred(x.clone(), &x.column_mean());
+        let deviations = centred(x, &x.column_mean());
         Moments {
             state: &deviations * deviations.transpose() / n,
             input: u * u.transpose() / n,

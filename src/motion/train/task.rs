@@ -71,7 +71,7 @@ impl<'a> Task<'a> {
         let least_std = options.encoder.least_std * options.scaling.state;
         let active = moments.active_coordinates(least_std, options.encoder.least_input_share);
         let (coordinates, requested) = (options.coordinates(), options.latent_dim);
-        let frame = Frame::new(&training, &active, requested, coordinates, robot)?;
+        let frame = Frame::new(&training, &active, requested, coordinates, robot);
         if requested == 0 || requested > frame.dim() {
             return Err(TrainError::LatentDim {
                 requested,
@@ -92,13 +92,5 @@ impl<'a> Task<'a> {
             options,
             robot,
         })
-    }
-
-    /// The jumps that candidates are judged by.
-    pub fn judged(&self) -> &Dataset {
-        match self.validation.jumps.is_empty() {
-            true => &self.training,
-            false => &self.validation,
-        }
     }
 }

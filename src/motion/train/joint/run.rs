@@ -16,7 +16,6 @@ use super::stages::{train_decoder, train_together, train_xi};
 use crate::model::{AffineMap, Layer, ModelError, StateMap};
 use crate::robot::{Robot, STATE_DIM};
 use crate::train::assemble::Origin;
-use crate::train::dataset::Quantity;
 use crate::train::dynamics_fit::Fitted;
 use crate::train::error::TrainError;
 use crate::train::latent::{EncodedSet, Latent, least_squares_decoder, map_samples, mean_jacobian};
@@ -78,7 +77,7 @@ fn frame(task: &Task<'_>) -> Frame {
     if options.joint.maps.is_linear() || options.joint.transfer == Transfer::Published {
         return plain;
     }
-    let x = task.training.gather(Quantity::X, None);
+    let x = task.training.states(None);
     let least = options.encoder.least_std * options.scaling.state;
     let spread: DVector<f64> = x
         .column_variance()
@@ -220,7 +219,7 @@ impl Trainer<'_> {
         if self.is_linear() {
             let encoder = &mut start.encoder.layers[0];
             if !self.is_published() {
-                let mean = training.gather(Quantity::X, Some(0)).column_mean();
+                let mean = training.states(Some(0)).column_mean();
                 encoder.bias = -(encoder.weights.tr_mul(&mean));
                 start.decoder.layers[0].bias = mean;
             }
@@ -240,7 +239,7 @@ impl Trainer<'_> {
             };
             self.task.fit_dynamics(maps, watch)?
         };
-        let report = (self.task).seed_report(&fitted, run.seed, Some(run.losses))?;
+        let report = (self.task).seed_report(&fitted, run.seed, Some(run.losses));
         Ok((report, fitted))
     }
 
@@ -259,9 +258,7 @@ impl Trainer<'_> {
         let (encoder, decoder) = self.state_maps(&parameters, &plain)?;
         Ok(Fitted {
             score: self.published_score(&parameters, judged),
-            weights: mean_jacobian(&encoder, &self.task.training),
-            encoder,
-            decoder,
+            maps: self.task.encoded(encoder, decoder),
             xi: parameters.xi,
             choice: None,
         })
@@ -315,7 +312,7 @@ impl Trainer<'_> {
     /// the latents in canonical order and their mean at 0.
     fn basis(&self, encoder: &StateMap) -> LatentBasis {
         let (d, training) = (self.task.options.latent_dim, &self.task.training);
-        let x = training.gather(Quantity::X, None);
+        let x = training.states(None);
         let gram = x.column_iter().fold(DMatrix::zeros(d, d), |sum, x| {
             let jacobian = encoder
                 .jacobian(&x.into_owned())
@@ -347,7 +344,7 @@ impl Trainer<'_> {
         let terms_at_start = || {
             let plain = LatentBasis::unchanged(self.task.options.latent_dim);
             let encoder = self.state_maps(&self.start(seed), &plain)?.0;
-            let latent = Latent::of(training, &encoder)?;
+            let latent = Latent::of(training, &encoder);
             let set = EncodedSet::new(training, &latent);
             check_terms(set, &self.task.features, &self.task.library)
         };

@@ -3,7 +3,6 @@
 use std::ops::Range;
 
 use super::super::dataset::{Dataset, Jump};
-use super::super::error::TrainError;
 use super::super::metrics::BODY_Z;
 use crate::robot::{ContactFlags, FeetRule};
 
@@ -59,20 +58,14 @@ impl Cut {
 }
 
 /// The cut of every jump; none where a jump has no flight with contact before it.
-///
-/// # Errors
-/// As [`Dataset::for_each`].
-pub fn cuts(training: &Dataset) -> Result<Vec<Option<Cut>>, TrainError> {
-    let mut all = Vec::new();
-    let scale = training.scaling.state[BODY_Z];
-    training.for_each(|jump, rates| {
-        let rising = |sample: usize| rates.dx[(BODY_Z, sample)] / scale > THRUST_SPEED_M_S;
-        all.push(cut(training, jump, rising));
-    })?;
-    Ok(all)
+pub fn cuts(training: &Dataset) -> Vec<Option<Cut>> {
+    let jumps = training.jumps.iter();
+    jumps.map(|jump| cut(training, jump)).collect()
 }
 
-fn cut(training: &Dataset, jump: &Jump, rising: impl Fn(usize) -> bool) -> Option<Cut> {
+fn cut(training: &Dataset, jump: &Jump) -> Option<Cut> {
+    let scale = training.scaling.state[BODY_Z];
+    let rising = |sample: usize| jump.dx[(BODY_Z, sample)] / scale > THRUST_SPEED_M_S;
     let patterns = &training.phases.patterns;
     let flies = |phase: usize| patterns[phase].feet == FeetRule::None;
     let spans = jump.spans.iter().enumerate();

@@ -12,8 +12,8 @@ fn training() -> Dataset {
 }
 
 fn learned(training: &Dataset) -> (Option<JumpPrior>, Vec<PartScore>) {
-    let latent = Latent::of(training, &encoder()).unwrap();
-    learn_jumps(EncodedSet::new(training, &latent), &encoder()).unwrap()
+    let latent = Latent::of(training, &encoder());
+    learn_jumps(EncodedSet::new(training, &latent), &encoder())
 }
 
 fn prior_of(training: &Dataset) -> JumpPrior {
@@ -50,7 +50,7 @@ fn jumps_are_cut_into_crouch_thrust_flight_and_landing() {
 fn prior_at_the_goal_of_a_jump_is_nearer_to_it_than_the_mean_jump() {
     let training = training();
     let prior = prior_of(&training);
-    let latent = Latent::of(&training, &encoder()).unwrap();
+    let latent = Latent::of(&training, &encoder());
     let last = prior.parts.last().unwrap();
     let error = |features: &dyn Fn(usize) -> [f64; FEATURE_DIM]| -> f64 {
         let ends = (0..8).map(|jump| {
