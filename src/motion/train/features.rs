@@ -9,7 +9,7 @@ use nalgebra::DMatrix;
 use crate::ir::sin_cos::{LIMIT, reduced_sin_cos, sin_cos};
 use crate::model::{Library, Step, Tape};
 use crate::symbolic::Function;
-use crate::train::vectors::{self, Loop};
+use crate::train::vectors::vectorised;
 
 /// A library over batches.
 #[derive(Clone, Debug)]
@@ -132,39 +132,18 @@ impl Features {
         for adjoint in &mut values.adjoints {
             adjoint.resize(theta_gradient.nrows(), 0.0);
         }
-        vectors::run(Backward {
-            features: self,
-            theta_gradient,
-            values,
-            gradient: gradient.as_mut_slice(),
-        });
+        sweep_back(&self.tape, theta_gradient, values, gradient.as_mut_slice());
     }
 
     /// Computes every step for all samples; see [`Self::evaluate`] for the shape of `variables`.
     pub fn forward(&self, variables: &DMatrix<f64>, values: &mut FeatureValues) {
-        vectors::run(Forward {
-            steps: &self.tape.steps,
-            variables,
-            values: &mut values.values,
-        });
+        compute(&self.tape.steps, variables, &mut values.values);
     }
 }
 
-/// All steps in their order, compiled for several vector units.
-struct Forward<'a> {
-    steps: &'a [Step],
-    variables: &'a DMatrix<f64>,
-    values: &'a mut Vec<Vec<f64>>,
-}
-
-impl Loop for Forward<'_> {
-    #[inline(always)]
-    fn run(self) {
-        let Self {
-            steps,
-            variables,
-            values,
-        } = self;
+vectorised! {
+    /// All steps in their order.
+    fn compute(steps: &[Step], variables: &DMatrix<f64>, values: &mut Vec<Vec<f64>>) {
         let n = variables.nrows();
         values.resize(steps.len(), Vec::new());
         for (index, step) in steps.iter().enumerate() {
@@ -205,31 +184,28 @@ impl Loop for Forward<'_> {
     }
 }
 
-/// All steps in the opposite order, compiled for several vector units.
-struct Backward<'a> {
-    features: &'a Features,
-    theta_gradient: &'a DMatrix<f64>,
-    values: &'a mut FeatureValues,
-    gradient: &'a mut [f64],
-}
-
-impl Loop for Backward<'_> {
-    #[inline(always)]
-    fn run(self) {
-        let FeatureValues { values, adjoints } = self.values;
-        let n = self.theta_gradient.nrows();
+vectorised! {
+    /// All steps in the opposite order.
+    fn sweep_back(
+        tape: &Tape,
+        theta_gradient: &DMatrix<f64>,
+        values: &mut FeatureValues,
+        gradient: &mut [f64],
+    ) {
+        let FeatureValues { values, adjoints } = values;
+        let n = theta_gradient.nrows();
         for adjoint in adjoints.iter_mut() {
             adjoint.fill(0.0);
         }
-        let columns = self.theta_gradient.as_slice().chunks_exact(n);
-        for (column, &step) in columns.zip(&self.features.tape.terms) {
+        let columns = theta_gradient.as_slice().chunks_exact(n);
+        for (column, &step) in columns.zip(&tape.terms) {
             add(&mut adjoints[step], column);
         }
-        for (index, step) in self.features.tape.steps.iter().enumerate().rev() {
+        for (index, step) in tape.steps.iter().enumerate().rev() {
             let (earlier, rest) = adjoints.split_at_mut(index);
             add_adjoints(step, values, index, &rest[0], earlier);
             if let Step::Variable(column) = *step {
-                add(&mut self.gradient[n * column..n * (column + 1)], &rest[0]);
+                add(&mut gradient[n * column..n * (column + 1)], &rest[0]);
             }
         }
     }

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 use super::dataset::Dataset;
 use super::features::Features;
 use super::latent::{EncodedSet, Latent};
-use super::rollout::{Candidate, Change, Window, predict, predict_changed, windows};
+use super::rollout::{Candidate, Change, Window, plain, predict, predict_changed, windows};
 use crate::sim::Restart;
 
 /// Weight of whole-jump rollouts against predictions of 0.1 s in a score.
@@ -142,7 +142,7 @@ impl<'a> Judge<'a> {
         kind: usize,
     ) -> impl Iterator<Item = (&Window, DMatrix<f64>)> {
         let (windows, features) = (self.windows_of(part, kind), self.features);
-        let predictions = predict(Candidate { features, xi }, self.set, windows);
+        let predictions = predict(Candidate { features, xi }, self.set, &plain(windows));
         windows.iter().zip(predictions)
     }
 

@@ -7,7 +7,7 @@ use super::dataset::{Dataset, Jump, Scaling, mean};
 use super::error::TrainError;
 use super::features::{FeatureValues, Features};
 use super::latent::{EncodedSet, Latent, lift_samples, map_samples};
-use super::rollout::{Candidate, Window, predict, windows};
+use super::rollout::{Candidate, Window, plain, predict, windows};
 use crate::model::{ReducedModel, StateMap};
 use crate::recording::Source;
 use crate::robot::JOINT_DIM;
@@ -102,7 +102,7 @@ fn body_rms(
     set: EncodedSet<'_>,
     windows: &[Window],
 ) -> [f64; 2] {
-    let predictions = predict(candidate, set, windows);
+    let predictions = predict(candidate, set, &plain(windows));
     let mut squares = [0.0; 2];
     let mut count = 0;
     for (window, prediction) in windows.iter().zip(&predictions) {

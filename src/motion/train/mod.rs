@@ -37,7 +37,6 @@ mod refine;
 mod report;
 mod seeds;
 mod split;
-mod stepper;
 mod task;
 mod thin;
 mod vectors;
