@@ -670,7 +670,7 @@ fn wrong_maps_name_the_key_the_column_and_what_there_is() {
 
 #[test]
 fn files_with_late_samples_are_smoothed_unless_told_otherwise() {
-    use romc::recording::{ConditionOptions, RecordingError, RecordingFile, RecordingFiles};
+    use romc::recording::{ConditionOptions, RecordingFile, RecordingSet};
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("fast.csv");
     let mut jump = jump();
@@ -688,14 +688,9 @@ fn files_with_late_samples_are_smoothed_unless_told_otherwise() {
         };
         let go1 = Robot::by_name("go1").unwrap();
         let (options, reader) = (ConditionOptions::default(), Reader::new(None, clocks));
-        let files = RecordingFiles::new(vec![file], go1, options, reader);
-        let mut all = Vec::new();
-        let kept = files.for_each(|recording| {
-            all.push(recording);
-            Ok::<_, RecordingError>(())
-        });
-        kept.unwrap();
-        (all.remove(0), files.notes().reading.lines())
+        let mut set = RecordingSet::default();
+        set.read(&[file], go1, &options, &reader).unwrap();
+        (set.recordings.remove(0), set.reading.lines())
     };
     let (smoothed, notes) = lines(Clocks::Repaired);
     assert!(

@@ -17,9 +17,6 @@ pub type RecordingError = Located<RecordingFault>;
 /// What is wrong at a place.
 #[derive(Debug, Error)]
 pub enum RecordingFault {
-    /// A file has other samples than when it was read before.
-    #[error("changed while its samples were in use, expected the same samples again")]
-    Changed,
     /// The file does not exist.
     #[error("no such file")]
     Missing,

@@ -55,7 +55,7 @@ pub use self::write::{WriteOptions, write, write_as, write_mcap, write_mcap_as, 
 pub use clock::Mended;
 pub use condition::{Accelerations, ConditionOptions, ImplausibleSamples, SmoothedRows, condition};
 pub use error::{RecordingError, RecordingFault};
-pub use files::{RecordingFile, RecordingFiles, Source};
+pub use files::{RecordingFile, RecordingSet};
 pub use foreign::map::ColumnMap;
 pub use phases::{PhaseRule, PhaseSpan, Stance};
 pub use reader::{Clocks, Reader, Reading, ReadingNotes};

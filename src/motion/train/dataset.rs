@@ -10,7 +10,7 @@ use super::subspace::Moments;
 use crate::evaluate::is_plausible;
 use crate::model::InputStatistics;
 use crate::recording::smoothing::moving_average;
-use crate::recording::{PhaseRule, Segment, Source};
+use crate::recording::{PhaseRule, Recording, Segment};
 use crate::robot::{FeetRule, InputRule, JOINT_DIM, STATE_DIM, WrenchFrame};
 
 /// Fewest samples of a segment, and of a phase over all segments.
@@ -139,8 +139,8 @@ impl Dataset {
     /// # Errors
     /// [`TrainError::TooFewSamples`] for a segment under 50 samples; [`TrainError::Recording`] where no phase
     /// matches, a value is not finite, or a file cannot be read.
-    pub fn new<'a>(
-        recordings: impl Into<Source<'a>>,
+    pub fn new(
+        recordings: &[Recording],
         rule: &InputRule,
         phases: &PhaseRule,
         scaling: &Scaling,
@@ -153,12 +153,9 @@ impl Dataset {
             smoothing,
             rule: rule.clone(),
         };
-        recordings.into().for_each(|recording| {
-            for segment in &recording.segments {
-                dataset.jumps.push(dataset.jump(segment)?);
-            }
-            Ok::<_, TrainError>(())
-        })?;
+        for segment in recordings.iter().flat_map(|recording| &recording.segments) {
+            dataset.jumps.push(dataset.jump(segment)?);
+        }
         Ok(dataset)
     }
 

@@ -9,7 +9,7 @@ use super::features::{FeatureValues, Features};
 use super::latent::{EncodedSet, Latent, lift_samples, map_samples};
 use super::rollout::{Candidate, Window, plain, predict, windows};
 use crate::model::{ReducedModel, StateMap};
-use crate::recording::Source;
+use crate::recording::Recording;
 use crate::robot::JOINT_DIM;
 use crate::sim::{Restart, phase_rule};
 
@@ -48,10 +48,7 @@ pub struct SetMetrics {
 ///
 /// # Errors
 /// [`TrainError`] if the model has no encoder, decoder, scaling or robot, or the recordings do not fit it.
-pub fn assess<'a>(
-    model: &ReducedModel,
-    recordings: impl Into<Source<'a>>,
-) -> Result<SetMetrics, TrainError> {
+pub fn assess(model: &ReducedModel, recordings: &[Recording]) -> Result<SetMetrics, TrainError> {
     let scaling = Scaling {
         state: model.state_factors()?,
         input: model.input_factors()?,

@@ -8,24 +8,24 @@ use super::knowledge::Knowledge;
 use super::options::TrainOptions;
 use super::subspace::Moments;
 use crate::model::Library;
-use crate::recording::Source;
+use crate::recording::Recording;
 use crate::robot::Robot;
 
 /// Recordings to learn from and to choose by.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct Recordings<'a> {
     /// Fitted.
-    pub training: Source<'a>,
+    pub training: &'a [Recording],
     /// Used to choose between candidates; without any, the training recordings are.
-    pub validation: Source<'a>,
+    pub validation: &'a [Recording],
 }
 
 impl<'a> Recordings<'a> {
-    /// These recordings, each in memory or in files.
-    pub fn new(training: impl Into<Source<'a>>, validation: impl Into<Source<'a>>) -> Self {
+    /// These recordings.
+    pub fn new(training: &'a [Recording], validation: &'a [Recording]) -> Self {
         Self {
-            training: training.into(),
-            validation: validation.into(),
+            training,
+            validation,
         }
     }
 }
@@ -63,7 +63,8 @@ impl<'a> Task<'a> {
         options.check()?;
         let (scaling, smoothing) = (options.scaling.factors(), options.regression.smoothing);
         let rule = options.input_rule(robot);
-        let read = |set: Source<'_>| Dataset::new(set, &rule, &options.phases, &scaling, smoothing);
+        let read =
+            |set: &[Recording]| Dataset::new(set, &rule, &options.phases, &scaling, smoothing);
         let training = read(recordings.training)?;
         training.check_for_training()?;
         let validation = read(recordings.validation)?;

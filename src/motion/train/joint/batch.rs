@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use crate::recording::Source;
+use crate::recording::Recording;
 use crate::recording::preprocess::{BATCH_ROWS, prepare};
 use crate::recording::smoothing::moving_average;
 use crate::train::dataset::{Dataset, scaled};
@@ -59,10 +59,10 @@ impl Batch {
 ///
 /// # Errors
 /// [`TrainError::Recording`] for what cannot be resampled or turned into inputs.
-pub fn batches(recordings: &Source<'_>, dataset: &Dataset) -> Result<Vec<Batch>, TrainError> {
+pub fn batches(recordings: &[Recording], dataset: &Dataset) -> Result<Vec<Batch>, TrainError> {
     let mut out = Vec::new();
     let state = |columns| scaled(columns, &dataset.scaling.state).transpose();
-    recordings.for_each(|recording| {
+    for recording in recordings {
         for (span, samples) in prepare(recording, &dataset.phases)? {
             let u = scaled(samples.input(&dataset.rule)?, &dataset.scaling.input).transpose();
             let (x, dx) = (state(samples.x.clone()), state(samples.dx.clone()));
@@ -73,7 +73,6 @@ pub fn batches(recordings: &Source<'_>, dataset: &Dataset) -> Result<Vec<Batch>,
                 out.push(Batch::new(span.phase, blocks, samples.mean_step_s()));
             }
         }
-        Ok::<_, TrainError>(())
-    })?;
+    }
     Ok(out)
 }

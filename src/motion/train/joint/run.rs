@@ -42,9 +42,9 @@ pub fn joint(
     origin: &Origin,
     watch: &mut Watch<'_>,
 ) -> Result<Trained, TrainError> {
-    let task = Task::new(recordings.clone(), robot, options)?;
+    let task = Task::new(recordings, robot, options)?;
     let cut = |set| batches(set, &task.training);
-    let training = cut(&recordings.training)?;
+    let training = cut(recordings.training)?;
     let trainer = Trainer {
         task: &task,
         batches: &training,
@@ -52,7 +52,7 @@ pub fn joint(
     };
     let runs = trainer.run_seeds(watch);
 
-    let validation = cut(&recordings.validation)?;
+    let validation = cut(recordings.validation)?;
     let judged = if validation.is_empty() {
         &training
     } else {
