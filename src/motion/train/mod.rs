@@ -5,23 +5,23 @@
 //! space ([`subspace`], [`varimax`]) and the decoder ([`latent`]) to the dynamics ([`weak_form`], [`sparse`], [`select`]),
 //! judged by [`rollout`]s.
 
-pub mod closed_form;
-pub mod dataset;
-pub mod features;
-pub mod frame;
+mod closed_form;
+mod dataset;
+mod features;
+mod frame;
 mod growth;
-pub mod joint;
-pub mod jumps;
-pub mod knowledge;
-pub mod latent;
-pub mod metrics;
-pub mod progress;
-pub mod rollout;
-pub mod select;
-pub mod sparse;
-pub mod subspace;
-pub mod varimax;
-pub mod weak_form;
+mod joint;
+mod jumps;
+mod knowledge;
+mod latent;
+mod metrics;
+mod progress;
+mod rollout;
+mod select;
+mod sparse;
+mod subspace;
+mod varimax;
+mod weak_form;
 
 mod assemble;
 mod dynamics_fit;
