@@ -67,7 +67,6 @@ pub fn sha256(bytes: &[u8]) -> String {
 }
 
 impl Task<'_> {
-    /// The model of fitted numbers, with what was learned of the jumps.
     pub fn assemble(
         &self,
         fitted: Fitted,
@@ -139,7 +138,6 @@ fn median_step_s(dataset: &Dataset) -> f64 {
         .map_or(0.002, |step| (step * 1e6).round() / 1e6)
 }
 
-/// How a model came to be: command, version, settings, recordings and figures.
 pub(super) fn provenance(
     options: &TrainOptions,
     method: &str,

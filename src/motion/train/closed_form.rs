@@ -47,7 +47,6 @@ pub fn closed_form(
     seeds.into_model(task, "closed-form", origin)
 }
 
-/// The numbers of one seed, and its score.
 fn fit(task: &Task<'_>, seed: u64, watch: &mut Watch<'_>) -> Outcome {
     let options = task.options;
     watch.stage("searching the latent space", 1);

@@ -19,9 +19,7 @@ pub const MIN_SAMPLES: usize = 50;
 /// Factors from SI to scaled units, one a coordinate.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scaling {
-    /// Of the state, 18.
     pub state: DVector<f64>,
-    /// Of the input, 18.
     pub input: DVector<f64>,
 }
 
@@ -81,9 +79,7 @@ impl ScaleOptions {
 /// One continuous jump (a segment of a recording); samples are columns, all in scaled units.
 #[derive(Clone, Debug)]
 pub struct Jump {
-    /// File it comes from.
     pub path: PathBuf,
-    /// Time of every sample.
     pub time_s: Vec<f64>,
     /// States, `18 x n`.
     pub x: DMatrix<f64>,
@@ -96,7 +92,6 @@ pub struct Jump {
     /// Joint friction and rotor inertia, which recorded torques have on top of those in the inputs, `12 x n`; none
     /// without actuators.
     pub losses: Option<DMatrix<f64>>,
-    /// Index of the model's phase at every sample.
     pub phase: Vec<usize>,
     /// Maximal runs of one phase.
     pub spans: Vec<(usize, Range<usize>)>,
@@ -105,7 +100,6 @@ pub struct Jump {
 }
 
 impl Jump {
-    /// Number of samples.
     pub fn samples(&self) -> usize {
         self.time_s.len()
     }
@@ -121,13 +115,11 @@ impl Jump {
 pub struct Dataset {
     /// Jumps in the order of the files and their segments.
     pub jumps: Vec<Jump>,
-    /// Phases in the order of the model file.
     pub phases: PhaseRule,
     /// Units of everything in [`Self::jumps`].
     pub scaling: Scaling,
     /// Window of the moving average over accelerations, in samples.
     pub(super) smoothing: usize,
-    /// How inputs are made of recordings.
     pub(super) rule: InputRule,
 }
 
@@ -212,7 +204,6 @@ impl Dataset {
         InputStatistics::of_samples(&u)
     }
 
-    /// Number of samples of one phase or of all.
     pub fn samples(&self, phase: Option<usize>) -> usize {
         self.spans(phase).map(|(_, range)| range.len()).sum()
     }
@@ -285,7 +276,6 @@ impl Dataset {
         })
     }
 
-    /// Accelerations averaged within each span.
     fn smoothed(&self, segment: &Segment, spans: &[(usize, Range<usize>)]) -> DMatrix<f64> {
         let mut ddx = DMatrix::zeros(STATE_DIM, segment.len());
         for (_, range) in spans {
@@ -297,7 +287,6 @@ impl Dataset {
     }
 }
 
-/// Mean of samples in columns.
 pub fn mean(samples: &DMatrix<f64>) -> DVector<f64> {
     let mut mean = DVector::zeros(samples.nrows());
     for column in samples.column_iter() {
@@ -306,7 +295,6 @@ pub fn mean(samples: &DMatrix<f64>) -> DVector<f64> {
     mean
 }
 
-/// Every row times its factor.
 pub fn scaled(mut rows: DMatrix<f64>, factors: &DVector<f64>) -> DMatrix<f64> {
     rows.row_iter_mut()
         .zip(factors.iter())
@@ -314,7 +302,6 @@ pub fn scaled(mut rows: DMatrix<f64>, factors: &DVector<f64>) -> DMatrix<f64> {
     rows
 }
 
-/// Samples in columns less their mean.
 pub fn centred(samples: &DMatrix<f64>, mean: &DVector<f64>) -> DMatrix<f64> {
     let mut centred = samples.clone();
     let columns = centred.column_iter_mut();

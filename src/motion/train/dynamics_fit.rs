@@ -20,7 +20,6 @@ use super::weak_form::check_terms;
 use crate::model::{AffineMap, StateMap};
 use crate::robot::Robot;
 
-/// Learned maps, and the jumps as they encode them.
 pub(super) struct Maps {
     pub encoder: StateMap,
     pub decoder: StateMap,
@@ -44,7 +43,6 @@ impl Maps {
     }
 }
 
-/// Numbers of a model before they are put together.
 pub(super) struct Fitted {
     pub maps: Maps,
     pub xi: Vec<DMatrix<f64>>,
@@ -95,7 +93,6 @@ impl Task<'_> {
         (arranged(basis), arranged(turn))
     }
 
-    /// Maps with the samples that they encode.
     pub fn encoded(&self, encoder: StateMap, decoder: StateMap) -> Maps {
         Maps {
             weights: mean_jacobian(&encoder, &self.training),
@@ -129,7 +126,6 @@ impl Task<'_> {
         })
     }
 
-    /// The metrics of one seed.
     pub fn seed_report(&self, fitted: &Fitted, seed: u64, losses: Option<Losses>) -> SeedReport {
         let std = self.training.state_std();
         let names = Robot::state_names();

@@ -26,7 +26,6 @@ pub struct FeatureValues {
 }
 
 impl Features {
-    /// Prepares the terms of `library`.
     pub fn new(library: &Library) -> Self {
         Self {
             tape: library.tape().clone(),
@@ -34,12 +33,10 @@ impl Features {
         }
     }
 
-    /// Number of terms.
     pub fn library_dim(&self) -> usize {
         self.tape.terms.len()
     }
 
-    /// Number of latent coordinates.
     pub fn latent_dim(&self) -> usize {
         self.latent_dim
     }
@@ -142,7 +139,6 @@ impl Features {
 }
 
 vectorised! {
-    /// All steps in their order.
     fn compute(steps: &[Step], variables: &DMatrix<f64>, values: &mut Vec<Vec<f64>>) {
         let n = variables.nrows();
         values.resize(steps.len(), Vec::new());
@@ -185,7 +181,6 @@ vectorised! {
 }
 
 vectorised! {
-    /// All steps in the opposite order.
     fn sweep_back(
         tape: &Tape,
         theta_gradient: &DMatrix<f64>,
@@ -235,7 +230,6 @@ fn add(out: &mut [f64], values: &[f64]) {
     }
 }
 
-/// Sines and cosines of all arguments.
 #[inline(always)]
 fn both(arguments: &[f64], sines: &mut Vec<f64>, cosines: &mut Vec<f64>) {
     sines.resize(arguments.len(), 0.0);

@@ -68,7 +68,6 @@ impl Frame {
         }
     }
 
-    /// Largest number of latent coordinates.
     pub fn dim(&self) -> usize {
         self.held.ncols() + self.free.ncols()
     }

@@ -121,7 +121,6 @@ impl Growth {
         }
     }
 
-    /// Of an eigenvalue of the sequence, 1/s.
     fn rate(&self, value: Complex<f64>) -> f64 {
         let duration_s: f64 = self.sequence.iter().map(|(_, duration_s)| duration_s).sum();
         value.norm().max(f64::MIN_POSITIVE).ln() / duration_s.max(f64::MIN_POSITIVE)
@@ -242,7 +241,6 @@ fn of_phase(lower: &DMatrix<f64>) -> Vec<Complex<f64>> {
     eigenvalues(state_matrix(lower)).unwrap_or_else(|| vec![f64::INFINITY.into()])
 }
 
-/// The same of a sequence.
 fn of_sequence(transitions: &[DMatrix<f64>]) -> Vec<Complex<f64>> {
     let product = (transitions.iter().cloned()).reduce(|before, next| next * before);
     let values = product.map_or_else(|| Some(Vec::new()), eigenvalues);
@@ -312,7 +310,6 @@ mod tests {
         (Growth::of_jumps(Some(1.0), set, &features), truth)
     }
 
-    /// Changes weigh the same in all coefficients.
     fn alike(gradient: &[DMatrix<f64>]) -> Vec<DMatrix<f64>> {
         gradient.to_vec()
     }

@@ -25,7 +25,6 @@ const LONG: usize = 1;
 /// A library, and samples to judge its coefficients on (`library_dim x latent_dim` a phase).
 #[derive(Clone)]
 pub struct Judge<'a> {
-    /// The library.
     pub features: &'a Features,
     set: EncodedSet<'a>,
     windows: [Vec<Window>; 2],     // short and long
@@ -34,7 +33,6 @@ pub struct Judge<'a> {
 }
 
 impl<'a> Judge<'a> {
-    /// Judges on these jumps.
     pub fn new(features: &'a Features, set: EncodedSet<'a>) -> Self {
         Self::in_parts(features, set, PART)
     }
@@ -110,7 +108,6 @@ impl<'a> Judge<'a> {
         are_finite(&errors).then_some(errors)
     }
 
-    /// The same with each of the `changes`, one at a time.
     pub fn errors_changed(
         &self,
         xi: &[DMatrix<f64>],
@@ -134,7 +131,6 @@ impl<'a> Judge<'a> {
         pairs.map(|(short, long)| finite([short, long])).collect()
     }
 
-    /// The windows of a part with what is predicted in them.
     fn predictions(
         &self,
         xi: &[DMatrix<f64>],

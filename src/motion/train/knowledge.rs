@@ -27,7 +27,6 @@ pub struct Knowledge {
 }
 
 impl Knowledge {
-    /// Nothing is known.
     pub fn nothing(library_dim: usize, latent_dim: usize) -> Self {
         Self {
             known: DMatrix::zeros(library_dim, latent_dim),

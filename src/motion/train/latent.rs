@@ -24,7 +24,6 @@ pub struct Latent {
 }
 
 impl Latent {
-    /// Encodes every jump.
     pub fn of(dataset: &Dataset, encoder: &StateMap) -> Vec<Latent> {
         let linear = encoder.as_affine().map(AffineMap::weights);
         let linear = linear.map(|weights| (weights, input_projection(weights)));
@@ -40,7 +39,6 @@ impl Latent {
         encoded.collect()
     }
 
-    /// Encodes a jump with the Jacobian at every sample.
     fn along(jump: &Jump, encoder: &StateMap) -> Self {
         let empty = DMatrix::zeros(encoder.output_dim(), jump.samples());
         let mut latent = Self {
@@ -72,7 +70,6 @@ impl Latent {
         variables
     }
 
-    /// Writes them into the rows of `variables`.
     fn copy_variables(&self, range: Range<usize>, variables: &mut DMatrixViewMut<'_, f64>) {
         let d = self.z.nrows();
         for (block, source) in [&self.z, &self.dz, &self.u_lat].into_iter().enumerate() {
@@ -83,22 +80,17 @@ impl Latent {
     }
 }
 
-/// A dataset with its latent samples, one of each jump.
 #[derive(Clone, Copy, Debug)]
 pub struct EncodedSet<'a> {
-    /// The jumps.
     pub dataset: &'a Dataset,
-    /// Their latent samples.
     pub latent: &'a [Latent],
 }
 
 impl<'a> EncodedSet<'a> {
-    /// These latent samples of a dataset.
     pub fn new(dataset: &'a Dataset, latent: &'a [Latent]) -> Self {
         Self { dataset, latent }
     }
 
-    /// Number of latent coordinates, 0 without a jump.
     pub fn latent_dim(self) -> usize {
         self.latent.first().map_or(0, |first| first.z.nrows())
     }
@@ -131,7 +123,6 @@ pub fn input_projection(weights: &DMatrix<f64>) -> DMatrix<f64> {
     }
 }
 
-/// A map, linear or not, of samples in columns.
 pub fn map_samples(map: &StateMap, samples: &DMatrix<f64>) -> DMatrix<f64> {
     if let Some(linear) = map.as_affine() {
         let mut mapped = linear.weights() * samples;

@@ -71,7 +71,6 @@ pub fn assess(model: &ReducedModel, recordings: &[Recording]) -> Result<SetMetri
     Ok(measure(candidate, maps, EncodedSet::new(&dataset, &latent)))
 }
 
-/// Measures a model on a dataset that it has encoded.
 pub(super) fn measure(
     candidate: Candidate<'_>,
     [encoder, decoder]: [&StateMap; 2],

@@ -36,7 +36,6 @@ fn truth(phase: usize, z: &[f64], dz: &[f64], u: &[f64]) -> [f64; 2] {
     }
 }
 
-/// Shipped jumps of the Go1, such as `train_01`.
 pub(super) fn go1(names: impl IntoIterator<Item = impl Display>) -> Dataset {
     let names = names.into_iter().map(|name| format!("go1/{name}"));
     let jumps: Vec<_> = names.map(|name| shipped(&name)).collect();
@@ -46,7 +45,6 @@ pub(super) fn go1(names: impl IntoIterator<Item = impl Display>) -> Dataset {
     Dataset::new(&jumps[..], &rule, &options.phases, &scaling, 11).expect("jumps")
 }
 
-/// A standard library with inputs.
 pub(super) fn standard_library(latent_dim: usize, degree: u32, trigonometric: bool) -> Library {
     let standard = StandardLibrary {
         degree,

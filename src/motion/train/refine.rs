@@ -18,9 +18,7 @@ use super::sparse::active_terms;
 pub(super) const PRIOR: f64 = 1e-3;
 /// Relative step of the difference quotients.
 const STEP: f64 = 1e-6;
-/// Dampings tried in one step before it is given up.
 const ATTEMPTS: usize = 6;
-/// Coefficients whose rollouts are computed together.
 const TOGETHER: usize = 64;
 /// Share of the squared errors that a step must lower them by to be followed by another.
 const LEAST_GAIN: f64 = 2e-3;
@@ -36,7 +34,6 @@ pub(super) struct Coefficients {
 }
 
 impl Coefficients {
-    /// Coefficients that are not zero.
     pub(super) fn active(&self) -> usize {
         self.xi.iter().map(active_terms).sum()
     }
@@ -50,21 +47,16 @@ pub(super) struct Free {
 }
 
 impl Free {
-    /// Place and size of every coefficient.
     pub fn each(&self) -> impl Iterator<Item = (Place, f64)> {
         let scales = self.scales.iter().copied();
         self.places.iter().copied().zip(scales)
     }
 }
 
-/// What coefficients are refined by.
 pub(super) struct Refiner<'a> {
     pub knowledge: &'a [Knowledge],
-    /// What the coefficients keep to.
     pub growth: &'a Growth,
-    /// Whose errors are lowered.
     pub training: &'a Judge<'a>,
-    /// Which of the coefficients on the way are kept.
     pub judge: &'a Judge<'a>,
 }
 
@@ -265,7 +257,6 @@ impl Refiner<'_> {
         Some(model)
     }
 
-    /// Every coefficient that may change.
     pub(super) fn free(&self, xi: &[DMatrix<f64>]) -> Free {
         let (mut places, mut scales) = (Vec::new(), Vec::new());
         for (phase, (xi, knowledge)) in xi.iter().zip(self.knowledge).enumerate() {

@@ -21,25 +21,20 @@ const STAGES: [(usize, f64); 4] = [(0, 0.0), (1, 0.5), (1, 0.5), (2, 1.0)];
 /// Latent dynamics under trial: `ddz = Xi_phase^T theta(z, dz, u_lat)`.
 #[derive(Clone, Copy, Debug)]
 pub struct Candidate<'a> {
-    /// The library.
     pub features: &'a Features,
     /// Coefficients a phase, `library_dim x latent_dim`.
     pub xi: &'a [DMatrix<f64>],
 }
 
-/// One coefficient that is not as in the candidate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Change {
     /// Phase, term and latent coordinate of the coefficient.
     pub place: (usize, usize, usize),
-    /// What is added to it.
     pub by: f64,
 }
 
-/// Where a rollout starts and how many steps it takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Window {
-    /// Index of the jump.
     pub jump: usize,
     /// First sample; the rollout starts at its true latent state.
     pub start: usize,
@@ -47,16 +42,12 @@ pub struct Window {
     pub steps: usize,
 }
 
-/// A window and the change that the candidate has in it.
 #[derive(Clone, Copy, Debug)]
 pub struct Row {
-    /// The window.
     pub window: Window,
-    /// The change, if any.
     pub change: Option<Change>,
 }
 
-/// Rows of the candidate without a change.
 pub fn plain(windows: &[Window]) -> Vec<Row> {
     let change = None;
     let rows = windows.iter().map(|&window| Row { window, change });
@@ -128,7 +119,6 @@ pub fn predict_changed(
     each.collect()
 }
 
-/// Steps of a batch of windows.
 struct Stepper<'a> {
     candidate: Candidate<'a>,
     set: EncodedSet<'a>,
@@ -143,11 +133,9 @@ struct Stepper<'a> {
     rates: [DMatrix<f64>; 4], // dz, ddz at the four stages
 }
 
-/// Terms and their coefficients for every latent coordinate.
 type ActiveTerms = Vec<Vec<(usize, f64)>>;
 
 impl<'a> Stepper<'a> {
-    /// At the true latent states that the windows start from.
     fn new(candidate: Candidate<'a>, set: EncodedSet<'a>, rows: Vec<Row>) -> Self {
         let d = candidate.features.latent_dim();
         let active = |xi: &DMatrix<f64>| {
@@ -179,7 +167,6 @@ impl<'a> Stepper<'a> {
         stepper
     }
 
-    /// Leaves out all rows but the first `n`.
     fn keep(&mut self, n: usize) {
         if n < self.rows.len() {
             self.rows.truncate(n);
@@ -198,7 +185,6 @@ impl<'a> Stepper<'a> {
         self.rates = std::array::from_fn(|_| DMatrix::zeros(n, 2 * d));
     }
 
-    /// Takes step `step` of every window.
     fn advance(&mut self, step: usize) {
         self.load_inputs(step);
         for stage in 0..STAGES.len() {
@@ -208,7 +194,6 @@ impl<'a> Stepper<'a> {
         finish_step(self.state.as_mut_slice(), &self.step_s, rates);
     }
 
-    /// Inputs, phases and step lengths of step `step`.
     fn load_inputs(&mut self, step: usize) {
         let (n, mut first) = (self.rows.len(), 0);
         for of_window in self.rows.chunk_by(|a, b| a.window == b.window) {
@@ -229,7 +214,6 @@ impl<'a> Stepper<'a> {
         }
     }
 
-    /// Rates `[dz; ddz]` of a stage.
     fn rate(&mut self, stage: usize) {
         let (features, n) = (self.candidate.features, self.rows.len());
         let d = features.latent_dim();

@@ -15,11 +15,9 @@ use crate::model::{Library, ModelError};
 /// What a seed came to and its numbers, or why it has none.
 pub(super) type Outcome = Result<(SeedReport, Fitted), TrainError>;
 
-/// Outcomes of the seeds so far.
 #[derive(Default)]
 pub(super) struct Seeds {
     finished: Vec<(SeedReport, Fitted)>,
-    /// Why the first seed without a model has none.
     failure: Option<TrainError>,
 }
 
@@ -112,7 +110,6 @@ fn with_finite_coefficients((mut report, fitted): (SeedReport, Fitted)) -> Outco
     Ok((report, fitted))
 }
 
-/// Whether another seed may do better.
 fn is_of_one_seed(error: &TrainError) -> bool {
     match error {
         TrainError::NoStableModel { .. } | TrainError::TermValue { .. } | TrainError::Model(_) => {

@@ -131,11 +131,9 @@ pub fn select(
     Ok((chosen.now.xi, choice, candidates))
 }
 
-/// A candidate that was fitted and judged.
 #[derive(Clone)]
 pub(super) struct Trial<'a> {
     pub now: Coefficients,
-    /// What it was fitted by, one a phase.
     pub regressions: &'a [Regression],
     pub ridge: f64,
     window: usize,
@@ -143,7 +141,6 @@ pub(super) struct Trial<'a> {
 }
 
 impl Trial<'_> {
-    /// Whether its rollouts stay finite.
     fn is_stable(&self) -> bool {
         self.now.score.is_finite()
     }
@@ -163,12 +160,9 @@ impl Trial<'_> {
     }
 }
 
-/// What candidates are fitted from and judged by.
 #[derive(Clone, Copy)]
 pub(super) struct Search<'a> {
-    /// Of every window, one a phase.
     regressions: &'a [Vec<Regression>; WINDOWS.len()],
-    /// What candidates keep to.
     pub growth: &'a Growth,
     pub judge: &'a Judge<'a>,
 }
@@ -238,12 +232,10 @@ impl<'a> Search<'a> {
     }
 }
 
-/// Whether the rollouts of a candidate stay finite.
 fn any_stable(tried: &[Trial<'_>]) -> bool {
     tried.iter().any(Trial::is_stable)
 }
 
-/// The candidate with the best score.
 fn best_of<'t, 'a>(tried: &'t [Trial<'a>]) -> Result<&'t Trial<'a>, TrainError> {
     let best = (tried.iter().filter(|trial| trial.is_stable()))
         .min_by(|a, b| a.now.score.total_cmp(&b.now.score));

@@ -118,7 +118,6 @@ impl Regression {
         }
     }
 
-    /// The support that is left for each of the losses.
     fn eliminate(
         &self,
         column: usize,
@@ -234,7 +233,6 @@ impl Regression {
         free.filter(|&i| support[(i, column)]).collect()
     }
 
-    /// Mean square of a column's accelerations.
     fn energy(&self, column: usize) -> f64 {
         self.target_rms[column].powi(2).max(f64::MIN_POSITIVE)
     }
@@ -271,11 +269,9 @@ impl Regression {
     }
 }
 
-/// The ridge solution of one column on a support.
 struct SupportFit {
     support: Vec<usize>,
     solution: DVector<f64>,
-    /// Of the ridged Gram matrix of the support.
     inverse: DMatrix<f64>,
 }
 
@@ -299,7 +295,6 @@ impl SupportFit {
     }
 }
 
-/// Entries of `xi` that are not zero.
 pub fn active_terms(xi: &DMatrix<f64>) -> usize {
     xi.iter().filter(|value| **value != 0.0).count()
 }
@@ -317,7 +312,6 @@ mod tests {
     use crate::train::random::Random;
 
     impl Regression {
-        /// With one pruning of all terms.
         pub fn fit(&self, ridge: f64, pruning: Pruning) -> DMatrix<f64> {
             let all = vec![true; self.theta_rms.len()];
             self.fit_each(ridge, &[pruning], &all).remove(0)

@@ -37,7 +37,6 @@ impl FromStr for Split {
 }
 
 impl fmt::Display for Split {
-    /// As it is read.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [training, validation, test] = self.shares;
         write!(f, "{training},{validation},{test}")

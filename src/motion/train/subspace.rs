@@ -11,7 +11,6 @@ use super::frame::Frame;
 use super::options::EncoderOptions;
 use super::random::Random;
 
-/// Second moments of the training samples, in scaled units.
 #[derive(Clone, Debug)]
 pub struct Moments {
     /// Covariance of the state, `state_dim x state_dim`.
@@ -36,7 +35,6 @@ impl Moments {
     }
 }
 
-/// Iterations of one descent.
 const ITERATIONS: usize = 2000;
 
 /// Finds the row space of least `reconstruction + lift_weight * lift_loss`: an orthonormal basis, in which the rows of

@@ -30,19 +30,15 @@ impl<'a> Recordings<'a> {
     }
 }
 
-/// Data, library and options that all seeds share.
 pub(super) struct Task<'a> {
     /// The training recordings cut into phases, scaled.
     pub training: Dataset,
     /// The same of the validation recordings; may have no jump.
     pub validation: Dataset,
-    /// Of the training samples.
     pub moments: Moments,
     pub library: Library,
     pub features: Features,
-    /// Coordinates that the encoder may use.
     pub active: Vec<usize>,
-    /// What the rows of a linear encoder are made of.
     pub frame: Frame,
     /// What is known of the dynamics in its coordinates, one a phase.
     pub knowledge: Vec<Knowledge>,

@@ -67,7 +67,6 @@ impl Refiner<'_> {
         best
     }
 
-    /// The places that may go, those first whose loss is least.
     fn order(&self, about: &About) -> Vec<usize> {
         let features = self.judge.features;
         let d = features.latent_dim();
@@ -120,7 +119,6 @@ impl About {
         (self.to_zero[i] - self.lowest[i]).powi(2) / self.inverse[(i, i)]
     }
 
-    /// The form without one more term.
     fn without(&self, i: usize) -> Self {
         let mut next = self.clone();
         let column = self.inverse.column(i) / self.inverse[(i, i)];
@@ -130,7 +128,6 @@ impl About {
         next
     }
 
-    /// The coefficients where the form is lowest.
     fn xi(&self, from: &Coefficients) -> Vec<DMatrix<f64>> {
         let mut xi = from.xi.clone();
         for (i, ((phase, term, column), scale)) in self.free.each().enumerate() {

@@ -88,7 +88,6 @@ pub fn windowed_samples(
     )
 }
 
-/// Running integrals of the library along one phase span.
 struct Span {
     time_s: Vec<f64>,
     z: DMatrix<f64>,

@@ -1,6 +1,5 @@
 //! The Adam optimiser (Kingma and Ba 2015) on one block of numbers.
 
-/// Moments of one block.
 #[derive(Clone, Debug)]
 pub struct Adam {
     learning_rate: f64,
@@ -15,7 +14,6 @@ const BETA_SQUARE: f64 = 0.999;
 const EPSILON: f64 = 1e-7;
 
 impl Adam {
-    /// A fresh optimiser for a block of `len` numbers.
     pub fn new(len: usize, learning_rate: f64) -> Self {
         Self {
             learning_rate,
@@ -25,7 +23,6 @@ impl Adam {
         }
     }
 
-    /// Moves `values` one step against `gradient`.
     pub fn step(&mut self, values: &mut [f64], gradient: &[f64]) {
         self.steps = self.steps.saturating_add(1);
         let mean_correction = 1.0 - BETA_MEAN.powi(self.steps);

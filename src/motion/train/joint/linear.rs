@@ -150,14 +150,14 @@ impl Maps for LinearMaps {
     }
 
     /// Quadratic in the decoder: the batch enters by moments that are computed once.
-    fn decoder_loss<'a>(&'a self, parameters: &Parameters, batch: &'a Batch) -> DecoderLoss<'a> {
+    fn decoder_loss(&self, parameters: &Parameters, batch: &Batch) -> Option<DecoderLoss> {
         let (n, d) = layers(parameters).0.weights.shape();
         let count = batch.samples() as f64;
         let z = encode(parameters, batch).insert_column(d, 1.0);
         let gram = z.tr_mul(&z) / count;
         let cross = z.tr_mul(&batch.x) / count;
         let energy = batch.x.norm_squared() / count;
-        Box::new(move |decoder, gradient| {
+        Some(Box::new(move |decoder, gradient| {
             let decoder = &decoder.layers[0];
             let mut extended = decoder.weights.clone().insert_row(d, 0.0);
             extended.row_mut(d).tr_copy_from(&decoder.bias);
@@ -169,11 +169,16 @@ impl Maps for LinearMaps {
             own.weights.copy_from(&adjoint.rows(0, d));
             own.bias.tr_copy_from(&adjoint.row(d));
             square / n as f64
-        })
+        }))
     }
 
     /// Quadratic in Xi: the batch enters by moments that are computed once.
-    fn xi_loss(&self, parameters: &Parameters, batch: &Batch, features: &Features) -> XiLoss {
+    fn xi_loss(
+        &self,
+        parameters: &Parameters,
+        batch: &Batch,
+        features: &Features,
+    ) -> Option<XiLoss> {
         let (encoder, decoder) = layers(parameters);
         let theta = theta(parameters, batch, features);
         let ddz = &batch.ddx * &encoder.weights;
@@ -183,7 +188,7 @@ impl Maps for LinearMaps {
         let decoder_gram = &decoder.weights * decoder.weights.transpose();
         let (ddz_energy, ddx_energy) = (ddz.norm_squared(), batch.ddx_energy);
         let (n, state_dim) = (batch.samples() as f64, batch.x.ncols() as f64);
-        Box::new(move |xi: &DMatrix<f64>, weights: LossWeights| {
+        Some(Box::new(move |xi: &DMatrix<f64>, weights: LossWeights| {
             let latent_scale = 1.0 / (n * xi.ncols() as f64);
             let real_scale = 1.0 / (n * state_dim);
             let product = &gram * xi;
@@ -197,7 +202,7 @@ impl Maps for LinearMaps {
             gradient += (decoded - &real) * (2.0 * weights.ddx * real_scale);
             losses.l1 = l1_subgradient(xi, weights.l1 / xi.len() as f64, &mut gradient);
             (losses, gradient)
-        })
+        }))
     }
 }
 

@@ -80,19 +80,15 @@ impl Losses {
     }
 }
 
-/// Parameters and samples at which a loss is evaluated.
 #[derive(Clone, Copy, Debug)]
 pub struct At<'a> {
-    /// Maps and coefficients.
     pub parameters: &'a Parameters,
-    /// Samples of one phase.
     pub batch: &'a Batch,
-    /// Weights of the losses.
     pub weights: LossWeights,
 }
 
 /// (16) of one batch as a function of the decoder; overwrites its gradient.
-pub type DecoderLoss<'a> = Box<dyn FnMut(&Network, &mut Network) -> f64 + 'a>;
+pub type DecoderLoss = Box<dyn Fn(&Network, &mut Network) -> f64>;
 /// (17) to (19) of one batch as functions of Xi, with their weighted gradient.
 pub type XiLoss = Box<dyn Fn(&DMatrix<f64>, LossWeights) -> (Losses, DMatrix<f64>)>;
 
@@ -125,11 +121,15 @@ pub trait Maps {
         gradient: &mut Parameters,
     ) -> f64;
 
-    /// The loss of the second step, in which the encoder stays.
-    fn decoder_loss<'a>(&'a self, parameters: &Parameters, batch: &'a Batch) -> DecoderLoss<'a>;
+    /// The loss of the second step, in which the encoder stays, where less than the whole loss gives it.
+    fn decoder_loss(&self, _: &Parameters, _: &Batch) -> Option<DecoderLoss> {
+        None
+    }
 
-    /// The loss of the third step, in which both maps stay; without (41).
-    fn xi_loss(&self, parameters: &Parameters, batch: &Batch, features: &Features) -> XiLoss;
+    /// The loss of the third step, in which both maps stay, where less than the whole loss gives it; without (41).
+    fn xi_loss(&self, _: &Parameters, _: &Batch, _: &Features) -> Option<XiLoss> {
+        None
+    }
 }
 
 /// The loss over one library, with its scratch space.
@@ -137,7 +137,6 @@ pub struct JointLoss<'a> {
     pub(super) features: &'a Features,
     pub(super) maps: Box<dyn Maps>,
     pub(super) weights: LossWeights,
-    /// The weights in the present epoch.
     current: LossWeights,
     unroll: Unroll,
     values: FeatureValues,
@@ -163,10 +162,20 @@ impl<'a> JointLoss<'a> {
         }
     }
 
-    /// Takes the weights of an epoch of `schedule`, and returns them.
     pub(super) fn start_epoch(&mut self, epoch: usize, schedule: &Schedule) -> LossWeights {
         self.current = schedule.weights_at(epoch, self.weights);
         self.current
+    }
+
+    /// Counts nothing but (16).
+    pub(super) fn count_reconstruction_only(&mut self) {
+        self.current = LossWeights {
+            ddz: 0.0,
+            ddx: 0.0,
+            l1: 0.0,
+            lift: 0.0,
+            bptt: 0.0,
+        };
     }
 
     /// Gradient of the last [`Self::evaluate`]; of Xi only the phase of that batch has one.

@@ -9,7 +9,6 @@ use crate::train::vectors::vectorised;
 
 const LANES: usize = 16;
 
-/// Consecutive columns of a matrix.
 #[derive(Clone, Copy)]
 pub struct Columns<'a> {
     values: &'a [f64],
@@ -17,7 +16,6 @@ pub struct Columns<'a> {
 }
 
 impl<'a> Columns<'a> {
-    /// All columns.
     pub fn all(matrix: &'a DMatrix<f64>) -> Self {
         Self {
             values: matrix.as_slice(),
@@ -25,7 +23,6 @@ impl<'a> Columns<'a> {
         }
     }
 
-    /// `count` columns from `start` on.
     pub fn some(matrix: &'a DMatrix<f64>, start: usize, count: usize) -> Self {
         let rows = matrix.nrows();
         Self {

@@ -19,14 +19,11 @@ pub struct Dense {
     pub weights: DMatrix<f64>,
     /// `b`, one per output.
     pub bias: DVector<f64>,
-    /// `phi`.
     pub activation: Activation,
 }
 
-/// Layers in the order in which they are applied, or gradients with respect to them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Network {
-    /// At least one.
     pub layers: Vec<Dense>,
 }
 
@@ -76,11 +73,6 @@ impl Network {
         }
     }
 
-    /// Sets every number to zero.
-    pub fn clear(&mut self) {
-        self.blocks_mut().for_each(|block| block.fill(0.0));
-    }
-
     /// Weights and bias of every layer as slices, in a fixed order.
     pub fn blocks(&self) -> impl Iterator<Item = &[f64]> {
         self.layers
@@ -88,7 +80,6 @@ impl Network {
             .flat_map(|layer| [layer.weights.as_slice(), layer.bias.as_slice()])
     }
 
-    /// The same, to be changed.
     pub fn blocks_mut(&mut self) -> impl Iterator<Item = &mut [f64]> {
         self.layers
             .iter_mut()
@@ -150,7 +141,6 @@ impl Network {
         adjoint
     }
 
-    /// Jacobians at the samples of the last forward pass.
     pub fn jacobian(&self, tape: &Tape) -> Jacobians {
         let n = tape.samples;
         let outputs = self.layers.last().map_or(0, |layer| layer.bias.len());
@@ -222,7 +212,6 @@ fn times_each(stack: &DMatrix<f64>, factors: &DMatrix<f64>) -> DMatrix<f64> {
     product
 }
 
-/// Sum of the blocks of `n` rows.
 fn summed(stack: &DMatrix<f64>, n: usize) -> DMatrix<f64> {
     let mut sum = DMatrix::zeros(n, stack.ncols());
     for start in (0..stack.nrows()).step_by(n.max(1)) {

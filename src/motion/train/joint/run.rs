@@ -91,14 +91,12 @@ fn frame(task: &Task<'_>) -> Frame {
     }
 }
 
-/// What all seeds share.
 struct Trainer<'a> {
     task: &'a Task<'a>,
     batches: &'a [Batch],
     frame: Frame,
 }
 
-/// What one seed has learned.
 struct Run {
     seed: u64,
     parameters: Parameters,
@@ -166,7 +164,7 @@ impl Trainer<'_> {
         let losses = train_together(&mut parameters, &first, &mut loss, schedule, &mut listener);
         let quiet = &mut |_: usize, _: &Losses, _: usize| !cancel.load(Ordering::Relaxed);
         if published {
-            train_decoder(&mut parameters, &all, &loss, schedule, quiet);
+            train_decoder(&mut parameters, &all, &mut loss, schedule, quiet);
             for phase in 0..parameters.xi.len() {
                 let own: Vec<&Batch> = of_phase(phase).collect();
                 parameters.xi[phase].fill(options.xi_start);
@@ -180,7 +178,6 @@ impl Trainer<'_> {
         }
     }
 
-    /// The loss of maps like those of `parameters`.
     fn loss(&self, weights: LossWeights, parameters: &Parameters) -> JointLoss<'_> {
         let coordinate_weights = self.task.options.encoder.coordinate_weights();
         let maps: Box<dyn Maps> = match self.is_linear() {
@@ -199,7 +196,6 @@ impl Trainer<'_> {
         self.task.options.joint.transfer == Transfer::Published
     }
 
-    /// Coordinates that the encoder may use.
     fn mask(&self) -> Vec<bool> {
         let factors = self.frame.factors.iter();
         factors.map(|factor| *factor != 0.0).collect()
@@ -228,7 +224,6 @@ impl Trainer<'_> {
         start
     }
 
-    /// The model numbers of a run, and its score.
     fn finish(&self, run: Run, judged: &[Batch], watch: &mut Watch<'_>) -> Outcome {
         let fitted = if self.is_published() {
             self.published(run.parameters, judged)?
@@ -243,7 +238,6 @@ impl Trainer<'_> {
         Ok((report, fitted))
     }
 
-    /// Mean combined loss over batches of all phases.
     fn published_score(&self, parameters: &Parameters, judged: &[Batch]) -> f64 {
         let weights = self.task.options.joint.weights;
         let mut loss = self.loss(weights, parameters);
@@ -252,7 +246,6 @@ impl Trainer<'_> {
         total / judged.len().max(1) as f64
     }
 
-    /// The numbers as Adam left them.
     fn published(&self, parameters: Parameters, judged: &[Batch]) -> Result<Fitted, TrainError> {
         let plain = LatentBasis::unchanged(self.task.options.latent_dim);
         let (encoder, decoder) = self.state_maps(&parameters, &plain)?;

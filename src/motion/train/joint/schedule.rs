@@ -34,7 +34,6 @@ impl Default for Schedule {
 }
 
 impl Schedule {
-    /// Epochs of one step, refinement included.
     pub fn total(&self) -> usize {
         self.epochs + self.refinement
     }
@@ -64,7 +63,6 @@ pub(super) struct MaskedAdam {
 }
 
 impl MaskedAdam {
-    /// Nothing masked yet.
     pub fn new(xi: &DMatrix<f64>, schedule: &Schedule) -> Self {
         Self {
             optimiser: Adam::new(xi.len(), schedule.learning_rate),
@@ -82,13 +80,11 @@ impl MaskedAdam {
         }
     }
 
-    /// One step along the gradient.
     pub fn step(&mut self, xi: &mut DMatrix<f64>, gradient: &DMatrix<f64>) {
         self.optimiser.step(xi.as_mut_slice(), gradient.as_slice());
         self.apply(xi);
     }
 
-    /// Coefficients that are not masked.
     pub fn active(&self) -> usize {
         self.support.iter().filter(|kept| **kept).count()
     }

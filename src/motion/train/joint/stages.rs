@@ -1,6 +1,6 @@
 //! The three transfer steps of section IV-D.
 //!
-//! Steps two and three move only the decoder or only Xi, on losses for which most of each batch is computed once
+//! Steps two and three move only the decoder or only Xi; of linear maps on losses that compute most of a batch once
 //! ([`Maps::decoder_loss`](super::loss::Maps::decoder_loss), [`Maps::xi_loss`](super::loss::Maps::xi_loss)); the
 //! iterates are those of the whole loss.
 
@@ -54,21 +54,32 @@ pub fn train_together(
 pub fn train_decoder(
     parameters: &mut Parameters,
     batches: &[&Batch],
-    loss: &JointLoss<'_>,
+    loss: &mut JointLoss<'_>,
     schedule: &Schedule,
     listener: &mut Listener<'_>,
 ) {
-    let mut losses: Vec<DecoderLoss<'_>> = (batches.iter())
-        .map(|batch| loss.maps.decoder_loss(parameters, batch))
-        .collect();
-    let decoder = &mut parameters.decoder;
-    let mut maps = optimisers(decoder.blocks(), schedule);
-    let mut gradient = decoder.clone();
+    let part = |batch: &&Batch| loss.maps.decoder_loss(parameters, batch);
+    let parts: Option<Vec<DecoderLoss>> = batches.iter().map(part).collect();
+    loss.count_reconstruction_only();
+    let mut optimisers = optimisers(parameters.decoder.blocks(), schedule);
+    let mut gradient = parameters.decoder.clone();
     for epoch in 0..schedule.total() {
         let mut mean = Losses::default();
-        for loss in &mut losses {
-            mean.decoder += loss(decoder, &mut gradient) / batches.len() as f64;
-            step(&mut maps, decoder.blocks_mut(), gradient.blocks());
+        for (index, batch) in batches.iter().enumerate() {
+            let value = match &parts {
+                Some(parts) => parts[index](&parameters.decoder, &mut gradient),
+                None => {
+                    let losses = loss.evaluate(parameters, batch);
+                    gradient.clone_from(&loss.gradient().decoder);
+                    losses.decoder
+                }
+            };
+            mean.decoder += value / batches.len() as f64;
+            step(
+                &mut optimisers,
+                parameters.decoder.blocks_mut(),
+                gradient.blocks(),
+            );
         }
         if !listener(epoch + 1, &mean, 0) {
             break;
@@ -88,8 +99,10 @@ pub fn train_xi(
     listener: &mut Listener<'_>,
 ) {
     let xi_loss = |batch: &&Batch| loss.maps.xi_loss(parameters, batch, loss.features);
-    let parts: Option<Vec<XiLoss>> =
-        (loss.weights.bptt == 0.0).then(|| batches.iter().map(xi_loss).collect());
+    let parts: Option<Vec<XiLoss>> = match loss.weights.bptt == 0.0 {
+        true => batches.iter().map(xi_loss).collect(),
+        false => None,
+    };
     let mut masked = MaskedAdam::new(&parameters.xi[phase], schedule);
     for epoch in 0..schedule.total() {
         masked.start_epoch(epoch, schedule, &mut parameters.xi[phase]);
@@ -112,13 +125,11 @@ pub fn train_xi(
     }
 }
 
-/// Adam for every block.
 fn optimisers<'a>(blocks: impl Iterator<Item = &'a [f64]>, schedule: &Schedule) -> Vec<Adam> {
     let rate = schedule.learning_rate;
     blocks.map(|block| Adam::new(block.len(), rate)).collect()
 }
 
-/// One step of every block along its gradient.
 fn step<'a>(
     optimisers: &mut [Adam],
     blocks: impl Iterator<Item = &'a mut [f64]>,
@@ -236,7 +247,7 @@ mod tests {
             };
             let mut loss = loss(&features, &mut fast, only_decoder);
             let mut slow = fast.clone();
-            train_decoder(&mut fast, &all, &loss, &short(5), &mut go);
+            train_decoder(&mut fast, &all, &mut loss, &short(5), &mut go);
             let mut maps = optimisers(slow.decoder.blocks(), &short(5));
             for _ in 0..5 {
                 for batch in &batches {

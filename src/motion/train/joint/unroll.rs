@@ -63,25 +63,20 @@ impl Integrator {
     }
 }
 
-/// Samples of one batch.
 #[derive(Clone, Copy, Debug)]
 pub struct Window<'a> {
-    /// The library.
     pub features: &'a Features,
     /// `n x 3d`: z, dz, u_lat.
     pub variables: &'a DMatrix<f64>,
     /// `library_dim x d`.
     pub xi: &'a DMatrix<f64>,
-    /// Time between samples.
     pub step_s: f64,
 }
 
-/// Gradients that the loss adds to.
 #[derive(Debug)]
 pub struct Adjoints<'a> {
     /// With respect to the variables, `n x 3d`.
     pub variables: &'a mut DMatrix<f64>,
-    /// With respect to the coefficients.
     pub xi: &'a mut DMatrix<f64>,
 }
 

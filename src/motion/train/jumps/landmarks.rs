@@ -16,21 +16,16 @@ const LEAST_SAMPLES: usize = 8;
 /// A part of every jump of a kind.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Landmark {
-    /// Its name.
     pub name: String,
-    /// Index of the model's phase.
     pub phase: usize,
     /// Feet on the ground: those that select the phase, as many as it allows.
     pub feet: ContactFlags,
 }
 
-/// A jump with its borders.
 pub struct Cut {
-    /// The parts.
     pub kind: Vec<Landmark>,
     /// First sample of each part, and the last sample of the last.
     borders: Vec<usize>,
-    /// Their times, s.
     times_s: Vec<f64>,
 }
 
@@ -40,7 +35,6 @@ impl Cut {
         self.borders[part]..self.borders[part + 1] + 1
     }
 
-    /// Duration of a part, s.
     pub fn duration_s(&self, part: usize) -> f64 {
         self.times_s[part + 1] - self.times_s[part]
     }
@@ -51,7 +45,6 @@ impl Cut {
         lands.then(|| self.borders[self.kind.len() - 1])
     }
 
-    /// The last sample of the last part.
     pub fn end(&self) -> usize {
         self.borders[self.kind.len()]
     }

@@ -27,7 +27,6 @@ pub const LEAST_JUMPS: usize = 6;
 /// Significant digits of what is kept: beyond those of any recording.
 const DIGITS: usize = 6;
 
-/// Everything of one jump that the prior is made of.
 struct Sampled {
     goal: [f64; GOAL_DIM],
     parts: Vec<PartNodes>,
@@ -160,7 +159,6 @@ fn input_covariance(all: &[&PartNodes]) -> DMatrix<f64> {
     covariance + DMatrix::identity(d, d) * floor
 }
 
-/// The least and the most of some numbers.
 fn range_of(values: impl Iterator<Item = f64>) -> [f64; 2] {
     let nothing = [f64::INFINITY, f64::NEG_INFINITY];
     let range = values.fold(nothing, |[least, most], v| [least.min(v), most.max(v)]);
