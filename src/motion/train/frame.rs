@@ -225,12 +225,4 @@ mod tests {
         }
         assert_eq!((frame.held.ncols(), frame.free.ncols()), (2, 7));
     }
-
-    #[test]
-    fn nearest_directions_of_a_space_inside_the_frame_span_it() {
-        let frame = Frame::plain(&[1, 2, 5]);
-        let basis = DMatrix::from_columns(&[(unit(1) + unit(5)) / 2f64.sqrt()]);
-        let nearest = frame.nearest(&basis, 1);
-        assert!((nearest.dot(&basis).abs() - 1.0).abs() < 1e-12);
-    }
 }

@@ -397,15 +397,6 @@ mod tests {
     }
 
     #[test]
-    fn fit_column_keeps_the_given_support_only() {
-        let (theta, target) = samples();
-        let support = DMatrix::from_column_slice(4, 1, &[true, false, true, false]);
-        let xi = unconstrained(&theta, &target).fit_column(0, &support, 1e-6);
-        assert_eq!((xi[1], xi[3]), (0.0, 0.0));
-        assert!((xi[0] - 2.0).abs() < 0.1);
-    }
-
-    #[test]
     fn no_term_is_left_of_an_elimination_of_everything_or_without_accelerations() {
         let (theta, target) = samples();
         let all = unconstrained(&theta, &target).fit(1e-3, Pruning::Elimination(2.0));

@@ -293,31 +293,6 @@ mod tests {
     }
 
     #[test]
-    fn lift_weight_turns_the_space_towards_the_inputs() {
-        let moments = moments();
-        let losses = |lift_weight| {
-            let options = options(lift_weight, 3.0);
-            let found = find_subspace(&moments, &all(), 2, &options, 1);
-            let objective = Objective::new(&moments, &all(), &options);
-            (
-                objective.lift_loss(&found),
-                objective.reconstruction(&found),
-            )
-        };
-        let (blind, lifted) = (losses(0.0), losses(10.0));
-        assert!(lifted.0 < blind.0 && lifted.1 >= blind.1 - 1e-12);
-    }
-
-    #[test]
-    fn masked_coordinates_get_no_weight() {
-        let frame = Frame::plain(&[1, 12, 14]);
-        let found = find_subspace(&moments(), &frame, 2, &options(0.1, 3.0), 1);
-        for masked in [0, 2, 13, 17] {
-            assert_eq!(found.row(masked).amax(), 0.0);
-        }
-    }
-
-    #[test]
     fn resting_coordinate_is_active_only_if_it_is_actuated() {
         let x = DMatrix::from_fn(3, 50, |i, j| if i == 0 { (j as f64).sin() } else { 0.0 });
         let u = DMatrix::from_fn(3, 50, |i, _| if i == 1 { 2.0 } else { 0.0 });

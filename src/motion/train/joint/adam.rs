@@ -37,29 +37,3 @@ impl Adam {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn first_step_has_the_length_of_the_learning_rate() {
-        let mut values = [1.0, -2.0];
-        Adam::new(2, 0.1).step(&mut values, &[5.0, -1e-3]);
-        assert!(
-            (values[0] - 0.9).abs() < 1e-6 && (values[1] + 1.9).abs() < 1e-4,
-            "{values:?}"
-        );
-    }
-
-    #[test]
-    fn repeated_steps_find_the_minimum_of_a_parabola() {
-        let mut values = [3.0];
-        let mut adam = Adam::new(1, 0.05);
-        for _ in 0..2000 {
-            let gradient = [2.0 * (values[0] - 0.5)];
-            adam.step(&mut values, &gradient);
-        }
-        assert!((values[0] - 0.5).abs() < 1e-3, "{values:?}");
-    }
-}

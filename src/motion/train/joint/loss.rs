@@ -273,6 +273,7 @@ mod tests {
     use crate::train::joint::linear::LinearMaps;
     use crate::train::joint::nonlinear::NonlinearMaps;
     use crate::train::joint::parameters::Frame;
+    use crate::train::joint::unroll::Integrator;
     use crate::train::oscillator::standard_library;
     use crate::train::random::Random;
 
@@ -310,11 +311,13 @@ mod tests {
         features: &'a Features,
         maps: Box<dyn Maps>,
         parameters: &Parameters,
+        integrator: Integrator,
     ) -> JointLoss<'a> {
         let unroll = Unroll {
             window: 3,
             stride: 2,
-            ..Unroll::default()
+            decay: 0.9,
+            integrator,
         };
         JointLoss::new(features, maps, (WEIGHTS, unroll), parameters)
     }
@@ -337,7 +340,11 @@ mod tests {
             factors,
             latent: 0.6,
         };
-        for phi in Activation::ALL {
+        let integrators = [Integrator::Rk2, Integrator::Rk4, Integrator::Euler];
+        for (phi, integrator) in Activation::ALL
+            .into_iter()
+            .zip(integrators.into_iter().cycle())
+        {
             if phi == Activation::Relu {
                 continue; // its Jacobian jumps, and the loss on velocities with it
             }
@@ -351,7 +358,7 @@ mod tests {
                 true => linear(coordinate_weights()),
                 false => Box::new(NonlinearMaps::new(coordinate_weights(), frame.clone())),
             };
-            let mut loss = loss(&features, maps, &parameters);
+            let mut loss = loss(&features, maps, &parameters, integrator);
             loss.evaluate(&parameters, &batch);
             let mut gradient = loss.gradient().clone();
             let masked = gradient.encoder.layers[0].weights.row(4).amax() == 0.0;
@@ -385,7 +392,8 @@ mod tests {
             map.layers[0].bias.fill(0.0);
         }
         let maps = linear(DVector::from_element(7, 1.0));
-        let losses = loss(&features, maps, &parameters).evaluate(&parameters, &batch);
+        let mut loss = loss(&features, maps, &parameters, Integrator::Rk2);
+        let losses = loss.evaluate(&parameters, &batch);
         let encoder = &parameters.encoder.layers[0].weights;
         let decoder = &parameters.decoder.layers[0].weights;
         let inverse = encoder.clone().pseudo_inverse(1e-12).expect("positive");
@@ -413,8 +421,9 @@ mod tests {
         let (features, batch, parameters) = setup((&[7, 3], &[3, 7]), Activation::Linear);
         let plain = Frame::plain(&[true; 7]);
         let networks = Box::new(NonlinearMaps::new(coordinate_weights(), plain));
-        let mut found = loss(&features, networks, &parameters);
-        let mut expected = loss(&features, linear(coordinate_weights()), &parameters);
+        let mut found = loss(&features, networks, &parameters, Integrator::Rk2);
+        let linear = linear(coordinate_weights());
+        let mut expected = loss(&features, linear, &parameters, Integrator::Rk2);
         let losses = found.evaluate(&parameters, &batch);
         let reference = expected.evaluate(&parameters, &batch);
         let (a, b) = (losses.total(&WEIGHTS), reference.total(&WEIGHTS));

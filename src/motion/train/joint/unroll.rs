@@ -197,59 +197,6 @@ impl Unroll {
 mod tests {
     use super::*;
     use crate::train::oscillator::standard_library;
-    use crate::train::random::Random;
-
-    fn setup() -> (Features, DMatrix<f64>, DMatrix<f64>) {
-        let features = Features::new(&standard_library(2, 2, true));
-        let mut random = Random::new(8);
-        let xi = random.matrix(features.library_dim(), 2, 0.4);
-        (features, random.matrix(20, 6, 0.8), xi)
-    }
-
-    /// The loss for this time between samples, and its gradients by the variables and by Xi times 0.3.
-    fn evaluate(
-        unroll: &Unroll,
-        features: &Features,
-        (variables, xi): (&DMatrix<f64>, &DMatrix<f64>),
-        step_s: f64,
-    ) -> (f64, [DMatrix<f64>; 2]) {
-        let samples = Window {
-            features,
-            variables,
-            xi,
-            step_s,
-        };
-        let mut gradients = [variables, xi].map(|matrix| matrix.map(|_| 0.0));
-        let [variables, xi] = &mut gradients;
-        let loss = unroll.evaluate(samples, 0.3, &mut Adjoints { variables, xi });
-        (loss, gradients)
-    }
-
-    #[test]
-    fn gradient_agrees_with_finite_differences_for_every_integrator() {
-        let (features, variables, xi) = setup();
-        for integrator in [Integrator::Euler, Integrator::Rk2, Integrator::Rk4] {
-            let unroll = Unroll {
-                window: 3,
-                stride: 2,
-                decay: 0.7,
-                integrator,
-            };
-            let (_, exact) = evaluate(&unroll, &features, (&variables, &xi), 0.1);
-            for (of, exact) in exact.iter().enumerate() {
-                for (i, exact) in exact.iter().enumerate() {
-                    let at = |step: f64| {
-                        let mut moved = [variables.clone(), xi.clone()];
-                        moved[of][i] += step;
-                        evaluate(&unroll, &features, (&moved[0], &moved[1]), 0.1).0
-                    };
-                    let difference = 0.3 * (at(1e-6) - at(-1e-6)) / 2e-6;
-                    let close = (difference - exact).abs() < 1e-6 * exact.abs().max(0.1);
-                    assert!(close, "{integrator:?}: {difference} {exact}");
-                }
-            }
-        }
-    }
 
     #[test]
     fn loss_of_the_true_model_falls_with_the_order_of_the_integrator() {
@@ -268,25 +215,20 @@ mod tests {
                 decay: 1.0,
                 integrator,
             };
-            evaluate(&unroll, &features, (&variables, &xi), 0.02).0
+            let samples = Window {
+                features: &features,
+                variables: &variables,
+                xi: &xi,
+                step_s: 0.02,
+            };
+            let mut adjoints = Adjoints {
+                variables: &mut variables.clone(),
+                xi: &mut xi.clone(),
+            };
+            unroll.evaluate(samples, 1.0, &mut adjoints)
         };
         let [euler, rk2, rk4] = [Integrator::Euler, Integrator::Rk2, Integrator::Rk4].map(loss);
-        assert!(
-            euler > 100.0 * rk2 && rk2 > 1e4 * rk4,
-            "{euler} {rk2} {rk4}"
-        );
-        assert!(rk4 < 1e-12, "{rk4}");
-    }
-
-    #[test]
-    fn batch_shorter_than_the_window_adds_nothing() {
-        let (features, variables, xi) = setup();
-        let unroll = Unroll {
-            window: 4,
-            stride: 5,
-            ..Unroll::default()
-        };
-        let (loss, gradients) = evaluate(&unroll, &features, (&variables, &xi), 0.1);
-        assert_eq!((loss, gradients.map(|g| g.amax())), (0.0, [0.0; 2]));
+        let falls = euler > 100.0 * rk2 && rk2 > 1e4 * rk4 && rk4 < 1e-12;
+        assert!(falls, "{euler} {rk2} {rk4}");
     }
 }

@@ -76,13 +76,6 @@ fn deviations_know_nothing_of_where_the_robot_stands() {
 }
 
 #[test]
-fn too_few_jumps_have_no_prior() {
-    let mut training = training();
-    training.jumps.truncate(LEAST_JUMPS - 1);
-    assert_eq!(learned(&training), (None, Vec::new()));
-}
-
-#[test]
 fn score_of_deviations_falls_when_inputs_belong_to_other_jumps() {
     let score = |training: &Dataset| -> f64 {
         let (_, scores) = learned(training);
