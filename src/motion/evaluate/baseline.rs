@@ -12,13 +12,9 @@ use crate::sim::{Restart, SimError};
 /// A template, where its constants come from, and its residuals.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Baseline {
-    /// Its name in tables, such as `ASLIP, published constants`.
     pub name: &'static str,
-    /// The template.
     pub template: Aslip,
-    /// Residuals over whole segments.
     pub full: AslipSums,
-    /// Residuals of rollouts that start again from the recorded state.
     pub restarted: AslipSums,
 }
 

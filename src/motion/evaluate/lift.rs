@@ -16,7 +16,6 @@ const SMALL_FORCE_N: f64 = 1.0;
 /// recorded velocities and accelerations is added to the lifted torques.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct LiftSums {
-    /// Agreement of the torques over all joints jointly.
     pub torque: Comparison,
     inconsistency: Mean,
 }

@@ -11,7 +11,6 @@ pub const RANK_THRESHOLD: f64 = 0.01;
 /// One phase, linearised at the mean of the recorded `(z, dz, u_lat)` of that phase.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LinearisedPhase {
-    /// Recorded samples in the phase.
     pub samples: usize,
     /// Eigenvalues of `A = [0 I; d ddz/dz  d ddz/d dz]`, in 1/s, by falling real part.
     pub eigenvalues: Vec<Complex<f64>>,

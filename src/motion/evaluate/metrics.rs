@@ -1,6 +1,5 @@
 //! Root mean square and coefficient of determination.
 
-/// How far predicted samples are from recorded ones.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fit {
     /// Root mean square of the residuals, in the unit of the samples.
@@ -49,7 +48,6 @@ impl FitSums {
         total
     }
 
-    /// Number of pairs added.
     pub fn count(&self) -> usize {
         self.count
     }
@@ -69,7 +67,6 @@ impl FitSums {
     }
 }
 
-/// A running mean.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Mean {
     sum: f64,
@@ -82,7 +79,6 @@ impl Mean {
         self.count += 1;
     }
 
-    /// The mean of all values added so far; `None` before the first.
     pub fn get(&self) -> Option<f64> {
         (self.count > 0).then(|| self.sum / self.count as f64)
     }

@@ -26,7 +26,6 @@ const SMALL_ERROR: f64 = 0.01;
 /// Relative error beyond which no slip explains anything, however much larger the error was.
 const UNEXPLAINED: f64 = 0.3;
 
-/// A model on recordings, sample by sample.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RoundTrip {
     /// Mean square of `decode(encode(x)) - x` over the mean square of the deviation of `x` from its
@@ -36,29 +35,21 @@ pub struct RoundTrip {
     pub slip: Option<(Slip, f64)>,
     /// Name of each phase and R^2 of its latent accelerations; none without samples of it.
     pub acceleration_r2: Vec<(String, Option<f64>)>,
-    /// R^2 of the latent accelerations of all phases; none without samples.
     pub all_acceleration_r2: Option<f64>,
-    /// What makes that better, and how good.
     pub acceleration_slip: Option<(AccelerationSlip, f64)>,
-    /// Other readings of the coefficients.
     pub trials: CoefficientTrials,
 }
 
-/// What spoils latent accelerations alone.
 #[derive(Debug, Clone, PartialEq)]
 pub enum AccelerationSlip {
-    /// Coefficients belong to other terms or to another phase.
     Coefficients(CoefficientSlip),
-    /// All inputs have to be multiplied by this.
     InputFactor(f64),
     /// The mean of the training has to be taken off states; the maps hide it where they reproduce it.
     Centred,
 }
 
-/// What a foreign model is easily given wrong.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Slip {
-    /// The coordinates are in another order.
     Order(CoordinateOrder),
     /// Scaled values are `factor x` in all coordinates.
     Factor(f64),
@@ -112,7 +103,6 @@ impl RoundTrip {
         }))
     }
 
-    /// Whether the maps fit the recordings.
     pub fn maps_fit(&self) -> bool {
         self.error <= LARGEST_ERROR && self.slip.is_none()
     }
@@ -164,7 +154,6 @@ impl RoundTrip {
         })
     }
 
-    /// What may be wrong with equations that no slip explains.
     fn unexplained(&self) -> String {
         let (tried, or) = match self.trials.by_order.is_empty() {
             true => (
@@ -190,7 +179,6 @@ impl RoundTrip {
 }
 
 impl CoefficientSlip {
-    /// What to pass where it explains the error.
     fn advice(&self, tensor: &dyn Fn(&str) -> Option<String>) -> String {
         let (mut with, mut expected) = (Vec::new(), Vec::new());
         if let Some([a, b]) = &self.exchanged {
@@ -216,7 +204,6 @@ impl CoefficientSlip {
 }
 
 impl Slip {
-    /// What to pass where it explains the error.
     fn advice(&self) -> String {
         match self {
             Slip::Order(order) => format!(

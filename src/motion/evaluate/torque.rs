@@ -12,7 +12,6 @@ pub fn is_plausible(robot: &Robot, torque_nm: &[f64; JOINT_DIM]) -> bool {
     !exceeds(torque_nm, robot.torque_limit_nm(), IMPLAUSIBLE)
 }
 
-/// Whether a torque is not a number or beyond `factor` times its limit.
 pub(super) fn exceeds(
     torque_nm: &[f64; JOINT_DIM],
     limits: &[f64; JOINT_DIM],
@@ -25,9 +24,7 @@ pub(super) fn exceeds(
 /// A figure for samples with and without ground contact; none where there were too few.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize)]
 pub struct ByContact {
-    /// At least one foot on the ground.
     pub contact: Option<f64>,
-    /// No foot on the ground.
     pub flight: Option<f64>,
 }
 
@@ -42,7 +39,6 @@ pub struct Comparison {
 }
 
 impl Comparison {
-    /// Adds one sample.
     pub fn add(
         &mut self,
         feet: ContactFlags,
