@@ -28,7 +28,7 @@ mod torque;
 mod verdict;
 
 pub use along_recording::{ReferenceInput, Run, StepRow, along_recording, lift_comparison};
-pub use aslip::AslipSums;
+pub use aslip::{Aslip, AslipSums};
 pub use assessment::{Assessment, SegmentRun};
 pub use baseline::Baseline;
 pub use control::Summary;
@@ -38,7 +38,7 @@ pub use error::EvaluateError;
 pub use invariance::Invariance;
 pub use lift::{LAMBDA, combined_loss};
 pub(crate) use linearised::state_matrix;
-pub use linearised::{LinearisedPhase, eigenvalues};
+pub use linearised::{LinearisedPhase, eigenvalues, linearise_phases};
 pub use metrics::{Fit, FitSums};
 pub use prediction::PredictionError;
 pub use remarks::remarks;

@@ -77,35 +77,3 @@ impl Comparison {
         FitSums::jointly(&self.all).fit().map(|fit| fit.rms)
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn r2_is_one_for_equal_torques_and_zero_for_the_mean() {
-        let recorded = [[1.0; JOINT_DIM], [3.0; JOINT_DIM]];
-        let mut equal = Comparison::default();
-        let mut mean = Comparison::default();
-        for torque in &recorded {
-            equal.add([true; 4], torque, torque);
-            mean.add([false; 4], &[2.0; JOINT_DIM], torque);
-        }
-        let r2 = |contact, flight| ByContact { contact, flight };
-        assert_eq!(equal.r2(), r2(Some(1.0), None));
-        assert_eq!(mean.r2(), r2(None, Some(0.0)));
-        assert_eq!((mean.r2_all(), mean.rms()), (Some(0.0), Some(1.0)));
-    }
-
-    #[test]
-    fn torques_beyond_twice_the_limit_are_not_the_robots() {
-        let go1 = Robot::by_name("go1").expect("known");
-        let mut torque = *go1.torque_limit_nm();
-        torque[3] *= 1.9;
-        assert!(is_plausible(go1, &torque));
-        torque[3] *= 1.1;
-        assert!(!is_plausible(go1, &torque));
-        torque[3] = f64::NAN;
-        assert!(!is_plausible(go1, &torque));
-    }
-}
