@@ -7,8 +7,8 @@
 use nalgebra::DMatrix;
 
 use crate::ir::sin_cos::{LIMIT, reduced_sin_cos, sin_cos};
-use crate::model::{Library, Step, Tape};
-use crate::symbolic::Function;
+use crate::model::{LatentVariable, Library, Step, Tape};
+use crate::symbolic::{Function, SymbolId};
 use crate::train::vectors::vectorised;
 
 /// A library over batches.
@@ -16,6 +16,8 @@ use crate::train::vectors::vectorised;
 pub struct Features {
     tape: Tape,
     latent_dim: usize,
+    occurring: Vec<Vec<bool>>, // term, variable
+    affine: Vec<bool>,
 }
 
 /// Values of all steps on one batch, reused between batches.
@@ -27,9 +29,24 @@ pub struct FeatureValues {
 
 impl Features {
     pub fn new(library: &Library) -> Self {
+        let latent_dim = library.latent_dim();
+        let variables = LatentVariable::all(latent_dim).filter_map(|v| library.symbol(v));
+        let variables: Vec<SymbolId> = variables.collect();
+        let mut pool = library.pool().clone();
+        let (mut occurring, mut affine) = (Vec::new(), Vec::new());
+        for term in library.terms() {
+            let own = pool.symbols_of(term.expr());
+            occurring.push(variables.iter().map(|v| own.contains(v)).collect());
+            affine.push(own.into_iter().all(|variable| {
+                let slope = pool.derivative(term.expr(), variable);
+                pool.is_constant(slope)
+            }));
+        }
         Self {
             tape: library.tape().clone(),
-            latent_dim: library.latent_dim(),
+            latent_dim,
+            occurring,
+            affine,
         }
     }
 
@@ -43,46 +60,13 @@ impl Features {
 
     /// For every term whether it is affine in `z`, `dz` and `u_lat`: dynamics of such terms do not run away within the
     /// time of a jump.
-    pub fn affine_terms(&self) -> Vec<bool> {
-        let bent = |inside: u32| if inside == 0 { 0 } else { 2 };
-        // 0 constant, 1 affine, 2 anything else
-        let degrees = self.of_terms(|step, of| match step {
-            Step::Number(_) => 0,
-            Step::Variable(_) => 1,
-            Step::Sum(parts) => parts.iter().map(of).max().unwrap_or(0),
-            Step::Product(parts) => parts.iter().map(of).sum::<u32>().min(2),
-            Step::Integer(base, 1) => of(base),
-            Step::Integer(inner, _)
-            | Step::Sine(inner)
-            | Step::Cosine(inner)
-            | Step::Apply(_, inner) => bent(of(inner)),
-            Step::Power(base, exponent) => bent(of(base).max(of(exponent))),
-        });
-        degrees.iter().map(|degree| *degree < 2).collect()
+    pub fn affine_terms(&self) -> &[bool] {
+        &self.affine
     }
 
-    /// For every term whether it depends on a variable, counted over `z`, `dz`, `u_lat`.
-    pub fn depend_on(&self, variable: usize) -> Vec<bool> {
-        self.of_terms(|step, of| match step {
-            Step::Number(_) => false,
-            Step::Variable(own) => *own == variable,
-            Step::Sum(parts) | Step::Product(parts) => parts.iter().any(of),
-            Step::Integer(inner, _)
-            | Step::Sine(inner)
-            | Step::Cosine(inner)
-            | Step::Apply(_, inner) => of(inner),
-            Step::Power(base, exponent) => of(base) || of(exponent),
-        })
-    }
-
-    /// For every term what `of_step` makes of its step and what it made of the steps before.
-    fn of_terms<T: Copy>(&self, of_step: impl Fn(&Step, &dyn Fn(&usize) -> T) -> T) -> Vec<T> {
-        let mut all = Vec::with_capacity(self.tape.steps.len());
-        for step in &self.tape.steps {
-            let next = of_step(step, &|at: &usize| all[*at]);
-            all.push(next);
-        }
-        self.tape.terms.iter().map(|&step| all[step]).collect()
+    /// Whether a variable, counted over `z`, `dz`, `u_lat`, occurs in a term.
+    pub fn depends_on(&self, term: usize, variable: usize) -> bool {
+        self.occurring[term][variable]
     }
 
     /// The term that is 1.
@@ -374,8 +358,11 @@ mod tests {
             "exp(dz1)",
         ];
         let library = Library::from_terms(2, &terms.map(String::from)).expect("terms parse");
-        let affine = Features::new(&library).affine_terms();
-        assert_eq!(affine, [true, true, true, true, false, false, false, false]);
+        let features = Features::new(&library);
+        assert_eq!(
+            features.affine_terms(),
+            [true, true, true, true, false, false, false, false]
+        );
     }
 
     #[test]

@@ -178,7 +178,7 @@ impl<'a> Search<'a> {
             |tried: &[Trial<'_>]| any_stable(tried) || (has_nonlinear && !tried.is_empty());
         let mut tried = self.fit_all(&vec![true; affine.len()], enough, watch);
         if has_nonlinear && !(watch.cancelled() && any_stable(&tried)) {
-            let tame = self.fit_all(&affine, any_stable, watch);
+            let tame = self.fit_all(affine, any_stable, watch);
             let mut grown = best_of(&tame).ok().cloned();
             if let Some(grown) = &mut grown {
                 self.grow(grown, watch);

@@ -1,13 +1,13 @@
 //! Dropping terms that the rollouts of the training jumps do not miss.
 //!
-//! About coefficients that are refined the squared errors are a quadratic form of their changes. Dropping one sets its
+//! QuadraticForm coefficients that are refined the squared errors are a quadratic form of their changes. Dropping one sets its
 //! change; the others take over what they can, and the form says what is lost (the optimal brain surgeon, Hassibi and
 //! Stork, Second order derivatives for network pruning, NIPS 1992).
 
 use nalgebra::{DMatrix, DVector};
 
 use super::progress::Watch;
-use super::refine::{Coefficients, Free, Model, PRIOR, Place, Refiner};
+use super::refine::{CoefficientIndex, Coefficients, ErrorModel, FreeCoefficients, PRIOR, Refiner};
 
 /// Damping of the changes, relative to each coefficient's own weight.
 const DAMPING: f64 = 1e-3;
@@ -31,7 +31,7 @@ impl Refiner<'_> {
             let free = self.free(&thinned.xi);
             let before = free.places.len();
             let model = self.model(&thinned.xi, &free, weights);
-            let about = model.and_then(|model| About::new(&thinned, free, &model));
+            let about = model.and_then(|model| QuadraticForm::new(&thinned, free, &model));
             let Some(mut about) = about else { break };
             let Some(fewer) = self.drop_about(&mut about, &thinned, limit) else {
                 break;
@@ -45,7 +45,7 @@ impl Refiner<'_> {
     /// The coefficients without the first terms that may go about them, at most [`TOGETHER`]; none if none may.
     fn drop_about(
         &self,
-        about: &mut About,
+        form: &mut QuadraticForm,
         from: &Coefficients,
         limit: f64,
     ) -> Option<Coefficients> {
@@ -67,13 +67,13 @@ impl Refiner<'_> {
         best
     }
 
-    fn order(&self, about: &About) -> Vec<usize> {
+    fn order(&self, about: &QuadraticForm) -> Vec<usize> {
         let features = self.judge.features;
         let d = features.latent_dim();
         let inputs: Vec<_> = (2 * d..3 * d)
             .filter_map(|i| features.variable_term(i))
             .collect();
-        let may_go = |(phase, term, column): Place| {
+        let may_go = |(phase, term, column): CoefficientIndex| {
             !inputs.contains(&term) && !self.knowledge[phase].kept[(term, column)]
         };
         let mut order: Vec<usize> = (0..about.gone.len())
@@ -86,8 +86,8 @@ impl Refiner<'_> {
 
 /// The quadratic form about some coefficients, some of them dropped.
 #[derive(Clone)]
-struct About {
-    free: Free,
+struct QuadraticForm {
+    free: FreeCoefficients,
     /// Relative changes that make the coefficients zero.
     to_zero: Vec<f64>,
     /// Where the form is lowest, with those that are gone at zero.
@@ -97,14 +97,15 @@ struct About {
     gone: Vec<bool>,
 }
 
-impl About {
-    fn new(from: &Coefficients, free: Free, model: &Model) -> Option<Self> {
+impl QuadraticForm {
+    fn new(from: &Coefficients, free: FreeCoefficients, model: &ErrorModel) -> Option<Self> {
         let (mut system, n) = (model.gram.clone(), free.places.len());
         for i in 0..n {
             system[(i, i)] += PRIOR + DAMPING * model.gram[(i, i)];
         }
         let factor = system.cholesky()?;
-        let to_zero = |((phase, term, k), scale): (Place, f64)| -from.xi[phase][(term, k)] / scale;
+        let to_zero =
+            |((phase, term, k), scale): (CoefficientIndex, f64)| -from.xi[phase][(term, k)] / scale;
         Some(Self {
             to_zero: free.each().map(to_zero).collect(),
             lowest: -factor.solve(&model.gradient),

@@ -81,7 +81,7 @@ impl Losses {
 }
 
 #[derive(Clone, Copy, Debug)]
-pub struct At<'a> {
+pub struct LossPoint<'a> {
     pub parameters: &'a Parameters,
     pub batch: &'a Batch,
     pub weights: LossWeights,
@@ -97,15 +97,15 @@ pub type XiLoss = Box<dyn Fn(&DMatrix<f64>, LossWeights) -> (Losses, DMatrix<f64
 /// One evaluation calls `encode`, `residual`, `decode` and `encode_adjoint` in this order on the same batch.
 pub trait Maps {
     /// `z`, `dz` and `u_lat` of all samples (9, 11, 13), `n x 3d`.
-    fn encode(&mut self, at: At<'_>) -> DMatrix<f64>;
+    fn encode(&mut self, at: LossPoint<'_>) -> DMatrix<f64>;
 
     /// `predicted - ddz` (12), `n x d`.
-    fn residual(&self, at: At<'_>, predicted: &DMatrix<f64>) -> DMatrix<f64>;
+    fn residual(&self, at: LossPoint<'_>, predicted: &DMatrix<f64>) -> DMatrix<f64>;
 
     /// (16) and (18), and the adjoint of `predicted`: `adjoint`, which comes from (17), plus the one from (18).
     fn decode(
         &mut self,
-        at: At<'_>,
+        at: LossPoint<'_>,
         predicted: &DMatrix<f64>,
         adjoint: &DMatrix<f64>,
         gradient: &mut Parameters,
@@ -115,7 +115,7 @@ pub trait Maps {
     /// `-ddz` and of the variables, mean for the encoder.
     fn encode_adjoint(
         &mut self,
-        at: At<'_>,
+        at: LossPoint<'_>,
         onto_ddz: &DMatrix<f64>,
         onto_variables: &DMatrix<f64>,
         gradient: &mut Parameters,
@@ -187,7 +187,7 @@ impl<'a> JointLoss<'a> {
     pub fn evaluate(&mut self, parameters: &Parameters, batch: &Batch) -> Losses {
         self.gradient.clear();
         let weights = self.current;
-        let at = At {
+        let at = LossPoint {
             parameters,
             batch,
             weights,
@@ -220,7 +220,7 @@ impl<'a> JointLoss<'a> {
     /// evaluated here and adds its own.
     fn library_adjoint(
         &mut self,
-        at: At<'_>,
+        at: LossPoint<'_>,
         variables: &DMatrix<f64>,
         theta: &DMatrix<f64>,
         adjoint: &DMatrix<f64>,

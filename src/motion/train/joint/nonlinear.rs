@@ -6,7 +6,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::batch::Batch;
-use super::loss::{At, Maps};
+use super::loss::{LossPoint, Maps};
 use super::network::{Jacobians, Tape};
 use super::parameters::{Frame, Parameters};
 use super::projection::InputProjections;
@@ -73,20 +73,20 @@ impl NonlinearMaps {
 }
 
 impl Maps for NonlinearMaps {
-    fn encode(&mut self, at: At<'_>) -> DMatrix<f64> {
+    fn encode(&mut self, at: LossPoint<'_>) -> DMatrix<f64> {
         let tape = &mut self.encoder_tape;
         self.encoded = Encoded::new(at.parameters, at.batch, &self.frame, tape);
         self.encoded.variables()
     }
 
-    fn residual(&self, at: At<'_>, predicted: &DMatrix<f64>) -> DMatrix<f64> {
+    fn residual(&self, at: LossPoint<'_>, predicted: &DMatrix<f64>) -> DMatrix<f64> {
         let n = at.batch.samples();
         predicted - self.encoded.stack.rows(2 * n, n)
     }
 
     fn decode(
         &mut self,
-        at: At<'_>,
+        at: LossPoint<'_>,
         predicted: &DMatrix<f64>,
         adjoint: &DMatrix<f64>,
         gradient: &mut Parameters,
@@ -125,7 +125,7 @@ impl Maps for NonlinearMaps {
 
     fn encode_adjoint(
         &mut self,
-        at: At<'_>,
+        at: LossPoint<'_>,
         onto_ddz: &DMatrix<f64>,
         onto_variables: &DMatrix<f64>,
         gradient: &mut Parameters,
