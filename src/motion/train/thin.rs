@@ -1,6 +1,6 @@
 //! Dropping terms that the rollouts of the training jumps do not miss.
 //!
-//! QuadraticForm coefficients that are refined the squared errors are a quadratic form of their changes. Dropping one sets its
+//! About coefficients that are refined the squared errors are a quadratic form of their changes. Dropping one sets its
 //! change; the others take over what they can, and the form says what is lost (the optimal brain surgeon, Hassibi and
 //! Stork, Second order derivatives for network pruning, NIPS 1992).
 
@@ -31,9 +31,9 @@ impl Refiner<'_> {
             let free = self.free(&thinned.xi);
             let before = free.places.len();
             let model = self.model(&thinned.xi, &free, weights);
-            let about = model.and_then(|model| QuadraticForm::new(&thinned, free, &model));
-            let Some(mut about) = about else { break };
-            let Some(fewer) = self.drop_about(&mut about, &thinned, limit) else {
+            let form = model.and_then(|model| QuadraticForm::new(&thinned, free, &model));
+            let Some(mut form) = form else { break };
+            let Some(fewer) = self.drop_about(&mut form, &thinned, limit) else {
                 break;
             };
             thinned = fewer;
@@ -51,8 +51,8 @@ impl Refiner<'_> {
     ) -> Option<Coefficients> {
         let mut best = None;
         for _ in 0..TOGETHER {
-            let found = self.order(about).into_iter().take(ATTEMPTS).find_map(|i| {
-                let without = about.without(i);
+            let found = self.order(form).into_iter().take(ATTEMPTS).find_map(|i| {
+                let without = form.without(i);
                 let mut xi = without.xi(from);
                 self.brake(&mut xi);
                 let score = self.score_within(&xi, limit);
@@ -61,13 +61,13 @@ impl Refiner<'_> {
             let Some((without, coefficients)) = found else {
                 break;
             };
-            *about = without;
+            *form = without;
             best = Some(coefficients);
         }
         best
     }
 
-    fn order(&self, about: &QuadraticForm) -> Vec<usize> {
+    fn order(&self, form: &QuadraticForm) -> Vec<usize> {
         let features = self.judge.features;
         let d = features.latent_dim();
         let inputs: Vec<_> = (2 * d..3 * d)
@@ -76,10 +76,10 @@ impl Refiner<'_> {
         let may_go = |(phase, term, column): CoefficientIndex| {
             !inputs.contains(&term) && !self.knowledge[phase].kept[(term, column)]
         };
-        let mut order: Vec<usize> = (0..about.gone.len())
-            .filter(|&i| !about.gone[i] && may_go(about.free.places[i]))
+        let mut order: Vec<usize> = (0..form.gone.len())
+            .filter(|&i| !form.gone[i] && may_go(form.free.places[i]))
             .collect();
-        order.sort_by(|&a, &b| about.loss(a).total_cmp(&about.loss(b)));
+        order.sort_by(|&a, &b| form.loss(a).total_cmp(&form.loss(b)));
         order
     }
 }
