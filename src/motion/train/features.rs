@@ -346,26 +346,6 @@ mod tests {
     }
 
     #[test]
-    fn affine_terms_are_those_of_degree_one_at_most() {
-        let terms = [
-            "2",
-            "z1",
-            "3*dz2 - z1 + 1",
-            "u1/4",
-            "z1*u1",
-            "z1^2",
-            "sin(z1)",
-            "exp(dz1)",
-        ];
-        let library = Library::from_terms(2, &terms.map(String::from)).expect("terms parse");
-        let features = Features::new(&library);
-        assert_eq!(
-            features.affine_terms(),
-            [true, true, true, true, false, false, false, false]
-        );
-    }
-
-    #[test]
     fn batch_values_equal_the_library_at_every_sample() {
         let library = library();
         let variables = Random::new(4).matrix(7, 6, 0.9);

@@ -205,24 +205,4 @@ mod tests {
         // No leg is so heavy that a radian of a joint moves the whole robot by more than 2 cm.
         assert!(rows.rows(0, JOINT_DIM).amax() < 0.02, "{rows}");
     }
-
-    #[test]
-    fn named_rows_say_nothing_of_sideways_motion_and_are_the_same_mirrored() {
-        let dataset = go1(["train_01"]);
-        let active: Vec<usize> = (0..STATE_DIM).collect();
-        let frame = Frame::new(&dataset, &active, 6, Coordinates::Named, robot());
-        let (y, roll, yaw) = (13, 15, 17);
-        for rows in [&frame.held, &frame.free] {
-            for sideways in [y, roll, yaw] {
-                assert_eq!(rows.row(sideways).amax(), 0.0);
-            }
-            for (right, left) in [(0, 3), (6, 9)] {
-                assert!((rows.row(right) + rows.row(left)).amax() < 1e-15);
-            }
-            for (right, left) in [(1, 4), (2, 5), (7, 10), (8, 11)] {
-                assert!((rows.row(right) - rows.row(left)).amax() < 1e-15);
-            }
-        }
-        assert_eq!((frame.held.ncols(), frame.free.ncols()), (2, 7));
-    }
 }

@@ -218,16 +218,4 @@ mod tests {
         // What cannot be told apart from none is not divided by.
         assert!(plain.relative_to(&truth).score(&off).is_finite());
     }
-
-    #[test]
-    fn score_within_a_limit_is_the_score_or_above_the_limit() {
-        let (dataset, latent) = oscillator::jumps(3);
-        let (features, truth) = oscillator::known();
-        let judge = Judge::new(&features, EncodedSet::new(&dataset, &latent));
-        let off: Vec<_> = truth.iter().map(|xi| xi.map(|c| 1.1 * c)).collect();
-        let (score, short) = (judge.score(&off), judge.error(&off, SHORT));
-        assert_eq!(judge.score_within(&off, score), score);
-        assert_eq!(judge.score_within(&off, 0.99 * short), short);
-        assert!(judge.score_within(&off, 0.99 * score) > 0.99 * score);
-    }
 }

@@ -176,12 +176,9 @@ mod tests {
             }
         }
         assert_ne!(left[0][(5, 1)], 0.0); // an input
-    }
-
-    #[test]
-    fn inputs_and_what_is_kept_stay_whatever_may_be_lost() {
-        let left = left_of_too_many(1e9);
-        assert_eq!(left[0].rows(0, 5).map(|c| (c != 0.0) as usize).sum(), 1);
-        assert!(left[0][(3, 0)] != 0.0 && left[0][(5, 0)] != 0.0 && left[0][(6, 1)] != 0.0);
+        let least = left_of_too_many(1e9)[0]
+            .rows(0, 5)
+            .map(|c| usize::from(c != 0.0));
+        assert_eq!(least.sum(), 1); // which must be kept
     }
 }

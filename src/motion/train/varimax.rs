@@ -101,13 +101,4 @@ mod tests {
             );
         }
     }
-
-    #[test]
-    fn columns_follow_the_named_coordinates_and_point_upwards() {
-        let loadings =
-            DMatrix::from_row_slice(3, 3, &[0.1, 0.0, -3.0, 0.2, 5.0, 0.1, -1.0, 0.1, 0.0]);
-        let (order, signs) = order_and_sign(&loadings, &[0, 1]);
-        assert_eq!(order, [2, 1, 0]);
-        assert_eq!(signs, [-1.0, 1.0, -1.0]);
-    }
 }

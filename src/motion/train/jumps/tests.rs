@@ -66,16 +66,6 @@ fn prior_at_the_goal_of_a_jump_is_nearer_to_it_than_the_mean_jump() {
 }
 
 #[test]
-fn deviations_know_nothing_of_where_the_robot_stands() {
-    let prior = prior_of(&training());
-    for part in &prior.parts {
-        let xi = part.xi.as_ref().unwrap();
-        assert!(xi.row(0).amax() < 1e-9 * xi.amax(), "{}", part.name);
-        assert!(xi.rows(4, 8).amax() > 0.0);
-    }
-}
-
-#[test]
 fn score_of_deviations_falls_when_inputs_belong_to_other_jumps() {
     let score = |training: &Dataset| -> f64 {
         let (_, scores) = learned(training);
