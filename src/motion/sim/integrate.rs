@@ -21,7 +21,6 @@ pub trait OdeSystem {
 /// How exactly to integrate, and when to give up.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct IntegrationOptions {
-    /// Relative tolerance of a step.
     pub relative_tolerance: f64,
     /// Absolute tolerance of a step, in the unit of the state.
     pub absolute_tolerance: f64,
@@ -49,16 +48,12 @@ pub struct Integration {
     pub states: DMatrix<f64>,
     /// Time in seconds at which the state left the divergence bound, if it did.
     pub diverged_at_s: Option<f64>,
-    /// The method that delivered the states.
     pub method: IntegrationMethod,
 }
 
-/// The family of the integration method.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum IntegrationMethod {
-    /// Extrapolated explicit midpoint rule.
     Explicit,
-    /// Extrapolated linearly implicit Euler rule.
     Implicit,
 }
 

@@ -14,7 +14,6 @@ use crate::recording::{PhaseRule, Segment};
 /// takes the place of `W_e`, and accelerations have the term `dJ/dt dx`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LatentSegment {
-    /// Increasing times, in s.
     pub time_s: Vec<f64>,
     /// Latent positions `z = W_e (s_x x) + b_e` (equation 9).
     pub z: DMatrix<f64>,
@@ -57,12 +56,10 @@ impl LatentSegment {
         })
     }
 
-    /// Number of samples.
     pub fn len(&self) -> usize {
         self.time_s.len()
     }
 
-    /// Whether there is no sample.
     pub fn is_empty(&self) -> bool {
         self.time_s.is_empty()
     }

@@ -21,14 +21,11 @@ pub enum Restart {
     Every(f64),
 }
 
-/// A rollout between two restarts.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Window {
-    /// Samples of the segment that the window covers.
     pub samples: Range<usize>,
     /// Predicted `z`, `latent_dim x reached`: the first `reached` samples of the window.
     pub z: DMatrix<f64>,
-    /// Predicted `dz`, as `z`.
     pub dz: DMatrix<f64>,
     /// Time at which the state left every bound, if it did; later samples have no prediction.
     pub diverged_at_s: Option<f64>,
@@ -37,7 +34,6 @@ pub struct Window {
 /// A segment's rollout: windows in the order of time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rollout {
-    /// One window, or one a restart.
     pub windows: Vec<Window>,
 }
 
@@ -59,7 +55,6 @@ impl Rollout {
         states
     }
 
-    /// First time at which a window diverged.
     pub fn diverged_at_s(&self) -> Option<f64> {
         self.windows.iter().find_map(|window| window.diverged_at_s)
     }

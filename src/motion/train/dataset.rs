@@ -26,13 +26,9 @@ pub struct Scaling {
 /// Factors from SI to scaled units by kind of quantity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ScaleOptions {
-    /// On all 18 states.
     pub state: f64,
-    /// On joint torques.
     pub torque: f64,
-    /// On linear body forces.
     pub force: f64,
-    /// On body moments.
     pub moment: f64,
 }
 
@@ -62,7 +58,6 @@ impl ScaleOptions {
         }
     }
 
-    /// The factor of every coordinate.
     pub fn factors(&self) -> Scaling {
         let input = DVector::from_fn(STATE_DIM, |i, _| match i {
             0..JOINT_DIM => self.torque,

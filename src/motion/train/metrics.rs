@@ -36,11 +36,9 @@ pub struct SetMetrics {
     pub torque_r2: f64,
     /// Root mean square error of body x over predictions of 0.1 s with fixed steps.
     pub prediction_x_m: f64,
-    /// The same of body z.
     pub prediction_z_m: f64,
     /// Root mean square error of body x over rollouts of whole jumps with fixed steps; `None` when one diverges.
     pub rollout_x_m: Option<f64>,
-    /// The same of body z.
     pub rollout_z_m: Option<f64>,
 }
 

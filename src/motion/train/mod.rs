@@ -5,6 +5,8 @@
 //! space ([`subspace`], [`varimax`]) and the decoder ([`latent`]) to the dynamics ([`weak_form`], [`sparse`], [`select`]),
 //! judged by [`rollout`]s.
 
+#![allow(missing_docs, reason = "names say it all where there is no comment")]
+
 mod closed_form;
 mod dataset;
 mod features;

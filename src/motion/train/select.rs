@@ -39,16 +39,12 @@ const SWEEPS: usize = 3;
 /// How a candidate was fitted, and how it did.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Choice {
-    /// Window of the regression in samples, 0 for accelerations.
     pub window: usize,
-    /// Ridge.
     pub ridge: f64,
-    /// Pruning.
     pub pruning: Pruning,
     /// Validation score: root mean square error of the latent state in standard deviations, of 0.1 s predictions
     /// plus 0.2 times that of whole jumps.
     pub score: f64,
-    /// Active terms over all phases.
     pub active: usize,
 }
 

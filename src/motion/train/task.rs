@@ -14,14 +14,12 @@ use crate::robot::Robot;
 /// Recordings to learn from and to choose by.
 #[derive(Clone, Copy, Debug)]
 pub struct Recordings<'a> {
-    /// Fitted.
     pub training: &'a [Recording],
     /// Used to choose between candidates; without any, the training recordings are.
     pub validation: &'a [Recording],
 }
 
 impl<'a> Recordings<'a> {
-    /// These recordings.
     pub fn new(training: &'a [Recording], validation: &'a [Recording]) -> Self {
         Self {
             training,

@@ -57,7 +57,6 @@ pub struct Losses {
 }
 
 impl Losses {
-    /// The combined loss (20).
     pub fn total(&self, weights: &LossWeights) -> f64 {
         self.decoder
             + weights.ddz * self.ddz

@@ -5,7 +5,6 @@ use nalgebra::DMatrix;
 use super::adam::Adam;
 use super::loss::LossWeights;
 
-/// Epochs, thresholding and step length.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Schedule {
     /// Epochs with the L1 term and thresholding.
@@ -16,12 +15,10 @@ pub struct Schedule {
     pub threshold: f64,
     /// Epochs between two thresholdings.
     pub threshold_every: usize,
-    /// Step length of Adam.
     pub learning_rate: f64,
 }
 
 impl Default for Schedule {
-    /// The author's schedule.
     fn default() -> Self {
         Self {
             epochs: 501,

@@ -10,28 +10,21 @@ use serde::{Deserialize, Serialize};
 
 use crate::train::features::{FeatureValues, Features};
 
-/// How predictions are integrated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Integrator {
-    /// Explicit Euler.
     Euler,
-    /// Midpoint rule.
     Rk2,
-    /// Classical Runge-Kutta.
     Rk4,
 }
 
-/// Shape of the window.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Unroll {
-    /// Steps predicted from every sample.
     pub window: usize,
     /// Samples per step: 5 at 500 Hz are the published 10 ms.
     pub stride: usize,
     /// Weight of a prediction against the one a step earlier, above 0 and at most 1.
     pub decay: f64,
-    /// How a step is integrated.
     pub integrator: Integrator,
 }
 
