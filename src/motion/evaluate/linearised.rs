@@ -32,7 +32,7 @@ impl LinearisedPhase {
         (*smallest > 0.0).then(|| largest / smallest)
     }
 
-    /// Number of singular values of the input gain above [`RANK_THRESHOLD`] of the largest.
+    /// Number of singular values of the input gain above 1 % of the largest.
     pub fn input_effective_rank(&self) -> usize {
         let largest = self.input_singular_values.first().copied().unwrap_or(0.0);
         let counts = |value: &&f64| **value > 0.0 && **value >= RANK_THRESHOLD * largest;

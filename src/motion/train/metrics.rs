@@ -32,7 +32,7 @@ pub struct SetMetrics {
     pub ddz_r2: Vec<f64>,
     /// Coefficient of determination of the 12 joint torques of `W_e^T pinv(W_e^T) u` (`J^T pinv(J^T) u`), and what the
     /// joints take on top, against the recorded ones over all plausible samples, all joints together as in
-    /// [`LiftSums::torque`](crate::evaluate::LiftSums::torque).
+    /// the lift of an [`Assessment`](crate::evaluate::Assessment).
     pub torque_r2: f64,
     /// Root mean square error of body x over predictions of 0.1 s with fixed steps.
     pub prediction_x_m: f64,

@@ -1,6 +1,6 @@
 //! Joint training of encoder, decoder and dynamics by Adam, as published and improved.
 //!
-//! Enters: recordings and [`JointOptions`](super::JointOptions). Leaves: a trained model. Read [`loss`] first (equations
+//! Enters: recordings and [`JointOptions`](super::JointOptions). Leaves: a trained model. Read `loss` first (equations
 //! 9 to 20 and their gradient), which asks [`linear`] or [`nonlinear`] maps for encoding and decoding, then [`stages`]
 //! (the transfer steps of section IV-D) and [`joint`] (seeds, choice, assembly).
 
