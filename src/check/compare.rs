@@ -5,8 +5,8 @@ use std::collections::HashMap;
 use serde::Serialize;
 
 use super::CheckOptions;
-use super::point::{Gap, Sides, decimals, search};
-use super::side::{Floats, RightSide, Side, SidePhase, literal};
+use super::point::{Gap, Sides, search};
+use super::side::{Floats, RightSide, Side, SidePhase};
 use crate::symbolic::{CanonicalForm, CanonicalForms, Coefficient, ExprId, ExprPool, Node, Number};
 
 /// Most terms that a difference names.
@@ -199,7 +199,6 @@ fn decide_with(
         [0, 1]
     };
     let proof = proof(&pool, &restrictions, rest, order);
-    let decimals = decimals(&pool, &[&whole[..], &restrictions].concat());
     let searched = |rest: [ExprId; 2], rows: &[&Row]| {
         let groups: Vec<ExprId> = rows.iter().map(|row| row.rest).collect();
         let sides = Sides {
@@ -207,7 +206,6 @@ fn decide_with(
             whole,
             rest,
             guards,
-            decimals: &decimals,
         };
         search(&sides, phase, &options.domain, &groups, proof.is_some())
     };
@@ -242,8 +240,7 @@ fn proof(
     if rest == [ExprId::ZERO; 2] {
         return Some(Verdict::Equal);
     }
-    let literal = |symbol| literal(pool, symbol);
-    let mut forms = CanonicalForms::new(pool, restrictions, &literal);
+    let mut forms = CanonicalForms::new(pool, restrictions);
     let [first, second] = order.map(|side| forms.of(rest[side]));
     let difference = first.minus(&second);
     let verdict = |form: &CanonicalForm, rounding: f64| {
@@ -375,7 +372,7 @@ fn parted(pool: &ExprPool, expr: ExprId) -> (Coefficient, Vec<ExprId>, Vec<ExprI
 fn value_of(pool: &ExprPool, factor: ExprId) -> Option<Coefficient> {
     match pool.node(factor) {
         Node::Number(number) => Some(Coefficient::from(*number)),
-        Node::Symbol(symbol) => literal(pool, *symbol),
+        Node::Symbol(symbol) => pool.decimal_of(*symbol).map(|(decimal, _)| decimal.clone()),
         _ => None,
     }
 }

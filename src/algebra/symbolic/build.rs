@@ -378,7 +378,3 @@ fn fold(
     left_over.sort_unstable();
     left_over
 }
-
-#[cfg(test)]
-#[path = "build_tests.rs"]
-mod tests;

@@ -7,8 +7,9 @@
 
 use std::cmp::Ordering;
 
+use super::function::Function;
 use super::id_map::IdMap;
-use super::node::{ExprId, Function, Node, SymbolId};
+use super::node::{ExprId, Node, SymbolId};
 use super::number::Number;
 use super::pool::ExprPool;
 use super::series::Series;

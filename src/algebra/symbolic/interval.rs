@@ -7,7 +7,7 @@
 
 use std::fmt;
 
-use super::node::Function;
+use super::function::Function;
 use super::rounding::{
     is_exact_root, mul_up, power_down, power_up, recip_down, recip_up, sub_up, widen_down, widen_up,
 };
@@ -24,7 +24,7 @@ pub struct Interval {
 
 impl Interval {
     /// All reals.
-    pub(crate) const ENTIRE: Interval = Interval::between(f64::NEG_INFINITY, f64::INFINITY);
+    pub const ENTIRE: Interval = Interval::between(f64::NEG_INFINITY, f64::INFINITY);
     /// No points: the value of an expression that is defined nowhere in its domain.
     pub const EMPTY: Interval = Interval::between(f64::INFINITY, f64::NEG_INFINITY);
     const NON_NEGATIVE: Interval = Interval::between(0.0, f64::INFINITY);
@@ -352,7 +352,3 @@ impl std::ops::Div for Interval {
         self * other.recip()
     }
 }
-
-#[cfg(test)]
-#[path = "interval_tests.rs"]
-mod tests;

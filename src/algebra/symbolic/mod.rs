@@ -7,7 +7,7 @@
 //!
 //! | files | |
 //! |---|---|
-//! | `node`, `number`, `pool`, `id_map`, `order` | what an expression is and how it is stored |
+//! | `node`, `function`, `number`, `pool`, `id_map`, `order` | what an expression is and how it is stored |
 //! | `build`, `power` | canonical constructors |
 //! | `lexer`, `parse`, `defined`, `display` | the grammar of candidate terms, both ways; constants without a value |
 //! | `eval`, `interval`, `rounding`, `bounds` | values, and bounds over boxes |
@@ -46,6 +46,7 @@ mod display;
 mod eval;
 mod expand;
 mod factors;
+mod function;
 mod germ;
 mod id_map;
 mod interval;
@@ -74,8 +75,9 @@ pub use canonical::{CanonicalForm, CanonicalForms, Coefficient};
 pub use defined::Reading;
 pub use display::Display;
 pub(crate) use eval::integer_power;
+pub use function::Function;
 pub use interval::Interval;
-pub use node::{ExprId, Function, Node, SymbolId};
+pub use node::{ExprId, Node, SymbolId};
 pub use number::Number;
 pub(crate) use number::sum_of_floats;
 pub use parse::{ParseError, ParseErrorKind, ParseLimits};

@@ -6,7 +6,8 @@
 
 use std::cmp::Ordering;
 
-use super::node::{ExprId, Function, Node};
+use super::function::Function;
+use super::node::{ExprId, Node};
 use super::number::Number;
 use super::pool::ExprPool;
 
@@ -184,68 +185,4 @@ impl ExprPool {
 fn combine_grades(a: u32, b: u32) -> u32 {
     let degree = (a % NOT_POLYNOMIAL) + (b % NOT_POLYNOMIAL);
     (degree.min(NOT_POLYNOMIAL - 1)) | ((a | b) & NOT_POLYNOMIAL)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// The texts of the terms of a sum, in canonical order.
-    fn sorted(terms: &[&str]) -> Vec<String> {
-        let mut pool = ExprPool::new();
-        let ids: Vec<ExprId> = terms.iter().map(|text| pool.parsed(text)).collect();
-        let sum = pool.sum(&ids);
-        let terms = pool.terms_of(sum);
-        terms
-            .into_iter()
-            .map(|(_, rest)| pool.display(rest).to_string())
-            .collect()
-    }
-
-    #[test]
-    fn sum_terms_follow_the_order_of_a_library() {
-        let library = [
-            "1",
-            "u1",
-            "z1",
-            "z2",
-            "z10",
-            "dz1",
-            "z1^2",
-            "z1*z2",
-            "z1*dz1",
-            "z2^2",
-            "z1^3",
-            "sin(z1)",
-            "sin(dz1)",
-            "cos(z1)",
-            "z1*sin(z1)",
-        ];
-        let mut shuffled = library;
-        shuffled.reverse();
-        shuffled.swap(2, 9);
-        assert_eq!(sorted(&shuffled), library);
-    }
-
-    #[test]
-    fn order_ignores_coefficients_and_creation() {
-        let mut pool = ExprPool::new();
-        let (b, a) = (pool.symbol("b"), pool.symbol("a"));
-        let minus_b = pool.neg(b);
-        assert_eq!(pool.compare(a, b), Ordering::Less);
-        assert_eq!(pool.compare(a, minus_b), Ordering::Less);
-        assert_eq!(pool.compare(minus_b, b), Ordering::Less);
-        assert_eq!(pool.compare(b, b), Ordering::Equal);
-    }
-
-    #[test]
-    fn order_of_deep_expressions_needs_no_stack() {
-        let mut pool = ExprPool::new();
-        let (mut a, mut b) = (pool.symbol("a"), pool.symbol("b"));
-        for _ in 0..100_000 {
-            a = pool.apply(Function::Tan, a);
-            b = pool.apply(Function::Tan, b);
-        }
-        assert_eq!(pool.compare(a, b), Ordering::Less);
-    }
 }

@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 
 use super::expand::{MAX_TERMS, Terms};
-use super::node::{ExprId, Function, Node};
+use super::function::Function;
+use super::node::{ExprId, Node};
 use super::number::Number;
 use super::order::Exponent;
 use super::perfect_power::add;

@@ -22,7 +22,8 @@
 //! | `(exp(a) - exp(b))/(exp(a) + exp(b))` | `tanh((a - b)/2)` |
 
 use super::expand::MAX_PRODUCTS;
-use super::node::{ExprId, Function, Node};
+use super::function::Function;
+use super::node::{ExprId, Node};
 use super::number::Number;
 use super::order::Exponent;
 use super::pool::ExprPool;

@@ -3,17 +3,22 @@
 use std::hash::{Hash, Hasher};
 
 use num_bigint::BigInt;
-
-use super::rational::Rational;
+pub(super) use num_rational::BigRational as Rational;
+use num_traits::{One, Signed, ToPrimitive, Zero};
 
 use crate::symbolic::number::Number;
 
 /// Widens a radius by more than the rounding errors of the operations on it.
 const OUTWARD: f64 = 1.0 + 1e-12;
 
-fn power_of_ten(exponent: i32) -> Rational {
-    let power = Rational::from(BigInt::from(10).pow(exponent.unsigned_abs()));
-    if exponent < 0 { power.recip() } else { power }
+/// `numerator / denominator`, whose denominator is not zero.
+pub(super) fn ratio(numerator: impl Into<BigInt>, denominator: impl Into<BigInt>) -> Rational {
+    Rational::new(numerator.into(), denominator.into())
+}
+
+/// The nearest float; infinite beyond the range of floats.
+pub(super) fn nearest(value: &Rational) -> f64 {
+    value.to_f64().unwrap_or(f64::NAN)
 }
 
 /// `re + i im`, known to `radius` in magnitude.
@@ -58,7 +63,7 @@ impl From<Number> for Coefficient {
                 false => magnitude,
             });
         };
-        Rational::new(top, bottom).into()
+        ratio(top, bottom).into()
     }
 }
 
@@ -78,9 +83,9 @@ impl Coefficient {
         if !(-800..=400).contains(&last) {
             return None;
         }
-        let unit = power_of_ten(last);
+        let unit = ratio(10, 1).pow(last);
         let radius = match is_rounded {
-            true => 0.5 * unit.to_f64(),
+            true => 0.5 * nearest(&unit),
             false => 0.0,
         };
         Some(Self {
@@ -104,7 +109,7 @@ impl Coefficient {
 
     /// `numerator/denominator` times the imaginary unit.
     pub(super) fn imaginary(numerator: i64, denominator: i64) -> Self {
-        let im = Rational::new(numerator, denominator);
+        let im = ratio(numerator, denominator);
         Self::complex(Rational::zero(), im)
     }
 
@@ -115,12 +120,12 @@ impl Coefficient {
 
     /// The magnitude of the value.
     pub fn magnitude(&self) -> f64 {
-        self.re.to_f64().hypot(self.im.to_f64())
+        nearest(&self.re).hypot(nearest(&self.im))
     }
 
-    /// The real part as the nearest float, or one beside it.
+    /// The real part as the nearest float.
     pub fn to_f64(&self) -> f64 {
-        self.re.to_f64()
+        nearest(&self.re)
     }
 
     /// Largest distance that rounded decimals allow.
@@ -168,7 +173,7 @@ impl Coefficient {
 
     /// `|re| + |im|`: a positive factor that scales with the value.
     pub(super) fn size(&self) -> Rational {
-        &self.re.abs() + &self.im.abs()
+        self.re.abs() + self.im.abs()
     }
 
     /// `self - other`.
@@ -200,8 +205,8 @@ impl Coefficient {
             (true, false) => (&self.re * &other.re, &self.re * &other.im),
             (false, true) => (&self.re * &other.re, &self.im * &other.re),
             (false, false) => (
-                &(&self.re * &other.re) + &-(&self.im * &other.im),
-                &(&self.re * &other.im) + &(&self.im * &other.re),
+                &self.re * &other.re - &self.im * &other.im,
+                &self.re * &other.im + &self.im * &other.re,
             ),
         };
         Self { re, im, radius }
@@ -209,7 +214,7 @@ impl Coefficient {
 
     /// The reciprocal; `None` for zero, or where zero is within the radius.
     pub(super) fn reciprocal(&self) -> Option<Self> {
-        let square = &(&self.re * &self.re) + &(&self.im * &self.im);
+        let square = &self.re * &self.re + &self.im * &self.im;
         let magnitude = self.magnitude();
         if square.is_zero() || self.radius >= magnitude {
             return None;
@@ -219,8 +224,8 @@ impl Coefficient {
             radius => radius / (magnitude * (magnitude - radius)) * OUTWARD,
         };
         Some(Self {
-            re: &self.re * &square.recip(),
-            im: -(&self.im * &square.recip()),
+            re: &self.re / &square,
+            im: -(&self.im / &square),
             radius,
         })
     }

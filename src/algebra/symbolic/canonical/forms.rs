@@ -5,10 +5,10 @@ use std::collections::{HashMap, HashSet};
 use num_traits::ToPrimitive;
 
 use super::atoms::Atom;
-use super::coefficient::Coefficient;
+use super::coefficient::{Coefficient, nearest, ratio};
 use super::polynomial::{CanonicalForm, Monomial};
-use super::rational::Rational;
-use crate::symbolic::node::{ExprId, Function, Node, SymbolId};
+use crate::symbolic::function::Function;
+use crate::symbolic::node::{ExprId, Node};
 use crate::symbolic::number::Number;
 use crate::symbolic::pool::ExprPool;
 
@@ -25,7 +25,6 @@ pub(super) const MAX_ROOT: i64 = 1_000;
 /// Normal forms of the expressions of a pool; the documentation of this folder has the method.
 pub struct CanonicalForms<'p> {
     pub(super) pool: &'p ExprPool,
-    pub(super) literal: &'p dyn Fn(SymbolId) -> Option<Coefficient>,
     pub(super) atoms: Vec<Atom>,
     pub(super) numbers: HashMap<Atom, u32>,
     pub(super) forms: HashMap<ExprId, CanonicalForm>,
@@ -46,16 +45,9 @@ pub struct CanonicalForms<'p> {
 impl<'p> CanonicalForms<'p> {
     /// Forms of expressions that are compared where all of `exprs` have values: what stands under a
     /// logarithm or root of one of these is taken as positive in all others.
-    ///
-    /// `literal` gives the symbols that stand for decimals.
-    pub fn new(
-        pool: &'p ExprPool,
-        exprs: &[ExprId],
-        literal: &'p dyn Fn(SymbolId) -> Option<Coefficient>,
-    ) -> Self {
+    pub fn new(pool: &'p ExprPool, exprs: &[ExprId]) -> Self {
         let mut forms = Self {
             pool,
-            literal,
             atoms: Vec::new(),
             numbers: HashMap::new(),
             forms: HashMap::new(),
@@ -207,8 +199,8 @@ impl<'p> CanonicalForms<'p> {
         let pool = self.pool;
         match pool.node(expr) {
             Node::Number(number) => Some(CanonicalForm::constant(Coefficient::from(*number))),
-            Node::Symbol(symbol) => Some(match (self.literal)(*symbol) {
-                Some(literal) => CanonicalForm::constant(literal),
+            Node::Symbol(symbol) => Some(match pool.decimal_of(*symbol) {
+                Some((decimal, _)) => CanonicalForm::constant(decimal.clone()),
                 None => self.atom(Atom::Symbol(*symbol)),
             }),
             Node::Sum(terms) => {
@@ -247,8 +239,7 @@ impl<'p> CanonicalForms<'p> {
         let exponent = self.argument(exponent);
         if let Some(constant) = exponent.as_constant()
             && let Some(value) = constant.as_real()
-            && let (Some(top), Some(bottom)) =
-                (value.numerator().to_i32(), value.denominator().to_i64())
+            && let (Some(top), Some(bottom)) = (value.numer().to_i32(), value.denom().to_i64())
             && bottom <= MAX_ROOT
         {
             return match bottom {
@@ -273,7 +264,7 @@ impl<'p> CanonicalForms<'p> {
             Function::Sin | Function::Cos => {
                 let argument = self.argument(argument.clone());
                 let [plus, minus] = exponentials(&argument, true);
-                let half = Coefficient::from(Rational::new(1, 2));
+                let half = Coefficient::from(ratio(1, 2));
                 Some(match function {
                     Function::Sin => plus.minus(&minus).scaled(&Coefficient::imaginary(-1, 2)),
                     _ => plus.plus(&minus).scaled(&half),
@@ -391,10 +382,10 @@ impl Argument {
         for (monomial, difference) in &other.minus(&self.form).terms {
             let (own, its) = (radius(&self.form, monomial), radius(other, monomial));
             let slack = 1e-9 * (own + its);
-            let distance = difference.re.to_f64();
+            let distance = nearest(&difference.re);
             let (low, high) = room.get(monomial).copied().unwrap_or((-own, own));
             let (low, high) = (low.max(distance - its), high.min(distance + its));
-            if low > high + slack || difference.im.to_f64().abs() > own + its + slack {
+            if low > high + slack || nearest(&difference.im).abs() > own + its + slack {
                 return None;
             }
             largest = largest.max(difference.magnitude());

@@ -2,8 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use super::coefficient::Coefficient;
-use super::rational::Rational;
+use num_traits::Zero;
+
+use super::coefficient::{Coefficient, Rational};
 
 /// Most terms of a form, and most products of terms that one multiplication makes.
 const MAX_TERMS: usize = 2_000;

@@ -1,16 +1,14 @@
 //! Roots, logarithms, exponentials and magnitudes of normal forms.
 
-use std::cmp::Ordering;
 use std::collections::BTreeSet;
 
 use num_bigint::BigInt;
-use num_traits::ToPrimitive;
+use num_traits::{ToPrimitive, Zero};
 
 use super::atoms::{Atom, prime_powers};
-use super::coefficient::Coefficient;
+use super::coefficient::{Coefficient, Rational, ratio};
 use super::forms::{CanonicalForms, MAX_ROOT, exponentials};
 use super::polynomial::{CanonicalForm, Monomial};
-use super::rational::Rational;
 
 impl CanonicalForms<'_> {
     /// `scale * prod base^power * exp(E)` of a form that is positive where it is used: a positive
@@ -40,7 +38,7 @@ impl CanonicalForms<'_> {
             if let Some((divisor, quotient)) = self.positive_divisor(&form) {
                 // sqrt(2 + 3*x + x^2) = sqrt(1 + x) sqrt(2 + x) where 1 + x is positive.
                 let (mut split, other) = (self.split(&divisor)?, self.split(&quotient)?);
-                split.scale = &split.scale * &other.scale;
+                split.scale *= other.scale;
                 split.factors.extend(other.factors);
                 split.exponent = split.exponent.plus(&other.exponent);
                 return Some(split);
@@ -109,18 +107,7 @@ impl CanonicalForms<'_> {
         let powers = |monomial: &Monomial| -> Vec<Rational> {
             names.iter().map(|name| power(monomial, name)).collect()
         };
-        // Rationals compare by their parts: their order is one of differences only by value.
-        let largest = form.terms.keys().map(powers).max_by(|a, b| {
-            let differences = a.iter().zip(b).map(|(a, b)| a + &-b.clone());
-            let first = differences
-                .into_iter()
-                .find(|difference| !difference.is_zero());
-            match first {
-                None => Ordering::Equal,
-                Some(difference) if difference.is_negative() => Ordering::Less,
-                Some(_) => Ordering::Greater,
-            }
-        })?;
+        let largest = form.terms.keys().map(powers).max()?;
         let mut exponent = CanonicalForm::default();
         for (name, power) in names.into_iter().zip(largest) {
             exponent.add(power.into(), name.clone());
@@ -184,7 +171,7 @@ impl CanonicalForms<'_> {
         for (base, power) in split.factors {
             let (base, index) = self.radicand(base);
             let log = self.atom(Atom::Log(base));
-            sum = sum.plus(&log.scaled(&Rational::new(power, index).into()));
+            sum = sum.plus(&log.scaled(&ratio(power, index).into()));
         }
         Some(sum)
     }
@@ -194,11 +181,11 @@ impl CanonicalForms<'_> {
             return Some(CanonicalForm::default());
         }
         let split = self.split(form)?;
-        let mut root = self.exp(split.exponent.scaled(&Rational::new(1, index).into()))?;
+        let mut root = self.exp(split.exponent.scaled(&ratio(1, index).into()))?;
         let primes = prime_powers(&split.scale).into_iter();
         for (base, power) in primes.chain(split.factors) {
             let (base, inner) = self.radicand(base);
-            let exponent = Rational::new(power, BigInt::from(index) * inner);
+            let exponent = ratio(power, BigInt::from(index) * inner);
             let factor = self.positive_power(&base, &exponent)?;
             root = self.product(&root, &factor)?;
         }
@@ -221,16 +208,13 @@ impl CanonicalForms<'_> {
     ) -> Option<CanonicalForm> {
         let whole = exponent.floor();
         let power = self.power(base, whole.to_i32()?)?;
-        let rest = exponent + &Rational::from(-whole);
+        let rest = exponent - whole;
         if rest.is_zero() {
             return Some(power);
         }
-        let index = rest
-            .denominator()
-            .to_i64()
-            .filter(|index| *index <= MAX_ROOT)?;
+        let index = rest.denom().to_i64().filter(|index| *index <= MAX_ROOT)?;
         let root = self.number(Atom::Root(base.clone(), u32::try_from(index).ok()?));
-        let root = Monomial::atom(root, rest.numerator().to_i32()?);
+        let root = Monomial::atom(root, rest.numer().to_i32()?);
         self.product(&power, &CanonicalForm::monomial(root))
     }
 

@@ -2,10 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use super::coefficient::Coefficient;
+use num_traits::Signed;
+
+use super::coefficient::{Coefficient, Rational, nearest, ratio};
 use super::forms::CanonicalForms;
 use super::polynomial::{CanonicalForm, Monomial};
-use super::rational::Rational;
 
 /// Most terms of a sum whose root is looked for.
 const MAX_TERMS: usize = 60;
@@ -46,7 +47,7 @@ impl CanonicalForms<'_> {
                 return None;
             }
             last = weight;
-            root.add(coefficient.times(&Rational::new(1, 2).into()), next);
+            root.add(coefficient.times(&ratio(1, 2).into()), next);
         }
         None
     }
@@ -94,7 +95,7 @@ impl CanonicalForms<'_> {
 
 /// The monomial whose square this is, if powers are even.
 fn halved(monomial: &Monomial) -> Option<Monomial> {
-    let half = Rational::new(1, 2);
+    let half = ratio(1, 2);
     let powers = monomial.powers.iter();
     let powers: Option<Vec<_>> = powers
         .map(|&(atom, power)| (power % 2 == 0).then_some((atom, power / 2)))
@@ -128,7 +129,7 @@ impl Order {
         let powers = powers.map(|&(atom, power)| f64::from(power) * (f64::from(atom) + 3.1).ln());
         let exponents = monomial.exponent.iter().map(|(of, (re, im))| {
             let weight = self.exponents.get(of).copied().unwrap_or(1.0);
-            weight * (re.to_f64() + 1.618 * im.to_f64())
+            weight * (nearest(re) + 1.618 * nearest(im))
         });
         powers.chain(exponents).sum()
     }

@@ -11,8 +11,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
 use super::Summands;
+use crate::symbolic::function::Function;
 use crate::symbolic::interval::Interval;
-use crate::symbolic::node::{ExprId, Function, Node, SymbolId};
+use crate::symbolic::node::{ExprId, Node, SymbolId};
 use crate::symbolic::pool::ExprPool;
 use crate::symbolic::rounding::power_by;
 

@@ -5,8 +5,9 @@ use super::search::Shortener;
 use super::units::{in_f64, in_units};
 use super::{Scaled, Summands};
 use crate::symbolic::expand::MAX_PRODUCTS;
+use crate::symbolic::function::Function;
 use crate::symbolic::id_map::IdMap;
-use crate::symbolic::node::{ExprId, Function, Node};
+use crate::symbolic::node::{ExprId, Node};
 use crate::symbolic::number::Number;
 use crate::symbolic::pool::ExprPool;
 

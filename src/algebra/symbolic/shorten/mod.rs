@@ -23,9 +23,6 @@ mod groups;
 mod search;
 mod units;
 
-#[cfg(test)]
-mod tests;
-
 pub(crate) use search::{Shortened, Shortener};
 
 use super::node::ExprId;
