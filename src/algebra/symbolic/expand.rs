@@ -99,37 +99,3 @@ impl ExprPool {
         self.terms_of(sum)
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::super::testing::assert_rewritten;
-    use super::*;
-
-    #[test]
-    fn expand_multiplies_products_and_powers_of_sums() {
-        let expand =
-            |pool: &mut ExprPool, expr| pool.expand_region(expr, &mut MAX_PRODUCTS.clone());
-        assert_rewritten(
-            expand,
-            &[
-                ("(x + y)*(x - y)", "x^2 - y^2"),
-                ("(x + 1)^3", "1 + 3*x + 3*x^2 + x^3"),
-                ("0.5*(x + y)", "0.5*x + 0.5*y"),
-                ("x*(y + 1/x)", "1 + x*y"),
-                ("(sqrt(x) + 1)*(sqrt(x) - 1)", "-1 + x"),
-                ("((x + 1)^2 + 1)^2", "4 + 8*x + 8*x^2 + 4*x^3 + x^4"),
-                // Other powers of sums are left.
-                ("(x + y)^-2", "1/(x + y)^2"),
-                ("sqrt(x + y)", "sqrt(x + y)"),
-                ("(x + y)^0.3*(x + y)", "(x + y)^1.3"),
-                // So is what is beyond the limits.
-                ("(a + b + c + d + e + f)^900", "(a + b + c + d + e + f)^900"),
-            ],
-        );
-        let narrow = |pool: &mut ExprPool, expr| {
-            pool.rewrite_region(expr, |pool, node| pool.expand_node(node, 3, &mut 100))
-        };
-        let expected = "x^2 + 2*x*y + y^2 + (x + y)^3";
-        assert_rewritten(narrow, &[("(x + y)^2 + (x + y)^3", expected)]);
-    }
-}

@@ -67,8 +67,6 @@ mod shorten;
 mod simplify;
 mod slope;
 mod substitute;
-#[cfg(test)]
-mod testing;
 mod trig;
 
 pub use canonical::{CanonicalForm, CanonicalForms, Coefficient};

@@ -373,3 +373,12 @@ impl<'p> Parser<'p> {
         ParseErrorKind::Unexpected { found, expected }.at(self.text, token.start)
     }
 }
+
+#[cfg(test)]
+impl ExprPool {
+    /// The expression of a text that parses.
+    pub(crate) fn parsed(&mut self, text: &str) -> ExprId {
+        self.parse(text, &|_| true)
+            .unwrap_or_else(|error| panic!("{text}: {error}"))
+    }
+}

@@ -114,34 +114,3 @@ pub(super) fn add(to: &mut Monomials, exponents: Vec<i64>, coefficient: Number) 
     }
     Some(())
 }
-
-#[cfg(test)]
-mod tests {
-    use super::super::testing::assert_rewritten;
-    use super::*;
-
-    #[test]
-    fn as_power_undoes_multiplying_out() {
-        let as_power = |pool: &mut ExprPool, expr| pool.as_power(expr).unwrap_or(ExprId::ZERO);
-        // Zero for what is none.
-        let cases = [
-            ("x^2 + 2*x*y + y^2", "(x + y)^2"),
-            ("1 - 2*x + x^2", "(1 - x)^2"),
-            ("4*x^2 + 12*x*y + 9*y^2", "(2*x + 3*y)^2"),
-            ("2*x^2 + 4*x*y + 2*y^2", "2*(x + y)^2"),
-            ("x^2/4 + x*y + y^2", "1/4*(x + 2*y)^2"),
-            ("1 + 3*x + 3*x^2 + x^3", "(1 + x)^3"),
-            ("1 + 4*x + 6*x^2 + 4*x^3 + x^4", "(1 + x)^4"),
-            ("x^2 + y^2 + z^2 + 2*x*y - 2*x*z - 2*y*z", "(x + y - z)^2"),
-            ("sin(x)^2 + 2*x*sin(x) + x^2", "(x + sin(x))^2"),
-            ("x^2 + 2*x + 2", "0"),
-            ("x^2 + x*y + y^2", "0"),
-            ("0.1*x^2 + 0.2*x + 0.1", "0.1*(1 + x)^2"),
-            ("0.09*x^2 + 0.12*x + 0.04", "0.01*(2 + 3*x)^2"),
-            ("x + 2*sqrt(x) + 1", "(1 + sqrt(x))^2"),
-            ("exp(2*x) + 2 + exp(-2*x)", "(exp(-x) + exp(x))^2"),
-            ("x^2 + 1", "0"),
-        ];
-        assert_rewritten(as_power, &cases);
-    }
-}

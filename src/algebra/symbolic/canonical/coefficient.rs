@@ -1,5 +1,6 @@
 //! Complex rational coefficients with a radius.
 
+use std::cmp::Ordering;
 use std::hash::{Hash, Hasher};
 
 use num_bigint::BigInt;
@@ -30,11 +31,21 @@ pub struct Coefficient {
     pub(super) radius: f64,
 }
 
+impl Ord for Coefficient {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.parts().cmp(&other.parts())
+    }
+}
+
+impl PartialOrd for Coefficient {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
 impl PartialEq for Coefficient {
     fn eq(&self, other: &Self) -> bool {
-        self.re == other.re
-            && self.im == other.im
-            && self.radius.to_bits() == other.radius.to_bits()
+        self.cmp(other).is_eq()
     }
 }
 
@@ -42,7 +53,7 @@ impl Eq for Coefficient {}
 
 impl Hash for Coefficient {
     fn hash<H: Hasher>(&self, state: &mut H) {
-        (&self.re, &self.im, self.radius.to_bits()).hash(state);
+        self.parts().hash(state);
     }
 }
 
@@ -68,6 +79,10 @@ impl From<Number> for Coefficient {
 }
 
 impl Coefficient {
+    fn parts(&self) -> (&Rational, &Rational, u64) {
+        (&self.re, &self.im, self.radius.to_bits())
+    }
+
     /// Reads a decimal as it is written: digits with at most one point and an exponent, such as `0.36`
     /// or `1.2e-3`. Where it stands for a rounded number its radius is half a unit of its last digit.
     ///

@@ -416,19 +416,10 @@ fn of_odd_power(pool: &ExprPool, mut expr: ExprId) -> (i64, ExprId) {
 
 /// `exp(argument)` and `exp(-argument)`, with `i * argument` for angles.
 pub(super) fn exponentials(argument: &CanonicalForm, is_angle: bool) -> [CanonicalForm; 2] {
-    let exponent: Vec<_> = (argument.terms.iter())
-        .map(|(monomial, coefficient)| {
-            let (re, im) = (coefficient.re.clone(), coefficient.im.clone());
-            (
-                monomial.clone(),
-                if is_angle { (-im, re) } else { (re, im) },
-            )
-        })
-        .collect();
-    let plus = Monomial {
-        powers: Vec::new(),
-        exponent,
+    let unit = match is_angle {
+        true => Coefficient::imaginary(1, 1),
+        false => Coefficient::integer(1),
     };
-    let minus = plus.reciprocal();
-    [plus, minus].map(CanonicalForm::monomial)
+    let minus_unit = Coefficient::integer(-1).times(&unit);
+    [unit, minus_unit].map(|factor| CanonicalForm::exponential(argument.scaled(&factor)))
 }

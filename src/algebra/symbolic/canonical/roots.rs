@@ -80,15 +80,10 @@ impl CanonicalForms<'_> {
             }
             _ => factors.push((CanonicalForm::term(sign, rest), 1)),
         }
-        let mut exponent = CanonicalForm::default();
-        for (monomial, (re, im)) in &monomial.exponent {
-            let coefficient = Coefficient::complex(re.clone(), im.clone());
-            exponent.add(coefficient, monomial.clone());
-        }
         Some(Split {
             scale,
             factors,
-            exponent,
+            exponent: monomial.exponent.clone(),
         })
     }
 
@@ -98,11 +93,14 @@ impl CanonicalForms<'_> {
         &mut self,
         form: &CanonicalForm,
     ) -> Option<(CanonicalForm, Option<CanonicalForm>)> {
-        let all = form.terms.keys().flat_map(|monomial| &monomial.exponent);
-        let names: BTreeSet<&Monomial> = all.map(|(name, _)| name).collect();
+        let all = form
+            .terms
+            .keys()
+            .flat_map(|monomial| monomial.exponent.terms.keys());
+        let names: BTreeSet<&Monomial> = all.collect();
         let power = |monomial: &Monomial, name: &Monomial| {
-            let found = monomial.exponent.iter().find(|(known, _)| known == name);
-            found.map_or_else(Rational::zero, |(_, (re, _))| re.clone())
+            let found = monomial.exponent.terms.get(name);
+            found.map_or_else(Rational::zero, |power| power.re.clone())
         };
         let powers = |monomial: &Monomial| -> Vec<Rational> {
             names.iter().map(|name| power(monomial, name)).collect()
@@ -157,7 +155,7 @@ impl CanonicalForms<'_> {
         powers.retain(|(_, power)| *power != 0);
         Monomial {
             powers,
-            exponent: Vec::new(),
+            exponent: CanonicalForm::default(),
         }
     }
 
@@ -224,7 +222,7 @@ impl CanonicalForms<'_> {
         let mut rest = CanonicalForm::default();
         let mut product = CanonicalForm::one();
         for (monomial, coefficient) in &argument.terms {
-            let log = match (monomial.powers.as_slice(), monomial.exponent.is_empty()) {
+            let log = match (monomial.powers.as_slice(), monomial.exponent.is_zero()) {
                 ([(atom, 1)], true) => match &self.atoms[*atom as usize] {
                     Atom::Log(base) => Some(base.clone()),
                     _ => None,
@@ -263,10 +261,7 @@ impl CanonicalForms<'_> {
         let Some((_, monomial)) = normed.as_term().filter(|(c, _)| c.is_one()) else {
             return Some(self.atom(Atom::Abs(normed)).scaled(&scale));
         };
-        let mut product = CanonicalForm::monomial(Monomial {
-            powers: Vec::new(),
-            exponent: monomial.exponent.clone(),
-        });
+        let mut product = CanonicalForm::exponential(monomial.exponent.clone());
         for &(atom, power) in &monomial.powers {
             let base = match self.is_positive(atom) || power % 2 == 0 {
                 true => CanonicalForm::atom(atom),

@@ -1,6 +1,6 @@
 //! Sums that are squares.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use num_traits::Signed;
 
@@ -95,16 +95,13 @@ impl CanonicalForms<'_> {
 
 /// The monomial whose square this is, if powers are even.
 fn halved(monomial: &Monomial) -> Option<Monomial> {
-    let half = ratio(1, 2);
     let powers = monomial.powers.iter();
     let powers: Option<Vec<_>> = powers
         .map(|&(atom, power)| (power % 2 == 0).then_some((atom, power / 2)))
         .collect();
-    let exponent = monomial.exponent.iter();
-    let exponent = exponent.map(|(of, (re, im))| (of.clone(), (re * &half, im * &half)));
     Some(Monomial {
         powers: powers?,
-        exponent: exponent.collect(),
+        exponent: monomial.exponent.scaled(&ratio(1, 2).into()),
     })
 }
 
@@ -115,8 +112,11 @@ struct Order {
 
 impl Order {
     fn of(form: &CanonicalForm) -> Self {
-        let all = form.terms.keys().flat_map(|monomial| &monomial.exponent);
-        let distinct: std::collections::BTreeSet<&Monomial> = all.map(|(of, _)| of).collect();
+        let all = form
+            .terms
+            .keys()
+            .flat_map(|monomial| monomial.exponent.terms.keys());
+        let distinct: BTreeSet<&Monomial> = all.collect();
         let weighted = (distinct.into_iter().enumerate())
             .map(|(place, of)| (of.clone(), (place as f64 + 2.7).sqrt()));
         Self {
@@ -127,9 +127,9 @@ impl Order {
     fn weight(&self, monomial: &Monomial) -> f64 {
         let powers = monomial.powers.iter();
         let powers = powers.map(|&(atom, power)| f64::from(power) * (f64::from(atom) + 3.1).ln());
-        let exponents = monomial.exponent.iter().map(|(of, (re, im))| {
+        let exponents = monomial.exponent.terms.iter().map(|(of, power)| {
             let weight = self.exponents.get(of).copied().unwrap_or(1.0);
-            weight * (nearest(re) + 1.618 * nearest(im))
+            weight * (nearest(&power.re) + 1.618 * nearest(&power.im))
         });
         powers.chain(exponents).sum()
     }
