@@ -31,13 +31,6 @@ pub(super) enum Stop {
     Unknown,
 }
 
-/// What an expression is at the point.
-enum Germ {
-    /// It has all derivatives.
-    Smooth,
-    Series(Series),
-}
-
 /// Series of expressions by one variable, on one side of a point of which some facts are known.
 pub(super) struct Germs<'a> {
     pub pool: &'a mut ExprPool,
@@ -47,7 +40,8 @@ pub(super) struct Germs<'a> {
     pub side: Number,
     /// Exponent from which on terms are left out.
     pub order: i64,
-    known: IdMap<Germ>,
+    /// Series of the expressions that are not smooth.
+    known: IdMap<Series>,
 }
 
 impl<'a> Germs<'a> {
@@ -76,19 +70,15 @@ impl<'a> Germs<'a> {
             if !self.pool.affords(1) {
                 return Err(Stop::Order);
             }
-            let germ = match self.germ_of_node(node)? {
-                Some(series) => Germ::Series(self.cut(series)),
-                None => Germ::Smooth,
-            };
-            self.known.insert(node, germ);
+            if let Some(series) = self.series_of_node(node)? {
+                let series = self.cut(series);
+                self.known.insert(node, series);
+            }
         }
-        Ok(match self.is_smooth(root) {
-            true => None,
-            false => Some(self.series(root)),
-        })
+        Ok(self.known.get(&root).cloned())
     }
 
-    fn germ_of_node(&mut self, expr: ExprId) -> Result<Option<Series>, Stop> {
+    fn series_of_node(&mut self, expr: ExprId) -> Result<Option<Series>, Stop> {
         let node = self.pool.node(expr).clone();
         let operands: Vec<ExprId> = node.operands().collect();
         let is_smooth = operands.iter().all(|operand| self.is_smooth(*operand));
@@ -152,7 +142,7 @@ impl<'a> Germs<'a> {
     }
 
     fn is_smooth(&self, expr: ExprId) -> bool {
-        !matches!(self.known.get(&expr), Some(Germ::Series(_)))
+        !self.known.contains_key(&expr)
     }
 
     pub(super) fn vanishes(&mut self, expr: ExprId) -> Result<bool, Stop> {
@@ -160,10 +150,8 @@ impl<'a> Germs<'a> {
     }
 
     fn series(&mut self, expr: ExprId) -> Series {
-        match self.known.get(&expr) {
-            Some(Germ::Series(series)) => series.clone(),
-            _ => self.taylor(expr),
-        }
+        let known = self.known.get(&expr).cloned();
+        known.unwrap_or_else(|| self.taylor(expr))
     }
 
     /// The Taylor series of a smooth expression.
@@ -208,7 +196,7 @@ impl<'a> Germs<'a> {
                 };
             }
         };
-        let symbol = self.pool.symbol_id("argument of a function");
+        let symbol = self.pool.placeholder("argument", 0);
         let variable = self.pool.symbol_expr(symbol);
         let mut derivative = self.pool.apply(function, variable);
         let mut factor = Number::ONE;

@@ -184,6 +184,11 @@ impl ExprPool {
         self.symbol_for(name, Meaning::Variable)
     }
 
+    /// A variable that takes the place of a part while expressions are rewritten; no file has one of its name.
+    pub(super) fn placeholder(&mut self, kind: &str, number: usize) -> SymbolId {
+        self.symbol_id(&format!(" {kind} {number}"))
+    }
+
     /// The symbol of a selection: no variable, but `[test, zero, other]`, the value of `zero` where `test` is zero
     /// and that of `other` elsewhere.
     pub(super) fn selection_symbol(&mut self, parts: [ExprId; 3]) -> ExprId {

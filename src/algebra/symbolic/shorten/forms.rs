@@ -24,7 +24,7 @@ impl Shortener<'_> {
         let singles: Scaled = (scaled.iter())
             .map(|&(number, expr)| (number, self.single(expr)))
             .collect();
-        let mut candidates = vec![collected(self.pool, &singles, Keep::Sums)];
+        let mut candidates = vec![collected(self.pool, &singles, NestedSums::Kept)];
         if old.len() <= MAX_GROUP && self.pool.affords(1) {
             candidates.extend(self.candidates(unit, &singles));
             candidates.extend(self.beside_common_factors(unit, &singles));
@@ -84,7 +84,7 @@ impl Shortener<'_> {
                 _ => terms.push((number, expr)),
             }
         }
-        collected(self.pool, &terms, Keep::Sums)
+        collected(self.pool, &terms, NestedSums::Kept)
     }
 
     /// Terms of a sum with those of sums inside products and fractions.
@@ -158,7 +158,7 @@ impl Shortener<'_> {
             if let [(number, rest)] = terms.as_slice()
                 && let Node::Sum(_) = self.pool.node(*rest)
             {
-                candidates.push(collected(self.pool, &[(*number, *rest)], Keep::Nothing));
+                candidates.push(collected(self.pool, &[(*number, *rest)], NestedSums::Split));
             }
             candidates.push(terms);
             if singles.len() == 1
@@ -197,7 +197,7 @@ impl Shortener<'_> {
             let terms: Scaled = terms
                 .map(|(number, expr)| (number, self.pool.product(&[common, expr])))
                 .collect();
-            collected(self.pool, &terms, Keep::Sums)
+            collected(self.pool, &terms, NestedSums::Kept)
         });
         with_factors.collect()
     }
@@ -216,7 +216,7 @@ impl Shortener<'_> {
                     let mut sum = singles.clone();
                     sum[first] = product;
                     sum.remove(second);
-                    found.push(collected(self.pool, &sum, Keep::Sums));
+                    found.push(collected(self.pool, &sum, NestedSums::Kept));
                 }
             }
         }
@@ -327,34 +327,38 @@ impl Shortener<'_> {
         let mut parts = Scaled::new();
         for (term, &(number, _)) in singles.iter().enumerate() {
             let form = forms[term][choice[term]];
-            let keep = match choice[term] {
-                0 => Keep::Sums,
-                _ => Keep::Nothing,
+            let sums = match choice[term] {
+                0 => NestedSums::Kept,
+                _ => NestedSums::Split,
             };
-            parts.extend(collected(self.pool, &[(number, form)], keep));
+            parts.extend(collected(self.pool, &[(number, form)], sums));
         }
-        let sum = collected(self.pool, &parts, Keep::Sums);
+        let sum = collected(self.pool, &parts, NestedSums::Kept);
         self.pool.spend(parts.len());
         let length = self.length(unit, &sum);
         (sum, length)
     }
 }
 
-/// Whether sums among the terms stay terms.
+/// Whether sums among the terms stay terms, or become their own terms.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Keep {
-    Sums,
-    Nothing,
+pub(super) enum NestedSums {
+    Kept,
+    Split,
 }
 
 /// Summands with the numbers of their terms in the coefficients and like terms added, in the order
 /// of their first appearance.
-pub(super) fn collected(pool: &ExprPool, summands: &[(Number, ExprId)], keep: Keep) -> Scaled {
+pub(super) fn collected(
+    pool: &ExprPool,
+    summands: &[(Number, ExprId)],
+    sums: NestedSums,
+) -> Scaled {
     let mut result = Scaled::new();
     let mut place: IdMap<usize> = IdMap::default();
     for &(number, expr) in summands {
         let parts = match pool.node(expr) {
-            Node::Sum(_) if keep == Keep::Sums => vec![(Number::ONE, expr)],
+            Node::Sum(_) if sums == NestedSums::Kept => vec![(Number::ONE, expr)],
             _ => pool.terms_of(expr),
         };
         for (factor, rest) in parts {
