@@ -9,7 +9,6 @@ use super::point::{Gap, Sides, search};
 use super::side::{Floats, RightSide, Side, SidePhase};
 use crate::symbolic::{CanonicalForm, CanonicalForms, Coefficient, ExprId, ExprPool, Node, Number};
 
-/// Most terms that a difference names.
 const MAX_TERMS: usize = 5;
 
 /// Both files, phase by phase.
@@ -259,7 +258,6 @@ fn proof(
     found.filter(|_| !forms.is_contradictory())
 }
 
-/// The sum of one side's terms in these rows.
 fn sum(pool: &mut ExprPool, side: usize, rows: &[&Row]) -> ExprId {
     let terms: Vec<ExprId> = (rows.iter())
         .flat_map(|row| row.terms[side].clone())
@@ -275,7 +273,6 @@ struct Table {
 struct Row {
     rest: ExprId,
     coefficients: [Coefficient; 2],
-    /// The terms with their numbers, for each side.
     terms: [Vec<ExprId>; 2],
 }
 
@@ -327,7 +324,6 @@ impl Table {
         })
     }
 
-    /// Those of them that rounding does not explain.
     fn unexplained(&self) -> Vec<&Row> {
         let rows = self.differing();
         rows.filter(|row| !row.difference().may_be_zero()).collect()

@@ -17,7 +17,6 @@ const ENOUGH: usize = 200;
 /// How far points reach without a domain, each in its turn.
 const SCALES: [f64; 8] = [1.0, 1.0, 1.0, 0.3, 3.0, 0.03, 10.0, 100.0];
 
-/// Values of variables by name.
 pub(crate) type Point = BTreeMap<String, f64>;
 
 /// Both sides at a point.
@@ -37,7 +36,6 @@ impl Gap {
     }
 }
 
-/// What the search found.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Search {
     /// A point where the sides differ by more than rounding explains.
@@ -46,14 +44,11 @@ pub(super) struct Search {
     pub(super) largest: Option<Gap>,
     /// A point where only one side has a value (the other is NaN).
     pub(super) one_sided: Option<Gap>,
-    /// Whether both sides have values anywhere.
     pub(super) has_common_point: bool,
 }
 
-/// The two sides of one equation.
 pub(super) struct Sides<'s> {
     pub(super) pool: &'s ExprPool,
-    /// The whole right sides.
     pub(super) whole: [ExprId; 2],
     /// The same without the terms that both have; the difference is that of the whole sides.
     pub(super) rest: [ExprId; 2],

@@ -30,17 +30,14 @@ pub struct Side {
     pub(super) phases: Vec<SidePhase>,
 }
 
-/// The right sides of one phase.
 #[derive(Clone, Debug)]
 pub(super) struct SidePhase {
     pub(super) name: Option<String>,
     pub(super) ddz: Vec<RightSide>,
 }
 
-/// A right side as text.
 #[derive(Clone, Debug)]
 pub(super) enum RightSide {
-    /// Coefficients and terms of a model.
     Summands(Vec<(f64, String)>),
     /// One expression, and the line of its left side.
     Text(usize, String),
@@ -145,7 +142,6 @@ impl Side {
         }
     }
 
-    /// Names of the phases that have one.
     pub(crate) fn phase_names(&self) -> Vec<String> {
         let names = self.phases.iter().map(|phase| phase.name.clone());
         names.flatten().collect()
@@ -238,16 +234,13 @@ impl Side {
     }
 }
 
-/// What the coefficients of a model are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Floats {
-    /// The numbers that are there.
     Exact,
     /// Numbers such as 1/3 and sums that were rounded to floats: of those with 16 digits or more, 15 count.
     Rounded,
 }
 
-/// Significant digits of a decimal.
 fn n_digits(decimal: &str) -> usize {
     let mantissa = decimal.split(['e', 'E']).next().unwrap_or_default();
     let digits = mantissa.trim_start_matches(['0', '.']);

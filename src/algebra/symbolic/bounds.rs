@@ -29,7 +29,6 @@ impl ExprPool {
         })
     }
 
-    /// The interval of one expression, given those of its operands.
     pub(super) fn bounds_of_node(
         &self,
         expr: ExprId,

@@ -29,14 +29,12 @@ const NESTED: u64 = 2;
 /// Digits that a reader sees of a coefficient.
 const MOST_DIGITS: usize = 3;
 
-/// Lengths found so far.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Costs {
     known: IdMap<u64>,
 }
 
 impl Costs {
-    /// The length of `expr`, see [`ExprPool::cost`].
     pub(super) fn of(&mut self, pool: &ExprPool, expr: ExprId) -> u64 {
         let terms = pool.terms_of(expr);
         let terms = terms
@@ -135,7 +133,6 @@ impl ExprPool {
         }
     }
 
-    /// Functions among the factors of the terms.
     fn n_functions(&self, expr: ExprId) -> u64 {
         let of_term = |term: &ExprId| {
             let powers = self.factors_of(*term).iter();
@@ -163,7 +160,6 @@ fn length_of_number(number: Number) -> u64 {
     }
 }
 
-/// Decimal digits of a coefficient as far as a reader sees them.
 fn digits(coefficient: f64) -> u64 {
     let text = format!("{:e}", coefficient.abs());
     let mantissa = text.split('e').next().unwrap_or_default();

@@ -48,7 +48,6 @@ impl ExprPool {
         self.derivatives.get(&(expr, symbol)).copied()
     }
 
-    /// The derivative of one node whose operands' derivatives are known.
     fn derivative_of_node(&mut self, expr: ExprId, symbol: SymbolId) -> ExprId {
         let inner = |pool: &ExprPool, operand: ExprId| {
             pool.known_derivative(operand, symbol)

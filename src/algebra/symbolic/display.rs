@@ -175,7 +175,6 @@ impl<'p> Display<'p> {
     }
 }
 
-/// Appends factors with `*` between them.
 fn join<'p>(pieces: &mut Vec<Piece<'p>>, factors: Vec<Piece<'p>>) {
     for (index, factor) in factors.into_iter().enumerate() {
         if index > 0 {

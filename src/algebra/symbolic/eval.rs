@@ -59,7 +59,6 @@ impl ExprPool {
     }
 }
 
-/// `base ^ exponent` by squaring.
 #[inline]
 pub(crate) fn integer_power(base: f64, exponent: i64) -> f64 {
     let power = power_by(base, exponent.unsigned_abs(), |a, b| a * b);

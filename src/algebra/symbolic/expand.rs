@@ -62,7 +62,6 @@ impl ExprPool {
         self.sum_of_terms(terms)
     }
 
-    /// A factor as a sum raised to a positive integer.
     fn as_sum_power(&self, factor: ExprId) -> Option<(ExprId, usize)> {
         match *self.node(factor) {
             Node::Sum(_) => Some((factor, 1)),
@@ -74,7 +73,6 @@ impl ExprPool {
         }
     }
 
-    /// All products of terms of `a` and `b`, like ones collected.
     fn multiply(&mut self, a: &Terms, b: &Terms) -> Terms {
         let mut products = Vec::with_capacity(a.len() * b.len());
         for &(coefficient_a, rest_a) in a {

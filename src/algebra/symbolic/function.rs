@@ -25,7 +25,6 @@ pub enum Function {
     Sign,
 }
 
-/// Symmetry of a function under a change of sign.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Parity {
     /// `f(-x) = f(x)`.
@@ -48,7 +47,6 @@ struct Row {
     derivative: fn(&mut ExprPool, ExprId, ExprId) -> ExprId,
 }
 
-/// In the order of the enum.
 const ROWS: [Row; 9] = [
     Row {
         function: Function::Sin,
@@ -163,7 +161,6 @@ impl Function {
         &ROWS[self as usize]
     }
 
-    /// The name in the term grammar.
     pub(crate) fn name(self) -> &'static str {
         self.row().names[0]
     }
@@ -189,7 +186,6 @@ impl Function {
         self.evaluate(0.0) == 0.0
     }
 
-    /// The values that it has on an interval.
     pub(super) fn image(self, argument: Interval) -> Interval {
         (self.row().image)(argument)
     }

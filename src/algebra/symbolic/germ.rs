@@ -18,7 +18,6 @@ use super::slope::Facts;
 /// Largest exponent up to which series are computed.
 pub(super) const LAST_ORDER: i64 = 8;
 
-/// Why a series ends.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Stop {
     /// It depends on whether this expression is zero.
@@ -62,7 +61,6 @@ impl<'a> Germs<'a> {
         }
     }
 
-    /// The series of an expression; nothing if it is smooth.
     pub(crate) fn of(&mut self, root: ExprId) -> Result<Option<Series>, Stop> {
         let symbol = self.symbol;
         let wanted = |node| self.pool.may_contain(node, symbol);
@@ -154,7 +152,6 @@ impl<'a> Germs<'a> {
         known.unwrap_or_else(|| self.taylor(expr))
     }
 
-    /// The Taylor series of a smooth expression.
     fn taylor(&mut self, expr: ExprId) -> Series {
         let mut series = Series::default();
         let (mut derivative, mut factor) = (expr, Some(Number::ONE));

@@ -103,7 +103,6 @@ impl Interval {
         Interval::new(self.lo.max(other.lo), self.hi.min(other.hi))
     }
 
-    /// `1/x` for the points other than zero.
     pub(crate) fn recip(self) -> Interval {
         if self.is_empty() || (self.lo == 0.0 && self.hi == 0.0) {
             return Interval::EMPTY;
@@ -116,7 +115,6 @@ impl Interval {
         }
     }
 
-    /// `|x|`.
     pub(crate) fn abs(self) -> Interval {
         if self.is_empty() || self.lo >= 0.0 {
             self
@@ -127,7 +125,6 @@ impl Interval {
         }
     }
 
-    /// `-1`, `0` or `1`.
     pub(crate) fn sign(self) -> Interval {
         if self.is_empty() {
             return self;
@@ -136,7 +133,6 @@ impl Interval {
         Interval::between(lo, hi)
     }
 
-    /// `x^exponent`.
     pub(crate) fn powi(self, exponent: i64) -> Interval {
         if self.is_empty() {
             return self;
@@ -204,7 +200,6 @@ impl Interval {
         Interval::between(lo, hi)
     }
 
-    /// `exp(x)`.
     pub(crate) fn exp(self) -> Interval {
         self.increasing(f64::exp)
             .intersection(Interval::NON_NEGATIVE)
@@ -219,18 +214,15 @@ impl Interval {
         inside.increasing(f64::ln)
     }
 
-    /// `tanh(x)`.
     pub(crate) fn tanh(self) -> Interval {
         self.increasing(f64::tanh)
             .intersection(Interval::new(-1.0, 1.0))
     }
 
-    /// `sin(x)`.
     pub(crate) fn sin(self) -> Interval {
         self.oscillation(f64::sin, 0.5)
     }
 
-    /// `cos(x)`.
     pub(crate) fn cos(self) -> Interval {
         self.oscillation(f64::cos, 0.0)
     }
@@ -246,7 +238,6 @@ impl Interval {
         self.increasing(f64::tan)
     }
 
-    /// The image under an increasing function, widened.
     fn increasing(self, function: impl Fn(f64) -> f64) -> Interval {
         if self.is_empty() {
             return self;
@@ -281,7 +272,6 @@ impl Interval {
     }
 }
 
-/// The two floats around pi.
 const PI: Interval = Interval::between(std::f64::consts::PI, std::f64::consts::PI.next_up());
 
 impl fmt::Display for Interval {

@@ -52,7 +52,6 @@ pub enum Node {
 }
 
 impl Node {
-    /// The operands, left to right.
     pub(super) fn operands(&self) -> impl Iterator<Item = ExprId> + '_ {
         let (pair, list): ([Option<ExprId>; 2], &[ExprId]) = match self {
             Node::Number(_) | Node::Symbol(_) => ([None, None], &[]),

@@ -39,9 +39,7 @@ impl Number {
     pub const ZERO: Number = Number::integer(0);
     /// The exact `1`.
     pub const ONE: Number = Number::integer(1);
-    /// The exact `-1`.
     pub(crate) const MINUS_ONE: Number = Number::integer(-1);
-    /// The exact `1/2`.
     pub(crate) const HALF: Number = Number(Repr::Rational(1, 2));
 
     /// The exact integer `value` (`i64::MIN` is taken one higher, the range being symmetric).
@@ -107,7 +105,6 @@ impl Number {
         self == Number::ONE
     }
 
-    /// Whether the value is below zero.
     pub(crate) fn is_negative(self) -> bool {
         match self.0 {
             Repr::Rational(numerator, _) => numerator < 0,
@@ -137,12 +134,10 @@ impl Number {
         }
     }
 
-    /// Whether this is an exact even integer.
     pub(crate) fn is_even(self) -> bool {
         self.as_integer().is_some_and(|value| value % 2 == 0)
     }
 
-    /// The magnitude.
     pub(crate) fn abs(self) -> Number {
         if self.is_negative() { -self } else { self }
     }

@@ -79,7 +79,6 @@ impl ExprPool {
         }
     }
 
-    /// A factor as an integer power.
     pub(super) fn integer_power(&self, factor: ExprId) -> Option<(ExprId, i64)> {
         match self.base_and_exponent(factor) {
             (base, Exponent::Number(number)) => Some((base, number.as_integer()?)),
@@ -112,7 +111,6 @@ impl ExprPool {
         (picked, others)
     }
 
-    /// `function(argument)^exponent`.
     pub(super) fn apply_power(
         &mut self,
         function: Function,

@@ -32,7 +32,6 @@ use super::pool::ExprPool;
 const MAX_LOG_POWER: i64 = 4;
 
 impl ExprPool {
-    /// One node rewritten towards the normal form.
     pub(super) fn normal_rules(&mut self, expr: ExprId) -> ExprId {
         match *self.node(expr) {
             Node::Apply(Function::Log, argument) => self.split_log(argument).unwrap_or(expr),
@@ -56,7 +55,6 @@ impl ExprPool {
         }
     }
 
-    /// One node rewritten towards fewer function calls.
     pub(super) fn compact_rules(&mut self, expr: ExprId) -> ExprId {
         match self.node(expr) {
             Node::Product(_) => {

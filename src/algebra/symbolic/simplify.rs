@@ -31,7 +31,6 @@ const MAX_CHOICES: usize = 4;
 /// Most divisors below each other for which it is proven that a symbol may go.
 const PROVEN_LEVELS: usize = 12;
 
-/// Most work on one expression.
 pub(super) const MAX_WORK: u64 = 120_000;
 
 /// Most rounds of rewriting on the way to a normal form.

@@ -27,7 +27,6 @@ const MOST_WORK: u64 = 300_000;
 /// The step of differences, a compromise of both precisions.
 const STEP: f64 = 1.0 / 8192.0;
 
-/// The slope of an expression by a symbol.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Slope {
     expr: ExprId,
@@ -38,7 +37,6 @@ pub(super) struct Slope {
 /// What is assumed about the points of a case.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Facts {
-    /// The first expression that is zero.
     first_zero: Option<ExprId>,
     zero: Vec<ExprId>,
     nonzero: Vec<ExprId>,
@@ -47,7 +45,6 @@ pub(super) struct Facts {
 }
 
 impl Facts {
-    /// An expression with the known values of symbols.
     pub(crate) fn at(&self, pool: &mut ExprPool, expr: ExprId) -> ExprId {
         pool.substitute(expr, &self.values)
     }
@@ -84,7 +81,6 @@ impl Facts {
         test
     }
 
-    /// Whether an expression that is not zero is positive.
     pub(crate) fn is_positive(&self, pool: &mut ExprPool, expr: ExprId) -> Result<bool, Stop> {
         let expr = self.at(pool, expr);
         if pool.is_constant(expr) {
@@ -132,7 +128,6 @@ impl Facts {
         (is_other || is_nonzero(pool, core)).then_some(false)
     }
 
-    /// These facts and whether `test` is zero.
     fn with(&self, pool: &mut ExprPool, test: ExprId, is_zero: bool) -> Facts {
         let mut facts = self.clone();
         if !is_zero {
@@ -228,12 +223,10 @@ fn value_of_symbol(pool: &mut ExprPool, expr: ExprId) -> Option<(SymbolId, ExprI
 
 /// What the values beside a point have.
 enum Outcome {
-    /// The derivative by the rules.
     Regular,
     Finite(ExprId),
     /// An infinity with the sign of an expression.
     Infinite(ExprId),
-    /// Not found.
     Open,
 }
 

@@ -57,7 +57,6 @@ impl ExprPool {
         exprs.iter().map(|expr| folded[expr]).collect()
     }
 
-    /// The node of `expr` built again from other operands.
     pub(super) fn rebuild(
         &mut self,
         expr: ExprId,

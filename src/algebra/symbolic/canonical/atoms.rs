@@ -8,7 +8,6 @@ use super::coefficient::Rational;
 use super::polynomial::CanonicalForm;
 use crate::symbolic::node::{ExprId, SymbolId};
 
-/// A factor of a monomial.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(super) enum Atom {
     Symbol(SymbolId),
@@ -25,7 +24,6 @@ pub(super) enum Atom {
     Opaque(ExprId),
 }
 
-/// Largest divisor that is tried.
 const LARGEST_DIVISOR: u64 = 2_000;
 
 /// A positive number as a product of primes to integer powers. What is left after small divisors

@@ -122,7 +122,6 @@ impl Coefficient {
         }
     }
 
-    /// `numerator/denominator` times the imaginary unit.
     pub(super) fn imaginary(numerator: i64, denominator: i64) -> Self {
         let im = ratio(numerator, denominator);
         Self::complex(Rational::zero(), im)
@@ -154,7 +153,6 @@ impl Coefficient {
         self.is_zero() || (self.radius > 0.0 && is_within())
     }
 
-    /// The value without its radius.
     pub(super) fn exact(&self) -> Self {
         Self {
             radius: 0.0,
@@ -162,7 +160,6 @@ impl Coefficient {
         }
     }
 
-    /// The value if it is real.
     pub(super) fn as_real(&self) -> Option<&Rational> {
         self.im.is_zero().then_some(&self.re)
     }
@@ -181,7 +178,6 @@ impl Coefficient {
         self.re.is_negative() || (self.re.is_zero() && self.im.is_negative())
     }
 
-    /// -1 if it is negative, else 1.
     pub(super) fn sign(&self) -> Self {
         Self::integer(if self.is_negative() { -1 } else { 1 })
     }

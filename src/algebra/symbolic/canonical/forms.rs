@@ -19,7 +19,6 @@ const MAX_FRACTION_TRIES: usize = 300;
 const MAX_REMOVALS: usize = 40;
 /// Most sums under roots and logarithms by which others are divided.
 const MAX_SUMS: usize = 12;
-/// Largest index of a root.
 pub(super) const MAX_ROOT: i64 = 1_000;
 
 /// Normal forms of the expressions of a pool; the documentation of this folder has the method.
@@ -33,7 +32,6 @@ pub struct CanonicalForms<'p> {
     /// Atoms that are positive wherever all given expressions are defined, and sums that are.
     pub(super) positive: HashSet<u32>,
     pub(super) positive_sums: Vec<CanonicalForm>,
-    /// Atoms that are negative there.
     pub(super) negative: HashSet<u32>,
     rounding: f64,
     /// Whether any argument has radii.
@@ -342,7 +340,6 @@ impl<'p> CanonicalForms<'p> {
         None
     }
 
-    /// The atoms of a form that multiplying out would remove.
     fn fractions(&self, form: &CanonicalForm) -> HashSet<u32> {
         let atoms = form.terms.keys().flat_map(|monomial| &monomial.powers);
         let atoms = atoms.map(|(atom, _)| *atom);

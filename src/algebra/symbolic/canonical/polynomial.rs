@@ -133,7 +133,6 @@ impl CanonicalForm {
         self.terms.values()
     }
 
-    /// The value if there is nothing but a number.
     pub(super) fn as_constant(&self) -> Option<Coefficient> {
         let mut terms = self.terms.iter();
         match (terms.next(), terms.next()) {
@@ -143,7 +142,6 @@ impl CanonicalForm {
         }
     }
 
-    /// The atom that the form is, if it is nothing else.
     pub(super) fn as_atom(&self) -> Option<u32> {
         let (coefficient, monomial) = self.as_term()?;
         match monomial.powers[..] {
@@ -152,7 +150,6 @@ impl CanonicalForm {
         }
     }
 
-    /// Coefficient and monomial if there is one term.
     pub(super) fn as_term(&self) -> Option<(&Coefficient, &Monomial)> {
         let mut terms = self.terms.iter();
         match (terms.next(), terms.next()) {
@@ -183,7 +180,6 @@ impl CanonicalForm {
             .any(|coefficient| coefficient.radius > 0.0)
     }
 
-    /// The values without their radii.
     pub(super) fn exact(&self) -> Self {
         let terms = self
             .terms
@@ -204,7 +200,6 @@ impl CanonicalForm {
         scaled
     }
 
-    /// `self + other`.
     pub(crate) fn plus(&self, other: &Self) -> Self {
         let (mut sum, rest) = match self.terms.len() >= other.terms.len() {
             true => (self.clone(), other),

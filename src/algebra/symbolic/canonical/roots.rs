@@ -198,7 +198,6 @@ impl CanonicalForms<'_> {
         }
     }
 
-    /// `base ^ exponent` of a positive base.
     pub(super) fn positive_power(
         &mut self,
         base: &CanonicalForm,
@@ -336,7 +335,6 @@ impl CanonicalForms<'_> {
     }
 }
 
-/// See [`CanonicalForms::split`].
 pub(super) struct Split {
     pub(super) scale: Rational,
     pub(super) factors: Vec<(CanonicalForm, i32)>,

@@ -8,7 +8,6 @@ use super::coefficient::{Coefficient, Rational, nearest, ratio};
 use super::forms::CanonicalForms;
 use super::polynomial::{CanonicalForm, Monomial};
 
-/// Most terms of a sum whose root is looked for.
 const MAX_TERMS: usize = 60;
 
 impl CanonicalForms<'_> {
@@ -68,7 +67,6 @@ impl CanonicalForms<'_> {
         })
     }
 
-    /// `form / divisor`, if the division leaves no remainder.
     fn divided(&mut self, form: &CanonicalForm, divisor: &CanonicalForm) -> Option<CanonicalForm> {
         let order = Order::of(&form.plus(divisor));
         let (leading, coefficient) = order.largest(divisor)?;

@@ -31,9 +31,7 @@ const EVALUATION: f64 = 1e-11;
 /// Multiples of the golden ratio fill an interval evenly.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
-/// Values at many points.
 type Column = Rc<[f64]>;
-/// The values of each variable at many points.
 type Points = BTreeMap<SymbolId, Column>;
 
 /// Floating-point numbers of generated code.
@@ -90,7 +88,6 @@ struct Far {
 }
 
 impl Agreement {
-    /// The comparison with `sum`.
     pub(super) fn with(pool: &ExprPool, sum: &Summands) -> Self {
         let symbols: BTreeSet<SymbolId> = (sum.iter())
             .flat_map(|&(_, expr)| pool.symbols_of(expr))

@@ -18,7 +18,6 @@ const MAX_PARTS: usize = 64;
 /// Relative error of coefficients that fit a power.
 const ROUNDING: f64 = 1e-13;
 
-/// What summands that can interact have in common.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum Link {
     /// A monomial of their normal forms.

@@ -15,7 +15,6 @@ use crate::symbolic::order::Exponent;
 use crate::symbolic::pool::ExprPool;
 use crate::symbolic::simplify::MAX_WORK;
 
-/// Most rounds of searching for groups.
 const MAX_ROUNDS: usize = 4;
 
 /// Summands that a shorter form takes the place of.
@@ -80,7 +79,6 @@ pub(super) struct Block {
 }
 
 impl<'a> Shortener<'a> {
-    /// A shortener of sums over `pool`.
     pub(crate) fn new(pool: &'a mut ExprPool) -> Self {
         Self {
             pool,
@@ -91,7 +89,6 @@ impl<'a> Shortener<'a> {
         }
     }
 
-    /// The pool, with the expressions that were made.
     pub(crate) fn pool(&self) -> &ExprPool {
         self.pool
     }
