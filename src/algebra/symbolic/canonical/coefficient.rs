@@ -1,8 +1,5 @@
 //! Complex rational coefficients with a radius.
 
-use std::cmp::Ordering;
-use std::hash::{Hash, Hasher};
-
 use num_bigint::BigInt;
 pub(super) use num_rational::BigRational as Rational;
 use num_traits::{One, Signed, ToPrimitive, Zero};
@@ -23,38 +20,12 @@ pub(super) fn nearest(value: &Rational) -> f64 {
 }
 
 /// `re + i im`, known to `radius` in magnitude.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Coefficient {
     pub(super) re: Rational,
     pub(super) im: Rational,
-    /// Bound of the distance from the number that was rounded.
-    pub(super) radius: f64,
-}
-
-impl Ord for Coefficient {
-    fn cmp(&self, other: &Self) -> Ordering {
-        self.parts().cmp(&other.parts())
-    }
-}
-
-impl PartialOrd for Coefficient {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl PartialEq for Coefficient {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other).is_eq()
-    }
-}
-
-impl Eq for Coefficient {}
-
-impl Hash for Coefficient {
-    fn hash<H: Hasher>(&self, state: &mut H) {
-        self.parts().hash(state);
-    }
+    /// Bits of the [`radius`](Coefficient::radius), whose order is that of the numbers.
+    radius: u64,
 }
 
 impl From<Rational> for Coefficient {
@@ -67,22 +38,14 @@ impl From<Rational> for Coefficient {
 impl From<Number> for Coefficient {
     fn from(number: Number) -> Self {
         let Some((top, bottom)) = number.as_rational() else {
-            let decimal = Self::parse(&format!("{:?}", number.abs().to_f64()), false);
-            let magnitude = decimal.map_or_else(Rational::zero, |decimal| decimal.re);
-            return Self::from(match number.is_negative() {
-                true => -magnitude,
-                false => magnitude,
-            });
+            let decimal = Self::parse(&format!("{:?}", number.to_f64()), false);
+            return decimal.unwrap_or_else(|| Self::integer(0));
         };
         ratio(top, bottom).into()
     }
 }
 
 impl Coefficient {
-    fn parts(&self) -> (&Rational, &Rational, u64) {
-        (&self.re, &self.im, self.radius.to_bits())
-    }
-
     /// Reads a decimal as it is written: digits with at most one point and an exponent, such as `0.36`
     /// or `1.2e-3`. Where it stands for a rounded number its radius is half a unit of its last digit.
     ///
@@ -104,9 +67,9 @@ impl Coefficient {
             false => 0.0,
         };
         Some(Self {
-            re: &Rational::from(mantissa) * &unit,
+            re: Rational::from(mantissa) * unit,
             im: Rational::zero(),
-            radius,
+            radius: radius.to_bits(),
         })
     }
 
@@ -115,11 +78,7 @@ impl Coefficient {
     }
 
     pub(super) fn complex(re: Rational, im: Rational) -> Self {
-        Self {
-            re,
-            im,
-            radius: 0.0,
-        }
+        Self { re, im, radius: 0 }
     }
 
     pub(super) fn imaginary(numerator: i64, denominator: i64) -> Self {
@@ -144,18 +103,18 @@ impl Coefficient {
 
     /// Largest distance that rounded decimals allow.
     pub fn radius(&self) -> f64 {
-        self.radius
+        f64::from_bits(self.radius)
     }
 
     /// Whether zero is among the numbers that it may stand for.
     pub fn may_be_zero(&self) -> bool {
-        let is_within = || self.magnitude() <= self.radius * (1.0 + 1e-9);
-        self.is_zero() || (self.radius > 0.0 && is_within())
+        let is_within = || self.magnitude() <= self.radius() * (1.0 + 1e-9);
+        self.is_zero() || (self.radius > 0 && is_within())
     }
 
     pub(super) fn exact(&self) -> Self {
         Self {
-            radius: 0.0,
+            radius: 0,
             ..self.clone()
         }
     }
@@ -194,20 +153,20 @@ impl Coefficient {
 
     /// `self + other`.
     pub fn plus(&self, other: &Self) -> Self {
-        let radius = match (self.radius, other.radius) {
+        let radius = match (self.radius(), other.radius()) {
             (0.0, radius) | (radius, 0.0) => radius,
             (a, b) => (a + b) * OUTWARD,
         };
         Self {
             re: &self.re + &other.re,
             im: &self.im + &other.im,
-            radius,
+            radius: radius.to_bits(),
         }
     }
 
     /// `self * other`.
     pub fn times(&self, other: &Self) -> Self {
-        let radius = match (self.radius, other.radius) {
+        let radius = match (self.radius(), other.radius()) {
             (0.0, 0.0) => 0.0,
             (a, b) => (self.magnitude() * b + other.magnitude() * a + a * b) * OUTWARD,
         };
@@ -220,24 +179,28 @@ impl Coefficient {
                 &self.re * &other.im + &self.im * &other.re,
             ),
         };
-        Self { re, im, radius }
+        Self {
+            re,
+            im,
+            radius: radius.to_bits(),
+        }
     }
 
     /// The reciprocal; `None` for zero, or where zero is within the radius.
     pub(super) fn reciprocal(&self) -> Option<Self> {
         let square = &self.re * &self.re + &self.im * &self.im;
         let magnitude = self.magnitude();
-        if square.is_zero() || self.radius >= magnitude {
+        if square.is_zero() || self.radius() >= magnitude {
             return None;
         }
-        let radius = match self.radius {
+        let radius = match self.radius() {
             0.0 => 0.0,
             radius => radius / (magnitude * (magnitude - radius)) * OUTWARD,
         };
         Some(Self {
             re: &self.re / &square,
             im: -(&self.im / &square),
-            radius,
+            radius: radius.to_bits(),
         })
     }
 }

@@ -372,7 +372,7 @@ impl Argument {
     /// largest distance of their coefficients.
     fn take(&mut self, other: &CanonicalForm) -> Option<f64> {
         let radius = |form: &CanonicalForm, monomial: &Monomial| {
-            form.terms.get(monomial).map_or(0.0, |c| c.radius)
+            form.terms.get(monomial).map_or(0.0, |c| c.radius())
         };
         let mut room = self.room.clone();
         let mut largest = 0.0_f64;

@@ -113,7 +113,7 @@ impl CanonicalForm {
             Some(before) => before.plus(&coefficient),
             None => coefficient,
         };
-        if !sum.is_zero() || sum.radius > 0.0 {
+        if !sum.is_zero() || sum.radius() > 0.0 {
             self.terms.insert(monomial, sum);
         }
     }
@@ -177,7 +177,7 @@ impl CanonicalForm {
     pub(super) fn has_radius(&self) -> bool {
         self.terms
             .values()
-            .any(|coefficient| coefficient.radius > 0.0)
+            .any(|coefficient| coefficient.radius() > 0.0)
     }
 
     pub(super) fn exact(&self) -> Self {
