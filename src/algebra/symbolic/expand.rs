@@ -1,33 +1,38 @@
-//! Multiplying out, within a budget.
+//! Multiplying out, within limits.
 
 use super::node::{ExprId, Node};
 use super::number::Number;
 use super::pool::ExprPool;
 
-/// Most terms of one expanded sum; what would have more stays a product or power.
-pub(super) const MAX_TERMS: usize = 2_000;
-/// Most products of two terms in the rewriting of one expression.
-pub(super) const MAX_PRODUCTS: usize = 100_000;
+/// Most terms of one expanded sum, and most products of two terms on the way to it; what would take more stays a
+/// product or power.
+#[derive(Clone, Copy)]
+pub(super) struct Limits {
+    terms: usize,
+    products: usize,
+}
+
+pub(super) const WIDE: Limits = Limits {
+    terms: 2_000,
+    products: 100_000,
+};
+/// Of intermediate results.
+pub(super) const NARROW: Limits = Limits {
+    terms: 500,
+    products: 500,
+};
 
 /// A sum taken apart: `coefficient * rest` each.
 pub(super) type Terms = Vec<(Number, ExprId)>;
 
 impl ExprPool {
-    /// A region (see `region.rs`) with products and integer powers of sums multiplied out, as far
-    /// as the budget of products goes.
-    pub(super) fn expand_region(&mut self, region: ExprId, budget: &mut usize) -> ExprId {
-        self.rewrite_region(region, |pool, node| {
-            pool.expand_node(node, MAX_TERMS, budget)
-        })
+    /// A region (see `region.rs`) with products and integer powers of sums multiplied out.
+    pub(super) fn expand_region(&mut self, region: ExprId) -> ExprId {
+        self.rewrite_region(region, |pool, node| pool.expand_node(node, WIDE))
     }
 
     /// Multiplies out one product or power whose operands are expanded.
-    pub(super) fn expand_node(
-        &mut self,
-        expr: ExprId,
-        max_terms: usize,
-        budget: &mut usize,
-    ) -> ExprId {
+    pub(super) fn expand_node(&mut self, expr: ExprId, limits: Limits) -> ExprId {
         if !matches!(self.node(expr), Node::Product(_) | Node::Power(..)) {
             return expr;
         }
@@ -44,17 +49,17 @@ impl ExprPool {
             return expr;
         }
         let plain = self.product(&plain);
-        let mut terms = vec![self.split(plain)];
+        let (mut terms, mut products_left) = (vec![self.split(plain)], limits.products);
         for (sum, exponent) in sums {
             let factor = self.terms_of(sum);
             for _ in 0..exponent {
                 let n_products = terms.len().saturating_mul(factor.len());
-                if n_products > *budget || !self.affords(n_products) {
+                if n_products > products_left || !self.affords(n_products) {
                     return expr;
                 }
-                *budget -= n_products;
+                products_left -= n_products;
                 terms = self.multiply(&terms, &factor);
-                if terms.len() > max_terms {
+                if terms.len() > limits.terms {
                     return expr;
                 }
             }

@@ -17,7 +17,8 @@
 //! | `simplify`, `shorten`, `cost`, `region` | choosing the shortest of equal forms |
 //! | `canonical/` | a normal form with exact coefficients, to decide equality |
 //!
-//! No algorithm recurses on the machine's stack, and none iterates a hash map towards a result.
+//! No algorithm but the parser, whose depth is limited, recurses on the machine's stack, and none iterates a hash map
+//! towards a result.
 //!
 //! ```
 //! use romc::symbolic::ExprPool;

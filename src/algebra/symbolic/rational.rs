@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::expand::{MAX_TERMS, Terms};
+use super::expand::{Terms, WIDE};
 use super::function::Function;
 use super::node::{ExprId, Node};
 use super::number::Number;
@@ -46,8 +46,8 @@ impl ExprPool {
     /// `x/(x + y) + y/(x + y)` becomes `1`, `(x^2 - 1)/(x - 1)` becomes `1 + x`.
     ///
     /// Nothing changes unless a sum or a function occurs in a denominator, or if there are too
-    /// many different ones. Numerators that would exceed `budget` products stay products.
-    pub(super) fn together(&mut self, expr: ExprId, budget: &mut usize) -> ExprId {
+    /// many different ones.
+    pub(super) fn together(&mut self, expr: ExprId) -> ExprId {
         let terms = self.terms_of(expr);
         let mut denominators: Vec<(ExprId, Number)> = Vec::new();
         for (_, rest) in &terms {
@@ -77,7 +77,7 @@ impl ExprPool {
             factors.push(rest);
             let numerator = self.product(&factors);
             let numerator = self.scale(coefficient, numerator);
-            numerators.push(self.expand_node(numerator, MAX_TERMS, budget));
+            numerators.push(self.expand_node(numerator, WIDE));
         }
         let numerator = self.sum(&numerators);
         self.cancel(numerator, &denominators)

@@ -21,7 +21,6 @@
 //! | `abs(a)*abs(b)`, `abs(a)/a` | `abs(a*b)`, `sign(a)` |
 //! | `(exp(a) - exp(b))/(exp(a) + exp(b))` | `tanh((a - b)/2)` |
 
-use super::expand::MAX_PRODUCTS;
 use super::function::Function;
 use super::node::{ExprId, Node};
 use super::number::Number;
@@ -335,7 +334,7 @@ impl ExprPool {
                 }
             }
             let product = self.product(&arguments);
-            let product = self.together(product, &mut MAX_PRODUCTS.clone());
+            let product = self.together(product);
             let log = self.apply(Function::Log, product);
             let term = self.product(&[cofactor, log]);
             parts.push(self.scale(unit, term));

@@ -7,7 +7,7 @@
 //! [`cost`](ExprPool::cost) replaces the region, if it is shorter than what was there.
 //!
 //! **Termination.** Every accepted step lowers the cost, a natural number. The work on one expression
-//! is bounded, counted in constructors, and so are the term products of one step; what exceeds that is left as it is.
+//! is bounded, counted in constructors; what exceeds that is left as it is.
 //!
 //! **Idempotence.** A result is returned once no further step lowers its cost, so simplifying it
 //! again returns it.
@@ -18,7 +18,6 @@
 
 use super::canonical::CanonicalForms;
 use super::cost::Costs;
-use super::expand::MAX_PRODUCTS;
 use super::function::Function;
 use super::id_map::IdMap;
 use super::node::{ExprId, Node};
@@ -46,10 +45,8 @@ impl ExprPool {
         let mut costs = Costs::default();
         let mut best = expr;
         loop {
-            let mut budget = MAX_PRODUCTS;
-            let next = self.map_regions(best, |pool, region| {
-                pool.cheapest_form(region, &mut budget, &mut costs)
-            });
+            let next =
+                self.map_regions(best, |pool, region| pool.cheapest_form(region, &mut costs));
             if costs.of(self, next) >= costs.of(self, best) {
                 return best;
             }
@@ -58,24 +55,19 @@ impl ExprPool {
     }
 
     /// The cheapest of the forms of one region; the region itself unless one is cheaper.
-    fn cheapest_form(&mut self, region: ExprId, budget: &mut usize, costs: &mut Costs) -> ExprId {
+    fn cheapest_form(&mut self, region: ExprId, costs: &mut Costs) -> ExprId {
         if self.as_number(region).is_some() || self.as_symbol(region).is_some() {
             return region;
         }
-        let mut best = region;
-        let mut best_cost = costs.of(self, region);
-        for form in self.forms(region, budget) {
-            let cost = costs.of(self, form);
-            if cost < best_cost {
-                (best, best_cost) = (form, cost);
-            }
-        }
-        best
+        let mut forms = vec![region];
+        forms.extend(self.forms(region));
+        let cheapest = forms.into_iter().min_by_key(|form| costs.of(self, *form));
+        cheapest.expect("the region is among them")
     }
 
     /// Forms equal to `region`, in a fixed order.
-    pub(super) fn forms(&mut self, region: ExprId, budget: &mut usize) -> Vec<ExprId> {
-        let normal = self.normal_form(region, budget);
+    pub(super) fn forms(&mut self, region: ExprId) -> Vec<ExprId> {
+        let normal = self.normal_form(region);
         if !self.affords(1) {
             return vec![region];
         }
@@ -83,13 +75,13 @@ impl ExprPool {
         if self.has_waves(normal) {
             let rational = self.rewrite_region(normal, ExprPool::without_sine_below);
             if rational != normal {
-                plain.push(self.normal_form(rational, budget));
+                plain.push(self.normal_form(rational));
             }
-            plain.extend(self.with_sines(normal, budget));
+            plain.extend(self.with_sines(normal));
             plain.push(self.combine_angles(normal));
         }
-        plain.push(self.rewrite_region(normal, |pool, node| pool.shorter_sums(node, budget)));
-        let expanded = self.expand_region(region, budget);
+        plain.push(self.rewrite_region(normal, ExprPool::shorter_sums));
+        let expanded = self.expand_region(region);
         plain.extend(self.as_power(expanded));
         plain.push(expanded);
         plain.push(region);
@@ -121,9 +113,9 @@ impl ExprPool {
     }
 
     /// A sum, or a product of divisors such as `(1 - x)*(1 + x)`, with fewer terms.
-    fn shorter_sums(&mut self, expr: ExprId, budget: &mut usize) -> ExprId {
+    fn shorter_sums(&mut self, expr: ExprId) -> ExprId {
         match self.node(expr) {
-            Node::Sum(_) => self.shorter_sum(expr, budget),
+            Node::Sum(_) => self.shorter_sum(expr),
             Node::Product(factors) => {
                 let is_divisor = |factor: &ExprId| match self.integer_power(*factor) {
                     Some((base, -1)) => matches!(self.node(base), Node::Sum(_)),
@@ -135,8 +127,8 @@ impl ExprPool {
                     .map(|factor| self.base_and_exponent(*factor).0)
                     .collect();
                 let product = self.product(&sums);
-                let product = self.expand_region(product, budget);
-                let product = self.shorter_sum(product, budget);
+                let product = self.expand_region(product);
+                let product = self.shorter_sum(product);
                 let n_terms = |expr: &ExprId| self.terms_of(*expr).len();
                 if n_terms(&product) >= sums.iter().map(n_terms).sum() {
                     return expr;
@@ -149,11 +141,11 @@ impl ExprPool {
     }
 
     /// A sum as a power, or with sines for cosines, if it has fewer terms then.
-    fn shorter_sum(&mut self, sum: ExprId, budget: &mut usize) -> ExprId {
+    fn shorter_sum(&mut self, sum: ExprId) -> ExprId {
         if !matches!(self.node(sum), Node::Sum(_)) {
             return sum;
         }
-        let mut forms = self.with_sines(sum, budget);
+        let mut forms = self.with_sines(sum);
         forms.extend(self.as_power(sum));
         let n_terms = |pool: &ExprPool, form| pool.terms_of(form).len();
         let shorter = forms.into_iter().min_by_key(|form| n_terms(self, *form));
@@ -161,7 +153,7 @@ impl ExprPool {
     }
 
     /// The forms that have sines instead of cosines of some of the angles with squares.
-    fn with_sines(&mut self, normal: ExprId, budget: &mut usize) -> Vec<ExprId> {
+    fn with_sines(&mut self, normal: ExprId) -> Vec<ExprId> {
         let angles = self.squared_angles(normal);
         let n_choices = 1_usize << angles.len().min(MAX_CHOICES);
         let mut forms = Vec::new();
@@ -174,13 +166,13 @@ impl ExprPool {
                 place.is_none_or(|place| choice >> place.min(MAX_CHOICES - 1) & 1 == 1)
             };
             let sines = self.reduce_powers(normal, Function::Cos, Function::Sin, is_chosen);
-            forms.push(self.expand_region(sines, budget));
+            forms.push(self.expand_region(sines));
         }
         forms
     }
 
     /// The normal form of one region, after a bounded number of rounds.
-    pub(super) fn normal_form(&mut self, region: ExprId, budget: &mut usize) -> ExprId {
+    pub(super) fn normal_form(&mut self, region: ExprId) -> ExprId {
         let mut form = region;
         for _ in 0..MAX_ROUNDS {
             if !self.affords(1) {
@@ -192,8 +184,8 @@ impl ExprPool {
                 form = self.expand_angles(form);
                 form = self.sines_to_cosines(form);
             }
-            form = self.expand_region(form, budget);
-            form = self.together(form, budget);
+            form = self.expand_region(form);
+            form = self.together(form);
             if form == before {
                 break;
             }

@@ -14,6 +14,7 @@ use std::collections::BTreeMap;
 
 use num_integer::Integer;
 
+use super::expand::NARROW;
 use super::function::Function;
 use super::node::{ExprId, Node};
 use super::number::Number;
@@ -23,8 +24,6 @@ use super::pool::ExprPool;
 const MAX_MULTIPLE: i64 = 6;
 /// Most sines and cosines multiplied in one term that are combined.
 const MAX_TRIG_DEGREE: i64 = 8;
-/// Limits of intermediate expansions; larger ones stay as they are.
-const MAX_TERMS: usize = 500;
 
 /// The unit in which multiples of an angle are counted, by what stands beside the coefficient.
 type Units = BTreeMap<ExprId, Number>;
@@ -117,7 +116,7 @@ impl ExprPool {
 
     fn expanded_product(&mut self, a: ExprId, b: ExprId) -> ExprId {
         let product = self.mul(a, b);
-        self.expand_node(product, MAX_TERMS, &mut MAX_TERMS.clone())
+        self.expand_node(product, NARROW)
     }
 
     /// `expr` with every power of a sine reduced to the first by `sin(x)^2 = 1 - cos(x)^2`, also
@@ -225,9 +224,9 @@ impl ExprPool {
         let (with, without) = (self.sum_of_terms(with), self.sum_of_terms(without));
         let other = self.sub(without, with);
         let product = self.mul(other, base);
-        let product = self.expand_node(product, MAX_TERMS, &mut MAX_TERMS.clone());
+        let product = self.expand_node(product, NARROW);
         let product = self.sines_to_cosines(product);
-        let below = self.expand_region(product, &mut MAX_TERMS.clone());
+        let below = self.rewrite_region(product, |pool, node| pool.expand_node(node, NARROW));
         let below = self.powi(below, -1);
         self.mul(other, below)
     }

@@ -4,7 +4,6 @@ use super::agreement::Agreement;
 use super::search::Shortener;
 use super::units::{in_f64, in_units};
 use super::{Scaled, Summands};
-use crate::symbolic::expand::MAX_PRODUCTS;
 use crate::symbolic::function::Function;
 use crate::symbolic::id_map::IdMap;
 use crate::symbolic::node::{ExprId, Node};
@@ -142,7 +141,6 @@ impl Shortener<'_> {
 
     /// Forms of a group: of its sum as a whole, and of each term chosen by itself.
     fn candidates(&mut self, unit: Number, singles: &Scaled) -> Vec<Scaled> {
-        let mut budget = MAX_PRODUCTS;
         let mut candidates = Vec::new();
         let products: Vec<ExprId> = (singles.iter())
             .map(|&(number, expr)| {
@@ -151,7 +149,7 @@ impl Shortener<'_> {
             })
             .collect();
         let sum = self.pool.sum(&products);
-        let mut forms = self.pool.forms(sum, &mut budget);
+        let mut forms = self.pool.forms(sum);
         forms.push(self.pool.simplify(sum));
         for form in forms {
             let terms = self.pool.terms_of(form);
@@ -272,7 +270,6 @@ impl Shortener<'_> {
         if singles.len() < 2 || singles.len() > MAX_CHOSEN {
             return Vec::new();
         }
-        let mut budget = MAX_PRODUCTS;
         let summands: Summands = (singles.iter())
             .map(|&(number, expr)| (number.to_f64(), expr))
             .collect();
@@ -280,10 +277,10 @@ impl Shortener<'_> {
         let mut forms: Vec<Vec<ExprId>> = Vec::new();
         for &(_, expr) in singles {
             let normal = self.normal(expr, waves);
-            let mut own = vec![expr, self.pool.expand_region(expr, &mut budget), normal];
+            let mut own = vec![expr, self.pool.expand_region(expr), normal];
             if self.pool.has_waves(normal) {
                 let sines = self.pool.cosines_to_sines(normal);
-                own.push(self.pool.expand_region(sines, &mut budget));
+                own.push(self.pool.expand_region(sines));
                 own.push(self.pool.combine_angles(normal));
             } else {
                 own.extend([normal, normal]);

@@ -4,7 +4,6 @@ use std::collections::{BTreeMap, HashMap};
 
 use super::Summands;
 use super::search::{Block, Distance, Shortener};
-use crate::symbolic::expand::MAX_PRODUCTS;
 use crate::symbolic::function::Function;
 use crate::symbolic::id_map::IdMap;
 use crate::symbolic::node::{ExprId, Node};
@@ -155,7 +154,7 @@ impl Shortener<'_> {
                 .collect::<Vec<_>>()
         };
         let normal = self.normal(expr, waves);
-        let expanded = self.pool.expand_region(normal, &mut MAX_PRODUCTS.clone());
+        let expanded = self.pool.expand_region(normal);
         let mut links = rests(self.pool, expanded);
         if let Some((cofactor, _)) = self.pool.as_log_term(self.pool.split(expr).1) {
             links.push(Link::Logarithm(cofactor));
@@ -184,7 +183,7 @@ impl Shortener<'_> {
             links.push(Link::Variables(self.pool.product(&variables)));
             // Terms that have a term of the numerator when they are multiplied by the denominator.
             let numerator = self.pool.product(&[expr, base]);
-            let numerator = (self.pool).expand_region(numerator, &mut MAX_PRODUCTS.clone());
+            let numerator = (self.pool).expand_region(numerator);
             for (_, above) in self.pool.terms_of(numerator) {
                 for (_, below) in self.pool.terms_of(base) {
                     links.push(Link::Monomial(self.pool.div(above, below)));
@@ -221,12 +220,10 @@ impl Shortener<'_> {
 
     /// The normal form of a term, with its angles in the units of all.
     pub(super) fn normal(&mut self, expr: ExprId, waves: ExprId) -> ExprId {
-        let mut budget = MAX_PRODUCTS;
-        let arguments = &mut MAX_PRODUCTS.clone();
         self.pool.limited(MAX_WORK / 2, |pool| {
-            let expanded = pool.map_regions(expr, |pool, part| pool.expand_region(part, arguments));
+            let expanded = pool.map_regions(expr, ExprPool::expand_region);
             let expanded = pool.expand_angles_like(expanded, waves);
-            pool.normal_form(expanded, &mut budget)
+            pool.normal_form(expanded)
         })
     }
 }
