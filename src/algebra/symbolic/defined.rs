@@ -40,23 +40,11 @@ impl Guards {
         function: Function,
         argument: ExprId,
     ) -> bool {
-        match function {
-            Function::Log => {
-                let guard = pool.apply(Function::Log, argument);
-                self.note(pool, guard) && !self.is_zero(pool, argument)
-            }
-            Function::Sqrt => {
-                let guard = pool.apply(Function::Sqrt, argument);
-                self.note(pool, guard)
-            }
-            Function::Sin
-            | Function::Cos
-            | Function::Tan
-            | Function::Tanh
-            | Function::Exp
-            | Function::Abs
-            | Function::Sign => true,
+        if !matches!(function, Function::Log | Function::Sqrt) {
+            return true;
         }
+        let guard = pool.apply(function, argument);
+        self.note(pool, guard) && (function == Function::Sqrt || !self.is_zero(pool, argument))
     }
 
     /// Notes a quotient by `divisor`; whether it has a value anywhere.

@@ -13,7 +13,7 @@
 //! | `eval`, `interval`, `rounding`, `bounds` | values, and bounds over boxes |
 //! | `diff`, `substitute` | derivatives and substitution |
 //! | `slope`, `germ`, `series` | derivatives with values where roots, magnitudes and signs have kinks |
-//! | `expand`, `rational`, `perfect_power`, `trig`, `rules`, `factors` | rewriting, each way when asked |
+//! | `expand`, `polynomial`, `trig`, `rules`, `factors` | rewriting, each way when asked |
 //! | `simplify`, `shorten`, `cost`, `region` | choosing the shortest of equal forms |
 //! | `canonical/` | a normal form with exact coefficients, to decide equality |
 //!
@@ -56,10 +56,9 @@ mod node;
 mod number;
 mod order;
 mod parse;
-mod perfect_power;
+mod polynomial;
 mod pool;
 mod power;
-mod rational;
 mod region;
 mod rounding;
 mod rules;

@@ -55,20 +55,14 @@ impl ExprPool {
     }
 
     pub(super) fn compact_rules(&mut self, expr: ExprId) -> ExprId {
-        match self.node(expr) {
-            Node::Product(_) => {
-                let expr = self.merge_tangents(expr);
-                let expr = self.merge_double_angles(expr);
-                let expr = self.merge_hyperbolic_tangent(expr);
-                let expr = self.merge_factors(Function::Abs, expr);
-                self.abs_to_sign(expr)
-            }
-            Node::Number(_)
-            | Node::Symbol(_)
-            | Node::Sum(_)
-            | Node::Power(..)
-            | Node::Apply(..) => expr,
+        if !matches!(self.node(expr), Node::Product(_)) {
+            return expr;
         }
+        let expr = self.merge_tangents(expr);
+        let expr = self.merge_double_angles(expr);
+        let expr = self.merge_hyperbolic_tangent(expr);
+        let expr = self.merge_factors(Function::Abs, expr);
+        self.abs_to_sign(expr)
     }
 
     /// `exp(n*log(a) + b) = a^n*exp(b)`.

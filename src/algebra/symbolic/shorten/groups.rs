@@ -8,7 +8,7 @@ use crate::symbolic::function::Function;
 use crate::symbolic::id_map::IdMap;
 use crate::symbolic::node::{ExprId, Node};
 use crate::symbolic::number::Number;
-use crate::symbolic::perfect_power::MAX_POWER;
+use crate::symbolic::polynomial::MAX_POWER;
 use crate::symbolic::pool::ExprPool;
 use crate::symbolic::simplify::MAX_WORK;
 
