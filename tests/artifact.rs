@@ -1190,3 +1190,49 @@ fn file_in_a_missing_folder_is_refused_and_leaves_nothing() {
     ));
     assert_eq!(fs::read_dir(folder.path()).expect("folder").count(), 0);
 }
+
+/// The text of the first fixture with this provenance.
+fn with_provenance(provenance: &Value) -> Result<String, ArtifactError> {
+    let mut value = fixture("one-dimensional");
+    value["provenance"] = provenance.clone();
+    read_value(&value).map(|model| artifact::to_text(&model))
+}
+
+#[test]
+fn text_has_one_row_of_a_matrix_per_line_and_fills_lines_with_words() {
+    let text = with_provenance(
+        &json!({ "name": "m", "weights": [[1.0, -0.5], [2.5e-7, 3.0]], "bias": [0.0] }),
+    );
+    let expected = "\n  \"provenance\": {\n    \"name\": \"m\",\n    \"weights\": [\n      [1.0, -0.5],\n      \
+                    [2.5e-7, 3.0]\n    ],\n    \"bias\": [0.0]\n  }\n}\n";
+    let text = text.expect("any JSON");
+    assert!(text.ends_with(expected), "{text}");
+    let word = "x".repeat(38);
+    let text = with_provenance(&json!({ "w": [word, word, word] })).expect("any JSON");
+    let expected =
+        format!("\"w\": [\n      \"{word}\", \"{word}\",\n      \"{word}\"\n    ]\n  }}\n}}\n");
+    assert!(text.ends_with(&expected), "{text}");
+}
+
+#[test]
+fn provenance_reads_back_equal_and_too_many_values_are_refused() {
+    let provenance = json!({
+        "empty": {}, "none": [], "nested": [[], [{ "a": [null, true] }]], "b": -2,
+        "text": "quote \" and \u{1} and \\", "words": ["a".repeat(60), "b".repeat(60)],
+        "number": [1e300, -0.0, 5e-324, 12345678901234567u64, u64::MAX],
+    });
+    let text = with_provenance(&provenance).expect("any JSON");
+    let again: Value = serde_json::from_str(&text).expect("JSON");
+    assert_eq!(again["provenance"], provenance);
+    // The object and its list are values as well.
+    assert!(with_provenance(&json!({ "v": vec![0; 99_998] })).is_ok());
+    let error = with_provenance(&json!({ "v": vec![0; 99_999] })).expect_err("too many");
+    assert!(
+        error.to_string().contains("more than 100000 values"),
+        "{error}"
+    );
+    let error = with_provenance(&json!([]))
+        .expect_err("an array")
+        .to_string();
+    assert!(error.contains("found [], expected an object"), "{error}");
+}

@@ -148,33 +148,3 @@ fn kind_of(value: &Value) -> &'static str {
         Value::Object(_) => "an object",
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn terms_are_read_from_lines_and_from_json() {
-        let expected = ["1", "z1", "sin(dz1)"];
-        for text in [
-            "1\n z1 # position\n\nsin(dz1)\n",
-            "[\"1\", \"z1\", \"sin(dz1)\"]",
-            "{ \"library\": [\"1\", \"z1\", \"sin(dz1)\"], \"phases\": {} }",
-        ] {
-            assert_eq!(parse_terms("terms", text).expect(text), expected);
-        }
-        for text in ["", "# only a comment", "[1]", "{}", "[\"1\",", "[[\"1\"]]"] {
-            let error = parse_terms("terms", text).expect_err(text);
-            assert!(matches!(error.place, Place::Character(..)), "{error}");
-        }
-    }
-
-    #[test]
-    fn shorthands_are_suggested_by_their_number_of_terms() {
-        assert_eq!(
-            standards_with(15, 2),
-            ["degree=1,trigonometric,inputs", "degree=2"]
-        );
-        assert!(standards_with(16, 2).is_empty());
-    }
-}

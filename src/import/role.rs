@@ -339,19 +339,4 @@ mod tests {
             assert_eq!(named(name).as_deref(), expected, "{name}");
         }
     }
-
-    #[test]
-    fn mapping_without_part_or_tensor_is_refused() {
-        for text in "|encoder.weight|encoder.weight=|=W|encoder=W|xi.=W".split('|') {
-            let error = text.parse::<Mapping>().expect_err(text);
-            assert!(error.to_string().starts_with("--map: found "), "{error}");
-        }
-    }
-
-    #[test]
-    fn mapping_splits_at_the_first_equals_sign() {
-        let mapping: Mapping = "xi.contact=a=b/c:0".parse().expect("a part and a tensor");
-        assert_eq!(mapping.role, Role::Xi("contact".to_owned()));
-        assert_eq!(mapping.tensor, "a=b/c:0");
-    }
 }

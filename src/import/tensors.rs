@@ -198,34 +198,3 @@ fn decode(info: &TensorInfo, number: &[u8]) -> f64 {
         _ => f64::from(u8::from(little != [0])),
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_follow_the_order_of_bytes_and_of_indices() {
-        let columns = TensorInfo {
-            name: "x".to_owned(),
-            shape: vec![2, 3],
-            element: Element::F32,
-            is_column_major: true,
-            is_big_endian: true,
-            member: 0,
-            start: 0,
-        };
-        let values = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0];
-        let matrix = columns.matrix((2, 3), &values);
-        for (position, value) in values.iter().enumerate() {
-            let index = columns.index_of(position);
-            assert_eq!(matrix[(index[0], index[1])], *value);
-        }
-        assert_eq!(columns.index_of(4), [0, 2]);
-        assert_eq!(decode(&columns, &0.3f32.to_be_bytes()), f64::from(0.3f32));
-        let rows = TensorInfo {
-            is_column_major: false,
-            ..columns
-        };
-        assert_eq!(rows.index_of(4), [1, 1]);
-    }
-}

@@ -176,6 +176,12 @@ fn files_that_are_packed_or_another_are_named_with_the_line_for_a_shell() {
             "gunzip -c \"net.npz.gz\" > \"net.npz\"",
         ),
         (
+            "$(x)`y`.gz",
+            b"\x1f\x8b\x08",
+            "packed by gzip",
+            "gunzip -c \"\\$(x)\\`y\\`.gz\" > ",
+        ),
+        (
             "eq.tex",
             b"\xff\xfe\\\0",
             "text in UTF-16",

@@ -297,39 +297,3 @@ impl Kind {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn kinds_are_those_of_the_content_then_of_the_ending() {
-        let what =
-            |name: &str, bytes: &[u8]| ForeignFile::of(Path::new(name), bytes).map(|f| f.what);
-        assert_eq!(
-            what("net.npz", b"PK\x03\x04net/data.pkl"),
-            Some("a PyTorch file")
-        );
-        assert_eq!(what("net.pt", b"\x89HDF\r\n\x1a\n"), Some("an HDF5 file"));
-        assert_eq!(
-            what("net", b"\x1c\0\0\0TFL3"),
-            Some("a TensorFlow Lite model")
-        );
-        assert_eq!(
-            what("net", b"\x08\x08\x12\x07pytorch\x1a"),
-            Some("an ONNX model")
-        );
-        assert_eq!(what("net.PTH", b""), Some("a PyTorch file"));
-        assert_eq!(what("net.txt", b"ddz1 = 2"), None);
-        let found = ForeignFile::of(Path::new("run/net.ckpt.index"), b"").expect("a checkpoint");
-        let remedy = found.remedy.expect("lines");
-        assert!(
-            remedy.contains("\n    saved = tf.train.load_checkpoint(\"run/net.ckpt\")\n"),
-            "{remedy}"
-        );
-        assert!(remedy.contains("savez(\"run/net.ckpt.npz\""), "{remedy}");
-        let found = ForeignFile::of(Path::new("$(x)`y`.gz"), b"\x1f\x8b").expect("packed");
-        let remedy = found.remedy.expect("a line");
-        assert!(remedy.contains(r#""\$(x)\`y\`.gz""#), "{remedy}");
-    }
-}

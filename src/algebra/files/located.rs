@@ -95,16 +95,3 @@ impl<E: Error> Error for Located<E> {
         self.kind.source()
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn columns_count_letters_not_bytes() {
-        let text = "a = 1\nµ = x";
-        let byte = text.find('x').expect("it is there");
-        assert_eq!(Place::of_byte(text, byte), Place::Character(2, 5));
-        assert_eq!(Place::of_byte(text, 0), Place::Character(1, 1));
-    }
-}

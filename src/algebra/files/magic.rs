@@ -194,26 +194,3 @@ fn first_member(start: &[u8]) -> Option<&[u8]> {
     let length = start.strip_prefix(b"PK\x03\x04")?.get(22..24)?;
     start.get(30..30 + usize::from(u16::from_le_bytes([length[0], length[1]])))
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn names_of_files_stand_in_the_line_as_a_shell_reads_them() {
-        let found = recognised("my logs/a.bag".as_ref(), b"#ROSBAG V2.0\n").expect("a bag");
-        assert_eq!(
-            found.remedy,
-            "mcap convert 'my logs/a.bag' 'my logs/a'.mcap"
-        );
-        let zip = [&b"PK\x03\x04"[..], &[0; 22], &[5, 0, 0, 0], b"q.npy"].concat();
-        let found = recognised("a.csv".as_ref(), &zip).expect("arrays");
-        assert_eq!(found.what, "NumPy arrays (.npz)");
-        assert!(
-            found.remedy.ends_with("\" a.csv a-table.csv"),
-            "{}",
-            found.remedy
-        );
-        assert_eq!(recognised("a.csv".as_ref(), b"Time,fr.hx Position\n"), None);
-    }
-}

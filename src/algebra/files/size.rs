@@ -122,30 +122,3 @@ pub fn read_text_capped(path: &Path, format: Format) -> io::Result<String> {
     }
     String::from_utf8(bytes).map_err(|error| invalid(error.to_string()))
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_source_of_the_most_bytes_is_read_and_one_byte_more_is_not() {
-        let read = |count: u64| {
-            let source = io::repeat(1).take(count);
-            io::copy(&mut Capped::new(source, Format::Model, 10), &mut io::sink())
-        };
-        assert_eq!(read(10).expect("the most"), 10);
-        let error = read(11).expect_err("more");
-        assert_eq!(error.kind(), io::ErrorKind::FileTooLarge);
-        assert!(
-            error.to_string().starts_with("more than 10 bytes"),
-            "{error}"
-        );
-    }
-
-    #[cfg(unix)]
-    #[test]
-    fn a_device_without_end_is_refused() {
-        let error = read_capped("/dev/zero".as_ref(), Format::Settings).expect_err("endless");
-        assert_eq!(error.kind(), io::ErrorKind::FileTooLarge);
-    }
-}

@@ -25,22 +25,3 @@ pub fn read_toml(path: &Path) -> io::Result<String> {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_file_of_too_many_tables_is_refused() {
-        let folder = tempfile::tempdir().expect("a folder");
-        let path = folder.path().join("settings.toml");
-        let read = |count: usize| {
-            std::fs::write(&path, format!("a{} = 0", ".b".repeat(count))).expect("written");
-            read_toml(&path)
-        };
-        assert_eq!(read(2).expect("settings"), "a.b.b = 0");
-        assert!(read(MOST_TABLES).is_ok());
-        let error = read(MOST_TABLES + 1).expect_err("too many");
-        assert_eq!(error.kind(), io::ErrorKind::InvalidData);
-    }
-}
