@@ -7,7 +7,6 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
-use crate::artifact::ArtifactError;
 use crate::import::ImportError;
 use crate::symbolic::ParseError;
 
@@ -22,12 +21,9 @@ pub enum CheckError {
         "{file}: found {found}, expected a model (.json), equations as text (.txt), or LaTeX (.tex, .md)"
     )]
     Kind { file: String, found: String },
-    /// A model that cannot be read.
+    /// A model or equations that cannot be read.
     #[error(transparent)]
-    Model(#[from] ArtifactError),
-    /// Equations that cannot be read.
-    #[error(transparent)]
-    Equations(#[from] ImportError),
+    File(#[from] ImportError),
     /// An equation that is too large once its numbers are kept as they are written.
     #[error("{file}:{line}: not a usable equation")]
     Expression {

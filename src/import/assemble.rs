@@ -6,7 +6,7 @@ mod units;
 use nalgebra::{DMatrix, DVector};
 
 use super::assign::{Assigned, Assignment, assign};
-use super::error::{ImportError, ImportFault, shape_text};
+use super::error::{ImportError, shape_text};
 use super::library;
 use super::options::{ImportOptions, PhaseRule, XiLayout, standard_text};
 use super::report::{ImportReport, Layout, Note, UnusedTensor, UsedTensor};
@@ -52,7 +52,7 @@ pub(super) fn parts(
     if matches!(options.library, Some(LibraryChoice::Terms(_))) && options.library_order.is_some() {
         let found = "a list of terms, which has an order";
         let expected = "--library degree=N[,trigonometric][,inputs]";
-        return Err(ImportFault::option("--library-order", found, expected));
+        return Err(ImportError::option("--library-order", found, expected));
     }
     let assignment = assign(tensors, options)?;
     let mut assembly = Assembly {
@@ -117,7 +117,7 @@ impl<'a> Assembly<'a, '_> {
 
     /// Parts that do not make a model.
     fn unusable(&self, source: impl Into<ModelError>) -> ImportError {
-        ImportFault::model(self.tensors.file(), source)
+        ImportError::unusable(self.tensors.file(), source)
     }
 
     fn wrong_shape(&self, assigned: &Assigned<'_>, expected: String) -> ImportError {

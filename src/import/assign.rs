@@ -1,6 +1,6 @@
 //! The use of each tensor: as mapped, else by its name.
 
-use super::error::{ImportError, ImportFault};
+use super::error::ImportError;
 use super::options::{ImportOptions, PhaseRule};
 use super::report::Chosen;
 use super::role::{ONLY_PHASE, Part, Role, is_of_optimiser, mentions};
@@ -19,10 +19,10 @@ impl Assigned<'_> {
     /// The tensor as the place of a fault, or the number of it at an index of the file.
     pub(super) fn place(&self, index: &[usize]) -> Place {
         let (name, role) = (&self.info.name, &self.role);
-        Place::Entry(match index {
+        match index {
             [] => format!("`{name}` as {role}").into(),
             _ => format!("`{name}`{index:?} as {role}").into(),
-        })
+        }
     }
 }
 
@@ -189,7 +189,7 @@ fn mapped<'f>(
         let (role, tensor) = (&mapping.role, &mapping.tensor);
         if let Some(earlier) = used.iter().find(|assigned| assigned.role == *role) {
             let found = format!("both `{}` and `{tensor}` for {role}", earlier.info.name);
-            return Err(ImportFault::option("--map", found, "one tensor"));
+            return Err(ImportError::option("--map", found, "one tensor"));
         }
         let Some(info) = tensors.infos().iter().find(|info| info.name == *tensor) else {
             let found = format!("no tensor `{tensor}` for {role}");
@@ -239,7 +239,7 @@ fn check_mapped_phases(options: &ImportOptions, phases: &[PhaseRule]) -> Result<
             let names: Vec<&str> = phases.iter().map(|rule| rule.name.as_str()).collect();
             let found = format!("{role} for a phase that no --phase names");
             let expected = format!("one of the phases {}", names.join(", "));
-            Err(ImportFault::option("--map", found, expected))
+            Err(ImportError::option("--map", found, expected))
         }
     }
 }

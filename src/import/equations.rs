@@ -13,8 +13,8 @@
 //! Each section is a phase; each phase has `ddz1` to `ddzd`. A text without sections is one phase,
 //! which `--phase` names. A line without `=` continues the equation before it. Names may have underscores (`ddz_1`).
 
-use super::error::{ImportError, ImportFault};
-use crate::files::{Located, Place};
+use super::error::ImportError;
+use crate::files::Place;
 use crate::model::{LatentVariable, MAX_LATENT_DIM};
 use crate::symbolic::{ExprId, ExprPool, ParseErrorKind, ParseLimits};
 
@@ -85,19 +85,9 @@ pub(super) fn text_of<'b>(file: &str, bytes: &'b [u8]) -> Result<&'b str, Import
     let text = std::str::from_utf8(bytes).map_err(|error| {
         let before = String::from_utf8_lossy(&bytes[..error.valid_up_to()]);
         let place = Place::of_byte(&before, before.len());
-        ImportFault::at(file, place, "bytes that are no text", "equations in UTF-8")
+        ImportError::at(file, place, "bytes that are no text", "equations in UTF-8")
     })?;
     Ok(text.strip_prefix('\u{feff}').unwrap_or(text))
-}
-
-/// A fault at a line and column.
-pub(super) fn refused(
-    file: &str,
-    (line, column): (usize, usize),
-    found: impl Into<Box<str>>,
-    expected: impl Into<Box<str>>,
-) -> ImportError {
-    ImportFault::at(file, Place::Character(line, column), found, expected)
 }
 
 /// The start of a text in quotes, for messages.
@@ -135,13 +125,13 @@ impl Reader<'_> {
             None => {
                 let expected = "a phase such as `[contact]` or an equation such as \
                                 `ddz1 = 0.5*z1 + u1`";
-                Err(refused(self.file, place, quote(content), expected))
+                Err(ImportError::at(self.file, place, quote(content), expected))
             }
         }
     }
 
     fn header(&mut self, place: (usize, usize), content: &str) -> Result<(), ImportError> {
-        let refused = |found, expected: &str| refused(self.file, place, found, expected);
+        let refused = |found, expected: &str| ImportError::at(self.file, place, found, expected);
         let name = (content.strip_prefix('[')).and_then(|rest| rest.strip_suffix(']'));
         let Some(name) = name.map(str::trim).filter(|name| !name.is_empty()) else {
             let expected = "the name of a phase in brackets, such as `[contact]`";
@@ -150,8 +140,8 @@ impl Reader<'_> {
         for section in &self.sections {
             if section.phase.is_none() {
                 let expected = "the name of its phase in brackets before the first equation";
-                let place = Place::Character(section.line, 1);
-                return Err(ImportFault::at(self.file, place, "an equation", expected));
+                let place = (section.line, 1);
+                return Err(ImportError::at(self.file, place, "an equation", expected));
             }
             if section.phase.as_deref() == Some(name) {
                 let found = format!("`[{name}]` again, as in line {}", section.line);
@@ -169,7 +159,7 @@ impl Reader<'_> {
         left: &str,
         right: Vec<Piece>,
     ) -> Result<(), ImportError> {
-        let refused = |found, expected: &str| refused(self.file, place, found, expected);
+        let refused = |found, expected: &str| ImportError::at(self.file, place, found, expected);
         let name = plain_name(left).unwrap_or_else(|| left.to_owned());
         let variable = (name.strip_prefix('d'))
             .and_then(|name| LatentVariable::from_name(name, MAX_LATENT_DIM));
@@ -239,7 +229,12 @@ pub(super) fn complete(
     let outputs = sections.iter().flat_map(|section| &section.equations);
     let Some(last) = outputs.map(|equation| equation.output).max() else {
         let place = (lines.max(1), 1);
-        return Err(refused(file, place, "the end of the text", expected));
+        return Err(ImportError::at(
+            file,
+            place,
+            "the end of the text",
+            expected,
+        ));
     };
     let latent_dim = last + 1;
     for section in &mut sections {
@@ -252,7 +247,7 @@ pub(super) fn complete(
             };
             let found = format!("{phase} without ddz{}", output + 1);
             let expected = format!("ddz1 to ddz{latent_dim} (`ddz{} = 0` if none)", output + 1);
-            return Err(refused(file, (section.line, 1), found, expected));
+            return Err(ImportError::at(file, (section.line, 1), found, expected));
         }
     }
     Ok(Sections {
@@ -279,9 +274,9 @@ impl Equation {
                         1 => "z1, dz1 or u1".to_owned(),
                         d => format!("z1 to z{d}, dz1 to dz{d} or u1 to u{d}"),
                     };
-                    refused(file, place, quote(&name), expected)
+                    ImportError::at(file, place, quote(&name), expected)
                 }
-                kind => Located::new(file, Place::Character(place.0, place.1), kind),
+                kind => ImportError::text(file, place, kind.to_string()),
             }
         })
     }

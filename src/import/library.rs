@@ -4,11 +4,10 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use super::error::{ImportError, ImportFault};
+use super::error::ImportError;
 use super::options::standard_text;
 use super::pysindy;
 use super::run::{check_size, read_file};
-use crate::files::Place;
 use crate::model::{Library, LibraryChoice, LibraryOrder, StandardLibrary};
 
 /// Largest file with a list of terms.
@@ -31,11 +30,11 @@ pub(super) fn build(
     let choice = match choice {
         LibraryChoice::Terms(terms) => LibraryChoice::Terms(
             pysindy::readable(terms, latent_dim)
-                .map_err(|(found, expected)| ImportFault::option("--library", found, expected))?,
+                .map_err(|(found, expected)| ImportError::option("--library", found, expected))?,
         ),
         LibraryChoice::Standard(_) => choice.clone(),
     };
-    Library::of(latent_dim, choice).map_err(|source| ImportFault::model(file, source))
+    Library::of(latent_dim, choice).map_err(|source| ImportError::unusable(file, source))
 }
 
 /// The order of a file's terms: as stated, or the only one that there is.
@@ -45,7 +44,7 @@ pub(super) fn order(
     stated: Option<LibraryOrder>,
 ) -> Result<LibraryOrder, ImportError> {
     let texts = |order| standard.texts_in(order, latent_dim);
-    let unusable = |source| ImportFault::model("", source);
+    let unusable = |source| ImportError::unusable("", source);
     let orders = LibraryOrder::NAMED.map(texts);
     let [paper, interleaved, romc] = orders;
     let orders = [
@@ -85,7 +84,7 @@ pub(super) fn order(
         choices.collect::<Vec<_>>().join(", ")
     );
     let found = format!("no order of the terms of {}", standard_text(standard));
-    Err(ImportFault::option("--library-order", found, expected))
+    Err(ImportError::option("--library-order", found, expected))
 }
 
 /// The shorthands that have this many terms.
@@ -111,7 +110,7 @@ pub fn read_terms(path: &Path) -> Result<Vec<String>, ImportError> {
 fn parse_terms(file: &str, text: &str) -> Result<Vec<String>, ImportError> {
     let text = text.trim_start_matches('\u{feff}');
     let refused = |line, column, found: &str, expected: &str| {
-        ImportFault::at(file, Place::Character(line, column), found, expected)
+        ImportError::at(file, (line, column), found, expected)
     };
     if !text.trim_start().starts_with(['[', '{']) {
         let lines = (text.lines()).map(|line| line.split('#').next().unwrap_or("").trim());

@@ -5,9 +5,8 @@ use std::borrow::Cow;
 use sha2::digest::Output;
 use sha2::{Digest as _, Sha256};
 
-use super::error::{ImportError, ImportFault, shape_text};
+use super::error::{ImportError, shape_text};
 use super::tensors::{Element, TensorFile, TensorInfo};
-use crate::files::Place;
 
 /// A named array of numbers.
 #[derive(Clone, Debug)]
@@ -31,10 +30,10 @@ pub(super) fn open<'t>(
     for (index, tensor) in tensors.iter().enumerate() {
         let expected = tensor.shape.iter().product::<usize>();
         if tensor.values.len() != expected {
-            let place = Place::Entry(format!("`{}`", tensor.name).into());
+            let place = format!("`{}`", tensor.name);
             let found = format!("{} numbers", tensor.values.len());
             let expected = format!("{expected} ({})", shape_text(&tensor.shape));
-            return Err(ImportFault::at(source, place, found, expected));
+            return Err(ImportError::at(source, place, found, expected));
         }
         infos.push(TensorInfo {
             name: tensor.name.clone(),

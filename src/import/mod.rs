@@ -45,7 +45,7 @@ mod tensors;
 mod terms;
 
 pub use equations::{Equation, Section, Sections};
-pub use error::{ImportError, ImportFault};
+pub use error::ImportError;
 pub use latex::{NameError, SymbolNames};
 pub use library::read_terms;
 pub use memory::Tensor;

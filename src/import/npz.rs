@@ -11,9 +11,9 @@ use std::io::{self, Cursor, Read};
 
 use zip::ZipArchive;
 
-use super::error::{ImportError, ImportFault};
+use super::error::{self, ImportError, too_large};
 use super::tensors::{Element, TensorFile, TensorInfo};
-use crate::files::{Located, Place};
+use crate::files::Place;
 
 /// Most members of a file.
 const MAX_MEMBERS: usize = 10_000;
@@ -30,7 +30,8 @@ pub(super) fn open<'b>(file: &str, bytes: &'b [u8]) -> Result<TensorFile<'b>, Im
         return Err(damaged(file, "two arrays of one name"));
     }
     if archive.len() > MAX_MEMBERS {
-        return Err(ImportFault::too_large(file, MAX_MEMBERS as u64, "arrays"));
+        let max = MAX_MEMBERS as u64;
+        return Err(too_large(file, Place::Whole, max, "arrays"));
     }
     let mut infos = Vec::new();
     for member in 0..archive.len() {
@@ -42,8 +43,7 @@ pub(super) fn open<'b>(file: &str, bytes: &'b [u8]) -> Result<TensorFile<'b>, Im
 }
 
 fn damaged(file: &str, error: impl Display) -> ImportError {
-    let (format, found) = ("npz", error.to_string());
-    Located::new(file, Place::Whole, ImportFault::Container { format, found })
+    error::damaged(file, "npz", &error.to_string())
 }
 
 /// Describes a member; `None` for one that is no array.
@@ -63,10 +63,7 @@ fn describe(
             member,
             ..header
         })),
-        Err((found, expected)) => {
-            let place = Place::Entry(format!("`{name}`").into());
-            Err(ImportFault::at(file, place, found, expected))
-        }
+        Err((found, expected)) => Err(ImportError::at(file, format!("`{name}`"), found, expected)),
     }
 }
 
@@ -78,9 +75,9 @@ fn numbers(
     length: usize,
 ) -> Result<Vec<u8>, ImportError> {
     let refused = |found: String| {
-        let place = Place::Entry(format!("`{}`", info.name).into());
+        let place = format!("`{}`", info.name);
         let expected = "as many bytes as its shape and type need";
-        ImportFault::at(file, place, found, expected)
+        ImportError::at(file, place, found, expected)
     };
     let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(|e| damaged(file, e))?;
     let member = (archive.by_index(info.member)).map_err(|error| refused(error.to_string()))?;

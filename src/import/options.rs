@@ -6,7 +6,7 @@ use std::str::FromStr;
 use clap::ValueEnum;
 use nalgebra::DVector;
 
-use super::error::{ImportError, ImportFault};
+use super::error::ImportError;
 use super::latex::SymbolNames;
 use super::report::Note;
 use super::role::{Mapping, ONLY_PHASE};
@@ -56,7 +56,7 @@ impl Format {
                      or --format to say what it is"
                 }
             };
-            ImportFault::at(&path.display().to_string(), Place::Whole, found, expected)
+            ImportError::at(&path.display().to_string(), Place::Whole, found, expected)
         }))
     }
 
@@ -91,7 +91,7 @@ impl Format {
 pub(super) fn refusal(path: &Path, found: ForeignFile) -> Option<ImportError> {
     let file = path.display().to_string();
     let expected = found.remedy?;
-    Some(ImportFault::at(&file, Place::Whole, found.what, expected))
+    Some(ImportError::at(&file, Place::Whole, found.what, expected))
 }
 
 /// How a file stores the weights of a map.
@@ -120,7 +120,7 @@ pub fn parse_standard(text: &str) -> Result<StandardLibrary, ImportError> {
     let refused = |part: &str| {
         let expected = "degree=N, then trigonometric and inputs if the library has them, separated \
                         by commas; or a file with the list of terms";
-        ImportFault::option("--library", format!("{part:?}"), expected)
+        ImportError::option("--library", format!("{part:?}"), expected)
     };
     let mut degree = None;
     let (mut trigonometric, mut inputs) = (false, false);
@@ -169,7 +169,7 @@ impl FromStr for PhaseRule {
         let refused = || {
             let expected = "NAME=any, NAME=none, NAME=always, or NAME= and foot patterns in the order fr fl rr \
                             rl, such as rear=0011,0001";
-            ImportFault::option("--phase", format!("{text:?}"), expected)
+            ImportError::option("--phase", format!("{text:?}"), expected)
         };
         let (name, feet) = text.split_once('=').ok_or_else(refused)?;
         let feet = match feet.trim() {
@@ -304,7 +304,7 @@ impl ImportOptions {
                     "--phase {phase}=any (or none, always, or patterns such as 0011 in the order fr \
                      fl rr rl)"
                 );
-                Err(ImportFault::at(file, Place::Whole, found, expected))
+                Err(ImportError::at(file, Place::Whole, found, expected))
             }
         }
     }

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use super::error::{ImportError, ImportFault};
+use super::error::ImportError;
 
 /// One of the two maps between robot and latent coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -111,7 +111,7 @@ impl FromStr for Role {
     /// Reads the name of a part; underscores may stand for its dots.
     fn from_str(text: &str) -> Result<Self, ImportError> {
         read_role(text)
-            .ok_or_else(|| ImportFault::option("--map", format!("the part {text:?}"), EXPECTED))
+            .ok_or_else(|| ImportError::option("--map", format!("the part {text:?}"), EXPECTED))
     }
 }
 
@@ -275,7 +275,7 @@ impl FromStr for Mapping {
             }),
             _ => {
                 let expected = "PART=TENSOR, such as encoder.weight=net.enc.0.weight";
-                Err(ImportFault::option("--map", format!("{text:?}"), expected))
+                Err(ImportError::option("--map", format!("{text:?}"), expected))
             }
         }
     }

@@ -4,8 +4,8 @@ use std::borrow::Cow;
 
 use nalgebra::DMatrix;
 
-use super::error::{ImportError, ImportFault, shape_text};
-use crate::files::{Located, Place};
+use super::error::{ImportError, shape_text, too_large};
+use crate::files::Place;
 
 /// Largest tensor that is read: the coefficients of the largest library fit twice.
 const MAX_ELEMENTS: usize = 4 << 20;
@@ -106,9 +106,9 @@ impl<'b> TensorFile<'b> {
     ) -> Result<TensorFile<'b>, ImportError> {
         infos.sort_by(|a, b| a.name.cmp(&b.name));
         if let Some(pair) = infos.windows(2).find(|pair| pair[0].name == pair[1].name) {
-            let place = Place::Entry(format!("`{}`", pair[0].name).into());
+            let place = format!("`{}`", pair[0].name);
             let found = "two tensors of this name";
-            return Err(ImportFault::at(file, place, found, "different names"));
+            return Err(ImportError::at(file, place, found, "different names"));
         }
         let file = file.to_owned();
         Ok(TensorFile { file, infos, bytes })
@@ -139,11 +139,11 @@ impl<'b> TensorFile<'b> {
     /// `found` at a place of the file, where `expected` should be.
     pub(super) fn refused(
         &self,
-        place: Place,
+        place: impl Into<Place>,
         found: impl Into<Box<str>>,
         expected: impl Into<Box<str>>,
     ) -> ImportError {
-        ImportFault::at(&self.file, place, found, expected)
+        ImportError::at(&self.file, place, found, expected)
     }
 
     /// A file without a tensor for a use.
@@ -168,8 +168,7 @@ impl<'b> TensorFile<'b> {
         let count = (info.shape.iter()).try_fold(1usize, |count, &dim| count.checked_mul(dim));
         let Some(count) = count.filter(|&count| count <= MAX_ELEMENTS) else {
             let (max, unit) = (MAX_ELEMENTS as u64, "numbers");
-            let fault = ImportFault::TooLarge { max, unit };
-            return Err(Located::new(&self.file, place(&[]), fault));
+            return Err(too_large(&self.file, place(&[]), max, unit));
         };
         let bytes = (self.bytes)(info, size * count)?;
         let numbers = bytes.chunks_exact(size);

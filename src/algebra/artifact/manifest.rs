@@ -12,9 +12,8 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Map, Value};
 
 use super::bounded;
-use super::error::{ArtifactError, ArtifactFault};
 use super::jump_prior::{LandmarksEntry, PriorEntry};
-use crate::files::{Located, Place};
+use super::read::ArtifactError;
 use crate::model::{
     Activation, CoordinateNames, FeetRule, LibraryChoice, ScaleFactors, Scaling, StandardLibrary,
 };
@@ -41,10 +40,9 @@ pub(super) fn from_rows(
     let expected = expected.or(rows.first().map(Vec::len)).unwrap_or(0);
     for (row, numbers) in rows.iter().enumerate() {
         if numbers.len() != expected {
-            let found = numbers.len();
-            let place = Place::Entry(format!("`{tensor}`[{row}]").into());
-            let fault = ArtifactFault::RowLength { found, expected };
-            return Err(Located::new(file, place, fault));
+            let (place, found) = (format!("`{tensor}`[{row}]"), numbers.len());
+            let found = format!("{found} numbers");
+            return Err(ArtifactError::at(file, place, found, expected.to_string()));
         }
     }
     Ok(DMatrix::from_row_iterator(

@@ -21,7 +21,7 @@ pub use folder::{
     Begun, FolderError, check_folder, earlier_files, hex, write_files, write_files_since,
 };
 pub use foreign::ForeignFile;
-pub use located::{Located, Place};
+pub use located::{Fault, Located, Place};
 pub use text::{is_invisible, shell_path, shell_paths, shell_word};
 pub use toml_text::read_toml;
 pub use whole::{EmittedFile, Overwrite, write_whole};

@@ -3,8 +3,8 @@
 use nalgebra::Vector3;
 
 use super::entry::{JointEntry, RobotEntry};
-use super::error::{RobotFileError, RobotFileFault};
 use super::legs::{Places, build};
+use super::read::RobotFileError;
 use super::registry::keep;
 use crate::files::{Located, Place};
 use crate::robot::joints::LEG_JOINT_DIM;
@@ -66,9 +66,7 @@ pub(super) fn identified(
                 "{:?}, romc's own robot with other numbers ({differences})",
                 entry.name
             );
-            let expected = "another name".to_owned();
-            let fault = RobotFileFault::Unexpected { found, expected };
-            return Err(Located::new("", Place::Option("--name"), fault));
+            return Err(RobotFileError::option("--name", found, "another name"));
         }
         let kind = match places {
             Places::Keys => "toml",

@@ -5,13 +5,15 @@ use std::path::Path;
 use serde::de::DeserializeOwned;
 
 use super::entry::RobotEntry;
-use super::error::{RobotFileError, RobotFileFault};
 use super::identity::{RobotReading, identified};
 use super::legs::Places;
 use super::urdf;
 use crate::files::size::{Format, read_text_capped};
-use crate::files::{Located, Place, read_toml};
+use crate::files::{Fault, Located, Place, read_toml};
 use crate::robot::Robot;
+
+/// A fault of a robot's file and its place; without a file, of a name or an option.
+pub type RobotFileError = Located<Fault>;
 
 /// What a command says of a robot's file besides its path.
 #[derive(Clone, Copy, Debug, Default)]
@@ -26,7 +28,7 @@ pub struct RobotOptions<'a> {
 /// The robot of a name, or of a file that ends in `.toml` or `.urdf`.
 ///
 /// # Errors
-/// [`RobotFileFault::Unknown`] for what is neither, else as [`read`].
+/// [`RobotFileError`] without a file for what is neither, else as [`read`].
 pub fn find(name_or_file: &str) -> Result<&'static Robot, RobotFileError> {
     Ok(open(name_or_file, &RobotOptions::default())?.robot)
 }
@@ -51,16 +53,13 @@ pub fn open(
             } else {
                 "--feet"
             };
-            Err(misplaced(
-                option,
-                format!("romc's own {name_or_file}"),
-                "a file",
-            ))
+            let found = format!("romc's own {name_or_file}");
+            Err(RobotFileError::option(option, found, "a file"))
         }
         (Err(_), "toml" | "urdf" | "xml" | "xacro") => read_with(path, options),
         (Err(unknown), _) => {
-            let fault = RobotFileFault::Unknown(unknown);
-            Err(Located::new("", Place::Whole, fault))
+            let text = format!("{unknown}, or a file that ends in .toml or .urdf");
+            Err(RobotFileError::text("", Place::Whole, text))
         }
     }
 }
@@ -68,12 +67,6 @@ pub fn open(
 fn ending(path: &Path) -> String {
     let ending = path.extension().unwrap_or_default();
     ending.to_string_lossy().to_lowercase()
-}
-
-fn misplaced(option: &'static str, found: String, expected: &str) -> RobotFileError {
-    let expected = expected.to_owned();
-    let fault = RobotFileFault::Unexpected { found, expected };
-    Located::new("", Place::Option(option), fault)
 }
 
 /// Reads a robot from a TOML or, by its ending, a URDF file; `feet` names the links of the feet of a
@@ -90,24 +83,22 @@ fn read_with(path: &Path, options: &RobotOptions<'_>) -> Result<RobotReading, Ro
     let text = text_of(path)?;
     match ending(path).as_str() {
         "toml" if options.feet.is_empty() => toml_reading(&file, &text, options.name),
-        "toml" => Err(misplaced(
-            "--feet",
-            format!("{file} with links of feet"),
-            "a URDF",
-        )),
+        "toml" => {
+            let found = format!("{file} with links of feet");
+            Err(RobotFileError::option("--feet", found, "a URDF"))
+        }
         _ => urdf_reading(&file, &text, options),
     }
 }
 
 /// The text of a file of bounded size.
 pub(super) fn text_of(path: &Path) -> Result<String, RobotFileError> {
-    let file = path.display().to_string();
-    let fault = |fault| RobotFileError::new(&file, Place::Whole, fault);
     let text = match ending(path).as_str() {
         "toml" => read_toml(path),
         _ => read_text_capped(path, Format::Robot),
     };
-    text.map_err(|source| fault(RobotFileFault::Read(source)))
+    let file = path.display().to_string();
+    text.map_err(|source| RobotFileError::io(&file, "read the file", source))
 }
 
 /// Reads a robot from TOML; `file` names it in errors.
@@ -167,7 +158,6 @@ pub(super) fn from_toml_text<T: DeserializeOwned>(
             None => Place::Whole,
             Some(span) => Place::of_byte(text, span.start),
         };
-        let fault = RobotFileFault::Syntax(error.message().to_owned());
-        Located::new(file, place, fault)
+        RobotFileError::text(file, place, error.message())
     })
 }

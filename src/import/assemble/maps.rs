@@ -3,7 +3,7 @@
 use nalgebra::DVector;
 
 use super::super::assign::Assigned;
-use super::super::error::{ImportError, ImportFault};
+use super::super::error::ImportError;
 use super::super::options::WeightVectors;
 use super::super::report::{Layout, Note};
 use super::super::role::{Part, Role};
@@ -27,7 +27,7 @@ impl<'a> Assembly<'a, '_> {
         {
             let found = format!("{activation}, but no map with several layers");
             let expected = "tensors of layers, such as encoder.0.weight and encoder.2.weight";
-            return Err(ImportFault::option("--activation", found, expected));
+            return Err(ImportError::option("--activation", found, expected));
         }
         let has = |layout| {
             let mut used = self.report.used.iter();

@@ -4,7 +4,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::super::assign::Assigned;
-use super::super::error::{ImportError, ImportFault};
+use super::super::error::ImportError;
 use super::super::report::Note;
 use super::super::role::Role;
 use super::{Assembly, Parts};
@@ -22,7 +22,7 @@ impl<'a> Assembly<'a, '_> {
         let known = self.options.scaling.clone();
         if known.is_some() && (state.is_some() || input.is_some()) {
             let found = "factors here and in tensors";
-            return Err(ImportFault::option("--scaling", found, "one of the two"));
+            return Err(ImportError::option("--scaling", found, "one of the two"));
         }
         let Some(state) = state else {
             return match (input, given) {
@@ -31,7 +31,7 @@ impl<'a> Assembly<'a, '_> {
                 (None, Some(_)) => {
                     let found = "factors of the inputs alone";
                     let expected = "--scaling, or a tensor scaling.state or std.state";
-                    Err(ImportFault::option("--input-scaling", found, expected))
+                    Err(ImportError::option("--input-scaling", found, expected))
                 }
             };
         };
@@ -39,7 +39,7 @@ impl<'a> Assembly<'a, '_> {
             (Some(_), Some(_)) => {
                 let found = "factors here and in a tensor";
                 let expected = "one of the two";
-                return Err(ImportFault::option("--input-scaling", found, expected));
+                return Err(ImportError::option("--input-scaling", found, expected));
             }
             (Some(input), None) => self.factors(input)?,
             (None, Some(given)) => given,
@@ -148,7 +148,7 @@ impl<'a> Assembly<'a, '_> {
                 Some(dim) => format!("an encoder or decoder of {dim} coordinates"),
             };
             let expected = "one of 18 coordinates";
-            return Err(ImportFault::option("--order", found, expected));
+            return Err(ImportError::option("--order", found, expected));
         }
         self.change_ends(
             parts,

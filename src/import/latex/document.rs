@@ -1,6 +1,5 @@
 //! The displays of a document as they are printed.
 
-use super::super::equations::refused;
 use super::super::error::ImportError;
 use super::derivatives::with_dots;
 use super::digits::with_numbers;
@@ -80,7 +79,7 @@ fn begin_document(file: &str, items: &mut Vec<Item>) -> Result<(), ImportError> 
         if let Some(token) = tokens.iter().find(|token| token.is_command("ddot")) {
             let found = format!("{} before `\\begin{{document}}`", token.quoted());
             let expected = "equations behind it, where they are printed";
-            return Err(refused(file, token.place, found, expected));
+            return Err(ImportError::at(file, token.place, found, expected));
         }
     }
     items.retain(|item| matches!(item, Item::Comment(_)));
@@ -92,7 +91,7 @@ fn display(expander: &mut Expander, start: &Token) -> Result<Item, ImportError> 
     match formula(expander, |_| false)? {
         Some(tokens) => {
             if let Some((token, expected)) = unread(&tokens) {
-                return Err(refused(
+                return Err(ImportError::at(
                     expander.file,
                     token.place,
                     token.quoted(),

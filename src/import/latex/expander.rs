@@ -3,7 +3,6 @@
 
 use std::rc::Rc;
 
-use super::super::equations::refused;
 use super::super::error::ImportError;
 use super::document::is_one_of;
 use super::reader::has;
@@ -124,7 +123,7 @@ impl<'t> Expander<'t> {
         expected: &str,
     ) -> Result<T, ImportError> {
         let found = format!("{}{why}", token.quoted());
-        Err(refused(self.file, token.place, found, expected))
+        Err(ImportError::at(self.file, token.place, found, expected))
     }
 
     /// What is not followed here: in a formula a token that says so, in text nothing, unless mathematics may be in it.

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::super::equations::{Piece, refused};
+use super::super::equations::Piece;
 use super::super::error::ImportError;
 use super::expression::WORDS;
 use super::names::SymbolNames;
@@ -118,7 +118,7 @@ impl<'a> Reader<'a> {
             None => Ok(reader),
             Some(token) => {
                 let found = format!("{} without its partner", token.quoted());
-                Err(refused(file, token.place, found, "braces in pairs"))
+                Err(ImportError::at(file, token.place, found, "braces in pairs"))
             }
         }
     }
@@ -206,7 +206,7 @@ impl<'a> Reader<'a> {
                 (place, "the end of the equation".to_owned())
             }
         };
-        Err(refused(self.file, place, found, expected))
+        Err(ImportError::at(self.file, place, found, expected))
     }
 
     pub(super) fn here(&mut self) -> (usize, usize) {

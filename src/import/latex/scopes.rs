@@ -3,7 +3,6 @@
 use std::collections::HashMap;
 use std::rc::Rc;
 
-use super::super::equations::refused;
 use super::super::error::ImportError;
 use super::document::{CASES, LAYOUTS, is_one_of};
 use super::token::{Kind, Token};
@@ -199,7 +198,7 @@ impl Scopes {
                 }
                 _ => format!("what {} closes before it", token.quoted()),
             };
-            return Err(refused(file, token.place, token.quoted(), expected));
+            return Err(ImportError::at(file, token.place, token.quoted(), expected));
         }
         if let Some(place) = place {
             self.leave_to(place);

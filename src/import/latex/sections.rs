@@ -1,6 +1,6 @@
 //! From a document's displays to sections of equations: one per phase.
 
-use super::super::equations::{Section, Sections, complete, refused, text_of};
+use super::super::equations::{Section, Sections, complete, text_of};
 use super::super::error::ImportError;
 use super::document::{Item, LAYOUTS, WITH_COLUMNS, is_one_of, items, unread};
 use super::markdown;
@@ -64,7 +64,7 @@ pub(in crate::import) fn read(
     }
     if let (true, Some((token, found))) = (document.sections.is_empty(), document.strange) {
         let expected = format!("\\ddot z_1 and so on, with {}", names.expected());
-        return Err(refused(file, token.place, found, expected));
+        return Err(ImportError::at(file, token.place, found, expected));
     }
     let expected = match is_markdown {
         true => "an equation such as $$ \\ddot z_1 = 0.5 z_1 + u_1 $$",
@@ -91,7 +91,12 @@ fn refuse_others_in_lines(document: &Document<'_>, items: &[Item]) -> Result<(),
         if let Some(symbol) = other {
             let found = format!("{} in a line of the text", symbol.quoted());
             let expected = "a display for it, as for the other equations";
-            return Err(refused(document.file, symbol.place, found, expected));
+            return Err(ImportError::at(
+                document.file,
+                symbol.place,
+                found,
+                expected,
+            ));
         }
     }
     Ok(())
@@ -144,7 +149,7 @@ fn flattened(file: &str, tokens: &[Token]) -> Result<Vec<Token>, ImportError> {
             {
                 if open.pop().map(|begin| &begin.kind) != Some(&Kind::Begin(name.clone())) {
                     let expected = "environments that end in the order in which they begin";
-                    return Err(refused(file, token.place, token.quoted(), expected));
+                    return Err(ImportError::at(file, token.place, token.quoted(), expected));
                 }
                 let next = tokens.get(at);
                 if next.is_some_and(|token| token.is_command("right")) {
@@ -159,7 +164,7 @@ fn flattened(file: &str, tokens: &[Token]) -> Result<Vec<Token>, ImportError> {
         Some(token) => {
             let found = format!("{} without its end", token.quoted());
             let expected = "environments that end inside their display";
-            Err(refused(file, token.place, found, expected))
+            Err(ImportError::at(file, token.place, found, expected))
         }
     }
 }
@@ -227,7 +232,12 @@ impl Document<'_> {
             return Ok(());
         };
         if let Some((token, expected)) = unread(tokens) {
-            return Err(refused(self.file, token.place, token.quoted(), expected));
+            return Err(ImportError::at(
+                self.file,
+                token.place,
+                token.quoted(),
+                expected,
+            ));
         }
         let flat = flattened(self.file, tokens);
         let mut reader = match &flat {
@@ -242,7 +252,7 @@ impl Document<'_> {
         if let Some(token) = reader.in_text(&places) {
             let (place, found) = (token.place, format!("an equation in {}", token.quoted()));
             let expected = "equations in the formula itself";
-            return Err(refused(self.file, place, found, expected));
+            return Err(ImportError::at(self.file, place, found, expected));
         }
         for (at, symbol, after) in found {
             let token = reader.tokens[at].clone();
@@ -261,7 +271,7 @@ impl Document<'_> {
         }
         flat?;
         let refuse = |token: &Token, found: String, expected: &str| {
-            Err(refused(self.file, token.place, found, expected))
+            Err(ImportError::at(self.file, token.place, found, expected))
         };
         if let Some((token, found)) = strange {
             return refuse(&token, found, &self.names.expected());
@@ -336,7 +346,12 @@ impl Document<'_> {
             {
                 let name = named.unwrap_or_default();
                 let found = format!("phase `{name}` again, as in line {}", earlier.line);
-                return Err(refused(self.file, token.place, found, "each phase once"));
+                return Err(ImportError::at(
+                    self.file,
+                    token.place,
+                    found,
+                    "each phase once",
+                ));
             }
             self.sections.push(Section::new(named, token.place.0));
         }

@@ -1,6 +1,6 @@
 //! Functions with their arguments, and variables with dots and subscripts.
 
-use super::super::equations::refused;
+use super::super::error::ImportError;
 use super::names::is_greek;
 use super::reader::{BARE, FONTS, INVISIBLE, Last, Read, Reader, Symbol, has};
 use super::token::Kind;
@@ -163,7 +163,7 @@ impl Reader<'_> {
             (None, 0) if symbol.name == "pi" => format!("{:?}", std::f64::consts::PI),
             _ => {
                 let (found, expected) = (symbol.quoted(), self.names.expected());
-                return Err(refused(self.file, symbol.place, found, expected));
+                return Err(ImportError::at(self.file, symbol.place, found, expected));
             }
         };
         self.push(place, name);

@@ -3,8 +3,8 @@
 use nalgebra::Vector3;
 use roxmltree::{Document, Node};
 
-use crate::files::{Located, Place, shell_word};
-use crate::robot_file::error::{RobotFileError, RobotFileFault};
+use crate::files::{Place, shell_word};
+use crate::robot_file::RobotFileError;
 
 /// Elements for drawings and simulators.
 const UNREAD: [&str; 5] = [
@@ -39,7 +39,7 @@ pub(super) fn document<'x>(file: &str, text: &'x str) -> Result<Document<'x>, Ro
         }
         let at = error.pos();
         let place = Place::Character(at.row as usize, at.col as usize);
-        Located::new(file, place, RobotFileFault::Syntax(error.to_string()))
+        RobotFileError::text(file, place, error.to_string())
     })?;
     // Meshes and extensions of simulators may have signs of xacro in what romc does not read.
     let mut unread_to = 0;
@@ -183,8 +183,8 @@ impl<'x> Element<'x> {
     pub(crate) fn fault(
         &self,
         key: &str,
-        found: impl Into<String>,
-        expected: impl Into<String>,
+        found: impl Into<Box<str>>,
+        expected: impl Into<Box<str>>,
     ) -> RobotFileError {
         let mut place = self.place();
         if !key.is_empty() {

@@ -11,8 +11,8 @@ mod tree;
 use nalgebra::{Rotation3, Vector3};
 
 use super::entry::{Axis, JointEntry, LegEntry, RobotEntry};
-use super::error::RobotFileError;
 use super::legs::{LegPlaces, Places};
+use super::read::RobotFileError;
 use element::{Element, document};
 use limbs::{Legs, Limb};
 use tree::{Joint, Tree};

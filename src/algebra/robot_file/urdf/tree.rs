@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::{Rotation3, Vector3};
 
 use super::element::Element;
-use crate::robot_file::error::RobotFileError;
+use crate::robot_file::RobotFileError;
 use crate::robot_file::identity::LARGEST_ANGLE_RAD;
 
 /// Kinds of joints; of them `fixed` alone does not move.
@@ -96,7 +96,7 @@ impl<'x> Tree<'x> {
     }
 
     /// Another tree than that of a quadruped.
-    pub(crate) fn refused(&self, found: String, expected: impl Into<String>) -> RobotFileError {
+    pub(crate) fn refused(&self, found: String, expected: impl Into<Box<str>>) -> RobotFileError {
         RobotFileError::at(self.file, "the tree", found, expected)
     }
 
