@@ -10,7 +10,8 @@ use super::error::ImportError;
 use super::latex::SymbolNames;
 use super::report::Note;
 use super::role::{Mapping, ONLY_PHASE};
-use crate::files::{ForeignFile, Place};
+use crate::files::Place;
+use crate::files::magic::{self, OtherFormat};
 use crate::model::{
     Activation, CoordinateOrder, FeetRule, LibraryChoice, LibraryOrder, ScaleFactors, Scaling,
     StandardLibrary,
@@ -45,7 +46,7 @@ impl Format {
             Some(ending) => format!("the ending `.{ending}`"),
             None => "no ending".to_owned(),
         };
-        let foreign = ForeignFile::of_path(path).and_then(|found| refusal(path, found));
+        let foreign = magic::arrays_by_ending(path).and_then(|found| refusal(path, found));
         Err(foreign.unwrap_or_else(|| {
             let expected = match ending.as_deref() {
                 Some("json") => {
@@ -66,7 +67,7 @@ impl Format {
         bytes: &[u8],
         given: Option<Self>,
     ) -> Result<Self, ImportError> {
-        let content = ForeignFile::of_content(path, bytes);
+        let content = magic::arrays_by_content(path, bytes);
         let is_known = content.is_some();
         match content.and_then(|found| refusal(path, found)) {
             Some(refused) => Err(refused),
@@ -88,10 +89,10 @@ impl Format {
 }
 
 /// The refusal of a file that has to be converted first.
-pub(super) fn refusal(path: &Path, found: ForeignFile) -> Option<ImportError> {
+pub(super) fn refusal(path: &Path, found: OtherFormat) -> Option<ImportError> {
     let file = path.display().to_string();
-    let expected = found.remedy?;
-    Some(ImportError::at(&file, Place::Whole, found.what, expected))
+    let refused = || ImportError::at(&file, Place::Whole, found.what, found.remedy.as_str());
+    (!found.remedy.is_empty()).then(refused)
 }
 
 /// How a file stores the weights of a map.

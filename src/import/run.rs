@@ -17,7 +17,7 @@ use super::npz;
 use super::options::{Format, ImportOptions, refusal};
 use super::report::ImportReport;
 use super::safetensors;
-use crate::files::{ForeignFile, Place, hex};
+use crate::files::{Place, hex, magic};
 use crate::model::{CoordinateNames, ReducedModel};
 use crate::symbolic::ExprPool;
 
@@ -39,7 +39,7 @@ pub struct Imported {
 /// [`ImportError`] with the place, what was found and what was expected.
 pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported, ImportError> {
     let (file, bytes) = read_file(path, MAX_FILE_BYTES).map_err(|fault| {
-        let foreign = ForeignFile::of_unreadable(path);
+        let foreign = magic::arrays_by_neighbours(path);
         (foreign.and_then(|found| refusal(path, found))).unwrap_or(fault)
     })?;
     let format = Format::of_file(path, &bytes, options.format)?;

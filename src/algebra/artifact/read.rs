@@ -14,7 +14,7 @@ use super::manifest::{
     SchemaProbe, StatisticsEntry, from_rows,
 };
 use crate::files::size::Format;
-use crate::files::{Fault, ForeignFile, Located, Place};
+use crate::files::{Fault, Located, Place, magic};
 use crate::model::{
     Activation, AffineMap, InputGivenState, InputStatistics, Layer, Library, ModelError, Phase,
     ReducedModel, StateMap,
@@ -113,13 +113,13 @@ fn parse<'de, T: serde::Deserialize<'de>>(
 /// The fault of a file that is no JSON but of a kind that other tools write.
 fn foreign(file: &str, bytes: &[u8]) -> Option<ArtifactError> {
     let is_object = bytes.trim_ascii_start().starts_with(b"{");
-    let found = ForeignFile::of(Path::new(file), bytes).filter(|_| !is_object)?;
+    let found = magic::arrays(Path::new(file), bytes).filter(|_| !is_object)?;
     let import =
         "romc import (in Python Model.from_arrays, from_torch or from_pysindy) makes one of";
-    let source = found.remedy.unwrap_or("it".to_owned());
-    let remedy = match found.is_packed {
-        true => source,
-        false => format!("{import} {source}"),
+    let remedy = match (found.is_packed, found.remedy.as_str()) {
+        (true, line) => line.to_owned(),
+        (false, "") => format!("{import} it"),
+        (false, lines) => format!("{import} {lines}"),
     };
     let expected = format!("a model file of romc: {remedy}");
     Some(ArtifactError::at(file, Place::Whole, found.what, expected))

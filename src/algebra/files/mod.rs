@@ -10,7 +10,6 @@ pub mod magic;
 pub mod size;
 
 mod folder;
-mod foreign;
 mod located;
 mod part;
 mod text;
@@ -20,7 +19,6 @@ mod whole;
 pub use folder::{
     Begun, FolderError, check_folder, earlier_files, hex, write_files, write_files_since,
 };
-pub use foreign::ForeignFile;
 pub use located::{Fault, Located, Place};
 pub use text::{is_invisible, shell_path, shell_paths, shell_word};
 pub use toml_text::read_toml;

@@ -115,7 +115,7 @@ pub fn read_capped(path: &Path, format: Format) -> io::Result<Vec<u8>> {
 pub fn read_text_capped(path: &Path, format: Format) -> io::Result<String> {
     let bytes = read_capped(path, format)?;
     let invalid = |text: String| io::Error::new(io::ErrorKind::InvalidData, text);
-    if let Some(OtherFormat { what, remedy }) = recognised(path, &bytes) {
+    if let Some(OtherFormat { what, remedy, .. }) = recognised(path, &bytes) {
         let expected = format.facts().1;
         let text = format!("found {what}, expected {expected}; this makes the text: {remedy}");
         return Err(invalid(text));
