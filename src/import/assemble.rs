@@ -16,7 +16,6 @@ use crate::files::Place;
 use crate::model::{InputStatistics, Library, LibraryChoice, ModelError, Phase, Scaling, StateMap};
 use crate::robot::STATE_DIM;
 
-/// The parts of a model that a file has.
 #[derive(Debug)]
 pub(super) struct Parts {
     pub(super) library: Library,
@@ -28,7 +27,6 @@ pub(super) struct Parts {
 }
 
 impl Parts {
-    /// Number of robot coordinates, if there is an encoder or decoder.
     pub(super) fn state_dim(&self) -> Option<usize> {
         (self.encoder.as_ref().map(StateMap::input_dim))
             .or(self.decoder.as_ref().map(StateMap::output_dim))
@@ -38,13 +36,10 @@ impl Parts {
 /// Dimensions as far as they are known before a tensor is looked at.
 #[derive(Clone, Copy, Debug, Default)]
 struct Known {
-    /// `d`.
     latent: Option<usize>,
-    /// `n`.
     state: Option<usize>,
 }
 
-/// Makes the parts of a model out of a file of tensors, with the decisions about each.
 pub(super) fn parts(
     tensors: &TensorFile<'_>,
     options: &ImportOptions,
@@ -105,7 +100,6 @@ impl<'a> Assembly<'a, '_> {
         used.find(|assigned| assigned.role == *role)
     }
 
-    /// A tensor that is something else than expected.
     fn refused(
         &self,
         assigned: &Assigned<'_>,
@@ -115,7 +109,6 @@ impl<'a> Assembly<'a, '_> {
         self.tensors.refused(assigned.place(&[]), found, expected)
     }
 
-    /// Parts that do not make a model.
     fn unusable(&self, source: impl Into<ModelError>) -> ImportError {
         ImportError::unusable(self.tensors.file(), source)
     }
@@ -188,7 +181,6 @@ impl<'a> Assembly<'a, '_> {
         Ok(values.column(0).into_owned())
     }
 
-    /// Library and phases.
     fn coefficients(&mut self) -> Result<(Library, Vec<Phase>), ImportError> {
         let first = Role::Xi(self.assignment.phases[0].name.clone());
         let first = (self.find(&first)).expect("every phase was assigned coefficients");

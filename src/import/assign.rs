@@ -7,7 +7,6 @@ use super::role::{ONLY_PHASE, Part, Role, is_of_optimiser, mentions};
 use super::tensors::{TensorFile, TensorInfo};
 use crate::files::Place;
 
-/// A tensor and its use.
 #[derive(Clone, Debug)]
 pub(super) struct Assigned<'f> {
     pub(super) role: Role,
@@ -26,14 +25,12 @@ impl Assigned<'_> {
     }
 }
 
-/// All decisions about a file.
 pub(super) struct Assignment<'f> {
     pub(super) phases: Vec<PhaseRule>,
     pub(super) used: Vec<Assigned<'f>>,
     pub(super) unused: Vec<&'f TensorInfo>,
 }
 
-/// Decides for the whole file.
 pub(super) fn assign<'f>(
     tensors: &'f TensorFile<'_>,
     options: &ImportOptions,
@@ -179,7 +176,6 @@ fn check_layers(
     Ok(())
 }
 
-/// The tensors of `--map`.
 fn mapped<'f>(
     tensors: &'f TensorFile<'_>,
     options: &ImportOptions,
@@ -227,7 +223,6 @@ fn phases(
     }
 }
 
-/// Refuses `--map` for a phase that is not there.
 fn check_mapped_phases(options: &ImportOptions, phases: &[PhaseRule]) -> Result<(), ImportError> {
     let is_strange = |role: &&Role| {
         (role.phase()).is_some_and(|phase| phases.iter().all(|rule| rule.name != phase))

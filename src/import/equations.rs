@@ -18,7 +18,6 @@ use crate::files::Place;
 use crate::model::{LatentVariable, MAX_LATENT_DIM};
 use crate::symbolic::{ExprId, ExprPool, ParseErrorKind, ParseLimits};
 
-/// Largest text.
 pub(super) const MAX_TEXT_BYTES: u64 = 4 << 20;
 
 /// The equations of one phase.
@@ -33,7 +32,6 @@ pub struct Section {
 }
 
 impl Section {
-    /// A section without equations so far.
     pub(super) fn new(phase: Option<String>, line: usize) -> Self {
         let equations = Vec::new();
         Self {
@@ -66,7 +64,6 @@ pub struct Sections {
     pub sections: Vec<Section>,
 }
 
-/// Cuts a text into sections and equations, and checks that they are complete.
 pub(super) fn read(file: &str, bytes: &[u8]) -> Result<Sections, ImportError> {
     let text = text_of(file, bytes)?;
     let mut reader = Reader {
@@ -90,7 +87,6 @@ pub(super) fn text_of<'b>(file: &str, bytes: &'b [u8]) -> Result<&'b str, Import
     Ok(text.strip_prefix('\u{feff}').unwrap_or(text))
 }
 
-/// The start of a text in quotes, for messages.
 fn quote(text: &str) -> String {
     let short: String = text.chars().take(40).collect();
     format!("`{}`", short.escape_debug())
@@ -257,7 +253,6 @@ pub(super) fn complete(
 }
 
 impl Equation {
-    /// Builds the right side in a pool.
     pub(super) fn parse(
         &self,
         file: &str,

@@ -69,7 +69,6 @@ pub(super) fn parts(
     Ok((parts, report))
 }
 
-/// The coefficients of a phase's equations in the rows of their terms.
 fn xi(library: &Library, columns: &[Coefficients], rows: &HashMap<ExprId, Row>) -> DMatrix<f64> {
     let mut xi = DMatrix::zeros(library.len(), library.latent_dim());
     for (column, coefficients) in columns.iter().enumerate() {
@@ -165,7 +164,6 @@ struct Separation<'f> {
     file: &'f str,
     latent_dim: usize,
     pool: ExprPool,
-    /// The terms of a library that was given.
     given: HashMap<ExprId, Row>,
 }
 
@@ -195,7 +193,6 @@ impl Separation<'_> {
     }
 }
 
-/// The library of all terms found.
 fn union(
     file: &str,
     latent_dim: usize,

@@ -10,10 +10,8 @@ use super::pysindy;
 use super::run::{check_size, read_file};
 use crate::model::{Library, LibraryChoice, LibraryOrder, StandardLibrary};
 
-/// Largest file with a list of terms.
 const MAX_TERMS_BYTES: u64 = 32 << 20;
 
-/// Number of terms that a choice has at a latent dimension.
 pub(super) fn dim(choice: &LibraryChoice, latent_dim: usize) -> Option<usize> {
     match choice {
         LibraryChoice::Standard(standard) => standard.term_count(latent_dim),

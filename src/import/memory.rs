@@ -54,7 +54,6 @@ fn little_endian(tensor: &Tensor<'_>) -> Vec<u8> {
     values.flat_map(|value| value.to_le_bytes()).collect()
 }
 
-/// Digest of names, dimensions and numbers.
 pub(super) fn digest(tensors: &[Tensor<'_>]) -> Output<Sha256> {
     let mut digest = Sha256::new();
     for tensor in tensors {

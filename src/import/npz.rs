@@ -15,7 +15,6 @@ use super::error::{self, ImportError, too_large};
 use super::tensors::{Element, TensorFile, TensorInfo};
 use crate::files::Place;
 
-/// Most members of a file.
 const MAX_MEMBERS: usize = 10_000;
 const MAGIC: &[u8; 6] = b"\x93NUMPY";
 const MAX_HEADER_BYTES: usize = 1 << 16;
@@ -67,7 +66,6 @@ fn describe(
     }
 }
 
-/// The bytes of an array's numbers.
 fn numbers(
     file: &str,
     bytes: &[u8],

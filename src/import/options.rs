@@ -77,7 +77,6 @@ impl Format {
         }
     }
 
-    /// Name for messages.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Format::Safetensors => "safetensors",
@@ -142,7 +141,6 @@ pub fn parse_standard(text: &str) -> Result<StandardLibrary, ImportError> {
     })
 }
 
-/// The shorthand as [`parse_standard`] reads it.
 pub(super) fn standard_text(standard: StandardLibrary) -> String {
     let mut text = format!("degree={}", standard.degree);
     if standard.trigonometric {
@@ -281,7 +279,6 @@ impl ImportOptions {
         given.next().map(|(option, _)| option)
     }
 
-    /// The place of a phase among those given.
     pub(super) fn given(&self, phase: &str) -> Option<usize> {
         self.phases.iter().position(|rule| rule.name == phase)
     }

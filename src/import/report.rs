@@ -56,7 +56,6 @@ pub struct UsedTensor {
 pub enum Chosen {
     /// `--map`.
     Mapped,
-    /// Its name.
     Named,
 }
 

@@ -115,7 +115,6 @@ impl FromStr for Role {
     }
 }
 
-/// Characters between the words of a name.
 const SEPARATORS: [char; 3] = ['.', '_', '/'];
 /// Words of the names of what an optimiser keeps beside the tensors that it changes.
 const OF_OPTIMISERS: [&str; 6] = [
@@ -209,7 +208,6 @@ impl Role {
         }
     }
 
-    /// The same for another phase.
     pub(super) fn of_phase(&self, phase: &str) -> Self {
         let phase = phase.to_owned();
         match self {
@@ -221,7 +219,6 @@ impl Role {
         }
     }
 
-    /// The phase that the tensor belongs to, if it belongs to one.
     pub(crate) fn phase(&self) -> Option<&str> {
         match self {
             Role::Xi(phase)
@@ -250,7 +247,6 @@ pub(super) fn mentions(name: &str, other: &str) -> bool {
     joined(name).contains(&joined(other))
 }
 
-/// Whether a tensor is the state of an optimiser by its name.
 pub(super) fn is_of_optimiser(name: &str) -> bool {
     words(name).any(|word| OF_OPTIMISERS.contains(&word.as_str()))
 }

@@ -21,7 +21,6 @@ use crate::files::{Place, hex, magic};
 use crate::model::{CoordinateNames, ReducedModel};
 use crate::symbolic::ExprPool;
 
-/// Largest file that is read.
 const MAX_FILE_BYTES: u64 = 256 << 20;
 
 /// An imported model and what was decided on the way.
@@ -195,7 +194,6 @@ fn provenance(report: &ImportReport, digest: &[u8]) -> Map<String, Value> {
     entries
 }
 
-/// Hands the parts to the builder that checks every model.
 fn build(
     file: &str,
     parts: Parts,

@@ -10,7 +10,6 @@ use crate::files::Place;
 /// Largest tensor that is read: the coefficients of the largest library fit twice.
 const MAX_ELEMENTS: usize = 4 << 20;
 
-/// Type of the numbers of a tensor.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Element {
     F32,
@@ -41,7 +40,6 @@ impl Element {
     }
 }
 
-/// The description of one tensor.
 #[derive(Clone, Debug)]
 pub(super) struct TensorInfo {
     pub(super) name: String,
@@ -118,12 +116,10 @@ impl<'b> TensorFile<'b> {
         &self.file
     }
 
-    /// All tensors, sorted by name.
     pub(super) fn infos(&self) -> &[TensorInfo] {
         &self.infos
     }
 
-    /// All tensors in words, for messages.
     pub(super) fn listing(&self) -> String {
         const MOST: usize = 24;
         let shown = self.infos.iter().take(MOST).map(TensorInfo::describe);
@@ -136,7 +132,6 @@ impl<'b> TensorFile<'b> {
         texts.join(", ")
     }
 
-    /// `found` at a place of the file, where `expected` should be.
     pub(super) fn refused(
         &self,
         place: impl Into<Place>,
@@ -146,7 +141,6 @@ impl<'b> TensorFile<'b> {
         ImportError::at(&self.file, place, found, expected)
     }
 
-    /// A file without a tensor for a use.
     pub(super) fn missing(&self, role: &dyn std::fmt::Display) -> ImportError {
         let found = format!("no tensor for {role} among {}", self.listing());
         let expected = format!("a tensor of that name, or --map {role}=TENSOR");

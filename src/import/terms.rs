@@ -9,7 +9,6 @@ use std::collections::HashMap;
 use crate::model::LatentVariable;
 use crate::symbolic::{ExprId, ExprPool, Function, Node, Number};
 
-/// Coefficients of one equation by term.
 pub(super) type Coefficients = HashMap<ExprId, Number>;
 
 /// Coefficients of `expr` as a sum over terms; `None` if one overflows.
@@ -96,7 +95,6 @@ fn variable(pool: &ExprPool, latent_dim: usize, expr: ExprId) -> Option<LatentVa
     LatentVariable::from_name(pool.symbol_name(symbol), latent_dim)
 }
 
-/// Index into (z, dz).
 fn state_index(pool: &ExprPool, latent_dim: usize, expr: ExprId) -> Option<usize> {
     let place = variable(pool, latent_dim, expr)?.place(latent_dim)?;
     (place < 2 * latent_dim).then_some(place)

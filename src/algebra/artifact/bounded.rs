@@ -16,7 +16,6 @@ pub(super) fn value<'de, D: Deserializer<'de>>(source: D) -> Result<Option<Value
     Ok(Some(value).filter(|value| !value.is_null()))
 }
 
-/// Reads an object.
 pub(super) fn object<'de, D: Deserializer<'de>>(source: D) -> Result<Map<String, Value>, D::Error> {
     match Bounded(&Cell::new(MOST)).deserialize(source)? {
         Value::Object(object) => Ok(object),

@@ -7,7 +7,6 @@ const INDENT: &str = "  ";
 /// Lists of words and small objects keep to this width, without indentation.
 const LINE_WIDTH: usize = 100;
 
-/// The value as text, with a newline at the end.
 pub(super) fn print(value: &Value) -> String {
     let mut out = String::new();
     push(&mut out, value, Some(0));

@@ -11,7 +11,6 @@ use sha2::{Digest as _, Sha256};
 use super::part::{Part, remove_left_in};
 use super::whole::{EmittedFile, Overwrite};
 
-/// Lists what romc wrote into the folder.
 const LIST: &str = ".romc-emitted";
 
 /// Why files could not be written.
@@ -88,7 +87,6 @@ impl Begun {
         Ok(Self(list.map(|list| list.emitted).unwrap_or_default()))
     }
 
-    /// Refuses a file that another run has made since, with other contents than ours.
     fn check(&self, folder: &Path, file: &EmittedFile, now: &Emitted) -> Result<(), FolderError> {
         let (then, now) = (self.0.digests(&file.path), now.digests(&file.path));
         // Models that share a folder share this one, which builds the last of them.
@@ -177,7 +175,6 @@ struct List {
 }
 
 impl List {
-    /// The list of a folder that has one.
     fn of(folder: &Path) -> Result<Option<Self>, FolderError> {
         Self::opened(folder, OpenOptions::new().read(true), File::lock_shared)
     }
@@ -220,7 +217,6 @@ impl List {
         }
     }
 
-    /// Adds digests of files that it does not have.
     fn extend(&mut self, files: &[EmittedFile]) -> Result<(), FolderError> {
         let mut lines = String::new();
         for file in files {
@@ -343,12 +339,10 @@ pub fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// SHA-256 in hexadecimal digits.
 fn digest(contents: &[u8]) -> String {
     hex(&Sha256::digest(contents))
 }
 
-/// Files beside their places.
 fn staged(folder: &Path, files: &[EmittedFile]) -> Result<Vec<Part>, FolderError> {
     let mut parts = Vec::new();
     let mut tidied = BTreeSet::new();

@@ -12,10 +12,8 @@ use super::whole::Overwrite;
 /// How names of parts end, after a random number in hexadecimal digits.
 const ENDING: &str = ".part";
 
-/// Digits of that number.
 const DIGITS: usize = 16;
 
-/// Names that are tried.
 const MAX_TRIED: usize = 16;
 
 /// A new file with a random, hidden name in the folder of its place; removed in the end unless it was moved there.

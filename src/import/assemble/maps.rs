@@ -14,7 +14,6 @@ use crate::model::{Activation, AffineMap, Layer, StateMap};
 /// How much decoding and encoding may change latent states without a note.
 const LARGEST_CHANGE: f64 = 0.5;
 
-/// Weights and bias of a layer.
 type Tensors<'a> = (&'a Assigned<'a>, Option<&'a Assigned<'a>>);
 
 impl<'a> Assembly<'a, '_> {
@@ -61,7 +60,6 @@ impl<'a> Assembly<'a, '_> {
         Ok((sum / dim as f64).sqrt())
     }
 
-    /// The tensors of a map's layers, in the order of their numbers.
     fn layers(&self, part: Part) -> Result<Vec<Tensors<'a>>, ImportError> {
         let mut layers: Vec<Tensors<'a>> = Vec::new();
         let used = &self.assignment.used;
@@ -205,7 +203,6 @@ fn is_kernel(name: &str) -> bool {
     name.trim_end_matches(":0").ends_with("kernel")
 }
 
-/// The weights in words, for messages.
 fn described(layers: &[Tensors<'_>]) -> String {
     let texts: Vec<String> = layers.iter().map(|(a, _)| a.info.describe()).collect();
     texts.join(", ")

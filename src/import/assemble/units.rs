@@ -175,7 +175,6 @@ impl<'a> Assembly<'a, '_> {
     }
 }
 
-/// The map with other weights and bias in one layer.
 fn replaced(
     map: &StateMap,
     layer: usize,

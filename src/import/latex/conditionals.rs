@@ -9,7 +9,6 @@ use super::reader::has;
 use super::scopes::Meaning;
 use super::token::{Kind, Token};
 
-/// TeX's conditionals.
 const CONDITIONALS: &str = "if ifcat ifnum ifdim ifodd ifvmode ifhmode ifmmode ifinner ifvoid ifhbox ifvbox ifx ifeof \
     iftrue iffalse ifcase ifdefined ifcsname iffontchar ifincsname ifpdf ifxetex ifluatex ifPDFTeX ifXeTeX ifLuaTeX";
 /// Commands that begin as conditionals do and take arguments, or none.
@@ -20,7 +19,6 @@ const KEEPING: &str = "AtBeginDocument AtEndDocument AtEndPreamble sbox savebox 
 const FOLLOWED: &str =
     "`\\iftrue`, `\\iffalse` or a switch of `\\newif`, or the printed branch alone";
 
-/// Why a command is not followed.
 const CONDITION: (&str, &str) = (", a conditional that is not followed", FOLLOWED);
 const KEPT: (&str, &str) = (
     ", which keeps mathematics for another place",

@@ -13,7 +13,6 @@ use super::token::{Kind, Token};
 const KERNEL: &str = "sin cos tan cot sec csc sinh cosh tanh exp log ln frac dfrac tfrac sqrt dot ddot dddot left right \
     cdot times lvert rvert vert text mathrm operatorname prime partial alpha beta gamma delta epsilon zeta eta theta \
     iota kappa lambda mu nu xi pi rho sigma tau upsilon phi chi psi omega";
-/// Definitions of macros that are followed.
 pub(super) const DEFINITIONS: &str = "newcommand renewcommand providecommand DeclareRobustCommand def gdef edef xdef let DeclareMathOperator newif";
 /// Definitions of macros whose form is not read: the macro that comes next is unknown from there on.
 pub(super) const UNREAD: &str = "chardef mathchardef font DeclarePairedDelimiter DeclarePairedDelimiterX DeclareMathSymbol \
@@ -24,7 +23,6 @@ pub(super) const UNREAD: &str = "chardef mathchardef font DeclarePairedDelimiter
 /// Definitions of environments whose contents are not read.
 const VERBATIM: &str =
     "excludecomment excludeversion lstnewenvironment DefineVerbatimEnvironment newverbatim";
-/// Why a macro is not read.
 const UNREAD_FORM: (&str, &str) = (
     ", a macro of a form that is not read",
     "`\\newcommand` with plain arguments",

@@ -4,7 +4,6 @@ use super::names::is_greek;
 use super::reader::{FONTS, INVISIBLE, has};
 use super::token::{Kind, Token, group_length};
 
-/// Most dots that have a command.
 const MAX_DOTS: usize = 3;
 /// Longest group that is looked at: a variable or a differential.
 const MAX_GROUP: usize = 32;
@@ -37,7 +36,6 @@ fn with_each(tokens: &[Token], find: fn(&[Token], usize) -> Option<Derivative>) 
     dotted
 }
 
-/// A derivative written as a fraction at `at`.
 fn fraction(tokens: &[Token], at: usize) -> Option<Derivative> {
     let fractions = ["frac", "dfrac", "tfrac"];
     (fractions.iter().any(|name| tokens[at].is_command(name))).then_some(())?;
@@ -150,7 +148,6 @@ fn subscript_end(tokens: &[Token], at: usize) -> Option<usize> {
     Some(argument(tokens, at + 1)?.1)
 }
 
-/// A variable with primes at `at`.
 fn primed(tokens: &[Token], at: usize) -> Option<Derivative> {
     let letter = letter_end(tokens, at)?;
     let subscript = subscript_end(tokens, letter);

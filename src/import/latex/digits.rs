@@ -42,7 +42,6 @@ impl Wanted {
         }
     }
 
-    /// Takes one argument; whether it was wanted.
     fn take(&mut self) -> bool {
         let is_wanted = self.count > 0;
         self.count = self.count.saturating_sub(1);
@@ -50,11 +49,9 @@ impl Wanted {
     }
 }
 
-/// A brace or bracket that is open.
 struct Group {
     start: usize,
     is_brace: bool,
-    /// What is wanted behind it.
     behind: Wanted,
     is_argument: bool,
     font: Option<usize>,
@@ -193,7 +190,6 @@ fn is_comment(token: &Token) -> bool {
     matches!(token.kind, Kind::Comment(_))
 }
 
-/// A number being read.
 struct Joiner<'t> {
     tokens: &'t [Token],
     at: usize,

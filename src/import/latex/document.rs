@@ -19,9 +19,7 @@ pub(super) const WITH_COLUMNS: &str = "alignat alignedat array IEEEeqnarray";
 pub(super) enum Item {
     /// A comment, or a heading in Markdown.
     Comment(String),
-    /// The tokens between the ends of a display.
     Display(Vec<Token>),
-    /// The tokens of mathematics inside a paragraph.
     Inline(Vec<Token>),
 }
 

@@ -11,7 +11,6 @@ use super::token::{Kind, Lexer, Token};
 
 /// Most tokens that macros may make of one document.
 const MAX_EXPANDED: usize = 500_000;
-/// Environments whose contents are no LaTeX.
 const VERBATIM: &str =
     "verbatim Verbatim BVerbatim LVerbatim lstlisting minted comment filecontents";
 /// Environments that old documents begin by their commands: `\let\be\equation`.
@@ -22,7 +21,6 @@ const NOT_PRINTED: &str = "index typeout message hypersetup pdfbookmark nocite @
 /// Commands after which the text reads in another way than is followed here.
 const NOT_FOLLOWED: &str =
     "globaldefs aftergroup afterassignment scantokens mathcode everymath everydisplay";
-/// Commands that print another file.
 const OTHER_FILES: &str = "input include subfile subfileinclude subinputfrom import subimport inputfrom includefrom \
     InputIfFileExists @input";
 
@@ -41,7 +39,6 @@ pub(super) struct Expander<'t> {
 }
 
 impl<'t> Expander<'t> {
-    /// An expander of tokens, then of a text.
     pub(super) fn new(file: &'t str, mut tokens: Vec<Token>, text: &'t str) -> Self {
         tokens.reverse();
         Self {
@@ -94,7 +91,6 @@ impl<'t> Expander<'t> {
         })
     }
 
-    /// The same without comments and empty lines.
     pub(super) fn code(&mut self) -> Option<Token> {
         loop {
             let token = self.raw()?;
@@ -157,14 +153,12 @@ impl<'t> Expander<'t> {
         }
     }
 
-    /// Passes a group, if one comes next.
     pub(super) fn skip_group(&mut self) {
         if self.takes(&Kind::Open) {
             self.until(&Kind::Close);
         }
     }
 
-    /// The tokens of `[...]`, if it comes next.
     pub(super) fn optional(&mut self) -> Option<Vec<Token>> {
         let is_next = self.takes(&Kind::Character('['));
         is_next.then(|| self.until(&Kind::Character(']'))).flatten()
@@ -330,7 +324,6 @@ impl<'t> Expander<'t> {
         Ok(())
     }
 
-    /// Ends the text here.
     fn stop(&mut self) {
         self.pending.clear();
         self.lexer.end();
@@ -418,7 +411,6 @@ impl<'t> Expander<'t> {
     }
 }
 
-/// The characters of a name.
 pub(super) fn spelled(tokens: &[Token]) -> String {
     let mut text = String::new();
     for token in tokens {

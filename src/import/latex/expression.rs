@@ -365,7 +365,6 @@ impl Reader<'_> {
         Ok(self.command("right"))
     }
 
-    /// Parentheses of any kind and size.
     pub(super) fn delimited(&mut self, place: (usize, usize)) -> Read<Last> {
         let has_left = self.command("left");
         let closer = match self.next_kind() {

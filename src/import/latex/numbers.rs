@@ -60,7 +60,6 @@ impl Reader<'_> {
         exponent.filter(|exponent: &i32| !is_one_token || *exponent < 10)
     }
 
-    /// Takes the number that comes next.
     pub(super) fn number(&mut self, expected: &str) -> Read<String> {
         match self.next_kind() {
             Some(Kind::Number(text)) => {
@@ -148,7 +147,6 @@ impl Reader<'_> {
         Ok(Last::Other)
     }
 
-    /// The index in brackets; 2 without.
     fn index(&mut self) -> Read<u32> {
         if !self.character('[') {
             return Ok(2);

@@ -8,7 +8,6 @@ use super::expression::WORDS;
 use super::names::SymbolNames;
 use super::token::{Kind, Token};
 
-/// Most nested groups.
 const MAX_DEPTH: usize = 60;
 /// Commands that change only how the page looks; those of the second list take an argument.
 pub(super) const INVISIBLE: &str = ", ; : ! > quad qquad enspace thinspace medspace thickspace negthinspace \
@@ -39,7 +38,6 @@ pub(super) struct Symbol {
 }
 
 impl Symbol {
-    /// The variable in quotes, for messages.
     pub(super) fn quoted(&self) -> String {
         let dots = ["", "\\dot ", "\\ddot ", "\\dddot "][self.dots.min(3)];
         format!("`{dots}{}`", self.name)
@@ -83,7 +81,6 @@ pub(super) fn has(list: &str, word: &str) -> bool {
     list.split_whitespace().any(|known| known == word)
 }
 
-/// Whether a token alone prints nothing.
 pub(super) fn is_blank(kind: &Kind) -> bool {
     match kind {
         Kind::Align | Kind::Break | Kind::Label(_) | Kind::Comment(_) | Kind::Paragraph => true,
@@ -156,7 +153,6 @@ impl<'a> Reader<'a> {
         (self.at < self.end).then(|| &self.tokens[self.at])
     }
 
-    /// The kind of what [`Self::peek`] gives.
     pub(super) fn next_kind(&mut self) -> Option<Kind> {
         self.peek().map(|token| token.kind.clone())
     }
@@ -217,7 +213,6 @@ impl<'a> Reader<'a> {
         self.pieces.push((place, text.into()));
     }
 
-    /// One more nested group.
     pub(super) fn deepen(&mut self) -> Read<()> {
         self.depth += 1;
         match self.depth > MAX_DEPTH {

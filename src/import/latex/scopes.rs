@@ -13,7 +13,6 @@ const WITHOUT_CELLS: &str = "equation displaymath dmath dgroup";
 const WITH_CELLS: &str = "array tabular tabularx longtable matrix pmatrix bmatrix Bmatrix vmatrix Vmatrix smallmatrix \
     subarray substack align";
 
-/// A macro.
 #[derive(Debug, PartialEq)]
 pub(super) struct Macro {
     pub(super) parameters: usize,
@@ -40,7 +39,6 @@ pub(super) enum Meaning {
     Verbatim,
 }
 
-/// A group that is open.
 struct Scope {
     opener: Token,
     /// What ends it; nothing for a cell, which ends with its column, row or environment.
@@ -110,7 +108,6 @@ impl Scopes {
         });
     }
 
-    /// Ends scopes until `depth` are left.
     pub(super) fn leave_to(&mut self, depth: usize) {
         while self.open.len() > depth {
             let Some(scope) = self.open.pop() else { return };

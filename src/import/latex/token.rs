@@ -39,7 +39,6 @@ pub(super) enum Kind {
     Number(String),
     /// `#1`.
     Parameter(usize),
-    /// The text after `%`; a heading in Markdown.
     Comment(String),
     /// An empty line.
     Paragraph,
@@ -49,7 +48,6 @@ pub(super) enum Kind {
 }
 
 impl Kind {
-    /// A token of the kind in quotes, for messages.
     pub(super) fn quoted(&self) -> String {
         let text = match self {
             Kind::Command(name) => format!("\\{name}"),
@@ -137,7 +135,6 @@ pub(super) fn group_length<'t>(tokens: impl Iterator<Item = &'t Token>) -> Optio
     None
 }
 
-/// The tokens of a text.
 pub(super) struct Lexer<'t> {
     /// The lines after the one that is read.
     lines: Lines<'t>,
@@ -185,7 +182,6 @@ impl Iterator for Lexer<'_> {
 }
 
 impl<'t> Lexer<'t> {
-    /// The tokens of a TeX file.
     pub(super) fn new(text: &'t str) -> Self {
         Self {
             lines: text.lines(),
@@ -226,7 +222,6 @@ impl<'t> Lexer<'t> {
         self.lines = "".lines();
     }
 
-    /// Ends the text.
     pub(super) fn end(&mut self) {
         self.end_after_line();
         self.next = self.characters.len();

@@ -98,7 +98,6 @@ impl<'x> Element<'x> {
         self.node.tag_name().name()
     }
 
-    /// The children of a kind.
     pub(crate) fn children(self, tag: &'static str) -> impl Iterator<Item = Self> {
         let nodes = (self.node.children()).filter(move |node| node.has_tag_name(tag));
         nodes.map(move |node| Self { node, ..self })
@@ -124,7 +123,6 @@ impl<'x> Element<'x> {
         name.ok_or_else(|| self.fault("", "no name", "name=\"...\""))
     }
 
-    /// A finite number.
     pub(crate) fn number(&self, key: &str) -> Result<f64, RobotFileError> {
         let text = self.attribute(key);
         let value = text.and_then(|text| text.trim().parse::<f64>().ok());
@@ -134,7 +132,6 @@ impl<'x> Element<'x> {
         })
     }
 
-    /// Three finite numbers of an attribute; none if it is not there.
     pub(crate) fn triple(&self, key: &str) -> Result<Option<Vector3<f64>>, RobotFileError> {
         let Some(text) = self.attribute(key) else {
             return Ok(None);

@@ -18,7 +18,6 @@ pub(super) struct Limb {
     pub point: Vector3<f64>,
 }
 
-/// The legs of a robot and the body that they are on.
 pub(super) struct Legs {
     pub legs: Vec<Limb>,
     /// The uppermost link of the body.
@@ -223,7 +222,6 @@ fn foot(tree: &Tree<'_>, joints: &[usize]) -> Result<usize, RobotFileError> {
     }
 }
 
-/// The legs that end in these links.
 fn named_legs(
     tree: &Tree<'_>,
     top: usize,
