@@ -97,13 +97,12 @@ fn differential(tokens: &[Token], at: usize) -> Option<usize> {
 fn power(tokens: &[Token], at: usize) -> (usize, usize) {
     let found = || {
         (tokens.get(at)?.kind == Kind::Superscript).then_some(())?;
-        match argument(tokens, at + 1)? {
-            ([number], behind) => match &number.kind {
-                Kind::Number(text) => Some((text.parse().ok()?, behind)),
-                _ => None,
-            },
+        let (inside, behind) = argument(tokens, at + 1)?;
+        let digits = inside.iter().map(|token| match token.kind {
+            Kind::Character(digit) if digit.is_ascii_digit() => Some(digit),
             _ => None,
-        }
+        });
+        Some((digits.collect::<Option<String>>()?.parse().ok()?, behind))
     };
     found().unwrap_or((1, at))
 }

@@ -2,7 +2,7 @@
 
 use super::super::error::ImportError;
 use super::derivatives::with_dots;
-use super::digits::with_numbers;
+use super::digits::without_operator_braces;
 use super::expander::Expander;
 use super::reader::has;
 use super::token::{Kind, Token};
@@ -127,7 +127,7 @@ fn formula(
         if expander.scopes.depth() <= around || ends(&token) {
             expander.scopes.leave_to(around);
             expander.scopes.formula = None;
-            return Ok(Some(with_dots(&with_numbers(tokens))));
+            return Ok(Some(with_dots(&without_operator_braces(tokens))));
         }
         tokens.push(token);
     }

@@ -19,7 +19,7 @@ pub(super) struct Token {
 pub(super) enum Kind {
     /// `\frac`, `\,`; without its backslash.
     Command(String),
-    /// `\begin{...}`; it, the next two and numbers are made of tokens that follow each other.
+    /// `\begin{...}`; it and the next two are made of tokens that follow each other.
     Begin(String),
     /// `\end{...}`.
     End(String),
@@ -35,8 +35,6 @@ pub(super) enum Kind {
     Dollar,
     /// `$$`, or a fence of mathematics in Markdown.
     Display,
-    /// Digits with at most one point, and an exponent as in `1.2e-3`.
-    Number(String),
     /// `#1`.
     Parameter(usize),
     Comment(String),
@@ -62,7 +60,6 @@ impl Kind {
             Kind::Break => "\\\\".to_owned(),
             Kind::Dollar => "$".to_owned(),
             Kind::Display => "$$".to_owned(),
-            Kind::Number(text) => text.clone(),
             Kind::Parameter(number) => format!("#{number}"),
             Kind::Comment(_) => "%".to_owned(),
             Kind::Paragraph => return "an empty line".to_owned(),
@@ -91,7 +88,6 @@ impl Kind {
             | Kind::Subscript
             | Kind::Dollar
             | Kind::Display
-            | Kind::Number(_)
             | Kind::Parameter(_)
             | Kind::Unread(..)
             | Kind::Character(_) => false,
@@ -353,8 +349,9 @@ impl<'t> Lexer<'t> {
         let values = number
             .chars()
             .filter_map(|c| digits.chars().position(|d| d == c));
-        let number: String = values.map(|value| value.to_string()).collect();
-        kinds.extend([Kind::Number(number.clone()), Kind::Close]);
+        let digits = values.filter_map(|value| char::from_digit(value as u32, 10));
+        kinds.extend(digits.map(Kind::Character));
+        kinds.push(Kind::Close);
         (!number.is_empty()).then_some(kinds)
     }
 
