@@ -9,7 +9,7 @@ use super::assign::{Assigned, Assignment, assign};
 use super::error::{ImportError, shape_text};
 use super::library;
 use super::options::{ImportOptions, PhaseRule, XiLayout, standard_text};
-use super::report::{ImportReport, Layout, Note, UnusedTensor, UsedTensor};
+use super::report::{ImportReport, Layout, UnusedTensor, UsedTensor};
 use super::role::{Part, Role, is_of_optimiser};
 use super::tensors::{Element, TensorFile, TensorInfo};
 use crate::files::Place;
@@ -318,10 +318,9 @@ impl<'a> Assembly<'a, '_> {
             return Err(self.tensors.refused(place, found, "0 or 1"));
         }
         let off = |(value, flag): &(&f64, &f64)| **flag == 0.0 && **value != 0.0;
-        self.report.notes.push(Note::Masked {
-            phase: phase.to_owned(),
-            count: xi.iter().zip(&mask).filter(off).count(),
-        });
+        let count = xi.iter().zip(&mask).filter(off).count();
+        let note = format!("the mask of phase {phase} switched {count} coefficients off");
+        self.report.notes.push(note);
         Ok(xi.zip_map(&mask, |value, flag| if flag == 0.0 { 0.0 } else { value }))
     }
 

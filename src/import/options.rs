@@ -8,7 +8,6 @@ use nalgebra::DVector;
 
 use super::error::ImportError;
 use super::latex::SymbolNames;
-use super::report::Note;
 use super::role::{Mapping, ONLY_PHASE};
 use crate::files::Place;
 use crate::files::magic::{self, OtherFormat};
@@ -308,10 +307,8 @@ impl ImportOptions {
     }
 
     /// The note that a phase got the usual rule, unless its rule was given.
-    pub(super) fn usual_feet(&self, phase: &str, feet: &FeetRule) -> Option<Note> {
-        self.given(phase).is_none().then(|| Note::UsualFeet {
-            phase: phase.to_owned(),
-            feet: feet.to_string(),
-        })
+    pub(super) fn usual_feet(&self, phase: &str, feet: &FeetRule) -> Option<String> {
+        let note = || format!("phase {phase} holds for feet `{feet}`, the usual rule of its name");
+        self.given(phase).is_none().then(note)
     }
 }

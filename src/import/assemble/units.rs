@@ -5,7 +5,6 @@ use nalgebra::{DMatrix, DVector};
 
 use super::super::assign::Assigned;
 use super::super::error::ImportError;
-use super::super::report::Note;
 use super::super::role::Role;
 use super::{Assembly, Parts};
 use crate::model::{
@@ -112,7 +111,8 @@ impl<'a> Assembly<'a, '_> {
             },
             |last| (last.weights().clone(), last.bias() + &offset),
         )?;
-        self.report.notes.push(Note::FoldedMean);
+        let note = "the mean of the training's states went into the biases";
+        self.report.notes.push(note.to_owned());
         Ok(())
     }
 
@@ -170,7 +170,8 @@ impl<'a> Assembly<'a, '_> {
         for (_, statistics) in &mut parts.statistics {
             *statistics = sorted_statistics(statistics, order);
         }
-        self.report.notes.push(Note::Sorted(order.to_string()));
+        let note = format!("coordinates were in the order {order}; the model has romc's");
+        self.report.notes.push(note);
         Ok(())
     }
 }

@@ -73,25 +73,11 @@ impl Kind {
 
     /// Whether it ends every term that it stands behind.
     pub(super) fn ends_term(&self) -> bool {
-        match self {
-            Kind::Align
-            | Kind::Break
-            | Kind::Close
-            | Kind::Label(_)
-            | Kind::Comment(_)
-            | Kind::Paragraph => true,
-            Kind::Command(_)
-            | Kind::Begin(_)
-            | Kind::End(_)
-            | Kind::Open
-            | Kind::Superscript
-            | Kind::Subscript
-            | Kind::Dollar
-            | Kind::Display
-            | Kind::Parameter(_)
-            | Kind::Unread(..)
-            | Kind::Character(_) => false,
-        }
+        use Kind::{Align, Break, Close, Comment, Label, Paragraph};
+        matches!(
+            self,
+            Align | Break | Close | Label(_) | Comment(_) | Paragraph
+        )
     }
 }
 
