@@ -6,7 +6,7 @@ use std::rc::Rc;
 use super::super::error::ImportError;
 use super::document::is_one_of;
 use super::reader::has;
-use super::scopes::{Macro, Meaning, Scopes};
+use super::scopes::{Macro, Meaning, Refusal, Scopes};
 use super::token::{Kind, Lexer, Token};
 
 /// Most tokens that macros may make of one document.
@@ -59,11 +59,9 @@ impl<'t> Expander<'t> {
             let printed = match &token.kind {
                 Kind::Command(name) => match self.scopes.meaning(name).cloned() {
                     Some(Meaning::Macro(found)) => self.expand(&token, &found).map(|()| None)?,
-                    Some(Meaning::Unread {
-                        why,
-                        expected,
-                        matters,
-                    }) => self.unread(&token, why, expected, matters)?,
+                    Some(Meaning::Unread(refusal, matters)) => {
+                        self.unread(&token, refusal, matters)?
+                    }
                     Some(Meaning::Same(kind)) => self.primitive(token.with(kind))?,
                     Some(Meaning::Verbatim) | None => self.primitive(token)?,
                 },
@@ -126,8 +124,7 @@ impl<'t> Expander<'t> {
     pub(super) fn unread(
         &self,
         token: &Token,
-        why: &str,
-        expected: &'static str,
+        (why, expected): Refusal,
         matters: bool,
     ) -> Result<Option<Token>, ImportError> {
         if self.scopes.formula.is_some() {
@@ -366,7 +363,7 @@ impl<'t> Expander<'t> {
         if name == "lrbox" {
             return self.refuse(&token, "", "text that is printed where it stands");
         }
-        if matches!(meaning, Some(Meaning::Macro(_) | Meaning::Unread { .. })) {
+        if matches!(meaning, Some(Meaning::Macro(_) | Meaning::Unread(..))) {
             self.scopes
                 .enter(token.clone(), Some(Kind::End(name.clone())));
             self.pending.push(token.with(Kind::Command(name.clone())));
@@ -386,7 +383,7 @@ impl<'t> Expander<'t> {
         }
         if matches!(
             self.scopes.meaning(name),
-            Some(Meaning::Macro(_) | Meaning::Unread { .. })
+            Some(Meaning::Macro(_) | Meaning::Unread(..))
         ) {
             let end = format!("end{name}");
             let is_defined = self.scopes.meaning(&end).is_some();

@@ -23,18 +23,17 @@ pub(super) struct Macro {
     pub(super) matters: bool,
 }
 
+/// Why something is not read, behind its name, and what would be.
+pub(super) type Refusal = (&'static str, &'static str);
+
 /// What a command means that the document defines.
 #[derive(Clone, Debug)]
 pub(super) enum Meaning {
     Macro(Rc<Macro>),
     /// The meaning that a command or character had when `\let` named it.
     Same(Kind),
-    /// A definition that is not read: why, and what would be.
-    Unread {
-        why: &'static str,
-        expected: &'static str,
-        matters: bool,
-    },
+    /// A definition that is not read, and whether mathematics may be in it.
+    Unread(Refusal, bool),
     /// An environment whose contents are not read.
     Verbatim,
 }
