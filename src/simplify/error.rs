@@ -5,7 +5,7 @@
 use std::path::PathBuf;
 
 use crate::lower::LowerError;
-use crate::model::{LibraryError, ModelError};
+use crate::model::ModelError;
 
 /// Errors of simplification.
 #[derive(Debug, thiserror::Error)]
@@ -67,7 +67,4 @@ pub enum SimplifyError {
     /// A model that cannot be lowered to code.
     #[error(transparent)]
     Lower(#[from] LowerError),
-    /// The simplified model's terms are no library.
-    #[error(transparent)]
-    Library(#[from] LibraryError),
 }

@@ -7,7 +7,7 @@ use nalgebra::DMatrix;
 use super::error::SimplifyError;
 use super::ranges::Ranges;
 use crate::equations::Equations;
-use crate::model::{LatentVariable, Library, LibraryError, ReducedModel};
+use crate::model::{LatentVariable, Library, ModelError, ReducedModel};
 use crate::symbolic::{ExprId, ExprPool, Interval, Node, SymbolId};
 
 /// A library of terms, counted by rows, and the rows of `1` and of variables.
@@ -22,10 +22,8 @@ pub(super) struct Workspace {
 
 impl Workspace {
     /// The terms of `equations`, extended by `1` and by every variable of those summands that are not affine.
-    ///
-    /// # Errors
-    /// [`LibraryError`] if the equations' own terms are refused, which equations exclude.
-    pub(crate) fn new(equations: &Equations<'_>) -> Result<Self, LibraryError> {
+    /// Where these would be too many for a library, nothing is appended.
+    pub(crate) fn new(equations: &Equations<'_>) -> Result<Self, ModelError> {
         let own = equations.terms();
         let mut texts: Vec<String> = own.iter().map(|term| term.text().to_owned()).collect();
         let mut pool = equations.pool().clone();
@@ -39,10 +37,8 @@ impl Workspace {
             }
         }
         let dim = equations.latent_dim();
-        let library = match Library::from_terms(dim, &texts) {
-            Err(LibraryError::TooManyTerms { .. }) => Library::from_terms(dim, &texts[..own.len()]),
-            library => library,
-        }?;
+        let library = Library::from_terms(dim, &texts)
+            .or_else(|_| Library::from_terms(dim, &texts[..own.len()]))?;
         Ok(Self {
             original: own.len(),
             rows: rows(&library),

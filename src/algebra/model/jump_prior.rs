@@ -9,7 +9,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::error::{ModelError, check_tensor};
-use super::phase::{Phase, selected};
+use super::rom::{Phase, selected};
 use crate::robot::{ContactFlags, STATE_DIM};
 
 /// Numbers of a goal: distance, rise of the body at the apex, height of the body at the start, m.

@@ -6,7 +6,7 @@ use std::fmt;
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
-use super::error::{LibraryError, ModelError, check_shape};
+use super::error::{ModelError, check, check_shape};
 use super::evaluation::Tape;
 use super::standard_library::StandardLibrary;
 use super::variable::LatentVariable;
@@ -69,38 +69,34 @@ impl Library {
     /// The library with these terms, in the expression syntax of the model file.
     ///
     /// # Errors
-    /// Each variant of [`LibraryError`] except [`LibraryError::Degree`] and
-    /// [`LibraryError::Duplicate`].
-    pub fn from_terms(latent_dim: usize, texts: &[String]) -> Result<Self, LibraryError> {
+    /// As [`Self::of`].
+    pub fn from_terms(latent_dim: usize, texts: &[String]) -> Result<Self, ModelError> {
         Self::of(latent_dim, LibraryChoice::Terms(texts.to_vec()))
     }
 
     /// The standard library, in the order of the published arrays.
     ///
     /// # Errors
-    /// [`LibraryError::LatentDim`], [`LibraryError::Degree`], [`LibraryError::TooManyTerms`].
-    pub fn standard(latent_dim: usize, standard: StandardLibrary) -> Result<Self, LibraryError> {
+    /// As [`Self::of`].
+    pub fn standard(latent_dim: usize, standard: StandardLibrary) -> Result<Self, ModelError> {
         Self::of(latent_dim, LibraryChoice::Standard(standard))
     }
 
     /// The library with the terms that were chosen.
     ///
     /// # Errors
-    /// As [`Self::from_terms`] and [`Self::standard`].
-    pub fn of(latent_dim: usize, choice: LibraryChoice) -> Result<Self, LibraryError> {
-        if !(1..=MAX_LATENT_DIM).contains(&latent_dim) {
-            return Err(LibraryError::LatentDim { found: latent_dim });
-        }
+    /// [`ModelError::Invalid`] for a number of coordinates, a degree or a number of terms beyond its bound, and for a
+    /// term that is zero everywhere or has a constant part beyond the range of floats; [`ModelError::Term`].
+    pub fn of(latent_dim: usize, choice: LibraryChoice) -> Result<Self, ModelError> {
+        let fits = (1..=MAX_LATENT_DIM).contains(&latent_dim);
+        let expected = format!("1 to {MAX_LATENT_DIM}");
+        check(fits, "`latent_dim`", || latent_dim, expected)?;
         let (texts, standard) = match choice {
             LibraryChoice::Terms(texts) => (texts, None),
             LibraryChoice::Standard(standard) => (standard.texts(latent_dim)?, Some(standard)),
         };
-        if texts.is_empty() {
-            return Err(LibraryError::Empty);
-        }
-        if texts.len() > MAX_LIBRARY_DIM {
-            return Err(LibraryError::TooManyTerms { found: texts.len() });
-        }
+        check(!texts.is_empty(), "`library`", || "no term", "at least one")?;
+        check_term_count(texts.len())?;
         let mut pool = ExprPool::new();
         let symbols: Vec<SymbolId> = LatentVariable::all(latent_dim)
             .map(|variable| pool.symbol_id(&variable.to_string()))
@@ -108,12 +104,6 @@ impl Library {
         let mut terms: Vec<CandidateTerm> = Vec::with_capacity(texts.len());
         for (index, text) in texts.into_iter().enumerate() {
             let expr = parse_term(&mut pool, latent_dim, index, &text)?;
-            if expr == ExprId::ZERO {
-                return Err(LibraryError::Zero { index, text });
-            }
-            if !constants_are_finite(&pool, expr) {
-                return Err(LibraryError::NotFinite { index, text });
-            }
             terms.push(CandidateTerm { text, expr });
         }
         let exprs: Vec<ExprId> = terms.iter().map(CandidateTerm::expr).collect();
@@ -132,17 +122,14 @@ impl Library {
     /// coefficients cannot be learned.
     ///
     /// # Errors
-    /// [`LibraryError::Duplicate`] for the first such term.
-    pub fn check_distinct(&self) -> Result<(), LibraryError> {
+    /// [`ModelError::Invalid`] for the first such term.
+    pub fn check_distinct(&self) -> Result<(), ModelError> {
         let mut first_use = HashMap::new();
         for (second, term) in self.terms.iter().enumerate() {
             if let Some(first) = first_use.insert(term.expr, second) {
-                return Err(LibraryError::Duplicate {
-                    first,
-                    second,
-                    text: term.text.clone(),
-                    earlier: self.terms[first].text.clone(),
-                });
+                let (place, earlier) = (place(second), &self.terms[first].text);
+                let found = format!("{:?}, which equals [{first}] {earlier:?}", term.text);
+                return Err(ModelError::invalid(place, found, "different terms"));
             }
         }
         Ok(())
@@ -219,7 +206,7 @@ impl Library {
     /// Theta at one point: the value of each term, in order.
     ///
     /// # Errors
-    /// [`ModelError::Dimension`] if an argument is not `latent_dim` long.
+    /// [`ModelError::Invalid`] if an argument is not `latent_dim` long.
     pub fn evaluate(
         &self,
         z: &DVector<f64>,
@@ -277,26 +264,46 @@ impl fmt::Debug for Library {
     }
 }
 
+pub(super) fn check_term_count(found: usize) -> Result<(), ModelError> {
+    let found = (found, || format!("{found} terms"));
+    let expected = format!("at most {MAX_LIBRARY_DIM}");
+    check(found.0 <= MAX_LIBRARY_DIM, "`library`", found.1, expected)
+}
+
+fn place(index: usize) -> String {
+    format!("`library`[{index}]")
+}
+
 fn parse_term(
     pool: &mut ExprPool,
     latent_dim: usize,
     index: usize,
     text: &str,
-) -> Result<ExprId, LibraryError> {
+) -> Result<ExprId, ModelError> {
     if text.len() > MAX_TERM_LEN || text.chars().any(char::is_control) {
-        return Err(LibraryError::TermText {
-            index,
-            found: text.len(),
-        });
+        let found = format!("{} bytes or a control character", text.len());
+        let expected = format!("one line of at most {MAX_TERM_LEN} bytes");
+        return Err(ModelError::invalid(place(index), found, expected));
     }
     let known = |name: &str| LatentVariable::from_name(name, latent_dim).is_some();
     let read = pool.parse_defined(text, &known, &|_| None, ParseLimits::default());
-    read.map(|reading| reading.expr)
-        .map_err(|source| LibraryError::Parse {
-            index,
-            text: text.to_owned(),
-            source: Box::new(source),
-        })
+    let reading = read.map_err(|source| ModelError::Term {
+        index,
+        text: text.to_owned(),
+        source: Box::new(source),
+    })?;
+    let expected = if reading.expr == ExprId::ZERO {
+        "a term that is not zero everywhere"
+    } else if !constants_are_finite(pool, reading.expr) {
+        "constant parts with values that floats hold (up to 1.8e308)"
+    } else {
+        return Ok(reading.expr);
+    };
+    Err(ModelError::invalid(
+        place(index),
+        format!("{text:?}"),
+        expected,
+    ))
 }
 
 /// Whether every part without variables has a finite value.
@@ -316,53 +323,42 @@ mod tests {
     use super::*;
     use crate::symbolic::ParseErrorKind;
 
-    fn terms(texts: &[&str]) -> Vec<String> {
-        texts.iter().map(|&text| text.to_owned()).collect()
+    fn library(texts: &[&str]) -> Result<Library, ModelError> {
+        let texts: Vec<String> = texts.iter().map(|&text| text.to_owned()).collect();
+        Library::from_terms(2, &texts)
     }
 
     #[test]
-    fn library_with_equal_terms_is_accepted_but_not_distinct() {
-        let library = Library::from_terms(2, &terms(&["1", "z1*z2", "u1", "z2*z1"])).unwrap();
-        assert_eq!(library.len(), 4);
-        let error = library.check_distinct().unwrap_err();
-        assert!(matches!(
-            error,
-            LibraryError::Duplicate {
-                first: 1,
-                second: 3,
-                ..
-            }
-        ));
-    }
-
-    #[test]
-    fn library_with_vanishing_oversized_or_missing_terms_is_refused() {
-        assert!(matches!(
-            Library::from_terms(1, &terms(&["z1 - z1"])),
-            Err(LibraryError::Zero { index: 0, .. })
-        ));
+    fn terms_that_are_equal_zero_oversized_or_without_value_are_refused() {
+        let equal = library(&["1", "z1*z2", "u1", "z2*z1"]).expect("readable");
+        let refused = equal.check_distinct().unwrap_err().to_string();
+        assert!(refused.starts_with("`library`[3]: found \"z2*z1\", which equals [1]"));
         for text in ["z1/0", "log(0)*z1", "z1^(1/0)", "sqrt(-1) + z1"] {
-            let error = Library::from_terms(1, &terms(&[text])).unwrap_err();
-            assert!(
-                matches!(&error, LibraryError::Parse { index: 0, source, .. }
-                    if matches!(source.kind, ParseErrorKind::NoValue(_))),
-                "{text}: {error:?}"
-            );
+            let Err(ModelError::Term {
+                index: 0, source, ..
+            }) = library(&[text])
+            else {
+                panic!("{text}");
+            };
+            assert!(matches!(source.kind, ParseErrorKind::NoValue(_)), "{text}");
         }
-        let error = Library::from_terms(1, &terms(&["exp(1000)*z1"])).unwrap_err();
-        assert!(matches!(error, LibraryError::NotFinite { index: 0, .. }));
-        for text in ["z1+".repeat(400) + "z1", "z1\n+1".to_owned()] {
-            let found = Library::from_terms(1, &[text]);
-            assert!(matches!(
-                found,
-                Err(LibraryError::TermText { index: 0, .. })
-            ));
+        let long = "z1+".repeat(400) + "z1";
+        for (text, said) in [
+            ("z1 - z1", "not zero everywhere"),
+            ("exp(1000)*z1", "values that floats hold"),
+            (&long, "1202 bytes"),
+            ("z1\n+1", "a control character"),
+        ] {
+            let refused = library(&[text]).unwrap_err().to_string();
+            assert!(refused.starts_with("`library`[0]: found"), "{refused}");
+            assert!(refused.contains(said), "{refused}");
         }
-        assert_eq!(Library::from_terms(1, &[]), Err(LibraryError::Empty));
+        let none = library(&[]).unwrap_err().to_string();
+        assert_eq!(none, "`library`: found no term, expected at least one");
     }
 
     #[test]
-    fn library_values_agree_with_the_pool_for_every_node() {
+    fn values_agree_with_the_pool_for_every_node() {
         let texts = [
             "z1^7 - 2/z1^3",
             "abs(z1)^dz1",
@@ -370,7 +366,7 @@ mod tests {
             "cos(tan(z1)*sqrt(2))",
             "0.1*z1*dz1*u1",
         ];
-        let library = Library::from_terms(1, &terms(&texts)).unwrap();
+        let library = Library::from_terms(1, &texts.map(str::to_owned)).unwrap();
         let points = [[0.3, -0.7, 2.0], [-1.25, 0.5, -0.1], [2.0, 3.0, 0.0]];
         let variables = DMatrix::from_fn(3, 3, |row, point| points[point][row]);
         let all = library.evaluate_points(&variables).unwrap();
@@ -379,12 +375,9 @@ mod tests {
             let alone = library.evaluate(&z, &dz, &u_lat).unwrap();
             assert_eq!(alone.transpose(), all.row(point));
             let exprs: Vec<ExprId> = library.terms().iter().map(CandidateTerm::expr).collect();
-            let expected = library
-                .pool()
-                .evaluate_all(&exprs, &|symbol| values[symbol.index()]);
-            for (term, expected) in expected.iter().enumerate() {
-                assert_eq!(all[(point, term)], *expected, "{}", texts[term]);
-            }
+            let value_of = |symbol: SymbolId| values[symbol.index()];
+            let expected = library.pool().evaluate_all(&exprs, &value_of);
+            assert_eq!(all.row(point), DVector::from_vec(expected).transpose());
         }
     }
 }

@@ -1,18 +1,31 @@
-//! The maps of a model between robot and latent coordinates.
+//! The maps of a model between robot and latent coordinates, and these maps to first order at a state.
 //!
-//! With the encoder `E` and the decoder `D`, the Jacobian `J_E` of `E` at `s_x x`:
+//! With the encoder `E` and the decoder `D`, their Jacobians `J_E` at `s_x x` and `J_D` at `z`:
 //!
-//! - `z = E(s_x x)`, `ddz = J_E (s_x ddx) + dJ_E/dt (s_x dx)`;
-//! - `x = D(z) / s_x`.
+//! - `z = E(s_x x)`, `dz = J_E (s_x dx)`, `ddz = J_E (s_x ddx) + dJ_E/dt (s_x dx)`;
+//! - `x = D(z) / s_x`, `dx = J_D dz / s_x`;
+//! - `u_lat = pinv(J_E^T) (s_u u)` (project), `u = (J_E^T u_lat) / s_u` (lift).
 //!
-//! Velocities and inputs: [`ReducedModel::tangent`].
+//! For a linear model the Jacobians are the same at every state. All of `x`, `dx`, `ddx` and `u` are in SI units.
 
 use nalgebra::{DMatrix, DVector};
 
-use super::affine::AffineMap;
 use super::error::ModelError;
+use super::projection::pinv_of_transpose;
 use super::rom::ReducedModel;
-use super::state_map::StateMap;
+use super::state_map::{AffineMap, StateMap};
+
+/// Velocities and inputs between robot and latent coordinates at one state.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tangent {
+    /// `dz = encode dx`: `J_E s_x`, `latent_dim x state_dim`.
+    pub encode: DMatrix<f64>,
+    /// `u_lat = project u`: `pinv(J_E^T) s_u`, `latent_dim x state_dim`.
+    pub project: DMatrix<f64>,
+    /// `u = lift u_lat`: `J_E^T / s_u`, `state_dim x latent_dim`. From the power balance under `dz = encode dx`; joint
+    /// torques (N m) are the leading entries.
+    pub lift: DMatrix<f64>,
+}
 
 impl ReducedModel {
     /// Whether encoder and decoder, as far as the model has them, are single affine maps.
@@ -22,18 +35,12 @@ impl ReducedModel {
     }
 
     /// The encoder, linear or not, in scaled units.
-    ///
-    /// # Errors
-    /// [`ModelError::Missing`] for a latent-only model.
     pub fn encoder_map(&self) -> Result<&StateMap, ModelError> {
         let purpose = "going from robot to latent coordinates";
         self.require(self.parts.encoder.as_ref(), "encoder", purpose)
     }
 
     /// The decoder, linear or not, in scaled units.
-    ///
-    /// # Errors
-    /// [`ModelError::Missing`] if the model has none.
     pub fn decoder_map(&self) -> Result<&StateMap, ModelError> {
         let purpose = "going from latent to robot coordinates";
         self.require(self.parts.decoder.as_ref(), "decoder", purpose)
@@ -56,25 +63,19 @@ impl ReducedModel {
     }
 
     /// `pinv(W_e^T)` of a linear model, `latent_dim x state_dim`, in scaled units.
-    ///
-    /// # Errors
-    /// [`ModelError::Missing`] for a latent-only model, [`ModelError::Nonlinear`].
     pub(crate) fn input_projection(&self) -> Result<&DMatrix<f64>, ModelError> {
         self.encoder()?;
         let projection = self.input_projection.as_ref();
         self.require(projection, "encoder", "projecting inputs")
     }
 
-    /// The linear model whose maps have the same value and the same Jacobian at the state `x` (SI
-    /// units) and, for the decoder, at `z = E(s_x x)`; the dynamics are the same. A linear map
-    /// stays as it is.
+    /// The linear model whose maps have the same value and the same Jacobian at the state `x` and, for the decoder, at
+    /// `z = E(s_x x)`; the dynamics are the same. A linear map stays as it is.
     ///
-    /// Positions, velocities and inputs of the two models agree at `x` and drift apart away from
-    /// it as the maps curve.
+    /// Positions, velocities and inputs of the two models agree at `x` and drift apart away from it.
     ///
     /// # Errors
-    /// As [`ReducedModel::encode`], and [`ModelError::RankDeficient`] where the encoder's Jacobian
-    /// has not full row rank.
+    /// As [`ReducedModel::tangent`].
     pub fn linearised_at(&self, x: &DVector<f64>) -> Result<ReducedModel, ModelError> {
         let scaled = self.scaled_state(x)?;
         let encoder = self.encoder_map()?;
@@ -91,27 +92,18 @@ impl ReducedModel {
         builder.build()
     }
 
-    /// `z = E(s_x x)`, for a linear model `W_e (s_x x) + b_e`; `x` in SI units.
-    ///
-    /// # Errors
-    /// [`ModelError::Missing`] for a latent-only model, [`ModelError::Dimension`].
+    /// `z = E(s_x x)`, for a linear model `W_e (s_x x) + b_e`.
     pub fn encode(&self, x: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
         self.encoder_map()?.apply(&self.scaled_state(x)?)
     }
 
-    /// `x = D(z) / s_x`, for a linear model `(W_d z + b_d) / s_x`, SI units.
-    ///
-    /// # Errors
-    /// [`ModelError::Missing`] if the model has no decoder or scaling, [`ModelError::Dimension`].
+    /// `x = D(z) / s_x`, for a linear model `(W_d z + b_d) / s_x`.
     pub fn decode(&self, z: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
         let scaled = self.decoder_map()?.apply(z)?;
         Ok(scaled.component_div(&self.state_factors()?))
     }
 
-    /// `ddz = J_E (s_x ddx) + dJ_E/dt (s_x dx)` at the state `x`; all in SI units.
-    ///
-    /// # Errors
-    /// As [`ReducedModel::encode`].
+    /// `ddz = J_E (s_x ddx) + dJ_E/dt (s_x dx)` at the state `x`.
     pub fn encode_acceleration(
         &self,
         x: &DVector<f64>,
@@ -124,7 +116,40 @@ impl ReducedModel {
         Ok(ddz)
     }
 
-    pub(super) fn scaled_state(&self, x: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
+    /// The maps that the encoder's Jacobian at the state `x` gives.
+    ///
+    /// # Errors
+    /// [`ModelError::Invalid`] where the Jacobian does not have full row rank.
+    pub fn tangent(&self, x: &DVector<f64>) -> Result<Tangent, ModelError> {
+        let jacobian = self.encoder_map()?.jacobian(&self.scaled_state(x)?)?;
+        let (s_x, s_u) = (self.state_factors()?, self.input_factors()?);
+        let projection = match &self.input_projection {
+            Some(projection) => projection,
+            None => &pinv_of_transpose(&jacobian, "Jacobian of the encoder at this state")?,
+        };
+        Ok(Tangent {
+            // divided by the factors, not multiplied by inverses, which round
+            lift: (jacobian.transpose()).map_with_location(|row, _, value| value / s_u[row]),
+            project: projection.map_with_location(|_, column, value| value * s_u[column]),
+            encode: jacobian.map_with_location(|_, column, value| value * s_x[column]),
+        })
+    }
+
+    /// `d z / d x = J_E s_x` at the state `x`, `latent_dim x state_dim`; of any rank.
+    pub fn encoder_jacobian(&self, x: &DVector<f64>) -> Result<DMatrix<f64>, ModelError> {
+        let jacobian = self.encoder_map()?.jacobian(&self.scaled_state(x)?)?;
+        let s_x = self.state_factors()?;
+        Ok(jacobian.map_with_location(|_, column, value| value * s_x[column]))
+    }
+
+    /// `d x / d z = J_D / s_x` at the latent state `z`, `state_dim x latent_dim`.
+    pub fn decoder_jacobian(&self, z: &DVector<f64>) -> Result<DMatrix<f64>, ModelError> {
+        let jacobian = self.decoder_map()?.jacobian(z)?;
+        let s_x = self.state_factors()?;
+        Ok(jacobian.map_with_location(|row, _, value| value / s_x[row]))
+    }
+
+    fn scaled_state(&self, x: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
         let factors = self.state_factors()?;
         ModelError::check_dimension("robot state", x.len(), factors.len())?;
         Ok(x.component_mul(&factors))

@@ -11,18 +11,18 @@ pub(crate) const RANK_TOLERANCE: f64 = 1e-10;
 /// `pinv(W_e^T) = U S^-1 V^T`.
 ///
 /// # Errors
-/// [`ModelError::RankDeficient`], with the name of the matrix.
+/// [`ModelError::Invalid`] with the name of the matrix, if its rows are (nearly) linearly dependent, so that latent
+/// inputs have no unique lift.
 pub(super) fn pinv_of_transpose(
     weights: &DMatrix<f64>,
-    matrix: &'static str,
+    matrix: &str,
 ) -> Result<DMatrix<f64>, ModelError> {
-    let expected = weights.nrows();
-    let deficient = |smallest, largest| ModelError::RankDeficient {
-        matrix,
-        smallest,
-        largest,
-        expected,
-        tolerance: RANK_TOLERANCE,
+    let dim = weights.nrows();
+    let deficient = |smallest: f64, largest: f64| {
+        let found = format!("singular values from {smallest:e} to {largest:e}");
+        let expected =
+            format!("full row rank {dim} (smallest above {RANK_TOLERANCE:e} times the largest)");
+        ModelError::invalid(matrix, found, expected)
     };
     let largest_entry = weights.amax();
     if largest_entry == 0.0 {

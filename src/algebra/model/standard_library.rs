@@ -6,8 +6,8 @@ use clap::ValueEnum;
 use clap::builder::PossibleValue;
 use serde::{Deserialize, Serialize};
 
-use super::error::LibraryError;
-use super::library::MAX_LIBRARY_DIM;
+use super::error::{ModelError, check};
+use super::library::check_term_count;
 
 /// Largest polynomial degree of the standard library.
 pub(crate) const MAX_DEGREE: u32 = 8;
@@ -23,7 +23,7 @@ pub(crate) const MAX_DEGREE: u32 = 8;
 /// let library = Library::standard(1, StandardLibrary { degree: 2, trigonometric: false, inputs: true })?;
 /// let texts: Vec<&str> = library.terms().iter().map(|term| term.text()).collect();
 /// assert_eq!(texts, ["1", "z1", "dz1", "z1^2", "z1*dz1", "dz1^2", "u1"]);
-/// # Ok::<(), romc::model::LibraryError>(())
+/// # Ok::<(), romc::model::ModelError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -87,7 +87,7 @@ impl Run {
 /// let standard = StandardLibrary { degree: 1, trigonometric: true, inputs: false };
 /// let texts = standard.texts_in(LibraryOrder::PAPER, 1)?;
 /// assert_eq!(texts, ["1", "z1", "dz1", "sin(z1)", "cos(z1)", "sin(dz1)", "cos(dz1)"]);
-/// # Ok::<(), romc::model::LibraryError>(())
+/// # Ok::<(), romc::model::ModelError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LibraryOrder {
@@ -218,26 +218,24 @@ impl StandardLibrary {
     }
 
     /// The terms in the syntax of the model file.
-    pub(super) fn texts(&self, latent_dim: usize) -> Result<Vec<String>, LibraryError> {
+    pub(super) fn texts(&self, latent_dim: usize) -> Result<Vec<String>, ModelError> {
         self.texts_in(LibraryOrder::ROMC, latent_dim)
     }
 
     /// The terms in another order; the texts are the same.
     ///
     /// # Errors
-    /// [`LibraryError::Degree`], [`LibraryError::TooManyTerms`].
+    /// [`ModelError::Invalid`] for a degree or a number of terms beyond its bound.
     pub fn texts_in(
         &self,
         order: LibraryOrder,
         latent_dim: usize,
-    ) -> Result<Vec<String>, LibraryError> {
-        if self.degree > MAX_DEGREE {
-            return Err(LibraryError::Degree { found: self.degree });
-        }
+    ) -> Result<Vec<String>, ModelError> {
+        let expected = format!("at most {MAX_DEGREE}");
+        let fits = self.degree <= MAX_DEGREE;
+        check(fits, "`library.degree`", || self.degree, expected)?;
         let count = self.term_count(latent_dim).unwrap_or(usize::MAX);
-        if count > MAX_LIBRARY_DIM {
-            return Err(LibraryError::TooManyTerms { found: count });
-        }
+        check_term_count(count)?;
         let name = |kind: &'static str| (1..=latent_dim).map(move |i| format!("{kind}{i}"));
         let names: Vec<String> = name("z").chain(name("dz")).collect();
         let state: Vec<usize> = match order.is_paired {
@@ -272,7 +270,7 @@ impl StandardLibrary {
         &self,
         order: LibraryOrder,
         latent_dim: usize,
-    ) -> Result<Vec<usize>, LibraryError> {
+    ) -> Result<Vec<usize>, ModelError> {
         let own = self.texts(latent_dim)?;
         let rows: HashMap<&str, usize> = (own.iter().map(String::as_str)).zip(0..).collect();
         let texts = self.texts_in(order, latent_dim)?;

@@ -7,13 +7,71 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::activation::Activation;
-use super::affine::AffineMap;
-use super::error::{ModelError, check_shape};
+use super::error::{ModelError, check, check_finite, check_shape};
 
 /// Most layers of a map.
 pub const MAX_LAYERS: usize = 16;
 /// Most units of a layer.
 pub const MAX_LAYER_WIDTH: usize = 1024;
+
+/// The map `x -> W x + b`, in scaled units.
+///
+/// As an encoder `W_e` is `latent_dim x state_dim`, as a decoder `W_d` is `state_dim x latent_dim`.
+/// Positions take the bias, velocities and accelerations do not.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AffineMap {
+    weights: DMatrix<f64>,
+    bias: DVector<f64>,
+}
+
+impl AffineMap {
+    /// The map with these weights and this bias; `tensor` names it in errors.
+    ///
+    /// # Errors
+    /// [`ModelError::Invalid`] unless `bias` has one entry per row of `weights`,
+    /// [`ModelError::NonFinite`] if an entry is infinite or not a number.
+    pub fn new(
+        tensor: &str,
+        weights: DMatrix<f64>,
+        bias: DVector<f64>,
+    ) -> Result<Self, ModelError> {
+        let bias_name = format!("{tensor}.bias");
+        check_shape(&bias_name, bias.shape(), (weights.nrows(), 1))?;
+        check_finite(&format!("{tensor}.weights"), &weights)?;
+        check_finite(&bias_name, &bias)?;
+        Ok(Self { weights, bias })
+    }
+
+    /// `W`, `output_dim x input_dim`.
+    pub fn weights(&self) -> &DMatrix<f64> {
+        &self.weights
+    }
+
+    /// `b`, `output_dim`.
+    pub fn bias(&self) -> &DVector<f64> {
+        &self.bias
+    }
+
+    /// Columns of `W`.
+    pub fn input_dim(&self) -> usize {
+        self.weights.ncols()
+    }
+
+    pub(crate) fn output_dim(&self) -> usize {
+        self.weights.nrows()
+    }
+
+    /// `W x + b`: how positions map.
+    fn apply(&self, x: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
+        Ok(self.apply_linear(x)? + &self.bias)
+    }
+
+    /// `W dx`: how velocities and accelerations map.
+    fn apply_linear(&self, dx: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
+        ModelError::check_dimension("argument of an affine map", dx.len(), self.input_dim())?;
+        Ok(&self.weights * dx)
+    }
+}
 
 /// One layer: `y -> phi(W y + b)`, the activation applied to each unit.
 #[derive(Clone, Debug, PartialEq)]
@@ -49,20 +107,26 @@ impl StateMap {
     /// [`ModelError::Invalid`] unless there are 1 to [`MAX_LAYERS`], each of at most
     /// [`MAX_LAYER_WIDTH`] units, and each takes the outputs of the layer before it.
     pub fn new(tensor: &str, layers: Vec<Layer>) -> Result<Self, ModelError> {
-        if !(1..=MAX_LAYERS).contains(&layers.len()) {
-            let place = format!("`{tensor}.layers`");
-            let found = format!("{} layers", layers.len());
-            let expected = format!("1 to {MAX_LAYERS}");
-            return Err(ModelError::invalid(place, found, expected));
-        }
+        let n_layers = layers.len();
+        let (fits, place) = (
+            (1..=MAX_LAYERS).contains(&n_layers),
+            format!("`{tensor}.layers`"),
+        );
+        let expected = format!("1 to {MAX_LAYERS}");
+        check(fits, &place, || format!("{n_layers} layers"), expected)?;
         for (index, layer) in layers.iter().enumerate() {
             let (rows, columns) = layer.map.weights().shape();
             let name = format!("{tensor}.layers[{index}].weights");
-            if rows > MAX_LAYER_WIDTH {
-                let found = format!("{rows} units");
-                let expected = format!("at most {MAX_LAYER_WIDTH}");
-                return Err(ModelError::invalid(format!("`{name}`"), found, expected));
-            }
+            let (fits, expected) = (
+                rows <= MAX_LAYER_WIDTH,
+                format!("at most {MAX_LAYER_WIDTH}"),
+            );
+            check(
+                fits,
+                &format!("`{name}`"),
+                || format!("{rows} units"),
+                expected,
+            )?;
             let expected = match index {
                 0 => columns,
                 _ => layers[index - 1].map.output_dim(),
@@ -101,9 +165,6 @@ impl StateMap {
     }
 
     /// How positions map.
-    ///
-    /// # Errors
-    /// [`ModelError::Dimension`] if `x` is not `input_dim` long.
     pub fn apply(&self, x: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
         let (first, rest) = self.layers.split_first().expect("a map has a layer");
         let y = first.activated(first.map.apply(x)?);
@@ -114,9 +175,6 @@ impl StateMap {
     /// How positions, velocities and accelerations map: `y`, `J(x) dx` and `J(x) ddx + dJ/dt dx`.
     ///
     /// Each layer takes `dy -> phi'(a) W dy` and `ddy -> phi''(a) (W dy)^2 + phi'(a) W ddy`.
-    ///
-    /// # Errors
-    /// [`ModelError::Dimension`] if an argument is not `input_dim` long.
     pub fn apply_rates(
         &self,
         x: &DVector<f64>,
@@ -139,9 +197,6 @@ impl StateMap {
     }
 
     /// The Jacobian `J(x) = dy/dx`, `output_dim x input_dim`.
-    ///
-    /// # Errors
-    /// [`ModelError::Dimension`] if `x` is not `input_dim` long.
     pub fn jacobian(&self, x: &DVector<f64>) -> Result<DMatrix<f64>, ModelError> {
         let mut y = x.clone();
         let mut jacobian = None;
@@ -180,15 +235,17 @@ impl StateMap {
     /// rank.
     pub(super) fn check_widths(&self, latent_dim: usize) -> Result<(), ModelError> {
         let widths = self.layers.iter().map(|layer| layer.map.output_dim());
-        match widths.enumerate().find(|&(_, width)| width < latent_dim) {
-            None => Ok(()),
-            Some((layer, found)) => {
-                let expected = format!("at least {latent_dim}, one per latent coordinate");
-                let place = format!("`encoder.layers[{layer}]`");
-                let found = format!("{found} units");
-                Err(ModelError::invalid(place, found, expected))
-            }
+        for (layer, width) in widths.enumerate() {
+            let place = format!("`encoder.layers[{layer}]`");
+            let expected = format!("at least {latent_dim}, one per latent coordinate");
+            check(
+                width >= latent_dim,
+                &place,
+                || format!("{width} units"),
+                expected,
+            )?;
         }
+        Ok(())
     }
 
     /// The layers in words: `18 -> 32 elu -> 4`.
