@@ -50,9 +50,6 @@ mod tables;
 mod tolerance;
 mod workspace;
 
-#[cfg(test)]
-mod tests;
-
 pub use certificate::{Certificate, certificate_json};
 pub use domain::{Domain, MARGIN, Samples};
 pub use error::SimplifyError;
