@@ -61,7 +61,6 @@ fn domain(arguments: &CheckArguments) -> Result<CheckDomain, CheckError> {
     CheckDomain::from_toml(path, &text)
 }
 
-/// The comparison for people.
 fn text(left: &Side, right: &Side, comparison: &Comparison) -> String {
     let mut text = format!("A: {}\nB: {}\n", left.file, right.file);
     for phase in &comparison.phases {
@@ -123,7 +122,6 @@ fn dropping(verdict: &Verdict, [left, right]: [&Side; 2]) -> String {
     notes.collect()
 }
 
-/// The letter of a file.
 fn side(is_second: bool) -> &'static str {
     if is_second { "B" } else { "A" }
 }

@@ -17,7 +17,6 @@ use crate::model::ReducedModel;
 use crate::typeset::{NumberStyle, PrintOptions, Rounding, SymbolTable, Table};
 use crate::{Error, artifact};
 
-/// Compiles a model into a folder.
 pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
     let save_model = arguments.simplification.save_model.as_deref();
     let (simplification, model) = (&arguments.simplification, &arguments.model);
@@ -99,7 +98,6 @@ fn twice(targets: &[Target]) -> String {
     lines("note: ", note)
 }
 
-/// The model and the written files as text.
 fn text(
     arguments: &CompileArguments,
     equations: &Equations<'_>,

@@ -16,7 +16,6 @@ use crate::recording::{
 };
 use crate::{Error, artifact};
 
-/// Reads, chains and writes.
 pub fn run(arguments: &ConvertArguments) -> Result<Answer, Error> {
     Inputs::default()
         .and(&arguments.recordings)

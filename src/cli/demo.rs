@@ -27,7 +27,6 @@ use crate::simplify::Tolerance;
 use crate::train::sha256;
 use crate::{Error, artifact, recording};
 
-/// The shipped model that the demo works with.
 const MODEL: (&str, &[u8]) = ("go1-d4.json", include_bytes!("../../models/go1-d4.json"));
 
 /// Recorded jumps that its training did not see.

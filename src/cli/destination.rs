@@ -14,15 +14,10 @@ use crate::robot::Robot;
 pub struct Format(&'static [&'static str]);
 
 impl Format {
-    /// A table as CSV.
     pub const TABLE: Self = Self(&[".csv"]);
-    /// A recording.
     pub const RECORDING: Self = Self(&[".csv", ".csv.gz", ".mcap"]);
-    /// A model file.
     pub const MODEL: Self = Self(&[".json"]);
-    /// A robot, its actuators, a map of columns.
     pub const TOML: Self = Self(&[".toml"]);
-    /// A report.
     pub const PAGE: Self = Self(&[".html", ".htm"]);
 
     /// Refuses a name whose ending says another format. What is there and no file of a disk is refused elsewhere.
@@ -53,7 +48,6 @@ impl Format {
 pub struct Inputs<'a>(Vec<&'a Path>, Option<Begun>);
 
 impl<'a> Inputs<'a> {
-    /// These and more.
     pub fn and<P: AsRef<Path> + ?Sized + 'a>(
         mut self,
         more: impl IntoIterator<Item = &'a P>,

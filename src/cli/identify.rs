@@ -16,7 +16,6 @@ use crate::recording::Clocks;
 use crate::robot::Robot;
 use crate::typeset::{Table, significant};
 
-/// Identifies the robot and writes the file, if one is asked for.
 pub fn run(arguments: &IdentifyArguments) -> Result<Answer, Error> {
     Inputs::default()
         .and(&arguments.recordings)
@@ -100,7 +99,6 @@ fn text(found: &Identification, robot: &Robot, recordings: usize) -> String {
     )
 }
 
-/// A table of values with their standard errors.
 fn quantities<const N: usize>(what: &str, rows: [(&str, &str, [f64; 2]); N]) -> Table {
     Table::of(rows)
         .column(what, "", |(name, ..)| *name)

@@ -22,7 +22,6 @@ const PATTERN_WIDTH: usize = 120;
 /// Coordinates named for each latent.
 const DOMINANT: usize = 4;
 
-/// Describes a model.
 pub fn describe(path: &Path, model: &ReducedModel) -> Result<Answer, Error> {
     let dominant = dominant_coordinates(model);
     let equations = Equations::of(model);

@@ -11,7 +11,6 @@ use super::output::names;
 use crate::Error;
 use crate::files::{EmittedFile, write_files};
 
-/// Writes `romc.1` and `romc-COMMAND.1` for each command.
 pub fn pages(arguments: &ManualArguments) -> Result<Answer, Error> {
     let mut root = Arguments::command();
     root.build();
@@ -46,7 +45,6 @@ fn file(folder: &Path, name: &str, command: clap::Command) -> Result<EmittedFile
     Ok(EmittedFile::new(path, String::from_utf8_lossy(&page)))
 }
 
-/// The completions of one shell.
 pub fn completions(arguments: &CompletionsArguments) -> Answer {
     let mut script = Vec::new();
     let mut command = Arguments::command();

@@ -99,7 +99,6 @@ const DONE: u8 = 0;
 const FAILED: u8 = 1;
 const WRONG_USAGE: u8 = 2;
 
-/// The exit code of a command that ran to its end.
 fn code(is_failed: bool) -> u8 {
     if is_failed { FAILED } else { DONE }
 }
@@ -150,7 +149,6 @@ fn print(text: &str) -> u8 {
     }
 }
 
-/// Prints an error and its chain of causes to stderr.
 fn print_error(error: &Error) {
     eprintln!("error: {}", printable(&error.to_string()));
     let first = std::error::Error::source(error);

@@ -65,13 +65,11 @@ pub fn run(arguments: &MpcArguments) -> Result<(Answer, u8), Error> {
     Ok((answer, code(is_failed)))
 }
 
-/// What the verdict takes of runs.
 pub fn judged(runs: &[NamedRun]) -> Vec<&ControlMetrics> {
     let metrics = runs.iter().filter_map(|(_, run)| run.metrics.as_ref());
     metrics.collect()
 }
 
-/// Runs a fresh controller along each recording.
 pub fn run_all(
     model: &ReducedModel,
     recordings: &[Recording],
@@ -182,7 +180,6 @@ pub fn run_json((path, run): &NamedRun) -> Value {
     value
 }
 
-/// One row per control step, for a CSV file.
 pub fn command_table(model: &ReducedModel, runs: &[NamedRun]) -> Table {
     let latent = |name| numbered(name, model.latent_dim());
     let inputs = match model.input() {

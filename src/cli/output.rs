@@ -33,7 +33,6 @@ pub fn write_file(path: &Path, contents: &[u8], overwrite: Overwrite) -> Result<
     })
 }
 
-/// Reads a text of settings.
 pub fn read_text(path: &Path) -> Result<String, Error> {
     read_toml(path).map_err(|source| Error::Read {
         path: path.to_owned(),
@@ -41,7 +40,6 @@ pub fn read_text(path: &Path) -> Result<String, Error> {
     })
 }
 
-/// The settings of a TOML file, checked.
 pub fn read_settings<T: DeserializeOwned>(
     path: &Path,
     check: impl Fn(&T) -> Result<(), String>,
@@ -52,7 +50,6 @@ pub fn read_settings<T: DeserializeOwned>(
     Ok(settings)
 }
 
-/// A file of settings that cannot be used.
 pub fn refused(path: &Path, message: impl Into<String>) -> Error {
     Error::Config {
         path: path.to_owned(),
@@ -107,7 +104,6 @@ pub fn printable(text: &str) -> Cow<'_, str> {
     escaped(text, |c| c.escape_unicode().to_string())
 }
 
-/// Prints a note to stderr.
 pub fn note(text: &str) {
     eprintln!("note: {}", printable(text));
 }
@@ -155,7 +151,6 @@ pub fn note_late_restarts(recordings: &[Recording], restart_every_s: f64) {
     }
 }
 
-/// Prints a warning to stderr.
 pub fn warn(text: &str) {
     eprintln!("warning: {}", printable(text));
 }
@@ -184,7 +179,6 @@ fn escaped(text: &str, written: impl Fn(char) -> String) -> Cow<'_, str> {
     Cow::Owned(out)
 }
 
-/// Reports on stderr what reading did besides reading.
 pub fn report_reading(notes: &ReadingNotes) {
     notes.lines().iter().for_each(|line| note(line));
 }
@@ -206,7 +200,6 @@ pub fn numbered(name: &str, count: usize) -> impl Iterator<Item = String> {
     (1..=count).map(move |index| format!("{name}_{index}"))
 }
 
-/// Adds the entries of one object to another.
 pub fn extend(object: &mut Value, more: Value) {
     if let (Value::Object(object), Value::Object(more)) = (object, more) {
         object.extend(more);
@@ -242,7 +235,6 @@ fn styled(bar: ProgressBar, template: &str, message: impl Into<String>) -> Progr
     bar
 }
 
-/// Shows on a bar how many steps are done.
 pub fn show_progress(bar: &ProgressBar, done: usize, total: usize) {
     bar.set_length(total as u64);
     bar.set_position(done as u64);

@@ -75,7 +75,6 @@ pub fn run(arguments: &PlanArguments) -> Result<Answer, Error> {
     Ok(answer)
 }
 
-/// The goal of the arguments.
 fn goal(arguments: &PlanArguments, robot: &'static Robot) -> Result<Goal, Error> {
     let (Some(distance_m), Some(apex_m)) = (arguments.distance, arguments.apex) else {
         unreachable!("clap asks for both without --reach");

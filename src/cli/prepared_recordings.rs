@@ -22,14 +22,12 @@ use crate::typeset::words::counted;
 /// A jump of a divided set: its file, its segment there, and the first row.
 type Place = (PathBuf, usize, usize);
 
-/// Names of the sets of a training.
 const SETS: [&str; 3] = ["training", "validation", "test"];
 
 /// The recordings of a training; their files are read when the samples are needed.
 pub struct RecordedSets {
     /// Jumps that the model is fitted to, those that choose between candidates, and those used only for the final metrics.
     pub sets: [Arc<RecordingFiles>; 3],
-    /// The jumps of each set, if they were divided.
     pub divided: Option<[Vec<Place>; 3]>,
     options: ConditionOptions,
 }
@@ -60,7 +58,6 @@ impl RecordedSets {
         })
     }
 
-    /// Whole files for training, validation and test.
     pub fn whole(
         paths: [&[PathBuf]; 3],
         settings: &TrainSettings,
@@ -130,7 +127,6 @@ impl RecordedSets {
         })
     }
 
-    /// The notes of all sets together, as far as files were read.
     fn notes(&self) -> Notes {
         let mut all = Notes::default();
         for set in &self.sets {
@@ -206,7 +202,6 @@ fn report_singular(findings: &[(PathBuf, Finding)]) {
     }
 }
 
-/// All recordings of a set of files, in memory.
 pub fn read_all(files: &RecordingFiles) -> Result<Vec<Recording>, Error> {
     let mut all = Vec::new();
     files.for_each(|recording| {
@@ -225,7 +220,6 @@ pub fn reader_for(arguments: &ReadingArguments, settings: &TrainSettings) -> Res
     reader(arguments, clocks)
 }
 
-/// Every jump of these files.
 fn jumps_of(paths: &[PathBuf], reader: &Reader) -> Result<Vec<Place>, Error> {
     let mut jumps = Vec::new();
     for path in paths {

@@ -109,23 +109,16 @@ pub fn run(arguments: &ReportArguments) -> Result<(Answer, u8), Error> {
     Ok((Answer { text, json }, code(made.verdict.fit_for.is_empty())))
 }
 
-/// A report in memory.
 pub struct Made {
-    /// The page.
     pub page: String,
-    /// Its first words.
     pub introduction: Introduction,
-    /// What the model is fit for.
     pub verdict: Verdict,
-    /// Every figure as SVG, PDF and CSV.
     pub files: Vec<EmittedFile>,
-    /// Number of figures.
     pub n_figures: usize,
     /// What speaks against using the model on these recordings.
     pub remarks: Vec<String>,
 }
 
-/// Assesses the model, runs the controller and draws everything.
 fn make(
     model: &ReducedModel,
     recordings: &[Recording],
@@ -162,7 +155,6 @@ fn make(
     made
 }
 
-/// Draws the assessment and the controller's runs.
 pub fn page_of(
     content: &Content<'_>,
     tolerance: Tolerance,
@@ -194,7 +186,6 @@ pub fn page_of(
 
 const LADDER_CAPTION: &str = "Size of the equations within each tolerance: active terms, digits of all coefficients, operations; errors as shares of the root mean square of their ddz, the largest of all equations; errors of rollouts over whole jumps and restarted";
 
-/// The commands that reproduce the page.
 fn commands(arguments: &ReportArguments, has_control: bool) -> Vec<String> {
     let model = quoted(&arguments.model);
     let recordings = quoted_all(&arguments.recordings) + &arguments.reading.as_flags();

@@ -35,7 +35,6 @@ fn note_all(file: &str, notes: &[String]) {
         .for_each(|text| note(&format!("{file}: {text}")));
 }
 
-/// Shows a robot, and writes its TOML.
 pub fn run(arguments: &RobotArguments) -> Result<Answer, Error> {
     Inputs::default()
         .and_robot(Some(&arguments.robot))

@@ -63,7 +63,6 @@ pub fn run(arguments: &SimulateArguments) -> Result<(Answer, u8), Error> {
     Ok((Answer { text, json }, code(verdict.fails_predictions())))
 }
 
-/// All metrics of an assessment as text.
 fn metrics_text(model: &ReducedModel, assessment: &Assessment<'_>) -> String {
     let mut text = format!("{}\n", coordinate_table(model, assessment));
     for (kind, sums) in [
@@ -156,7 +155,6 @@ fn columns(latent_dim: usize, names: &[String]) -> Vec<String> {
         .collect()
 }
 
-/// Adds each recorded value with its two predictions to a row.
 fn add<'a>(
     row: &mut Vec<String>,
     recorded: impl Iterator<Item = &'a f64>,

@@ -18,10 +18,8 @@ use crate::study::{self, CellId, FOLDS, Outcome, Plan, Shard, Spread, Store, Sum
 use crate::train::{Method, Origin};
 use crate::typeset::{Cell, Table, significant};
 
-/// The tables of a study.
 const TABLES: [&str; 2] = ["cells.csv", "summary.csv"];
 
-/// Trains what is missing, or joins parts, and writes the tables of the study.
 pub fn run(arguments: &StudyArguments) -> Result<Answer, Error> {
     check_folder(&arguments.out_dir, &TABLES, arguments.force)?;
     let store = match arguments.merge.is_empty() {

@@ -21,7 +21,6 @@ use crate::train::{
 use crate::typeset::{Cell, Table, significant};
 use crate::{Error, artifact, train};
 
-/// Learns a model and writes it.
 pub fn run(arguments: &TrainArguments) -> Result<(Answer, u8), Error> {
     let settings = train_settings::effective(arguments)?;
     Inputs::default()
@@ -137,7 +136,6 @@ const INTERRUPTED_CODE: u8 = 130;
 /// Becomes true at the first Ctrl-C, so that a training ends with the best so far; the second one ends the process.
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
-/// The model with a provenance that says that its training did not come to its end.
 fn marked_as_interrupted(model: ReducedModel) -> ReducedModel {
     let mut provenance = model.provenance().clone();
     provenance.insert("interrupted".to_owned(), true.into());
@@ -205,7 +203,6 @@ fn answer(arguments: &TrainArguments, trained: &Trained, tested: Option<&SetMetr
     Answer { text, json }
 }
 
-/// Every metric on each set of recordings.
 fn metrics_table(report: &TrainReport, tested: Option<&SetMetrics>) -> Table {
     let mut sets = vec![
         ("training", Some(&report.training)),
@@ -265,7 +262,6 @@ fn seed_table(report: &TrainReport) -> String {
     format!("\n{table}")
 }
 
-/// Rows of the body's position forwards and upwards.
 const BODY: [usize; 2] = [BODY_X, BODY_Z];
 
 /// A note if rollouts of whole jumps end up further off than a body would be that stays where each jump starts: root mean

@@ -114,12 +114,10 @@ pub(super) fn identified(
     Ok(())
 }
 
-/// The robot of a training.
 pub(super) fn robot(settings: &TrainSettings) -> Result<&'static Robot, Error> {
     chosen(settings.robot.as_deref().unwrap_or("go1"))
 }
 
-/// How recordings are prepared for the training.
 pub(super) fn conditioning(settings: &TrainSettings) -> ConditionOptions {
     let rows = settings.smooth_rows.unwrap_or_default();
     ConditionOptions {
@@ -184,7 +182,6 @@ const WINDOW: [&str; 4] = [
     "bptt-integrator",
 ];
 
-/// The first of these settings that is given.
 pub(super) fn first(settings: &TrainSettings, names: &[&'static str]) -> Option<&'static str> {
     let given = given(settings);
     names.iter().copied().find(|name| given.contains_key(*name))
@@ -341,7 +338,6 @@ pub(super) fn without_effect(settings: &TrainSettings, options: &TrainOptions) -
     ))
 }
 
-/// The settings of a file.
 pub(super) fn read(path: &Path) -> Result<TrainSettings, Error> {
     read_settings(path, check)
 }

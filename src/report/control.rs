@@ -35,7 +35,6 @@ pub(crate) fn without_statistics(model: &ReducedModel) -> Option<&str> {
     without.map(|(_, phase)| phase.name.as_str())
 }
 
-/// A line over the steps of a run.
 fn line(run: &Run, role: Role, value: impl Fn(&StepRow) -> Option<f64>) -> Series {
     let points = run.rows.iter().map(|row| (row.time_s, value(row)));
     Series::through(role, points)
@@ -74,7 +73,6 @@ pub(super) fn torques(model: &ReducedModel, lift: Lift, run: &Run, place: &Place
     )
 }
 
-/// The controller's latent inputs.
 pub(super) fn latent_inputs(model: &ReducedModel, run: &Run, place: &Place) -> Figure {
     let Place { suffix, words } = place;
     let panel = |latent: usize| {

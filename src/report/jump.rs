@@ -35,7 +35,6 @@ pub(crate) fn modelled(
     Ok(columns.map(|column| column.amax() != 0.0).collect())
 }
 
-/// Which jump a figure shows.
 pub(super) struct Place {
     /// Number from 1, which ends the figure's name.
     pub suffix: String,
@@ -44,7 +43,6 @@ pub(super) struct Place {
 }
 
 impl Place {
-    /// A recording.
     pub(crate) fn of_recording(index: usize, path: &Path) -> Self {
         let name = file_name(path);
         let stem = name.trim_end_matches(".gz").trim_end_matches(".csv");
@@ -127,7 +125,6 @@ impl Jump<'_> {
         states.enumerate().map(value).collect()
     }
 
-    /// Coordinates of the robot along a rollout.
     fn decoded(&self, rollout: &Rollout) -> Result<Samples, ModelError> {
         self.predicted(rollout, |_, z, _| self.model.decode(z))
     }

@@ -26,7 +26,6 @@ pub(crate) struct PageOptions {
     /// Effects of simplification within several tolerances, and every change of the chosen one; tables without rows
     /// are left out.
     pub simplification: Vec<Table>,
-    /// Commands that reproduce the report, in order.
     pub commands: Vec<String>,
 }
 

@@ -11,7 +11,6 @@ const FRAMES: usize = 8;
 /// Half the size of the cross of a recorded jump, m.
 const CROSS_M: f64 = 0.004;
 
-/// The figures of a plan for a robot.
 pub(crate) fn plan_figures(plan: &Plan, robot: &Robot) -> Vec<Figure> {
     let motion = &plan.motion;
     let [distance_m, apex_m] = plan.goal_m;
@@ -36,7 +35,6 @@ fn over_time(plan: &Plan, role: Role, value: impl Fn(usize) -> f64) -> Series {
     Series::over(role, &plan.motion.time_s, |sample| Some(value(sample)))
 }
 
-/// Times without a foot on the ground.
 fn flights(plan: &Plan) -> Vec<(f64, f64)> {
     let mut start = 0.0;
     let mut flights = Vec::new();
@@ -100,7 +98,6 @@ fn phases(plan: &Plan, goal: &str) -> Figure {
     }
 }
 
-/// Torques between their limits.
 fn torques(plan: &Plan, robot: &Robot, goal: &str) -> Figure {
     let names = Robot::state_names();
     let panels = (0..JOINT_DIM).map(|joint| {

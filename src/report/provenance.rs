@@ -10,7 +10,6 @@ const LONGEST_LIST: usize = 24;
 /// Digits of a digest that are shown.
 const DIGEST: usize = 12;
 
-/// The origin of a model, ready for a page.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Origin {
     /// Name and value of each entry that fits a cell.

@@ -59,7 +59,6 @@ pub(crate) fn error_table(model: &ReducedModel, assessment: &Assessment<'_>) -> 
     with_phases(coordinate_table(model, assessment), model, assessment)
 }
 
-/// Restarted residuals of every coordinate, one column per phase.
 pub(crate) fn phase_table(model: &ReducedModel, assessment: &Assessment<'_>) -> Table {
     with_phases(coordinates(assessment), model, assessment)
 }
@@ -72,7 +71,6 @@ fn with_phases(mut table: Table, model: &ReducedModel, assessment: &Assessment<'
     table
 }
 
-/// Root mean square errors of body x and z.
 pub(crate) fn body_rms(assessment: &Assessment<'_>, sums: &CoordinateSums) -> [Option<f64>; 2] {
     ["body.x", "body.z"].map(|name| rms(assessment.fit(sums, name)))
 }
@@ -82,7 +80,6 @@ pub(crate) fn template_rms(sums: &AslipSums) -> [Option<f64>; 2] {
     [sums.x, sums.z].map(|sums| rms(sums.fit()))
 }
 
-/// The model beside the template models, body x and z.
 pub(crate) fn baseline_table(assessment: &Assessment<'_>) -> Table {
     let every = format!("restarted every {} s", assessment.restart_every_s);
     let titles = ["body.x", "body.z"]
@@ -210,7 +207,6 @@ pub(crate) fn failures(runs: &[NamedRun]) -> Vec<String> {
     failed.collect()
 }
 
-/// The rows of a verdict, one by one.
 pub(crate) fn verdict_table(verdict: &Verdict) -> Table {
     let number = |value: Option<f64>| match value {
         Some(value) if !value.is_finite() => "diverges".to_owned(),

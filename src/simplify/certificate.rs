@@ -14,9 +14,7 @@ use crate::symbolic::Interval;
 /// A count before and after simplification.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct BeforeAfter {
-    /// In the model.
     pub before: usize,
-    /// In the simplified model.
     pub after: usize,
 }
 
@@ -36,10 +34,8 @@ impl std::iter::Sum for BeforeAfter {
     }
 }
 
-/// The kind of a change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ChangeKind {
-    /// It is gone.
     Dropped,
     /// A constant took its place.
     Constant,
@@ -52,7 +48,6 @@ pub enum ChangeKind {
     },
 }
 
-/// Another coefficient that a change altered.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Effect {
     /// The term in the library's syntax.
@@ -66,7 +61,6 @@ pub struct Effect {
 /// One change of one equation.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Change {
-    /// Its kind.
     #[serde(flatten, serialize_with = "kind")]
     pub kind: ChangeKind,
     /// The term in the library's syntax.
@@ -104,18 +98,14 @@ pub struct EquationCertificate {
     pub sum_of_bounds: Interval,
     /// The difference at the recorded samples.
     pub measured: Option<Measured>,
-    /// Active terms.
     pub terms: BeforeAfter,
     /// Significant decimal digits that the coefficients need, added up.
     pub digits: BeforeAfter,
-    /// The changes, in order.
     pub changes: Vec<Change>,
 }
 
-/// One phase.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PhaseCertificate {
-    /// The phase's name.
     pub name: String,
     /// The box: each variable's name and range. `None` if there is no sample of the phase, so that
     /// its equations were kept.
@@ -132,7 +122,6 @@ pub struct PhaseCertificate {
     /// can no longer be used for control.
     #[serde(rename = "no_longer_depends_on", serialize_with = "names")]
     pub lost: Vec<LatentVariable>,
-    /// One entry per latent coordinate.
     pub equations: Vec<EquationCertificate>,
 }
 
@@ -234,7 +223,6 @@ fn ends<S: Serializer>(interval: &Interval, to: S) -> Result<S::Ok, S::Error> {
     [interval.lo(), interval.hi()].serialize(to)
 }
 
-/// Ranges under their variables' names.
 fn ranges<S: Serializer>(
     domain: &Option<Vec<(String, Interval)>>,
     to: S,
@@ -245,7 +233,6 @@ fn ranges<S: Serializer>(
     to.collect_map((ranges.iter()).map(|(name, range)| (name, [range.lo(), range.hi()])))
 }
 
-/// Names of variables.
 fn names<S: Serializer>(lost: &[LatentVariable], to: S) -> Result<S::Ok, S::Error> {
     to.collect_seq(lost.iter().map(ToString::to_string))
 }

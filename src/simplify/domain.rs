@@ -164,10 +164,6 @@ impl Domain {
         Self::new(model, boxes)
     }
 
-    /// The box of a phase: `3 latent_dim` ranges.
-    ///
-    /// # Panics
-    /// If there is no such phase.
     pub(crate) fn phase(&self, phase: usize) -> Option<&[Interval]> {
         self.boxes[phase].as_deref()
     }

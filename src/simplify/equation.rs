@@ -56,12 +56,10 @@ impl<'a> Terms<'a> {
     }
 }
 
-/// An equation on its way.
 #[derive(Clone, Debug)]
 pub(super) struct Equation {
     /// Coefficients now, by row.
     pub xi: Vec<f64>,
-    /// The changes so far, in order.
     pub steps: Vec<Step>,
     /// Encloses the original equation minus the present one.
     pub spent: Interval,
@@ -70,7 +68,6 @@ pub(super) struct Equation {
 }
 
 impl Equation {
-    /// An equation as it is.
     pub(crate) fn new(xi: Vec<f64>, known: Option<usize>) -> Self {
         Self {
             xi,

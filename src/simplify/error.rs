@@ -11,10 +11,8 @@ use crate::model::ModelError;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SimplifyError {
-    /// The number of boxes differs from the number of phases.
     #[error("the domain has {found} boxes, expected one for each of {expected} phases")]
     PhaseCount { found: usize, expected: usize },
-    /// A box of the wrong dimension.
     #[error(
         "the domain of phase `{phase}` has {found} ranges, expected {expected} (z, dz, u of each latent coordinate)"
     )]
@@ -23,7 +21,6 @@ pub enum SimplifyError {
         found: usize,
         expected: usize,
     },
-    /// A range that is empty or infinite.
     #[error(
         "the domain of `{variable}` in phase `{phase}` is {lo} to {hi}, expected finite numbers in order"
     )]
@@ -33,25 +30,20 @@ pub enum SimplifyError {
         lo: f64,
         hi: f64,
     },
-    /// A file of ranges that cannot be read as such.
     #[error("{path}: {message}", path = path.display())]
     DomainFile { path: PathBuf, message: String },
-    /// Recordings for a model that cannot encode them.
     #[error(
         "model `{model}` has no encoder, so recordings give it no domain; give a .toml file with one table per phase, such as [contact], and a range for each of z1, dz1, u1, ..., such as z1 = [-0.2, 0.4]"
     )]
     NoEncoder { model: String },
-    /// A share of the recorded accelerations without recordings.
     #[error(
         "a tolerance in percent is a share of the root mean square of each ddz over recordings, and the domain has none; give a number in scaled units per s^2"
     )]
     NoSamples,
-    /// A margin around ranges, which are taken as they are.
     #[error(
         "a margin widens the box around recordings; the ranges of a .toml file are taken as they are"
     )]
     Margin,
-    /// A recorded sample has a larger error than the certified one: a defect of romc.
     #[error(
         "internal error: in phase `{phase}`, ddz{output} of the simplified model is off by {measured:e} at a recorded sample, beyond the bound {bound:e}", output = output + 1
     )]
@@ -61,10 +53,8 @@ pub enum SimplifyError {
         measured: f64,
         bound: f64,
     },
-    /// The simplified model is not a model.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// A model that cannot be lowered to code.
     #[error(transparent)]
     Lower(#[from] LowerError),
 }

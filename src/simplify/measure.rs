@@ -9,9 +9,7 @@ use crate::symbolic::Interval;
 /// How large an error is at recorded samples (scaled units per second squared).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Measured {
-    /// Largest magnitude.
     pub max: f64,
-    /// Root mean square.
     pub rms: f64,
 }
 

@@ -42,12 +42,10 @@ impl Ranges {
         }
     }
 
-    /// The pool with all terms.
     pub(crate) fn pool(&mut self) -> &mut ExprPool {
         &mut self.pool
     }
 
-    /// A term of the pool.
     pub(crate) fn expr(&self, row: usize) -> ExprId {
         self.terms[row]
     }
@@ -61,7 +59,6 @@ impl Ranges {
             .collect()
     }
 
-    /// All values of a term.
     pub(crate) fn term(&mut self, row: usize) -> Interval {
         if let Some(range) = self.known[row] {
             return range;
@@ -105,7 +102,6 @@ impl Ranges {
         total
     }
 
-    /// Terms with the same variables.
     fn alike(&self, parts: &[Part]) -> Vec<Vec<Part>> {
         let mut groups: BTreeMap<Vec<SymbolId>, Vec<Part>> = BTreeMap::new();
         for &(row, delta) in parts {

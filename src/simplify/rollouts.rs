@@ -40,16 +40,11 @@ pub struct RolloutEffect {
     pub after: RolloutErrors,
 }
 
-/// Recordings to roll out over.
 #[derive(Clone, Debug)]
 pub(crate) struct RolloutBasis<'a> {
-    /// Where bounds hold.
     pub domain: &'a Domain,
-    /// Recorded samples.
     pub segments: Vec<&'a Segment>,
-    /// The same, encoded.
     pub latent: Vec<&'a LatentSegment>,
-    /// Time between restarts, s.
     pub restart_every_s: f64,
 }
 
@@ -73,10 +68,6 @@ impl RolloutBasis<'_> {
         })
     }
 
-    /// Rolls one model out, whole and restarted.
-    ///
-    /// # Errors
-    /// As [`RolloutBasis::effect`].
     pub(crate) fn errors(&self, model: &ReducedModel) -> Result<RolloutErrors, EvaluateError> {
         let coordinates: Vec<usize> = body(model).map(|(index, _, _)| index).collect();
         let compiled = CompiledModel::new(model)?;

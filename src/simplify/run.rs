@@ -104,7 +104,6 @@ pub fn simplify(
     })
 }
 
-/// What the simplified model file says about itself.
 fn provenance_of(model: &ReducedModel, certificate: &Certificate) -> Value {
     let phase = |phase: &PhaseCertificate| {
         let bounds = phase.equations.iter().map(|e| e.bound.magnitude());
@@ -239,7 +238,6 @@ impl<'a> PhaseProblem<'a> {
         (self.equation(output), Interval::point(0.0))
     }
 
-    /// Root mean square of an acceleration over the samples.
     fn rms(&self, output: usize) -> Option<f64> {
         let all = self.coefficients(output);
         let active = Differences::between(&all, &vec![0.0; all.len()]);

@@ -70,7 +70,6 @@ fn name(phase: &str, output: usize) -> Cell {
     format!("{phase}, ddz{}", output + 1).into()
 }
 
-/// A change in words.
 fn change_words(change: &Change) -> String {
     let others = || {
         let terms = change.effects.iter().map(|effect| {

@@ -46,27 +46,22 @@ impl Workspace {
         })
     }
 
-    /// Number of terms.
     pub(crate) fn len(&self) -> usize {
         self.library.len()
     }
 
-    /// The library with the appended terms.
     pub(crate) fn library(&self) -> &Library {
         &self.library
     }
 
-    /// The text of a term.
     pub(crate) fn text(&self, row: usize) -> &str {
         self.library.terms()[row].text()
     }
 
-    /// The row of a variable.
     pub(crate) fn variable(&self, symbol: SymbolId) -> Option<usize> {
         self.rows.get(&Some(symbol)).copied()
     }
 
-    /// The row of `1`.
     pub(crate) fn constant(&self) -> Option<usize> {
         self.rows.get(&None).copied()
     }
@@ -121,7 +116,6 @@ impl Workspace {
     }
 }
 
-/// The rows of `1` and of variables.
 fn rows(library: &Library) -> BTreeMap<Option<SymbolId>, usize> {
     let mut pool = library.pool().clone();
     let mut exprs = vec![(None, pool.number(1.0))];

@@ -33,7 +33,6 @@ impl CoordinateNames {
         })
     }
 
-    /// Number of coordinates.
     pub(crate) fn dim(&self) -> usize {
         self.names.len()
     }

@@ -78,7 +78,6 @@ impl Identifier {
         &self.0
     }
 
-    /// The identifier in upper case, as macros are written.
     pub(crate) fn upper(&self) -> String {
         self.0.to_ascii_uppercase()
     }

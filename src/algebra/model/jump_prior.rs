@@ -16,7 +16,6 @@ use crate::robot::{ContactFlags, STATE_DIM};
 pub const GOAL_DIM: usize = 3;
 /// Features of the prior: one, and the normalised numbers of the goal.
 pub const FEATURE_DIM: usize = 1 + GOAL_DIM;
-/// Most nodes of a part.
 const MAX_NODES: usize = 200;
 
 /// The features of a goal that the prior multiplies.

@@ -15,7 +15,6 @@ pub enum FeetRule {
     Patterns(Vec<ContactFlags>),
 }
 
-/// Number of patterns of four feet.
 const N_PATTERNS: usize = 16;
 
 impl fmt::Display for FeetRule {

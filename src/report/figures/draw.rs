@@ -12,10 +12,8 @@ const BOTTOM: f64 = 26.0;
 const RIGHT: f64 = 8.0;
 /// Points of a line that are drawn; CSV has them all.
 const MAX_POINTS: usize = 240;
-/// Size of letters.
 pub(super) const FONT: f64 = 9.0;
 
-/// Where a text is held.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Anchor {
     Start,
@@ -23,7 +21,6 @@ pub(crate) enum Anchor {
     End,
 }
 
-/// With what a mark is drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Paint {
     /// The frame.
@@ -36,14 +33,12 @@ pub(crate) enum Paint {
     Heat(f64),
 }
 
-/// One thing to draw.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Mark {
     /// A filled rectangle: corner, width, height.
     Rectangle([f64; 4], Paint),
     /// A straight line between two points.
     Rule([f64; 4], Paint),
-    /// A data line.
     Line(Vec<(f64, f64)>, Role),
     /// A text at the left end of its baseline, or as anchored.
     Text(f64, f64, Anchor, String),
@@ -52,7 +47,6 @@ pub(crate) enum Mark {
 /// Height of the legend's line.
 const LEGEND: f64 = 18.0;
 
-/// Size of a figure on a page of its own.
 pub(super) fn figure_size(figure: &Figure) -> (f64, f64) {
     let columns = figure.columns.min(figure.panels.len()).max(1);
     let rows = figure.panels.len().div_ceil(columns);

@@ -13,7 +13,6 @@ pub enum Role {
     Restarted,
     /// A template model, or the first of two things compared.
     Baseline,
-    /// A second template model.
     SecondBaseline,
     /// A bound that the others keep, always within the frame.
     Limit,
@@ -71,7 +70,6 @@ impl Series {
     }
 }
 
-/// One frame of a figure.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Panel {
     /// The quantity with its unit, such as `body.x, m`, or the instant, such as `0.12 s`.
@@ -79,7 +77,6 @@ pub(crate) struct Panel {
     pub drawing: Drawing,
 }
 
-/// What a panel shows.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Drawing {
     /// Lines over one axis; shaded are ranges of x with a grey ground, such as flight.
@@ -87,9 +84,7 @@ pub(crate) enum Drawing {
         series: Vec<Series>,
         shaded: Vec<(f64, f64)>,
     },
-    /// Magnitudes of a matrix as shades.
     Heat(HeatMap),
-    /// Robots.
     Sticks(StickPlot),
 }
 
@@ -107,14 +102,11 @@ pub(crate) struct HeatMap {
 pub(crate) struct StickPlot {
     /// The robots, the first below the others.
     pub sticks: Vec<(Role, Sticks)>,
-    /// The part of the plane that is in sight.
     pub extent: Extent,
-    /// Height of the floor, in m.
     pub floor_m: f64,
 }
 
 impl Panel {
-    /// Lines over one axis, without shaded ranges.
     pub(crate) fn lines(title: impl Into<String>, series: Vec<Series>) -> Self {
         Self::shaded(title, series, Vec::new())
     }
@@ -132,12 +124,10 @@ impl Panel {
     }
 }
 
-/// Panels that belong together, with a caption and a legend.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Figure {
     /// Stem of its files.
     pub id: String,
-    /// Caption, as in a paper.
     pub caption: String,
     /// The common axis below, such as `time, s`.
     pub x_label: String,
@@ -145,9 +135,7 @@ pub(crate) struct Figure {
     pub panel_size: (f64, f64),
     /// Panels side by side when drawn on a page of their own.
     pub columns: usize,
-    /// The panels.
     pub panels: Vec<Panel>,
-    /// The meaning of each line, in the order of the legend.
     pub legend: Vec<(Role, String)>,
 }
 

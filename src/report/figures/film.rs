@@ -20,11 +20,9 @@ pub(crate) struct Film {
     pub frames: String,
     /// The instant that the drawing shows: the highest point of the first motion.
     pub shown: usize,
-    /// Number of instants.
     pub count: usize,
     /// Time of the instant that is shown, from the first sample, in s.
     pub shown_s: f64,
-    /// What each line means.
     pub legend: Vec<(Role, String)>,
 }
 

@@ -11,7 +11,6 @@ use crate::robot::{FOOT_DIM, JOINT_DIM, Leg, Robot, STATE_DIM};
 /// Half the height of the box that stands for a trunk, in m.
 const TRUNK_HALF_HEIGHT_M: f64 = 0.05;
 
-/// Space around the robots in sight, in m.
 const MARGIN_M: f64 = 0.04;
 
 /// A robot's lines in a vertical plane: pairs of forward and up, in m.
@@ -22,7 +21,6 @@ pub(crate) struct Sticks {
 }
 
 impl Sticks {
-    /// Names of the lines.
     pub(crate) const NAMES: [&str; 1 + FOOT_DIM] = ["trunk", "fr", "fl", "rr", "rl"];
 
     /// `robot` at the state `x` (18: joint angles in rad, body position in m, roll, pitch and yaw in rad), projected on
@@ -84,19 +82,15 @@ impl Extent {
     }
 }
 
-/// A motion of a robot.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Motion {
-    /// The line that it is drawn with.
     pub role: Role,
-    /// Its name in the legend.
     pub words: String,
     /// The state (18, as [`Sticks::of`] takes it) at each time; none where there is no prediction.
     pub states: Vec<Option<DVector<f64>>>,
 }
 
 impl Motion {
-    /// What was recorded of a segment.
     pub(crate) fn recorded(segment: &Segment) -> Self {
         Self {
             role: Role::Recorded,
@@ -138,7 +132,6 @@ impl Motion {
         Some(Sticks::of(robot, state.as_slice(), heading_rad))
     }
 
-    /// What each motion's lines mean.
     pub(super) fn legend(motions: &[Self]) -> Vec<(Role, String)> {
         let entry = |motion: &Self| (motion.role, motion.words.clone());
         motions.iter().map(entry).collect()
@@ -210,7 +203,6 @@ pub(crate) fn film_strip(
 mod tests {
     use super::*;
 
-    /// Standing straight: hips above feet, knees behind.
     fn standing(x_m: f64, yaw_rad: f64) -> DVector<f64> {
         let mut x = DVector::zeros(STATE_DIM);
         for leg in 0..FOOT_DIM {

@@ -24,7 +24,6 @@ pub(crate) fn number(value: f64, places: usize) -> String {
     format!("{value:.places$}").replace('-', "\u{2212}")
 }
 
-/// An index below the line.
 pub(crate) fn subscript(index: usize) -> String {
     let below = |digit: char| match digit.to_digit(10) {
         Some(value) => char::from_u32(0x2080 + value).unwrap_or(digit),
