@@ -7,9 +7,8 @@ use clap::{ArgAction, Args, Parser, Subcommand};
 
 use super::compile::CompileArguments;
 use super::import::ImportArguments;
-use super::reading::ReadingArguments;
 use super::train::{StudyArguments, TrainArguments};
-use super::value::{RobotParser, count, overwrite, real};
+use super::value::{ReadingArguments, RobotParser, count, overwrite, real};
 use crate::evaluate::ReferenceInput;
 use crate::files::Overwrite;
 use crate::limits::table::{APEX, DISTANCE, HORIZON, RESTART_EVERY, STEP, TORQUE_RATE};

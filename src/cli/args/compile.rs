@@ -4,8 +4,7 @@ use std::path::PathBuf;
 
 use clap::{ArgAction, Args, ValueEnum};
 
-use super::reading::ReadingArguments;
-use super::value::{count, overwrite, real};
+use super::value::{ReadingArguments, count, overwrite, real};
 use crate::codegen::{Precision, SineCosine, Units};
 use crate::deploy::Target;
 use crate::files::Overwrite;

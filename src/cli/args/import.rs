@@ -4,8 +4,7 @@ use std::path::PathBuf;
 
 use clap::{ArgAction, Args};
 
-use super::reading::ReadingArguments;
-use super::value::{RobotParser, count, overwrite, real, wrench_frame};
+use super::value::{ReadingArguments, RobotParser, count, overwrite, real, wrench_frame};
 use crate::files::Overwrite;
 use crate::import::{
     Format, ImportError, Mapping, PhaseRule, WeightVectors, XiLayout, parse_standard,

@@ -6,8 +6,7 @@ use std::str::FromStr;
 use clap::{ArgAction, Args, ValueEnum};
 use serde::{Deserialize, Serialize};
 
-use super::reading::ReadingArguments;
-use super::value::{RobotParser, count, finite, overwrite, real, wrench_frame};
+use super::value::{ReadingArguments, RobotParser, count, finite, overwrite, real, wrench_frame};
 use crate::files::Overwrite;
 use crate::limits::table;
 use crate::model::Activation;
