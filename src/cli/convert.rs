@@ -43,16 +43,15 @@ pub fn run(arguments: &ConvertArguments) -> Result<Answer, Error> {
     let inputs = inputs.as_deref();
     write_recording(&arguments.output, segments, inputs, arguments.force)?;
     let output = arguments.output.display().to_string();
-    Ok(Answer {
-        text: format!("{output}: {samples} samples in {count} segments\n"),
-        json: json!({
-            "recordings": names(&arguments.recordings),
-            "output": output,
-            "samples": samples,
-            "segments": count,
-            "inputs": rule.is_some(),
-        }),
-    })
+    let text = format!("{output}: {samples} samples in {count} segments\n");
+    let json = json!({
+        "recordings": names(&arguments.recordings),
+        "output": output,
+        "samples": samples,
+        "segments": count,
+        "inputs": rule.is_some(),
+    });
+    Ok(Answer::new(text, json))
 }
 
 /// The segments one after the other; where there are several, each begins at 0 s.

@@ -12,8 +12,7 @@ use super::args::DemoArguments;
 use super::destination::Inputs;
 use super::output::{lines, names, spinner};
 use super::simplification::RESTART_S;
-use super::{Answer, code};
-use super::{mpc as mpc_command, report};
+use super::{Answer, mpc as mpc_command, report};
 use crate::deploy::{self, EmitOptions, Target};
 use crate::equations::Equations;
 use crate::evaluate::{Assessment, verdict};
@@ -50,7 +49,7 @@ const REPORT_TOLERANCE: Tolerance = Tolerance::ShareOfRms(0.01);
 
 /// Runs the whole path and reports its files and metrics. The exit code is 1 if predictions of body x or z, the
 /// self-test or a run fail.
-pub fn run(arguments: &DemoArguments) -> Result<(Answer, u8), Error> {
+pub fn run(arguments: &DemoArguments) -> Result<Answer, Error> {
     let inputs = Inputs::default().into_folder(Some(&arguments.out_dir))?;
     let progress = spinner("reading the shipped model and recordings");
     let model = artifact::read_from_bytes(MODEL.0, MODEL.1)?;
@@ -118,8 +117,7 @@ pub fn run(arguments: &DemoArguments) -> Result<(Answer, u8), Error> {
         "failed": failed,
         "files": names(&made),
     });
-    let answer = Answer { text, json };
-    Ok((answer, code(is_failed)))
+    Ok(Answer::new(text, json).failed_if(is_failed))
 }
 
 /// The files, a line each.

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use super::Answer;
 use super::args::IdentifyArguments;
 use super::destination::{Format, Inputs};
-use super::output::{lines, names, note_repeated, read_with, reader, spinner, write_file};
+use super::output::{lines, names, note_repeated, read_with, reader, shown, spinner, write_file};
 use super::robot;
 use crate::Error;
 use crate::identify::{Identification, Legs, identify};
@@ -36,10 +36,7 @@ pub fn run(arguments: &IdentifyArguments) -> Result<Answer, Error> {
         write_file(path, found.to_toml().as_bytes(), arguments.force)?;
         let _ = writeln!(text, "\nwritten: {}", path.display());
     }
-    Ok(Answer {
-        text,
-        json: report(&found, arguments),
-    })
+    Ok(Answer::new(text, report(&found, arguments)))
 }
 
 fn text(found: &Identification, robot: &Robot, recordings: usize) -> String {
@@ -138,6 +135,6 @@ fn report(found: &Identification, arguments: &IdentifyArguments) -> Value {
         "force_alone": { "gravity_m_s2": alone.gravity_m_s2, "mass_kg": alone.mass_kg },
         "samples": found.samples,
         "notes": found.notes,
-        "output": arguments.output.as_ref().map(|path| path.display().to_string()),
+        "output": shown(&arguments.output),
     })
 }

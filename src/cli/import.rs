@@ -80,7 +80,7 @@ pub fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
         "lacking": lacking,
         "check": check.as_ref().map(|check| check_json(check, fault.as_deref())),
     });
-    Ok(Answer { text, json })
+    Ok(Answer::new(text, json))
 }
 
 /// An imported model, compared with recordings if there are any.

@@ -99,7 +99,7 @@ pub fn describe(path: &Path, model: &ReducedModel) -> Result<Answer, Error> {
         "invariance": invariance,
         "provenance": model.provenance(),
     });
-    Ok(Answer { text, json })
+    Ok(Answer::new(text, json))
 }
 
 /// What the inputs of a model over a robot are made of.

@@ -79,7 +79,7 @@ pub fn describe(reading: &Reading, robot: &Robot) -> Result<Answer, Error> {
             value
         }).collect::<Vec<_>>(),
     });
-    Ok(Answer { text, json })
+    Ok(Answer::new(text, json))
 }
 
 /// Feet on the ground over time, one character per slice of equal duration.

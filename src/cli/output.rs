@@ -17,6 +17,7 @@ use crate::files::{Overwrite, is_invisible, read_toml, write_whole};
 pub use crate::files::{
     shell_path as quoted, shell_paths as quoted_all, shell_word as quoted_text,
 };
+use crate::model::ReducedModel;
 use crate::recording::{Clocks, ColumnMap, Reader, ReadingNotes, Recording, Segment, mismatch};
 use crate::robot::Robot;
 use crate::train::sha256;
@@ -64,6 +65,30 @@ pub fn reader(arguments: &ReadingArguments, clocks: Clocks) -> Result<Reader, Er
         map.transpose()?,
         arguments.clock.unwrap_or(clocks),
     ))
+}
+
+/// Reads recordings of a model's robot.
+pub fn read_for(
+    model: &ReducedModel,
+    paths: &[PathBuf],
+    arguments: &ReadingArguments,
+) -> Result<Vec<Recording>, Error> {
+    read_recordings(paths, arguments, model.robot().ok())
+}
+
+/// The one jump of the recording after `--plan`, of a model's robot.
+pub fn read_jump(
+    model: &ReducedModel,
+    path: &PathBuf,
+    arguments: &ReadingArguments,
+) -> Result<Segment, Error> {
+    let mut recording = read_for(model, std::slice::from_ref(path), arguments)?.swap_remove(0);
+    note_mismatches(&recording, model.robot()?);
+    if let found @ 2.. = recording.segments.len() {
+        let message = format!("--plan takes one jump: found {found} segments");
+        return Err(refused(path, message));
+    }
+    Ok(recording.segments.swap_remove(0))
 }
 
 /// Reads recordings of a robot, if it is known, showing which; what reading did besides goes to stderr.
@@ -187,6 +212,11 @@ pub fn report_reading(notes: &ReadingNotes) {
 pub fn lines<T: Display>(words: &str, items: impl IntoIterator<Item = T>) -> String {
     let lines = items.into_iter().map(|item| format!("{words}{item}\n"));
     lines.collect()
+}
+
+/// The output of a command as JSON shows it.
+pub fn shown(path: &Option<PathBuf>) -> Option<String> {
+    path.as_ref().map(|path| path.display().to_string())
 }
 
 /// Paths as JSON shows them.

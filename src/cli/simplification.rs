@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 
 use super::args::SimplifyArguments;
-use super::output::{lines, names, read_recordings, read_text, spinner};
+use super::output::{lines, names, read_for, read_text, spinner};
 use crate::equations::Equations;
 use crate::evaluate::Assessment;
 use crate::files::EmittedFile;
@@ -56,7 +56,7 @@ impl Basis {
                 margin: None,
             });
         }
-        let recordings = read_recordings(files, &arguments.reading, model.robot().ok())?;
+        let recordings = read_for(model, files, &arguments.reading)?;
         if model.encoder_map().is_err() {
             let model = model.name().to_owned();
             return Err(SimplifyError::NoEncoder { model }.into());

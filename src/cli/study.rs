@@ -188,5 +188,5 @@ fn answer(folder: &Path, store: &Store, cells: &[study::Cell], summary: &Summary
         "missing": missing,
         "refused": refused,
     });
-    Answer { text, json }
+    Answer::new(text, json)
 }

@@ -21,7 +21,7 @@ use crate::train::{
 use crate::typeset::{Cell, Table, significant};
 use crate::{Error, artifact, train};
 
-pub fn run(arguments: &TrainArguments) -> Result<(Answer, u8), Error> {
+pub fn run(arguments: &TrainArguments) -> Result<Answer, Error> {
     let settings = train_settings::effective(arguments)?;
     Inputs::default()
         .and(&arguments.recordings)
@@ -100,14 +100,15 @@ pub fn run(arguments: &TrainArguments) -> Result<(Answer, u8), Error> {
         let _ = write!(answer.text, "\n{text}");
     }
     if !is_interrupted {
-        return Ok((answer, 0));
+        return Ok(answer);
     }
     let _ = writeln!(
         answer.text,
         "\ninterrupted by Ctrl-C: the model is the best until then, and the command in its provenance, which says so, \
          does not give it again"
     );
-    Ok((answer, INTERRUPTED_CODE))
+    answer.code = INTERRUPTED_CODE;
+    Ok(answer)
 }
 
 /// Where whole jumps are worse than standing still: of the validation, or else of the training, and of the test.
@@ -200,7 +201,7 @@ fn answer(arguments: &TrainArguments, trained: &Trained, tested: Option<&SetMetr
         "report": report,
         "test": tested,
     });
-    Answer { text, json }
+    Answer::new(text, json)
 }
 
 fn metrics_table(report: &TrainReport, tested: Option<&SetMetrics>) -> Table {
