@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use super::Answer;
 use super::args::{CompileArguments, UnitsChoice};
 use super::destination::{Format, Inputs};
-use super::output::{lines, names, quoted, read_jump, refused, shown};
+use super::output::{lines, names, quoted, read_jump, shown};
 use super::simplification::{self, Outcome, exact_words};
 use crate::deploy::{self, EmitOptions, PlannedJump, Target};
 use crate::equations::Equations;
@@ -151,7 +151,7 @@ fn planned(
     if !jumps(Target::Controller) && !jumps(Target::ControllerC) {
         let message =
             "--plan without a target that jumps it; add --emit controller or controller-c";
-        return Err(refused(path, message));
+        return Err(Error::refused(path, message));
     }
     let motion = read_jump(model, path, &arguments.simplification.reading)?;
     Ok(Some(PlannedJump {

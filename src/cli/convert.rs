@@ -72,7 +72,7 @@ fn chained(recordings: Vec<Recording>) -> Vec<Segment> {
 /// Writes a recording in the format that the ending of its name says.
 ///
 /// # Errors
-/// [`Error::OneSegment`] for an MCAP file of several, [`Error::Exists`], [`Error::Recording`] if the file system refuses.
+/// [`Error::NotOne`] for an MCAP file of several, [`Error::Exists`], [`Error::Recording`] if the file system refuses.
 pub fn write_recording(
     path: &Path,
     segments: Vec<Segment>,
@@ -81,7 +81,10 @@ pub fn write_recording(
 ) -> Result<(), Error> {
     let written = if (path.extension()).is_some_and(|ending| ending.eq_ignore_ascii_case("mcap")) {
         let [segment] = &segments[..] else {
-            return Err(Error::OneSegment(segments.len()));
+            return Err(Error::NotOne {
+                found: format!("{} segments", segments.len()),
+                expected: "for an MCAP file",
+            });
         };
         write_mcap_as(path, segment, inputs.map(|inputs| &inputs[0]), overwrite)
     } else {

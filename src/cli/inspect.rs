@@ -51,7 +51,10 @@ pub fn run(arguments: &InspectArguments) -> Result<Answer, Error> {
 /// A first map of one log.
 fn guessed(arguments: &InspectArguments, robot: &Robot) -> Result<Answer, Error> {
     let [log] = &arguments.files[..] else {
-        return Err(Error::OneLog(arguments.files.len()));
+        return Err(Error::NotOne {
+            found: format!("{} files", arguments.files.len()),
+            expected: "log to guess a map of",
+        });
     };
     Inputs::default()
         .and([log])

@@ -46,16 +46,9 @@ pub fn read_settings<T: DeserializeOwned>(
     check: impl Fn(&T) -> Result<(), String>,
 ) -> Result<T, Error> {
     let settings = toml::from_str(&read_text(path)?)
-        .map_err(|error| refused(path, error.to_string().trim_end()))?;
-    check(&settings).map_err(|message| refused(path, message))?;
+        .map_err(|error| Error::refused(path, error.to_string().trim_end()))?;
+    check(&settings).map_err(|message| Error::refused(path, message))?;
     Ok(settings)
-}
-
-pub fn refused(path: &Path, message: impl Into<String>) -> Error {
-    Error::Config {
-        path: path.to_owned(),
-        message: message.into(),
-    }
 }
 
 /// The reader that the arguments ask for, with this treatment of clocks unless they name another.
@@ -86,7 +79,7 @@ pub fn read_jump(
     note_mismatches(&recording, model.robot()?);
     if let found @ 2.. = recording.segments.len() {
         let message = format!("--plan takes one jump: found {found} segments");
-        return Err(refused(path, message));
+        return Err(Error::refused(path, message));
     }
     Ok(recording.segments.swap_remove(0))
 }

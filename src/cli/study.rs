@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use super::Answer;
 use super::args::{StudyArguments, TrainSettings};
 use super::destination::Inputs;
-use super::output::{note, refused, spinner};
+use super::output::{note, spinner};
 use super::prepared_recordings::{RecordedSets, read_all, reader_for};
 use super::train_settings;
 use crate::Error;
@@ -100,7 +100,7 @@ fn settings(arguments: &StudyArguments) -> Result<TrainSettings, Error> {
         settings = train_settings::read(path)?;
         if let Some(name) = train_settings::first(&settings, &["latent-dim", "seed", "seeds"]) {
             let message = format!("`{name}` is not a setting of a study, which runs over them");
-            return Err(refused(path, message));
+            return Err(Error::refused(path, message));
         }
     }
     settings.paper |= arguments.paper;

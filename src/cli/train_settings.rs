@@ -6,7 +6,7 @@ use std::path::Path;
 use serde_json::{Map, Value};
 
 use super::args::{PhaseSet, TrainArguments, TrainSettings, Widths};
-use super::output::{note, quoted_text, read_settings, refused};
+use super::output::{note, quoted_text, read_settings};
 use super::robot::chosen;
 use crate::Error;
 use crate::identify::{IdentifyError, identify};
@@ -248,7 +248,7 @@ pub(super) fn effective(arguments: &TrainArguments) -> Result<TrainSettings, Err
         settings = serde_json::from_value(Value::Object(merged)).expect("names are all known");
         if settings.latent_dim.is_none() {
             let message = "`latent-dim` is missing, here and on the command line";
-            return Err(refused(path, message));
+            return Err(Error::refused(path, message));
         }
     }
     check_pairs(&settings)?;
