@@ -2,6 +2,8 @@
 
 #[path = "artifact/maps.rs"]
 mod maps;
+#[path = "artifact/parts.rs"]
+mod parts;
 
 use std::fs;
 use std::path::{Path, PathBuf};

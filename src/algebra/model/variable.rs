@@ -59,30 +59,3 @@ impl fmt::Display for LatentVariable {
         write!(f, "{}{}", KINDS[kind].0, index + 1)
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn variable_names_are_read_and_written_alike() {
-        for variable in LatentVariable::all(12) {
-            assert_eq!(
-                LatentVariable::from_name(&variable.to_string(), 12),
-                Some(variable)
-            );
-        }
-        for name in [
-            "z0",
-            "z13",
-            "z01",
-            "z",
-            "z1x",
-            "ddz1",
-            "1",
-            "u99999999999999999999",
-        ] {
-            assert_eq!(LatentVariable::from_name(name, 12), None, "{name}");
-        }
-    }
-}
