@@ -317,12 +317,4 @@ mod tests {
         let doubtful = headline(&Verdict::default(), true);
         assert!(doubtful.starts_with("Do not rely on it here"), "{doubtful}");
     }
-
-    #[test]
-    fn lists_and_counts_read_as_english() {
-        let names = ["a", "b", "c"].map(str::to_owned);
-        assert_eq!(listed(&names), "a, b and c");
-        assert_eq!(listed(&names[..1]), "a");
-        assert_eq!([1, 2].map(|n| counted(n, "jump")), ["1 jump", "2 jumps"]);
-    }
 }

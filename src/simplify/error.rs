@@ -11,25 +11,8 @@ use crate::model::ModelError;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SimplifyError {
-    #[error("the domain has {found} boxes, expected one for each of {expected} phases")]
-    PhaseCount { found: usize, expected: usize },
-    #[error(
-        "the domain of phase `{phase}` has {found} ranges, expected {expected} (z, dz, u of each latent coordinate)"
-    )]
-    BoxDimension {
-        phase: String,
-        found: usize,
-        expected: usize,
-    },
-    #[error(
-        "the domain of `{variable}` in phase `{phase}` is {lo} to {hi}, expected finite numbers in order"
-    )]
-    Range {
-        phase: String,
-        variable: String,
-        lo: f64,
-        hi: f64,
-    },
+    #[error("the domain {0}")]
+    Domain(String),
     #[error("{path}: {message}", path = path.display())]
     DomainFile { path: PathBuf, message: String },
     #[error(

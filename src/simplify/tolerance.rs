@@ -75,24 +75,3 @@ impl fmt::Display for Tolerance {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn tolerance_reads_shares_and_numbers_and_prints_them_alike() {
-        for (text, expected) in [
-            ("1%", Tolerance::ShareOfRms(0.01)),
-            ("0.3%", Tolerance::ShareOfRms(0.003)),
-            ("0.05", Tolerance::Absolute(0.05)),
-            ("0", Tolerance::Absolute(0.0)),
-        ] {
-            assert_eq!(text.parse(), Ok(expected));
-            assert_eq!(expected.to_string(), text);
-        }
-        for text in ["", "%", "-1%", "nan", "inf", "1 percent"] {
-            assert!(text.parse::<Tolerance>().is_err(), "{text}");
-        }
-    }
-}

@@ -1,7 +1,6 @@
 //! The library Theta: ordered candidate terms over `z`, `dz` and `u`.
 
 use std::collections::HashMap;
-use std::fmt;
 
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
@@ -54,7 +53,7 @@ pub enum LibraryChoice {
 }
 
 /// Candidate terms in order, over `z1..zd`, `dz1..dzd`, `u1..ud`.
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 pub struct Library {
     latent_dim: usize,
     /// The shorthand, if the library was given by it.
@@ -254,20 +253,10 @@ impl PartialEq for Library {
     }
 }
 
-impl fmt::Debug for Library {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Library")
-            .field("latent_dim", &self.latent_dim)
-            .field("standard", &self.standard)
-            .field("terms", &self.terms)
-            .finish_non_exhaustive()
-    }
-}
-
 pub(super) fn check_term_count(found: usize) -> Result<(), ModelError> {
-    let found = (found, || format!("{found} terms"));
     let expected = format!("at most {MAX_LIBRARY_DIM}");
-    check(found.0 <= MAX_LIBRARY_DIM, "`library`", found.1, expected)
+    let fits = found <= MAX_LIBRARY_DIM;
+    check(fits, "`library`", || format!("{found} terms"), expected)
 }
 
 fn place(index: usize) -> String {

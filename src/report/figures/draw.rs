@@ -296,18 +296,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn thinned_line_keeps_its_ends_and_gaps() {
-        let points: Vec<_> = (0..1000)
-            .map(|k| (f64::from(k), (k != 501).then_some(f64::from(k))))
-            .collect();
-        let thin = thinned(&points);
-        assert!(thin.len() <= MAX_POINTS + 2);
-        assert_eq!(thin.first(), points.first());
-        assert_eq!(thin.last(), points.last());
-        assert!(thin.iter().any(|point| point.1.is_none()));
-    }
-
-    #[test]
     fn every_mark_of_a_runaway_prediction_stays_inside_the_frame() {
         let line =
             |role, values: [f64; 3]| Series::over(role, &[0.0, 1.0, 2.0], |k| Some(values[k]));

@@ -264,37 +264,4 @@ mod tests {
         assert!((forward(500).unwrap() - 2.0).abs() < 1e-9);
         assert_eq!(forward(501), None);
     }
-
-    #[test]
-    fn film_strip_shows_first_and_last_sample_and_all_of_the_motion() {
-        let time_s: Vec<f64> = (0..101).map(|k| 3.0 + 0.01 * f64::from(k)).collect();
-        let motion = |role, speed: f64| Motion {
-            role,
-            words: "a".to_owned(),
-            states: (0..101)
-                .map(|k| Some(standing(speed * f64::from(k), 0.0)))
-                .collect(),
-        };
-        let mut runaway = motion(Role::Full, 0.02);
-        runaway.states[100] = None;
-        let motions = [motion(Role::Recorded, 0.01), runaway];
-        let names = ("strip".to_owned(), String::new());
-        let figure = film_strip(go1(), names, (&time_s, &motions), (0.0, 0.0), 5);
-        let plots: Vec<&StickPlot> = (figure.panels.iter())
-            .map(|panel| match &panel.drawing {
-                Drawing::Sticks(plot) => plot,
-                other => panic!("{other:?}"),
-            })
-            .collect();
-        assert_eq!(plots.len(), 5);
-        assert_eq!(
-            [0, 4].map(|frame| &figure.panels[frame].title),
-            ["0.00 s", "1.00 s"]
-        );
-        assert_eq!((plots[0].sticks.len(), plots[4].sticks.len()), (2, 1));
-        // the second motion is 1.5 m on at its last frame, its front hip further
-        assert!(plots[0].extent.forward_m.1 > 1.5 + 0.18);
-        let (_, last) = &plots[4].sticks[0];
-        assert_eq!(*last, Sticks::of(go1(), standing(1.0, 0.0).as_slice(), 0.0));
-    }
 }
