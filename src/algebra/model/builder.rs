@@ -4,14 +4,13 @@ use std::collections::HashMap;
 
 use serde_json::{Map, Value};
 
-use super::coordinate_names::CoordinateNames;
+use super::coordinates::{CoordinateNames, Scaling};
 use super::error::{ModelError, check, check_tensor};
 use super::identifier::{Identifier, identifier_of};
 use super::jump_prior::JumpPrior;
 use super::library::Library;
 use super::projection::pinv_of_transpose;
 use super::rom::{Phase, ReducedModel, selected};
-use super::scaling::Scaling;
 use super::state_map::{AffineMap, StateMap};
 use super::statistics::InputStatistics;
 use crate::robot::{Actuators, FeetRule, JOINT_NAMES, Robot, WrenchFrame};

@@ -20,12 +20,11 @@ use nalgebra::{DMatrix, DVector};
 use serde_json::{Map, Value};
 
 use super::builder::ModelBuilder;
-use super::coordinate_names::CoordinateNames;
+use super::coordinates::{CoordinateNames, Scaling};
 use super::error::{ModelError, check};
 use super::identifier::Identifier;
 use super::jump_prior::JumpPrior;
 use super::library::{CandidateTerm, Library};
-use super::scaling::Scaling;
 use super::statistics::InputStatistics;
 use crate::robot::{Actuators, ContactFlags, FeetRule, InputRule, Robot, WrenchFrame};
 
