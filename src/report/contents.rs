@@ -65,9 +65,6 @@ impl AllFigures {
 }
 
 /// The figures of a report.
-///
-/// # Errors
-/// [`ModelError`] for a model without encoder or decoder.
 pub(crate) fn all_figures(content: &Content<'_>) -> Result<AllFigures, ModelError> {
     let mut figures = AllFigures::default();
     let (model, assessment) = (content.model, content.assessment);

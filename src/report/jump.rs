@@ -23,9 +23,6 @@ pub(super) fn heading_rad(segment: &Segment) -> f64 {
 }
 
 /// Whether each coordinate of the robot enters a latent one at the beginning of a run.
-///
-/// # Errors
-/// [`ModelError`] for a model without encoder.
 pub(crate) fn modelled(
     model: &ReducedModel,
     run: &SegmentRun<'_>,

@@ -30,9 +30,6 @@ pub(crate) struct PageOptions {
 }
 
 /// The report as one HTML page: no request to anywhere, one small script for animations and for copying equations.
-///
-/// # Errors
-/// [`TypesetError::Template`].
 pub(crate) fn page(
     content: &Content<'_>,
     introduction: &Introduction,

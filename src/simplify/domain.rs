@@ -84,9 +84,6 @@ impl Domain {
     }
 
     /// The smallest boxes that hold all samples, each side moved out by `margin` times the width.
-    ///
-    /// # Errors
-    /// As `Domain::new`, for samples of another model.
     pub fn around(
         model: &ReducedModel,
         samples: &Samples,

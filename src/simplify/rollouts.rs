@@ -50,9 +50,6 @@ pub(crate) struct RolloutBasis<'a> {
 
 impl RolloutBasis<'_> {
     /// Rolls both models out, whole and restarted.
-    ///
-    /// # Errors
-    /// [`EvaluateError::Model`] for a latent-only model, [`EvaluateError::Sim`] if the integrator refuses.
     pub(crate) fn effect(
         &self,
         model: &ReducedModel,

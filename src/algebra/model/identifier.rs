@@ -90,9 +90,6 @@ impl fmt::Display for Identifier {
 }
 
 /// Refuses a name that a model cannot have, before one is made.
-///
-/// # Errors
-/// [`ModelError::Name`].
 pub fn check_name(name: &str) -> Result<(), ModelError> {
     identifier_of("model name", name).map(|_| ())
 }

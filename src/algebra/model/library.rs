@@ -66,17 +66,11 @@ pub struct Library {
 
 impl Library {
     /// The library with these terms, in the expression syntax of the model file.
-    ///
-    /// # Errors
-    /// As [`Self::of`].
     pub fn from_terms(latent_dim: usize, texts: &[String]) -> Result<Self, ModelError> {
         Self::of(latent_dim, LibraryChoice::Terms(texts.to_vec()))
     }
 
     /// The standard library, in the order of the published arrays.
-    ///
-    /// # Errors
-    /// As [`Self::of`].
     pub fn standard(latent_dim: usize, standard: StandardLibrary) -> Result<Self, ModelError> {
         Self::of(latent_dim, LibraryChoice::Standard(standard))
     }

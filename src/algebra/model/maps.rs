@@ -73,9 +73,6 @@ impl ReducedModel {
     /// `z = E(s_x x)`; the dynamics are the same. A linear map stays as it is.
     ///
     /// Positions, velocities and inputs of the two models agree at `x` and drift apart away from it.
-    ///
-    /// # Errors
-    /// As [`ReducedModel::tangent`].
     pub fn linearised_at(&self, x: &DVector<f64>) -> Result<ReducedModel, ModelError> {
         let scaled = self.scaled_state(x)?;
         let encoder = self.encoder_map()?;

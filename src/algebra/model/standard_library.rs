@@ -263,9 +263,6 @@ impl StandardLibrary {
     }
 
     /// For each term in another order its row in romc's.
-    ///
-    /// # Errors
-    /// As [`Self::texts_in`].
     pub fn rows_in(
         &self,
         order: LibraryOrder,

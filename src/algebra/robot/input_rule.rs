@@ -120,9 +120,6 @@ impl InputRule {
 
     /// The 6 x 12 matrix `G` of `[F; M] = G net` at a posture (rad), an attitude (roll, pitch, yaw,
     /// rad) and a contact; columns of legs in the air are zero.
-    ///
-    /// # Errors
-    /// As [`InputRule::wrench`].
     pub fn wrench_map(
         &self,
         joints: &[f64; JOINT_DIM],

@@ -36,9 +36,6 @@ impl Robot {
 
     /// The matrix `-J^-T` that takes a leg's torques (N m) to its force on the
     /// body (N).
-    ///
-    /// # Errors
-    /// As [`Robot::foot_force`].
     pub fn foot_force_map(&self, leg: Leg, q: &[f64; 3]) -> Result<Matrix3<f64>, RobotError> {
         self.require_finite(leg, "joint angle", q)?;
         let singular = |determinant| RobotError::SingularLeg {
@@ -78,9 +75,6 @@ impl Robot {
 
     /// Force and moment on the body `[F_lin; F_ang]`, in N and N m (equations 5
     /// to 7, 22): sums of `F_k` and of `x_k x F_k` over the feet in contact.
-    ///
-    /// # Errors
-    /// As [`Robot::damped_force_map`], for a leg in contact; the others do not count.
     pub fn body_wrench(
         &self,
         joints: &[f64; JOINT_DIM],
