@@ -9,7 +9,7 @@ use super::error::{ModelError, check, check_tensor};
 use super::identifier::{Identifier, identifier_of};
 use super::jump_prior::JumpPrior;
 use super::library::Library;
-use super::projection::pinv_of_transpose;
+use super::maps::pinv_of_transpose;
 use super::rom::{Phase, ReducedModel, selected};
 use super::state_map::{AffineMap, StateMap};
 use super::statistics::InputStatistics;

@@ -125,11 +125,27 @@ impl LibraryOrder {
     /// The orders that have names.
     pub const NAMED: [Self; 3] = [Self::PAPER, Self::INTERLEAVED, Self::ROMC];
 
+    /// Names and descriptions of [`Self::NAMED`].
+    const NAMES: [(&str, &str); 3] = [
+        (
+            "paper",
+            "sin z, cos z, sin dz, cos dz: Appendix B of the paper",
+        ),
+        (
+            "interleaved",
+            "sin z1, cos z1, sin z2, ..., then dz: the paper's training code, PySINDy",
+        ),
+        ("romc", "sin z, sin dz, cos z, cos dz: model files of romc"),
+    ];
+
+    fn named(&self) -> Option<(&'static str, &'static str)> {
+        let place = Self::NAMED.iter().position(|named| named == self)?;
+        Some(Self::NAMES[place])
+    }
+
     /// `paper`, `interleaved` or `romc`, for orders that have a name.
     pub fn name(&self) -> Option<&'static str> {
-        let names = ["paper", "interleaved", "romc"];
-        let place = Self::NAMED.iter().position(|named| named == self)?;
-        Some(names[place])
+        self.named().map(|(name, _)| name)
     }
 
     /// Orders that trainers may have: those with names first, then others in which the constant or
@@ -176,14 +192,8 @@ impl ValueEnum for LibraryOrder {
     }
 
     fn to_possible_value(&self) -> Option<PossibleValue> {
-        let help = match self.run {
-            Run::Half => "sin z, cos z, sin dz, cos dz: Appendix B of the paper",
-            Run::Single => {
-                "sin z1, cos z1, sin z2, ..., then dz: the paper's training code, PySINDy"
-            }
-            Run::All => "sin z, sin dz, cos z, cos dz: model files of romc",
-        };
-        Some(PossibleValue::new(self.name()?).help(help))
+        let (name, help) = self.named()?;
+        Some(PossibleValue::new(name).help(help))
     }
 }
 

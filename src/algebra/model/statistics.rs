@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::error::{ModelError, check_tensor};
-use super::projection::complement;
+use super::maps::complement;
 
 /// Largest asymmetry, and most negative eigenvalue, that count as rounding: relative to the
 /// largest entry, and to the largest eigenvalue.
