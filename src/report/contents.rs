@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use super::complexity::study_figures;
 use super::control::{latent_inputs, torques};
 use super::figures::{Drawing, Figure, Film, HeatMap, Panel, subscript};
-use super::jump::{Jump, Place};
+use super::jump::{Jump, JumpName};
 use super::tables::NamedRun;
 use crate::evaluate::{Assessment, SegmentRun, Verdict};
 use crate::model::{ModelError, ReducedModel};
@@ -108,7 +108,7 @@ pub(super) fn jumps<'a>(content: &Content<'a>) -> Vec<Jump<'a>> {
     let (model, assessment) = (content.model, content.assessment);
     let jump = |(index, run): (usize, &'a SegmentRun<'a>)| {
         let path = &run.segment.path;
-        let mut place = Place::of_recording(index, path);
+        let mut place = JumpName::of_recording(index, path);
         let same = assessment.runs.iter().map(|run| &run.segment.path);
         if same.filter(|other| *other == path).count() > 1 {
             place.words += &format!(", from row {}", run.segment.first_row);

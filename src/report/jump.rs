@@ -32,14 +32,14 @@ pub(crate) fn modelled(
     Ok(columns.map(|column| column.amax() != 0.0).collect())
 }
 
-pub(super) struct Place {
+pub(super) struct JumpName {
     /// Number from 1, which ends the figure's name.
     pub suffix: String,
     /// Name of the recording, with the row where the jump begins if there may be several.
     pub words: String,
 }
 
-impl Place {
+impl JumpName {
     pub(crate) fn of_recording(index: usize, path: &Path) -> Self {
         let name = file_name(path);
         let stem = name.trim_end_matches(".gz").trim_end_matches(".csv");
@@ -58,7 +58,7 @@ pub(super) struct Jump<'a> {
     pub model: &'a ReducedModel,
     pub assessment: &'a Assessment<'a>,
     pub run: &'a SegmentRun<'a>,
-    pub place: Place,
+    pub place: JumpName,
 }
 
 impl Jump<'_> {

@@ -120,7 +120,7 @@ pub struct PhaseCertificate {
     pub operations: BeforeAfter,
     /// Variables that some `ddz` of the phase depended on, and none does any more: inputs among them
     /// can no longer be used for control.
-    #[serde(rename = "no_longer_depends_on", serialize_with = "names")]
+    #[serde(rename = "no_longer_depends_on")]
     pub lost: Vec<LatentVariable>,
     pub equations: Vec<EquationCertificate>,
 }
@@ -231,10 +231,6 @@ fn ranges<S: Serializer>(
         return to.serialize_none();
     };
     to.collect_map((ranges.iter()).map(|(name, range)| (name, [range.lo(), range.hi()])))
-}
-
-fn names<S: Serializer>(lost: &[LatentVariable], to: S) -> Result<S::Ok, S::Error> {
-    to.collect_seq(lost.iter().map(ToString::to_string))
 }
 
 /// The kind of a change, with the digits of a rounding.

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::fmt;
 
 use nalgebra::{DMatrix, DVector};
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use super::error::{ModelError, check, check_shape};
 use super::evaluation::Tape;
@@ -66,6 +66,12 @@ impl LatentVariable {
     /// All variables at `latent_dim`: z, then dz, then u.
     pub fn all(latent_dim: usize) -> impl Iterator<Item = Self> {
         (KINDS.into_iter()).flat_map(move |(_, variable)| (0..latent_dim).map(variable))
+    }
+}
+
+impl Serialize for LatentVariable {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        to.collect_str(self)
     }
 }
 

@@ -68,7 +68,6 @@ pub enum Command {
     Completions(CompletionsArguments),
 }
 
-/// `romc demo`
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  romc demo --out-dir out/demo")]
 pub struct DemoArguments {
@@ -80,7 +79,6 @@ pub struct DemoArguments {
     pub force: Overwrite,
 }
 
-/// `romc inspect`
 #[derive(Debug, Args)]
 #[command(
     after_help = "Example:\n  romc inspect models/go1-d4.json examples/recordings/go1/test_01.csv.gz\n  romc inspect --guess my-log.csv > my-log.toml"
@@ -105,7 +103,6 @@ pub struct InspectArguments {
     pub reading: ReadingArguments,
 }
 
-/// `romc convert`
 #[derive(Debug, Args)]
 #[command(
     after_help = "The ending of the output says its format: .csv, .csv.gz or .mcap. Clocks stay as recorded unless\n\
@@ -131,7 +128,6 @@ pub struct ConvertArguments {
     pub reading: ReadingArguments,
 }
 
-/// `romc identify`
 #[derive(Debug, Args)]
 #[command(
     after_help = "Recordings should hold jumps: flight shows gravity and the legs' inertia,\n\
@@ -156,7 +152,6 @@ pub struct IdentifyArguments {
     pub reading: ReadingArguments,
 }
 
-/// `romc robot`
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  romc robot go1\n  \
                   romc robot solo12.urdf --output solo12.toml\n  \
@@ -181,7 +176,6 @@ pub struct RobotArguments {
     pub force: Overwrite,
 }
 
-/// `romc check`
 #[derive(Debug, Args)]
 #[command(
     after_help = "Phases of LaTeX go by a comment `% Phase NAME` (in Markdown a heading) or a label that ends in\n\
@@ -212,7 +206,6 @@ pub struct CheckArguments {
     pub symbols: Vec<String>,
 }
 
-/// `romc simulate`
 #[derive(Debug, Args)]
 #[command(
     after_help = "Example:\n  romc simulate models/go1-d4.json examples/recordings/go1/test_*.csv.gz"
@@ -237,7 +230,6 @@ pub struct SimulateArguments {
     pub reading: ReadingArguments,
 }
 
-/// `romc mpc`
 #[derive(Debug, Args)]
 #[command(
     after_help = "Example:\n  romc mpc models/go1-d4.json examples/recordings/go1/test_01.csv.gz --output mpc.csv"
@@ -280,7 +272,6 @@ pub struct MpcArguments {
     pub reading: ReadingArguments,
 }
 
-/// `romc plan`
 #[derive(Debug, Args)]
 #[command(
     after_help = "Exit code 1 and a reason where there is no plan to be trusted.\n\n\
@@ -332,7 +323,6 @@ pub struct PlanArguments {
     pub reading: ReadingArguments,
 }
 
-/// `romc report`
 #[derive(Debug, Args)]
 #[command(
     after_help = "Example:\n  romc report models/go1-d4.json examples/recordings/go1/test_*.csv.gz --output report.html"
@@ -374,7 +364,6 @@ pub struct ReportArguments {
     pub reading: ReadingArguments,
 }
 
-/// `romc manual`
 #[derive(Debug, Args)]
 #[command(
     after_help = "Example:\n  romc manual --out-dir ~/.local/share/man/man1 && man romc-compile"
@@ -388,7 +377,6 @@ pub struct ManualArguments {
     pub force: Overwrite,
 }
 
-/// `romc completions`
 #[derive(Debug, Args)]
 #[command(
     after_help = "Example:\n  romc completions bash > ~/.local/share/bash-completion/completions/romc"

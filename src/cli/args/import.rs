@@ -35,7 +35,6 @@ fn library_argument(text: &str) -> Result<LibraryArgument, ImportError> {
     }
 }
 
-/// `romc import`
 #[derive(Debug, Args)]
 #[command(
     after_help = "Tensors are found by the names of the parts, encoder.weight, encoder.bias, decoder.weight,\n\
