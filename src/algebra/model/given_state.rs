@@ -1,0 +1,158 @@
+//! What the latent state says of the latent input.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::error::{ModelError, check_tensor};
+use super::maps::complement;
+use super::statistics::{check_covariance, symmetric};
+
+/// Samples per number of a regression, below which it is left out.
+const LEAST_SAMPLES: usize = 4;
+/// Ridge relative to the variance of each coordinate.
+const RIDGE: f64 = 1e-2;
+
+/// The latent input of one phase given the latent state, `u_lat | z, dz ~ (mean [1; z; dz], covariance)`, and how far
+/// the model's accelerations are off. Scaled units.
+#[derive(Clone, Debug, PartialEq)]
+pub struct InputGivenState {
+    /// `latent_dim x (1 + 2 latent_dim)`.
+    pub mean: DMatrix<f64>,
+    /// `latent_dim x latent_dim`, symmetric positive semidefinite.
+    pub covariance: DMatrix<f64>,
+    /// Of `ddz - Xi^T Theta(z, dz, u_lat)` about zero, `latent_dim x latent_dim`.
+    pub acceleration_error: DMatrix<f64>,
+}
+
+impl InputGivenState {
+    /// Ridge regression of the inputs on the states of `n` samples, in rows of blocks: `[z, dz, u_lat]`, and what the
+    /// model leaves of `ddz`. Shifts of `z` along the columns of `shifts` change no input, as where a robot is does
+    /// not. None for fewer samples than say something.
+    pub fn of_blocks<I>(n: usize, shifts: &DMatrix<f64>, blocks: impl Fn() -> I) -> Option<Self>
+    where
+        I: Iterator<Item = (DMatrix<f64>, DMatrix<f64>)>,
+    {
+        let d = shifts.nrows();
+        if n < LEAST_SAMPLES * (1 + 2 * d) {
+            return None;
+        }
+        let share = 1.0 / n as f64;
+        let mut average = DVector::zeros(3 * d);
+        for (variables, _) in blocks() {
+            average += variables.row_sum().transpose() * share;
+        }
+        let (mut covariance, mut error) = (DMatrix::zeros(3 * d, 3 * d), DMatrix::zeros(d, d));
+        for (mut variables, left) in blocks() {
+            for mut row in variables.row_iter_mut() {
+                row -= average.transpose();
+            }
+            covariance.gemm_tr(share, &variables, &variables, 1.0);
+            error.gemm_tr(share, &left, &left, 1.0);
+        }
+        // States without their shifts.
+        let mut still = DMatrix::identity(2 * d, 2 * d);
+        still
+            .view_mut((0, 0), (d, d))
+            .copy_from(&complement(shifts));
+        let state = &still * covariance.view((0, 0), (2 * d, 2 * d)) * &still;
+        let input = covariance.view((2 * d, 2 * d), (d, d));
+        let both = covariance.view((2 * d, 0), (d, 2 * d)) * &still;
+        let gain = ridge(&state, &both)? * still;
+        let explained = &gain * both.transpose();
+        let left = input - &explained - explained.transpose() + &gain * &state * gain.transpose();
+        let bias = average.rows(2 * d, d) - &gain * average.rows(0, 2 * d);
+        let mut mean = DMatrix::zeros(d, 1 + 2 * d);
+        mean.set_column(0, &bias);
+        mean.columns_mut(1, 2 * d).copy_from(&gain);
+        Some(Self {
+            mean,
+            covariance: symmetric(left),
+            acceleration_error: symmetric(error),
+        })
+    }
+
+    pub(super) fn check(&self, place: &str, latent_dim: usize) -> Result<(), ModelError> {
+        let (mean, shape) = (format!("{place}.mean"), (latent_dim, 1 + 2 * latent_dim));
+        check_tensor(&mean, &self.mean, shape)?;
+        for (key, matrix) in [
+            ("covariance", &self.covariance),
+            ("acceleration_error", &self.acceleration_error),
+        ] {
+            check_covariance(&format!("{place}.{key}"), matrix, latent_dim)?;
+        }
+        Ok(())
+    }
+}
+
+/// `both (state + ridge)^-1` with the ridge relative to each variance; none if that has no factor.
+fn ridge(state: &DMatrix<f64>, both: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let variance = state.diagonal();
+    let floor = f64::EPSILON * variance.amax();
+    // A coordinate that never moves says nothing.
+    let inverse = variance.map(|v| if v > floor { 1.0 / v.sqrt() } else { 0.0 });
+    let inverse = DMatrix::from_diagonal(&inverse);
+    let normalised =
+        &inverse * state * &inverse + DMatrix::identity(state.nrows(), state.nrows()) * RIDGE;
+    let solved = normalised.cholesky()?.solve(&(&inverse * both.transpose()));
+    Some((inverse * solved).transpose())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Inputs `u = 2 + 3 z2 - dz1 + e`, where `e` is 1 and -1 in turn.
+    fn samples(n: usize) -> (DMatrix<f64>, DMatrix<f64>) {
+        let wave = |k: usize, rate: f64| (rate * k as f64).sin();
+        let variables = DMatrix::from_fn(n, 6, |k, column| {
+            let state = [wave(k, 0.9), wave(k, 1.7), wave(k, 2.3), wave(k, 2.9)];
+            let sign = if k % 2 == 0 { 1.0 } else { -1.0 };
+            match column {
+                4 => 2.0 + 3.0 * state[1] - state[2] + sign,
+                5 => 0.0,
+                _ => state[column],
+            }
+        });
+        (
+            variables,
+            DMatrix::from_fn(n, 2, |_, column| [0.5, 0.0][column]),
+        )
+    }
+
+    #[test]
+    fn states_explain_the_inputs_that_depend_on_them() {
+        let n = 4000;
+        let blocks = || std::iter::once(samples(n));
+        let shifts = DMatrix::from_row_slice(2, 1, &[1.0, 0.0]);
+        let given = InputGivenState::of_blocks(n, &shifts, blocks).expect("enough samples");
+        let expected = [2.0, 0.0, 3.0, -1.0, 0.0];
+        for (found, expected) in given.mean.row(0).iter().zip(expected) {
+            assert!((found - expected).abs() < 0.05, "{}", given.mean);
+        }
+        assert_eq!(given.mean[(0, 1)], 0.0);
+        assert!(given.mean.row(1).amax() < 1e-12);
+        assert!(
+            (given.covariance[(0, 0)] - 1.0).abs() < 0.05,
+            "{}",
+            given.covariance
+        );
+        assert!((given.acceleration_error[(0, 0)] - 0.25).abs() < 1e-12);
+        given.check("statistics", 2).expect("consistent shapes");
+    }
+
+    #[test]
+    fn blocks_do_not_matter_and_few_samples_say_nothing() {
+        let (n, shifts) = (400, DMatrix::zeros(2, 0));
+        let whole = InputGivenState::of_blocks(n, &shifts, || std::iter::once(samples(n)));
+        let cut = || {
+            let (variables, left) = samples(n);
+            let part = |from: usize, count: usize| {
+                let rows = |m: &DMatrix<f64>| m.rows(from, count).into_owned();
+                (rows(&variables), rows(&left))
+            };
+            vec![part(0, 150), part(150, 250)].into_iter()
+        };
+        let cut = InputGivenState::of_blocks(n, &shifts, cut).expect("enough");
+        assert!((whole.expect("enough").mean - cut.mean).amax() < 1e-9);
+        assert!(InputGivenState::of_blocks(19, &shifts, || std::iter::once(samples(19))).is_none());
+    }
+}
