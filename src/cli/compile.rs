@@ -88,7 +88,6 @@ pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
     Ok(Answer::new(text, json))
 }
 
-/// A note on a target that is named twice.
 fn twice(targets: &[Target]) -> String {
     let mut named = targets.iter().enumerate();
     let twice = named.find(|(place, target)| targets[..*place].contains(target));

@@ -28,7 +28,6 @@ use crate::{Error, artifact, recording};
 
 const MODEL: (&str, &[u8]) = ("go1-d4.json", include_bytes!("../../models/go1-d4.json"));
 
-/// Recorded jumps that its training did not see.
 const JUMPS: [(&str, &[u8]); 3] = [
     (
         "test_01",
@@ -44,7 +43,6 @@ const JUMPS: [(&str, &[u8]); 3] = [
     ),
 ];
 
-/// The tolerance within which the report lists changes.
 const REPORT_TOLERANCE: Tolerance = Tolerance::ShareOfRms(0.01);
 
 /// Runs the whole path and reports its files and metrics. The exit code is 1 if predictions of body x or z, the
@@ -120,7 +118,6 @@ pub fn run(arguments: &DemoArguments) -> Result<Answer, Error> {
     Ok(Answer::new(text, json).failed_if(is_failed))
 }
 
-/// The files, a line each.
 fn made_in(folder: &Path, made: &[PathBuf], files: &[EmittedFile]) -> String {
     let mut text = format!("made in {}:\n", folder.display());
     for (path, file) in made.iter().zip(files) {

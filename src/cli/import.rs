@@ -154,7 +154,6 @@ pub fn import_compared(
     }
 }
 
-/// A model without both maps cannot be compared with recordings.
 fn needs_maps(report: &ImportReport) -> Error {
     let unused = report
         .unused

@@ -48,7 +48,6 @@ pub fn run(arguments: &InspectArguments) -> Result<Answer, Error> {
     Ok(Answer::new(texts.join("\n"), json!({ "files": files })))
 }
 
-/// A first map of one log.
 fn guessed(arguments: &InspectArguments, robot: &Robot) -> Result<Answer, Error> {
     let [log] = &arguments.files[..] else {
         return Err(Error::NotOne {

@@ -114,7 +114,6 @@ fn segment_json(segment: &Segment, spans: &[PhaseSpan], rule: &PhaseRule) -> Val
     })
 }
 
-/// Extremes of one coordinate over all segments.
 #[derive(Serialize)]
 struct Range {
     coordinate: String,

@@ -115,7 +115,6 @@ const DONE: u8 = 0;
 const FAILED: u8 = 1;
 const WRONG_USAGE: u8 = 2;
 
-/// Runs a command, whose name goes before the entries of its JSON object.
 fn execute(command: Command) -> Result<Answer, Error> {
     args::refuse_idle(&command)?;
     let (name, mut answer) = match &command {

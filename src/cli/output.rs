@@ -60,7 +60,6 @@ pub fn reader(arguments: &ReadingArguments, clocks: Clocks) -> Result<Reader, Er
     ))
 }
 
-/// Reads recordings of a model's robot.
 pub fn read_for(
     model: &ReducedModel,
     paths: &[PathBuf],
@@ -207,12 +206,10 @@ pub fn lines<T: Display>(words: &str, items: impl IntoIterator<Item = T>) -> Str
     lines.collect()
 }
 
-/// The output of a command as JSON shows it.
 pub fn shown(path: &Option<PathBuf>) -> Option<String> {
     path.as_ref().map(|path| path.display().to_string())
 }
 
-/// Paths as JSON shows them.
 pub fn names(paths: &[PathBuf]) -> Vec<String> {
     let names = paths.iter().map(|path| path.display().to_string());
     names.collect()

@@ -93,7 +93,6 @@ fn trained(arguments: &StudyArguments) -> Result<Store, Error> {
     Ok(store)
 }
 
-/// The settings of the file with those of the command line over them.
 fn settings(arguments: &StudyArguments) -> Result<TrainSettings, Error> {
     let mut settings = TrainSettings::default();
     if let Some(path) = &arguments.config {

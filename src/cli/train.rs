@@ -154,7 +154,6 @@ fn stop_on_interrupt() -> &'static AtomicBool {
     &INTERRUPTED
 }
 
-/// The command that repeats this training, as the provenance keeps it.
 fn command_line(
     arguments: &TrainArguments,
     settings: &TrainSettings,

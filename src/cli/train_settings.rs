@@ -161,7 +161,6 @@ pub(super) fn actuators(settings: &TrainSettings) -> &str {
     settings.actuators.as_deref().unwrap_or(default)
 }
 
-/// The first setting that the closed form would ignore.
 fn of_the_joint_method(settings: &TrainSettings) -> Option<&'static str> {
     let layers = match settings.encoder_layers {
         Some(_) => "encoder-layers",
@@ -207,7 +206,6 @@ fn set<T>(option: &mut T, given: Option<impl Into<T>>) {
     }
 }
 
-/// The settings that were given, by the names of their flags.
 fn given(settings: &TrainSettings) -> Map<String, Value> {
     let Ok(Value::Object(mut given)) = serde_json::to_value(settings) else {
         unreachable!("settings are a struct of numbers, texts and switches");

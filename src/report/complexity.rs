@@ -40,7 +40,6 @@ pub(crate) fn study_figures(summary: &Summary) -> Vec<Figure> {
     ]
 }
 
-/// Lower end, middle and upper end of a bar.
 type Bar = [f64; 3];
 
 fn range(Spread { mean, std }: Spread) -> Bar {

@@ -13,7 +13,6 @@ use crate::mpc::Lift;
 use crate::recording::Segment;
 use crate::study::Summary;
 
-/// Jumps that get figures of their own; tables cover all.
 const MAX_JUMPS: usize = 3;
 
 #[derive(Debug, Clone, Copy)]
@@ -64,7 +63,6 @@ impl AllFigures {
     }
 }
 
-/// The figures of a report.
 pub(crate) fn all_figures(content: &Content<'_>) -> Result<AllFigures, ModelError> {
     let mut figures = AllFigures::default();
     let (model, assessment) = (content.model, content.assessment);

@@ -40,7 +40,6 @@ fn line(run: &Run, role: Role, value: impl Fn(&StepRow) -> Option<f64>) -> Serie
     Series::through(role, points)
 }
 
-/// Commanded torques beside the recorded ones, between the limits.
 pub(super) fn torques(model: &ReducedModel, lift: Lift, run: &Run, place: &JumpName) -> Figure {
     let JumpName { suffix, words } = place;
     let limits = model.robot().ok().map(Robot::torque_limit_nm);
@@ -120,7 +119,6 @@ fn latent_tracking(
     )
 }
 
-/// Wall time and iterations of every step.
 fn solve_times(settings: &MpcSettings, run: &Run, place: &JumpName) -> Figure {
     let milliseconds = line(run, Role::Recorded, |row| Some(1e-3 * row.command.solve_us));
     let iterations = line(run, Role::Recorded, |row| {

@@ -110,7 +110,6 @@ fn subject(content: &Content<'_>) -> Result<String, ModelError> {
     ))
 }
 
-/// `a, b and c`.
 fn listed(names: &[String]) -> String {
     match names {
         [] => String::new(),
@@ -165,7 +164,6 @@ fn compared(content: &Content<'_>) -> String {
     )
 }
 
-/// Millimetres with two digits.
 fn millimetres(metres: f64) -> String {
     format!("{} mm", rounded(1e3 * metres, 2))
 }
@@ -192,7 +190,6 @@ fn errors(content: &Content<'_>) -> String {
     )
 }
 
-/// How it compares with the better of the template models over whole jumps.
 fn beside_pendulum(content: &Content<'_>) -> Option<String> {
     let assessment = content.assessment;
     let own = body_rms(assessment, &assessment.full);

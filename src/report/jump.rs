@@ -14,10 +14,8 @@ use crate::recording::{Segment, stretches};
 use crate::robot::{BODY_X, BODY_Z, JOINT_DIM, STATE_DIM};
 use crate::sim::Rollout;
 
-/// Instants of a film strip.
 const FRAMES: usize = 10;
 
-/// Yaw at the first sample, in rad.
 pub(super) fn heading_rad(segment: &Segment) -> f64 {
     segment.x[(STATE_DIM - 1, 0)]
 }
@@ -53,7 +51,6 @@ impl JumpName {
 /// A value of every sample; none where a rollout did not arrive.
 type Samples = Vec<Option<DVector<f64>>>;
 
-/// One segment of a recording beside its rollouts.
 pub(super) struct Jump<'a> {
     pub model: &'a ReducedModel,
     pub assessment: &'a Assessment<'a>,
@@ -109,7 +106,6 @@ impl Jump<'_> {
         Ok(states)
     }
 
-    /// A function's value at every predicted sample.
     fn predicted(
         &self,
         rollout: &Rollout,
@@ -130,12 +126,10 @@ impl Jump<'_> {
         Series::over(role, &self.run.latent.time_s, value)
     }
 
-    /// Lines over the samples; flight is shaded.
     fn panel(&self, title: impl Into<String>, series: Vec<Series>) -> Panel {
         Panel::shaded(title, series, self.flights())
     }
 
-    /// Times without a foot down.
     fn flights(&self) -> Vec<(f64, f64)> {
         let Segment { time_s, feet, .. } = self.run.segment;
         let in_air = |sample: usize| !feet[sample].contains(&true);

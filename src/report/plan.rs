@@ -6,7 +6,6 @@ use crate::model::JumpPrior;
 use crate::plan::{Plan, Reach};
 use crate::robot::{BODY_X, BODY_Z, JOINT_DIM, Robot};
 
-/// Postures in the film strip.
 const FRAMES: usize = 8;
 /// Half the size of the cross of a recorded jump, m.
 const CROSS_M: f64 = 0.004;
@@ -55,7 +54,6 @@ fn panel(plan: &Plan, title: String, series: Vec<Series>) -> Panel {
     Panel::shaded(title, series, flights(plan))
 }
 
-/// Height over distance of the body.
 fn path(plan: &Plan, goal: &str) -> Figure {
     let x = &plan.motion.x;
     let points = (0..plan.motion.len()).map(|k| (x[(BODY_X, k)], Some(x[(BODY_Z, k)])));

@@ -23,7 +23,6 @@ fn r2(fit: Option<Fit>) -> Cell {
     r2.map(|r2| format!("{r2:.3}")).into()
 }
 
-/// A row for each coordinate, so far with its name and unit.
 fn coordinates(assessment: &Assessment<'_>) -> Table {
     let mut table = Table::default();
     table.column("coordinate", "", &assessment.names);
@@ -54,7 +53,6 @@ pub(crate) fn coordinate_table(model: &ReducedModel, assessment: &Assessment<'_>
     table
 }
 
-/// Fit of every coordinate, and its restarted residuals in each phase.
 pub(crate) fn error_table(model: &ReducedModel, assessment: &Assessment<'_>) -> Table {
     with_phases(coordinate_table(model, assessment), model, assessment)
 }
@@ -100,7 +98,6 @@ pub(crate) fn baseline_table(assessment: &Assessment<'_>) -> Table {
     table
 }
 
-/// Latent accelerations, stability and input gain of each phase.
 pub(crate) fn dynamics_table(model: &ReducedModel, assessment: &Assessment<'_>) -> Table {
     let fits = assessment.pointwise.acceleration.iter().map(FitSums::fit);
     let phases = model.phases().iter();
@@ -127,7 +124,6 @@ pub(crate) fn dynamics_table(model: &ReducedModel, assessment: &Assessment<'_>) 
         .table()
 }
 
-/// What a model says of known physics, one row per phase.
 pub(crate) fn invariance_table(invariance: &Invariance) -> Table {
     let shown = |value: Option<f64>| value.map_or("-".to_owned(), significant);
     let words = format!(
@@ -198,7 +194,6 @@ fn driven(metrics: &ControlMetrics) -> [Driven<'_>; 5] {
     ]
 }
 
-/// The rows of the verdict that fail along each recording.
 pub(crate) fn failures(runs: &[NamedRun]) -> Vec<String> {
     let failed = runs.iter().filter_map(|(path, run)| {
         let failure = run.metrics.as_ref()?.failure.as_ref()?;
@@ -252,7 +247,6 @@ pub(crate) fn verdict_lines(verdict: &Verdict) -> String {
     text
 }
 
-/// The runs that controlled nothing, and why.
 pub(crate) fn failed_runs(runs: &[NamedRun]) -> Vec<String> {
     let failed = (runs.iter())
         .filter_map(|(path, run)| Some(format!("{}: {}", file_name(path), run.failure()?)));

@@ -37,35 +37,26 @@ impl std::iter::Sum for BeforeAfter {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ChangeKind {
     Dropped,
-    /// A constant took its place.
     Constant,
     /// A straight line took its place: multiples of variables, perhaps with a constant.
     Linear,
-    /// Its coefficient has fewer digits.
     Rounded {
-        /// Significant digits that are left.
         digits: usize,
     },
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Effect {
-    /// The term in the library's syntax.
     pub term: String,
-    /// Its coefficient before the change.
     pub before: f64,
-    /// And after it.
     pub after: f64,
 }
 
-/// One change of one equation.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Change {
     #[serde(flatten, serialize_with = "kind")]
     pub kind: ChangeKind,
-    /// The term in the library's syntax.
     pub term: String,
-    /// Its coefficient before this change.
     pub before: f64,
     /// And after it; zero unless the change is a rounding.
     pub after: f64,
@@ -82,12 +73,10 @@ pub struct Change {
 /// One equation of one phase; all errors in scaled units per second squared.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct EquationCertificate {
-    /// Index of the latent coordinate.
     #[serde(rename = "equation", serialize_with = "equation")]
     pub output: usize,
     /// Root mean square of the model's `ddz` over the recorded samples.
     pub rms: Option<f64>,
-    /// The largest error that the tolerance allows.
     pub allowed: f64,
     /// Contains `ddz` of the model minus `ddz` of the simplified model at every point of the domain;
     /// found from the two models, not from the list of changes.
@@ -213,12 +202,10 @@ pub fn certificate_json(certificate: &Certificate) -> Value {
     })
 }
 
-/// `ddz1` for the first latent coordinate.
 fn equation<S: Serializer>(output: &usize, to: S) -> Result<S::Ok, S::Error> {
     to.collect_str(&format_args!("ddz{}", output + 1))
 }
 
-/// The lower and the upper end of an interval.
 fn ends<S: Serializer>(interval: &Interval, to: S) -> Result<S::Ok, S::Error> {
     [interval.lo(), interval.hi()].serialize(to)
 }

@@ -186,7 +186,6 @@ impl Domain {
     }
 }
 
-/// One box or matrix of samples per phase.
 pub(super) fn check_count(found: usize, expected: usize) -> Result<(), SimplifyError> {
     match found == expected {
         true => Ok(()),

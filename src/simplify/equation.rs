@@ -157,7 +157,6 @@ impl<'a> Terms<'a> {
 
 #[derive(Clone, Debug)]
 pub(super) struct Equation {
-    /// Coefficients now, by row.
     pub xi: Vec<f64>,
     pub steps: Vec<Step>,
     /// Encloses the original equation minus the present one.

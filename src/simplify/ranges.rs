@@ -10,7 +10,6 @@ const CONSTANT_ROUNDING: f64 = 1.0 / (1u64 << 48) as f64;
 /// A range counts as sharp when its ends are this close to values of the function, as a share of
 /// its width.
 const SHARP: f64 = 1e-3;
-/// Most boxes that a range is cut into.
 const MAX_BOXES: usize = 64;
 /// Nodes visited for one range, about.
 const MAX_VISITS: usize = 50_000;
@@ -28,7 +27,6 @@ pub(super) struct Ranges {
 }
 
 impl Ranges {
-    /// Over the box `domain`, for these terms of `pool`.
     pub(crate) fn new(
         pool: ExprPool,
         domain: Vec<(SymbolId, Interval)>,

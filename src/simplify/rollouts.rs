@@ -10,7 +10,6 @@ use crate::model::ReducedModel;
 use crate::recording::Segment;
 use crate::sim::{LatentSegment, Restart, Rollout, Window, rollout};
 
-/// Names of the coordinates in which rollouts are compared.
 const BODY: &str = "body.";
 
 /// Errors of a model's rollouts in the robot's body coordinates.
@@ -49,7 +48,6 @@ pub(crate) struct RolloutBasis<'a> {
 }
 
 impl RolloutBasis<'_> {
-    /// Rolls both models out, whole and restarted.
     pub(crate) fn effect(
         &self,
         model: &ReducedModel,
@@ -92,7 +90,6 @@ impl RolloutBasis<'_> {
         Ok(errors)
     }
 
-    /// Predicted samples outside the domain.
     fn outside(&self, latent: &LatentSegment, run: &Rollout) -> usize {
         let is_inside = |(sample, window, column): &(usize, &Window, usize)| {
             let z = window.z.column(*column);

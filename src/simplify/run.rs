@@ -129,7 +129,6 @@ fn gravity(model: &ReducedModel) -> Option<f64> {
     Some(-GRAVITY_M_S2 * factors[BODY_Z])
 }
 
-/// One phase with its box and samples.
 struct PhaseProblem<'a> {
     name: &'a str,
     workspace: &'a Workspace,

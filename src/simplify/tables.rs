@@ -45,7 +45,6 @@ pub(crate) fn change_table(certificate: &Certificate) -> Table {
         .table()
 }
 
-/// Root mean square errors of rollouts before and after.
 pub(crate) fn rollout_table(effect: &RolloutEffect) -> Table {
     let names = effect.names.iter().zip(&effect.units);
     let names = names.map(|(name, unit)| format!("{name}, {unit}"));
@@ -61,7 +60,6 @@ pub(crate) fn rollout_table(effect: &RolloutEffect) -> Table {
     table
 }
 
-/// Errors of equations whose coefficients are rounded for print.
 fn printing_table(printed: &[PrintedEquation]) -> Table {
     Table::of(printed)
         .column("phase, equation", "", |e| name(&e.phase, e.output))

@@ -37,7 +37,6 @@ impl Tolerance {
         }
     }
 
-    /// Whether nothing may change.
     pub(crate) fn is_zero(self) -> bool {
         match self {
             Tolerance::ShareOfRms(value) | Tolerance::Absolute(value) => value == 0.0,

@@ -66,7 +66,6 @@ impl Workspace {
         self.rows.get(&None).copied()
     }
 
-    /// Ranges over a box, `3 latent_dim` intervals.
     pub(crate) fn ranges(&self, domain: &[Interval]) -> Ranges {
         let variables = LatentVariable::all(self.library.latent_dim());
         let symbols = variables.filter_map(|variable| self.library.symbol(variable));

@@ -23,9 +23,7 @@ pub(crate) enum Anchor {
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Paint {
-    /// The frame.
     Axis,
-    /// Lines across the frame.
     Grid,
     /// The ground of a flight.
     Shade,
@@ -250,7 +248,6 @@ fn draw_heat(title: &str, map: &HeatMap, size: (f64, f64), x_label: &str) -> Vec
     marks
 }
 
-/// The title, and the shades from zero to the largest magnitude.
 fn heat_scale(title: &str, left: f64, largest: f64) -> Vec<Mark> {
     const SHADES: usize = 6;
     const CELL: f64 = 9.0;
@@ -269,7 +266,6 @@ fn heat_scale(title: &str, left: f64, largest: f64) -> Vec<Mark> {
     marks
 }
 
-/// Robots on their floor; the title stands above.
 fn draw_sticks(title: &str, plot: &StickPlot, size: (f64, f64)) -> Vec<Mark> {
     let (x, z) = (plot.extent.forward_m, plot.extent.up_m);
     let (width, height) = (size.0 - 2.0 * RIGHT, size.1 - TOP - RIGHT);

@@ -28,7 +28,6 @@ impl Role {
         Self::Limit,
     ];
 
-    /// Class of its lines in SVG.
     pub(crate) fn class(self) -> &'static str {
         self.style().0
     }
@@ -88,7 +87,6 @@ pub(crate) enum Drawing {
     Sticks(StickPlot),
 }
 
-/// Magnitudes of a matrix as shades.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct HeatMap {
     pub rows: Vec<String>,

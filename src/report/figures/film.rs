@@ -7,7 +7,6 @@ use super::sticks::{Extent, Motion, Sticks};
 use crate::robot::Robot;
 use crate::typeset::mathml::HtmlText;
 
-/// Instants of an animation at most.
 const MOST_FRAMES: usize = 72;
 
 /// An animation: the drawing at its first instant in sight, and the lines of every instant.

@@ -13,7 +13,6 @@ const TRUNK_HALF_HEIGHT_M: f64 = 0.05;
 
 const MARGIN_M: f64 = 0.04;
 
-/// A robot's lines in a vertical plane: pairs of forward and up, in m.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Sticks {
     /// The trunk as a closed box, then hip, knee and foot of each leg, as named in [`Sticks::NAMES`].
@@ -56,12 +55,9 @@ impl Sticks {
     }
 }
 
-/// A part of a vertical plane, in m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Extent {
-    /// Least and largest distance forward.
     pub forward_m: (f64, f64),
-    /// Least and largest height.
     pub up_m: (f64, f64),
 }
 
@@ -126,7 +122,6 @@ impl Motion {
         }
     }
 
-    /// The robot at a sample, for drawing.
     pub(crate) fn sticks(&self, robot: &Robot, heading_rad: f64, sample: usize) -> Option<Sticks> {
         let state = self.states.get(sample)?.as_ref()?;
         Some(Sticks::of(robot, state.as_slice(), heading_rad))
