@@ -11,11 +11,11 @@ const LEGEND: [(Role, &str); 2] = [
 /// Figures 10 (decoder error and active coefficients) and 11 (combined loss) of a study; bars are one standard deviation
 /// over the seeds to either side.
 pub(crate) fn study_figures(summary: &Summary) -> Vec<Figure> {
-    let figure = |id: &str, caption: &str, panels: Vec<Panel>| Figure {
-        x_label: "latent coordinates".to_owned(),
-        panel_size: (360.0, 210.0),
-        columns: 2,
-        ..Figure::over_time(id, caption, panels, &LEGEND)
+    let figure = |id: &str, caption: &str, panels: Vec<Panel>| {
+        let figure = Figure::over_time(id, caption, panels, &LEGEND);
+        figure
+            .over("latent coordinates")
+            .in_columns(2, (360.0, 210.0))
     };
     type Row = (&'static str, fn(&DimensionSummary) -> Bar);
     let over_dimensions: [Row; 4] = [

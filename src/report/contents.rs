@@ -149,10 +149,6 @@ fn encoder(
             values,
         }),
     };
-    Ok(Figure {
-        x_label: String::new(),
-        panel_size: (120.0 + 40.0 * d.min(18) as f64, 330.0),
-        columns: 1,
-        ..Figure::over_time("encoder", caption, vec![map], &[])
-    })
+    let figure = Figure::over_time("encoder", caption, vec![map], &[]).over("");
+    Ok(figure.in_columns(1, (120.0 + 40.0 * d.min(18) as f64, 330.0)))
 }

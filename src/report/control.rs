@@ -124,21 +124,18 @@ fn solve_times(settings: &MpcSettings, run: &Run, place: &JumpName) -> Figure {
     let iterations = line(run, Role::Recorded, |row| {
         Some(f64::from(row.command.iterations))
     });
-    Figure {
-        panel_size: (360.0, 170.0),
-        columns: 2,
-        ..Figure::over_time(
-            format!("solve_times_{}", place.suffix),
-            format!(
-                "Steps along {}: wall time from measurement to command, {} stages of {} s each, and \
-                 interior-point iterations.",
-                place.words, settings.horizon, settings.step_s
-            ),
-            vec![
-                Panel::lines("time of a step, ms", vec![milliseconds]),
-                Panel::lines("iterations", vec![iterations]),
-            ],
-            &[(Role::Recorded, "one step")],
-        )
-    }
+    let caption = format!(
+        "Steps along {}: wall time from measurement to command, {} stages of {} s each, and \
+         interior-point iterations.",
+        place.words, settings.horizon, settings.step_s
+    );
+    let panels = vec![
+        Panel::lines("time of a step, ms", vec![milliseconds]),
+        Panel::lines("iterations", vec![iterations]),
+    ];
+    let (id, legend) = (
+        format!("solve_times_{}", place.suffix),
+        [(Role::Recorded, "one step")],
+    );
+    Figure::over_time(id, caption, panels, &legend).in_columns(2, (360.0, 170.0))
 }

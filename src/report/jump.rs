@@ -252,11 +252,8 @@ impl Jump<'_> {
             panel(BODY_Z, 1, "body.z, m"),
         ];
         let id = format!("aslip_{}", self.place.suffix);
-        Ok(Figure {
-            panel_size: (360.0, 180.0),
-            columns: 2,
-            ..Figure::over_time(id, caption, panels, &legend)
-        })
+        let figure = Figure::over_time(id, caption, panels, &legend);
+        Ok(figure.in_columns(2, (360.0, 180.0)))
     }
 
     /// Root mean square errors of body x and z over the whole jump, in m; none where the rollout arrives nowhere.

@@ -60,12 +60,8 @@ fn path(plan: &Plan, goal: &str) -> Figure {
     let body = Series::through(Role::Full, points);
     let panels = vec![Panel::lines("body z, m", vec![body])];
     let caption = format!("Path of the body in {goal}.");
-    Figure {
-        x_label: "body x, m".to_owned(),
-        panel_size: (360.0, 220.0),
-        columns: 1,
-        ..Figure::over_time("plan_path", caption, panels, &[(Role::Full, "planned")])
-    }
+    let figure = Figure::over_time("plan_path", caption, panels, &[(Role::Full, "planned")]);
+    figure.over("body x, m").in_columns(1, (360.0, 220.0))
 }
 
 /// Body and its speeds over time, the flight shaded, with the borders of the parts.
@@ -120,14 +116,10 @@ fn torques(plan: &Plan, robot: &Robot, goal: &str) -> Figure {
 pub(crate) fn reach_figure(reach: &Reach, prior: &JumpPrior) -> Figure {
     let crosses = prior.jumps.iter().flat_map(|&[distance, apex, _]| {
         let at = |x: f64, y: f64| (distance + x * CROSS_M, Some(apex + 0.25 * y * CROSS_M));
-        [
-            at(-1.0, -1.0),
-            at(1.0, 1.0),
-            (distance, None),
-            at(-1.0, 1.0),
-            at(1.0, -1.0),
-            (distance, None),
-        ]
+        let gap = (distance, None);
+        [[-1.0, 1.0], [1.0, -1.0]]
+            .map(|[from, to]| [at(-1.0, from), at(1.0, to), gap])
+            .concat()
     });
     let series = vec![
         Series::through(Role::Recorded, crosses),
@@ -141,12 +133,8 @@ pub(crate) fn reach_figure(reach: &Reach, prior: &JumpPrior) -> Figure {
         (Role::Full, "trusted"),
         (Role::Restarted, "with a warning"),
     ];
-    Figure {
-        x_label: "distance, m".to_owned(),
-        panel_size: (420.0, 280.0),
-        columns: 1,
-        ..Figure::over_time("plan_reach", caption, panels, &legend)
-    }
+    let figure = Figure::over_time("plan_reach", caption, panels, &legend);
+    figure.over("distance, m").in_columns(1, (420.0, 280.0))
 }
 
 /// The outline of the goals with one of these verdicts: for each apex, the stretch of distances.

@@ -156,4 +156,19 @@ impl Figure {
             legend: legend.iter().map(words).collect(),
         }
     }
+
+    /// The same with panels of another size, so many side by side.
+    pub(crate) fn in_columns(self, columns: usize, panel_size: (f64, f64)) -> Self {
+        Self {
+            columns,
+            panel_size,
+            ..self
+        }
+    }
+
+    /// The same over another axis than time.
+    pub(crate) fn over(self, x_label: &str) -> Self {
+        let x_label = x_label.to_owned();
+        Self { x_label, ..self }
+    }
 }
