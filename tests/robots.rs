@@ -5,6 +5,8 @@
 //! `examples/robots/reference.py`.
 
 mod command_line;
+#[path = "robots/formulas.rs"]
+mod formulas;
 #[path = "robots/made.rs"]
 mod made;
 mod tools;

@@ -14,15 +14,10 @@ use crate::robot::Robot;
 pub struct Format(&'static [&'static str]);
 
 impl Format {
-    /// A table as CSV.
     pub const TABLE: Self = Self(&[".csv"]);
-    /// A recording.
     pub const RECORDING: Self = Self(&[".csv", ".csv.gz", ".mcap"]);
-    /// A model file.
     pub const MODEL: Self = Self(&[".json"]);
-    /// A robot, its actuators, a map of columns.
     pub const TOML: Self = Self(&[".toml"]);
-    /// A report.
     pub const PAGE: Self = Self(&[".html", ".htm"]);
 
     /// Refuses a name whose ending says another format. What is there and no file of a disk is refused elsewhere.
@@ -33,16 +28,17 @@ impl Format {
         if is_device || self.0.iter().any(|ending| name.ends_with(ending)) {
             return Ok(());
         }
-        Err(Error::Ending {
+        let found = match path.extension() {
+            Some(ending) => format!(".{}", ending.to_string_lossy()),
+            None => "no ending".to_owned(),
+        };
+        let expected = match self.0 {
+            [all @ .., last] if !all.is_empty() => format!("{} or {last}", all.join(", ")),
+            all => all.concat(),
+        };
+        Err(Error::Output {
             path: path.to_owned(),
-            found: match path.extension() {
-                Some(ending) => format!(".{}", ending.to_string_lossy()),
-                None => "no ending".to_owned(),
-            },
-            expected: match self.0 {
-                [all @ .., last] if !all.is_empty() => format!("{} or {last}", all.join(", ")),
-                all => all.concat(),
-            },
+            message: format!("found {found}, expected a name that ends in {expected}"),
         })
     }
 }
@@ -53,7 +49,6 @@ impl Format {
 pub struct Inputs<'a>(Vec<&'a Path>, Option<Begun>);
 
 impl<'a> Inputs<'a> {
-    /// These and more.
     pub fn and<P: AsRef<Path> + ?Sized + 'a>(
         mut self,
         more: impl IntoIterator<Item = &'a P>,
@@ -83,19 +78,28 @@ impl<'a> Inputs<'a> {
             (input.canonicalize())
                 .is_ok_and(|input| input == place || Some(&*input) == place.parent())
         };
-        match self.0.iter().find(is_read) {
-            Some(input) if place.is_file() => Err(Error::IsRead {
-                path: output.to_owned(),
-                input: input.to_path_buf(),
-            }),
-            Some(_) | None => Ok(()),
-        }
+        let Some(input) = self.0.iter().find(is_read).filter(|_| place.is_file()) else {
+            return Ok(());
+        };
+        let other = match output == *input {
+            true => String::new(),
+            false => format!(" as {}", input.display()),
+        };
+        Err(Error::Output {
+            path: output.to_owned(),
+            message: format!(
+                "the command reads this file{other}, and does not replace it; choose another name for the output"
+            ),
+        })
     }
 
     /// Refuses an output by its name alone: a folder, a name that says another format, one of the inputs.
     pub fn check_name(&self, path: &Path, format: Format) -> Result<(), Error> {
         if path.is_dir() || path.file_name().is_none() {
-            return Err(Error::IsFolder(path.to_owned()));
+            return Err(Error::refused(
+                path,
+                "is a folder; expected the name of a file",
+            ));
         }
         format.check(path)?;
         self.check(path)
@@ -116,10 +120,9 @@ impl<'a> Inputs<'a> {
         }
         match path.parent() {
             Some(folder) if !folder.as_os_str().is_empty() && !folder.is_dir() => {
-                Err(Error::NoFolder {
-                    path: path.to_owned(),
-                    folder: folder.to_owned(),
-                })
+                let folder = folder.display();
+                let message = format!("there is no folder `{folder}`; make it first");
+                Err(Error::refused(path, message))
             }
             Some(_) | None => Ok(()),
         }

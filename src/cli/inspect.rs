@@ -5,7 +5,7 @@ use serde_json::json;
 use super::Answer;
 use super::args::InspectArguments;
 use super::destination::{Format, Inputs};
-use super::output::{note, reader, write_file};
+use super::output::{note, reader, shown, write_file};
 use super::{inspect_model, inspect_recording, robot};
 use crate::recording::Clocks;
 use crate::recording::foreign::guess::guess;
@@ -38,23 +38,22 @@ pub fn run(arguments: &InspectArguments) -> Result<Answer, Error> {
             || OF_MODELS
                 .iter()
                 .any(|of| path.extension().is_some_and(|e| e == *of));
-        let Answer { text, json } = match is_model {
+        let Answer { text, json, .. } = match is_model {
             true => inspect_model::describe(path, &artifact::read(path)?)?,
             false => inspect_recording::describe(&reader.read(path)?, robot)?,
         };
         texts.push(text);
         files.push(json);
     }
-    Ok(Answer {
-        text: texts.join("\n"),
-        json: json!({ "files": files }),
-    })
+    Ok(Answer::new(texts.join("\n"), json!({ "files": files })))
 }
 
-/// A first map of one log.
 fn guessed(arguments: &InspectArguments, robot: &Robot) -> Result<Answer, Error> {
     let [log] = &arguments.files[..] else {
-        return Err(Error::OneLog(arguments.files.len()));
+        return Err(Error::NotOne {
+            found: format!("{} files", arguments.files.len()),
+            expected: "log to guess a map of",
+        });
     };
     Inputs::default()
         .and([log])
@@ -81,7 +80,7 @@ fn guessed(arguments: &InspectArguments, robot: &Robot) -> Result<Answer, Error>
         "notes": guess.notes,
         "samples": guess.outcome.as_ref().ok(),
         "refused": guess.outcome.as_ref().err(),
-        "output": arguments.output.as_ref().map(|path| path.display().to_string()),
+        "output": shown(&arguments.output),
     });
-    Ok(Answer { text, json })
+    Ok(Answer::new(text, json))
 }

@@ -19,10 +19,8 @@ use crate::typeset::{Table, significant};
 
 /// Library terms that still fit as a pattern in a terminal.
 const PATTERN_WIDTH: usize = 120;
-/// Coordinates named for each latent.
 const DOMINANT: usize = 4;
 
-/// Describes a model.
 pub fn describe(path: &Path, model: &ReducedModel) -> Result<Answer, Error> {
     let dominant = dominant_coordinates(model);
     let equations = Equations::of(model);
@@ -100,10 +98,9 @@ pub fn describe(path: &Path, model: &ReducedModel) -> Result<Answer, Error> {
         "invariance": invariance,
         "provenance": model.provenance(),
     });
-    Ok(Answer { text, json })
+    Ok(Answer::new(text, json))
 }
 
-/// What the inputs of a model over a robot are made of.
 fn input_rule(model: &ReducedModel) -> String {
     let Ok(robot) = model.robot() else {
         return String::new();
@@ -147,7 +144,6 @@ fn pattern(equations: &Equations<'_>, phase: usize) -> String {
     text
 }
 
-/// For each latent, the coordinates of the largest encoder weights.
 fn dominant_coordinates(model: &ReducedModel) -> Option<Vec<Vec<(String, f64)>>> {
     let weights = model.encoder().ok()?.weights();
     let names = match model.state() {

@@ -16,14 +16,12 @@ use crate::robot::{JOINT_DIM, Robot};
 use crate::typeset::words::counted;
 use crate::typeset::{Cell, Table, significant};
 
-/// Characters of the time bar.
 const BAR_WIDTH: usize = 60;
 /// Shorter spans are feet that leave or land one after the other, part of the span before them.
 const CHATTER: usize = 10;
 /// Findings shown to people; JSON holds them all.
 const FINDINGS_SHOWN: usize = 12;
 
-/// Describes a recording.
 pub fn describe(reading: &Reading, robot: &Robot) -> Result<Answer, Error> {
     let recording = &reading.recording;
     let mut notes = ReadingNotes::default();
@@ -81,7 +79,7 @@ pub fn describe(reading: &Reading, robot: &Robot) -> Result<Answer, Error> {
             value
         }).collect::<Vec<_>>(),
     });
-    Ok(Answer { text, json })
+    Ok(Answer::new(text, json))
 }
 
 /// Feet on the ground over time, one character per slice of equal duration.
@@ -116,7 +114,6 @@ fn segment_json(segment: &Segment, spans: &[PhaseSpan], rule: &PhaseRule) -> Val
     })
 }
 
-/// Extremes of one coordinate over all segments.
 #[derive(Serialize)]
 struct Range {
     coordinate: String,

@@ -4,13 +4,13 @@ use std::fmt::Write as _;
 
 use serde_json::{Value, json};
 
+use super::Answer;
 use super::args::MpcArguments;
 use super::destination::{Format, Inputs};
 use super::output::{
-    extend, lines, note, numbered, progress_bar, read_recordings, show_progress, write_file,
+    extend, lines, note, numbered, progress_bar, read_for, show_progress, shown, write_file,
 };
 use super::simplification::RESTART_S;
-use super::{Answer, code};
 use crate::evaluate::{
     Assessment, ControlMetrics, ReferenceInput, Verdict, along_recording, control_metrics,
     usual_settings, verdict,
@@ -27,7 +27,7 @@ use crate::{Error, artifact};
 
 /// Runs the controller along each recording. The exit code is 1 if the model is not fit for torques or control there, or
 /// if most steps along one of them have no plan.
-pub fn run(arguments: &MpcArguments) -> Result<(Answer, u8), Error> {
+pub fn run(arguments: &MpcArguments) -> Result<Answer, Error> {
     let inputs = Inputs::default()
         .and([&arguments.model])
         .and(&arguments.recordings)
@@ -43,11 +43,7 @@ pub fn run(arguments: &MpcArguments) -> Result<(Answer, u8), Error> {
         torque_rate_nm_s: arguments.torque_rate,
         ..MpcSettings::default()
     };
-    let recordings = read_recordings(
-        &arguments.recordings,
-        &arguments.reading,
-        model.robot().ok(),
-    )?;
+    let recordings = read_for(&model, &arguments.recordings, &arguments.reading)?;
     let runs = run_all(&model, &recordings, settings, arguments.reference_input)?;
     let assessment = Assessment::over(&model, &recordings, RESTART_S)?;
     let verdict = verdict(&model, &assessment, &judged(&runs));
@@ -62,16 +58,14 @@ pub fn run(arguments: &MpcArguments) -> Result<(Answer, u8), Error> {
         let table = command_table(&model, &runs);
         write_file(path, table.csv().as_bytes(), arguments.force)?;
     }
-    Ok((answer, code(is_failed)))
+    Ok(answer.failed_if(is_failed))
 }
 
-/// What the verdict takes of runs.
 pub fn judged(runs: &[NamedRun]) -> Vec<&ControlMetrics> {
     let metrics = runs.iter().filter_map(|(_, run)| run.metrics.as_ref());
     metrics.collect()
 }
 
-/// Runs a fresh controller along each recording.
 pub fn run_all(
     model: &ReducedModel,
     recordings: &[Recording],
@@ -139,7 +133,7 @@ fn answer(
         let torques = torques.join(" ");
         let _ = writeln!(text, "first torque command (N m): {torques}");
     }
-    let output = arguments.output.as_ref().map(|path| path.display());
+    let output = shown(&arguments.output);
     text += &lines("every step: ", &output);
     let json = json!({
         "model": arguments.model.display().to_string(),
@@ -149,9 +143,9 @@ fn answer(
         "failed": failed,
         "verdict": verdict,
         "runs": runs.iter().map(run_json).collect::<Vec<_>>(),
-        "output": output.map(|path| path.to_string()),
+        "output": output,
     });
-    Answer { text, json }
+    Answer::new(text, json)
 }
 
 /// One run: figures that depend on the dynamics, and what happened.
@@ -182,7 +176,6 @@ pub fn run_json((path, run): &NamedRun) -> Value {
     value
 }
 
-/// One row per control step, for a CSV file.
 pub fn command_table(model: &ReducedModel, runs: &[NamedRun]) -> Table {
     let latent = |name| numbered(name, model.latent_dim());
     let inputs = match model.input() {

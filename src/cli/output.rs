@@ -17,6 +17,7 @@ use crate::files::{Overwrite, is_invisible, read_toml, write_whole};
 pub use crate::files::{
     shell_path as quoted, shell_paths as quoted_all, shell_word as quoted_text,
 };
+use crate::model::ReducedModel;
 use crate::recording::{Clocks, ColumnMap, Reader, ReadingNotes, Recording, Segment, mismatch};
 use crate::robot::Robot;
 use crate::train::sha256;
@@ -33,7 +34,6 @@ pub fn write_file(path: &Path, contents: &[u8], overwrite: Overwrite) -> Result<
     })
 }
 
-/// Reads a text of settings.
 pub fn read_text(path: &Path) -> Result<String, Error> {
     read_toml(path).map_err(|source| Error::Read {
         path: path.to_owned(),
@@ -41,23 +41,14 @@ pub fn read_text(path: &Path) -> Result<String, Error> {
     })
 }
 
-/// The settings of a TOML file, checked.
 pub fn read_settings<T: DeserializeOwned>(
     path: &Path,
     check: impl Fn(&T) -> Result<(), String>,
 ) -> Result<T, Error> {
     let settings = toml::from_str(&read_text(path)?)
-        .map_err(|error| refused(path, error.to_string().trim_end()))?;
-    check(&settings).map_err(|message| refused(path, message))?;
+        .map_err(|error| Error::refused(path, error.to_string().trim_end()))?;
+    check(&settings).map_err(|message| Error::refused(path, message))?;
     Ok(settings)
-}
-
-/// A file of settings that cannot be used.
-pub fn refused(path: &Path, message: impl Into<String>) -> Error {
-    Error::Config {
-        path: path.to_owned(),
-        message: message.into(),
-    }
 }
 
 /// The reader that the arguments ask for, with this treatment of clocks unless they name another.
@@ -67,6 +58,29 @@ pub fn reader(arguments: &ReadingArguments, clocks: Clocks) -> Result<Reader, Er
         map.transpose()?,
         arguments.clock.unwrap_or(clocks),
     ))
+}
+
+pub fn read_for(
+    model: &ReducedModel,
+    paths: &[PathBuf],
+    arguments: &ReadingArguments,
+) -> Result<Vec<Recording>, Error> {
+    read_recordings(paths, arguments, model.robot().ok())
+}
+
+/// The one jump of the recording after `--plan`, of a model's robot.
+pub fn read_jump(
+    model: &ReducedModel,
+    path: &PathBuf,
+    arguments: &ReadingArguments,
+) -> Result<Segment, Error> {
+    let mut recording = read_for(model, std::slice::from_ref(path), arguments)?.swap_remove(0);
+    note_mismatches(&recording, model.robot()?);
+    if let found @ 2.. = recording.segments.len() {
+        let message = format!("--plan takes one jump: found {found} segments");
+        return Err(Error::refused(path, message));
+    }
+    Ok(recording.segments.swap_remove(0))
 }
 
 /// Reads recordings of a robot, if it is known, showing which; what reading did besides goes to stderr.
@@ -107,7 +121,6 @@ pub fn printable(text: &str) -> Cow<'_, str> {
     escaped(text, |c| c.escape_unicode().to_string())
 }
 
-/// Prints a note to stderr.
 pub fn note(text: &str) {
     eprintln!("note: {}", printable(text));
 }
@@ -155,7 +168,6 @@ pub fn note_late_restarts(recordings: &[Recording], restart_every_s: f64) {
     }
 }
 
-/// Prints a warning to stderr.
 pub fn warn(text: &str) {
     eprintln!("warning: {}", printable(text));
 }
@@ -184,7 +196,6 @@ fn escaped(text: &str, written: impl Fn(char) -> String) -> Cow<'_, str> {
     Cow::Owned(out)
 }
 
-/// Reports on stderr what reading did besides reading.
 pub fn report_reading(notes: &ReadingNotes) {
     notes.lines().iter().for_each(|line| note(line));
 }
@@ -195,7 +206,10 @@ pub fn lines<T: Display>(words: &str, items: impl IntoIterator<Item = T>) -> Str
     lines.collect()
 }
 
-/// Paths as JSON shows them.
+pub fn shown(path: &Option<PathBuf>) -> Option<String> {
+    path.as_ref().map(|path| path.display().to_string())
+}
+
 pub fn names(paths: &[PathBuf]) -> Vec<String> {
     let names = paths.iter().map(|path| path.display().to_string());
     names.collect()
@@ -206,7 +220,6 @@ pub fn numbered(name: &str, count: usize) -> impl Iterator<Item = String> {
     (1..=count).map(move |index| format!("{name}_{index}"))
 }
 
-/// Adds the entries of one object to another.
 pub fn extend(object: &mut Value, more: Value) {
     if let (Value::Object(object), Value::Object(more)) = (object, more) {
         object.extend(more);
@@ -242,7 +255,6 @@ fn styled(bar: ProgressBar, template: &str, message: impl Into<String>) -> Progr
     bar
 }
 
-/// Shows on a bar how many steps are done.
 pub fn show_progress(bar: &ProgressBar, done: usize, total: usize) {
     bar.set_length(total as u64);
     bar.set_position(done as u64);

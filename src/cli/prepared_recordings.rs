@@ -21,7 +21,6 @@ use crate::typeset::words::counted;
 /// A jump of a divided set: its file, its segment there, and the first row.
 type Place = (PathBuf, usize, usize);
 
-/// Names of the sets of a training.
 const SETS: [&str; 3] = ["training", "validation", "test"];
 
 /// The recordings of a training.
@@ -63,7 +62,6 @@ impl RecordedSets {
         })
     }
 
-    /// Whole files for training, validation and test.
     pub fn whole(
         paths: [&[PathBuf]; 3],
         settings: &TrainSettings,
@@ -226,7 +224,6 @@ pub fn reader_for(arguments: &ReadingArguments, settings: &TrainSettings) -> Res
     reader(arguments, clocks)
 }
 
-/// Every jump of these files.
 fn jumps_of(paths: &[PathBuf], reader: &Reader) -> Result<Vec<Place>, Error> {
     let mut jumps = Vec::new();
     for path in paths {

@@ -7,7 +7,7 @@ use serde_json::json;
 use super::Answer;
 use super::args::RobotArguments;
 use super::destination::{Format, Inputs};
-use super::output::{note, write_file};
+use super::output::{note, shown, write_file};
 use crate::Error;
 use crate::robot::{JOINT_NAMES, Leg, Robot};
 use crate::robot_file::{self, RobotEntry, RobotOptions};
@@ -35,7 +35,6 @@ fn note_all(file: &str, notes: &[String]) {
         .for_each(|text| note(&format!("{file}: {text}")));
 }
 
-/// Shows a robot, and writes its TOML.
 pub fn run(arguments: &RobotArguments) -> Result<Answer, Error> {
     Inputs::default()
         .and_robot(Some(&arguments.robot))
@@ -76,9 +75,9 @@ pub fn run(arguments: &RobotArguments) -> Result<Answer, Error> {
     let json = json!({
         "robot": RobotEntry::of(robot),
         "notes": read.notes,
-        "output": arguments.output.as_ref().map(|path| path.display().to_string()),
+        "output": shown(&arguments.output),
     });
-    Ok(Answer { text, json })
+    Ok(Answer::new(text, json))
 }
 
 fn vector(vector: [f64; 3]) -> String {

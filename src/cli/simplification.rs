@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 
 use super::args::SimplifyArguments;
-use super::output::{lines, names, read_recordings, read_text, spinner};
+use super::output::{lines, names, read_for, read_text, spinner};
 use crate::equations::Equations;
 use crate::evaluate::Assessment;
 use crate::files::EmittedFile;
@@ -24,7 +24,6 @@ use crate::{Error, artifact};
 /// Time between restarts of the short rollouts, as in the paper's second test.
 pub const RESTART_S: f64 = 0.1;
 
-/// A domain with the samples that it was made from.
 struct Basis {
     domain: Domain,
     samples: Option<Samples>,
@@ -57,7 +56,7 @@ impl Basis {
                 margin: None,
             });
         }
-        let recordings = read_recordings(files, &arguments.reading, model.robot().ok())?;
+        let recordings = read_for(model, files, &arguments.reading)?;
         if model.encoder_map().is_err() {
             let model = model.name().to_owned();
             return Err(SimplifyError::NoEncoder { model }.into());
@@ -96,9 +95,7 @@ impl Basis {
     }
 }
 
-/// A simplified model with its certificate and effects.
 pub struct Outcome {
-    /// The model.
     pub model: ReducedModel,
     original: ReducedModel,
     certificate: Certificate,
@@ -257,7 +254,6 @@ fn printed_json(equation: &PrintedEquation) -> Value {
     })
 }
 
-/// Tolerances that a report compares.
 const LADDER: [f64; 4] = [0.001, 0.01, 0.05, 0.1];
 
 /// Simplifies a model within several tolerances over the recordings of an assessment: a table with a row per tolerance

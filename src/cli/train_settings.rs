@@ -6,7 +6,7 @@ use std::path::Path;
 use serde_json::{Map, Value};
 
 use super::args::{PhaseSet, TrainArguments, TrainSettings, Widths};
-use super::output::{note, quoted_text, read_settings, refused};
+use super::output::{note, quoted_text, read_settings};
 use super::prepared_recordings::RecordedSets;
 use super::robot::chosen;
 use crate::Error;
@@ -115,12 +115,10 @@ pub(super) fn identified(
     Ok(())
 }
 
-/// The robot of a training.
 pub(super) fn robot(settings: &TrainSettings) -> Result<&'static Robot, Error> {
     chosen(settings.robot.as_deref().unwrap_or("go1"))
 }
 
-/// How recordings are prepared for the training.
 pub(super) fn conditioning(settings: &TrainSettings) -> ConditionOptions {
     let rows = settings.smooth_rows.unwrap_or_default();
     ConditionOptions {
@@ -164,7 +162,6 @@ pub(super) fn actuators(settings: &TrainSettings) -> &str {
     settings.actuators.as_deref().unwrap_or(default)
 }
 
-/// The first setting that the closed form would ignore.
 fn of_the_joint_method(settings: &TrainSettings) -> Option<&'static str> {
     let layers = match settings.encoder_layers {
         Some(_) => "encoder-layers",
@@ -185,7 +182,6 @@ const WINDOW: [&str; 4] = [
     "bptt-integrator",
 ];
 
-/// The first of these settings that is given.
 pub(super) fn first(settings: &TrainSettings, names: &[&'static str]) -> Option<&'static str> {
     let given = given(settings);
     names.iter().copied().find(|name| given.contains_key(*name))
@@ -211,7 +207,6 @@ fn set<T>(option: &mut T, given: Option<impl Into<T>>) {
     }
 }
 
-/// The settings that were given, by the names of their flags.
 fn given(settings: &TrainSettings) -> Map<String, Value> {
     let Ok(Value::Object(mut given)) = serde_json::to_value(settings) else {
         unreachable!("settings are a struct of numbers, texts and switches");
@@ -252,7 +247,7 @@ pub(super) fn effective(arguments: &TrainArguments) -> Result<TrainSettings, Err
         settings = serde_json::from_value(Value::Object(merged)).expect("names are all known");
         if settings.latent_dim.is_none() {
             let message = "`latent-dim` is missing, here and on the command line";
-            return Err(refused(path, message));
+            return Err(Error::refused(path, message));
         }
     }
     check_pairs(&settings)?;
@@ -262,65 +257,62 @@ pub(super) fn effective(arguments: &TrainArguments) -> Result<TrainSettings, Err
 /// Refuses settings that the method does not use, an activation without hidden layers, rows to filter without a filter,
 /// and named coordinates where a method learns others.
 pub(super) fn check_pairs(settings: &TrainSettings) -> Result<(), Error> {
-    let refused = |option, found, expected| {
-        Err(Error::Train(TrainError::Option {
-            option,
-            found,
-            expected,
-        }))
-    };
-    if let (Method::ClosedForm, Some(name)) = (method(settings), of_the_joint_method(settings)) {
-        return refused(
-            name,
-            "set for the closed form, which does not use it".to_owned(),
-            "`--method joint`, or no method",
-        );
-    }
-    let weight = settings.bptt_weight.map_or(0.0, f64::from);
-    if let (Some(name), true) = (first(settings, &WINDOW), weight == 0.0) {
-        return refused(
-            name,
-            "set for a loss without weight".to_owned(),
-            "`--bptt-weight` above 0 beside it",
-        );
-    }
-    if let (Some(activation), true) = (settings.activation, maps(settings).is_linear()) {
-        return refused(
-            "activation",
-            format!("{activation} without hidden layers"),
-            "`--encoder-layers` or `--decoder-layers` beside it",
-        );
-    }
-    let named = settings.coordinates == Some(Coordinates::Named);
-    if named && !maps(settings).is_linear() {
-        return refused(
-            "coordinates",
-            "named with hidden layers".to_owned(),
-            "free, or maps without hidden layers",
-        );
-    }
-    if named && settings.paper && method(settings) == Method::Joint {
-        return refused(
-            "coordinates",
-            "named with the published joint training".to_owned(),
-            "free, or a training without `--paper`",
-        );
-    }
+    let (method, is_linear) = (method(settings), maps(settings).is_linear());
+    let given = |names: &[&'static str], when: bool| first(settings, names).filter(|_| when);
+    let has_weight = settings
+        .bptt_weight
+        .is_some_and(|weight| f64::from(weight) != 0.0);
+    let is_named = settings.coordinates == Some(Coordinates::Named);
+    let is_published = settings.paper && method == Method::Joint;
+    let activation = settings.activation.unwrap_or_default();
     let of_choice = ["slack", "refinements", "growth", "no-rotation"];
-    if let (Some(name), true) = (first(settings, &of_choice), settings.paper) {
-        return refused(
-            name,
-            "set for the published training, which neither chooses terms nor turns the basis"
-                .to_owned(),
+    let faults = [
+        (
+            of_the_joint_method(settings).filter(|_| method == Method::ClosedForm),
+            "set for the closed form, which does not use it",
+            "`--method joint`, or no method",
+        ),
+        (
+            given(&WINDOW, !has_weight),
+            "set for a loss without weight",
+            "`--bptt-weight` above 0 beside it",
+        ),
+        (
+            given(&["activation"], is_linear),
+            &format!("{activation} without hidden layers"),
+            "`--encoder-layers` or `--decoder-layers` beside it",
+        ),
+        (
+            given(&["coordinates"], is_named && !is_linear),
+            "named with hidden layers",
+            "free, or maps without hidden layers",
+        ),
+        (
+            given(&["coordinates"], is_named && is_published),
+            "named with the published joint training",
+            "free, or a training without `--paper`",
+        ),
+        (
+            given(&of_choice, settings.paper),
+            "set for the published training, which neither chooses terms nor turns the basis",
             "a training without `--paper`",
-        );
-    }
-    if settings.smooth_rows.is_some() && settings.smooth.is_none() {
-        return refused(
-            "smooth-rows",
-            "set without a filter".to_owned(),
+        ),
+        (
+            given(&["smooth-rows"], settings.smooth.is_none()),
+            "set without a filter",
             "`--smooth` beside it",
-        );
+        ),
+    ];
+    for (option, found, expected) in faults {
+        if let Some(option) = option {
+            let found = found.to_owned();
+            return Err(TrainError::Option {
+                option,
+                found,
+                expected,
+            }
+            .into());
+        }
     }
     Ok(())
 }
@@ -342,7 +334,6 @@ pub(super) fn without_effect(settings: &TrainSettings, options: &TrainOptions) -
     ))
 }
 
-/// The settings of a file.
 pub(super) fn read(path: &Path) -> Result<TrainSettings, Error> {
     read_settings(path, check)
 }

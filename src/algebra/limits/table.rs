@@ -1,34 +1,25 @@
-//! The ranges.
+//! The ranges; the command line's help says what each setting is.
+
+#![allow(missing_docs, reason = "the name of a range is that of its flag")]
 
 use super::Range;
 
-/// Latent coordinates of a training, at most the robot's coordinates.
 pub const LATENT_DIM: Range = Range::whole("latent-dim", 1, 18);
 /// Latent coordinates of a model from elsewhere.
 pub const IMPORTED_LATENT_DIM: Range = Range::whole("latent-dim", 1, 64);
-/// Seeds of a training, and of each latent dimension of a study.
 pub const SEEDS: Range = Range::whole("seeds", 1, 10_000);
-/// Epochs of a step of the joint method.
 pub const EPOCHS: Range = Range::whole("epochs", 1, 1_000_000);
-/// Weight of the input energy that the latent input does not represent.
 pub const LIFT_WEIGHT: Range = Range::real("lift-weight", 0.0, 1e6);
-/// Weight of body x, y, z in the reconstruction error.
 pub const BODY_WEIGHT: Range = Range::real("body-weight", 1e-6, 1e6);
-/// Weight of the loss over a window of predictions.
 pub const BPTT_WEIGHT: Range = Range::real("bptt-weight", 0.0, 1e6);
-/// Steps of that window.
 pub const BPTT_WINDOW: Range = Range::whole("bptt-window", 1, 1000);
-/// Steps of the refinement by rollouts.
 pub const REFINEMENTS: Range = Range::whole("refinements", 0, 1000);
 /// Growth rate of deviations, 1/s.
 pub const GROWTH: Range = Range::real("growth", 1e-2, 1e6);
 /// Samples per step of that window.
 pub const BPTT_STRIDE: Range = Range::whole("bptt-stride", 1, 1000);
-/// Weight of a prediction relative to the previous one.
 pub const BPTT_DECAY: Range = Range::above("bptt-decay", 0.0, 1.0);
-/// Accepted increase of the validation error for fewer terms.
 pub const SLACK: Range = Range::real("slack", 0.0, 1e3);
-/// Highest degree of polynomial candidate terms.
 pub const DEGREE: Range = Range::whole("degree", 0, 8);
 /// Samples of the mean over accelerations.
 pub const MOVING_AVERAGE: Range = Range::whole("moving-average", 1, 10_001);
@@ -45,9 +36,7 @@ pub const TORQUE_SCALING: Range = Range::real("torque-scaling", 1e-6, 1e4);
 pub const FORCE_SCALING: Range = Range::real("force-scaling", 1e-6, 1e4);
 /// Scaled units of moments on the body in one N m.
 pub const MOMENT_SCALING: Range = Range::real("moment-scaling", 1e-6, 1e4);
-/// Width of a hidden layer.
 pub const LAYER_WIDTH: Range = Range::whole("layers", 1, 1024);
-/// Weight of the complexity in the combined loss of a study.
 pub const LAMBDA: Range = Range::real("lambda", 0.0, 1e6);
 /// Stages of the controller's horizon.
 pub const HORIZON: Range = Range::whole("horizon", 1, 500);
@@ -61,13 +50,10 @@ pub const RESTART_EVERY: Range = Range::real("restart-every", 1e-3, 1e4);
 pub const MARGIN: Range = Range::real("margin", 0.0, 100.0);
 /// Longest printed line in em.
 pub const WIDTH: Range = Range::real("width", 1.0, 1000.0);
-/// Decimal places of printed coefficients.
 pub const DIGITS: Range = Range::whole("digits", 0, 40);
-/// Significant digits of printed coefficients.
 pub const SIGNIFICANT: Range = Range::whole("significant", 1, 40);
 /// Scaled units in one SI unit, of a model from elsewhere.
 pub const SCALING: Range = Range::real("scaling", 1e-9, 1e9);
-/// As [`SCALING`], of the inputs.
 pub const INPUT_SCALING: Range = Range::real("input-scaling", 1e-9, 1e9);
 /// Sampling period of training recordings in seconds.
 pub const SAMPLE_TIME: Range = Range::real("sample-time", 1e-6, 1.0);

@@ -15,7 +15,6 @@ pub enum FeetRule {
     Patterns(Vec<ContactFlags>),
 }
 
-/// Number of patterns of four feet.
 const N_PATTERNS: usize = 16;
 
 impl fmt::Display for FeetRule {
@@ -43,9 +42,12 @@ impl FeetRule {
     /// assert_eq!(always.to_string(), "always");
     /// ```
     pub fn always() -> Self {
-        let patterns =
-            (0..N_PATTERNS).map(|code| std::array::from_fn(|foot| (code >> foot) & 1 == 1));
-        FeetRule::Patterns(patterns.collect())
+        FeetRule::Patterns(Self::all_patterns().collect())
+    }
+
+    /// From no foot to four feet.
+    pub(crate) fn all_patterns() -> impl Iterator<Item = ContactFlags> {
+        (0..N_PATTERNS).map(|code| std::array::from_fn(|foot| (code >> foot) & 1 == 1))
     }
 
     /// Whether it is the rule of all patterns, each in it once.

@@ -12,10 +12,8 @@ const BOTTOM: f64 = 26.0;
 const RIGHT: f64 = 8.0;
 /// Points of a line that are drawn; CSV has them all.
 const MAX_POINTS: usize = 240;
-/// Size of letters.
 pub(super) const FONT: f64 = 9.0;
 
-/// Where a text is held.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Anchor {
     Start,
@@ -23,12 +21,9 @@ pub(crate) enum Anchor {
     End,
 }
 
-/// With what a mark is drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Paint {
-    /// The frame.
     Axis,
-    /// Lines across the frame.
     Grid,
     /// The ground of a flight.
     Shade,
@@ -36,14 +31,12 @@ pub(crate) enum Paint {
     Heat(f64),
 }
 
-/// One thing to draw.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Mark {
     /// A filled rectangle: corner, width, height.
     Rectangle([f64; 4], Paint),
     /// A straight line between two points.
     Rule([f64; 4], Paint),
-    /// A data line.
     Line(Vec<(f64, f64)>, Role),
     /// A text at the left end of its baseline, or as anchored.
     Text(f64, f64, Anchor, String),
@@ -52,7 +45,6 @@ pub(crate) enum Mark {
 /// Height of the legend's line.
 const LEGEND: f64 = 18.0;
 
-/// Size of a figure on a page of its own.
 pub(super) fn figure_size(figure: &Figure) -> (f64, f64) {
     let columns = figure.columns.min(figure.panels.len()).max(1);
     let rows = figure.panels.len().div_ceil(columns);
@@ -256,7 +248,6 @@ fn draw_heat(title: &str, map: &HeatMap, size: (f64, f64), x_label: &str) -> Vec
     marks
 }
 
-/// The title, and the shades from zero to the largest magnitude.
 fn heat_scale(title: &str, left: f64, largest: f64) -> Vec<Mark> {
     const SHADES: usize = 6;
     const CELL: f64 = 9.0;
@@ -275,7 +266,6 @@ fn heat_scale(title: &str, left: f64, largest: f64) -> Vec<Mark> {
     marks
 }
 
-/// Robots on their floor; the title stands above.
 fn draw_sticks(title: &str, plot: &StickPlot, size: (f64, f64)) -> Vec<Mark> {
     let (x, z) = (plot.extent.forward_m, plot.extent.up_m);
     let (width, height) = (size.0 - 2.0 * RIGHT, size.1 - TOP - RIGHT);
@@ -300,18 +290,6 @@ fn draw_sticks(title: &str, plot: &StickPlot, size: (f64, f64)) -> Vec<Mark> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn thinned_line_keeps_its_ends_and_gaps() {
-        let points: Vec<_> = (0..1000)
-            .map(|k| (f64::from(k), (k != 501).then_some(f64::from(k))))
-            .collect();
-        let thin = thinned(&points);
-        assert!(thin.len() <= MAX_POINTS + 2);
-        assert_eq!(thin.first(), points.first());
-        assert_eq!(thin.last(), points.last());
-        assert!(thin.iter().any(|point| point.1.is_none()));
-    }
 
     #[test]
     fn every_mark_of_a_runaway_prediction_stays_inside_the_frame() {

@@ -22,7 +22,6 @@ pub(crate) use ticks::subscript;
 
 use crate::files::EmittedFile;
 
-/// A figure as SVG, PDF and CSV, named after it.
 pub(crate) fn figure_files(figure: &Figure) -> [EmittedFile; 3] {
     let file = |ending, contents| EmittedFile::new(format!("{}.{ending}", figure.id), contents);
     [

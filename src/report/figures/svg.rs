@@ -6,7 +6,6 @@ use super::draw::{Anchor, FONT, Mark, Paint, draw_panel, figure_size, placed_mar
 use super::figure::{Figure, Panel, Role};
 use crate::typeset::mathml::HtmlText;
 
-/// One panel as an `svg` element that takes its colours from the page.
 pub(crate) fn panel_svg(figure: &Figure, panel: &Panel) -> String {
     let (width, height) = figure.panel_size;
     let title = HtmlText(&panel.title);

@@ -24,7 +24,6 @@ pub(crate) fn number(value: f64, places: usize) -> String {
     format!("{value:.places$}").replace('-', "\u{2212}")
 }
 
-/// An index below the line.
 pub(crate) fn subscript(index: usize) -> String {
     let below = |digit: char| match digit.to_digit(10) {
         Some(value) => char::from_u32(0x2080 + value).unwrap_or(digit),
@@ -52,31 +51,5 @@ pub(crate) fn padded(values: impl Iterator<Item = f64>) -> (f64, f64) {
     } else {
         let around = 0.05 * low.abs() + 1e-6;
         (low - around, high + around)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn ticks_are_round_and_inside() {
-        assert_eq!(ticks(-0.13, 0.52, 4).0, [0.0, 0.2, 0.4]);
-        let (values, places) = ticks(0.301, 0.309, 3);
-        assert_eq!(places, 3);
-        assert!(values.iter().all(|v| (0.301..=0.309).contains(v)));
-    }
-
-    #[test]
-    fn numbers_and_indices_use_the_signs_of_print() {
-        assert_eq!(number(-0.25, 1), "\u{2212}0.2");
-        assert_eq!(format!("z{}", subscript(10)), "z\u{2081}\u{2080}");
-    }
-
-    #[test]
-    fn constant_values_get_a_range() {
-        let (low, high) = padded([2.0, 2.0].into_iter());
-        assert!(low < 2.0 && high > 2.0);
-        assert_eq!(padded(std::iter::empty()), (0.0, 1.0));
     }
 }

@@ -4,8 +4,11 @@ use nalgebra::{DMatrix, DVector, SVD};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
-use super::*;
-use crate::robot::ContactFlags;
+use romc::model::{
+    Activation, AffineMap, FeetRule, InputStatistics, Layer, Library, ModelError, Phase,
+    ReducedModel, ScaleFactors, Scaling, StateMap,
+};
+use romc::robot::ContactFlags;
 
 const FOUR_FEET: ContactFlags = [true; 4];
 const REAR_PAIR: ContactFlags = [false, false, true, true];
@@ -101,7 +104,7 @@ fn maps_refuse_vectors_of_the_wrong_length() {
         model.decoder_jacobian(&three).unwrap_err(),
         model.ddz(0, &two, &two, &three).unwrap_err(),
     ] {
-        assert!(matches!(error, ModelError::Dimension { .. }), "{error}");
+        assert!(error.to_string().contains(" entries, expected "), "{error}");
     }
     assert_eq!(
         model.ddz(1, &two, &two, &two),
@@ -129,7 +132,8 @@ fn projection_is_exact_where_the_singular_values_converge_slowly() {
         input: ScaleFactors::Uniform(1.0),
     };
     let model = linear_model(encoder.clone(), encoder.transpose(), scaling).unwrap();
-    let identity = model.input_projection().unwrap() * encoder.transpose();
+    let projection = model.tangent(&DVector::zeros(5)).unwrap().project;
+    let identity = projection * encoder.transpose();
     assert!((identity - DMatrix::identity(3, 3)).amax() < 1e-14);
 }
 
