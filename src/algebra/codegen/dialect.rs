@@ -1,14 +1,9 @@
 //! What targets spell differently.
 
-use super::code::{ConstTable, Index, Span};
-use super::fours::{FourBlock, Fours};
-use super::lanes::Row;
+use super::code::{Index, Span};
 use super::precision::Precision;
 use super::printer::subscript;
-use crate::ir::{Binary, Unary};
-
-/// Lines, each with its depth of indentation.
-pub(crate) type Lines = Vec<(usize, String)>;
+use crate::ir::{Binary, Table, Unary};
 
 /// Spelling of a target language. The printer owns precedence and parentheses, the
 /// dialect everything that differs between languages.
@@ -63,18 +58,6 @@ pub(crate) trait Dialect {
         format!("{table}[{}][{}]", subscript(row), subscript(col))
     }
 
-    /// Lines that compute the columns of a row side by side in lanes; nothing in languages whose loops take column
-    /// after column.
-    fn row(&self, _: &Row) -> Option<Lines> {
-        None
-    }
-
-    /// Lines that compute a block of sums of vectors of four numbers side by side; nothing in languages that take one
-    /// number after the other.
-    fn four_block(&self, _: &Fours, _: &FourBlock) -> Option<Lines> {
-        None
-    }
-
     /// A number in the target's precision.
     fn literal(&self, value: f64) -> String {
         Precision::Double.digits(value)
@@ -91,7 +74,7 @@ pub(crate) trait Dialect {
     /// Definition of an array by its printed elements.
     fn let_array(&self, name: &str, elements: &[String]) -> String;
 
-    /// Declaration of an array that is assigned later; without [`Self::row`] of zeros.
+    /// Declaration of an array that is assigned later.
     fn declare(&self, name: &str, len: usize) -> String;
 
     /// Head of a loop.
@@ -120,31 +103,15 @@ pub(crate) trait Dialect {
 
     /// The rows of a constant table: entries between `open` and `close`, with `between` after every
     /// eight of them.
-    fn rows(&self, table: &ConstTable, [open, between, close]: [&str; 3]) -> String {
+    fn rows(&self, table: &Table, [open, between, close]: [&str; 3]) -> String {
         let row = |row: &[f64]| {
             let entries: Vec<String> = row.iter().map(|&entry| self.literal(entry)).collect();
             let lines: Vec<String> = entries.chunks(8).map(|line| line.join(", ")).collect();
             format!("{open}{}{close}\n", lines.join(between))
         };
-        (0..table.values.rows())
-            .map(|r| row(table.values.row(r)))
-            .collect()
+        (0..table.rows()).map(|r| row(table.row(r))).collect()
     }
 
-    /// Definition of a constant table; nothing for a table that the language prints as plain numbers.
-    fn table(&self, table: &ConstTable) -> Option<String>;
-}
-
-/// What most targets call a function.
-pub(crate) fn name(function: Unary) -> &'static str {
-    match function {
-        Unary::Neg => unreachable!("the printer spells negation as an operator"),
-        Unary::Sqrt => "sqrt",
-        Unary::Abs => "abs",
-        Unary::Sign => "sign",
-        Unary::Tan => "tan",
-        Unary::Tanh => "tanh",
-        Unary::Exp => "exp",
-        Unary::Log => "log",
-    }
+    /// Definition of a constant table.
+    fn table(&self, name: &str, table: &Table) -> String;
 }

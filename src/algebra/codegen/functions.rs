@@ -1,9 +1,10 @@
 //! Programs to functions of one target.
 
-use super::code::{Function, Parameter, Role, Stmt};
+use super::code::{Function, Parameter, Role};
 use super::dialect::Dialect;
 use super::ident::{Ident, Namer};
 use super::interface::{FunctionSpec, computes_angles};
+use super::printer::Printer;
 use super::sines::SineCosine;
 use super::tables::Tables;
 use super::translate::{Names, translate};
@@ -12,11 +13,7 @@ use crate::ir::{Binary, Program, Slot, Statement, Unary};
 /// The body of the loop over the lanes of a block of points; arrays are called `z_lanes` and so on, the
 /// loop variable `lane`. Nothing if the program is better run point by point: it loops over tables itself,
 /// or calls functions that no compiler vectorises.
-pub(crate) fn lanes(
-    program: &Program,
-    dialect: &dyn Dialect,
-    sines: SineCosine,
-) -> Option<Vec<Stmt>> {
+pub(crate) fn lanes(program: &Program, dialect: &dyn Dialect, sines: SineCosine) -> Option<String> {
     let is_by_library = sines == SineCosine::Library && program.has(computes_angles);
     if is_by_library || !program.statements().iter().all(vectorises) {
         return None;
@@ -44,22 +41,19 @@ pub(crate) fn lanes(
         locals: &mut locals,
         tables: &mut Tables::new(Namer::new(""), ""),
     };
-    Some(translate(program, names, Some(lane)).body)
+    let printer = Printer::new(dialect, 3, true);
+    let translator = translate(program, names, printer, Some(lane));
+    Some(translator.printer.into_text())
 }
 
 fn vectorises(statement: &Statement) -> bool {
     match statement {
         Statement::Constant(_) | Statement::Input { .. } | Statement::SinCos { .. } => true,
         Statement::Binary(op, ..) => *op != Binary::Pow,
-        Statement::Unary(op, _) => match op {
-            Unary::Neg | Unary::Sqrt | Unary::Abs => true,
-            Unary::Sign | Unary::Tan | Unary::Tanh | Unary::Exp | Unary::Log => false,
-        },
+        Statement::Unary(op, _) => *op != Unary::Sign && !op.is_by_library(),
         Statement::Select(_)
         | Statement::Accumulate { .. }
-        | Statement::Quads { .. }
-        | Statement::Constants { .. }
-        | Statement::Separable { .. }
+        | Statement::Scaled { .. }
         | Statement::Call { .. } => false,
     }
 }
@@ -92,15 +86,15 @@ pub(crate) fn function(
         locals: &mut locals,
         tables,
     };
-    let translator = translate(&entry.program, names, None);
+    let printer = Printer::new(dialect, 1, false);
+    let translator = translate(&entry.program, names, printer, None);
     let is_empty = |p: &&Parameter| p.role == Role::Output && p.len == 0;
     let empty = parameters.iter().filter(is_empty).map(|p| &p.name);
     Function {
         name,
         docs: entry.docs.clone(),
         unused: translator.unused().chain(empty).cloned().collect(),
-        in_lanes: translator.in_lanes,
-        body: translator.body,
+        body: translator.printer.into_text(),
         parameters,
     }
 }

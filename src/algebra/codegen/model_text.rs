@@ -5,10 +5,8 @@ use super::dialect::Dialect;
 use super::functions::{function, lanes};
 use super::ident::{Ident, Namer};
 use super::interface::{FunctionSpec, ModelInterface, computes_angles};
-use super::printer::Printer;
 use super::sines::SineCosine;
 use super::tables::Tables;
-use crate::ir::Statement;
 
 /// What the files of all languages say of a model; `F` is what they print of a function.
 pub(crate) struct ModelText<'a, F> {
@@ -73,7 +71,8 @@ impl<'a, F> ModelText<'a, F> {
             }
         });
         let phases = phases.collect();
-        let tables = tables.iter().filter_map(|table| dialect.table(table));
+        let tables = tables.known.iter();
+        let tables = tables.map(|(name, table)| dialect.table(&name.to_string(), table));
         Self {
             entries,
             tables: tables.collect(),
@@ -85,8 +84,7 @@ impl<'a, F> ModelText<'a, F> {
     /// The same with the loops over the lanes of batches that run in blocks.
     pub(crate) fn with_lanes(mut self, dialect: &dyn Dialect, sines: SineCosine) -> Self {
         for (text, phase) in self.phases.iter_mut().zip(&self.entries.phases) {
-            let lanes = lanes(&phase.dynamics.program, dialect, sines);
-            text.lanes = lanes.map(|lanes| Printer::new(dialect).statements(&lanes, 3));
+            text.lanes = lanes(&phase.dynamics.program, dialect, sines);
         }
         self
     }
@@ -94,16 +92,6 @@ impl<'a, F> ModelText<'a, F> {
     /// Whether a batch runs in blocks.
     pub(crate) fn has_lanes(&self) -> bool {
         self.phases.iter().any(|phase| phase.lanes.is_some())
-    }
-
-    /// Whether rows of functions are added in lanes, so that wide registers read rows of tables.
-    pub(crate) fn has_rows(&self) -> bool {
-        (self.entries).has(|s| matches!(s, Statement::Separable { .. }))
-    }
-
-    /// Whether there are sums of vectors of four numbers.
-    pub(crate) fn has_fours(&self) -> bool {
-        (self.entries).has(|s| matches!(s, Statement::Quads { .. }))
     }
 
     /// Name of the first phase's accelerations, for an example of a call.

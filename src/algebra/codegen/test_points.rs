@@ -160,13 +160,17 @@ pub(crate) struct BatchPoints {
 impl BatchPoints {
     /// Numbers of both signs, or positive ones where the accelerations are finite at more of these.
     pub(crate) fn new(phase: &PhaseInterface, precision: Precision) -> Self {
-        let overflows = phase.dynamics.program.statements().iter().any(|statement| {
-            use Unary::{Exp, Log, Tan, Tanh};
-            matches!(
-                statement,
-                Statement::Unary(Exp | Tan | Tanh | Log, _) | Statement::Binary(Binary::Pow, ..)
-            )
-        });
+        let overflows =
+            phase
+                .dynamics
+                .program
+                .statements()
+                .iter()
+                .any(|statement| match statement {
+                    Statement::Unary(op, _) => op.is_by_library(),
+                    Statement::Binary(op, ..) => *op == Binary::Pow,
+                    _ => false,
+                });
         let far_angle = match (overflows, precision) {
             (true, _) => 0.125,
             (false, Precision::Double) => 9000.125,

@@ -1,9 +1,10 @@
-//! Programs to statements: names, and what is nested into one expression.
+//! Programs to the text of a function's body: names, and what is nested into one expression.
 //!
 //! No mathematics happens here: the tree of operations of the program is kept as it is.
 
-use super::code::{Expr, Index, Parameter, Role, Stmt};
+use super::code::{Expr, Index, Parameter, Role, Span};
 use super::ident::{Ident, Namer};
+use super::printer::Printer;
 use super::tables::Tables;
 use crate::ir::{Program, Statement, ValueId};
 
@@ -34,13 +35,11 @@ pub(super) struct Translator<'a> {
     /// how deeply operations are nested in it.
     pub spelled: Vec<Option<(Expr, usize)>>,
     /// Statements, ending with the assignments of the outputs.
-    pub body: Vec<Stmt>,
+    pub printer: Printer<'a>,
+    /// All arrays: parameters, and those that the function declares.
+    pub arrays: Vec<Span>,
     /// Values that were copied to an array.
-    pub copies: Vec<(Vec<ValueId>, Ident)>,
-    /// Arrays that end with zeros, and where these begin.
-    pub zeros: Vec<(Ident, usize)>,
-    /// Arrays that are assigned in lanes.
-    pub in_lanes: Vec<Ident>,
+    pub copies: Vec<(Vec<ValueId>, Span)>,
     /// Loop variable of a block of lanes.
     pub lane: Option<Ident>,
 }
@@ -50,26 +49,22 @@ pub(super) struct Translator<'a> {
 pub(super) fn translate<'a>(
     program: &'a Program,
     names: Names<'a>,
+    printer: Printer<'a>,
     lane: Option<Ident>,
 ) -> Translator<'a> {
     let live = program.live();
+    let parameters = names.inputs.iter().chain(names.outputs);
+    let arrays = parameters.map(|parameter| Span::whole(&parameter.name, parameter.len, true));
     let mut translator = Translator {
         program,
-        names,
         n_uses: n_uses(program, &live),
         spelled: vec![None; program.n_values()],
-        body: Vec::new(),
+        printer,
+        arrays: arrays.collect(),
         copies: Vec::new(),
-        zeros: Vec::new(),
-        in_lanes: Vec::new(),
         lane,
+        names,
     };
-    for (position, statement) in program.statements().iter().enumerate() {
-        if let Statement::Constant(value) = statement {
-            let constant = Expr::Literal(*value);
-            translator.spell(program.values_of(position).start, constant);
-        }
-    }
     for (position, statement) in program.statements().iter().enumerate() {
         if live[position] {
             translator.statement(position, statement);
@@ -96,8 +91,7 @@ impl Translator<'_> {
     fn statement(&mut self, position: usize, statement: &Statement) {
         let first = self.program.values_of(position).start;
         match statement {
-            // Spelled beforehand: what is copied for several statements may end with zeros.
-            Statement::Constant(_) => {}
+            Statement::Constant(value) => self.spell(first, Expr::Literal(*value)),
             Statement::Input { slot, index } => {
                 let parameter = &self.names.inputs[*slot];
                 let expr = match parameter.role {
@@ -125,19 +119,8 @@ impl Translator<'_> {
                 self.define(first, expr, depth.unwrap_or(1));
             }
             Statement::SinCos { arguments } => self.sin_cos(first, arguments),
-            Statement::Accumulate { table, sections } => self.accumulate(first, *table, sections),
-            Statement::Quads {
-                table,
-                weights,
-                sums,
-            } => self.quads(first, *table, weights, sums),
-            Statement::Constants { table } => self.constants(first, *table),
-            Statement::Separable {
-                start,
-                base,
-                groups,
-                cols,
-            } => self.separable(first, start, base.as_deref(), groups, *cols),
+            Statement::Accumulate { table, weights } => self.accumulate(first, *table, weights),
+            Statement::Scaled { base, groups } => self.scaled(first, base.as_deref(), groups),
             Statement::Call { callee, arguments } => self.call(first, *callee, arguments),
         }
     }
@@ -162,7 +145,7 @@ impl Translator<'_> {
 
     fn name(&mut self, value: usize, expr: Expr) -> Expr {
         let name = self.names.locals.mint("t");
-        self.body.push(Stmt::Let(name.clone(), expr));
+        self.printer.let_scalar(&name, &expr);
         self.spell(value, Expr::Name(name.clone()));
         Expr::Name(name)
     }
@@ -203,11 +186,8 @@ impl Translator<'_> {
 
     /// Assigns the outputs. What replaces an input is computed completely beforehand.
     fn results(&mut self) {
-        let in_place = self
-            .names
-            .outputs
-            .iter()
-            .any(|output| output.role == Role::InOut);
+        let mut outputs = self.names.outputs.iter();
+        let in_place = outputs.any(|output| output.role == Role::InOut);
         let mut assigned = Vec::new();
         for entry in self.program.results() {
             let output = &self.names.outputs[entry.slot];
@@ -218,11 +198,13 @@ impl Translator<'_> {
             }
             if in_place {
                 let name = self.names.locals.mint(&format!("{}_next", output.name));
-                self.body.push(Stmt::Let(name.clone(), value));
+                self.printer.let_scalar(&name, &value);
                 value = Expr::Name(name);
             }
-            assigned.push(Stmt::Assign(target, value));
+            assigned.push((target, value));
         }
-        self.body.extend(assigned);
+        for (target, value) in assigned {
+            self.printer.assign(&target, &value);
+        }
     }
 }

@@ -1,6 +1,6 @@
 //! What every program promises, checked once when it is built.
 
-use super::program::{LANES, Program, QUAD, Quad, Statement, TableId, ValueId};
+use super::program::{Program, Statement, Table, TableId, ValueId};
 
 /// Why a program is refused.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -139,66 +139,22 @@ fn check_shape(program: &Program, statement: &Statement) -> Result<(), Fault> {
         None => Ok(()),
         Some(&value) => Err(Fault::NonFinite(value)),
     };
-    let table = |id: &TableId| &program.tables[id.index()];
+    let table = |id: &TableId| -> Result<&Table, Fault> {
+        let table = &program.tables[id.index()];
+        finite(&table.entries).map(|()| table)
+    };
     match statement {
         Statement::Constant(value) => finite(&[*value]),
-        Statement::Accumulate {
-            table: id,
-            sections,
-        } => {
-            finite(&table(id).entries)?;
-            let n_weights: usize = sections.iter().map(Vec::len).sum();
-            count(n_weights + 1, table(id).rows)
-        }
-        Statement::Quads {
-            table: id,
-            weights,
-            sums,
-        } => {
-            finite(&table(id).entries)?;
-            count(table(id).cols, QUAD)?;
-            let below = |found: usize, end: usize| match found < end {
-                true => Ok(()),
-                false => count(found + 1, end),
-            };
-            for (position, sum) in sums.iter().enumerate() {
-                for vector in sum.vectors() {
-                    match vector {
-                        Quad::Row(row) => below(row, table(id).rows)?,
-                        Quad::Sum(earlier) => below(earlier, position)?,
-                    }
-                }
-                for &(weight, _) in &sum.terms {
-                    below(weight, weights.len())?;
-                }
-            }
-            Ok(())
-        }
-        Statement::Constants { table: id } => finite(&table(id).entries),
-        Statement::Separable {
-            start,
-            base,
-            groups,
-            cols,
-        } => {
-            let width = (*cols).max(1).next_multiple_of(LANES);
+        Statement::Accumulate { table: id, weights } => count(weights.len() + 1, table(id)?.rows),
+        Statement::Scaled { base, groups } => {
+            let shape = table(&groups[0].0)?;
             if let Some(base) = base {
-                let row = (base.len() / start.len().max(1)).next_multiple_of(LANES);
-                count(base.len(), start.len() * row.min(width))?;
+                count(base.len(), shape.entries.len())?;
             }
-            let widest = groups.iter().map(|group| table(&group.table).cols).max();
-            count(widest.unwrap_or(0), width)?;
-            for group in groups {
-                let behind = group.values.len().saturating_sub(*cols);
-                count(program.n_zeros_behind(&group.values).min(behind), behind)?;
-                let table = table(&group.table);
-                finite(&table.entries)?;
-                count(table.rows, start.len())?;
-                count(table.cols, table.cols.next_multiple_of(LANES))?;
-                count(group.values.len(), table.cols)?;
-                if let Some(slopes) = group.slopes.values() {
-                    count(slopes.len(), table.cols)?;
-                }
+            for (id, weights) in groups {
+                count(table(id)?.rows, shape.rows)?;
+                count(table(id)?.cols, shape.cols)?;
+                count(weights.as_ref().map_or(shape.cols, Vec::len), shape.cols)?;
             }
             Ok(())
         }
@@ -216,7 +172,7 @@ fn check_shape(program: &Program, statement: &Statement) -> Result<(), Fault> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Group, ProgramBuilder, Slopes, Table};
+    use super::super::ProgramBuilder;
     use super::*;
 
     fn finished(build: impl FnOnce(&mut ProgramBuilder)) -> Result<Program, IrError> {
@@ -250,45 +206,9 @@ mod tests {
         let (found, expected) = (2, 3);
         refused(1, Fault::OperandCount { found, expected }, |builder| {
             let x = builder.input("x", 1);
-            let y = builder.accumulate(Table::new(3, 2, vec![1.0; 6]), vec![x]);
+            let y = builder.accumulate(&Table::new(3, 2, vec![1.0; 6]), x);
             builder.output("y", &y);
         });
-    }
-
-    /// One row over two variables; the value behind them is zero or not.
-    fn separable(builder: &mut ProgramBuilder, is_padded: bool) {
-        let x = builder.input("x", 3);
-        let start = builder.constant(0.0);
-        let mut values = vec![start; LANES];
-        values[..2].copy_from_slice(&x[..2]);
-        if !is_padded {
-            values[2] = x[2];
-        }
-        let group = Group {
-            table: builder.table(Table::new(1, LANES, vec![1.0; LANES])),
-            values,
-            slopes: Slopes::One,
-        };
-        let (sums, slopes) = builder.separable(vec![start], None, vec![group], 2);
-        builder.output("y", &sums);
-        builder.output("slopes", &slopes);
-    }
-
-    #[test]
-    fn separable_has_groups_and_zeros_behind_the_variables() {
-        assert!(finished(|builder| separable(builder, true)).is_ok());
-        let without_zeros = finished(|builder| separable(builder, false));
-        let without_groups = finished(|builder| {
-            let start = builder.input("x", 1);
-            let (sums, _) = builder.separable(start, None, Vec::new(), 0);
-            builder.output("y", &sums);
-        });
-        for found in [without_zeros, without_groups] {
-            let Err(IrError::Statement { fault, .. }) = &found else {
-                panic!("{found:?}");
-            };
-            assert!(matches!(fault, Fault::OperandCount { .. }), "{found:?}");
-        }
     }
 
     #[test]

@@ -7,7 +7,6 @@ use super::cost::Form;
 use super::dense::{DenseJacobian, distinct, matrix_vector};
 use super::error::LowerError;
 use super::expression::ExpressionLowering;
-use super::gradient::Gradient;
 use super::nested::{Demand, Nested, Shared};
 use crate::equations::Equations;
 use crate::ir::{Program, ProgramBuilder, ValueId};
@@ -97,16 +96,7 @@ pub fn dynamics_jacobian(
             }
         }
     }
-    let n_terms = equations.iter().chain(&entries).map(|sum| sum.items.len());
-    let n_terms = n_terms.sum();
-    let gradient = Gradient::new(form, &mut pool, &equations, &columns, n_terms);
-    let (mut builder, ddz, jacobian) = if let Some(gradient) = gradient {
-        let mut lowering = start(system, &pool, "dynamics_jacobian");
-        lowering.prepare(gradient.expressions());
-        let (ddz, slopes) = gradient.lower(&mut lowering, system.latent_dim());
-        let jacobian = pattern.places().map(|place| slopes[&place]).collect();
-        (lowering.builder, ddz, jacobian)
-    } else if form.uses_tables(&equations) {
+    let (mut builder, ddz, jacobian) = if form.uses_tables(&equations) {
         dense_jacobian(system, &mut pool, &equations, &columns, &pattern)
     } else {
         let sums = nested_jacobian(&mut pool, &equations, &columns, entries, &pattern);
@@ -161,7 +151,8 @@ fn dense_jacobian(
     let mut roots = distinct(equations);
     roots.extend(dense.expressions());
     lowering.prepare(&roots);
-    let (ddz, entries) = dense.lower(&mut lowering, equations);
+    let ddz = matrix_vector(&mut lowering, equations);
+    let entries = dense.lower(&mut lowering, equations);
     let places = pattern.places();
     let jacobian = places.map(|(row, col)| entries[&(row, columns[col])]);
     let jacobian = jacobian.collect();

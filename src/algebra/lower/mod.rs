@@ -14,7 +14,6 @@ mod dense;
 mod dynamics;
 mod error;
 mod expression;
-mod gradient;
 mod maps;
 mod nested;
 mod network;

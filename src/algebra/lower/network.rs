@@ -165,8 +165,7 @@ impl<'b> Network<'b> {
     }
 
     fn accumulated(&self, table: Table, weights: &[Number<'b>]) -> Vec<Number<'b>> {
-        let sections = vec![ids(weights)];
-        let sums = self.sheet.borrow_mut().accumulate(table, sections);
+        let sums = self.sheet.borrow_mut().accumulate(&table, ids(weights));
         numbers(self.sheet, &sums)
     }
 }

@@ -1,7 +1,6 @@
 //! C99: `NAME.h`, `NAME.c`, `NAME_selftest.c` and `CMakeLists.txt`.
 
 mod dialect;
-mod lanes;
 mod selftest;
 
 use askama::Template;
@@ -65,7 +64,6 @@ pub fn emit(
     let d = &CDialect {
         name: name.to_owned(),
         precision,
-        in_lanes: false,
     };
     let print = |f, _: &Tables| (d.prototype(&f), d.definition(&f));
     let text = ModelText::new(entries, d, &format!("{name}_"), print, numbers);

@@ -1,9 +1,7 @@
 //! Functions that return what they compute, as text for the templates.
 
 use crate::codegen::code::{Function, Parameter, Role};
-use crate::codegen::dialect::Dialect;
 use crate::codegen::line_wrapping::comment_lines;
-use crate::codegen::printer::Printer;
 use crate::codegen::tables::Tables;
 
 /// A function of a script. A parameter that is read and written is taken and returned.
@@ -23,9 +21,9 @@ pub(crate) struct FunctionText {
 
 impl FunctionText {
     /// The text of a function that reads some of the tables.
-    pub(crate) fn new(function: Function, tables: &Tables, dialect: &dyn Dialect) -> Self {
-        let body = Printer::new(dialect).statements(&function.body, 1);
-        let names = tables.iter().map(|table| table.name.to_string());
+    pub(crate) fn new(function: Function, tables: &Tables) -> Self {
+        let body = function.body;
+        let names = tables.known.iter().map(|(name, _)| name.to_string());
         let is_read = |name: &String| {
             body.contains(&format!("{name}[")) || body.contains(&format!("{name}("))
         };

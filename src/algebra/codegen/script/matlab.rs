@@ -3,17 +3,16 @@
 use askama::Template;
 
 use super::functions::{FunctionText, list, names};
-use crate::codegen::code::{ConstTable, Index, Span};
-use crate::codegen::dialect::{Dialect, name};
+use crate::codegen::code::{Index, Span};
+use crate::codegen::dialect::Dialect;
 use crate::codegen::error::CodegenError;
 use crate::codegen::ident::Namer;
 use crate::codegen::interface::ModelInterface;
 use crate::codegen::line_wrapping::tidy;
 use crate::codegen::model_text::ModelText;
 use crate::codegen::printer::subscript;
-use crate::codegen::tables::Tables;
 use crate::files::EmittedFile;
-use crate::ir::{Binary, Statement, Unary};
+use crate::ir::{Binary, Statement, Table, Unary};
 
 /// MATLAB without toolboxes; Octave runs the same.
 #[derive(Clone, Copy, Debug)]
@@ -72,7 +71,7 @@ impl Dialect for MatlabDialect {
     }
 
     fn apply(&self, function: Unary, argument: &str) -> String {
-        format!("{}({argument})", name(function))
+        format!("{}({argument})", function.name())
     }
 
     fn let_array(&self, name: &str, elements: &[String]) -> String {
@@ -102,13 +101,9 @@ impl Dialect for MatlabDialect {
         }
     }
 
-    fn table(&self, table: &ConstTable) -> Option<String> {
-        let (name, rows) = (
-            &table.name,
-            self.rows(table, ["        ", ", ...\n        ", ""]),
-        );
-        (table.is_entered)
-            .then(|| format!("function t = {name}_entries()\n    t = [\n{rows}    ];\nend"))
+    fn table(&self, name: &str, table: &Table) -> String {
+        let rows = self.rows(table, ["        ", ", ...\n        ", ""]);
+        format!("function t = {name}_entries()\n    t = [\n{rows}    ];\nend")
     }
 }
 
@@ -144,12 +139,11 @@ struct MatlabFile<'a> {
 /// [`CodegenError::Template`] if a template fails.
 pub fn emit(entries: &ModelInterface, provenance: &str) -> Result<Vec<EmittedFile>, CodegenError> {
     let stem = Namer::new(RESERVED).mint(&entries.identifier).to_string();
-    let print = |f, tables: &Tables| FunctionText::new(f, tables, &MatlabDialect);
     let file = MatlabFile {
         banner: format!("% {provenance}"),
         file: &stem,
         selects: entries.has(|s| matches!(s, Statement::Select(_))),
-        m: ModelText::new(entries, &MatlabDialect, "", print, column),
+        m: ModelText::new(entries, &MatlabDialect, "", FunctionText::new, column),
     };
     Ok(vec![EmittedFile::new(
         format!("{stem}.m"),

@@ -3,16 +3,15 @@
 use askama::Template;
 
 use super::functions::{FunctionText, list, names};
-use crate::codegen::code::{ConstTable, Role, Span};
-use crate::codegen::dialect::{Dialect, name};
+use crate::codegen::code::{Role, Span};
+use crate::codegen::dialect::Dialect;
 use crate::codegen::error::CodegenError;
 use crate::codegen::ident::Namer;
 use crate::codegen::interface::ModelInterface;
 use crate::codegen::line_wrapping::tidy;
 use crate::codegen::model_text::ModelText;
-use crate::codegen::tables::Tables;
 use crate::files::EmittedFile;
-use crate::ir::Unary;
+use crate::ir::{Table, Unary};
 
 /// Python with the elementary functions of the library on whose numbers the functions work.
 #[derive(Clone, Copy, Debug)]
@@ -71,7 +70,7 @@ impl Dialect for Library {
     fn apply(&self, function: Unary, argument: &str) -> String {
         let name = match (function, self) {
             (Unary::Abs, Library::Casadi) => "fabs",
-            (named, _) => name(named),
+            (named, _) => named.name(),
         };
         format!("{}.{name}({argument})", self.module())
     }
@@ -112,9 +111,9 @@ impl Dialect for Library {
         format!("{} = {callee}({read})", list(written, slice))
     }
 
-    fn table(&self, table: &ConstTable) -> Option<String> {
+    fn table(&self, name: &str, table: &Table) -> String {
         let rows = self.rows(table, ["    [", ",\n     ", "],"]);
-        (table.is_entered).then(|| format!("{} = [\n{rows}]", table.name))
+        format!("{name} = [\n{rows}]")
     }
 }
 
@@ -142,10 +141,9 @@ struct CasadiModule<'a> {
 /// # Errors
 /// [`CodegenError::Template`] if a template fails.
 pub fn emit(entries: &ModelInterface, provenance: &str) -> Result<Vec<EmittedFile>, CodegenError> {
-    let print = |f, tables: &Tables| FunctionText::new(f, tables, &Library::NumPy);
     let module = NumPyModule {
         banner: format!("# {provenance}"),
-        m: ModelText::new(entries, &Library::NumPy, "", print, tuple),
+        m: ModelText::new(entries, &Library::NumPy, "", FunctionText::new, tuple),
     };
     let path = format!("{}.py", stem(entries));
     Ok(vec![EmittedFile::new(path, tidy(&module.render()?))])
@@ -160,11 +158,10 @@ pub fn emit_casadi(
     provenance: &str,
 ) -> Result<Vec<EmittedFile>, CodegenError> {
     let module_name = format!("{}_casadi", stem(entries));
-    let print = |f, tables: &Tables| FunctionText::new(f, tables, &Library::Casadi);
     let module = CasadiModule {
         banner: format!("# {provenance}"),
         module: &module_name,
-        m: ModelText::new(entries, &Library::Casadi, "", print, tuple),
+        m: ModelText::new(entries, &Library::Casadi, "", FunctionText::new, tuple),
     };
     let path = format!("{module_name}.py");
     Ok(vec![EmittedFile::new(path, tidy(&module.render()?))])
