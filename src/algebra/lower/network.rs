@@ -63,7 +63,7 @@ pub(super) fn lower(map: Map, model: &ReducedModel) -> Result<Program, LowerErro
             let rows = (0..model.latent_dim()).map(|row| network.jacobian_row(row, &slopes));
             let rows: Vec<Vec<Number>> = rows.collect();
             let factors = model.input_factors()?;
-            let scaled = given.iter().zip(&factors).map(|(u, &s_u)| u.scaled(s_u));
+            let scaled = given.iter().zip(&factors).map(|(&u, &s_u)| s_u * u);
             pinv_times(sheet, &rows, &scaled.collect::<Vec<_>>())
         }
         // u = (J_E(s_x x)^T u_lat) / s_u
@@ -128,7 +128,7 @@ impl<'b> Network<'b> {
         let weights = self.map.layers()[last].map.weights().row(row);
         let slope = slopes[last].as_ref().map(|slopes| slopes[row]);
         let entry = |&weight: &f64| match slope {
-            Some(slope) => slope.scaled(weight),
+            Some(slope) => weight * slope,
             None => Number::known(self.sheet, weight),
         };
         let g: Vec<Number> = weights.iter().map(entry).collect();

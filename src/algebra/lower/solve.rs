@@ -13,8 +13,14 @@ pub(super) fn pinv_times<'b>(
     rows: &[Vec<Number<'b>>],
     w: &[Number<'b>],
 ) -> Vec<Number<'b>> {
-    let dot =
-        |a: &[Number<'b>], b: &[Number<'b>]| dot(a, b).unwrap_or_else(|| Number::known(sheet, 0.0));
+    // Two chains, so that one does not wait for every sum of the other.
+    let dot = |a: &[Number<'b>], b: &[Number<'b>]| {
+        let mut sums = [Number::known(sheet, 0.0); 2];
+        for (k, (&a, &b)) in a.iter().zip(b).enumerate() {
+            sums[k % 2] = sums[k % 2] + a * b;
+        }
+        sums[0] + sums[1]
+    };
     let d = rows.len();
     let mut lower: Vec<Vec<Number>> = Vec::with_capacity(d);
     let mut pivots: Vec<Number> = Vec::with_capacity(d);
@@ -41,17 +47,6 @@ pub(super) fn pinv_times<'b>(
         solution[i] = right / pivots[i];
     }
     solution
-}
-
-/// `a . b`; two chains, so that one does not wait for every sum of the other.
-fn dot<'b>(a: &[Number<'b>], b: &[Number<'b>]) -> Option<Number<'b>> {
-    let mut sums: [Option<Number>; 2] = [None; 2];
-    for (k, (&a, &b)) in a.iter().zip(b).enumerate() {
-        let product = a * b;
-        sums[k % 2] = Some(sums[k % 2].map_or(product, |sum| sum + product));
-    }
-    let [even, odd] = sums;
-    even.map(|even| odd.map_or(even, |odd| even + odd))
 }
 
 /// `start - a . b`.

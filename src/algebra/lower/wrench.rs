@@ -19,7 +19,7 @@
 //! `d / max(d^2, least^2)`, see
 //! [`LegGeometry::least_levers`](crate::robot::LegGeometry::least_levers).
 
-use super::chain::{JointAngles, chain_wrench};
+use super::chain::chain_wrench;
 use super::error::LowerError;
 use super::number::{Number, Sheet};
 use crate::ir::{Program, ProgramBuilder, Unary, ValueId};
@@ -30,6 +30,9 @@ use crate::robot::kinematics::least_levers;
 use crate::robot::{
     BODY_DIM, FOOT_DIM, InputRule, JOINT_DIM, Leg, LegGeometry, PlanarLeg, STATE_DIM, WrenchFrame,
 };
+
+/// Sine and cosine of each joint's angle.
+pub(super) type JointAngles<'b> = [(Number<'b>, Number<'b>); 3];
 
 /// `u = [net; F; M]` with the torques at the links `net` and the force and moment of the feet on the
 /// ground, by the model's rule (equations 4 to 7, 22 and 23): inputs `x` and `dx` (18 robot coordinates
@@ -71,10 +74,8 @@ fn torque_of(rule: &InputRule) -> Result<Program, LowerError> {
     let sheet = &Sheet::new(&mut builder);
     let tau = (0..JOINT_DIM).map(|joint| {
         let [dx, ddx, net] = [dx[joint], ddx[joint], net[joint]].map(|id| Number::new(sheet, id));
-        let friction = friction(rule, joint, dx);
         let armature = rule.actuators().map_or(0.0, |a| a.armature[joint]);
-        let losses = sum(friction, scaled(armature, ddx));
-        losses.map_or(net, |losses| net + losses).id
+        (net + (friction(rule, joint, dx) + armature * ddx)).id()
     });
     let tau: Vec<ValueId> = tau.collect();
     builder.output("tau", &tau);
@@ -90,11 +91,8 @@ fn input_of(rule: &InputRule) -> Result<Program, LowerError> {
     let feet = builder.input("feet", FOOT_DIM);
     let sheet = &Sheet::new(&mut builder);
     let number = |id: ValueId| Number::new(sheet, id);
-    let net: [Number; JOINT_DIM] = std::array::from_fn(|joint| {
-        let tau = number(tau[joint]);
-        let friction = friction(rule, joint, number(dx[joint]));
-        friction.map_or(tau, |friction| tau - friction)
-    });
+    let net: [Number; JOINT_DIM] =
+        std::array::from_fn(|joint| number(tau[joint]) - friction(rule, joint, number(dx[joint])));
     let joint = |kind: usize| (0..FOOT_DIM).map(move |leg| LEG_JOINT_DIM * leg + kind);
     // Abductions, then flexions, then of planar legs the angles of the calves, flexion plus knee, of
     // others those of the knees.
@@ -102,7 +100,7 @@ fn input_of(rule: &InputRule) -> Result<Program, LowerError> {
     for leg in Leg::ALL {
         let k = LEG_JOINT_DIM * leg.index() + 1;
         angles.push(match robot.geometry(leg) {
-            LegGeometry::Planar(_) => (number(x[k]) + number(x[k + 1])).id,
+            LegGeometry::Planar(_) => (number(x[k]) + number(x[k + 1])).id(),
             LegGeometry::Chain(_) => x[k + 1],
         });
     }
@@ -132,37 +130,22 @@ fn input_of(rule: &InputRule) -> Result<Program, LowerError> {
         WrenchFrame::Body => wrench,
         WrenchFrame::World => in_world([0, 1, 2].map(|angle| at(JOINT_DIM + angle)), wrench),
     };
-    let u: Vec<ValueId> = net.into_iter().chain(wrench).map(|u| u.id).collect();
+    let u: Vec<ValueId> = net.into_iter().chain(wrench).map(Number::id).collect();
     builder.output("u", &u);
     Ok(builder.finish()?)
 }
 
-/// `factor value`; nothing is computed for a factor of zero.
-fn scaled(factor: f64, value: Number) -> Option<Number> {
-    (factor != 0.0).then(|| factor * value)
-}
-
-/// The sum of what is there.
-fn sum<'b>(a: Option<Number<'b>>, b: Option<Number<'b>>) -> Option<Number<'b>> {
-    match (a, b) {
-        (Some(a), Some(b)) => Some(a + b),
-        (one, None) | (None, one) => one,
+/// Viscous and dry friction of a joint at a velocity.
+fn friction<'b>(rule: &InputRule, joint: usize, velocity: Number<'b>) -> Number<'b> {
+    let of = rule.actuators().map(|a| (a.viscous[joint], a.dry[joint]));
+    match of {
+        None => velocity.constant(0.0),
+        Some((viscous, 0.0)) => viscous * velocity,
+        Some((viscous, dry)) => {
+            let slow = (velocity / DRY_SPEED_RAD_S).unary(Unary::Tanh);
+            viscous * velocity + dry * slow
+        }
     }
-}
-
-/// `a value_a + b value_b`.
-fn combined<'b>((a, of_a): (f64, Number<'b>), (b, of_b): (f64, Number<'b>)) -> Number<'b> {
-    let combined = sum(scaled(a, of_a), scaled(b, of_b));
-    combined.unwrap_or_else(|| of_a.constant(0.0))
-}
-
-/// Viscous and dry friction of a joint at a velocity; none without any.
-fn friction<'b>(rule: &InputRule, joint: usize, velocity: Number<'b>) -> Option<Number<'b>> {
-    let actuators = rule.actuators()?;
-    let viscous = scaled(actuators.viscous[joint], velocity);
-    let dry = actuators.dry[joint];
-    let dry = (dry != 0.0).then(|| dry * (velocity / DRY_SPEED_RAD_S).unary(Unary::Tanh));
-    sum(viscous, dry)
 }
 
 /// `numerator / divisor`, with `divisor / max(divisor^2, least^2)` for the reciprocal.
@@ -178,9 +161,7 @@ fn about_body<'b>(hip: [f64; 3], wrench: [Number<'b>; BODY_DIM]) -> [Number<'b>;
     for axis in 0..3 {
         let (next, last) = ((axis + 1) % 3, (axis + 2) % 3);
         for (lever, force) in [(hip[next], wrench[last]), (-hip[last], wrench[next])] {
-            if let Some(part) = scaled(lever, force) {
-                moved[3 + axis] = moved[3 + axis] + part;
-            }
+            moved[3 + axis] = moved[3 + axis] + lever * force;
         }
     }
     moved
@@ -208,15 +189,14 @@ fn in_world<'b>(
 /// of the calf, flexion plus knee.
 fn leg_wrench<'b>(
     geometry: &PlanarLeg,
-    [abduction, of_thigh, (calf_sin, calf_cos)]: JointAngles<'b>,
+    [abduction, (thigh_sin, thigh_cos), (calf_sin, calf_cos)]: JointAngles<'b>,
     torques: [Number<'b>; LEG_JOINT_DIM],
     foot: Number<'b>,
 ) -> [Number<'b>; BODY_DIM] {
     let (thigh, calf, forward) = (geometry.thigh_m, geometry.calf_m, geometry.foot_forward_m);
-    let calf_forward = combined((-calf, calf_sin), (forward, calf_cos));
-    let calf_up = combined((-calf, calf_cos), (-forward, calf_sin));
-    let thigh_forward = combined((-thigh, of_thigh.0), (0.0, of_thigh.0));
-    let thigh_up = combined((-thigh, of_thigh.1), (0.0, of_thigh.1));
+    let calf_forward = -calf * calf_sin + forward * calf_cos;
+    let calf_up = -calf * calf_cos + -forward * calf_sin;
+    let (thigh_forward, thigh_up) = (-thigh * thigh_sin, -thigh * thigh_cos);
     let (fwd, up) = (thigh_forward + calf_forward, thigh_up + calf_up);
     // The same as up c_fwd - fwd c_up, without what cancels.
     let det = thigh_up * calf_forward - thigh_forward * calf_up;
