@@ -4,7 +4,7 @@ use romc::artifact;
 use romc::equations::Equations;
 use romc::model::{FeetRule, LatentVariable};
 use romc::typeset::words::feet;
-use romc::typeset::{RenameError, RobotTypeset, Rounding, SymbolTable, TypesetError};
+use romc::typeset::{RobotTypeset, Rounding, SymbolTable, TypesetError};
 
 /// A model of one latent coordinate over two robot coordinates.
 const TWO: &str = r#"{ "schema": "romc-model/1", "name": "two", "latent_dim": 1,
@@ -71,7 +71,10 @@ fn table_renames_the_coordinate_and_all_its_derivatives() {
 
 #[test]
 fn table_refuses_names_that_carry_tex_variables_that_the_model_lacks_and_one_look_of_two() {
-    let refused = |entry: &str| SymbolTable::parse(&[entry], 2).expect_err(entry);
+    let refused = |entry: &str| {
+        let error = SymbolTable::parse(&[entry], 2).expect_err(entry);
+        error.to_string()
+    };
     let names = [
         r"\input{x}",
         "x%",
@@ -86,14 +89,14 @@ fn table_refuses_names_that_carry_tex_variables_that_the_model_lacks_and_one_loo
     ];
     for name in names {
         let error = refused(&format!("z1={name}"));
-        assert!(matches!(error, RenameError::Name { .. }), "{name}");
+        assert!(error.contains("expected a letter, a word"), "{error}");
     }
     for entry in ["z3=x", "dz1=v", "u0=a", "q=a"] {
         let error = refused(entry);
-        assert!(matches!(error, RenameError::Variable { .. }), "{entry}");
+        assert!(error.contains("cannot be renamed"), "{error}");
     }
     let clash = refused("z1=z_2");
-    assert!(matches!(clash, RenameError::Collision { .. }));
+    assert!(clash.contains("would both be printed as"), "{clash}");
     assert!(SymbolTable::parse(&["z1=z_2", "z2=z_1"], 2).is_ok());
 }
 

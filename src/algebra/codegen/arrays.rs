@@ -38,7 +38,7 @@ impl Translator<'_> {
 
     fn sin_cos_lane(&mut self, values: [usize; 2], argument: ValueId) {
         let argument = self.named(argument);
-        let names = ["s", "c"].map(|name| self.names.locals.mint(name));
+        let names = ["s", "c"].map(|name| self.locals.mint(name));
         for (value, name) in values.iter().zip(&names) {
             self.spell(*value, Expr::Name(name.clone()));
         }
@@ -48,7 +48,7 @@ impl Translator<'_> {
 
     fn table(&mut self, id: TableId) -> (Ident, usize) {
         let table = &self.program.tables()[id.index()];
-        (self.names.tables.name(table), table.cols())
+        (self.tables.name(table), table.cols())
     }
 
     /// A loop over four rows at a time.
@@ -56,7 +56,7 @@ impl Translator<'_> {
         let (name, cols) = self.table(table);
         let w = self.span(weights);
         let home = self.matrix_storage(first, 1, cols, "y").home;
-        let (i, k) = (self.names.locals.mint("i"), self.names.locals.mint("k"));
+        let (i, k) = (self.locals.mint("i"), self.locals.mint("k"));
         let target = home.element(&Index::variable(&i));
         let entry = |row: Index| Expr::Entry(name.clone(), row, Index::variable(&i));
         let product = |index: Index| {
@@ -90,7 +90,7 @@ impl Translator<'_> {
     ) {
         let shape = &self.program.tables()[groups[0].0.index()];
         let (rows, cols) = (shape.rows(), shape.cols());
-        let (r, i) = (self.names.locals.mint("r"), self.names.locals.mint("i"));
+        let (r, i) = (self.locals.mint("r"), self.locals.mint("i"));
         let mut sum = base.map(|base| {
             let home = self.span(base);
             MatrixStorage { home, stride: cols }.element(&r, &i)
@@ -134,7 +134,7 @@ impl Translator<'_> {
             written.push(self.allocate(next, home));
             next += slot.len;
         }
-        let callee = self.names.callees[callee].to_string();
+        let callee = self.callees[callee].to_string();
         let call = self.printer.dialect.call(Some(&callee), &read, &written);
         self.printer.line(&call);
     }
@@ -175,7 +175,7 @@ impl Translator<'_> {
         if let Some((_, span)) = known {
             return span.clone();
         }
-        let array = self.names.locals.mint("a");
+        let array = self.locals.mint("a");
         let elements: Vec<Expr> = values.iter().map(|&value| self.read(value).0).collect();
         self.printer.let_array(&array, &elements);
         let span = Span::whole(&array, values.len(), false);
@@ -185,7 +185,7 @@ impl Translator<'_> {
 
     /// A new array.
     fn declared(&mut self, len: usize, wanted: &str) -> Span {
-        let array = self.names.locals.mint(wanted);
+        let array = self.locals.mint(wanted);
         self.printer.declare(&array, len);
         let span = Span::whole(&array, len, false);
         self.arrays.push(span.clone());
@@ -236,7 +236,7 @@ impl Translator<'_> {
             _ => find(first + cols)?.checked_sub(at)?,
         };
         let slot = results[at].slot;
-        let output = &self.names.outputs[slot];
+        let output = &self.outputs[slot];
         let fits = (0..rows * cols).all(|k| {
             let entry = results.get(at + k / cols * stride + k % cols);
             entry.is_some_and(|entry| entry.slot == slot && entry.value.index() == first + k)

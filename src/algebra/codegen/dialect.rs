@@ -1,7 +1,7 @@
 //! What targets spell differently.
 
 use super::code::{Index, Span};
-use super::precision::Precision;
+use super::options::Precision;
 use super::printer::subscript;
 use crate::ir::{Binary, Table, Unary};
 

@@ -2,7 +2,7 @@
 
 use super::code::{Parameter, Role};
 use super::map_equations::{in_matrices, points, titles, without_factors};
-use super::units::Units;
+use super::options::Units;
 use crate::equations::{Equations, LatentUnits, Unit, summand_words};
 use crate::ir::{Program, Slot, Statement};
 use crate::lower::{self, Form, JacobianPattern, LowerError, Map};

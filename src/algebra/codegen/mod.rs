@@ -9,8 +9,6 @@ mod arrays;
 pub mod c;
 mod code;
 mod dialect;
-mod error;
-mod functions;
 mod ident;
 #[doc(hidden)] // for `deploy`, in the crate above
 pub mod interface;
@@ -18,21 +16,16 @@ pub mod interface;
 pub mod line_wrapping;
 mod map_equations;
 mod model_text;
-mod precision;
+mod options;
 mod printer;
 #[doc(hidden)] // for `deploy`, in the crate above
 pub mod rust;
 #[doc(hidden)] // for `deploy`, in the crate above
 pub mod script;
 mod sin_cos;
-mod sines;
 mod tables;
 mod test_points;
 mod test_vectors;
 mod translate;
-mod units;
 
-pub use error::CodegenError;
-pub use precision::Precision;
-pub use sines::SineCosine;
-pub use units::Units;
+pub use options::{CodegenError, Precision, SineCosine, Units};

@@ -2,11 +2,11 @@
 
 use super::code::Function;
 use super::dialect::Dialect;
-use super::functions::{function, lanes};
 use super::ident::{Ident, Namer};
 use super::interface::{FunctionSpec, ModelInterface, computes_angles};
-use super::sines::SineCosine;
+use super::options::SineCosine;
 use super::tables::Tables;
+use super::translate::{function, lanes};
 
 /// What the files of all languages say of a model; `F` is what they print of a function.
 pub(crate) struct ModelText<'a, F> {

@@ -1,7 +1,7 @@
 //! The constants of the sine-and-cosine kernel as text.
 
 use super::dialect::Dialect;
-use super::precision::Precision;
+use super::options::Precision;
 use crate::ir::{sin_cos, sin_cos_f32};
 
 /// Spelled constants, in the order in which kernels use them.

@@ -1,7 +1,7 @@
 //! Points of self-tests, where possible those at which the functions have finite values.
 
 use super::interface::{FunctionSpec, PhaseInterface};
-use super::precision::Precision;
+use super::options::Precision;
 use crate::ir::{Binary, Interpreter, Statement, Unary};
 use crate::robot::JOINT_DIM;
 use crate::robot::joints::LEG_JOINT_DIM;

@@ -3,7 +3,7 @@
 use super::code::Role;
 use super::dialect::Dialect;
 use super::interface::{FunctionSpec, ModelInterface, PhaseInterface};
-use super::precision::{Precision, rounded_up};
+use super::options::{Precision, rounded_up};
 use super::test_points::{BatchPoints, N_BATCH, Random, point};
 use crate::ir::Interpreter;
 

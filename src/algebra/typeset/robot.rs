@@ -10,8 +10,8 @@ use crate::model::{AffineMap, LatentVariable};
 
 use super::decimal::{Decimal, Rounding};
 use super::equations::{EquationSystem, coefficients};
-use super::error::TypesetError;
 use super::expression::terms;
+use super::options::TypesetError;
 use super::rounder::{Rounder, RoundingReport};
 use super::symbols::{SymbolTable, glyph};
 use super::tree::{Glyph, Math, Signed, Symbol};

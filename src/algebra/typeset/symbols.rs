@@ -2,9 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use super::error::RenameError;
 use super::tree::{GREEK, Glyph, Symbol};
 use crate::model::LatentVariable;
+
+/// Why a table of new names was refused.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct RenameError(String);
 
 /// New names for latent coordinates and inputs, such as `z1=x`, `u2=F_z`.
 ///
@@ -28,23 +32,23 @@ impl SymbolTable {
         let mut table = Self::default();
         for entry in entries {
             let entry = entry.as_ref();
-            let (left, right) = entry.split_once('=').ok_or_else(|| RenameError::Form {
-                entry: entry.to_owned(),
-            })?;
+            let refused = |fault: &str| Err(RenameError(fault.to_owned()));
+            let Some((left, right)) = entry.split_once('=') else {
+                let expected = "expected `VARIABLE=NAME`, for example `z1=x`";
+                return refused(&format!("`{entry}`: {expected}"));
+            };
             let (left, right) = (left.trim(), right.trim());
             let variable = LatentVariable::from_name(left, latent_dim)
-                .filter(|variable| !matches!(variable, LatentVariable::Dz(_)))
-                .ok_or_else(|| RenameError::Variable {
-                    found: left.to_owned(),
-                })?;
-            let symbol = parse_symbol(right).ok_or_else(|| RenameError::Name {
-                variable: left.to_owned(),
-                found: right.to_owned(),
-            })?;
+                .filter(|variable| !matches!(variable, LatentVariable::Dz(_)));
+            let Some(variable) = variable else {
+                let expected = "expected z1, z2, ... or u1, u2, ... (dots follow z)";
+                return refused(&format!("`{left}` cannot be renamed: {expected}"));
+            };
+            let Some(symbol) = parse_symbol(right) else {
+                return refused(&format!("`{left}={right}`: expected {NAME}"));
+            };
             if table.names.insert(variable, symbol).is_some() {
-                return Err(RenameError::Twice {
-                    variable: left.to_owned(),
-                });
+                return refused(&format!("`{left}` is renamed twice"));
             }
         }
         table.check_distinct(latent_dim)?;
@@ -81,12 +85,9 @@ impl SymbolTable {
         for variable in LatentVariable::all(latent_dim) {
             let (symbol, second) = (self.symbol(variable), variable.to_string());
             if let Some(first) = seen.insert(symbol.clone(), second.clone()) {
-                let name = symbol.to_string();
-                return Err(RenameError::Collision {
-                    first,
-                    second,
-                    name,
-                });
+                return Err(RenameError(format!(
+                    "`{first}` and `{second}` would both be printed as `{symbol}`"
+                )));
             }
         }
         Ok(())
@@ -116,6 +117,10 @@ impl std::fmt::Display for Glyph {
         }
     }
 }
+
+/// What a new name may be.
+const NAME: &str = "a letter, a word or a Greek letter's name, with an optional subscript of letters and digits after \
+                    `_` (x, theta, p_x, F_lin,1)";
 
 /// Longest word in a name; more is surely a mistake.
 const LONGEST_WORD: usize = 24;

@@ -3,7 +3,7 @@
 use crate::codegen::code::{Function, Parameter, Role, Span};
 use crate::codegen::dialect::Dialect;
 use crate::codegen::line_wrapping::{braced, comment_lines};
-use crate::codegen::precision::Precision;
+use crate::codegen::options::Precision;
 use crate::ir::{Table, Unary};
 
 /// C99 with the names of one model.

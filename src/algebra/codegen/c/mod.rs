@@ -5,13 +5,13 @@ mod selftest;
 
 use askama::Template;
 
-use super::error::CodegenError;
 use super::interface::{ModelInterface, computes_angles};
 use super::line_wrapping::{braced, tidy};
 use super::model_text::ModelText;
-use super::precision::Precision;
+use super::options::CodegenError;
+use super::options::Precision;
+use super::options::SineCosine;
 use super::sin_cos::KernelText;
-use super::sines::SineCosine;
 use super::tables::Tables;
 use super::test_vectors::TestVectors;
 use crate::files::EmittedFile;

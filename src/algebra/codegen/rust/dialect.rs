@@ -3,7 +3,7 @@
 use crate::codegen::code::{Function, Parameter, Role, Span};
 use crate::codegen::dialect::Dialect;
 use crate::codegen::line_wrapping::wrapped;
-use crate::codegen::precision::Precision;
+use crate::codegen::options::Precision;
 use crate::ir::{Table, Unary};
 
 /// Rust without `std` or allocation.

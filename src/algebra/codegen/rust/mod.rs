@@ -6,13 +6,13 @@ mod selftest;
 
 use askama::Template;
 
-use super::error::CodegenError;
 use super::interface::{ModelInterface, computes_angles};
 use super::line_wrapping::{tidy, wrapped};
 use super::model_text::ModelText;
-use super::precision::Precision;
+use super::options::CodegenError;
+use super::options::Precision;
+use super::options::SineCosine;
 use super::sin_cos::KernelText;
-use super::sines::SineCosine;
 use super::test_vectors::TestVectors;
 use crate::files::EmittedFile;
 use dialect::RustDialect;

@@ -5,11 +5,11 @@ use askama::Template;
 use super::functions::{FunctionText, list, names};
 use crate::codegen::code::{Role, Span};
 use crate::codegen::dialect::Dialect;
-use crate::codegen::error::CodegenError;
 use crate::codegen::ident::Namer;
 use crate::codegen::interface::ModelInterface;
 use crate::codegen::line_wrapping::tidy;
 use crate::codegen::model_text::ModelText;
+use crate::codegen::options::CodegenError;
 use crate::files::EmittedFile;
 use crate::ir::{Table, Unary};
 
