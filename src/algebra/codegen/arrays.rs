@@ -159,7 +159,6 @@ impl Translator<'_> {
         })
     }
 
-    /// Array and position of a value that is an element.
     fn element(&self, value: ValueId) -> Option<(&Ident, usize)> {
         match self.spelled[value.index()].as_ref() {
             Some((Expr::Element(array, index), _)) if index.terms.is_empty() => {
@@ -183,7 +182,6 @@ impl Translator<'_> {
         span
     }
 
-    /// A new array.
     fn declared(&mut self, len: usize, wanted: &str) -> Span {
         let array = self.locals.mint(wanted);
         self.printer.declare(&array, len);

@@ -8,12 +8,10 @@ use crate::ir::{Binary, Unary};
 pub(crate) struct Index {
     /// Strides and the variables that they multiply.
     pub terms: Vec<(usize, Ident)>,
-    /// What is added.
     pub offset: usize,
 }
 
 impl Index {
-    /// A constant subscript.
     pub(crate) fn fixed(offset: usize) -> Self {
         Self {
             terms: Vec::new(),
@@ -21,30 +19,24 @@ impl Index {
         }
     }
 
-    /// A loop variable.
     pub(crate) fn variable(name: &Ident) -> Self {
         Self::fixed(0).plus(1, name)
     }
 
-    /// With `stride * name` added.
     pub(crate) fn plus(mut self, stride: usize, name: &Ident) -> Self {
         self.terms.push((stride, name.clone()));
         self
     }
 
-    /// With a constant added.
     pub(crate) fn shifted(mut self, by: usize) -> Self {
         self.offset += by;
         self
     }
 }
 
-/// An expression.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Expr {
-    /// A finite number.
     Literal(f64),
-    /// A scalar variable.
     Name(Ident),
     /// `array[index]`
     Element(Ident, Index),
@@ -52,14 +44,12 @@ pub(crate) enum Expr {
     Entry(Ident, Index, Index),
     /// `-a` or `f(a)`
     Unary(Unary, Box<Expr>),
-    /// `a op b`
     Infix(Binary, Box<Expr>, Box<Expr>),
     /// The second where the first is zero, else the third.
     Select(Box<[Expr; 3]>),
 }
 
 impl Expr {
-    /// `a op b`
     pub(crate) fn infix(op: Binary, a: Expr, b: Expr) -> Self {
         Self::Infix(op, Box::new(a), Box::new(b))
     }
@@ -71,7 +61,6 @@ pub(crate) struct Span {
     pub array: Ident,
     /// First element.
     pub offset: usize,
-    /// Number of elements.
     pub len: usize,
     /// Length of the whole array.
     pub of: usize,
@@ -80,7 +69,6 @@ pub(crate) struct Span {
 }
 
 impl Span {
-    /// All of an array.
     pub(crate) fn whole(array: &Ident, len: usize, is_parameter: bool) -> Self {
         Self {
             array: array.clone(),
@@ -91,12 +79,10 @@ impl Span {
         }
     }
 
-    /// Element `index` of the span.
     pub(crate) fn element(&self, index: &Index) -> Expr {
         Expr::Element(self.array.clone(), index.clone().shifted(self.offset))
     }
 
-    /// Whether the span is the whole array.
     pub(crate) fn is_whole(&self) -> bool {
         self.offset == 0 && self.len == self.of
     }

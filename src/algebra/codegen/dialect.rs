@@ -48,17 +48,14 @@ pub(crate) trait Dialect {
     /// The second printed operand where the first is zero, else the third.
     fn select(&self, operands: [String; 3]) -> String;
 
-    /// An element of an array.
     fn element(&self, array: &str, index: &Index) -> String {
         format!("{array}[{}]", subscript(index))
     }
 
-    /// An entry of a table.
     fn entry(&self, table: &str, row: &Index, col: &Index) -> String {
         format!("{table}[{}][{}]", subscript(row), subscript(col))
     }
 
-    /// A number in the target's precision.
     fn literal(&self, value: f64) -> String {
         Precision::Double.digits(value)
     }
@@ -66,7 +63,6 @@ pub(crate) trait Dialect {
     /// A function applied to a printed argument; never [`Unary::Neg`], which is an operator.
     fn apply(&self, function: Unary, argument: &str) -> String;
 
-    /// Definition of a scalar.
     fn let_scalar(&self, name: &str, value: &str) -> String {
         format!("{name} = {value}{}", self.terminator())
     }
@@ -77,7 +73,6 @@ pub(crate) trait Dialect {
     /// Declaration of an array that is assigned later.
     fn declare(&self, name: &str, len: usize) -> String;
 
-    /// Head of a loop.
     fn for_loop(&self, variable: &str, count: usize) -> String;
 
     /// Beginning of the names of constant tables.
@@ -112,6 +107,5 @@ pub(crate) trait Dialect {
         (0..table.rows()).map(|r| row(table.row(r))).collect()
     }
 
-    /// Definition of a constant table.
     fn table(&self, name: &str, table: &Table) -> String;
 }

@@ -10,9 +10,7 @@ use super::translate::{function, lanes};
 
 /// What the files of all languages say of a model; `F` is what they print of a function.
 pub(crate) struct ModelText<'a, F> {
-    /// What is generated.
     pub entries: &'a ModelInterface,
-    /// Constant tables.
     pub tables: Vec<String>,
     /// Maps between robot and latent coordinates.
     pub maps: Vec<F>,
@@ -21,11 +19,9 @@ pub(crate) struct ModelText<'a, F> {
 
 /// A phase in the templates; `F` is what they print of a function.
 pub(crate) struct PhaseText<F> {
-    /// Name of the phase as an identifier.
     pub identifier: String,
     /// The same in upper case, the beginning of its constants.
     pub upper: String,
-    /// Number of structural nonzeros of the Jacobian.
     pub nnz: usize,
     pub rows: String,
     pub cols: String,
@@ -89,7 +85,6 @@ impl<'a, F> ModelText<'a, F> {
         self
     }
 
-    /// Whether a batch runs in blocks.
     pub(crate) fn has_lanes(&self) -> bool {
         self.phases.iter().any(|phase| phase.lanes.is_some())
     }

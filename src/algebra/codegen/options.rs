@@ -18,7 +18,6 @@ pub enum Precision {
 }
 
 impl Precision {
-    /// Bits of a number.
     pub(crate) fn bits(self) -> usize {
         match self {
             Self::Double => 64,
@@ -44,7 +43,6 @@ impl Precision {
         }
     }
 
-    /// Whether numbers have 32 bits.
     pub(crate) fn is_single(self) -> bool {
         self == Self::Single
     }
@@ -127,7 +125,6 @@ pub enum Units {
 }
 
 impl Units {
-    /// The units of robot coordinates in words.
     pub(super) fn of_robot(self) -> &'static str {
         match self {
             Self::Si => "SI units",

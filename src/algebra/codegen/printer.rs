@@ -37,7 +37,6 @@ impl<'a> Printer<'a> {
         }
     }
 
-    /// What was printed, each line with its end.
     pub(crate) fn into_text(self) -> String {
         self.text
     }
@@ -57,7 +56,6 @@ impl<'a> Printer<'a> {
         self.line(&self.dialect.declare(&name.to_string(), len));
     }
 
-    /// `target = value`
     pub(crate) fn assign(&mut self, target: &Expr, value: &Expr) {
         self.assign_by(" = ", target, value);
     }

@@ -12,7 +12,6 @@ pub(crate) struct Tables {
 }
 
 impl Tables {
-    /// No table yet; names begin with `base`.
     pub(crate) fn new(namer: Namer, base: &str) -> Self {
         Self {
             namer,

@@ -14,18 +14,15 @@ use crate::ir::{Binary, Program, Slot, Statement, Unary, ValueId};
 /// Deepest nesting of operations in one expression.
 const DEEPEST: usize = 48;
 
-/// A program on its way to text.
 pub(super) struct Translator<'a> {
     pub program: &'a Program,
     pub tables: &'a mut Tables,
     /// Function of each program that this one calls.
     pub callees: &'a [Ident],
-    /// Parameter of each input slot.
     inputs: Vec<Parameter>,
     /// Parameter of each output slot; one that is also an input (role `InOut`) is assigned
     /// only after everything has been read.
     pub outputs: Vec<Parameter>,
-    /// Names for the local variables.
     pub locals: Namer,
     pub n_uses: Vec<usize>,
     /// How a value is read: a name, an element, or an expression to be nested once, and

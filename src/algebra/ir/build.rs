@@ -73,17 +73,14 @@ impl ProgramBuilder {
         self.numbered(Key::Binary(op, low, high), Statement::Binary(op, a, b))
     }
 
-    /// `a + b`.
     pub(crate) fn add(&mut self, a: ValueId, b: ValueId) -> ValueId {
         self.binary(Binary::Add, a, b)
     }
 
-    /// `a * b`.
     pub(crate) fn mul(&mut self, a: ValueId, b: ValueId) -> ValueId {
         self.binary(Binary::Mul, a, b)
     }
 
-    /// `a / b`.
     pub(crate) fn div(&mut self, a: ValueId, b: ValueId) -> ValueId {
         self.binary(Binary::Div, a, b)
     }

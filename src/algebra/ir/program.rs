@@ -16,7 +16,6 @@ pub struct Slot {
 pub struct ValueId(pub(super) u32);
 
 impl ValueId {
-    /// Position of the value in schedule order.
     pub(crate) fn index(self) -> usize {
         self.0 as usize
     }
@@ -55,12 +54,10 @@ impl<T> Table<T> {
         }
     }
 
-    /// Number of rows.
     pub(crate) fn rows(&self) -> usize {
         self.rows
     }
 
-    /// Number of columns.
     pub(crate) fn cols(&self) -> usize {
         self.cols
     }
@@ -70,7 +67,6 @@ impl<T> Table<T> {
         &self.entries[row * self.cols..(row + 1) * self.cols]
     }
 
-    /// All entries, row-major.
     pub(crate) fn entries(&self) -> &[T] {
         &self.entries
     }
@@ -213,9 +209,7 @@ impl Statement {
 /// One element of an output slot and the value that it takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct ResultEntry {
-    /// Which output.
     pub slot: usize,
-    /// Which element of it.
     pub index: usize,
     /// The value stored there.
     pub value: ValueId,
@@ -272,7 +266,6 @@ impl Program {
         &self.results
     }
 
-    /// Number of scalar values.
     pub(crate) fn n_values(&self) -> usize {
         self.first.last().map_or(0, |&count| count as usize)
     }
@@ -307,7 +300,6 @@ impl Program {
         self.first[statement] as usize..self.first[statement + 1] as usize
     }
 
-    /// Statement that defines a value.
     fn definition(&self, value: ValueId) -> usize {
         self.first.partition_point(|&first| first <= value.0) - 1
     }

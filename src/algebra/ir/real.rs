@@ -21,7 +21,6 @@ pub trait Real:
     /// A constant of a program.
     fn constant(value: f64) -> Self;
 
-    /// `a * a`.
     #[inline]
     fn square(self) -> Self {
         self * self

@@ -6,7 +6,6 @@ use super::program::{Program, Statement, Table, TableId, ValueId};
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("program `{program}`: {fault}")]
 pub struct IrError {
-    /// Name of the program.
     program: String,
     fault: String,
 }

@@ -64,7 +64,6 @@ fn angle_of(pool: &ExprPool, expr: ExprId) -> Option<(Function, SymbolId)> {
 
 /// The Jacobian of equations, divided into what has a form of its own.
 pub(super) struct DenseJacobian {
-    /// Variables whose columns vary.
     curved: Vec<SymbolId>,
     /// Variables that occur only linearly.
     linear: Vec<SymbolId>,
@@ -105,7 +104,6 @@ impl DenseJacobian {
         }
     }
 
-    /// All expressions that the code needs besides the equations.
     pub(crate) fn expressions(&self) -> Vec<ExprId> {
         distinct(&self.slopes)
     }

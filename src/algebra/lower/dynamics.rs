@@ -23,7 +23,6 @@ pub struct JacobianPattern {
 }
 
 impl JacobianPattern {
-    /// Row and column of each entry.
     pub(super) fn places(&self) -> impl Iterator<Item = (usize, usize)> {
         self.rows.iter().copied().zip(self.cols.iter().copied())
     }

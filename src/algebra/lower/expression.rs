@@ -14,7 +14,6 @@ pub(super) struct ExpressionLowering<'a> {
     pub pool: &'a ExprPool,
     pub builder: ProgramBuilder,
     values: HashMap<ExprId, ValueId>,
-    /// Sine and cosine of an argument.
     angles: HashMap<ExprId, (ValueId, ValueId)>,
     variables: HashMap<SymbolId, ValueId>,
     /// Expressions that wait for a function of the library or the kernel.
@@ -121,7 +120,6 @@ impl<'a> ExpressionLowering<'a> {
         value
     }
 
-    /// The value of a linear combination.
     pub(crate) fn combination(&mut self, combination: &Combination) -> ValueId {
         let terms = self.terms(combination);
         linear_combination(&mut self.builder, combination.constant, &terms)
@@ -256,7 +254,6 @@ impl<'a> ExpressionLowering<'a> {
         }
     }
 
-    /// Sine and cosine of an argument.
     pub(crate) fn angle(&mut self, argument: ExprId) -> (ValueId, ValueId) {
         self.sines_and_cosines(&[argument]);
         self.angles[&argument]

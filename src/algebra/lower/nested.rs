@@ -22,7 +22,6 @@ pub(super) struct Nested {
     pub groups: Vec<Group>,
 }
 
-/// Which group of which sum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Shared {
     pub sum: usize,
@@ -32,7 +31,6 @@ pub(super) struct Shared {
 /// A factor taken out of a part of a sum.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Group {
-    /// The factor.
     pub factor: ExprId,
     /// What it multiplies and does not contain it: the derivative of these terms by the factor.
     pub single: Combination,

@@ -16,7 +16,6 @@ use crate::model::{
     Activation, DENSITY_AT_ZERO, GELU_CUBIC, GELU_RATE, ReducedModel, StateMap, TAIL,
 };
 
-/// The program of a map over layers.
 pub(super) fn lower(map: Map, model: &ReducedModel) -> Result<Program, LowerError> {
     let (name, (from, to)) = map.words();
     let (at, factors, layers) = match map {
@@ -82,7 +81,6 @@ pub(super) fn lower(map: Map, model: &ReducedModel) -> Result<Program, LowerErro
 /// Slopes of one layer's activation; `None` where it is linear.
 type Slopes<'b> = Option<Vec<Number<'b>>>;
 
-/// A program over the layers of one map.
 struct Network<'b> {
     sheet: &'b Sheet<'b>,
     map: &'b StateMap,
@@ -122,7 +120,6 @@ impl<'b> Network<'b> {
         g
     }
 
-    /// Row `row` of `J`.
     fn jacobian_row(&self, row: usize, slopes: &[Slopes<'b>]) -> Vec<Number<'b>> {
         let last = self.map.layers().len() - 1;
         let weights = self.map.layers()[last].map.weights().row(row);

@@ -34,12 +34,10 @@ impl<'b> Number<'b> {
         Self { sheet, scalar }
     }
 
-    /// A constant of the same program.
     pub(crate) fn constant(self, value: f64) -> Self {
         Self::known(self.sheet, value)
     }
 
-    /// The number as a value.
     pub(crate) fn id(self) -> ValueId {
         match self.scalar {
             Known(number) => self.sheet.borrow_mut().constant(number),

@@ -132,17 +132,14 @@ impl Decimal {
         !self.digits.contains(|digit| ('1'..='9').contains(&digit))
     }
 
-    /// Whether it prints as one.
     pub(crate) fn is_one(&self) -> bool {
         self.exponent.is_none() && self.value().abs() == 1.0
     }
 
-    /// Whether it is below zero.
     pub(crate) fn is_negative(&self) -> bool {
         self.negative
     }
 
-    /// The number without its sign.
     pub(crate) fn magnitude(&self) -> Self {
         Self {
             negative: false,

@@ -85,7 +85,6 @@ impl RobotTypeset {
     }
 }
 
-/// The rows of the encoder in SI units, and how many weights were left out.
 fn encoder(
     encoder: &AffineMap,
     factors: &DVector<f64>,

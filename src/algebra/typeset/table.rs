@@ -83,7 +83,6 @@ impl<T: Into<Cell>> From<Option<T>> for Cell {
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Table {
     caption: String,
-    /// Name and unit of each column.
     columns: Vec<(String, String)>,
     rows: Vec<Vec<String>>,
 }

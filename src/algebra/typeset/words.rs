@@ -100,7 +100,6 @@ fn pairs(patterns: &[ContactFlags]) -> String {
     }
 }
 
-/// The feet of one pattern by name.
 fn by_name(pattern: &ContactFlags) -> String {
     let feet = Leg::ALL.iter().zip(pattern).filter(|(_, down)| **down);
     let feet: Vec<&str> = feet.map(|(leg, _)| leg.short_name()).collect();

@@ -6,12 +6,10 @@ use crate::codegen::line_wrapping::{braced, comment_lines};
 use crate::codegen::options::Precision;
 use crate::ir::{Table, Unary};
 
-/// C99 with the names of one model.
 #[derive(Clone, Debug)]
 pub(crate) struct CDialect {
     /// Identifier of the model, the beginning of all external and helper names.
     pub name: String,
-    /// Floating-point numbers of the code.
     pub precision: Precision,
 }
 
@@ -114,7 +112,6 @@ impl Dialect for CDialect {
 }
 
 impl CDialect {
-    /// What macros begin with.
     pub(crate) fn upper(&self) -> String {
         self.name.to_ascii_uppercase()
     }
@@ -143,7 +140,6 @@ impl CDialect {
         }
     }
 
-    /// The type of numbers.
     pub(crate) fn real(&self) -> &'static str {
         match self.precision {
             Precision::Double => "double",

@@ -9,12 +9,10 @@ use crate::ir::{Table, Unary};
 /// Rust without `std` or allocation.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RustDialect {
-    /// Floating-point numbers of the code.
     pub precision: Precision,
 }
 
 impl RustDialect {
-    /// The type of numbers.
     pub(crate) fn real(&self) -> &'static str {
         match self.precision {
             Precision::Double => "f64",
@@ -36,7 +34,6 @@ impl RustDialect {
         }
     }
 
-    /// A function with its documentation.
     pub(crate) fn definition(&self, function: &Function) -> String {
         let parameters = function.parameters.iter().map(|p| self.parameter(p));
         let parameters = parameters.collect::<Vec<_>>().join(", ");

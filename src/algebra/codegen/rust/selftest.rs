@@ -18,7 +18,6 @@ pub(super) struct SelfTest<'a> {
     pub vectors: TestVectors<'a>,
 }
 
-/// An array of one row.
 fn array(row: &[String]) -> String {
     let lines = wrapped(&row.join(", "), 80, " ");
     format!("[{}]", lines.join("\n           "))

@@ -16,9 +16,7 @@ use crate::ir::{Table, Unary};
 /// Python with the elementary functions of the library on whose numbers the functions work.
 #[derive(Clone, Copy, Debug)]
 enum Library {
-    /// Arrays of NumPy.
     NumPy,
-    /// Symbolic scalars of CasADi.
     Casadi,
 }
 

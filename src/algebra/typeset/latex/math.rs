@@ -60,7 +60,6 @@ pub(crate) fn tex_terms(terms: &[Signed], numbers: NumberStyle, continues: bool)
     text
 }
 
-/// A number with its sign.
 pub(crate) fn tex_number(number: &Decimal, numbers: NumberStyle) -> String {
     match (numbers, number.exponent()) {
         (NumberStyle::Plain, None) => number.to_string(),

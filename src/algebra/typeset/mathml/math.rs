@@ -79,7 +79,6 @@ pub(crate) fn mathml_terms(terms: &[Signed], continues: bool) -> String {
     text
 }
 
-/// A number with its sign.
 fn mathml_number(number: &Decimal) -> String {
     let digits = format!("<mn>{}</mn>", number.digits());
     let size = match number.exponent() {
@@ -100,7 +99,6 @@ fn mathml_number(number: &Decimal) -> String {
     }
 }
 
-/// A symbol with its dots and subscript.
 pub(crate) fn mathml_symbol(symbol: &Symbol) -> String {
     let base = accented(symbol);
     match symbol.subscript.is_empty() {
