@@ -3,44 +3,46 @@
 use super::code::{Index, Span};
 use super::options::Precision;
 use super::printer::subscript;
-use crate::ir::{Binary, Table, Unary};
+use crate::ir::{Table, Unary};
 
-/// Spelling of a target language. The printer owns precedence and parentheses, the
-/// dialect everything that differs between languages.
-pub(crate) trait Dialect {
+/// What a language spells the same everywhere.
+pub(crate) struct Spelling {
     /// Words that no variable may be called, with blanks between them.
-    fn reserved(&self) -> &'static str;
-
+    pub reserved: &'static str,
     /// What ends a statement.
-    fn terminator(&self) -> &'static str {
-        ";"
-    }
-
+    pub terminator: &'static str,
     /// What follows the head of a loop, and what closes its body.
-    fn loop_ends(&self) -> (&'static str, Option<&'static str>) {
-        (" {", Some("}"))
-    }
-
+    pub loop_ends: (&'static str, Option<&'static str>),
     /// What ends a line that goes on in the next.
-    fn continuation(&self) -> &'static str {
-        ""
-    }
-
+    pub continuation: &'static str,
     /// Whether there is `+=`.
-    fn adds_in_place(&self) -> bool {
-        true
-    }
+    pub adds_in_place: bool,
+    /// Sum, difference, product and quotient, with the spaces around them.
+    pub operators: [&'static str; 4],
+    /// Function `f(a, b, c) = a*b + c` for loops, in a language whose compilers never fuse the two
+    /// operations by themselves.
+    pub multiply_add: Option<&'static str>,
+}
 
-    /// An operator between numbers, with the spaces around it.
-    fn operator(&self, op: Binary) -> &'static str {
-        match op {
-            Binary::Add => " + ",
-            Binary::Sub => " - ",
-            Binary::Mul => "*",
-            Binary::Div => "/",
-            Binary::Pow => unreachable!("powers are functions"),
+impl Spelling {
+    /// As in C.
+    pub(crate) const fn with_braces(reserved: &'static str) -> Self {
+        Self {
+            reserved,
+            terminator: ";",
+            loop_ends: (" {", Some("}")),
+            continuation: "",
+            adds_in_place: true,
+            operators: [" + ", " - ", "*", "/"],
+            multiply_add: None,
         }
     }
+}
+
+/// A target language. The printer owns precedence and parentheses, the dialect everything that differs between
+/// languages.
+pub(crate) trait Dialect {
+    fn spelling(&self) -> &'static Spelling;
 
     /// A power of printed operands.
     fn power(&self, base: &str, exponent: &str) -> String;
@@ -64,7 +66,7 @@ pub(crate) trait Dialect {
     fn apply(&self, function: Unary, argument: &str) -> String;
 
     fn let_scalar(&self, name: &str, value: &str) -> String {
-        format!("{name} = {value}{}", self.terminator())
+        format!("{name} = {value}{}", self.spelling().terminator)
     }
 
     /// Definition of an array by its printed elements.
@@ -78,12 +80,6 @@ pub(crate) trait Dialect {
     /// Beginning of the names of constant tables.
     fn table_base(&self, _prefix: &str) -> String {
         "TABLE".to_owned()
-    }
-
-    /// Function `f(a, b, c) = a*b + c` for loops, in a language whose compilers never fuse the two
-    /// operations by themselves.
-    fn multiply_add(&self) -> Option<&'static str> {
-        None
     }
 
     /// A call of the sine-and-cosine kernel, or of a generated function (`callee`).

@@ -43,8 +43,11 @@ impl<'a, F> ModelText<'a, F> {
         print: impl Fn(Function, &Tables) -> F,
         numbers: fn(&[usize]) -> String,
     ) -> Self {
-        let mut globals = Namer::new(dialect.reserved());
-        let mut tables = Tables::new(Namer::new(dialect.reserved()), &dialect.table_base(prefix));
+        let mut globals = Namer::new(dialect.spelling().reserved);
+        let mut tables = Tables::new(
+            Namer::new(dialect.spelling().reserved),
+            &dialect.table_base(prefix),
+        );
         let mut text = |entry: &FunctionSpec, callees: &[Ident]| {
             let name = globals.mint(&format!("{prefix}{}", entry.name));
             let function = function(entry, name.clone(), dialect, callees, &mut tables);

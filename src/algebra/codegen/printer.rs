@@ -31,7 +31,7 @@ impl<'a> Printer<'a> {
     pub(crate) fn new(dialect: &'a dyn Dialect, depth: usize, in_loop: bool) -> Self {
         Self {
             dialect,
-            multiply_add: dialect.multiply_add().filter(|_| in_loop),
+            multiply_add: dialect.spelling().multiply_add.filter(|_| in_loop),
             depth,
             text: String::new(),
         }
@@ -63,7 +63,7 @@ impl<'a> Printer<'a> {
     /// `target += value`
     pub(crate) fn add_assign(&mut self, target: &Expr, value: Expr) {
         let is_fused = self.multiply_add.is_some() && product(&value).is_some();
-        match is_fused || !self.dialect.adds_in_place() {
+        match is_fused || !self.dialect.spelling().adds_in_place {
             true => self.assign(target, &Expr::infix(Binary::Add, target.clone(), value)),
             false => self.assign_by(" += ", target, &value),
         }
@@ -80,16 +80,16 @@ impl<'a> Printer<'a> {
 
     fn assign_by(&mut self, op: &str, target: &Expr, value: &Expr) {
         let [target, value] = [target, value].map(|expr| self.expression(expr));
-        let end = self.dialect.terminator();
+        let end = self.dialect.spelling().terminator;
         self.line(&format!("{target}{op}{value}{end}"));
     }
 
     /// A loop of the variable from 0 to below the count.
     pub(crate) fn looped(&mut self, variable: &Ident, count: usize, body: impl FnOnce(&mut Self)) {
-        let (open, close) = self.dialect.loop_ends();
+        let (open, close) = self.dialect.spelling().loop_ends;
         let head = self.dialect.for_loop(&variable.to_string(), count);
         self.line(&format!("{head}{open}"));
-        let outer = std::mem::replace(&mut self.multiply_add, self.dialect.multiply_add());
+        let outer = std::mem::replace(&mut self.multiply_add, self.dialect.spelling().multiply_add);
         self.depth += 1;
         body(self);
         self.depth -= 1;
@@ -118,7 +118,7 @@ impl<'a> Printer<'a> {
                 return;
             };
             self.text.push_str(&rest[..cut]);
-            self.text.push_str(self.dialect.continuation());
+            self.text.push_str(self.dialect.spelling().continuation);
             self.text.push('\n');
             rest = &rest[cut + 1..];
             indent = 4 * self.depth + 4;
@@ -157,8 +157,14 @@ impl<'a> Printer<'a> {
                 } else {
                     right
                 };
+                let [add, sub, mul, div] = self.dialect.spelling().operators;
+                let operator = match op {
+                    Binary::Add => add,
+                    Binary::Sub => sub,
+                    Binary::Mul => mul,
+                    Binary::Div | Binary::Pow => div,
+                };
                 let left = self.operand(a, own);
-                let operator = self.dialect.operator(*op);
                 format!("{left}{operator}{}", self.operand(b, right))
             }
         }

@@ -45,7 +45,7 @@ pub(crate) fn function(
     callees: &[Ident],
     tables: &mut Tables,
 ) -> Function {
-    let mut locals = Namer::new(dialect.reserved());
+    let mut locals = Namer::new(dialect.spelling().reserved);
     let parameters = entry.parameters.iter().map(|parameter| Parameter {
         name: locals.mint(&parameter.name),
         len: parameter.len,
@@ -83,7 +83,7 @@ pub(crate) fn lanes(program: &Program, dialect: &dyn Dialect, sines: SineCosine)
     if is_by_library || !program.statements().iter().all(vectorises) {
         return None;
     }
-    let mut locals = Namer::new(dialect.reserved());
+    let mut locals = Namer::new(dialect.spelling().reserved);
     let lane = Some(locals.mint("lane"));
     for taken in ["beyond", "count", "first", "point"] {
         locals.mint(taken);

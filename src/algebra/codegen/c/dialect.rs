@@ -1,7 +1,7 @@
 //! How C99 spells statements.
 
 use crate::codegen::code::{Function, Parameter, Role, Span};
-use crate::codegen::dialect::Dialect;
+use crate::codegen::dialect::{Dialect, Spelling};
 use crate::codegen::line_wrapping::{braced, comment_lines};
 use crate::codegen::options::Precision;
 use crate::ir::{Table, Unary};
@@ -14,7 +14,8 @@ pub(crate) struct CDialect {
 }
 
 /// Keywords of C and C++, and the library names that generated files use.
-const RESERVED: &str = "
+static SPELLING: Spelling = Spelling::with_braces(
+    "
     auto break case char const continue default do double else enum extern float for goto if inline
     int long register restrict return short signed sizeof static struct switch typedef union
     unsigned void volatile while bool true false catch class delete explicit export friend mutable
@@ -23,11 +24,12 @@ const RESERVED: &str = "
     uint64_t y0 y1 yn j0 j1 jn gamma signgam abs asm typeof constexpr concept requires import module
     alignas alignof static_assert thread_local decltype div index time erf I NULL errno stdin stdout
     stderr
-";
+",
+);
 
 impl Dialect for CDialect {
-    fn reserved(&self) -> &'static str {
-        RESERVED
+    fn spelling(&self) -> &'static Spelling {
+        &SPELLING
     }
 
     fn literal(&self, value: f64) -> String {

@@ -1,7 +1,7 @@
 //! How Rust spells statements.
 
 use crate::codegen::code::{Function, Parameter, Role, Span};
-use crate::codegen::dialect::Dialect;
+use crate::codegen::dialect::{Dialect, Spelling};
 use crate::codegen::line_wrapping::wrapped;
 use crate::codegen::options::Precision;
 use crate::ir::{Table, Unary};
@@ -44,16 +44,21 @@ impl RustDialect {
 }
 
 /// Keywords of Rust and the names that generated crates use themselves.
-const RESERVED: &str = "
+static SPELLING: Spelling = Spelling {
+    multiply_add: Some("math::mul_add"),
+    ..Spelling::with_braces(
+        "
     abstract as async await become box break const continue crate do dyn else enum extern false
     final fn for gen if impl in let loop macro match mod move mut override priv pub ref return self
     static struct super trait true try type typeof unsafe unsized use virtual where while yield f64
     f32 usize std core libm math sin_cos sin_cos_reduced sign union
-";
+",
+    )
+};
 
 impl Dialect for RustDialect {
-    fn reserved(&self) -> &'static str {
-        RESERVED
+    fn spelling(&self) -> &'static Spelling {
+        &SPELLING
     }
 
     fn literal(&self, value: f64) -> String {
@@ -91,10 +96,6 @@ impl Dialect for RustDialect {
 
     fn for_loop(&self, variable: &str, count: usize) -> String {
         format!("for {variable} in 0..{count}")
-    }
-
-    fn multiply_add(&self) -> Option<&'static str> {
-        Some("math::mul_add")
     }
 
     fn call(&self, callee: Option<&str>, read: &[Span], written: &[Span]) -> String {
