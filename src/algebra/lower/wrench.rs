@@ -15,24 +15,25 @@
 //! det = up c_fwd - fwd c_up
 //! ```
 //!
-//! for a leg of the usual shape; `chain.rs` has that of any other. `1 / d` of both divisors is
+//! for a leg of the usual shape; other legs move as [`Moved`] says. `1 / d` of both divisors is
 //! `d / max(d^2, least^2)`, see
 //! [`LegGeometry::least_levers`](crate::robot::LegGeometry::least_levers).
 
-use super::chain::chain_wrench;
 use super::error::LowerError;
 use super::number::{Number, Sheet};
 use crate::ir::{Program, ProgramBuilder, Unary, ValueId};
 use crate::model::ReducedModel;
 use crate::robot::actuators::DRY_SPEED_RAD_S;
+use crate::robot::chain::{Moved, cross, dot, sum};
 use crate::robot::joints::LEG_JOINT_DIM;
 use crate::robot::kinematics::least_levers;
 use crate::robot::{
-    BODY_DIM, FOOT_DIM, InputRule, JOINT_DIM, Leg, LegGeometry, PlanarLeg, STATE_DIM, WrenchFrame,
+    BODY_DIM, ChainLeg, FOOT_DIM, InputRule, JOINT_DIM, Leg, LegGeometry, PlanarLeg, STATE_DIM,
+    WrenchFrame,
 };
 
 /// Sine and cosine of each joint's angle.
-pub(super) type JointAngles<'b> = [(Number<'b>, Number<'b>); 3];
+type JointAngles<'b> = [(Number<'b>, Number<'b>); 3];
 
 /// `u = [net; F; M]` with the torques at the links `net` and the force and moment of the feet on the
 /// ground, by the model's rule (equations 4 to 7, 22 and 23): inputs `x` and `dx` (18 robot coordinates
@@ -149,7 +150,7 @@ fn friction<'b>(rule: &InputRule, joint: usize, velocity: Number<'b>) -> Number<
 }
 
 /// `numerator / divisor`, with `divisor / max(divisor^2, least^2)` for the reciprocal.
-pub(super) fn damped<'b>(numerator: Number<'b>, divisor: Number<'b>, least: f64) -> Number<'b> {
+fn damped<'b>(numerator: Number<'b>, divisor: Number<'b>, least: f64) -> Number<'b> {
     let (square, floor) = (divisor * divisor, divisor.constant(least * least));
     let twice_larger = (square + floor) + (square - floor).abs();
     2.0 * (numerator * divisor) / twice_larger
@@ -219,4 +220,36 @@ fn leg_wrench<'b>(
 /// The components along y and z of `a e + b n`.
 fn turned<'b>((s, c): (Number<'b>, Number<'b>), a: Number<'b>, b: Number<'b>) -> [Number<'b>; 2] {
     [a * s + b * c, b * s - a * c]
+}
+
+/// Force and moment of a leg with any axes about its first joint, in axes parallel to the body's.
+fn chain_wrench<'b>(
+    leg: &ChainLeg,
+    angles: JointAngles<'b>,
+    torques: [Number<'b>; 3],
+    foot: Number<'b>,
+) -> [Number<'b>; BODY_DIM] {
+    let known = |vector: [f64; 3]| vector.map(|component| foot.constant(component));
+    let one = foot.constant(1.0);
+    let moved = Moved::new(leg.axes.map(known), leg.links.map(known), angles, one);
+    let (columns, normal) = (moved.columns, moved.normal);
+    // F = -J^-T tau by area and lever, as ChainLeg::damped_force_map.
+    let [area, lever] = moved.levers();
+    let [least_area, least_lever] = least_levers(leg.lengths());
+    let of_area = damped(one, area, least_area);
+    let of_lever = damped(one, lever, least_lever);
+    let torques = torques.map(|torque| foot * torque);
+    // In the plane: (c_2 x n) tau_1 + (n x c_1) tau_2 over the area.
+    let (of_second, of_third) = (cross(columns[2], normal), cross(normal, columns[1]));
+    let in_plane = sum(times(torques[1], of_second), times(torques[2], of_third));
+    let in_plane = times(of_area, in_plane);
+    // Along the normal: tau_0 - c_0 . (the force in the plane, reversed) over the lever.
+    let along = (torques[0] - dot(columns[0], in_plane)) * of_lever;
+    let force = sum(in_plane, times(along, normal)).map(|component| -component);
+    let ([f_x, f_y, f_z], [m_x, m_y, m_z]) = (force, cross(moved.foot, force));
+    [f_x, f_y, f_z, m_x, m_y, m_z]
+}
+
+fn times<'b>(factor: Number<'b>, vector: [Number<'b>; 3]) -> [Number<'b>; 3] {
+    vector.map(|component| factor * component)
 }
