@@ -34,6 +34,6 @@ pub use robot::RobotTypeset;
 pub use rounder::{Place, RoundingReport};
 pub use symbols::{RenameError, SymbolTable};
 pub use table::{Cell, Rows, Table, rounded, rounded_up, significant};
-pub(crate) use tree::{GREEK, Glyph};
+pub(crate) use tree::Glyph;
 pub use tree::{Math, Signed, Symbol};
 pub(crate) use width::{EQUALS, break_lines, symbol_width, width};

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::tree::{GREEK, Glyph, Symbol};
+use super::tree::{Glyph, Symbol, greek, greek_letter};
 use crate::model::LatentVariable;
 
 /// Why a table of new names was refused.
@@ -112,7 +112,7 @@ impl std::fmt::Display for Glyph {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Glyph::Letter(letter) => write!(f, "{letter}"),
-            Glyph::Greek(place) => f.write_str(GREEK[*place].0),
+            Glyph::Greek(place) => f.write_str(greek_letter(*place).0),
             Glyph::Digits(text) | Glyph::Word(text) => f.write_str(text),
         }
     }
@@ -155,7 +155,7 @@ pub(super) fn glyph(text: &str) -> Option<Glyph> {
     let text = text.trim();
     let named = text.strip_prefix('\\');
     let name = named.unwrap_or(text);
-    if let Some(place) = GREEK.iter().position(|(greek, _)| *greek == name) {
+    if let Some(place) = greek().position(|(greek, _)| greek == name) {
         return Some(Glyph::Greek(place));
     }
     let is_plain = name.bytes().all(|byte| byte.is_ascii_alphanumeric());

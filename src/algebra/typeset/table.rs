@@ -43,29 +43,16 @@ pub fn rounded_up(value: f64, digits: usize) -> f64 {
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Cell(String);
 
-impl From<String> for Cell {
-    fn from(text: String) -> Self {
-        Self(text)
-    }
+macro_rules! cells {
+    ($($shown:ty),*) => {$(
+        impl From<$shown> for Cell {
+            fn from(shown: $shown) -> Self {
+                Self(shown.to_string())
+            }
+        }
+    )*};
 }
-
-impl From<&str> for Cell {
-    fn from(text: &str) -> Self {
-        Self(text.to_owned())
-    }
-}
-
-impl From<&String> for Cell {
-    fn from(text: &String) -> Self {
-        Self(text.clone())
-    }
-}
-
-impl From<usize> for Cell {
-    fn from(count: usize) -> Self {
-        Self(count.to_string())
-    }
-}
+cells!(String, &str, &String, usize);
 
 impl From<f64> for Cell {
     fn from(value: f64) -> Self {
