@@ -119,7 +119,7 @@ impl<T: Real> Interpreter<T> {
         for step in &self.steps {
             match *step {
                 Step::Unary(op, a, result) => values[result] = T::unary(op, values[a.index()]),
-                Step::Square(a, result) => values[result] = values[a.index()].square(),
+                Step::Square(a, result) => values[result] = values[a.index()] * values[a.index()],
                 Step::Binary(op, a, b, result) => {
                     let (a, b) = (values[a.index()], values[b.index()]);
                     values[result] = match op {
@@ -132,7 +132,8 @@ impl<T: Real> Interpreter<T> {
                 }
                 Step::Select(operands, result) => {
                     let [test, zero, other] = operands.map(|operand| values[operand.index()]);
-                    values[result] = T::select(test, zero, other);
+                    let is_zero = test == T::constant(0.0);
+                    values[result] = if is_zero { zero } else { other };
                 }
                 Step::Array(ref statement, first) => {
                     array(statement, first, &self.tables, &mut self.callees, values);
