@@ -6,7 +6,7 @@ use super::controller;
 use super::controller_c;
 use super::error::EmitError;
 use super::planned::PlannedJump;
-use crate::codegen::script::{matlab, python};
+use crate::codegen::script::Script;
 use crate::codegen::{Precision, SineCosine, Units, c, interface::ModelInterface, rust};
 use crate::equations::Equations;
 use crate::files::EmittedFile;
@@ -106,9 +106,9 @@ pub fn emit(
                 let entries = made(&mut in_precision, for_compilers)?;
                 rust::emit(entries, &provenance, precision, sines)?
             }
-            Target::Python => python::emit(made(&mut scripts, for_scripts)?, &provenance)?,
-            Target::Casadi => python::emit_casadi(made(&mut scripts, for_scripts)?, &provenance)?,
-            Target::Matlab => matlab::emit(made(&mut scripts, for_scripts)?, &provenance)?,
+            Target::Python => Script::NumPy.emit(made(&mut scripts, for_scripts)?, &provenance)?,
+            Target::Casadi => Script::Casadi.emit(made(&mut scripts, for_scripts)?, &provenance)?,
+            Target::Matlab => Script::Matlab.emit(made(&mut scripts, for_scripts)?, &provenance)?,
             Target::Latex => latex::emit(equations, &options.print)?,
             Target::Markdown => markdown::emit(equations, &options.print)?,
             Target::Mathml => mathml::emit(equations, &options.print)?,
