@@ -344,10 +344,10 @@ impl Conic {
         for k in 0..horizon {
             for i in 0..NX {
                 let row = k * NX + i;
-                entries.extend((0..NU).map(|j| (row, k * width + j)));
-                entries.push((row, k * width + NU + i));
+                entries.extend((0..NU).map(|j| (row, k * width + j, 0.0)));
+                entries.push((row, k * width + NU + i, 0.0));
                 if k > 0 {
-                    entries.extend((0..NX).map(|j| (row, (k - 1) * width + NU + j)));
+                    entries.extend((0..NX).map(|j| (row, (k - 1) * width + NU + j, 0.0)));
                 }
             }
             for number in 0..rows {
@@ -357,13 +357,13 @@ impl Conic {
                     NU
                 };
                 let row = equalities + k * rows + number;
-                entries.extend((0..NU).map(|j| (row, k * width + offset + j)));
+                entries.extend((0..NU).map(|j| (row, k * width + offset + j, 0.0)));
             }
         }
         let m = equalities + rows * horizon;
-        let mut a = SparseColumns::from_pattern(m, n, &entries);
-        let diagonal: Vec<(usize, usize)> = (0..n).map(|i| (i, i)).collect();
-        let mut p = SparseColumns::from_pattern(n, n, &diagonal);
+        let mut a = SparseColumns::new(m, n, &entries);
+        let diagonal: Vec<_> = (0..n).map(|i| (i, i, 0.0)).collect();
+        let mut p = SparseColumns::new(n, n, &diagonal);
         for k in 0..horizon {
             let factor = if k + 1 == horizon {
                 shared.terminal

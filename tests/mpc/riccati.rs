@@ -239,13 +239,9 @@ impl RandomProgram {
                 (0..NU).for_each(|j| add(row, (k - 1) * WIDTH + j, -self.link[number - LINKS][j]));
             }
         }
-        let places: Vec<(usize, usize)> = entries.iter().map(|entry| (entry.0, entry.1)).collect();
-        let mut a = SparseColumns::from_pattern(m, n, &places);
-        entries
-            .iter()
-            .for_each(|entry| a.set(entry.0, entry.1, entry.2));
-        let diagonal: Vec<(usize, usize)> = (0..n).map(|i| (i, i)).collect();
-        let mut p = SparseColumns::from_pattern(n, n, &diagonal);
+        let a = SparseColumns::new(m, n, &entries);
+        let diagonal: Vec<_> = (0..n).map(|i| (i, i, 0.0)).collect();
+        let mut p = SparseColumns::new(n, n, &diagonal);
         let mut q = vec![0.0; n];
         for k in 0..HORIZON {
             let factor = if k + 1 == HORIZON { 3.0 } else { 1.0 };

@@ -21,12 +21,8 @@ macro_rules! sources {
 
 const SOURCES: &[(&str, &str)] = sources! {
     "motion/mpc/online":
-        command control_model controller dense effectiveness engine error estimate fallback horizon;
-    "motion/mpc/online/interface":
-        codes handle mod;
-    "motion/mpc/online":
-        layout lift lift_cones lift_pyramids linearise mod plan problem prune qp reference
-        settings sparse step structured swing transcribe;
+        command conic control_model controller dense effectiveness engine error estimate fallback horizon
+        interface lift linearise mod plan problem prune qp reference settings stage step structured swing;
     "algebra/robot":
         actuators chain error feet geometry input_rule joints kinematics mod registry wrench;
     "motion/solver":

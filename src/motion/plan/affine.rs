@@ -103,28 +103,11 @@ impl Builder {
             cones.push(Cone::Nonnegative(self.at_most.len()));
         }
         ConeProgram {
-            p: sparse(variables, variables, self.cost),
+            p: SparseColumns::new(variables, variables, &self.cost),
             q,
-            a: sparse(rows, variables, entries),
+            a: SparseColumns::new(rows, variables, &entries),
             b,
             cones,
         }
     }
-}
-
-/// The matrix of `(row, column, value)`, values of one place added.
-fn sparse(rows: usize, columns: usize, mut entries: Vec<(usize, usize, f64)>) -> SparseColumns {
-    entries.sort_unstable_by_key(|&(row, column, _)| (column, row));
-    let places: Vec<(usize, usize)> = entries.iter().map(|&(row, col, _)| (row, col)).collect();
-    let mut matrix = SparseColumns::from_pattern(rows, columns, &places);
-    let values = matrix.values_mut();
-    let (mut at, mut last) = (0, None);
-    for (row, column, value) in entries {
-        if last.is_some_and(|place| place != (row, column)) {
-            at += 1;
-        }
-        values[at] += value;
-        last = Some((row, column));
-    }
-    matrix
 }

@@ -45,7 +45,12 @@ use super::control_model::ControlModel;
 use super::prune::needed_rows;
 use super::reference::Reference;
 use super::settings::{Lift, MpcSettings, RowSelection};
+use super::stage::StageCost;
 use crate::robot::{GRAVITY_M_S2, JOINT_DIM, WrenchFrame};
+
+/// Price of a slack in the program; the whole cost is scaled to it. clarabel starts with all
+/// multipliers near one and needs two iterations more if it has to bring them to 100.
+pub const SLACK_PRICE: f64 = 10.0;
 
 /// Distance from the reference, in its standard deviations, within which joint limits matter.
 pub const STATE_REACH: f64 = 4.0;
@@ -168,6 +173,17 @@ impl StageRows {
             joint: select(joint_rows(plant)),
             friction: friction.map(|coefficient| BodyFriction::new(plant, coefficient)),
         }
+    }
+}
+
+/// The cost of a stage with weights of the scaled states.
+pub(super) fn stage_cost(state_weights: &[f64], settings: &MpcSettings) -> StageCost {
+    let scale = SLACK_PRICE / settings.joint_penalty;
+    StageCost {
+        state: state_weights.iter().map(|weight| scale * weight).collect(),
+        terminal: settings.terminal_weight,
+        input: scale * settings.input_weight,
+        slack: SLACK_PRICE,
     }
 }
 

@@ -12,13 +12,12 @@
 //! [`Outcome`], and it is `Solved` only if the optimality conditions hold for the returned point
 //! by [`QpSolver::residuals`], which is computed here from the problem's own data.
 
-pub use clarabel::algebra::CscMatrix;
+use clarabel::algebra::CscMatrix;
 use clarabel::solver::{
     DefaultSettings, DefaultSettingsBuilder, DefaultSolver, IPSolver, SolverStatus, SupportedConeT,
 };
 
 use super::error::ControlError;
-use super::sparse::SparseColumns;
 
 /// One factor of the cone that holds the slack `s = b − A x`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -36,6 +35,99 @@ impl Cone {
     pub fn dim(self) -> usize {
         match self {
             Cone::Zero(dim) | Cone::Nonnegative(dim) | Cone::SecondOrder(dim) => dim,
+        }
+    }
+}
+
+/// A matrix in compressed sparse columns, of which values change and the pattern does not.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SparseColumns(CscMatrix<f64>);
+
+impl SparseColumns {
+    /// The matrix of `(row, column, value)` in any order, each inside `n_rows` by `n_cols`, zeros among them; values of
+    /// one place are added.
+    pub fn new(n_rows: usize, n_cols: usize, entries: &[(usize, usize, f64)]) -> Self {
+        let mut entries = entries.to_vec();
+        entries.sort_unstable_by_key(|&(row, col, _)| (col, row));
+        entries.dedup_by(|next, before| {
+            let is_same = (next.0, next.1) == (before.0, before.1);
+            before.2 += if is_same { next.2 } else { 0.0 };
+            is_same
+        });
+        let mut colptr = vec![0; n_cols + 1];
+        for &(row, col, _) in &entries {
+            let is_inside = row < n_rows && col < n_cols;
+            assert!(is_inside, "entry ({row}, {col}) lies inside the matrix");
+            colptr[col + 1] += 1;
+        }
+        for col in 0..n_cols {
+            colptr[col + 1] += colptr[col];
+        }
+        let rowval = entries.iter().map(|&(row, ..)| row).collect();
+        let nzval = entries.iter().map(|&(.., value)| value).collect();
+        Self(CscMatrix::new(n_rows, n_cols, colptr, rowval, nzval))
+    }
+
+    /// The matrix as the solver has it.
+    pub fn csc(&self) -> &CscMatrix<f64> {
+        &self.0
+    }
+
+    /// The stored values, column by column.
+    pub fn values(&self) -> &[f64] {
+        &self.0.nzval
+    }
+
+    /// The stored values, to be overwritten.
+    pub(super) fn values_mut(&mut self) -> &mut [f64] {
+        &mut self.0.nzval
+    }
+
+    /// Position of an entry among the values, or none if the pattern lacks it.
+    pub(super) fn position(&self, row: usize, col: usize) -> Option<usize> {
+        let start = self.0.colptr[col];
+        let rows = &self.0.rowval[start..self.0.colptr[col + 1]];
+        Some(start + rows.binary_search(&row).ok()?)
+    }
+
+    /// Overwrites an entry, which the pattern must hold.
+    pub fn set(&mut self, row: usize, col: usize, value: f64) {
+        let position = self.position(row, col);
+        self.0.nzval[position.expect("entry belongs to the pattern")] = value;
+    }
+
+    /// Row and value of each entry of a column.
+    fn column(&self, col: usize) -> impl Iterator<Item = (usize, f64)> {
+        let range = self.0.colptr[col]..self.0.colptr[col + 1];
+        range.map(|entry| (self.0.rowval[entry], self.0.nzval[entry]))
+    }
+
+    /// `out += A x`.
+    fn multiply_add(&self, x: &[f64], out: &mut [f64]) {
+        for (col, factor) in x.iter().enumerate() {
+            for (row, value) in self.column(col) {
+                out[row] += value * factor;
+            }
+        }
+    }
+
+    /// `out += Aᵀ y`.
+    fn transpose_multiply_add(&self, y: &[f64], out: &mut [f64]) {
+        for (col, total) in out.iter_mut().enumerate() {
+            let products = self.column(col).map(|(row, value)| value * y[row]);
+            *total += products.fold(0.0, |sum, product| sum + product);
+        }
+    }
+
+    /// `out += P x` for a symmetric `P` of which only the upper triangle is stored.
+    pub fn symmetric_multiply_add(&self, x: &[f64], out: &mut [f64]) {
+        for (col, factor) in x.iter().enumerate() {
+            for (row, value) in self.column(col) {
+                out[row] += value * factor;
+                if row != col {
+                    out[col] += value * x[row];
+                }
+            }
         }
     }
 }
@@ -335,7 +427,7 @@ fn norm_inf(values: &[f64]) -> f64 {
     sizes.fold(0.0, larger)
 }
 
-pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
+fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
