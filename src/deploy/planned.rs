@@ -95,36 +95,3 @@ fn push_lines(text: &mut String, values: impl Iterator<Item = f64>) {
         let _ = writeln!(text, "    {},", line.join(", "));
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn arrays_hold_every_sample_and_read_back() {
-        let plan = PlannedJump {
-            time_s: vec![0.0, 0.002],
-            x: DMatrix::from_fn(18, 2, |i, j| 1.0 / (1.0 + i as f64) - j as f64),
-            dx: DMatrix::zeros(18, 2),
-            u: DMatrix::from_element(18, 2, -2.5),
-            torque_nm: DMatrix::zeros(12, 2),
-            feet: vec![[true; 4], [false, true, false, false]],
-        };
-        let [header, source] = plan.files("examples", "hop", "made by a test");
-        assert_eq!(header.path, "examples/hop_plan.h");
-        assert!(header.contents.contains("HOP_PLAN_COUNT = 2"));
-        assert!(source.contents.contains("{ 0, 1, 0, 0 }"));
-        let numbers = source.contents.split([',', '{', '}', '\n', ' ']);
-        let numbers: Vec<f64> = numbers
-            .filter(|w| w.contains('e'))
-            .flat_map(str::parse)
-            .collect();
-        assert_eq!(numbers.len(), 2 + 3 * 36);
-        for (found, expected) in numbers[2..38].iter().zip(plan.x.iter()) {
-            assert!(
-                (found - expected).abs() <= 1e-8 * expected.abs(),
-                "{found} {expected}"
-            );
-        }
-    }
-}

@@ -111,28 +111,3 @@ impl<'a> Lock<'a> {
         position.expect("the lock file has all that its entries name")
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn lock_of_a_controller_has_the_solver_and_what_it_needs_and_no_more() {
-        let text = Lock::own().text("# made by a test", "go1_d4");
-        let names: Vec<&str> = text
-            .lines()
-            .filter_map(|line| Some(line.strip_prefix("name = ")?.trim_matches('"')))
-            .collect();
-        for needed in ["clarabel", "nalgebra", "amd", "go1_d4", "go1_d4-controller"] {
-            assert!(names.contains(&needed), "{needed}");
-        }
-        for other in ["romc", "clap", "zip"] {
-            assert!(!names.contains(&other), "{other}");
-        }
-        assert!(names.is_sorted());
-        assert!(!Lock::own().version("clarabel").is_empty());
-        // Both versions of thiserror: clarabel's and romc's own.
-        let both = names.iter().filter(|name| **name == "thiserror");
-        assert_eq!(both.count(), 2);
-    }
-}
