@@ -1,6 +1,6 @@
 //! The step of a stage and its derivatives.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use romc::mpc::linearise::{Lineariser, StageModel};
 
 /// A stiff, nonlinear pair of oscillators with inputs inside and outside the sine.
@@ -35,13 +35,13 @@ fn sensitivities_match_central_differences_of_the_step() {
             } else {
                 u[col - 4] += sign * delta
             }
-            stage_at(&x, &u).next
+            DVector::from_vec(stage_at(&x, &u).next)
         };
         let difference = (moved(1.0) - moved(-1.0)) / (2.0 * delta);
         for row in 0..4 {
             let exact = match col < 4 {
-                true => stage.a[(row, col)],
-                false => stage.b[(row, col - 4)],
+                true => stage.a(row, col),
+                false => stage.b(row, col - 4),
             };
             let off = (exact - difference[row]).abs();
             assert!(off < 1e-8, "row {row}, column {col}");
@@ -63,12 +63,7 @@ fn step_of_a_linear_oscillator_is_the_taylor_polynomial_of_order_four() {
         1.0 - h.powi(2) / 2.0 + h.powi(4) / 24.0,
         h - h.powi(3) / 6.0,
     );
-    let found = [
-        stage.a[(0, 0)],
-        stage.a[(0, 1)],
-        stage.next[0],
-        stage.b[(0, 0)],
-    ];
+    let found = [stage.a(0, 0), stage.a(0, 1), stage.next[0], stage.b(0, 0)];
     for (found, exact) in found
         .into_iter()
         .zip([cosine, sine, 2.0 * cosine, 1.0 - cosine])

@@ -1,7 +1,5 @@
 //! The result of a control step.
 
-use std::ffi::CStr;
-
 use crate::robot::JOINT_DIM;
 
 /// Makes [`Status`] of a table: code, word, and text that begins with the word.
@@ -25,12 +23,11 @@ macro_rules! statuses {
                 }
             }
 
-            /// The status in words.
-            pub(super) fn text(self) -> &'static CStr {
-                let text = match self {
+            /// The status in words, with a final nul.
+            pub(super) fn text(self) -> &'static str {
+                match self {
                     $(Self::$name => concat!($text, "\0"),)*
-                };
-                CStr::from_bytes_until_nul(text.as_bytes()).expect("a final nul")
+                }
             }
         }
     };

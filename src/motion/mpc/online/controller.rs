@@ -2,13 +2,13 @@
 
 use std::time::Instant;
 
-use super::command::Command;
+use super::command::{Command, Status};
 use super::control_model::ControlModel;
 use super::effectiveness::Effectiveness;
 use super::engine::StageSolver;
 use super::error::ControlError;
 use super::fallback::Memory;
-use super::horizon::{Contact, Horizon, StageInputs};
+use super::horizon::{Horizon, StageInputs};
 use super::lift::{ConsistentLift, LiftFailure, StanceState};
 use super::linearise::LatentDynamics;
 use super::plan::Plan;
@@ -251,7 +251,7 @@ impl Controller {
     }
 
     /// Writes the horizon from a time on and its gains; none without a reference.
-    pub(super) fn prepare_stages(&mut self, time_s: f64, feet: ContactFlags) -> Option<Contact> {
+    pub(super) fn prepare_stages(&mut self, time_s: f64, feet: ContactFlags) -> Option<Status> {
         let inputs = StageInputs {
             plant: &self.plant,
             settings: &self.settings,

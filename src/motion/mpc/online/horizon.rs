@@ -1,5 +1,6 @@
 //! The stages of the horizon at a control step: phases, reference, linearised dynamics, scaled programs.
 
+use super::command::Status;
 use super::control_model::ControlModel;
 use super::engine::Start;
 use super::linearise::{LatentDynamics, Lineariser, StageModel};
@@ -9,19 +10,6 @@ use super::reference::Reference;
 use super::settings::{Drift, Linearisation, MpcSettings};
 use super::stage::{StageQp, StageScale, StageShape};
 use crate::robot::ContactFlags;
-
-/// How the feet's phase relates to the reference's at a control step.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Contact {
-    /// The same.
-    AsScheduled,
-    /// The feet are already in a phase that the reference enters later: it is entered now.
-    Early,
-    /// The feet are still in a phase that the reference has left: it lasts for one more stage.
-    Late,
-    /// The feet are in a phase that the reference is not near, or in none of the model's.
-    Unknown,
-}
 
 /// One stage in latent units.
 #[derive(Debug, Clone)]
@@ -166,14 +154,14 @@ impl Horizon {
         }
     }
 
-    /// Prepares all stages from a time on with the feet as measured then.
+    /// Prepares all stages from a time on with the feet as measured then; the status of a plan for them.
     pub(super) fn prepare(
         &mut self,
         inputs: &StageInputs<'_>,
         dynamics: &mut dyn LatentDynamics,
         time_s: f64,
         feet: ContactFlags,
-    ) -> Contact {
+    ) -> Status {
         let contact = self.schedule(inputs, time_s, feet);
         self.reuse(inputs.settings, time_s);
         for index in 0..self.stages.len() {
@@ -196,7 +184,7 @@ impl Horizon {
     }
 
     /// Phases of all stages: the reference's, changed where the feet disagree.
-    fn schedule(&mut self, inputs: &StageInputs<'_>, time_s: f64, feet: ContactFlags) -> Contact {
+    fn schedule(&mut self, inputs: &StageInputs<'_>, time_s: f64, feet: ContactFlags) -> Status {
         let (plant, step_s) = (inputs.plant, inputs.settings.step_s);
         let scheduled = |time_s: f64| {
             let phase = plant.phase_for(inputs.reference.feet_at(time_s));
@@ -206,10 +194,10 @@ impl Horizon {
             *phase = scheduled(time_s + (index as f64 + 0.5) * step_s);
         }
         let Some(measured) = plant.phase_for(feet) else {
-            return Contact::Unknown;
+            return Status::ContactUnknown;
         };
         if measured == scheduled(time_s) || measured == self.phases[0] {
-            return Contact::AsScheduled;
+            return Status::Solved;
         }
         let length = self.phases.len();
         let next = self.phases.iter().position(|&phase| phase == measured);
@@ -217,15 +205,15 @@ impl Horizon {
         match (next, last) {
             (None, None) => {
                 self.phases[0] = measured;
-                Contact::Unknown
+                Status::ContactUnknown
             }
             (Some(next), last) if last.is_none_or(|last| next <= last) => {
                 self.phases[..next].fill(measured);
-                Contact::Early
+                Status::ContactEarly
             }
             (_, _) => {
                 self.phases[0] = measured;
-                Contact::Late
+                Status::ContactLate
             }
         }
     }
@@ -273,8 +261,7 @@ impl Horizon {
             input: &stage.input,
             deviation: inputs.reference.deviation(),
         };
-        let StageModel { a, b, .. } = &stage.model;
-        program.write_dynamics((a, b, &stage.defect), &scale);
+        program.write_dynamics(&stage.model, &stage.defect, &scale);
         let rows = stage.rows.as_ref().unwrap_or(inputs.rows);
         let losses_nm = plant.planned_losses(&stage.state, &stage.end, step_s);
         program.write_rows(rows, &losses_nm, &stage.end, &scale);
@@ -317,10 +304,10 @@ impl Horizon {
             for (row, defect) in stage.defect.iter_mut().enumerate() {
                 *defect = stage.model.next[row] - end[row];
                 for (col, value) in state.iter().enumerate() {
-                    *defect += stage.model.a[(row, col)] * (stage.state[col] - value);
+                    *defect += stage.model.a(row, col) * (stage.state[col] - value);
                 }
                 for (col, value) in input.iter().enumerate() {
-                    *defect += stage.model.b[(row, col)] * (stage.input[col] - value);
+                    *defect += stage.model.b(row, col) * (stage.input[col] - value);
                 }
             }
             if trusts_reference {

@@ -15,18 +15,23 @@ use super::settings::MpcSettings;
 pub use super::settings::{Accepts, SETTINGS, Setting, Settings};
 use crate::robot::{ContactFlags, FOOT_DIM, JOINT_DIM, Robot};
 
-/// A pointer is null or not aligned.
-pub const BAD_POINTER: i32 = -4;
-/// The time of a reference does not increase.
-pub const TIME_ORDER: i32 = -5;
-/// No phase of the model has the feet of a reference's sample in contact.
-pub const UNKNOWN_FEET: i32 = -6;
-/// A setting is out of its range.
-pub const BAD_SETTING: i32 = -7;
-/// The conic solver refused the problem.
-pub const SOLVER_REFUSED: i32 = -8;
-/// The controller broke down inside; it works again after a new reference.
-pub const INTERNAL: i32 = -9;
+macro_rules! codes {
+    ($($name:ident = $code:literal, $text:literal;)*) => {
+        $(#[doc = $text] pub const $name: i32 = $code;)*
+
+        /// The codes beside those of [`Status`].
+        const BEYOND_STEPS: &[(i32, &str)] = &[$(($name, concat!($text, "\0"))),*];
+    };
+}
+
+codes! {
+    BAD_POINTER = -4, "bad pointer: null or not aligned; fallback";
+    TIME_ORDER = -5, "time order: the reference's time does not increase";
+    UNKNOWN_FEET = -6, "unknown feet: no phase of the model has these feet in contact";
+    BAD_SETTING = -7, "bad setting: a setting is out of its range";
+    SOLVER_REFUSED = -8, "solver refused: the conic solver does not take the problem";
+    INTERNAL = -9, "internal: the controller broke down; set a reference to use it again";
+}
 
 /// Runs `action`; its error or panic becomes a code, and a message for [`last_error`].
 fn guarded<T>(action: impl FnOnce() -> Result<T, ControlError>) -> Result<T, i32> {
@@ -73,34 +78,16 @@ pub fn last_error() -> *const c_char {
     LAST_ERROR.with_borrow(|last| last.as_ptr())
 }
 
-/// The codes beside those of [`Status`], in words.
-const BEYOND_STEPS: [(i32, &CStr); 6] = [
-    (BAD_POINTER, c"bad pointer: null or not aligned; fallback"),
-    (
-        TIME_ORDER,
-        c"time order: the reference's time does not increase",
-    ),
-    (
-        UNKNOWN_FEET,
-        c"unknown feet: no phase of the model has these feet in contact",
-    ),
-    (BAD_SETTING, c"bad setting: a setting is out of its range"),
-    (
-        SOLVER_REFUSED,
-        c"solver refused: the conic solver does not take the problem",
-    ),
-    (
-        INTERNAL,
-        c"internal: the controller broke down; set a reference to use it again",
-    ),
-];
-
 /// Every code that the interface returns, with its text.
 pub fn all_codes() -> impl Iterator<Item = (i32, &'static CStr)> {
     let of_steps = Status::ALL
         .iter()
         .map(|status| (status.code(), status.text()));
-    of_steps.chain(BEYOND_STEPS)
+    let texts = of_steps.chain(BEYOND_STEPS.iter().copied());
+    texts.map(|(code, text)| {
+        let text = CStr::from_bytes_until_nul(text.as_bytes());
+        (code, text.expect("texts end with a nul"))
+    })
 }
 
 /// A status or return code in words.

@@ -10,7 +10,8 @@
 
 use nalgebra::DMatrix;
 
-use super::problem::{Row, StageRows};
+use super::linearise::StageModel;
+use super::problem::{Row, StageRows, pairs};
 
 /// Rows of a friction pyramid.
 pub(super) const PYRAMID_ROWS: usize = 4;
@@ -79,7 +80,7 @@ impl StageShape {
             states: 2 * latent_dim,
             inputs: latent_dim,
             input_rows: rows.torque.len() + PYRAMID_ROWS * pyramids,
-            pairs: super::problem::pairs(&rows.torque),
+            pairs: pairs(&rows.torque),
             soft_rows: rows.joint.len(),
             rate_rows: rows.rate.len(),
             cones,
@@ -144,7 +145,8 @@ impl StageQp {
     /// `σ⁻¹ A σ`, `σ⁻¹ B C_p` and `σ⁻¹ defect`.
     pub(super) fn write_dynamics(
         &mut self,
-        (a, b, defect): (&DMatrix<f64>, &DMatrix<f64>, &[f64]),
+        model: &StageModel,
+        defect: &[f64],
         scale: &StageScale<'_>,
     ) {
         let dim = scale.input.len();
@@ -153,12 +155,12 @@ impl StageQp {
             for col in 0..dim {
                 let mut sum = 0.0;
                 for k in col..dim {
-                    sum += b[(row, k)] * scale.root[(k, col)];
+                    sum += model.b(row, k) * scale.root[(k, col)];
                 }
                 self.b[row * dim + col] = factor * sum;
             }
             for col in 0..2 * dim {
-                self.a[row * 2 * dim + col] = factor * a[(row, col)] * scale.deviation[col];
+                self.a[row * 2 * dim + col] = factor * model.a(row, col) * scale.deviation[col];
             }
             self.c[row] = factor * defect[row];
         }

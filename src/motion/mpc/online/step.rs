@@ -4,7 +4,6 @@ use nalgebra::SVector;
 
 use super::command::{Command, Source, Status};
 use super::controller::{Controller, Measurement, SOFTENED_FROM};
-use super::horizon::Contact;
 use super::lift::StanceState;
 use super::qp::Outcome;
 use crate::robot::{JOINT_DIM, STATE_DIM};
@@ -91,7 +90,7 @@ impl Controller {
             (self.horizon).unscale(stage, scaled, &self.plant, deviation, out);
         }
         let is_grounded = self.plant.phases()[phase].is_grounded;
-        self.effectiveness.begin(&first.model.b, is_grounded);
+        self.effectiveness.begin(&first.model, is_grounded);
         command.slack = self.largest_violation();
         self.memory.stance = Some(StanceState::at(measurement.x, measurement.feet, phase));
         if !self.write_plan(0, command) {
@@ -99,11 +98,8 @@ impl Controller {
         }
         command.source = Source::Plan;
         match contact {
-            Contact::Early => Status::ContactEarly,
-            Contact::Late => Status::ContactLate,
-            Contact::Unknown => Status::ContactUnknown,
-            Contact::AsScheduled if command.slack > SOFTENED_FROM => Status::Softened,
-            Contact::AsScheduled => Status::Solved,
+            Status::Solved if command.slack > SOFTENED_FROM => Status::Softened,
+            status => status,
         }
     }
 
