@@ -2,7 +2,7 @@
 
 use romc::mpc::{
     Cone, ConeProgram, ConsistentLift, ControlModel, MpcSettings, Outcome, QpSettings, QpSolver,
-    Solver, SolverProfile, SparseColumns, StanceState, foot_forces,
+    Solver, SolverProfile, StanceState, foot_forces, sparse,
 };
 use romc::robot::{JOINT_DIM, STATE_DIM};
 
@@ -138,9 +138,9 @@ fn by_clarabel(
     let all = (0..rows.len()).flat_map(|row| (0..JOINT_DIM).map(move |col| (row, col)));
     let all: Vec<_> = all.map(|(row, col)| (row, col, rows[row].0[col])).collect();
     let program = ConeProgram {
-        p: SparseColumns::new(JOINT_DIM, JOINT_DIM, &hessian),
+        p: sparse(JOINT_DIM, JOINT_DIM, &hessian),
         q: cost.1.clone(),
-        a: SparseColumns::new(rows.len(), JOINT_DIM, &all),
+        a: sparse(rows.len(), JOINT_DIM, &all),
         b: rows.iter().map(|(_, bound)| *bound).collect(),
         cones: vec![Cone::Nonnegative(rows.len())],
     };

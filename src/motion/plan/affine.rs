@@ -1,6 +1,6 @@
 //! Affine expressions of a program's variables, and sparse matrices made of them.
 
-use crate::mpc::{Cone, ConeProgram, SparseColumns};
+use crate::mpc::{Cone, ConeProgram, sparse};
 
 /// `constant + sum of factor times variable`.
 #[derive(Clone, Debug, Default)]
@@ -103,9 +103,9 @@ impl Builder {
             cones.push(Cone::Nonnegative(self.at_most.len()));
         }
         ConeProgram {
-            p: SparseColumns::new(variables, variables, &self.cost),
+            p: sparse(variables, variables, &self.cost),
             q,
-            a: SparseColumns::new(rows, variables, &entries),
+            a: sparse(rows, variables, &entries),
             b,
             cones,
         }

@@ -6,7 +6,7 @@
 
 use super::engine::{StageSolver, Start};
 use super::error::ControlError;
-use super::qp::{Cone, ConeProgram, Outcome, QpSettings, QpSolver, SparseColumns};
+use super::qp::{Cone, ConeProgram, Outcome, QpSettings, QpSolver, position, sparse};
 use super::stage::{CONE_ROWS, StageCost, StageQp, StageShape};
 
 /// The program of a horizon.
@@ -32,8 +32,8 @@ impl Conic {
         let mut entries = Vec::new();
         layout.entries(&stages, |row, col, value| entries.push((row, col, value)));
         let (rows, unknowns) = (layout.cone_row(horizon), horizon * layout.width());
-        let a = SparseColumns::new(rows, unknowns, &entries);
-        let find = |&(row, col, _): &(usize, usize, f64)| a.position(row, col);
+        let a = sparse(rows, unknowns, &entries);
+        let find = |&(row, col, _): &(usize, usize, f64)| position(&a, row, col);
         let positions = entries.iter().map(find).collect::<Option<_>>();
         let mut cones = vec![
             Cone::Zero(horizon * shape.states),
@@ -43,7 +43,7 @@ impl Conic {
         cones.retain(|cone| cone.dim() > 0);
         let (p, q) = layout.cost(cost);
         let program = ConeProgram {
-            p: SparseColumns::new(unknowns, unknowns, &p),
+            p: sparse(unknowns, unknowns, &p),
             q,
             a,
             b: vec![0.0; rows],
@@ -60,7 +60,7 @@ impl Conic {
 impl StageSolver for Conic {
     fn solve(&mut self, stages: &[StageQp], start: &Start) -> (Outcome, u32) {
         let program = self.solver.program_mut();
-        let values = program.a.values_mut();
+        let values = &mut program.a.nzval;
         let mut positions = self.positions.iter();
         self.layout.entries(stages, |_, _, value| {
             if let Some(&position) = positions.next() {

@@ -60,6 +60,7 @@ pub use problem::{to_upright, upright};
 pub use prune::needed_rows;
 pub use qp::{
     Cone, ConeProgram, Outcome, QpSettings, QpSolver, Residuals, SolverProfile, SparseColumns,
+    sparse,
 };
 pub use reference::{Reference, ReferenceSamples};
 pub use settings::{

@@ -6,7 +6,7 @@
 //! equal rows, of which each cuts a sliver off what the other allows.
 
 use super::problem::Row;
-use super::qp::{Cone, ConeProgram, Outcome, QpSettings, QpSolver, SparseColumns};
+use super::qp::{Cone, ConeProgram, Outcome, QpSettings, QpSolver, sparse};
 
 /// The rows without those that follow from the others to within `margin`, in the same order.
 ///
@@ -57,9 +57,9 @@ fn maximum(rows: &[&Row], relaxation: f64) -> Option<f64> {
     let mut b: Vec<f64> = rows.iter().map(|row| row.bound).collect();
     b[rows.len() - 1] += relaxation;
     let program = ConeProgram {
-        p: SparseColumns::new(dim, dim, &[]),
+        p: sparse(dim, dim, &[]),
         q: last.row.iter().map(|entry| -entry).collect(),
-        a: SparseColumns::new(rows.len(), dim, &entries),
+        a: sparse(rows.len(), dim, &entries),
         b,
         cones: vec![Cone::Nonnegative(rows.len())],
     };
