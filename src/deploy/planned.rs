@@ -1,14 +1,11 @@
 //! A planned jump as C arrays: what an example of a generated controller jumps.
 
-use std::fmt::Write as _;
-
 use nalgebra::DMatrix;
 
+use super::controller_c::numbers::{integers, list, nested};
 use crate::files::EmittedFile;
 use crate::robot::{ContactFlags, STATE_DIM};
 
-/// Values on a line of an array.
-const PER_LINE: usize = 6;
 /// Significant digits, beyond those of any sensor.
 const DIGITS: usize = 9;
 
@@ -60,38 +57,26 @@ impl PlannedJump {
 
     fn source(&self, name: &str, provenance: &str) -> String {
         let upper = name.to_ascii_uppercase();
-        let mut text = format!("/* {provenance} */\n#include \"{name}_plan.h\"\n");
-        let open = |text: &mut String, kind: &str, of: &str, width: &str| {
-            let array = format!("{name}_plan_{of}[{upper}_PLAN_COUNT]{width}");
-            let _ = write!(text, "\nconst {kind} {array} = {{\n");
+        let one = |value: &f64| format!("{value:.*e}", DIGITS - 1);
+        let columns = |rows: &DMatrix<f64>| {
+            let columns = rows.column_iter();
+            nested(columns.map(|column| list(column.iter().map(one))))
         };
-        open(&mut text, "double", "time_s", "");
-        push_lines(&mut text, self.time_s.iter().copied());
-        text.push_str("};\n");
-        for (rows, of) in [(&self.x, "x"), (&self.dx, "dx"), (&self.u, "u")] {
-            open(&mut text, "double", of, &format!("[{STATE_DIM}]"));
-            for column in rows.column_iter() {
-                text.push_str("    {\n");
-                push_lines(&mut text, column.iter().copied());
-                text.push_str("    },\n");
-            }
-            text.push_str("};\n");
-        }
-        open(&mut text, "uint8_t", "feet", "[4]");
-        for feet in &self.feet {
-            let [a, b, c, d] = feet.map(u8::from);
-            let _ = writeln!(text, "    {{ {a}, {b}, {c}, {d} }},");
-        }
-        text.push_str("};\n");
-        text
-    }
-}
-
-fn push_lines(text: &mut String, values: impl Iterator<Item = f64>) {
-    let values: Vec<String> = values
-        .map(|value| format!("{value:.*e}", DIGITS - 1))
-        .collect();
-    for line in values.chunks(PER_LINE) {
-        let _ = writeln!(text, "    {},", line.join(", "));
+        let feet = self.feet.iter().map(|feet| integers(feet.map(i64::from)));
+        let states = format!("[{STATE_DIM}]");
+        let arrays = [
+            ("double", "time_s", "", list(self.time_s.iter().map(one))),
+            ("double", "x", &states, columns(&self.x)),
+            ("double", "dx", &states, columns(&self.dx)),
+            ("double", "u", &states, columns(&self.u)),
+            ("uint8_t", "feet", "[4]", nested(feet)),
+        ];
+        let arrays = arrays.map(|(kind, of, width, values)| {
+            format!("\nconst {kind} {name}_plan_{of}[{upper}_PLAN_COUNT]{width} = {values};\n")
+        });
+        format!(
+            "/* {provenance} */\n#include \"{name}_plan.h\"\n{}",
+            arrays.concat()
+        )
     }
 }

@@ -49,7 +49,7 @@ pub mod widest {
 }
 
 pub use command::{Command, Source, Status};
-pub use control_model::{ControlModel, ControlModelParts, ControlPhase, InputMaps, NonlinearMaps};
+pub use control_model::{ControlModel, ControlModelParts, ControlPhase, NonlinearMaps};
 pub use controller::{Controller, Measurement};
 pub use error::ControlError;
 pub use estimate::InputGivenState;
