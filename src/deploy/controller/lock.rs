@@ -6,13 +6,11 @@
 use std::collections::BTreeSet;
 use std::sync::LazyLock;
 
-/// romc's own lock file.
 const OWN: &str = include_str!("../../../Cargo.lock");
 
 /// What a generated controller depends on, besides its model.
 const DIRECT: [&str; 3] = ["clarabel", "nalgebra", "thiserror"];
 
-/// Locked packages.
 #[derive(Debug, Clone)]
 pub(crate) struct Lock<'a> {
     packages: Vec<Package<'a>>,
@@ -46,7 +44,6 @@ impl<'a> Package<'a> {
 }
 
 impl Lock<'static> {
-    /// romc's own, parsed once.
     pub(crate) fn own() -> &'static Self {
         static PARSED: LazyLock<Lock<'static>> = LazyLock::new(|| {
             let blocks = OWN.split("[[package]]\n").skip(1);

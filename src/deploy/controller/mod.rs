@@ -39,9 +39,7 @@ pub(super) struct Facts<'a> {
     joint_names: String,
     /// How `u` comes from torques, lines of a comment.
     pub(super) input_is: String,
-    /// Constant and value of every code.
     pub(super) codes: Vec<(String, i32)>,
-    /// Every code with its text.
     pub(super) texts: Vec<(i32, String)>,
     pub(super) defaults: Settings,
     pub(super) settings: Vec<SettingText>,
@@ -176,7 +174,6 @@ fn input_in_words(rule: &InputRule, name: &str) -> String {
     wrapped(&text, 100, "").join("\n * ")
 }
 
-/// What is the same for all models but for names.
 fn project(
     entries: &ModelInterface,
     plant: &ControlModel,

@@ -3,7 +3,6 @@
 /// The tests at the end of a file, which stay here.
 const TESTS: &str = "\n#[cfg(test)]\nmod tests";
 
-/// The licences of these sources.
 pub(crate) const LICENCES: [(&str, &str); 2] = [
     ("LICENSE-APACHE", include_str!("../../../LICENSE-APACHE")),
     ("LICENSE-MIT", include_str!("../../../LICENSE-MIT")),

@@ -30,7 +30,6 @@ pub enum MpcError {
     #[error("{}: a sample every {:.3} ms; found a step of {} s, expected at least as long (`romc mpc --step {}`)", path.display(), recorded_s * 1e3, found_s, (recorded_s * 1e4).ceil() / 1e4)]
     Step {
         path: PathBuf,
-        /// Duration of a stage, s.
         found_s: f64,
         /// Time between samples, s.
         recorded_s: f64,

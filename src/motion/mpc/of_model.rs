@@ -130,7 +130,6 @@ impl NonlinearMaps for ModelMaps {
     }
 }
 
-/// The statistics of all phases with latent inputs `projection u`.
 fn phases_under(
     model: &ReducedModel,
     projection: &DMatrix<f64>,

@@ -82,7 +82,6 @@ settings! {
     reach: f64 = 1.5, ANY;
 }
 
-/// One number or two.
 trait Numbers {
     fn numbers(&self) -> &[f64];
 }

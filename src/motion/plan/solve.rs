@@ -178,7 +178,6 @@ fn outside(seed: &Seed<'_>, goal_m: [f64; 2]) -> [f64; 2] {
     })
 }
 
-/// Distance and rise of the body in a motion, m.
 fn reached(motion: &Segment) -> [f64; 2] {
     let (x, last) = (&motion.x, motion.len() - 1);
     let height = x.row(BODY_Z);

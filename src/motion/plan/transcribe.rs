@@ -55,7 +55,6 @@ pub(crate) enum Bound {
 }
 
 impl Bound {
-    /// All of them.
     pub(crate) const ALL: [Self; 4] = [Self::Torque, Self::Joint, Self::Friction, Self::Height];
 }
 
@@ -69,7 +68,6 @@ pub struct Layout {
 }
 
 impl Layout {
-    /// The layout of a seed's program.
     pub(crate) fn new(seed: &Seed<'_>) -> Self {
         let d = seed.latent_dim;
         let mut first = Vec::new();
@@ -86,7 +84,6 @@ impl Layout {
         }
     }
 
-    /// Number of variables.
     pub(crate) fn len(&self) -> usize {
         self.slacks + Bound::ALL.len()
     }
@@ -96,25 +93,21 @@ impl Layout {
         self.first[part] + 3 * self.latent_dim * node
     }
 
-    /// The variable of a part's duration.
     pub(crate) fn duration(&self, part: usize) -> usize {
         self.durations + part
     }
 
-    /// The violation of a kind of bounds.
     pub(crate) fn slack(&self, bound: Bound) -> usize {
         self.slacks + bound as usize
     }
 }
 
-/// Values of a node at an iterate.
 pub(crate) struct NodeValues {
     pub z: DVector<f64>,
     pub dz: DVector<f64>,
     pub u_lat: DVector<f64>,
 }
 
-/// A seed, its layout and the settings.
 pub(crate) struct Task<'a> {
     pub seed: &'a Seed<'a>,
     pub layout: Layout,
@@ -136,13 +129,11 @@ impl<'a> Task<'a> {
         task
     }
 
-    /// Duration of a part at an iterate, s.
     pub(crate) fn duration_s(&self, part: usize, y: &[f64]) -> f64 {
         let tau = y[self.layout.duration(part)];
         self.seed.parts[part].duration_s * (1.0 + DURATION_SHARE * tau)
     }
 
-    /// Values of a node at an iterate.
     pub(crate) fn values(&self, part: usize, node: usize, y: &[f64]) -> NodeValues {
         let d = self.layout.latent_dim;
         let of = &self.seed.parts[part];
@@ -231,7 +222,6 @@ impl<'a> Task<'a> {
             .losses(&first(&rates), &first(&accelerations))
     }
 
-    /// The program about an iterate.
     pub(crate) fn program(&self, y: &[f64]) -> ConeProgram {
         let mut builder = Builder::default();
         costs::add(self, y, &mut builder);
@@ -248,7 +238,6 @@ impl<'a> Task<'a> {
         builder.program(self.layout.len())
     }
 
-    /// The part's equations, linearised.
     fn equations(&self, part: usize, y: &[f64], builder: &mut Builder) {
         let of = &self.seed.parts[part];
         let d = self.layout.latent_dim;
@@ -352,7 +341,6 @@ impl<'a> Task<'a> {
         within(builder, &self.x(part, node, PITCH), [-pitch, pitch], None);
     }
 
-    /// The last node.
     pub(crate) fn last(&self) -> (usize, usize) {
         let part = self.seed.parts.len() - 1;
         (part, self.seed.parts[part].intervals())
@@ -420,7 +408,6 @@ impl<'a> Task<'a> {
         self.apex_node = highest.expect("invariant: a part has nodes");
     }
 
-    /// The part in the air.
     pub(crate) fn flight(&self) -> usize {
         let mut parts = self.seed.parts.iter();
         let flight = parts.position(|part| !part.is_grounded());
@@ -446,7 +433,6 @@ impl<'a> Task<'a> {
         height
     }
 
-    /// The variables of the prior itself: all zero.
     pub(crate) fn prior_point(&self) -> Vec<f64> {
         vec![0.0; self.layout.len()]
     }

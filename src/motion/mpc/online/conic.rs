@@ -9,7 +9,6 @@ use super::error::ControlError;
 use super::qp::{Cone, ConeProgram, Outcome, QpSettings, QpSolver, position, sparse};
 use super::stage::{CONE_ROWS, StageCost, StageQp, StageShape};
 
-/// The program of a horizon.
 #[derive(Debug)]
 pub(super) struct Conic {
     layout: Layout,
@@ -90,7 +89,6 @@ struct Layout {
 }
 
 impl Layout {
-    /// Unknowns of a stage.
     fn width(&self) -> usize {
         self.shape.inputs + self.shape.states + self.slacks()
     }
@@ -104,12 +102,10 @@ impl Layout {
         shape.input_rows + shape.rate_rows + shape.soft_rows + self.slacks()
     }
 
-    /// First inequality of a stage.
     fn input_row(&self, stage: usize) -> usize {
         self.horizon * self.shape.states + stage * self.inequalities()
     }
 
-    /// First cone row of a stage.
     fn cone_row(&self, stage: usize) -> usize {
         self.input_row(self.horizon) + stage * CONE_ROWS * self.shape.cones
     }

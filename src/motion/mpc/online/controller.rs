@@ -301,7 +301,6 @@ impl Controller {
     }
 }
 
-/// Stages and solver for rows and weights of the scaled states, `2 latent_dim`.
 fn program(
     latent_dim: usize,
     rows: &StageRows,

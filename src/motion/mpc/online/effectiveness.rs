@@ -67,7 +67,6 @@ impl Effectiveness {
         self.estimate
     }
 
-    /// Begins the first stage of a plan.
     pub(super) fn begin(&mut self, model: &StageModel, is_grounded: bool) {
         self.is_grounded = is_grounded;
         let d = self.drives.len();
@@ -94,7 +93,6 @@ impl Effectiveness {
         }
     }
 
-    /// Forgets the last command: what follows it says nothing.
     pub(super) fn interrupt(&mut self) {
         self.held = None;
     }

@@ -9,7 +9,6 @@ use super::settings::Solver;
 use super::stage::{FrictionShape, StageCost, StageQp, StageShape};
 use super::structured::{MAX_STRUCTURED_DIM, structured};
 
-/// What a solve starts from.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Start {
     /// The scaled state before the first stage.
@@ -18,9 +17,7 @@ pub(super) struct Start {
     pub rate_before: Vec<f64>,
 }
 
-/// A solver with the memory for a program.
 pub(super) trait StageSolver: Debug + Send {
-    /// Forgets the last solution.
     fn forget(&mut self) {}
 
     /// Computes ahead what does not depend on the start, after the horizon moved on by `shift` stages and those
@@ -40,7 +37,6 @@ pub(super) trait StageSolver: Debug + Send {
 }
 
 impl Solver {
-    /// How it takes friction.
     pub(super) fn friction(self) -> FrictionShape {
         match self {
             Self::Clarabel => FrictionShape::Cone,

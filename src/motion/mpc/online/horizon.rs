@@ -11,7 +11,6 @@ use super::settings::{Drift, Linearisation, MpcSettings};
 use super::stage::{StageQp, StageScale, StageShape};
 use crate::robot::ContactFlags;
 
-/// One stage in latent units.
 #[derive(Debug, Clone)]
 pub(super) struct Stage {
     /// Linearised dynamics.
@@ -30,7 +29,6 @@ pub(super) struct Stage {
     rows: Option<StageRows>,
 }
 
-/// Stages that are kept from step to step.
 #[derive(Debug, Clone)]
 pub(super) struct Horizon {
     stages: Vec<Stage>,
@@ -40,7 +38,6 @@ pub(super) struct Horizon {
     /// Stages by which the last preparation moved on, and those that it made.
     shift: usize,
     is_new: Vec<bool>,
-    /// What the next solve starts from.
     start: Start,
     /// Rows of the friction cone `(μ F_z, F_x, F_y) / weight` of a stage.
     force: Vec<f64>,
@@ -48,7 +45,6 @@ pub(super) struct Horizon {
     nominal: StageModel,
 }
 
-/// What the stages are prepared from.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct StageInputs<'a> {
     pub plant: &'a ControlModel,
@@ -63,7 +59,6 @@ pub(super) struct StageInputs<'a> {
 const TIME_TOLERANCE_S: f64 = 1e-9;
 
 impl Horizon {
-    /// Memory for a horizon of stages of a shape.
     pub(super) fn new(length: usize, shape: &StageShape) -> Self {
         let latent_dim = shape.inputs;
         let stage = Stage {
@@ -92,7 +87,6 @@ impl Horizon {
         }
     }
 
-    /// Forgets all linearisations: the reference has changed.
     pub(super) fn forget(&mut self) {
         for stage in &mut self.stages {
             stage.made_for = None;

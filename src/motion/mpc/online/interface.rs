@@ -19,7 +19,6 @@ macro_rules! codes {
     ($($name:ident = $code:literal, $text:literal;)*) => {
         $(#[doc = $text] pub const $name: i32 = $code;)*
 
-        /// The codes beside those of [`Status`].
         const BEYOND_STEPS: &[(i32, &str)] = &[$(($name, concat!($text, "\0"))),*];
     };
 }
@@ -288,7 +287,6 @@ fn present<T>(name: &str, array: Option<T>) -> Result<T, i32> {
     })
 }
 
-/// Feet in contact of four flags; zero is in the air.
 fn contact(flags: &[u8]) -> ContactFlags {
     std::array::from_fn(|foot| flags.get(foot).is_some_and(|&flag| flag != 0))
 }

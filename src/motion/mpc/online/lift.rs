@@ -376,7 +376,6 @@ impl ConsistentLift {
     }
 }
 
-/// The solver of the one stage.
 fn solver(shape: StageShape, settings: &MpcSettings) -> Result<Box<dyn StageSolver>, ControlError> {
     let cost = StageCost {
         state: Vec::new(),

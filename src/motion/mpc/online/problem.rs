@@ -176,7 +176,6 @@ impl StageRows {
     }
 }
 
-/// The cost of a stage with weights of the scaled states.
 pub(super) fn stage_cost(state_weights: &[f64], settings: &MpcSettings) -> StageCost {
     let scale = SLACK_PRICE / settings.joint_penalty;
     StageCost {
@@ -203,12 +202,10 @@ pub fn pairs(rows: &[Row]) -> usize {
 }
 
 impl Row {
-    /// Whether the row constrains anything.
     fn is_not_zero(&self) -> bool {
         self.row.iter().any(|entry| *entry != 0.0)
     }
 
-    /// Whether another row is the other side of a limit.
     fn is_opposite(&self, other: &Row) -> bool {
         let opposite = other.row.iter().map(|entry| -entry);
         self.joint == other.joint && self.row.iter().copied().eq(opposite)

@@ -53,7 +53,6 @@ pub fn sparse(n_rows: usize, n_cols: usize, entries: &[(usize, usize, f64)]) -> 
     CscMatrix::new_from_triplets(n_rows, n_cols, rows, columns, values)
 }
 
-/// Row, column and value of each entry.
 fn entries(matrix: &SparseColumns) -> impl Iterator<Item = (usize, usize, f64)> {
     let column = move |col| (matrix.colptr[col]..matrix.colptr[col + 1]).map(move |at| (col, at));
     let entries = (0..matrix.n).flat_map(column);
