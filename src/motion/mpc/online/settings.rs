@@ -52,6 +52,7 @@ pub enum MissingInput {
 pub enum RowSelection {
     /// Those that can become active, see [`StageRows::new`](super::problem::StageRows::new).
     Needed,
+    /// All of them.
     All,
 }
 
