@@ -387,7 +387,7 @@ fn solver(shape: StageShape, settings: &MpcSettings) -> Result<Box<dyn StageSolv
         Solver::Clarabel => {
             let settings = QpSettings {
                 max_iterations: LIFT_ITERATIONS,
-                tolerance: 1e-8,
+                tolerance: 1e-12,
                 ..settings.qp
             };
             Box::new(Conic::new(1, shape, &cost, settings)?)
