@@ -239,11 +239,9 @@ impl Horizon {
             let mean = &plant.phases()[stage.phase].latent_mean;
             stage.input.copy_from_slice(mean.as_slice());
         }
-        stage.rows = reference.robot_state_at(start_s).and_then(|x| {
-            let z = &stage.end[..plant.latent_dim()];
-            let local = plant.tangent_at(&x, z)?;
-            inputs.rows.with_maps_of(&local, settings)
-        });
+        let z = &stage.end[..plant.latent_dim()];
+        let local = plant.tangent_at(&reference.robot_state_at(start_s), z);
+        stage.rows = local.and_then(|local| inputs.rows.with_maps_of(&local, settings));
     }
 
     fn write_program(&mut self, inputs: &StageInputs<'_>, index: usize, start_s: f64) {
@@ -287,38 +285,38 @@ impl Horizon {
             Linearisation::Reference => None,
             Linearisation::LastPlan => inputs.plan.at(start_s),
         };
-        let stage = &mut self.stages[index];
-        let phase = stage.phase;
+        let Stage {
+            model,
+            defect,
+            state,
+            end,
+            input,
+            phase,
+            ..
+        } = &mut self.stages[index];
         let mut evaluate = |z: &[f64], dz: &[f64], u: &[f64], ddz: &mut [f64], jacobian: &mut _| {
-            dynamics.jacobian(phase, z, dz, u, ddz, jacobian);
+            dynamics.jacobian(*phase, z, dz, u, ddz, jacobian);
         };
-        let (end, lineariser) = (&stage.end, &mut self.lineariser);
-        if let Some((state, input)) = point {
-            lineariser.stage(state, input, step_s, &mut evaluate, &mut stage.model);
-            for (row, defect) in stage.defect.iter_mut().enumerate() {
-                *defect = stage.model.next[row] - end[row];
-                for (col, value) in state.iter().enumerate() {
-                    *defect += stage.model.a(row, col) * (stage.state[col] - value);
-                }
-                for (col, value) in input.iter().enumerate() {
-                    *defect += stage.model.b(row, col) * (stage.input[col] - value);
-                }
+        let (x, u) = point.unwrap_or((state, input));
+        (self.lineariser).stage(x, u, step_s, &mut evaluate, model);
+        for (row, defect) in defect.iter_mut().enumerate() {
+            *defect = model.next[row] - end[row];
+            for (col, value) in x.iter().enumerate() {
+                *defect += model.a(row, col) * (state[col] - value);
             }
-            if trusts_reference {
-                let (state, input, nominal) = (&stage.state, &stage.input, &mut self.nominal);
-                lineariser.stage(state, input, step_s, &mut evaluate, nominal);
-                for (row, defect) in stage.defect.iter_mut().enumerate() {
+            for (col, value) in u.iter().enumerate() {
+                *defect += model.b(row, col) * (input[col] - value);
+            }
+        }
+        match (trusts_reference, point) {
+            (false, _) => {}
+            (true, None) => defect.fill(0.0),
+            (true, Some(_)) => {
+                let nominal = &mut self.nominal;
+                (self.lineariser).stage(state, input, step_s, &mut evaluate, nominal);
+                for (row, defect) in defect.iter_mut().enumerate() {
                     *defect += end[row] - nominal.next[row];
                 }
-            }
-        } else {
-            let (state, input, model) = (&stage.state, &stage.input, &mut stage.model);
-            lineariser.stage(state, input, step_s, &mut evaluate, model);
-            for (row, defect) in stage.defect.iter_mut().enumerate() {
-                *defect = match trusts_reference {
-                    true => 0.0,
-                    false => stage.model.next[row] - end[row],
-                };
             }
         }
     }
