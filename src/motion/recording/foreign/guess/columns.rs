@@ -27,6 +27,17 @@ impl Group {
     fn qualifiers(&self) -> impl Iterator<Item = &String> {
         self.family.iter().filter(|word| !is_quantity(word))
     }
+
+    /// Whether its legs are only counted, as an arm's twelve joints are among others; a low-level state of Unitree's counts
+    /// legs in romc's order.
+    pub(super) fn is_unnamed(&self, logs: &[Log]) -> bool {
+        let is_motor = |channel: &Channel| {
+            let name = &channel.name;
+            name.starts_with("motor_state[") || name.starts_with("motorState[")
+        };
+        let is_unitree = || logs[self.log].columns.iter().any(is_motor);
+        self.is_counted && self.quantity.is_by_leg() && !is_unitree()
+    }
 }
 
 /// The clock of the log, if it is a column.
@@ -51,11 +62,7 @@ pub(super) fn groups(logs: &[Log], robot: &Robot) -> Vec<Group> {
         others.filter(|other| of(*other).any(is_alike)).count()
     };
     let rate = |group: &Group| std::cmp::Reverse(rates[group.log].unwrap_or_default());
-    // An arm's twelve joints are counted among others, the robot's have names.
-    let is_unnamed = |group: &Group| {
-        let is_by_leg = group.quantity.is_of_joints() || group.quantity == Quantity::Feet;
-        group.is_counted && is_by_leg && !is_unitree(&logs[group.log])
-    };
+    let is_unnamed = |group: &Group| group.is_unnamed(logs);
     let first = |quantity| {
         of(quantity).min_by_key(|group| {
             (
@@ -69,11 +76,9 @@ pub(super) fn groups(logs: &[Log], robot: &Robot) -> Vec<Group> {
     };
     let [joints, body] = [Quantity::JointPosition, Quantity::BodyPosition].map(first);
     let chosen = Quantity::ALL.into_iter().filter_map(|quantity| {
-        let is_of_body = !quantity.is_of_joints() && quantity != Quantity::Feet;
-        let base = if is_of_body {
-            body.or(joints)
-        } else {
-            joints.or(body)
+        let base = match quantity.is_by_leg() {
+            true => joints.or(body),
+            false => body.or(joints),
         };
         let rank = |group: &Group| {
             let alike = base.map_or((true, 0), |base| {
@@ -119,12 +124,6 @@ pub(super) fn groups(logs: &[Log], robot: &Robot) -> Vec<Group> {
         })
     });
     chosen.collect()
-}
-
-/// Whether a log is a low-level state of Unitree's, which counts legs in romc's order.
-pub(super) fn is_unitree(log: &Log) -> bool {
-    let is_motor = |name: &str| name.starts_with("motor_state[") || name.starts_with("motorState[");
-    log.columns.iter().any(|column| is_motor(&column.name))
 }
 
 fn in_words(logs: &[Log], group: &Group) -> String {

@@ -10,7 +10,7 @@ use super::super::elements::Quantity;
 use super::super::log::Log;
 use super::super::map::Name;
 use super::Guess;
-use super::columns::{Clock, Group, clock, groups, is_unitree};
+use super::columns::{Clock, Group, clock, groups};
 use super::evidence::{scale, slopes};
 use super::names::unit;
 use super::scales::{Scales, order_line};
@@ -64,8 +64,7 @@ pub(super) fn guessed(path: &Path, logs: &[Log], robot: &Robot) -> Guess {
             open.extend(group.is_tie.then(|| note.clone()));
             notes.push(note);
         }
-        let is_by_leg = group.quantity.is_of_joints() || group.quantity == Quantity::Feet;
-        if group.is_counted && is_by_leg && !is_unitree(&logs[group.log]) {
+        if group.is_unnamed(logs) {
             let name = &logs[group.log].columns[group.columns[0]].name;
             open.push(format!(
                 "{key}: columns such as `{name}`, which are only counted"
