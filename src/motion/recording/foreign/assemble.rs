@@ -25,9 +25,6 @@ const QUATERNION_TOLERANCE: f64 = 0.05;
 const MAX_RESAMPLED: usize = 10_000_000;
 
 /// Makes a recording of the logs as the map says, with notes of what was derived, resampled, turned or cut.
-///
-/// # Errors
-/// [`RecordingError`] with the map's key, or with file, row and column.
 pub(in crate::recording) fn assemble(
     path: &Path,
     logs: &[Log],
@@ -102,9 +99,6 @@ impl Rows<'_> {
     }
 
     /// Quaternions become angles, and angles do not jump by whole turns.
-    ///
-    /// # Errors
-    /// [`RecordingFault::Unexpected`] for a quaternion whose length is far from one.
     fn angles(&mut self) -> Result<(), RecordingError> {
         let path = self.path;
         let signal = self.required(Quantity::Orientation);

@@ -133,9 +133,6 @@ pub(super) const QUATERNION: [&str; 4] = ["w", "x", "y", "z"];
 
 /// The elements that the words of an order name, in that order: single names, names with `*` for every leg or
 /// joint (`*.hx`, `fl.*`), a word of single letters (`wxyz`, `rpy`, `xyz`).
-///
-/// # Errors
-/// The word that names nothing, or an element that is named twice.
 pub(super) fn ordered(words: &[String], elements: &[String]) -> Result<Vec<usize>, String> {
     let mut out = Vec::new();
     for word in words {

@@ -17,9 +17,6 @@ const LARGE: f64 = 1e8;
 /// Reads the files of a recording: `path` itself, or those that the map names, in the folder `path` or beside it.
 ///
 /// In a file's name `{}` stands for the name of `path` without its ending.
-///
-/// # Errors
-/// [`RecordingError`] with file and row.
 pub(in crate::recording) fn read_texts(
     path: &Path,
     map: &ColumnMap,

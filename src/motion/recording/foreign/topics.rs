@@ -64,9 +64,6 @@ impl Topics {
     }
 
     /// A declared channel.
-    ///
-    /// # Errors
-    /// In words, for a channel that was declared otherwise.
     pub(crate) fn channel(&mut self, channel: &Declared) -> Result<(), String> {
         let schema = self.schemas.get(&channel.schema_id);
         let (header, text) = schema.map_or((None, &[][..]), |(header, text)| (Some(header), text));
@@ -107,9 +104,6 @@ impl Topics {
     }
 
     /// A message.
-    ///
-    /// # Errors
-    /// In words, for one of a channel that was not declared.
     pub(crate) fn message(
         &mut self,
         channel: u16,
@@ -131,9 +125,6 @@ impl Topics {
     }
 
     /// The tables, and topics that are none, each with its fault.
-    ///
-    /// # Errors
-    /// [`RecordingFault::NoTopic`] without any table.
     pub(crate) fn logs(self) -> Result<Vec<Log>, RecordingFault> {
         let mut logs = Vec::new();
         for mut topic in self.topics {
