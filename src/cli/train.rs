@@ -42,6 +42,7 @@ pub fn run(arguments: &TrainArguments) -> Result<(Answer, u8), Error> {
     let mut recorded = RecordedSets::new(arguments, &settings, robot, options.seed)?;
     train_settings::identified(&mut options, &settings, &recorded, robot)?;
     options.check()?;
+    note_repeated(&recorded.files());
     let read = recorded.read();
     recorded.report_findings();
     read?;
@@ -53,7 +54,6 @@ pub fn run(arguments: &TrainArguments) -> Result<(Answer, u8), Error> {
     for file in &mut origin.recordings {
         file.sets = recorded.sets_of(&file.path);
     }
-    note_repeated(&recorded.files());
 
     let bar = spinner("training");
     let mut listener = |progress: Progress| match progress {
