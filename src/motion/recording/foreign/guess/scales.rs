@@ -159,34 +159,27 @@ impl Source<'_> {
         };
         let values = self.raw(group);
         if group.is_quaternion {
-            let order = |last: bool, why: &str| {
-                let (name, order) = if last {
-                    ("xyzw", [3, 0, 1, 2])
-                } else {
-                    ("wxyz", [0, 1, 2, 3])
-                };
+            let attitude = |(name, order): (&str, [usize; 4]), why: &str| {
                 let angles = angles_of_quaternions(&values.select_rows(&order));
                 (vec![format!("order = \"{name}\"{why}")], angles)
             };
+            let mut orders = [("wxyz", [0, 1, 2, 3]), ("xyzw", [3, 0, 1, 2])];
             if !group.is_counted {
-                return vec![order(false, "")];
+                return vec![attitude(orders[0], "")];
             }
             // The real part of a robot on its feet is the largest, unless it looks backwards.
             let size = |row: usize| values.row(row).abs().sum();
-            let last = size(3) > size(0);
+            if size(3) > size(0) {
+                orders.reverse();
+            }
             let why = "   # feet on the ground stay in place";
-            return vec![order(last, why), order(!last, why)];
+            return orders.map(|order| attitude(order, why)).to_vec();
         }
         let of_unit = |(unit, factor): NamedUnit| (vec![unit_line(unit, "")], &values * factor);
-        let units = self.units(
-            Quantity::Orientation,
-            &["rad", "deg"],
-            &["rad", "deg"],
-            || {
-                let is_steep = reach(values.row(1).iter().copied()) > PITCH_RAD;
-                if is_steep { "deg" } else { "rad" }
-            },
-        );
+        let is_steep = || reach(values.row(1).iter().copied()) > PITCH_RAD;
+        let first = || if is_steep() { "deg" } else { "rad" };
+        let both = ["rad", "deg"];
+        let units = self.units(Quantity::Orientation, &both, &both, first);
         units.into_iter().map(of_unit).collect()
     }
 
