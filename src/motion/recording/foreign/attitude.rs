@@ -144,14 +144,4 @@ mod tests {
             Err(0)
         );
     }
-
-    #[test]
-    fn unwrap_takes_whole_turns_off() {
-        let mut angles = DMatrix::from_row_slice(1, 5, &[3.0, 3.1, -3.1, -3.0, 3.1]);
-        assert!(unwrap(&mut angles));
-        let expected = [3.0, 3.1, TAU - 3.1, TAU - 3.0, 3.1];
-        let errors = angles.iter().zip(expected).map(|(a, b)| (a - b).abs());
-        assert!(errors.fold(0.0, f64::max) < 1e-14);
-        assert!(!unwrap(&mut angles));
-    }
 }

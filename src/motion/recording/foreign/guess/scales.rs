@@ -284,15 +284,19 @@ impl Source<'_> {
         for (mut row, sign) in position.row_iter_mut().zip(reading.signs) {
             row *= sign;
         }
-        let all =
-            |unit: String, signs: &[f64]| [unit].into_iter().chain(sign_line(signs)).collect();
+        let mut put = |quantity, unit, why, signs: &[f64]| {
+            let own = [unit_line(unit, why)].into_iter().chain(sign_line(signs));
+            lines.insert(quantity, own.collect());
+        };
         let why = match self.told(group, &["mrad", "rad", "deg"]) {
             None if reading.joint.0 != "rad" => "   # by their size and the feet",
             Some(_) | None => "",
         };
-        lines.insert(
+        put(
             Quantity::JointPosition,
-            all(unit_line(reading.joint.0, why), &reading.signs),
+            reading.joint.0,
+            why,
+            &reading.signs,
         );
         if let Some((velocity, times)) = self.beside(Quantity::JointVelocity, group) {
             let velocity = in_order(velocity);
@@ -314,19 +318,21 @@ impl Source<'_> {
                 .filter(|_| !units.is_empty())
                 .unwrap_or(reading.joint.0);
             let why = "   # by the change of the positions";
-            lines.insert(Quantity::JointVelocity, all(unit_line(unit, why), &own));
+            put(Quantity::JointVelocity, unit, why, &own);
         }
         if let Some(group) = self.group(Quantity::JointTorque) {
             let told = self.told(group, &["nmm", "mnm", "ncm"]);
-            let (signs, unit) = match torques {
-                Some((signs, (unit, _))) => (signs, told.unwrap_or(unit)),
-                None => (reading.signs, told.unwrap_or("N m")),
+            let (signs, unit, why) = match torques {
+                Some((signs, (unit, _))) => {
+                    let why = "   # unit and signs by the weight that the feet carry";
+                    (signs, unit, why)
+                }
+                None => {
+                    let why = "   # signs as of the angles: the torques carry nothing";
+                    (reading.signs, "N m", why)
+                }
             };
-            let why = match torques {
-                Some(_) => "   # unit and signs by the weight that the feet carry",
-                None => "   # signs as of the angles: the torques carry nothing",
-            };
-            lines.insert(Quantity::JointTorque, all(unit_line(unit, why), &signs));
+            put(Quantity::JointTorque, told.unwrap_or(unit), why, &signs);
         }
     }
 
