@@ -41,6 +41,7 @@ pub fn run(arguments: &TrainArguments) -> Result<Answer, Error> {
     let mut recorded = RecordedSets::new(arguments, &settings, robot, options.seed)?;
     train_settings::identified(&mut options, &settings, &recorded, robot)?;
     options.check()?;
+    note_repeated(&recorded.files());
     let read = recorded.read();
     recorded.report_findings();
     read?;
@@ -52,7 +53,6 @@ pub fn run(arguments: &TrainArguments) -> Result<Answer, Error> {
     for file in &mut origin.recordings {
         file.sets = recorded.sets_of(&file.path);
     }
-    note_repeated(&recorded.files());
 
     let bar = spinner("training");
     let mut listener = |progress: Progress| match progress {
