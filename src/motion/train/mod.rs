@@ -33,7 +33,6 @@ mod options;
 #[cfg(test)]
 mod oscillator;
 mod overlap;
-mod prune;
 mod random;
 mod refine;
 mod report;
