@@ -9,11 +9,10 @@ use super::batch::{Batch, batches};
 use super::fold::{LatentBasis, folded};
 use super::linear::{LinearMaps, mask_rows};
 use super::loss::{JointLoss, LossWeights, Losses, Maps};
-use super::network::Network;
 use super::nonlinear::NonlinearMaps;
 use super::parameters::{Frame, Parameters};
 use super::stages::{train_decoder, train_together, train_xi};
-use crate::model::{AffineMap, Layer, ModelError, StateMap};
+use crate::model::{Layer, ModelError, StateMap};
 use crate::robot::{Robot, STATE_DIM};
 use crate::train::assemble::Origin;
 use crate::train::dynamics_fit::Fitted;
@@ -257,22 +256,13 @@ impl Trainer<'_> {
         })
     }
 
-    /// Encoder and decoder between scaled states and latent coordinates in `basis`, which linear maps ignore.
+    /// Encoder and decoder between scaled states and latent coordinates in `basis`.
     fn state_maps(
         &self,
         parameters: &Parameters,
         basis: &LatentBasis,
     ) -> Result<(StateMap, StateMap), TrainError> {
-        let (encoder, decoder) = (&parameters.encoder, &parameters.decoder);
-        if !self.is_linear() {
-            return Ok(folded((encoder, decoder), &self.frame, basis)?);
-        }
-        let affine = |tensor, network: &Network| {
-            let layer = &network.layers[0];
-            AffineMap::new(tensor, layer.weights.transpose(), layer.bias.clone())
-        };
-        let encoder = affine("encoder", encoder)?.into();
-        Ok((encoder, affine("decoder", decoder)?.into()))
+        Ok(folded(parameters, &self.frame, basis)?)
     }
 
     /// The encoder over the learned row space, and its least-squares decoder.
