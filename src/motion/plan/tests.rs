@@ -11,7 +11,7 @@ use crate::evaluate::shipped_model;
 use crate::model::ReducedModel;
 use crate::recording::Recording;
 use crate::robot::{BODY_Z, GRAVITY_M_S2, Robot};
-use crate::train::{Method, Origin, Progress, Recordings, TrainOptions, Watch};
+use crate::train::{Method, Monitor, Origin, Progress, Recordings, TrainOptions};
 
 fn recordings(split: &str, count: usize) -> Vec<Recording> {
     let names = (1..=count).map(|k| format!("go1/{split}_{k:02}"));
@@ -28,9 +28,9 @@ fn learned(training: &[Recording], validation: &[Recording], latent_dim: usize) 
     let robot = Robot::by_name("go1").unwrap();
     let options = TrainOptions::new("planner", latent_dim);
     let (cancel, mut listener) = (AtomicBool::new(false), |_: Progress| ());
-    let mut watch = Watch::new(&mut listener, &cancel);
+    let mut monitor = Monitor::new(&mut listener, &cancel);
     let origin = Origin::default();
-    let trained = Method::ClosedForm.learn(sets, robot, &options, &origin, &mut watch);
+    let trained = Method::ClosedForm.learn(sets, robot, &options, &origin, &mut monitor);
     trained.expect("a model").model
 }
 

@@ -52,7 +52,7 @@ pub use options::{
     Coordinates, EncoderOptions, JointOptions, MapOptions, Method, RegressionOptions, TrainOptions,
     Transfer,
 };
-pub use progress::{Progress, Watch};
+pub use progress::{Monitor, Progress};
 pub use report::{PartScore, PhaseTerms, SeedReport, TrainReport, Trained};
 pub use split::Split;
 pub use task::Recordings;

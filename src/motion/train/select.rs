@@ -11,7 +11,7 @@ use super::judge::Judge;
 use super::knowledge::Knowledge;
 use super::latent::EncodedSet;
 use super::options::RegressionOptions;
-use super::progress::Watch;
+use super::progress::Monitor;
 use super::refine::{Coefficients, Refiner};
 use super::sparse::Regression;
 use super::weak_form::windowed_samples;
@@ -58,7 +58,7 @@ pub fn select(
     knowledge: &[Knowledge],
     judge: &Judge<'_>,
     options: &RegressionOptions,
-    watch: &mut Watch<'_>,
+    monitor: &mut Monitor<'_>,
 ) -> Result<(Vec<DMatrix<f64>>, Choice, usize), TrainError> {
     let features = judge.features;
     let regressions = &WINDOWS.map(|window| {
@@ -74,7 +74,7 @@ pub fn select(
         growth,
         judge,
     };
-    let mut tried = search.all(watch);
+    let mut tried = search.all(monitor);
     let candidates = tried.len();
     let reference = best_of(&tried)?.now.xi.clone();
     let training = Judge::new(features, set).relative_to(&reference);
@@ -93,14 +93,14 @@ pub fn select(
     for mut trial in starts(tried, limit) {
         trial.hold(growth);
         trial.score_by(relative);
-        trial.now = refiner.refine(trial.now, options.refinements, watch);
+        trial.now = refiner.refine(trial.now, options.refinements, monitor);
         refined.push(trial);
     }
     let best = best_of(&refined)?;
     let limit = (1.0 + options.slack) * best.now.score;
     if options.refinements > 0 {
         let mut thinned = best.clone();
-        thinned.now = refiner.thin(thinned.now, limit, watch);
+        thinned.now = refiner.thin(thinned.now, limit, monitor);
         refined.push(thinned);
     }
     let all = refined.into_iter();
@@ -159,15 +159,15 @@ struct Search<'a> {
 impl<'a> Search<'a> {
     /// Every combination of windows, ridges and eliminations; where the library has terms that are not affine, also those
     /// without them: rollouts of full libraries diverge more often than not.
-    fn all(&self, watch: &mut Watch<'_>) -> Vec<Trial<'a>> {
+    fn all(&self, monitor: &mut Monitor<'_>) -> Vec<Trial<'a>> {
         let affine = self.judge.features.affine_terms();
         let has_nonlinear = affine.contains(&false);
         // The affine terms are still to come where full libraries diverge.
         let enough =
             |tried: &[Trial<'_>]| any_stable(tried) || (has_nonlinear && !tried.is_empty());
-        let mut tried = self.fit_all(&vec![true; affine.len()], enough, watch);
-        if has_nonlinear && !(watch.cancelled() && any_stable(&tried)) {
-            tried.extend(self.fit_all(affine, any_stable, watch));
+        let mut tried = self.fit_all(&vec![true; affine.len()], enough, monitor);
+        if has_nonlinear && !(monitor.cancelled() && any_stable(&tried)) {
+            tried.extend(self.fit_all(affine, any_stable, monitor));
         }
         tried
     }
@@ -178,14 +178,14 @@ impl<'a> Search<'a> {
         &self,
         allowed: &[bool],
         enough: impl Fn(&[Trial<'_>]) -> bool,
-        watch: &mut Watch<'_>,
+        monitor: &mut Monitor<'_>,
     ) -> Vec<Trial<'a>> {
         let mut tried = Vec::new();
         let steps = WINDOWS.len() * RIDGES.len() * ELIMINATIONS.len();
-        watch.stage("fitting the dynamics", steps);
+        monitor.stage("fitting the dynamics", steps);
         for (window, regressions) in WINDOWS.into_iter().zip(self.regressions) {
             for ridge in RIDGES {
-                if watch.cancelled() && enough(&tried) {
+                if monitor.cancelled() && enough(&tried) {
                     return tried;
                 }
                 let each = regressions.iter();
@@ -207,7 +207,7 @@ impl<'a> Search<'a> {
                         trial.score_by(self.judge);
                     }
                     let (active, score) = (trial.now.active(), trial.now.score);
-                    watch.done(tried.len() + 1, format!("{active} terms, score {score:.4}"));
+                    monitor.done(tried.len() + 1, format!("{active} terms, score {score:.4}"));
                     tried.push(trial);
                 }
             }
