@@ -11,6 +11,7 @@ mod closed_form;
 mod dataset;
 mod features;
 mod frame;
+mod grow;
 mod growth;
 mod joint;
 mod jumps;

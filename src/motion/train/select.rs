@@ -121,10 +121,10 @@ pub fn select(
 }
 
 #[derive(Clone)]
-struct Trial<'a> {
-    now: Coefficients,
-    regressions: &'a [Regression],
-    ridge: f64,
+pub(super) struct Trial<'a> {
+    pub now: Coefficients,
+    pub regressions: &'a [Regression],
+    pub ridge: f64,
     window: usize,
     elimination: f64,
 }
@@ -150,15 +150,15 @@ impl Trial<'_> {
 }
 
 #[derive(Clone, Copy)]
-struct Search<'a> {
+pub(super) struct Search<'a> {
     regressions: &'a [Vec<Regression>; WINDOWS.len()],
-    growth: &'a Growth,
-    judge: &'a Judge<'a>,
+    pub growth: &'a Growth,
+    pub judge: &'a Judge<'a>,
 }
 
 impl<'a> Search<'a> {
     /// Every combination of windows, ridges and eliminations; where the library has terms that are not affine, also those
-    /// without them: rollouts of full libraries diverge more often than not.
+    /// without them, and the best of these grown by such terms: rollouts of full libraries diverge more often than not.
     fn all(&self, monitor: &mut Monitor<'_>) -> Vec<Trial<'a>> {
         let affine = self.judge.features.affine_terms();
         let has_nonlinear = affine.contains(&false);
@@ -167,7 +167,13 @@ impl<'a> Search<'a> {
             |tried: &[Trial<'_>]| any_stable(tried) || (has_nonlinear && !tried.is_empty());
         let mut tried = self.fit_all(&vec![true; affine.len()], enough, monitor);
         if has_nonlinear && !(monitor.cancelled() && any_stable(&tried)) {
-            tried.extend(self.fit_all(affine, any_stable, monitor));
+            let tame = self.fit_all(affine, any_stable, monitor);
+            let mut grown = best_of(&tame).ok().cloned();
+            if let Some(grown) = &mut grown {
+                self.grow(grown, monitor);
+            }
+            tried.extend(tame);
+            tried.extend(grown);
         }
         tried
     }

@@ -110,6 +110,38 @@ impl Regression {
         }
     }
 
+    /// For every term that is not active in a column: its row, and the share of the acceleration's energy that is
+    /// explained with it and not without.
+    pub fn gains(&self, column: usize, support: &DMatrix<bool>, ridge: f64) -> Vec<(usize, f64)> {
+        let energy = self.energy(column);
+        let (inside, outside): (Vec<usize>, Vec<usize>) =
+            (self.free_terms(column)).partition(|&i| support[(i, column)]);
+        let fit = self.support_fit(column, inside, ridge);
+        let outside = outside.into_iter().filter(|&i| self.theta_rms[i] > 0.0);
+        outside
+            .map(|i| {
+                let shared = fit.support.iter().map(|&j| self.gram[(i, j)]);
+                let shared = DVector::from_iterator(fit.support.len(), shared);
+                let missing = self.correlation[(i, column)] - shared.dot(&fit.solution);
+                let own = self.gram[(i, i)] + ridge.max(LEAST_RIDGE)
+                    - shared.dot(&(&fit.inverse * &shared));
+                (i, missing.powi(2) / own / energy)
+            })
+            .collect()
+    }
+
+    /// One column of Xi on a given support (`library_dim x latent_dim`, true where a term is active).
+    pub fn fit_column(&self, column: usize, support: &DMatrix<bool>, ridge: f64) -> DVector<f64> {
+        let rows = self
+            .free_terms(column)
+            .filter(|&i| support[(i, column)])
+            .collect::<Vec<_>>();
+        let solution = self.solve(column, &rows, ridge);
+        let mut xi = self.knowledge.known.clone();
+        self.store(&mut xi, column, &rows, &solution);
+        xi.column(column).into_owned()
+    }
+
     /// What the active terms of `xi` would change by for this gradient: the inverse of the normal equations applied to
     /// it, column by column, each relative to the energy of its accelerations.
     pub fn change(&self, xi: &DMatrix<f64>, gradient: &DMatrix<f64>, ridge: f64) -> DMatrix<f64> {
@@ -280,6 +312,18 @@ mod tests {
             assert_eq!(*found, support, "{loss}");
         }
         assert!(found[0].len() < found[2].len() && found[2].len() < found[1].len());
+    }
+
+    #[test]
+    fn gains_of_terms_are_what_a_fit_with_them_loses_without() {
+        let mut random = Random::new(6);
+        let (theta, target) = (random.matrix(100, 5, 1.0), random.matrix(100, 1, 1.0));
+        let regression = unconstrained(&theta, &target);
+        let support = DMatrix::from_column_slice(5, 1, &[true, false, true, false, false]);
+        let gains = regression.gains(0, &support, 1e-2);
+        assert!(gains.iter().map(|(row, _)| *row).eq([1, 3, 4]));
+        let with = regression.support_fit(0, vec![0, 2, 3], 1e-2);
+        assert!((gains[1].1 - with.rise(2) / regression.energy(0)).abs() < 1e-12);
     }
 
     #[test]
