@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use super::check::{Finding, check};
 use super::condition::{ConditionOptions, SmoothedRows, condition};
 use super::error::{RecordingError, RecordingFault};
-use super::mismatch::{Balance, Mismatch, MismatchKind, contradiction, mismatches};
+use super::mismatch::{Balance, Mismatch, contradiction, mismatches};
 use super::reader::{Clocks, Reader, Reading, ReadingNotes};
 use super::segment::{Recording, Segment};
 use super::smoothing::SavitzkyGolay;
@@ -82,7 +82,7 @@ impl RecordingSet {
     }
 
     /// Adds other recordings and what was found in them, but not what reading them did.
-    pub fn append(&mut self, other: Self) {
+    pub(crate) fn append(&mut self, other: Self) {
         self.recordings.extend(other.recordings);
         self.findings.extend(other.findings);
         self.mismatches.extend(other.mismatches);
@@ -124,7 +124,7 @@ fn read_file(
         let path = recording.path.clone();
         let findings = check(&recording, robot);
         for found in mismatches(&recording, robot) {
-            if found.kind == MismatchKind::Fallen {
+            if found.kind == "fallen" {
                 return Err(RecordingFault::Contradiction(found.words).of(&path));
             }
             set.mismatches.push((path.clone(), found));
@@ -176,51 +176,4 @@ fn chosen(file: &RecordingFile, mut recording: Recording) -> Vec<Recording> {
         .filter(|(index, _)| chosen.contains(index))
         .map(|(_, segment)| recording.with_segments(vec![segment]))
         .collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use std::path::Path;
-
-    use super::*;
-
-    fn read(names: &[&str], segments: Option<Vec<usize>>) -> (RecordingSet, Result<(), String>) {
-        let folder =
-            Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/recordings/go1-noisy");
-        let file = |name: &&str| RecordingFile {
-            path: folder.join(name),
-            segments: segments.clone(),
-        };
-        let files: Vec<_> = names.iter().map(file).collect();
-        let go1 = Robot::by_name("go1").expect("known");
-        let mut set = RecordingSet::default();
-        let read = set.read(
-            &files,
-            go1,
-            &ConditionOptions::default(),
-            &Reader::default(),
-        );
-        (set, read.map_err(|error| error.to_string()))
-    }
-
-    #[test]
-    fn recordings_come_in_the_order_of_their_files() {
-        let names = [1, 2, 3].map(|i| format!("train_0{i}.csv.gz"));
-        let (set, read) = read(&names.each_ref().map(String::as_str), Some(vec![0]));
-        assert_eq!(read, Ok(()));
-        assert_eq!(set.recordings.len(), 3);
-        for (recording, name) in set.recordings.iter().zip(&names) {
-            assert!(recording.path.ends_with(name));
-            assert_eq!(recording.segments.len(), 1);
-        }
-    }
-
-    #[test]
-    fn a_file_that_cannot_be_read_ends_the_reading_at_its_place() {
-        let names = ["train_01.csv.gz", "missing.csv", "train_02.csv.gz"];
-        let (set, read) = read(&names, None);
-        let error = read.expect_err("no such file");
-        assert!(error.ends_with("missing.csv: no such file"), "{error}");
-        assert_eq!(set.recordings.len(), 1);
-    }
 }

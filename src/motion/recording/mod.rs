@@ -47,16 +47,15 @@ pub mod write;
 mod error;
 mod instant;
 mod lines;
-mod number;
 mod segments;
 
 pub use self::csv::{read, read_from_bytes};
-pub use self::write::{WriteOptions, write, write_as, write_mcap, write_mcap_as, write_with};
+pub use self::write::{WriteOptions, write, write_as, write_mcap};
 pub use clock::Mended;
 pub use condition::{Accelerations, ConditionOptions, ImplausibleSamples, SmoothedRows, condition};
 pub use error::{RecordingError, RecordingFault};
 pub use files::{RecordingFile, RecordingSet};
-pub use foreign::map::ColumnMap;
+pub use foreign::ColumnMap;
 pub use phases::{PhaseRule, PhaseSpan, Stance};
 pub use reader::{Clocks, Reader, Reading, ReadingNotes};
 pub use segment::{Recording, Segment, stretches};
