@@ -21,7 +21,7 @@ const WINDOWS: [usize; 3] = [0, 25, 50];
 /// Ridges on the normalised columns.
 const RIDGES: [f64; 3] = [1e-4, 1e-3, 1e-2];
 /// Shares of the accelerations' energy that eliminations may lose; they share the walk that drops terms one by one.
-const ELIMINATIONS: [f64; 7] = [0.0, 1e-3, 3e-3, 1e-2, 2e-2, 3e-2, 5e-2];
+const ELIMINATIONS: [f64; 7] = [1e-3, 3e-3, 1e-2, 2e-2, 3e-2, 5e-2, 0.0];
 /// How many candidates are refined.
 const REFINED: usize = 3;
 
