@@ -15,7 +15,7 @@ use crate::model::ReducedModel;
 use crate::recording::{Recording, RecordingSet};
 use crate::robot::{BODY_X, BODY_Z};
 use crate::train::{
-    Method, Origin, Progress, Recordings, SetMetrics, TrainOptions, TrainReport, Trained, Watch,
+    Method, Monitor, Origin, Progress, Recordings, SetMetrics, TrainOptions, TrainReport, Trained,
 };
 use crate::typeset::{Cell, Table, significant};
 use crate::{Error, artifact, train};
@@ -59,8 +59,8 @@ pub fn run(arguments: &TrainArguments) -> Result<Answer, Error> {
         Progress::Stage { name, .. } => bar.set_message(name),
         Progress::Done { text, .. } => bar.set_message(text),
     };
-    let mut watch = Watch::new(&mut listener, stop_on_interrupt());
-    let mut trained = method.learn(sets, robot, &options, &origin, &mut watch)?;
+    let mut monitor = Monitor::new(&mut listener, stop_on_interrupt());
+    let mut trained = method.learn(sets, robot, &options, &origin, &mut monitor)?;
     bar.finish_and_clear();
     let is_interrupted = INTERRUPTED.load(Ordering::Relaxed);
     if is_interrupted {
