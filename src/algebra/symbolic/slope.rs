@@ -16,6 +16,7 @@ use std::cmp::Ordering;
 
 use super::function::Function;
 use super::germ::{Germs, LAST_ORDER, Stop};
+use super::id_map::IdMap;
 use super::node::{ExprId, Node, SymbolId};
 use super::number::Number;
 use super::pool::{ExprPool, Sign};
@@ -377,7 +378,15 @@ impl ExprPool {
         for side in [Number::ONE, Number::MINUS_ONE] {
             let mut order = 2;
             let stop = loop {
-                match Germs::new(self, facts, symbol, side, order).slope(expr) {
+                let mut germs = Germs {
+                    pool: self,
+                    facts,
+                    symbol,
+                    side,
+                    order,
+                    known: IdMap::default(),
+                };
+                match germs.slope(expr) {
                     Ok(Outcome::Finite(slope) | Outcome::Infinite(slope))
                         if self.has_pole(slope) =>
                     {
