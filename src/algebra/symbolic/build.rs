@@ -194,6 +194,26 @@ impl ExprPool {
         }
     }
 
+    /// Splits an expression into a number and the rest, which is the same for all its multiples: that of `2*x - 4*y` is
+    /// `x - 2*y`.
+    pub(super) fn content(&mut self, expr: ExprId) -> (Number, ExprId) {
+        let (mut number, mut rest) = self.split(expr);
+        loop {
+            let terms = self.terms_of(rest);
+            let first = terms.first().map_or(Number::ONE, |term| term.0);
+            if terms.len() < 2 || first.is_one() {
+                return (number, rest);
+            }
+            let quotients = (terms.iter()).map(|&(n, rest)| Some((n.checked_div(first)?, rest)));
+            let (Some(terms), Some(product)) = (quotients.collect(), number.checked_mul(first))
+            else {
+                return (number, rest);
+            };
+            // A part that is no longer multiplied may be a sum itself.
+            (number, rest) = (product, self.sum_of_terms(terms));
+        }
+    }
+
     /// The product of all operands: flat, powers of like bases collected, sorted.
     ///
     /// Sums are not multiplied out.

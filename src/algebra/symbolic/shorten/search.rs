@@ -224,19 +224,10 @@ impl<'a> Shortener<'a> {
             else {
                 continue;
             };
-            let (outer, inner) = self.pool.split(angle);
-            let terms = self.pool.terms_of(inner);
-            let Some(&(first, _)) = terms.get(1).and(terms.first()) else {
+            let (factor, monic) = self.pool.content(angle);
+            if !matches!(self.pool.node(monic), Node::Sum(_)) {
                 continue;
-            };
-            let Some(factor) = outer.checked_mul(first) else {
-                continue;
-            };
-            let monic: Option<Vec<ExprId>> = (terms.into_iter())
-                .map(|(number, rest)| Some(self.pool.scale(number.checked_div(first)?, rest)))
-                .collect();
-            let Some(monic) = monic else { continue };
-            let monic = self.pool.sum(&monic);
+            }
             match families.iter_mut().find(|(known, _)| *known == monic) {
                 Some((_, angles)) => angles.push((factor, angle)),
                 None => families.push((monic, vec![(factor, angle)])),
@@ -267,15 +258,8 @@ impl<'a> Shortener<'a> {
         if replaced.is_empty() {
             return None;
         }
-        for expr in order {
-            if !replaced.contains_key(&expr) {
-                let known = &replaced;
-                let operand = |child: ExprId| known.get(&child).copied().unwrap_or(child);
-                let new = self.pool.rebuild(expr, operand);
-                replaced.insert(expr, new);
-            }
-        }
-        let whole = summands.iter().map(|(c, expr)| (*c, replaced[expr]));
+        let whole = self.pool.replace(&exprs, order, replaced);
+        let whole = summands.iter().zip(whole).map(|((c, _), expr)| (*c, expr));
         Some((whole.collect(), variables))
     }
 
