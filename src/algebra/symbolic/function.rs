@@ -53,7 +53,7 @@ const ROWS: [Row; 9] = [
         names: &["sin"],
         parity: Parity::Odd,
         value: f64::sin,
-        image: Interval::sin,
+        image: |x| x.oscillation(f64::sin, 0.5),
         is_lipschitz: |_| true,
         derivative: |pool, x, _| pool.apply(Function::Cos, x),
     },
@@ -62,7 +62,7 @@ const ROWS: [Row; 9] = [
         names: &["cos"],
         parity: Parity::Even,
         value: f64::cos,
-        image: Interval::cos,
+        image: |x| x.oscillation(f64::cos, 0.0),
         is_lipschitz: |_| true,
         derivative: |pool, x, _| {
             let sine = pool.apply(Function::Sin, x);
@@ -86,7 +86,10 @@ const ROWS: [Row; 9] = [
         names: &["tanh"],
         parity: Parity::Odd,
         value: f64::tanh,
-        image: Interval::tanh,
+        image: |x| {
+            x.increasing(f64::tanh)
+                .intersection(Interval::new(-1.0, 1.0))
+        },
         is_lipschitz: |_| true,
         derivative: |pool, _, value| {
             let square = pool.powi(value, 2);
