@@ -128,7 +128,7 @@ impl ExprPool {
                 let product = self.product(&sums);
                 let product = self.expand_region(product);
                 let product = self.shorter_sum(product);
-                let n_terms = |expr: &ExprId| self.summands_of(*expr).len();
+                let n_terms = |expr: &ExprId| self.terms_of(*expr).len();
                 if n_terms(&product) >= sums.iter().map(n_terms).sum() {
                     return expr;
                 }
@@ -146,7 +146,7 @@ impl ExprPool {
         }
         let mut forms = self.with_sines(sum);
         forms.extend(self.as_power(sum));
-        let n_terms = |pool: &ExprPool, form| pool.summands_of(form).len();
+        let n_terms = |pool: &ExprPool, form| pool.terms_of(form).len();
         let shorter = forms.into_iter().min_by_key(|form| n_terms(self, *form));
         (shorter.filter(|form| n_terms(self, *form) < n_terms(self, sum))).unwrap_or(sum)
     }
