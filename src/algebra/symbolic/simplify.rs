@@ -116,10 +116,7 @@ impl ExprPool {
         match self.node(expr) {
             Node::Sum(_) => self.shorter_sum(expr),
             Node::Product(factors) => {
-                let is_divisor = |factor: &ExprId| match self.integer_power(*factor) {
-                    Some((base, -1)) => matches!(self.node(base), Node::Sum(_)),
-                    _ => false,
-                };
+                let is_divisor = |factor: &ExprId| matches!(self.sum_power(*factor), Some((_, -1)));
                 let (divisors, mut rest): (Vec<ExprId>, Vec<ExprId>) =
                     factors.iter().partition(|factor| is_divisor(factor));
                 let sums: Vec<ExprId> = (divisors.iter())

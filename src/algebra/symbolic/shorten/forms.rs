@@ -97,9 +97,7 @@ impl Shortener<'_> {
                     Node::Power(base, _) => base,
                     _ => factor,
                 };
-                if let Node::Sum(terms) = self.pool.node(base) {
-                    count += terms.len() - 1;
-                }
+                count += self.pool.summands_of(base).len() - 1;
             }
         }
         count
