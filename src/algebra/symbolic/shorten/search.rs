@@ -78,6 +78,20 @@ pub(super) struct Block {
     is_new: bool,
 }
 
+/// Puts blocks together at the place of the first, with new summands; the others lose their positions.
+fn merge(blocks: &mut [Block], places: &[usize], summands: Summands) {
+    let mut positions = Vec::new();
+    for &place in places {
+        positions.append(&mut blocks[place].positions);
+    }
+    positions.sort_unstable();
+    blocks[places[0]] = Block {
+        positions,
+        summands,
+        is_new: true,
+    };
+}
+
 impl<'a> Shortener<'a> {
     pub(crate) fn new(pool: &'a mut ExprPool) -> Self {
         Self {
@@ -173,9 +187,8 @@ impl<'a> Shortener<'a> {
                     *place = places[0];
                 }
             }
-            let (mut positions, mut left) = (Vec::new(), Summands::new());
+            let mut left = Summands::new();
             for &place in &places {
-                positions.append(&mut blocks[place].positions);
                 left.append(&mut blocks[place].summands);
             }
             for summand in lost {
@@ -184,12 +197,7 @@ impl<'a> Shortener<'a> {
                 }
             }
             by.extend(left);
-            positions.sort_unstable();
-            blocks[places[0]] = Block {
-                positions,
-                summands: by,
-                is_new: true,
-            };
+            merge(blocks, &places, by);
         }
         blocks.retain(|block| !block.positions.is_empty());
         is_changed
@@ -377,18 +385,11 @@ impl<'a> Shortener<'a> {
             .collect();
         positions.sort_unstable();
         let replaced: Summands = positions.iter().map(|&place| original[place]).collect();
-        let Some(new) = self.shortest(&old, &replaced) else {
-            return false;
-        };
-        for &place in &group[1..] {
-            blocks[place].positions.clear();
-            blocks[place].is_new = false;
+        let new = self.shortest(&old, &replaced);
+        let is_shorter = new.is_some();
+        if let Some(new) = new {
+            merge(blocks, group, new);
         }
-        blocks[group[0]] = Block {
-            positions,
-            summands: new,
-            is_new: true,
-        };
-        true
+        is_shorter
     }
 }
