@@ -49,17 +49,8 @@ pub(super) enum Distance {
 /// Summands with variables for parts, and these parts.
 type Seen = (Summands, Vec<(SymbolId, ExprId)>);
 
-/// What of the terms is a variable while they are searched.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum View {
-    /// Sums that are factors, and functions other than waves that are factors of several terms:
-    /// `(a + b)^2*sin(c)^2` is searched as `f^2*sin(c)^2`.
-    Factors,
-    /// Sums that are angles.
-    Angles,
-    /// Nothing.
-    Whole,
-}
+/// Summands with variables in the place of some parts; nothing if there are none of these.
+type View<'a> = fn(&mut Shortener<'a>, &[(f64, ExprId)]) -> Option<Seen>;
 
 fn blocks_of(summands: &[(f64, ExprId)]) -> Vec<Block> {
     (summands.iter().enumerate())
@@ -119,7 +110,8 @@ impl<'a> Shortener<'a> {
         let mut blocks = blocks_of(summands);
         for _ in 0..MAX_ROUNDS {
             let mut is_changed = false;
-            for view in [View::Factors, View::Angles, View::Whole] {
+            let views: [View<'a>; 3] = [Self::whole_factors, Self::whole_angles, Self::unchanged];
+            for view in views {
                 is_changed |= self.pass(&mut blocks, view);
             }
             if !is_changed {
@@ -143,17 +135,12 @@ impl<'a> Shortener<'a> {
     }
 
     /// Shortens all blocks in one view; whether anything changed.
-    fn pass(&mut self, blocks: &mut Vec<Block>, view: View) -> bool {
+    fn pass(&mut self, blocks: &mut Vec<Block>, view: View<'a>) -> bool {
         let flat: Vec<(usize, (f64, ExprId))> = (blocks.iter().enumerate())
             .flat_map(|(place, block)| block.summands.iter().map(move |&summand| (place, summand)))
             .collect();
         let written: Summands = flat.iter().map(|&(_, summand)| summand).collect();
-        let seen = match view {
-            View::Whole => Some((written.clone(), Vec::new())),
-            View::Angles => self.whole_angles(&written),
-            View::Factors => self.whole_factors(&written),
-        };
-        let Some((summands, parts)) = seen else {
+        let Some((summands, parts)) = view(self, &written) else {
             return false;
         };
         let mut found = blocks_of(&summands);
@@ -271,8 +258,8 @@ impl<'a> Shortener<'a> {
         Some((whole.collect(), variables))
     }
 
-    /// The summands with a variable of its own in the place of each factor of [`View::Factors`], and
-    /// these; nothing if there is none.
+    /// The summands with a variable of its own in the place of each sum that is a factor, and of each function other than
+    /// waves that is a factor of several terms: `(a + b)^2*sin(c)^2` is searched as `f^2*sin(c)^2`.
     fn whole_factors(&mut self, summands: &[(f64, ExprId)]) -> Option<Seen> {
         let mut n_terms: IdMap<usize> = IdMap::default();
         for &(_, expr) in summands {
@@ -313,6 +300,10 @@ impl<'a> Shortener<'a> {
             whole.push((coefficient, self.pool.product(&factors)));
         }
         (!parts.is_empty()).then_some((whole, parts))
+    }
+
+    fn unchanged(&mut self, summands: &[(f64, ExprId)]) -> Option<Seen> {
+        Some((summands.to_vec(), Vec::new()))
     }
 
     /// Whether the terms are distinct monomials that cannot interact.
