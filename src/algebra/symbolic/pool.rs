@@ -309,10 +309,10 @@ impl ExprPool {
     /// The terms of a sum in canonical order, each as `(coefficient, rest)`; anything else is a
     /// sum of one term, and zero of none.
     pub fn terms_of(&self, expr: ExprId) -> Vec<(Number, ExprId)> {
-        let terms = self
-            .summands_of(expr)
-            .iter()
-            .filter(|term| **term != ExprId::ZERO);
+        if expr == ExprId::ZERO {
+            return Vec::new();
+        }
+        let terms = self.summands_of(expr).iter();
         terms.map(|term| self.split(*term)).collect()
     }
 
