@@ -13,15 +13,12 @@ use crate::symbolic::ParseError;
 /// What is wrong with a file that is to be compared.
 #[derive(Debug, Error)]
 pub enum CheckError {
-    /// The file system refused.
     #[error("{}: cannot read the file", path.display())]
     Io { path: PathBuf, source: io::Error },
-    /// A file of another kind.
     #[error(
         "{file}: found {found}, expected a model (.json), equations as text (.txt), or LaTeX (.tex, .md)"
     )]
     Kind { file: String, found: String },
-    /// A model or equations that cannot be read.
     #[error(transparent)]
     File(#[from] ImportError),
     /// An equation that is too large once its numbers are kept as they are written.
@@ -32,7 +29,6 @@ pub enum CheckError {
         line: usize,
         source: ParseError,
     },
-    /// A domain that cannot be used.
     #[error("{}: {message}", path.display())]
     Domain {
         path: PathBuf,

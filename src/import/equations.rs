@@ -255,7 +255,7 @@ impl Equation {
         pool: &mut ExprPool,
     ) -> Result<ExprId, ImportError> {
         let known = |name: &str| LatentVariable::from_name(name, latent_dim).is_some();
-        let read = pool.parse_defined(&self.text(), &known, &|_| None, ParseLimits::default());
+        let read = pool.parse_defined(&self.text(), &known, &|_, _| None, ParseLimits::default());
         read.map(|reading| reading.expr).map_err(|error| {
             let place = self.place(error.position);
             match error.kind {
