@@ -23,7 +23,7 @@ use romc::ir::Interpreter;
 use romc::lower;
 use romc::model::{AffineMap, Library, ReducedModel, Scaling, StateMap};
 use romc::robot::{Actuators, InputRule, Leg, LegGeometry, Robot, WrenchFrame};
-use romc::robot_file::{self, RobotEntry, RobotOptions};
+use romc::robot_file::{self, RobotEntry, RobotFileError, RobotOptions};
 use serde_json::Value;
 
 use command_line::{romc, text};
@@ -38,8 +38,13 @@ fn file(name: &str) -> PathBuf {
     root().join("examples/robots").join(name)
 }
 
+fn from_text(file: &str, text: &str) -> Result<&'static Robot, RobotFileError> {
+    let read = robot_file::from_text(file, text, &RobotOptions::default())?;
+    Ok(read.robot)
+}
+
 fn robot(name: &str) -> &'static Robot {
-    robot_file::read(&file(name), &[]).expect("an example")
+    robot_file::find(&file(name).to_string_lossy()).expect("an example")
 }
 
 fn numbers(value: &Value) -> Vec<f64> {
@@ -60,7 +65,7 @@ fn feet_and_jacobians_are_those_of_pinocchio() {
         "<link name=\"world\"/><joint name=\"held\" type=\"fixed\"><parent link=\"world\"/><child link=\"torso\"/>\
          <origin xyz=\"0.3 -0.1 2\" rpy=\"0.1 0.2 0.7\"/></joint></robot>",
     );
-    let below_world = robot_file::from_urdf("t.urdf", &below_world, &[]).expect("reads");
+    let below_world = from_text("t.urdf", &below_world).expect("reads");
     let robots = FILES.map(|name| (name, robot(name)));
     for (name, robot) in robots.into_iter().chain([("hare.urdf", below_world)]) {
         let mut legs = 0;
@@ -125,7 +130,7 @@ fn legs_are_matched_by_where_they_stand() {
 #[test]
 fn robot_of_a_urdf_comes_back_from_its_own_toml_bit_for_bit() {
     let hare = robot("hare.urdf");
-    let again = robot_file::from_toml("hare.toml", &robot_file::to_toml(hare)).expect("its text");
+    let again = from_text("hare.toml", &robot_file::to_toml(hare)).expect("its text");
     assert!(std::ptr::eq(again, hare));
     assert!((hare.mass_kg() - 11.6).abs() < 1e-12);
     let turned = hare.joint_limit_rad()[8];
@@ -402,9 +407,7 @@ fn trees_of_other_robots_are_told_apart() {
             "link `l0_2` beyond joint `j0_2`: found no link on a fixed joint",
         ),
     ] {
-        let error = robot_file::from_urdf("t.urdf", &tree(&limbs), &[])
-            .unwrap_err()
-            .to_string();
+        let error = from_text("t.urdf", &tree(&limbs)).unwrap_err().to_string();
         assert!(
             error.starts_with("t.urdf: ") && error.contains(said),
             "{error}"
@@ -430,9 +433,7 @@ fn trees_of_other_robots_are_told_apart() {
     ] {
         assert!(hare.contains(from), "{from}");
         let wrong = hare.replace(from, to);
-        let error = robot_file::from_urdf("t.urdf", &wrong, &[])
-            .unwrap_err()
-            .to_string();
+        let error = from_text("t.urdf", &wrong).unwrap_err().to_string();
         assert!(error.contains(said), "{error}");
     }
 }
@@ -444,7 +445,8 @@ fn command_shows_a_robot_and_writes_its_toml() {
     let done = romc(folder.path(), &["robot", &urdf, "--output", "hare.toml"]);
     assert!(done.status.success(), "{}", text(&done.stderr));
     assert!(text(&done.stdout).contains("ne_swing"));
-    let written = robot_file::read(&folder.path().join("hare.toml"), &[]).expect("its TOML");
+    let written =
+        robot_file::find(&folder.path().join("hare.toml").to_string_lossy()).expect("its TOML");
     assert!(std::ptr::eq(written, robot("hare.urdf")));
     let feet = "se_paw,nw_paw,sw_paw,ne_paw";
     let named = romc(folder.path(), &["robot", &urdf, "--feet", feet, "--json"]);
@@ -529,18 +531,14 @@ fn names_that_act_on_the_text_around_them_are_refused() {
             let hostile = format!("{name}{acts}x");
             let quoted = Value::from(hostile.as_str()).to_string();
             let text = solo12.replace(&format!("\"{name}\""), &quoted);
-            let error = robot_file::from_toml("r.toml", &text)
-                .expect_err("a fault")
-                .to_string();
+            let error = from_text("r.toml", &text).expect_err("a fault").to_string();
             let found =
                 format!("r.toml: {place}: found {hostile:?}, expected a name of at most 80 bytes");
             assert!(error.starts_with(&found), "{error}");
         }
     }
     let text = robot_file::to_toml(robot("solo12.toml")).replace("FL_HAA", "FL*/HAA");
-    let error = robot_file::from_toml("r.toml", &text)
-        .unwrap_err()
-        .to_string();
+    let error = from_text("r.toml", &text).unwrap_err().to_string();
     assert!(
         error.contains("leg[1].joint[0].name: found \"FL*/HAA\""),
         "{error}"
@@ -557,7 +555,8 @@ fn known_robots_are_planar_and_come_back_from_their_own_text_as_themselves() {
                 "{name} {leg}"
             );
         }
-        let again = robot_file::from_toml(name, &robot_file::to_toml(robot)).expect("its own text");
+        let again =
+            from_text(&format!("{name}.toml"), &robot_file::to_toml(robot)).expect("its own text");
         assert!(std::ptr::eq(again, robot), "{name}");
         assert!(std::ptr::eq(robot_file::find(name).expect("known"), robot));
     }
@@ -596,7 +595,7 @@ fn faults_name_the_entry() {
         ("axis = \"y\"", "axis = \"z\"", "parallel axes"),
     ] {
         assert!(good.contains(from), "{from}");
-        let error = robot_file::from_toml("r.toml", &good.replacen(from, to, 1))
+        let error = from_text("r.toml", &good.replacen(from, to, 1))
             .unwrap_err()
             .to_string();
         assert!(error.contains(said), "{error}");
@@ -641,7 +640,7 @@ fn signs_and_offsets_turn_the_same_leg_at_other_angles() {
         "_calf_joint\", at = [0.0, 0.0, -0.213], axis = \"y\"",
         "_calf_joint\", at = [0.0, 0.0, -0.213], axis = \"y\", sign = -1.0, offset_rad = 0.4",
     );
-    let turned = robot_file::from_toml("mine.toml", &text).unwrap();
+    let turned = from_text("mine.toml", &text).unwrap();
     for leg in Leg::ALL {
         let q = [0.1, 0.7, -1.4];
         let read = [q[0], q[1], 0.4 - q[2]];

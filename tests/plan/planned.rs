@@ -10,7 +10,7 @@ use romc::model::ReducedModel;
 use romc::plan::{Goal, Plan, PlanError, PlanSettings, Verdict, plan};
 use romc::recording::{self, Recording};
 use romc::robot::{BODY_Z, GRAVITY_M_S2, Robot};
-use romc::train::{Method, Origin, Progress, Recordings, TrainOptions, Monitor};
+use romc::train::{Method, Monitor, Origin, Progress, Recordings, TrainOptions};
 
 fn shipped_model(name: &str) -> ReducedModel {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
