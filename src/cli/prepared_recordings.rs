@@ -6,7 +6,7 @@ use std::sync::Arc;
 use serde_json::{Map, Value, json};
 
 use super::args::{ReadingArguments, TrainArguments, TrainSettings};
-use super::inspect_recording::finding_json;
+use super::inspect::finding_json;
 use super::output::{note, reader, report_reading};
 use super::train_settings;
 use crate::Error;
