@@ -333,7 +333,7 @@ fn parse_term(
         return Err(ModelError::invalid(place(index), found, expected));
     }
     let known = |name: &str| LatentVariable::from_name(name, latent_dim).is_some();
-    let read = pool.parse_defined(text, &known, &|_| None, ParseLimits::default());
+    let read = pool.parse_defined(text, &known, &|_, _| None, ParseLimits::default());
     let reading = read.map_err(|source| ModelError::Term {
         index,
         text: text.to_owned(),
