@@ -42,7 +42,7 @@ const OF_MODELS: [&str; 9] = [
 ];
 
 /// Inspects each file: those with an ending of models as such, all others as recordings.
-pub fn run(arguments: &InspectArguments) -> Result<Answer, Error> {
+pub(crate) fn run(arguments: &InspectArguments) -> Result<Answer, Error> {
     let robot = robot::chosen(&arguments.robot)?;
     if arguments.guess {
         return guessed(arguments, robot);
@@ -403,7 +403,7 @@ fn findings_text(findings: &[Finding]) -> String {
 }
 
 /// A finding without the place of its recording.
-pub(super) fn finding_json(finding: &Finding) -> Value {
+pub(crate) fn finding_json(finding: &Finding) -> Value {
     json!({
         "what": finding.kind.description(),
         "samples": finding.samples.len(),

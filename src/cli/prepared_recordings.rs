@@ -24,7 +24,7 @@ type DividedJump = (PathBuf, usize, usize);
 const SETS: [&str; 3] = ["training", "validation", "test"];
 
 /// The recordings of a training.
-pub struct RecordedSets {
+pub(crate) struct RecordedSets {
     /// Jumps that the model is fitted to, those that choose between candidates, and those used only for the final
     /// metrics; empty before [`Self::read`].
     pub sets: [RecordingSet; 3],
@@ -39,7 +39,7 @@ pub struct RecordedSets {
 impl RecordedSets {
     /// The recordings that the arguments name, divided by their shares if they have any, to be conditioned as the
     /// settings say.
-    pub fn new(
+    pub(crate) fn new(
         arguments: &TrainArguments,
         settings: &TrainSettings,
         robot: &'static Robot,
@@ -63,7 +63,7 @@ impl RecordedSets {
         })
     }
 
-    pub fn whole(
+    pub(crate) fn whole(
         paths: [&[PathBuf]; 3],
         settings: &TrainSettings,
         robot: &'static Robot,
@@ -94,13 +94,13 @@ impl RecordedSets {
     }
 
     /// The first training recordings as recorded.
-    pub fn first(&self, count: usize) -> Result<Vec<Recording>, RecordingError> {
+    pub(crate) fn first(&self, count: usize) -> Result<Vec<Recording>, RecordingError> {
         let files = &self.files[0];
         as_recorded(&files[..count.min(files.len())], self.robot, &self.reader)
     }
 
     /// Reads all sets, those of the test first.
-    pub fn read(&mut self) -> Result<(), RecordingError> {
+    pub(crate) fn read(&mut self) -> Result<(), RecordingError> {
         for set in [2, 0, 1] {
             let files = &self.files[set];
             self.sets[set].read(files, self.robot, &self.options, &self.reader)?;
@@ -109,7 +109,7 @@ impl RecordedSets {
     }
 
     /// Which jumps came into which set, file and first row of each, if they were divided: in words and as JSON.
-    pub fn division(&self) -> Option<(String, Value)> {
+    pub(crate) fn division(&self) -> Option<(String, Value)> {
         let (mut text, mut json) = (String::new(), Map::new());
         for (name, places) in SETS.into_iter().zip(self.divided.as_ref()?) {
             let places = || (places.iter()).map(|(path, _, row)| (path.display().to_string(), row));
@@ -125,7 +125,7 @@ impl RecordedSets {
     }
 
     /// The sets that the jumps of a file came into, if they were divided.
-    pub fn sets_of(&self, path: &str) -> Vec<&'static str> {
+    pub(crate) fn sets_of(&self, path: &str) -> Vec<&'static str> {
         let sets = SETS.into_iter().zip(self.divided.iter().flatten());
         let is_of = |(file, ..): &DividedJump| file.display().to_string() == path;
         let with = sets.filter(|(_, places)| places.iter().any(is_of));
@@ -133,7 +133,7 @@ impl RecordedSets {
     }
 
     /// The files of each set, those with jumps in several in the first.
-    pub fn files(&self) -> [(&'static str, Vec<&Path>); 3] {
+    pub(crate) fn files(&self) -> [(&'static str, Vec<&Path>); 3] {
         let mut seen: Vec<&Path> = Vec::new();
         std::array::from_fn(|set| {
             let files = self.files[set].iter();
@@ -146,7 +146,7 @@ impl RecordedSets {
     }
 
     /// Reports on stderr which files have implausible samples, and what became of them.
-    pub fn report_findings(&self) {
+    pub(crate) fn report_findings(&self) {
         report_reading(&self.sets[0].reading);
         for (file, mismatch) in self.sets.iter().flat_map(|set| &set.mismatches) {
             note(&format!("{}: {mismatch}", file.display()));
@@ -185,7 +185,7 @@ impl RecordedSets {
     }
 
     /// Every finding with its place, and how many samples were left out.
-    pub fn findings_json(&self) -> Value {
+    pub(crate) fn findings_json(&self) -> Value {
         let of_file = |file: &Path, mut value: Value| {
             value["file"] = json!(file.display().to_string());
             value
@@ -217,7 +217,10 @@ fn report_singular(findings: &[&(PathBuf, Finding)]) {
 }
 
 /// The reader of a training: clocks are repaired unless told otherwise, or to train as published.
-pub fn reader_for(arguments: &ReadingArguments, settings: &TrainSettings) -> Result<Reader, Error> {
+pub(crate) fn reader_for(
+    arguments: &ReadingArguments,
+    settings: &TrainSettings,
+) -> Result<Reader, Error> {
     let clocks = match settings.paper {
         true => Clocks::Recorded,
         false => Clocks::Repaired,
