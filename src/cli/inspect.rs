@@ -139,21 +139,12 @@ fn describe_model(path: &Path, model: &ReducedModel) -> Result<Answer, Error> {
     for phase in 0..equations.phases().len() {
         text.push_str(&pattern(&equations, phase));
     }
-    if let Some(dominant) = &dominant {
-        for (latent, weights) in dominant.iter().enumerate() {
-            let parts: Vec<String> = (weights.iter())
-                .map(|(name, weight)| format!("{} {name}", significant(*weight)))
-                .collect();
-            let _ = writeln!(text, "  z{} = {} ...", latent + 1, parts.join(", "));
-        }
-    } else if let Ok(encoder) = model.encoder_map() {
-        let _ = writeln!(text, "  encoder {}", encoder.summary());
-        if let Ok(decoder) = model.decoder_map() {
-            let _ = writeln!(text, "  decoder {}", decoder.summary());
-        }
-    } else {
-        text.push_str("latent-only: no encoder, so it says nothing about a robot's coordinates\n");
-    }
+    let [encoder, decoder] =
+        [model.encoder_map(), model.decoder_map()].map(|map| map.ok().map(StateMap::summary));
+    text += &composition(
+        dominant.as_deref(),
+        [encoder.as_deref(), decoder.as_deref()],
+    );
     let file = path.display().to_string();
     let invariance = Invariance::of(model).unwrap_or_else(|error| {
         note(&format!("{file}: invariance is not told: {error}"));
@@ -175,14 +166,35 @@ fn describe_model(path: &Path, model: &ReducedModel) -> Result<Answer, Error> {
         "phases": phases.collect::<Vec<_>>(),
         "exact": equations.steps(),
         "dominant_coordinates": dominant,
-        "encoder": model.encoder_map().ok().map(StateMap::summary),
-        "decoder": model.decoder_map().ok().map(StateMap::summary),
+        "encoder": encoder,
+        "decoder": decoder,
         "actuators": model.actuators(),
         "wrench_frame": model.wrench_frame(),
         "invariance": invariance,
         "provenance": model.provenance(),
     });
     Ok(Answer::new(text, json))
+}
+
+/// The largest weights of a linear encoder, or the layers of the maps.
+fn composition(
+    dominant: Option<&[Vec<(String, f64)>]>,
+    [encoder, decoder]: [Option<&str>; 2],
+) -> String {
+    let Some(latents) = dominant else {
+        return match encoder {
+            Some(_) => lines("  encoder ", encoder) + &lines("  decoder ", decoder),
+            None => {
+                "latent-only: no encoder, so it says nothing about a robot's coordinates\n".into()
+            }
+        };
+    };
+    let weight = |(name, weight): &(String, f64)| format!("{} {name}", significant(*weight));
+    let line = |(latent, weights): (usize, &Vec<(String, f64)>)| {
+        let parts: Vec<String> = weights.iter().map(weight).collect();
+        format!("  z{} = {} ...\n", latent + 1, parts.join(", "))
+    };
+    latents.iter().enumerate().map(line).collect()
 }
 
 fn input_rule(model: &ReducedModel) -> String {
