@@ -18,7 +18,7 @@ use crate::typeset::significant;
 use crate::typeset::words::counted;
 
 /// Compares two files. The exit code is 0 if they are proven equal and 1 otherwise.
-pub fn run(arguments: &CheckArguments) -> Result<Answer, Error> {
+pub(crate) fn run(arguments: &CheckArguments) -> Result<Answer, Error> {
     let options = CheckOptions {
         exact: arguments.exact,
         symbols: SymbolNames::parse(&arguments.symbols)?,

@@ -17,7 +17,7 @@ use crate::model::ReducedModel;
 use crate::typeset::{NumberStyle, PrintOptions, Rounding, SymbolTable, Table};
 use crate::{Error, artifact};
 
-pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
+pub(crate) fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
     let save_model = arguments.simplification.save_model.as_deref();
     let (simplification, model) = (&arguments.simplification, &arguments.model);
     let inputs = Inputs::default()

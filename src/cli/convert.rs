@@ -16,7 +16,7 @@ use crate::recording::{
 };
 use crate::{Error, artifact};
 
-pub fn run(arguments: &ConvertArguments) -> Result<Answer, Error> {
+pub(crate) fn run(arguments: &ConvertArguments) -> Result<Answer, Error> {
     Inputs::default()
         .and(&arguments.recordings)
         .and(&arguments.inputs_of)
@@ -73,7 +73,7 @@ fn chained(recordings: Vec<Recording>) -> Vec<Segment> {
 ///
 /// # Errors
 /// [`Error::NotOne`] for an MCAP file of several, [`Error::Exists`], [`Error::Recording`] if the file system refuses.
-pub fn write_recording(
+pub(crate) fn write_recording(
     path: &Path,
     segments: Vec<Segment>,
     inputs: Option<&[DMatrix<f64>]>,

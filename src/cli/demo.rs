@@ -47,7 +47,7 @@ const REPORT_TOLERANCE: Tolerance = Tolerance::ShareOfRms(0.01);
 
 /// Runs the whole path and reports its files and metrics. The exit code is 1 if predictions of body x or z, the
 /// self-test or a run fail.
-pub fn run(arguments: &DemoArguments) -> Result<Answer, Error> {
+pub(crate) fn run(arguments: &DemoArguments) -> Result<Answer, Error> {
     let inputs = Inputs::default().into_folder(Some(&arguments.out_dir))?;
     let progress = spinner("reading the shipped model and recordings");
     let model = artifact::read_from_bytes(MODEL.0, MODEL.1)?;

@@ -11,14 +11,14 @@ use crate::robot::Robot;
 
 /// What an output file holds: the endings that it may have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Format(&'static [&'static str]);
+pub(crate) struct Format(&'static [&'static str]);
 
 impl Format {
-    pub const TABLE: Self = Self(&[".csv"]);
-    pub const RECORDING: Self = Self(&[".csv", ".csv.gz", ".mcap"]);
-    pub const MODEL: Self = Self(&[".json"]);
-    pub const TOML: Self = Self(&[".toml"]);
-    pub const PAGE: Self = Self(&[".html", ".htm"]);
+    pub(crate) const TABLE: Self = Self(&[".csv"]);
+    pub(crate) const RECORDING: Self = Self(&[".csv", ".csv.gz", ".mcap"]);
+    pub(crate) const MODEL: Self = Self(&[".json"]);
+    pub(crate) const TOML: Self = Self(&[".toml"]);
+    pub(crate) const PAGE: Self = Self(&[".html", ".htm"]);
 
     /// Refuses a name whose ending says another format. What is there and no file of a disk is refused elsewhere.
     fn check(self, path: &Path) -> Result<(), Error> {
@@ -46,10 +46,10 @@ impl Format {
 /// The files that a command reads, none of which it may replace, forced or not; and the folder that it writes into, as it
 /// is when the command begins.
 #[derive(Debug, Default)]
-pub struct Inputs<'a>(Vec<&'a Path>, Option<Begun>);
+pub(crate) struct Inputs<'a>(Vec<&'a Path>, Option<Begun>);
 
 impl<'a> Inputs<'a> {
-    pub fn and<P: AsRef<Path> + ?Sized + 'a>(
+    pub(crate) fn and<P: AsRef<Path> + ?Sized + 'a>(
         mut self,
         more: impl IntoIterator<Item = &'a P>,
     ) -> Self {
@@ -58,13 +58,13 @@ impl<'a> Inputs<'a> {
     }
 
     /// The same for a command that writes into this folder.
-    pub fn into_folder(mut self, folder: Option<&Path>) -> Result<Self, Error> {
+    pub(crate) fn into_folder(mut self, folder: Option<&Path>) -> Result<Self, Error> {
         self.1 = folder.map(Begun::of).transpose()?;
         Ok(self)
     }
 
     /// These and the file of a robot, unless the name is that of one of romc's own.
-    pub fn and_robot(self, name: Option<&'a str>) -> Self {
+    pub(crate) fn and_robot(self, name: Option<&'a str>) -> Self {
         let is_file = |name: &&str| !Robot::known_names().contains(name);
         self.and(name.filter(is_file))
     }
@@ -94,7 +94,7 @@ impl<'a> Inputs<'a> {
     }
 
     /// Refuses an output by its name alone: a folder, a name that says another format, one of the inputs.
-    pub fn check_name(&self, path: &Path, format: Format) -> Result<(), Error> {
+    pub(crate) fn check_name(&self, path: &Path, format: Format) -> Result<(), Error> {
         if path.is_dir() || path.file_name().is_none() {
             return Err(Error::refused(
                 path,
@@ -107,7 +107,7 @@ impl<'a> Inputs<'a> {
 
     /// Refuses an output that could not be written, before long work begins: by its name, as it is there and may not be
     /// replaced, or as its folder is not.
-    pub fn check_output(
+    pub(crate) fn check_output(
         &self,
         path: Option<&Path>,
         format: Format,
@@ -129,7 +129,7 @@ impl<'a> Inputs<'a> {
     }
 
     /// Writes files into a folder, none of them one of these, nor one of that name that romc did not make.
-    pub fn write_folder(
+    pub(crate) fn write_folder(
         &self,
         folder: &Path,
         files: &[EmittedFile],
@@ -144,7 +144,7 @@ impl<'a> Inputs<'a> {
     }
 
     /// Writes figures into a folder, and says so in the answer.
-    pub fn write_figures(
+    pub(crate) fn write_figures(
         &self,
         folder: &Path,
         figures: &[Figure],

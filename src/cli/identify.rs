@@ -16,7 +16,7 @@ use crate::recording::Clocks;
 use crate::robot::Robot;
 use crate::typeset::{Table, significant};
 
-pub fn run(arguments: &IdentifyArguments) -> Result<Answer, Error> {
+pub(crate) fn run(arguments: &IdentifyArguments) -> Result<Answer, Error> {
     Inputs::default()
         .and(&arguments.recordings)
         .and(&arguments.reading.columns)

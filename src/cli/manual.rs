@@ -11,7 +11,7 @@ use super::output::names;
 use crate::Error;
 use crate::files::{EmittedFile, write_files};
 
-pub fn pages(arguments: &ManualArguments) -> Result<Answer, Error> {
+pub(crate) fn pages(arguments: &ManualArguments) -> Result<Answer, Error> {
     let mut root = Arguments::command();
     root.build();
     let mut files = vec![file(&arguments.out_dir, "romc", root.clone())?];
@@ -43,7 +43,7 @@ fn file(folder: &Path, name: &str, command: clap::Command) -> Result<EmittedFile
     Ok(EmittedFile::new(path, String::from_utf8_lossy(&page)))
 }
 
-pub fn completions(arguments: &CompletionsArguments) -> Answer {
+pub(crate) fn completions(arguments: &CompletionsArguments) -> Answer {
     let mut script = Vec::new();
     let mut command = Arguments::command();
     clap_complete::generate(arguments.shell, &mut command, "romc", &mut script);

@@ -13,8 +13,6 @@ mod destination;
 mod identify;
 mod import;
 mod inspect;
-mod inspect_model;
-mod inspect_recording;
 mod manual;
 mod mpc;
 mod output;

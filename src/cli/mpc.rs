@@ -27,7 +27,7 @@ use crate::{Error, artifact};
 
 /// Runs the controller along each recording. The exit code is 1 if the model is not fit for torques or control there, or
 /// if most steps along one of them have no plan.
-pub fn run(arguments: &MpcArguments) -> Result<Answer, Error> {
+pub(crate) fn run(arguments: &MpcArguments) -> Result<Answer, Error> {
     let inputs = Inputs::default()
         .and([&arguments.model])
         .and(&arguments.recordings)
@@ -61,12 +61,12 @@ pub fn run(arguments: &MpcArguments) -> Result<Answer, Error> {
     Ok(answer.failed_if(is_failed))
 }
 
-pub fn judged(runs: &[NamedRun]) -> Vec<&ControlMetrics> {
+pub(crate) fn judged(runs: &[NamedRun]) -> Vec<&ControlMetrics> {
     let metrics = runs.iter().filter_map(|(_, run)| run.metrics.as_ref());
     metrics.collect()
 }
 
-pub fn run_all(
+pub(crate) fn run_all(
     model: &ReducedModel,
     recordings: &[Recording],
     settings: MpcSettings,
@@ -90,7 +90,7 @@ pub fn run_all(
 
 /// Runs with default settings: with the plain lift, then with the consistent one. Recordings of fewer samples than a
 /// default stage has are followed at the rate of the slowest, which a note says.
-pub fn run_with_both_lifts(
+pub(crate) fn run_with_both_lifts(
     model: &ReducedModel,
     recordings: &[Recording],
 ) -> Result<[Vec<NamedRun>; 2], Error> {
@@ -152,7 +152,7 @@ fn answer(
 ///
 /// `steps` to `prepare_us` count and time the solver's work, `lift` is what the maps and the lift make of recorded inputs:
 /// none of these depends on whether the dynamics are right.
-pub fn run_json((path, run): &NamedRun) -> Value {
+pub(crate) fn run_json((path, run): &NamedRun) -> Value {
     let summary = &run.summary;
     let mut value = json!({
         "recording": path.display().to_string(),
@@ -176,7 +176,7 @@ pub fn run_json((path, run): &NamedRun) -> Value {
     value
 }
 
-pub fn command_table(model: &ReducedModel, runs: &[NamedRun]) -> Table {
+pub(crate) fn command_table(model: &ReducedModel, runs: &[NamedRun]) -> Table {
     let latent = |name| numbered(name, model.latent_dim());
     let inputs = match model.input() {
         Some(input) => input.names.clone(),

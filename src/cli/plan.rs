@@ -21,7 +21,7 @@ use crate::typeset::{Cell, Table};
 use crate::{Error, artifact};
 
 /// Plans a jump and writes it unless it is not to be trusted and not forced, or maps what can be planned.
-pub fn run(arguments: &PlanArguments) -> Result<Answer, Error> {
+pub(crate) fn run(arguments: &PlanArguments) -> Result<Answer, Error> {
     let inputs = Inputs::default()
         .and([&arguments.model])
         .and(&arguments.start)

@@ -27,7 +27,7 @@ use crate::train::sha256;
 use crate::{Error, artifact};
 
 /// Writes the page, and the figures if a folder for them is given. The exit code is 1 if the model is fit for nothing.
-pub fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
+pub(crate) fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
     let inputs = Inputs::default()
         .and([&arguments.model])
         .and(&arguments.recordings)
@@ -92,7 +92,7 @@ pub fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
     Ok(Answer::new(text, json).failed_if(made.verdict.fit_for.is_empty()))
 }
 
-pub struct Made {
+pub(crate) struct Made {
     pub page: String,
     pub introduction: Introduction,
     pub verdict: Verdict,
@@ -138,7 +138,7 @@ fn make(
     made
 }
 
-pub fn page_of(
+pub(crate) fn page_of(
     content: &Content<'_>,
     tolerance: Tolerance,
     commands: Vec<String>,

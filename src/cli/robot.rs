@@ -14,7 +14,7 @@ use crate::robot_file::{self, RobotEntry, RobotOptions};
 use crate::typeset::Table;
 
 /// The robot of `--robot`; of a file, how its joints were matched goes to stderr.
-pub fn chosen(name_or_file: &str) -> Result<&'static Robot, Error> {
+pub(crate) fn chosen(name_or_file: &str) -> Result<&'static Robot, Error> {
     let read = robot_file::open(name_or_file, &RobotOptions::default())?;
     let robot = read.robot;
     if Robot::by_name(name_or_file).is_err() {
@@ -35,7 +35,7 @@ fn note_all(file: &str, notes: &[String]) {
         .for_each(|text| note(&format!("{file}: {text}")));
 }
 
-pub fn run(arguments: &RobotArguments) -> Result<Answer, Error> {
+pub(crate) fn run(arguments: &RobotArguments) -> Result<Answer, Error> {
     Inputs::default()
         .and_robot(Some(&arguments.robot))
         .check_output(arguments.output.as_deref(), Format::TOML, arguments.force)?;

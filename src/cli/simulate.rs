@@ -19,7 +19,7 @@ use crate::typeset::{Table, significant};
 use crate::{Error, artifact};
 
 /// Rolls the model out over every segment of every recording. The exit code is 1 if predictions of body x or z fail.
-pub fn run(arguments: &SimulateArguments) -> Result<Answer, Error> {
+pub(crate) fn run(arguments: &SimulateArguments) -> Result<Answer, Error> {
     Inputs::default()
         .and([&arguments.model])
         .and(&arguments.recordings)

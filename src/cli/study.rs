@@ -20,7 +20,7 @@ use crate::typeset::{Cell, Table, significant};
 
 const TABLES: [&str; 2] = ["cells.csv", "summary.csv"];
 
-pub fn run(arguments: &StudyArguments) -> Result<Answer, Error> {
+pub(crate) fn run(arguments: &StudyArguments) -> Result<Answer, Error> {
     check_folder(&arguments.out_dir, &TABLES, arguments.force)?;
     let store = match arguments.merge.is_empty() {
         true => trained(arguments)?,

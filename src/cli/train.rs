@@ -20,7 +20,7 @@ use crate::train::{
 use crate::typeset::{Cell, Table, significant};
 use crate::{Error, artifact, train};
 
-pub fn run(arguments: &TrainArguments) -> Result<Answer, Error> {
+pub(crate) fn run(arguments: &TrainArguments) -> Result<Answer, Error> {
     let settings = train_settings::effective(arguments)?;
     Inputs::default()
         .and(&arguments.recordings)

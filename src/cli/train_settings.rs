@@ -29,7 +29,7 @@ const IDENTIFIED: &str = "identify";
 const IDENTIFIED_FROM: usize = 20;
 
 /// The options that the settings describe; actuators that recordings tell are still to be [`identified`].
-pub(super) fn options(
+pub(crate) fn options(
     settings: &TrainSettings,
     latent_dim: usize,
     name: String,
@@ -88,7 +88,7 @@ pub(super) fn options(
 ///
 /// # Errors
 /// [`IdentifyError::Contradiction`] for recordings that are not of one robot, also where no actuators are wanted.
-pub(super) fn identified(
+pub(crate) fn identified(
     options: &mut TrainOptions,
     settings: &TrainSettings,
     recorded: &RecordedSets,
@@ -115,11 +115,11 @@ pub(super) fn identified(
     Ok(())
 }
 
-pub(super) fn robot(settings: &TrainSettings) -> Result<&'static Robot, Error> {
+pub(crate) fn robot(settings: &TrainSettings) -> Result<&'static Robot, Error> {
     chosen(settings.robot.as_deref().unwrap_or("go1"))
 }
 
-pub(super) fn conditioning(settings: &TrainSettings) -> ConditionOptions {
+pub(crate) fn conditioning(settings: &TrainSettings) -> ConditionOptions {
     let rows = settings.smooth_rows.unwrap_or_default();
     ConditionOptions {
         implausible: match settings.leave_out_implausible {
@@ -145,7 +145,7 @@ fn maps(settings: &TrainSettings) -> MapOptions {
 }
 
 /// The method that is asked for: the joint one if a setting is given that it alone knows.
-pub(super) fn method(settings: &TrainSettings) -> Method {
+pub(crate) fn method(settings: &TrainSettings) -> Method {
     let default = match of_the_joint_method(settings) {
         None => Method::ClosedForm,
         Some(_) => Method::Joint,
@@ -154,7 +154,7 @@ pub(super) fn method(settings: &TrainSettings) -> Method {
 }
 
 /// Where the joints' losses come from: a file, [`NONE`] or [`IDENTIFIED`].
-pub(super) fn actuators(settings: &TrainSettings) -> &str {
+pub(crate) fn actuators(settings: &TrainSettings) -> &str {
     let default = match settings.paper {
         true => NONE,
         false => IDENTIFIED,
@@ -182,7 +182,7 @@ const WINDOW: [&str; 4] = [
     "bptt-integrator",
 ];
 
-pub(super) fn first(settings: &TrainSettings, names: &[&'static str]) -> Option<&'static str> {
+pub(crate) fn first(settings: &TrainSettings, names: &[&'static str]) -> Option<&'static str> {
     let given = given(settings);
     names.iter().copied().find(|name| given.contains_key(*name))
 }
@@ -216,7 +216,7 @@ fn given(settings: &TrainSettings) -> Map<String, Value> {
 }
 
 /// The flags that were given, with a space before each.
-pub(super) fn as_flags(settings: &TrainSettings) -> String {
+pub(crate) fn as_flags(settings: &TrainSettings) -> String {
     let mut line = String::new();
     for (name, value) in given(settings) {
         let text = match value {
@@ -239,7 +239,7 @@ pub(super) fn as_flags(settings: &TrainSettings) -> String {
 }
 
 /// The settings of the command line over those of its file, if it names one.
-pub(super) fn effective(arguments: &TrainArguments) -> Result<TrainSettings, Error> {
+pub(crate) fn effective(arguments: &TrainArguments) -> Result<TrainSettings, Error> {
     let mut settings = arguments.settings.clone();
     if let Some(path) = &arguments.config {
         let mut merged = given(&read(path)?);
@@ -256,7 +256,7 @@ pub(super) fn effective(arguments: &TrainArguments) -> Result<TrainSettings, Err
 
 /// Refuses settings that the method does not use, an activation without hidden layers, rows to filter without a filter,
 /// and named coordinates where a method learns others.
-pub(super) fn check_pairs(settings: &TrainSettings) -> Result<(), Error> {
+pub(crate) fn check_pairs(settings: &TrainSettings) -> Result<(), Error> {
     let (method, is_linear) = (method(settings), maps(settings).is_linear());
     let given = |names: &[&'static str], when: bool| first(settings, names).filter(|_| when);
     let has_weight = settings
@@ -319,7 +319,7 @@ pub(super) fn check_pairs(settings: &TrainSettings) -> Result<(), Error> {
 
 /// The first setting that this training does not depend on, in words: two named coordinates are those of the
 /// centre of mass, which nothing searches, and the search of the closed form ends in one model from every start.
-pub(super) fn without_effect(settings: &TrainSettings, options: &TrainOptions) -> Option<String> {
+pub(crate) fn without_effect(settings: &TrainSettings, options: &TrainOptions) -> Option<String> {
     let is_closed = method(settings) == Method::ClosedForm;
     let is_held = options.coordinates() == Coordinates::Named && options.latent_dim == 2;
     let searched = ["lift-weight", "body-weight", "no-rotation"];
@@ -334,7 +334,7 @@ pub(super) fn without_effect(settings: &TrainSettings, options: &TrainOptions) -
     ))
 }
 
-pub(super) fn read(path: &Path) -> Result<TrainSettings, Error> {
+pub(crate) fn read(path: &Path) -> Result<TrainSettings, Error> {
     read_settings(path, check)
 }
 

@@ -3,8 +3,9 @@
 use nalgebra::{DMatrix, DVector};
 use romc::limits::Range;
 use romc::model::{
-    Activation, AffineMap, CandidateTerm, CoordinateOrder, Identifier, LatentVariable, Layer,
-    Library, LibraryOrder, MAX_LAYER_WIDTH, MAX_LAYERS, ModelError, StandardLibrary, StateMap,
+    Activation, AffineMap, CandidateTerm, CoordinateOrder, FeetRule, Identifier, LatentVariable,
+    Layer, Library, LibraryOrder, MAX_LAYER_WIDTH, MAX_LAYERS, ModelError, StandardLibrary,
+    StateMap,
 };
 use romc::symbolic::{ExprId, ParseErrorKind, SymbolId};
 
@@ -518,4 +519,12 @@ fn refusal_names_the_setting_the_number_and_the_range() {
         refused.expect_err("too small").to_string(),
         "state-scaling is 1e-200, expected a number from 1e-6 to 1e4"
     );
+}
+
+#[test]
+fn rule_of_all_foot_patterns_matches_each() {
+    let always = FeetRule::always();
+    assert!(always.matches([false; 4]) && always.matches([true, false, false, true]));
+    assert!(always.is_always() && always.to_string() == "always");
+    assert!(!FeetRule::Patterns(vec![[true; 4]]).matches([false; 4]));
 }

@@ -169,32 +169,12 @@ fn every_flag_is_in_the_table_or_known_to_be_used_or_refused_elsewhere() {
 /// Flags that take a number and have no range of the table: any seed will do.
 const WITHOUT: [&str; 1] = ["seed"];
 
-/// Ranges by command and flag where it is not the training's.
 fn range(command: &str, flag: &str) -> Option<Range> {
-    let others = [
-        table::LAMBDA,
-        table::HORIZON,
-        table::STEP,
-        table::TORQUE_RATE,
-        table::RESTART_EVERY,
-        table::MARGIN,
-        table::WIDTH,
-        table::DIGITS,
-        table::SIGNIFICANT,
-        table::SCALING,
-        table::INPUT_SCALING,
-        table::SAMPLE_TIME,
-        table::DISTANCE,
-        table::APEX,
-    ];
-    if (command, flag) == ("import", "latent-dim") {
-        return Some(table::IMPORTED_LATENT_DIM);
+    match (command, flag) {
+        ("import", "latent-dim") => Some(table::IMPORTED_LATENT_DIM),
+        (_, flag) if flag.ends_with("-layers") => Some(table::LAYER_WIDTH),
+        (_, flag) => table::of_training(flag).copied(),
     }
-    if flag.ends_with("-layers") {
-        return Some(table::LAYER_WIDTH);
-    }
-    let of_training = table::of_training(flag).copied();
-    of_training.or_else(|| others.into_iter().find(|range| range.name == flag))
 }
 
 /// Whether a command refuses the value of a flag as such.

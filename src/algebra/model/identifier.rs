@@ -10,14 +10,6 @@ use super::error::ModelError;
 pub(crate) const MAX_IDENTIFIER_LEN: usize = 40;
 
 /// A name which is an identifier in C, C++ and Rust, and neither a keyword nor reserved there.
-///
-/// ```
-/// use romc::model::Identifier;
-///
-/// assert_eq!(Identifier::from_name("go1-d4").unwrap().as_str(), "go1_d4");
-/// assert!(Identifier::from_name("while").is_err());
-/// assert!(Identifier::from_name("x; system(\"x\")").is_err());
-/// ```
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Identifier(String);
 

@@ -16,15 +16,6 @@ pub(crate) const MAX_DEGREE: u32 = 8;
 ///
 /// Order: constant; z; dz; monomials of degree 2 to `degree` over `(z, dz)`, graded, each with
 /// indices `i <= j <= k`; sin z; sin dz; cos z; cos dz; u.
-///
-/// ```
-/// use romc::model::{Library, StandardLibrary};
-///
-/// let library = Library::standard(1, StandardLibrary { degree: 2, trigonometric: false, inputs: true })?;
-/// let texts: Vec<&str> = library.terms().iter().map(|term| term.text()).collect();
-/// assert_eq!(texts, ["1", "z1", "dz1", "z1^2", "z1*dz1", "dz1^2", "u1"]);
-/// # Ok::<(), romc::model::ModelError>(())
-/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StandardLibrary {
@@ -80,15 +71,6 @@ impl Run {
 }
 
 /// The order in which a trainer keeps the terms of a standard library.
-///
-/// ```
-/// use romc::model::{LibraryOrder, StandardLibrary};
-///
-/// let standard = StandardLibrary { degree: 1, trigonometric: true, inputs: false };
-/// let texts = standard.texts_in(LibraryOrder::PAPER, 1)?;
-/// assert_eq!(texts, ["1", "z1", "dz1", "sin(z1)", "cos(z1)", "sin(dz1)", "cos(dz1)"]);
-/// # Ok::<(), romc::model::ModelError>(())
-/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LibraryOrder {
     groups: [Group; 5],

@@ -33,14 +33,6 @@ impl fmt::Display for FeetRule {
 
 impl FeetRule {
     /// The rule of a phase that holds whatever the feet do: all patterns.
-    ///
-    /// ```
-    /// use romc::robot::FeetRule;
-    ///
-    /// let always = FeetRule::always();
-    /// assert!(always.matches([false; 4]) && always.matches([true, false, false, true]));
-    /// assert_eq!(always.to_string(), "always");
-    /// ```
     pub fn always() -> Self {
         FeetRule::Patterns(Self::all_patterns().collect())
     }
@@ -56,16 +48,6 @@ impl FeetRule {
     }
 
     /// Whether the rule names this pattern.
-    ///
-    /// ```
-    /// use romc::robot::FeetRule;
-    ///
-    /// let rear_pair = FeetRule::Patterns(vec![[false, false, true, true]]);
-    /// assert!(rear_pair.matches([false, false, true, true]));
-    /// assert!(!rear_pair.matches([true; 4]));
-    /// assert!(FeetRule::Any.matches([true, false, false, false]));
-    /// assert!(FeetRule::None.matches([false; 4]));
-    /// ```
     pub fn matches(&self, feet: ContactFlags) -> bool {
         match self {
             FeetRule::Any => feet.contains(&true),

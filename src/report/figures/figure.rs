@@ -18,31 +18,20 @@ pub enum Role {
     Limit,
 }
 
+/// Of each role the class of its lines in SVG, their colour on white (red, green and blue from 0 to 255), and the lengths of
+/// dashes and gaps as SVG and PDF list them, none for a full line; by these lines differ in grey print too.
+pub(crate) const STYLES: [(&str, [u8; 3], &str); 6] = [
+    ("recorded", [31, 95, 168], ""),
+    ("full", [194, 87, 12], "6 2.5"),
+    ("restarted", [35, 122, 62], "2 1.6"),
+    ("baseline", [123, 63, 160], "8 2 2 2"),
+    ("baseline2", [110; 3], "1 2"),
+    ("limit", [110; 3], "1 2"),
+];
+
 impl Role {
-    pub(crate) const ALL: [Self; 6] = [
-        Self::Recorded,
-        Self::Full,
-        Self::Restarted,
-        Self::Baseline,
-        Self::SecondBaseline,
-        Self::Limit,
-    ];
-
     pub(crate) fn class(self) -> &'static str {
-        self.style().0
-    }
-
-    /// Class of its lines in SVG, their colour on white (red, green and blue from 0 to 255), and the lengths of dashes
-    /// and gaps as SVG and PDF list them, none for a full line; by these lines differ in grey print too.
-    pub(crate) fn style(self) -> (&'static str, [u8; 3], &'static str) {
-        match self {
-            Self::Recorded => ("recorded", [31, 95, 168], ""),
-            Self::Full => ("full", [194, 87, 12], "6 2.5"),
-            Self::Restarted => ("restarted", [35, 122, 62], "2 1.6"),
-            Self::Baseline => ("baseline", [123, 63, 160], "8 2 2 2"),
-            Self::SecondBaseline => ("baseline2", [110; 3], "1 2"),
-            Self::Limit => ("limit", [110; 3], "1 2"),
-        }
+        STYLES[self as usize].0
     }
 }
 

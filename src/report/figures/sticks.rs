@@ -2,8 +2,8 @@
 
 use nalgebra::{DVector, Vector3};
 
+use super::draw::range;
 use super::figure::{Drawing, Figure, Panel, Role, StickPlot};
-use super::ticks::range;
 use crate::recording::Segment;
 use crate::robot::input_rule::rotation;
 use crate::robot::{FOOT_DIM, JOINT_DIM, Leg, Robot, STATE_DIM};
