@@ -12,7 +12,7 @@ use super::transcribe::{Bound, Task};
 use super::verdict::{Findings, Verdict, verdict};
 use crate::model::ReducedModel;
 use crate::mpc::{Outcome, QpSettings, QpSolver, SolverProfile};
-use crate::recording::mismatch::weight_share;
+use crate::recording::mismatch::Balance;
 use crate::recording::{Recording, Segment};
 use crate::robot::{BODY_X, BODY_Z, GRAVITY_M_S2};
 
@@ -85,14 +85,14 @@ pub fn plan(model: &ReducedModel, goal: &Goal, settings: &PlanSettings) -> Resul
         })
         .collect();
     let goal_m = goal.goal_m();
-    let slack = Bound::ALL.map(|bound| (bound, y[task.layout.slack(bound)]));
+    let slack = Bound::ALL.map(|bound| (bound, y[task.slack(bound)]));
     let input_deviation = input_deviation(&task, &y);
     let findings = Findings {
         input_deviation,
         slack,
         margins: &margins,
         outside: outside(&seed, goal_m),
-        weight_share: weight_share(&Recording::from(motion.clone()), model.robot()?),
+        weight_share: Balance::of(&Recording::from(motion.clone()), model.robot()?).weight_share,
         start_lost: seed.start_lost.clone(),
     };
     Ok(Plan {
@@ -156,11 +156,11 @@ fn solve(task: &mut Task<'_>) -> Result<(Vec<f64>, usize), PlanError> {
 
 /// Largest `|mu| / sqrt(latent_dim)` of a node.
 fn input_deviation(task: &Task<'_>, y: &[f64]) -> f64 {
-    let d = task.layout.latent_dim;
+    let d = task.seed.latent_dim;
     let mut most = 0.0_f64;
     for (part, of) in task.seed.parts.iter().enumerate() {
         for node in 0..of.z.len() {
-            let at = task.layout.node(part, node) + 2 * d;
+            let at = task.node(part, node) + 2 * d;
             let square: f64 = y[at..at + d].iter().map(|mu| mu * mu).sum();
             most = most.max((square / d as f64).sqrt());
         }
@@ -178,7 +178,6 @@ fn outside(seed: &Seed<'_>, goal_m: [f64; 2]) -> [f64; 2] {
     })
 }
 
-/// Distance and rise of the body in a motion, m.
 fn reached(motion: &Segment) -> [f64; 2] {
     let (x, last) = (&motion.x, motion.len() - 1);
     let height = x.row(BODY_Z);
