@@ -20,6 +20,8 @@
 //! Anything else is a [`Fault`] with file and line. Indices are not checked in C: the Rust's tests have to reach them.
 //! A sum or product keeps the order that it has in Rust, so that both have the same bits without contraction.
 
+mod call;
+mod definitions;
 mod expression;
 mod function;
 mod items;
