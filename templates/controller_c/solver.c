@@ -65,7 +65,7 @@ typedef struct {
 
 /* Rows that link inputs, and memory for their gains. */
 typedef struct {
-    /* L: Shape::link(super::Shape::link) rows for each place of the ring of stages. */
+    /* L: Shape::link rows for each place of the ring of stages. */
     real (*rows)[NU];
     /* Memory of the solver, one for each place. */
     real (*gains)[NU][NU];

@@ -6,13 +6,13 @@ const FUNCTIONS: &str = include_str!("../../../templates/controller_c/solver.c")
 
 /// A stage of the horizon's solver, for the header of a controller.
 pub(super) fn stage(name: &str, upper: &str, real: &str) -> String {
-    renamed(STAGE, |word| {
-        Some(match word {
-            "real" => real.to_owned(),
-            "NX" => format!("2 * {upper}_LATENT_DIM"),
-            "NU" => format!("{upper}_LATENT_DIM"),
-            _ => format!("{name}_{}", word.strip_prefix("solver_").map(|_| word)?),
-        })
+    renamed(STAGE, |word| match word {
+        "real" => Some(real.to_owned()),
+        "NX" => Some(format!("2 * {upper}_LATENT_DIM")),
+        "NU" => Some(format!("{upper}_LATENT_DIM")),
+        _ => word
+            .starts_with("solver_")
+            .then(|| format!("{name}_{word}")),
     })
 }
 

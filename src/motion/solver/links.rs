@@ -25,7 +25,7 @@ use super::scalar::Real;
 /// Rows that link inputs, and memory for their gains.
 #[derive(Debug)]
 pub struct Links<'m, T, const NU: usize, const LINKED: bool> {
-    /// `L`: [`Shape::link`](super::Shape::link) rows for each place of the ring of stages.
+    /// `L`: `Shape::link` rows for each place of the ring of stages.
     pub rows: &'m [[T; NU]],
     /// Memory of the solver, one for each place.
     pub gains: &'m mut [[[T; NU]; NU]],
