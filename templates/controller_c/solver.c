@@ -73,12 +73,10 @@ typedef struct {
     real softness;
 } solver_links;
 
-/* Columns 0 to 3 of every row, columns 4 to 7 of the rows from the fourth on, and columns 8 to 11 of the
- * rows from the eighth on; what stands right of the diagonal is not read. */
+/* Blocks of four columns: columns 0 to 3 of every row, columns 4 to 7 of the rows from the fourth on, and columns
+ * 8 to 11 of the rows from the eighth on; what stands right of the diagonal is not read. */
 typedef struct {
-    real first[NU][4];
-    real second[NU][4];
-    real third[NU][4];
+    real blocks[SOLVER_WIDE / 4][NU][4];
 } solver_lower;
 
 /* How a solve ended. */
@@ -312,7 +310,7 @@ static inline const real *solver_cost_state_at(solver_cost *self, int stage, int
 
 /* out += M x, each row summed in the order of its entries; four rows at a time, as their sums do not wait for each
  * other. */
-static inline void solver_add_product_nx_nx(real matrix[NX][NX], const real x[NX], real out[restrict NX])
+static inline void solver_add_product_nx_nx(real matrix[NX][NX], const real *x, real out[restrict NX])
 {
     for (int i = 0; i < NX - NX % 4; i += 4) {
         real sums[4] = {0};
@@ -346,7 +344,7 @@ static inline void solver_products_clear_hessian(solver_products *self)
 }
 
 /* out += factor row. */
-static inline void solver_add_multiple_nx(real factor, const real row[NX], real out[restrict NX])
+static inline void solver_add_multiple_nx(real factor, const real *row, real out[restrict NX])
 {
     for (int j = 0; j < NX; ++j) {
         out[j] += factor * row[j];
@@ -354,7 +352,7 @@ static inline void solver_add_multiple_nx(real factor, const real row[NX], real 
 }
 
 /* out += factor row of rows of NU numbers and zeros. */
-static inline void solver_add_wide(real factor, const real row[SOLVER_WIDE], real out[restrict SOLVER_WIDE])
+static inline void solver_add_wide(real factor, const real *row, real out[restrict SOLVER_WIDE])
 {
     for (int j = 0; j < (NU + 3) / 4 * 4; ++j) {
         out[j] += factor * row[j];
@@ -483,7 +481,7 @@ static inline void solver_scale_rows_nx(real factor[NU][NU], real matrix[NU][NX]
 }
 
 /* out += factor row. */
-static inline void solver_add_multiple_8(real factor, const real row[8], real out[restrict 8])
+static inline void solver_add_multiple_8(real factor, const real *row, real out[restrict 8])
 {
     for (int j = 0; j < 8; ++j) {
         out[j] += factor * row[j];
@@ -491,7 +489,7 @@ static inline void solver_add_multiple_8(real factor, const real row[8], real ou
 }
 
 /* out -= factor row. */
-static inline void solver_subtract_multiple_8(real factor, const real row[8], real out[restrict 8])
+static inline void solver_subtract_multiple_8(real factor, const real *row, real out[restrict 8])
 {
     for (int j = 0; j < 8; ++j) {
         out[j] = out[j] - factor * row[j];
@@ -522,7 +520,7 @@ static inline void solver_products_write_block_8(solver_products *self, int i, i
 }
 
 /* out += factor row. */
-static inline void solver_add_multiple_4(real factor, const real row[4], real out[restrict 4])
+static inline void solver_add_multiple_4(real factor, const real *row, real out[restrict 4])
 {
     for (int j = 0; j < 4; ++j) {
         out[j] += factor * row[j];
@@ -530,7 +528,7 @@ static inline void solver_add_multiple_4(real factor, const real row[4], real ou
 }
 
 /* out -= factor row. */
-static inline void solver_subtract_multiple_4(real factor, const real row[4], real out[restrict 4])
+static inline void solver_subtract_multiple_4(real factor, const real *row, real out[restrict 4])
 {
     for (int j = 0; j < 4; ++j) {
         out[j] = out[j] - factor * row[j];
@@ -561,7 +559,7 @@ static inline void solver_products_write_block_4(solver_products *self, int i, i
 }
 
 /* out -= factor row. */
-static inline void solver_subtract_multiple_nx(real factor, const real row[NX], real out[restrict NX])
+static inline void solver_subtract_multiple_nx(real factor, const real *row, real out[restrict NX])
 {
     for (int j = 0; j < NX; ++j) {
         out[j] = out[j] - factor * row[j];
@@ -637,7 +635,7 @@ static inline bool solver_eliminate(solver_stage *restrict stage, real p[restric
 }
 
 /* out += factor row. */
-static inline void solver_add_multiple_nu(real factor, const real row[NU], real out[restrict NU])
+static inline void solver_add_multiple_nu(real factor, const real *row, real out[restrict NU])
 {
     for (int j = 0; j < NU; ++j) {
         out[j] += factor * row[j];
@@ -645,7 +643,7 @@ static inline void solver_add_multiple_nu(real factor, const real row[NU], real 
 }
 
 /* out += M^T y. */
-static inline void solver_add_transposed_nx_nu(real matrix[NX][NU], const real y[NX], real out[restrict NU])
+static inline void solver_add_transposed_nx_nu(real matrix[NX][NU], const real *y, real out[restrict NU])
 {
     for (int k = 0; k < NX; ++k) {
         solver_add_multiple_nu(y[k], matrix[k], out);
@@ -671,7 +669,7 @@ static inline void solver_solve_factored(real factor[NU][NU], real h[restrict NU
 }
 
 /* out += M^T y. */
-static inline void solver_add_transposed_nx_nx(real matrix[NX][NX], const real y[NX], real out[restrict NX])
+static inline void solver_add_transposed_nx_nx(real matrix[NX][NX], const real *y, real out[restrict NX])
 {
     for (int k = 0; k < NX; ++k) {
         solver_add_multiple_nx(y[k], matrix[k], out);
@@ -729,7 +727,7 @@ static inline bool solver_program_prepare(solver_program *self)
 
 /* out += M x, each row summed in the order of its entries; four rows at a time, as their sums do not wait for each
  * other. */
-static inline void solver_add_product_nu_nx(real matrix[NU][NX], const real x[NX], real out[restrict NU])
+static inline void solver_add_product_nu_nx(real matrix[NU][NX], const real *x, real out[restrict NU])
 {
     for (int i = 0; i < NU - NU % 4; i += 4) {
         real sums[4] = {0};
@@ -755,7 +753,7 @@ static inline void solver_add_product_nu_nx(real matrix[NU][NX], const real x[NX
 }
 
 /* Input from the state at the stage's beginning: -feed - K x. */
-static inline void solver_stage_answer(solver_stage *self, const real x[NX], real v[restrict NU])
+static inline void solver_stage_answer(solver_stage *self, const real *x, real v[restrict NU])
 {
     real sum[NU];
     memcpy(sum, self->feed, sizeof sum);
@@ -767,7 +765,7 @@ static inline void solver_stage_answer(solver_stage *self, const real x[NX], rea
 
 /* out += M x, each row summed in the order of its entries; four rows at a time, as their sums do not wait for each
  * other. */
-static inline void solver_add_product_nx_nu(real matrix[NX][NU], const real x[NU], real out[restrict NX])
+static inline void solver_add_product_nx_nu(real matrix[NX][NU], const real *x, real out[restrict NX])
 {
     for (int i = 0; i < NX - NX % 4; i += 4) {
         real sums[4] = {0};
@@ -793,7 +791,7 @@ static inline void solver_add_product_nx_nu(real matrix[NX][NU], const real x[NU
 }
 
 /* State at the stage's end: A x + B v + c. */
-static inline void solver_stage_end(solver_stage *self, const real x[NX], const real v[NU], real end[restrict NX])
+static inline void solver_stage_end(solver_stage *self, const real *x, const real *v, real end[restrict NX])
 {
     real sum[NX];
     memcpy(sum, self->c, sizeof sum);
@@ -835,7 +833,7 @@ static inline solver_rows solver_rows_of(real *memory, int count)
     };
 }
 
-static inline real solver_dot(const real row[NU], const real x[NU])
+static inline real solver_dot(const real *row, const real *x)
 {
     real sum = row[0] * x[0];
     for (int j = 1; j < NU; ++j) {
@@ -845,7 +843,7 @@ static inline real solver_dot(const real row[NU], const real x[NU])
 }
 
 /* out = rows x of count rows, of which so many pairs of opposite ones come first. */
-static inline void solver_times(real (*rows)[NU], int pairs, int count, const real x[NU], real *restrict out)
+static inline void solver_times(real (*rows)[NU], int pairs, int count, const real *x, real *restrict out)
 {
     for (int pair = 0; pair < pairs; ++pair) {
         const real product = solver_dot(rows[2 * pair], x);
@@ -864,8 +862,8 @@ static inline int solver_shape_slack_row(solver_shape *self)
 }
 
 /* The rows of a stage times a point, into their target; before is the input of the stage before. */
-static inline solver_rows solver_program_rows_times(solver_program *restrict self, int k, const real before[NU],
-        const real v[NU], const real x[NX], real t)
+static inline solver_rows solver_program_rows_times(solver_program *restrict self, int k, const real *before,
+        const real *v, const real *x, real t)
 {
     solver_shape shape = self->shape;
     const int memory = solver_shape_memory(&shape);
@@ -906,7 +904,7 @@ static inline solver_rows solver_program_rows_times(solver_program *restrict sel
 }
 
 /* States and inputs that the gains give, kept if no row is violated; returns the largest violation. */
-static inline real solver_program_follow_gains(solver_program *restrict self, const real x0[NX])
+static inline real solver_program_follow_gains(solver_program *restrict self, const real *x0)
 {
     real worst = 0;
     real x[NX];
@@ -990,7 +988,7 @@ static inline void solver_program_take_gains(solver_program *self)
 }
 
 /* First point of the iterations, to be centred: the guess, or the point of the gains. */
-static inline void solver_program_start(solver_program *restrict self, const real x0[NX], bool is_warm)
+static inline void solver_program_start(solver_program *restrict self, const real *x0, bool is_warm)
 {
     solver_shape shape = self->shape;
     const real price = self->cost.slack;
@@ -1205,43 +1203,32 @@ static inline solver_lower solver_lower_zeros(void)
 {
     (void)sizeof(char[(NU <= SOLVER_WIDE) ? 1 : -1]);
     return (solver_lower){
-        .first = {{0}},
-        .second = {{0}},
-        .third = {{0}},
+        .blocks = {{{0}}},
     };
 }
 
 /* A diagonal matrix. */
-static inline solver_lower solver_lower_diagonal(const real entries[NU])
+static inline solver_lower solver_lower_diagonal(const real *entries)
 {
     solver_lower out = solver_lower_zeros();
     for (int i = 0; i < NU; ++i) {
-        if (i < 4) {
-            out.first[i][i] = entries[i];
-        } else if (i < 8) {
-            out.second[i][i - 4] = entries[i];
-        } else {
-            out.third[i][i - 8] = entries[i];
-        }
+        out.blocks[i / 4][i][i % 4] = entries[i];
     }
     return out;
 }
 
 /* M += w r r^T. */
-static inline void solver_lower_add_square(solver_lower *restrict self, real w, const real row[NU])
+static inline void solver_lower_add_square(solver_lower *restrict self, real w, const real *row)
 {
     real parts[SOLVER_WIDE / 4][4] = {{0}};
+    real factors[NU] = {0};
     for (int j = 0; j < NU; ++j) {
         parts[j / 4][j % 4] = row[j];
+        factors[j] = w * row[j];
     }
-    for (int i = 0; i < NU; ++i) {
-        const real factor = w * row[i];
-        solver_add_multiple_4(factor, parts[0], self->first[i]);
-        if (i >= 4) {
-            solver_add_multiple_4(factor, parts[1], self->second[i]);
-        }
-        if (i >= 8) {
-            solver_add_multiple_4(factor, parts[2], self->third[i]);
+    for (int block = 0; block < SOLVER_WIDE / 4; ++block) {
+        for (int i = 4 * block; i < NU; ++i) {
+            solver_add_multiple_4(factors[i], parts[block], self->blocks[block][i]);
         }
     }
 }
@@ -1269,7 +1256,7 @@ static inline void solver_add_weighted(const real *w, const real *y, real (*rows
 /* An entry on or below the diagonal. */
 static inline real solver_lower_entry(solver_lower *self, int i, int j)
 {
-    return j < 4 ? self->first[i][j] : j < 8 ? self->second[i][j - 4] : self->third[i][j - 8];
+    return self->blocks[j / 4][i][j % 4];
 }
 
 /* Adds the symmetric matrix to a block on the diagonal of another, from this row on. */
@@ -1312,10 +1299,8 @@ static inline void solver_stage_add_soft_rows(solver_stage *restrict self, const
 static inline void solver_lower_write_rows(solver_lower *self, real out[restrict NU][SOLVER_WIDE])
 {
     for (int i = 0; i < NU; ++i) {
-        for (int j = 0; j < 4; ++j) {
-            out[i][j] = self->first[i][j];
-            out[i][4 + j] = self->second[i][j];
-            out[i][8 + j] = self->third[i][j];
+        for (int j = 0; j < SOLVER_WIDE; ++j) {
+            out[i][j] = self->blocks[j / 4][i][j % 4];
         }
     }
 }
@@ -1386,7 +1371,7 @@ static inline void solver_pull_before(const real *y, real (*earlier)[NU], int co
 }
 
 /* out -= factor row. */
-static inline void solver_subtract_multiple_nu(real factor, const real row[NU], real out[restrict NU])
+static inline void solver_subtract_multiple_nu(real factor, const real *row, real out[restrict NU])
 {
     for (int j = 0; j < NU; ++j) {
         out[j] = out[j] - factor * row[j];
@@ -1394,7 +1379,7 @@ static inline void solver_subtract_multiple_nu(real factor, const real row[NU], 
 }
 
 /* Takes what a stage's input answers off the gradient by the input before: - K_before^T h. */
-static inline void solver_take_answer(real gain[NU][NU], const real h[NU], real by_before[restrict NU])
+static inline void solver_take_answer(real gain[NU][NU], const real *h, real by_before[restrict NU])
 {
     for (int i = 0; i < NU; ++i) {
         solver_subtract_multiple_nu(h[i], gain[i], by_before);
@@ -1404,7 +1389,7 @@ static inline void solver_take_answer(real gain[NU][NU], const real h[NU], real 
 /* Becomes the cost of the input before a stage that was eliminated, with weights and multipliers of its count
  * links, their rows of both stages, and the gradient h by the stage's own input. Writes the gain. */
 static inline void solver_before_write(solver_before *restrict self, solver_stage *stage, real gain[restrict NU][NU],
-        const real *w, const real *y, real (*own)[NU], real (*earlier)[NU], int count, const real h[NU])
+        const real *w, const real *y, real (*own)[NU], real (*earlier)[NU], int count, const real *h)
 {
     solver_lower square = solver_lower_zeros();
     real cross[NU][NU] = {{0}};
@@ -1636,8 +1621,9 @@ static inline void solver_program_pull_all(solver_program *self, real left, real
         stage = &self->stages[at];
         if (NU <= NX && shape.soft > 0) {
             stage->dt = -by_t * stage->soft_inverse;
+            real *by_z = p + 0;
             for (int j = 0; j < NU; ++j) {
-                p[j] = p[j] - stage->soft_pull[j] * stage->dt;
+                by_z[j] = by_z[j] - stage->soft_pull[j] * stage->dt;
             }
         }
         solver_stage_pull(stage, p, by_v);
@@ -1648,7 +1634,7 @@ static inline void solver_program_pull_all(solver_program *self, real left, real
 }
 
 /* Takes the answer to the input before a stage off its own: - K_before v_before. */
-static inline void solver_answer_before(real gain[NU][NU], const real before[NU], real v[restrict NU])
+static inline void solver_answer_before(real gain[NU][NU], const real *before, real v[restrict NU])
 {
     for (int i = 0; i < NU; ++i) {
         for (int j = 0; j < NU; ++j) {
@@ -1860,7 +1846,7 @@ static inline real solver_or_kept_larger(real self, real other)
 }
 
 /* Residuals of the optimality conditions at the present point, from the program's own numbers. */
-static inline solver_residuals solver_program_residuals(solver_program *restrict self, const real x0[NX])
+static inline solver_residuals solver_program_residuals(solver_program *restrict self, const real *x0)
 {
     const int horizon = self->stages_len;
     solver_shape shape = self->shape;
@@ -1952,7 +1938,7 @@ static inline bool solver_residuals_within(solver_residuals *self, real limit)
  *
  * is_warm says that inputs and multipliers are a guess at the solution, such as the last one's,
  * shifted by a stage. */
-static inline solver_report solver_program_solve(solver_program *restrict self, const real x0[NX], bool is_warm,
+static inline solver_report solver_program_solve(solver_program *restrict self, const real *x0, bool is_warm,
         solver_settings *settings)
 {
     const real worst = solver_program_follow_gains(self, x0);

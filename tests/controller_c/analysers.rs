@@ -111,6 +111,8 @@ fn analysers_find_nothing() {
             Command::new("cppcheck")
                 .args(["--std=c99", "--quiet", "--error-exitcode=1"])
                 .arg("--enable=warning,performance,portability")
+                // It takes arrays that memcpy fills for uninitialised ones without elements.
+                .arg("--suppress=ctuArrayIndex")
                 .args(&sources)
                 .current_dir(emitted.folder()),
         );

@@ -298,8 +298,9 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
             let stage = &mut self.stages[at];
             if NU <= NX && shape.soft > 0 {
                 stage.dt = -by_t * stage.soft_inverse;
+                let by_z: &mut [T; NU] = part_mut(&mut p, 0);
                 for j in 0..NU {
-                    p[j] = p[j] - stage.soft_pull[j] * stage.dt;
+                    by_z[j] = by_z[j] - stage.soft_pull[j] * stage.dt;
                 }
             }
             stage.pull(&mut p, &mut by_v);

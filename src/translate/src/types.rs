@@ -86,7 +86,7 @@ impl Type {
         }
     }
 
-    /// C's declaration of a parameter; arrays keep their length.
+    /// C's declaration of a parameter; arrays keep their length, but for constant vectors.
     pub fn parameter(
         &self,
         name: &str,
@@ -102,13 +102,10 @@ impl Type {
             ""
         };
         match of.as_ref() {
-            Self::Array(element, length) => {
-                let sized = element.declare(&format!("{name}[{restrict}{length}]"), spelling);
-                match *is_mutable || element.element().is_some() {
-                    true => sized,
-                    false => format!("const {sized}"),
-                }
+            Self::Array(element, length) if *is_mutable || element.element().is_some() => {
+                element.declare(&format!("{name}[{restrict}{length}]"), spelling)
             }
+            Self::Array(element, _) => pointer(element, false, name, spelling),
             Self::Slice(element) => {
                 pointer(element, *is_mutable, &format!("{restrict}{name}"), spelling)
             }
