@@ -13,8 +13,11 @@ use crate::train::features::{FeatureValues, Features};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Integrator {
+    /// Explicit Euler
     Euler,
+    /// Midpoint rule
     Rk2,
+    /// Classical Runge-Kutta
     Rk4,
 }
 
