@@ -28,7 +28,7 @@ const DIFFERENCE: f64 = 1e-6;
 
 /// What the dynamics of a training must keep to.
 #[derive(Clone, Debug)]
-pub struct Growth {
+pub(super) struct Growth {
     bound_per_s: Option<f64>,
     slopes: Vec<DMatrix<f64>>, // a phase: d theta / d (z, dz) at its mean state
     sequence: Vec<(usize, f64)>, // phases and their durations in s
@@ -43,7 +43,11 @@ struct Mode {
 
 impl Growth {
     /// Of these jumps: the mean state of each phase, and the most frequent order of phases with its mean durations.
-    pub fn of_jumps(bound_per_s: Option<f64>, set: EncodedSet<'_>, features: &Features) -> Self {
+    pub(super) fn of_jumps(
+        bound_per_s: Option<f64>,
+        set: EncodedSet<'_>,
+        features: &Features,
+    ) -> Self {
         let phases = 0..set.dataset.phases.patterns.len();
         Self {
             bound_per_s,
@@ -55,7 +59,7 @@ impl Growth {
     }
 
     /// Whether no phase grows faster than the bound, nor the sequence of phases.
-    pub fn admits(&self, xi: &[DMatrix<f64>]) -> bool {
+    pub(super) fn admits(&self, xi: &[DMatrix<f64>]) -> bool {
         self.excess(&self.lower_halves(xi)) == [0.0; 2]
     }
 
@@ -63,7 +67,7 @@ impl Growth {
     ///
     /// `inverse` applies the inverse of the matrix that weighs changes (`library_dim x latent_dim` a phase), and makes
     /// no change where there must not be one. Where such steps do not end, what depends on the state is scaled down.
-    pub fn hold(
+    pub(super) fn hold(
         &self,
         xi: &mut [DMatrix<f64>],
         inverse: impl Fn(&[DMatrix<f64>]) -> Vec<DMatrix<f64>>,

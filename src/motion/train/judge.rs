@@ -23,7 +23,7 @@ const LONG: usize = 1;
 
 /// A library, and samples to judge its coefficients on (`library_dim x latent_dim` a phase).
 #[derive(Clone)]
-pub struct Judge<'a> {
+pub(super) struct Judge<'a> {
     pub features: &'a Features,
     set: EncodedSet<'a>,
     windows: [Vec<Window>; 2], // short and long
@@ -31,7 +31,7 @@ pub struct Judge<'a> {
 }
 
 impl<'a> Judge<'a> {
-    pub fn new(features: &'a Features, set: EncodedSet<'a>) -> Self {
+    pub(super) fn new(features: &'a Features, set: EncodedSet<'a>) -> Self {
         let inverse_std: Vec<f64> = (0..set.latent_dim())
             .map(|row| 1.0 / row_std(set.latent, row).max(f64::MIN_POSITIVE))
             .collect();
@@ -47,7 +47,7 @@ impl<'a> Judge<'a> {
     ///
     /// In standard deviations a millimetre of a body that jumps half a metre is nothing beside a leg's error, though
     /// both are a tenth of what can be predicted: this way a tenth less counts the same wherever it is.
-    pub fn relative_to(&self, xi: &[DMatrix<f64>]) -> Self {
+    pub(super) fn relative_to(&self, xi: &[DMatrix<f64>]) -> Self {
         let mut relative = self.clone();
         for kind in [SHORT, LONG] {
             let squares = self.mean_squares(xi, kind);
@@ -62,12 +62,12 @@ impl<'a> Judge<'a> {
     }
 
     /// Score of coefficients, see [`Choice::score`](super::select::Choice::score); infinite if a rollout diverges.
-    pub fn score(&self, xi: &[DMatrix<f64>]) -> f64 {
+    pub(super) fn score(&self, xi: &[DMatrix<f64>]) -> f64 {
         self.score_within(xi, f64::MAX)
     }
 
     /// The same, or a number above `limit` if the score is: whole jumps are left out if 0.1 s are enough to know.
-    pub fn score_within(&self, xi: &[DMatrix<f64>], limit: f64) -> f64 {
+    pub(super) fn score_within(&self, xi: &[DMatrix<f64>], limit: f64) -> f64 {
         let short = self.error(xi, SHORT);
         if short > limit {
             return short;
@@ -76,13 +76,13 @@ impl<'a> Judge<'a> {
     }
 
     /// Parts that [`Self::errors`] can be asked for, one by one so that few predictions are held at a time.
-    pub fn parts(&self) -> Range<usize> {
+    pub(super) fn parts(&self) -> Range<usize> {
         0..self.set.dataset.jumps.len().div_ceil(JUMPS)
     }
 
     /// Scaled errors of 0.1 s predictions and of whole jumps of a part, every [`THINNED`]th sample;
     /// none if a rollout diverges.
-    pub fn errors(&self, xi: &[DMatrix<f64>], part: usize) -> Option<[DVector<f64>; 2]> {
+    pub(super) fn errors(&self, xi: &[DMatrix<f64>], part: usize) -> Option<[DVector<f64>; 2]> {
         let errors = [SHORT, LONG].map(|kind| {
             let mut errors = Vec::new();
             for (window, prediction) in self.predictions(xi, part, kind) {
@@ -93,7 +93,7 @@ impl<'a> Judge<'a> {
         are_finite(&errors).then_some(errors)
     }
 
-    pub fn errors_changed(
+    pub(super) fn errors_changed(
         &self,
         xi: &[DMatrix<f64>],
         changes: &[Change],

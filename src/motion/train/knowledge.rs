@@ -15,7 +15,7 @@ const HELD: usize = 2;
 
 /// Coefficients of one phase that are known, those that a regression may choose, and those that it must keep.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Knowledge {
+pub(super) struct Knowledge {
     /// `library_dim x latent_dim`, zero where nothing is known.
     pub known: DMatrix<f64>,
     /// Whether a coefficient is free, `library_dim x latent_dim`.
@@ -27,7 +27,7 @@ pub struct Knowledge {
 }
 
 impl Knowledge {
-    pub fn nothing(library_dim: usize, latent_dim: usize) -> Self {
+    pub(super) fn nothing(library_dim: usize, latent_dim: usize) -> Self {
         Self {
             known: DMatrix::zeros(library_dim, latent_dim),
             free: DMatrix::from_element(library_dim, latent_dim, true),
@@ -37,7 +37,7 @@ impl Knowledge {
     }
 
     /// Coefficients that would drive where they may only brake, set to 0.
-    pub fn brake(&self, xi: &mut DMatrix<f64>) {
+    pub(super) fn brake(&self, xi: &mut DMatrix<f64>) {
         for (coefficient, braking) in xi.iter_mut().zip(self.braking.iter()) {
             if *braking && *coefficient > 0.0 {
                 *coefficient = 0.0;
@@ -54,7 +54,7 @@ impl Knowledge {
     /// and velocity alone, and keeps its constant: gravity, less what the ground carries of the legs' weight, which
     /// forces that come from torques leave out. In flight `ddz1 = 0`, `ddz2 = -g`, and there are no forces that any term
     /// could depend on. An input acts on its own coordinate.
-    pub fn of_phases(training: &Dataset, features: &Features, frame: &Frame) -> Vec<Self> {
+    pub(super) fn of_phases(training: &Dataset, features: &Features, frame: &Frame) -> Vec<Self> {
         let (p, d) = (features.library_dim(), features.latent_dim());
         let each = training.phases.patterns.iter();
         if frame.held.ncols() < HELD {

@@ -19,7 +19,7 @@ type RankedTerm = (f64, usize, usize, usize);
 impl Search<'_> {
     /// Drops terms, the least useful to the regression first, fitting the rest of their equation again, as long as
     /// the score stays within `limit`. One attempt a term.
-    pub fn sweep(&self, trial: &mut Trial<'_>, limit: f64, monitor: &mut Monitor<'_>) {
+    pub(super) fn sweep(&self, trial: &mut Trial<'_>, limit: f64, monitor: &mut Monitor<'_>) {
         let mut order = trial.places(Regression::losses);
         order.sort_by(|a, b| a.0.total_cmp(&b.0));
         monitor.stage("dropping terms that predictions do not miss", order.len());
@@ -34,7 +34,7 @@ impl Search<'_> {
 
     /// Adds terms, those that explain most of the accelerations first, fitting their equation again, wherever the score
     /// falls by [`LEAST_GAIN`] or more. Goes round [`ROUNDS`] times, as terms explain less once others are there.
-    pub fn grow(&self, trial: &mut Trial<'_>, monitor: &mut Monitor<'_>) {
+    pub(super) fn grow(&self, trial: &mut Trial<'_>, monitor: &mut Monitor<'_>) {
         monitor.stage("adding terms that predictions gain by", ROUNDS * ATTEMPTS);
         for round in 0..ROUNDS {
             let before = trial.now.score;

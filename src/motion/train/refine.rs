@@ -47,7 +47,7 @@ pub(super) struct FreeCoefficients {
 }
 
 impl FreeCoefficients {
-    pub fn each(&self) -> impl Iterator<Item = (CoefficientIndex, f64)> {
+    pub(super) fn each(&self) -> impl Iterator<Item = (CoefficientIndex, f64)> {
         let scales = self.scales.iter().copied();
         self.places.iter().copied().zip(scales)
     }
@@ -71,7 +71,7 @@ impl Refiner<'_> {
     /// Lowers the errors that `training` measures in at most `steps` steps, and gives the coefficients that `judge`
     /// scores best on the way. Which terms are active does not change, but for those that would drive where they may
     /// only brake, nor do coefficients that are known.
-    pub fn refine(
+    pub(super) fn refine(
         &self,
         start: Coefficients,
         steps: usize,

@@ -26,7 +26,7 @@ impl Seeds {
     ///
     /// # Errors
     /// Those that other seeds would have as well.
-    pub fn add(
+    pub(super) fn add(
         &mut self,
         seed: u64,
         outcome: Outcome,
@@ -48,7 +48,7 @@ impl Seeds {
     ///
     /// # Errors
     /// The first seed's if none has a model, [`TrainError::Cancelled`] if none was begun.
-    pub fn into_model(
+    pub(super) fn into_model(
         self,
         task: Task<'_>,
         method: &str,

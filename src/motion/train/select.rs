@@ -57,7 +57,7 @@ pub struct Choice {
 ///
 /// # Errors
 /// [`TrainError::NoStableModel`] if every candidate diverges. If cancelled, the search ends as soon as one does not.
-pub fn select(
+pub(super) fn select(
     set: EncodedSet<'_>,
     knowledge: &[Knowledge],
     judge: &Judge<'_>,

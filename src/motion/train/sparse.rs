@@ -14,7 +14,7 @@ const RECOMPUTED: usize = 64;
 ///
 /// Building it reads the samples once; every solve afterwards works on `library_dim x library_dim` matrices.
 #[derive(Clone, Debug)]
-pub struct Regression {
+pub(super) struct Regression {
     gram: DMatrix<f64>,        // p x p, normalised theta^T theta / n
     correlation: DMatrix<f64>, // p x d, normalised theta^T ddz / n
     theta_rms: DVector<f64>,
@@ -37,7 +37,7 @@ pub enum Pruning {
 impl Regression {
     /// Normal equations from samples: `theta` is `n x library_dim`, `target` is `n x latent_dim`; what is known is
     /// taken off the target.
-    pub fn new(theta: &DMatrix<f64>, target: &DMatrix<f64>, knowledge: Knowledge) -> Self {
+    pub(super) fn new(theta: &DMatrix<f64>, target: &DMatrix<f64>, knowledge: Knowledge) -> Self {
         let n = theta.nrows().max(1) as f64;
         let unknown = target - theta * &knowledge.known;
         let theta_rms = column_rms(theta);
@@ -64,7 +64,7 @@ impl Regression {
     ///
     /// Contributions, not bare coefficients, decide (STLSQ of Brunton et al. 2016 otherwise), so that the units of a
     /// term do not matter. Eliminations drop terms in one and the same order, which is walked once for all of them.
-    pub fn fit_each(
+    pub(super) fn fit_each(
         &self,
         ridge: f64,
         prunings: &[Pruning],
@@ -163,7 +163,12 @@ impl Regression {
 
     /// For every term that is not active in a column: its row, and the share of the acceleration's energy that is
     /// explained with it and not without.
-    pub fn gains(&self, column: usize, support: &DMatrix<bool>, ridge: f64) -> Vec<(usize, f64)> {
+    pub(super) fn gains(
+        &self,
+        column: usize,
+        support: &DMatrix<bool>,
+        ridge: f64,
+    ) -> Vec<(usize, f64)> {
         let energy = self.energy(column);
         let (inside, outside): (Vec<usize>, Vec<usize>) =
             (self.free_terms(column)).partition(|&i| support[(i, column)]);
@@ -182,7 +187,12 @@ impl Regression {
     }
 
     /// One column of Xi on a given support (`library_dim x latent_dim`, true where a term is active).
-    pub fn fit_column(&self, column: usize, support: &DMatrix<bool>, ridge: f64) -> DVector<f64> {
+    pub(super) fn fit_column(
+        &self,
+        column: usize,
+        support: &DMatrix<bool>,
+        ridge: f64,
+    ) -> DVector<f64> {
         let rows = self.active_terms(column, support);
         let solution = self.solve(column, &rows, ridge);
         let mut xi = self.knowledge.known.clone();
@@ -192,7 +202,12 @@ impl Regression {
 
     /// What the active terms of `xi` would change by for this gradient: the inverse of the normal equations applied to
     /// it, column by column, each relative to the energy of its accelerations.
-    pub fn change(&self, xi: &DMatrix<f64>, gradient: &DMatrix<f64>, ridge: f64) -> DMatrix<f64> {
+    pub(super) fn change(
+        &self,
+        xi: &DMatrix<f64>,
+        gradient: &DMatrix<f64>,
+        ridge: f64,
+    ) -> DMatrix<f64> {
         let mut change = DMatrix::zeros(xi.nrows(), xi.ncols());
         for column in 0..xi.ncols() {
             let active = (self.free_terms(column))
@@ -213,7 +228,12 @@ impl Regression {
 
     /// For every active term of a column that may go: its row, and the share of the acceleration's energy lost
     /// without it.
-    pub fn losses(&self, column: usize, support: &DMatrix<bool>, ridge: f64) -> Vec<(usize, f64)> {
+    pub(super) fn losses(
+        &self,
+        column: usize,
+        support: &DMatrix<bool>,
+        ridge: f64,
+    ) -> Vec<(usize, f64)> {
         let energy = self.energy(column);
         let fit = self.support_fit(column, self.active_terms(column, support), ridge);
         let losses = (0..fit.support.len()).map(|j| fit.rise(j) / energy);
@@ -295,7 +315,7 @@ impl SupportFit {
     }
 }
 
-pub fn active_terms(xi: &DMatrix<f64>) -> usize {
+pub(super) fn active_terms(xi: &DMatrix<f64>) -> usize {
     xi.iter().filter(|value| **value != 0.0).count()
 }
 
@@ -312,7 +332,7 @@ mod tests {
     use crate::train::random::Random;
 
     impl Regression {
-        pub fn fit(&self, ridge: f64, pruning: Pruning) -> DMatrix<f64> {
+        pub(in crate::train) fn fit(&self, ridge: f64, pruning: Pruning) -> DMatrix<f64> {
             let all = vec![true; self.theta_rms.len()];
             self.fit_each(ridge, &[pruning], &all).remove(0)
         }

@@ -49,7 +49,7 @@ impl<'a> Task<'a> {
     ///
     /// # Errors
     /// [`TrainError`]: options out of range, too few samples, too many latent coordinates.
-    pub fn new(
+    pub(super) fn new(
         recordings: Recordings<'_>,
         robot: &'static Robot,
         options: &'a TrainOptions,

@@ -20,7 +20,7 @@ impl Refiner<'_> {
     /// Drops terms one at a time, those first that training misses least, while `judge` scores at most `limit`. What is
     /// known and what must be kept stay, and so do inputs: a controller needs what they do, whether or not the recorded
     /// ones differ enough for a prediction to miss them.
-    pub fn thin(
+    pub(super) fn thin(
         &self,
         refined: Coefficients,
         limit: f64,

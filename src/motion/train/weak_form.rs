@@ -17,7 +17,7 @@ const LARGEST: f64 = 1e150;
 ///
 /// # Errors
 /// [`TrainError::TermValue`].
-pub fn check_terms(
+pub(super) fn check_terms(
     set: EncodedSet<'_>,
     features: &Features,
     library: &Library,
@@ -59,7 +59,7 @@ pub fn check_terms(
 /// `(dz(T) - dz(0)) / T = mean of theta Xi` and `2 (z(T) - z(0) - T dz(0)) / T^2 = weighted mean of theta Xi`
 /// (the integral form of Schaeffer and McCalla 2017, here of second order). They need no accelerations and weigh
 /// coefficients by what they do to a prediction. A `window` of 0 gives the smoothed accelerations themselves.
-pub fn windowed_samples(
+pub(super) fn windowed_samples(
     set: EncodedSet<'_>,
     features: &Features,
     phase: usize,

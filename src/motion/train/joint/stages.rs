@@ -12,10 +12,10 @@ use super::loss::{DecoderLoss, JointLoss, Losses, XiLoss};
 use super::parameters::Parameters;
 
 /// Called after every epoch with its number, the losses and the active terms. Returns whether to go on.
-pub type Listener<'a> = dyn FnMut(usize, &Losses, usize) -> bool + 'a;
+pub(super) type Listener<'a> = dyn FnMut(usize, &Losses, usize) -> bool + 'a;
 
 /// Encoder, decoder and Xi together; every batch moves the Xi of its phase. Returns the mean losses of the last epoch.
-pub fn train_together(
+pub(super) fn train_together(
     parameters: &mut Parameters,
     batches: &[&Batch],
     loss: &mut JointLoss<'_>,
@@ -50,7 +50,7 @@ pub fn train_together(
 }
 
 /// The decoder alone, on batches of all phases.
-pub fn train_decoder(
+pub(super) fn train_decoder(
     parameters: &mut Parameters,
     batches: &[&Batch],
     loss: &mut JointLoss<'_>,
@@ -89,7 +89,7 @@ pub fn train_decoder(
 /// Xi of one phase alone, on its batches, from the value that `parameters` has.
 ///
 /// Where the loss has predictions over a window (41), the whole of it is evaluated.
-pub fn train_xi(
+pub(super) fn train_xi(
     parameters: &mut Parameters,
     phase: usize,
     batches: &[&Batch],

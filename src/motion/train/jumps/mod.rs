@@ -23,7 +23,7 @@ use nodes::{PartNodes, intervals, sample};
 use regression::GoalRegression;
 
 /// Fewest jumps of one kind that say how jumps depend on their goal.
-pub const LEAST_JUMPS: usize = 6;
+pub(super) const LEAST_JUMPS: usize = 6;
 /// Significant digits of what is kept: beyond those of any recording.
 const DIGITS: usize = 6;
 
@@ -34,7 +34,10 @@ struct Sampled {
 
 /// Landmarks and prior of the training jumps, and how well its deviations are explained in each of its parts; none for
 /// a nonlinear encoder or too few jumps of one kind.
-pub fn learn_jumps(set: EncodedSet<'_>, encoder: &StateMap) -> (Option<JumpPrior>, Vec<PartScore>) {
+pub(super) fn learn_jumps(
+    set: EncodedSet<'_>,
+    encoder: &StateMap,
+) -> (Option<JumpPrior>, Vec<PartScore>) {
     let (training, latent) = (set.dataset, set.latent);
     let nothing = (None, Vec::new());
     let Some(affine) = encoder.as_affine() else {
