@@ -64,7 +64,7 @@ impl Baseline {
 ///
 /// # Errors
 /// [`RecordingFault::Wrench`](crate::recording::RecordingFault::Wrench) if an angle or torque is not finite.
-pub fn fit_aslip(rule: &InputRule, segments: &[&Segment]) -> Result<Option<Aslip>, RecordingError> {
+fn fit_aslip(rule: &InputRule, segments: &[&Segment]) -> Result<Option<Aslip>, RecordingError> {
     let published = Aslip::PUBLISHED;
     let (mut rows, mut right) = (Vec::new(), Vec::new());
     for segment in segments {

@@ -31,7 +31,7 @@ impl PredictionError {
     ///
     /// These are what the dynamics predict. The robot's coordinates are made of them by the decoder: one for which no
     /// latent coordinate stands, such as pitch in a model of legs, can be off by much where it hardly moves.
-    pub fn share_of(&self, other: &Self) -> f64 {
+    pub(super) fn share_of(&self, other: &Self) -> f64 {
         let shares = self.latent.iter().zip(&other.latent);
         shares.map(|(own, other)| own / other).sum::<f64>() / self.latent.len() as f64
     }
