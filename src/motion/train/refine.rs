@@ -5,7 +5,7 @@
 //! of whole jumps do: coefficients under which a phase, or the sequence of phases, runs away predict badly (the
 //! prediction-error method, Ljung, System Identification, 2nd ed. 1999, section 7.2).
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::growth::Growth;
 use super::judge::Judge;
@@ -15,7 +15,7 @@ use super::rollout::Change;
 use super::sparse::active_terms;
 
 /// Weight of relative changes of the coefficients, against squared errors that start at 1 for both kinds of windows.
-pub(super) const PRIOR: f64 = 1e-3;
+const PRIOR: f64 = 1e-3;
 /// Relative step of the difference quotients.
 const STEP: f64 = 1e-6;
 const ATTEMPTS: usize = 6;
@@ -65,6 +65,17 @@ pub(super) struct ErrorModel {
     squared_error: f64,
     pub gram: DMatrix<f64>,
     pub gradient: DVector<f64>,
+}
+
+impl ErrorModel {
+    /// The factor of the form's matrix with the prior, and damped relative to each coefficient's own weight.
+    pub(super) fn damped(&self, damping: f64) -> Option<Cholesky<f64, Dyn>> {
+        let mut system = self.gram.clone();
+        for i in 0..system.nrows() {
+            system[(i, i)] += PRIOR + damping * self.gram[(i, i)];
+        }
+        system.cholesky()
+    }
 }
 
 impl Refiner<'_> {
@@ -121,11 +132,7 @@ impl Refiner<'_> {
             let before = cost(model.squared_error, &current);
             let gradient = &model.gradient + moved(&current) * PRIOR;
             let lower = (0..ATTEMPTS).find_map(|_| {
-                let mut system = model.gram.clone();
-                for i in 0..n {
-                    system[(i, i)] += PRIOR + damping * model.gram[(i, i)];
-                }
-                let factor = system.cholesky()?;
+                let factor = model.damped(damping)?;
                 let change = -factor.solve(&gradient);
                 let mut trial = current.clone();
                 for (((phase, term, k), scale), change) in free.each().zip(change.iter()) {
@@ -137,16 +144,12 @@ impl Refiner<'_> {
                 damping *= if after < before { 0.1 } else { 10.0 };
                 (after < before).then_some((trial, after))
             });
-            let Some((trial, after)) = lower else {
-                break;
-            };
+            let Some((trial, after)) = lower else { break };
             let score = self.score(&trial);
             monitor.done(step + 1, format!("score {score:.4}"));
             if score < best.score {
-                best = Coefficients {
-                    xi: trial.clone(),
-                    score,
-                };
+                let xi = trial.clone();
+                best = Coefficients { xi, score };
             }
             current = trial;
             if after > (1.0 - LEAST_GAIN) * before {

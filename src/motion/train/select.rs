@@ -105,6 +105,27 @@ pub(super) fn select(
         trial.now = refiner.refine(trial.now, options.refinements, monitor);
         refined.push(trial);
     }
+    let mut chosen = sparsest(refined, &refiner, options, monitor)?;
+    chosen.score_by(judge);
+    let choice = Choice {
+        window: chosen.window,
+        ridge: chosen.ridge,
+        pruning: chosen.pruning,
+        score: chosen.now.score,
+        active: chosen.now.active(),
+    };
+    Ok((chosen.now.xi, choice, candidates))
+}
+
+/// Of the best refined candidate without the terms that rollouts do not miss, and of all others within the slack of the
+/// best, the one with fewest terms.
+fn sparsest<'a>(
+    mut refined: Vec<Trial<'a>>,
+    refiner: &Refiner<'_>,
+    options: &RegressionOptions,
+    monitor: &mut Monitor<'_>,
+) -> Result<Trial<'a>, TrainError> {
+    let candidates = refined.len();
     let best = best_of(&refined)?;
     let limit = (1.0 + options.slack) * best.now.score;
     if options.refinements > 0 {
@@ -115,16 +136,7 @@ pub(super) fn select(
     let all = refined.into_iter();
     let within = all.filter(|trial| trial.now.score <= limit);
     let sparsest = within.min_by_key(|trial| trial.now.active());
-    let mut chosen = sparsest.ok_or(TrainError::NoStableModel { candidates })?;
-    chosen.score_by(judge);
-    let choice = Choice {
-        window: chosen.window,
-        ridge: chosen.ridge,
-        pruning: chosen.pruning,
-        score: chosen.now.score,
-        active: chosen.now.active(),
-    };
-    Ok((chosen.now.xi, choice, candidates))
+    sparsest.ok_or(TrainError::NoStableModel { candidates })
 }
 
 #[derive(Clone)]

@@ -7,7 +7,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::progress::Monitor;
-use super::refine::{CoefficientIndex, Coefficients, ErrorModel, FreeCoefficients, PRIOR, Refiner};
+use super::refine::{CoefficientIndex, Coefficients, ErrorModel, FreeCoefficients, Refiner};
 
 /// Damping of the changes, relative to each coefficient's own weight.
 const DAMPING: f64 = 1e-3;
@@ -104,18 +104,14 @@ struct QuadraticForm {
 
 impl QuadraticForm {
     fn new(from: &Coefficients, free: FreeCoefficients, model: &ErrorModel) -> Option<Self> {
-        let (mut system, n) = (model.gram.clone(), free.places.len());
-        for i in 0..n {
-            system[(i, i)] += PRIOR + DAMPING * model.gram[(i, i)];
-        }
-        let factor = system.cholesky()?;
+        let factor = model.damped(DAMPING)?;
         let to_zero =
             |((phase, term, k), scale): (CoefficientIndex, f64)| -from.xi[phase][(term, k)] / scale;
         Some(Self {
             to_zero: free.each().map(to_zero).collect(),
             lowest: -factor.solve(&model.gradient),
             inverse: factor.inverse(),
-            gone: vec![false; n],
+            gone: vec![false; free.places.len()],
             free,
         })
     }
