@@ -66,9 +66,6 @@ impl Recovery {
 
 /// Pushes the robot at many times of a recording, with every foot that is on the ground staying there for the time of a
 /// window.
-///
-/// # Errors
-/// Those of [`Controller::set_reference`] and [`MpcError::Recording`].
 pub(super) fn recovery(
     controller: &mut Controller,
     recording: &Recording,

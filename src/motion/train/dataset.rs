@@ -122,10 +122,6 @@ impl Dataset {
     /// Takes the samples of recordings, cut into `phases`.
     ///
     /// `smoothing` is the window of the moving average over accelerations, in samples.
-    ///
-    /// # Errors
-    /// [`TrainError::TooFewSamples`] for a segment under 50 samples; [`TrainError::Recording`] where no phase
-    /// matches, a value is not finite, or a file cannot be read.
     pub(super) fn new(
         recordings: &[Recording],
         rule: &InputRule,
@@ -215,9 +211,6 @@ impl Dataset {
     }
 
     /// Complains unless there are jumps and enough samples of every phase.
-    ///
-    /// # Errors
-    /// [`TrainError::NoRecording`] without a jump, [`TrainError::PhaseSamples`] for a phase under 50 samples.
     pub(super) fn check_for_training(&self) -> Result<(), TrainError> {
         if self.jumps.is_empty() {
             return Err(TrainError::NoRecording);

@@ -104,9 +104,6 @@ impl Task<'_> {
     }
 
     /// Chosen dynamics for an encoder and its decoder.
-    ///
-    /// # Errors
-    /// [`TrainError::TermValue`] for a term without a finite value at a sample, and those of [`select`].
     pub(super) fn fit_dynamics(
         &self,
         (encoder, decoder): (StateMap, StateMap),

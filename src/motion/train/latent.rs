@@ -171,9 +171,6 @@ pub(super) fn mean_jacobian(encoder: &StateMap, dataset: &Dataset) -> DMatrix<f6
 
 /// Decoder of least mean square error over all phases: `x ~ W_d z + b_d`, with `z` the encoded samples after the
 /// `hidden` layers of the decoder, if it has any.
-///
-/// # Errors
-/// [`TrainError::Model`] if a weight is not finite.
 pub(super) fn least_squares_decoder(
     dataset: &Dataset,
     encoder: &StateMap,

@@ -22,10 +22,7 @@ pub(super) struct Seeds {
 }
 
 impl Seeds {
-    /// Keeps the outcome of a seed.
-    ///
-    /// # Errors
-    /// Those that other seeds would have as well.
+    /// Keeps the outcome of a seed; returns an error that other seeds would have as well.
     pub(super) fn add(
         &mut self,
         seed: u64,
@@ -45,9 +42,6 @@ impl Seeds {
     }
 
     /// The model of the best seed of `task`.
-    ///
-    /// # Errors
-    /// The first seed's if none has a model, [`TrainError::Cancelled`] if none was begun.
     pub(super) fn into_model(
         self,
         task: Task<'_>,
@@ -71,9 +65,6 @@ impl Seeds {
 
     /// The seed of least score, the reports of all that have a model, best first, and the overlap of their supports;
     /// `state_covariance` (18 x 18) is that of the training states in scaled units.
-    ///
-    /// # Errors
-    /// The first seed's if none has a model, [`TrainError::Cancelled`] if none was begun.
     fn best(
         mut self,
         library: &Library,

@@ -53,10 +53,7 @@ pub struct Choice {
 /// were.
 ///
 /// Fits the jumps of `set` with what is known of each phase, for the library of `judge`. The best by `judge` sets the
-/// scale: from there on errors are relative to its own.
-///
-/// # Errors
-/// [`TrainError::NoStableModel`] if every candidate diverges. If cancelled, the search ends as soon as one does not.
+/// scale: from there on errors are relative to its own. If cancelled, the search ends as soon as a candidate is stable.
 pub(super) fn select(
     set: EncodedSet<'_>,
     knowledge: &[Knowledge],

@@ -46,9 +46,6 @@ pub(super) struct Task<'a> {
 
 impl<'a> Task<'a> {
     /// Checks the options, reads the data sets and cuts them into phases, and checks them against the options.
-    ///
-    /// # Errors
-    /// [`TrainError`]: options out of range, too few samples, too many latent coordinates.
     pub(super) fn new(
         recordings: Recordings<'_>,
         robot: &'static Robot,

@@ -14,9 +14,6 @@ const STRIDE: usize = 5;
 const LARGEST: f64 = 1e150;
 
 /// Complains about the first term of `library` without a finite value at a sample, or with one whose square overflows.
-///
-/// # Errors
-/// [`TrainError::TermValue`].
 pub(super) fn check_terms(
     set: EncodedSet<'_>,
     features: &Features,

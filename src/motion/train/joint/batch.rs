@@ -52,9 +52,6 @@ impl Batch {
 }
 
 /// Batches of all phases of all recordings, in their order, with the phases, inputs, units and smoothing of `dataset`.
-///
-/// # Errors
-/// [`TrainError::Recording`] for what cannot be resampled or turned into inputs.
 pub(super) fn batches(
     recordings: &[Recording],
     dataset: &Dataset,

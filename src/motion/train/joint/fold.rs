@@ -26,9 +26,6 @@ impl LatentBasis {
 }
 
 /// Encoder and decoder between scaled states and latent coordinates in `basis`.
-///
-/// # Errors
-/// [`ModelError`] for numbers that are not finite, as a training that diverged leaves them.
 pub(super) fn folded(
     parameters: &Parameters,
     frame: &Frame,
