@@ -1,7 +1,5 @@
 //! What can keep a model from being trained.
 
-#![allow(missing_docs, reason = "each variant's message names its fields")]
-
 use std::path::PathBuf;
 
 use thiserror::Error;
