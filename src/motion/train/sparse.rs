@@ -10,6 +10,9 @@ const LEAST_RIDGE: f64 = 1e-10;
 /// Supports up to this size are solved anew after every elimination, larger ones by an update.
 const RECOMPUTED: usize = 64;
 
+/// Which terms are active, `library_dim x latent_dim`.
+type Support = DMatrix<bool>;
+
 /// Normal equations of `ddz = theta Xi` for one phase, columns normalised to unit root mean square.
 ///
 /// Building it reads the samples once; every solve afterwards works on `library_dim x library_dim` matrices.
@@ -163,12 +166,7 @@ impl Regression {
 
     /// For every term that is not active in a column: its row, and the share of the acceleration's energy that is
     /// explained with it and not without.
-    pub(super) fn gains(
-        &self,
-        column: usize,
-        support: &DMatrix<bool>,
-        ridge: f64,
-    ) -> Vec<(usize, f64)> {
+    pub(super) fn gains(&self, column: usize, support: &Support, ridge: f64) -> Vec<(usize, f64)> {
         let energy = self.energy(column);
         let (inside, outside): (Vec<usize>, Vec<usize>) =
             (self.free_terms(column)).partition(|&i| support[(i, column)]);
@@ -187,12 +185,7 @@ impl Regression {
     }
 
     /// One column of Xi on a given support (`library_dim x latent_dim`, true where a term is active).
-    pub(super) fn fit_column(
-        &self,
-        column: usize,
-        support: &DMatrix<bool>,
-        ridge: f64,
-    ) -> DVector<f64> {
+    pub(super) fn fit_column(&self, column: usize, support: &Support, ridge: f64) -> DVector<f64> {
         let rows = self.active_terms(column, support);
         let solution = self.solve(column, &rows, ridge);
         let mut xi = self.knowledge.known.clone();
@@ -228,12 +221,7 @@ impl Regression {
 
     /// For every active term of a column that may go: its row, and the share of the acceleration's energy lost
     /// without it.
-    pub(super) fn losses(
-        &self,
-        column: usize,
-        support: &DMatrix<bool>,
-        ridge: f64,
-    ) -> Vec<(usize, f64)> {
+    pub(super) fn losses(&self, column: usize, support: &Support, ridge: f64) -> Vec<(usize, f64)> {
         let energy = self.energy(column);
         let fit = self.support_fit(column, self.active_terms(column, support), ridge);
         let losses = (0..fit.support.len()).map(|j| fit.rise(j) / energy);
@@ -248,7 +236,7 @@ impl Regression {
     }
 
     /// Those of them that are active in a support.
-    fn active_terms(&self, column: usize, support: &DMatrix<bool>) -> Vec<usize> {
+    fn active_terms(&self, column: usize, support: &Support) -> Vec<usize> {
         let free = self.free_terms(column);
         free.filter(|&i| support[(i, column)]).collect()
     }
