@@ -11,7 +11,7 @@ use super::latent::{EncodedSet, Latent, input_projection, lift_samples, mean_jac
 use super::metrics::{BODY_X, BODY_Z, SetMetrics, measure};
 use super::progress::Monitor;
 use super::report::{PhaseTerms, SeedReport, TrainReport};
-use super::rollout::Candidate;
+use super::rollout::{Candidate, Xi};
 use super::select::{Choice, select};
 use super::sparse::active_terms;
 use super::task::Task;
@@ -45,7 +45,7 @@ impl Maps {
 
 pub(super) struct Fitted {
     pub maps: Maps,
-    pub xi: Vec<DMatrix<f64>>,
+    pub xi: Vec<Xi>,
     /// The regression, if Xi was chosen among regressions, and how many were tried.
     pub choice: Option<(Choice, usize)>,
     /// What seeds are compared by, see [`SeedReport::score`].

@@ -11,7 +11,7 @@ use super::growth::Growth;
 use super::judge::Judge;
 use super::knowledge::Knowledge;
 use super::progress::Monitor;
-use super::rollout::Change;
+use super::rollout::{Change, Xi};
 use super::sparse::active_terms;
 
 /// Weight of relative changes of the coefficients, against squared errors that start at 1 for both kinds of windows.
@@ -29,7 +29,7 @@ pub(super) type CoefficientIndex = (usize, usize, usize);
 /// Coefficients of all phases, `library_dim x latent_dim` each, and the score that judges them.
 #[derive(Clone, Debug)]
 pub(super) struct Coefficients {
-    pub xi: Vec<DMatrix<f64>>,
+    pub xi: Vec<Xi>,
     pub score: f64,
 }
 
@@ -106,15 +106,13 @@ impl Refiner<'_> {
         monitor: &mut Monitor<'_>,
     ) -> Coefficients {
         let n = free.places.len();
-        let moved = |xi: &[DMatrix<f64>]| {
+        let moved = |xi: &[Xi]| {
             let change = |((phase, term, k), scale): (CoefficientIndex, f64)| {
                 (xi[phase][(term, k)] - start.xi[phase][(term, k)]) / scale
             };
             DVector::from_iterator(n, free.each().map(change))
         };
-        let cost = |squared_error: f64, xi: &[DMatrix<f64>]| {
-            squared_error + PRIOR * moved(xi).norm_squared()
-        };
+        let cost = |squared_error: f64, xi: &[Xi]| squared_error + PRIOR * moved(xi).norm_squared();
         let mut current = start.xi.clone();
         self.admit(&mut current, free, Clone::clone);
         let mut best = Coefficients {
@@ -163,7 +161,7 @@ impl Refiner<'_> {
     /// `inverse` applies that of the matrix which weighs relative changes of the `free` coefficients.
     fn admit(
         &self,
-        xi: &mut [DMatrix<f64>],
+        xi: &mut [Xi],
         free: &FreeCoefficients,
         inverse: impl Fn(&DVector<f64>) -> DVector<f64>,
     ) {
@@ -182,19 +180,19 @@ impl Refiner<'_> {
     }
 
     /// Coefficients that would drive where they may only brake, set to 0.
-    pub(super) fn brake(&self, xi: &mut [DMatrix<f64>]) {
+    pub(super) fn brake(&self, xi: &mut [Xi]) {
         for (knowledge, xi) in self.knowledge.iter().zip(xi) {
             knowledge.brake(xi);
         }
     }
 
     /// Score of coefficients, infinite if they grow faster than they may or diverge.
-    pub(super) fn score(&self, xi: &[DMatrix<f64>]) -> f64 {
+    pub(super) fn score(&self, xi: &[Xi]) -> f64 {
         self.score_within(xi, f64::MAX)
     }
 
     /// The same, or a number above `limit` if the score is.
-    pub(super) fn score_within(&self, xi: &[DMatrix<f64>], limit: f64) -> f64 {
+    pub(super) fn score_within(&self, xi: &[Xi], limit: f64) -> f64 {
         match self.growth.admits(xi) {
             true => self.judge.score_within(xi, limit),
             false => f64::INFINITY,
@@ -202,23 +200,18 @@ impl Refiner<'_> {
     }
 
     /// Errors of a part, weighted and stacked; none if a rollout diverges.
-    fn residual(
-        &self,
-        xi: &[DMatrix<f64>],
-        weights: [f64; 2],
-        part: usize,
-    ) -> Option<DVector<f64>> {
+    fn residual(&self, xi: &[Xi], weights: [f64; 2], part: usize) -> Option<DVector<f64>> {
         Some(stacked(&self.training.errors(xi, part)?, weights))
     }
 
     /// Squared errors of all parts; none if a rollout diverges.
-    fn squared_error(&self, xi: &[DMatrix<f64>], weights: [f64; 2]) -> Option<f64> {
+    fn squared_error(&self, xi: &[Xi], weights: [f64; 2]) -> Option<f64> {
         let of_part = |part| Some(self.residual(xi, weights, part)?.norm_squared());
         self.training.parts().map(of_part).sum()
     }
 
     /// Weights under which the squared errors of both kinds of windows are 1; none if a rollout diverges.
-    pub(super) fn weights(&self, xi: &[DMatrix<f64>]) -> Option<[f64; 2]> {
+    pub(super) fn weights(&self, xi: &[Xi]) -> Option<[f64; 2]> {
         let mut squares = [0.0; 2];
         for part in self.training.parts() {
             let errors = self.training.errors(xi, part)?;
@@ -232,7 +225,7 @@ impl Refiner<'_> {
     /// The squared errors about `xi`; none if a rollout diverges.
     pub(super) fn model(
         &self,
-        xi: &[DMatrix<f64>],
+        xi: &[Xi],
         free: &FreeCoefficients,
         weights: [f64; 2],
     ) -> Option<ErrorModel> {
@@ -265,7 +258,7 @@ impl Refiner<'_> {
         Some(model)
     }
 
-    pub(super) fn free(&self, xi: &[DMatrix<f64>]) -> FreeCoefficients {
+    pub(super) fn free(&self, xi: &[Xi]) -> FreeCoefficients {
         let (mut places, mut scales) = (Vec::new(), Vec::new());
         for (phase, (xi, knowledge)) in xi.iter().zip(self.knowledge).enumerate() {
             for (index, (value, free)) in xi.iter().zip(knowledge.free.iter()).enumerate() {

@@ -18,12 +18,14 @@ const DIVERGED: f64 = 1e6;
 /// Input of the step (start, middle, end) that each stage has, and its share of the step.
 const STAGES: [(usize, f64); 4] = [(0, 0.0), (1, 0.5), (1, 0.5), (2, 1.0)];
 
+/// Coefficients of one phase, `library_dim x latent_dim`.
+pub(super) type Xi = DMatrix<f64>;
+
 /// Latent dynamics under trial: `ddz = Xi_phase^T theta(z, dz, u_lat)`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Candidate<'a> {
     pub features: &'a Features,
-    /// Coefficients a phase, `library_dim x latent_dim`.
-    pub xi: &'a [DMatrix<f64>],
+    pub xi: &'a [Xi],
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]

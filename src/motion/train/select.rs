@@ -2,7 +2,6 @@
 
 use std::collections::BTreeSet;
 
-use nalgebra::DMatrix;
 use serde::Serialize;
 
 use super::error::TrainError;
@@ -13,6 +12,7 @@ use super::latent::EncodedSet;
 use super::options::RegressionOptions;
 use super::progress::Monitor;
 use super::refine::{Coefficients, Refiner};
+use super::rollout::Xi;
 use super::sparse::{Pruning, Regression};
 use super::weak_form::windowed_samples;
 
@@ -60,7 +60,7 @@ pub(super) fn select(
     judge: &Judge<'_>,
     options: &RegressionOptions,
     monitor: &mut Monitor<'_>,
-) -> Result<(Vec<DMatrix<f64>>, Choice, usize), TrainError> {
+) -> Result<(Vec<Xi>, Choice, usize), TrainError> {
     let features = judge.features;
     let regressions = &WINDOWS.map(|window| {
         let of_phase = |(phase, knowledge): (usize, &Knowledge)| {
@@ -212,7 +212,7 @@ impl<'a> Search<'a> {
                 }
                 let each = regressions.iter();
                 let fits = each.map(|regression| regression.fit_each(ridge, &PRUNINGS, allowed));
-                let fits: Vec<Vec<DMatrix<f64>>> = fits.collect();
+                let fits: Vec<Vec<Xi>> = fits.collect();
                 for (number, pruning) in PRUNINGS.into_iter().enumerate() {
                     let xi: Vec<_> = fits.iter().map(|phase| phase[number].clone()).collect();
                     let score = self.judge.score(&xi);

@@ -8,6 +8,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::progress::Monitor;
 use super::refine::{CoefficientIndex, Coefficients, ErrorModel, FreeCoefficients, Refiner};
+use super::rollout::Xi;
 
 /// Damping of the changes, relative to each coefficient's own weight.
 const DAMPING: f64 = 1e-3;
@@ -130,7 +131,7 @@ impl QuadraticForm {
         next
     }
 
-    fn xi(&self, from: &Coefficients) -> Vec<DMatrix<f64>> {
+    fn xi(&self, from: &Coefficients) -> Vec<Xi> {
         let mut xi = from.xi.clone();
         for (i, ((phase, term, column), scale)) in self.free.each().enumerate() {
             let change = self.lowest[i] * scale;
