@@ -40,18 +40,7 @@ impl Coefficients {
 }
 
 /// Coefficients that may change, and their sizes, which changes are relative to.
-#[derive(Clone)]
-pub(super) struct FreeCoefficients {
-    pub places: Vec<CoefficientIndex>,
-    pub scales: Vec<f64>,
-}
-
-impl FreeCoefficients {
-    pub(super) fn each(&self) -> impl Iterator<Item = (CoefficientIndex, f64)> {
-        let scales = self.scales.iter().copied();
-        self.places.iter().copied().zip(scales)
-    }
-}
+pub(super) type FreeCoefficients = Vec<(CoefficientIndex, f64)>;
 
 pub(super) struct Refiner<'a> {
     pub knowledge: &'a [Knowledge],
@@ -89,7 +78,7 @@ impl Refiner<'_> {
         monitor: &mut Monitor<'_>,
     ) -> Coefficients {
         let free = self.free(&start.xi);
-        let Some(weights) = self.weights(&start.xi).filter(|_| !free.places.is_empty()) else {
+        let Some(weights) = self.weights(&start.xi).filter(|_| !free.is_empty()) else {
             return start;
         };
         monitor.stage("refining coefficients by rollouts", steps);
@@ -100,17 +89,17 @@ impl Refiner<'_> {
     fn descend(
         &self,
         start: Coefficients,
-        free: &FreeCoefficients,
+        free: &[(CoefficientIndex, f64)],
         weights: [f64; 2],
         steps: usize,
         monitor: &mut Monitor<'_>,
     ) -> Coefficients {
-        let n = free.places.len();
+        let n = free.len();
         let moved = |xi: &[Xi]| {
             let change = |((phase, term, k), scale): (CoefficientIndex, f64)| {
                 (xi[phase][(term, k)] - start.xi[phase][(term, k)]) / scale
             };
-            DVector::from_iterator(n, free.each().map(change))
+            DVector::from_iterator(n, free.iter().copied().map(change))
         };
         let cost = |squared_error: f64, xi: &[Xi]| squared_error + PRIOR * moved(xi).norm_squared();
         let mut current = start.xi.clone();
@@ -133,7 +122,7 @@ impl Refiner<'_> {
                 let factor = model.damped(damping)?;
                 let change = -factor.solve(&gradient);
                 let mut trial = current.clone();
-                for (((phase, term, k), scale), change) in free.each().zip(change.iter()) {
+                for (((phase, term, k), scale), change) in free.iter().copied().zip(change.iter()) {
                     trial[phase][(term, k)] += change * scale;
                 }
                 self.admit(&mut trial, free, |gradient| factor.solve(gradient));
@@ -162,16 +151,16 @@ impl Refiner<'_> {
     fn admit(
         &self,
         xi: &mut [Xi],
-        free: &FreeCoefficients,
+        free: &[(CoefficientIndex, f64)],
         inverse: impl Fn(&DVector<f64>) -> DVector<f64>,
     ) {
         self.growth.hold(xi, |gradient| {
-            let relative = free.each();
+            let relative = free.iter().copied();
             let relative =
                 relative.map(|((phase, term, k), scale)| gradient[phase][(term, k)] * scale);
-            let change = inverse(&DVector::from_iterator(free.places.len(), relative));
+            let change = inverse(&DVector::from_iterator(free.len(), relative));
             let mut all: Vec<_> = gradient.iter().map(|each| each.map(|_| 0.0)).collect();
-            for (((phase, term, k), scale), change) in free.each().zip(&change) {
+            for (((phase, term, k), scale), change) in free.iter().copied().zip(&change) {
                 all[phase][(term, k)] = change * scale;
             }
             all
@@ -226,10 +215,10 @@ impl Refiner<'_> {
     pub(super) fn model(
         &self,
         xi: &[Xi],
-        free: &FreeCoefficients,
+        free: &[(CoefficientIndex, f64)],
         weights: [f64; 2],
     ) -> Option<ErrorModel> {
-        let n = free.places.len();
+        let n = free.len();
         let mut model = ErrorModel {
             squared_error: 0.0,
             gram: DMatrix::zeros(n, n),
@@ -243,7 +232,7 @@ impl Refiner<'_> {
             let residual = self.residual(xi, weights, part)?;
             let mut sensitivity = DMatrix::zeros(residual.len(), n);
             for first in (0..n).step_by(TOGETHER) {
-                let each = free.each().skip(first).take(TOGETHER);
+                let each = free.iter().copied().skip(first).take(TOGETHER);
                 let changes: Vec<_> = each.map(change).collect();
                 let moved = self.training.errors_changed(xi, &changes, part)?;
                 for (column, moved) in (first..).zip(&moved) {
@@ -259,17 +248,16 @@ impl Refiner<'_> {
     }
 
     pub(super) fn free(&self, xi: &[Xi]) -> FreeCoefficients {
-        let (mut places, mut scales) = (Vec::new(), Vec::new());
+        let mut all = Vec::new();
         for (phase, (xi, knowledge)) in xi.iter().zip(self.knowledge).enumerate() {
             for (index, (value, free)) in xi.iter().zip(knowledge.free.iter()).enumerate() {
                 if *value != 0.0 && *free {
                     let (term, column) = xi.vector_to_matrix_index(index);
-                    places.push((phase, term, column));
-                    scales.push(value.abs());
+                    all.push(((phase, term, column), value.abs()));
                 }
             }
         }
-        FreeCoefficients { places, scales }
+        all
     }
 }
 

@@ -31,11 +31,11 @@ impl Refiner<'_> {
             return refined;
         };
         let mut thinned = refined;
-        let total = self.free(&thinned.xi).places.len();
+        let total = self.free(&thinned.xi).len();
         monitor.stage("dropping terms that rollouts do not miss", total);
         while !monitor.cancelled() {
             let free = self.free(&thinned.xi);
-            let before = free.places.len();
+            let before = free.len();
             let model = self.model(&thinned.xi, &free, weights);
             let form = model.and_then(|model| QuadraticForm::new(&thinned, free, &model));
             let Some(mut form) = form else { break };
@@ -83,7 +83,7 @@ impl Refiner<'_> {
             !inputs.contains(&term) && !self.knowledge[phase].kept[(term, column)]
         };
         let mut order: Vec<usize> = (0..form.gone.len())
-            .filter(|&i| !form.gone[i] && may_go(form.free.places[i]))
+            .filter(|&i| !form.gone[i] && may_go(form.free[i].0))
             .collect();
         order.sort_by(|&a, &b| form.loss(a).total_cmp(&form.loss(b)));
         order
@@ -109,10 +109,10 @@ impl QuadraticForm {
         let to_zero =
             |((phase, term, k), scale): (CoefficientIndex, f64)| -from.xi[phase][(term, k)] / scale;
         Some(Self {
-            to_zero: free.each().map(to_zero).collect(),
+            to_zero: free.iter().copied().map(to_zero).collect(),
             lowest: -factor.solve(&model.gradient),
             inverse: factor.inverse(),
-            gone: vec![false; free.places.len()],
+            gone: vec![false; free.len()],
             free,
         })
     }
@@ -133,7 +133,7 @@ impl QuadraticForm {
 
     fn xi(&self, from: &Coefficients) -> Vec<Xi> {
         let mut xi = from.xi.clone();
-        for (i, ((phase, term, column), scale)) in self.free.each().enumerate() {
+        for (i, ((phase, term, column), scale)) in self.free.iter().copied().enumerate() {
             let change = self.lowest[i] * scale;
             let coefficient = &mut xi[phase][(term, column)];
             *coefficient = match self.gone[i] {
