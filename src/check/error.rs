@@ -7,7 +7,6 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
-use crate::artifact::ArtifactError;
 use crate::import::ImportError;
 use crate::symbolic::ParseError;
 
@@ -21,9 +20,7 @@ pub enum CheckError {
     )]
     Kind { file: String, found: String },
     #[error(transparent)]
-    Model(#[from] ArtifactError),
-    #[error(transparent)]
-    Equations(#[from] ImportError),
+    File(#[from] ImportError),
     /// An equation that is too large once its numbers are kept as they are written.
     #[error("{file}:{line}: not a usable equation")]
     Expression {

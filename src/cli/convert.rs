@@ -12,7 +12,7 @@ use super::destination::{Format, Inputs};
 use super::output::{names, read_with, reader};
 use crate::files::Overwrite;
 use crate::recording::{
-    Clocks, Recording, RecordingFault, Segment, WriteOptions, write_as, write_mcap_as,
+    Clocks, Recording, RecordingFault, Segment, WriteOptions, write_as, write_mcap,
 };
 use crate::{Error, artifact};
 
@@ -85,7 +85,7 @@ pub fn write_recording(
         let [segment] = &segments[..] else {
             return Err(Error::OneSegment(segments.len()));
         };
-        write_mcap_as(path, segment, inputs.map(|inputs| &inputs[0]), overwrite)
+        write_mcap(path, segment, inputs.map(|inputs| &inputs[0]), overwrite)
     } else {
         let recording = Recording {
             path: path.to_owned(),

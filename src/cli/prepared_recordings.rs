@@ -1,7 +1,6 @@
-//! Recordings on their way into a training: divided into sets, checked, conditioned while they are read.
+//! Recordings on their way into a training: divided into sets, checked, conditioned.
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use serde_json::{Map, Value, json};
 
@@ -11,10 +10,10 @@ use super::output::{note, reader, report_reading};
 use super::train_settings;
 use crate::Error;
 use crate::recording::check::Finding;
-use crate::recording::files::Notes;
+use crate::recording::files::as_recorded;
 use crate::recording::{
     Clocks, ConditionOptions, ImplausibleSamples, Reader, Recording, RecordingError, RecordingFile,
-    RecordingFiles,
+    RecordingSet,
 };
 use crate::robot::Robot;
 use crate::typeset::words::counted;
@@ -25,10 +24,14 @@ type Place = (PathBuf, usize, usize);
 /// Names of the sets of a training.
 const SETS: [&str; 3] = ["training", "validation", "test"];
 
-/// The recordings of a training; their files are read when the samples are needed.
+/// The recordings of a training.
 pub struct RecordedSets {
-    /// Jumps that the model is fitted to, those that choose between candidates, and those used only for the final metrics.
-    pub sets: [Arc<RecordingFiles>; 3],
+    /// Jumps that the model is fitted to, those that choose between candidates, and those used only for the final
+    /// metrics; empty before [`Self::read`].
+    pub sets: [RecordingSet; 3],
+    files: [Vec<RecordingFile>; 3],
+    robot: &'static Robot,
+    reader: Reader,
     /// The jumps of each set, if they were divided.
     pub divided: Option<[Vec<Place>; 3]>,
     options: ConditionOptions,
@@ -81,16 +84,29 @@ impl RecordedSets {
         robot: &'static Robot,
         reader: Reader,
     ) -> Self {
-        let options = train_settings::conditioning(settings);
-        let sets = files.map(|files| {
-            let (options, reader) = (options.clone(), reader.clone());
-            Arc::new(RecordingFiles::new(files, robot, options, reader))
-        });
         Self {
-            sets,
+            sets: Default::default(),
+            files,
+            robot,
+            reader,
             divided: None,
-            options,
+            options: train_settings::conditioning(settings),
         }
+    }
+
+    /// The first training recordings as recorded.
+    pub fn first(&self, count: usize) -> Result<Vec<Recording>, RecordingError> {
+        let files = &self.files[0];
+        as_recorded(&files[..count.min(files.len())], self.robot, &self.reader)
+    }
+
+    /// Reads all sets, those of the test first.
+    pub fn read(&mut self) -> Result<(), RecordingError> {
+        for set in [2, 0, 1] {
+            let files = &self.files[set];
+            self.sets[set].read(files, self.robot, &self.options, &self.reader)?;
+        }
+        Ok(())
     }
 
     /// Which jumps came into which set, file and first row of each, if they were divided: in words and as JSON.
@@ -121,7 +137,7 @@ impl RecordedSets {
     pub fn files(&self) -> [(&'static str, Vec<&Path>); 3] {
         let mut seen: Vec<&Path> = Vec::new();
         std::array::from_fn(|set| {
-            let files = self.sets[set].files().iter();
+            let files = self.files[set].iter();
             let files = files.map(|file| file.path.as_path());
             let new = files.filter(|path| self.divided.is_none() || !seen.contains(path));
             let new: Vec<&Path> = new.collect();
@@ -130,27 +146,19 @@ impl RecordedSets {
         })
     }
 
-    /// The notes of all sets together, as far as files were read.
-    fn notes(&self) -> Notes {
-        let mut all = Notes::default();
-        for set in &self.sets {
-            all.add(set.notes());
-        }
-        all
-    }
-
     /// Reports on stderr which files have implausible samples, and what became of them.
     pub fn report_findings(&self) {
-        report_reading(&self.sets[0].notes().reading);
-        let notes = self.notes();
-        for (file, mismatch) in &notes.mismatches {
+        report_reading(&self.sets[0].reading);
+        for (file, mismatch) in self.sets.iter().flat_map(|set| &set.mismatches) {
             note(&format!("{}: {mismatch}", file.display()));
         }
+        let findings = self.sets.iter().flat_map(|set| &set.findings);
         let (findings, singular): (Vec<_>, Vec<_>) =
-            (notes.findings.into_iter()).partition(|(_, finding)| finding.kind.can_be_left_out());
+            findings.partition(|(_, finding)| finding.kind.can_be_left_out());
+        let left_out = self.left_out();
         report_singular(&singular);
         let mut files: Vec<(&Path, usize, &Finding)> = Vec::new();
-        for (file, finding) in &findings {
+        for (file, finding) in findings.iter().copied() {
             match files.iter_mut().find(|(known, ..)| known == file) {
                 Some((_, runs, _)) => *runs += 1,
                 None => files.push((file, 1, finding)),
@@ -163,8 +171,8 @@ impl RecordedSets {
             ));
         }
         match self.options.implausible {
-            ImplausibleSamples::LeaveOut if notes.left_out > 0 => {
-                note(&format!("{} samples are left out", notes.left_out));
+            ImplausibleSamples::LeaveOut if left_out > 0 => {
+                note(&format!("{left_out} samples are left out"));
             }
             ImplausibleSamples::Keep if !findings.is_empty() => note(
                 "they are used; `romc inspect` lists them, --leave-out-implausible leaves them out",
@@ -173,27 +181,30 @@ impl RecordedSets {
         }
     }
 
+    fn left_out(&self) -> usize {
+        self.sets.iter().map(|set| set.left_out).sum()
+    }
+
     /// Every finding with its place, and how many samples were left out.
     pub fn findings_json(&self) -> Value {
-        let notes = self.notes();
         let of_file = |file: &Path, mut value: Value| {
             value["file"] = json!(file.display().to_string());
             value
         };
-        let findings = notes.findings.iter();
+        let findings = self.sets.iter().flat_map(|set| &set.findings);
         let findings = findings.map(|(file, found)| of_file(file, finding_json(found)));
-        let unlike = notes.mismatches.iter();
+        let unlike = self.sets.iter().flat_map(|set| &set.mismatches);
         let unlike = unlike.map(|(file, found)| of_file(file, json!(found)));
         json!({
             "implausible": findings.collect::<Vec<_>>(),
             "mismatches": unlike.collect::<Vec<_>>(),
-            "left_out": notes.left_out,
+            "left_out": self.left_out(),
         })
     }
 }
 
 /// Reports on stderr which files have legs near a singularity while they are on the ground.
-fn report_singular(findings: &[(PathBuf, Finding)]) {
+fn report_singular(findings: &[&(PathBuf, Finding)]) {
     let of_file = findings.chunk_by(|(one, _), (other, _)| one == other);
     for runs in of_file {
         let samples: usize = runs.iter().map(|(_, finding)| finding.samples.len()).sum();
@@ -204,16 +215,6 @@ fn report_singular(findings: &[(PathBuf, Finding)]) {
             runs[0].1
         ));
     }
-}
-
-/// All recordings of a set of files, in memory.
-pub fn read_all(files: &RecordingFiles) -> Result<Vec<Recording>, Error> {
-    let mut all = Vec::new();
-    files.for_each(|recording| {
-        all.push(recording);
-        Ok::<_, RecordingError>(())
-    })?;
-    Ok(all)
 }
 
 /// The reader of a training: clocks are repaired unless told otherwise, or to train as published.

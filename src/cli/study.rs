@@ -8,7 +8,7 @@ use super::Answer;
 use super::args::{StudyArguments, TrainSettings};
 use super::destination::Inputs;
 use super::output::{note, refused, spinner};
-use super::prepared_recordings::{RecordedSets, read_all, reader_for};
+use super::prepared_recordings::{RecordedSets, reader_for};
 use super::train_settings;
 use crate::Error;
 use crate::files::{EmittedFile, check_folder};
@@ -59,21 +59,21 @@ fn merged(arguments: &StudyArguments) -> Result<Store, Error> {
 fn trained(arguments: &StudyArguments) -> Result<Store, Error> {
     let mut settings = settings(arguments)?;
     let robot = train_settings::robot(&settings)?;
-    let recorded = RecordedSets::whole(
+    let mut recorded = RecordedSets::whole(
         [&arguments.recordings, &arguments.validation, &[]],
         &settings,
         robot,
         reader_for(&arguments.reading, &settings)?,
     );
-    let [of_training, of_validation, _] = &recorded.sets;
-    let training = read_all(of_training)?;
-    let validation = read_all(of_validation)?;
+    recorded.read()?;
     recorded.report_findings();
+    let [training, validation, _] = &recorded.sets;
+    let [training, validation] = [training, validation].map(|set| &set.recordings[..]);
     let mut base = train_settings::options(&settings, 1, String::new(), robot)?;
-    train_settings::identified(&mut base, &settings, of_training, robot)?;
+    train_settings::identified(&mut base, &settings, &recorded, robot)?;
     settings.wrench_frame = Some(base.wrench_frame);
     settings.actuators = Some(train_settings::actuators(&settings).to_owned());
-    let plan = plan(arguments, &settings, &training, &validation);
+    let plan = plan(arguments, &settings, training, validation);
     if plan.method == Method::ClosedForm && plan.seeds > FOLDS {
         let message = "has seeds from 6 on leave out the jumps of seeds 1 to 5 again";
         note(&format!(
@@ -89,7 +89,7 @@ fn trained(arguments: &StudyArguments) -> Result<Store, Error> {
         bar.set_message(format!("{} of {total} models trained", total - left));
     };
     let shard = arguments.shard.unwrap_or(Shard::WHOLE);
-    let sets = [&training[..], &validation];
+    let sets = [training, validation];
     study::run(&store, shard, sets, robot, &base, &finished)?;
     bar.finish_and_clear();
     Ok(store)

@@ -7,13 +7,14 @@ use serde_json::{Map, Value};
 
 use super::args::{PhaseSet, TrainArguments, TrainSettings, Widths};
 use super::output::{note, quoted_text, read_settings, refused};
+use super::prepared_recordings::RecordedSets;
 use super::robot::chosen;
 use crate::Error;
 use crate::identify::{IdentifyError, identify};
 use crate::limits::of_training;
 use crate::limits::table::LAYER_WIDTH;
 use crate::model::{Activation, LibraryChoice, StandardLibrary};
-use crate::recording::{ConditionOptions, ImplausibleSamples, PhaseRule, RecordingFiles};
+use crate::recording::{ConditionOptions, ImplausibleSamples, PhaseRule};
 use crate::robot::{Actuators, Robot};
 use crate::robot_file::read_actuators;
 use crate::train::{
@@ -90,10 +91,10 @@ pub(super) fn options(
 pub(super) fn identified(
     options: &mut TrainOptions,
     settings: &TrainSettings,
-    recordings: &RecordingFiles,
+    recorded: &RecordedSets,
     robot: &Robot,
 ) -> Result<(), Error> {
-    let found = identify(&recordings.first(IDENTIFIED_FROM)?, robot);
+    let found = identify(&recorded.first(IDENTIFIED_FROM)?, robot);
     if actuators(settings) != IDENTIFIED
         && !matches!(found, Err(IdentifyError::Contradiction { .. }))
     {

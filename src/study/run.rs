@@ -75,7 +75,7 @@ fn train(
         let never = AtomicBool::new(false);
         let mut deaf = |_| {};
         let mut watch = Watch::new(&mut deaf, &never);
-        method.learn(sets.clone(), robot, options, &Origin::default(), &mut watch)
+        method.learn(sets, robot, options, &Origin::default(), &mut watch)
     };
     let mut trained = learn(&options);
     if matches!(trained, Err(TrainError::LatentDim { .. })) {

@@ -10,12 +10,11 @@ use super::interpolate::{Between, at_times};
 use super::log::Log;
 use super::map::{ColumnMap, Frame, Origin};
 use super::signal::{Signal, Source};
-use crate::recording::columns::Column;
 use crate::recording::error::{RecordingError, RecordingFault};
 use crate::recording::preprocess::differences_within;
 use crate::recording::reader::Reading;
-use crate::recording::segment::Recording;
-use crate::recording::segments::{DERIVED_DDX, EPOCH_S, Sample, SegmentBuilder, begins_segment};
+use crate::recording::segment::{Recording, Segment};
+use crate::recording::segments::{DERIVED_DDX, EPOCH_S, divided, ranges};
 use crate::robot::FOOT_DIM;
 
 /// Largest distance between samples of a topic that is interpolated, in s.
@@ -93,13 +92,11 @@ struct Rows<'a> {
 }
 
 impl Rows<'_> {
-    /// A quantity that every map has.
     fn required(&mut self, quantity: Quantity) -> &mut Signal {
         let signal = self.signals.get_mut(&quantity);
         signal.expect("a map has what is required")
     }
 
-    /// The axes that the map gives to a velocity.
     fn frame(&self, quantity: Quantity) -> Option<Frame> {
         self.map.table(quantity).and_then(|table| table.frame)
     }
@@ -107,7 +104,7 @@ impl Rows<'_> {
     /// Quaternions become angles, and angles do not jump by whole turns.
     ///
     /// # Errors
-    /// [`RecordingFault::Number`] for a quaternion whose length is far from one.
+    /// [`RecordingFault::Unexpected`] for a quaternion whose length is far from one.
     fn angles(&mut self) -> Result<(), RecordingError> {
         let path = self.path;
         let signal = self.required(Quantity::Orientation);
@@ -117,7 +114,7 @@ impl Rows<'_> {
                 if norm.is_nan() || (1.0 - norm).abs() > QUATERNION_TOLERANCE {
                     let found = format!("a quaternion of length {norm:.3}");
                     let expected = "one of length 1";
-                    let fault = RecordingFault::Number { found, expected };
+                    let fault = RecordingFault::number(&found, expected);
                     return Err(fault.in_cell(path, signal.first_row + sample, "orientation"));
                 }
             }
@@ -154,7 +151,7 @@ impl Rows<'_> {
                         let path = file.map_or(path, |log| &log.path);
                         let row = signal.first_row + sample;
                         let name = Quantity::Feet.column(foot).name();
-                        return Err(RecordingFault::Contact(value).in_cell(path, row, &name));
+                        return Err(RecordingFault::contact(value).in_cell(path, row, &name));
                     }
                 };
                 signal.values[(foot, sample)] = f64::from(u8::from(down));
@@ -173,16 +170,8 @@ impl Rows<'_> {
             self.ranges.push(0..self.times_s.len());
             return Ok(());
         }
-        let mut start = 0;
-        for i in 1..self.times_s.len() {
-            if begins_segment(&self.times_s[start..i], self.times_s[i])
-                .map_err(|fault| fault.in_cell(self.path, self.first_row + i, "Time"))?
-            {
-                self.ranges.push(start..i);
-                start = i;
-            }
-        }
-        self.ranges.push(start..self.times_s.len());
+        self.ranges = ranges(&self.times_s)
+            .map_err(|(at, fault)| fault.in_cell(self.path, self.first_row + at, "Time"))?;
         Ok(())
     }
 
@@ -196,10 +185,11 @@ impl Rows<'_> {
             for i in 1..times.len() {
                 let (found, previous) = (times[i], times[i - 1]);
                 let fault = if found <= previous {
-                    RecordingFault::Time { found, previous }
+                    RecordingFault::time(found, previous)
                 } else if found - previous > max_gap_s {
-                    let (found, expected) = (found - previous, max_gap_s);
-                    RecordingFault::Gap { found, expected }
+                    let found = format!("no sample for {} s", found - previous);
+                    let expected = format!("at most {max_gap_s} s (`max_gap_s` in `[time]`)");
+                    RecordingFault::unexpected(found, expected)
                 } else {
                     continue;
                 };
@@ -226,7 +216,9 @@ impl Rows<'_> {
             Some(_) => Vec::new(),
         };
         if times.len() < 2 {
-            return Err(RecordingFault::NoOverlap.of(self.path));
+            let found = "clocks that do not overlap";
+            let fault = RecordingFault::unexpected(found, "topics of the same time");
+            return Err(fault.of(self.path));
         }
         self.notes.push(match time.resample_s {
             Some(step) => format!("all quantities are brought to even steps of {step} s"),
@@ -303,7 +295,9 @@ impl Rows<'_> {
             let turned = angle_rates(&angles, &signal.values, frame.unwrap_or(Frame::Angles));
             signal.values = turned.map_err(|sample| {
                 let row = self.first_row + sample;
-                RecordingFault::Upright.at(self.path, row)
+                let expected = "less where rates come from angular velocities";
+                let fault = RecordingFault::unexpected("a pitch of 90 degrees", expected);
+                fault.at(self.path, row)
             })?;
         }
         Ok(())
@@ -356,7 +350,6 @@ impl Rows<'_> {
         }
     }
 
-    /// The segments.
     fn recording(mut self) -> Result<Reading, RecordingError> {
         let kept = match self.map.text.rows {
             None => 0..self.times_s.len(),
@@ -380,21 +373,19 @@ impl Rows<'_> {
         } else {
             (self.notes).push(DERIVED_DDX.to_owned());
         }
-        let mut builder = SegmentBuilder::new(self.path, has_acceleration, false);
-        for i in kept {
-            let mut sample = Sample::default();
-            sample.set(Column::Time, self.times_s[i]);
-            for (quantity, signal) in &self.signals {
-                for (element, value) in signal.values.column(i).iter().enumerate() {
-                    sample.set(quantity.column(element), *value);
-                }
+        let mut whole = Segment {
+            first_row: self.first_row + kept.start,
+            ..Segment::still(self.path, self.times_s[kept.clone()].to_vec())
+        };
+        for (quantity, signal) in &self.signals {
+            for (element, row) in signal.values.row_iter().enumerate() {
+                let values = row.iter().skip(kept.start).copied();
+                whole.set(quantity.column(element), values);
             }
-            builder.push(self.first_row + i, sample)?;
         }
-        let columns = self.logs.iter().map(|log| log.columns.len()).sum();
         let recording = Recording {
             path: self.path.to_owned(),
-            segments: builder.finish(columns)?,
+            segments: divided(whole, has_acceleration)?,
             ignored_columns: Vec::new(),
         };
         Ok(Reading::as_recorded(recording, self.notes))

@@ -1,29 +1,21 @@
-//! The quantities of a recording and the names of their elements, in romc's order.
+//! The quantities of a recording, the names of their elements in romc's order, and units with their factors to SI.
 
-use super::units::Dimension;
 use crate::recording::columns::Column;
 use crate::robot::{JOINT_DIM, JOINT_NAMES, Leg, STATE_DIM};
 
 /// A quantity that a map places.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Quantity {
-    /// Joint angles.
+pub(super) enum Quantity {
     JointPosition,
-    /// Joint velocities.
     JointVelocity,
-    /// Joint accelerations.
     JointAcceleration,
-    /// Joint torques.
     JointTorque,
-    /// Position of the trunk.
     BodyPosition,
     /// Attitude of the trunk: a quaternion, or roll, pitch and yaw.
     Orientation,
-    /// Velocity of the trunk.
     BodyVelocity,
     /// Angular velocity of the trunk, or rates of roll, pitch and yaw.
     AngularVelocity,
-    /// Acceleration of the trunk.
     BodyAcceleration,
     /// Second derivatives of roll, pitch and yaw.
     AngularAcceleration,
@@ -32,8 +24,8 @@ pub enum Quantity {
 }
 
 impl Quantity {
-    /// All, in the order of a map.
-    pub const ALL: [Self; 11] = [
+    /// In the order of a map.
+    pub(crate) const ALL: [Self; 11] = [
         Self::JointPosition,
         Self::JointVelocity,
         Self::JointAcceleration,
@@ -48,7 +40,7 @@ impl Quantity {
     ];
 
     /// Accelerations, each with the velocity whose derivative it is.
-    pub(super) const ACCELERATIONS: [(Self, Self); 3] = [
+    pub(crate) const ACCELERATIONS: [(Self, Self); 3] = [
         (Self::JointAcceleration, Self::JointVelocity),
         (Self::BodyAcceleration, Self::BodyVelocity),
         (Self::AngularAcceleration, Self::AngularVelocity),
@@ -76,29 +68,28 @@ impl Quantity {
     }
 
     /// Its table in a map.
-    pub const fn key(self) -> &'static str {
+    pub(crate) const fn key(self) -> &'static str {
         self.facts().0
     }
 
-    /// A key of its table.
-    pub(super) fn at(self, key: &str) -> String {
+    pub(crate) fn at(self, key: &str) -> String {
         format!("{}.{key}", self.key())
     }
 
     /// What its units measure.
-    pub(super) const fn dimension(self) -> Dimension {
+    pub(crate) const fn dimension(self) -> Dimension {
         self.facts().1
     }
 
     /// The recording's column of an element.
-    pub(super) fn column(self, element: usize) -> Column {
+    pub(crate) fn column(self, element: usize) -> Column {
         let (_, _, column, first) = self.facts();
         debug_assert!(first + element < STATE_DIM, "w of a quaternion");
         column(first + element)
     }
 
     /// Whether a recording cannot be without it.
-    pub(super) const fn is_required(self) -> bool {
+    pub(crate) const fn is_required(self) -> bool {
         matches!(
             self,
             Self::JointPosition
@@ -110,7 +101,7 @@ impl Quantity {
     }
 
     /// Whether the quantity is one of joints.
-    pub(super) const fn is_of_joints(self) -> bool {
+    pub(crate) const fn is_of_joints(self) -> bool {
         matches!(
             self,
             Self::JointPosition | Self::JointVelocity | Self::JointAcceleration | Self::JointTorque
@@ -118,7 +109,7 @@ impl Quantity {
     }
 
     /// Names of its elements in romc's order; a quaternion has [`QUATERNION`] instead.
-    pub(super) fn elements(self) -> Vec<String> {
+    pub(crate) fn elements(self) -> Vec<String> {
         let owned = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
         match self {
             _ if self.is_of_joints() => owned(&JOINT_NAMES),
@@ -158,7 +149,6 @@ pub(super) fn ordered(words: &[String], elements: &[String]) -> Result<Vec<usize
     Ok(out)
 }
 
-/// The elements that one word names.
 pub(super) fn named(word: &str, elements: &[String]) -> Vec<usize> {
     let word = word.trim().to_lowercase();
     let matches = |element: &String| match word.split_once('*') {
@@ -182,6 +172,68 @@ pub(super) fn named(word: &str, elements: &[String]) -> Vec<usize> {
     match letters.collect::<Option<Vec<usize>>>() {
         Some(found) if short => found,
         Some(_) | None => Vec::new(),
+    }
+}
+
+/// What a unit measures; rates and accelerations are the same per s and s^2.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Dimension {
+    Angle,
+    Length,
+    Torque,
+    Force,
+    Time,
+}
+
+impl Dimension {
+    /// Units with their factors to rad, m, N m, N or s.
+    pub(crate) const fn units(self) -> &'static [(&'static str, f64)] {
+        const DEGREE: f64 = std::f64::consts::PI / 180.0;
+        const TURN: f64 = 2.0 * std::f64::consts::PI;
+        match self {
+            Dimension::Angle => &[
+                ("rad", 1.0),
+                ("deg", DEGREE),
+                ("mrad", 1e-3),
+                ("turn", TURN),
+                ("rpm", TURN / 60.0),
+                ("degree", DEGREE),
+                ("degrees", DEGREE),
+                ("radians", 1.0),
+                ("°", DEGREE),
+            ],
+            Dimension::Length => &[("m", 1.0), ("mm", 1e-3), ("cm", 1e-2)],
+            Dimension::Torque => &[("nm", 1.0), ("nmm", 1e-3), ("mnm", 1e-3), ("ncm", 1e-2)],
+            Dimension::Force => &[("n", 1.0), ("kn", 1e3), ("kgf", 9.80665)],
+            Dimension::Time => &[
+                ("s", 1.0),
+                ("ms", 1e-3),
+                ("us", 1e-6),
+                ("µs", 1e-6),
+                ("ns", 1e-9),
+                ("min", 60.0),
+                ("iso", 1.0),
+            ],
+        }
+    }
+
+    /// The factor of a unit such as `deg/s`, `mm`, `N mm`; case, blanks and `/s` do not matter.
+    pub(crate) fn factor(self, text: &str) -> Option<f64> {
+        let folded: String = (text.chars())
+            .filter(|c| !c.is_whitespace() && !matches!(c, '*' | '.' | '·'))
+            .flat_map(char::to_lowercase)
+            .collect();
+        let base = match self {
+            Dimension::Time => &folded[..],
+            _ => folded.split('/').next().unwrap_or_default(),
+        };
+        let known = self.units().iter().find(|(name, _)| *name == base);
+        known.map(|(_, factor)| *factor)
+    }
+
+    pub(crate) fn names(self) -> String {
+        let names: Vec<&str> = self.units().iter().map(|(name, _)| *name).collect();
+        names.join(", ")
     }
 }
 

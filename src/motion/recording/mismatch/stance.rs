@@ -60,7 +60,7 @@ impl Reading {
     }
 
     /// Whether it is another order of a quaternion.
-    pub fn is_of_quaternion(&self) -> bool {
+    pub(crate) fn is_of_quaternion(&self) -> bool {
         matches!(self, Self::Turned(..))
     }
 }
@@ -78,7 +78,6 @@ impl fmt::Display for Reading {
     }
 }
 
-/// The columns as they are.
 const AS_RECORDED: Reading = Reading::Legs(Leg::ALL);
 
 /// Coordinates that are easily recorded with the other sign.
@@ -140,7 +139,6 @@ pub(super) fn best_other_reading(recording: &Recording, robot: &Robot) -> Option
     best(of_orders.chain(of_signs))
 }
 
-/// The reading with the least of these figures.
 fn best(judged: impl IntoIterator<Item = (Option<f64>, Reading)>) -> Option<(f64, Reading)> {
     let known = judged
         .into_iter()
@@ -149,7 +147,6 @@ fn best(judged: impl IntoIterator<Item = (Option<f64>, Reading)>) -> Option<(f64
     finite.min_by(|one, other| one.0.total_cmp(&other.0))
 }
 
-/// All orders of the legs.
 pub(super) fn orders() -> Vec<[Leg; FOOT_DIM]> {
     let mut out = Vec::new();
     for code in 0..FOOT_DIM.pow(FOOT_DIM as u32) {
@@ -180,7 +177,6 @@ pub(in crate::recording) fn foot_place(
     place - FOOT_RADIUS_M * inclination * Vector3::new(yaw.cos(), yaw.sin(), 0.0)
 }
 
-/// How far feet on the ground are from where they stand.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Slip {
     absolute: (f64, usize),
@@ -203,12 +199,12 @@ impl Slip {
     }
 
     /// Root mean square of places about the median of their stance, m; none for fewer than [`LEAST_SAMPLES`].
-    pub fn rms_m(&self) -> Option<f64> {
+    pub(crate) fn rms_m(&self) -> Option<f64> {
         root_mean(self.absolute)
     }
 
     /// The same of what feet that stand together do not have in common, m.
-    pub fn relative_rms_m(&self) -> Option<f64> {
+    pub(crate) fn relative_rms_m(&self) -> Option<f64> {
         root_mean(self.relative)
     }
 }
@@ -234,7 +230,7 @@ impl Stances {
                     foot_place(robot, leg, &x, true)
                 };
                 let places: Vec<Vector3<f64>> = samples.clone().map(place).collect();
-                let stands = Vector3::from_fn(|axis, _| median(places.iter().map(|p| p[axis])));
+                let stands = median_place(&places);
                 let about = samples.clone().zip(places);
                 moved.extend(about.map(|(sample, place)| (sample, leg, from, place - stands)));
             }
@@ -267,6 +263,10 @@ impl Stances {
             }
         }
     }
+}
+
+pub(in crate::recording) fn median_place(places: &[Vector3<f64>]) -> Vector3<f64> {
+    Vector3::from_fn(|axis, _| median(places.iter().map(|place| place[axis])))
 }
 
 fn root_mean((sum, count): (f64, usize)) -> Option<f64> {

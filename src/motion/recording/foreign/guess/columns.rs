@@ -1,24 +1,20 @@
 //! Columns sorted into quantities, and the clock among them.
 
+use super::super::elements::Dimension;
 use super::super::elements::{QUATERNION, Quantity};
 use super::super::log::{Channel, Log};
-use super::super::units::Dimension;
 use super::names::{Reading, is_quantity, is_time, is_wanted, read, unit};
 use crate::recording::preprocess::median;
 use crate::robot::{JOINT_DIM, Robot};
 
-/// The columns of one quantity.
 #[derive(Debug, Clone)]
 pub(super) struct Group {
     pub quantity: Quantity,
-    /// Index of the log.
     pub log: usize,
-    /// The columns, by element.
     pub columns: Vec<usize>,
     pub is_quaternion: bool,
     /// Whether elements were counted rather than named.
     pub is_counted: bool,
-    /// Other columns that are this quantity by their names, in words.
     pub others: Vec<String>,
     /// Whether one of these fits no less than the columns, which are only the first.
     pub is_tie: bool,
@@ -131,7 +127,6 @@ pub(super) fn is_unitree(log: &Log) -> bool {
     log.columns.iter().any(|column| is_motor(&column.name))
 }
 
-/// A family of columns: its first column, topic and rate.
 fn in_words(logs: &[Log], group: &Group) -> String {
     let log = &logs[group.log];
     let name = |at: usize| &log.columns[group.columns[at]].name;
@@ -155,7 +150,6 @@ fn rate_class(log: &Log) -> Option<i32> {
     rate_hz(log).map(|rate| (10.0 * rate.ln()).round() as i32)
 }
 
-/// How many words the names of two groups have in common.
 fn shared(one: &Group, other: &Group) -> usize {
     one.family
         .iter()
@@ -163,13 +157,11 @@ fn shared(one: &Group, other: &Group) -> usize {
         .count()
 }
 
-/// Whether two groups have other numbers.
 fn differ(logs: &[Log], one: &Group, other: &Group) -> bool {
     let values = |group: &Group, at: usize| &logs[group.log].columns[group.columns[at]].values;
     (0..one.columns.len()).any(|at| values(one, at) != values(other, at))
 }
 
-/// Columns by the quantity, topic and words of their names.
 type Families = Vec<(usize, Vec<(usize, Reading)>)>;
 
 fn families(logs: &[Log], robot: &Robot) -> Families {

@@ -17,7 +17,6 @@ const SPREAD: f64 = 0.35;
 /// Least difference of two sensors in the air that matters, as a share of the range.
 const ALIKE: f64 = 0.05;
 
-/// A sensor in the air.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Rest {
     level: f64,
@@ -157,7 +156,6 @@ fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {
     sorted
 }
 
-/// The value below which a share of the sorted values lies.
 fn at_share(sorted: &[f64], share: f64) -> f64 {
     let last = sorted.len().saturating_sub(1) as f64;
     sorted

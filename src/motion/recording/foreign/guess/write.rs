@@ -5,10 +5,10 @@ use std::path::Path;
 
 use nalgebra::DMatrix;
 
+use super::super::elements::Dimension;
 use super::super::elements::Quantity;
 use super::super::log::Log;
 use super::super::map::Name;
-use super::super::units::Dimension;
 use super::Guess;
 use super::columns::{Clock, Group, clock, groups, is_unitree};
 use super::evidence::{scale, slopes};
@@ -16,7 +16,6 @@ use super::names::unit;
 use super::scales::{Scales, order_line};
 use crate::robot::Robot;
 
-/// The lines of tables.
 pub(super) type Lines = BTreeMap<Quantity, Vec<String>>;
 
 /// The guessed map of logs; what reading by it gives is not known yet.
@@ -57,20 +56,9 @@ pub(super) fn guessed(path: &Path, logs: &[Log], robot: &Robot) -> Guess {
     let mut open = Vec::new();
     for group in &sound {
         let key = group.quantity.key();
-        let mut lines = source.columns(group);
-        if group.quantity == Quantity::Feet && group.is_counted {
-            let order = "order = \"fr fl rr rl\"   # assumed: the columns are only counted";
-            lines.push(order.to_owned());
-        } else if group.quantity.is_of_joints() {
-            lines.extend(order_line(order, group));
-        }
-        lines.extend(scales.remove(&group.quantity).unwrap_or_default());
-        lines.extend(
-            group
-                .others
-                .iter()
-                .map(|other| format!("# by their names also: {other}")),
-        );
+        let scales = scales.remove(&group.quantity).unwrap_or_default();
+        let lines = source.lines(group, order, scales).join("\n");
+        text.push_str(&format!("\n[{key}]\n{lines}\n"));
         if !group.others.is_empty() {
             let note = format!("{key}: by their names also {}", group.others.join(", "));
             open.extend(group.is_tie.then(|| note.clone()));
@@ -83,8 +71,6 @@ pub(super) fn guessed(path: &Path, logs: &[Log], robot: &Robot) -> Guess {
                 "{key}: columns such as `{name}`, which are only counted"
             ));
         }
-        let lines = lines.join("\n");
-        text.push_str(&format!("\n[{key}]\n{lines}\n"));
     }
     let is_missing = |quantity: &Quantity| {
         quantity.is_required() && sound.iter().all(|group| group.quantity != *quantity)
@@ -110,7 +96,6 @@ fn quoted(name: &str) -> String {
     serde_json::Value::from(name).to_string()
 }
 
-/// The log and what its names say.
 pub(super) struct Source<'a> {
     pub path: &'a Path,
     pub logs: &'a [Log],
@@ -123,24 +108,27 @@ pub(super) fn unit_line(unit: &str, why: &str) -> String {
 }
 
 impl Source<'_> {
-    pub fn group(&self, quantity: Quantity) -> Option<&Group> {
+    pub(crate) fn group(&self, quantity: Quantity) -> Option<&Group> {
         self.groups.iter().find(|group| group.quantity == quantity)
     }
 
-    /// The unit that the names of a group carry.
-    pub fn told(&self, group: &Group, units: &[&'static str]) -> Option<&'static str> {
+    pub(crate) fn told(&self, group: &Group, units: &[&'static str]) -> Option<&'static str> {
         let columns = &self.logs[group.log].columns;
         unit(&columns[group.columns[0]].name, units)
     }
 
     /// Values of a group and their times, if they share the log of `with`.
-    pub fn beside(&self, quantity: Quantity, with: &Group) -> Option<(DMatrix<f64>, Vec<f64>)> {
+    pub(crate) fn beside(
+        &self,
+        quantity: Quantity,
+        with: &Group,
+    ) -> Option<(DMatrix<f64>, Vec<f64>)> {
         let group = self.group(quantity).filter(|group| group.log == with.log)?;
         Some((self.raw(group), self.times_s(group.log)?))
     }
 
     /// Values of a group in the units of the log, one row a column.
-    pub fn raw(&self, group: &Group) -> DMatrix<f64> {
+    pub(crate) fn raw(&self, group: &Group) -> DMatrix<f64> {
         let log = &self.logs[group.log];
         DMatrix::from_fn(group.columns.len(), log.len(), |row, sample| {
             let value = log.columns[group.columns[row]].values[sample];
@@ -148,8 +136,7 @@ impl Source<'_> {
         })
     }
 
-    /// Times of a log in s.
-    pub fn times_s(&self, log: usize) -> Option<Vec<f64>> {
+    pub(crate) fn times_s(&self, log: usize) -> Option<Vec<f64>> {
         let (log, clock) = (&self.logs[log], self.clock?);
         let (column, factor) = match log.clock {
             Some(column) => (column, 1.0),
@@ -162,8 +149,7 @@ impl Source<'_> {
         Some(times.into_iter().map(|time| factor * time).collect())
     }
 
-    /// The file and the columns of a group.
-    pub fn columns(&self, group: &Group) -> Vec<String> {
+    pub(crate) fn columns(&self, group: &Group) -> Vec<String> {
         let log = &self.logs[group.log];
         let mut lines = Vec::new();
         if self.logs.len() > 1 {
@@ -179,6 +165,21 @@ impl Source<'_> {
             [row] => format!("columns = [{row}]"),
             _ => format!("columns = [\n    {},\n]", rows.join(",\n    ")),
         });
+        lines
+    }
+
+    /// The lines of a group's table.
+    fn lines(&self, group: &Group, order: Option<&str>, scales: Vec<String>) -> Vec<String> {
+        let mut lines = self.columns(group);
+        if group.quantity == Quantity::Feet && group.is_counted {
+            let order = "order = \"fr fl rr rl\"   # assumed: the columns are only counted";
+            lines.push(order.to_owned());
+        } else if group.quantity.is_of_joints() {
+            lines.extend(order_line(order, group));
+        }
+        lines.extend(scales);
+        let others = group.others.iter();
+        lines.extend(others.map(|other| format!("# by their names also: {other}")));
         lines
     }
 
