@@ -39,14 +39,12 @@ pub struct ExprPool {
     places: HashMap<u64, ExprId, BuildIdHasher>,
     symbols: Vec<Symbol>,
     symbol_ids: HashMap<String, SymbolId>,
-    /// See [`ExprPool::exact`].
     is_exact: bool,
     /// Constructors that were called and steps of about that effort, and how many of them there may be.
     work_done: u64,
     work_limit: u64,
     /// Derivatives found so far; expressions never change, so entries stay valid.
     pub(super) derivatives: HashMap<(ExprId, SymbolId), ExprId, BuildIdHasher>,
-    /// Slopes found so far.
     pub(super) slopes: HashMap<(ExprId, SymbolId), Slope, BuildIdHasher>,
 }
 
@@ -57,11 +55,9 @@ struct Symbol {
     meaning: Meaning,
 }
 
-/// What a symbol stands for.
 #[derive(Clone, Debug)]
 enum Meaning {
     Variable,
-    /// See [`ExprPool::selection`].
     Selection([ExprId; 3]),
     /// See [`ExprPool::decimal`]; with the nearest float.
     Decimal(Coefficient, f64),
@@ -74,7 +70,6 @@ struct Facts {
     itself: ExprId,
     /// The node without its numeric factor.
     rest: ExprId,
-    /// First sorting key, see [`super::order`].
     grade: u32,
     /// The symbols that occur: bit `i` for symbol `i`, the last bit for all from 63 on.
     symbols: u64,
@@ -125,7 +120,6 @@ impl ExprPool {
         }
     }
 
-    /// Whether this is an [`ExprPool::exact`] pool.
     pub(super) fn is_exact(&self) -> bool {
         self.is_exact
     }
@@ -146,7 +140,6 @@ impl ExprPool {
         outer
     }
 
-    /// Ends a limit, given the one before.
     pub(super) fn restore_limit(&mut self, limit: u64) {
         self.work_limit = limit;
     }
@@ -157,7 +150,6 @@ impl ExprPool {
         self.work_done <= self.work_limit
     }
 
-    /// Whether so many more steps are within the limit.
     pub(super) fn affords(&self, steps: usize) -> bool {
         self.work_done.saturating_add(steps as u64) <= self.work_limit
     }
@@ -436,7 +428,6 @@ impl ExprPool {
         Err(place)
     }
 
-    /// The product without its number, if it has exactly one.
     fn rest_of(&mut self, node: &Node) -> Option<ExprId> {
         let Node::Product(factors) = node else {
             return None;

@@ -134,7 +134,6 @@ impl<'a> Shortener<'a> {
         found
     }
 
-    /// Shortens all blocks in one view; whether anything changed.
     fn pass(&mut self, blocks: &mut Vec<Block>, view: View<'a>) -> bool {
         let flat: Vec<(usize, (f64, ExprId))> = (blocks.iter().enumerate())
             .flat_map(|(place, block)| block.summands.iter().map(move |&summand| (place, summand)))
@@ -306,7 +305,6 @@ impl<'a> Shortener<'a> {
         Some((summands.to_vec(), Vec::new()))
     }
 
-    /// Whether the terms are distinct monomials that cannot interact.
     fn is_plain_sum(&mut self, summands: &[(f64, ExprId)]) -> bool {
         let mut seen = IdSet::default();
         (summands.iter()).all(|&(_, expr)| seen.insert(expr) && self.is_plain(expr))
@@ -339,7 +337,6 @@ impl<'a> Shortener<'a> {
         })
     }
 
-    /// The term alone in its shortest form.
     pub(super) fn single(&mut self, expr: ExprId) -> ExprId {
         if self.is_plain(expr) {
             return expr;
@@ -361,7 +358,6 @@ impl<'a> Shortener<'a> {
         single
     }
 
-    /// Replaces the blocks of a group by one, if that is shorter.
     fn shorten_group(
         &mut self,
         blocks: &mut [Block],
