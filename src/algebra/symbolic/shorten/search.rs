@@ -284,16 +284,12 @@ impl<'a> Shortener<'a> {
                     _ if n_terms[factor] < 2 => continue,
                     _ => (*factor, Number::ONE),
                 };
-                let known = parts.iter().find(|(_, known)| *known == part);
-                let variable = match known {
-                    Some(&(variable, _)) => variable,
-                    None => {
-                        let variable = self.pool.placeholder("factor", parts.len());
-                        parts.push((variable, part));
-                        variable
-                    }
-                };
-                let symbol = self.pool.symbol_expr(variable);
+                let known = parts.iter().position(|(_, known)| *known == part);
+                let place = known.unwrap_or_else(|| {
+                    parts.push((self.pool.placeholder("factor", parts.len()), part));
+                    parts.len() - 1
+                });
+                let symbol = self.pool.symbol_expr(parts[place].0);
                 *factor = self.pool.pow_number(symbol, exponent);
             }
             whole.push((coefficient, self.pool.product(&factors)));
