@@ -1,5 +1,7 @@
-//! Exact simplification: a table of sums with their simplest forms, and random models.
+//! Simplification, exact: a table of sums with their simplest forms, and random models; within a tolerance: certificates.
 
+#[path = "simplification/certificates.rs"]
+mod certificates;
 #[path = "simplification/far_out.rs"]
 mod far_out;
 mod tools;
