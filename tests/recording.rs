@@ -5,6 +5,8 @@
 
 #[path = "recording/bad_files.rs"]
 mod bad_files;
+#[path = "recording/checks.rs"]
+mod checks;
 #[path = "recording/clock.rs"]
 mod clock;
 #[path = "recording/foreign.rs"]
@@ -22,6 +24,8 @@ mod outside;
 mod random_bytes;
 #[path = "recording/real_jumps.rs"]
 mod real_jumps;
+#[path = "recording/samples.rs"]
+mod samples;
 #[path = "recording/sheet.rs"]
 mod sheet;
 mod tools;

@@ -11,8 +11,8 @@ use super::output::{lines, named, read_recordings};
 use super::robot;
 use crate::evaluate::RoundTrip;
 use crate::import::{
-    Chosen, Format as FileKind, ImportError, ImportFault, ImportOptions, ImportReport, Imported,
-    SymbolNames, import, read_terms,
+    Chosen, Format as FileKind, ImportError, ImportOptions, ImportReport, Imported, SymbolNames,
+    import, read_terms,
 };
 use crate::model::{LibraryChoice, LibraryOrder, ReducedModel};
 use crate::recording::Segment;
@@ -21,7 +21,6 @@ use crate::sim::with_input_statistics;
 use crate::typeset::Table;
 use crate::{Error, artifact};
 
-/// Imports a model and writes it.
 pub fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
     let library = match &arguments.library {
         Some(LibraryArgument::File(path)) => Some(path),
@@ -42,7 +41,7 @@ pub fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
     let is_text = matches!(kind, Ok(FileKind::Equations | FileKind::Latex));
     if is_text && !arguments.inputs_from.is_empty() {
         let (found, expected) = ("a file of equations", "a file with encoder and decoder");
-        return Err(ImportFault::option("--inputs-from", found, expected).into());
+        return Err(ImportError::option("--inputs-from", found, expected).into());
     }
     let recordings = read_recordings(&arguments.inputs_from, &arguments.reading, options.robot)?;
     let segments: Vec<&Segment> = recordings.iter().flat_map(|r| &r.segments).collect();
@@ -81,7 +80,7 @@ pub fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
         "lacking": lacking,
         "check": check.as_ref().map(|check| check_json(check, fault.as_deref())),
     });
-    Ok(Answer { text, json })
+    Ok(Answer::new(text, json))
 }
 
 /// An imported model, compared with recordings if there are any.
@@ -155,7 +154,6 @@ pub fn import_compared(
     }
 }
 
-/// A model without both maps cannot be compared with recordings.
 fn needs_maps(report: &ImportReport) -> Error {
     let unused = report
         .unused
@@ -168,7 +166,7 @@ fn needs_maps(report: &ImportReport) -> Error {
     };
     let found = format!("a model without encoder or decoder to compare; {left}");
     let expected = "both (--map encoder.weight=TENSOR, --map decoder.weight=TENSOR)";
-    ImportFault::option("--inputs-from", found, expected).into()
+    ImportError::option("--inputs-from", found, expected).into()
 }
 
 /// Commands that cannot use a model, and the option that mends it.
@@ -221,7 +219,6 @@ fn options(arguments: &ImportArguments) -> Result<ImportOptions, Error> {
     })
 }
 
-/// The report of an import as text.
 fn describe(report: &ImportReport) -> String {
     let mut text = format!(
         "{} ({}): {} latent coordinates, ",
@@ -301,7 +298,6 @@ fn describe_check(check: &RoundTrip, fault: Option<&str>) -> String {
     text + "\n" + &lines("warning: ", fault) + "\n"
 }
 
-/// The same as JSON.
 fn check_json(check: &RoundTrip, fault: Option<&str>) -> Value {
     let orders: Map<String, Value> = (check.trials.by_order.iter())
         .map(|(order, r2)| (order.name().unwrap_or_default().to_owned(), json!(r2)))

@@ -1,43 +1,45 @@
-//! Recordings on their way into a training: divided into sets, checked, conditioned while they are read.
+//! Recordings on their way into a training: divided into sets, checked, conditioned.
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use serde_json::{Map, Value, json};
 
 use super::args::{ReadingArguments, TrainArguments, TrainSettings};
-use super::inspect_recording::finding_json;
+use super::inspect::finding_json;
 use super::output::{note, reader, report_reading};
 use super::train_settings;
 use crate::Error;
 use crate::recording::check::Finding;
-use crate::recording::files::Notes;
+use crate::recording::files::as_recorded;
 use crate::recording::{
     Clocks, ConditionOptions, ImplausibleSamples, Reader, Recording, RecordingError, RecordingFile,
-    RecordingFiles,
+    RecordingSet,
 };
 use crate::robot::Robot;
 use crate::typeset::words::counted;
 
 /// A jump of a divided set: its file, its segment there, and the first row.
-type Place = (PathBuf, usize, usize);
+type DividedJump = (PathBuf, usize, usize);
 
-/// Names of the sets of a training.
 const SETS: [&str; 3] = ["training", "validation", "test"];
 
-/// The recordings of a training; their files are read when the samples are needed.
-pub struct RecordedSets {
-    /// Jumps that the model is fitted to, those that choose between candidates, and those used only for the final metrics.
-    pub sets: [Arc<RecordingFiles>; 3],
+/// The recordings of a training.
+pub(crate) struct RecordedSets {
+    /// Jumps that the model is fitted to, those that choose between candidates, and those used only for the final
+    /// metrics; empty before [`Self::read`].
+    pub sets: [RecordingSet; 3],
+    files: [Vec<RecordingFile>; 3],
+    robot: &'static Robot,
+    reader: Reader,
     /// The jumps of each set, if they were divided.
-    pub divided: Option<[Vec<Place>; 3]>,
+    pub divided: Option<[Vec<DividedJump>; 3]>,
     options: ConditionOptions,
 }
 
 impl RecordedSets {
     /// The recordings that the arguments name, divided by their shares if they have any, to be conditioned as the
     /// settings say.
-    pub fn new(
+    pub(crate) fn new(
         arguments: &TrainArguments,
         settings: &TrainSettings,
         robot: &'static Robot,
@@ -51,8 +53,9 @@ impl RecordedSets {
         };
         let jumps = jumps_of(&arguments.recordings, &reader)?;
         let sets = split.of(jumps.len(), seed)?;
-        let sets = sets
-            .map(|set| -> Vec<Place> { set.into_iter().map(|jump| jumps[jump].clone()).collect() });
+        let sets = sets.map(|set| -> Vec<DividedJump> {
+            set.into_iter().map(|jump| jumps[jump].clone()).collect()
+        });
         let files = sets.each_ref().map(|set| chosen_segments(set));
         Ok(Self {
             divided: Some(sets),
@@ -60,8 +63,7 @@ impl RecordedSets {
         })
     }
 
-    /// Whole files for training, validation and test.
-    pub fn whole(
+    pub(crate) fn whole(
         paths: [&[PathBuf]; 3],
         settings: &TrainSettings,
         robot: &'static Robot,
@@ -81,20 +83,33 @@ impl RecordedSets {
         robot: &'static Robot,
         reader: Reader,
     ) -> Self {
-        let options = train_settings::conditioning(settings);
-        let sets = files.map(|files| {
-            let (options, reader) = (options.clone(), reader.clone());
-            Arc::new(RecordingFiles::new(files, robot, options, reader))
-        });
         Self {
-            sets,
+            sets: Default::default(),
+            files,
+            robot,
+            reader,
             divided: None,
-            options,
+            options: train_settings::conditioning(settings),
         }
     }
 
+    /// The first training recordings as recorded.
+    pub(crate) fn first(&self, count: usize) -> Result<Vec<Recording>, RecordingError> {
+        let files = &self.files[0];
+        as_recorded(&files[..count.min(files.len())], self.robot, &self.reader)
+    }
+
+    /// Reads all sets, those of the test first.
+    pub(crate) fn read(&mut self) -> Result<(), RecordingError> {
+        for set in [2, 0, 1] {
+            let files = &self.files[set];
+            self.sets[set].read(files, self.robot, &self.options, &self.reader)?;
+        }
+        Ok(())
+    }
+
     /// Which jumps came into which set, file and first row of each, if they were divided: in words and as JSON.
-    pub fn division(&self) -> Option<(String, Value)> {
+    pub(crate) fn division(&self) -> Option<(String, Value)> {
         let (mut text, mut json) = (String::new(), Map::new());
         for (name, places) in SETS.into_iter().zip(self.divided.as_ref()?) {
             let places = || (places.iter()).map(|(path, _, row)| (path.display().to_string(), row));
@@ -110,18 +125,18 @@ impl RecordedSets {
     }
 
     /// The sets that the jumps of a file came into, if they were divided.
-    pub fn sets_of(&self, path: &str) -> Vec<&'static str> {
+    pub(crate) fn sets_of(&self, path: &str) -> Vec<&'static str> {
         let sets = SETS.into_iter().zip(self.divided.iter().flatten());
-        let is_of = |(file, ..): &Place| file.display().to_string() == path;
+        let is_of = |(file, ..): &DividedJump| file.display().to_string() == path;
         let with = sets.filter(|(_, places)| places.iter().any(is_of));
         with.map(|(name, _)| name).collect()
     }
 
     /// The files of each set, those with jumps in several in the first.
-    pub fn files(&self) -> [(&'static str, Vec<&Path>); 3] {
+    pub(crate) fn files(&self) -> [(&'static str, Vec<&Path>); 3] {
         let mut seen: Vec<&Path> = Vec::new();
         std::array::from_fn(|set| {
-            let files = self.sets[set].files().iter();
+            let files = self.files[set].iter();
             let files = files.map(|file| file.path.as_path());
             let new = files.filter(|path| self.divided.is_none() || !seen.contains(path));
             let new: Vec<&Path> = new.collect();
@@ -130,27 +145,19 @@ impl RecordedSets {
         })
     }
 
-    /// The notes of all sets together, as far as files were read.
-    fn notes(&self) -> Notes {
-        let mut all = Notes::default();
-        for set in &self.sets {
-            all.add(set.notes());
-        }
-        all
-    }
-
     /// Reports on stderr which files have implausible samples, and what became of them.
-    pub fn report_findings(&self) {
-        report_reading(&self.sets[0].notes().reading);
-        let notes = self.notes();
-        for (file, mismatch) in &notes.mismatches {
+    pub(crate) fn report_findings(&self) {
+        report_reading(&self.sets[0].reading);
+        for (file, mismatch) in self.sets.iter().flat_map(|set| &set.mismatches) {
             note(&format!("{}: {mismatch}", file.display()));
         }
+        let findings = self.sets.iter().flat_map(|set| &set.findings);
         let (findings, singular): (Vec<_>, Vec<_>) =
-            (notes.findings.into_iter()).partition(|(_, finding)| finding.kind.can_be_left_out());
+            findings.partition(|(_, finding)| finding.kind.can_be_left_out());
+        let left_out = self.left_out();
         report_singular(&singular);
         let mut files: Vec<(&Path, usize, &Finding)> = Vec::new();
-        for (file, finding) in &findings {
+        for (file, finding) in findings.iter().copied() {
             match files.iter_mut().find(|(known, ..)| known == file) {
                 Some((_, runs, _)) => *runs += 1,
                 None => files.push((file, 1, finding)),
@@ -163,8 +170,8 @@ impl RecordedSets {
             ));
         }
         match self.options.implausible {
-            ImplausibleSamples::LeaveOut if notes.left_out > 0 => {
-                note(&format!("{} samples are left out", notes.left_out));
+            ImplausibleSamples::LeaveOut if left_out > 0 => {
+                note(&format!("{left_out} samples are left out"));
             }
             ImplausibleSamples::Keep if !findings.is_empty() => note(
                 "they are used; `romc inspect` lists them, --leave-out-implausible leaves them out",
@@ -173,27 +180,30 @@ impl RecordedSets {
         }
     }
 
+    fn left_out(&self) -> usize {
+        self.sets.iter().map(|set| set.left_out).sum()
+    }
+
     /// Every finding with its place, and how many samples were left out.
-    pub fn findings_json(&self) -> Value {
-        let notes = self.notes();
+    pub(crate) fn findings_json(&self) -> Value {
         let of_file = |file: &Path, mut value: Value| {
             value["file"] = json!(file.display().to_string());
             value
         };
-        let findings = notes.findings.iter();
+        let findings = self.sets.iter().flat_map(|set| &set.findings);
         let findings = findings.map(|(file, found)| of_file(file, finding_json(found)));
-        let unlike = notes.mismatches.iter();
+        let unlike = self.sets.iter().flat_map(|set| &set.mismatches);
         let unlike = unlike.map(|(file, found)| of_file(file, json!(found)));
         json!({
             "implausible": findings.collect::<Vec<_>>(),
             "mismatches": unlike.collect::<Vec<_>>(),
-            "left_out": notes.left_out,
+            "left_out": self.left_out(),
         })
     }
 }
 
 /// Reports on stderr which files have legs near a singularity while they are on the ground.
-fn report_singular(findings: &[(PathBuf, Finding)]) {
+fn report_singular(findings: &[&(PathBuf, Finding)]) {
     let of_file = findings.chunk_by(|(one, _), (other, _)| one == other);
     for runs in of_file {
         let samples: usize = runs.iter().map(|(_, finding)| finding.samples.len()).sum();
@@ -206,18 +216,11 @@ fn report_singular(findings: &[(PathBuf, Finding)]) {
     }
 }
 
-/// All recordings of a set of files, in memory.
-pub fn read_all(files: &RecordingFiles) -> Result<Vec<Recording>, Error> {
-    let mut all = Vec::new();
-    files.for_each(|recording| {
-        all.push(recording);
-        Ok::<_, RecordingError>(())
-    })?;
-    Ok(all)
-}
-
 /// The reader of a training: clocks are repaired unless told otherwise, or to train as published.
-pub fn reader_for(arguments: &ReadingArguments, settings: &TrainSettings) -> Result<Reader, Error> {
+pub(crate) fn reader_for(
+    arguments: &ReadingArguments,
+    settings: &TrainSettings,
+) -> Result<Reader, Error> {
     let clocks = match settings.paper {
         true => Clocks::Recorded,
         false => Clocks::Repaired,
@@ -225,8 +228,7 @@ pub fn reader_for(arguments: &ReadingArguments, settings: &TrainSettings) -> Res
     reader(arguments, clocks)
 }
 
-/// Every jump of these files.
-fn jumps_of(paths: &[PathBuf], reader: &Reader) -> Result<Vec<Place>, Error> {
+fn jumps_of(paths: &[PathBuf], reader: &Reader) -> Result<Vec<DividedJump>, Error> {
     let mut jumps = Vec::new();
     for path in paths {
         let recording = reader.read(path)?.recording;
@@ -237,7 +239,7 @@ fn jumps_of(paths: &[PathBuf], reader: &Reader) -> Result<Vec<Place>, Error> {
 }
 
 /// The files of a set of jumps; neighbours in the same file are read together.
-fn chosen_segments(jumps: &[Place]) -> Vec<RecordingFile> {
+fn chosen_segments(jumps: &[DividedJump]) -> Vec<RecordingFile> {
     let mut files: Vec<RecordingFile> = Vec::new();
     for (path, segment, _) in jumps {
         match files.last_mut() {

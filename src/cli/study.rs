@@ -7,8 +7,8 @@ use serde_json::{Value, json};
 use super::Answer;
 use super::args::{StudyArguments, TrainSettings};
 use super::destination::Inputs;
-use super::output::{note, refused, spinner};
-use super::prepared_recordings::{RecordedSets, read_all, reader_for};
+use super::output::{note, spinner};
+use super::prepared_recordings::{RecordedSets, reader_for};
 use super::train_settings;
 use crate::Error;
 use crate::files::{EmittedFile, check_folder};
@@ -18,11 +18,9 @@ use crate::study::{self, CellId, FOLDS, Outcome, Plan, Shard, Spread, Store, Sum
 use crate::train::{Method, Origin};
 use crate::typeset::{Cell, Table, significant};
 
-/// The tables of a study.
 const TABLES: [&str; 2] = ["cells.csv", "summary.csv"];
 
-/// Trains what is missing, or joins parts, and writes the tables of the study.
-pub fn run(arguments: &StudyArguments) -> Result<Answer, Error> {
+pub(crate) fn run(arguments: &StudyArguments) -> Result<Answer, Error> {
     check_folder(&arguments.out_dir, &TABLES, arguments.force)?;
     let store = match arguments.merge.is_empty() {
         true => trained(arguments)?,
@@ -59,21 +57,21 @@ fn merged(arguments: &StudyArguments) -> Result<Store, Error> {
 fn trained(arguments: &StudyArguments) -> Result<Store, Error> {
     let mut settings = settings(arguments)?;
     let robot = train_settings::robot(&settings)?;
-    let recorded = RecordedSets::whole(
+    let mut recorded = RecordedSets::whole(
         [&arguments.recordings, &arguments.validation, &[]],
         &settings,
         robot,
         reader_for(&arguments.reading, &settings)?,
     );
-    let [of_training, of_validation, _] = &recorded.sets;
-    let training = read_all(of_training)?;
-    let validation = read_all(of_validation)?;
+    recorded.read()?;
     recorded.report_findings();
+    let [training, validation, _] = &recorded.sets;
+    let [training, validation] = [training, validation].map(|set| &set.recordings[..]);
     let mut base = train_settings::options(&settings, 1, String::new(), robot)?;
-    train_settings::identified(&mut base, &settings, of_training, robot)?;
+    train_settings::identified(&mut base, &settings, &recorded, robot)?;
     settings.wrench_frame = Some(base.wrench_frame);
     settings.actuators = Some(train_settings::actuators(&settings).to_owned());
-    let plan = plan(arguments, &settings, &training, &validation);
+    let plan = plan(arguments, &settings, training, validation);
     if plan.method == Method::ClosedForm && plan.seeds > FOLDS {
         let message = "has seeds from 6 on leave out the jumps of seeds 1 to 5 again";
         note(&format!(
@@ -89,20 +87,19 @@ fn trained(arguments: &StudyArguments) -> Result<Store, Error> {
         bar.set_message(format!("{} of {total} models trained", total - left));
     };
     let shard = arguments.shard.unwrap_or(Shard::WHOLE);
-    let sets = [&training[..], &validation];
+    let sets = [training, validation];
     study::run(&store, shard, sets, robot, &base, &finished)?;
     bar.finish_and_clear();
     Ok(store)
 }
 
-/// The settings of the file with those of the command line over them.
 fn settings(arguments: &StudyArguments) -> Result<TrainSettings, Error> {
     let mut settings = TrainSettings::default();
     if let Some(path) = &arguments.config {
         settings = train_settings::read(path)?;
         if let Some(name) = train_settings::first(&settings, &["latent-dim", "seed", "seeds"]) {
             let message = format!("`{name}` is not a setting of a study, which runs over them");
-            return Err(refused(path, message));
+            return Err(Error::refused(path, message));
         }
     }
     settings.paper |= arguments.paper;
@@ -190,5 +187,5 @@ fn answer(folder: &Path, store: &Store, cells: &[study::Cell], summary: &Summary
         "missing": missing,
         "refused": refused,
     });
-    Answer { text, json }
+    Answer::new(text, json)
 }

@@ -1,7 +1,6 @@
 //! `romc train`: recordings in, a model file out.
 
 use std::fmt::Write as _;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use serde_json::json;
@@ -10,19 +9,18 @@ use super::Answer;
 use super::args::{TrainArguments, TrainSettings};
 use super::destination::{Format, Inputs};
 use super::output::{named, note, note_repeated, quoted, quoted_all, quoted_text, spinner};
-use super::prepared_recordings::{RecordedSets, read_all};
+use super::prepared_recordings::RecordedSets;
 use super::train_settings;
 use crate::model::ReducedModel;
-use crate::recording::Source;
+use crate::recording::{Recording, RecordingSet};
 use crate::robot::{BODY_X, BODY_Z};
 use crate::train::{
-    Method, Origin, Progress, Recordings, SetMetrics, TrainOptions, TrainReport, Trained, Watch,
+    Method, Monitor, Origin, Progress, Recordings, SetMetrics, TrainOptions, TrainReport, Trained,
 };
 use crate::typeset::{Cell, Table, significant};
 use crate::{Error, artifact, train};
 
-/// Learns a model and writes it.
-pub fn run(arguments: &TrainArguments) -> Result<(Answer, u8), Error> {
+pub(crate) fn run(arguments: &TrainArguments) -> Result<Answer, Error> {
     let settings = train_settings::effective(arguments)?;
     Inputs::default()
         .and(&arguments.recordings)
@@ -40,38 +38,29 @@ pub fn run(arguments: &TrainArguments) -> Result<(Answer, u8), Error> {
     let robot = train_settings::robot(&settings)?;
     let name = named(arguments.name.as_deref(), &arguments.output);
     let mut options = train_settings::options(&settings, latent_dim, name, robot)?;
-    let recorded = RecordedSets::new(arguments, &settings, robot, options.seed)?;
-    let [training, validation, test] = &recorded.sets;
-    train_settings::identified(&mut options, &settings, training, robot)?;
-    // a fault of the test recordings ends the command before the training
-    read_all(test)?;
-    let sets = Recordings::new(Arc::clone(training), Arc::clone(validation));
+    let mut recorded = RecordedSets::new(arguments, &settings, robot, options.seed)?;
+    train_settings::identified(&mut options, &settings, &recorded, robot)?;
+    options.check()?;
+    note_repeated(&recorded.files());
+    let read = recorded.read();
+    recorded.report_findings();
+    read?;
+    let [training, validation, test] = recorded.sets.each_ref().map(|set| &set.recordings[..]);
+    let sets = Recordings::new(training, validation);
     let files = arguments.recordings.iter().chain(&arguments.validation);
     let command = command_line(arguments, &settings, method, &options);
     let mut origin = Origin::new(command, files);
     for file in &mut origin.recordings {
         file.sets = recorded.sets_of(&file.path);
     }
-    note_repeated(&recorded.files());
 
     let bar = spinner("training");
-    let mut findings_reported = false;
-    let mut report_findings = || {
-        if !std::mem::replace(&mut findings_reported, true) {
-            bar.suspend(|| recorded.report_findings());
-        }
-    };
     let mut listener = |progress: Progress| match progress {
-        Progress::Stage { name, .. } => {
-            report_findings();
-            bar.set_message(name);
-        }
+        Progress::Stage { name, .. } => bar.set_message(name),
         Progress::Done { text, .. } => bar.set_message(text),
     };
-    let mut watch = Watch::new(&mut listener, stop_on_interrupt());
-    let trained = method.learn(sets, robot, &options, &origin, &mut watch);
-    report_findings();
-    let mut trained = trained?;
+    let mut monitor = Monitor::new(&mut listener, stop_on_interrupt());
+    let mut trained = method.learn(sets, robot, &options, &origin, &mut monitor)?;
     bar.finish_and_clear();
     let is_interrupted = INTERRUPTED.load(Ordering::Relaxed);
     if is_interrupted {
@@ -83,10 +72,10 @@ pub fn run(arguments: &TrainArguments) -> Result<(Answer, u8), Error> {
     artifact::write(&arguments.output, &trained.model, arguments.force)?;
     let tested = match test.is_empty() {
         true => None,
-        false => Some(train::assess(&trained.model, Arc::clone(test))?),
+        false => Some(train::assess(&trained.model, test)?),
     };
     let mut answer = answer(arguments, &trained, tested.as_ref());
-    let notes = notes(&trained.report, tested.as_ref(), &recorded)?;
+    let notes = notes(&trained.report, tested.as_ref(), &recorded.sets);
     notes.iter().for_each(|text| note(text));
     if arguments.split.is_none()
         && let Some(words) = train_settings::without_effect(&settings, &options)
@@ -101,34 +90,30 @@ pub fn run(arguments: &TrainArguments) -> Result<(Answer, u8), Error> {
         let _ = write!(answer.text, "\n{text}");
     }
     if !is_interrupted {
-        return Ok((answer, 0));
+        return Ok(answer);
     }
     let _ = writeln!(
         answer.text,
         "\ninterrupted by Ctrl-C: the model is the best until then, and the command in its provenance, which says so, \
          does not give it again"
     );
-    Ok((answer, INTERRUPTED_CODE))
+    answer.code = INTERRUPTED_CODE;
+    Ok(answer)
 }
 
 /// Where whole jumps are worse than standing still: of the validation, or else of the training, and of the test.
 fn notes(
     report: &TrainReport,
     tested: Option<&SetMetrics>,
-    recorded: &RecordedSets,
-) -> Result<Vec<String>, Error> {
-    let [training, validation, test] = &recorded.sets;
+    [training, validation, test]: &[RecordingSet; 3],
+) -> Vec<String> {
     let judged = match &report.validation {
         Some(metrics) => ("validation", Some(metrics), validation),
         None => ("training", Some(&report.training), training),
     };
-    let mut notes = Vec::new();
-    for (set, metrics, files) in [judged, ("test", tested, test)] {
-        if let Some(metrics) = metrics {
-            notes.extend(whole_jump_note(metrics, (set, Arc::clone(files)))?);
-        }
-    }
-    Ok(notes)
+    let sets = [judged, ("test", tested, test)].into_iter();
+    sets.filter_map(|(name, metrics, set)| whole_jump_note(metrics?, name, &set.recordings))
+        .collect()
 }
 
 /// Exit code of a process that Ctrl-C ended: 128 and the number of the signal.
@@ -137,7 +122,6 @@ const INTERRUPTED_CODE: u8 = 130;
 /// Becomes true at the first Ctrl-C, so that a training ends with the best so far; the second one ends the process.
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
-/// The model with a provenance that says that its training did not come to its end.
 fn marked_as_interrupted(model: ReducedModel) -> ReducedModel {
     let mut provenance = model.provenance().clone();
     provenance.insert("interrupted".to_owned(), true.into());
@@ -155,7 +139,6 @@ fn stop_on_interrupt() -> &'static AtomicBool {
     &INTERRUPTED
 }
 
-/// The command that repeats this training, as the provenance keeps it.
 fn command_line(
     arguments: &TrainArguments,
     settings: &TrainSettings,
@@ -202,10 +185,9 @@ fn answer(arguments: &TrainArguments, trained: &Trained, tested: Option<&SetMetr
         "report": report,
         "test": tested,
     });
-    Answer { text, json }
+    Answer::new(text, json)
 }
 
-/// Every metric on each set of recordings.
 fn metrics_table(report: &TrainReport, tested: Option<&SetMetrics>) -> Table {
     let mut sets = vec![
         ("training", Some(&report.training)),
@@ -265,39 +247,32 @@ fn seed_table(report: &TrainReport) -> String {
     format!("\n{table}")
 }
 
-/// Rows of the body's position forwards and upwards.
 const BODY: [usize; 2] = [BODY_X, BODY_Z];
 
 /// A note if rollouts of whole jumps end up further off than a body would be that stays where each jump starts: root mean
 /// squares over all samples of the body's error forwards and upwards, and of its way from the start.
-fn whole_jump_note<'a>(
-    metrics: &SetMetrics,
-    (set, recordings): (&str, impl Into<Source<'a>>),
-) -> Result<Option<String>, Error> {
+fn whole_jump_note(metrics: &SetMetrics, set: &str, recordings: &[Recording]) -> Option<String> {
     let (mut squares, mut samples) = (0.0, 0);
-    recordings.into().for_each(|recording| {
-        for segment in &recording.segments {
-            for row in BODY {
-                let start = segment.x[(row, 0)];
-                squares += (segment.x.row(row).iter())
-                    .map(|value| (value - start).powi(2))
-                    .sum::<f64>();
-            }
-            samples += segment.len();
+    for segment in recordings.iter().flat_map(|recording| &recording.segments) {
+        for row in BODY {
+            let start = segment.x[(row, 0)];
+            squares += (segment.x.row(row).iter())
+                .map(|value| (value - start).powi(2))
+                .sum::<f64>();
         }
-        Ok::<_, Error>(())
-    })?;
+        samples += segment.len();
+    }
     let moved_m = (squares / f64::from(u32::try_from(samples.max(1)).unwrap_or(u32::MAX))).sqrt();
     let off = match (metrics.rollout_x_m, metrics.rollout_z_m) {
-        (Some(x), Some(z)) if x.hypot(z) <= moved_m => return Ok(None),
+        (Some(x), Some(z)) if x.hypot(z) <= moved_m => return None,
         (Some(x), Some(z)) => format!("are {} m off", significant(x.hypot(z))),
         (None, _) | (_, None) => "diverge".to_owned(),
     };
-    Ok(Some(format!(
+    Some(format!(
         "rollouts of the whole {set} jumps {off}, where a body that stays at its start is {} m off: rely on predictions \
          of 0.1 s only, try another number of latent coordinates, or record more jumps",
         significant(moved_m)
-    )))
+    ))
 }
 
 #[cfg(test)]
@@ -322,7 +297,7 @@ mod tests {
                 rollout_x_m: x,
                 rollout_z_m: Some(z),
             };
-            whole_jump_note(&metrics, ("validation", &jumps)).expect("in memory")
+            whole_jump_note(&metrics, "validation", &jumps)
         };
         assert_eq!(note(Some(0.13), 0.06), None);
         let found = note(Some(0.15), 0.07).expect("a note");

@@ -7,7 +7,7 @@ use super::controller;
 use super::controller_c;
 use super::error::EmitError;
 use super::planned::PlannedJump;
-use crate::codegen::script::{matlab, python};
+use crate::codegen::script::Script;
 use crate::codegen::{Precision, SineCosine, Units, c, interface::ModelInterface, rust};
 use crate::equations::Equations;
 use crate::files::EmittedFile;
@@ -101,9 +101,9 @@ pub fn emit(
         files.extend(match target {
             Target::C => c::emit(for_compilers()?, &provenance, precision, sines)?,
             Target::Rust => rust::emit(for_compilers()?, &provenance, precision, sines)?,
-            Target::Python => python::emit(for_scripts()?, &provenance)?,
-            Target::Casadi => python::emit_casadi(for_scripts()?, &provenance)?,
-            Target::Matlab => matlab::emit(for_scripts()?, &provenance)?,
+            Target::Python => Script::NumPy.emit(for_scripts()?, &provenance)?,
+            Target::Casadi => Script::Casadi.emit(for_scripts()?, &provenance)?,
+            Target::Matlab => Script::Matlab.emit(for_scripts()?, &provenance)?,
             Target::Latex => latex::emit(equations, &options.print)?,
             Target::Markdown => markdown::emit(equations, &options.print)?,
             Target::Mathml => mathml::emit(equations, &options.print)?,

@@ -1,20 +1,18 @@
 //! The candidate terms of imported coefficients.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use serde_json::Value;
 
-use super::error::{ImportError, ImportFault};
+use super::error::ImportError;
 use super::options::standard_text;
 use super::pysindy;
 use super::run::{check_size, read_file};
-use crate::files::Place;
 use crate::model::{Library, LibraryChoice, LibraryOrder, StandardLibrary};
 
-/// Largest file with a list of terms.
 const MAX_TERMS_BYTES: u64 = 32 << 20;
 
-/// Number of terms that a choice has at a latent dimension.
 pub(super) fn dim(choice: &LibraryChoice, latent_dim: usize) -> Option<usize> {
     match choice {
         LibraryChoice::Standard(standard) => standard.term_count(latent_dim),
@@ -31,11 +29,11 @@ pub(super) fn build(
     let choice = match choice {
         LibraryChoice::Terms(terms) => LibraryChoice::Terms(
             pysindy::readable(terms, latent_dim)
-                .map_err(|(found, expected)| ImportFault::option("--library", found, expected))?,
+                .map_err(|(found, expected)| ImportError::option("--library", found, expected))?,
         ),
         LibraryChoice::Standard(_) => choice.clone(),
     };
-    Library::of(latent_dim, choice).map_err(|source| ImportFault::model(file, source))
+    Library::of(latent_dim, choice).map_err(|source| ImportError::unusable(file, source))
 }
 
 /// The order of a file's terms: as stated, or the only one that there is.
@@ -44,48 +42,39 @@ pub(super) fn order(
     latent_dim: usize,
     stated: Option<LibraryOrder>,
 ) -> Result<LibraryOrder, ImportError> {
-    let texts = |order| standard.texts_in(order, latent_dim);
-    let unusable = |source| ImportFault::model("", source);
-    let orders = LibraryOrder::NAMED.map(texts);
-    let [paper, interleaved, romc] = orders;
-    let orders = [
-        paper.map_err(unusable)?,
-        interleaved.map_err(unusable)?,
-        romc.map_err(unusable)?,
-    ];
+    let texts = |order: &LibraryOrder| standard.texts_in(*order, latent_dim);
+    let orders: Result<Vec<Vec<String>>, _> = LibraryOrder::NAMED.iter().map(texts).collect();
+    let orders = orders.map_err(|source| ImportError::unusable("", source))?;
     if let Some(stated) = stated {
         return Ok(stated);
     }
-    let differs = |a: usize, b: usize| (orders[a].iter().zip(&orders[b])).position(|(a, b)| a != b);
-    let mut rows: Vec<usize> = [(0, 1), (0, 2), (1, 2)]
-        .iter()
-        .filter_map(|&(a, b)| differs(a, b))
+    let differs = |(a, b): (usize, usize)| {
+        let mut rows = orders[a].iter().zip(&orders[b]);
+        rows.position(|(a, b)| a != b)
+    };
+    let rows: BTreeSet<usize> = [(0, 1), (0, 2), (1, 2)]
+        .into_iter()
+        .filter_map(differs)
         .collect();
-    rows.sort_unstable();
-    rows.dedup();
     if rows.is_empty() {
         return Ok(LibraryOrder::ROMC);
     }
-    let choices = LibraryOrder::NAMED
+    let choice = |(order, texts): (&LibraryOrder, &Vec<String>)| {
+        let terms = rows
+            .iter()
+            .map(|&row| format!("{} in row {}", texts[row], row + 1));
+        let (name, terms) = (order.name().unwrap_or_default(), terms.collect::<Vec<_>>());
+        format!("--library-order {name} ({})", terms.join(", "))
+    };
+    let choices: Vec<String> = LibraryOrder::NAMED
         .iter()
         .zip(&orders)
-        .map(|(order, texts)| {
-            let terms = rows
-                .iter()
-                .map(|&row| format!("{} in row {}", texts[row], row + 1));
-            let terms: Vec<String> = terms.collect();
-            format!(
-                "--library-order {} ({})",
-                order.name().unwrap_or_default(),
-                terms.join(", ")
-            )
-        });
-    let expected = format!(
-        "one of {}: the order of the rows of Xi, counted from 1",
-        choices.collect::<Vec<_>>().join(", ")
-    );
+        .map(choice)
+        .collect();
+    let choices = choices.join(", ");
+    let expected = format!("one of {choices}: the order of the rows of Xi, counted from 1");
     let found = format!("no order of the terms of {}", standard_text(standard));
-    Err(ImportFault::option("--library-order", found, expected))
+    Err(ImportError::option("--library-order", found, expected))
 }
 
 /// The shorthands that have this many terms.
@@ -111,7 +100,7 @@ pub fn read_terms(path: &Path) -> Result<Vec<String>, ImportError> {
 fn parse_terms(file: &str, text: &str) -> Result<Vec<String>, ImportError> {
     let text = text.trim_start_matches('\u{feff}');
     let refused = |line, column, found: &str, expected: &str| {
-        ImportFault::at(file, Place::Character(line, column), found, expected)
+        ImportError::at(file, (line, column), found, expected)
     };
     if !text.trim_start().starts_with(['[', '{']) {
         let lines = (text.lines()).map(|line| line.split('#').next().unwrap_or("").trim());
@@ -146,35 +135,5 @@ fn kind_of(value: &Value) -> &'static str {
         Value::String(_) => "a text",
         Value::Array(_) => "a list",
         Value::Object(_) => "an object",
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn terms_are_read_from_lines_and_from_json() {
-        let expected = ["1", "z1", "sin(dz1)"];
-        for text in [
-            "1\n z1 # position\n\nsin(dz1)\n",
-            "[\"1\", \"z1\", \"sin(dz1)\"]",
-            "{ \"library\": [\"1\", \"z1\", \"sin(dz1)\"], \"phases\": {} }",
-        ] {
-            assert_eq!(parse_terms("terms", text).expect(text), expected);
-        }
-        for text in ["", "# only a comment", "[1]", "{}", "[\"1\",", "[[\"1\"]]"] {
-            let error = parse_terms("terms", text).expect_err(text);
-            assert!(matches!(error.place, Place::Character(..)), "{error}");
-        }
-    }
-
-    #[test]
-    fn shorthands_are_suggested_by_their_number_of_terms() {
-        assert_eq!(
-            standards_with(15, 2),
-            ["degree=1,trigonometric,inputs", "degree=2"]
-        );
-        assert!(standards_with(16, 2).is_empty());
     }
 }

@@ -103,7 +103,7 @@ fn number_after_first(token: &str) -> Option<(char, usize)> {
 }
 
 /// Names, digits with points (an exponent is tokens of its own), runs of white space, `**`, and single characters.
-fn tokens(text: &str) -> impl Iterator<Item = &str> {
+pub(super) fn tokens(text: &str) -> impl Iterator<Item = &str> {
     let mut rest = text;
     std::iter::from_fn(move || {
         let first = rest.chars().next()?;
@@ -122,56 +122,4 @@ fn tokens(text: &str) -> impl Iterator<Item = &str> {
         rest = after;
         Some(token)
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn read(terms: &[&str]) -> Vec<String> {
-        let terms: Vec<String> = terms.iter().map(|term| (*term).to_owned()).collect();
-        readable(&terms, 2).expect("names in one way")
-    }
-
-    #[test]
-    fn names_of_pysindy_are_products() {
-        for (name, expected) in [
-            ("1", "1"),
-            ("z1 z2", "z1*z2"),
-            ("z1^2 dz1", "z1^2*dz1"),
-            ("sin(1 z1)", "sin(1*z1)"),
-            ("z1 sin(2 dz1)  cos(1 z2)", "z1*sin(2*dz1)*cos(1*z2)"),
-            ("z1**2", "z1^2"),
-            ("1e-3 z1", "1e-3*z1"),
-            ("2.5E+2 z1", "2.5E+2*z1"),
-            ("z1 - 0.5 * z2", "z1 - 0.5 * z2"),
-            ("tanh(z1)*(1 + u1)", "tanh(z1)*(1 + u1)"),
-            ("sin (z1) cos (2 z_2)", "sin (z1)*cos (2*z2)"),
-        ] {
-            assert_eq!(read(&[name]), [expected]);
-        }
-    }
-
-    #[test]
-    fn names_that_count_from_zero_are_those_of_the_latent_coordinates() {
-        let read = read(&["x0", "x1 x3", "sin(1 x2)", "u1", "exp(x0)"]);
-        assert_eq!(read, ["z1", "z2*dz2", "sin(1*dz1)", "u2", "exp(z1)"]);
-    }
-
-    #[test]
-    fn names_that_count_from_one_are_told_by_the_last() {
-        let found = read(&["x1", "x2 x4", "u1", "u2"]);
-        assert_eq!(found, ["z1", "z2*dz2", "u1", "u2"]);
-        assert_eq!(read(&["x1", "u2"]), ["z1", "u2"]);
-        for (terms, said) in [
-            (vec!["x1", "x2", "x3"], "from 0 or from 1"),
-            (vec!["x0", "x4"], "one too many"),
-            (vec!["x1", "x2", "u0", "u2"], "one too many"),
-            (vec!["x0", "z2"], "x and z in one list"),
-        ] {
-            let terms: Vec<String> = terms.into_iter().map(str::to_owned).collect();
-            let (found, _) = readable(&terms, 2).expect_err(said);
-            assert!(found.contains(said), "{found}");
-        }
-    }
 }

@@ -10,7 +10,7 @@ use romc::model::ReducedModel;
 use romc::plan::{Goal, Plan, PlanError, PlanSettings, Verdict, plan};
 use romc::recording::{self, Recording};
 use romc::robot::{BODY_Z, GRAVITY_M_S2, Robot};
-use romc::train::{Method, Origin, Progress, Recordings, TrainOptions, Watch};
+use romc::train::{Method, Monitor, Origin, Progress, Recordings, TrainOptions};
 
 fn shipped_model(name: &str) -> ReducedModel {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
@@ -35,9 +35,9 @@ fn learned(training: &[Recording], validation: &[Recording], latent_dim: usize) 
     let robot = Robot::by_name("go1").unwrap();
     let options = TrainOptions::new("planner", latent_dim);
     let (cancel, mut listener) = (AtomicBool::new(false), |_: Progress| ());
-    let mut watch = Watch::new(&mut listener, &cancel);
+    let mut monitor = Monitor::new(&mut listener, &cancel);
     let origin = Origin::default();
-    let trained = Method::ClosedForm.learn(sets, robot, &options, &origin, &mut watch);
+    let trained = Method::ClosedForm.learn(sets, robot, &options, &origin, &mut monitor);
     trained.expect("a model").model
 }
 

@@ -64,7 +64,7 @@ fn header_after_a_blank_line_is_told() {
     let text = format!("\n{}", Sheet::landing().text());
     let error = read_from_bytes("landing.csv", text.as_bytes()).unwrap_err();
     assert!(
-        matches!(error.kind, RecordingFault::Delimiter { .. }) && error.place.row() == Some(1),
+        message(&error).contains("expected cells separated by") && error.place.row() == Some(1),
         "{error:?}"
     );
 }
@@ -74,16 +74,6 @@ fn single_sample_is_too_short() {
     let mut sheet = Sheet::landing();
     sheet.rows.truncate(2);
     let error = fault(&sheet);
-    assert!(
-        matches!(
-            error.kind,
-            RecordingFault::TooShort {
-                found: 1,
-                expected: 2,
-                ..
-            }
-        ) && error.place.row() == Some(2)
-    );
     assert_eq!(
         message(&error),
         "row 2: found 1 consecutive samples, expected at least 2"
@@ -97,12 +87,12 @@ fn time_in_milliseconds_is_told() {
         sheet.set(row + 1, "Time", &(2 * row).to_string());
     }
     let error = fault(&sheet);
+    let text = message(&error);
     assert!(
-        matches!(error.kind, RecordingFault::Sampling { found, .. } if found == 2.0)
-            && error.place.row() == Some(2),
-        "{error:?}"
+        text.starts_with("row 2, column `Time`: found a sample every 2 s on average"),
+        "{text}"
     );
-    assert!(message(&error).ends_with("is `Time` in milliseconds?"));
+    assert!(text.ends_with("is `Time` in milliseconds?"));
 }
 
 #[test]
@@ -164,7 +154,6 @@ fn text_in_a_number_names_row_column_and_cell() {
     let mut sheet = Sheet::landing();
     sheet.set(5, "rr.hy Velocity", "fast");
     let error = fault(&sheet);
-    assert!(matches!(error.kind, RecordingFault::Number { .. }) && error.place.row() == Some(5));
     assert_eq!(
         message(&error),
         "row 5, column `rr.hy Velocity`: found `fast`, expected a number with a decimal comma"
@@ -204,10 +193,6 @@ fn nan_infinite_and_overflowing_numbers_are_told() {
         let mut sheet = Sheet::landing();
         sheet.set(12, "Body angular Velocity y", cell);
         let error = fault(&sheet);
-        assert!(
-            matches!(error.kind, RecordingFault::Number { .. }) && error.place.row() == Some(12),
-            "{error:?}"
-        );
         assert_eq!(
             message(&error),
             format!(
@@ -295,7 +280,6 @@ fn contact_flag_that_is_neither_0_nor_1_is_told() {
         let mut sheet = Sheet::landing();
         sheet.set(7, "fl Foot", cell);
         let error = fault(&sheet);
-        assert!(matches!(error.kind, RecordingFault::Contact(_)) && error.place.row() == Some(7));
         assert_eq!(
             message(&error),
             format!(
@@ -315,7 +299,7 @@ fn other_delimiters_are_told() {
         sheet.separator = separator;
         let error = fault(&sheet);
         assert!(
-            matches!(error.kind, RecordingFault::Delimiter { .. }) && error.place.row() == Some(1),
+            message(&error).contains("expected cells separated by") && error.place.row() == Some(1),
             "{error:?}"
         );
         assert!(message(&error).contains("expected cells separated by `;`, a tab or `,`"));
@@ -350,7 +334,7 @@ fn row_with_another_delimiter_than_the_header_is_told() {
     lines[4] = lines[4].replace(';', ",");
     let error = read_from_bytes("landing.csv", lines.join("\n").as_bytes()).unwrap_err();
     assert!(
-        matches!(error.kind, RecordingFault::Delimiter { .. }) && error.place.row() == Some(5),
+        message(&error).contains("expected cells separated by") && error.place.row() == Some(5),
         "{error:?}"
     );
     assert!(message(&error).ends_with("expected cells separated by `;`"));
@@ -363,16 +347,10 @@ fn text_that_is_not_utf8_names_row_byte_and_value() {
     let start = row_3.map(|(place, _)| place).nth(1).unwrap() + 1;
     bytes[start + 4] = 0xe9;
     let error = read_from_bytes("landing.csv", &bytes).unwrap_err();
+    let text = message(&error);
     assert!(
-        matches!(
-            error.kind,
-            RecordingFault::Encoding {
-                byte: 5,
-                found: 0xe9,
-                ..
-            }
-        ) && error.place.row() == Some(3),
-        "{error:?}"
+        text.starts_with("row 3") && text.contains("found 0xe9 as byte 5"),
+        "{text}"
     );
     assert_eq!(
         message(&error),
@@ -411,10 +389,10 @@ fn damaged_and_truncated_gzip_are_told() {
 fn absurdly_long_line_is_refused_also_when_packed() {
     let endless = vec![b'1'; 50_000_000];
     let error = read_from_bytes("landing.csv", &endless).unwrap_err();
-    assert!(matches!(error.kind, RecordingFault::LineTooLong(_)) && error.place.row() == Some(1));
+    assert!(message(&error).contains("found a line of more than") && error.place.row() == Some(1));
     assert!(message(&error).starts_with("row 1: found a line of more than 65536 bytes"));
     let error = read_from_bytes("landing.csv", &gzip(&endless)).unwrap_err();
-    assert!(matches!(error.kind, RecordingFault::LineTooLong(_)) && error.place.row() == Some(1));
+    assert!(message(&error).contains("found a line of more than") && error.place.row() == Some(1));
 }
 
 #[test]
@@ -424,7 +402,7 @@ fn time_that_stands_still_or_steps_back_is_told() {
     sheet.set(11, "Time", &before);
     let error = fault(&sheet);
     assert!(
-        matches!(error.kind, RecordingFault::Time { .. }) && error.place.row() == Some(11),
+        message(&error).contains("expected a later time") && error.place.row() == Some(11),
         "{error:?}"
     );
     assert!(message(&error).contains("expected a later time or a new segment"));
@@ -432,7 +410,7 @@ fn time_that_stands_still_or_steps_back_is_told() {
     sheet.rows.swap(10, 11);
     let error = fault(&sheet);
     assert!(
-        matches!(error.kind, RecordingFault::Time { .. }) && error.place.row() == Some(12),
+        message(&error).contains("expected a later time") && error.place.row() == Some(12),
         "{error:?}"
     );
 }

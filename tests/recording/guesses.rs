@@ -5,6 +5,7 @@ use std::fs;
 use std::path::Path;
 
 use nalgebra::DMatrix;
+use romc::files::Overwrite;
 use romc::recording::foreign::guess::{Guess, guess};
 use romc::recording::{self, Clocks, ColumnMap, Reader, Recording, Segment};
 use romc::robot::Robot;
@@ -262,7 +263,7 @@ fn short_parts_of_jumps_keep_their_signs() {
             (80, 15),
         ] {
             let part = jump.slice(start * jump.len() / 100..(start + share) * jump.len() / 100);
-            recording::write_mcap(&path, &part, None).unwrap();
+            recording::write_mcap(&path, &part, None, Overwrite::Replace).unwrap();
             let read = Reader::new(None, Clocks::Recorded).read(&path).unwrap();
             let (state, _, _) = difference(&read.recording, &part);
             if state > 1e-9 {
@@ -278,7 +279,7 @@ fn short_parts_of_jumps_keep_their_signs() {
     let noisy = Path::new(env!("CARGO_MANIFEST_DIR"));
     let noisy = noisy.join("examples/recordings/go1-noisy/test_01.csv.gz");
     let noisy = recording::read(&noisy).unwrap().segments.remove(0);
-    recording::write_mcap(&path, &noisy, None).unwrap();
+    recording::write_mcap(&path, &noisy, None, Overwrite::Replace).unwrap();
     let read = Reader::new(None, Clocks::Recorded).read(&path).unwrap();
     assert!(difference(&read.recording, &noisy).1 < 1e-9);
 }

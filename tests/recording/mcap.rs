@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use mcap::records::MessageHeader;
 use mcap::{MessageStream, WriteOptions, Writer};
+use romc::files::Overwrite;
 use romc::recording::{self, Clocks, ColumnMap, Reader, Reading, RecordingError, Segment};
 use romc::robot::JOINT_NAMES;
 
@@ -30,7 +31,7 @@ impl Bag {
     fn of(segment: &Segment) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("jump.mcap");
-        recording::write_mcap(&path, segment, None).unwrap();
+        recording::write_mcap(&path, segment, None, Overwrite::Replace).unwrap();
         let bytes = fs::read(&path).unwrap();
         let (mut messages, mut schemas) = (Vec::new(), BTreeMap::new());
         for message in MessageStream::new(&bytes).unwrap() {
@@ -771,7 +772,7 @@ fn logs_of_other_formats_are_named_with_the_line_that_converts_them() {
     // An MCAP log under another name is one all the same.
     let jump = jump();
     let path = folder.path().join("jump.bag");
-    recording::write_mcap(&path, &jump, None).unwrap();
+    recording::write_mcap(&path, &jump, None, Overwrite::Replace).unwrap();
     is_the_jump(&path, &jump);
 }
 

@@ -2,7 +2,8 @@
 
 use num_integer::Integer;
 
-use super::node::{ExprId, Function, Node, Parity};
+use super::function::{Function, Parity};
+use super::node::{ExprId, Node};
 use super::number::Number;
 use super::order::Exponent;
 use super::pool::{ExprPool, Sign};
@@ -215,10 +216,11 @@ impl ExprPool {
         if let Some(value) = self.special_value(function, argument) {
             return value;
         }
-        if function.parity() != Parity::Neither && self.starts_negative(argument) {
+        let parity = function.row().parity;
+        if parity != Parity::Neither && self.starts_negative(argument) {
             let positive = self.neg(argument);
             let value = self.apply(function, positive);
-            return self.negated_if(function.parity() == Parity::Odd, value);
+            return self.negated_if(parity == Parity::Odd, value);
         }
         self.intern(Node::Apply(function, argument))
     }
@@ -226,8 +228,8 @@ impl ExprPool {
     fn special_value(&mut self, function: Function, argument: ExprId) -> Option<ExprId> {
         let is_zero = argument == ExprId::ZERO;
         match (function, self.node(argument)) {
-            (Function::Sin | Function::Tan | Function::Tanh, _) if is_zero => Some(ExprId::ZERO),
             (Function::Cos | Function::Exp, _) if is_zero => Some(ExprId::ONE),
+            (_, _) if is_zero && function.vanishes_at_zero() => Some(ExprId::ZERO),
             (Function::Cos, &Node::Apply(Function::Abs, inner)) => {
                 Some(self.apply(Function::Cos, inner))
             }
@@ -243,7 +245,6 @@ impl ExprPool {
                 let magnitude = self.apply(Function::Abs, rest);
                 Some(self.scale(coefficient.abs(), magnitude))
             }
-            (Function::Sign, _) if is_zero => Some(ExprId::ZERO),
             (Function::Sign, _) if self.sign(argument) == Sign::Positive => Some(ExprId::ONE),
             (Function::Sign, Node::Number(_)) => Some(self.integer(-1)),
             (Function::Sign, Node::Apply(Function::Sign, _)) => Some(argument),

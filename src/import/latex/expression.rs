@@ -11,6 +11,18 @@ use crate::model::LatentVariable;
 
 /// What can stand where a factor begins.
 const FACTOR: &str = "a number, a variable, a function or a group";
+const BARS: &[&str] = &["|", "\\rvert", "\\vert", "\\|"];
+/// What opens a sum, and what closes it.
+const DELIMITERS: [(&str, &[&str]); 8] = [
+    ("(", &[")"]),
+    ("[", &["]"]),
+    ("\\{", &["\\}"]),
+    ("\\lbrace", &["\\rbrace"]),
+    ("|", BARS),
+    ("\\lvert", BARS),
+    ("\\vert", BARS),
+    ("\\|", BARS),
+];
 /// Commands whose argument is text.
 pub(super) const WORDS: &str = "text textrm textit mbox intertext shortintertext";
 
@@ -94,7 +106,6 @@ impl Reader<'_> {
                     self.at = at + 1 + usize::from(self.kind(at + 1) == Some(&Kind::Open));
                     self.takes(&Kind::Dollar);
                     let is_formula = match self.next_kind() {
-                        Some(Kind::Number(_)) => true,
                         Some(Kind::Character(c)) => "+-*/=".contains(c) || c.is_ascii_digit(),
                         _ => false,
                     };
@@ -137,7 +148,7 @@ impl Reader<'_> {
 
     pub(super) fn term(&mut self, leads: bool) -> Read<()> {
         self.peek();
-        let is_literal = matches!(self.kind(self.at), Some(Kind::Number(_)));
+        let is_literal = self.number_at(self.at).is_some();
         let mut last = self.factor(leads)?;
         let behind_literal = is_literal.then_some(self.at);
         let mut after_slash = false;
@@ -222,6 +233,7 @@ impl Reader<'_> {
     /// Whether a token behind a factor is another one; other tokens end the term.
     pub(super) fn starts_factor(&self, kind: &Kind) -> bool {
         match kind {
+            _ if self.number_at(self.at).is_some() => true,
             Kind::Character('|') => self.bars.last() != Some(&true),
             Kind::Character(c) => !"+-=,.;)]<>:!*/".contains(*c),
             Kind::Command(name) => {
@@ -243,13 +255,15 @@ impl Reader<'_> {
             self.at = after;
             return self.call(place, &name);
         }
+        if let Some(number) = self.number_at(self.at) {
+            let place = self.tokens[number.first].place;
+            self.at = number.behind;
+            let literal = self.literal(&number.text, leads);
+            self.push(place, literal);
+            self.powers(place)?;
+            return Ok(Last::Number);
+        }
         let last = match &token.kind {
-            Kind::Number(text) => {
-                self.at += 1;
-                let literal = self.literal(text, leads);
-                self.push(place, literal);
-                Last::Number
-            }
             Kind::Command(name) if name == "num" => self.macro_number(place)?,
             Kind::Command(name) if has("frac dfrac tfrac cfrac nicefrac sfrac", name) => {
                 self.at += 1;
@@ -264,13 +278,12 @@ impl Reader<'_> {
                 }
             }
             Kind::Command(name) if name == "sqrt" => self.root(place)?,
-            Kind::Command(name) if has("abs lvert vert", name) => self.absolute(place, name)?,
-            Kind::Character('|') => self.absolute(place, "|")?,
-            Kind::Command(name) if name == "left" && self.opens_bar() => {
-                self.absolute(place, "left")?
+            Kind::Command(name) if name == "abs" => {
+                self.at += 1;
+                self.enclosed_sum(place, "abs(")?
             }
-            Kind::Character('(' | '[') => self.delimited(place)?,
-            Kind::Command(name) if name == "left" || name == "{" => self.delimited(place)?,
+            Kind::Character('(' | '[' | '|') => self.delimited(place)?,
+            Kind::Command(name) if has("left { lvert vert", name) => self.delimited(place)?,
             kind => self.variable_or_braces(place, kind)?,
         };
         self.powers(place)?;
@@ -327,32 +340,8 @@ impl Reader<'_> {
     fn group_sum(&mut self, leads: bool) -> Read<Last> {
         let first = self.at;
         self.sum(leads)?;
-        let is_number = self.at == first + 1 && matches!(self.tokens[first].kind, Kind::Number(_));
+        let is_number = (self.number_at(first)).is_some_and(|number| number.behind == self.at);
         Ok(if is_number { Last::Number } else { Last::Other })
-    }
-
-    pub(super) fn opens_bar(&self) -> bool {
-        match self.kind(self.at + 1) {
-            Some(Kind::Character('|')) => true,
-            Some(Kind::Command(name)) => matches!(name.as_str(), "lvert" | "vert" | "|"),
-            _ => false,
-        }
-    }
-
-    fn absolute(&mut self, place: (usize, usize), opener: &str) -> Read<Last> {
-        self.at += 1 + usize::from(opener == "left");
-        if opener == "abs" {
-            return self.enclosed_sum(place, "abs(");
-        }
-        self.push(place, "abs(");
-        let has_right = self.sum_between(true)?;
-        let closed =
-            self.character('|') || ["rvert", "vert", "|"].iter().any(|name| self.command(name));
-        if !closed || has_right != (opener == "left") {
-            return self.unexpected("an operator or the closing bar");
-        }
-        self.push(place, ")");
-        Ok(Last::Other)
     }
 
     /// A sum between bars or parentheses; whether `\right` stands behind it.
@@ -365,26 +354,33 @@ impl Reader<'_> {
         Ok(self.command("right"))
     }
 
-    /// Parentheses of any kind and size.
+    /// A sum between delimiters of any size.
     pub(super) fn delimited(&mut self, place: (usize, usize)) -> Read<Last> {
         let has_left = self.command("left");
-        let closer = match self.next_kind() {
-            Some(Kind::Character('(')) => Kind::Character(')'),
-            Some(Kind::Character('[')) => Kind::Character(']'),
-            Some(Kind::Command(name)) if name == "{" => Kind::Command("}".to_owned()),
-            Some(Kind::Command(name)) if name == "lbrace" => Kind::Command("rbrace".to_owned()),
-            _ => return self.unexpected("`(`, `[`, `\\{` or `|`"),
+        let mut openers = DELIMITERS.iter();
+        let Some((_, closers)) = openers.find(|(opener, _)| self.delimiter(opener)) else {
+            return self.unexpected("`(`, `[`, `\\{` or `|`");
         };
-        self.at += 1;
-        self.push(place, "(");
-        let has_right = self.sum_between(false)?;
-        if has_left != has_right || !self.takes(&closer) {
-            let quoted = closer.quoted();
+        let are_bars = *closers == BARS;
+        self.push(place, if are_bars { "abs(" } else { "(" });
+        let has_right = self.sum_between(are_bars)?;
+        if has_left != has_right || !closers.iter().any(|closer| self.delimiter(closer)) {
             let right = if has_left { "`\\right` and " } else { "" };
-            return self.unexpected(&format!("an operator or {right}{quoted}"));
+            let expected = match are_bars {
+                true => "an operator or the closing bar".to_owned(),
+                false => format!("an operator or {right}`{}`", closers[0]),
+            };
+            return self.unexpected(&expected);
         }
         self.push(place, ")");
         Ok(Last::Other)
+    }
+
+    fn delimiter(&mut self, wanted: &str) -> bool {
+        match wanted.strip_prefix('\\') {
+            Some(command) => self.command(command),
+            None => wanted.chars().all(|character| self.character(character)),
+        }
     }
 
     /// The sum in the argument that comes next, between an opening text and a parenthesis.

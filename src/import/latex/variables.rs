@@ -1,6 +1,6 @@
 //! Functions with their arguments, and variables with dots and subscripts.
 
-use super::super::equations::refused;
+use super::super::error::ImportError;
 use super::names::is_greek;
 use super::reader::{BARE, FONTS, INVISIBLE, Last, Read, Reader, Symbol, has};
 use super::token::Kind;
@@ -80,7 +80,7 @@ impl Reader<'_> {
         let argument = self.here();
         let last = match self.next_kind() {
             Some(Kind::Character('(' | '[')) => self.delimited(argument)?,
-            Some(Kind::Command(opener)) if opener == "left" && !self.opens_bar() => {
+            Some(Kind::Command(opener)) if opener == "left" && !self.is_bar_behind() => {
                 self.delimited(argument)?
             }
             // Braces do not print: a sum or a power of what is in them would read otherwise without.
@@ -128,6 +128,15 @@ impl Reader<'_> {
         Ok(last)
     }
 
+    /// Whether `\left` at the reader's place opens a bar.
+    fn is_bar_behind(&self) -> bool {
+        match self.kind(self.at + 1) {
+            Some(Kind::Character(bar)) => *bar == '|',
+            Some(Kind::Command(name)) => has("lvert vert |", name),
+            _ => false,
+        }
+    }
+
     /// `\sin 2\dot z_1`: numbers and one more factor.
     pub(super) fn bare_argument(&mut self) -> Read<Last> {
         self.deepen()?;
@@ -136,7 +145,7 @@ impl Reader<'_> {
         let next = self.next_kind();
         let goes_on = match &next {
             Some(Kind::Command(name)) if function(name).is_some() => false,
-            Some(kind) => self.starts_factor(kind) && !matches!(kind, Kind::Number(_)),
+            Some(kind) => self.starts_factor(kind) && self.number_at(self.at).is_none(),
             None => false,
         };
         let is_dot = matches!(&next, Some(Kind::Command(name)) if has("cdot times", name));
@@ -163,7 +172,7 @@ impl Reader<'_> {
             (None, 0) if symbol.name == "pi" => format!("{:?}", std::f64::consts::PI),
             _ => {
                 let (found, expected) = (symbol.quoted(), self.names.expected());
-                return Err(refused(self.file, symbol.place, found, expected));
+                return Err(ImportError::at(self.file, symbol.place, found, expected));
             }
         };
         self.push(place, name);
@@ -196,6 +205,7 @@ impl Reader<'_> {
                 self.subscript(&mut name)?;
                 let end = self.at;
                 self.tokens[power..end].rotate_left(behind - power);
+                self.is_around[power..end].rotate_left(behind - power);
                 self.link(power..end);
                 self.at = power + (end - behind);
             }
@@ -279,8 +289,7 @@ impl Reader<'_> {
         let mut word = String::new();
         for token in &self.tokens[from..to.min(self.end)] {
             match &token.kind {
-                Kind::Character(c) if c.is_ascii_alphabetic() || *c == ',' => word.push(*c),
-                Kind::Number(text) if !text.contains(['.', '+', '-']) => word.push_str(text),
+                Kind::Character(c) if c.is_ascii_alphanumeric() || *c == ',' => word.push(*c),
                 Kind::Command(name) if is_greek(name) => word.push_str(name),
                 Kind::Command(name) if has(FONTS, name) || has(INVISIBLE, name) => {}
                 Kind::Open | Kind::Close => {}

@@ -44,16 +44,13 @@ const NO_DYNAMICS: &str = "no dynamics";
 /// The side of a threshold on which a value passes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum Bound {
-    /// Errors, shares.
     #[serde(rename = "at most")]
     AtMost,
-    /// Coefficients of determination, counts.
     #[serde(rename = "at least")]
     AtLeast,
 }
 
 impl Bound {
-    /// `at most`, `at least`.
     pub fn words(self) -> &'static str {
         match self {
             Self::AtMost => "at most",
@@ -62,26 +59,18 @@ impl Bound {
     }
 }
 
-/// A figure of a model beside that of a baseline.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct VerdictRow {
-    /// What is measured.
     pub name: String,
-    /// The use that the row decides on.
     #[serde(rename = "use")]
     pub of: String,
-    /// Unit of the numbers.
     pub unit: &'static str,
     /// The model's figure, that of the recording on which it is worst; infinite for a rollout that diverges, none where
     /// recordings do not show it.
     pub value: Option<f64>,
-    /// The same figure of the baseline.
     pub baseline: Option<f64>,
-    /// The baseline's name.
     pub baseline_name: &'static str,
-    /// What the value is compared with.
     pub threshold: f64,
-    /// The side on which it passes.
     pub bound: Bound,
     /// Whether it passes; none without a value.
     pub passed: Option<bool>,
@@ -121,7 +110,6 @@ impl VerdictRow {
         }
     }
 
-    /// Whether the row decides that the model fails.
     pub fn is_failed(&self) -> bool {
         self.counts && self.passed == Some(false)
     }
@@ -168,11 +156,8 @@ impl VerdictRow {
 /// `control`; one that recordings or model do not allow to measure is in neither list.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Verdict {
-    /// Uses of which every counted row passes.
     pub fit_for: Vec<String>,
-    /// Uses of which one fails.
     pub failed: Vec<String>,
-    /// Every figure.
     pub rows: Vec<VerdictRow>,
 }
 
@@ -183,13 +168,11 @@ impl Verdict {
         (self.failed.iter()).any(|of| !others.contains(&of.as_str()))
     }
 
-    /// Whether torques or control fail.
     pub fn fails_control(&self) -> bool {
         let mut failed = self.failed.iter();
         failed.any(|of| [TORQUES, CONTROL].contains(&of.as_str()))
     }
 
-    /// Counted rows that fail.
     pub fn failures(&self) -> impl Iterator<Item = &VerdictRow> {
         self.rows.iter().filter(|row| row.is_failed())
     }
@@ -326,29 +309,14 @@ fn without_predictions(rows: &mut [VerdictRow], fails_soon: bool) {
 fn control_rows(metrics: &ControlMetrics) -> [VerdictRow; 5] {
     let baseline = &metrics.baseline;
     let blind = &baseline.no_dynamics;
-    let torque = |name, own: Option<f64>, other: Option<f64>| {
-        let threshold = other.map_or(TORQUE_R2, |other| other.max(TORQUE_R2));
-        let against = (NO_DYNAMICS, other);
-        VerdictRow::new(
-            (TORQUES, name, ""),
-            own,
-            against,
-            (Bound::AtLeast, threshold),
-        )
+    let torque = |name, own, other: Option<f64>| {
+        let least = other.map_or(TORQUE_R2, |other| other.max(TORQUE_R2));
+        let (row, against) = ((TORQUES, name, ""), (NO_DYNAMICS, other));
+        VerdictRow::new(row, own, against, (Bound::AtLeast, least))
     };
-    let [contact, flight] = [
-        (
-            TORQUES_IN_CONTACT,
-            metrics.torque_r2.contact,
-            blind.torque_r2.contact,
-        ),
-        (
-            "R^2 of torques in flight",
-            metrics.torque_r2.flight,
-            blind.torque_r2.flight,
-        ),
-    ]
-    .map(|(name, own, other)| torque(name, own, other));
+    let (own, other) = (metrics.torque_r2, blind.torque_r2);
+    let contact = torque(TORQUES_IN_CONTACT, own.contact, other.contact);
+    let flight = torque("R^2 of torques in flight", own.flight, other.flight);
     let stage = |name, other: &Option<_>| {
         let share = (metrics.prediction_rms.as_ref())
             .zip(other.as_ref())
@@ -356,10 +324,8 @@ fn control_rows(metrics: &ControlMetrics) -> [VerdictRow; 5] {
         let row = (CONTROL, ONE_STAGE, "");
         VerdictRow::new(row, share, (name, Some(1.0)), (Bound::AtMost, NO_BETTER))
     };
-    let constant = stage(
-        CONSTANT_VELOCITY,
-        &baseline.constant_velocity.prediction_rms,
-    );
+    let constant = &baseline.constant_velocity.prediction_rms;
+    let constant = stage(CONSTANT_VELOCITY, constant);
     let uninformed = stage(NO_DYNAMICS, &blind.prediction_rms);
     let stage = match uninformed.margin() < constant.margin() {
         true => uninformed,

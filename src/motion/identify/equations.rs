@@ -19,12 +19,13 @@ use super::parameters::{
 };
 use crate::recording::Segment;
 use crate::recording::preprocess::differences;
+use crate::recording::segment::between;
 use crate::robot::actuators::DRY_SPEED_RAD_S;
 use crate::robot::joints::LEG_JOINT_DIM;
 use crate::robot::{JOINT_DIM, Leg, Robot};
 
 /// Smallest `|det J|` over the volume of its links at which a foot's force is taken from torques.
-pub const LEAST_MANIPULABILITY: f64 = 0.04;
+pub(crate) const LEAST_MANIPULABILITY: f64 = 0.04;
 /// Speed within which rolling resistance changes its sign, in rad/s.
 const ROLLING_SPEED_RAD_S: f64 = 0.05;
 
@@ -281,21 +282,9 @@ fn own_torques(
 
 /// Rows as they were `delay_s` before each time, by straight lines; held at the ends.
 fn delayed(time_s: &[f64], rows: &DMatrix<f64>, delay_s: f64) -> DMatrix<f64> {
-    let last = time_s.len() - 1;
-    let mut right = 0;
     let mut out = rows.clone();
     for (sample, time) in time_s.iter().enumerate() {
-        let time = (time - delay_s).clamp(time_s[0], time_s[last]);
-        while right < last && time_s[right] < time {
-            right += 1;
-        }
-        let left = right.saturating_sub(1);
-        let step = time_s[right] - time_s[left];
-        let share = if step > 0.0 {
-            (time - time_s[left]) / step
-        } else {
-            1.0
-        };
+        let (left, right, share) = between(time_s, time - delay_s);
         let value = rows.column(left) * (1.0 - share) + rows.column(right) * share;
         out.set_column(sample, &value);
     }

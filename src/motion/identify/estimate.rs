@@ -88,10 +88,8 @@ pub fn identify(recordings: &[Recording], robot: &Robot) -> Result<Identificatio
     Ok(found)
 }
 
-/// A segment ready for its equations.
 type Prepared = (Timed, Motion);
 
-/// Refuses windows that say too little of these many recordings.
 fn require_enough(windows: &Windows, recordings: usize) -> Result<(), IdentifyError> {
     let (found, expected) = (windows.contact_samples, LEAST_CONTACT_SAMPLES);
     if found < expected {
@@ -139,7 +137,6 @@ fn exclusions(windows: &Windows) -> Vec<String> {
     notes
 }
 
-/// What the rounds improve.
 struct State {
     gravity_m_s2: f64,
     mass_kg: f64,
@@ -161,7 +158,6 @@ impl State {
         }
     }
 
-    /// The equations of all segments at this estimate of gravity and delay.
     fn windows(&self, segments: &[Prepared], robot: &Robot) -> Result<Windows, IdentifyError> {
         let mut windows = Windows::default();
         for (Timed { segment, lost, .. }, motion) in segments {
@@ -270,7 +266,6 @@ impl State {
     }
 }
 
-/// The regression on the feet's forces alone.
 fn alone(windows: &Windows) -> ForceAlone {
     let estimate = force_alone(&windows.rows).unwrap_or_default();
     ForceAlone {
@@ -287,7 +282,6 @@ fn fit_of(windows: &Windows, estimate: &Estimate) -> Fit {
     }
 }
 
-/// What a robot cannot have done, counted by kind.
 fn implausible(recording: &Recording, robot: &Robot) -> Option<String> {
     let mut counts: BTreeMap<&'static str, usize> = BTreeMap::new();
     for finding in check(recording, robot) {
@@ -305,7 +299,6 @@ fn implausible(recording: &Recording, robot: &Robot) -> Option<String> {
     })
 }
 
-/// What was mended in the segments of a recording.
 fn mended(path: &Path, segments: &[Timed]) -> Option<String> {
     let mut faults = Vec::new();
     let rebuilt = segments

@@ -107,7 +107,6 @@ fn at(file: &str, place: Place, fault: IdentifyFault) -> IdentifyError {
     IdentifyError::File(Located::new(file, place, fault))
 }
 
-/// A number with its name.
 type Entry = (&'static str, f64);
 
 fn gravity_and_mass(gravity_m_s2: f64, mass_kg: f64) -> [Entry; 2] {

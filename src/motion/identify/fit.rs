@@ -11,8 +11,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, SMatrix, SVector};
 use super::parameters::{DELAY, GRAVITY, INVERSE_MASS, NOT_NEGATIVE, PARAMETER_DIM, Prior};
 use super::windows::{Group, OVERLAP, Row};
 
-/// Unknowns, per mass except gravity.
-pub type Estimate = SVector<f64, PARAMETER_DIM>;
+pub(crate) type Estimate = SVector<f64, PARAMETER_DIM>;
 type Square = SMatrix<f64, PARAMETER_DIM, PARAMETER_DIM>;
 
 /// Deviations of a residual from which it counts less.
@@ -24,13 +23,12 @@ const FIRST_WEIGHTS: [f64; 2] = [1.0, 0.3];
 
 /// The state of the iteration: unknowns, deviations of the groups.
 #[derive(Debug, Clone, Default)]
-pub struct Iteration {
+pub(crate) struct Iteration {
     /// Present estimate; `None` before the first step.
     pub estimate: Option<Estimate>,
     deviations: Option<[f64; Group::COUNT]>,
 }
 
-/// Normal equations `matrix x = side`.
 #[derive(Debug, Clone, Default)]
 struct Normal {
     matrix: Square,
@@ -119,14 +117,13 @@ impl Normal {
 }
 
 /// What a row's equation leaves unexplained, m/s^2.
-pub fn residual(row: &Row, estimate: &Estimate, mass_kg: f64) -> f64 {
+pub(crate) fn residual(row: &Row, estimate: &Estimate, mass_kg: f64) -> f64 {
     let product: f64 = (row.coefficients.iter().zip(estimate.iter()))
         .map(|(coefficient, value)| coefficient * value)
         .sum();
     left(row, mass_kg) - product
 }
 
-/// The left side per mass: joint equations are divided by it.
 fn left(row: &Row, mass_kg: f64) -> f64 {
     match row.group {
         Group::Contact(_) | Group::Flight(_) => row.left,
@@ -138,7 +135,7 @@ impl Iteration {
     /// Solves once with present deviations, then takes the deviations of the new residuals.
     ///
     /// `None` if the equations are singular even with the priors (not finite numbers).
-    pub fn step(&mut self, rows: &[Row], priors: &[Prior], mass_kg: f64) -> Option<()> {
+    pub(crate) fn step(&mut self, rows: &[Row], priors: &[Prior], mass_kg: f64) -> Option<()> {
         let normal = self.normal(rows, priors, mass_kg);
         let (estimate, _) = normal.solve_not_negative()?;
         self.estimate = Some(estimate);
@@ -167,7 +164,7 @@ impl Iteration {
     /// `delay_deviation_s` beside the estimated one; `None` as for [`Iteration::step`].
     ///
     /// Unknowns at zero have the variance that they have when they are free.
-    pub fn variances(
+    pub(crate) fn variances(
         &self,
         rows: &[Row],
         groupings: &[Vec<usize>],
@@ -243,7 +240,6 @@ impl Iteration {
     }
 }
 
-/// Weight of a residual in deviations.
 fn huber(residual: f64) -> f64 {
     HUBER / residual.abs().max(HUBER)
 }
@@ -268,7 +264,7 @@ fn spread(whole: &Normal, parts: &[Normal], free: &[usize]) -> Option<Estimate> 
 }
 
 /// Gravity and inverse mass by the feet's forces alone, over rows in contact; `None` without any.
-pub fn force_alone(rows: &[Row]) -> Option<Estimate> {
+pub(crate) fn force_alone(rows: &[Row]) -> Option<Estimate> {
     let mut normal = Normal::default();
     let is_contact = |row: &&Row| matches!(row.group, Group::Contact(_));
     for row in rows.iter().filter(is_contact) {
@@ -278,7 +274,7 @@ pub fn force_alone(rows: &[Row]) -> Option<Estimate> {
 }
 
 /// Share of the variance of the trunk's acceleration along an axis in contact that is explained.
-pub fn explained(rows: &[Row], estimate: &Estimate, axis: usize) -> f64 {
+pub(crate) fn explained(rows: &[Row], estimate: &Estimate, axis: usize) -> f64 {
     let chosen = || rows.iter().filter(|row| row.group == Group::Contact(axis));
     let count = chosen().count().max(1) as f64;
     let mean = chosen().map(|row| row.left).sum::<f64>() / count;

@@ -3,10 +3,10 @@
 //! Enters: recordings and the robot's geometry. Leaves: an [`Identification`], each value with its
 //! standard error, and the file that keeps it. [`clock`](crate::recording::clock) mends segments whose time
 //! stamps disagree with their motion, [`motion`] has the directions of the links and their accelerations,
-//! [`equations`] the linear equations that these obey at every sample, [`windows`] their averages
-//! over short windows, [`fit`] the weighted least squares, [`estimate`] the loop around it, `agreement` the refusal of
+//! [`equations`] the linear equations that these obey at every sample, `windows` their averages
+//! over short windows, `fit` the weighted least squares, `estimate` the loop around it, `agreement` the refusal of
 //! recordings that contradict each other or physics,
-//! [`file`](mod@file) the result on disk. Read [`estimate`] first;
+//! `file` the result on disk. Read `estimate` first;
 //! `docs/identify.md` has the method and measured figures.
 //!
 //! ```
@@ -22,16 +22,16 @@
 //! ```
 
 pub mod equations;
-pub mod estimate;
-pub mod file;
-pub mod fit;
-pub mod identification;
 pub mod motion;
 pub mod parameters;
-pub mod windows;
 
 mod agreement;
 mod error;
+mod estimate;
+mod file;
+mod fit;
+mod identification;
+mod windows;
 
 pub use error::{IdentifyError, IdentifyFault};
 pub use estimate::identify;

@@ -105,7 +105,7 @@ impl Motion {
     }
 
     /// Second derivative of a trunk axis (0 x, 1 y, 2 z), 1/s^2.
-    pub fn trunk_axis(&self, axis: usize, sample: usize) -> Vector3<f64> {
+    pub(crate) fn trunk_axis(&self, axis: usize, sample: usize) -> Vector3<f64> {
         self.direction(3 * axis, sample)
     }
 

@@ -20,7 +20,7 @@ pub const ARMATURE: usize = 8;
 /// First moment of the trunk along its x axis, kg m.
 pub const TRUNK_FORWARD: usize = 11;
 /// First moment of the trunk along its z axis, kg m.
-pub const TRUNK_UP: usize = 12;
+pub(crate) const TRUNK_UP: usize = 12;
 /// First moment of a leg beside its axis of abduction, kg m.
 pub const LEG_SIDE: usize = 13;
 /// First moment of a thigh along its length, with the calf's mass at the knee, kg m.
@@ -32,18 +32,18 @@ pub const CALF: usize = 16;
 /// Second moment of the same, kg m^2.
 pub const CALF_SECOND: usize = 17;
 /// First moment of a thigh in front of its length, kg m.
-pub const THIGH_FRONT: usize = 18;
+pub(crate) const THIGH_FRONT: usize = 18;
 /// First moment of a calf in front of its length, kg m.
-pub const CALF_FRONT: usize = 19;
+pub(crate) const CALF_FRONT: usize = 19;
 /// Height of the foot's centre above its point of contact, m.
-pub const FOOT_RADIUS: usize = 20;
+pub(crate) const FOOT_RADIUS: usize = 20;
 /// Rolling resistance: arm of the normal force about a rolling foot, m.
-pub const ROLLING: usize = 21;
+pub(crate) const ROLLING: usize = 21;
 /// Change of the time by which torques run ahead of the motion, s.
-pub const DELAY: usize = 22;
+pub(crate) const DELAY: usize = 22;
 
 /// Unknowns that cannot be negative: losses, second moments, rolling resistance.
-pub const NOT_NEGATIVE: [usize; 12] = [
+pub(crate) const NOT_NEGATIVE: [usize; 12] = [
     VISCOUS,
     VISCOUS + 1,
     VISCOUS + 2,
@@ -62,7 +62,7 @@ pub const NOT_NEGATIVE: [usize; 12] = [
 ///
 /// These are wide: they matter only where the recordings leave a direction open.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Prior {
+pub(crate) struct Prior {
     /// Coefficients by unknown.
     pub terms: Vec<(usize, f64)>,
     /// Standard deviation of the sum, in the unknowns' units.
@@ -84,7 +84,11 @@ const HIP_LIKE_THIGH: [(usize, f64, f64); 3] = [
 ];
 
 /// What is known of any quadruped of this size and mass (kg). `losses` are present estimates, SI.
-pub fn priors(geometry: &LegGeometry, mass_kg: f64, losses: &[f64; PARAMETER_DIM]) -> Vec<Prior> {
+pub(crate) fn priors(
+    geometry: &LegGeometry,
+    mass_kg: f64,
+    losses: &[f64; PARAMETER_DIM],
+) -> Vec<Prior> {
     let [thigh, calf] = geometry.lengths();
     let leg = LEG_SHARE * mass_kg;
     let single = |index: usize, deviation: f64| Prior {

@@ -21,7 +21,7 @@ const WINDOW_S: f64 = 0.03;
 /// Distance of windows from a change of the feet on the ground, s.
 const MARGIN_S: f64 = 0.02;
 /// Windows a window's length: neighbours overlap.
-pub const OVERLAP: usize = 4;
+pub(crate) const OVERLAP: usize = 4;
 /// Length of the blocks that are left out in turn for standard errors, s.
 const BLOCK_S: f64 = 0.1;
 /// Fewest jumps that are left out in turn, too, and the largest share of all equations that one of them may have.
@@ -35,9 +35,8 @@ const SIDEWAYS: usize = 1;
 /// Speed that a joint in the air keeps over a window for the same reason, rad/s.
 const TURNING_RAD_S: f64 = 0.15;
 
-/// Which equation a row is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Group {
+pub(crate) enum Group {
     /// Trunk's acceleration along an axis (x, y, z) with feet on the ground.
     Contact(usize),
     /// The same in flight.
@@ -48,10 +47,9 @@ pub enum Group {
 
 impl Group {
     /// Number of groups.
-    pub const COUNT: usize = 9;
+    pub(crate) const COUNT: usize = 9;
 
-    /// Place among the groups.
-    pub fn index(self) -> usize {
+    pub(crate) fn index(self) -> usize {
         match self {
             Self::Contact(axis) => axis,
             Self::Flight(axis) => 3 + axis,
@@ -60,14 +58,11 @@ impl Group {
     }
 }
 
-/// One equation over a window.
 #[derive(Debug, Clone)]
-pub struct Row {
-    /// Coefficients of the unknowns.
+pub(crate) struct Row {
     pub coefficients: [f64; PARAMETER_DIM],
     /// Left side: m/s^2, or N m for a joint.
     pub left: f64,
-    /// Which equation.
     pub group: Group,
     /// Block of time that it belongs to, counted over all segments.
     pub block: usize,
@@ -75,10 +70,8 @@ pub struct Row {
     pub moving: bool,
 }
 
-/// The windows of all segments.
 #[derive(Debug, Clone, Default)]
-pub struct Windows {
-    /// All equations.
+pub(crate) struct Windows {
     pub rows: Vec<Row>,
     /// The segment that each block lies in, counted from zero.
     pub blocks: Vec<usize>,
@@ -90,16 +83,12 @@ pub struct Windows {
     pub singular_samples: usize,
     /// Torques above the robot's limits, which count as the limit.
     pub clipped_torques: usize,
-    /// Number of segments.
     segments: usize,
 }
 
 impl Windows {
     /// Adds the windows of a segment at even time steps; `lost` are samples to leave out.
-    ///
-    /// # Errors
-    /// [`IdentifyError::Recording`] if the filter cannot be made for the segment's time step.
-    pub fn add(
+    pub(crate) fn add(
         &mut self,
         segment: &Segment,
         equations: &SampleEquations,
@@ -147,7 +136,7 @@ impl Windows {
     /// Ways to divide the blocks into groups that are left out in turn for standard errors: the group of every block.
     /// Blocks by themselves; and whole segments, which are jumps, where there are at least six and none has more than
     /// a third of the equations of the fit.
-    pub fn groupings(&self) -> Vec<Vec<usize>> {
+    pub(crate) fn groupings(&self) -> Vec<Vec<usize>> {
         let mut groupings = vec![(0..self.blocks.len()).collect()];
         let mut counts = vec![0; self.segments];
         for row in self.rows.iter().filter(|row| row.moving) {
@@ -233,7 +222,6 @@ impl Windows {
     }
 }
 
-/// A stretch of samples of a segment.
 struct Averaged<'a> {
     segment: &'a Segment,
     equations: &'a SampleEquations,

@@ -12,7 +12,7 @@ use super::transcribe::{Bound, Task};
 use super::verdict::{Findings, Verdict, verdict};
 use crate::model::ReducedModel;
 use crate::mpc::{Outcome, QpSettings, QpSolver, SolverProfile};
-use crate::recording::mismatch::weight_share;
+use crate::recording::mismatch::Balance;
 use crate::recording::{Recording, Segment};
 use crate::robot::{BODY_X, BODY_Z, GRAVITY_M_S2};
 
@@ -92,7 +92,7 @@ pub fn plan(model: &ReducedModel, goal: &Goal, settings: &PlanSettings) -> Resul
         slack,
         margins: &margins,
         outside: outside(&seed, goal_m),
-        weight_share: weight_share(&Recording::from(motion.clone()), model.robot()?),
+        weight_share: Balance::of(&Recording::from(motion.clone()), model.robot()?).weight_share,
         start_lost: seed.start_lost.clone(),
     };
     Ok(Plan {

@@ -160,7 +160,7 @@ pub fn check(recording: &Recording, robot: &Robot) -> Vec<Finding> {
 /// a single sample goes too.
 ///
 /// # Errors
-/// [`RecordingFault::TooShort`] if nothing remains.
+/// [`RecordingFault::Unexpected`] if nothing remains.
 pub fn without(
     recording: &Recording,
     findings: &[Finding],
@@ -381,6 +381,3 @@ fn disagrees(time_s: &[f64], values: &[f64], rates: &[f64], j: usize, slack: f64
     let (low, high) = (left.min(right), left.max(right));
     outside(rates[j], low - slack, high + slack).map(|_| (rates[j], rates[j].clamp(low, high)))
 }
-
-#[cfg(test)]
-mod tests;

@@ -58,7 +58,7 @@ pub struct Mended {
 /// angular rates where they disagree with the angles.
 ///
 /// # Errors
-/// [`TooShort`](crate::recording::RecordingFault::TooShort) if fewer than two samples remain.
+/// [`RecordingFault::Unexpected`](crate::recording::RecordingFault::Unexpected) if fewer than two samples remain.
 pub fn timed(segment: &Segment) -> Result<Timed, RecordingError> {
     let elapsed = Interval::all(segment, &agreeing_coordinates(segment));
     let elapsed_ratio = ratio(&elapsed, 0.0).unwrap_or(1.0);
@@ -190,7 +190,6 @@ fn replace_angular_rates(segment: &mut Segment) -> bool {
     disagree
 }
 
-/// What moved between two samples.
 struct Interval {
     stamped_s: f64,
     /// Weighted square of the velocity.
@@ -200,13 +199,11 @@ struct Interval {
 }
 
 impl Interval {
-    /// From each sample to the next, in some of the coordinates.
     fn all(segment: &Segment, coordinates: &[usize]) -> Vec<Self> {
         let rights = 1..segment.len();
         (rights.map(|right| Self::of(segment, right, coordinates))).collect()
     }
 
-    /// From the sample before `right` to `right`.
     fn of(segment: &Segment, right: usize, coordinates: &[usize]) -> Self {
         let (mut speed, mut moved) = (0.0, 0.0);
         for &row in coordinates {

@@ -60,7 +60,7 @@ pub struct ConditionOptions {
 /// number of samples left out: implausible ones and pieces between them that are too short.
 ///
 /// # Errors
-/// [`RecordingFault::TooShort`] if nothing long enough remains, or a segment is shorter than the filter.
+/// [`RecordingFault::Unexpected`] if nothing long enough remains, or a segment is shorter than the filter.
 pub fn condition(
     recording: Recording,
     findings: &[Finding],
@@ -118,104 +118,4 @@ fn long_enough(mut recording: Recording, least: usize) -> Result<Recording, Reco
         return Err(RecordingFault::too_short(found, least).at(&recording.path, row));
     }
     Ok(recording)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::recording::check::check;
-    use crate::robot::Robot;
-
-    /// A robot that stands still, with noise on the accelerations, and one torque that no motor gives.
-    fn recording() -> Recording {
-        let n = 200;
-        let mut torque_nm = DMatrix::from_element(12, n, 1.0);
-        torque_nm[(4, 60)] = 900.0;
-        torque_nm[(4, 70)] = 900.0;
-        let standing = |i: usize, _| match i {
-            0..12 => [0.0, 0.7, -1.4][i % 3],
-            14 => 0.3,
-            _ => 0.0,
-        };
-        Recording::from(Segment {
-            x: DMatrix::from_fn(18, n, standing),
-            ddx: DMatrix::from_fn(18, n, |_, j| if j % 2 == 0 { 0.5 } else { -0.5 }),
-            torque_nm,
-            ..Segment::still("stand.csv", (0..n).map(|i| 0.002 * i as f64).collect())
-        })
-    }
-
-    /// [`condition`] of a recording with all that is found in it.
-    fn conditioned(
-        recording: &Recording,
-        options: &ConditionOptions,
-    ) -> Result<(Recording, usize), RecordingError> {
-        let go1 = Robot::by_name("go1").expect("a known robot");
-        condition(recording.clone(), &check(recording, go1), options)
-    }
-
-    #[test]
-    fn condition_by_default_changes_nothing() {
-        let out = conditioned(&recording(), &ConditionOptions::default()).expect("sound");
-        assert_eq!(out, (recording(), 0));
-    }
-
-    #[test]
-    fn condition_leaves_out_implausible_samples_and_pieces_too_short_to_learn_from() {
-        let options = ConditionOptions {
-            implausible: ImplausibleSamples::LeaveOut,
-            least_samples: 50,
-            ..ConditionOptions::default()
-        };
-        let (out, left_out) = conditioned(&recording(), &options).expect("sound");
-        let pieces: Vec<_> = (out.segments.iter())
-            .map(|piece| (piece.first_row, piece.len()))
-            .collect();
-        assert_eq!(pieces, [(2, 60), (73, 129)]);
-        assert_eq!(left_out, 11);
-
-        let options = ConditionOptions {
-            least_samples: 150,
-            ..options
-        };
-        let error = conditioned(&recording(), &options).expect_err("nothing remains");
-        let expected = "row 73: found 129 consecutive samples, expected at least 150";
-        assert!(error.to_string().ends_with(expected), "{error}");
-    }
-
-    #[test]
-    fn condition_smooths_accelerations_or_takes_them_from_velocities() {
-        let filter = SavitzkyGolay::new(11, 2).expect("a filter");
-        let smooth = ConditionOptions {
-            smoothing: Some((filter, SmoothedRows::Accelerations)),
-            ..ConditionOptions::default()
-        };
-        let before = recording();
-        let made = |options| conditioned(&before, options).expect("sound").0;
-        let out = made(&smooth);
-        let ddx = |recording: &Recording| recording.segments[0].ddx.clone();
-        assert!(ddx(&out).norm() < 0.3 * ddx(&before).norm());
-        assert_eq!(out.segments[0].torque_nm, before.segments[0].torque_nm);
-
-        let differences = ConditionOptions {
-            accelerations: Accelerations::Differences,
-            ..ConditionOptions::default()
-        };
-        let out = made(&differences);
-        assert_eq!(ddx(&out).amax(), 0.0);
-    }
-
-    #[test]
-    fn smoothing_longer_than_a_segment_is_an_error() {
-        let mut short = recording();
-        short.segments[0] = short.segments[0].slice(0..5);
-        let filter = SavitzkyGolay::new(11, 2).expect("a filter");
-        let options = ConditionOptions {
-            smoothing: Some((filter, SmoothedRows::All)),
-            ..ConditionOptions::default()
-        };
-        let error = conditioned(&short, &options).expect_err("five samples");
-        let expected = "found 5 consecutive samples, expected at least 11";
-        assert!(error.to_string().ends_with(expected), "{error}");
-    }
 }

@@ -5,15 +5,13 @@ use super::lines::count;
 /// A time as whole units and the rest, so that nanoseconds since 1970 lose nothing in differences.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Instant {
-    /// Whole units of the clock.
     pub whole: i64,
-    /// The rest, from 0 to 1.
     pub rest: f64,
 }
 
 impl Instant {
     /// A time of a clock whose values need no care.
-    pub fn of(value: f64) -> Option<Self> {
+    pub(crate) fn of(value: f64) -> Option<Self> {
         let whole = value.floor();
         (whole.abs() < 9e18).then_some(Instant {
             whole: whole as i64,
@@ -22,17 +20,16 @@ impl Instant {
     }
 
     /// Units from `start` to this time.
-    pub fn since(self, start: Instant) -> f64 {
+    pub(crate) fn since(self, start: Instant) -> f64 {
         (self.whole - start.whole) as f64 + (self.rest - start.rest)
     }
 
-    /// The time as one number.
-    pub fn value(self) -> f64 {
+    pub(crate) fn value(self) -> f64 {
         self.whole as f64 + self.rest
     }
 
     /// A decimal number of any length, with a decimal point; `None` for other text.
-    pub fn from_decimal(text: &str) -> Option<Self> {
+    pub(crate) fn from_decimal(text: &str) -> Option<Self> {
         let (whole, rest) = text.split_once('.').unwrap_or((text, "0"));
         if !is_digits(rest) {
             return None;
@@ -45,7 +42,7 @@ impl Instant {
 
     /// A date and time as ISO 8601 writes it, in s since 1970: `2026-03-01T12:00:00.002Z`, with a blank for
     /// the `T` and `+01:00` for the `Z` if need be; or a time of day alone, `12:00:00.002`.
-    pub fn from_iso(text: &str) -> Option<Self> {
+    pub(crate) fn from_iso(text: &str) -> Option<Self> {
         if count(text, ':') == 0 {
             return None;
         }
@@ -68,7 +65,6 @@ impl Instant {
     }
 }
 
-/// The clock's digits and the offset of its zone from UTC, in s.
 fn without_zone(time: &str) -> Option<(&str, i64)> {
     if let Some(clock) = time.strip_suffix(['Z', 'z']) {
         return Some((clock, 0));

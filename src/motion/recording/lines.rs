@@ -1,4 +1,4 @@
-//! Lines of a file in bounded memory, and their cells.
+//! Lines of a file in bounded memory, their cells, and cells as numbers with a decimal point or a decimal comma.
 
 use std::fs::{self, File};
 use std::io::{self, BufRead, BufReader, Read};
@@ -31,7 +31,7 @@ pub(super) struct Lines<'a> {
 
 impl<'a> Lines<'a> {
     /// Of a file, plain or gzip.
-    pub fn open(path: &'a Path) -> Result<Self, RecordingError> {
+    pub(crate) fn open(path: &'a Path) -> Result<Self, RecordingError> {
         let file = File::open(path)
             .map_err(|source| RecordingFault::unreadable("open", source).of(path))?;
         let size = file.metadata().ok().filter(fs::Metadata::is_file);
@@ -39,7 +39,7 @@ impl<'a> Lines<'a> {
     }
 
     /// Of any source, plain or gzip, found from the first two bytes; `path` stands for it in messages.
-    pub fn of(path: &'a Path, source: impl Read + 'a) -> Result<Self, RecordingError> {
+    pub(crate) fn of(path: &'a Path, source: impl Read + 'a) -> Result<Self, RecordingError> {
         Self::packed(path, source, u64::MAX)
     }
 
@@ -78,13 +78,13 @@ impl<'a> Lines<'a> {
             false => Ok(None),
         };
         match plain.or(unpacked.map_err(|source| lines.read_error(source))?) {
-            Some(format) => Err(RecordingFault::OtherFormat(format).of(path)),
+            Some(format) => Err(RecordingFault::other_format(&format).of(path)),
             None => Ok(lines),
         }
     }
 
     /// The next row's number and text; `None` at the end of the file.
-    pub fn next_row(&mut self) -> Result<Option<(usize, &str)>, RecordingError> {
+    pub(crate) fn next_row(&mut self) -> Result<Option<(usize, &str)>, RecordingError> {
         self.row += 1;
         self.buffer.clear();
         let most = MAX_LINE_BYTES as u64 + 1;
@@ -102,7 +102,9 @@ impl<'a> Lines<'a> {
             }
         }
         if self.buffer.len() > MAX_LINE_BYTES {
-            return Err(RecordingFault::LineTooLong(MAX_LINE_BYTES).at(self.path, self.row));
+            let found = format!("a line of more than {MAX_LINE_BYTES} bytes");
+            let fault = RecordingFault::unexpected(found, "a recording");
+            return Err(fault.at(self.path, self.row));
         }
         self.count_blank()?;
         let bytes = match self.buffer.strip_prefix(b"\xef\xbb\xbf") {
@@ -112,9 +114,9 @@ impl<'a> Lines<'a> {
         match std::str::from_utf8(bytes) {
             Ok(text) => Ok(Some((self.row, text))),
             Err(error) => {
-                let found = bytes[error.valid_up_to()];
-                let byte = error.valid_up_to() + 1;
-                Err(RecordingFault::Encoding { byte, found }.at(self.path, self.row))
+                let at = error.valid_up_to();
+                let found = format!("0x{:02x} as byte {}", bytes[at], at + 1);
+                Err(RecordingFault::unexpected(found, "UTF-8 text").at(self.path, self.row))
             }
         }
     }
@@ -132,7 +134,11 @@ impl<'a> Lines<'a> {
         };
         let filled = self.row - *all;
         match *since > MAX_BLANK_ROWS || *all > filled.saturating_add(MAX_BLANK_ROWS) {
-            true => Err(RecordingFault::TooManyBlankRows(MAX_BLANK_ROWS).at(self.path, self.row)),
+            true => {
+                let found = format!("more than {MAX_BLANK_ROWS} empty lines");
+                let fault = RecordingFault::unexpected(found, "samples or the end");
+                Err(fault.at(self.path, self.row))
+            }
             false => Ok(()),
         }
     }
@@ -164,7 +170,6 @@ pub(super) fn cells(line: &str, delimiter: char) -> impl Iterator<Item = &str> {
     })
 }
 
-/// How often an ASCII character is in a line.
 pub(super) fn count(line: &str, character: char) -> usize {
     let wanted = character as u8;
     line.bytes().filter(|byte| *byte == wanted).count()
@@ -178,20 +183,70 @@ fn trimmed(cell: &str) -> &str {
     }
 }
 
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Mark {
+    Point,
+    Comma,
+}
+
+/// Reads cells, and learns the file's decimal mark from them.
+#[derive(Debug)]
+pub(super) struct NumberReader {
+    /// The first one met holds for the rest.
+    mark: Option<Mark>,
+    /// A cell with its comma replaced, kept to spare an allocation a cell.
+    pointed: String,
+}
+
+impl NumberReader {
+    /// Of cells that are separated by this character: between commas the mark is a point.
+    pub(crate) fn new(delimiter: char) -> Self {
+        NumberReader {
+            mark: (delimiter == ',').then_some(Mark::Point),
+            pointed: String::new(),
+        }
+    }
+
+    pub(crate) fn expected(&self) -> &'static str {
+        match self.mark {
+            None => "a number",
+            Some(Mark::Point) => "a number with a decimal point",
+            Some(Mark::Comma) => "a number with a decimal comma",
+        }
+    }
+
+    /// The value of a cell, or `None` if it is no number in this notation.
+    /// May be infinite or NaN.
+    pub(crate) fn parse(&mut self, cell: &str) -> Option<f64> {
+        let Some(place) = cell.bytes().position(|b| b == b'.' || b == b',') else {
+            return cell.parse().ok();
+        };
+        let found = match cell.as_bytes()[place] {
+            b'.' => Mark::Point,
+            _ => Mark::Comma,
+        };
+        if self.mark.is_some_and(|mark| mark != found) {
+            return None;
+        }
+        let pointed = match found {
+            Mark::Comma => {
+                // A second mark of either kind fails to parse.
+                self.pointed.clear();
+                self.pointed
+                    .extend([&cell[..place], ".", &cell[place + 1..]]);
+                &self.pointed
+            }
+            Mark::Point => cell,
+        };
+        let value = pointed.parse().ok()?;
+        self.mark = Some(found);
+        Some(value)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn cells_quoted_delimiter_does_not_separate() {
-        for (line, delimiter, expected) in [
-            ("\"0,5\", 1 ,\"a\"", ',', &["0,5", "1", "a"][..]),
-            ("a;;b;", ';', &["a", "", "b", ""]),
-            ("\"a;b", ';', &["\"a;b"]),
-        ] {
-            assert_eq!(cells(line, delimiter).collect::<Vec<_>>(), expected);
-        }
-    }
 
     #[test]
     fn next_row_longest_line_is_read_and_one_byte_more_is_not() {
@@ -202,7 +257,7 @@ mod tests {
         };
         assert!(read(MAX_LINE_BYTES).unwrap());
         let error = read(MAX_LINE_BYTES + 1).unwrap_err();
-        assert!(matches!(error.kind, RecordingFault::LineTooLong(_)));
+        assert!(error.to_string().contains("found a line of more than"));
         assert_eq!(error.place.row(), Some(1));
     }
 }

@@ -20,9 +20,10 @@ use super::check::{check, outside};
 use super::preprocess::{differences, median};
 use super::segment::Recording;
 use crate::robot::{GRAVITY_M_S2, JOINT_DIM, Leg, Robot, STATE_DIM};
-pub use balance::Balance;
+pub(crate) use balance::Balance;
+pub(super) use balance::hip_torque;
 use stance::{Slip, best_other_place, best_other_reading};
-pub(super) use stance::{foot_place, stances};
+pub(super) use stance::{foot_place, median_place, stances};
 
 /// Largest root mean square of the places of feet on the ground about their medians, m.
 const SLIP_M: f64 = 0.025;
@@ -54,42 +55,12 @@ const OTHER_SLIP: f64 = 1.15;
 /// Distance from the origin, m, and turn about the vertical, rad, at which a segment may begin.
 const ORIGIN: (f64, f64) = (1.0, 0.5);
 
-/// What does not fit; in JSON one word such as `foot_slip`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum MismatchKind {
-    /// Feet on the ground move.
-    FootSlip,
-    /// Feet on the ground stay in place better if columns are read otherwise.
-    LegsOrSigns,
-    /// The columns of contact fit the heights of the feet better in another order.
-    FeetColumns,
-    /// The body does not fall in flight.
-    Fall,
-    /// The feet do not carry the robot.
-    Weight,
-    /// The torques of hips hold the feet on the wrong side.
-    HipTorques,
-    /// Accelerations are not those of the velocities.
-    Accelerations,
-    /// Another robot that romc knows fits better.
-    OtherRobot,
-    /// A segment begins far from the origin, or turned from the x axis.
-    Origin,
-    /// Feet on the ground are not at height zero.
-    Floor,
-    /// The trunk lies on the ground, or is under it.
-    Fallen,
-    /// Velocities are in another unit or of another sign than positions.
-    Rates,
-}
-
 /// Something about a whole recording that cannot be true of the robot.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Mismatch {
-    /// What does not fit.
+    /// What does not fit, one word such as `foot_slip`.
     #[serde(rename = "what")]
-    pub kind: MismatchKind,
+    pub kind: &'static str,
     /// The figure.
     pub value: f64,
     /// The bound that it breaks.
@@ -104,63 +75,59 @@ impl fmt::Display for Mismatch {
     }
 }
 
+/// The mismatch of a figure that breaks a bound, `(value, bound)`, in the words for its value.
+fn mismatch(
+    kind: &'static str,
+    breach: Option<(f64, f64)>,
+    words: impl FnOnce(f64) -> String,
+) -> Option<Mismatch> {
+    let (value, bound) = breach?;
+    let words = words(value);
+    Some(Mismatch {
+        kind,
+        value,
+        bound,
+        words,
+    })
+}
+
 /// Everything about a recording that cannot be true of the robot.
 pub fn mismatches(recording: &Recording, robot: &Robot) -> Vec<Mismatch> {
     let slip = Slip::of(recording, robot);
     let balance = Balance::of(recording, robot);
     let (place, is_attitude) = place(recording, robot, &slip).unzip();
     let floor_m = feet::floor_m(recording, robot);
-    // In another attitude the feet's heights say nothing of their columns.
-    let of_feet = || feet::columns(recording, robot);
     let found = [
-        (MismatchKind::FootSlip, place.or_else(|| foot_slip(&slip))),
-        (
-            MismatchKind::LegsOrSigns,
-            legs_or_signs(recording, robot, &slip),
-        ),
-        (
-            MismatchKind::FeetColumns,
-            (is_attitude != Some(true)).then(of_feet).flatten(),
-        ),
-        (MismatchKind::Fall, fall(&balance)),
-        (MismatchKind::Weight, weight(&balance, robot)),
-        (MismatchKind::HipTorques, hip_torques(&balance)),
-        (MismatchKind::Accelerations, accelerations(&balance)),
-        (
-            MismatchKind::OtherRobot,
-            other_robot(recording, robot, &slip, &balance),
-        ),
-        (MismatchKind::Origin, origin(recording)),
-        (MismatchKind::Floor, feet::floor(floor_m)),
-        (MismatchKind::Fallen, feet::fallen(recording, floor_m)),
-        (MismatchKind::Rates, rates(recording)),
+        place.or_else(|| foot_slip(&slip)),
+        legs_or_signs(recording, robot, &slip),
+        // In another attitude the feet's heights say nothing of their columns.
+        (is_attitude != Some(true))
+            .then(|| feet::columns(recording, robot))
+            .flatten(),
+        fall(&balance),
+        weight(&balance, robot),
+        hip_torques(&balance),
+        accelerations(&balance),
+        other_robot(recording, robot, &slip, &balance),
+        origin(recording),
+        feet::floor(floor_m),
+        feet::fallen(recording, floor_m),
+        rates(recording),
     ];
-    let mismatch = |(kind, broken): (MismatchKind, Option<Broken>)| {
-        broken.map(|(value, bound, words)| Mismatch {
-            kind,
-            value,
-            bound,
-            words,
-        })
-    };
-    found.into_iter().filter_map(mismatch).collect()
+    found.into_iter().flatten().collect()
 }
-
-/// A figure, the bound that it breaks, and that in words.
-type Broken = (f64, f64, String);
 
 /// The figures that [`mismatches`] compares with its bounds; none where a recording has too little of what they need.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Figures {
-    /// Root mean square of the places of feet on the ground about the medians of their stances, m.
-    pub foot_slip_m: Option<f64>,
-    /// The same of what feet that stand together do not have in common, m.
-    pub relative_foot_slip_m: Option<f64>,
-    /// That for the best other order of the legs or sign of an angle, m.
-    pub other_reading_m: Option<f64>,
-    /// What forces and accelerations come to.
+    /// Root mean square of the places of feet on the ground about the medians of their stances.
+    foot_slip_m: Option<f64>,
+    /// The same of what feet that stand together do not have in common.
+    relative_foot_slip_m: Option<f64>,
+    /// That for the best other order of the legs or sign of an angle.
+    other_reading_m: Option<f64>,
     #[serde(flatten)]
-    pub balance: Balance,
+    balance: Balance,
 }
 
 impl Figures {
@@ -179,22 +146,22 @@ impl Figures {
 /// What cannot be true of any robot, or of one robot beside the others of these recordings, with the index of the recording
 /// and in words: torques that carry nothing, a body that does not fall in flight, torques that carry another share of
 /// the weight than most.
-pub fn contradiction(balances: &[Balance]) -> Option<(usize, String)> {
+pub(crate) fn contradiction(balances: &[Balance]) -> Option<(usize, String)> {
     let each = || balances.iter().enumerate();
     let shares = || each().filter_map(|(at, balance)| Some((at, balance.weight_share?)));
-    let empty = shares().find(|(_, share)| share.abs() < NOTHING_CARRIED);
-    if let Some((at, share)) = empty {
+    if let Some((at, share)) = shares().find(|(_, share)| share.abs() < NOTHING_CARRIED) {
         let words = format!(
             "its feet bear weight, and its torques carry {share:.3} of it: torques that were not recorded, or in other units"
         );
         return Some((at, words));
     }
     // Velocities may be broken where heights are right.
-    let by_height = |balance: &Balance| beyond(balance.fall_by_height_m_s2?, FALL_M_S2);
-    let falls = each().filter(|(_, balance)| by_height(balance).is_some());
-    let falls = falls.filter_map(|(at, balance)| Some((at, fall(balance)?.2)));
-    if let Some(found) = falls.into_iter().next() {
-        return Some(found);
+    let falls = each().find_map(|(at, balance)| {
+        beyond(balance.fall_by_height_m_s2?, FALL_M_S2)?;
+        Some((at, fall(balance)?.words))
+    });
+    if falls.is_some() {
+        return falls;
     }
     // Of several recordings, those that differ from the median; all may be off alike, by units or a payload.
     let most = median(shares().map(|(_, share)| share));
@@ -206,11 +173,6 @@ pub fn contradiction(balances: &[Balance]) -> Option<(usize, String)> {
          or order of the torques, or another robot"
     );
     Some((at, words))
-}
-
-/// Impulse of the feet over what the robot's weight and change of velocity need; none without stance.
-pub fn weight_share(recording: &Recording, robot: &Robot) -> Option<f64> {
-    Balance::of(recording, robot).weight_share
 }
 
 /// Notes for people: the mismatches of a recording, and how many runs of samples are implausible, such as the first.
@@ -233,95 +195,90 @@ pub fn notes(recording: &Recording, robot: &Robot) -> Vec<String> {
 }
 
 /// Encoders and decoders were learned from jumps that begin at the origin and run along x.
-fn origin(recording: &Recording) -> Option<Broken> {
+fn origin(recording: &Recording) -> Option<Mismatch> {
     let [x, y, yaw] = [0, 1, 5].map(|coordinate| {
         let starts = recording.segments.iter().map(|segment| segment.state(0));
         let starts = starts.map(|start| start[JOINT_DIM + coordinate].abs());
         starts.fold(0.0, f64::max)
     });
-    let far = x.max(y);
     let advice = "models expect jumps that begin near the origin and run along x";
-    if far > ORIGIN.0 {
-        let words = format!(
+    let far = mismatch("origin", outside(x.max(y), 0.0, ORIGIN.0), |far| {
+        format!(
             "a segment begins {far:.2} m from the origin: {advice}; `origin = \"start\"` in a map of columns counts x \
              and y from the first sample"
-        );
-        return Some((far, ORIGIN.0, words));
-    }
-    (yaw > ORIGIN.1).then(|| {
-        let words = format!("a segment begins turned by {yaw:.2} rad about the vertical: {advice}");
-        (yaw, ORIGIN.1, words)
-    })
+        )
+    });
+    let turned =
+        |yaw| format!("a segment begins turned by {yaw:.2} rad about the vertical: {advice}");
+    far.or_else(|| mismatch("origin", outside(yaw, 0.0, ORIGIN.1), turned))
 }
 
-fn foot_slip(slip: &Slip) -> Option<Broken> {
-    let value = slip.rms_m()?;
-    (value.is_nan() || value > SLIP_M).then(|| {
-        let words = format!(
+fn foot_slip(slip: &Slip) -> Option<Mismatch> {
+    mismatch("foot_slip", beyond(slip.rms_m()?, (0.0, SLIP_M)), |value| {
+        format!(
             "feet on the ground move by {:.0} mm (root mean square; {:.0} mm are accepted): the joints, the body's \
              pose, their units or signs, or the contacts are not this robot's",
             1e3 * value,
             1e3 * SLIP_M
-        );
-        (value, SLIP_M, words)
+        )
     })
 }
 
 /// The body's place or attitude read otherwise, and whether it is the attitude.
-fn place(recording: &Recording, robot: &Robot, slip: &Slip) -> Option<(Broken, bool)> {
+fn place(recording: &Recording, robot: &Robot, slip: &Slip) -> Option<(Mismatch, bool)> {
     // The bound is at least this.
     let value = slip.rms_m().filter(|value| *value > PLACE.1)?;
-    let (best, reading) = best_other_place(recording, robot)?;
-    let bound = PLACE.0 * best + PLACE.1;
-    (value > bound).then(|| {
-        let words = format!(
+    let (best, reading, is_attitude) = best_other_place(recording, robot)?;
+    let breach = outside(value, 0.0, PLACE.0 * best + PLACE.1);
+    let found = mismatch("foot_slip", breach, |value| {
+        format!(
             "feet on the ground move by {:.1} mm, and by {:.1} mm {reading}: is the body's place in another frame than \
              its attitude?",
             1e3 * value,
             1e3 * best
-        );
-        ((value, bound, words), reading.is_of_quaternion())
-    })
+        )
+    });
+    Some((found?, is_attitude))
 }
 
-fn legs_or_signs(recording: &Recording, robot: &Robot, slip: &Slip) -> Option<Broken> {
+fn legs_or_signs(recording: &Recording, robot: &Robot, slip: &Slip) -> Option<Mismatch> {
     let value = slip.relative_rms_m()?;
     let (best, reading) = best_other_reading(recording, robot)?;
-    let bound = READING_FACTOR * best + READING_LEAST_M;
-    (value > bound).then(|| {
-        let words = format!(
+    let breach = outside(value, 0.0, READING_FACTOR * best + READING_LEAST_M);
+    mismatch("legs_or_signs", breach, |value| {
+        format!(
             "feet on the ground move by {:.1} mm against each other, and by {:.1} mm {reading}: are legs or signs \
              exchanged?",
             1e3 * value,
             1e3 * best
-        );
-        (value, bound, words)
+        )
     })
 }
 
-fn fall(balance: &Balance) -> Option<Broken> {
-    let (value, bound) = beyond(balance.fall_m_s2?, FALL_M_S2)?;
-    let words = format!(
-        "in flight the body accelerates by {value:.2} m/s^2 upwards, expected {} to {}: another axis, sign or \
-         unit, another time, or contacts that are not the feet's",
-        FALL_M_S2.0, FALL_M_S2.1
-    );
-    Some((value, bound, words))
+fn fall(balance: &Balance) -> Option<Mismatch> {
+    mismatch("fall", beyond(balance.fall_m_s2?, FALL_M_S2), |value| {
+        format!(
+            "in flight the body accelerates by {value:.2} m/s^2 upwards, expected {} to {}: another axis, sign or \
+             unit, another time, or contacts that are not the feet's",
+            FALL_M_S2.0, FALL_M_S2.1
+        )
+    })
 }
 
-fn weight(balance: &Balance, robot: &Robot) -> Option<Broken> {
-    let (value, bound) = beyond(balance.weight_share?, WEIGHT_SHARE)?;
-    let words = format!(
-        "the torques carry {value:.3} of what {} kg need ({} to {} are accepted): torques in other units, of \
-         other signs or other joints, or another robot",
-        (1e6 * robot.mass_kg()).round() / 1e6,
-        WEIGHT_SHARE.0,
-        WEIGHT_SHARE.1
-    );
-    Some((value, bound, words))
+fn weight(balance: &Balance, robot: &Robot) -> Option<Mismatch> {
+    let breach = beyond(balance.weight_share?, WEIGHT_SHARE);
+    mismatch("weight", breach, |value| {
+        format!(
+            "the torques carry {value:.3} of what {} kg need ({} to {} are accepted): torques in other units, of \
+             other signs or other joints, or another robot",
+            (1e6 * robot.mass_kg()).round() / 1e6,
+            WEIGHT_SHARE.0,
+            WEIGHT_SHARE.1
+        )
+    })
 }
 
-fn hip_torques(balance: &Balance) -> Option<Broken> {
+fn hip_torques(balance: &Balance) -> Option<Mismatch> {
     let shares = Leg::ALL.into_iter().zip(balance.hip_share);
     let wrong: Vec<(Leg, f64)> = shares
         .filter_map(|(leg, share)| Some((leg, share.filter(|share| *share < HIP_SHARE)?)))
@@ -334,12 +291,13 @@ fn hip_torques(balance: &Balance) -> Option<Broken> {
         return None;
     }
     let names: Vec<&str> = wrong.iter().map(|(leg, _)| leg.short_name()).collect();
-    let words = format!(
-        "the hips' torques of {} hold the feet on the other side of the body: are left and right legs or the \
-         torques' signs exchanged, or do feet stick and pull inwards?",
-        names.join(", ")
-    );
-    Some((value, HIP_SHARE, words))
+    mismatch("hip_torques", Some((value, HIP_SHARE)), |_| {
+        format!(
+            "the hips' torques of {} hold the feet on the other side of the body: are left and right legs or the \
+             torques' signs exchanged, or do feet stick and pull inwards?",
+            names.join(", ")
+        )
+    })
 }
 
 /// Factors by which velocities may be off, with what they come from.
@@ -370,7 +328,7 @@ const FACTORS: [(f64, &str); 6] = [
 const FACTOR_SHARE: f64 = 0.1;
 
 /// Velocities that are a multiple of the changes of their positions.
-fn rates(recording: &Recording) -> Option<Broken> {
+fn rates(recording: &Recording) -> Option<Mismatch> {
     const GROUPS: [(std::ops::Range<usize>, &str); 3] = [
         (0..JOINT_DIM, "the joints"),
         (JOINT_DIM..JOINT_DIM + 3, "the body"),
@@ -390,21 +348,22 @@ fn rates(recording: &Recording) -> Option<Broken> {
         let follows = product * product > 0.5 * squares * own;
         let known = |(known, _): &&(f64, &str)| (factor / known - 1.0).abs() < FACTOR_SHARE;
         let (known, why) = FACTORS.iter().find(known).filter(|_| follows)?;
-        let words = format!(
-            "velocities of {what} are {factor:.3} times the changes of their positions, about {known}: {why}?"
-        );
-        Some((factor, 1.0, words))
+        mismatch("rates", Some((factor, 1.0)), |factor| {
+            format!(
+                "velocities of {what} are {factor:.3} times the changes of their positions, about {known}: {why}?"
+            )
+        })
     })
 }
 
-fn accelerations(balance: &Balance) -> Option<Broken> {
+fn accelerations(balance: &Balance) -> Option<Mismatch> {
     let (axis, value) = balance.acceleration_offset_m_s2?;
-    (value.abs() > ACCELERATION_M_S2).then(|| {
-        let words = format!(
+    let breach = outside(value, -ACCELERATION_M_S2, ACCELERATION_M_S2);
+    mismatch("accelerations", breach, |value| {
+        format!(
             "the body's acceleration along {axis} differs from the slope of its velocity by {value:.2} m/s^2 in the \
              median: gravity, or another unit?"
-        );
-        (value, ACCELERATION_M_S2.copysign(value), words)
+        )
     })
 }
 
@@ -413,7 +372,7 @@ fn other_robot(
     robot: &Robot,
     slip: &Slip,
     balance: &Balance,
-) -> Option<Broken> {
+) -> Option<Mismatch> {
     let share = balance.weight_share.filter(|share| *share > 0.0)?;
     let (own, own_slip) = (share.ln().abs(), slip.rms_m()?);
     if own <= OTHER_WEIGHT.0 {
@@ -430,14 +389,18 @@ fn other_robot(
     let nearest =
         |one: &(f64, &Robot), two: &(f64, &Robot)| one.0.ln().abs().total_cmp(&two.0.ln().abs());
     let (other_share, other) = explains.min_by(nearest)?;
-    let words = format!(
-        "the torques carry {share:.2} of the weight of a {} and {other_share:.2} of that of a {}, and feet on \
-         the ground stay in place as well: is it a recording of a {}?",
-        robot.name(),
-        other.name(),
-        other.name()
-    );
-    Some((share, OTHER_WEIGHT.0.exp(), words))
+    let other = other.name();
+    mismatch(
+        "other_robot",
+        Some((share, OTHER_WEIGHT.0.exp())),
+        |share| {
+            format!(
+                "the torques carry {share:.2} of the weight of a {} and {other_share:.2} of that of a {other}, and feet on \
+             the ground stay in place as well: is it a recording of a {other}?",
+                robot.name(),
+            )
+        },
+    )
 }
 
 /// A value that is not within a range, and the bound that it breaks; no number breaks the upper.
@@ -446,7 +409,6 @@ fn beyond(value: f64, (low, high): (f64, f64)) -> Option<(f64, f64)> {
     outside(value, low, high).or(of_nan)
 }
 
-/// Weight of a mass, N.
 fn weight_n(mass_kg: f64) -> f64 {
     GRAVITY_M_S2 * mass_kg
 }

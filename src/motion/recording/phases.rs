@@ -14,7 +14,7 @@ use super::segment::{Segment, stretches};
 use crate::robot::{ContactFlags, FeetRule};
 
 /// Fewest samples of a span: fewer are chatter of contact and join the span before them.
-pub const CHATTER_SAMPLES: usize = 5;
+pub(crate) const CHATTER_SAMPLES: usize = 5;
 
 /// A phase and its feet.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -100,7 +100,7 @@ impl PhaseRule {
     }
 
     /// Index of the first pattern that matches, if any does.
-    pub fn phase_of(&self, feet: ContactFlags) -> Option<usize> {
+    pub(crate) fn phase_of(&self, feet: ContactFlags) -> Option<usize> {
         self.patterns.iter().position(|p| p.feet.matches(feet))
     }
 
@@ -203,106 +203,4 @@ fn with_stance(runs: Vec<Run>, feet: &[ContactFlags]) -> Vec<PhaseSpan> {
             PhaseSpan { phase, kind, range }
         })
         .collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::recording::segment::tests::sample_segment;
-
-    /// Feet sample after sample: `2x0011` for two samples with the rear feet down.
-    fn segment(runs: &str) -> Segment {
-        let run = |run: &str| -> Vec<ContactFlags> {
-            let (count, feet) = run.split_once('x').unwrap();
-            let feet = std::array::from_fn(|foot| feet.as_bytes()[foot] == b'1');
-            vec![feet; count.parse().unwrap()]
-        };
-        let feet: Vec<ContactFlags> = runs.split(' ').flat_map(run).collect();
-        Segment {
-            feet: feet.clone(),
-            ..sample_segment(feet.len())
-        }
-    }
-
-    /// The spans in words: `0 Launch 0..13` for phase, place and samples.
-    fn brief(rule: &PhaseRule, segment: &Segment) -> Vec<String> {
-        let spans = rule.spans(segment).unwrap();
-        assert_eq!(spans.first().map(|s| s.range.start), Some(0));
-        assert_eq!(spans.last().map(|s| s.range.end), Some(segment.len()));
-        let text = |span: PhaseSpan| format!("{} {:?} {:?}", span.phase, span.kind, span.range);
-        spans.into_iter().map(text).collect()
-    }
-
-    #[test]
-    fn spans_join_what_is_no_phase_or_too_short_to_a_neighbour() {
-        let exact = |name: &str, feet: [u8; 4]| {
-            pattern(name, FeetRule::Patterns(vec![feet.map(|f| f == 1)]))
-        };
-        let exact = PhaseRule::new(vec![
-            exact("all", [1; 4]),
-            exact("rear", [0, 0, 1, 1]),
-            exact("none", [0; 4]),
-        ]);
-        for (rule, runs, expected) in [
-            // samples in transition join launch and landing
-            (
-                PhaseRule::two_phase(),
-                "10x1111 2x0011 1x0001 20x0000 3x0100 9x1111",
-                &["0 Launch 0..13", "1 Flight 13..33", "0 Landing 33..45"][..],
-            ),
-            // three phases separate the rear stance
-            (
-                PhaseRule::three_phase(),
-                "10x1111 2x0111 30x0011 1x0010 20x0000",
-                &["0 Launch 0..12", "1 Launch 12..43", "2 Flight 43..63"],
-            ),
-            // exact patterns give transitions to the side with more feet
-            (
-                exact,
-                "1x1011 5x1111 2x0111 5x0011 1x0001 5x0000 2x1000 5x1111 1x1100",
-                &[
-                    "0 Launch 0..8",
-                    "1 Launch 8..14",
-                    "2 Flight 14..19",
-                    "0 Landing 19..27",
-                ],
-            ),
-            // chatter shorter than the minimum joins its neighbour
-            (
-                PhaseRule::two_phase().with_min_samples(3),
-                "1x0000 9x1111 2x0000 4x1111 20x0000 1x1111 2x0000",
-                &["0 Launch 0..16", "1 Flight 16..39"],
-            ),
-            // a single sample is one span
-            (
-                PhaseRule::two_phase().with_min_samples(10),
-                "1x1111",
-                &["0 Launch 0..1"],
-            ),
-        ] {
-            assert_eq!(brief(&rule, &segment(runs)), expected, "{runs}");
-        }
-        let chatter = segment("1x0000 9x1111 2x0000 4x1111 20x0000 1x1111 2x0000");
-        assert_eq!(PhaseRule::two_phase().spans(&chatter).unwrap().len(), 7);
-    }
-
-    #[test]
-    fn three_phase_rule_matches_every_contact_exactly_once() {
-        let rule = PhaseRule::three_phase();
-        for bits in 0..16_u8 {
-            let feet = std::array::from_fn(|foot| bits & (1 << foot) != 0);
-            let matching = rule.patterns.iter().filter(|p| p.feet.matches(feet));
-            assert_eq!(matching.count(), 1, "{feet:?}");
-        }
-    }
-
-    #[test]
-    fn spans_no_pattern_matches_is_an_error_with_row_and_feet() {
-        let rule = PhaseRule::new(vec![pattern("flight", FeetRule::None)]);
-        let error = rule.spans(&segment("3x1100")).unwrap_err();
-        let text = error.to_string();
-        assert!(matches!(error.kind, RecordingFault::NoPhase { .. }));
-        assert_eq!(error.place.row(), Some(2));
-        assert!(text.contains("none of the phases `flight`"), "{text}");
-    }
 }

@@ -12,12 +12,12 @@ use super::phases::{PhaseRule, PhaseSpan};
 use super::segment::{Recording, Segment};
 
 /// Samples of a batch: every phase of a jump is resampled to a multiple (section IV-C4).
-pub const BATCH_ROWS: usize = 100;
+pub(crate) const BATCH_ROWS: usize = 100;
 
 /// The phases of every segment of a recording, each with its samples resampled to a multiple of [`BATCH_ROWS`].
 ///
 /// # Errors
-/// [`RecordingFault::TooShort`] for a span of one sample, [`RecordingFault::NoPhase`].
+/// [`RecordingFault::Unexpected`] for a span of one sample, [`RecordingFault::NoPhase`].
 pub fn prepare(
     recording: &Recording,
     rule: &PhaseRule,
@@ -80,7 +80,7 @@ pub(super) fn differences_within(
 /// Contact flags are those of the nearest sample.
 ///
 /// # Errors
-/// [`RecordingFault::TooShort`] if it has one sample or `rows` is below 2.
+/// [`RecordingFault::Unexpected`] if it has one sample or `rows` is below 2.
 pub fn resampled(segment: &Segment, rows: usize) -> Result<Segment, RecordingError> {
     let n = segment.len();
     if n < 2 || rows < 2 {
@@ -119,90 +119,4 @@ pub(crate) fn median(values: impl Iterator<Item = f64>) -> f64 {
     let mut sorted: Vec<f64> = values.collect();
     sorted.sort_by(f64::total_cmp);
     sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::recording::segment::tests::sample_segment;
-
-    fn unequal_times(n: usize) -> Vec<f64> {
-        (0..n)
-            .map(|i| 0.002 * i as f64 + 0.0004 * (i as f64).sin())
-            .collect()
-    }
-
-    #[test]
-    fn differences_parabola_is_exact_inside_for_unequal_steps() {
-        let time = unequal_times(20);
-        let rows = DMatrix::from_fn(1, 20, |_, j| 3.0 * time[j] * time[j] - time[j]);
-        let slopes = differences(&time, &rows);
-        for j in 1..19 {
-            assert!((slopes[j] - (6.0 * time[j] - 1.0)).abs() < 1e-10, "{j}");
-        }
-        assert!((slopes[0] - (rows[1] - rows[0]) / (time[1] - time[0])).abs() < 1e-12);
-    }
-
-    #[test]
-    fn differences_single_sample_is_zero() {
-        assert_eq!(
-            differences(&[0.0], &DMatrix::from_element(2, 1, 5.0)),
-            DMatrix::zeros(2, 1)
-        );
-    }
-
-    #[test]
-    fn resampled_same_count_returns_the_samples() {
-        let segment = sample_segment(50);
-        let same = resampled(&segment, 50).unwrap();
-        assert!((&same.x - &segment.x).amax() < 1e-12);
-        assert!((&same.torque_nm - &segment.torque_nm).amax() < 1e-12);
-        assert_eq!(same.feet, segment.feet);
-    }
-
-    #[test]
-    fn resampled_straight_lines_are_exact_for_unequal_steps() {
-        let mut segment = sample_segment(40);
-        segment.time_s = unequal_times(40);
-        let time = segment.time_s.clone();
-        segment.x = DMatrix::from_fn(18, 40, |i, j| i as f64 + time[j]);
-        let fine = resampled(&segment, 173).unwrap();
-        for (j, t) in fine.time_s.iter().enumerate() {
-            assert!((fine.x[(3, j)] - (3.0 + t)).abs() < 1e-12);
-        }
-        assert_eq!((fine.time_s[0], fine.time_s[172]), (time[0], time[39]));
-    }
-
-    #[test]
-    fn resampled_rows_point_into_the_file() {
-        let segment = sample_segment(119);
-        let out = resampled(&segment, 200).unwrap();
-        assert_eq!((out.row(0), out.row(199)), (2, 120));
-        assert!((out.mean_step_s() - 0.002 * 118.0 / 199.0).abs() < 1e-15);
-    }
-
-    #[test]
-    fn resampled_single_sample_is_an_error_with_its_row() {
-        let one = sample_segment(5).slice(3..4);
-        let error = resampled(&one, 100).unwrap_err();
-        let expected = "row 5: found 1 consecutive samples, expected at least 2";
-        assert!(error.to_string().ends_with(expected), "{error}");
-    }
-
-    #[test]
-    fn prepare_keeps_segments_apart_and_fills_batches() {
-        let mut jump = sample_segment(300);
-        jump.feet[150..240].fill([false; 4]);
-        let second = sample_segment(120);
-        let mut recording = Recording::from(jump);
-        recording.segments.push(second);
-        let phases = prepare(&recording, &PhaseRule::two_phase()).unwrap();
-        let found = phases.iter();
-        let found = found.map(|(span, samples)| (span.phase, samples.len()));
-        let found: Vec<_> = found.collect();
-        assert_eq!(found, [(0, 200), (1, 100), (0, 100), (0, 200)]);
-        let flight = &phases[1].1;
-        assert!(flight.feet.iter().all(|feet| *feet == [false; 4]));
-        assert_eq!(flight.x.column(0), recording.segments[0].x.column(150));
-    }
 }

@@ -10,8 +10,8 @@ use super::clock::{Mended, timed};
 use super::csv;
 use super::error::{RecordingError, RecordingFault};
 use super::foreign::guess::guess_of;
-use super::foreign::map::ColumnMap;
-use super::foreign::{assemble, is_mcap, read_mcap, read_texts};
+use super::foreign::{ColumnMap, assemble, is_mcap, read_mcap, read_texts};
+use super::lines::Lines;
 use super::segment::Recording;
 use crate::robot::Robot;
 
@@ -87,8 +87,11 @@ impl Reader {
                 let go1 = || Robot::by_name("go1").expect("a known robot");
                 by_guess(path, self.robot.unwrap_or_else(go1))?
             }
-            None if path.is_dir() => return Err(RecordingFault::Folder.of(path)),
-            None => csv::read_noted(path)?,
+            None if path.is_dir() => {
+                let expected = "a file, or `--columns` with a map that names the folder's files";
+                return Err(RecordingFault::unexpected("a folder", expected).of(path));
+            }
+            None => csv::read_noted(path, Lines::open(path)?)?,
         };
         if self.clocks == Clocks::Repaired {
             for segment in &mut reading.recording.segments {
@@ -100,6 +103,10 @@ impl Reader {
         Ok(reading)
     }
 }
+
+/// Advice for topics that are not a recording by their names.
+const TO_COMPLETE: &str =
+    "; `romc inspect --guess LOG` writes a map for --columns, to be completed";
 
 /// An MCAP file by the names of its topics and fields.
 fn by_guess(path: &Path, robot: &Robot) -> Result<Reading, RecordingError> {
@@ -120,11 +127,11 @@ fn by_guess(path: &Path, robot: &Robot) -> Result<Reading, RecordingError> {
             "topics of the robot: joints named as fr.hx, FR_hip_joint, LF_HAA or {}",
             robot.joint_names()[0]
         );
-        return Err(RecordingFault::Topics { found, expected }.of(path));
+        return Err(RecordingFault::unexpected(found, expected + TO_COMPLETE).of(path));
     }
     if !guess.open.is_empty() {
-        let (found, expected) = (guess.open.join("; "), "one reading by names".to_owned());
-        return Err(RecordingFault::Topics { found, expected }.of(path));
+        let expected = format!("one reading by names{TO_COMPLETE}");
+        return Err(RecordingFault::unexpected(guess.open.join("; "), expected).of(path));
     }
     let map = ColumnMap::parse(&format!("{}: the guessed map", path.display()), &guess.text)?;
     let mut reading = assemble(path, &logs, &map)?;
@@ -134,14 +141,29 @@ fn by_guess(path: &Path, robot: &Robot) -> Result<Reading, RecordingError> {
     Ok(reading)
 }
 
+/// Repairs of clocks, in words; `{}` is the range of [`Mended::elapsed_ratio`].
+const REPAIRS: [(fn(&Mended) -> bool, &str); 3] = [
+    (
+        |mended| mended.elapsed_ratio.is_some(),
+        "times are rebuilt from the motion, which takes {} s in a recorded second",
+    ),
+    (
+        |mended| mended.elapsed_ratio.is_none() && mended.resampled,
+        "uneven steps are resampled",
+    ),
+    (
+        |mended| mended.rates_replaced,
+        "angular rates, which disagree with the angles, are differences of these",
+    ),
+];
+
 /// What was done to several recordings besides reading.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ReadingNotes {
     recordings: usize,
-    rebuilt: usize,
-    ratios: Option<(f64, f64)>,
-    resampled: usize,
-    rates_replaced: usize,
+    ratios: Vec<f64>,
+    /// Recordings by [`REPAIRS`].
+    repaired: [usize; 3],
     others: Vec<(String, usize)>,
 }
 
@@ -149,14 +171,11 @@ impl ReadingNotes {
     /// Counts one recording.
     pub fn add(&mut self, reading: &Reading) {
         self.recordings += 1;
-        let any = |of: fn(&Mended) -> bool| usize::from(reading.mended.iter().any(of));
-        self.rebuilt += any(|mended| mended.elapsed_ratio.is_some());
-        self.resampled += any(|mended| mended.elapsed_ratio.is_none() && mended.resampled);
-        self.rates_replaced += any(|mended| mended.rates_replaced);
-        for ratio in reading.mended.iter().filter_map(|m| m.elapsed_ratio) {
-            let (least, most) = self.ratios.unwrap_or((ratio, ratio));
-            self.ratios = Some((least.min(ratio), most.max(ratio)));
+        for (count, (is_made, _)) in self.repaired.iter_mut().zip(REPAIRS) {
+            *count += usize::from(reading.mended.iter().any(is_made));
         }
+        let ratios = reading.mended.iter().filter_map(|m| m.elapsed_ratio);
+        self.ratios.extend(ratios);
         for note in &reading.notes {
             match self.others.iter_mut().find(|(known, _)| known == note) {
                 Some((_, count)) => *count += 1,
@@ -167,94 +186,30 @@ impl ReadingNotes {
 
     /// The notes as lines: one for clocks and rates, one for each other note.
     pub fn lines(&self) -> Vec<String> {
-        let of = |count: usize| match self.recordings {
-            1 => String::new(),
-            all => format!(" in {count} of {all} recordings"),
+        let counted = |note: &str, count: usize| match self.recordings {
+            1 => note.to_owned(),
+            all => format!("{note} in {count} of {all} recordings"),
         };
-        let mut clocks = Vec::new();
-        if let Some((least, most)) = self.ratios {
-            let ratio = match [least, most].map(|ratio| format!("{ratio:.2}")) {
-                [least, most] if least == most => most,
-                [least, most] => format!("{least} to {most}"),
-            };
-            clocks.push(format!(
-                "times are rebuilt from the motion, which takes {ratio} s in a recorded second{}",
-                of(self.rebuilt)
-            ));
-        }
-        if self.resampled > 0 {
-            clocks.push(format!("uneven steps are resampled{}", of(self.resampled)));
-        }
-        if self.rates_replaced > 0 {
-            clocks.push(format!(
-                "angular rates, which disagree with the angles, are differences of these{}",
-                of(self.rates_replaced)
-            ));
-        }
+        let end = |of: fn(f64, f64) -> f64| self.ratios.iter().copied().reduce(of).unwrap_or(1.0);
+        let [least, most] = [end(f64::min), end(f64::max)].map(|ratio| format!("{ratio:.2}"));
+        let range = match least == most {
+            true => most,
+            false => format!("{least} to {most}"),
+        };
+        let repairs = self.repaired.iter().zip(REPAIRS);
+        let repairs = repairs.filter(|(count, _)| **count > 0);
+        let repairs: Vec<String> = repairs
+            .map(|(count, (_, words))| counted(&words.replace("{}", &range), *count))
+            .collect();
         let mut lines = Vec::new();
-        if !clocks.is_empty() {
-            let clocks = clocks.join("; ");
-            lines.push(format!("{clocks} (--clock recorded: as recorded)"));
+        if !repairs.is_empty() {
+            lines.push(format!(
+                "{} (--clock recorded: as recorded)",
+                repairs.join("; ")
+            ));
         }
         let others = self.others.iter();
-        lines.extend(others.map(|(note, count)| format!("{note}{}", of(*count))));
+        lines.extend(others.map(|(note, count)| counted(note, *count)));
         lines
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::recording::segment::tests::sample_segment;
-    use crate::recording::segments::DERIVED_DDX;
-    use crate::recording::{WriteOptions, write_with};
-
-    fn reading(elapsed_ratio: Option<f64>, note: &str) -> Reading {
-        Reading {
-            recording: Recording::from(sample_segment(3)),
-            notes: vec![note.to_owned()],
-            mended: vec![Mended {
-                elapsed_ratio,
-                resampled: true,
-                rates_replaced: false,
-            }],
-        }
-    }
-
-    #[test]
-    fn lines_say_each_thing_once_with_its_count() {
-        let mut notes = ReadingNotes::default();
-        notes.add(&reading(Some(1.1), "a"));
-        notes.add(&reading(Some(1.24), "a"));
-        notes.add(&reading(None, "b"));
-        let lines = notes.lines();
-        assert_eq!(lines.len(), 3);
-        assert!(lines[0].contains("1.10 to 1.24 s in a recorded second in 2 of 3 recordings"));
-        assert!(lines[0].contains("uneven steps are resampled in 1 of 3 recordings"));
-        assert_eq!(lines[1], "a in 2 of 3 recordings");
-    }
-
-    #[test]
-    fn accelerations_that_a_file_does_not_have_are_noted() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("jump.csv");
-        let recording = Recording::from(sample_segment(3));
-        for accelerations in [true, false] {
-            let options = WriteOptions {
-                accelerations,
-                ..WriteOptions::default()
-            };
-            write_with(&path, &recording, None, &options).unwrap();
-            let notes = Reader::default().read(&path).unwrap().notes;
-            let expected = [DERIVED_DDX];
-            assert_eq!(notes, expected[usize::from(accelerations)..]);
-        }
-    }
-
-    #[test]
-    fn a_folder_without_a_map_is_refused() {
-        let folder = tempfile::tempdir().unwrap();
-        let error = Reader::default().read(folder.path()).unwrap_err();
-        assert!(matches!(error.kind, RecordingFault::Folder));
     }
 }

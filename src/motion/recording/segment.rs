@@ -5,13 +5,14 @@ use std::path::PathBuf;
 
 use nalgebra::DMatrix;
 
+use super::columns::Column;
 use super::error::{RecordingError, RecordingFault};
 use super::smoothing::moving_average;
 use crate::robot::{BODY_DIM, ContactFlags, InputRule, JOINT_DIM, Robot, STATE_DIM};
 
 /// Time over which accelerations of joints are averaged before the inertia of the motors counts, in
 /// s: 11 samples at 500 Hz.
-pub const ACCELERATION_WINDOW_S: f64 = 0.02;
+const ACCELERATION_WINDOW_S: f64 = 0.02;
 
 /// What a file holds.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,7 +27,7 @@ pub struct Recording {
 
 impl Recording {
     /// These segments as a recording of the same file.
-    pub fn with_segments(&self, segments: Vec<Segment>) -> Self {
+    pub(crate) fn with_segments(&self, segments: Vec<Segment>) -> Self {
         Self {
             path: self.path.clone(),
             segments,
@@ -140,6 +141,41 @@ impl Segment {
         }
     }
 
+    /// Sets all samples of a column; a foot with 1 is down.
+    pub(super) fn set(&mut self, column: Column, values: impl Iterator<Item = f64>) {
+        let n = self.len();
+        let (matrix, row) = match column {
+            Column::Time => return self.time_s = values.collect(),
+            Column::Foot(i) => {
+                let feet = self.feet.iter_mut().zip(values);
+                return feet.for_each(|(feet, value)| feet[i] = value == 1.0);
+            }
+            Column::Position(i) => (&mut self.x, i),
+            Column::Velocity(i) => (&mut self.dx, i),
+            Column::Acceleration(i) => (&mut self.ddx, i),
+            Column::Torque(i) => (&mut self.torque_nm, i),
+            Column::Force(i) => {
+                let empty = || DMatrix::zeros(BODY_DIM, n);
+                (self.body_wrench.get_or_insert_with(empty), i)
+            }
+        };
+        for (cell, value) in matrix.row_mut(row).iter_mut().zip(values) {
+            *cell = value;
+        }
+    }
+
+    pub(super) fn get(&self, column: Column, sample: usize) -> f64 {
+        match column {
+            Column::Time => self.time_s[sample],
+            Column::Position(i) => self.x[(i, sample)],
+            Column::Velocity(i) => self.dx[(i, sample)],
+            Column::Acceleration(i) => self.ddx[(i, sample)],
+            Column::Torque(i) => self.torque_nm[(i, sample)],
+            Column::Force(i) => self.body_wrench.as_ref().map_or(0.0, |w| w[(i, sample)]),
+            Column::Foot(i) => f64::from(u8::from(self.feet[sample][i])),
+        }
+    }
+
     /// Number of samples.
     pub fn len(&self) -> usize {
         self.time_s.len()
@@ -169,31 +205,22 @@ impl Segment {
     }
 
     /// Joint angles of a sample, in rad.
-    ///
-    /// # Panics
-    /// If there is no such sample.
     pub fn joints(&self, sample: usize) -> [f64; JOINT_DIM] {
         std::array::from_fn(|i| self.x[(i, sample)])
     }
 
     /// State of a sample, in rad and m.
-    ///
-    /// # Panics
-    /// If there is no such sample.
     pub fn state(&self, sample: usize) -> [f64; STATE_DIM] {
         std::array::from_fn(|i| self.x[(i, sample)])
     }
 
     /// Joint torques of a sample, in N m.
-    ///
-    /// # Panics
-    /// If there is no such sample.
     pub fn torque(&self, sample: usize) -> [f64; JOINT_DIM] {
         std::array::from_fn(|i| self.torque_nm[(i, sample)])
     }
 
     /// Accelerations of the joints, 12 x n, in rad/s^2: [`Self::ddx`] averaged over
-    /// [`ACCELERATION_WINDOW_S`] within stretches of equal contact (a foot down, or none), so that
+    /// 20 ms within stretches of equal contact (a foot down, or none), so that
     /// the noise of differences and the spikes of landings do not become torques.
     pub fn joint_accelerations(&self) -> DMatrix<f64> {
         let half = match self.mean_step_s() {
@@ -241,17 +268,13 @@ impl Segment {
         self.input_of(rule, &self.torque_nm)
     }
 
-    /// The same of torques that the robot's motors can give: recorded ones beyond a limit count as
-    /// the limit.
-    ///
-    /// # Errors
-    /// As [`Segment::input`].
+    /// [`Segment::input`] of [`Segment::torque_within_limits`].
     pub fn input_within_limits(&self, rule: &InputRule) -> Result<DMatrix<f64>, RecordingError> {
         self.input_of(rule, &self.torque_within_limits(rule.robot()))
     }
 
     /// The recorded torques, N m; those beyond a limit of the robot count as the limit.
-    pub fn torque_within_limits(&self, robot: &Robot) -> DMatrix<f64> {
+    pub(crate) fn torque_within_limits(&self, robot: &Robot) -> DMatrix<f64> {
         let mut torque_nm = self.torque_nm.clone();
         for (mut row, limit) in torque_nm.row_iter_mut().zip(robot.torque_limit_nm()) {
             row.apply(|torque| *torque = torque.clamp(-limit, *limit));
@@ -289,9 +312,6 @@ impl Segment {
     }
 
     /// The samples of a range as a segment of their own.
-    ///
-    /// # Panics
-    /// If the range leaves the segment, as indexing a slice does.
     pub fn slice(&self, range: Range<usize>) -> Segment {
         let (time_s, feet) = (&self.time_s[range.clone()], &self.feet[range.clone()]);
         Segment {
@@ -300,118 +320,5 @@ impl Segment {
                 m.columns(range.start, range.len()).into_owned()
             })
         }
-    }
-}
-
-#[cfg(test)]
-pub(super) mod tests {
-    use super::*;
-    use crate::robot::{Actuators, RobotError, WrenchFrame};
-
-    /// A segment whose entries all differ, of a robot that stands.
-    pub fn sample_segment(n: usize) -> Segment {
-        let fill = |rows: usize, offset: f64| {
-            DMatrix::from_fn(rows, n, |i, j| offset + 0.01 * i as f64 + 0.001 * j as f64)
-        };
-        let mut x = fill(STATE_DIM, 0.0);
-        for j in 0..n {
-            for i in 0..JOINT_DIM {
-                x[(i, j)] += [0.0, 0.7, -1.6][i % 3];
-            }
-        }
-        Segment {
-            x,
-            dx: fill(STATE_DIM, 1.0),
-            ddx: fill(STATE_DIM, 2.0),
-            torque_nm: fill(JOINT_DIM, 3.0),
-            ..Segment::still("sample.csv", (0..n).map(|j| 0.002 * j as f64).collect())
-        }
-    }
-
-    fn published() -> InputRule {
-        InputRule::published(Robot::by_name("go1").unwrap())
-    }
-
-    fn with_losses(frame: WrenchFrame) -> InputRule {
-        let actuators = Actuators::of_leg([1.0, 0.6, 0.6], [0.2; 3], [0.01; 3]);
-        InputRule::new(Robot::by_name("go1").unwrap(), Some(actuators), frame)
-    }
-
-    #[test]
-    fn input_stacks_torques_and_the_robots_wrench() {
-        let segment = sample_segment(4);
-        let u = segment.input(&published()).unwrap();
-        assert_eq!(u.rows(0, 12), segment.torque_nm.rows(0, 12));
-        let wrench = published()
-            .robot()
-            .body_wrench(&segment.joints(2), &segment.torque(2), [true; 4])
-            .unwrap();
-        for axis in 0..BODY_DIM {
-            assert_eq!(u[(12 + axis, 2)], wrench[axis]);
-        }
-    }
-
-    #[test]
-    fn input_under_the_published_rule_prefers_the_wrench_of_the_file() {
-        let mut segment = sample_segment(3);
-        segment.body_wrench = Some(DMatrix::from_element(6, 3, 7.5));
-        let u = segment.input(&published()).unwrap();
-        assert_eq!((u[(12, 0)], u[(17, 2)]), (7.5, 7.5));
-        let u = segment.input(&with_losses(WrenchFrame::Body)).unwrap();
-        assert!(u[(12, 0)] != 7.5 && u[(17, 2)] != 7.5);
-    }
-
-    #[test]
-    fn input_with_actuators_has_the_net_torques_and_their_wrench() {
-        let segment = sample_segment(30);
-        for frame in WrenchFrame::ALL {
-            let rule = with_losses(frame);
-            let u = segment.input(&rule).unwrap();
-            let (dq, ddq) = (segment.dx[(4, 15)], segment.ddx[(4, 15)]);
-            // Accelerations rise linearly here, so that their average is their value.
-            let expected = segment.torque_nm[(4, 15)] - 0.6 * dq - 0.2 - 0.01 * ddq;
-            assert!((u[(4, 15)] - expected).abs() < 1e-12);
-            let net = std::array::from_fn(|i| u[(i, 15)]);
-            let wrench = rule.wrench(&segment.state(15), &net, [true; 4]).unwrap();
-            assert_eq!(u.fixed_view::<6, 1>(12, 15), wrench);
-        }
-    }
-
-    #[test]
-    fn joint_accelerations_average_noise_but_not_across_lift_off() {
-        let mut segment = sample_segment(60);
-        segment.feet[30..].fill([false; 4]);
-        segment.ddx = DMatrix::from_fn(STATE_DIM, 60, |_, j| {
-            let noise = if j % 2 == 0 { 11.0 } else { -11.0 };
-            noise + if j < 30 { 0.0 } else { 500.0 }
-        });
-        let smooth = segment.joint_accelerations();
-        assert_eq!(smooth.nrows(), JOINT_DIM);
-        assert!(smooth.columns(5, 20).amax() <= 1.0 + 1e-12);
-        assert!(smooth.columns(0, 30).amax() <= 11.0);
-        assert!(smooth.columns(30, 30).min() >= 489.0);
-    }
-
-    #[test]
-    fn input_that_is_not_finite_names_its_row() {
-        let mut segment = sample_segment(5);
-        segment.torque_nm[(5, 3)] = f64::NAN;
-        let error = segment.input(&published()).unwrap_err();
-        let RecordingFault::Wrench(source) = &error.kind else {
-            panic!("{error:?}");
-        };
-        assert_eq!(error.place.row(), Some(5));
-        assert!(matches!(**source, RobotError::NotFinite { .. }));
-        segment.feet[3][1] = false;
-        assert!(segment.input(&published()).is_ok());
-    }
-
-    #[test]
-    fn slice_keeps_rows_of_the_file() {
-        let segment = sample_segment(6);
-        let part = segment.slice(2..5);
-        assert_eq!((part.len(), part.first_row, part.row(1)), (3, 4, 5));
-        assert_eq!(part.x.column(0), segment.x.column(2));
-        assert_eq!(part.time_s, segment.time_s[2..5]);
     }
 }

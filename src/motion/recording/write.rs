@@ -52,24 +52,12 @@ impl Default for WriteOptions {
 /// # Errors
 /// [`RecordingFault::Io`]. An existing file is replaced.
 pub fn write(path: &Path, recording: &Recording) -> Result<(), RecordingError> {
-    write_with(path, recording, None, &WriteOptions::default())
+    let options = WriteOptions::default();
+    write_as(path, recording, None, &options, Overwrite::Replace)
 }
 
 /// [`write()`] with a choice of notation and columns, and, if given, the inputs of each segment (18 x samples), as columns
 /// `Input fr.hx` and so on, which reading ignores.
-///
-/// # Errors
-/// As [`write()`].
-pub fn write_with(
-    path: &Path,
-    recording: &Recording,
-    inputs: Option<&[DMatrix<f64>]>,
-    options: &WriteOptions,
-) -> Result<(), RecordingError> {
-    write_as(path, recording, inputs, options, Overwrite::Replace)
-}
-
-/// [`write_with`], which may not replace a file.
 ///
 /// # Errors
 /// As [`write()`], and for a file that is there and may not be replaced.
@@ -95,20 +83,8 @@ pub fn write_as(
 /// Writes a segment as an MCAP file: joint states, odometry, contact, and if given the inputs (18 x samples).
 ///
 /// # Errors
-/// [`RecordingFault::Io`]. An existing file is replaced.
+/// As [`write_as`].
 pub fn write_mcap(
-    path: &Path,
-    segment: &Segment,
-    inputs: Option<&DMatrix<f64>>,
-) -> Result<(), RecordingError> {
-    write_mcap_as(path, segment, inputs, Overwrite::Replace)
-}
-
-/// [`write_mcap`], which may not replace a file.
-///
-/// # Errors
-/// As it, and for a file that is there and may not be replaced.
-pub fn write_mcap_as(
     path: &Path,
     segment: &Segment,
     inputs: Option<&DMatrix<f64>>,
@@ -121,7 +97,7 @@ pub fn write_mcap_as(
     written.map_err(|source| RecordingFault::io("write", source).of(path))
 }
 
-/// Writes a recording as text, its inputs as [`write_with`].
+/// Writes a recording as text, its inputs as [`write_as`].
 ///
 /// The wrench is written if every segment carries one.
 ///
@@ -149,7 +125,10 @@ pub fn write_to(
         for sample in 0..segment.len() {
             line.clear();
             for column in &columns {
-                push_cell(&mut line, segment, *column, sample);
+                match (column, segment.get(*column, sample)) {
+                    (Column::Foot(_), down) => line.push(if down == 1.0 { '1' } else { '0' }),
+                    (_, value) => push_number(&mut line, value),
+                }
                 line.push_str(separator);
             }
             if let Some(inputs) = inputs {
@@ -170,105 +149,7 @@ pub fn write_to(
     Ok(())
 }
 
-fn push_cell(out: &mut String, segment: &Segment, column: Column, sample: usize) {
-    let value = match column {
-        Column::Time => segment.time_s[sample],
-        Column::Position(i) => segment.x[(i, sample)],
-        Column::Velocity(i) => segment.dx[(i, sample)],
-        Column::Acceleration(i) => segment.ddx[(i, sample)],
-        Column::Torque(i) => segment.torque_nm[(i, sample)],
-        Column::Force(i) => segment.body_wrench.as_ref().map_or(0.0, |w| w[(i, sample)]),
-        Column::Foot(i) => {
-            out.push(if segment.feet[sample][i] { '1' } else { '0' });
-            return;
-        }
-    };
-    push_number(out, value);
-}
-
 fn push_number(out: &mut String, value: f64) {
     // Debug has an exponent where Display would print hundreds of zeros.
     write!(out, "{value:?}").expect("a String takes any text");
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::recording::read_from_bytes;
-    use crate::recording::segment::tests::sample_segment;
-    use std::fs;
-
-    fn awkward() -> Recording {
-        let mut first = sample_segment(7);
-        first.x[(0, 0)] = 1.0 / 3.0;
-        first.x[(1, 1)] = -5e-324;
-        first.dx[(2, 2)] = f64::MAX;
-        first.ddx[(3, 3)] = -0.0;
-        first.torque_nm[(4, 4)] = 1e-7;
-        first.feet[5] = [true, false, true, false];
-        let mut second = sample_segment(3);
-        second.first_row = 9;
-        let mut recording = Recording::from(first);
-        recording.segments.push(second);
-        recording
-    }
-
-    fn text(recording: &Recording, options: &WriteOptions) -> Vec<u8> {
-        let mut out = Vec::new();
-        write_to(&mut out, recording, None, options).unwrap();
-        out
-    }
-
-    fn bits(m: &DMatrix<f64>) -> Vec<u64> {
-        m.iter().map(|v| v.to_bits()).collect()
-    }
-
-    #[test]
-    fn write_then_read_returns_the_same_bits_in_both_notations() {
-        let recording = awkward();
-        for notation in [Notation::Semicolon, Notation::Comma] {
-            let options = WriteOptions {
-                notation,
-                ..WriteOptions::default()
-            };
-            let back = read_from_bytes("sample.csv", &text(&recording, &options)).unwrap();
-            assert_eq!(back, recording);
-            for (a, b) in back.segments.iter().zip(&recording.segments) {
-                assert_eq!(bits(&a.x), bits(&b.x));
-                assert_eq!(bits(&a.ddx), bits(&b.ddx));
-            }
-        }
-    }
-
-    #[test]
-    fn write_wrench_of_every_segment_is_kept() {
-        let mut recording = awkward();
-        for segment in &mut recording.segments {
-            let n = segment.len();
-            segment.body_wrench = Some(DMatrix::from_fn(6, n, |i, j| i as f64 - 0.1 * j as f64));
-        }
-        let bytes = text(&recording, &WriteOptions::default());
-        assert_eq!(read_from_bytes("sample.csv", &bytes).unwrap(), recording);
-    }
-
-    #[test]
-    fn write_below_a_file_is_an_error_and_leaves_nothing() {
-        let folder = tempfile::tempdir().unwrap();
-        fs::write(folder.path().join("file"), "").unwrap();
-        let path = folder.path().join("file/place.csv");
-        let error = write(&path, &awkward()).unwrap_err();
-        assert!(error.to_string().ends_with("cannot write"), "{error}");
-        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
-    }
-
-    #[test]
-    fn write_gzip_by_extension_is_packed_and_reads_back() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("jump.csv.gz");
-        write(&path, &awkward()).unwrap();
-        assert_eq!(fs::read(&path).unwrap()[..2], [0x1f, 0x8b]);
-        let back = crate::recording::read(&path).unwrap();
-        assert_eq!(back.segments[0].x, awkward().segments[0].x);
-        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
-    }
 }

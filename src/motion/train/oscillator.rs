@@ -7,15 +7,15 @@ use std::sync::atomic::AtomicBool;
 
 use nalgebra::{DMatrix, DVector, Vector2};
 
-use super::dataset::{Dataset, Jump, Rates, ScaleOptions};
-use super::dynamics_fit::Fitted;
+use super::dataset::{Dataset, Jump, ScaleOptions};
+use super::dynamics_fit::{Fitted, Maps};
 use super::features::Features;
 use super::growth::Growth;
 use super::judge::Judge;
 use super::knowledge::Knowledge;
 use super::latent::{EncodedSet, Latent};
 use super::options::TrainOptions;
-use super::progress::{Progress, Watch};
+use super::progress::{Monitor, Progress};
 use super::refine::Refiner;
 use crate::model::{AffineMap, Library, StandardLibrary};
 use crate::recording::{PhaseRule, shipped};
@@ -36,7 +36,6 @@ fn truth(phase: usize, z: &[f64], dz: &[f64], u: &[f64]) -> [f64; 2] {
     }
 }
 
-/// Shipped jumps of the Go1, such as `train_01`.
 pub(super) fn go1(names: impl IntoIterator<Item = impl Display>) -> Dataset {
     let names = names.into_iter().map(|name| format!("go1/{name}"));
     let jumps: Vec<_> = names.map(|name| shipped(&name)).collect();
@@ -46,7 +45,6 @@ pub(super) fn go1(names: impl IntoIterator<Item = impl Display>) -> Dataset {
     Dataset::new(&jumps[..], &rule, &options.phases, &scaling, 11).expect("jumps")
 }
 
-/// A standard library with inputs.
 pub(super) fn standard_library(latent_dim: usize, degree: u32, trigonometric: bool) -> Library {
     let standard = StandardLibrary {
         degree,
@@ -83,11 +81,9 @@ pub(super) fn jumps(n_jumps: usize) -> (Dataset, Vec<Latent>) {
             time_s: (0..n).map(|i| i as f64 * STEP_S).collect(),
             x: lift(&samples.z),
             u: lift(&samples.u_lat),
-            rates: Some(Rates {
-                dx: lift(&samples.dz),
-                ddx: lift(&samples.ddz),
-                losses: None,
-            }),
+            dx: lift(&samples.dz),
+            ddx: lift(&samples.ddz),
+            losses: None,
             phase: (0..n).map(|i| usize::from(i >= LIFT_OFF)).collect(),
             spans: vec![(0, 0..LIFT_OFF), (1, LIFT_OFF..n)],
             implausible: Vec::new(),
@@ -100,7 +96,6 @@ pub(super) fn jumps(n_jumps: usize) -> (Dataset, Vec<Latent>) {
         rule: InputRule::new(robot, None, WrenchFrame::World),
         scaling: ScaleOptions::uniform(1.0).factors(),
         smoothing: 1,
-        files: None,
     };
     (dataset, latent)
 }
@@ -112,9 +107,13 @@ pub(super) fn fitted(weights: DMatrix<f64>, xi: DMatrix<f64>) -> Fitted {
         AffineMap::new("map", w, bias).expect("finite").into()
     };
     Fitted {
-        decoder: map(weights.transpose()),
-        encoder: map(weights.clone()),
-        weights,
+        maps: Maps {
+            decoder: map(weights.transpose()),
+            encoder: map(weights.clone()),
+            weights,
+            training: Vec::new(),
+            validation: Vec::new(),
+        },
         xi: vec![xi],
         choice: None,
         score: 0.0,
@@ -125,7 +124,7 @@ pub(super) fn fitted(weights: DMatrix<f64>, xi: DMatrix<f64>) -> Fitted {
 pub(super) fn with_refiner<T>(
     bound_per_s: Option<f64>,
     knowledge: &[Knowledge],
-    work: impl FnOnce(&Refiner<'_>, &mut Watch<'_>) -> T,
+    work: impl FnOnce(&Refiner<'_>, &mut Monitor<'_>) -> T,
 ) -> T {
     let ((dataset, latent), (features, _)) = (jumps(3), known());
     let set = EncodedSet::new(&dataset, &latent);
@@ -137,7 +136,7 @@ pub(super) fn with_refiner<T>(
         judge: &judge,
     };
     let (mut nothing, cancel) = (|_: Progress| {}, AtomicBool::new(false));
-    work(&refiner, &mut Watch::new(&mut nothing, &cancel))
+    work(&refiner, &mut Monitor::new(&mut nothing, &cancel))
 }
 
 fn simulate(seed: usize) -> Latent {

@@ -8,41 +8,35 @@ use super::knowledge::Knowledge;
 use super::options::TrainOptions;
 use super::subspace::Moments;
 use crate::model::Library;
-use crate::recording::Source;
+use crate::recording::Recording;
 use crate::robot::Robot;
 
 /// Recordings to learn from and to choose by.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct Recordings<'a> {
-    /// Fitted.
-    pub training: Source<'a>,
+    pub training: &'a [Recording],
     /// Used to choose between candidates; without any, the training recordings are.
-    pub validation: Source<'a>,
+    pub validation: &'a [Recording],
 }
 
 impl<'a> Recordings<'a> {
-    /// These recordings, each in memory or in files.
-    pub fn new(training: impl Into<Source<'a>>, validation: impl Into<Source<'a>>) -> Self {
+    pub fn new(training: &'a [Recording], validation: &'a [Recording]) -> Self {
         Self {
-            training: training.into(),
-            validation: validation.into(),
+            training,
+            validation,
         }
     }
 }
 
-/// Data, library and options that all seeds share.
 pub(super) struct Task<'a> {
     /// The training recordings cut into phases, scaled.
     pub training: Dataset,
     /// The same of the validation recordings; may have no jump.
     pub validation: Dataset,
-    /// Of the training samples.
     pub moments: Moments,
     pub library: Library,
     pub features: Features,
-    /// Coordinates that the encoder may use.
     pub active: Vec<usize>,
-    /// What the rows of a linear encoder are made of.
     pub frame: Frame,
     /// What is known of the dynamics in its coordinates, one a phase.
     pub knowledge: Vec<Knowledge>,
@@ -63,7 +57,8 @@ impl<'a> Task<'a> {
         options.check()?;
         let (scaling, smoothing) = (options.scaling.factors(), options.regression.smoothing);
         let rule = options.input_rule(robot);
-        let read = |set: Source<'_>| Dataset::new(set, &rule, &options.phases, &scaling, smoothing);
+        let read =
+            |set: &[Recording]| Dataset::new(set, &rule, &options.phases, &scaling, smoothing);
         let training = read(recordings.training)?;
         training.check_for_training()?;
         let validation = read(recordings.validation)?;
@@ -71,7 +66,7 @@ impl<'a> Task<'a> {
         let least_std = options.encoder.least_std * options.scaling.state;
         let active = moments.active_coordinates(least_std, options.encoder.least_input_share);
         let (coordinates, requested) = (options.coordinates(), options.latent_dim);
-        let frame = Frame::new(&training, &active, requested, coordinates, robot)?;
+        let frame = Frame::new(&training, &active, requested, coordinates, robot);
         if requested == 0 || requested > frame.dim() {
             return Err(TrainError::LatentDim {
                 requested,
@@ -92,13 +87,5 @@ impl<'a> Task<'a> {
             options,
             robot,
         })
-    }
-
-    /// The jumps that candidates are judged by.
-    pub fn judged(&self) -> &Dataset {
-        match self.validation.jumps.is_empty() {
-            true => &self.training,
-            false => &self.validation,
-        }
     }
 }

@@ -3,17 +3,18 @@
 use std::collections::HashMap;
 
 use super::agreement::Agreement;
-use super::forms::{Keep, collected};
+use super::forms::{NestedSums, collected};
+use super::groups::Link;
 use super::{Scaled, Summands};
 use crate::symbolic::cost::Costs;
+use crate::symbolic::function::Function;
 use crate::symbolic::id_map::{IdMap, IdSet};
-use crate::symbolic::node::{ExprId, Function, Node, SymbolId};
+use crate::symbolic::node::{ExprId, Node, SymbolId};
 use crate::symbolic::number::Number;
 use crate::symbolic::order::Exponent;
 use crate::symbolic::pool::ExprPool;
 use crate::symbolic::simplify::MAX_WORK;
 
-/// Most rounds of searching for groups.
 const MAX_ROUNDS: usize = 4;
 
 /// Summands that a shorter form takes the place of.
@@ -33,12 +34,12 @@ pub(crate) struct Shortener<'a> {
     singles: IdMap<ExprId>,
     pub(super) plain: IdMap<bool>,
     /// By term and by the sum of all waves beside it.
-    pub(super) monomials: HashMap<(ExprId, ExprId), Vec<ExprId>>,
+    pub(super) links: HashMap<(ExprId, ExprId), Vec<Link>>,
 }
 
 /// How far terms are looked for that can interact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Reach {
+pub(super) enum Distance {
     /// Those whose normal forms share a monomial that is not the constant one, or a denominator.
     Near,
     /// Those that share a constant too, or have denominators of the same variables.
@@ -48,17 +49,8 @@ pub(super) enum Reach {
 /// Summands with variables for parts, and these parts.
 type Seen = (Summands, Vec<(SymbolId, ExprId)>);
 
-/// What of the terms is a variable while they are searched.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum View {
-    /// Sums that are factors, and functions other than waves that are factors of several terms:
-    /// `(a + b)^2*sin(c)^2` is searched as `f^2*sin(c)^2`.
-    Factors,
-    /// Sums that are angles.
-    Angles,
-    /// Nothing.
-    Whole,
-}
+/// Summands with variables in the place of some parts; nothing if there are none of these.
+type View<'a> = fn(&mut Shortener<'a>, &[(f64, ExprId)]) -> Option<Seen>;
 
 fn blocks_of(summands: &[(f64, ExprId)]) -> Vec<Block> {
     (summands.iter().enumerate())
@@ -77,19 +69,31 @@ pub(super) struct Block {
     is_new: bool,
 }
 
+/// Puts blocks together at the place of the first, with new summands; the others lose their positions.
+fn merge(blocks: &mut [Block], places: &[usize], summands: Summands) {
+    let mut positions = Vec::new();
+    for &place in places {
+        positions.append(&mut blocks[place].positions);
+    }
+    positions.sort_unstable();
+    blocks[places[0]] = Block {
+        positions,
+        summands,
+        is_new: true,
+    };
+}
+
 impl<'a> Shortener<'a> {
-    /// A shortener of sums over `pool`.
     pub(crate) fn new(pool: &'a mut ExprPool) -> Self {
         Self {
             pool,
             costs: Costs::default(),
             singles: IdMap::default(),
             plain: IdMap::default(),
-            monomials: HashMap::new(),
+            links: HashMap::new(),
         }
     }
 
-    /// The pool, with the expressions that were made.
     pub(crate) fn pool(&self) -> &ExprPool {
         self.pool
     }
@@ -106,7 +110,8 @@ impl<'a> Shortener<'a> {
         let mut blocks = blocks_of(summands);
         for _ in 0..MAX_ROUNDS {
             let mut is_changed = false;
-            for view in [View::Factors, View::Angles, View::Whole] {
+            let views: [View<'a>; 3] = [Self::whole_factors, Self::whole_angles, Self::unchanged];
+            for view in views {
                 is_changed |= self.pass(&mut blocks, view);
             }
             if !is_changed {
@@ -130,17 +135,12 @@ impl<'a> Shortener<'a> {
     }
 
     /// Shortens all blocks in one view; whether anything changed.
-    fn pass(&mut self, blocks: &mut Vec<Block>, view: View) -> bool {
+    fn pass(&mut self, blocks: &mut Vec<Block>, view: View<'a>) -> bool {
         let flat: Vec<(usize, (f64, ExprId))> = (blocks.iter().enumerate())
             .flat_map(|(place, block)| block.summands.iter().map(move |&summand| (place, summand)))
             .collect();
         let written: Summands = flat.iter().map(|&(_, summand)| summand).collect();
-        let seen = match view {
-            View::Whole => Some((written.clone(), Vec::new())),
-            View::Angles => self.whole_angles(&written),
-            View::Factors => self.whole_factors(&written),
-        };
-        let Some((summands, parts)) = seen else {
+        let Some((summands, parts)) = view(self, &written) else {
             return false;
         };
         let mut found = blocks_of(&summands);
@@ -154,7 +154,7 @@ impl<'a> Shortener<'a> {
             let Some(written_out) = written_out else {
                 continue;
             };
-            let by = collected(self.pool, &written_out, Keep::Sums).into_iter();
+            let by = collected(self.pool, &written_out, NestedSums::Kept).into_iter();
             let mut by: Summands = by.map(|(number, expr)| (number.to_f64(), expr)).collect();
             let lost: Summands = new.positions.iter().map(|&at| written[at]).collect();
             let mut length =
@@ -174,9 +174,8 @@ impl<'a> Shortener<'a> {
                     *place = places[0];
                 }
             }
-            let (mut positions, mut left) = (Vec::new(), Summands::new());
+            let mut left = Summands::new();
             for &place in &places {
-                positions.append(&mut blocks[place].positions);
                 left.append(&mut blocks[place].summands);
             }
             for summand in lost {
@@ -185,12 +184,7 @@ impl<'a> Shortener<'a> {
                 }
             }
             by.extend(left);
-            positions.sort_unstable();
-            blocks[places[0]] = Block {
-                positions,
-                summands: by,
-                is_new: true,
-            };
+            merge(blocks, &places, by);
         }
         blocks.retain(|block| !block.positions.is_empty());
         is_changed
@@ -199,9 +193,9 @@ impl<'a> Shortener<'a> {
     /// Shortens group after group: first those that share a term, then all that can interact.
     fn run(&mut self, blocks: &mut Vec<Block>, summands: &[(f64, ExprId)]) {
         for _ in 0..MAX_ROUNDS {
-            let is_changed = [Reach::Near, Reach::Far].into_iter().any(|reach| {
+            let is_changed = [Distance::Near, Distance::Far].into_iter().any(|distance| {
                 let mut is_changed = false;
-                for group in self.groups(blocks, reach) {
+                for group in self.groups(blocks, distance) {
                     is_changed |= self.shorten_group(blocks, &group, summands);
                 }
                 blocks.retain(|block| !block.positions.is_empty());
@@ -225,19 +219,10 @@ impl<'a> Shortener<'a> {
             else {
                 continue;
             };
-            let (outer, inner) = self.pool.split(angle);
-            let terms = self.pool.terms_of(inner);
-            let Some(&(first, _)) = terms.get(1).and(terms.first()) else {
+            let (factor, monic) = self.pool.content(angle);
+            if !matches!(self.pool.node(monic), Node::Sum(_)) {
                 continue;
-            };
-            let Some(factor) = outer.checked_mul(first) else {
-                continue;
-            };
-            let monic: Option<Vec<ExprId>> = (terms.into_iter())
-                .map(|(number, rest)| Some(self.pool.scale(number.checked_div(first)?, rest)))
-                .collect();
-            let Some(monic) = monic else { continue };
-            let monic = self.pool.sum(&monic);
+            }
             match families.iter_mut().find(|(known, _)| *known == monic) {
                 Some((_, angles)) => angles.push((factor, angle)),
                 None => families.push((monic, vec![(factor, angle)])),
@@ -254,8 +239,7 @@ impl<'a> Shortener<'a> {
                 .map(|(number, rest)| Some(self.pool.scale(number.checked_mul(least)?, rest)))
                 .collect();
             let Some(angle) = angle else { continue };
-            // No file has a variable of this name.
-            let variable = self.pool.symbol_id(&format!(" angle {place}"));
+            let variable = self.pool.placeholder("angle", place);
             let symbol = self.pool.symbol_expr(variable);
             for (factor, angle) in angles {
                 let multiple = factor.checked_div(least);
@@ -269,20 +253,13 @@ impl<'a> Shortener<'a> {
         if replaced.is_empty() {
             return None;
         }
-        for expr in order {
-            if !replaced.contains_key(&expr) {
-                let known = &replaced;
-                let operand = |child: ExprId| known.get(&child).copied().unwrap_or(child);
-                let new = self.pool.rebuild(expr, operand);
-                replaced.insert(expr, new);
-            }
-        }
-        let whole = summands.iter().map(|(c, expr)| (*c, replaced[expr]));
+        let whole = self.pool.replace(&exprs, order, replaced);
+        let whole = summands.iter().zip(whole).map(|((c, _), expr)| (*c, expr));
         Some((whole.collect(), variables))
     }
 
-    /// The summands with a variable of its own in the place of each factor of [`View::Factors`], and
-    /// these; nothing if there is none.
+    /// The summands with a variable of its own in the place of each sum that is a factor, and of each function other than
+    /// waves that is a factor of several terms: `(a + b)^2*sin(c)^2` is searched as `f^2*sin(c)^2`.
     fn whole_factors(&mut self, summands: &[(f64, ExprId)]) -> Option<Seen> {
         let mut n_terms: IdMap<usize> = IdMap::default();
         for &(_, expr) in summands {
@@ -312,8 +289,7 @@ impl<'a> Shortener<'a> {
                 let variable = match known {
                     Some(&(variable, _)) => variable,
                     None => {
-                        // No file has a variable of this name.
-                        let variable = self.pool.symbol_id(&format!(" factor {}", parts.len()));
+                        let variable = self.pool.placeholder("factor", parts.len());
                         parts.push((variable, part));
                         variable
                     }
@@ -324,6 +300,10 @@ impl<'a> Shortener<'a> {
             whole.push((coefficient, self.pool.product(&factors)));
         }
         (!parts.is_empty()).then_some((whole, parts))
+    }
+
+    fn unchanged(&mut self, summands: &[(f64, ExprId)]) -> Option<Seen> {
+        Some((summands.to_vec(), Vec::new()))
     }
 
     /// Whether the terms are distinct monomials that cannot interact.
@@ -396,18 +376,11 @@ impl<'a> Shortener<'a> {
             .collect();
         positions.sort_unstable();
         let replaced: Summands = positions.iter().map(|&place| original[place]).collect();
-        let Some(new) = self.shortest(&old, &replaced) else {
-            return false;
-        };
-        for &place in &group[1..] {
-            blocks[place].positions.clear();
-            blocks[place].is_new = false;
+        let new = self.shortest(&old, &replaced);
+        let is_shorter = new.is_some();
+        if let Some(new) = new {
+            merge(blocks, group, new);
         }
-        blocks[group[0]] = Block {
-            positions,
-            summands: new,
-            is_new: true,
-        };
-        true
+        is_shorter
     }
 }

@@ -10,12 +10,11 @@ use super::interpolate::{Between, at_times};
 use super::log::Log;
 use super::map::{ColumnMap, Frame, Origin};
 use super::signal::{Signal, Source};
-use crate::recording::columns::Column;
 use crate::recording::error::{RecordingError, RecordingFault};
 use crate::recording::preprocess::differences_within;
 use crate::recording::reader::Reading;
-use crate::recording::segment::Recording;
-use crate::recording::segments::{DERIVED_DDX, EPOCH_S, Sample, SegmentBuilder, begins_segment};
+use crate::recording::segment::{Recording, Segment};
+use crate::recording::segments::{DERIVED_DDX, EPOCH_S, divided, ranges};
 use crate::robot::FOOT_DIM;
 
 /// Largest distance between samples of a topic that is interpolated, in s.
@@ -26,9 +25,6 @@ const QUATERNION_TOLERANCE: f64 = 0.05;
 const MAX_RESAMPLED: usize = 10_000_000;
 
 /// Makes a recording of the logs as the map says, with notes of what was derived, resampled, turned or cut.
-///
-/// # Errors
-/// [`RecordingError`] with the map's key, or with file, row and column.
 pub(in crate::recording) fn assemble(
     path: &Path,
     logs: &[Log],
@@ -42,13 +38,11 @@ pub(in crate::recording) fn assemble(
     let (mut signals, mut notes) = (BTreeMap::new(), Vec::new());
     for quantity in Quantity::ALL {
         if let Some(source) = find(quantity)? {
-            let new = source
-                .log()
-                .notes
-                .iter()
-                .filter(|note| !notes.contains(note));
-            let new: Vec<&String> = new.collect();
-            notes.extend(new);
+            for note in &source.log().notes {
+                if !notes.contains(note) {
+                    notes.push(note.clone());
+                }
+            }
             signals.insert(quantity, source.take(epoch_s.unwrap_or(0))?);
         }
     }
@@ -62,7 +56,7 @@ pub(in crate::recording) fn assemble(
         times_s: base.times_s.clone(),
         ranges: Vec::new(),
         signals,
-        notes: notes.into_iter().cloned().collect(),
+        notes,
     };
     rows.angles()?;
     rows.contacts()?;
@@ -93,21 +87,16 @@ struct Rows<'a> {
 }
 
 impl Rows<'_> {
-    /// A quantity that every map has.
     fn required(&mut self, quantity: Quantity) -> &mut Signal {
         let signal = self.signals.get_mut(&quantity);
         signal.expect("a map has what is required")
     }
 
-    /// The axes that the map gives to a velocity.
     fn frame(&self, quantity: Quantity) -> Option<Frame> {
         self.map.table(quantity).and_then(|table| table.frame)
     }
 
     /// Quaternions become angles, and angles do not jump by whole turns.
-    ///
-    /// # Errors
-    /// [`RecordingFault::Number`] for a quaternion whose length is far from one.
     fn angles(&mut self) -> Result<(), RecordingError> {
         let path = self.path;
         let signal = self.required(Quantity::Orientation);
@@ -117,7 +106,7 @@ impl Rows<'_> {
                 if norm.is_nan() || (1.0 - norm).abs() > QUATERNION_TOLERANCE {
                     let found = format!("a quaternion of length {norm:.3}");
                     let expected = "one of length 1";
-                    let fault = RecordingFault::Number { found, expected };
+                    let fault = RecordingFault::number(&found, expected);
                     return Err(fault.in_cell(path, signal.first_row + sample, "orientation"));
                 }
             }
@@ -154,7 +143,7 @@ impl Rows<'_> {
                         let path = file.map_or(path, |log| &log.path);
                         let row = signal.first_row + sample;
                         let name = Quantity::Feet.column(foot).name();
-                        return Err(RecordingFault::Contact(value).in_cell(path, row, &name));
+                        return Err(RecordingFault::contact(value).in_cell(path, row, &name));
                     }
                 };
                 signal.values[(foot, sample)] = f64::from(u8::from(down));
@@ -173,16 +162,8 @@ impl Rows<'_> {
             self.ranges.push(0..self.times_s.len());
             return Ok(());
         }
-        let mut start = 0;
-        for i in 1..self.times_s.len() {
-            if begins_segment(&self.times_s[start..i], self.times_s[i])
-                .map_err(|fault| fault.in_cell(self.path, self.first_row + i, "Time"))?
-            {
-                self.ranges.push(start..i);
-                start = i;
-            }
-        }
-        self.ranges.push(start..self.times_s.len());
+        self.ranges = ranges(&self.times_s)
+            .map_err(|(at, fault)| fault.in_cell(self.path, self.first_row + at, "Time"))?;
         Ok(())
     }
 
@@ -196,10 +177,11 @@ impl Rows<'_> {
             for i in 1..times.len() {
                 let (found, previous) = (times[i], times[i - 1]);
                 let fault = if found <= previous {
-                    RecordingFault::Time { found, previous }
+                    RecordingFault::time(found, previous)
                 } else if found - previous > max_gap_s {
-                    let (found, expected) = (found - previous, max_gap_s);
-                    RecordingFault::Gap { found, expected }
+                    let found = format!("no sample for {} s", found - previous);
+                    let expected = format!("at most {max_gap_s} s (`max_gap_s` in `[time]`)");
+                    RecordingFault::unexpected(found, expected)
                 } else {
                     continue;
                 };
@@ -226,7 +208,9 @@ impl Rows<'_> {
             Some(_) => Vec::new(),
         };
         if times.len() < 2 {
-            return Err(RecordingFault::NoOverlap.of(self.path));
+            let found = "clocks that do not overlap";
+            let fault = RecordingFault::unexpected(found, "topics of the same time");
+            return Err(fault.of(self.path));
         }
         self.notes.push(match time.resample_s {
             Some(step) => format!("all quantities are brought to even steps of {step} s"),
@@ -273,20 +257,15 @@ impl Rows<'_> {
         let rate = match quantity {
             Quantity::JointPosition => Quantity::JointVelocity,
             Quantity::JointVelocity => Quantity::JointAcceleration,
-            Quantity::BodyPosition if self.frame(Quantity::BodyVelocity) != Some(Frame::Body) => {
-                Quantity::BodyVelocity
-            }
-            Quantity::Orientation
-                if matches!(
-                    self.frame(Quantity::AngularVelocity),
-                    None | Some(Frame::Angles)
-                ) =>
-            {
-                Quantity::AngularVelocity
-            }
+            Quantity::BodyPosition => Quantity::BodyVelocity,
+            Quantity::Orientation => Quantity::AngularVelocity,
             _ => return None,
         };
-        self.signals.get(&rate)
+        let is_derivative = match (rate, self.frame(rate)) {
+            (Quantity::BodyVelocity, frame) => frame != Some(Frame::Body),
+            (_, frame) => matches!(frame, None | Some(Frame::Angles)),
+        };
+        self.signals.get(&rate).filter(|_| is_derivative)
     }
 
     /// Velocities about the body's own axes become the derivatives of position and angles.
@@ -303,7 +282,9 @@ impl Rows<'_> {
             let turned = angle_rates(&angles, &signal.values, frame.unwrap_or(Frame::Angles));
             signal.values = turned.map_err(|sample| {
                 let row = self.first_row + sample;
-                RecordingFault::Upright.at(self.path, row)
+                let expected = "less where rates come from angular velocities";
+                let fault = RecordingFault::unexpected("a pitch of 90 degrees", expected);
+                fault.at(self.path, row)
             })?;
         }
         Ok(())
@@ -356,7 +337,6 @@ impl Rows<'_> {
         }
     }
 
-    /// The segments.
     fn recording(mut self) -> Result<Reading, RecordingError> {
         let kept = match self.map.text.rows {
             None => 0..self.times_s.len(),
@@ -380,21 +360,19 @@ impl Rows<'_> {
         } else {
             (self.notes).push(DERIVED_DDX.to_owned());
         }
-        let mut builder = SegmentBuilder::new(self.path, has_acceleration, false);
-        for i in kept {
-            let mut sample = Sample::default();
-            sample.set(Column::Time, self.times_s[i]);
-            for (quantity, signal) in &self.signals {
-                for (element, value) in signal.values.column(i).iter().enumerate() {
-                    sample.set(quantity.column(element), *value);
-                }
+        let mut whole = Segment {
+            first_row: self.first_row + kept.start,
+            ..Segment::still(self.path, self.times_s[kept.clone()].to_vec())
+        };
+        for (quantity, signal) in &self.signals {
+            for (element, row) in signal.values.row_iter().enumerate() {
+                let values = row.iter().skip(kept.start).copied();
+                whole.set(quantity.column(element), values);
             }
-            builder.push(self.first_row + i, sample)?;
         }
-        let columns = self.logs.iter().map(|log| log.columns.len()).sum();
         let recording = Recording {
             path: self.path.to_owned(),
-            segments: builder.finish(columns)?,
+            segments: divided(whole, has_acceleration)?,
             ignored_columns: Vec::new(),
         };
         Ok(Reading::as_recorded(recording, self.notes))

@@ -17,10 +17,6 @@ pub(super) fn is_bag(path: &Path) -> bool {
 }
 
 /// The files of a log: the path itself, or those of the bag that the folder is; and notes on files that are left out.
-///
-/// # Errors
-/// [`RecordingFault::Missing`] for a file that the bag lists or counts, [`RecordingFault::Bag`] for a folder of other
-/// recordings.
 pub(super) fn files(path: &Path) -> Result<(Vec<PathBuf>, Vec<String>), RecordingError> {
     if !path.is_dir() {
         return Ok((vec![path.to_owned()], Vec::new()));
@@ -57,7 +53,12 @@ pub(super) fn files(path: &Path) -> Result<(Vec<PathBuf>, Vec<String>), Recordin
         one.is_some() && one == other
     };
     if files.is_empty() || (!path.join(METADATA).is_file() && !files.windows(2).all(is_one)) {
-        return Err(RecordingFault::Bag(files.len()).of(path));
+        let found = format!(
+            "a folder of {} MCAP files without metadata.yaml that are not NAME_0.mcap, NAME_1.mcap and so on",
+            files.len()
+        );
+        let expected = "the parts of one bag; give separate recordings one by one: FOLDER/*.mcap";
+        return Err(RecordingFault::unexpected(found, expected).of(path));
     }
     // Without a list, a number that is left out is a file that is lost.
     let lost = files.windows(2).filter(|_| !is_listed).find_map(|pair| {

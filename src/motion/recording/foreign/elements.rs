@@ -1,29 +1,21 @@
-//! The quantities of a recording and the names of their elements, in romc's order.
+//! The quantities of a recording, the names of their elements in romc's order, and units with their factors to SI.
 
-use super::units::Dimension;
 use crate::recording::columns::Column;
 use crate::robot::{JOINT_DIM, JOINT_NAMES, Leg, STATE_DIM};
 
 /// A quantity that a map places.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Quantity {
-    /// Joint angles.
+pub(super) enum Quantity {
     JointPosition,
-    /// Joint velocities.
     JointVelocity,
-    /// Joint accelerations.
     JointAcceleration,
-    /// Joint torques.
     JointTorque,
-    /// Position of the trunk.
     BodyPosition,
     /// Attitude of the trunk: a quaternion, or roll, pitch and yaw.
     Orientation,
-    /// Velocity of the trunk.
     BodyVelocity,
     /// Angular velocity of the trunk, or rates of roll, pitch and yaw.
     AngularVelocity,
-    /// Acceleration of the trunk.
     BodyAcceleration,
     /// Second derivatives of roll, pitch and yaw.
     AngularAcceleration,
@@ -32,8 +24,8 @@ pub enum Quantity {
 }
 
 impl Quantity {
-    /// All, in the order of a map.
-    pub const ALL: [Self; 11] = [
+    /// In the order of a map.
+    pub(crate) const ALL: [Self; 11] = [
         Self::JointPosition,
         Self::JointVelocity,
         Self::JointAcceleration,
@@ -48,7 +40,7 @@ impl Quantity {
     ];
 
     /// Accelerations, each with the velocity whose derivative it is.
-    pub(super) const ACCELERATIONS: [(Self, Self); 3] = [
+    pub(crate) const ACCELERATIONS: [(Self, Self); 3] = [
         (Self::JointAcceleration, Self::JointVelocity),
         (Self::BodyAcceleration, Self::BodyVelocity),
         (Self::AngularAcceleration, Self::AngularVelocity),
@@ -76,29 +68,28 @@ impl Quantity {
     }
 
     /// Its table in a map.
-    pub const fn key(self) -> &'static str {
+    pub(crate) const fn key(self) -> &'static str {
         self.facts().0
     }
 
-    /// A key of its table.
-    pub(super) fn at(self, key: &str) -> String {
+    pub(crate) fn at(self, key: &str) -> String {
         format!("{}.{key}", self.key())
     }
 
     /// What its units measure.
-    pub(super) const fn dimension(self) -> Dimension {
+    pub(crate) const fn dimension(self) -> Dimension {
         self.facts().1
     }
 
     /// The recording's column of an element.
-    pub(super) fn column(self, element: usize) -> Column {
+    pub(crate) fn column(self, element: usize) -> Column {
         let (_, _, column, first) = self.facts();
         debug_assert!(first + element < STATE_DIM, "w of a quaternion");
         column(first + element)
     }
 
     /// Whether a recording cannot be without it.
-    pub(super) const fn is_required(self) -> bool {
+    pub(crate) const fn is_required(self) -> bool {
         matches!(
             self,
             Self::JointPosition
@@ -110,15 +101,19 @@ impl Quantity {
     }
 
     /// Whether the quantity is one of joints.
-    pub(super) const fn is_of_joints(self) -> bool {
+    pub(crate) const fn is_of_joints(self) -> bool {
         matches!(
             self,
             Self::JointPosition | Self::JointVelocity | Self::JointAcceleration | Self::JointTorque
         )
     }
 
+    pub(crate) fn is_by_leg(self) -> bool {
+        self.is_of_joints() || self == Self::Feet
+    }
+
     /// Names of its elements in romc's order; a quaternion has [`QUATERNION`] instead.
-    pub(super) fn elements(self) -> Vec<String> {
+    pub(crate) fn elements(self) -> Vec<String> {
         let owned = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
         match self {
             _ if self.is_of_joints() => owned(&JOINT_NAMES),
@@ -138,9 +133,6 @@ pub(super) const QUATERNION: [&str; 4] = ["w", "x", "y", "z"];
 
 /// The elements that the words of an order name, in that order: single names, names with `*` for every leg or
 /// joint (`*.hx`, `fl.*`), a word of single letters (`wxyz`, `rpy`, `xyz`).
-///
-/// # Errors
-/// The word that names nothing, or an element that is named twice.
 pub(super) fn ordered(words: &[String], elements: &[String]) -> Result<Vec<usize>, String> {
     let mut out = Vec::new();
     for word in words {
@@ -158,7 +150,6 @@ pub(super) fn ordered(words: &[String], elements: &[String]) -> Result<Vec<usize
     Ok(out)
 }
 
-/// The elements that one word names.
 pub(super) fn named(word: &str, elements: &[String]) -> Vec<usize> {
     let word = word.trim().to_lowercase();
     let matches = |element: &String| match word.split_once('*') {
@@ -185,42 +176,89 @@ pub(super) fn named(word: &str, elements: &[String]) -> Vec<usize> {
     }
 }
 
+/// What a unit measures; rates and accelerations are the same per s and s^2.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Dimension {
+    Angle,
+    Length,
+    Torque,
+    Force,
+    Time,
+}
+
+impl Dimension {
+    /// Units with their factors to rad, m, N m, N or s.
+    pub(crate) const fn units(self) -> &'static [(&'static str, f64)] {
+        const DEGREE: f64 = std::f64::consts::PI / 180.0;
+        const TURN: f64 = 2.0 * std::f64::consts::PI;
+        match self {
+            Dimension::Angle => &[
+                ("rad", 1.0),
+                ("deg", DEGREE),
+                ("mrad", 1e-3),
+                ("turn", TURN),
+                ("rpm", TURN / 60.0),
+                ("degree", DEGREE),
+                ("degrees", DEGREE),
+                ("radians", 1.0),
+                ("°", DEGREE),
+            ],
+            Dimension::Length => &[("m", 1.0), ("mm", 1e-3), ("cm", 1e-2)],
+            Dimension::Torque => &[("nm", 1.0), ("nmm", 1e-3), ("mnm", 1e-3), ("ncm", 1e-2)],
+            Dimension::Force => &[("n", 1.0), ("kn", 1e3), ("kgf", 9.80665)],
+            Dimension::Time => &[
+                ("s", 1.0),
+                ("ms", 1e-3),
+                ("us", 1e-6),
+                ("µs", 1e-6),
+                ("ns", 1e-9),
+                ("min", 60.0),
+                ("iso", 1.0),
+            ],
+        }
+    }
+
+    /// The factor of a unit such as `deg/s`, `mm`, `N mm`; case, blanks and `/s` do not matter.
+    pub(crate) fn factor(self, text: &str) -> Option<f64> {
+        let folded: String = (text.chars())
+            .filter(|c| !c.is_whitespace() && !matches!(c, '*' | '.' | '·'))
+            .flat_map(char::to_lowercase)
+            .collect();
+        let base = match self {
+            Dimension::Time => &folded[..],
+            _ => folded.split('/').next().unwrap_or_default(),
+        };
+        let known = self.units().iter().find(|(name, _)| *name == base);
+        known.map(|(_, factor)| *factor)
+    }
+
+    pub(crate) fn names(self) -> String {
+        let names: Vec<&str> = self.units().iter().map(|(name, _)| *name).collect();
+        names.join(", ")
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn order(text: &str, quantity: Quantity) -> Result<Vec<usize>, String> {
-        let words: Vec<String> = text.split_whitespace().map(str::to_owned).collect();
-        ordered(&words, &quantity.elements())
-    }
-
     #[test]
-    fn ordered_wildcards_stand_for_every_leg_or_joint() {
-        let found = order("*.hx *.hy *.kn", Quantity::JointPosition).unwrap();
-        assert_eq!(found, [0, 3, 6, 9, 1, 4, 7, 10, 2, 5, 8, 11]);
-        let found = order("fl.* fr.* rl.* rr.*", Quantity::JointTorque).unwrap();
-        assert_eq!(found, [3, 4, 5, 0, 1, 2, 9, 10, 11, 6, 7, 8]);
-        assert_eq!(order("fl fr rl rr", Quantity::Feet).unwrap(), [1, 0, 3, 2]);
-    }
-
-    #[test]
-    fn ordered_letters_stand_for_axes_and_angles() {
-        assert_eq!(order("ypr", Quantity::Orientation).unwrap(), [2, 1, 0]);
-        assert_eq!(order("zxy", Quantity::BodyPosition).unwrap(), [2, 0, 1]);
-        let quaternion = QUATERNION.map(str::to_owned);
-        let found = ordered(&["xyzw".to_owned()], &quaternion).unwrap();
-        assert_eq!(found, [1, 2, 3, 0]);
-    }
-
-    #[test]
-    fn ordered_unknown_and_repeated_names_are_refused() {
-        let error = order("fr.hx fr.hx", Quantity::JointPosition).unwrap_err();
-        assert_eq!(error, "`fr.hx` twice");
-        assert!(
-            order("FR.hz", Quantity::JointPosition)
-                .unwrap_err()
-                .starts_with("`FR.hz`")
-        );
-        assert!(order("xx", Quantity::BodyPosition).is_err());
+    fn ordered_wildcards_and_letters_stand_for_elements() {
+        for (quantity, words, expected) in [
+            (
+                Quantity::JointTorque,
+                "*.hx *.hy *.kn",
+                &[0, 3, 6, 9, 1, 4, 7, 10, 2, 5, 8, 11][..],
+            ),
+            (Quantity::Feet, "fl fr rl rr", &[1, 0, 3, 2]),
+            (Quantity::Orientation, "ypr", &[2, 1, 0]),
+            (Quantity::BodyPosition, "zxy", &[2, 0, 1]),
+        ] {
+            let words: Vec<String> = words.split_whitespace().map(str::to_owned).collect();
+            let found = ordered(&words, &quantity.elements());
+            assert_eq!(found.as_deref(), Ok(expected), "{words:?}");
+        }
+        let unknown = ordered(&["FR.hz".to_owned()], &Quantity::JointPosition.elements());
+        assert!(unknown.is_err_and(|found| found.starts_with("`FR.hz`")));
     }
 }

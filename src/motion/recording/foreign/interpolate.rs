@@ -114,22 +114,6 @@ fn slope_weights(times: &[f64], at: usize) -> [f64; STENCIL] {
 mod tests {
     use super::*;
 
-    fn sine(times_s: &[f64]) -> DMatrix<f64> {
-        DMatrix::from_fn(1, times_s.len(), |_, i| (20.0 * times_s[i]).sin())
-    }
-
-    #[test]
-    fn at_times_motion_at_5_ms_is_found_again_to_1e_4() {
-        let own: Vec<f64> = (0..80).map(|i| 0.005 * f64::from(i)).collect();
-        let times: Vec<f64> = (1..190).map(|i| 0.002 * f64::from(i)).collect();
-        let slopes = DMatrix::from_fn(1, 80, |_, i| 20.0 * (20.0 * own[i]).cos());
-        for (slopes, bound) in [(None, 3e-6), (Some(&slopes), 1e-6)] {
-            let found = at_times(&own, &sine(&own), slopes, &times, Between::Smooth);
-            let error = (found - sine(&times)).amax();
-            assert!(error < bound, "{error}");
-        }
-    }
-
     #[test]
     fn slopes_are_those_of_a_quartic_at_uneven_times_and_differences_where_they_swing() {
         let own = [0.0, 0.011, 0.019, 0.032, 0.04, 0.049, 0.062];

@@ -9,25 +9,20 @@ use crate::recording::instant::Instant;
 /// One file or topic.
 #[derive(Debug, Clone, Default)]
 pub(in crate::recording) struct Log {
-    /// The file.
     pub path: PathBuf,
     /// Name of the file in a map, or of the topic; empty for the only file.
     pub name: String,
     /// Column of the clock, in s, that every message of a topic has.
     pub clock: Option<usize>,
-    /// The columns in the order of the file.
     pub columns: Vec<Channel>,
-    /// Whether the columns have names.
     pub is_named: bool,
     /// Line of the first sample, 1 for the first message of a topic.
     pub first_row: usize,
     /// Why a topic is no table; it has no columns then.
     pub fault: Option<String>,
-    /// What reading did to it besides reading.
     pub notes: Vec<String>,
 }
 
-/// One column.
 #[derive(Debug, Clone, Default)]
 pub(in crate::recording) struct Channel {
     /// Its name; empty without a header.
@@ -41,8 +36,7 @@ pub(in crate::recording) struct Channel {
 }
 
 impl Channel {
-    /// A column of this name without values.
-    pub fn named(name: &str) -> Self {
+    pub(crate) fn named(name: &str) -> Self {
         Self {
             name: name.to_owned(),
             ..Self::default()
@@ -50,7 +44,7 @@ impl Channel {
     }
 
     /// Its values as times, from the first on where one number does not hold them.
-    pub fn times(&self) -> Vec<f64> {
+    pub(crate) fn times(&self) -> Vec<f64> {
         match &self.instants {
             Some(all) => all.iter().map(|instant| instant.since(all[0])).collect(),
             None => self.values.clone(),
@@ -59,15 +53,19 @@ impl Channel {
 }
 
 impl Log {
+    pub(crate) fn names(&self) -> Vec<String> {
+        let names = self.columns.iter().map(|channel| channel.name.clone());
+        names.collect()
+    }
+
     /// Number of samples.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.columns
             .first()
             .map_or(0, |channel| channel.values.len())
     }
 
-    /// Makes these rows, in this order, the rows.
-    pub fn choose(&mut self, rows: &[usize]) {
+    pub(crate) fn choose(&mut self, rows: &[usize]) {
         for column in &mut self.columns {
             column.values = rows.iter().map(|row| column.values[*row]).collect();
             if let Some(instants) = &mut column.instants {
@@ -76,8 +74,15 @@ impl Log {
         }
     }
 
+    /// Sorts the rows by these times of theirs; those of one time keep their order.
+    pub(crate) fn sort_by(&mut self, times: &[f64]) {
+        let mut order = Vec::from_iter(0..times.len());
+        order.sort_by(|one, other| times[*one].total_cmp(&times[*other]));
+        self.choose(&order);
+    }
+
     /// The column of a name or number: an exact name before one that differs in case and blanks.
-    pub fn column(&self, name: &Name) -> Option<usize> {
+    pub(in crate::recording::foreign) fn column(&self, name: &Name) -> Option<usize> {
         match name {
             Name::Number(number) => number.checked_sub(1).filter(|i| *i < self.columns.len()),
             Name::Text(text) => {
@@ -89,8 +94,7 @@ impl Log {
         }
     }
 
-    /// The first columns by name, for messages.
-    pub fn summary(&self) -> String {
+    pub(crate) fn summary(&self) -> String {
         const MOST: usize = 6;
         if !self.is_named {
             return format!("{} columns without names", self.columns.len());

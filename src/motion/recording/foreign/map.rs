@@ -21,29 +21,29 @@ use super::elements::Quantity;
 use crate::files::read_toml;
 use crate::recording::error::{RecordingError, RecordingFault};
 
-/// A map as its file says it.
+/// Most columns that a range stands for.
+const MAX_COLUMNS: usize = 10_000;
+
+/// A map as its file states it.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ColumnMap {
-    /// How text files are laid out.
-    pub text: TextFormat,
+    pub(super) text: TextFormat,
     /// The clock of all tables that have none of their own.
-    pub time: TimeMap,
-    /// Words that stand for legs, joints and axes in patterns of names.
-    pub names: Names,
+    pub(super) time: TimeMap,
+    pub(super) names: Names,
     joint: JointTables,
     body: BodyTables,
     feet: Option<Table>,
     /// The file that the map was read from, for messages.
     #[serde(skip)]
-    pub file: String,
+    pub(super) file: String,
 }
 
 /// How text files are laid out; what is absent is found from the file.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct TextFormat {
-    /// Separator of cells.
+pub(in crate::recording) struct TextFormat {
     pub delimiter: Option<Delimiter>,
     /// Whether the first line has names.
     pub header: Option<bool>,
@@ -53,47 +53,43 @@ pub struct TextFormat {
     pub blank: bool,
     /// First and last sample to keep, counted from 1.
     pub rows: Option<[usize; 2]>,
+    /// romc's own columns: none is left to guess, and each cell that is read has a finite number.
+    #[serde(skip)]
+    pub own: bool,
 }
 
 /// Separator of cells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Delimiter {
-    /// One tab.
+pub(in crate::recording) enum Delimiter {
     Tab,
     /// Any number of blanks or tabs.
     Blank,
-    /// `,`
     Comma,
-    /// `;`
     Semicolon,
 }
 
-/// The clock.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct TimeMap {
-    /// Its column; absent with `sample_time_s`.
+pub(super) struct TimeMap {
+    /// Absent with `sample_time_s`.
     pub column: Option<Name>,
-    /// Its unit, s unless given; dates and times of day are found by themselves.
+    /// [default: s]; dates and times of day are found by themselves.
     pub unit: Option<String>,
-    /// Distance of samples without a clock, in s.
+    /// Distance of samples without a clock.
     pub sample_time_s: Option<f64>,
-    /// Even steps to bring the recording to, in s.
+    /// Even steps to bring the recording to.
     pub resample_s: Option<f64>,
-    /// Largest distance between samples of a topic that is interpolated, in s; 0.05 unless given.
+    /// Largest distance between samples of a topic that is interpolated [default: 0.05].
     pub max_gap_s: Option<f64>,
 }
 
 /// Words that stand for `{leg}`, `{joint}`, `{axis}` in patterns of names, in romc's order.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct Names {
-    /// fr, fl, rr, rl.
+pub(super) struct Names {
     pub legs: [String; 4],
-    /// hx, hy, kn.
     pub joints: [String; 3],
-    /// x, y, z.
     pub axes: [String; 3],
 }
 
@@ -130,85 +126,72 @@ struct BodyTables {
 /// Where one quantity stands: `value = sign x unit x raw + offset`.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Table {
-    /// Columns: names, numbers from 1, ranges such as `"4..6"`, or one pattern.
+pub(super) struct Table {
+    /// Names, numbers from 1, ranges such as `"4..6"`, or one pattern.
     pub columns: Columns,
-    /// The file or topic that they are in; the only one unless given.
+    /// The file or topic that they are in [default: the only one].
     #[serde(alias = "topic")]
     pub file: Option<String>,
     /// Column of a clock of their own.
     pub time: Option<Name>,
-    /// Unit of that clock.
     pub time_unit: Option<String>,
-    /// Added to the clock, in s.
+    /// Added to the clock.
     #[serde(default)]
     pub time_offset_s: f64,
-    /// Unit; SI unless given.
+    /// [default: SI]
     pub unit: Option<String>,
-    /// 1 or -1: for all, for each column, or by the names of elements.
+    /// 1 or -1.
     pub sign: Option<Factors>,
-    /// Added after sign and unit, in SI units: for all, for each column, or by the names of elements.
+    /// Added after sign and unit, in SI units.
     pub offset: Option<Factors>,
-    /// What each column is; romc's order unless given.
+    /// What each column is [default: romc's order].
     pub order: Option<Words>,
-    /// Axes of velocities: `world` (unless given) or `body`; of angular velocities also `angles`, rates of
-    /// roll, pitch and yaw (unless given).
+    /// Axes of velocities [default: `world`]; of angular velocities [default: `angles`].
     pub frame: Option<Frame>,
-    /// `start`: x and y count from the first sample.
     pub origin: Option<Origin>,
     /// Force from which a foot is on the ground, in the table's unit; absent for flags.
     pub threshold: Option<f64>,
-    /// Force below which it is in the air again; the threshold unless given.
+    /// Force below which it is in the air again [default: the threshold].
     pub release: Option<f64>,
 }
 
 /// A column: its name, or its number from 1.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 #[serde(untagged)]
-pub enum Name {
-    /// Counted from 1.
+pub(super) enum Name {
     Number(usize),
-    /// As in the header.
     Text(String),
 }
 
-/// The columns of a quantity.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 #[serde(untagged)]
-pub enum Columns {
+pub(super) enum Columns {
     /// One name, range or pattern.
     One(Name),
-    /// Several.
     Many(Vec<Name>),
 }
 
 /// Words, also in one text with blanks between them.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 #[serde(untagged)]
-pub enum Words {
-    /// With blanks.
+pub(super) enum Words {
     One(String),
-    /// One by one.
     Many(Vec<String>),
 }
 
-/// A number for all columns, for each, or by name (`*.kn`).
+/// A number for all columns, for each in their order, or by the names of elements (`*.kn`).
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(untagged)]
-pub enum Factors {
-    /// For all.
+pub(super) enum Factors {
     All(f64),
-    /// For each column, in the order of the columns.
     Each(Vec<f64>),
-    /// By the names of elements.
     Named(BTreeMap<String, f64>),
 }
 
 /// Axes of a velocity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Frame {
-    /// Fixed axes.
+pub(super) enum Frame {
     World,
     /// The trunk's own.
     Body,
@@ -219,7 +202,7 @@ pub enum Frame {
 /// Where positions count from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Origin {
+pub(super) enum Origin {
     /// The first sample, for x and y.
     Start,
     /// As logged.
@@ -230,7 +213,7 @@ impl ColumnMap {
     /// Reads a map.
     ///
     /// # Errors
-    /// [`RecordingFault::MapSyntax`] with line, key and what was expected; [`RecordingFault::Map`] for
+    /// [`RecordingFault::MapSyntax`] with line, key and what was expected; [`RecordingFault::Unexpected`] for
     /// a key that does not apply to its table.
     pub fn read(path: &Path) -> Result<Self, RecordingError> {
         let text = read_toml(path)
@@ -253,7 +236,7 @@ impl ColumnMap {
     }
 
     /// Where a quantity stands.
-    pub fn table(&self, quantity: Quantity) -> Option<&Table> {
+    pub(super) fn table(&self, quantity: Quantity) -> Option<&Table> {
         let (joint, body) = (&self.joint, &self.body);
         match quantity {
             Quantity::JointPosition => &joint.position,
@@ -291,8 +274,11 @@ impl ColumnMap {
         expected: impl Into<String>,
     ) -> RecordingError {
         let place = crate::files::Place::Entry(format!("`{key}`").into());
-        let (found, expected) = (found.into(), expected.into());
-        RecordingError::new(&self.file, place, RecordingFault::Map { found, expected })
+        RecordingError::new(
+            &self.file,
+            place,
+            RecordingFault::unexpected(found, expected),
+        )
     }
 }
 
@@ -358,46 +344,102 @@ fn pattern(text: &str, names: &Names, quantity: Quantity) -> Vec<String> {
     out
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const REQUIRED: &str = "[time]\ncolumn = 1\n[joint.position]\ncolumns = \"{leg}-{joint}\"\n\
-         [joint.torque]\ncolumns = \"tau{1}\"\n[body.position]\ncolumns = \"p{axis}\"\n\
-         [body.orientation]\ncolumns = [7, \"2..4\"]\norder = \"wxyz\"\n[feet]\ncolumns = \"f_{leg}\"\n";
-
-    #[test]
-    fn parse_patterns_and_ranges_are_written_out() {
-        let map = ColumnMap::parse("m.toml", REQUIRED).unwrap();
-        let columns = |quantity| map.table(quantity).unwrap().columns(&map.names, quantity);
-        let text = |text: &str| Name::Text(text.to_owned());
-        let joints = columns(Quantity::JointPosition);
-        assert_eq!((&joints[0], &joints[4]), (&text("fr-hx"), &text("fl-hy")));
-        assert_eq!(columns(Quantity::JointTorque)[11], text("tau12"));
-        let body = columns(Quantity::BodyPosition);
-        assert_eq!(body, ["px", "py", "pz"].map(text));
-        let turn = columns(Quantity::Orientation);
-        assert_eq!(turn, [7, 2, 3, 4].map(Name::Number));
-        assert_eq!((joints.len(), columns(Quantity::Feet).len()), (12, 4));
+/// What a map may not state, whatever the log.
+impl ColumnMap {
+    pub(super) fn require_applicable(&self) -> Result<(), RecordingError> {
+        for quantity in Quantity::ALL {
+            let Some(table) = self.table(quantity) else {
+                if quantity.is_required() {
+                    let expected = format!("the columns of {}", quantity.column(0).name());
+                    return Err(self.fault(quantity.key(), "no such table", expected));
+                }
+                continue;
+            };
+            let refuse =
+                |key: &str, expected: &str| Err(self.fault(&quantity.at(key), "a value", expected));
+            let angular = quantity == Quantity::AngularVelocity;
+            let velocity = quantity == Quantity::BodyVelocity;
+            match table.frame {
+                Some(_) if !angular && !velocity => {
+                    return refuse("frame", "none: only velocities of the body have one");
+                }
+                Some(Frame::Angles) if !angular => return refuse("frame", "`world` or `body`"),
+                Some(_) | None => {}
+            }
+            if table.origin.is_some() && quantity != Quantity::BodyPosition {
+                return refuse("origin", "none: only `body.position` has one");
+            }
+            if table.release.is_some() && table.threshold.is_none() {
+                return refuse("release", "a `threshold` beside it");
+            }
+            if table.threshold.is_some() && quantity != Quantity::Feet {
+                return refuse("threshold", "none: only `feet` has one");
+            }
+            if table.release > table.threshold {
+                return refuse("release", "at most the `threshold`");
+            }
+            self.require_finite(quantity, table)?;
+            self.require_distinct(quantity, table)?;
+        }
+        let time = &self.time;
+        if time.column.is_some() && time.sample_time_s.is_some() {
+            let expected = "either a column or `sample_time_s`";
+            return Err(self.fault("time.sample_time_s", "a column too", expected));
+        }
+        for (key, value) in [
+            ("time.sample_time_s", time.sample_time_s),
+            ("time.resample_s", time.resample_s),
+            ("time.max_gap_s", time.max_gap_s),
+        ] {
+            if let Some(value) = value.filter(|value| !(value.is_finite() && *value > 0.0)) {
+                return Err(self.fault(key, value.to_string(), "more than 0 s"));
+            }
+        }
+        Ok(())
     }
 
-    #[test]
-    fn parse_faults_name_key_found_and_expected() {
-        let message = |text: &str| ColumnMap::parse("m.toml", text).unwrap_err().to_string();
-        assert_eq!(
-            message(""),
-            "m.toml: `joint.position`: found no such table, expected the columns of fr.hx Position"
-        );
-        let unknown = message(&format!("{REQUIRED}[foots]\n"));
-        assert!(
-            unknown.contains("foots") && unknown.starts_with("m.toml"),
-            "{unknown}"
-        );
-        let release = message(&format!("{REQUIRED}release = 3.0\n"));
-        assert!(release.contains("`feet.release`"), "{release}");
-        let frame = message(&format!("{REQUIRED}frame = \"body\"\n"));
-        assert!(frame.contains("`feet.frame`"), "{frame}");
-        let step = message(&REQUIRED.replace("column = 1\n", "sample_time_s = 0.0\n"));
-        assert!(step.contains("`time.sample_time_s`: found 0"), "{step}");
+    fn require_finite(&self, quantity: Quantity, table: &Table) -> Result<(), RecordingError> {
+        let factors = |factors: &Option<Factors>| match factors {
+            None => Vec::new(),
+            Some(Factors::All(value)) => vec![*value],
+            Some(Factors::Each(values)) => values.clone(),
+            Some(Factors::Named(values)) => values.values().copied().collect(),
+        };
+        for (key, values) in [
+            ("time_offset_s", vec![table.time_offset_s]),
+            ("threshold", table.threshold.into_iter().collect()),
+            ("release", table.release.into_iter().collect()),
+            ("sign", factors(&table.sign)),
+            ("offset", factors(&table.offset)),
+        ] {
+            if let Some(value) = values.into_iter().find(|value| !value.is_finite()) {
+                let expected = "a finite number";
+                return Err(self.fault(&quantity.at(key), value.to_string(), expected));
+            }
+        }
+        Ok(())
+    }
+
+    /// No column of a table twice, and no range that no log could have.
+    fn require_distinct(&self, quantity: Quantity, table: &Table) -> Result<(), RecordingError> {
+        let refuse = |found: String, expected: &str| {
+            Err(self.fault(&quantity.at("columns"), found, expected))
+        };
+        for entry in table.entries() {
+            let Name::Text(text) = entry else { continue };
+            if range(text).is_some_and(|all| all.end().saturating_sub(*all.start()) >= MAX_COLUMNS)
+            {
+                let expected = format!("at most {MAX_COLUMNS} columns");
+                return refuse(format!("{text:?}"), &expected);
+            }
+        }
+        let columns = table.columns(&self.names, quantity);
+        let repeated = (1..columns.len()).find(|at| columns[..*at].contains(&columns[*at]));
+        let name = match repeated.map(|at| &columns[at]) {
+            None => return Ok(()),
+            Some(Name::Text(name)) => format!("{name:?}"),
+            Some(Name::Number(number)) => number.to_string(),
+        };
+        refuse(format!("{name} twice"), "each column once")
     }
 }

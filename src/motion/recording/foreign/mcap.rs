@@ -42,10 +42,6 @@ pub(in crate::recording) fn is_mcap(path: &Path) -> bool {
 }
 
 /// Reads every topic whose messages are numbers; others have their fault.
-///
-/// # Errors
-/// [`RecordingFault::Mcap`] for a damaged file, [`RecordingFault::OtherFormat`] for another one,
-/// [`RecordingFault::NoTopic`] if nothing can be read.
 pub(in crate::recording) fn read_mcap(path: &Path) -> Result<Vec<Log>, RecordingError> {
     let mut topics = Topics::default();
     let (files, mut notes) = bag::files(path)?;
@@ -54,18 +50,16 @@ pub(in crate::recording) fn read_mcap(path: &Path) -> Result<Vec<Log>, Recording
         let open = open.map_err(|source| RecordingFault::unreadable("read", source).of(&file))?;
         topics.begin_file();
         let mut scan = Scan::new(BufReader::new(open), &mut topics);
-        let ended = scan.whole(&file).map_err(|fault| fault.of(&file))?;
-        let note = match ended {
-            Ended::Whole => continue,
-            // Nothing of a recording's last file may have come to the disk.
-            Ended::Empty(words) if topics.messages == 0 => {
-                return Err(RecordingFault::Mcap(words).of(&file));
-            }
-            Ended::Early(words) | Ended::Empty(words) => words,
+        let Some(early) = scan.whole(&file).map_err(|fault| fault.of(&file))? else {
+            continue;
         };
+        // Nothing of a recording's last file may have come to the disk.
+        if topics.messages == 0 {
+            return Err(RecordingFault::Mcap(early).of(&file));
+        }
         notes.push(match path == file {
-            true => note,
-            false => format!("{}: {note}", file.display()),
+            true => early,
+            false => format!("{}: {early}", file.display()),
         });
     }
     let mut logs = topics.logs().map_err(|fault| fault.of(path))?;
@@ -76,26 +70,13 @@ pub(in crate::recording) fn read_mcap(path: &Path) -> Result<Vec<Log>, Recording
     Ok(logs)
 }
 
-/// How a file ends.
-enum Ended {
-    /// At its end.
-    Whole,
-    /// Before it, in words.
-    Early(String),
-    /// Before its first message, in words.
-    Empty(String),
-}
-
-/// One pass over a file.
 struct Scan<'a, R> {
     source: R,
     topics: &'a mut Topics,
-    /// Bytes read.
     offset: u64,
     /// Checksum of the present section: the data, or the summary behind it.
     section: Crc,
     chunks: usize,
-    /// Bytes of chunks, packed and unpacked.
     packed: u64,
     unpacked: u64,
 }
@@ -113,21 +94,27 @@ impl<'a, R: Read> Scan<'a, R> {
         }
     }
 
-    /// Reads all records.
-    fn whole(&mut self, path: &Path) -> Result<Ended, RecordingFault> {
+    /// Reads all records; words for a file that ends before its end.
+    fn whole(&mut self, path: &Path) -> Result<Option<String>, RecordingFault> {
         let before = self.topics.messages;
-        if !self.magic(path)? {
-            return Ok(self.ended(before));
-        }
-        loop {
-            let at = self.offset;
-            let Some((header, body)) = self.next()? else {
-                return Ok(self.ended(before));
-            };
+        let mut next = match self.magic(path)? {
+            true => self.next()?,
+            false => None,
+        };
+        while let Some((at, header, body)) = next {
             if self.take(&header, &body, at)? {
-                return Ok(Ended::Whole);
+                return Ok(None);
             }
+            next = self.next()?;
         }
+        let messages = self.topics.messages - before;
+        let (offset, chunks) = (self.offset, self.chunks);
+        Ok(Some(match messages {
+            0 => format!("it ends after {offset} bytes, before a whole chunk with messages"),
+            _ => format!(
+                "the file ends early, after {offset} bytes: {messages} messages are read, of {chunks} whole chunks"
+            ),
+        }))
     }
 
     /// The first bytes of the file; none if it ends within them or holds zeros alone.
@@ -144,13 +131,13 @@ impl<'a, R: Read> Scan<'a, R> {
         }
         start.extend(self.bytes((MAGIC_BYTES - MCAP.len()) as u64)?);
         Err(match recognised(path, &start) {
-            Some(format) => RecordingFault::OtherFormat(format),
+            Some(format) => RecordingFault::other_format(&format),
             None => RecordingFault::Mcap("it begins with other bytes".to_owned()),
         })
     }
 
-    /// The next record, its header and contents; none where the file ends before that.
-    fn next(&mut self) -> Result<Option<(Vec<u8>, Vec<u8>)>, RecordingFault> {
+    /// The next record: its place, header and contents; none where the file ends before that.
+    fn next(&mut self) -> Result<Option<(u64, Vec<u8>, Vec<u8>)>, RecordingFault> {
         let at = self.offset;
         let header = self.bytes(RECORD_HEADER as u64)?;
         let Some(length) = header.get(1..).and_then(|length| length.try_into().ok()) else {
@@ -167,7 +154,7 @@ impl<'a, R: Read> Scan<'a, R> {
         }
         let body = self.bytes(length)?;
         match body.len() as u64 == length {
-            true => Ok(Some((header, body))),
+            true => Ok(Some((at, header, body))),
             // The end of the file is there: it was not cut off.
             false if body.ends_with(MCAP) => {
                 refused(format!("{length} bytes, which the file does not have"))
@@ -226,21 +213,6 @@ impl<'a, R: Read> Scan<'a, R> {
         }
     }
 
-    /// A file that ends before its end.
-    fn ended(&self, before: usize) -> Ended {
-        let messages = self.topics.messages - before;
-        let (offset, chunks) = (self.offset, self.chunks);
-        match messages {
-            0 => Ended::Empty(format!(
-                "it ends after {offset} bytes, before a whole chunk with messages"
-            )),
-            _ => Ended::Early(format!(
-                "the file ends early, after {offset} bytes: {messages} messages are read, of {chunks} whole chunks"
-            )),
-        }
-    }
-
-    /// The records of a chunk.
     fn chunk(
         &mut self,
         header: &ChunkHeader,
@@ -329,7 +301,6 @@ fn same_checksum(stated: u32, found: u32) -> Result<(), String> {
     }
 }
 
-/// The bytes of a chunk, at most `left`.
 fn unpacked<'a>(
     header: &ChunkHeader,
     data: Cow<'a, [u8]>,
@@ -360,7 +331,6 @@ fn unpacked<'a>(
     exact(Cow::Owned(out), size)
 }
 
-/// Bytes that are as many as a chunk states.
 fn exact(bytes: Cow<'_, [u8]>, size: u64) -> Result<Cow<'_, [u8]>, String> {
     match bytes.len() as u64 == size {
         true => Ok(bytes),

@@ -135,7 +135,6 @@ fn odometry(segment: &Segment, sample: usize, time_ns: i64) -> Message {
     message
 }
 
-/// A message in CDR, little endian.
 struct Message {
     bytes: Vec<u8>,
 }

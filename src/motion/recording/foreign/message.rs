@@ -1,4 +1,5 @@
-//! Messages of ROS 1 and 2 as numbers with names, by the definition that a log carries.
+//! Messages of ROS 1 and 2 as numbers with names, by the definition that a log carries. Faults are words: a topic that
+//! cannot be read is listed with its fault.
 
 use std::collections::BTreeMap;
 
@@ -11,39 +12,6 @@ const MOST_EMPTY: usize = 100_000;
 /// Deepest nesting of messages.
 const MOST_LEVELS: usize = 16;
 
-/// Why a message or definition cannot be read.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum MessageFault {
-    /// A line of a definition.
-    #[error("definition: found `{0}`, expected a type and a name")]
-    Definition(String),
-    /// A type without definition.
-    #[error("definition: `{0}` is not defined")]
-    Undefined(String),
-    /// Too short.
-    #[error("message: {0} bytes, which end before its fields do")]
-    Short(usize),
-    /// Lists that are longer in one message than in another, or have other names, in too many ways.
-    #[error("messages of more than {0} lengths or sets of names, expected tables")]
-    Ragged(usize),
-    /// More messages than a table has rows.
-    #[error("more than {0} messages, expected shorter recordings")]
-    Long(usize),
-    /// More numbers than a table has columns.
-    #[error("message: more than {0} numbers")]
-    Wide(usize),
-    /// A joint state with another number of values than of names.
-    #[error("message: {0} names and {1} values of `{2}`")]
-    Lengths(usize, usize, String),
-    /// Two numbers of one name.
-    #[error("message: `{0}` twice")]
-    Twice(String),
-    /// Another encoding than those that are read.
-    #[error("encoding `{0}`, expected cdr with ros2msg or ros1 with ros1msg")]
-    Encoding(String),
-}
-
-/// How the bytes of a message are laid out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Layout {
     /// Packed, little endian.
@@ -78,13 +46,25 @@ struct Field {
     count: Count,
 }
 
+impl Field {
+    /// Appends its name to the path of its message, of a list with the entry.
+    fn append_to(&self, path: &mut String, entry: &str) {
+        if !path.is_empty() {
+            path.push('.');
+        }
+        path.push_str(&self.name);
+        if self.count != Count::One {
+            path.push_str(&format!("[{entry}]"));
+        }
+    }
+}
+
 /// A message type with all that it is made of; the first is the message's own.
 #[derive(Debug, Clone)]
 pub(super) struct Definition {
     types: Vec<(String, Vec<Field>)>,
 }
 
-/// One number of a message.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Value {
     Number(f64),
@@ -92,12 +72,10 @@ pub(super) enum Value {
     Time(i64, u32),
 }
 
-/// The numbers of a message.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Numbers {
     /// Their names, if these are asked for.
     pub names: Vec<String>,
-    /// The numbers.
     pub values: Vec<Value>,
     /// Lengths and names of its lists: messages of one type that agree in them have the same numbers in the same order.
     pub lists: Vec<u8>,
@@ -105,7 +83,7 @@ pub(super) struct Numbers {
 
 impl Definition {
     /// Reads a definition and those of its parts, as `ros2 bag` and `rosbag` store them.
-    pub fn parse(name: &str, text: &str) -> Result<Self, MessageFault> {
+    pub(crate) fn parse(name: &str, text: &str) -> Result<Self, String> {
         let mut texts: BTreeMap<String, Vec<&str>> = BTreeMap::new();
         let mut current = short(name);
         for line in text.lines() {
@@ -121,13 +99,12 @@ impl Definition {
         Ok(definition)
     }
 
-    /// Adds a type and its parts; its index.
     fn add(
         &mut self,
         name: &str,
         texts: &BTreeMap<String, Vec<&str>>,
         level: usize,
-    ) -> Result<usize, MessageFault> {
+    ) -> Result<usize, String> {
         if let Some(index) = self.types.iter().position(|(known, _)| known == name) {
             return Ok(index);
         }
@@ -135,14 +112,14 @@ impl Definition {
         // An empty message has no lines.
         let lines = lines.unwrap_or_default();
         if level > MOST_LEVELS || (lines.is_empty() && level > 0 && !name.ends_with("/Empty")) {
-            return Err(MessageFault::Undefined(name.to_owned()));
+            return Err(undefined(name));
         }
         let index = self.types.len();
         self.types.push((name.to_owned(), Vec::new()));
         let package = name.split('/').next().unwrap_or_default();
         let mut fields = Vec::new();
         for line in lines {
-            let fault = || MessageFault::Definition(line.to_owned());
+            let fault = || format!("definition: found `{line}`, expected a type and a name");
             let (kind, rest) = line.split_once(char::is_whitespace).ok_or_else(fault)?;
             let field = rest.split_whitespace().next().ok_or_else(fault)?;
             if is_constant(rest) {
@@ -172,12 +149,12 @@ impl Definition {
 
     /// The names of a message's numbers, if `named`, and the numbers: `pose.position.x`, `motor_state[3].q`, and
     /// `position[FR_hip_joint]` where a list of names goes with a list of numbers.
-    pub fn values(
+    pub(crate) fn values(
         &self,
         layout: Layout,
         bytes: &[u8],
         named: bool,
-    ) -> Result<Numbers, MessageFault> {
+    ) -> Result<Numbers, String> {
         let (mut cursor, mut out) = (Cursor::new(layout, bytes)?, Numbers::default());
         self.message(0, &mut cursor, named, &mut String::new(), Some(&mut out))?;
         Ok(out)
@@ -190,7 +167,7 @@ impl Definition {
         named: bool,
         path: &mut String,
         mut out: Option<&mut Numbers>,
-    ) -> Result<(), MessageFault> {
+    ) -> Result<(), String> {
         let mut names: Vec<String> = Vec::new();
         let before = path.len();
         let (of_type, fields) = &self.types[index];
@@ -207,9 +184,8 @@ impl Definition {
             let is_list = field.count != Count::One;
             let is_named = field.count == Count::Any && !matches!(field.kind, Kind::Message(_));
             if field.kind == Kind::Text && is_list && field.name.starts_with("name") {
-                names = (0..count)
-                    .map(|_| cursor.text())
-                    .collect::<Result<_, _>>()?;
+                let read = (0..count).map(|_| cursor.text());
+                names = read.collect::<Result<_, _>>()?;
                 if let Some(out) = out.as_deref_mut() {
                     let ended = names.iter().flat_map(|name| [name.as_bytes(), &[0]]);
                     ended.for_each(|bytes| out.lists.extend(bytes));
@@ -218,49 +194,32 @@ impl Definition {
             }
             let others = ![0, names.len()].contains(&count) && !names.is_empty();
             if is_named && others && of_type.ends_with("/JointState") {
-                let field = field.name.clone();
-                return Err(MessageFault::Lengths(names.len(), count, field));
+                let names = names.len();
+                return Err(format!(
+                    "message: {names} names and {count} values of `{}`",
+                    field.name
+                ));
             }
             for entry in 0..count {
                 cursor.count_field()?;
                 if named {
+                    let own = names.get(entry);
+                    let own = own.filter(|_| is_named && names.len() == count);
+                    let entry = own.map_or_else(|| entry.to_string(), String::clone);
                     path.truncate(before);
-                    if before > 0 {
-                        path.push('.');
-                    }
-                    path.push_str(&field.name);
-                    if is_list {
-                        let own = names.get(entry);
-                        let own = own.filter(|_| is_named && names.len() == count);
-                        let entry = own.map_or(entry.to_string(), String::clone);
-                        path.push_str(&format!("[{entry}]"));
-                    }
+                    field.append_to(path, &entry);
                 }
+                let out = out.as_deref_mut().filter(|_| count <= MOST_ENTRIES);
                 let value = match field.kind {
                     Kind::Message(part) => {
-                        let out = out.as_deref_mut().filter(|_| count <= MOST_ENTRIES);
                         self.message(part, cursor, named, path, out)?;
                         continue;
                     }
-                    Kind::Text => {
-                        cursor.text()?;
-                        continue;
-                    }
-                    Kind::Time => Value::Time(cursor.signed(4)?, cursor.unsigned(4)? as u32),
-                    Kind::Bool => Value::Number(f64::from(u8::from(cursor.unsigned(1)? != 0))),
-                    Kind::Unsigned(size) => Value::Number(cursor.unsigned(size)? as f64),
-                    Kind::Signed(size) => Value::Number(cursor.signed(size)? as f64),
-                    Kind::Float(4) => {
-                        let bits = cursor.unsigned(4)? as u32;
-                        Value::Number(f64::from(f32::from_bits(bits)))
-                    }
-                    Kind::Float(_) => Value::Number(f64::from_bits(cursor.unsigned(8)?)),
+                    kind => cursor.value(kind)?,
                 };
-                if let Some(out) = out.as_deref_mut()
-                    && count <= MOST_ENTRIES
-                {
+                if let (Some(out), Some(value)) = (out, value) {
                     if out.values.len() == MOST_NUMBERS {
-                        return Err(MessageFault::Wide(MOST_NUMBERS));
+                        return Err(format!("message: more than {MOST_NUMBERS} numbers"));
                     }
                     out.names.extend(named.then(|| path.clone()));
                     out.values.push(value);
@@ -270,6 +229,19 @@ impl Definition {
         path.truncate(before);
         Ok(())
     }
+}
+
+pub(super) fn undefined(name: &str) -> String {
+    format!("definition: `{name}` is not defined")
+}
+
+pub(super) fn unknown_encoding(found: &str) -> String {
+    format!("encoding `{found}`, expected cdr with ros2msg or ros1 with ros1msg")
+}
+
+fn ends_early(bytes: &[u8]) -> String {
+    let length = bytes.len();
+    format!("message: {length} bytes, which end before its fields do")
 }
 
 /// `sensor_msgs/msg/JointState` and `sensor_msgs/JointState` are the same type.
@@ -283,7 +255,6 @@ fn is_constant(rest: &str) -> bool {
     rest[name.len()..].trim_start().starts_with('=')
 }
 
-/// A type without its brackets, and how many there are.
 fn counted(kind: &str) -> Option<(&str, Count)> {
     let Some((base, count)) = kind.split_once('[') else {
         return Some((kind.split("<=").next()?, Count::One));
@@ -322,15 +293,13 @@ struct Cursor<'a> {
     place: usize,
     layout: Layout,
     big_endian: bool,
-    /// Largest alignment.
     align: usize,
-    /// Fields so far.
     fields: usize,
 }
 
 impl<'a> Cursor<'a> {
     /// Behind CDR's header, which tells byte order and alignment.
-    fn new(layout: Layout, bytes: &'a [u8]) -> Result<Self, MessageFault> {
+    fn new(layout: Layout, bytes: &'a [u8]) -> Result<Self, String> {
         let (bytes, big_endian, align) = match (layout, bytes) {
             (Layout::Ros1, bytes) => (bytes, false, 1),
             (Layout::Ros2, [0, 0, _, _, rest @ ..]) => (rest, true, 8),
@@ -338,9 +307,9 @@ impl<'a> Cursor<'a> {
             (Layout::Ros2, [0, 6, _, _, rest @ ..]) => (rest, true, 4),
             (Layout::Ros2, [0, 7, _, _, rest @ ..]) => (rest, false, 4),
             (Layout::Ros2, [first, kind, _, _, ..]) => {
-                return Err(MessageFault::Encoding(format!("cdr {first:#x} {kind:#x}")));
+                return Err(unknown_encoding(&format!("cdr {first:#x} {kind:#x}")));
             }
-            (Layout::Ros2, short) => return Err(MessageFault::Short(short.len())),
+            (Layout::Ros2, short) => return Err(ends_early(short)),
         };
         Ok(Self {
             bytes,
@@ -353,23 +322,22 @@ impl<'a> Cursor<'a> {
     }
 
     /// Counts a field: each has a byte at least, but for empty messages.
-    fn count_field(&mut self) -> Result<(), MessageFault> {
+    fn count_field(&mut self) -> Result<(), String> {
         self.fields += 1;
         match self.fields <= self.bytes.len() + MOST_EMPTY {
             true => Ok(()),
-            false => Err(MessageFault::Short(self.bytes.len())),
+            false => Err(ends_early(self.bytes)),
         }
     }
 
-    fn take(&mut self, count: usize) -> Result<&'a [u8], MessageFault> {
-        let short = MessageFault::Short(self.bytes.len());
-        let end = self.place.checked_add(count).ok_or(short.clone())?;
-        let taken = self.bytes.get(self.place..end).ok_or(short)?;
-        self.place = end;
-        Ok(taken)
+    fn take(&mut self, count: usize) -> Result<&'a [u8], String> {
+        let end = self.place.checked_add(count);
+        let taken = end.and_then(|end| self.bytes.get(self.place..end));
+        self.place += count;
+        taken.ok_or_else(|| ends_early(self.bytes))
     }
 
-    fn unsigned(&mut self, size: usize) -> Result<u64, MessageFault> {
+    fn unsigned(&mut self, size: usize) -> Result<u64, String> {
         let align = size.min(self.align).max(1);
         self.place = self.place.next_multiple_of(align);
         let bytes = self.take(size)?;
@@ -380,21 +348,41 @@ impl<'a> Cursor<'a> {
         })
     }
 
-    fn signed(&mut self, size: usize) -> Result<i64, MessageFault> {
+    fn signed(&mut self, size: usize) -> Result<i64, String> {
         let unused = 64 - 8 * size as u32;
         Ok((self.unsigned(size)? << unused) as i64 >> unused)
     }
 
-    fn length(&mut self) -> Result<usize, MessageFault> {
+    /// The next number; none of a text.
+    fn value(&mut self, kind: Kind) -> Result<Option<Value>, String> {
+        let number = match kind {
+            Kind::Text | Kind::Message(_) => {
+                self.text()?;
+                return Ok(None);
+            }
+            Kind::Time => {
+                let time = Value::Time(self.signed(4)?, self.unsigned(4)? as u32);
+                return Ok(Some(time));
+            }
+            Kind::Bool => f64::from(u8::from(self.unsigned(1)? != 0)),
+            Kind::Unsigned(size) => self.unsigned(size)? as f64,
+            Kind::Signed(size) => self.signed(size)? as f64,
+            Kind::Float(4) => f64::from(f32::from_bits(self.unsigned(4)? as u32)),
+            Kind::Float(_) => f64::from_bits(self.unsigned(8)?),
+        };
+        Ok(Some(Value::Number(number)))
+    }
+
+    fn length(&mut self) -> Result<usize, String> {
         let length = self.unsigned(4)? as usize;
         // Every entry has a byte at least.
         match length <= self.bytes.len() {
             true => Ok(length),
-            false => Err(MessageFault::Short(self.bytes.len())),
+            false => Err(ends_early(self.bytes)),
         }
     }
 
-    fn text(&mut self) -> Result<String, MessageFault> {
+    fn text(&mut self) -> Result<String, String> {
         let length = self.length()?;
         let bytes = self.take(length)?;
         let bytes = match self.layout {
@@ -489,14 +477,17 @@ mod tests {
         let mut other = whole;
         other[1] = 3;
         let fault = definition.values(Layout::Ros2, &other, false);
-        assert!(matches!(fault, Err(MessageFault::Encoding(_))));
+        assert!(fault.is_err_and(|fault| fault.starts_with("encoding `cdr 0x0 0x3`")));
     }
 
     #[test]
     fn parse_unknown_part_is_named() {
         let fault = Definition::parse("a/B", "Missing part\n").unwrap_err();
-        assert_eq!(fault, MessageFault::Undefined("a/Missing".to_owned()));
+        assert_eq!(fault, "definition: `a/Missing` is not defined");
         let fault = Definition::parse("a/B", "float64\n").unwrap_err();
-        assert_eq!(fault, MessageFault::Definition("float64".to_owned()));
+        assert_eq!(
+            fault,
+            "definition: found `float64`, expected a type and a name"
+        );
     }
 }

@@ -2,10 +2,10 @@
 
 use nalgebra::DMatrix;
 
+use super::elements::Dimension;
 use super::elements::{QUATERNION, Quantity, named, ordered};
 use super::log::{Channel, Log};
 use super::map::{ColumnMap, Factors, Name, Table, Words};
-use super::units::Dimension;
 use crate::recording::error::{RecordingError, RecordingFault};
 use crate::recording::instant::Instant;
 
@@ -14,13 +14,10 @@ use crate::recording::instant::Instant;
 pub(super) struct Signal {
     /// One row an element in romc's order, one column a sample; a quaternion has four rows, w first.
     pub values: DMatrix<f64>,
-    /// Times of the samples, in s.
     pub times_s: Vec<f64>,
-    /// Line of the first sample.
     pub first_row: usize,
 }
 
-/// A quantity's table in a map, and the log that it speaks of.
 pub(super) struct Source<'a> {
     map: &'a ColumnMap,
     quantity: Quantity,
@@ -30,7 +27,7 @@ pub(super) struct Source<'a> {
 
 impl<'a> Source<'a> {
     /// Where a quantity stands; `None` if the map does not have it.
-    pub fn find(
+    pub(crate) fn find(
         logs: &'a [Log],
         map: &'a ColumnMap,
         quantity: Quantity,
@@ -63,13 +60,12 @@ impl<'a> Source<'a> {
         }))
     }
 
-    /// The log, and what reading did to it.
-    pub fn log(&self) -> &'a Log {
+    pub(crate) fn log(&self) -> &'a Log {
         self.log
     }
 
     /// The quantity, its times in s from `epoch_s`, the whole seconds that all clocks count from.
-    pub fn take(&self, epoch_s: i64) -> Result<Signal, RecordingError> {
+    pub(crate) fn take(&self, epoch_s: i64) -> Result<Signal, RecordingError> {
         let columns = self.columns()?;
         let elements = match self.is_quaternion(columns.len()) {
             true => QUATERNION.map(str::to_owned).to_vec(),
@@ -107,14 +103,13 @@ impl<'a> Source<'a> {
     }
 
     /// First instant of the clock where that counts from an epoch, in whole seconds.
-    pub fn epoch_s(&self) -> Result<Option<i64>, RecordingError> {
+    pub(crate) fn epoch_s(&self) -> Result<Option<i64>, RecordingError> {
         let times = self.times()?;
         let instants = times.channel.and_then(|channel| channel.instants.as_ref());
         let first = instants.and_then(|instants| instants.first());
         Ok(first.map(|instant| instant.whole.div_euclid(times.per_second)))
     }
 
-    /// Whether so many columns are a quaternion.
     fn is_quaternion(&self, columns: usize) -> bool {
         self.quantity == Quantity::Orientation && columns == QUATERNION.len()
     }
@@ -156,7 +151,6 @@ impl<'a> Source<'a> {
         })
     }
 
-    /// For each column the element that it is.
     fn order(&self, elements: &[String], columns: usize) -> Result<Vec<usize>, RecordingError> {
         let key = self.quantity.at("order");
         let words = match &self.table.order {
@@ -192,7 +186,6 @@ impl<'a> Source<'a> {
         })
     }
 
-    /// A number for each column.
     fn numbers(
         &self,
         factors: &Option<Factors>,
@@ -258,7 +251,7 @@ impl<'a> Source<'a> {
         };
         let expected =
             "a finite number (for cells left empty on purpose: `blank = true` in `[text]`)";
-        let fault = RecordingFault::Number { found, expected };
+        let fault = RecordingFault::number(&found, expected);
         Err(fault.in_cell(&log.path, log.first_row + row, &name))
     }
 
@@ -292,7 +285,6 @@ impl<'a> Source<'a> {
     }
 }
 
-/// The clock of a log.
 struct Times<'a> {
     column: Option<usize>,
     channel: Option<&'a Channel>,

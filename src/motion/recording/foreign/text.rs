@@ -1,14 +1,15 @@
-//! Text files as logs: any separator, with or without header.
+//! Text files as logs: any separator, with or without header; or romc's own format, in which every cell that has a
+//! meaning is a finite number.
 
 use std::path::{Path, PathBuf};
 
 use super::log::{Channel, Log};
 use super::map::{ColumnMap, Delimiter, TextFormat};
+use crate::recording::columns::Column;
 use crate::recording::csv::MAX_ROWS;
 use crate::recording::error::{RecordingError, RecordingFault, shortened};
 use crate::recording::instant::Instant;
-use crate::recording::lines::{self, Lines};
-use crate::recording::number::NumberReader;
+use crate::recording::lines::{self, Lines, NumberReader};
 
 /// Numbers from which a column is kept as times: beyond, one number does not hold a microsecond.
 const LARGE: f64 = 1e8;
@@ -16,18 +17,14 @@ const LARGE: f64 = 1e8;
 /// Reads the files of a recording: `path` itself, or those that the map names, in the folder `path` or beside it.
 ///
 /// In a file's name `{}` stands for the name of `path` without its ending.
-///
-/// # Errors
-/// [`RecordingError`] with file and row.
 pub(in crate::recording) fn read_texts(
     path: &Path,
     map: &ColumnMap,
 ) -> Result<Vec<Log>, RecordingError> {
     let named = map.files();
     if path.is_dir() && named.is_empty() {
-        let found = "a folder".to_owned();
         let expected = format!("a file, or the names of its files in {}", map.file);
-        return Err(RecordingFault::Map { found, expected }.of(path));
+        return Err(RecordingFault::unexpected("a folder", expected).of(path));
     }
     let mut logs = Vec::new();
     if !path.is_dir() {
@@ -56,103 +53,165 @@ pub(in crate::recording) fn read_text(
     path: &Path,
     format: &TextFormat,
 ) -> Result<Log, RecordingError> {
-    let mut lines = Lines::open(path)?;
+    read_lines(path, Lines::open(path)?, format)
+}
+
+pub(in crate::recording) fn read_lines(
+    path: &Path,
+    mut lines: Lines<'_>,
+    format: &TextFormat,
+) -> Result<Log, RecordingError> {
     let mut sheet: Option<Sheet> = None;
+    let mut blank = None;
     while let Some((row, line)) = lines.next_row()? {
         if row <= format.skip || line.trim().is_empty() {
+            blank.get_or_insert(row);
             continue;
         }
-        match &mut sheet {
-            None => sheet = Some(Sheet::begin(path, row, line, format)),
-            Some(Sheet { log, .. }) if log.len() == MAX_ROWS => {
-                return Err(RecordingFault::TooManyRows(MAX_ROWS).at(path, log.first_row));
+        let blank = blank.filter(|_| format.own);
+        match (&mut sheet, blank) {
+            (None, None) => sheet = Some(Sheet::begin(path, row, line, format)?),
+            (None, Some(_)) => {
+                let fault = RecordingFault::delimiter("", "`;`, a tab or `,` in a header");
+                return Err(fault.at(path, row - 1));
             }
-            Some(sheet) => sheet.push(row, line)?,
+            // Blank lines may end a file of romc's, but not divide it.
+            (Some(sheet), Some(blank)) => return Err(sheet.length_fault(blank, 0)),
+            (Some(sheet), None) => sheet.push(row, line)?,
         }
     }
-    let log = sheet.ok_or_else(|| RecordingFault::Empty.of(path))?.log;
-    match log.len() {
-        0 => Err(RecordingFault::HeaderOnly(log.columns.len()).of(path)),
-        _ => Ok(log),
+    let sheet = sheet.ok_or_else(|| RecordingFault::Empty.of(path))?;
+    match sheet.count {
+        0 => Err(RecordingFault::HeaderOnly(sheet.log.columns.len()).of(path)),
+        _ => Ok(sheet.log),
     }
 }
 
-/// The rows read so far.
 struct Sheet {
     delimiter: Delimiter,
     numbers: NumberReader,
     log: Log,
+    count: usize,
+    /// Meaning of each column in romc's own format.
+    own: Option<Vec<Option<Column>>>,
 }
 
 impl Sheet {
     /// From the first line: names, or already numbers.
-    fn begin(path: &Path, row: usize, line: &str, format: &TextFormat) -> Self {
+    fn begin(
+        path: &Path,
+        row: usize,
+        line: &str,
+        format: &TextFormat,
+    ) -> Result<Self, RecordingError> {
         // NumPy and MATLAB write headers as comments.
-        let header = line.trim_start().trim_start_matches(['#', '%']);
-        let delimiter = format.delimiter.unwrap_or_else(|| delimiter_of(header));
-        let numbers = || NumberReader::new(character(delimiter));
-        let (cells, mut reader) = (cells(header, delimiter), numbers());
-        let is_value = |cell: &String| {
-            cell.is_empty() || reader.parse(cell).is_some() || Instant::from_iso(cell).is_some()
+        let header = match format.own {
+            true => line,
+            false => line.trim_start().trim_start_matches(['#', '%']),
         };
-        let is_named = format.header.unwrap_or_else(|| !cells.iter().all(is_value));
+        let delimiter = match (format.delimiter, delimiter_of(header)) {
+            (None, Delimiter::Blank) if format.own => {
+                let fault = RecordingFault::delimiter(line, "`;`, a tab or `,`");
+                return Err(fault.at(path, row));
+            }
+            (given, found) => given.unwrap_or(found),
+        };
+        let cells = cells(header, delimiter);
+        let mut numbers = NumberReader::new(character(delimiter));
+        let is_value = |cell: &&str| {
+            cell.is_empty() || numbers.parse(cell).is_some() || Instant::from_iso(cell).is_some()
+        };
+        let is_named = (format.header).unwrap_or_else(|| format.own || !cells.iter().all(is_value));
+        let named = |cell: &&str| Channel::named(if is_named { cell } else { "" });
+        let log = Log {
+            path: path.to_owned(),
+            columns: cells.iter().map(named).collect(),
+            is_named,
+            first_row: if is_named { row + 1 } else { row },
+            ..Log::default()
+        };
+        let own = format.own.then(|| Column::arranged(path, &log.names()));
         let mut sheet = Self {
             delimiter,
-            numbers: numbers(),
-            log: Log {
-                path: path.to_owned(),
-                columns: vec![Channel::default(); cells.len()],
-                is_named,
-                first_row: if is_named { row + 1 } else { row },
-                ..Log::default()
-            },
+            numbers: NumberReader::new(character(delimiter)),
+            log,
+            count: 0,
+            own: own.transpose()?,
         };
-        if is_named {
-            for (column, name) in sheet.log.columns.iter_mut().zip(cells) {
-                column.name = name;
-            }
-        } else {
-            sheet.push_cells(cells);
+        if !is_named {
+            sheet.push_cells(row, cells)?;
         }
-        sheet
+        Ok(sheet)
     }
 
     fn push(&mut self, row: usize, line: &str) -> Result<(), RecordingError> {
-        let log = &mut self.log;
+        if self.count == MAX_ROWS {
+            let found = format!("more than {MAX_ROWS} samples");
+            let fault = RecordingFault::unexpected(found, "shorter recordings");
+            return Err(fault.at(&self.log.path, row));
+        }
         let mut cells = cells(line, self.delimiter);
-        let expected = log.columns.len();
+        let expected = self.log.columns.len();
+        let is_own = self.own.is_some();
         // A separator at the end of each line is no column.
-        if cells.len() == expected + 1 && cells.last().is_some_and(String::is_empty) {
+        if !is_own && cells.len() == expected + 1 && cells.last().is_some_and(|c| c.is_empty()) {
             cells.pop();
         }
         if cells.len() != expected {
-            let found = cells.len();
-            let hint = match log.len() {
-                0 if log.is_named => {
-                    "; lines before the header are left out by `skip = 1` in `[text]` of the map, which \
-                     `romc inspect --guess` finds"
-                }
-                _ => "",
+            let (other, separator) = match self.delimiter {
+                Delimiter::Semicolon => (',', "`;`"),
+                _ => (';', "`,`"),
             };
-            let fault = RecordingFault::RowLength {
-                found,
-                expected,
-                hint,
-            };
-            let name = log.columns.get(found).map_or("", |column| &column.name);
-            return Err(fault.in_cell(&log.path, row, name));
+            if is_own && cells.len() == 1 && line.contains(other) {
+                return Err(RecordingFault::delimiter(line, separator).at(&self.log.path, row));
+            }
+            return Err(self.length_fault(row, cells.len()));
         }
-        if log.len() == 0 {
-            log.first_row = row;
+        if self.count == 0 {
+            self.log.first_row = row;
         }
-        self.push_cells(cells);
+        self.push_cells(row, cells)
+    }
+
+    fn push_cells(&mut self, row: usize, cells: Vec<&str>) -> Result<(), RecordingError> {
+        let own = self.own.as_deref();
+        for (place, cell) in cells.into_iter().enumerate() {
+            let channel = &mut self.log.columns[place];
+            match own.map(|columns| columns[place]) {
+                None => channel.push(cell, &mut self.numbers),
+                Some(None) => {}
+                Some(Some(column)) => (channel.push_own(column, cell, &mut self.numbers))
+                    .map_err(|fault| fault.in_cell(&self.log.path, row, &channel.name))?,
+            }
+        }
+        self.count += 1;
         Ok(())
     }
 
-    fn push_cells(&mut self, cells: Vec<String>) {
-        for (column, cell) in self.log.columns.iter_mut().zip(cells) {
-            column.push(&cell, &mut self.numbers);
-        }
+    fn length_fault(&self, row: usize, found: usize) -> RecordingError {
+        let columns = &self.log.columns;
+        let is_own = self.own.is_some();
+        let hint = match self.delimiter {
+            Delimiter::Comma if is_own && found > columns.len() => {
+                "; where numbers have decimal commas, cells are separated by `;`"
+            }
+            _ if !is_own && self.count == 0 && self.log.is_named => {
+                "; lines before the header are left out by `skip = 1` in `[text]` of the map, which \
+                 `romc inspect --guess` finds"
+            }
+            _ => "",
+        };
+        let last = columns.last().filter(|_| is_own);
+        let name = columns
+            .get(found)
+            .or(last)
+            .map_or("", |column| &column.name);
+        let fault = RecordingFault::RowLength {
+            found,
+            expected: columns.len(),
+            hint,
+        };
+        fault.in_cell(&self.log.path, row, name)
     }
 }
 
@@ -179,18 +238,56 @@ impl Channel {
                 return self.push_instant(instant);
             }
         }
+        self.push_value(value);
+    }
+
+    fn push_value(&mut self, value: f64) {
         self.values.push(value);
         if let Some(instants) = &mut self.instants {
-            // No time: the value is NaN, which whoever needs the column refuses.
-            instants.push(Instant {
+            // Where this is no time, the value is NaN, which whoever needs the column refuses.
+            let none = Instant {
                 whole: 0,
                 rest: 0.0,
-            });
+            };
+            instants.push(Instant::of(value).unwrap_or(none));
         }
     }
 
+    /// Adds a cell of romc's own format: a date, 0 or 1 of a foot, or a finite number.
+    fn push_own(
+        &mut self,
+        column: Column,
+        cell: &str,
+        numbers: &mut NumberReader,
+    ) -> Result<(), RecordingFault> {
+        let is_foot = matches!(column, Column::Foot(_));
+        if column == Column::Time
+            && let Some(date) = Instant::from_iso(cell)
+        {
+            self.push_instant(date);
+            return Ok(());
+        }
+        let value = match cell {
+            "True" | "true" | "TRUE" if is_foot => Some(1.0),
+            "False" | "false" | "FALSE" if is_foot => Some(0.0),
+            _ => numbers.parse(cell),
+        };
+        let expected = match value {
+            Some(value) if is_foot && value.is_finite() && value != 0.0 && value != 1.0 => {
+                return Err(RecordingFault::contact(value));
+            }
+            Some(value) if value.is_finite() => {
+                self.push_value(value);
+                return Ok(());
+            }
+            Some(_) => "a finite number",
+            None => numbers.expected(),
+        };
+        Err(RecordingFault::number(cell, expected))
+    }
+
     /// Adds a time; earlier values become times as well.
-    pub fn push_instant(&mut self, instant: Instant) {
+    pub(crate) fn push_instant(&mut self, instant: Instant) {
         let earlier = |value: &f64| Instant::of(*value).unwrap_or(instant);
         self.instants
             .get_or_insert_with(|| self.values.iter().map(earlier).collect())
@@ -217,56 +314,11 @@ fn character(delimiter: Delimiter) -> char {
     }
 }
 
-fn cells(line: &str, delimiter: Delimiter) -> Vec<String> {
+fn cells(line: &str, delimiter: Delimiter) -> Vec<&str> {
     match delimiter {
-        Delimiter::Blank => line.split_whitespace().map(str::to_owned).collect(),
+        Delimiter::Blank => line.split_whitespace().collect(),
         Delimiter::Tab | Delimiter::Comma | Delimiter::Semicolon => {
-            lines::cells(line, character(delimiter))
-                .map(str::to_owned)
-                .collect()
+            lines::cells(line, character(delimiter)).collect()
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn log(text: &str) -> Log {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("log.txt");
-        std::fs::write(&path, text).unwrap();
-        read_text(&path, &TextFormat::default()).unwrap()
-    }
-
-    #[test]
-    fn read_text_any_separator_gives_the_same_numbers() {
-        for text in [
-            "a;b\n0,5;True\n1;False\n",
-            "a\tb\n0.5\ttrue\n1\tfalse\n",
-            "# a, b\n0.5, 1\n1.0, 0,\n",
-            "a b\n 0.5  1\n 1e0 0\n",
-        ] {
-            let log = log(text);
-            assert_eq!(log.columns[0].values, [0.5, 1.0], "{text}");
-            assert_eq!(log.columns[1].values, [1.0, 0.0], "{text}");
-            assert_eq!((log.columns[1].name.as_str(), log.first_row), ("b", 2));
-        }
-    }
-
-    #[test]
-    fn read_text_without_header_counts_its_first_line() {
-        let log = log("1 2\n3 4\n");
-        assert!(!log.is_named && log.first_row == 1);
-        assert_eq!(log.columns[1].values, [2.0, 4.0]);
-        assert_eq!(log.column(&super::super::map::Name::Number(2)), Some(1));
-        assert_eq!(log.column(&super::super::map::Name::Number(3)), None);
-    }
-
-    #[test]
-    fn read_text_word_among_numbers_is_kept_with_its_sample() {
-        let log = log("a,b\n1,2\n1,x\n");
-        assert_eq!(log.columns[1].refused, Some((1, "x".to_owned())));
-        assert!(log.columns[0].refused.is_none());
     }
 }

@@ -10,7 +10,7 @@ use std::collections::btree_map::Entry;
 use mcap::records::{Channel as Declared, SchemaHeader};
 
 use super::log::{Channel, Log};
-use super::message::{Definition, Layout, MessageFault, Value};
+use super::message::{Definition, Layout, Value, undefined, unknown_encoding};
 use crate::recording::csv::MAX_ROWS;
 use crate::recording::error::RecordingFault;
 use crate::recording::instant::Instant;
@@ -23,36 +23,28 @@ const MOST_ARRANGEMENTS: usize = 64;
 /// of a simulator.
 const MOST_LATE: usize = 20;
 
-/// The topics of the files of a log.
 #[derive(Default)]
 pub(super) struct Topics {
     schemas: BTreeMap<u16, (SchemaHeader, Vec<u8>)>,
-    /// Topics of the channels of the present file.
     channels: BTreeMap<u16, usize>,
     topics: Vec<Topic>,
-    /// Messages read.
     pub messages: usize,
 }
 
-/// A topic by its name and the definition of its messages.
 struct Topic {
     name: String,
-    definition: Result<(Layout, Definition), MessageFault>,
-    /// Encodings and definition, as declared.
+    definition: Result<(Layout, Definition), String>,
     declared: (String, String, String, Vec<u8>),
     tables: Vec<Table>,
     /// By lists of a message: its table, and the columns of its numbers.
     arrangements: BTreeMap<Vec<u8>, (usize, Vec<usize>)>,
-    /// Messages read.
     arrived: usize,
-    fault: Option<MessageFault>,
+    fault: Option<String>,
 }
 
 /// Messages with the same names.
 struct Table {
     log: Log,
-    /// Times of recording, ns.
-    times_ns: Vec<u64>,
     /// Numbers of the messages within their topic.
     arrivals: Vec<usize>,
     /// Whether a narrower table has its rows.
@@ -61,20 +53,17 @@ struct Table {
 
 impl Topics {
     /// Forgets the channels of the last file: numbers of channels hold within one.
-    pub fn begin_file(&mut self) {
+    pub(crate) fn begin_file(&mut self) {
         self.schemas.clear();
         self.channels.clear();
     }
 
-    pub fn schema(&mut self, header: SchemaHeader, text: Vec<u8>) {
+    pub(crate) fn schema(&mut self, header: SchemaHeader, text: Vec<u8>) {
         self.schemas.insert(header.id, (header, text));
     }
 
     /// A declared channel.
-    ///
-    /// # Errors
-    /// In words, for a channel that was declared otherwise.
-    pub fn channel(&mut self, channel: &Declared) -> Result<(), String> {
+    pub(crate) fn channel(&mut self, channel: &Declared) -> Result<(), String> {
         let schema = self.schemas.get(&channel.schema_id);
         let (header, text) = schema.map_or((None, &[][..]), |(header, text)| (Some(header), text));
         let of =
@@ -114,10 +103,12 @@ impl Topics {
     }
 
     /// A message.
-    ///
-    /// # Errors
-    /// In words, for one of a channel that was not declared.
-    pub fn message(&mut self, channel: u16, time_ns: u64, bytes: &[u8]) -> Result<(), String> {
+    pub(crate) fn message(
+        &mut self,
+        channel: u16,
+        time_ns: u64,
+        bytes: &[u8],
+    ) -> Result<(), String> {
         let index = self.channels.get(&channel);
         let index = index
             .ok_or_else(|| format!("a message of channel {channel}, which is not declared"))?;
@@ -133,20 +124,17 @@ impl Topics {
     }
 
     /// The tables, and topics that are none, each with its fault.
-    ///
-    /// # Errors
-    /// [`RecordingFault::NoTopic`] without any table.
-    pub fn logs(self) -> Result<Vec<Log>, RecordingFault> {
+    pub(crate) fn logs(self) -> Result<Vec<Log>, RecordingFault> {
         let mut logs = Vec::new();
         for mut topic in self.topics {
-            let messages: usize = topic.tables.iter().map(|table| table.times_ns.len()).sum();
+            let messages: usize = topic.tables.iter().map(|table| table.log.len()).sum();
             topic.tables.sort_by_key(|table| table.log.columns.len());
             for at in 0..topic.tables.len() {
                 let (tables, wider) = topic.tables.split_at_mut(at + 1);
                 wider.iter_mut().for_each(|table| tables[at].add(table));
             }
             for table in topic.tables {
-                let others = messages - table.times_ns.len();
+                let others = messages - table.log.len();
                 let what = match table.is_part {
                     true => "lack values that the others have",
                     false => "have other names or lengths and are left out",
@@ -160,7 +148,7 @@ impl Topics {
             }
             logs.extend(topic.fault.map(|fault| Log {
                 name: topic.name,
-                fault: Some(fault.to_string()),
+                fault: Some(fault),
                 ..Log::default()
             }));
         }
@@ -173,21 +161,20 @@ impl Topics {
     }
 }
 
-/// How the messages of a channel are read.
 fn definition(
     channel: &Declared,
     has_schema: bool,
     (message, encoding, name, text): &(String, String, String, Vec<u8>),
-) -> Result<(Layout, Definition), MessageFault> {
+) -> Result<(Layout, Definition), String> {
     let layout = match (&message[..], &encoding[..]) {
         ("cdr", "ros2msg") => Layout::Ros2,
         ("ros1", "ros1msg") => Layout::Ros1,
         (message, schema) => {
-            return Err(MessageFault::Encoding(format!("{message} with {schema}")));
+            return Err(unknown_encoding(&format!("{message} with {schema}")));
         }
     };
     if !has_schema {
-        return Err(MessageFault::Undefined(channel.topic.clone()));
+        return Err(undefined(&channel.topic));
     }
     Ok((
         layout,
@@ -196,7 +183,7 @@ fn definition(
 }
 
 impl Topic {
-    fn push(&mut self, time_ns: u64, message: &[u8]) -> Result<(), MessageFault> {
+    fn push(&mut self, time_ns: u64, message: &[u8]) -> Result<(), String> {
         let (layout, definition) = self.definition.as_ref().map_err(Clone::clone)?;
         let found = definition.values(*layout, message, false)?;
         if !self.arrangements.contains_key(&found.lists) {
@@ -209,10 +196,11 @@ impl Topic {
         }
         let (table, order) = &self.arrangements[&found.lists];
         let table = &mut self.tables[*table];
-        if table.times_ns.len() == MAX_ROWS {
-            return Err(MessageFault::Long(MAX_ROWS));
+        if table.log.len() == MAX_ROWS {
+            return Err(format!(
+                "more than {MAX_ROWS} messages, expected shorter recordings"
+            ));
         }
-        table.times_ns.push(time_ns);
         table.arrivals.push(self.arrived);
         self.arrived += 1;
         let (seconds, rest) = (time_ns / 1_000_000_000, time_ns % 1_000_000_000);
@@ -230,11 +218,11 @@ impl Topic {
     }
 
     /// The table of numbers of these names, made if there is none, and their columns in it.
-    fn arranged(&mut self, names: Vec<String>) -> Result<(usize, Vec<usize>), MessageFault> {
+    fn arranged(&mut self, names: Vec<String>) -> Result<(usize, Vec<usize>), String> {
         let mut sorted: Vec<&String> = names.iter().collect();
         sorted.sort_unstable();
         if let Some(twice) = sorted.windows(2).find(|pair| pair[0] == pair[1]) {
-            return Err(MessageFault::Twice(twice[0].clone()));
+            return Err(format!("message: `{}` twice", twice[0]));
         }
         let columns_in = |table: &Table| {
             let columns = &table.log.columns[1..];
@@ -253,7 +241,9 @@ impl Topic {
             return Ok(found);
         }
         if self.tables.len() == MOST_TABLES {
-            return Err(MessageFault::Ragged(MOST_TABLES));
+            return Err(format!(
+                "messages of more than {MOST_TABLES} lengths or sets of names, expected tables"
+            ));
         }
         let order = (1..=names.len()).collect();
         let columns = ["log_time".to_owned()].into_iter().chain(names);
@@ -266,7 +256,6 @@ impl Topic {
         };
         self.tables.push(Table {
             log,
-            times_ns: Vec::new(),
             arrivals: Vec::new(),
             is_part: false,
         });
@@ -299,45 +288,34 @@ impl Table {
                 own.extend(others);
             }
         }
-        self.times_ns.extend(&wider.times_ns);
         self.arrivals.extend(&wider.arrivals);
         let mut rows = Vec::from_iter(0..self.arrivals.len());
         rows.sort_by_key(|row| self.arrivals[*row]);
         self.log.choose(&rows);
-        self.times_ns = rows.iter().map(|row| self.times_ns[*row]).collect();
         self.arrivals.sort_unstable();
         wider.is_part = true;
     }
 
     /// The table by the stamps of its messages, or the time of recording if they have none, with rows in order.
     fn finished(self) -> Log {
-        let Self {
-            mut log, times_ns, ..
-        } = self;
+        let mut log = self.log;
+        let (name, total) = (log.name.clone(), log.len());
+        let say = |log: &mut Log, count: usize, what: &str| {
+            let note = format!("`{name}`: {count} of {total} messages {what}");
+            log.notes.push(note);
+        };
+        let recorded = log.columns[0].times();
+        let early = late(&recorded);
+        if early > 0 {
+            log.sort_by(&recorded);
+            let what = "were out of order and are sorted by their time of recording";
+            say(&mut log, early, what);
+        }
         let is_stamp = |channel: &Channel| {
             channel.name == "header.stamp" && channel.values.iter().any(|time| *time != 0.0)
         };
         let clock = log.columns.iter().position(is_stamp).unwrap_or(0);
         log.clock = Some(clock);
-        let say = |log: &mut Log, count: usize, what: &str| {
-            let note = format!(
-                "`{}`: {count} of {} messages {what}",
-                log.name,
-                times_ns.len()
-            );
-            log.notes.push(note);
-        };
-        let early = late(&times_ns);
-        if early > 0 {
-            let mut order = Vec::from_iter(0..times_ns.len());
-            order.sort_by_key(|row| times_ns[*row]);
-            log.choose(&order);
-            say(
-                &mut log,
-                early,
-                "were out of order and are sorted by their time of recording",
-            );
-        }
         let stamps = log.columns[clock].times();
         let mut runs = stamps
             .iter()
@@ -348,9 +326,7 @@ impl Table {
             });
         let count = late(&stamps);
         if count > 0 && runs.all(|run| run <= MOST_LATE) {
-            let mut order = Vec::from_iter(0..stamps.len());
-            order.sort_by(|one, other| stamps[*one].total_cmp(&stamps[*other]));
-            log.choose(&order);
+            log.sort_by(&stamps);
             say(&mut log, count, "had late stamps and are sorted by these");
         }
         let kept = distinct(&log, clock);
@@ -364,11 +340,11 @@ impl Table {
 }
 
 /// How many of some times are earlier than one before them.
-fn late<T: PartialOrd + Copy>(times: &[T]) -> usize {
-    let mut latest = times.first().copied();
-    let is_late = |time: &&T| {
-        let found = latest.is_some_and(|latest| **time < latest);
-        latest = if found { latest } else { Some(**time) };
+fn late(times: &[f64]) -> usize {
+    let mut latest = f64::NEG_INFINITY;
+    let is_late = |time: &&f64| {
+        let found = **time < latest;
+        latest = latest.max(**time);
         found
     };
     times.iter().filter(is_late).count()

@@ -10,7 +10,6 @@ use crate::recording::{Recording, Segment};
 use crate::robot::input_rule::rotation;
 use crate::robot::{BODY_NAMES, BODY_Z, FOOT_DIM, JOINT_DIM, Leg, Robot};
 
-/// Row of the body's height.
 const HEIGHT: usize = BODY_Z;
 /// Shortest flight, and shortest time on the ground in all, that counts, s.
 const LEAST_S: f64 = 0.04;
@@ -19,7 +18,7 @@ const LEAST_FORCE: f64 = 0.02;
 
 /// What forces and accelerations of a recording come to.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Balance {
+pub(crate) struct Balance {
     /// Mean vertical acceleration in flight, upwards, m/s^2.
     pub fall_m_s2: Option<f64>,
     /// The same by the heights alone, the median over the flights.
@@ -35,7 +34,6 @@ pub struct Balance {
     pub acceleration_offset_m_s2: Option<(&'static str, f64)>,
 }
 
-/// Sums of a balance.
 #[derive(Debug, Clone, Copy, Default)]
 struct Sums {
     /// Change of velocity and time in flight.
@@ -110,14 +108,9 @@ impl Sums {
             };
             let force = map * Vector3::from(tau);
             sum += force;
-            // A force in the plane of the leg leaves the hip's torque this much: its lever is the
-            // distance of the plane from the axis of abduction.
-            let links = robot.geometry(leg).links();
-            let axis = Unit::new_normalize(links.abduction);
-            let normal = Rotation3::from_axis_angle(&axis, q[0]) * links.flexion;
-            let in_plane = force - normal * normal.dot(&force);
-            let lever = -robot.foot_jacobian(leg, &q).column(0).dot(&in_plane);
-            let least = LEAST_FORCE * weight_n(robot.mass_kg()) * links.hip.norm();
+            let lever = hip_torque(robot, leg, &q, &force);
+            let hip_m = robot.geometry(leg).links().hip.norm();
+            let least = LEAST_FORCE * weight_n(robot.mass_kg()) * hip_m;
             if lever.abs() > least {
                 let (product, square) = &mut self.hips[leg.index()];
                 *product += tau[0] * lever;
@@ -127,6 +120,21 @@ impl Sums {
         let [roll, pitch, yaw] = std::array::from_fn(|i| segment.x[(JOINT_DIM + 3 + i, sample)]);
         rotation([roll, pitch, yaw]) * sum
     }
+}
+
+/// Torque of a hip's abduction that holds the part of a foot's force (body axes, N) in the plane of the leg: its lever is
+/// the distance of the plane from the axis of abduction.
+pub(in crate::recording) fn hip_torque(
+    robot: &Robot,
+    leg: Leg,
+    q: &[f64; 3],
+    force: &Vector3<f64>,
+) -> f64 {
+    let links = robot.geometry(leg).links();
+    let axis = Unit::new_normalize(links.abduction);
+    let normal = Rotation3::from_axis_angle(&axis, q[0]) * links.flexion;
+    let in_plane = force - normal * normal.dot(force);
+    -robot.foot_jacobian(leg, q).column(0).dot(&in_plane)
 }
 
 /// Vertical acceleration of each flight by a parabola through its heights.

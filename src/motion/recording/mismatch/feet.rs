@@ -1,8 +1,9 @@
 //! Heights of the feet: while only some are on the ground, those in the air are higher, which tells which column of
 //! contact belongs to which foot; those on the ground are at height zero.
 
-use super::Broken;
 use super::stance::{foot_place, orders};
+use super::{Mismatch, mismatch};
+use crate::recording::check::outside;
 use crate::recording::preprocess::median;
 use crate::recording::{Recording, Segment};
 use crate::robot::{ContactFlags, FOOT_DIM, JOINT_DIM, Leg, Robot};
@@ -15,7 +16,7 @@ const LEAST_GAIN: (f64, f64) = (9e-3, 0.3);
 const FLOOR_M: f64 = 0.1;
 
 /// Another order of the columns, if it fits the heights of the feet clearly better than the recorded one.
-pub(super) fn columns(recording: &Recording, robot: &Robot) -> Option<Broken> {
+pub(super) fn columns(recording: &Recording, robot: &Robot) -> Option<Mismatch> {
     let orders = orders();
     let mut sums = vec![0.0; orders.len()];
     for segment in &recording.segments {
@@ -32,15 +33,15 @@ pub(super) fn columns(recording: &Recording, robot: &Robot) -> Option<Broken> {
     let (_, &recorded_m) = judged().find(|(order, _)| **order == Leg::ALL)?;
     let (legs, &best_m) = judged().max_by(|one, other| one.1.total_cmp(other.1))?;
     let least_m = best_m - LEAST_GAIN.0.max(LEAST_GAIN.1 * best_m.abs());
-    (recorded_m < least_m).then(|| {
-        let words = format!(
+    let breach = outside(recorded_m, least_m, f64::INFINITY);
+    mismatch("feet_columns", breach, |recorded_m| {
+        format!(
             "while some feet are on the ground, those said to be in the air are higher by {:.0} mm in sum over the \
              samples, and by {:.0} mm if the columns of the feet are of {}: are they exchanged?",
             1e3 * recorded_m,
             1e3 * best_m,
             legs.map(Leg::short_name).join(", ")
-        );
-        (recorded_m, least_m, words)
+        )
     })
 }
 
@@ -55,13 +56,14 @@ fn higher_m(feet: &ContactFlags, height: &[f64; FOOT_DIM], legs: &[Leg; FOOT_DIM
 }
 
 /// The median height of the feet that are on the ground, if that is not the floor's.
-pub(super) fn floor(value: f64) -> Option<Broken> {
-    (value.abs() > FLOOR_M).then(|| {
-        let words = format!(
+pub(super) fn floor(value: f64) -> Option<Mismatch> {
+    // The bound has no sign.
+    let breach = outside(value, -FLOOR_M, FLOOR_M).map(|(value, _)| (value, FLOOR_M));
+    mismatch("floor", breach, |value| {
+        format!(
             "feet on the ground are at a height of {value:.2} m ({FLOOR_M:.2} m are accepted): is z that of the trunk \
              over the ground?"
-        );
-        (value, FLOOR_M, words)
+        )
     })
 }
 
@@ -85,7 +87,7 @@ const TRUNK: (f64, f64) = (0.05, 1.6);
 const LIES_S: f64 = 0.1;
 
 /// Time, s, that the trunk lies on the ground, or under it, or on its back, if that is long enough.
-pub(super) fn fallen(recording: &Recording, floor_m: f64) -> Option<Broken> {
+pub(super) fn fallen(recording: &Recording, floor_m: f64) -> Option<Mismatch> {
     let (mut lies_s, mut lowest, mut steepest) = (0.0, f64::INFINITY, 0.0_f64);
     for segment in &recording.segments {
         let grounded = (0..segment.len()).filter(|sample| segment.feet[*sample].contains(&true));
@@ -100,13 +102,12 @@ pub(super) fn fallen(recording: &Recording, floor_m: f64) -> Option<Broken> {
             (lowest, steepest) = (lowest.min(height), steepest.max(tilt));
         }
     }
-    (lies_s > LIES_S).then(|| {
-        let words = format!(
+    mismatch("fallen", outside(lies_s, 0.0, LIES_S), |lies_s| {
+        format!(
             "for {lies_s:.2} s with feet on the ground the trunk is tilted by up to {:.0} degrees and as low as \
              {lowest:.2} m: did the robot fall? `rows` in `[text]` of a map keeps the jump alone",
             steepest.to_degrees()
-        );
-        (lies_s, LIES_S, words)
+        )
     })
 }
 

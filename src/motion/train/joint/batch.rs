@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use crate::recording::Source;
+use crate::recording::Recording;
 use crate::recording::preprocess::{BATCH_ROWS, prepare};
 use crate::recording::smoothing::moving_average;
 use crate::train::dataset::{Dataset, scaled};
@@ -11,7 +11,6 @@ use crate::train::error::TrainError;
 /// Consecutive samples of one phase, rows are samples, scaled units.
 #[derive(Clone, Debug)]
 pub struct Batch {
-    /// Phase of all its samples.
     pub phase: usize,
     /// States, `n x 18`.
     pub x: DMatrix<f64>,
@@ -21,7 +20,6 @@ pub struct Batch {
     pub ddx: DMatrix<f64>,
     /// Inputs, `n x 18`.
     pub u: DMatrix<f64>,
-    /// Time between samples.
     pub step_s: f64,
     /// `[x, 1]^T [x, 1] / n`, `19 x 19`.
     pub state_moment: DMatrix<f64>,
@@ -32,7 +30,6 @@ pub struct Batch {
 }
 
 impl Batch {
-    /// A batch of samples in rows.
     pub fn new(phase: usize, [x, dx, ddx, u]: [DMatrix<f64>; 4], step_s: f64) -> Self {
         let n = x.nrows();
         let extended = x.clone().insert_column(x.ncols(), 1.0);
@@ -49,7 +46,6 @@ impl Batch {
         }
     }
 
-    /// Number of samples.
     pub fn samples(&self) -> usize {
         self.x.nrows()
     }
@@ -59,10 +55,10 @@ impl Batch {
 ///
 /// # Errors
 /// [`TrainError::Recording`] for what cannot be resampled or turned into inputs.
-pub fn batches(recordings: &Source<'_>, dataset: &Dataset) -> Result<Vec<Batch>, TrainError> {
+pub fn batches(recordings: &[Recording], dataset: &Dataset) -> Result<Vec<Batch>, TrainError> {
     let mut out = Vec::new();
     let state = |columns| scaled(columns, &dataset.scaling.state).transpose();
-    recordings.for_each(|recording| {
+    for recording in recordings {
         for (span, samples) in prepare(recording, &dataset.phases)? {
             let u = scaled(samples.input(&dataset.rule)?, &dataset.scaling.input).transpose();
             let (x, dx) = (state(samples.x.clone()), state(samples.dx.clone()));
@@ -73,7 +69,6 @@ pub fn batches(recordings: &Source<'_>, dataset: &Dataset) -> Result<Vec<Batch>,
                 out.push(Batch::new(span.phase, blocks, samples.mean_step_s()));
             }
         }
-        Ok::<_, TrainError>(())
-    })?;
+    }
     Ok(out)
 }

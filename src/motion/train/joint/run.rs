@@ -9,19 +9,17 @@ use super::batch::{Batch, batches};
 use super::fold::{LatentBasis, folded};
 use super::linear::{LinearMaps, mask_rows};
 use super::loss::{JointLoss, LossWeights, Losses, Maps};
-use super::network::Network;
 use super::nonlinear::NonlinearMaps;
 use super::parameters::{Frame, Parameters};
 use super::stages::{train_decoder, train_together, train_xi};
-use crate::model::{AffineMap, Layer, ModelError, StateMap};
+use crate::model::{Layer, ModelError, StateMap};
 use crate::robot::{Robot, STATE_DIM};
 use crate::train::assemble::Origin;
-use crate::train::dataset::Quantity;
 use crate::train::dynamics_fit::Fitted;
 use crate::train::error::TrainError;
 use crate::train::latent::{EncodedSet, Latent, least_squares_decoder, map_samples, mean_jacobian};
 use crate::train::options::{TrainOptions, Transfer};
-use crate::train::progress::Watch;
+use crate::train::progress::Monitor;
 use crate::train::random::Random;
 use crate::train::report::Trained;
 use crate::train::seeds::{Outcome, Seeds};
@@ -41,19 +39,19 @@ pub fn joint(
     robot: &'static Robot,
     options: &TrainOptions,
     origin: &Origin,
-    watch: &mut Watch<'_>,
+    monitor: &mut Monitor<'_>,
 ) -> Result<Trained, TrainError> {
-    let task = Task::new(recordings.clone(), robot, options)?;
+    let task = Task::new(recordings, robot, options)?;
     let cut = |set| batches(set, &task.training);
-    let training = cut(&recordings.training)?;
+    let training = cut(recordings.training)?;
     let trainer = Trainer {
         task: &task,
         batches: &training,
         frame: frame(&task),
     };
-    let runs = trainer.run_seeds(watch);
+    let runs = trainer.run_seeds(monitor);
 
-    let validation = cut(&recordings.validation)?;
+    let validation = cut(recordings.validation)?;
     let judged = if validation.is_empty() {
         &training
     } else {
@@ -62,9 +60,9 @@ pub fn joint(
     let mut seeds = Seeds::default();
     for run in runs {
         let seed = run.seed;
-        let outcome = trainer.finish(run, judged, watch);
+        let outcome = trainer.finish(run, judged, monitor);
         let outcome = outcome.map_err(|error| trainer.explained(error, seed));
-        seeds.add(seed, outcome, watch)?;
+        seeds.add(seed, outcome, monitor)?;
     }
     seeds.into_model(task, "joint", origin)
 }
@@ -78,7 +76,7 @@ fn frame(task: &Task<'_>) -> Frame {
     if options.joint.maps.is_linear() || options.joint.transfer == Transfer::Published {
         return plain;
     }
-    let x = task.training.gather(Quantity::X, None);
+    let x = task.training.states(None);
     let least = options.encoder.least_std * options.scaling.state;
     let spread: DVector<f64> = x
         .column_variance()
@@ -92,14 +90,12 @@ fn frame(task: &Task<'_>) -> Frame {
     }
 }
 
-/// What all seeds share.
 struct Trainer<'a> {
     task: &'a Task<'a>,
     batches: &'a [Batch],
     frame: Frame,
 }
 
-/// What one seed has learned.
 struct Run {
     seed: u64,
     parameters: Parameters,
@@ -109,15 +105,15 @@ struct Run {
 impl Trainer<'_> {
     /// Trains all seeds on the threads of the options, in rounds, none of which begins after a cancellation; results
     /// are in the order of the seeds.
-    fn run_seeds(&self, watch: &mut Watch<'_>) -> Vec<Run> {
+    fn run_seeds(&self, monitor: &mut Monitor<'_>) -> Vec<Run> {
         let options = &self.task.options.joint;
         let (threads, epochs) = (options.threads.max(1), options.schedule.total());
-        let (seeds, cancel) = (self.task.options.seeds(), watch.cancel_flag());
+        let (seeds, cancel) = (self.task.options.seeds(), monitor.cancel_flag());
         let steps = seeds.len() * epochs;
-        watch.stage("training encoder, decoder and dynamics", steps);
+        monitor.stage("training encoder, decoder and dynamics", steps);
         let mut runs = Vec::new();
         for (round, group) in seeds.chunks(threads).enumerate() {
-            if watch.cancelled() {
+            if monitor.cancelled() {
                 break;
             }
             let (sender, receiver) = channel();
@@ -129,7 +125,7 @@ impl Trainer<'_> {
                 let workers: Vec<_> = started.collect();
                 drop(sender);
                 for (done, text) in receiver.iter().enumerate() {
-                    watch.done(round * threads * epochs + done + 1, text);
+                    monitor.done(round * threads * epochs + done + 1, text);
                 }
                 for worker in workers {
                     runs.push(worker.join().expect("a seed does not panic"));
@@ -167,7 +163,7 @@ impl Trainer<'_> {
         let losses = train_together(&mut parameters, &first, &mut loss, schedule, &mut listener);
         let quiet = &mut |_: usize, _: &Losses, _: usize| !cancel.load(Ordering::Relaxed);
         if published {
-            train_decoder(&mut parameters, &all, &loss, schedule, quiet);
+            train_decoder(&mut parameters, &all, &mut loss, schedule, quiet);
             for phase in 0..parameters.xi.len() {
                 let own: Vec<&Batch> = of_phase(phase).collect();
                 parameters.xi[phase].fill(options.xi_start);
@@ -181,7 +177,6 @@ impl Trainer<'_> {
         }
     }
 
-    /// The loss of maps like those of `parameters`.
     fn loss(&self, weights: LossWeights, parameters: &Parameters) -> JointLoss<'_> {
         let coordinate_weights = self.task.options.encoder.coordinate_weights();
         let maps: Box<dyn Maps> = match self.is_linear() {
@@ -200,7 +195,6 @@ impl Trainer<'_> {
         self.task.options.joint.transfer == Transfer::Published
     }
 
-    /// Coordinates that the encoder may use.
     fn mask(&self) -> Vec<bool> {
         let factors = self.frame.factors.iter();
         factors.map(|factor| *factor != 0.0).collect()
@@ -220,7 +214,7 @@ impl Trainer<'_> {
         if self.is_linear() {
             let encoder = &mut start.encoder.layers[0];
             if !self.is_published() {
-                let mean = training.gather(Quantity::X, Some(0)).column_mean();
+                let mean = training.states(Some(0)).column_mean();
                 encoder.bias = -(encoder.weights.tr_mul(&mean));
                 start.decoder.layers[0].bias = mean;
             }
@@ -229,8 +223,7 @@ impl Trainer<'_> {
         start
     }
 
-    /// The model numbers of a run, and its score.
-    fn finish(&self, run: Run, judged: &[Batch], watch: &mut Watch<'_>) -> Outcome {
+    fn finish(&self, run: Run, judged: &[Batch], monitor: &mut Monitor<'_>) -> Outcome {
         let fitted = if self.is_published() {
             self.published(run.parameters, judged)?
         } else {
@@ -238,13 +231,12 @@ impl Trainer<'_> {
                 true => self.linear_maps(&run.parameters)?,
                 false => self.nonlinear_maps(&run.parameters)?,
             };
-            self.task.fit_dynamics(maps, watch)?
+            self.task.fit_dynamics(maps, monitor)?
         };
-        let report = (self.task).seed_report(&fitted, run.seed, Some(run.losses))?;
+        let report = (self.task).seed_report(&fitted, run.seed, Some(run.losses));
         Ok((report, fitted))
     }
 
-    /// Mean combined loss over batches of all phases.
     fn published_score(&self, parameters: &Parameters, judged: &[Batch]) -> f64 {
         let weights = self.task.options.joint.weights;
         let mut loss = self.loss(weights, parameters);
@@ -253,36 +245,24 @@ impl Trainer<'_> {
         total / judged.len().max(1) as f64
     }
 
-    /// The numbers as Adam left them.
     fn published(&self, parameters: Parameters, judged: &[Batch]) -> Result<Fitted, TrainError> {
         let plain = LatentBasis::unchanged(self.task.options.latent_dim);
         let (encoder, decoder) = self.state_maps(&parameters, &plain)?;
         Ok(Fitted {
             score: self.published_score(&parameters, judged),
-            weights: mean_jacobian(&encoder, &self.task.training),
-            encoder,
-            decoder,
+            maps: self.task.encoded(encoder, decoder),
             xi: parameters.xi,
             choice: None,
         })
     }
 
-    /// Encoder and decoder between scaled states and latent coordinates in `basis`, which linear maps ignore.
+    /// Encoder and decoder between scaled states and latent coordinates in `basis`.
     fn state_maps(
         &self,
         parameters: &Parameters,
         basis: &LatentBasis,
     ) -> Result<(StateMap, StateMap), TrainError> {
-        let (encoder, decoder) = (&parameters.encoder, &parameters.decoder);
-        if !self.is_linear() {
-            return Ok(folded((encoder, decoder), &self.frame, basis)?);
-        }
-        let affine = |tensor, network: &Network| {
-            let layer = &network.layers[0];
-            AffineMap::new(tensor, layer.weights.transpose(), layer.bias.clone())
-        };
-        let encoder = affine("encoder", encoder)?.into();
-        Ok((encoder, affine("decoder", decoder)?.into()))
+        Ok(folded(parameters, &self.frame, basis)?)
     }
 
     /// The encoder over the learned row space, and its least-squares decoder.
@@ -315,7 +295,7 @@ impl Trainer<'_> {
     /// the latents in canonical order and their mean at 0.
     fn basis(&self, encoder: &StateMap) -> LatentBasis {
         let (d, training) = (self.task.options.latent_dim, &self.task.training);
-        let x = training.gather(Quantity::X, None);
+        let x = training.states(None);
         let gram = x.column_iter().fold(DMatrix::zeros(d, d), |sum, x| {
             let jacobian = encoder
                 .jacobian(&x.into_owned())
@@ -347,7 +327,7 @@ impl Trainer<'_> {
         let terms_at_start = || {
             let plain = LatentBasis::unchanged(self.task.options.latent_dim);
             let encoder = self.state_maps(&self.start(seed), &plain)?.0;
-            let latent = Latent::of(training, &encoder)?;
+            let latent = Latent::of(training, &encoder);
             let set = EncodedSet::new(training, &latent);
             check_terms(set, &self.task.features, &self.task.library)
         };

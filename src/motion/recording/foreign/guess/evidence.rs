@@ -12,7 +12,6 @@ const UNEXPLAINED: f64 = 0.5;
 /// Times the least residual below which a plainer explanation is preferred.
 const AS_GOOD: f64 = 1.1;
 
-/// A unit and sign for all rows.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Scale {
     pub unit: &'static str,
@@ -46,17 +45,17 @@ pub(super) fn scale(
 
 /// Unit and axes of a velocity whose position or angles have these rates: of `frames`, the first that fits nearly as
 /// well as the best. `turned` gives the velocity, if it is in a frame, in the axes of the rates.
-pub(super) fn axes<const N: usize>(
-    frames: [Frame; N],
+pub(super) fn axes(
+    frames: &[Frame],
     turned: impl Fn(Frame) -> Option<DMatrix<f64>>,
     rates: &DMatrix<f64>,
     units: &[(&'static str, f64)],
 ) -> Option<(Scale, Frame)> {
-    let explained = |frame| {
-        let (scale, left) = scale(rates, &turned(frame)?, units)?;
-        Some((frame, scale, left))
+    let explained = |frame: &Frame| {
+        let (scale, left) = scale(rates, &turned(*frame)?, units)?;
+        Some((*frame, scale, left))
     };
-    let found: Vec<(Frame, Scale, f64)> = frames.into_iter().filter_map(explained).collect();
+    let found: Vec<(Frame, Scale, f64)> = frames.iter().filter_map(explained).collect();
     let least = found.iter().map(|choice| choice.2);
     let least = least.fold(f64::INFINITY, f64::min);
     let is_as_good = |choice: &(Frame, Scale, f64)| choice.2 <= AS_GOOD * least + 1e-12;

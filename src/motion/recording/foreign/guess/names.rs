@@ -33,22 +33,17 @@ const WANTED: &str = "des desired ref reference references cmd cmds command comm
      setpoints goal raw lost temperature mode covariance ff kp kd";
 const TIME: &str = "time timestamp stamp t sec secs seconds clock datetime date";
 
-/// What a name says.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Reading {
     /// The quantity; a quaternion and angles are both orientations.
     pub quantity: Quantity,
     /// The element, in romc's order; of a quaternion 0 is w. The number of elements for the last of those counted from 1.
     pub element: usize,
-    /// Whether the element is one of a quaternion.
     pub is_quaternion: bool,
-    /// Whether the place was counted rather than named.
     pub is_counted: bool,
     /// The words that all elements of one quantity share.
     pub family: String,
-    /// Whether it is something that was asked for rather than measured.
     pub is_wanted: bool,
-    /// Whether the joint is a `hip` without a word for which one.
     pub is_bare_hip: bool,
 }
 
@@ -79,12 +74,10 @@ pub(super) fn words(name: &str) -> Vec<String> {
     out
 }
 
-/// Whether a word is one of some with blanks between them.
 fn is_one(word: &str, of: &str) -> bool {
     of.split(' ').any(|known| known == word)
 }
 
-/// Whether a word is one of quantities.
 pub(super) fn is_quantity(word: &str) -> bool {
     let known = [
         TORQUE,
@@ -105,7 +98,6 @@ pub(super) fn is_wanted(name: &str) -> bool {
     words(name).iter().any(|word| is_one(word, WANTED))
 }
 
-/// Whether a name is one of a clock.
 pub(super) fn is_time(name: &str) -> bool {
     words(name).iter().any(|word| is_one(word, TIME))
 }
@@ -123,169 +115,173 @@ pub(super) fn unit(name: &str, units: &[&'static str]) -> Option<&'static str> {
     found.copied()
 }
 
+/// The quantity, the element, whether that is one of a quaternion, and whether it was counted.
+type Meaning = (Quantity, usize, bool, bool);
+
 /// What the name of a column says, if it says enough.
 pub(super) fn read(name: &str) -> Option<Reading> {
-    let mut words = words(name);
-    join_pairs(&mut words);
-    split_compact(&mut words);
-    greek_angles(&mut words);
-    let place = |table: &[&str]| {
-        let of = |word: &String| table.iter().position(|known| is_one(word, known));
-        words.iter().find_map(of)
-    };
-    let has = |known: &str| words.iter().any(|word| is_one(word, known));
-    if has("covariance") {
-        return None;
-    }
-    let (leg, joint) = (place(&LEGS), joint(&words));
-    let number = words
-        .iter()
-        .rev()
-        .find_map(|word| word.parse::<usize>().ok());
-    let axis = place(&["x roll", "y pitch", "z yaw"]);
-    let family: Vec<&str> = (words.iter().map(String::as_str))
-        .filter(|word| {
-            !LEGS.iter().chain(&JOINTS).any(|known| is_one(word, known))
-                && !is_one(word, "x y z w roll pitch yaw hip")
-                && word.parse::<usize>().is_err()
-        })
-        .collect();
-    let reading = |quantity, element, is_quaternion, is_counted| {
-        Some(Reading {
-            quantity,
-            element,
-            is_quaternion,
-            is_counted,
-            family: family.join(" "),
-            is_wanted: has(WANTED),
-            is_bare_hip: joint == Some(0) && has("hip") && !has("x roll aa"),
-        })
-    };
-    let kinds = [
-        (TORQUE, Quantity::JointTorque),
-        (ACCELERATION, Quantity::JointAcceleration),
-        (VELOCITY, Quantity::JointVelocity),
-    ];
-    let kind = kinds.into_iter().find(|(known, _)| has(known));
-    let kind = kind.map_or(Quantity::JointPosition, |(_, kind)| kind);
-    if let (Some(number), [list, _]) = (number, &words[..])
-        && let Some((quantity, element, is_quaternion)) = in_list(list, number)
-    {
-        let is_counted = matches!(
-            quantity,
-            Quantity::JointPosition | Quantity::JointVelocity | Quantity::Feet
-        );
-        return reading(quantity, element, is_quaternion, is_counted);
-    }
-    let is_force = has("force forces") || (has("f fn load pressure") && leg.is_some());
-    if has(FEET) || (is_force && axis.is_none() && joint.is_none()) {
-        let element = leg.or(number.filter(|n| *n <= 4));
-        let is_moved = has("position pos velocity vel speed");
-        let is_contact = has("contact contacts stance touch");
-        let is_place = axis.map_or(is_moved && !is_contact, |axis| axis != 2 || is_moved);
-        return match element {
-            Some(element) if !is_place => reading(Quantity::Feet, element, false, leg.is_none()),
-            Some(_) | None => None,
-        };
-    }
-    if let Some(leg) = leg {
-        let joint = joint.or(number.filter(|number| *number < 3))?;
-        return reading(kind, 3 * leg + joint, false, false);
-    }
-    if let (Some(leg @ 0..4), Some(joint @ 0..3)) =
-        (after(&words, "leg"), after(&words, "joint motor"))
-    {
-        return reading(kind, 3 * leg + joint, false, true);
-    }
-    let in_array = number.filter(|number| *number <= 12);
-    let of_body = has("imu body base trunk com torso pose odom twist");
-    let of_axes = has(QUATERNION) && !has("q") || has(ANGULAR) || has("gyro gyroscope omega");
-    if let Some(number) = in_array
-        && axis.is_none()
-        && !of_body
-        && !of_axes
-        && has(JOINT_ARRAYS)
-    {
-        return reading(kind, number, false, true);
-    }
-    body(&words, axis, number, kind, reading)
-}
-
-/// The number behind a word.
-fn after(words: &[String], known: &str) -> Option<usize> {
-    let pair = words.windows(2).find(|pair| is_one(&pair[0], known))?;
-    pair[1].parse().ok()
-}
-
-/// An element of MuJoCo's lists of a floating robot: place, quaternion, joints; or of a list `c` of contacts.
-fn in_list(list: &str, number: usize) -> Option<(Quantity, usize, bool)> {
-    Some(match (list, number) {
-        ("qpos", 0..3) => (Quantity::BodyPosition, number, false),
-        ("qpos", 3..7) => (Quantity::Orientation, number - 3, true),
-        ("qpos", 7..19) => (Quantity::JointPosition, number - 7, false),
-        ("qvel", 0..3) => (Quantity::BodyVelocity, number, false),
-        ("qvel", 3..6) => (Quantity::AngularVelocity, number - 3, false),
-        ("qvel", 6..18) => (Quantity::JointVelocity, number - 6, false),
-        ("c", 0..4) => (Quantity::Feet, number, false),
-        _ => return None,
+    let words = Name::of(name);
+    let (quantity, element, is_quaternion, is_counted) = words.meaning()?;
+    let has = |known| words.has(known);
+    Some(Reading {
+        quantity,
+        element,
+        is_quaternion,
+        is_counted,
+        family: words.family(),
+        is_wanted: has(WANTED),
+        is_bare_hip: words.joint() == Some(0) && has("hip") && !has("x roll aa"),
     })
 }
 
-/// The joint that words name.
-fn joint(words: &[String]) -> Option<usize> {
-    let of = |word: &String| JOINTS.iter().position(|known| is_one(word, known));
-    let has = |word: &str| words.iter().any(|own| own == word);
-    if has("hip") {
-        let flexes = has("y") || has("pitch") || has("flexion") || has("fe");
-        return Some(usize::from(flexes));
+/// The words of a name, abbreviations written out.
+struct Name(Vec<String>);
+
+impl Name {
+    fn of(name: &str) -> Self {
+        let mut words = words(name);
+        join_pairs(&mut words);
+        split_compact(&mut words);
+        greek_angles(&mut words);
+        Self(words)
     }
-    words.iter().find_map(of)
+
+    fn has(&self, known: &str) -> bool {
+        self.0.iter().any(|word| is_one(word, known))
+    }
+
+    /// The place in a table of words of the first word that is in it.
+    fn place(&self, table: &[&str]) -> Option<usize> {
+        let of = |word: &String| table.iter().position(|known| is_one(word, known));
+        self.0.iter().find_map(of)
+    }
+
+    /// The number behind a word.
+    fn after(&self, known: &str) -> Option<usize> {
+        let pair = self.0.windows(2).find(|pair| is_one(&pair[0], known))?;
+        pair[1].parse().ok()
+    }
+
+    fn number(&self) -> Option<usize> {
+        let words = self.0.iter().rev();
+        words.filter_map(|word| word.parse().ok()).next()
+    }
+
+    fn axis(&self) -> Option<usize> {
+        self.place(&["x roll", "y pitch", "z yaw"])
+    }
+
+    fn joint(&self) -> Option<usize> {
+        match self.has("hip") {
+            true => Some(usize::from(self.has("y pitch flexion fe"))),
+            false => self.place(&JOINTS),
+        }
+    }
+
+    fn family(&self) -> String {
+        let names_element = |word: &&str| {
+            LEGS.iter().chain(&JOINTS).any(|known| is_one(word, known))
+                || is_one(word, "x y z w roll pitch yaw hip")
+                || word.parse::<usize>().is_ok()
+        };
+        let words = self.0.iter().map(String::as_str);
+        let family: Vec<&str> = words.filter(|word| !names_element(word)).collect();
+        family.join(" ")
+    }
+
+    fn meaning(&self) -> Option<Meaning> {
+        let has = |known| self.has(known);
+        if has("covariance") {
+            return None;
+        }
+        let (leg, joint, axis, number) =
+            (self.place(&LEGS), self.joint(), self.axis(), self.number());
+        let kinds = [
+            (TORQUE, Quantity::JointTorque),
+            (ACCELERATION, Quantity::JointAcceleration),
+            (VELOCITY, Quantity::JointVelocity),
+        ];
+        let kind = kinds.into_iter().find(|(known, _)| has(known));
+        let kind = kind.map_or(Quantity::JointPosition, |(_, kind)| kind);
+        if let (Some(number), [list, _]) = (number, &self.0[..])
+            && let Some(found) = in_list(list, number)
+        {
+            return Some(found);
+        }
+        let is_force = has("force forces") || (has("f fn load pressure") && leg.is_some());
+        if has(FEET) || (is_force && axis.is_none() && joint.is_none()) {
+            let element = leg.or(number.filter(|n| *n <= 4))?;
+            let is_moved = has("position pos velocity vel speed");
+            let is_contact = has("contact contacts stance touch");
+            let is_place = axis.map_or(is_moved && !is_contact, |axis| axis != 2 || is_moved);
+            return (!is_place).then_some((Quantity::Feet, element, false, leg.is_none()));
+        }
+        if let Some(leg) = leg {
+            let joint = joint.or(number.filter(|number| *number < 3))?;
+            return Some((kind, 3 * leg + joint, false, false));
+        }
+        if let (Some(leg @ 0..4), Some(joint @ 0..3)) =
+            (self.after("leg"), self.after("joint motor"))
+        {
+            return Some((kind, 3 * leg + joint, false, true));
+        }
+        let of_body = has("imu body base trunk com torso pose odom twist");
+        let of_axes = has(QUATERNION) && !has("q") || has(ANGULAR) || has("gyro gyroscope omega");
+        let in_array = axis.is_none() && !of_body && !of_axes && has(JOINT_ARRAYS);
+        match number.filter(|number| in_array && *number <= 12) {
+            Some(number) => Some((kind, number, false, true)),
+            None => self.of_trunk(kind),
+        }
+    }
+
+    /// An element of a quantity of the trunk, whose names are those of a joint's quantity of this kind.
+    fn of_trunk(&self, kind: Quantity) -> Option<Meaning> {
+        let has = |known| self.has(known);
+        let (axis, number) = (self.axis(), self.number());
+        let by_angle = has("roll pitch yaw rpy euler");
+        let counted = axis.is_none();
+        if has("w") && has(QUATERNION) && !by_angle {
+            return Some((Quantity::Orientation, 0, true, false));
+        }
+        if has("quat quaternion") {
+            let element = axis.map(|axis| axis + 1);
+            let element = element.or(number.filter(|number| *number < 4))?;
+            return Some((Quantity::Orientation, element, true, counted));
+        }
+        let element = axis.or(number.filter(|number| *number < 3))?;
+        let of_quaternion = Some((Quantity::Orientation, element + 1, true, counted));
+        let angular = by_angle || has(ANGULAR) || has(ANGULAR_VELOCITY);
+        let rate = has(ANGULAR_VELOCITY) || kind == Quantity::JointVelocity;
+        let quantity = match (angular, kind) {
+            (_, Quantity::JointTorque) => return None,
+            (true, Quantity::JointAcceleration) => Quantity::AngularAcceleration,
+            (false, Quantity::JointAcceleration) => Quantity::BodyAcceleration,
+            (true, _) if rate => Quantity::AngularVelocity,
+            (true, _) if by_angle => Quantity::Orientation,
+            // `Body angular Position x`; a bare `orientation.x` is one of a quaternion.
+            (true, _) if has("position pos angle angular") => Quantity::Orientation,
+            (true, _) => return of_quaternion,
+            (false, _) if rate => Quantity::BodyVelocity,
+            (false, _) if has("q") => return of_quaternion,
+            (false, _) if has(PLACE) || self.0.len() == 1 => Quantity::BodyPosition,
+            (false, _) => return None,
+        };
+        Some((quantity, element, false, counted))
+    }
 }
 
-/// The element of a quantity of the trunk.
-fn body(
-    words: &[String],
-    axis: Option<usize>,
-    number: Option<usize>,
-    kind: Quantity,
-    reading: impl Fn(Quantity, usize, bool, bool) -> Option<Reading>,
-) -> Option<Reading> {
-    let has = |known: &str| words.iter().any(|word| is_one(word, known));
-    let by_angle = has("roll pitch yaw rpy euler");
-    let counted = axis.is_none();
-    let is_real = has("w") && has(QUATERNION);
-    if is_real && !by_angle {
-        return reading(Quantity::Orientation, 0, true, false);
-    }
-    if has("quat quaternion") {
-        return match (axis, number) {
-            (Some(axis), _) => reading(Quantity::Orientation, axis + 1, true, false),
-            (None, Some(number)) if number < 4 => {
-                reading(Quantity::Orientation, number, true, true)
-            }
-            (None, _) => None,
-        };
-    }
-    let element = axis.or(number.filter(|number| *number < 3))?;
-    let angular = by_angle || has(ANGULAR) || has(ANGULAR_VELOCITY);
-    let rate = has(ANGULAR_VELOCITY) || kind == Quantity::JointVelocity;
-    let quantity = match (angular, kind) {
-        (_, Quantity::JointTorque) => return None,
-        (true, Quantity::JointAcceleration) => Quantity::AngularAcceleration,
-        (false, Quantity::JointAcceleration) => Quantity::BodyAcceleration,
-        (true, _) if rate => Quantity::AngularVelocity,
-        (true, _) if by_angle => Quantity::Orientation,
-        // `Body angular Position x`; a bare `orientation.x` is one of a quaternion.
-        (true, _) if has("position pos angle angular") => Quantity::Orientation,
-        (true, _) => return reading(Quantity::Orientation, element + 1, true, counted),
-        (false, _) if rate => Quantity::BodyVelocity,
-        (false, _) if has("q") => {
-            return reading(Quantity::Orientation, element + 1, true, counted);
-        }
-        (false, _) if has(PLACE) || words.len() == 1 => Quantity::BodyPosition,
-        (false, _) => return None,
-    };
-    reading(quantity, element, false, counted)
+/// An element of MuJoCo's lists of a floating robot: place, quaternion, joints; or of a list `c` of contacts.
+fn in_list(list: &str, number: usize) -> Option<Meaning> {
+    Some(match (list, number) {
+        ("qpos", 0..3) => (Quantity::BodyPosition, number, false, false),
+        ("qpos", 3..7) => (Quantity::Orientation, number - 3, true, false),
+        ("qpos", 7..19) => (Quantity::JointPosition, number - 7, false, true),
+        ("qvel", 0..3) => (Quantity::BodyVelocity, number, false, false),
+        ("qvel", 3..6) => (Quantity::AngularVelocity, number - 3, false, false),
+        ("qvel", 6..18) => (Quantity::JointVelocity, number - 6, false, true),
+        ("c", 0..4) => (Quantity::Feet, number, false, true),
+        _ => return None,
+    })
 }
 
 /// Joins `front right`, `Co M`, `d Q` and the like to one word.
@@ -355,58 +351,50 @@ mod tests {
 
     #[test]
     fn read_names_of_many_loggers() {
-        for (name, expected) in [
-            ("FR_hip_joint/position", (Quantity::JointPosition, 0)),
-            ("position[RL_calf_joint]", (Quantity::JointPosition, 11)),
-            ("effort[LF_HFE]", (Quantity::JointTorque, 4)),
-            ("motor_state[4].dq", (Quantity::JointVelocity, 4)),
-            ("q_11", (Quantity::JointPosition, 11)),
-            ("tau3", (Quantity::JointTorque, 3)),
-            ("front_right.knee.vel", (Quantity::JointVelocity, 2)),
-            ("RearLeft thigh angle (deg)", (Quantity::JointPosition, 10)),
-            ("fl.hip_pitch.torque", (Quantity::JointTorque, 4)),
-            ("pose.pose.position.z", (Quantity::BodyPosition, 2)),
-            ("pose.pose.orientation.w", (Quantity::Orientation, 0)),
-            ("pose.pose.orientation.z", (Quantity::Orientation, 3)),
-            ("twist.twist.linear.y", (Quantity::BodyVelocity, 1)),
-            ("twist.twist.angular.y", (Quantity::AngularVelocity, 1)),
-            ("imu_state.quaternion[2]", (Quantity::Orientation, 2)),
-            ("imu_state.gyroscope[0]", (Quantity::AngularVelocity, 0)),
-            ("qw", (Quantity::Orientation, 0)),
-            ("qx", (Quantity::Orientation, 1)),
-            ("body_vx", (Quantity::BodyVelocity, 0)),
-            ("wz", (Quantity::AngularVelocity, 2)),
-            ("base_pitch", (Quantity::Orientation, 1)),
-            ("yaw_rate", (Quantity::AngularVelocity, 2)),
-            ("foot_force[3]", (Quantity::Feet, 3)),
-            ("contact_RL", (Quantity::Feet, 3)),
-            ("fr Foot", (Quantity::Feet, 0)),
-            ("Body angular Position z", (Quantity::Orientation, 2)),
-            ("Body linear Velocity x", (Quantity::BodyVelocity, 0)),
-            ("com_z", (Quantity::BodyPosition, 2)),
-            ("CoM Z", (Quantity::BodyPosition, 2)),
-            ("p_y", (Quantity::BodyPosition, 1)),
-            ("qpos[2]", (Quantity::BodyPosition, 2)),
-            ("qpos[3]", (Quantity::Orientation, 0)),
-            ("qpos[18]", (Quantity::JointPosition, 11)),
-            ("qvel_5", (Quantity::AngularVelocity, 2)),
-            ("qvel_6", (Quantity::JointVelocity, 0)),
-            ("ctrl[4]", (Quantity::JointTorque, 4)),
-            ("dof_vel[7]", (Quantity::JointVelocity, 7)),
-            ("leg1_joint2_torque", (Quantity::JointTorque, 5)),
-            ("FRHipPos", (Quantity::JointPosition, 0)),
-            ("dQ_3", (Quantity::JointVelocity, 3)),
-            ("theta", (Quantity::Orientation, 1)),
-            ("psi_dot", (Quantity::AngularVelocity, 2)),
-            ("Fz RF", (Quantity::Feet, 0)),
-            ("F_RL [N]", (Quantity::Feet, 3)),
-            ("FL load (N)", (Quantity::Feet, 1)),
-            ("tau_RR_knee [Nm]", (Quantity::JointTorque, 8)),
-            ("base vx [m/s]", (Quantity::BodyVelocity, 0)),
-            ("pitch rate [deg/s]", (Quantity::AngularVelocity, 1)),
-            ("c_2", (Quantity::Feet, 2)),
+        for (quantity, names) in [
+            (
+                Quantity::JointPosition,
+                "FR_hip_joint/position = 0; position[RL_calf_joint] = 11; q_11 = 11; RearLeft thigh angle \
+                 (deg) = 10; qpos[18] = 11; FRHipPos = 0",
+            ),
+            (
+                Quantity::JointTorque,
+                "effort[LF_HFE] = 4; tau3 = 3; fl.hip_pitch.torque = 4; ctrl[4] = 4; leg1_joint2_torque = \
+                 5; tau_RR_knee [Nm] = 8",
+            ),
+            (
+                Quantity::JointVelocity,
+                "motor_state[4].dq = 4; front_right.knee.vel = 2; qvel_6 = 0; dof_vel[7] = 7; dQ_3 = 3",
+            ),
+            (
+                Quantity::BodyPosition,
+                "pose.pose.position.z = 2; com_z = 2; CoM Z = 2; p_y = 1; qpos[2] = 2",
+            ),
+            (
+                Quantity::Orientation,
+                "pose.pose.orientation.w = 0; pose.pose.orientation.z = 3; imu_state.quaternion[2] = 2; qw \
+                 = 0; qx = 1; base_pitch = 1; Body angular Position z = 2; qpos[3] = 0; theta = 1",
+            ),
+            (
+                Quantity::BodyVelocity,
+                "twist.twist.linear.y = 1; body_vx = 0; Body linear Velocity x = 0; base vx [m/s] = 0",
+            ),
+            (
+                Quantity::AngularVelocity,
+                "twist.twist.angular.y = 1; imu_state.gyroscope[0] = 0; wz = 2; yaw_rate = 2; qvel_5 = 2; \
+                 psi_dot = 2; pitch rate [deg/s] = 1",
+            ),
+            (
+                Quantity::Feet,
+                "foot_force[3] = 3; contact_RL = 3; fr Foot = 0; Fz RF = 0; F_RL [N] = 3; FL load (N) = 1; \
+                 c_2 = 2",
+            ),
         ] {
-            assert_eq!(said(name), Some(expected), "{name}");
+            for entry in names.split("; ") {
+                let (name, element) = entry.rsplit_once(" = ").expect("an element");
+                let element = element.parse().expect("a number");
+                assert_eq!(said(name), Some((quantity, element)), "{name}");
+            }
         }
     }
 

@@ -3,11 +3,10 @@
 //!
 //! Everything is tried on one recording that is read without scales; its rows are scaled here.
 
-use nalgebra::{Rotation3, Unit, Vector3};
+use nalgebra::Vector3;
 
-use super::super::units::Dimension;
-use crate::recording::mismatch::{foot_place, stances};
-use crate::recording::preprocess::median;
+use super::super::elements::Dimension;
+use crate::recording::mismatch::{foot_place, hip_torque, median_place, stances};
 use crate::recording::segment::stretches;
 use crate::recording::{Recording, Segment};
 use crate::robot::input_rule::rotation;
@@ -34,7 +33,6 @@ const HIP_SHARE: f64 = 0.3;
 /// Largest movement of feet on the ground in a reading that fits, m.
 const FITS_M: f64 = 0.05;
 
-/// A unit and its factor.
 pub(super) type NamedUnit = (&'static str, f64);
 
 /// How columns are read: units of the trunk's position and the joints' angles, whether joints are grouped by their kind,
@@ -54,8 +52,7 @@ pub(super) struct Reading {
 }
 
 impl Reading {
-    /// With these units, nothing turned or exchanged.
-    pub fn plain(position: NamedUnit, joint: NamedUnit) -> Self {
+    pub(crate) fn plain(position: NamedUnit, joint: NamedUnit) -> Self {
         Self {
             position,
             joint,
@@ -69,7 +66,7 @@ impl Reading {
 
     /// Whether it is better than a plainer one by more than chance: feet move less compared with what they would on stiff
     /// legs, whatever the units.
-    pub fn beats(&self, other: &Self) -> bool {
+    pub(crate) fn beats(&self, other: &Self) -> bool {
         let figure = |reading: &Self| match reading.motion_m > LEAST_MOTION_M {
             true => reading.slip_m / reading.motion_m,
             false => 1.0,
@@ -77,13 +74,11 @@ impl Reading {
         figure(self) < BETTER.0 * figure(other)
     }
 
-    /// Whether feet on the ground stay in place in it.
-    pub fn fits(&self) -> bool {
+    pub(crate) fn fits(&self) -> bool {
         self.slip_m < FITS_M
     }
 
-    /// The row of a joint among the columns.
-    pub fn row(&self, joint: usize) -> usize {
+    pub(crate) fn row(&self, joint: usize) -> usize {
         match self.by_kind {
             true => 4 * (joint % 3) + joint / 3,
             false => joint,
@@ -91,7 +86,6 @@ impl Reading {
     }
 }
 
-/// A recording without scales, and the samples of its stances that are looked at.
 pub(super) struct View<'a> {
     robot: &'a Robot,
     recording: &'a Recording,
@@ -99,7 +93,7 @@ pub(super) struct View<'a> {
 }
 
 impl<'a> View<'a> {
-    pub fn of(recording: &'a Recording, robot: &'a Robot) -> Self {
+    pub(crate) fn of(recording: &'a Recording, robot: &'a Robot) -> Self {
         let all = recording.segments.iter();
         let all = all.flat_map(|segment| {
             stances(segment)
@@ -124,7 +118,7 @@ impl<'a> View<'a> {
 
     /// The best reading with one of these units and orders, the first choice of each unless another is clearly better;
     /// none without stances. Also others that fit as well.
-    pub fn best(
+    pub(crate) fn best(
         &self,
         positions: &[NamedUnit],
         joints: &[NamedUnit],
@@ -150,7 +144,6 @@ impl<'a> View<'a> {
         Some((chosen, all))
     }
 
-    /// A reading with the signs under which feet stay best in place.
     fn signed(&self, position: NamedUnit, joint: NamedUnit, by_kind: bool) -> Option<Reading> {
         let mut reading = Reading {
             by_kind,
@@ -216,20 +209,15 @@ impl<'a> View<'a> {
     fn motion_m(&self, reading: &Reading) -> f64 {
         let (mut sum, mut count) = (0.0, 0);
         for (segment, leg, samples) in &self.stances {
-            let stiff = samples
-                .first()
-                .map(|sample| state(segment, *sample, reading));
-            let places = samples
-                .iter()
-                .zip(stiff.iter().cycle())
-                .map(|(sample, stiff)| {
-                    let mut x = state(segment, *sample, reading);
-                    x[..JOINT_DIM].copy_from_slice(&stiff[..JOINT_DIM]);
-                    foot_place(self.robot, *leg, &x, true)
-                });
-            let places: Vec<Vector3<f64>> = places.collect();
-            sum += about_median(&places);
-            count += places.len();
+            let mut states = states(segment, samples, reading);
+            if let Some((first, others)) = states.split_first_mut() {
+                let stiff = &first[..JOINT_DIM];
+                others
+                    .iter_mut()
+                    .for_each(|x| x[..JOINT_DIM].copy_from_slice(stiff));
+            }
+            sum += self.about_median(*leg, &states);
+            count += samples.len();
         }
         (sum / f64::from(u32::try_from(count).unwrap_or(u32::MAX).max(1))).sqrt()
     }
@@ -237,35 +225,38 @@ impl<'a> View<'a> {
     /// Squared distances of a leg's foot from where it stands, summed, and their number.
     fn moved(&self, reading: &Reading, leg: Leg) -> (f64, usize) {
         let (mut sum, mut count) = (0.0, 0);
-        let limits = self.robot.joint_limit_rad();
+        let of_leg = 3 * leg.index()..3 * leg.index() + 3;
+        let limits = &self.robot.joint_limit_rad()[of_leg.clone()];
         for (segment, _, samples) in self.stances.iter().filter(|(_, own, _)| *own == leg) {
-            let mut outside = 0;
-            let places: Vec<Vector3<f64>> = (samples.iter())
-                .map(|&sample| {
-                    let x = state(segment, sample, reading);
-                    outside += (0..3)
-                        .filter(|kind| {
-                            let joint = 3 * leg.index() + kind;
-                            let (low, high) = limits[joint];
-                            !(low - 0.1..=high + 0.1).contains(&x[joint])
-                        })
-                        .count();
-                    foot_place(self.robot, leg, &x, true)
-                })
-                .collect();
-            sum += about_median(&places);
+            let states = states(segment, samples, reading);
+            let angles = states
+                .iter()
+                .flat_map(|x| joints_of(leg, x).into_iter().zip(limits));
+            let outside = angles.filter(|(q, (low, high))| !(low - 0.1..=high + 0.1).contains(q));
+            let outside = outside.count();
+            sum += self.about_median(leg, &states);
             sum += OUTSIDE_M * OUTSIDE_M * outside as f64;
-            count += places.len();
+            count += samples.len();
         }
-        let turned = (0..3)
-            .filter(|kind| reading.signs[3 * leg.index() + kind] < 0.0)
-            .count();
-        (sum + TURNED_M * TURNED_M * (turned * count) as f64, count)
+        let turned = reading.signs[of_leg].iter().filter(|sign| **sign < 0.0);
+        (
+            sum + TURNED_M * TURNED_M * (turned.count() * count) as f64,
+            count,
+        )
+    }
+
+    /// Squared distances of the places of a leg's foot in these states from their median, summed.
+    fn about_median(&self, leg: Leg, states: &[[f64; STATE_DIM]]) -> f64 {
+        let places = states.iter().map(|x| foot_place(self.robot, leg, x, true));
+        let places: Vec<Vector3<f64>> = places.collect();
+        let stands = median_place(&places);
+        let squares = places.iter().map(|place| (place - stands).norm_squared());
+        squares.sum()
     }
 
     /// Signs of the torques in romc's order and their unit: those under which feet carry the body; none where they carry
     /// nothing. Signs of the reading that feet in place do not show become those of the torques.
-    pub fn torques(&self, reading: &mut Reading) -> Option<([f64; JOINT_DIM], NamedUnit)> {
+    pub(crate) fn torques(&self, reading: &mut Reading) -> Option<([f64; JOINT_DIM], NamedUnit)> {
         let blocks = self.blocks(reading);
         let explained = |signs: [f64; 2]| {
             let mut sums = [0.0; 3];
@@ -369,13 +360,9 @@ impl<'a> View<'a> {
         x: &[f64; STATE_DIM],
         reading: &Reading,
     ) -> Option<(nalgebra::Matrix3<f64>, [f64; 3])> {
-        let first = 3 * leg.index();
-        let map = self
-            .robot
-            .damped_force_map(leg, &[x[first], x[first + 1], x[first + 2]])
-            .ok()?;
+        let map = (self.robot.damped_force_map(leg, &joints_of(leg, x))).ok()?;
         let torque = |kind: usize| {
-            let joint = first + kind;
+            let joint = 3 * leg.index() + kind;
             reading.signs[joint] * segment.torque_nm[(reading.row(joint), sample)]
         };
         Some((map, std::array::from_fn(torque)))
@@ -394,17 +381,8 @@ impl<'a> View<'a> {
                 };
                 let force =
                     map.column(1) * (signs[0] * tau[1]) + map.column(2) * (signs[1] * tau[2]);
-                let first = 3 * leg.index();
-                let jacobian = self
-                    .robot
-                    .foot_jacobian(*leg, &[x[first], x[first + 1], x[first + 2]]);
                 // What flexion and knee give lies in the leg's plane.
-                let links = self.robot.geometry(*leg).links();
-                let axis = Unit::new_normalize(links.abduction);
-                let normal = Rotation3::from_axis_angle(&axis, x[first]) * links.flexion;
-                let lever = -jacobian
-                    .column(0)
-                    .dot(&(force - normal * normal.dot(&force)));
+                let lever = hip_torque(self.robot, *leg, &joints_of(*leg, &x), &force);
                 *product += tau[0] * lever;
                 *square += lever * lever;
             }
@@ -423,16 +401,15 @@ impl<'a> View<'a> {
     }
 }
 
-/// Squared distances of places from their median, summed.
-fn about_median(places: &[Vector3<f64>]) -> f64 {
-    let stands = Vector3::from_fn(|axis, _| median(places.iter().map(|place| place[axis])));
-    places
-        .iter()
-        .map(|place| (place - stands).norm_squared())
-        .sum()
+fn joints_of(leg: Leg, x: &[f64; STATE_DIM]) -> [f64; 3] {
+    std::array::from_fn(|kind| x[3 * leg.index() + kind])
 }
 
-/// The state of a sample in a reading.
+fn states(segment: &Segment, samples: &[usize], reading: &Reading) -> Vec<[f64; STATE_DIM]> {
+    let of = |sample: &usize| state(segment, *sample, reading);
+    samples.iter().map(of).collect()
+}
+
 fn state(segment: &Segment, sample: usize, reading: &Reading) -> [f64; STATE_DIM] {
     let raw = segment.state(sample);
     std::array::from_fn(|i| match i {

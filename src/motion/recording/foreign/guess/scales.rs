@@ -7,9 +7,9 @@ use nalgebra::DMatrix;
 
 use super::super::assemble::assemble;
 use super::super::attitude::{angle_rates, angles_of_quaternions, in_world, unwrap};
+use super::super::elements::Dimension;
 use super::super::elements::Quantity;
 use super::super::map::{ColumnMap, Frame};
-use super::super::units::Dimension;
 use super::columns::Group;
 use super::evidence::{Scale, axes, reach, scale, slopes};
 use super::feet::force_lines;
@@ -26,23 +26,18 @@ const LENGTHS: [&str; 3] = ["m", "cm", "mm"];
 /// Largest pitch for which radians are the first choice.
 const PITCH_RAD: f64 = 1.6;
 
-/// What the scales of a map rest on.
 pub(super) struct Scales {
-    /// Lines by quantity.
     pub lines: Lines,
     /// The order of the joints' columns, if they are counted and grouped by kind.
     pub order: Option<&'static str>,
     pub notes: Vec<String>,
 }
 
-/// How the log is read.
 struct Choice {
-    /// Index among the attitudes.
     attitude: usize,
     reading: Reading,
     /// Signs and unit of the torques, if these carry the robot.
     torques: Option<([f64; JOINT_DIM], NamedUnit)>,
-    /// Other readings that fit as well.
     as_well: Vec<Reading>,
 }
 
@@ -50,8 +45,7 @@ struct Choice {
 type Attitude = (Vec<String>, DMatrix<f64>);
 
 impl Source<'_> {
-    /// The scales of all quantities.
-    pub fn scales(&self, robot: &Robot, time: &str) -> Scales {
+    pub(crate) fn scales(&self, robot: &Robot, time: &str) -> Scales {
         let (mut lines, mut notes) = (Lines::new(), Vec::new());
         if let Some(feet) = self.group(Quantity::Feet) {
             let (own, note) = force_lines(&self.raw(feet));
@@ -132,7 +126,6 @@ impl Source<'_> {
         })
     }
 
-    /// Values of a quantity, none without it.
     fn raw_of(&self, quantity: Quantity) -> DMatrix<f64> {
         match self.group(quantity) {
             Some(group) => self.raw(group),
@@ -160,41 +153,33 @@ impl Source<'_> {
         [first].into_iter().chain(others).map(factor).collect()
     }
 
-    /// The ways in which the trunk's attitude may be read, the first choice first.
     fn attitudes(&self) -> Vec<Attitude> {
         let Some(group) = self.group(Quantity::Orientation) else {
             return Vec::new();
         };
         let values = self.raw(group);
         if group.is_quaternion {
-            let order = |last: bool, why: &str| {
-                let (name, order) = if last {
-                    ("xyzw", [3, 0, 1, 2])
-                } else {
-                    ("wxyz", [0, 1, 2, 3])
-                };
+            let attitude = |(name, order): (&str, [usize; 4]), why: &str| {
                 let angles = angles_of_quaternions(&values.select_rows(&order));
                 (vec![format!("order = \"{name}\"{why}")], angles)
             };
+            let mut orders = [("wxyz", [0, 1, 2, 3]), ("xyzw", [3, 0, 1, 2])];
             if !group.is_counted {
-                return vec![order(false, "")];
+                return vec![attitude(orders[0], "")];
             }
             // The real part of a robot on its feet is the largest, unless it looks backwards.
             let size = |row: usize| values.row(row).abs().sum();
-            let last = size(3) > size(0);
+            if size(3) > size(0) {
+                orders.reverse();
+            }
             let why = "   # feet on the ground stay in place";
-            return vec![order(last, why), order(!last, why)];
+            return orders.map(|order| attitude(order, why)).to_vec();
         }
         let of_unit = |(unit, factor): NamedUnit| (vec![unit_line(unit, "")], &values * factor);
-        let units = self.units(
-            Quantity::Orientation,
-            &["rad", "deg"],
-            &["rad", "deg"],
-            || {
-                let is_steep = reach(values.row(1).iter().copied()) > PITCH_RAD;
-                if is_steep { "deg" } else { "rad" }
-            },
-        );
+        let is_steep = || reach(values.row(1).iter().copied()) > PITCH_RAD;
+        let first = || if is_steep() { "deg" } else { "rad" };
+        let both = ["rad", "deg"];
+        let units = self.units(Quantity::Orientation, &both, &both, first);
         units.into_iter().map(of_unit).collect()
     }
 
@@ -282,7 +267,6 @@ impl Source<'_> {
         reading
     }
 
-    /// Lines of the joints' quantities.
     fn joints(
         &self,
         reading: &Reading,
@@ -300,15 +284,19 @@ impl Source<'_> {
         for (mut row, sign) in position.row_iter_mut().zip(reading.signs) {
             row *= sign;
         }
-        let all =
-            |unit: String, signs: &[f64]| [unit].into_iter().chain(sign_line(signs)).collect();
+        let mut put = |quantity, unit, why, signs: &[f64]| {
+            let own = [unit_line(unit, why)].into_iter().chain(sign_line(signs));
+            lines.insert(quantity, own.collect());
+        };
         let why = match self.told(group, &["mrad", "rad", "deg"]) {
             None if reading.joint.0 != "rad" => "   # by their size and the feet",
             Some(_) | None => "",
         };
-        lines.insert(
+        put(
             Quantity::JointPosition,
-            all(unit_line(reading.joint.0, why), &reading.signs),
+            reading.joint.0,
+            why,
+            &reading.signs,
         );
         if let Some((velocity, times)) = self.beside(Quantity::JointVelocity, group) {
             let velocity = in_order(velocity);
@@ -330,31 +318,24 @@ impl Source<'_> {
                 .filter(|_| !units.is_empty())
                 .unwrap_or(reading.joint.0);
             let why = "   # by the change of the positions";
-            lines.insert(Quantity::JointVelocity, all(unit_line(unit, why), &own));
+            put(Quantity::JointVelocity, unit, why, &own);
         }
         if let Some(group) = self.group(Quantity::JointTorque) {
             let told = self.told(group, &["nmm", "mnm", "ncm"]);
-            let (signs, unit) = match torques {
-                Some((signs, (unit, _))) => (signs, told.unwrap_or(unit)),
-                None => (reading.signs, told.unwrap_or("N m")),
+            let (signs, unit, why) = match torques {
+                Some((signs, (unit, _))) => {
+                    let why = "   # unit and signs by the weight that the feet carry";
+                    (signs, unit, why)
+                }
+                None => {
+                    let why = "   # signs as of the angles: the torques carry nothing";
+                    (reading.signs, "N m", why)
+                }
             };
-            let why = match torques {
-                Some(_) => "   # unit and signs by the weight that the feet carry",
-                None => "   # signs as of the angles: the torques carry nothing",
-            };
-            lines.insert(Quantity::JointTorque, all(unit_line(unit, why), &signs));
+            put(Quantity::JointTorque, told.unwrap_or(unit), why, &signs);
         }
     }
 
-    /// Whether a velocity is the twist of an odometry, which is in the body's frame unless the numbers show another.
-    fn is_odometry(&self, quantity: Quantity) -> bool {
-        self.group(quantity).is_some_and(|group| {
-            let first = &self.logs[group.log].columns[group.columns[0]];
-            first.name.starts_with("twist.twist.")
-        })
-    }
-
-    /// Lines of the trunk's quantities.
     fn trunk(
         &self,
         own: Vec<String>,
@@ -363,27 +344,18 @@ impl Source<'_> {
         lines: &mut Lines,
     ) {
         lines.insert(Quantity::Orientation, own);
-        let group = self.group(Quantity::Orientation);
-        if let Some((raw, times)) =
-            group.and_then(|group| self.beside(Quantity::AngularVelocity, group))
-        {
+        if let Some(group) = self.group(Quantity::Orientation) {
             let mut own = angles.clone();
             unwrap(&mut own);
-            let rates = slopes(&times, &own);
-            let is_odometry = self.is_odometry(Quantity::AngularVelocity);
-            let frames = match is_odometry {
-                true => [Frame::Body, Frame::Angles, Frame::World],
-                false => [Frame::Angles, Frame::Body, Frame::World],
-            };
-            let turned = |frame| angle_rates(&own, &raw, frame).ok();
-            let scale = axes(frames, turned, &rates, &ANGLE[..2]);
-            let own = velocity_lines(scale, "the angles", is_odometry);
-            lines.insert(Quantity::AngularVelocity, own);
+            let turned = |raw: &DMatrix<f64>, frame| angle_rates(&own, raw, frame).ok();
+            let frames = [Frame::Angles, Frame::Body, Frame::World];
+            let of = (group, &own, "the angles");
+            let velocity = (Quantity::AngularVelocity, &ANGLE[..2]);
+            self.velocity(velocity, of, &frames, turned, lines);
         }
         self.place(Some(angles), position, lines);
     }
 
-    /// Lines of the trunk's position and velocity.
     fn place(&self, angles: Option<&DMatrix<f64>>, (unit, factor): NamedUnit, lines: &mut Lines) {
         let Some(group) = self.group(Quantity::BodyPosition) else {
             return;
@@ -392,22 +364,41 @@ impl Source<'_> {
         let height = reach(values.row(2).iter().copied());
         let line = unit_line(unit, &format!("   # z reaches {height:.3}"));
         lines.insert(Quantity::BodyPosition, vec![line]);
-        if let Some((raw, times)) = self.beside(Quantity::BodyVelocity, group) {
-            let rates = slopes(&times, &(values * factor));
-            let angles = angles.filter(|angles| angles.ncols() == raw.ncols());
-            let turned = |frame| match frame {
-                Frame::Body => Some(in_world(angles?, &raw)),
-                Frame::World | Frame::Angles => Some(raw.clone()),
-            };
-            let is_odometry = self.is_odometry(Quantity::BodyVelocity);
-            let frames = match is_odometry {
-                true => [Frame::Body, Frame::World],
-                false => [Frame::World, Frame::Body],
-            };
-            let scale = axes(frames, turned, &rates, Dimension::Length.units());
-            let own = velocity_lines(scale, "the position", is_odometry);
-            lines.insert(Quantity::BodyVelocity, own);
-        }
+        let turned = |raw: &DMatrix<f64>, frame| match frame {
+            Frame::Body => {
+                let angles = angles.filter(|angles| angles.ncols() == raw.ncols())?;
+                Some(in_world(angles, raw))
+            }
+            Frame::World | Frame::Angles => Some(raw.clone()),
+        };
+        let velocity = (Quantity::BodyVelocity, Dimension::Length.units());
+        let of = (group, &(values * factor), "the position");
+        self.velocity(velocity, of, &[Frame::World, Frame::Body], turned, lines);
+    }
+
+    /// Lines of a velocity of the trunk, whose positions have this group and these values: unit, sign and axes, of
+    /// `frames` the first that fits nearly as well as the best.
+    fn velocity(
+        &self,
+        (velocity, units): (Quantity, &[NamedUnit]),
+        (group, positions, of): (&Group, &DMatrix<f64>, &str),
+        frames: &[Frame],
+        turned: impl Fn(&DMatrix<f64>, Frame) -> Option<DMatrix<f64>>,
+        lines: &mut Lines,
+    ) {
+        let Some((raw, times)) = self.beside(velocity, group) else {
+            return;
+        };
+        // The twist of an odometry is in the body's frame unless the numbers show another.
+        let is_odometry = self.group(velocity).is_some_and(|group| {
+            let first = &self.logs[group.log].columns[group.columns[0]];
+            first.name.starts_with("twist.twist.")
+        });
+        let mut frames = frames.to_vec();
+        frames.sort_by_key(|frame| is_odometry && *frame != Frame::Body);
+        let rates = slopes(&times, positions);
+        let found = axes(&frames, |frame| turned(&raw, frame), &rates, units);
+        lines.insert(velocity, velocity_lines(found, of, is_odometry));
     }
 }
 
@@ -442,7 +433,6 @@ fn said(reading: &Reading, as_well: &[Reading]) -> Vec<String> {
     notes
 }
 
-/// The signs of joints, if any is negative.
 fn sign_line(signs: &[f64]) -> Option<String> {
     let negative: Vec<usize> = (0..signs.len()).filter(|i| signs[*i] < 0.0).collect();
     if negative.is_empty() {
@@ -458,7 +448,6 @@ fn sign_line(signs: &[f64]) -> Option<String> {
     Some(format!("sign = {{ {} }}", names.join(", ")))
 }
 
-/// Unit, sign and axes of a velocity of the trunk.
 fn velocity_lines(found: Option<(Scale, Frame)>, of: &str, is_odometry: bool) -> Vec<String> {
     let Some((scale, axes)) = found else {
         let (sign, what) = match is_odometry {
@@ -484,7 +473,6 @@ fn velocity_lines(found: Option<(Scale, Frame)>, of: &str, is_odometry: bool) ->
     lines
 }
 
-/// The order of a quantity of joints whose columns are counted.
 pub(super) fn order_line(order: Option<&str>, group: &Group) -> Option<String> {
     match order {
         Some(order) => Some(format!(

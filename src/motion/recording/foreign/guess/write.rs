@@ -5,18 +5,17 @@ use std::path::Path;
 
 use nalgebra::DMatrix;
 
+use super::super::elements::Dimension;
 use super::super::elements::Quantity;
 use super::super::log::Log;
 use super::super::map::Name;
-use super::super::units::Dimension;
 use super::Guess;
-use super::columns::{Clock, Group, clock, groups, is_unitree};
+use super::columns::{Clock, Group, clock, groups};
 use super::evidence::{scale, slopes};
 use super::names::unit;
 use super::scales::{Scales, order_line};
 use crate::robot::Robot;
 
-/// The lines of tables.
 pub(super) type Lines = BTreeMap<Quantity, Vec<String>>;
 
 /// The guessed map of logs; what reading by it gives is not known yet.
@@ -29,19 +28,7 @@ pub(super) fn guessed(path: &Path, logs: &[Log], robot: &Robot) -> Guess {
         groups: &groups,
         clock: clock.as_ref(),
     };
-    let time = match &clock {
-        None => {
-            "# sample_time_s = 0.001   # no column counts time: the distance of samples".to_owned()
-        }
-        Some(_) if logs[groups[0].log].clock.is_some() => {
-            "# each topic has the time stamps of its messages".to_owned()
-        }
-        Some(clock) => format!(
-            "column = {}\nunit = \"{}\"",
-            quoted(&clock.name),
-            clock.unit
-        ),
-    };
+    let time = source.time();
     let mut text = format!(
         "# Guessed from {}: check every line, then `romc inspect LOG --columns THIS.toml`.\n\n[time]\n{time}\n",
         path.file_name().unwrap_or_default().to_string_lossy(),
@@ -57,34 +44,20 @@ pub(super) fn guessed(path: &Path, logs: &[Log], robot: &Robot) -> Guess {
     let mut open = Vec::new();
     for group in &sound {
         let key = group.quantity.key();
-        let mut lines = source.columns(group);
-        if group.quantity == Quantity::Feet && group.is_counted {
-            let order = "order = \"fr fl rr rl\"   # assumed: the columns are only counted";
-            lines.push(order.to_owned());
-        } else if group.quantity.is_of_joints() {
-            lines.extend(order_line(order, group));
-        }
-        lines.extend(scales.remove(&group.quantity).unwrap_or_default());
-        lines.extend(
-            group
-                .others
-                .iter()
-                .map(|other| format!("# by their names also: {other}")),
-        );
+        let scales = scales.remove(&group.quantity).unwrap_or_default();
+        let lines = source.lines(group, order, scales).join("\n");
+        text.push_str(&format!("\n[{key}]\n{lines}\n"));
         if !group.others.is_empty() {
             let note = format!("{key}: by their names also {}", group.others.join(", "));
             open.extend(group.is_tie.then(|| note.clone()));
             notes.push(note);
         }
-        let is_by_leg = group.quantity.is_of_joints() || group.quantity == Quantity::Feet;
-        if group.is_counted && is_by_leg && !is_unitree(&logs[group.log]) {
+        if group.is_unnamed(logs) {
             let name = &logs[group.log].columns[group.columns[0]].name;
             open.push(format!(
                 "{key}: columns such as `{name}`, which are only counted"
             ));
         }
-        let lines = lines.join("\n");
-        text.push_str(&format!("\n[{key}]\n{lines}\n"));
     }
     let is_missing = |quantity: &Quantity| {
         quantity.is_required() && sound.iter().all(|group| group.quantity != *quantity)
@@ -110,7 +83,6 @@ fn quoted(name: &str) -> String {
     serde_json::Value::from(name).to_string()
 }
 
-/// The log and what its names say.
 pub(super) struct Source<'a> {
     pub path: &'a Path,
     pub logs: &'a [Log],
@@ -123,24 +95,27 @@ pub(super) fn unit_line(unit: &str, why: &str) -> String {
 }
 
 impl Source<'_> {
-    pub fn group(&self, quantity: Quantity) -> Option<&Group> {
+    pub(crate) fn group(&self, quantity: Quantity) -> Option<&Group> {
         self.groups.iter().find(|group| group.quantity == quantity)
     }
 
-    /// The unit that the names of a group carry.
-    pub fn told(&self, group: &Group, units: &[&'static str]) -> Option<&'static str> {
+    pub(crate) fn told(&self, group: &Group, units: &[&'static str]) -> Option<&'static str> {
         let columns = &self.logs[group.log].columns;
         unit(&columns[group.columns[0]].name, units)
     }
 
     /// Values of a group and their times, if they share the log of `with`.
-    pub fn beside(&self, quantity: Quantity, with: &Group) -> Option<(DMatrix<f64>, Vec<f64>)> {
+    pub(crate) fn beside(
+        &self,
+        quantity: Quantity,
+        with: &Group,
+    ) -> Option<(DMatrix<f64>, Vec<f64>)> {
         let group = self.group(quantity).filter(|group| group.log == with.log)?;
         Some((self.raw(group), self.times_s(group.log)?))
     }
 
     /// Values of a group in the units of the log, one row a column.
-    pub fn raw(&self, group: &Group) -> DMatrix<f64> {
+    pub(crate) fn raw(&self, group: &Group) -> DMatrix<f64> {
         let log = &self.logs[group.log];
         DMatrix::from_fn(group.columns.len(), log.len(), |row, sample| {
             let value = log.columns[group.columns[row]].values[sample];
@@ -148,8 +123,7 @@ impl Source<'_> {
         })
     }
 
-    /// Times of a log in s.
-    pub fn times_s(&self, log: usize) -> Option<Vec<f64>> {
+    pub(crate) fn times_s(&self, log: usize) -> Option<Vec<f64>> {
         let (log, clock) = (&self.logs[log], self.clock?);
         let (column, factor) = match log.clock {
             Some(column) => (column, 1.0),
@@ -162,8 +136,7 @@ impl Source<'_> {
         Some(times.into_iter().map(|time| factor * time).collect())
     }
 
-    /// The file and the columns of a group.
-    pub fn columns(&self, group: &Group) -> Vec<String> {
+    pub(crate) fn columns(&self, group: &Group) -> Vec<String> {
         let log = &self.logs[group.log];
         let mut lines = Vec::new();
         if self.logs.len() > 1 {
@@ -179,6 +152,35 @@ impl Source<'_> {
             [row] => format!("columns = [{row}]"),
             _ => format!("columns = [\n    {},\n]", rows.join(",\n    ")),
         });
+        lines
+    }
+
+    /// The lines of the clock.
+    fn time(&self) -> String {
+        let stamped = "# each topic has the time stamps of its messages";
+        let uncounted =
+            "# sample_time_s = 0.001   # no column counts time: the distance of samples";
+        match self.clock {
+            None => uncounted.to_owned(),
+            Some(_) if self.logs[self.groups[0].log].clock.is_some() => stamped.to_owned(),
+            Some(Clock { name, unit }) => {
+                format!("column = {}\nunit = \"{unit}\"", quoted(name))
+            }
+        }
+    }
+
+    /// The lines of a group's table.
+    fn lines(&self, group: &Group, order: Option<&str>, scales: Vec<String>) -> Vec<String> {
+        let mut lines = self.columns(group);
+        if group.quantity == Quantity::Feet && group.is_counted {
+            let order = "order = \"fr fl rr rl\"   # assumed: the columns are only counted";
+            lines.push(order.to_owned());
+        } else if group.quantity.is_of_joints() {
+            lines.extend(order_line(order, group));
+        }
+        lines.extend(scales);
+        let others = group.others.iter();
+        lines.extend(others.map(|other| format!("# by their names also: {other}")));
         lines
     }
 

@@ -1,0 +1,193 @@
+//! The elementary functions, each a row of a table.
+
+use std::fmt;
+
+use super::interval::Interval;
+use super::node::ExprId;
+use super::number::Number;
+use super::pool::ExprPool;
+
+/// The elementary functions. Arguments are real, in radians where they are angles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[allow(missing_docs, reason = "the names say it")]
+pub enum Function {
+    Sin,
+    Cos,
+    Tan,
+    Tanh,
+    Exp,
+    /// Natural logarithm.
+    Log,
+    /// Non-negative square root.
+    Sqrt,
+    Abs,
+    /// `-1`, `0` or `1`: the derivative of [`Function::Abs`].
+    Sign,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Parity {
+    /// `f(-x) = f(x)`.
+    Even,
+    /// `f(-x) = -f(x)`.
+    Odd,
+    Neither,
+}
+
+/// What the algebra uses of a function.
+pub(super) struct Row {
+    function: Function,
+    /// Names in the term grammar; the first is printed.
+    names: &'static [&'static str],
+    pub(super) parity: Parity,
+    value: fn(f64) -> f64,
+    pub(super) image: fn(Interval) -> Interval,
+    /// Whether slopes are bounded on an interval of arguments, and no jump lies in it.
+    pub(super) is_lipschitz: fn(Interval) -> bool,
+    /// `f'(x)`, given `x` and `f(x)`, written with the latter where that saves work.
+    pub(super) derivative: fn(&mut ExprPool, ExprId, ExprId) -> ExprId,
+}
+
+const ROWS: [Row; 9] = [
+    Row {
+        function: Function::Sin,
+        names: &["sin"],
+        parity: Parity::Odd,
+        value: f64::sin,
+        image: |x| x.oscillation(f64::sin, 0.5),
+        is_lipschitz: |_| true,
+        derivative: |pool, x, _| pool.apply(Function::Cos, x),
+    },
+    Row {
+        function: Function::Cos,
+        names: &["cos"],
+        parity: Parity::Even,
+        value: f64::cos,
+        image: |x| x.oscillation(f64::cos, 0.0),
+        is_lipschitz: |_| true,
+        derivative: |pool, x, _| {
+            let sine = pool.apply(Function::Sin, x);
+            pool.neg(sine)
+        },
+    },
+    Row {
+        function: Function::Tan,
+        names: &["tan"],
+        parity: Parity::Odd,
+        value: f64::tan,
+        image: Interval::tan,
+        is_lipschitz: |x| x.tan() != Interval::ENTIRE,
+        derivative: |pool, _, value| {
+            let square = pool.powi(value, 2);
+            pool.add(ExprId::ONE, square)
+        },
+    },
+    Row {
+        function: Function::Tanh,
+        names: &["tanh"],
+        parity: Parity::Odd,
+        value: f64::tanh,
+        image: |x| {
+            x.increasing(f64::tanh)
+                .intersection(Interval::new(-1.0, 1.0))
+        },
+        is_lipschitz: |_| true,
+        derivative: |pool, _, value| {
+            let square = pool.powi(value, 2);
+            pool.sub(ExprId::ONE, square)
+        },
+    },
+    Row {
+        function: Function::Exp,
+        names: &["exp"],
+        parity: Parity::Neither,
+        value: f64::exp,
+        image: Interval::exp,
+        is_lipschitz: |_| true,
+        derivative: |_, _, value| value,
+    },
+    Row {
+        function: Function::Log,
+        names: &["log", "ln"],
+        parity: Parity::Neither,
+        value: f64::ln,
+        image: Interval::log,
+        is_lipschitz: |x| x.lo() > 0.0,
+        derivative: |pool, x, _| pool.powi(x, -1),
+    },
+    Row {
+        function: Function::Sqrt,
+        names: &["sqrt"],
+        parity: Parity::Neither,
+        value: f64::sqrt,
+        image: Interval::sqrt,
+        is_lipschitz: |x| x.lo() > 0.0,
+        derivative: |pool, _, value| {
+            let reciprocal = pool.powi(value, -1);
+            pool.scale(Number::HALF, reciprocal)
+        },
+    },
+    Row {
+        function: Function::Abs,
+        names: &["abs"],
+        parity: Parity::Even,
+        value: f64::abs,
+        image: Interval::abs,
+        is_lipschitz: |_| true,
+        derivative: |pool, x, _| pool.apply(Function::Sign, x),
+    },
+    Row {
+        function: Function::Sign,
+        names: &["sign", "sgn"],
+        parity: Parity::Odd,
+        // f64::signum gives 1 for zero.
+        value: |x| if x == 0.0 { 0.0 } else { x.signum() },
+        image: Interval::sign,
+        is_lipschitz: |x| !x.contains(0.0),
+        derivative: |_, _, _| ExprId::ZERO,
+    },
+];
+
+impl Function {
+    /// All functions, in the order in which sums list them.
+    pub const ALL: [Function; ROWS.len()] = {
+        let mut all = [Function::Sin; ROWS.len()];
+        let mut place = 0;
+        while place < ROWS.len() {
+            all[place] = ROWS[place].function;
+            assert!(all[place] as usize == place);
+            place += 1;
+        }
+        all
+    };
+
+    pub(super) fn row(self) -> &'static Row {
+        &ROWS[self as usize]
+    }
+
+    pub(crate) fn name(self) -> &'static str {
+        self.row().names[0]
+    }
+
+    /// The function of that name; `ln` and `sgn` are names of the logarithm and the sign too.
+    pub fn by_name(name: &str) -> Option<Function> {
+        let row = ROWS.iter().find(|row| row.names.contains(&name))?;
+        Some(row.function)
+    }
+
+    /// The value at `argument`; NaN or infinite where the function has none.
+    pub fn evaluate(self, argument: f64) -> f64 {
+        (self.row().value)(argument)
+    }
+
+    /// Whether it is zero where its argument is; in floats, nowhere else: none is a multiple of pi.
+    pub(super) fn vanishes_at_zero(self) -> bool {
+        self.evaluate(0.0) == 0.0
+    }
+}
+
+impl fmt::Display for Function {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(self.name())
+    }
+}
