@@ -22,7 +22,6 @@ const MAX_RANK: usize = 32;
 
 type Archive<'b> = ZipArchive<Cursor<&'b [u8]>>;
 
-/// Opens a file; only the headers of its arrays are read.
 pub(super) fn open<'b>(file: &str, bytes: &'b [u8]) -> Result<TensorFile<'b>, ImportError> {
     let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(|e| damaged(file, e))?;
     if archive.has_duplicate_names() {
@@ -45,7 +44,6 @@ fn damaged(file: &str, error: impl Display) -> ImportError {
     error::damaged(file, "npz", &error.to_string())
 }
 
-/// Describes a member; `None` for one that is no array.
 fn describe(
     file: &str,
     archive: &mut Archive<'_>,

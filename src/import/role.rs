@@ -17,7 +17,6 @@ pub enum Part {
 impl Part {
     pub(super) const ALL: [Self; 2] = [Part::Encoder, Part::Decoder];
 
-    /// Whether a tensor lies in the module of this map.
     pub(super) fn holds(self, name: &str) -> bool {
         let mut modules = name.split(['.', '/']);
         modules.next_back();
@@ -76,7 +75,6 @@ const OF_PHASES: [(&str, fn(String) -> Role); 5] = [
     ("input_mean", Role::InputMean),
     ("input_covariance", Role::InputCovariance),
 ];
-/// Parts of which a model has one.
 const SINGLE: [Role; 5] = [
     Role::StateScaling,
     Role::InputScaling,

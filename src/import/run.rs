@@ -108,7 +108,6 @@ pub(super) fn check_size(file: &str, bytes: &[u8], max: u64) -> Result<(), Impor
     }
 }
 
-/// The equations of a file in memory, their right sides not looked at.
 fn sections(
     file: &str,
     format: Format,
@@ -153,7 +152,6 @@ pub fn read_equations(
     Ok(read)
 }
 
-/// From the parts to the model; the report has the file, its kind and the decisions.
 fn finish(
     parts: Parts,
     report: ImportReport,

@@ -15,7 +15,6 @@ pub(super) enum Element {
     F32,
     F64,
     Bool,
-    /// Any other type, by its name in the file.
     Other(String),
 }
 
@@ -55,7 +54,6 @@ pub(super) struct TensorInfo {
 }
 
 impl TensorInfo {
-    /// `net.0.weight (18 x 4)`.
     pub(super) fn describe(&self) -> String {
         format!("`{}` ({})", self.name, shape_text(&self.shape))
     }
@@ -68,7 +66,6 @@ impl TensorInfo {
         }
     }
 
-    /// The index of the number at a position of the file.
     fn index_of(&self, position: usize) -> Vec<usize> {
         let mut rest = position;
         let mut index = vec![0; self.shape.len()];
@@ -96,7 +93,6 @@ pub(super) struct TensorFile<'b> {
 }
 
 impl<'b> TensorFile<'b> {
-    /// The tensors that a container describes; numbers are read one tensor at a time.
     pub(super) fn new(
         file: &str,
         mut infos: Vec<TensorInfo>,
@@ -177,7 +173,6 @@ impl<'b> TensorFile<'b> {
     }
 }
 
-/// One number from its bytes, as many as its type has.
 fn decode(info: &TensorInfo, number: &[u8]) -> f64 {
     let mut little = [0; 8];
     let little = &mut little[..number.len()];

@@ -71,7 +71,6 @@ fn ending(path: &Path) -> String {
     ending.to_string_lossy().to_lowercase()
 }
 
-/// The text of a file of bounded size.
 pub(super) fn text_of(path: &Path) -> Result<String, RobotFileError> {
     let text = match ending(path).as_str() {
         "toml" => read_toml(path),

@@ -199,9 +199,7 @@ struct Document<'d> {
     names: &'d SymbolNames,
     known: &'d [String],
     digits: Option<Digits>,
-    /// The phase that the last comment names.
     phase: Option<String>,
-    /// Whether it was named since the last equation.
     starts_phase: bool,
     /// The first left side of a variable that is not known.
     strange: Option<(Token, String)>,

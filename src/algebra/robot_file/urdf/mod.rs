@@ -135,7 +135,6 @@ fn places(robot: Element<'_>, tree: &Tree<'_>, legs: &Legs) -> Places {
     }
 }
 
-/// A leg along the axes of the trunk.
 fn entry(tree: &Tree<'_>, trunk: usize, leg: &Limb) -> Result<LegEntry, RobotFileError> {
     let (origin, frame) = tree.frame(trunk);
     let seen = |link: usize| {
@@ -159,7 +158,6 @@ fn entry(tree: &Tree<'_>, trunk: usize, leg: &Limb) -> Result<LegEntry, RobotFil
     })
 }
 
-/// The axis of a joint whose frame is turned so.
 fn axis(joint: &Joint<'_>, turn: Rotation3<f64>) -> Result<[f64; 3], RobotFileError> {
     let Some(element) = joint.element.child("axis")? else {
         return Ok(rounded(turn * Vector3::x()));
