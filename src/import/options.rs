@@ -32,9 +32,6 @@ pub enum Format {
 
 impl Format {
     /// The kind of a file by its ending.
-    ///
-    /// # Errors
-    /// [`ImportError`], which states how to convert files of known other kinds.
     pub(crate) fn of_path(path: &Path) -> Result<Self, ImportError> {
         let ending = (path.extension()).map(|ending| ending.to_string_lossy().to_lowercase());
         let found = match ending.as_deref() {

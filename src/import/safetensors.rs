@@ -1,11 +1,9 @@
 //! Safetensors files, such as PyTorch state dicts.
 
-use std::borrow::Cow;
-
 use safetensors::{Dtype, SafeTensors};
 
 use super::error::{ImportError, damaged};
-use super::tensors::{Element, TensorFile, TensorInfo};
+use super::tensors::{Container, Element, TensorFile, TensorInfo};
 
 /// Bytes before the header: its length.
 const LENGTH_BYTES: usize = 8;
@@ -24,11 +22,8 @@ pub(super) fn open<'b>(file: &str, bytes: &'b [u8]) -> Result<TensorFile<'b>, Im
             Dtype::BOOL => Element::Bool,
             other => Element::Other(other.to_string()),
         },
-        is_column_major: false,
-        is_big_endian: false,
-        member: 0,
         start: LENGTH_BYTES + header + info.data_offsets.0,
+        ..TensorInfo::default()
     });
-    let read = |info: &TensorInfo, length| Ok(Cow::from(&bytes[info.start..info.start + length]));
-    TensorFile::new(file, infos.collect(), Box::new(read))
+    TensorFile::new(file, infos.collect(), Container::Safetensors(bytes))
 }

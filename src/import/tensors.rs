@@ -5,14 +5,17 @@ use std::borrow::Cow;
 use nalgebra::DMatrix;
 
 use super::error::{ImportError, shape_text, too_large};
+use super::memory::{self, Tensor};
+use super::npz;
 use crate::files::Place;
 
 /// Largest tensor that is read: the coefficients of the largest library fit twice.
 const MAX_ELEMENTS: usize = 4 << 20;
 
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) enum Element {
     F32,
+    #[default]
     F64,
     Bool,
     Other(String),
@@ -39,7 +42,7 @@ impl Element {
     }
 }
 
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct TensorInfo {
     pub(super) name: String,
     pub(super) shape: Vec<usize>,
@@ -81,22 +84,25 @@ impl TensorInfo {
     }
 }
 
-/// Hands out the bytes of a tensor's numbers, as many as its shape and type need.
-pub(super) type ByteReader<'b> =
-    dyn Fn(&TensorInfo, usize) -> Result<Cow<'b, [u8]>, ImportError> + 'b;
+/// What the numbers of tensors are in.
+pub(super) enum Container<'b> {
+    Safetensors(&'b [u8]),
+    Npz(&'b [u8]),
+    Memory(&'b [Tensor<'b>]),
+}
 
-/// A file of tensors: their descriptions, and the container's reader.
+/// A file of tensors: their descriptions, and their numbers, which are read one tensor at a time.
 pub(super) struct TensorFile<'b> {
     file: String,
     infos: Vec<TensorInfo>,
-    bytes: Box<ByteReader<'b>>,
+    container: Container<'b>,
 }
 
 impl<'b> TensorFile<'b> {
     pub(super) fn new(
         file: &str,
         mut infos: Vec<TensorInfo>,
-        bytes: Box<ByteReader<'b>>,
+        container: Container<'b>,
     ) -> Result<TensorFile<'b>, ImportError> {
         infos.sort_by(|a, b| a.name.cmp(&b.name));
         if let Some(pair) = infos.windows(2).find(|pair| pair[0].name == pair[1].name) {
@@ -105,7 +111,20 @@ impl<'b> TensorFile<'b> {
             return Err(ImportError::at(file, place, found, "different names"));
         }
         let file = file.to_owned();
-        Ok(TensorFile { file, infos, bytes })
+        Ok(TensorFile {
+            file,
+            infos,
+            container,
+        })
+    }
+
+    /// The bytes of a tensor's numbers, as many as its shape and type need.
+    fn bytes(&self, info: &TensorInfo, length: usize) -> Result<Cow<'b, [u8]>, ImportError> {
+        Ok(match self.container {
+            Container::Safetensors(bytes) => Cow::from(&bytes[info.start..info.start + length]),
+            Container::Npz(bytes) => npz::numbers(&self.file, bytes, info, length)?.into(),
+            Container::Memory(tensors) => memory::little_endian(&tensors[info.member]).into(),
+        })
     }
 
     pub(super) fn file(&self) -> &str {
@@ -160,7 +179,7 @@ impl<'b> TensorFile<'b> {
             let (max, unit) = (MAX_ELEMENTS as u64, "numbers");
             return Err(too_large(&self.file, place(&[]), max, unit));
         };
-        let bytes = (self.bytes)(info, size * count)?;
+        let bytes = self.bytes(info, size * count)?;
         let numbers = bytes.chunks_exact(size);
         let values: Vec<f64> = numbers.map(|number| decode(info, number)).collect();
         match values.iter().position(|value| !value.is_finite()) {

@@ -38,9 +38,6 @@ pub(super) fn namesake(robot: &Robot) -> Option<String> {
 
 /// The robot of an entry from a file. Numbers other than those of romc's robot of that name make it another robot,
 /// with the kind of the file in its name.
-///
-/// # Errors
-/// [`RobotFileError`] with the part that is wrong, or for a name that a user `chose` and romc's own robot has.
 pub(super) fn identified(
     file: &str,
     mut entry: RobotEntry,

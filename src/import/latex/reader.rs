@@ -93,9 +93,6 @@ pub(super) fn is_blank(kind: &Kind) -> bool {
 
 impl<'a> Reader<'a> {
     /// A reader of one display's tokens.
-    ///
-    /// # Errors
-    /// [`ImportError`] for braces without partner.
     pub(super) fn new(file: &'a str, names: &'a SymbolNames, tokens: &[Token]) -> Read<Self> {
         let tokens = without_split_delimiters(tokens);
         let end = tokens.len();

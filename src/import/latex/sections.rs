@@ -15,9 +15,6 @@ const DISTINCTIONS: &str = "cases dcases array";
 ///
 /// `known` are names of phases, which labels may end in; the phase of a comment `Phase NAME` (a
 /// heading in Markdown) goes before that of a label.
-///
-/// # Errors
-/// [`ImportError`] with the place, what was found and what was expected.
 pub(in crate::import) fn read(
     file: &str,
     bytes: &[u8],

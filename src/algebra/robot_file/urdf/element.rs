@@ -25,9 +25,6 @@ pub(super) struct Element<'x> {
 }
 
 /// The document of a text.
-///
-/// # Errors
-/// [`RobotFileError`] with the character that breaks XML, or the first sign of a xacro, which is no URDF yet.
 pub(super) fn document<'x>(file: &str, text: &'x str) -> Result<Document<'x>, RobotFileError> {
     let document = Document::parse(text).map_err(|error| {
         // A prefix that nothing declares; macros of included files have none.

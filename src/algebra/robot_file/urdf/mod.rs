@@ -31,9 +31,6 @@ pub(super) struct Reading {
 }
 
 /// Reads a URDF; `name` is the robot's, if not the file's, `feet` are links, empty to find them.
-///
-/// # Errors
-/// [`RobotFileError`] with the element that is wrong or missing.
 pub(super) fn read(
     file: &str,
     text: &str,
@@ -68,9 +65,6 @@ pub(super) fn read(
 }
 
 /// Where the body's frame is if not at the root, and which parts have no mass.
-///
-/// # Errors
-/// [`RobotFileError`] if the trunk has none.
 fn notes(tree: &Tree<'_>, legs: &Legs) -> Result<Vec<String>, RobotFileError> {
     let (trunk, body) = (&tree.links[legs.trunk], tree.body(legs.top));
     if tree.mass(&body.links) == 0.0 {
