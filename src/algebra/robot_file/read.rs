@@ -90,9 +90,7 @@ pub fn from_text(
     options: &RobotOptions<'_>,
 ) -> Result<RobotReading, RobotFileError> {
     if ending(Path::new(file)) != "toml" {
-        let reading = urdf::read(file, text, options.feet, options.name)?;
-        let (entry, places) = (reading.entry, &reading.places);
-        return identified(file, entry, places, options.name, reading.notes);
+        return urdf::read(file, text, options);
     }
     if !options.feet.is_empty() {
         let found = format!("{file} with links of feet");
