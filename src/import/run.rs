@@ -16,7 +16,7 @@ use super::memory::{self, Tensor};
 use super::npz;
 use super::options::{Format, ImportOptions, refusal};
 use super::report::ImportReport;
-use super::safetensors;
+use super::tensors::open_safetensors;
 use crate::files::{Place, hex, magic};
 use crate::model::{CoordinateNames, ReducedModel};
 use crate::symbolic::ExprPool;
@@ -69,7 +69,7 @@ pub fn import_from_bytes(
     let (parts, mut report) = match format {
         Format::Safetensors => {
             check_size(file, bytes, MAX_FILE_BYTES)?;
-            assemble::parts(&safetensors::open(file, bytes)?, options)?
+            assemble::parts(&open_safetensors(file, bytes)?, options)?
         }
         Format::Npz => {
             check_size(file, bytes, MAX_FILE_BYTES)?;

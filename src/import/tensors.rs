@@ -3,8 +3,9 @@
 use std::borrow::Cow;
 
 use nalgebra::DMatrix;
+use safetensors::{Dtype, SafeTensors};
 
-use super::error::{ImportError, shape_text, too_large};
+use super::error::{ImportError, damaged, shape_text, too_large};
 use super::memory::{self, Tensor};
 use super::npz;
 use crate::files::Place;
@@ -190,6 +191,32 @@ impl<'b> TensorFile<'b> {
             }
         }
     }
+}
+
+/// Bytes before the header: its length.
+const LENGTH_BYTES: usize = 8;
+
+/// Opens a file; offsets and lengths of its tensors are checked against the file.
+pub(super) fn open_safetensors<'b>(
+    file: &str,
+    bytes: &'b [u8],
+) -> Result<TensorFile<'b>, ImportError> {
+    let (header, metadata) = SafeTensors::read_metadata(bytes)
+        .map_err(|error| damaged(file, "safetensors", &error.to_string()))?;
+    let tensors = metadata.tensors().into_iter();
+    let infos = tensors.map(|(name, info)| TensorInfo {
+        name,
+        shape: info.shape.clone(),
+        element: match info.dtype {
+            Dtype::F32 => Element::F32,
+            Dtype::F64 => Element::F64,
+            Dtype::BOOL => Element::Bool,
+            other => Element::Other(other.to_string()),
+        },
+        start: LENGTH_BYTES + header + info.data_offsets.0,
+        ..TensorInfo::default()
+    });
+    TensorFile::new(file, infos.collect(), Container::Safetensors(bytes))
 }
 
 fn decode(info: &TensorInfo, number: &[u8]) -> f64 {
