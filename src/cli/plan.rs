@@ -13,7 +13,7 @@ use super::output::{
     shown, spinner, warn,
 };
 use crate::files::Overwrite;
-use crate::plan::{self, Goal, Plan, PlanSettings, Reach, Verdict};
+use crate::plan::{self, Goal, GoalMap, Plan, PlanSettings, Verdict};
 use crate::recording::Clocks;
 use crate::report::{plan_figures, plan_json, reach_figure};
 use crate::robot::Robot;
@@ -134,7 +134,7 @@ fn answer(arguments: &PlanArguments, planned: &Plan) -> Answer {
     Answer::new(text, json)
 }
 
-fn reach_answer(arguments: &PlanArguments, reach: &Reach) -> Answer {
+fn reach_answer(arguments: &PlanArguments, reach: &GoalMap) -> Answer {
     let first = std::iter::once("apex, m \\ distance, m".to_owned());
     let heads = first.chain(reach.distances_m.iter().map(|d| format!("{d:.2}")));
     let mut table = Table::new(heads);

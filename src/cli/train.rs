@@ -14,7 +14,7 @@ use super::train_settings;
 use crate::recording::{Recording, RecordingSet};
 use crate::robot::{BODY_X, BODY_Z};
 use crate::train::{
-    Method, Origin, Progress, Recordings, SetMetrics, TrainOptions, TrainReport, Trained, Watch,
+    Method, Monitor, Origin, Progress, Recordings, SetMetrics, TrainOptions, TrainReport, Trained,
 };
 use crate::typeset::{Cell, Table, significant};
 use crate::{Error, artifact, train};
@@ -40,6 +40,7 @@ pub(crate) fn run(arguments: &TrainArguments) -> Result<Answer, Error> {
     let mut recorded = RecordedSets::new(arguments, &settings, robot, options.seed)?;
     train_settings::identified(&mut options, &settings, &recorded, robot)?;
     options.check()?;
+    note_repeated(&recorded.files());
     let read = recorded.read();
     recorded.report_findings();
     read?;
@@ -51,15 +52,14 @@ pub(crate) fn run(arguments: &TrainArguments) -> Result<Answer, Error> {
     for file in &mut origin.recordings {
         file.sets = recorded.sets_of(&file.path);
     }
-    note_repeated(&recorded.files());
 
     let bar = spinner("training");
     let mut listener = |progress: Progress| match progress {
         Progress::Stage { name, .. } => bar.set_message(name),
         Progress::Done { text, .. } => bar.set_message(text),
     };
-    let mut watch = Watch::new(&mut listener, stop_on_interrupt());
-    let trained = method.learn(sets, robot, &options, &origin, &mut watch)?;
+    let mut monitor = Monitor::new(&mut listener, stop_on_interrupt());
+    let trained = method.learn(sets, robot, &options, &origin, &mut monitor)?;
     bar.finish_and_clear();
     let is_interrupted = INTERRUPTED.load(Ordering::Relaxed);
     let trained = match is_interrupted {

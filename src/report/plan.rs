@@ -3,7 +3,7 @@
 
 use super::figures::{Figure, Motion, Panel, Role, Series, film_strip, floor_m};
 use crate::model::JumpPrior;
-use crate::plan::{Plan, Reach};
+use crate::plan::{GoalMap, Plan};
 use crate::robot::{BODY_X, BODY_Z, JOINT_DIM, Robot};
 
 const FRAMES: usize = 8;
@@ -113,7 +113,7 @@ fn torques(plan: &Plan, robot: &Robot, goal: &str) -> Figure {
 }
 
 /// Distances and apexes that can be planned, with the recorded jumps.
-pub(crate) fn reach_figure(reach: &Reach, prior: &JumpPrior) -> Figure {
+pub(crate) fn reach_figure(reach: &GoalMap, prior: &JumpPrior) -> Figure {
     let crosses = prior.jumps.iter().flat_map(|&[distance, apex, _]| {
         let at = |x: f64, y: f64| (distance + x * CROSS_M, Some(apex + 0.25 * y * CROSS_M));
         let gap = (distance, None);
@@ -138,7 +138,7 @@ pub(crate) fn reach_figure(reach: &Reach, prior: &JumpPrior) -> Figure {
 }
 
 /// The outline of the goals with one of these verdicts: for each apex, the stretch of distances.
-fn border(reach: &Reach, role: Role, words: &[&str]) -> Series {
+fn border(reach: &GoalMap, role: Role, words: &[&str]) -> Series {
     let rows = reach.points.chunks_exact(reach.distances_m.len());
     let stretches: Vec<[f64; 3]> = rows
         .zip(&reach.apexes_m)

@@ -319,7 +319,7 @@ fn operations(system: &Equations<'_>, phase: usize) -> Result<usize, SimplifyErr
     let counted = program.statements().iter().enumerate();
     Ok(counted
         .map(|(index, statement)| match statement {
-            Statement::Constant(_) | Statement::Input { .. } | Statement::Constants { .. } => 0,
+            Statement::Constant(_) | Statement::Input { .. } => 0,
             _ => program.values_of(index).len(),
         })
         .sum())

@@ -20,9 +20,6 @@ const MASS: (f64, f64) = (0.05, 4.0);
 const LEAST_BLOCKS: usize = 3;
 
 /// Refuses recordings that contradict physics, or each other by what their torques carry.
-///
-/// # Errors
-/// [`IdentifyError::Contradiction`] with the recording.
 pub(super) fn require_physics(
     recordings: &[Recording],
     robot: &Robot,
@@ -38,9 +35,6 @@ pub(super) fn require_physics(
 }
 
 /// Refuses jumps whose mass is not that of all; `segments` are those of each recording among the windows.
-///
-/// # Errors
-/// [`IdentifyError::Contradiction`] with the recording.
 pub(super) fn require_one_robot(
     recordings: &[Recording],
     segments: &[Range<usize>],

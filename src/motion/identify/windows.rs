@@ -88,9 +88,6 @@ pub(crate) struct Windows {
 
 impl Windows {
     /// Adds the windows of a segment at even time steps; `lost` are samples to leave out.
-    ///
-    /// # Errors
-    /// [`IdentifyError::Recording`] if the filter cannot be made for the segment's time step.
     pub(crate) fn add(
         &mut self,
         segment: &Segment,

@@ -54,9 +54,6 @@ impl Column {
     /// The columns that the cells of a header name, none for unknown names. Case and runs of blanks do not matter.
     ///
     /// Accelerations and forces may be absent, but only all of them.
-    ///
-    /// # Errors
-    /// [`RecordingFault::MissingColumns`], [`RecordingFault::DuplicateColumn`].
     pub(super) fn arranged(
         path: &Path,
         names: &[String],

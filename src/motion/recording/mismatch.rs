@@ -228,7 +228,7 @@ fn foot_slip(slip: &Slip) -> Option<Mismatch> {
 fn place(recording: &Recording, robot: &Robot, slip: &Slip) -> Option<(Mismatch, bool)> {
     // The bound is at least this.
     let value = slip.rms_m().filter(|value| *value > PLACE.1)?;
-    let (best, reading) = best_other_place(recording, robot)?;
+    let (best, reading, is_attitude) = best_other_place(recording, robot)?;
     let breach = outside(value, 0.0, PLACE.0 * best + PLACE.1);
     let found = mismatch("foot_slip", breach, |value| {
         format!(
@@ -238,7 +238,7 @@ fn place(recording: &Recording, robot: &Robot, slip: &Slip) -> Option<(Mismatch,
             1e3 * best
         )
     });
-    Some((found?, reading.is_of_quaternion()))
+    Some((found?, is_attitude))
 }
 
 fn legs_or_signs(recording: &Recording, robot: &Robot, slip: &Slip) -> Option<Mismatch> {

@@ -61,10 +61,7 @@ pub(super) fn divided(
 }
 
 /// Stretches of increasing time without gaps. A new one begins where time jumps back by more than a step or to where the
-/// stretch began, or far ahead.
-///
-/// # Errors
-/// The fault with the sample at which time stands still, or steps back by less.
+/// stretch began, or far ahead. An error has the sample at which time stands still, or steps back by less.
 pub(super) fn ranges(times_s: &[f64]) -> Result<Vec<Range<usize>>, (usize, RecordingFault)> {
     let mut ranges = Vec::new();
     let mut start = 0;

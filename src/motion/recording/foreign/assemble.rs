@@ -25,9 +25,6 @@ const QUATERNION_TOLERANCE: f64 = 0.05;
 const MAX_RESAMPLED: usize = 10_000_000;
 
 /// Makes a recording of the logs as the map says, with notes of what was derived, resampled, turned or cut.
-///
-/// # Errors
-/// [`RecordingError`] with the map's key, or with file, row and column.
 pub(in crate::recording) fn assemble(
     path: &Path,
     logs: &[Log],
@@ -41,13 +38,11 @@ pub(in crate::recording) fn assemble(
     let (mut signals, mut notes) = (BTreeMap::new(), Vec::new());
     for quantity in Quantity::ALL {
         if let Some(source) = find(quantity)? {
-            let new = source
-                .log()
-                .notes
-                .iter()
-                .filter(|note| !notes.contains(note));
-            let new: Vec<&String> = new.collect();
-            notes.extend(new);
+            for note in &source.log().notes {
+                if !notes.contains(note) {
+                    notes.push(note.clone());
+                }
+            }
             signals.insert(quantity, source.take(epoch_s.unwrap_or(0))?);
         }
     }
@@ -61,7 +56,7 @@ pub(in crate::recording) fn assemble(
         times_s: base.times_s.clone(),
         ranges: Vec::new(),
         signals,
-        notes: notes.into_iter().cloned().collect(),
+        notes,
     };
     rows.angles()?;
     rows.contacts()?;
@@ -102,9 +97,6 @@ impl Rows<'_> {
     }
 
     /// Quaternions become angles, and angles do not jump by whole turns.
-    ///
-    /// # Errors
-    /// [`RecordingFault::Unexpected`] for a quaternion whose length is far from one.
     fn angles(&mut self) -> Result<(), RecordingError> {
         let path = self.path;
         let signal = self.required(Quantity::Orientation);
@@ -265,20 +257,15 @@ impl Rows<'_> {
         let rate = match quantity {
             Quantity::JointPosition => Quantity::JointVelocity,
             Quantity::JointVelocity => Quantity::JointAcceleration,
-            Quantity::BodyPosition if self.frame(Quantity::BodyVelocity) != Some(Frame::Body) => {
-                Quantity::BodyVelocity
-            }
-            Quantity::Orientation
-                if matches!(
-                    self.frame(Quantity::AngularVelocity),
-                    None | Some(Frame::Angles)
-                ) =>
-            {
-                Quantity::AngularVelocity
-            }
+            Quantity::BodyPosition => Quantity::BodyVelocity,
+            Quantity::Orientation => Quantity::AngularVelocity,
             _ => return None,
         };
-        self.signals.get(&rate)
+        let is_derivative = match (rate, self.frame(rate)) {
+            (Quantity::BodyVelocity, frame) => frame != Some(Frame::Body),
+            (_, frame) => matches!(frame, None | Some(Frame::Angles)),
+        };
+        self.signals.get(&rate).filter(|_| is_derivative)
     }
 
     /// Velocities about the body's own axes become the derivatives of position and angles.

@@ -17,10 +17,6 @@ pub(super) fn is_bag(path: &Path) -> bool {
 }
 
 /// The files of a log: the path itself, or those of the bag that the folder is; and notes on files that are left out.
-///
-/// # Errors
-/// [`RecordingFault::Missing`] for a file that the bag lists or counts, [`RecordingFault::Unexpected`] for a folder of other
-/// recordings.
 pub(super) fn files(path: &Path) -> Result<(Vec<PathBuf>, Vec<String>), RecordingError> {
     if !path.is_dir() {
         return Ok((vec![path.to_owned()], Vec::new()));

@@ -74,6 +74,13 @@ impl Log {
         }
     }
 
+    /// Sorts the rows by these times of theirs; those of one time keep their order.
+    pub(crate) fn sort_by(&mut self, times: &[f64]) {
+        let mut order = Vec::from_iter(0..times.len());
+        order.sort_by(|one, other| times[*one].total_cmp(&times[*other]));
+        self.choose(&order);
+    }
+
     /// The column of a name or number: an exact name before one that differs in case and blanks.
     pub(in crate::recording::foreign) fn column(&self, name: &Name) -> Option<usize> {
         match name {

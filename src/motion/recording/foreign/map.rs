@@ -346,8 +346,6 @@ fn pattern(text: &str, names: &Names, quantity: Quantity) -> Vec<String> {
 
 /// What a map may not state, whatever the log.
 impl ColumnMap {
-    /// # Errors
-    /// [`RecordingFault::Unexpected`](crate::recording::RecordingFault::Unexpected) with the key.
     pub(super) fn require_applicable(&self) -> Result<(), RecordingError> {
         for quantity in Quantity::ALL {
             let Some(table) = self.table(quantity) else {

@@ -42,10 +42,6 @@ pub(in crate::recording) fn is_mcap(path: &Path) -> bool {
 }
 
 /// Reads every topic whose messages are numbers; others have their fault.
-///
-/// # Errors
-/// [`RecordingFault::Mcap`] for a damaged file, [`RecordingFault::Unexpected`] for another one,
-/// [`RecordingFault::NoTopic`] if nothing can be read.
 pub(in crate::recording) fn read_mcap(path: &Path) -> Result<Vec<Log>, RecordingError> {
     let mut topics = Topics::default();
     let (files, mut notes) = bag::files(path)?;

@@ -46,6 +46,19 @@ struct Field {
     count: Count,
 }
 
+impl Field {
+    /// Appends its name to the path of its message, of a list with the entry.
+    fn append_to(&self, path: &mut String, entry: &str) {
+        if !path.is_empty() {
+            path.push('.');
+        }
+        path.push_str(&self.name);
+        if self.count != Count::One {
+            path.push_str(&format!("[{entry}]"));
+        }
+    }
+}
+
 /// A message type with all that it is made of; the first is the message's own.
 #[derive(Debug, Clone)]
 pub(super) struct Definition {
@@ -171,9 +184,8 @@ impl Definition {
             let is_list = field.count != Count::One;
             let is_named = field.count == Count::Any && !matches!(field.kind, Kind::Message(_));
             if field.kind == Kind::Text && is_list && field.name.starts_with("name") {
-                names = (0..count)
-                    .map(|_| cursor.text())
-                    .collect::<Result<_, _>>()?;
+                let read = (0..count).map(|_| cursor.text());
+                names = read.collect::<Result<_, _>>()?;
                 if let Some(out) = out.as_deref_mut() {
                     let ended = names.iter().flat_map(|name| [name.as_bytes(), &[0]]);
                     ended.for_each(|bytes| out.lists.extend(bytes));
@@ -191,18 +203,11 @@ impl Definition {
             for entry in 0..count {
                 cursor.count_field()?;
                 if named {
-                    path.truncate(before);
-                    if before > 0 {
-                        path.push('.');
-                    }
-                    path.push_str(&field.name);
                     let own = names.get(entry);
                     let own = own.filter(|_| is_named && names.len() == count);
-                    match (is_list, own) {
-                        (true, Some(own)) => path.push_str(&format!("[{own}]")),
-                        (true, None) => path.push_str(&format!("[{entry}]")),
-                        (false, _) => {}
-                    }
+                    let entry = own.map_or_else(|| entry.to_string(), String::clone);
+                    path.truncate(before);
+                    field.append_to(path, &entry);
                 }
                 let out = out.as_deref_mut().filter(|_| count <= MOST_ENTRIES);
                 let value = match field.kind {

@@ -17,9 +17,6 @@ const LARGE: f64 = 1e8;
 /// Reads the files of a recording: `path` itself, or those that the map names, in the folder `path` or beside it.
 ///
 /// In a file's name `{}` stands for the name of `path` without its ending.
-///
-/// # Errors
-/// [`RecordingError`] with file and row.
 pub(in crate::recording) fn read_texts(
     path: &Path,
     map: &ColumnMap,
@@ -241,13 +238,18 @@ impl Channel {
                 return self.push_instant(instant);
             }
         }
+        self.push_value(value);
+    }
+
+    fn push_value(&mut self, value: f64) {
         self.values.push(value);
         if let Some(instants) = &mut self.instants {
-            // No time: the value is NaN, which whoever needs the column refuses.
-            instants.push(Instant {
+            // Where this is no time, the value is NaN, which whoever needs the column refuses.
+            let none = Instant {
                 whole: 0,
                 rest: 0.0,
-            });
+            };
+            instants.push(Instant::of(value).unwrap_or(none));
         }
     }
 
@@ -275,7 +277,7 @@ impl Channel {
                 return Err(RecordingFault::contact(value));
             }
             Some(value) if value.is_finite() => {
-                self.values.push(value);
+                self.push_value(value);
                 return Ok(());
             }
             Some(_) => "a finite number",

@@ -45,7 +45,6 @@ struct Topic {
 /// Messages with the same names.
 struct Table {
     log: Log,
-    times_ns: Vec<u64>,
     /// Numbers of the messages within their topic.
     arrivals: Vec<usize>,
     /// Whether a narrower table has its rows.
@@ -64,9 +63,6 @@ impl Topics {
     }
 
     /// A declared channel.
-    ///
-    /// # Errors
-    /// In words, for a channel that was declared otherwise.
     pub(crate) fn channel(&mut self, channel: &Declared) -> Result<(), String> {
         let schema = self.schemas.get(&channel.schema_id);
         let (header, text) = schema.map_or((None, &[][..]), |(header, text)| (Some(header), text));
@@ -107,9 +103,6 @@ impl Topics {
     }
 
     /// A message.
-    ///
-    /// # Errors
-    /// In words, for one of a channel that was not declared.
     pub(crate) fn message(
         &mut self,
         channel: u16,
@@ -131,20 +124,17 @@ impl Topics {
     }
 
     /// The tables, and topics that are none, each with its fault.
-    ///
-    /// # Errors
-    /// [`RecordingFault::NoTopic`] without any table.
     pub(crate) fn logs(self) -> Result<Vec<Log>, RecordingFault> {
         let mut logs = Vec::new();
         for mut topic in self.topics {
-            let messages: usize = topic.tables.iter().map(|table| table.times_ns.len()).sum();
+            let messages: usize = topic.tables.iter().map(|table| table.log.len()).sum();
             topic.tables.sort_by_key(|table| table.log.columns.len());
             for at in 0..topic.tables.len() {
                 let (tables, wider) = topic.tables.split_at_mut(at + 1);
                 wider.iter_mut().for_each(|table| tables[at].add(table));
             }
             for table in topic.tables {
-                let others = messages - table.times_ns.len();
+                let others = messages - table.log.len();
                 let what = match table.is_part {
                     true => "lack values that the others have",
                     false => "have other names or lengths and are left out",
@@ -206,12 +196,11 @@ impl Topic {
         }
         let (table, order) = &self.arrangements[&found.lists];
         let table = &mut self.tables[*table];
-        if table.times_ns.len() == MAX_ROWS {
+        if table.log.len() == MAX_ROWS {
             return Err(format!(
                 "more than {MAX_ROWS} messages, expected shorter recordings"
             ));
         }
-        table.times_ns.push(time_ns);
         table.arrivals.push(self.arrived);
         self.arrived += 1;
         let (seconds, rest) = (time_ns / 1_000_000_000, time_ns % 1_000_000_000);
@@ -267,7 +256,6 @@ impl Topic {
         };
         self.tables.push(Table {
             log,
-            times_ns: Vec::new(),
             arrivals: Vec::new(),
             is_part: false,
         });
@@ -300,45 +288,34 @@ impl Table {
                 own.extend(others);
             }
         }
-        self.times_ns.extend(&wider.times_ns);
         self.arrivals.extend(&wider.arrivals);
         let mut rows = Vec::from_iter(0..self.arrivals.len());
         rows.sort_by_key(|row| self.arrivals[*row]);
         self.log.choose(&rows);
-        self.times_ns = rows.iter().map(|row| self.times_ns[*row]).collect();
         self.arrivals.sort_unstable();
         wider.is_part = true;
     }
 
     /// The table by the stamps of its messages, or the time of recording if they have none, with rows in order.
     fn finished(self) -> Log {
-        let Self {
-            mut log, times_ns, ..
-        } = self;
+        let mut log = self.log;
+        let (name, total) = (log.name.clone(), log.len());
+        let say = |log: &mut Log, count: usize, what: &str| {
+            let note = format!("`{name}`: {count} of {total} messages {what}");
+            log.notes.push(note);
+        };
+        let recorded = log.columns[0].times();
+        let early = late(&recorded);
+        if early > 0 {
+            log.sort_by(&recorded);
+            let what = "were out of order and are sorted by their time of recording";
+            say(&mut log, early, what);
+        }
         let is_stamp = |channel: &Channel| {
             channel.name == "header.stamp" && channel.values.iter().any(|time| *time != 0.0)
         };
         let clock = log.columns.iter().position(is_stamp).unwrap_or(0);
         log.clock = Some(clock);
-        let say = |log: &mut Log, count: usize, what: &str| {
-            let note = format!(
-                "`{}`: {count} of {} messages {what}",
-                log.name,
-                times_ns.len()
-            );
-            log.notes.push(note);
-        };
-        let early = late(&times_ns);
-        if early > 0 {
-            let mut order = Vec::from_iter(0..times_ns.len());
-            order.sort_by_key(|row| times_ns[*row]);
-            log.choose(&order);
-            say(
-                &mut log,
-                early,
-                "were out of order and are sorted by their time of recording",
-            );
-        }
         let stamps = log.columns[clock].times();
         let mut runs = stamps
             .iter()
@@ -349,9 +326,7 @@ impl Table {
             });
         let count = late(&stamps);
         if count > 0 && runs.all(|run| run <= MOST_LATE) {
-            let mut order = Vec::from_iter(0..stamps.len());
-            order.sort_by(|one, other| stamps[*one].total_cmp(&stamps[*other]));
-            log.choose(&order);
+            log.sort_by(&stamps);
             say(&mut log, count, "had late stamps and are sorted by these");
         }
         let kept = distinct(&log, clock);
@@ -364,11 +339,12 @@ impl Table {
     }
 }
 
-fn late<T: PartialOrd + Copy>(times: &[T]) -> usize {
-    let mut latest = times.first().copied();
-    let is_late = |time: &&T| {
-        let found = latest.is_some_and(|latest| **time < latest);
-        latest = if found { latest } else { Some(**time) };
+/// How many of some times are earlier than one before them.
+fn late(times: &[f64]) -> usize {
+    let mut latest = f64::NEG_INFINITY;
+    let is_late = |time: &&f64| {
+        let found = **time < latest;
+        latest = latest.max(**time);
         found
     };
     times.iter().filter(is_late).count()

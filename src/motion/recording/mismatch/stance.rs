@@ -1,6 +1,5 @@
 //! Places of the feet in the world, and how well those on the ground stay there.
 
-use std::fmt;
 use std::ops::Range;
 
 use nalgebra::{DMatrix, UnitQuaternion, Vector3};
@@ -20,129 +19,107 @@ const FOOT_RADIUS_M: f64 = 0.022;
 /// Fewest samples of feet on the ground that say anything.
 const LEAST_SAMPLES: usize = 50;
 
-/// A way to read the columns of joints and body.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) enum Reading {
-    /// The legs whose columns the legs have.
-    Legs([Leg; FOOT_DIM]),
-    /// Coordinates that are recorded with the other sign, and their name.
-    Negated(&'static [usize], &'static str),
-    /// What body x and y are made of, and what that is.
-    Placed([[f64; 2]; 2], &'static str),
-    /// Elements of the quaternion as read of which its real part and x, y, z are made, and what that is.
-    Turned([usize; 4], &'static str),
-}
+/// A way in which columns of joints and body are easily recorded, in words, and what it makes of a state.
+type Reading = (&'static str, fn(&mut [f64; STATE_DIM]));
 
-impl Reading {
-    /// The state that the columns would mean; orders of legs are not applied here.
-    fn read(&self, x: &mut [f64; STATE_DIM]) {
-        match self {
-            Self::Legs(_) => {}
-            Self::Negated(coordinates, _) => coordinates.iter().for_each(|&i| x[i] = -x[i]),
-            Self::Placed(rows, _) => {
-                let place = [x[JOINT_DIM], x[JOINT_DIM + 1]];
-                for (axis, row) in rows.iter().enumerate() {
-                    x[JOINT_DIM + axis] = row[0] * place[0] + row[1] * place[1];
-                }
-            }
-            Self::Turned(elements, _) => {
-                let about = |axis: usize| {
-                    let angle = x[JOINT_DIM + 3 + axis];
-                    UnitQuaternion::from_scaled_axis(Vector3::ith(axis, angle))
-                };
-                let read = about(2) * about(1) * about(0);
-                let read = [read.w, read.i, read.j, read.k];
-                let meant = DMatrix::from_iterator(4, 1, elements.map(|element| read[element]));
-                let angles = angles_of_quaternions(&meant);
-                x[JOINT_DIM + 3..].copy_from_slice(angles.as_slice());
-            }
-        }
-    }
+const BODY: usize = JOINT_DIM;
+const AS_RECORDED: Reading = ("as recorded", |_| {});
 
-    /// Whether it is another order of a quaternion.
-    pub(crate) fn is_of_quaternion(&self) -> bool {
-        matches!(self, Self::Turned(..))
-    }
-}
-
-impl fmt::Display for Reading {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Negated(_, name) => write!(f, "with {name} of the other sign"),
-            Self::Placed(_, words) | Self::Turned(_, words) => f.write_str(words),
-            Self::Legs(legs) => {
-                let names = legs.map(Leg::short_name).join(", ");
-                write!(f, "with the joints of fr, fl, rr, rl taken from {names}")
-            }
-        }
-    }
-}
-
-const AS_RECORDED: Reading = Reading::Legs(Leg::ALL);
-
-/// Coordinates that are easily recorded with the other sign.
 const SIGNS: [Reading; 4] = [
-    Reading::Negated(&[JOINT_DIM + 3], "roll"),
-    Reading::Negated(&[JOINT_DIM + 4], "pitch"),
-    Reading::Negated(&[JOINT_DIM + 5], "yaw"),
-    Reading::Negated(&[0, 3, 6, 9], "hip abduction"),
+    ("with roll of the other sign", |x| negate(x, &[BODY + 3])),
+    ("with pitch of the other sign", |x| negate(x, &[BODY + 4])),
+    ("with yaw of the other sign", |x| negate(x, &[BODY + 5])),
+    ("with hip abduction of the other sign", |x| {
+        negate(x, &[0, 3, 6, 9]);
+    }),
 ];
 
-/// Frames and orders in which the place of a body is easily recorded, its attitude being right, or the attitude.
-const PLACES: [Reading; 8] = [
-    Reading::Placed([[-1.0, 0.0], [0.0, 1.0]], "with body x of the other sign"),
-    Reading::Placed([[1.0, 0.0], [0.0, -1.0]], "with body y of the other sign"),
-    Reading::Placed([[0.0, 1.0], [1.0, 0.0]], "with body x and y exchanged"),
-    Reading::Placed(
-        [[-1.0, 0.0], [0.0, -1.0]],
-        "with body x and y of the other sign",
-    ),
-    Reading::Placed(
-        [[0.0, 1.0], [-1.0, 0.0]],
-        "with body x and y turned by a right angle",
-    ),
-    Reading::Placed(
-        [[0.0, -1.0], [1.0, 0.0]],
-        "with body x and y turned by a right angle",
-    ),
-    Reading::Turned(
-        [3, 0, 1, 2],
+/// Places of the body, its attitude being right.
+const PLACES: [Reading; 6] = [
+    ("with body x of the other sign", |x| negate(x, &[BODY])),
+    ("with body y of the other sign", |x| negate(x, &[BODY + 1])),
+    ("with body x and y exchanged", |x| x.swap(BODY, BODY + 1)),
+    ("with body x and y of the other sign", |x| {
+        negate(x, &[BODY, BODY + 1]);
+    }),
+    ("with body x and y turned by a right angle", |x| {
+        x.swap(BODY, BODY + 1);
+        negate(x, &[BODY + 1]);
+    }),
+    ("with body x and y turned by a right angle", |x| {
+        x.swap(BODY, BODY + 1);
+        negate(x, &[BODY]);
+    }),
+];
+
+const QUATERNIONS: [Reading; 2] = [
+    (
         "with the quaternion in the order xyzw instead of wxyz",
+        |x| reorder_quaternion(x, [3, 0, 1, 2]),
     ),
-    Reading::Turned(
-        [1, 2, 3, 0],
+    (
         "with the quaternion in the order wxyz instead of xyzw",
+        |x| reorder_quaternion(x, [1, 2, 3, 0]),
     ),
 ];
 
-/// The reading of the body's place under which feet on the ground stay best where they are, and their root mean square
-/// then, m.
-pub(super) fn best_other_place(recording: &Recording, robot: &Robot) -> Option<(f64, Reading)> {
-    best(PLACES.map(|reading| (Slip::read(recording, robot, &reading).rms_m(), reading)))
+fn negate(x: &mut [f64; STATE_DIM], coordinates: &[usize]) {
+    coordinates.iter().for_each(|&i| x[i] = -x[i]);
+}
+
+/// The attitude whose quaternion has these elements of the one as read.
+fn reorder_quaternion(x: &mut [f64; STATE_DIM], elements: [usize; 4]) {
+    let about = |axis: usize| {
+        let angle = x[BODY + 3 + axis];
+        UnitQuaternion::from_scaled_axis(Vector3::ith(axis, angle))
+    };
+    let read = about(2) * about(1) * about(0);
+    let read = [read.w, read.i, read.j, read.k];
+    let meant = DMatrix::from_iterator(4, 1, elements.map(|element| read[element]));
+    let angles = angles_of_quaternions(&meant);
+    x[BODY + 3..].copy_from_slice(angles.as_slice());
+}
+
+/// The reading of the body's place or attitude under which feet on the ground stay best where they are, their root mean
+/// square then, m, and whether it is one of the attitude.
+pub(super) fn best_other_place(
+    recording: &Recording,
+    robot: &Robot,
+) -> Option<(f64, &'static str, bool)> {
+    let places = PLACES.into_iter().map(|reading| (reading, false));
+    let all = places.chain(QUATERNIONS.map(|reading| (reading, true)));
+    let judged = all.map(|(reading, is_attitude)| {
+        let slip = Slip::read(recording, robot, reading).rms_m();
+        (slip, (reading.0, is_attitude))
+    });
+    best(judged).map(|(rms_m, (words, is_attitude))| (rms_m, words, is_attitude))
 }
 
 /// The reading under which feet on the ground stay best in place against each other, and their root mean square then,
 /// m: of all orders of the legs but the recorded one, and of the other signs of [`SIGNS`].
-pub(super) fn best_other_reading(recording: &Recording, robot: &Robot) -> Option<(f64, Reading)> {
+pub(super) fn best_other_reading(recording: &Recording, robot: &Robot) -> Option<(f64, String)> {
     let all: Vec<Stances> = (recording.segments.iter())
-        .map(|segment| Stances::of(segment, robot, &AS_RECORDED, &Leg::ALL))
+        .map(|segment| Stances::of(segment, robot, AS_RECORDED, &Leg::ALL))
         .collect();
     let orders = orders().into_iter().filter(|order| *order != Leg::ALL);
     let of_orders = orders.map(|order| {
         let mut slip = Slip::default();
         all.iter()
             .for_each(|stances| stances.add_to(&mut slip, &order));
-        (slip.relative_rms_m(), Reading::Legs(order))
+        let names = order.map(Leg::short_name).join(", ");
+        let words = format!("with the joints of fr, fl, rr, rl taken from {names}");
+        (slip.relative_rms_m(), words)
     });
-    let slip = |reading: &Reading| Slip::read(recording, robot, reading);
-    let of_signs = SIGNS.map(|reading| (slip(&reading).relative_rms_m(), reading));
+    let of_signs = SIGNS.map(|reading| {
+        let slip = Slip::read(recording, robot, reading);
+        (slip.relative_rms_m(), reading.0.to_owned())
+    });
     best(of_orders.chain(of_signs))
 }
 
-fn best(judged: impl IntoIterator<Item = (Option<f64>, Reading)>) -> Option<(f64, Reading)> {
-    let known = judged
-        .into_iter()
-        .filter_map(|(rms_m, reading)| Some((rms_m?, reading)));
+/// The one with the least of these figures.
+fn best<T>(judged: impl Iterator<Item = (Option<f64>, T)>) -> Option<(f64, T)> {
+    let known = judged.filter_map(|(rms_m, reading)| Some((rms_m?, reading)));
     let finite = known.filter(|(rms_m, _)| rms_m.is_finite());
     finite.min_by(|one, other| one.0.total_cmp(&other.0))
 }
@@ -186,11 +163,11 @@ pub(super) struct Slip {
 impl Slip {
     /// Over all segments of a recording.
     pub fn of(recording: &Recording, robot: &Robot) -> Self {
-        Self::read(recording, robot, &AS_RECORDED)
+        Self::read(recording, robot, AS_RECORDED)
     }
 
     /// The same if the columns are read otherwise; orders of legs are not.
-    fn read(recording: &Recording, robot: &Robot, reading: &Reading) -> Self {
+    fn read(recording: &Recording, robot: &Robot, reading: Reading) -> Self {
         let mut slip = Self::default();
         for segment in &recording.segments {
             Stances::of(segment, robot, reading, &[]).add_to(&mut slip, &Leg::ALL);
@@ -217,14 +194,14 @@ struct Stances {
 
 impl Stances {
     /// In a reading of the columns; each leg is read from its own columns and from those of `others`.
-    fn of(segment: &Segment, robot: &Robot, reading: &Reading, others: &[Leg]) -> Self {
+    fn of(segment: &Segment, robot: &Robot, reading: Reading, others: &[Leg]) -> Self {
         let mut moved = Vec::new();
         for (leg, samples) in stances(segment) {
             let others = others.iter().copied().filter(|other| *other != leg);
             for from in std::iter::once(leg).chain(others) {
                 let place = |sample: usize| {
                     let mut x = segment.state(sample);
-                    reading.read(&mut x);
+                    (reading.1)(&mut x);
                     let q = from.of_joints(&std::array::from_fn(|joint| x[joint]));
                     x[3 * leg.index()..][..3].copy_from_slice(&q);
                     foot_place(robot, leg, &x, true)

@@ -1,5 +1,7 @@
 //! Columns sorted into quantities, and the clock among them.
 
+use std::cmp::Reverse;
+
 use super::super::elements::Dimension;
 use super::super::elements::{QUATERNION, Quantity};
 use super::super::log::{Channel, Log};
@@ -27,6 +29,17 @@ impl Group {
     fn qualifiers(&self) -> impl Iterator<Item = &String> {
         self.family.iter().filter(|word| !is_quantity(word))
     }
+
+    /// Whether its legs are only counted, as an arm's twelve joints are among others; a low-level state of Unitree's counts
+    /// legs in romc's order.
+    pub(super) fn is_unnamed(&self, logs: &[Log]) -> bool {
+        let is_motor = |channel: &Channel| {
+            let name = &channel.name;
+            name.starts_with("motor_state[") || name.starts_with("motorState[")
+        };
+        let is_unitree = || logs[self.log].columns.iter().any(is_motor);
+        self.is_counted && self.quantity.is_by_leg() && !is_unitree()
+    }
 }
 
 /// The clock of the log, if it is a column.
@@ -50,81 +63,61 @@ pub(super) fn groups(logs: &[Log], robot: &Robot) -> Vec<Group> {
         let is_alike = |other: &Group| other.qualifiers().eq(one.qualifiers());
         others.filter(|other| of(*other).any(is_alike)).count()
     };
-    let rate = |group: &Group| std::cmp::Reverse(rates[group.log].unwrap_or_default());
-    // An arm's twelve joints are counted among others, the robot's have names.
-    let is_unnamed = |group: &Group| {
-        let is_by_leg = group.quantity.is_of_joints() || group.quantity == Quantity::Feet;
-        group.is_counted && is_by_leg && !is_unitree(&logs[group.log])
-    };
+    let rate = |group: &Group| Reverse(rates[group.log].unwrap_or_default());
     let first = |quantity| {
         of(quantity).min_by_key(|group| {
             (
                 group.is_wanted,
-                is_unnamed(group),
+                group.is_unnamed(logs),
                 rate(group),
-                std::cmp::Reverse(fellows(group)),
+                Reverse(fellows(group)),
                 group.family.len(),
             )
         })
     };
     let [joints, body] = [Quantity::JointPosition, Quantity::BodyPosition].map(first);
     let chosen = Quantity::ALL.into_iter().filter_map(|quantity| {
-        let is_of_body = !quantity.is_of_joints() && quantity != Quantity::Feet;
-        let base = if is_of_body {
-            body.or(joints)
-        } else {
-            joints.or(body)
+        let base = match quantity.is_by_leg() {
+            true => joints.or(body),
+            false => body.or(joints),
         };
-        let rank = |group: &Group| {
-            let alike = base.map_or((true, 0), |base| {
+        let alike = |group: &Group| {
+            base.map_or((true, 0), |base| {
                 (base.log == group.log, shared(base, group))
-            });
-            let is_first = base.is_some_and(|base| std::ptr::eq(base, group));
-            let (same_log, words) = (std::cmp::Reverse(alike.0), std::cmp::Reverse(alike.1));
-            let plain = (group.is_quaternion, group.family.len());
-            (
-                !is_first,
-                (group.is_wanted, is_unnamed(group)),
-                same_log,
-                rate(group),
-                words,
-                plain,
-            )
+            })
         };
-        let best = of(quantity).min_by_key(|group| rank(group))?;
-        let measured = of(quantity).filter(|group| group.is_wanted == best.is_wanted);
-        let others = measured.filter(|group| !std::ptr::eq(*group, best));
-        let others: Vec<&Group> = others
-            .filter(|o| o.is_quaternion == best.is_quaternion)
-            .collect();
-        let rank_of = |group: &Group| {
-            let (_, (_, unnamed), log, rate, words, plain) = rank(group);
-            // The base is alike to nothing but itself.
-            let alike = (log, words);
-            let is_base = std::ptr::eq(best, base.unwrap_or(group));
-            let alike = if is_base { Default::default() } else { alike };
-            (unnamed, alike, rate, plain)
+        let rank_by = |group: &Group, (same_log, words): (bool, usize)| {
+            let plain = (group.is_quaternion, group.family.len());
+            let (log, words) = (Reverse(same_log), Reverse(words));
+            (group.is_unnamed(logs), log, rate(group), words, plain)
+        };
+        let best = of(quantity).min_by_key(|group| {
+            let is_first = base.is_some_and(|base| std::ptr::eq(base, *group));
+            (!is_first, group.is_wanted, rank_by(group, alike(group)))
+        })?;
+        let others = of(quantity).filter(|group| !std::ptr::eq(*group, best));
+        let is_of_kind = |group: &&Group| {
+            (group.is_wanted, group.is_quaternion) == (best.is_wanted, best.is_quaternion)
+        };
+        let others: Vec<&Group> = others.filter(is_of_kind).collect();
+        // The base is alike to nothing but itself.
+        let rank = |group: &Group| match std::ptr::eq(best, base.unwrap_or(group)) {
+            true => rank_by(group, (false, 0)),
+            false => rank_by(group, alike(group)),
         };
         // Tables of one topic hold the same messages.
         let is_apart =
             |other: &Group| other.log == best.log || logs[other.log].name != logs[best.log].name;
         let ties = |other: &&Group| {
-            is_apart(other) && rank_of(other) == rank_of(best) && differ(logs, best, other)
+            is_apart(other) && rank(other) == rank(best) && differ(logs, best, other)
         };
-        let tie = others.iter().copied().any(|other| ties(&other));
         Some(Group {
-            is_tie: tie,
+            is_tie: others.iter().any(ties),
             others: others.iter().map(|other| in_words(logs, other)).collect(),
             ..best.clone()
         })
     });
     chosen.collect()
-}
-
-/// Whether a log is a low-level state of Unitree's, which counts legs in romc's order.
-pub(super) fn is_unitree(log: &Log) -> bool {
-    let is_motor = |name: &str| name.starts_with("motor_state[") || name.starts_with("motorState[");
-    log.columns.iter().any(|column| is_motor(&column.name))
 }
 
 fn in_words(logs: &[Log], group: &Group) -> String {

@@ -60,23 +60,20 @@ pub(super) fn force_lines(values: &DMatrix<f64>) -> (Vec<String>, Option<String>
     }
     let level = known.iter().map(|rest| rest.level).sum::<f64>() / known.len() as f64;
     let deviation = known.iter().map(|rest| rest.deviation).fold(0.0, f64::max);
-    let levels: Vec<f64> = rests
-        .iter()
-        .map(|rest| rest.map_or(level, |rest| rest.level))
-        .collect();
-    let differ = levels.iter().any(|own| (own - level).abs() > ALIKE * range);
-    let rest = if differ { 0.0 } else { level };
-    if differ {
-        let offsets: Vec<String> = levels
+    let levels = || {
+        rests
             .iter()
-            .map(|level| format!("{:.3}", -level))
-            .collect();
+            .map(|rest| rest.map_or(level, |rest| rest.level))
+    };
+    let (mut rest, mut span) = (level, high - level);
+    if levels().any(|own| (own - level).abs() > ALIKE * range) {
+        (rest, span) = (0.0, range);
+        let offsets: Vec<String> = levels().map(|level| format!("{:.3}", -level)).collect();
         lines.push(format!(
             "offset = [{}]   # what each sensor shows in the air",
             offsets.join(", ")
         ));
     }
-    let span = if differ { range } else { high - level };
     let least = DEVIATIONS * deviation;
     lines.push(format!(
         "threshold = {:.3}   # a tenth of the way from no force ({:.1}) to the largest",

@@ -159,34 +159,27 @@ impl Source<'_> {
         };
         let values = self.raw(group);
         if group.is_quaternion {
-            let order = |last: bool, why: &str| {
-                let (name, order) = if last {
-                    ("xyzw", [3, 0, 1, 2])
-                } else {
-                    ("wxyz", [0, 1, 2, 3])
-                };
+            let attitude = |(name, order): (&str, [usize; 4]), why: &str| {
                 let angles = angles_of_quaternions(&values.select_rows(&order));
                 (vec![format!("order = \"{name}\"{why}")], angles)
             };
+            let mut orders = [("wxyz", [0, 1, 2, 3]), ("xyzw", [3, 0, 1, 2])];
             if !group.is_counted {
-                return vec![order(false, "")];
+                return vec![attitude(orders[0], "")];
             }
             // The real part of a robot on its feet is the largest, unless it looks backwards.
             let size = |row: usize| values.row(row).abs().sum();
-            let last = size(3) > size(0);
+            if size(3) > size(0) {
+                orders.reverse();
+            }
             let why = "   # feet on the ground stay in place";
-            return vec![order(last, why), order(!last, why)];
+            return orders.map(|order| attitude(order, why)).to_vec();
         }
         let of_unit = |(unit, factor): NamedUnit| (vec![unit_line(unit, "")], &values * factor);
-        let units = self.units(
-            Quantity::Orientation,
-            &["rad", "deg"],
-            &["rad", "deg"],
-            || {
-                let is_steep = reach(values.row(1).iter().copied()) > PITCH_RAD;
-                if is_steep { "deg" } else { "rad" }
-            },
-        );
+        let is_steep = || reach(values.row(1).iter().copied()) > PITCH_RAD;
+        let first = || if is_steep() { "deg" } else { "rad" };
+        let both = ["rad", "deg"];
+        let units = self.units(Quantity::Orientation, &both, &both, first);
         units.into_iter().map(of_unit).collect()
     }
 
@@ -291,15 +284,19 @@ impl Source<'_> {
         for (mut row, sign) in position.row_iter_mut().zip(reading.signs) {
             row *= sign;
         }
-        let all =
-            |unit: String, signs: &[f64]| [unit].into_iter().chain(sign_line(signs)).collect();
+        let mut put = |quantity, unit, why, signs: &[f64]| {
+            let own = [unit_line(unit, why)].into_iter().chain(sign_line(signs));
+            lines.insert(quantity, own.collect());
+        };
         let why = match self.told(group, &["mrad", "rad", "deg"]) {
             None if reading.joint.0 != "rad" => "   # by their size and the feet",
             Some(_) | None => "",
         };
-        lines.insert(
+        put(
             Quantity::JointPosition,
-            all(unit_line(reading.joint.0, why), &reading.signs),
+            reading.joint.0,
+            why,
+            &reading.signs,
         );
         if let Some((velocity, times)) = self.beside(Quantity::JointVelocity, group) {
             let velocity = in_order(velocity);
@@ -321,19 +318,21 @@ impl Source<'_> {
                 .filter(|_| !units.is_empty())
                 .unwrap_or(reading.joint.0);
             let why = "   # by the change of the positions";
-            lines.insert(Quantity::JointVelocity, all(unit_line(unit, why), &own));
+            put(Quantity::JointVelocity, unit, why, &own);
         }
         if let Some(group) = self.group(Quantity::JointTorque) {
             let told = self.told(group, &["nmm", "mnm", "ncm"]);
-            let (signs, unit) = match torques {
-                Some((signs, (unit, _))) => (signs, told.unwrap_or(unit)),
-                None => (reading.signs, told.unwrap_or("N m")),
+            let (signs, unit, why) = match torques {
+                Some((signs, (unit, _))) => {
+                    let why = "   # unit and signs by the weight that the feet carry";
+                    (signs, unit, why)
+                }
+                None => {
+                    let why = "   # signs as of the angles: the torques carry nothing";
+                    (reading.signs, "N m", why)
+                }
             };
-            let why = match torques {
-                Some(_) => "   # unit and signs by the weight that the feet carry",
-                None => "   # signs as of the angles: the torques carry nothing",
-            };
-            lines.insert(Quantity::JointTorque, all(unit_line(unit, why), &signs));
+            put(Quantity::JointTorque, told.unwrap_or(unit), why, &signs);
         }
     }
 

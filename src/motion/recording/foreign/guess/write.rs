@@ -10,7 +10,7 @@ use super::super::elements::Quantity;
 use super::super::log::Log;
 use super::super::map::Name;
 use super::Guess;
-use super::columns::{Clock, Group, clock, groups, is_unitree};
+use super::columns::{Clock, Group, clock, groups};
 use super::evidence::{scale, slopes};
 use super::names::unit;
 use super::scales::{Scales, order_line};
@@ -28,19 +28,7 @@ pub(super) fn guessed(path: &Path, logs: &[Log], robot: &Robot) -> Guess {
         groups: &groups,
         clock: clock.as_ref(),
     };
-    let time = match &clock {
-        None => {
-            "# sample_time_s = 0.001   # no column counts time: the distance of samples".to_owned()
-        }
-        Some(_) if logs[groups[0].log].clock.is_some() => {
-            "# each topic has the time stamps of its messages".to_owned()
-        }
-        Some(clock) => format!(
-            "column = {}\nunit = \"{}\"",
-            quoted(&clock.name),
-            clock.unit
-        ),
-    };
+    let time = source.time();
     let mut text = format!(
         "# Guessed from {}: check every line, then `romc inspect LOG --columns THIS.toml`.\n\n[time]\n{time}\n",
         path.file_name().unwrap_or_default().to_string_lossy(),
@@ -64,8 +52,7 @@ pub(super) fn guessed(path: &Path, logs: &[Log], robot: &Robot) -> Guess {
             open.extend(group.is_tie.then(|| note.clone()));
             notes.push(note);
         }
-        let is_by_leg = group.quantity.is_of_joints() || group.quantity == Quantity::Feet;
-        if group.is_counted && is_by_leg && !is_unitree(&logs[group.log]) {
+        if group.is_unnamed(logs) {
             let name = &logs[group.log].columns[group.columns[0]].name;
             open.push(format!(
                 "{key}: columns such as `{name}`, which are only counted"
@@ -166,6 +153,20 @@ impl Source<'_> {
             _ => format!("columns = [\n    {},\n]", rows.join(",\n    ")),
         });
         lines
+    }
+
+    /// The lines of the clock.
+    fn time(&self) -> String {
+        let stamped = "# each topic has the time stamps of its messages";
+        let uncounted =
+            "# sample_time_s = 0.001   # no column counts time: the distance of samples";
+        match self.clock {
+            None => uncounted.to_owned(),
+            Some(_) if self.logs[self.groups[0].log].clock.is_some() => stamped.to_owned(),
+            Some(Clock { name, unit }) => {
+                format!("column = {}\nunit = \"{unit}\"", quoted(name))
+            }
+        }
     }
 
     /// The lines of a group's table.

@@ -1,14 +1,100 @@
-//! A controller that C holds by its address: a trajectory and measurements in, commands out.
+//! The controller behind a C interface: numbers in, numbers and codes out, never a panic.
+//!
+//! A generated controller wraps these functions under its model's name; pointers are turned into
+//! slices there, everything else happens here. A pointer that cannot be used arrives as `None`.
 
+use std::cell::RefCell;
+use std::ffi::{CStr, CString, c_char};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use super::super::command::{Command, Status};
-use super::super::controller::{Controller, Measurement};
-use super::super::error::ControlError;
-use super::super::reference::ReferenceSamples;
-use super::super::settings::{MpcSettings, Settings};
-use super::codes::{BAD_POINTER, INTERNAL, guarded, report};
+use super::command::{Command, Status};
+use super::controller::{Controller, Measurement};
+use super::error::ControlError;
+use super::reference::ReferenceSamples;
+use super::settings::MpcSettings;
+pub use super::settings::{Accepts, SETTINGS, Setting, Settings};
 use crate::robot::{ContactFlags, FOOT_DIM, JOINT_DIM, Robot};
+
+macro_rules! codes {
+    ($($name:ident = $code:literal, $text:literal;)*) => {
+        $(#[doc = $text] pub const $name: i32 = $code;)*
+
+        const BEYOND_STEPS: &[(i32, &str)] = &[$(($name, concat!($text, "\0"))),*];
+    };
+}
+
+codes! {
+    BAD_POINTER = -4, "bad pointer: null or not aligned; fallback";
+    TIME_ORDER = -5, "time order: the reference's time does not increase";
+    UNKNOWN_FEET = -6, "unknown feet: no phase of the model has these feet in contact";
+    BAD_SETTING = -7, "bad setting: a setting is out of its range";
+    SOLVER_REFUSED = -8, "solver refused: the conic solver does not take the problem";
+    INTERNAL = -9, "internal: the controller broke down; set a reference to use it again";
+}
+
+/// Runs `action`; its error or panic becomes a code, and a message for [`last_error`].
+fn guarded<T>(action: impl FnOnce() -> Result<T, ControlError>) -> Result<T, i32> {
+    match catch_unwind(AssertUnwindSafe(action)) {
+        Ok(Ok(value)) => Ok(value),
+        Ok(Err(error)) => {
+            report(&error.to_string());
+            Err(code_of(&error))
+        }
+        Err(_) => {
+            report("the controller broke down inside");
+            Err(INTERNAL)
+        }
+    }
+}
+
+fn code_of(error: &ControlError) -> i32 {
+    match error {
+        ControlError::Shape { .. } => INTERNAL,
+        ControlError::Setting { .. } | ControlError::StructuredDim { .. } => BAD_SETTING,
+        ControlError::ReferenceLen { .. } | ControlError::ReferenceShape { .. } => {
+            Status::WrongDimension.code()
+        }
+        ControlError::ReferenceValue { .. } => Status::NotFinite.code(),
+        ControlError::ReferenceTime { .. } => TIME_ORDER,
+        ControlError::ReferencePhase { .. } => UNKNOWN_FEET,
+        ControlError::Solver { .. } => SOLVER_REFUSED,
+    }
+}
+
+thread_local! {
+    static LAST_ERROR: RefCell<CString> = RefCell::new(CString::default());
+}
+
+/// Leaves a message for [`last_error`].
+pub fn report(message: &str) {
+    let text = CString::new(message.replace('\0', " ")).unwrap_or_default();
+    LAST_ERROR.with_borrow_mut(|last| *last = text);
+}
+
+/// Why the last call on this thread that made a controller or set a reference was refused; valid
+/// until the next such call on this thread.
+pub fn last_error() -> *const c_char {
+    LAST_ERROR.with_borrow(|last| last.as_ptr())
+}
+
+/// Every code that the interface returns, with its text.
+pub fn all_codes() -> impl Iterator<Item = (i32, &'static CStr)> {
+    let of_steps = Status::ALL
+        .iter()
+        .map(|status| (status.code(), status.text()));
+    let texts = of_steps.chain(BEYOND_STEPS.iter().copied());
+    texts.map(|(code, text)| {
+        let text = CStr::from_bytes_until_nul(text.as_bytes());
+        (code, text.expect("texts end with a nul"))
+    })
+}
+
+/// A status or return code in words.
+pub fn status_text(code: i32) -> &'static CStr {
+    let mut codes = all_codes();
+    let found = codes.find(|(known, _)| *known == code);
+    found.map_or(c"unknown status", |(_, text)| text)
+}
 
 /// What a robot's low-level interface takes, as C has it; `D` latent coordinates.
 #[repr(C)]
@@ -87,7 +173,7 @@ pub struct Handle<const D: usize> {
 
 impl<const D: usize> Handle<D> {
     /// Builds a controller with `build`, from settings or the defaults; a message is left for
-    /// [`last_error`](super::last_error) if there is none to be made.
+    /// [`last_error`] if there is none to be made.
     pub fn create(
         settings: Option<&Settings>,
         build: impl FnOnce(MpcSettings) -> Result<Controller, ControlError>,
@@ -106,7 +192,7 @@ impl<const D: usize> Handle<D> {
         made.ok()
     }
 
-    /// Takes a trajectory to follow; 0, or a code with a message for [`last_error`](super::last_error). A refused
+    /// Takes a trajectory to follow; 0, or a code with a message for [`last_error`]. A refused
     /// trajectory leaves the old one.
     pub fn set_reference(&mut self, raw: &RawReference<'_>) -> i32 {
         match self.take_reference(raw) {
@@ -201,88 +287,6 @@ fn present<T>(name: &str, array: Option<T>) -> Result<T, i32> {
     })
 }
 
-/// Feet in contact of four flags; zero is in the air.
 fn contact(flags: &[u8]) -> ContactFlags {
     std::array::from_fn(|foot| flags.get(foot).is_some_and(|&flag| flag != 0))
-}
-
-#[cfg(test)]
-mod tests {
-    use std::ffi::CStr;
-
-    use nalgebra::DMatrix;
-
-    use super::super::codes::last_error;
-    use super::*;
-    use crate::mpc::online::LatentDynamics;
-
-    /// Equations that panic.
-    #[derive(Debug)]
-    struct Broken;
-
-    impl LatentDynamics for Broken {
-        fn jacobian(
-            &mut self,
-            _: usize,
-            _: &[f64],
-            _: &[f64],
-            _: &[f64],
-            _: &mut [f64],
-            _: &mut DMatrix<f64>,
-        ) {
-            panic!("equations that panic");
-        }
-    }
-
-    #[test]
-    fn panic_inside_a_step_becomes_a_code_with_the_last_posture_and_no_torque() {
-        let model = crate::evaluate::shipped_model("go1-d4");
-        let handle = Handle::<4>::create(None, |settings| {
-            let controller = Controller::new(&model, settings).expect("a complete model");
-            Controller::with_plant(controller.plant().clone(), Box::new(Broken), settings)
-        });
-        let mut handle = handle.expect("default settings");
-        // A robot that stands for 0.2 s.
-        let time_s: Vec<f64> = (0..100).map(|sample| 0.002 * f64::from(sample)).collect();
-        let joints = [0.0, 0.8, -1.6].repeat(4);
-        let x = [&joints[..], &[0.0, 0.0, 0.3, 0.0, 0.0, 0.0]]
-            .concat()
-            .repeat(100);
-        let (zeros, feet) = ([0.0; 1800], [1; 400]);
-        let reference = RawReference {
-            time_s: Some(&time_s),
-            x: Some(&x),
-            dx: Some(&zeros),
-            u: Some(Some(&zeros)),
-            feet: Some(&feet),
-        };
-        let short = RawReference {
-            x: Some(&x[1..]),
-            ..reference
-        };
-        assert_eq!(handle.set_reference(&short), -2);
-        assert_eq!(handle.set_reference(&reference), 0);
-        let measurement = RawMeasurement {
-            time_s: 0.0,
-            x: Some(&x[..18]),
-            dx: Some(&zeros[..18]),
-            feet: Some(&feet[..4]),
-        };
-        let mut command = RawCommand::at_rest(handle.controller.plant().robot(), 99);
-        let rest = command.joint_position;
-        for _ in 0..2 {
-            assert_eq!(handle.step(&measurement, &mut command), INTERNAL);
-            assert_eq!((command.status, command.torque), (INTERNAL, [0.0; 12]));
-            assert_eq!(command.joint_position, rest);
-        }
-        // Without an input the reference asks the equations for one.
-        let no_input = RawReference {
-            u: None,
-            ..reference
-        };
-        assert_eq!(handle.set_reference(&no_input), INTERNAL);
-        // SAFETY: the text lives until the next refusal on this thread.
-        let message = unsafe { CStr::from_ptr(last_error()) };
-        assert!(message.to_string_lossy().contains("broke down"));
-    }
 }

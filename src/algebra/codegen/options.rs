@@ -1,8 +1,9 @@
-//! In which floating-point numbers generated code computes.
+//! What a user chooses of generated code: its numbers, sines and units; and why there is none.
 
-use super::error::CodegenError;
 use super::interface::ModelInterface;
 use crate::ir::{Program, Statement};
+use crate::lower::LowerError;
+use crate::model::{ReducedModel, Scaling};
 
 /// Floating-point numbers of generated code.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
@@ -17,7 +18,6 @@ pub enum Precision {
 }
 
 impl Precision {
-    /// Bits of a number.
     pub(crate) fn bits(self) -> usize {
         match self {
             Self::Double => 64,
@@ -43,7 +43,6 @@ impl Precision {
         }
     }
 
-    /// Whether numbers have 32 bits.
     pub(crate) fn is_single(self) -> bool {
         self == Self::Single
     }
@@ -101,6 +100,70 @@ fn beyond_single(program: &Program) -> Option<f64> {
 /// Two significant digits, never less than the number.
 pub(crate) fn rounded_up(bound: f64) -> String {
     format!("{:.1e}", crate::typeset::rounded_up(bound, 2))
+}
+
+/// Where sines and cosines come from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum SineCosine {
+    // Within about one unit of the last place, without branches, so that loops over it vectorise.
+    /// A function inside the file that compilers vectorise, the same bits everywhere.
+    #[default]
+    Inline,
+    /// The platform's mathematics library.
+    Library,
+}
+
+/// Units of `x`, `dx` and `u` at the interface of generated code.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Units {
+    /// SI units; the model's scaling factors are folded into the maps.
+    #[default]
+    Si,
+    /// Scaled values as the model was learned with: `s_x x`, `s_x dx`, `s_u u`; the maps are the
+    /// encoder's and the decoder's very weights.
+    Scaled,
+}
+
+impl Units {
+    pub(super) fn of_robot(self) -> &'static str {
+        match self {
+            Self::Si => "SI units",
+            Self::Scaled => "scaled units (s_x and s_u times SI units)",
+        }
+    }
+
+    /// The model whose maps take these units.
+    pub(super) fn convert(self, model: &ReducedModel) -> Result<ReducedModel, LowerError> {
+        match (self, model.scaling()) {
+            (Self::Scaled, Ok(_)) => {
+                let builder = model.clone().into_builder();
+                Ok(builder.scaling(Scaling::uniform(1.0)).build()?)
+            }
+            // A model without robot coordinates has no maps either.
+            (Self::Si, _) | (Self::Scaled, Err(_)) => Ok(model.clone()),
+        }
+    }
+}
+
+/// Why no code could be generated from a model.
+#[derive(Debug, thiserror::Error)]
+pub enum CodegenError {
+    /// The model cannot be lowered.
+    #[error(transparent)]
+    Lower(#[from] LowerError),
+    /// A constant is beyond the largest single-precision number.
+    #[error(
+        "`{function}` has the constant {value:e}, beyond what single precision holds (3.4e38); use `--precision f64`"
+    )]
+    BeyondSingle {
+        /// The function, without the model's name.
+        function: String,
+        /// The constant.
+        value: f64,
+    },
+    /// A template failed to render.
+    #[error("a template failed")]
+    Template(#[from] askama::Error),
 }
 
 #[cfg(test)]

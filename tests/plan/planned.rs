@@ -1,21 +1,28 @@
 //! Plans of a model that is trained on the shipped recordings.
 
+use std::path::Path;
 use std::sync::OnceLock;
 use std::sync::atomic::AtomicBool;
 
 use nalgebra::DVector;
+use romc::artifact;
+use romc::model::ReducedModel;
+use romc::plan::{Goal, Plan, PlanError, PlanSettings, Verdict, plan};
+use romc::recording::{self, Recording};
+use romc::robot::{BODY_Z, GRAVITY_M_S2, Robot};
+use romc::train::{Method, Monitor, Origin, Progress, Recordings, TrainOptions};
 
-use super::*;
-use crate::artifact;
-use crate::evaluate::shipped_model;
-use crate::model::ReducedModel;
-use crate::recording::Recording;
-use crate::robot::{BODY_Z, GRAVITY_M_S2, Robot};
-use crate::train::{Method, Origin, Progress, Recordings, TrainOptions, Watch};
+fn shipped_model(name: &str) -> ReducedModel {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    artifact::read(&root.join(format!("models/{name}.json"))).expect("shipped")
+}
 
 fn recordings(split: &str, count: usize) -> Vec<Recording> {
-    let names = (1..=count).map(|k| format!("go1/{split}_{k:02}"));
-    names.map(|name| crate::recording::shipped(&name)).collect()
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/recordings/go1");
+    let paths = (1..=count).map(|k| folder.join(format!("{split}_{k:02}.csv.gz")));
+    paths
+        .map(|path| recording::read(&path).expect("shipped"))
+        .collect()
 }
 
 fn model() -> &'static ReducedModel {
@@ -28,9 +35,9 @@ fn learned(training: &[Recording], validation: &[Recording], latent_dim: usize) 
     let robot = Robot::by_name("go1").unwrap();
     let options = TrainOptions::new("planner", latent_dim);
     let (cancel, mut listener) = (AtomicBool::new(false), |_: Progress| ());
-    let mut watch = Watch::new(&mut listener, &cancel);
+    let mut monitor = Monitor::new(&mut listener, &cancel);
     let origin = Origin::default();
-    let trained = Method::ClosedForm.learn(sets, robot, &options, &origin, &mut watch);
+    let trained = Method::ClosedForm.learn(sets, robot, &options, &origin, &mut monitor);
     trained.expect("a model").model
 }
 
@@ -86,9 +93,9 @@ fn plan_read_as_a_recording_has_the_planned_torques_inside_their_limits() {
     let plan = planned(0.3, 0.12).expect("a plan");
     let recording = Recording::from(plan.motion.clone());
     let mut bytes = Vec::new();
-    let options = crate::recording::WriteOptions::default();
-    crate::recording::write::write_to(&mut bytes, &recording, None, &options).unwrap();
-    let read = crate::recording::read_from_bytes("plan.csv", &bytes).unwrap();
+    let options = recording::WriteOptions::default();
+    recording::write::write_to(&mut bytes, &recording, None, &options).unwrap();
+    let read = recording::read_from_bytes("plan.csv", &bytes).unwrap();
     assert_eq!(read.segments[0].torque_nm, plan.motion.torque_nm);
     let limits = Robot::by_name("go1").unwrap().torque_limit_nm();
     for column in read.segments[0].torque_nm.column_iter() {
