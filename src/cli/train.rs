@@ -30,9 +30,7 @@ pub(crate) fn run(arguments: &TrainArguments) -> Result<Answer, Error> {
         .and_robot(settings.robot.as_deref())
         .and(&settings.actuators)
         .check_output(Some(&arguments.output), Format::MODEL, arguments.force)?;
-    let latent_dim = settings
-        .latent_dim
-        .expect("checked by clap, or with the file");
+    let latent_dim = settings.latent_dim.expect("clap or the file's check asks");
     let method = train_settings::method(&settings);
     let robot = train_settings::robot(&settings)?;
     let name = named(arguments.name.as_deref(), &arguments.output);
@@ -59,18 +57,15 @@ pub(crate) fn run(arguments: &TrainArguments) -> Result<Answer, Error> {
         Progress::Done { text, .. } => bar.set_message(text),
     };
     let mut monitor = Monitor::new(&mut listener, stop_on_interrupt());
-    let trained = method.learn(sets, robot, &options, &origin, &mut monitor)?;
+    let mut trained = method.learn(sets, robot, &options, &origin, &mut monitor)?;
     bar.finish_and_clear();
     let is_interrupted = INTERRUPTED.load(Ordering::Relaxed);
-    let trained = match is_interrupted {
-        true => marked_as_interrupted(trained),
-        false => trained,
-    };
+    if is_interrupted {
+        trained = marked_as_interrupted(trained);
+    }
     artifact::write(&arguments.output, &trained.model, arguments.force)?;
-    let tested = match test.is_empty() {
-        true => None,
-        false => Some(train::assess(&trained.model, test)?),
-    };
+    let tested = (!test.is_empty()).then(|| train::assess(&trained.model, test));
+    let tested = tested.transpose()?;
     let mut answer = answer(arguments, &trained, tested.as_ref());
     let notes = notes(&trained.report, tested.as_ref(), &recorded.sets);
     notes.iter().for_each(|text| note(text));
