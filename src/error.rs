@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use crate::equations::PhysicalError;
 use crate::files::Place;
 use crate::robot::RobotError;
-use crate::robot_file::{RobotFileError, RobotFileFault};
+use crate::robot_file::RobotFileError;
 use crate::simplify::SimplifyError;
 use crate::train::TrainError;
 
@@ -24,10 +24,9 @@ pub enum Error {
     Recording(#[from] crate::recording::RecordingError),
     #[error(transparent)]
     Model(#[from] crate::model::ModelError),
+    /// A model file, or one of a model trained elsewhere.
     #[error(transparent)]
-    Artifact(#[from] crate::artifact::ArtifactError),
-    #[error(transparent)]
-    Import(#[from] crate::import::ImportError),
+    ModelFile(#[from] crate::artifact::ArtifactError),
     #[error(transparent)]
     Identify(#[from] crate::identify::IdentifyError),
     #[error(transparent)]
@@ -115,11 +114,8 @@ impl Error {
     pub fn is_usage(&self) -> bool {
         match self {
             Self::Robot(error) => matches!(error, RobotError::UnknownRobot { .. }),
-            Self::RobotFile(error) => {
-                matches!(error.kind, RobotFileFault::Unknown(_))
-                    || matches!(error.place, Place::Option(_))
-            }
-            Self::Import(error) => matches!(error.place, Place::Option(_)),
+            Self::RobotFile(error) => error.file.is_empty(),
+            Self::ModelFile(error) => matches!(error.place, Place::Option(_)),
             Self::Physical(error) => matches!(error, PhysicalError::LatentOnly { .. }),
             Self::Train(error) => matches!(error, TrainError::Option { .. }),
             Self::Simplify(error) => {
@@ -137,7 +133,6 @@ impl Error {
             Self::Recording(_)
             | Self::Identify(_)
             | Self::Model(_)
-            | Self::Artifact(_)
             | Self::Emit(_)
             | Self::Typeset(_)
             | Self::Codegen(_)

@@ -1,5 +1,8 @@
 //! Faults that were found by attack and by use, each as it was found; the command line from outside.
 
+#[path = "faults/files.rs"]
+mod files;
+
 use std::fs;
 use std::io::Write as _;
 use std::path::Path;

@@ -16,6 +16,8 @@ mod foreign;
 mod formats;
 #[path = "import/hostile.rs"]
 mod hostile;
+#[path = "import/latex.rs"]
+mod latex;
 #[path = "import/library_order.rs"]
 mod library_order;
 #[path = "import/names.rs"]
@@ -24,6 +26,8 @@ mod names;
 mod round_trip;
 #[path = "import/store.rs"]
 mod store;
+#[path = "import/terms.rs"]
+mod terms;
 mod tools;
 #[path = "import/trained.rs"]
 mod trained;

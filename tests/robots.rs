@@ -20,7 +20,7 @@ use romc::artifact;
 use romc::lower;
 use romc::model::{Library, ReducedModel};
 use romc::robot::{InputRule, Leg, LegGeometry, Robot, WrenchFrame};
-use romc::robot_file;
+use romc::robot_file::{self, RobotEntry, RobotOptions};
 use serde_json::Value;
 
 use command_line::{romc, text};
@@ -419,4 +419,109 @@ fn names_that_act_on_the_text_around_them_are_refused() {
         error.contains("leg[1].joint[0].name: found \"FL*/HAA\""),
         "{error}"
     );
+}
+
+#[test]
+fn known_robots_are_planar_and_come_back_from_their_own_text_as_themselves() {
+    for name in Robot::known_names() {
+        let robot = Robot::by_name(name).expect("read");
+        for leg in Leg::ALL {
+            assert!(
+                matches!(robot.geometry(leg), LegGeometry::Planar(_)),
+                "{name} {leg}"
+            );
+        }
+        let again = robot_file::from_toml(name, &robot_file::to_toml(robot)).expect("its own text");
+        assert!(std::ptr::eq(again, robot), "{name}");
+        assert!(std::ptr::eq(robot_file::find(name).expect("known"), robot));
+    }
+}
+
+#[test]
+fn faults_name_the_entry() {
+    let good = robot_file::to_toml(Robot::by_name("go1").unwrap()).replace("\"go1\"", "\"mine\"");
+    for (from, to, said) in [
+        (
+            "FR_calf_joint",
+            "FR_hip_joint",
+            "leg[0].joint[2].name: found \"FR_hip_joint\" a second",
+        ),
+        (
+            "torque_nm = 35.55",
+            "torque_nm = -1.0",
+            "leg[0].joint[2].torque_nm: found -1",
+        ),
+        (
+            "axis = \"y\"",
+            "axis = \"w\"",
+            "leg[0].joint[1].axis: found Name(\"w\")",
+        ),
+        (
+            "limits_rad = [-0.863, 0.863]",
+            "limits_rad = [0.863, -0.863]",
+            "the lower limit first",
+        ),
+        (
+            "[0.1881, 0.04675, 0.0]",
+            "[0.1881, -0.04675, 0.0]",
+            "one at each corner",
+        ),
+        ("mass_kg", "mass", "unknown field `mass`"),
+        ("axis = \"y\"", "axis = \"z\"", "parallel axes"),
+    ] {
+        assert!(good.contains(from), "{from}");
+        let error = robot_file::from_toml("r.toml", &good.replacen(from, to, 1))
+            .unwrap_err()
+            .to_string();
+        assert!(error.contains(said), "{error}");
+    }
+}
+
+#[test]
+fn another_robot_of_a_known_name_is_one_of_its_own_and_says_what_differs() {
+    let a1 = robot_file::to_toml(Robot::by_name("a1").unwrap()).replace("12.78", "12.79");
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("r.toml").display().to_string();
+    fs::write(&path, &a1).expect("written");
+    let open = |name: Option<&str>| robot_file::open(&path, &RobotOptions { feet: &[], name });
+    let read = open(None).expect("read");
+    assert_eq!(
+        (read.robot.name(), read.robot.mass_kg()),
+        ("a1-toml", 12.79)
+    );
+    assert_eq!(
+        read.notes,
+        [
+            "its numbers are not those of romc's own \"a1\" (mass_kg 12.79 instead of 12.78): it is called \
+             \"a1-toml\"; --name (romc robot) gives it another name"
+        ]
+    );
+    assert_eq!(open(Some("mine")).expect("read").robot.name(), "mine");
+    let error = open(Some("a1")).unwrap_err().to_string();
+    let found = "--name: found \"a1\", romc's own robot with other";
+    assert!(error.contains(found), "{error}");
+    // A model file's robot is what it is; it is not renamed.
+    let entry: RobotEntry = toml::from_str(&a1).expect("an entry");
+    let error = entry.robot("robot").unwrap_err().to_string();
+    assert!(error.contains("(mass_kg 12.79 instead of 12.78), expected another name"));
+}
+
+#[test]
+fn signs_and_offsets_turn_the_same_leg_at_other_angles() {
+    let own = Robot::by_name("go1").unwrap();
+    let text = robot_file::to_toml(own).replace("\"go1\"", "\"mine\"");
+    // Knees that count the other way, and read 0.4 where the leg is straight.
+    let text = text.replace(
+        "_calf_joint\", at = [0.0, 0.0, -0.213], axis = \"y\"",
+        "_calf_joint\", at = [0.0, 0.0, -0.213], axis = \"y\", sign = -1.0, offset_rad = 0.4",
+    );
+    let turned = robot_file::from_toml("mine.toml", &text).unwrap();
+    for leg in Leg::ALL {
+        let q = [0.1, 0.7, -1.4];
+        let read = [q[0], q[1], 0.4 - q[2]];
+        let (a, b) = (own.foot_position(leg, &q), turned.foot_position(leg, &read));
+        assert!((a - b).norm() < 1e-15, "{leg}: {a} {b}");
+        let (a, b) = (own.foot_jacobian(leg, &q), turned.foot_jacobian(leg, &read));
+        assert!((a.column(2) + b.column(2)).norm() < 1e-15);
+    }
 }

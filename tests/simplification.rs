@@ -220,6 +220,80 @@ fn cases_of_the_table_come_out_simplest() {
     assert!(n_cases >= 30, "{n_cases} cases");
 }
 
+/// The printed simplest form of a sum.
+fn shortest(sum: &str) -> String {
+    printed(&Equations::of(&model_of(&parsed(sum))))
+}
+
+#[test]
+fn shorten_finds_the_simplest_form_of_each_family() {
+    let mut wrong = Vec::new();
+    for (sum, expected) in [
+        ("1 sin(z1)^2 ; 1 cos(z1)^2", "1 1"),
+        ("0.37 sin(z1)^2 ; 0.37 cos(z1)^2 ; 2 z2", "0.37 1 ; 2 z2"),
+        ("3 sin(z1)^2 ; 2 cos(z1)^2", "2 1 ; 1 sin(z1)^2"),
+        ("2 sin(z1)*cos(z1) ; -1 sin(2*z1)", ""),
+        (
+            "0.7 sin(z1)*cos(z2) ; 0.7 cos(z1)*sin(z2)",
+            "0.7 sin(z1 + z2)",
+        ),
+        ("1 sin(-z1) ; 1 sin(z1)", ""),
+        ("1 cos(-z1) ; 1 cos(z1)", "2 cos(z1)"),
+        ("1 z1/2 ; 0.5 z1", "1 z1"),
+        ("1 (z1^2 - 1)/(z1 - 1)", "1 1 ; 1 z1"),
+        ("1 (z1 + 1)^2 ; -1 z1^2 ; -2 z1", "1 1"),
+        ("0.1 (z1 + 1)^3 ; -0.1 z1^3 ; -0.3 z1^2 ; -0.3 z1", "0.1 1"),
+        ("1 exp(z1)*exp(-z1) ; 2 z1", "1 1 ; 2 z1"),
+        ("0.3 log(exp(z1)) ; 0.1 z1", "0.4 z1"),
+        ("1.3 exp(2*log(z1))", "1.3 z1^2"),
+        ("0.1 z1*z2 ; -0.1 z2*z1", ""),
+        ("0.1 sqrt(z1)^2 ; 0.2 z1", "0.3 z1"),
+        ("1 sin(z1 + z2) ; 1 sin(z1 - z2)", "2 sin(z1)*cos(z2)"),
+        (
+            "1 sin(z1)*cos(z2) ; 1 cos(z1)*sin(z2) ; 0.3 sin(z1)*cos(dz1)",
+            "1 sin(z1 + z2) ; 0.3 sin(z1)*cos(dz1)",
+        ),
+        ("1 tan(z1)*cos(z1) ; 1 sin(z1)", "2 sin(z1)"),
+        ("1 1 ; 1 tan(z1)^2", "1 1/cos(z1)^2"),
+        ("1 1 ; -2 sin(z1)^2", "1 cos(2*z1)"),
+        (
+            "1 (z1 + 1)^2 ; -1 z1^2 ; -2 z1 ; 0.3 (z1 + 1)^3",
+            "1 1 ; 0.3 (1 + z1)^3",
+        ),
+        // Of equal terms each counts once.
+        (
+            "0.5 1 ; -0.5 cos(2*z1) ; 0.5 1*z2 ; 0.5 z2",
+            "1 sin(z1)^2 ; 1 z2",
+        ),
+    ] {
+        let found = shortest(sum);
+        if found != expected {
+            wrong.push(format!("{sum}: {found}, expected {expected}"));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn shorten_leaves_what_is_short_already() {
+    for sum in [
+        "0.36 1 ; -0.16 dz1 ; -0.91 dz2 ; -0.75 sin(dz1)",
+        "0.1 z1 ; 0.2 z1*z2 ; 0.3 (1 + z1)^2",
+        "1 z1*z2 ; 1 z1*dz1",
+        "0.37 sin(z1)*cos(z2) ; 0.21 sin(dz1)*cos(z1)",
+        "1 1/3*z1",
+        "1 exp(z1) ; 1 tanh(z2) ; 0.5 sqrt(z1^2 + z2^2)",
+        // Shorter forms of these overflow or underflow where they do not.
+        "0.4 log(z1) ; 0.4 log(z2)",
+        "1 -exp(z1)/(z2 - exp(z1)) ; 1 exp(z1)/(z2 + exp(z1))",
+        "1 1/(z1 - z2) ; -1 1/(z1 + z2)",
+        "1 sign(z1)*sign(z2)",
+        "1 sqrt(z1)*sqrt(z2)",
+    ] {
+        assert_eq!(shortest(sum), sum);
+    }
+}
+
 #[test]
 fn steps_state_how_many_terms_became_how_many() {
     let model = model_of(&parsed(

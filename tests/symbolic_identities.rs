@@ -1,4 +1,15 @@
-//! The table of identities: `tests/fixtures/identities.txt`.
+//! The algebra by its public functions, and the table of identities `tests/fixtures/identities.txt`.
+
+#[path = "symbolic_identities/bounds.rs"]
+mod bounds;
+#[path = "symbolic_identities/expressions.rs"]
+mod expressions;
+#[path = "symbolic_identities/normal_form.rs"]
+mod normal_form;
+#[path = "symbolic_identities/parsing.rs"]
+mod parsing;
+#[path = "symbolic_identities/simplify.rs"]
+mod simplify;
 
 use romc::symbolic::{CanonicalForms, ExprId, ExprPool};
 
@@ -7,6 +18,21 @@ const TABLE: &str = include_str!("fixtures/identities.txt");
 fn parse(pool: &mut ExprPool, text: &str) -> ExprId {
     pool.parse(text, &|_| true)
         .unwrap_or_else(|error| panic!("{text}: {error}"))
+}
+
+/// The text of what `rewrite` makes of the expression of a text.
+fn rewritten(text: &str, rewrite: impl FnOnce(&mut ExprPool, ExprId) -> ExprId) -> String {
+    let mut pool = ExprPool::new();
+    let expr = parse(&mut pool, text);
+    let result = rewrite(&mut pool, expr);
+    pool.display(result).to_string()
+}
+
+/// Asserts that `rewrite` makes the right text of each left one.
+fn assert_rewritten(rewrite: impl Fn(&mut ExprPool, ExprId) -> ExprId, cases: &[(&str, &str)]) {
+    for (text, expected) in cases {
+        assert_eq!(rewritten(text, &rewrite), *expected, "{text}");
+    }
 }
 
 /// The pairs that stand left and right of `operator`.
@@ -27,7 +53,7 @@ fn pairs(operator: &str) -> Vec<(&'static str, &'static str)> {
 
 /// Whether the normal forms of two expressions prove them equal.
 fn is_proven(pool: &ExprPool, a: ExprId, b: ExprId) -> bool {
-    let mut forms = CanonicalForms::new(pool, &[a, b], &|_| None);
+    let mut forms = CanonicalForms::new(pool, &[a, b]);
     let difference = forms.of(a).minus(&forms.of(b));
     let cleared = forms.without_fractions(&difference);
     cleared.is_some_and(|form| form.is_zero())

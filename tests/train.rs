@@ -18,7 +18,7 @@ use romc::robot::{Actuators, Robot, WrenchFrame};
 use romc::sim::{LatentSegment, Restart, rollout};
 use romc::train::{
     self, Coordinates, EncoderOptions, Origin, Progress, Recordings, ScaleOptions, SetMetrics,
-    TrainError, TrainOptions, Trained, Transfer, Watch,
+    Split, TrainError, TrainOptions, Trained, Transfer, Watch,
 };
 
 fn jumps(set: &str, count: usize) -> Vec<Recording> {
@@ -594,4 +594,51 @@ fn hidden_layers_are_refused_where_they_make_no_sense() {
         matches!(&narrow, Err(TrainError::Option { option: "encoder-layers", found, .. }) if found == "[8, 1]"),
         "{narrow:?}"
     );
+}
+
+fn split(text: &str) -> Split {
+    text.parse().expect("shares")
+}
+
+#[test]
+fn split_takes_every_jump_into_one_set_and_depends_on_the_seed_alone() {
+    let sets = split("14,3,3").of(20, 5).expect("enough jumps");
+    assert_eq!(sets.each_ref().map(Vec::len), [14, 3, 3]);
+    assert!(sets.iter().all(|set| set.is_sorted()));
+    let mut all = sets.concat();
+    all.sort_unstable();
+    assert_eq!(all, (0..20).collect::<Vec<_>>());
+    assert_eq!(sets, split("14,3,3").of(20, 5).expect("enough"));
+    assert_ne!(sets, split("14,3,3").of(20, 6).expect("enough"));
+}
+
+#[test]
+fn split_gives_each_set_its_share_and_none_without_one() {
+    for (shares, jumps, expected) in [
+        ("14,3,3", 20, [14, 3, 3]),
+        ("70,15,15", 20, [14, 3, 3]),
+        ("70,15,15", 3, [1, 1, 1]),
+        ("1,1,1", 5, [2, 2, 1]),
+        ("98,1,1", 10, [8, 1, 1]),
+        ("4,1", 10, [8, 2, 0]),
+        ("1,0,1", 4, [2, 0, 2]),
+    ] {
+        let sets = split(shares).of(jumps, 1).expect("enough jumps");
+        assert_eq!(sets.map(|set| set.len()), expected, "{shares} of {jumps}");
+    }
+    assert!(matches!(
+        split("14,3,3").of(2, 1),
+        Err(TrainError::Split {
+            found: 2,
+            expected: 3
+        })
+    ));
+}
+
+#[test]
+fn shares_that_are_not_two_or_three_numbers_are_refused() {
+    for text in ["14", "0,3,3", "14,3,3,3", "14,-3", "a,b", ""] {
+        let message = text.parse::<Split>().expect_err("refused");
+        assert!(message.contains("14,3,3"), "{text}: {message}");
+    }
 }

@@ -8,11 +8,10 @@ use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyType};
 use romc::Error;
-use romc::artifact::{ArtifactError, ArtifactFault};
+use romc::artifact::ArtifactError;
 use romc::deploy::EmitError;
 use romc::evaluate::EvaluateError;
-use romc::files::Place;
-use romc::import::{ImportError, ImportFault};
+use romc::files::{Fault as FileFault, Place};
 use romc::limits::{OutOfRange, Range};
 use romc::lower::LowerError;
 use romc::model::ModelError;
@@ -126,20 +125,10 @@ impl Fault {
         }
     }
 
-    fn of_artifact(error: &ArtifactError) -> Self {
+    fn of_model_file(error: &ArtifactError) -> Self {
         let fault = match (&error.kind, &error.place) {
-            (ArtifactFault::Model(source), _) => Fault::of_model(source),
-            (ArtifactFault::Syntax { place, .. }, _) => Fault::at_tensor(place),
-            (_, Place::Entry(entry)) => Fault::at_tensor(entry),
-            _ => Fault::of(Class::Model),
-        };
-        fault.in_file(&error.file)
-    }
-
-    fn of_import(error: &ImportError) -> Self {
-        let fault = match (&error.kind, &error.place) {
-            (ImportFault::Model(source), _) => Fault::of_model(source),
-            (_, Place::Entry(entry)) => Fault::at_tensor(entry),
+            (FileFault::Unusable(source), _) => Fault::of_model(source),
+            (_, Place::Entry(place) | Place::Key(place, ..)) => Fault::at_tensor(place),
             _ => Fault::of(Class::Model),
         };
         fault.in_file(&error.file)
@@ -194,8 +183,7 @@ impl Fault {
         match error {
             Error::Recording(error) => Fault::of_recording(error),
             Error::Model(error) => Fault::of_model(error),
-            Error::Artifact(error) => Fault::of_artifact(error),
-            Error::Import(error) => Fault::of_import(error),
+            Error::ModelFile(error) => Fault::of_model_file(error),
             Error::Mismatch { file, .. } => {
                 Fault::of(Class::Model).in_file(&file.to_string_lossy())
             }

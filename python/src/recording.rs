@@ -308,7 +308,7 @@ fn through_the_format(
         // Arrays count from 0 and have no header.
         match &mut error.place {
             Place::Row(row) | Place::Cell(row, _) => *row = row.saturating_sub(FIRST_ROW),
-            Place::Whole | Place::Character(..) | Place::Entry(_) | Place::Option(_) => {}
+            _ => {}
         }
         error
     })

@@ -5,11 +5,10 @@ use std::collections::HashMap;
 use serde::Serialize;
 
 use super::CheckOptions;
-use super::point::{Gap, Sides, decimals, search};
-use super::side::{Floats, RightSide, Side, SidePhase, literal};
+use super::point::{Gap, Sides, search};
+use super::side::{Floats, RightSide, Side, SidePhase};
 use crate::symbolic::{CanonicalForm, CanonicalForms, Coefficient, ExprId, ExprPool, Node, Number};
 
-/// Most terms that a difference names.
 const MAX_TERMS: usize = 5;
 
 /// Both files, phase by phase.
@@ -199,7 +198,6 @@ fn decide_with(
         [0, 1]
     };
     let proof = proof(&pool, &restrictions, rest, order);
-    let decimals = decimals(&pool, &[&whole[..], &restrictions].concat());
     let searched = |rest: [ExprId; 2], rows: &[&Row]| {
         let groups: Vec<ExprId> = rows.iter().map(|row| row.rest).collect();
         let sides = Sides {
@@ -207,7 +205,6 @@ fn decide_with(
             whole,
             rest,
             guards,
-            decimals: &decimals,
         };
         search(&sides, phase, &options.domain, &groups, proof.is_some())
     };
@@ -242,8 +239,7 @@ fn proof(
     if rest == [ExprId::ZERO; 2] {
         return Some(Verdict::Equal);
     }
-    let literal = |symbol| literal(pool, symbol);
-    let mut forms = CanonicalForms::new(pool, restrictions, &literal);
+    let mut forms = CanonicalForms::new(pool, restrictions);
     let [first, second] = order.map(|side| forms.of(rest[side]));
     let difference = first.minus(&second);
     let verdict = |form: &CanonicalForm, rounding: f64| {
@@ -262,7 +258,6 @@ fn proof(
     found.filter(|_| !forms.is_contradictory())
 }
 
-/// The sum of one side's terms in these rows.
 fn sum(pool: &mut ExprPool, side: usize, rows: &[&Row]) -> ExprId {
     let terms: Vec<ExprId> = (rows.iter())
         .flat_map(|row| row.terms[side].clone())
@@ -278,7 +273,6 @@ struct Table {
 struct Row {
     rest: ExprId,
     coefficients: [Coefficient; 2],
-    /// The terms with their numbers, for each side.
     terms: [Vec<ExprId>; 2],
 }
 
@@ -330,7 +324,6 @@ impl Table {
         })
     }
 
-    /// Those of them that rounding does not explain.
     fn unexplained(&self) -> Vec<&Row> {
         let rows = self.differing();
         rows.filter(|row| !row.difference().may_be_zero()).collect()
@@ -375,7 +368,7 @@ fn parted(pool: &ExprPool, expr: ExprId) -> (Coefficient, Vec<ExprId>, Vec<ExprI
 fn value_of(pool: &ExprPool, factor: ExprId) -> Option<Coefficient> {
     match pool.node(factor) {
         Node::Number(number) => Some(Coefficient::from(*number)),
-        Node::Symbol(symbol) => literal(pool, *symbol),
+        Node::Symbol(symbol) => pool.decimal_of(*symbol).map(|(decimal, _)| decimal.clone()),
         _ => None,
     }
 }

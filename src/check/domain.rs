@@ -56,7 +56,6 @@ impl CheckDomain {
         })
     }
 
-    /// The range of a variable; `None` where the domain says nothing.
     pub(crate) fn range(&self, phase: &str, variable: &str) -> Option<[f64; 2]> {
         self.phases.get(phase)?.get(variable).copied()
     }

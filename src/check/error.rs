@@ -7,27 +7,20 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
-use crate::artifact::ArtifactError;
 use crate::import::ImportError;
 use crate::symbolic::ParseError;
 
 /// What is wrong with a file that is to be compared.
 #[derive(Debug, Error)]
 pub enum CheckError {
-    /// The file system refused.
     #[error("{}: cannot read the file", path.display())]
     Io { path: PathBuf, source: io::Error },
-    /// A file of another kind.
     #[error(
         "{file}: found {found}, expected a model (.json), equations as text (.txt), or LaTeX (.tex, .md)"
     )]
     Kind { file: String, found: String },
-    /// A model that cannot be read.
     #[error(transparent)]
-    Model(#[from] ArtifactError),
-    /// Equations that cannot be read.
-    #[error(transparent)]
-    Equations(#[from] ImportError),
+    File(#[from] ImportError),
     /// An equation that is too large once its numbers are kept as they are written.
     #[error("{file}:{line}: not a usable equation")]
     Expression {
@@ -36,7 +29,6 @@ pub enum CheckError {
         line: usize,
         source: ParseError,
     },
-    /// A domain that cannot be used.
     #[error("{}: {message}", path.display())]
     Domain {
         path: PathBuf,

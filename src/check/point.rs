@@ -1,12 +1,11 @@
 //! Search for a point where two expressions differ by more than rounding explains.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet};
 
 use chacha20::ChaCha8Rng;
 use chacha20::rand_core::{Rng, SeedableRng};
 
 use super::domain::CheckDomain;
-use super::side::literal;
 use crate::symbolic::{ExprId, ExprPool, Interval, SymbolId};
 
 /// Points that are tried without a proof of equality, and with one, where they only show where
@@ -18,7 +17,6 @@ const ENOUGH: usize = 200;
 /// How far points reach without a domain, each in its turn.
 const SCALES: [f64; 8] = [1.0, 1.0, 1.0, 0.3, 3.0, 0.03, 10.0, 100.0];
 
-/// Values of variables by name.
 pub(crate) type Point = BTreeMap<String, f64>;
 
 /// Both sides at a point.
@@ -38,7 +36,6 @@ impl Gap {
     }
 }
 
-/// What the search found.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Search {
     /// A point where the sides differ by more than rounding explains.
@@ -47,31 +44,16 @@ pub(super) struct Search {
     pub(super) largest: Option<Gap>,
     /// A point where only one side has a value (the other is NaN).
     pub(super) one_sided: Option<Gap>,
-    /// Whether both sides have values anywhere.
     pub(super) has_common_point: bool,
 }
 
-/// The two sides of one equation.
 pub(super) struct Sides<'s> {
     pub(super) pool: &'s ExprPool,
-    /// The whole right sides.
     pub(super) whole: [ExprId; 2],
     /// The same without the terms that both have; the difference is that of the whole sides.
     pub(super) rest: [ExprId; 2],
     /// What has a value where each side as written has one.
     pub(super) guards: [&'s [ExprId]; 2],
-    /// The [`decimals`] of the whole sides and their guards.
-    pub(super) decimals: &'s HashMap<SymbolId, (f64, f64)>,
-}
-
-/// Value and radius of each symbol that stands for a decimal.
-pub(super) fn decimals(pool: &ExprPool, exprs: &[ExprId]) -> HashMap<SymbolId, (f64, f64)> {
-    let symbols = exprs.iter().flat_map(|expr| pool.symbols_of(*expr));
-    let decimals = symbols.filter_map(|symbol| {
-        let literal = literal(pool, symbol)?;
-        Some((symbol, (literal.to_f64(), literal.radius())))
-    });
-    decimals.collect()
 }
 
 /// Tries points of a fixed sequence: all variables at once, and single groups of them with the
@@ -87,7 +69,7 @@ pub(super) fn search(
     let variables: Vec<SymbolId> = (sides.whole.iter())
         .chain(sides.guards.into_iter().flatten())
         .flat_map(|expr| pool.symbols_of(*expr))
-        .filter(|symbol| !sides.decimals.contains_key(symbol))
+        .filter(|symbol| pool.decimal_of(*symbol).is_none())
         .collect::<BTreeSet<_>>()
         .into_iter()
         .collect();
@@ -163,10 +145,7 @@ fn short(value: f64) -> f64 {
 
 impl Sides<'_> {
     fn values_of(&self, exprs: &[ExprId], values: &BTreeMap<SymbolId, f64>) -> Vec<f64> {
-        let value_of = |symbol: SymbolId| match self.decimals.get(&symbol) {
-            Some((value, _)) => *value,
-            None => values.get(&symbol).copied().unwrap_or(0.0),
-        };
+        let value_of = |symbol: SymbolId| values.get(&symbol).copied().unwrap_or(0.0);
         self.pool.evaluate_all(exprs, &value_of)
     }
 
@@ -197,12 +176,8 @@ impl Sides<'_> {
 
     /// Bounds with the rounding of decimals.
     fn bounds_of(&self, exprs: &[ExprId], values: &BTreeMap<SymbolId, f64>) -> Vec<Interval> {
-        let range_of = |symbol: SymbolId| match self.decimals.get(&symbol) {
-            Some((value, radius)) => {
-                Interval::new((value - radius).next_down(), (value + radius).next_up())
-            }
-            None => Interval::point(values.get(&symbol).copied().unwrap_or(0.0)),
-        };
+        let range_of =
+            |symbol: SymbolId| Interval::point(values.get(&symbol).copied().unwrap_or(0.0));
         self.pool.evaluate_intervals(exprs, &range_of)
     }
 

@@ -9,13 +9,8 @@ use crate::equations::Equations;
 use crate::files::size;
 use crate::import::{Format, read_equations};
 use crate::model::{LatentVariable, ReducedModel};
-use crate::symbolic::{
-    Coefficient, ExprId, ExprPool, Number, ParseError, ParseLimits, Reading, SymbolId,
-};
+use crate::symbolic::{Coefficient, ExprId, ExprPool, Number, ParseError, ParseLimits, Reading};
 
-/// Marks of symbols that stand for decimals: exact ones, and ones rounded in their last digit.
-const EXACT: char = '#';
-const ROUNDED: char = '~';
 /// Digits that a rounded float has at least; decimals with more digits are nearer to one float than to any other.
 const FLOAT_DIGITS: usize = 16;
 /// Below this floats hold every multiple of 1/2.
@@ -35,17 +30,14 @@ pub struct Side {
     pub(super) phases: Vec<SidePhase>,
 }
 
-/// The right sides of one phase.
 #[derive(Clone, Debug)]
 pub(super) struct SidePhase {
     pub(super) name: Option<String>,
     pub(super) ddz: Vec<RightSide>,
 }
 
-/// A right side as text.
 #[derive(Clone, Debug)]
 pub(super) enum RightSide {
-    /// Coefficients and terms of a model.
     Summands(Vec<(f64, String)>),
     /// One expression, and the line of its left side.
     Text(usize, String),
@@ -150,7 +142,6 @@ impl Side {
         }
     }
 
-    /// Names of the phases that have one.
     pub(crate) fn phase_names(&self) -> Vec<String> {
         let names = self.phases.iter().map(|phase| phase.name.clone());
         names.flatten().collect()
@@ -174,13 +165,13 @@ impl Side {
 
     fn parse(&self, text: &str, pool: &mut ExprPool) -> Result<Reading, ParseError> {
         let known = |name: &str| LatentVariable::from_name(name, self.latent_dim).is_some();
-        let literal = |number: &str| self.literal_name(number);
+        let literal = |pool: &mut ExprPool, number: &str| self.decimal(pool, number);
         pool.parse_defined(text, &known, &literal, ParseLimits::default())
     }
 
-    /// The symbol of a decimal. Integers are numbers of the pool, and multiples of 1/2 of exact
+    /// A decimal as it is written. Integers are numbers of the pool, and multiples of 1/2 of exact
     /// files, which floats hold exactly. Decimals of 17 digits or more are the shortest one of the same float.
-    fn literal_name(&self, number: &str) -> Option<String> {
+    fn decimal(&self, pool: &mut ExprPool, number: &str) -> Option<ExprId> {
         if number.bytes().all(|byte| byte.is_ascii_digit()) && number.parse::<i64>().is_ok() {
             return None;
         }
@@ -196,8 +187,7 @@ impl Side {
         if !is_rounded && is_half && literal.to_f64() < LARGEST_HALF && float.is_none() {
             return None;
         }
-        let mark = if is_rounded { ROUNDED } else { EXACT };
-        Some(format!("{mark}{text}"))
+        pool.decimal(&text, is_rounded)
     }
 
     /// Builds a right side, with symbols for decimals, and its guards; where a model's `floats` count as rounded, those of as many digits
@@ -221,16 +211,14 @@ impl Side {
                         let size = coefficient.abs();
                         let whole = Number::from_f64(size).filter(|number| number.is_exact());
                         let text = format!("{size:?}");
-                        let (mark, text) = match floats {
-                            Floats::Rounded if n_digits(&text) >= FLOAT_DIGITS => {
-                                (ROUNDED, format!("{size:.14e}"))
-                            }
-                            Floats::Rounded | Floats::Exact => (EXACT, text),
+                        let is_rounded =
+                            floats == Floats::Rounded && n_digits(&text) >= FLOAT_DIGITS;
+                        let factor = match (whole, is_rounded) {
+                            (Some(number), _) => Some(pool.constant(number)),
+                            (None, true) => pool.decimal(&format!("{size:.14e}"), true),
+                            (None, false) => pool.decimal(&text, false),
                         };
-                        let factor = match whole {
-                            Some(number) => pool.constant(number),
-                            None => pool.symbol(&format!("{mark}{text}")),
-                        };
+                        let factor = factor.expect("a float reads as a decimal");
                         let product = pool.mul(factor, term.expr);
                         if *coefficient < 0.0 {
                             pool.neg(product)
@@ -246,27 +234,15 @@ impl Side {
     }
 }
 
-/// What the coefficients of a model are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Floats {
-    /// The numbers that are there.
     Exact,
     /// Numbers such as 1/3 and sums that were rounded to floats: of those with 16 digits or more, 15 count.
     Rounded,
 }
 
-/// Significant digits of a decimal.
 fn n_digits(decimal: &str) -> usize {
     let mantissa = decimal.split(['e', 'E']).next().unwrap_or_default();
     let digits = mantissa.trim_start_matches(['0', '.']);
     digits.bytes().filter(u8::is_ascii_digit).count()
-}
-
-/// The decimal that a symbol stands for.
-pub(super) fn literal(pool: &ExprPool, symbol: SymbolId) -> Option<Coefficient> {
-    let name = pool.symbol_name(symbol);
-    match name.strip_prefix(ROUNDED) {
-        Some(digits) => Coefficient::parse(digits, true),
-        None => Coefficient::parse(name.strip_prefix(EXACT)?, false),
-    }
 }

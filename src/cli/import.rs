@@ -11,8 +11,8 @@ use super::output::{lines, named, read_recordings};
 use super::robot;
 use crate::evaluate::RoundTrip;
 use crate::import::{
-    Chosen, Format as FileKind, ImportError, ImportFault, ImportOptions, ImportReport, Imported,
-    SymbolNames, import, read_terms,
+    Chosen, Format as FileKind, ImportError, ImportOptions, ImportReport, Imported, SymbolNames,
+    import, read_terms,
 };
 use crate::model::{LibraryChoice, LibraryOrder, ReducedModel};
 use crate::recording::Segment;
@@ -42,7 +42,7 @@ pub fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
     let is_text = matches!(kind, Ok(FileKind::Equations | FileKind::Latex));
     if is_text && !arguments.inputs_from.is_empty() {
         let (found, expected) = ("a file of equations", "a file with encoder and decoder");
-        return Err(ImportFault::option("--inputs-from", found, expected).into());
+        return Err(ImportError::option("--inputs-from", found, expected).into());
     }
     let recordings = read_recordings(&arguments.inputs_from, &arguments.reading, options.robot)?;
     let segments: Vec<&Segment> = recordings.iter().flat_map(|r| &r.segments).collect();
@@ -168,7 +168,7 @@ fn needs_maps(report: &ImportReport) -> Error {
     };
     let found = format!("a model without encoder or decoder to compare; {left}");
     let expected = "both (--map encoder.weight=TENSOR, --map decoder.weight=TENSOR)";
-    ImportFault::option("--inputs-from", found, expected).into()
+    ImportError::option("--inputs-from", found, expected).into()
 }
 
 /// Commands that cannot use a model, and the option that mends it.

@@ -6,17 +6,16 @@ mod units;
 use nalgebra::{DMatrix, DVector};
 
 use super::assign::{Assigned, Assignment, assign};
-use super::error::{ImportError, ImportFault, shape_text};
+use super::error::{ImportError, shape_text};
 use super::library;
 use super::options::{ImportOptions, PhaseRule, XiLayout, standard_text};
-use super::report::{ImportReport, Layout, Note, UnusedTensor, UsedTensor};
+use super::report::{ImportReport, Layout, UnusedTensor, UsedTensor};
 use super::role::{Part, Role, is_of_optimiser};
 use super::tensors::{Element, TensorFile, TensorInfo};
 use crate::files::Place;
 use crate::model::{InputStatistics, Library, LibraryChoice, ModelError, Phase, Scaling, StateMap};
 use crate::robot::STATE_DIM;
 
-/// The parts of a model that a file has.
 #[derive(Debug)]
 pub(super) struct Parts {
     pub(super) library: Library,
@@ -28,7 +27,6 @@ pub(super) struct Parts {
 }
 
 impl Parts {
-    /// Number of robot coordinates, if there is an encoder or decoder.
     pub(super) fn state_dim(&self) -> Option<usize> {
         (self.encoder.as_ref().map(StateMap::input_dim))
             .or(self.decoder.as_ref().map(StateMap::output_dim))
@@ -38,13 +36,10 @@ impl Parts {
 /// Dimensions as far as they are known before a tensor is looked at.
 #[derive(Clone, Copy, Debug, Default)]
 struct Known {
-    /// `d`.
     latent: Option<usize>,
-    /// `n`.
     state: Option<usize>,
 }
 
-/// Makes the parts of a model out of a file of tensors, with the decisions about each.
 pub(super) fn parts(
     tensors: &TensorFile<'_>,
     options: &ImportOptions,
@@ -52,7 +47,7 @@ pub(super) fn parts(
     if matches!(options.library, Some(LibraryChoice::Terms(_))) && options.library_order.is_some() {
         let found = "a list of terms, which has an order";
         let expected = "--library degree=N[,trigonometric][,inputs]";
-        return Err(ImportFault::option("--library-order", found, expected));
+        return Err(ImportError::option("--library-order", found, expected));
     }
     let assignment = assign(tensors, options)?;
     let mut assembly = Assembly {
@@ -105,7 +100,6 @@ impl<'a> Assembly<'a, '_> {
         used.find(|assigned| assigned.role == *role)
     }
 
-    /// A tensor that is something else than expected.
     fn refused(
         &self,
         assigned: &Assigned<'_>,
@@ -115,9 +109,8 @@ impl<'a> Assembly<'a, '_> {
         self.tensors.refused(assigned.place(&[]), found, expected)
     }
 
-    /// Parts that do not make a model.
     fn unusable(&self, source: impl Into<ModelError>) -> ImportError {
-        ImportFault::model(self.tensors.file(), source)
+        ImportError::unusable(self.tensors.file(), source)
     }
 
     fn wrong_shape(&self, assigned: &Assigned<'_>, expected: String) -> ImportError {
@@ -188,7 +181,6 @@ impl<'a> Assembly<'a, '_> {
         Ok(values.column(0).into_owned())
     }
 
-    /// Library and phases.
     fn coefficients(&mut self) -> Result<(Library, Vec<Phase>), ImportError> {
         let first = Role::Xi(self.assignment.phases[0].name.clone());
         let first = (self.find(&first)).expect("every phase was assigned coefficients");
@@ -326,10 +318,9 @@ impl<'a> Assembly<'a, '_> {
             return Err(self.tensors.refused(place, found, "0 or 1"));
         }
         let off = |(value, flag): &(&f64, &f64)| **flag == 0.0 && **value != 0.0;
-        self.report.notes.push(Note::Masked {
-            phase: phase.to_owned(),
-            count: xi.iter().zip(&mask).filter(off).count(),
-        });
+        let count = xi.iter().zip(&mask).filter(off).count();
+        let note = format!("the mask of phase {phase} switched {count} coefficients off");
+        self.report.notes.push(note);
         Ok(xi.zip_map(&mask, |value, flag| if flag == 0.0 { 0.0 } else { value }))
     }
 

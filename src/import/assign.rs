@@ -1,13 +1,12 @@
 //! The use of each tensor: as mapped, else by its name.
 
-use super::error::{ImportError, ImportFault};
+use super::error::ImportError;
 use super::options::{ImportOptions, PhaseRule};
 use super::report::Chosen;
 use super::role::{ONLY_PHASE, Part, Role, is_of_optimiser, mentions};
 use super::tensors::{TensorFile, TensorInfo};
 use crate::files::Place;
 
-/// A tensor and its use.
 #[derive(Clone, Debug)]
 pub(super) struct Assigned<'f> {
     pub(super) role: Role,
@@ -19,21 +18,19 @@ impl Assigned<'_> {
     /// The tensor as the place of a fault, or the number of it at an index of the file.
     pub(super) fn place(&self, index: &[usize]) -> Place {
         let (name, role) = (&self.info.name, &self.role);
-        Place::Entry(match index {
+        match index {
             [] => format!("`{name}` as {role}").into(),
             _ => format!("`{name}`{index:?} as {role}").into(),
-        })
+        }
     }
 }
 
-/// All decisions about a file.
 pub(super) struct Assignment<'f> {
     pub(super) phases: Vec<PhaseRule>,
     pub(super) used: Vec<Assigned<'f>>,
     pub(super) unused: Vec<&'f TensorInfo>,
 }
 
-/// Decides for the whole file.
 pub(super) fn assign<'f>(
     tensors: &'f TensorFile<'_>,
     options: &ImportOptions,
@@ -179,7 +176,6 @@ fn check_layers(
     Ok(())
 }
 
-/// The tensors of `--map`.
 fn mapped<'f>(
     tensors: &'f TensorFile<'_>,
     options: &ImportOptions,
@@ -189,7 +185,7 @@ fn mapped<'f>(
         let (role, tensor) = (&mapping.role, &mapping.tensor);
         if let Some(earlier) = used.iter().find(|assigned| assigned.role == *role) {
             let found = format!("both `{}` and `{tensor}` for {role}", earlier.info.name);
-            return Err(ImportFault::option("--map", found, "one tensor"));
+            return Err(ImportError::option("--map", found, "one tensor"));
         }
         let Some(info) = tensors.infos().iter().find(|info| info.name == *tensor) else {
             let found = format!("no tensor `{tensor}` for {role}");
@@ -227,7 +223,6 @@ fn phases(
     }
 }
 
-/// Refuses `--map` for a phase that is not there.
 fn check_mapped_phases(options: &ImportOptions, phases: &[PhaseRule]) -> Result<(), ImportError> {
     let is_strange = |role: &&Role| {
         (role.phase()).is_some_and(|phase| phases.iter().all(|rule| rule.name != phase))
@@ -239,7 +234,7 @@ fn check_mapped_phases(options: &ImportOptions, phases: &[PhaseRule]) -> Result<
             let names: Vec<&str> = phases.iter().map(|rule| rule.name.as_str()).collect();
             let found = format!("{role} for a phase that no --phase names");
             let expected = format!("one of the phases {}", names.join(", "));
-            Err(ImportFault::option("--map", found, expected))
+            Err(ImportError::option("--map", found, expected))
         }
     }
 }

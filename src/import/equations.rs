@@ -13,12 +13,11 @@
 //! Each section is a phase; each phase has `ddz1` to `ddzd`. A text without sections is one phase,
 //! which `--phase` names. A line without `=` continues the equation before it. Names may have underscores (`ddz_1`).
 
-use super::error::{ImportError, ImportFault};
-use crate::files::{Located, Place};
+use super::error::ImportError;
+use crate::files::Place;
 use crate::model::{LatentVariable, MAX_LATENT_DIM};
 use crate::symbolic::{ExprId, ExprPool, ParseErrorKind, ParseLimits};
 
-/// Largest text.
 pub(super) const MAX_TEXT_BYTES: u64 = 4 << 20;
 
 /// The equations of one phase.
@@ -33,7 +32,6 @@ pub struct Section {
 }
 
 impl Section {
-    /// A section without equations so far.
     pub(super) fn new(phase: Option<String>, line: usize) -> Self {
         let equations = Vec::new();
         Self {
@@ -66,7 +64,6 @@ pub struct Sections {
     pub sections: Vec<Section>,
 }
 
-/// Cuts a text into sections and equations, and checks that they are complete.
 pub(super) fn read(file: &str, bytes: &[u8]) -> Result<Sections, ImportError> {
     let text = text_of(file, bytes)?;
     let mut reader = Reader {
@@ -85,22 +82,11 @@ pub(super) fn text_of<'b>(file: &str, bytes: &'b [u8]) -> Result<&'b str, Import
     let text = std::str::from_utf8(bytes).map_err(|error| {
         let before = String::from_utf8_lossy(&bytes[..error.valid_up_to()]);
         let place = Place::of_byte(&before, before.len());
-        ImportFault::at(file, place, "bytes that are no text", "equations in UTF-8")
+        ImportError::at(file, place, "bytes that are no text", "equations in UTF-8")
     })?;
     Ok(text.strip_prefix('\u{feff}').unwrap_or(text))
 }
 
-/// A fault at a line and column.
-pub(super) fn refused(
-    file: &str,
-    (line, column): (usize, usize),
-    found: impl Into<Box<str>>,
-    expected: impl Into<Box<str>>,
-) -> ImportError {
-    ImportFault::at(file, Place::Character(line, column), found, expected)
-}
-
-/// The start of a text in quotes, for messages.
 fn quote(text: &str) -> String {
     let short: String = text.chars().take(40).collect();
     format!("`{}`", short.escape_debug())
@@ -135,13 +121,13 @@ impl Reader<'_> {
             None => {
                 let expected = "a phase such as `[contact]` or an equation such as \
                                 `ddz1 = 0.5*z1 + u1`";
-                Err(refused(self.file, place, quote(content), expected))
+                Err(ImportError::at(self.file, place, quote(content), expected))
             }
         }
     }
 
     fn header(&mut self, place: (usize, usize), content: &str) -> Result<(), ImportError> {
-        let refused = |found, expected: &str| refused(self.file, place, found, expected);
+        let refused = |found, expected: &str| ImportError::at(self.file, place, found, expected);
         let name = (content.strip_prefix('[')).and_then(|rest| rest.strip_suffix(']'));
         let Some(name) = name.map(str::trim).filter(|name| !name.is_empty()) else {
             let expected = "the name of a phase in brackets, such as `[contact]`";
@@ -150,8 +136,8 @@ impl Reader<'_> {
         for section in &self.sections {
             if section.phase.is_none() {
                 let expected = "the name of its phase in brackets before the first equation";
-                let place = Place::Character(section.line, 1);
-                return Err(ImportFault::at(self.file, place, "an equation", expected));
+                let place = (section.line, 1);
+                return Err(ImportError::at(self.file, place, "an equation", expected));
             }
             if section.phase.as_deref() == Some(name) {
                 let found = format!("`[{name}]` again, as in line {}", section.line);
@@ -169,7 +155,7 @@ impl Reader<'_> {
         left: &str,
         right: Vec<Piece>,
     ) -> Result<(), ImportError> {
-        let refused = |found, expected: &str| refused(self.file, place, found, expected);
+        let refused = |found, expected: &str| ImportError::at(self.file, place, found, expected);
         let name = plain_name(left).unwrap_or_else(|| left.to_owned());
         let variable = (name.strip_prefix('d'))
             .and_then(|name| LatentVariable::from_name(name, MAX_LATENT_DIM));
@@ -239,7 +225,12 @@ pub(super) fn complete(
     let outputs = sections.iter().flat_map(|section| &section.equations);
     let Some(last) = outputs.map(|equation| equation.output).max() else {
         let place = (lines.max(1), 1);
-        return Err(refused(file, place, "the end of the text", expected));
+        return Err(ImportError::at(
+            file,
+            place,
+            "the end of the text",
+            expected,
+        ));
     };
     let latent_dim = last + 1;
     for section in &mut sections {
@@ -252,7 +243,7 @@ pub(super) fn complete(
             };
             let found = format!("{phase} without ddz{}", output + 1);
             let expected = format!("ddz1 to ddz{latent_dim} (`ddz{} = 0` if none)", output + 1);
-            return Err(refused(file, (section.line, 1), found, expected));
+            return Err(ImportError::at(file, (section.line, 1), found, expected));
         }
     }
     Ok(Sections {
@@ -262,7 +253,6 @@ pub(super) fn complete(
 }
 
 impl Equation {
-    /// Builds the right side in a pool.
     pub(super) fn parse(
         &self,
         file: &str,
@@ -270,7 +260,7 @@ impl Equation {
         pool: &mut ExprPool,
     ) -> Result<ExprId, ImportError> {
         let known = |name: &str| LatentVariable::from_name(name, latent_dim).is_some();
-        let read = pool.parse_defined(&self.text(), &known, &|_| None, ParseLimits::default());
+        let read = pool.parse_defined(&self.text(), &known, &|_, _| None, ParseLimits::default());
         read.map(|reading| reading.expr).map_err(|error| {
             let place = self.place(error.position);
             match error.kind {
@@ -279,9 +269,9 @@ impl Equation {
                         1 => "z1, dz1 or u1".to_owned(),
                         d => format!("z1 to z{d}, dz1 to dz{d} or u1 to u{d}"),
                     };
-                    refused(file, place, quote(&name), expected)
+                    ImportError::at(file, place, quote(&name), expected)
                 }
-                kind => Located::new(file, Place::Character(place.0, place.1), kind),
+                kind => ImportError::text(file, place, kind.to_string()),
             }
         })
     }
@@ -306,83 +296,5 @@ impl Equation {
             rest -= length + 1;
         }
         place
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn refusal(text: &[u8]) -> String {
-        let parsed = read("eq", text).and_then(|sections| {
-            let mut pool = ExprPool::new();
-            let mut equations = sections.sections.iter().flat_map(|s| &s.equations);
-            equations.try_for_each(|e| e.parse("eq", sections.latent_dim, &mut pool).map(|_| ()))
-        });
-        let error = parsed.expect_err("a fault").to_string();
-        error
-            .split(", expected ")
-            .next()
-            .expect("what was found")
-            .to_owned()
-    }
-
-    #[test]
-    fn sections_and_continued_lines_are_read() {
-        let text = "# made by hand\r\n[contact]\r\nddz2 = z1\nddz1 = 1 -\n   dz2 # more\n[ flight ]\n\
-                    ddz1 = 0\nddz2=u1\n";
-        let read = read("eq.txt", text.as_bytes()).expect("two phases");
-        assert_eq!(read.latent_dim, 2);
-        let names: Vec<_> = read.sections.iter().map(|s| s.phase.as_deref()).collect();
-        assert_eq!(names, [Some("contact"), Some("flight")]);
-        let mut pool = ExprPool::new();
-        let first = &read.sections[0].equations[0];
-        assert_eq!((first.output, first.line), (0, 4));
-        let expr = first.parse("eq.txt", 2, &mut pool).expect("an expression");
-        assert_eq!(pool.display(expr).to_string(), "1 - dz2");
-    }
-
-    #[test]
-    fn names_with_underscores_and_other_spellings_are_read() {
-        let text = "ddz_1 = 2*z_1**2 − 3·dz_1\n  + ln(z_1)*sgn (u_1) + pi";
-        let read = read("eq.txt", text.as_bytes()).expect("an equation");
-        let mut pool = ExprPool::new();
-        let equation = &read.sections[0].equations[0];
-        let found = equation
-            .parse("eq.txt", 1, &mut pool)
-            .expect("an expression");
-        let plain = "2*z1^2 - 3*dz1 + log(z1)*sign(u1) + 3.141592653589793";
-        assert_eq!(Ok(found), pool.parse(plain, &|_| true));
-    }
-
-    #[test]
-    fn faults_are_reported_with_line_and_column() {
-        for (text, line, column, found) in [
-            ("", 1, 1, "the end of the text"),
-            ("z1 + 2", 1, 1, "`z1 + 2`"),
-            ("ddz1 = z1 + z2", 1, 13, "`z2`"),
-            ("  dz1 = z1", 1, 3, "`dz1`"),
-            ("ddz1 = z1 +\n   é*z1", 2, 4, "`é`"),
-            ("ddz1 = sin z1", 1, 12, "`z1`"),
-            ("ddz1 = sinh(z1)", 1, 8, "`sinh`"),
-            ("ddz1 = z1 +", 1, 12, "end of text"),
-            ("ddz1 = z1\n + \n", 2, 3, "end of text"),
-            ("ddz1 = 1e999", 1, 8, "`1e999`"),
-            ("[contact\nddz1 = 1", 1, 1, "`[contact`"),
-            ("[]\nddz1 = 1", 1, 1, "`[]`"),
-            ("[a]\nddz1 = 1\n[a]", 3, 1, "`[a]` again, as in line 1"),
-            ("ddz1 = 1\n[a]\nddz1 = 1", 1, 1, "an equation"),
-            ("ddz1 = 1\nddz1 = 2", 2, 1, "`ddz1` again, as in line 1"),
-            ("[a]\nddz2 = 1", 1, 1, "phase `[a]` without ddz1"),
-            ("[a]\nddz1 = 1\n[b]\n", 3, 1, "phase `[b]` without ddz1"),
-            ("ddz_1 = z_1 + dz_1 + q", 1, 22, "`q`"),
-            ("ddz1 = z1²", 1, 10, "`²`"),
-            ("ddz1 = z1^2000", 1, 15, "the exponent 2000"),
-        ] {
-            let expected = format!("eq:{line}:{column}: found {found}");
-            assert_eq!(refusal(text.as_bytes()), expected, "{text}");
-        }
-        let found = refusal(b"ddz1 = 1\nddz2 = \xff");
-        assert_eq!(found, "eq:2:8: found bytes that are no text");
     }
 }

@@ -5,8 +5,8 @@ use std::collections::HashMap;
 use nalgebra::DMatrix;
 
 use super::assemble::Parts;
-use super::equations::{Equation, Section, Sections, refused};
-use super::error::{ImportError, ImportFault};
+use super::equations::{Equation, Section, Sections};
+use super::error::ImportError;
 use super::library;
 use super::options::{ImportOptions, PhaseRule};
 use super::report::{ImportReport, ReadEquation};
@@ -69,7 +69,6 @@ pub(super) fn parts(
     Ok((parts, report))
 }
 
-/// The coefficients of a phase's equations in the rows of their terms.
 fn xi(library: &Library, columns: &[Coefficients], rows: &HashMap<ExprId, Row>) -> DMatrix<f64> {
     let mut xi = DMatrix::zeros(library.len(), library.latent_dim());
     for (column, coefficients) in columns.iter().enumerate() {
@@ -92,7 +91,7 @@ struct Row {
 fn check_options(latent_dim: usize, options: &ImportOptions) -> Result<(), ImportError> {
     if let Some(given) = options.latent_dim.filter(|given| *given != latent_dim) {
         let expected = format!("{latent_dim}, as the equations have");
-        return Err(ImportFault::option(
+        return Err(ImportError::option(
             "--latent-dim",
             given.to_string(),
             expected,
@@ -111,7 +110,7 @@ fn check_options(latent_dim: usize, options: &ImportOptions) -> Result<(), Impor
         None => Ok(()),
         Some((option, _)) => {
             let (found, expected) = ("a file of equations", "a file of tensors");
-            Err(ImportFault::option(option, found, expected))
+            Err(ImportError::option(option, found, expected))
         }
     }
 }
@@ -132,7 +131,7 @@ fn phases_in_order<'s>(
                 let found = "equations of no phase";
                 let expected = "a phase such as `[contact]` before them (LaTeX: `% Phase contact`, \
                                 or a label that ends in its name), or one --phase NAME=FEET for each";
-                return Err(refused(file, (section.line, 1), found, expected));
+                return Err(ImportError::at(file, (section.line, 1), found, expected));
             }
         };
         let found = format!("equations (line {})", section.line);
@@ -143,7 +142,7 @@ fn phases_in_order<'s>(
         if ordered.iter().all(|(rule, _)| rule.name != *name) {
             let found = format!("{name}, which {file} has no equations for");
             let expected = format!("`[{name}]` in the file");
-            return Err(ImportFault::option("--phase", found, expected));
+            return Err(ImportError::option("--phase", found, expected));
         }
     }
     // Those that `--phase` does not name come last, in the order of the file.
@@ -165,7 +164,6 @@ struct Separation<'f> {
     file: &'f str,
     latent_dim: usize,
     pool: ExprPool,
-    /// The terms of a library that was given.
     given: HashMap<ExprId, Row>,
 }
 
@@ -176,7 +174,7 @@ impl Separation<'_> {
         let is_term = |expr| self.given.contains_key(&expr);
         let coefficients = terms::coefficients(&self.pool, expr, &is_term).ok_or_else(|| {
             let found = format!("a coefficient of ddz{output} beyond the range of numbers");
-            refused(self.file, place, found, "finite coefficients")
+            ImportError::at(self.file, place, found, "finite coefficients")
         })?;
         let mut strange: Vec<ExprId> = (coefficients.keys().copied())
             .filter(|&term| !self.given.is_empty() && !is_term(term))
@@ -189,13 +187,12 @@ impl Separation<'_> {
                 let short: String = term.chars().take(80).collect();
                 let found = format!("the term `{short}` in ddz{output}");
                 let expected = "the terms of --library only";
-                Err(refused(self.file, place, found, expected))
+                Err(ImportError::at(self.file, place, found, expected))
             }
         }
     }
 }
 
-/// The library of all terms found.
 fn union(
     file: &str,
     latent_dim: usize,
@@ -216,7 +213,7 @@ fn union(
         texts.push("1".to_owned());
     }
     let library = Library::from_terms(latent_dim, &texts)
-        .map_err(|source| ImportFault::model(file, source))?;
+        .map_err(|source| ImportError::unusable(file, source))?;
     let row = |(index, &term): (usize, &ExprId)| (term, Row { index, factor: 1.0 });
     Ok((library, found.iter().enumerate().map(row).collect()))
 }

@@ -4,17 +4,14 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use super::error::{ImportError, ImportFault};
+use super::error::ImportError;
 use super::options::standard_text;
 use super::pysindy;
 use super::run::{check_size, read_file};
-use crate::files::Place;
 use crate::model::{Library, LibraryChoice, LibraryOrder, StandardLibrary};
 
-/// Largest file with a list of terms.
 const MAX_TERMS_BYTES: u64 = 32 << 20;
 
-/// Number of terms that a choice has at a latent dimension.
 pub(super) fn dim(choice: &LibraryChoice, latent_dim: usize) -> Option<usize> {
     match choice {
         LibraryChoice::Standard(standard) => standard.term_count(latent_dim),
@@ -31,11 +28,11 @@ pub(super) fn build(
     let choice = match choice {
         LibraryChoice::Terms(terms) => LibraryChoice::Terms(
             pysindy::readable(terms, latent_dim)
-                .map_err(|(found, expected)| ImportFault::option("--library", found, expected))?,
+                .map_err(|(found, expected)| ImportError::option("--library", found, expected))?,
         ),
         LibraryChoice::Standard(_) => choice.clone(),
     };
-    Library::of(latent_dim, choice).map_err(|source| ImportFault::model(file, source))
+    Library::of(latent_dim, choice).map_err(|source| ImportError::unusable(file, source))
 }
 
 /// The order of a file's terms: as stated, or the only one that there is.
@@ -45,7 +42,7 @@ pub(super) fn order(
     stated: Option<LibraryOrder>,
 ) -> Result<LibraryOrder, ImportError> {
     let texts = |order| standard.texts_in(order, latent_dim);
-    let unusable = |source| ImportFault::model("", source);
+    let unusable = |source| ImportError::unusable("", source);
     let orders = LibraryOrder::NAMED.map(texts);
     let [paper, interleaved, romc] = orders;
     let orders = [
@@ -85,7 +82,7 @@ pub(super) fn order(
         choices.collect::<Vec<_>>().join(", ")
     );
     let found = format!("no order of the terms of {}", standard_text(standard));
-    Err(ImportFault::option("--library-order", found, expected))
+    Err(ImportError::option("--library-order", found, expected))
 }
 
 /// The shorthands that have this many terms.
@@ -111,7 +108,7 @@ pub fn read_terms(path: &Path) -> Result<Vec<String>, ImportError> {
 fn parse_terms(file: &str, text: &str) -> Result<Vec<String>, ImportError> {
     let text = text.trim_start_matches('\u{feff}');
     let refused = |line, column, found: &str, expected: &str| {
-        ImportFault::at(file, Place::Character(line, column), found, expected)
+        ImportError::at(file, (line, column), found, expected)
     };
     if !text.trim_start().starts_with(['[', '{']) {
         let lines = (text.lines()).map(|line| line.split('#').next().unwrap_or("").trim());
@@ -146,35 +143,5 @@ fn kind_of(value: &Value) -> &'static str {
         Value::String(_) => "a text",
         Value::Array(_) => "a list",
         Value::Object(_) => "an object",
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn terms_are_read_from_lines_and_from_json() {
-        let expected = ["1", "z1", "sin(dz1)"];
-        for text in [
-            "1\n z1 # position\n\nsin(dz1)\n",
-            "[\"1\", \"z1\", \"sin(dz1)\"]",
-            "{ \"library\": [\"1\", \"z1\", \"sin(dz1)\"], \"phases\": {} }",
-        ] {
-            assert_eq!(parse_terms("terms", text).expect(text), expected);
-        }
-        for text in ["", "# only a comment", "[1]", "{}", "[\"1\",", "[[\"1\"]]"] {
-            let error = parse_terms("terms", text).expect_err(text);
-            assert!(matches!(error.place, Place::Character(..)), "{error}");
-        }
-    }
-
-    #[test]
-    fn shorthands_are_suggested_by_their_number_of_terms() {
-        assert_eq!(
-            standards_with(15, 2),
-            ["degree=1,trigonometric,inputs", "degree=2"]
-        );
-        assert!(standards_with(16, 2).is_empty());
     }
 }

@@ -5,9 +5,8 @@ use std::borrow::Cow;
 use sha2::digest::Output;
 use sha2::{Digest as _, Sha256};
 
-use super::error::{ImportError, ImportFault, shape_text};
+use super::error::{ImportError, shape_text};
 use super::tensors::{Element, TensorFile, TensorInfo};
-use crate::files::Place;
 
 /// A named array of numbers.
 #[derive(Clone, Debug)]
@@ -31,10 +30,10 @@ pub(super) fn open<'t>(
     for (index, tensor) in tensors.iter().enumerate() {
         let expected = tensor.shape.iter().product::<usize>();
         if tensor.values.len() != expected {
-            let place = Place::Entry(format!("`{}`", tensor.name).into());
+            let place = format!("`{}`", tensor.name);
             let found = format!("{} numbers", tensor.values.len());
             let expected = format!("{expected} ({})", shape_text(&tensor.shape));
-            return Err(ImportFault::at(source, place, found, expected));
+            return Err(ImportError::at(source, place, found, expected));
         }
         infos.push(TensorInfo {
             name: tensor.name.clone(),
@@ -55,7 +54,6 @@ fn little_endian(tensor: &Tensor<'_>) -> Vec<u8> {
     values.flat_map(|value| value.to_le_bytes()).collect()
 }
 
-/// Digest of names, dimensions and numbers.
 pub(super) fn digest(tensors: &[Tensor<'_>]) -> Output<Sha256> {
     let mut digest = Sha256::new();
     for tensor in tensors {
@@ -65,52 +63,4 @@ pub(super) fn digest(tensors: &[Tensor<'_>]) -> Output<Sha256> {
         digest.update(little_endian(tensor));
     }
     digest.finalize()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::{ImportOptions, import_tensors};
-    use super::*;
-    use crate::model::LibraryChoice;
-
-    fn options() -> ImportOptions {
-        let terms = ["1", "z1", "dz2"].map(str::to_owned);
-        ImportOptions {
-            name: "m".to_owned(),
-            library: Some(LibraryChoice::Terms(terms.to_vec())),
-            ..ImportOptions::default()
-        }
-    }
-
-    fn xi(values: &[f64], is_column_major: bool) -> Tensor<'_> {
-        Tensor {
-            name: "xi.contact".to_owned(),
-            shape: vec![3, 2],
-            values,
-            is_column_major,
-        }
-    }
-
-    #[test]
-    fn arrays_of_either_order_make_the_same_model() {
-        let rows = [xi(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0], false)];
-        let columns = [xi(&[1.0, 3.0, 5.0, 2.0, 4.0, 6.0], true)];
-        let model = |tensors: &[_]| {
-            let imported = import_tensors("arrays", tensors, &options()).expect("a model");
-            imported.model.phases()[0].xi.clone()
-        };
-        assert_eq!(model(&rows), model(&columns));
-        assert_eq!(model(&rows)[(1, 0)], 3.0);
-        assert_ne!(digest(&rows), digest(&columns));
-    }
-
-    #[test]
-    fn numbers_that_do_not_fit_the_dimensions_are_refused() {
-        let error = import_tensors("arrays", &[xi(&[1.0], false)], &options());
-        let error = error.expect_err("too few numbers").to_string();
-        assert!(
-            error.contains("found 1 numbers, expected 6 (3 x 2)"),
-            "{error}"
-        );
-    }
 }

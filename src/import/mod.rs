@@ -45,11 +45,11 @@ mod tensors;
 mod terms;
 
 pub use equations::{Equation, Section, Sections};
-pub use error::{ImportError, ImportFault};
+pub use error::ImportError;
 pub use latex::{NameError, SymbolNames};
 pub use library::read_terms;
 pub use memory::Tensor;
 pub use options::{Format, ImportOptions, PhaseRule, WeightVectors, XiLayout, parse_standard};
-pub use report::{Chosen, ImportReport, Layout, Note, ReadEquation, UnusedTensor, UsedTensor};
+pub use report::{Chosen, ImportReport, Layout, ReadEquation, UnusedTensor, UsedTensor};
 pub use role::{Mapping, Part, Role};
 pub use run::{Imported, import, import_from_bytes, import_tensors, read_equations};

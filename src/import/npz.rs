@@ -11,11 +11,10 @@ use std::io::{self, Cursor, Read};
 
 use zip::ZipArchive;
 
-use super::error::{ImportError, ImportFault};
+use super::error::{self, ImportError, too_large};
 use super::tensors::{Element, TensorFile, TensorInfo};
-use crate::files::{Located, Place};
+use crate::files::Place;
 
-/// Most members of a file.
 const MAX_MEMBERS: usize = 10_000;
 const MAGIC: &[u8; 6] = b"\x93NUMPY";
 const MAX_HEADER_BYTES: usize = 1 << 16;
@@ -30,7 +29,8 @@ pub(super) fn open<'b>(file: &str, bytes: &'b [u8]) -> Result<TensorFile<'b>, Im
         return Err(damaged(file, "two arrays of one name"));
     }
     if archive.len() > MAX_MEMBERS {
-        return Err(ImportFault::too_large(file, MAX_MEMBERS as u64, "arrays"));
+        let max = MAX_MEMBERS as u64;
+        return Err(too_large(file, Place::Whole, max, "arrays"));
     }
     let mut infos = Vec::new();
     for member in 0..archive.len() {
@@ -42,8 +42,7 @@ pub(super) fn open<'b>(file: &str, bytes: &'b [u8]) -> Result<TensorFile<'b>, Im
 }
 
 fn damaged(file: &str, error: impl Display) -> ImportError {
-    let (format, found) = ("npz", error.to_string());
-    Located::new(file, Place::Whole, ImportFault::Container { format, found })
+    error::damaged(file, "npz", &error.to_string())
 }
 
 /// Describes a member; `None` for one that is no array.
@@ -63,14 +62,10 @@ fn describe(
             member,
             ..header
         })),
-        Err((found, expected)) => {
-            let place = Place::Entry(format!("`{name}`").into());
-            Err(ImportFault::at(file, place, found, expected))
-        }
+        Err((found, expected)) => Err(ImportError::at(file, format!("`{name}`"), found, expected)),
     }
 }
 
-/// The bytes of an array's numbers.
 fn numbers(
     file: &str,
     bytes: &[u8],
@@ -78,9 +73,9 @@ fn numbers(
     length: usize,
 ) -> Result<Vec<u8>, ImportError> {
     let refused = |found: String| {
-        let place = Place::Entry(format!("`{}`", info.name).into());
+        let place = format!("`{}`", info.name);
         let expected = "as many bytes as its shape and type need";
-        ImportFault::at(file, place, found, expected)
+        ImportError::at(file, place, found, expected)
     };
     let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(|e| damaged(file, e))?;
     let member = (archive.by_index(info.member)).map_err(|error| refused(error.to_string()))?;
@@ -181,55 +176,4 @@ fn parse_shape(text: &str) -> Option<Vec<usize>> {
     });
     let dims: Vec<usize> = dims.collect::<Option<_>>()?;
     (dims.len() <= MAX_RANK).then_some(dims)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn header(version: u8, dictionary: &str) -> Result<TensorInfo, (String, &'static str)> {
-        let mut bytes = MAGIC.to_vec();
-        bytes.extend([version, 0]);
-        match version {
-            1 => bytes.extend((dictionary.len() as u16).to_le_bytes()),
-            _ => bytes.extend((dictionary.len() as u32).to_le_bytes()),
-        }
-        bytes.extend(dictionary.as_bytes());
-        read_header(&mut bytes.as_slice())
-    }
-
-    #[test]
-    fn header_of_numpy_is_read() {
-        let text = "{'descr': '<f8', 'fortran_order': False, 'shape': (18, 4), }          \n";
-        let read = header(1, text).expect("as NumPy writes it");
-        assert_eq!((read.element, read.is_column_major), (Element::F64, false));
-        assert_eq!((read.shape, read.start), (vec![18, 4], 10 + 71));
-        let read = header(2, "{'shape': (5L,), 'fortran_order': True, 'descr': '>f4'}")
-            .expect("keys in another order");
-        assert_eq!((read.shape, read.element), (vec![5], Element::F32));
-        assert!(read.is_big_endian && read.is_column_major);
-        let text =
-            "{'descr': [('a', '<f8'), ('b', '<f4', (2,))], 'fortran_order': False, 'shape': ()}";
-        let read = header(1, text).expect("a structure is a header all the same");
-        assert_eq!(read.element, Element::Other("a structure".to_owned()));
-        assert!(read.shape.is_empty());
-    }
-
-    #[test]
-    fn header_without_all_entries_is_refused() {
-        for text in [
-            "",
-            "{}",
-            "{'descr': '<f8', 'shape': (1,)}",
-            "{'descr': '<f8', 'fortran_order': 0, 'shape': (1,)}",
-            "{'descr': '<f8', 'fortran_order': False, 'shape': (1,,)}",
-            "{'descr': '<f8', 'fortran_order': False, 'shape': (-1,)}",
-            "{'descr': '<f8', 'fortran_order': False, 'shape': (99999999999999999999,)}",
-            "{'descr': f8, 'fortran_order': False, 'shape': (1,)}",
-        ] {
-            let (found, _) = header(1, text).expect_err(text);
-            assert_eq!(found, "a header that cannot be read");
-        }
-        assert_eq!(header(9, "{}").expect_err("no such version").0, "version 9");
-    }
 }

@@ -6,11 +6,11 @@ use std::str::FromStr;
 use clap::ValueEnum;
 use nalgebra::DVector;
 
-use super::error::{ImportError, ImportFault};
+use super::error::ImportError;
 use super::latex::SymbolNames;
-use super::report::Note;
 use super::role::{Mapping, ONLY_PHASE};
-use crate::files::{ForeignFile, Place};
+use crate::files::Place;
+use crate::files::magic::{self, OtherFormat};
 use crate::model::{
     Activation, CoordinateOrder, FeetRule, LibraryChoice, LibraryOrder, ScaleFactors, Scaling,
     StandardLibrary,
@@ -45,7 +45,7 @@ impl Format {
             Some(ending) => format!("the ending `.{ending}`"),
             None => "no ending".to_owned(),
         };
-        let foreign = ForeignFile::of_path(path).and_then(|found| refusal(path, found));
+        let foreign = magic::arrays_by_ending(path).and_then(|found| refusal(path, found));
         Err(foreign.unwrap_or_else(|| {
             let expected = match ending.as_deref() {
                 Some("json") => {
@@ -56,7 +56,7 @@ impl Format {
                      or --format to say what it is"
                 }
             };
-            ImportFault::at(&path.display().to_string(), Place::Whole, found, expected)
+            ImportError::at(&path.display().to_string(), Place::Whole, found, expected)
         }))
     }
 
@@ -66,7 +66,7 @@ impl Format {
         bytes: &[u8],
         given: Option<Self>,
     ) -> Result<Self, ImportError> {
-        let content = ForeignFile::of_content(path, bytes);
+        let content = magic::arrays_by_content(path, bytes);
         let is_known = content.is_some();
         match content.and_then(|found| refusal(path, found)) {
             Some(refused) => Err(refused),
@@ -76,7 +76,6 @@ impl Format {
         }
     }
 
-    /// Name for messages.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Format::Safetensors => "safetensors",
@@ -88,10 +87,10 @@ impl Format {
 }
 
 /// The refusal of a file that has to be converted first.
-pub(super) fn refusal(path: &Path, found: ForeignFile) -> Option<ImportError> {
+pub(super) fn refusal(path: &Path, found: OtherFormat) -> Option<ImportError> {
     let file = path.display().to_string();
-    let expected = found.remedy?;
-    Some(ImportFault::at(&file, Place::Whole, found.what, expected))
+    let refused = || ImportError::at(&file, Place::Whole, found.what, found.remedy.as_str());
+    (!found.remedy.is_empty()).then(refused)
 }
 
 /// How a file stores the weights of a map.
@@ -120,7 +119,7 @@ pub fn parse_standard(text: &str) -> Result<StandardLibrary, ImportError> {
     let refused = |part: &str| {
         let expected = "degree=N, then trigonometric and inputs if the library has them, separated \
                         by commas; or a file with the list of terms";
-        ImportFault::option("--library", format!("{part:?}"), expected)
+        ImportError::option("--library", format!("{part:?}"), expected)
     };
     let mut degree = None;
     let (mut trigonometric, mut inputs) = (false, false);
@@ -141,7 +140,6 @@ pub fn parse_standard(text: &str) -> Result<StandardLibrary, ImportError> {
     })
 }
 
-/// The shorthand as [`parse_standard`] reads it.
 pub(super) fn standard_text(standard: StandardLibrary) -> String {
     let mut text = format!("degree={}", standard.degree);
     if standard.trigonometric {
@@ -169,7 +167,7 @@ impl FromStr for PhaseRule {
         let refused = || {
             let expected = "NAME=any, NAME=none, NAME=always, or NAME= and foot patterns in the order fr fl rr \
                             rl, such as rear=0011,0001";
-            ImportFault::option("--phase", format!("{text:?}"), expected)
+            ImportError::option("--phase", format!("{text:?}"), expected)
         };
         let (name, feet) = text.split_once('=').ok_or_else(refused)?;
         let feet = match feet.trim() {
@@ -280,7 +278,6 @@ impl ImportOptions {
         given.next().map(|(option, _)| option)
     }
 
-    /// The place of a phase among those given.
     pub(super) fn given(&self, phase: &str) -> Option<usize> {
         self.phases.iter().position(|rule| rule.name == phase)
     }
@@ -304,59 +301,14 @@ impl ImportOptions {
                     "--phase {phase}=any (or none, always, or patterns such as 0011 in the order fr \
                      fl rr rl)"
                 );
-                Err(ImportFault::at(file, Place::Whole, found, expected))
+                Err(ImportError::at(file, Place::Whole, found, expected))
             }
         }
     }
 
     /// The note that a phase got the usual rule, unless its rule was given.
-    pub(super) fn usual_feet(&self, phase: &str, feet: &FeetRule) -> Option<Note> {
-        self.given(phase).is_none().then(|| Note::UsualFeet {
-            phase: phase.to_owned(),
-            feet: feet.to_string(),
-        })
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn shorthand_reads_back_from_its_text() {
-        for standard in StandardLibrary::small() {
-            let text = standard_text(standard);
-            assert_eq!(parse_standard(&text).expect(&text), standard);
-        }
-        for text in "|inputs|degree=1,degree=2|degree=-1|degree=1,cosines".split('|') {
-            assert!(parse_standard(text).is_err(), "{text}");
-        }
-    }
-
-    #[test]
-    fn phase_rule_reads_back_from_its_text() {
-        let rear: PhaseRule = "rear=0011, 0001".parse().expect("two patterns");
-        assert_eq!(rear.feet.to_string(), "0011,0001");
-        let contact: PhaseRule = "contact=any".parse().expect("a rule");
-        assert_eq!(contact.feet, FeetRule::Any);
-        for text in "|contact|=any|rear=|rear=001|rear=00112|rear=002x".split('|') {
-            assert!(text.parse::<PhaseRule>().is_err(), "{text}");
-        }
-    }
-
-    #[test]
-    fn format_of_other_files_says_how_to_convert_them() {
-        assert_eq!(
-            Format::of_path(Path::new("a/NET.SafeTensors")).expect("known"),
-            Format::Safetensors
-        );
-        for (name, hint) in [
-            ("net.pth", "save_file"),
-            ("net.h5", "savez"),
-            ("net", "--format"),
-        ] {
-            let error = Format::of_path(Path::new(name)).expect_err("another kind");
-            assert!(error.to_string().contains(hint), "{error}");
-        }
+    pub(super) fn usual_feet(&self, phase: &str, feet: &FeetRule) -> Option<String> {
+        let note = || format!("phase {phase} holds for feet `{feet}`, the usual rule of its name");
+        self.given(phase).is_none().then(note)
     }
 }

@@ -2,9 +2,7 @@
 
 use std::fmt;
 
-use serde::{Serialize, Serializer};
-
-use super::role::Part;
+use serde::Serialize;
 
 /// Everything that was decided on the way from a foreign file to a model.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -29,8 +27,8 @@ pub struct ImportReport {
     pub unused: Vec<UnusedTensor>,
     /// Equations that became part of the model.
     pub equations: Vec<ReadEquation>,
-    /// Further decisions.
-    pub notes: Vec<Note>,
+    /// Further decisions, in words.
+    pub notes: Vec<String>,
 }
 
 /// A tensor that became part of the model.
@@ -108,76 +106,4 @@ pub struct ReadEquation {
     pub line: usize,
     /// Number of its terms.
     pub terms: usize,
-}
-
-/// A decision that a user may want to know of.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Note {
-    /// A phase got the usual rule for its name.
-    UsualFeet {
-        /// The phase.
-        phase: String,
-        /// Its rule.
-        feet: String,
-    },
-    /// A map came without bias.
-    ZeroBias(Part),
-    /// A map has several layers: their widths and activations.
-    Layers(Part, String),
-    /// There is no encoder, or no decoder.
-    NoMap(Part),
-    /// Encoder and decoder are stored in different ways.
-    MixedWeights,
-    /// A mean that the training took off states went into the biases.
-    FoldedMean,
-    /// Coordinates were brought into romc's order from this order of the file.
-    Sorted(String),
-    /// Latent states change when they are decoded and encoded: by this part of their size.
-    Unmatched(f64),
-    /// A mask switched coefficients off.
-    Masked {
-        /// The phase.
-        phase: String,
-        /// How many coefficients became zero.
-        count: usize,
-    },
-}
-
-impl fmt::Display for Note {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&match self {
-            Note::UsualFeet { phase, feet } => {
-                format!("phase {phase} holds for feet `{feet}`, the usual rule of its name")
-            }
-            Note::ZeroBias(part) => format!("the {} has no bias: zero", part.name()),
-            Note::Layers(part, layers) => format!("the {} has layers {layers}", part.name()),
-            Note::NoMap(part) => {
-                let (part, lost) = match part {
-                    Part::Encoder => ("encoder", "the model has latent coordinates only"),
-                    Part::Decoder => ("decoder", "latent states cannot be mapped back"),
-                };
-                format!("no tensor {part}.weight, and no --map {part}.weight=TENSOR: {lost}")
-            }
-            Note::MixedWeights => "encoder and decoder are stored in different ways, one for row \
-                                   and one for column vectors"
-                .to_owned(),
-            Note::FoldedMean => "the mean of the training's states went into the biases".to_owned(),
-            Note::Sorted(order) => {
-                format!("coordinates were in the order {order}; the model has romc's")
-            }
-            Note::Unmatched(change) => format!(
-                "encode(decode(z)) differs from z by {change:.2} of its size: are encoder and decoder \
-                 those of one training?"
-            ),
-            Note::Masked { phase, count } => {
-                format!("the mask of phase {phase} switched {count} coefficients off")
-            }
-        })
-    }
-}
-
-impl Serialize for Note {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_str(self)
-    }
 }

@@ -9,7 +9,7 @@ use sha2::{Digest as _, Sha256};
 
 use super::assemble::{self, Parts};
 use super::equations::{self, Sections};
-use super::error::{ImportError, ImportFault};
+use super::error::{ImportError, too_large};
 use super::latent;
 use super::latex::{self, SymbolNames};
 use super::memory::{self, Tensor};
@@ -17,11 +17,10 @@ use super::npz;
 use super::options::{Format, ImportOptions, refusal};
 use super::report::ImportReport;
 use super::safetensors;
-use crate::files::{ForeignFile, Located, Place, hex};
+use crate::files::{Place, hex, magic};
 use crate::model::{CoordinateNames, ReducedModel};
 use crate::symbolic::ExprPool;
 
-/// Largest file that is read.
 const MAX_FILE_BYTES: u64 = 256 << 20;
 
 /// An imported model and what was decided on the way.
@@ -39,7 +38,7 @@ pub struct Imported {
 /// [`ImportError`] with the place, what was found and what was expected.
 pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported, ImportError> {
     let (file, bytes) = read_file(path, MAX_FILE_BYTES).map_err(|fault| {
-        let foreign = ForeignFile::of_unreadable(path);
+        let foreign = magic::arrays_by_neighbours(path);
         (foreign.and_then(|found| refusal(path, found))).unwrap_or(fault)
     })?;
     let format = Format::of_file(path, &bytes, options.format)?;
@@ -53,7 +52,7 @@ pub(super) fn read_file(path: &Path, max: u64) -> Result<(String, Vec<u8>), Impo
     let mut bytes = Vec::new();
     match File::open(path).and_then(|open| open.take(max + 1).read_to_end(&mut bytes)) {
         Ok(_) => Ok((file, bytes)),
-        Err(source) => Err(Located::new(&file, Place::Whole, source)),
+        Err(source) => Err(ImportError::io(&file, "read the file", source)),
     }
 }
 
@@ -104,7 +103,7 @@ pub fn import_tensors(
 
 pub(super) fn check_size(file: &str, bytes: &[u8], max: u64) -> Result<(), ImportError> {
     match bytes.len() as u64 > max {
-        true => Err(ImportFault::too_large(file, max, "bytes")),
+        true => Err(too_large(file, Place::Whole, max, "bytes")),
         false => Ok(()),
     }
 }
@@ -126,7 +125,7 @@ fn sections(
                 Some(found) => {
                     let of = read.latent_dim;
                     let expected = format!("variables of the {of} latent coordinates of {file}");
-                    Err(ImportFault::option("--symbols", found, expected))
+                    Err(ImportError::option("--symbols", found, expected))
                 }
             }
         }
@@ -195,7 +194,6 @@ fn provenance(report: &ImportReport, digest: &[u8]) -> Map<String, Value> {
     entries
 }
 
-/// Hands the parts to the builder that checks every model.
 fn build(
     file: &str,
     parts: Parts,
@@ -211,12 +209,12 @@ fn build(
         let expected = "--scaling FACTOR (scaled value = factor times SI value: 0.1 for the \
                         published models, 1 for SI units)";
         let found = format!("{map} without scale factors");
-        return Err(ImportFault::at(file, Place::Whole, found, expected));
+        return Err(ImportError::at(file, Place::Whole, found, expected));
     }
     if options.robot.is_none() && options.actuators.is_some() {
         let found = "losses of joints without a robot";
         let expected = "--robot as well: go1, go2, a1, or a .toml or .urdf file";
-        return Err(ImportFault::option("--actuators", found, expected));
+        return Err(ImportError::option("--actuators", found, expected));
     }
     let mut builder = ReducedModel::builder(options.name.clone(), parts.library)
         .description(options.description.clone())
@@ -240,5 +238,5 @@ fn build(
             builder = builder.state(state).input(input);
         }
     }
-    (builder.build()).map_err(|source| ImportFault::model(file, source))
+    (builder.build()).map_err(|source| ImportError::unusable(file, source))
 }

@@ -4,20 +4,16 @@ use std::borrow::Cow;
 
 use safetensors::{Dtype, SafeTensors};
 
-use super::error::{ImportError, ImportFault};
+use super::error::{ImportError, damaged};
 use super::tensors::{Element, TensorFile, TensorInfo};
-use crate::files::{Located, Place};
 
 /// Bytes before the header: its length.
 const LENGTH_BYTES: usize = 8;
 
 /// Opens a file; offsets and lengths of its tensors are checked against the file.
 pub(super) fn open<'b>(file: &str, bytes: &'b [u8]) -> Result<TensorFile<'b>, ImportError> {
-    let (header, metadata) = SafeTensors::read_metadata(bytes).map_err(|error| {
-        let found = error.to_string();
-        let format = "safetensors";
-        Located::new(file, Place::Whole, ImportFault::Container { format, found })
-    })?;
+    let (header, metadata) = SafeTensors::read_metadata(bytes)
+        .map_err(|error| damaged(file, "safetensors", &error.to_string()))?;
     let tensors = metadata.tensors().into_iter();
     let infos = tensors.map(|(name, info)| TensorInfo {
         name,

@@ -4,13 +4,12 @@ use std::borrow::Cow;
 
 use nalgebra::DMatrix;
 
-use super::error::{ImportError, ImportFault, shape_text};
-use crate::files::{Located, Place};
+use super::error::{ImportError, shape_text, too_large};
+use crate::files::Place;
 
 /// Largest tensor that is read: the coefficients of the largest library fit twice.
 const MAX_ELEMENTS: usize = 4 << 20;
 
-/// Type of the numbers of a tensor.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Element {
     F32,
@@ -41,7 +40,6 @@ impl Element {
     }
 }
 
-/// The description of one tensor.
 #[derive(Clone, Debug)]
 pub(super) struct TensorInfo {
     pub(super) name: String,
@@ -106,9 +104,9 @@ impl<'b> TensorFile<'b> {
     ) -> Result<TensorFile<'b>, ImportError> {
         infos.sort_by(|a, b| a.name.cmp(&b.name));
         if let Some(pair) = infos.windows(2).find(|pair| pair[0].name == pair[1].name) {
-            let place = Place::Entry(format!("`{}`", pair[0].name).into());
+            let place = format!("`{}`", pair[0].name);
             let found = "two tensors of this name";
-            return Err(ImportFault::at(file, place, found, "different names"));
+            return Err(ImportError::at(file, place, found, "different names"));
         }
         let file = file.to_owned();
         Ok(TensorFile { file, infos, bytes })
@@ -118,12 +116,10 @@ impl<'b> TensorFile<'b> {
         &self.file
     }
 
-    /// All tensors, sorted by name.
     pub(super) fn infos(&self) -> &[TensorInfo] {
         &self.infos
     }
 
-    /// All tensors in words, for messages.
     pub(super) fn listing(&self) -> String {
         const MOST: usize = 24;
         let shown = self.infos.iter().take(MOST).map(TensorInfo::describe);
@@ -136,17 +132,15 @@ impl<'b> TensorFile<'b> {
         texts.join(", ")
     }
 
-    /// `found` at a place of the file, where `expected` should be.
     pub(super) fn refused(
         &self,
-        place: Place,
+        place: impl Into<Place>,
         found: impl Into<Box<str>>,
         expected: impl Into<Box<str>>,
     ) -> ImportError {
-        ImportFault::at(&self.file, place, found, expected)
+        ImportError::at(&self.file, place, found, expected)
     }
 
-    /// A file without a tensor for a use.
     pub(super) fn missing(&self, role: &dyn std::fmt::Display) -> ImportError {
         let found = format!("no tensor for {role} among {}", self.listing());
         let expected = format!("a tensor of that name, or --map {role}=TENSOR");
@@ -168,8 +162,7 @@ impl<'b> TensorFile<'b> {
         let count = (info.shape.iter()).try_fold(1usize, |count, &dim| count.checked_mul(dim));
         let Some(count) = count.filter(|&count| count <= MAX_ELEMENTS) else {
             let (max, unit) = (MAX_ELEMENTS as u64, "numbers");
-            let fault = ImportFault::TooLarge { max, unit };
-            return Err(Located::new(&self.file, place(&[]), fault));
+            return Err(too_large(&self.file, place(&[]), max, unit));
         };
         let bytes = (self.bytes)(info, size * count)?;
         let numbers = bytes.chunks_exact(size);
@@ -196,36 +189,5 @@ fn decode(info: &TensorInfo, number: &[u8]) -> f64 {
         [a, b, c, d, e, f, g, h] => f64::from_le_bytes([a, b, c, d, e, f, g, h]),
         [a, b, c, d] => f64::from(f32::from_le_bytes([a, b, c, d])),
         _ => f64::from(u8::from(little != [0])),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_follow_the_order_of_bytes_and_of_indices() {
-        let columns = TensorInfo {
-            name: "x".to_owned(),
-            shape: vec![2, 3],
-            element: Element::F32,
-            is_column_major: true,
-            is_big_endian: true,
-            member: 0,
-            start: 0,
-        };
-        let values = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0];
-        let matrix = columns.matrix((2, 3), &values);
-        for (position, value) in values.iter().enumerate() {
-            let index = columns.index_of(position);
-            assert_eq!(matrix[(index[0], index[1])], *value);
-        }
-        assert_eq!(columns.index_of(4), [0, 2]);
-        assert_eq!(decode(&columns, &0.3f32.to_be_bytes()), f64::from(0.3f32));
-        let rows = TensorInfo {
-            is_column_major: false,
-            ..columns
-        };
-        assert_eq!(rows.index_of(4), [1, 1]);
     }
 }

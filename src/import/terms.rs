@@ -9,7 +9,6 @@ use std::collections::HashMap;
 use crate::model::LatentVariable;
 use crate::symbolic::{ExprId, ExprPool, Function, Node, Number};
 
-/// Coefficients of one equation by term.
 pub(super) type Coefficients = HashMap<ExprId, Number>;
 
 /// Coefficients of `expr` as a sum over terms; `None` if one overflows.
@@ -96,7 +95,6 @@ fn variable(pool: &ExprPool, latent_dim: usize, expr: ExprId) -> Option<LatentVa
     LatentVariable::from_name(pool.symbol_name(symbol), latent_dim)
 }
 
-/// Index into (z, dz).
 fn state_index(pool: &ExprPool, latent_dim: usize, expr: ExprId) -> Option<usize> {
     let place = variable(pool, latent_dim, expr)?.place(latent_dim)?;
     (place < 2 * latent_dim).then_some(place)
@@ -118,49 +116,4 @@ fn monomial(pool: &ExprPool, latent_dim: usize, expr: ExprId) -> Option<Vec<usiz
     }
     indices.sort_unstable();
     Some(indices)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// `0.5 z1; -2.0 sin(z1)`: coefficients and terms, sorted.
-    fn separate(text: &str) -> String {
-        let mut pool = ExprPool::new();
-        let expr = pool.parse(text, &|_| true).expect(text);
-        let found = coefficients(&pool, expr, &|_| false).expect("no overflow");
-        let mut terms: Vec<ExprId> = found.keys().copied().collect();
-        sort(&pool, 2, &mut terms);
-        let text = |term: &ExprId| format!("{:?} {}", found[term].to_f64(), pool.display(*term));
-        let texts: Vec<String> = terms.iter().map(text).collect();
-        texts.join("; ")
-    }
-
-    #[test]
-    fn coefficients_are_the_numbers_as_written() {
-        assert_eq!(
-            separate("u2*3 - 0.1*z1 + 0.36 - sin(dz1)/4 + 1e-320*z2 + 1.7976931348623157e308*u1"),
-            "0.36 1; -0.1 z1; 1e-320 z2; -0.25 sin(dz1); 1.7976931348623157e308 u1; 3.0 u2"
-        );
-    }
-
-    #[test]
-    fn products_with_numbers_are_multiplied_out_and_like_terms_added() {
-        assert_eq!(
-            separate("2*(0.5*z1 - 3*(u1 + 1)) + z1*(1 + dz1) + z1 + (z2 + u2)/2"),
-            "-6.0 1; 2.0 z1; 0.5 z2; 1.0 z1*(1 + dz1); -6.0 u1; 0.5 u2"
-        );
-        assert_eq!(separate("2*(z1 + u1) - 2*z1 - u1*2"), "");
-    }
-
-    #[test]
-    fn terms_are_sorted_as_in_the_standard_library() {
-        let sorted = "z1 z2 dz1 dz2 z1^2 z1*z2 z1*dz1 z1*dz2 z2^2 z2*dz1 z2*dz2 dz1^2 dz1*dz2 \
-                      dz2^2 z1^3 z1^2*dz1 sin(z1) sin(z2) sin(dz1) sin(dz2) cos(z1) cos(z2) \
-                      cos(dz1) cos(dz2) u1*z1 tanh(z1) u1";
-        let sorted: Vec<&str> = sorted.split_whitespace().collect();
-        let shuffled: Vec<&str> = sorted.iter().rev().copied().collect();
-        let expected = format!("1.0 1; 1.0 {}", sorted.join("; 1.0 "));
-        assert_eq!(separate(&format!("{} + 1", shuffled.join(" + "))), expected);
-    }
 }

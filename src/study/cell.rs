@@ -6,13 +6,10 @@ use super::plan::CellId;
 use crate::evaluate::combined_loss;
 use crate::train::{SetMetrics, TrainReport};
 
-/// One training and its outcome.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Cell {
-    /// Which training.
     pub id: CellId,
-    /// Its outcome.
     pub outcome: Outcome,
 }
 
@@ -20,7 +17,6 @@ pub(crate) struct Cell {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum Outcome {
-    /// A model was found.
     Trained(Metrics),
     /// Training refused, for this reason; the same settings would refuse again.
     Refused(String),
@@ -40,12 +36,10 @@ pub(crate) struct Metrics {
     pub torque_r2: f64,
     /// Root mean square error of body x over predictions of 0.1 s, m.
     pub prediction_x_m: f64,
-    /// The same of body z.
     pub prediction_z_m: f64,
 }
 
 impl Metrics {
-    /// The metrics of a finished training.
     pub(crate) fn of(report: &TrainReport) -> Self {
         let set: &SetMetrics = report.validation.as_ref().unwrap_or(&report.training);
         let active = report.active_terms.iter().map(|phase| phase.active);
@@ -59,7 +53,6 @@ impl Metrics {
         }
     }
 
-    /// Whether all of them are numbers.
     pub(crate) fn is_finite(&self) -> bool {
         let [x, z] = [self.prediction_x_m, self.prediction_z_m];
         let values = [x, z, self.decoder_mse, self.torque_r2];

@@ -5,7 +5,6 @@
 use std::io;
 use std::path::PathBuf;
 
-/// Why a study stopped.
 #[derive(Debug, thiserror::Error)]
 pub enum StudyError {
     /// A range of dimensions or seeds that cannot be trained.
@@ -14,10 +13,8 @@ pub enum StudyError {
         found: String,
         expected: &'static str,
     },
-    /// More seeds than a study can have.
     #[error(transparent)]
     Seeds(#[from] crate::limits::OutOfRange),
-    /// A folder holds another study.
     #[error(
         "{path}: belongs to another study ({difference} differ); choose another folder, or repeat the command that made it"
     )]
@@ -25,7 +22,6 @@ pub enum StudyError {
         path: PathBuf,
         difference: &'static str,
     },
-    /// A file of a study does not hold what it should.
     #[error("{path}: {message}")]
     Broken { path: PathBuf, message: String },
     /// Two parts computed the same training with different results.

@@ -14,11 +14,9 @@ pub(crate) const FOLDS: usize = 5;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Plan {
-    /// Latent dimensions, ascending.
     pub latent_dims: Vec<usize>,
     /// Seeds, counted from 1.
     pub seeds: usize,
-    /// How models are learned.
     pub method: Method,
     /// The settings of the training as flags.
     pub settings: String,
@@ -26,7 +24,6 @@ pub(crate) struct Plan {
     pub recordings: Vec<String>,
     /// Of all recordings, how many are for training.
     pub training: usize,
-    /// Version of romc that trains.
     pub romc: String,
 }
 
@@ -34,7 +31,6 @@ pub(crate) struct Plan {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct CellId {
-    /// Number of latent coordinates.
     pub latent_dim: usize,
     /// Seed, from 1.
     pub seed: u64,
@@ -77,7 +73,6 @@ pub struct Shard {
 }
 
 impl Shard {
-    /// The whole study.
     pub(crate) const WHOLE: Self = Self { index: 1, count: 1 };
 
     /// Reads `3/8`.

@@ -15,7 +15,6 @@ use crate::files::{Overwrite, write_whole};
 
 const PLAN: &str = "study.json";
 
-/// A folder with the finished trainings of one plan.
 #[derive(Clone, Debug)]
 pub(crate) struct Store {
     folder: PathBuf,
@@ -55,7 +54,6 @@ impl Store {
         Ok(Self { folder, plan })
     }
 
-    /// The plan of the study.
     pub(crate) fn plan(&self) -> &Plan {
         &self.plan
     }
@@ -97,7 +95,6 @@ impl Store {
         ids.filter_map(|id| self.get(id).transpose()).collect()
     }
 
-    /// Trainings of the plan that are not finished.
     pub(crate) fn missing(&self) -> Vec<CellId> {
         let cells = self.plan.cells().into_iter();
         cells.filter(|id| !self.path(*id).exists()).collect()
@@ -133,7 +130,6 @@ impl Store {
     }
 }
 
-/// The first part in which two plans differ.
 fn difference(found: &Plan, expected: &Plan) -> Option<&'static str> {
     let parts = [
         ("the versions of romc", found.romc != expected.romc),
@@ -171,7 +167,6 @@ fn write_json<T: Serialize>(
     written.map_err(refused(path, "write"))
 }
 
-/// The error for a file or folder that the file system refuses to `action`.
 fn refused(path: &Path, action: &'static str) -> impl Fn(io::Error) -> StudyError {
     move |source| StudyError::File {
         path: path.to_owned(),

@@ -5,17 +5,14 @@ use serde::Serialize;
 use super::cell::{Cell, Metrics, Outcome};
 use crate::typeset::Table;
 
-/// Mean and standard deviation over seeds.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub(crate) struct Spread {
-    /// Mean.
     pub mean: f64,
     /// Standard deviation (divided by n - 1), 0 for one seed.
     pub std: f64,
 }
 
 impl Spread {
-    /// Of some values; `None` without any.
     pub(crate) fn of(values: &[f64]) -> Option<Self> {
         let n = values.len() as f64;
         let mean = values.iter().sum::<f64>() / n;
@@ -27,16 +24,11 @@ impl Spread {
     }
 }
 
-/// Metrics of one latent dimension over its seeds.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct DimensionSummary {
-    /// Number of latent coordinates.
     pub latent_dim: usize,
-    /// Trainings that gave a model.
     pub trained: usize,
-    /// Trainings that refused.
     pub refused: usize,
-    /// Mean square of the decoder's error, scaled units.
     pub decoder_mse: Spread,
     /// Active coefficients in contact.
     pub active: Spread,
@@ -44,9 +36,7 @@ pub(crate) struct DimensionSummary {
     pub combined_loss: Spread,
     /// Coefficient of determination of the torques of the plain lift.
     pub torque_r2: Spread,
-    /// Predictions of 0.1 s, body x, m.
     pub prediction_x_m: Spread,
-    /// Predictions of 0.1 s, body z, m.
     pub prediction_z_m: Spread,
 }
 
@@ -60,7 +50,6 @@ pub(crate) struct Summary {
 }
 
 impl Summary {
-    /// Of finished trainings.
     pub(crate) fn of(cells: &[Cell], lambda: f64) -> Self {
         let mut dims: Vec<usize> = cells.iter().map(|cell| cell.id.latent_dim).collect();
         dims.sort_unstable();

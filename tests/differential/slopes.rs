@@ -150,6 +150,116 @@ fn slopes_at_kinks_are_no_nan_in_single_precision() {
     case.check("f32", tools::thorough_or(SINGLE_OF_MANY, SINGLE), &found);
 }
 
+/// The slope of a text by z1, where variables that are not given are zero.
+fn slope_at(text: &str, values: &[(&str, f64)]) -> f64 {
+    let names = ["z1", "z2", "dz1", "dz2", "u1", "u2"];
+    let value = |name: &str| values.iter().find(|(known, _)| *known == name);
+    let point = names.map(|name| value(name).map_or(0.0, |(_, value)| *value));
+    let phase = Phase {
+        name: "phase".to_owned(),
+        feet: FeetRule::Any,
+        xi: DMatrix::from_column_slice(1, 2, &[1.0, 0.0]),
+    };
+    let library = Library::from_terms(2, &[text.to_owned()]).expect("the term parses");
+    let model = ReducedModel::builder("kink", library).phase(phase).build();
+    let mut compiled = CompiledModel::new(&model.expect("a model")).expect("lowers");
+    let (mut ddz, mut jacobian) = ([f64::NAN; 2], DMatrix::from_element(2, 6, f64::NAN));
+    compiled.jacobian(
+        0,
+        &point[..2],
+        &point[2..4],
+        &point[4..],
+        &mut ddz,
+        &mut jacobian,
+    );
+    jacobian[(0, 0)]
+}
+
+#[test]
+fn slope_has_the_value_that_the_function_has() {
+    let (inf, zero) = (f64::INFINITY, 0.0);
+    let at_zero = [
+        ("z1*sqrt(abs(z1))", zero),
+        ("z1*sqrt(z1^2 + z2^2)", zero),
+        ("sign(z1)*tanh(abs(z1))", 1.0),
+        ("abs(z1)", 1.0),
+        ("-abs(sin(z1))", -1.0),
+        ("sqrt(z1)", inf),
+        ("sqrt(-z1)", -inf),
+        ("-sqrt(abs(z1))", -inf),
+        ("sqrt(z1^2 + z2^2)", 1.0),
+        ("cos(sqrt(abs(z1)))", -0.5),
+        ("sqrt(1 - cos(z1))", 0.5f64.sqrt()),
+        ("sqrt(abs(z1))*sqrt(abs(sin(z1)))", 1.0),
+        ("sqrt(z1) - sqrt(2*z1)", -inf),
+        ("sqrt(z1) - sin(sqrt(z1))", zero),
+        ("abs(z1)^0.3*abs(tan(z1))^0.7", 1.0),
+        ("(z1^2 + z2^2)^0.75", zero),
+        ("(z1^2)^0.3*z1", zero),
+        ("sqrt(abs(z1) + abs(z2))", inf),
+        ("sign(z1)*(1 + z1)", 1.0),
+        ("sign(z1)*cos(z2)", zero),
+        ("tanh(1/z1)", zero),
+        ("1/(1 + 1/z1)", 1.0),
+        ("exp(-1/z1^2)", zero),
+        ("(1 + sqrt(z1))*(1 - sqrt(z1) + z1)", zero),
+        ("z1*sign(sin(z1)*cos(z1))", 1.0),
+    ];
+    for (text, expected) in at_zero {
+        let found = slope_at(text, &[]);
+        assert!(
+            found == expected || (found - expected).abs() < 1e-12,
+            "{text}: {found}, {expected}"
+        );
+    }
+}
+
+#[test]
+fn slope_follows_exponents_and_other_variables() {
+    let cases = [
+        ("abs(z1)^z2", 2.5, 0.0),
+        ("abs(z1)^z2", 1.0, 1.0),
+        ("abs(z1)^z2", 0.5, f64::INFINITY),
+        ("z1*abs(z1)^z2", 0.5, 0.0),
+        ("sqrt(abs(z2*z1))", 0.0, 0.0),
+        ("sqrt(z2*z1)", -2.0, f64::NEG_INFINITY),
+        ("sqrt(z2*z1)", 2.0, f64::INFINITY),
+        ("sqrt(z1^2 + z2^2)", 2.0, 0.0),
+        ("z2*sqrt(abs(z1)) + z1", 0.0, 1.0),
+        ("z2*sqrt(abs(z1)) + z1", -1.0, f64::NEG_INFINITY),
+        ("sqrt(abs(z1 - z2))*(z1 - z2)", 0.0, 0.0),
+        ("abs(z2)^z1", 0.0, 0.0),
+    ];
+    for (text, y, expected) in cases {
+        let found = slope_at(text, &[("z2", y)]);
+        assert_eq!(found, expected, "{text} at z2 = {y}");
+    }
+    for (text, expected) in [("sqrt(abs(z1 - z2))*(z1 - z2)", 0.0), ("abs(z1 - z2)", 1.0)] {
+        assert_eq!(
+            slope_at(text, &[("z1", 0.7), ("z2", 0.7)]),
+            expected,
+            "{text}"
+        );
+    }
+    for (at, expected) in [([3.0, 4.0], 0.15), ([0.0, 2.0], 0.0)] {
+        let values = [("z1", at[0]), ("z2", at[1])];
+        let found = slope_at("sqrt(z1^2 + z2^2)/z2", &values);
+        assert!((found - expected).abs() < 1e-15, "{found} at {at:?}");
+    }
+    assert_eq!(slope_at("sqrt(1 - z1)*(1 - z1)", &[("z1", 1.0)]), 0.0);
+    assert_eq!(slope_at("sqrt(1 - z1)", &[("z1", 1.0)]), f64::NEG_INFINITY);
+}
+
+#[test]
+fn slope_with_too_many_cases_is_a_difference_instead_of_no_number() {
+    let nested = "sqrt(abs(tan(z1)/(1 + abs(abs(z1^2 + z1^2)^u1))) + abs(z2))*(1 - cos(z1))";
+    let found = slope_at(nested, &[("u1", 1.0)]);
+    assert!(found.abs() < 1e-3, "{found}");
+    let nested = "abs(abs(abs(z1)^dz1 + sin(z2)*z1^2)^dz2 - abs(abs(z2)^u1 - z1)^dz1)^u1*z1";
+    let found = slope_at(nested, &[("dz1", 1.5), ("dz2", 0.5), ("u1", 2.0)]);
+    assert!(found.abs() < 1e-3, "{found}");
+}
+
 #[test]
 fn infinite_slopes_of_two_terms_cancel() {
     let terms = ["sqrt(z1)", "sqrt(sin(z1))"].map(str::to_owned);

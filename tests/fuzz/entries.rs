@@ -86,7 +86,7 @@ fn reads_back(pool: &mut ExprPool, expr: romc::symbolic::ExprId, text: &str) -> 
         depth: usize::MAX,
         exponent: u32::MAX,
     };
-    match pool.parse_within(&printed, &|_| true, &|_| None, limits) {
+    match pool.parse_within(&printed, &|_| true, &|_, _| None, limits) {
         Ok(again) => assert_eq!(
             again,
             expr,

@@ -7,6 +7,7 @@ use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use romc::import::*;
 use romc::model::{LibraryChoice, ReducedModel, StandardLibrary};
+use romc::symbolic::{ExprId, ExprPool};
 
 use crate::store::*;
 
@@ -242,6 +243,78 @@ fn equations_that_do_not_fit_the_options_are_refused() {
     );
     let nothing = import("[contact]\nddz1 = z1 - z1\n", &base).expect("zeros");
     assert_eq!(nothing.model.phases()[0].xi.amax(), 0.0);
+}
+
+fn read(text: &[u8]) -> Result<Sections, ImportError> {
+    read_equations("eq", Format::Equations, text, &SymbolNames::default(), &[])
+}
+
+/// Place of a fault and what was found there.
+fn refusal(text: &[u8]) -> String {
+    let error = read(text).expect_err("a fault").to_string();
+    let found = error.split(", expected ").next();
+    found.expect("what was found").to_owned()
+}
+
+fn parsed(equation: &Equation, pool: &mut ExprPool) -> ExprId {
+    pool.parse(&equation.text(), &|_| true)
+        .expect("it was read")
+}
+
+#[test]
+fn sections_and_continued_lines_are_read() {
+    let text = "# made by hand\r\n[contact]\r\nddz2 = z1\nddz1 = 1 -\n   dz2 # more\n[ flight ]\n\
+                ddz1 = 0\nddz2=u1\n";
+    let read = read(text.as_bytes()).expect("two phases");
+    assert_eq!(read.latent_dim, 2);
+    let names: Vec<_> = read.sections.iter().map(|s| s.phase.as_deref()).collect();
+    assert_eq!(names, [Some("contact"), Some("flight")]);
+    let mut pool = ExprPool::new();
+    let first = &read.sections[0].equations[0];
+    assert_eq!((first.output, first.line), (0, 4));
+    let expr = parsed(first, &mut pool);
+    assert_eq!(pool.display(expr).to_string(), "1 - dz2");
+}
+
+#[test]
+fn names_with_underscores_and_other_spellings_are_read() {
+    let text = "ddz_1 = 2*z_1**2 − 3·dz_1\n  + ln(z_1)*sgn (u_1) + pi";
+    let read = read(text.as_bytes()).expect("an equation");
+    let mut pool = ExprPool::new();
+    let found = parsed(&read.sections[0].equations[0], &mut pool);
+    let plain = "2*z1^2 - 3*dz1 + log(z1)*sign(u1) + 3.141592653589793";
+    assert_eq!(Ok(found), pool.parse(plain, &|_| true));
+}
+
+#[test]
+fn faults_are_reported_with_line_and_column() {
+    for (text, line, column, found) in [
+        ("", 1, 1, "the end of the text"),
+        ("z1 + 2", 1, 1, "`z1 + 2`"),
+        ("ddz1 = z1 + z2", 1, 13, "`z2`"),
+        ("  dz1 = z1", 1, 3, "`dz1`"),
+        ("ddz1 = z1 +\n   é*z1", 2, 4, "`é`"),
+        ("ddz1 = sin z1", 1, 12, "`z1`"),
+        ("ddz1 = sinh(z1)", 1, 8, "`sinh`"),
+        ("ddz1 = z1 +", 1, 12, "end of text"),
+        ("ddz1 = z1\n + \n", 2, 3, "end of text"),
+        ("ddz1 = 1e999", 1, 8, "`1e999`"),
+        ("[contact\nddz1 = 1", 1, 1, "`[contact`"),
+        ("[]\nddz1 = 1", 1, 1, "`[]`"),
+        ("[a]\nddz1 = 1\n[a]", 3, 1, "`[a]` again, as in line 1"),
+        ("ddz1 = 1\n[a]\nddz1 = 1", 1, 1, "an equation"),
+        ("ddz1 = 1\nddz1 = 2", 2, 1, "`ddz1` again, as in line 1"),
+        ("[a]\nddz2 = 1", 1, 1, "phase `[a]` without ddz1"),
+        ("[a]\nddz1 = 1\n[b]\n", 3, 1, "phase `[b]` without ddz1"),
+        ("ddz_1 = z_1 + dz_1 + q", 1, 22, "`q`"),
+        ("ddz1 = z1²", 1, 10, "`²`"),
+        ("ddz1 = z1^2000", 1, 15, "the exponent 2000"),
+    ] {
+        let expected = format!("eq:{line}:{column}: found {found}");
+        assert_eq!(refusal(text.as_bytes()), expected, "{text}");
+    }
+    let found = refusal(b"ddz1 = 1\nddz2 = \xff");
+    assert_eq!(found, "eq:2:8: found bytes that are no text");
 }
 
 proptest! {

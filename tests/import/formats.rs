@@ -166,20 +166,26 @@ fn files_that_are_packed_or_another_are_named_with_the_line_for_a_shell() {
             "net.npz",
             &b"\n<!DOCTYPE HTML>"[..],
             "a web page",
-            "curl -L -o \"net.npz\"",
+            "curl -L -o net.npz",
         ),
-        ("eq.txt", b"<html>", "a web page", "curl -L -o \"eq.txt\""),
+        ("eq.txt", b"<html>", "a web page", "curl -L -o eq.txt"),
         (
             "net.npz.gz",
             b"\x1f\x8b\x08",
             "packed by gzip",
-            "gunzip -c \"net.npz.gz\" > \"net.npz\"",
+            "gunzip -c net.npz.gz > net.npz",
+        ),
+        (
+            "$(x)`y`.gz",
+            b"\x1f\x8b\x08",
+            "packed by gzip",
+            "gunzip -c '$(x)`y`.gz' > '$(x)`y`'",
         ),
         (
             "eq.tex",
             b"\xff\xfe\\\0",
             "text in UTF-16",
-            "mv utf8.tmp \"eq.tex\"",
+            "mv utf8.tmp eq.tex",
         ),
     ] {
         fs::write(folder.path().join(name), bytes).expect("writable");

@@ -269,7 +269,7 @@ fn maps_that_do_not_belong_together_are_noted() {
         report
             .notes
             .iter()
-            .any(|note| matches!(note, Note::Unmatched(_)))
+            .any(|note| note.starts_with("encode(decode(z)) differs from z by "))
     };
     assert!(!has_note(&stored));
     let turned = -encoder.pseudo_inverse(1e-9).expect("full rank");

@@ -9,7 +9,6 @@ use crate::model::{InputStatistics, ReducedModel, StateMap};
 use crate::robot::{Robot, WrenchFrame};
 use crate::robot_file::RobotEntry;
 
-/// The content of the model file.
 pub(super) fn manifest_of(model: &ReducedModel) -> Manifest {
     let phases = model.phases().iter().enumerate();
     let statistics = phases.filter_map(|(index, phase)| {

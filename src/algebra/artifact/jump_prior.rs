@@ -3,8 +3,8 @@
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
-use super::error::{ArtifactError, refused};
 use super::manifest::{Rows, from_rows, to_rows};
+use super::read::ArtifactError;
 use crate::model::{FEATURE_DIM, GOAL_DIM, JumpPart, JumpPrior, ModelError, Phase, ReducedModel};
 use crate::robot::FOOT_DIM;
 
@@ -93,7 +93,8 @@ pub(super) fn prior_of(
     keys: (Option<LandmarksEntry>, Option<PriorEntry>),
     phases: &[Phase],
 ) -> Result<Option<JumpPrior>, ArtifactError> {
-    let incomplete = |part, needs| refused(file, ModelError::Incomplete { part, needs });
+    let refused = |error: ModelError| ArtifactError::unusable(file, error);
+    let incomplete = |part, needs| refused(ModelError::Incomplete { part, needs });
     let (landmarks, prior) = match keys {
         (None, None) => return Ok(None),
         (Some(_), None) => return Err(incomplete("landmarks", "prior")),
@@ -101,7 +102,7 @@ pub(super) fn prior_of(
         (Some(landmarks), Some(prior)) => (landmarks, prior),
     };
     let invalid = |place: &str, found: String, expected: &str| {
-        refused(file, ModelError::invalid(place, found, expected))
+        refused(ModelError::invalid(place, found, expected))
     };
     let (found, expected) = (prior.parts.len(), landmarks.parts.len());
     if found != expected {

@@ -12,9 +12,8 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Map, Value};
 
 use super::bounded;
-use super::error::{ArtifactError, ArtifactFault};
 use super::jump_prior::{LandmarksEntry, PriorEntry};
-use crate::files::{Located, Place};
+use super::read::ArtifactError;
 use crate::model::{
     Activation, CoordinateNames, FeetRule, LibraryChoice, ScaleFactors, Scaling, StandardLibrary,
 };
@@ -28,7 +27,6 @@ pub(crate) const SCHEMA: &str = "romc-model/1";
 /// `robot` that is described.
 pub(crate) const SCHEMA_2: &str = "romc-model/2";
 
-/// Rows of a matrix.
 pub(super) type Rows = Vec<Vec<f64>>;
 
 /// The matrix with these rows; every row must have `expected` numbers, or as many as the first.
@@ -41,10 +39,9 @@ pub(super) fn from_rows(
     let expected = expected.or(rows.first().map(Vec::len)).unwrap_or(0);
     for (row, numbers) in rows.iter().enumerate() {
         if numbers.len() != expected {
-            let found = numbers.len();
-            let place = Place::Entry(format!("`{tensor}`[{row}]").into());
-            let fault = ArtifactFault::RowLength { found, expected };
-            return Err(Located::new(file, place, fault));
+            let (place, found) = (format!("`{tensor}`[{row}]"), numbers.len());
+            let found = format!("{found} numbers");
+            return Err(ArtifactError::at(file, place, found, expected.to_string()));
         }
     }
     Ok(DMatrix::from_row_iterator(
@@ -54,7 +51,6 @@ pub(super) fn from_rows(
     ))
 }
 
-/// The rows of a matrix.
 pub(super) fn to_rows(matrix: &DMatrix<f64>) -> Rows {
     matrix
         .row_iter()
@@ -62,7 +58,6 @@ pub(super) fn to_rows(matrix: &DMatrix<f64>) -> Rows {
         .collect()
 }
 
-/// The whole file.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Manifest {
@@ -124,7 +119,6 @@ impl Manifest {
     }
 }
 
-/// A robot of romc's own by its name, or any by its description.
 #[derive(Serialize)]
 #[serde(untagged)]
 pub(super) enum RobotValue {
@@ -151,7 +145,6 @@ impl<'de> Deserialize<'de> for RobotValue {
     }
 }
 
-/// Only the schema; everything else is passed over.
 #[derive(Deserialize)]
 pub(super) struct SchemaProbe {
     #[serde(default, deserialize_with = "bounded::value")]
@@ -276,7 +269,6 @@ impl<'de> Deserialize<'de> for ScaleFactors {
     }
 }
 
-/// A list of terms, or the shorthand.
 impl<'de> Deserialize<'de> for LibraryChoice {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         struct Terms;

@@ -33,7 +33,6 @@
 //! [`ReducedModel`]: crate::model::ReducedModel
 
 mod bounded;
-mod error;
 mod export;
 mod jump_prior;
 mod manifest;
@@ -41,6 +40,5 @@ mod print;
 mod read;
 mod write;
 
-pub use error::{ArtifactError, ArtifactFault, describe};
-pub use read::{MAX_FILE_BYTES, is_standard_input, read, read_from_bytes};
+pub use read::{ArtifactError, MAX_FILE_BYTES, describe, is_standard_input, read, read_from_bytes};
 pub use write::{Digest, check_place, digest, to_text, write};

@@ -7,7 +7,6 @@ const INDENT: &str = "  ";
 /// Lists of words and small objects keep to this width, without indentation.
 const LINE_WIDTH: usize = 100;
 
-/// The value as text, with a newline at the end.
 pub(super) fn print(value: &Value) -> String {
     let mut out = String::new();
     push(&mut out, value, Some(0));
@@ -86,37 +85,4 @@ fn fill_lines(words: &[Value]) -> Vec<String> {
         }
     }
     lines
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use serde_json::json;
-
-    #[test]
-    fn matrix_prints_one_row_a_line() {
-        let value = json!({ "name": "m", "weights": [[1.0, -0.5], [2.5e-7, 3.0]], "bias": [0.0] });
-        let expected = "{\n  \"name\": \"m\",\n  \"weights\": [\n    [1.0, -0.5],\n    \
-                        [2.5e-7, 3.0]\n  ],\n  \"bias\": [0.0]\n}\n";
-        assert_eq!(print(&value), expected);
-    }
-
-    #[test]
-    fn long_list_of_words_fills_lines() {
-        let words = vec!["x".repeat(38); 3];
-        let word = format!("\"{}\"", words[0]);
-        let expected = format!("{{\n  \"w\": [\n    {word}, {word},\n    {word}\n  ]\n}}\n");
-        assert_eq!(print(&json!({ "w": words })), expected);
-    }
-
-    #[test]
-    fn printed_value_reads_back_equal() {
-        let value = json!({
-            "empty": {}, "none": [], "nested": [[], [{ "a": [null, true] }]],
-            "text": "quote \" and \u{1} and \\", "words": ["a".repeat(60), "b".repeat(60)],
-            "number": [1e300, -0.0, 5e-324, 12345678901234567u64],
-        });
-        let again: Value = serde_json::from_str(&print(&value)).unwrap();
-        assert_eq!(again, value);
-    }
 }

@@ -1,5 +1,6 @@
 //! From bytes to a checked model.
 
+use std::error::Error;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
@@ -7,19 +8,33 @@ use std::path::Path;
 use nalgebra::DVector;
 use serde_json::Value;
 
-use super::error::{ArtifactError, ArtifactFault, refused};
 use super::jump_prior::prior_of;
 use super::manifest::{
     GivenStateEntry, Manifest, MapEntry, PhaseEntry, RobotValue, Rows, SCHEMA, SCHEMA_2,
     SchemaProbe, StatisticsEntry, from_rows,
 };
-use crate::files::ForeignFile;
 use crate::files::size::Format;
+use crate::files::{Fault, Located, Place, magic};
 use crate::model::{
     Activation, AffineMap, InputGivenState, InputStatistics, Layer, Library, ModelError, Phase,
     ReducedModel, StateMap,
 };
 use crate::robot::{Robot, STATE_DIM};
+
+/// A fault and its place in a model file.
+pub type ArtifactError = Located<Fault<ModelError>>;
+
+/// An error and all its causes in one line.
+pub fn describe(error: &dyn Error) -> String {
+    let mut text = error.to_string();
+    let mut cause = error.source();
+    while let Some(source) = cause {
+        text.push_str(": ");
+        text.push_str(&source.to_string());
+        cause = source.source();
+    }
+    text
+}
 
 /// Largest model file; all of the largest model fits.
 pub const MAX_FILE_BYTES: u64 = Format::Model.most_bytes();
@@ -32,7 +47,7 @@ pub fn is_standard_input(path: &Path) -> bool {
 /// Reads and checks a model file, or standard input for the path `-`.
 ///
 /// # Errors
-/// [`ArtifactError`], of any kind but [`ArtifactFault::Exists`].
+/// [`ArtifactError`] with what was found and expected.
 pub fn read(path: &Path) -> Result<ReducedModel, ArtifactError> {
     let mut bytes = Vec::new();
     let (name, source): (String, io::Result<Box<dyn Read>>) = match is_standard_input(path) {
@@ -48,10 +63,7 @@ pub fn read(path: &Path) -> Result<ReducedModel, ArtifactError> {
     // One byte more than allowed distinguishes a file that is too large from one that just fits.
     source
         .and_then(|source| source.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes))
-        .map_err(|source| {
-            let action = "read";
-            ArtifactFault::Io { action, source }.of(&name)
-        })?;
+        .map_err(|source| ArtifactError::io(&name, "read the model file", source))?;
     read_from_bytes(&name, &bytes)
 }
 
@@ -61,13 +73,18 @@ pub fn read(path: &Path) -> Result<ReducedModel, ArtifactError> {
 /// As [`read`]. Never panics, whatever the bytes are.
 pub fn read_from_bytes(file: &str, bytes: &[u8]) -> Result<ReducedModel, ArtifactError> {
     if bytes.len() as u64 > MAX_FILE_BYTES {
-        return Err(ArtifactFault::TooLarge(MAX_FILE_BYTES).of(file));
+        let text = format!("found more than {MAX_FILE_BYTES} bytes, which no model file needs");
+        return Err(ArtifactError::text(file, Place::Whole, text));
     }
     check_schema(file, bytes)?;
     let manifest: Manifest =
         parse(file, bytes).map_err(|fault| foreign(file, bytes).unwrap_or(fault))?;
     match manifest.later_key().filter(|_| manifest.schema == SCHEMA) {
-        Some(key) => Err(ArtifactFault::LaterKey(key).of(file)),
+        Some(key) => {
+            let found = format!("in a file of \"{SCHEMA}\"");
+            let expected = format!("only from \"{SCHEMA_2}\" on");
+            Err(ArtifactError::at(file, format!("`{key}`"), found, expected))
+        }
         None => to_model(file, manifest),
     }
 }
@@ -82,13 +99,8 @@ fn parse<'de, T: serde::Deserialize<'de>>(
         let message = text
             .rsplit_once(" at line ")
             .map_or(&*text, |(message, _)| message);
-        let fault = ArtifactFault::Syntax {
-            place,
-            line: error.line(),
-            column: error.column(),
-            message: message.to_owned(),
-        };
-        fault.of(file)
+        let place = Place::Key(place.into(), error.line(), error.column());
+        ArtifactError::text(file, place, message)
     };
     let mut deserializer = serde_json::Deserializer::from_slice(bytes);
     let value = serde_path_to_error::deserialize(&mut deserializer)
@@ -101,54 +113,52 @@ fn parse<'de, T: serde::Deserialize<'de>>(
 /// The fault of a file that is no JSON but of a kind that other tools write.
 fn foreign(file: &str, bytes: &[u8]) -> Option<ArtifactError> {
     let is_object = bytes.trim_ascii_start().starts_with(b"{");
-    let found = ForeignFile::of(Path::new(file), bytes).filter(|_| !is_object)?;
+    let found = magic::arrays(Path::new(file), bytes).filter(|_| !is_object)?;
     let import =
         "romc import (in Python Model.from_arrays, from_torch or from_pysindy) makes one of";
-    let source = found.remedy.unwrap_or("it".to_owned());
-    let remedy = match found.is_packed {
-        true => source,
-        false => format!("{import} {source}"),
+    let remedy = match (found.is_packed, found.remedy.as_str()) {
+        (true, line) => line.to_owned(),
+        (false, "") => format!("{import} it"),
+        (false, lines) => format!("{import} {lines}"),
     };
-    let what = found.what;
-    Some(ArtifactFault::Foreign { what, remedy }.of(file))
+    let expected = format!("a model file of romc: {remedy}");
+    Some(ArtifactError::at(file, Place::Whole, found.what, expected))
 }
 
 /// Looks at the schema first: for a file of a later version it is the fault, not unknown keys.
 fn check_schema(file: &str, bytes: &[u8]) -> Result<(), ArtifactError> {
     if bytes.trim_ascii_start().first() == Some(&b'[') {
         // serde would take an array for an object whose keys are left out.
-        let fault = ArtifactFault::Syntax {
-            place: ".".to_owned(),
-            line: 1,
-            column: 1,
-            message: "found an array, expected an object".to_owned(),
-        };
-        return Err(fault.of(file));
+        let place = Place::Key(".".into(), 1, 1);
+        return Err(ArtifactError::at(file, place, "an array", "an object"));
     }
     let Ok(probe) = parse::<SchemaProbe>(file, bytes) else {
         // No JSON at all: reading the whole grammar meets the same fault, and knows its place.
         return Ok(());
     };
-    let found = match probe.schema {
+    let found: String = match probe.schema {
         Some(Value::String(schema)) if schema == SCHEMA || schema == SCHEMA_2 => return Ok(()),
         Some(other) => other.to_string().chars().take(80).collect(),
         None => "none".to_owned(),
     };
-    Err(ArtifactFault::Schema(found).of(file))
+    let expected = format!("\"{SCHEMA}\" or \"{SCHEMA_2}\"");
+    Err(ArtifactError::at(file, "`schema`", found, expected))
 }
 
 fn to_model(file: &str, manifest: Manifest) -> Result<ReducedModel, ArtifactError> {
     let latent_dim = manifest.latent_dim;
     let library = Library::of(latent_dim, manifest.library);
-    let library = library.map_err(|source| refused(file, source))?;
+    let library = library.map_err(|source| ArtifactError::unusable(file, source))?;
     let mut builder = ReducedModel::builder(manifest.name, library)
         .description(manifest.description)
         .provenance(manifest.provenance);
     let robot = manifest.robot.map(|robot| match robot {
-        RobotValue::Name(name) => Robot::by_name(&name).map_err(|source| refused(file, source)),
+        RobotValue::Name(name) => {
+            Robot::by_name(&name).map_err(|source| ArtifactError::unusable(file, source))
+        }
         RobotValue::Entry(entry) => {
             let robot = entry.robot("robot");
-            robot.map_err(|source| ArtifactFault::Robot(source).of(file))
+            robot.map_err(|error| ArtifactError::text(file, Place::Whole, error.to_string()))
         }
     });
     let robot = robot.transpose()?;
@@ -183,7 +193,9 @@ fn to_model(file: &str, manifest: Manifest) -> Result<ReducedModel, ArtifactErro
         let statistics = statistics_of(file, &name, &entry)?;
         builder = builder.input_statistics(name, statistics);
     }
-    builder.build().map_err(|source| refused(file, source))
+    builder
+        .build()
+        .map_err(|source| ArtifactError::unusable(file, source))
 }
 
 /// An encoder or decoder; a chain of one linear layer is the affine map.
@@ -193,7 +205,7 @@ fn map_of(
     entry: &MapEntry,
     columns: Option<usize>,
 ) -> Result<StateMap, ArtifactError> {
-    let refused = |source: ModelError| refused(file, source);
+    let refused = |source: ModelError| ArtifactError::unusable(file, source);
     let entries = match entry {
         MapEntry::Affine { weights, bias } => {
             return affine_of(file, tensor, (weights, bias), columns).map(StateMap::from);
@@ -221,7 +233,7 @@ fn affine_of(
 ) -> Result<AffineMap, ArtifactError> {
     let weights = from_rows(file, &format!("{tensor}.weights"), weights, columns)?;
     let bias = DVector::from_column_slice(bias);
-    AffineMap::new(tensor, weights, bias).map_err(|source| refused(file, source))
+    AffineMap::new(tensor, weights, bias).map_err(|source| ArtifactError::unusable(file, source))
 }
 
 fn statistics_of(

@@ -6,10 +6,10 @@ use std::{fmt, fs, io};
 
 use sha2::{Digest as _, Sha256};
 
-use super::error::{ArtifactError, ArtifactFault};
 use super::export::manifest_of;
 use super::print::print;
-use crate::files::{Overwrite, hex, write_whole};
+use super::read::ArtifactError;
+use crate::files::{Overwrite, Place, hex, write_whole};
 use crate::model::ReducedModel;
 
 /// The model file as text: equal for equal models, numbers in the shortest form that reads back to
@@ -23,7 +23,7 @@ pub fn to_text(model: &ReducedModel) -> String {
 /// Checks whether [`write()`] would refuse.
 ///
 /// # Errors
-/// [`ArtifactFault::Exists`] if a different file is there and `overwrite` refuses.
+/// [`Fault::Text`](crate::files::Fault::Text) if a different file is there and `overwrite` refuses.
 pub fn check_place(
     path: &Path,
     model: &ReducedModel,
@@ -36,14 +36,18 @@ fn check_text(path: &Path, text: &str, overwrite: Overwrite) -> Result<(), Artif
     let same = || fs::read(path).is_ok_and(|bytes| bytes == text.as_bytes());
     match overwrite.allows(path) || same() {
         true => Ok(()),
-        false => Err(ArtifactFault::Exists.of(&path.display().to_string())),
+        false => {
+            let text = "a file of this name is there already";
+            let file = path.display().to_string();
+            Err(ArtifactError::text(&file, Place::Whole, text))
+        }
     }
 }
 
 /// Writes a model file: into a new file beside `path`, which is then moved there.
 ///
 /// # Errors
-/// [`ArtifactFault::Exists`] if a different file is there and `overwrite` refuses,
+/// [`Fault::Text`](crate::files::Fault::Text) if a different file is there and `overwrite` refuses,
 /// [`ArtifactFault::Io`].
 pub fn write(path: &Path, model: &ReducedModel, overwrite: Overwrite) -> Result<(), ArtifactError> {
     let text = to_text(model);
@@ -53,8 +57,8 @@ pub fn write(path: &Path, model: &ReducedModel, overwrite: Overwrite) -> Result<
             check_text(path, &text, Overwrite::Refuse)
         }
         Err(source) => {
-            let action = "write";
-            Err(ArtifactFault::Io { action, source }.of(&path.display().to_string()))
+            let (file, action) = (path.display().to_string(), "write the model file");
+            Err(ArtifactError::io(&file, action, source))
         }
         Ok(()) => Ok(()),
     }

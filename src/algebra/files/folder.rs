@@ -11,7 +11,6 @@ use sha2::{Digest as _, Sha256};
 use super::part::{Part, remove_left_in};
 use super::whole::{EmittedFile, Overwrite};
 
-/// Lists what romc wrote into the folder.
 const LIST: &str = ".romc-emitted";
 
 /// Why files could not be written.
@@ -88,7 +87,6 @@ impl Begun {
         Ok(Self(list.map(|list| list.emitted).unwrap_or_default()))
     }
 
-    /// Refuses a file that another run has made since, with other contents than ours.
     fn check(&self, folder: &Path, file: &EmittedFile, now: &Emitted) -> Result<(), FolderError> {
         let (then, now) = (self.0.digests(&file.path), now.digests(&file.path));
         // Models that share a folder share this one, which builds the last of them.
@@ -177,7 +175,6 @@ struct List {
 }
 
 impl List {
-    /// The list of a folder that has one.
     fn of(folder: &Path) -> Result<Option<Self>, FolderError> {
         Self::opened(folder, OpenOptions::new().read(true), File::lock_shared)
     }
@@ -220,7 +217,6 @@ impl List {
         }
     }
 
-    /// Adds digests of files that it does not have.
     fn extend(&mut self, files: &[EmittedFile]) -> Result<(), FolderError> {
         let mut lines = String::new();
         for file in files {
@@ -343,12 +339,10 @@ pub fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// SHA-256 in hexadecimal digits.
 fn digest(contents: &[u8]) -> String {
     hex(&Sha256::digest(contents))
 }
 
-/// Files beside their places.
 fn staged(folder: &Path, files: &[EmittedFile]) -> Result<Vec<Part>, FolderError> {
     let mut parts = Vec::new();
     let mut tidied = BTreeSet::new();
@@ -372,183 +366,5 @@ fn io_error(path: &Path, source: io::Error) -> FolderError {
     FolderError::Io {
         path: path.to_owned(),
         source,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn files(contents: &str) -> Vec<EmittedFile> {
-        vec![
-            EmittedFile::new("m.c", contents),
-            EmittedFile::new("m/src/lib.rs", contents),
-        ]
-    }
-
-    #[test]
-    fn second_run_replaces_own_files_and_leaves_no_part() {
-        let folder = tempfile::tempdir().expect("a folder");
-        let out = folder.path().join("new/out");
-        write_files(&out, &files("one"), Overwrite::Refuse).expect("first");
-        let written = write_files(&out, &files("two"), Overwrite::Refuse).expect("second");
-        assert_eq!(written, [out.join("m.c"), out.join("m/src/lib.rs")]);
-        for path in written {
-            assert_eq!(fs::read_to_string(path).expect("written"), "two");
-        }
-        let mut names: Vec<_> = fs::read_dir(&out)
-            .expect("a folder")
-            .map(|entry| entry.expect("an entry").file_name())
-            .collect();
-        names.sort();
-        assert_eq!(names, [LIST, "m", "m.c"]);
-    }
-
-    #[test]
-    fn a_place_that_cannot_be_taken_leaves_no_part() {
-        let folder = tempfile::tempdir().expect("a folder");
-        let mut files = files("one");
-        files.push(EmittedFile::new(
-            "m.c/below",
-            "a file stands where a folder should",
-        ));
-        let found = write_files(folder.path(), &files, Overwrite::Refuse);
-        assert!(
-            matches!(found, Err(FolderError::Foreign { .. })),
-            "{found:?}"
-        );
-        let left = fs::read_dir(folder.path()).expect("a folder");
-        let names = left.map(|entry| entry.expect("an entry").file_name());
-        let parts = names.filter(|name| name.to_string_lossy().ends_with(".part"));
-        assert_eq!(parts.count(), 0);
-    }
-
-    #[test]
-    fn runs_into_one_folder_at_a_time_know_all_files_as_their_own() {
-        let folder = tempfile::tempdir().expect("a folder");
-        let write = |own: &str, contents: &str| {
-            let files = [
-                EmittedFile::new(own, contents),
-                EmittedFile::new("CMakeLists.txt", "of all"),
-            ];
-            write_files(folder.path(), &files, Overwrite::Refuse).expect("written")
-        };
-        std::thread::scope(|scope| {
-            for name in ["a.c", "b.c", "c.c", "d.c"] {
-                scope.spawn(move || {
-                    for run in 0..50 {
-                        write(name, &format!("{name} {run}"));
-                    }
-                });
-            }
-        });
-        write("e.c", "alone");
-        let list = List::of(folder.path()).expect("read").expect("a list");
-        let mut names = Vec::new();
-        for (name, digests) in &list.emitted.0 {
-            names.push(name.as_str());
-            assert_eq!(digests.len(), 1, "{name}");
-        }
-        names.sort();
-        assert_eq!(names, ["CMakeLists.txt", "a.c", "b.c", "c.c", "d.c", "e.c"]);
-    }
-
-    #[test]
-    fn foreign_file_is_refused_and_kept_unless_forced() {
-        let folder = tempfile::tempdir().expect("a folder");
-        let foreign = folder.path().join("m.c");
-        fs::write(&foreign, "mine").expect("written");
-        let found = write_files(folder.path(), &files("new"), Overwrite::Refuse);
-        assert!(matches!(found, Err(FolderError::Foreign { path }) if path == foreign));
-        assert_eq!(fs::read_to_string(&foreign).expect("kept"), "mine");
-        assert!(!folder.path().join("m").exists());
-        write_files(folder.path(), &files("new"), Overwrite::Replace).expect("forced");
-        assert_eq!(fs::read_to_string(&foreign).expect("replaced"), "new");
-    }
-
-    #[test]
-    fn an_emitted_file_that_was_changed_is_refused_and_kept() {
-        let folder = tempfile::tempdir().expect("a folder");
-        write_files(folder.path(), &files("one"), Overwrite::Refuse).expect("first");
-        let own = folder.path().join("m.c");
-        fs::write(&own, "my own work").expect("written");
-        let found = write_files(folder.path(), &files("two"), Overwrite::Refuse);
-        assert!(matches!(found, Err(FolderError::Changed { path }) if path == own));
-        assert_eq!(fs::read_to_string(&own).expect("kept"), "my own work");
-        let other = folder.path().join("m/src/lib.rs");
-        assert_eq!(fs::read_to_string(other).expect("kept"), "one");
-        let checked = check_folder(folder.path(), &["m.c"], Overwrite::Refuse);
-        assert!(matches!(checked, Err(FolderError::Changed { .. })));
-        // What romc would write anyway is no loss.
-        fs::write(&own, "two").expect("written");
-        write_files(folder.path(), &files("two"), Overwrite::Refuse).expect("the same bytes");
-    }
-
-    #[test]
-    fn a_lock_file_that_cargo_rewrote_is_replaced_and_one_of_the_users_kept() {
-        let folder = tempfile::tempdir().expect("a folder");
-        let lock = |text: &str| vec![EmittedFile::new("m/Cargo.lock", text)];
-        let path = folder.path().join("m/Cargo.lock");
-        write_files(folder.path(), &lock("version = 4"), Overwrite::Refuse).expect("first");
-        let cargos = [CARGOS_LINE, b"\nversion = 4"].concat();
-        fs::write(&path, cargos).expect("written");
-        write_files(folder.path(), &lock("version = 5"), Overwrite::Refuse).expect("again");
-        assert_eq!(fs::read_to_string(&path).expect("there"), "version = 5");
-        fs::write(&path, "my own").expect("written");
-        let found = write_files(folder.path(), &lock("version = 6"), Overwrite::Refuse);
-        assert!(matches!(found, Err(FolderError::Changed { .. })));
-    }
-
-    #[test]
-    fn of_two_commands_at_a_time_the_second_is_refused_unless_it_writes_the_same() {
-        let folder = tempfile::tempdir().expect("a folder");
-        let begin = || Begun::of(folder.path()).expect("readable");
-        let write = |begun: &Begun, text: &str, overwrite| {
-            write_files_since(begun, folder.path(), &files(text), overwrite)
-        };
-        let before = begin();
-        write(&begin(), "one", Overwrite::Refuse).expect("the first");
-        write(&before, "one", Overwrite::Refuse).expect("the same");
-        let found = write(&before, "two", Overwrite::Refuse);
-        assert!(
-            matches!(&found, Err(FolderError::Concurrent { path }) if path.ends_with("m.c")),
-            "{found:?}"
-        );
-        let left = fs::read_to_string(folder.path().join("m/src/lib.rs"));
-        assert_eq!(left.expect("kept"), "one");
-        write(&begin(), "two", Overwrite::Refuse).expect("one after the other");
-        write(&before, "three", Overwrite::Replace).expect("forced");
-    }
-
-    #[test]
-    fn files_of_earlier_runs_are_named_unless_changed() {
-        let folder = tempfile::tempdir().expect("a folder");
-        let write = |name: &str| {
-            let file = EmittedFile::new(name, "text");
-            write_files(folder.path(), &[file], Overwrite::Refuse).expect("written")
-        };
-        write("old.c");
-        write("mine.c");
-        fs::write(folder.path().join("mine.c"), "changed").expect("written");
-        write("new.c");
-        let now = [EmittedFile::new("new.c", "text")];
-        let earlier = earlier_files(folder.path(), &now).expect("a list");
-        assert_eq!(earlier, [folder.path().join("old.c")]);
-    }
-
-    #[cfg(unix)]
-    #[test]
-    fn links_in_the_way_are_refused_and_what_they_lead_to_is_kept() {
-        let folder = tempfile::tempdir().expect("a folder");
-        let victim = folder.path().join("victim");
-        fs::write(&victim, "precious").expect("written");
-        for name in [LIST, "m.c"] {
-            let link = folder.path().join(name);
-            std::os::unix::fs::symlink(&victim, &link).expect("a link");
-            let found = write_files(folder.path(), &files("one"), Overwrite::Refuse);
-            assert!(matches!(found, Err(FolderError::Foreign { path }) if path == link));
-            fs::remove_file(link).expect("removed");
-        }
-        assert_eq!(fs::read_to_string(victim).expect("kept"), "precious");
     }
 }

@@ -1,7 +1,8 @@
-//! Errors with their place in a file.
+//! Errors with their place in a file: one type for the faults of all readers.
 
+use std::convert::Infallible;
 use std::error::Error;
-use std::fmt;
+use std::{fmt, io};
 
 /// A place in a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -16,6 +17,8 @@ pub enum Place {
     Character(usize, usize),
     /// A named entry with what it is used for, such as `` `W_e`[3, 2] as encoder.weight ``.
     Entry(Box<str>),
+    /// A path of keys in a JSON file, such as `encoder.weights[3][2]`, with line and column.
+    Key(Box<str>, usize, usize),
     /// No place in a file: an option of the command line.
     Option(&'static str),
 }
@@ -33,21 +36,64 @@ impl Place {
     pub fn row(&self) -> Option<usize> {
         match self {
             Place::Row(row) | Place::Cell(row, _) => Some(*row),
-            Place::Whole | Place::Character(..) | Place::Entry(_) | Place::Option(_) => None,
+            _ => None,
         }
     }
+}
+
+/// An entry by its name.
+impl From<&str> for Place {
+    fn from(entry: &str) -> Self {
+        Place::Entry(entry.into())
+    }
+}
+
+impl From<String> for Place {
+    fn from(entry: String) -> Self {
+        Place::Entry(entry.into())
+    }
+}
+
+/// Line and column of a character.
+impl From<(usize, usize)> for Place {
+    fn from((line, column): (usize, usize)) -> Self {
+        Place::Character(line, column)
+    }
+}
+
+/// What is wrong at a place; `C` says why the contents of a file cannot be used as a whole.
+#[derive(Debug, thiserror::Error)]
+pub enum Fault<C: Error + 'static = Infallible> {
+    /// The file system refused an action.
+    #[error("cannot {action}")]
+    Io {
+        /// Such as `read the file`.
+        action: &'static str,
+        /// Its reason.
+        source: io::Error,
+    },
+    /// Something else is there than what is needed, or nothing.
+    #[error("found {found}, expected {expected}")]
+    Unexpected {
+        /// What is there.
+        found: Box<str>,
+        /// What could be, or the option that settles it.
+        expected: Box<str>,
+    },
+    /// A text that breaks a grammar, in the words of its parser, or a fault without alternative.
+    #[error("{0}")]
+    Text(Box<str>),
+    /// The parts do not make a model; tensors are named as in the model file.
+    #[error("not a usable model")]
+    Unusable(#[source] Box<C>),
 }
 
 /// An error of kind `E` at a place; prints as `file: place: error`.
 ///
 /// ```
-/// use romc::files::{Located, Place};
+/// use romc::files::{Fault, Located, Place};
 ///
-/// #[derive(Debug, thiserror::Error)]
-/// #[error("found `x`, expected a number")]
-/// struct NoNumber;
-///
-/// let error: Located<NoNumber> = Located::new("jump.csv", Place::Cell(3, "Time".into()), NoNumber);
+/// let error: Located<Fault> = Located::at("jump.csv", Place::Cell(3, "Time".into()), "`x`", "a number");
 /// assert_eq!(error.to_string(), "jump.csv: row 3, column `Time`: found `x`, expected a number");
 /// ```
 #[derive(Debug)]
@@ -71,6 +117,43 @@ impl<E> Located<E> {
     }
 }
 
+impl<C: Error + 'static> Located<Fault<C>> {
+    /// `found` at a place, where `expected` should be.
+    pub fn at(
+        file: &str,
+        place: impl Into<Place>,
+        found: impl Into<Box<str>>,
+        expected: impl Into<Box<str>>,
+    ) -> Self {
+        let (found, expected) = (found.into(), expected.into());
+        Self::new(file, place.into(), Fault::Unexpected { found, expected })
+    }
+
+    /// An option that cannot be followed.
+    pub fn option(
+        option: &'static str,
+        found: impl Into<Box<str>>,
+        expected: impl Into<Box<str>>,
+    ) -> Self {
+        Self::at("", Place::Option(option), found, expected)
+    }
+
+    /// A fault in words.
+    pub fn text(file: &str, place: impl Into<Place>, text: impl Into<Box<str>>) -> Self {
+        Self::new(file, place.into(), Fault::Text(text.into()))
+    }
+
+    /// A refusal of the file system.
+    pub fn io(file: &str, action: &'static str, source: io::Error) -> Self {
+        Self::new(file, Place::Whole, Fault::Io { action, source })
+    }
+
+    /// Contents that cannot be used.
+    pub fn unusable(file: &str, source: impl Into<C>) -> Self {
+        Self::new(file, Place::Whole, Fault::Unusable(Box::new(source.into())))
+    }
+}
+
 impl<E: fmt::Display> fmt::Display for Located<E> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.file)?;
@@ -80,6 +163,9 @@ impl<E: fmt::Display> fmt::Display for Located<E> {
             Place::Cell(row, column) => write!(f, ": row {row}, column `{column}`"),
             Place::Character(line, column) => write!(f, ":{line}:{column}"),
             Place::Entry(entry) => write!(f, ": {entry}"),
+            Place::Key(path, line, column) => {
+                write!(f, ": at `{path}`, line {line}, column {column}")
+            }
             Place::Option(option) => f.write_str(option),
         }?;
         match (self.file.is_empty(), &self.place) {
@@ -93,18 +179,5 @@ impl<E: fmt::Display> fmt::Display for Located<E> {
 impl<E: Error> Error for Located<E> {
     fn source(&self) -> Option<&(dyn Error + 'static)> {
         self.kind.source()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn columns_count_letters_not_bytes() {
-        let text = "a = 1\nµ = x";
-        let byte = text.find('x').expect("it is there");
-        assert_eq!(Place::of_byte(text, byte), Place::Character(2, 5));
-        assert_eq!(Place::of_byte(text, 0), Place::Character(1, 1));
     }
 }

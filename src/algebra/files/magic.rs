@@ -1,7 +1,12 @@
-//! Formats that are recognised by their first bytes and read by other programs, each with a line that makes a text table
-//! or an MCAP log of it: one table.
+//! Files of other programs: what they are, by their bytes or their ending, and the lines to type that convert them.
+//!
+//! `magic.toml` is the one table. Readers of recordings ask for a text table or a log ([`recognised`]), readers of models
+//! for arrays.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+use serde::Deserialize;
 
 use super::shell_path;
 
@@ -11,209 +16,217 @@ pub const MAGIC_BYTES: usize = 512;
 /// First bytes of an MCAP file.
 pub const MCAP: &[u8] = b"\x89MCAP0\r\n";
 
-/// A row: offset of the bytes, the bytes, name of the format, and the line that converts it, in which `<in>` is the file, `<out>` its
-/// name without ending; a line that begins with `:` is Python with NumPy and pandas, up to the table or the arrays `a`.
-type Row = (usize, &'static [u8], &'static str, &'static str);
-
-const PICKLE: &str = "a Python pickle, which runs code when it is read";
-const FROM_PICKLE: &str =
-    ":pd.DataFrame(pd.read_pickle(sys.argv[1])).to_csv(sys.argv[2], index=False)";
-const SPREADSHEET: &str = "libreoffice --headless --convert-to csv <in>";
-const UTF_8: &str = "iconv -f UTF-16 -t UTF-8 <in> > <out>.utf8.csv";
-const WEB_PAGE: &str = "curl -L -o <in> ADDRESS_OF_THE_RAW_FILE";
-
-/// Earlier rows apply before later ones.
-const TABLE: &[Row] = &[
-    (
-        0,
-        b"version https://git-lfs",
-        "a pointer of git LFS, not the file itself",
-        "git lfs pull --include <in>",
-    ),
-    (
-        0,
-        b"SQLite format 3\0",
-        "an SQLite file (.db3), as ROS 2 bags are",
-        "mcap convert <in> <out>.mcap",
-    ),
-    (
-        0,
-        b"#ROSBAG",
-        "a bag of ROS 1",
-        "mcap convert <in> <out>.mcap",
-    ),
-    (
-        0,
-        b"PAR1",
-        "a Parquet file",
-        ":pd.read_parquet(sys.argv[1]).to_csv(sys.argv[2], index=False)",
-    ),
-    (
-        0,
-        b"ARROW1",
-        "a Feather file",
-        ":pd.read_feather(sys.argv[1]).to_csv(sys.argv[2], index=False)",
-    ),
-    (
-        0,
-        b"MATLAB 7.3",
-        "a .mat file of MATLAB 7.3",
-        ":import mat73; a = mat73.loadmat(sys.argv[1])",
-    ),
-    (
-        0,
-        b"MATLAB 5.0",
-        "a .mat file of MATLAB",
-        ":import scipy.io; a = scipy.io.loadmat(sys.argv[1])",
-    ),
-    (
-        0,
-        b"\x89HDF\r\n\x1a\n",
-        "an HDF5 file",
-        ":import h5py; a = h5py.File(sys.argv[1])",
-    ),
-    (
-        0,
-        b"\x93NUMPY",
-        "a NumPy array (.npy)",
-        ":a = {'c': np.load(sys.argv[1])}",
-    ),
-    (30, b"[Content_Types].xml", "a spreadsheet", SPREADSHEET),
-    (
-        30,
-        b"mimetypeapplication/vnd.oasis",
-        "a spreadsheet",
-        SPREADSHEET,
-    ),
-    (0, b"\xd0\xcf\x11\xe0", "a spreadsheet", SPREADSHEET),
-    (0, b"PK\x03\x04", "a zip archive", "unzip <in>"),
-    (0, b"\x80\x02", PICKLE, FROM_PICKLE),
-    (0, b"\x80\x03", PICKLE, FROM_PICKLE),
-    (0, b"\x80\x04", PICKLE, FROM_PICKLE),
-    (0, b"\x80\x05", PICKLE, FROM_PICKLE),
-    (
-        0,
-        b"\x28\xb5\x2f\xfd",
-        "a file packed by zstd",
-        "zstd -d <in> -o <out>",
-    ),
-    (
-        0,
-        b"\xfd7zXZ\0",
-        "a file packed by xz",
-        "xz -d -c <in> > <out>",
-    ),
-    (
-        0,
-        b"BZh",
-        "a file packed by bzip2",
-        "bzip2 -d -c <in> > <out>",
-    ),
-    (
-        0,
-        b"\x04\x22\x4d\x18",
-        "a file packed by lz4",
-        "lz4 -d <in> <out>",
-    ),
-    (
-        0,
-        b"\x1f\x8b",
-        "a file packed by gzip",
-        "gunzip -c <in> > <out>",
-    ),
-    (0, b"7z\xbc\xaf\x27\x1c", "a 7z archive", "7z x <in>"),
-    (257, b"ustar", "a tar archive", "tar -xf <in>"),
-    (
-        0,
-        b"ULog\x01\x12\x35",
-        "a log of PX4 (ULog)",
-        "ulog2csv <in>",
-    ),
-    (0, b"\xff\xfe", "text in UTF-16", UTF_8),
-    (0, b"\xfe\xff", "text in UTF-16", UTF_8),
-    (0, b"<!DOCTYPE html", "a web page", WEB_PAGE),
-    (0, b"<!doctype html", "a web page", WEB_PAGE),
-    (0, b"<html", "a web page", WEB_PAGE),
-];
-
-/// Another format: its name, and a line to type that converts it.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct OtherFormat {
-    /// What it is, with its article.
-    pub what: &'static str,
-    /// The line.
-    pub remedy: String,
-}
-
-/// What a file of these first bytes is, if it is in the table.
-pub fn recognised(path: &Path, start: &[u8]) -> Option<OtherFormat> {
-    let has = |at: usize, bytes: &[u8]| start.get(at..).is_some_and(|rest| rest.starts_with(bytes));
-    let row = TABLE.iter().find(|(at, bytes, ..)| has(*at, bytes));
-    let (_, _, what, line) = *row?;
-    let (what, line) = match first_member(start) {
-        Some(member) if member.ends_with(b".npy") => {
-            ("NumPy arrays (.npz)", ":a = np.load(sys.argv[1])")
-        }
-        Some(_) | None => (what, line),
-    };
-    let stem = path.with_extension("");
-    let remedy = match line.strip_prefix(':') {
-        None => line
-            .replace("<in>", &shell_path(path))
-            .replace("<out>", &shell_path(&stem)),
-        Some(code) => {
-            let columns = match code.ends_with("index=False)") {
-                true => "",
-                false => TO_COLUMNS,
-            };
-            let with_ending = |end: &str| {
-                let name = stem.file_name().unwrap_or_default().to_string_lossy();
-                stem.with_file_name(format!("{name}{end}"))
-            };
-            let table = match with_ending(".csv") {
-                same if same == path => with_ending("-table.csv"),
-                other => other,
-            };
-            format!(
-                "python3 -c \"import sys, numpy as np, pandas as pd; {code}{columns}\" {} {}",
-                shell_path(path),
-                shell_path(&table)
-            )
-        }
-    };
-    Some(OtherFormat { what, remedy })
-}
+/// Bytes at either end of a file in which names are looked for.
+const SEARCHED: usize = 1 << 16;
 
 /// Arrays by name become columns; those of two axes one for each of the second.
 const TO_COLUMNS: &str = "; c = {k: np.squeeze(a[k]) for k in a if k[:2] != '__'}; \
      pd.DataFrame({k if v.ndim < 2 else f'{k}_{i}': v.reshape(len(v), -1)[:, i] for k, v in c.items() if v.ndim \
      for i in range(v.size // len(v))}).to_csv(sys.argv[2], index=False)";
 
-/// The name of the first member of a zip archive.
-fn first_member(start: &[u8]) -> Option<&[u8]> {
-    let length = start.strip_prefix(b"PK\x03\x04")?.get(22..24)?;
-    start.get(30..30 + usize::from(u16::from_le_bytes([length[0], length[1]])))
+/// Another format: its name, and what to type to convert it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct OtherFormat {
+    /// What it is, with its article.
+    pub what: String,
+    /// The lines; empty for arrays that `romc import` reads as they are.
+    pub remedy: String,
+    /// Whether the lines make the file that was meant rather than arrays for `romc import`.
+    pub(crate) is_packed: bool,
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+#[derive(Deserialize)]
+struct Table {
+    format: Vec<Row>,
+}
 
-    #[test]
-    fn names_of_files_stand_in_the_line_as_a_shell_reads_them() {
-        let found = recognised("my logs/a.bag".as_ref(), b"#ROSBAG V2.0\n").expect("a bag");
-        assert_eq!(
-            found.remedy,
-            "mcap convert 'my logs/a.bag' 'my logs/a'.mcap"
-        );
-        let zip = [&b"PK\x03\x04"[..], &[0; 22], &[5, 0, 0, 0], b"q.npy"].concat();
-        let found = recognised("a.csv".as_ref(), &zip).expect("arrays");
-        assert_eq!(found.what, "NumPy arrays (.npz)");
-        assert!(
-            found.remedy.ends_with("\" a.csv a-table.csv"),
-            "{}",
-            found.remedy
-        );
-        assert_eq!(recognised("a.csv".as_ref(), b"Time,fr.hx Position\n"), None);
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Row {
+    what: String,
+    #[serde(default)]
+    endings: Vec<String>,
+    /// Of one the first bytes, and text inside.
+    #[serde(default)]
+    signs: Vec<Vec<String>>,
+    #[serde(default)]
+    at: usize,
+    ends: Option<String>,
+    test: Option<Test>,
+    packed: Option<String>,
+    arrays: Option<String>,
+    table: Option<String>,
+}
+
+/// Formats without fixed bytes.
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Test {
+    Safetensors,
+    Onnx,
+    #[serde(rename = "web page")]
+    WebPage,
+}
+
+fn table() -> &'static [Row] {
+    static TABLE: OnceLock<Vec<Row>> = OnceLock::new();
+    TABLE.get_or_init(|| {
+        let table = toml::from_str::<Table>(include_str!("magic.toml"));
+        table.expect("romc's own table, read by tests").format
+    })
+}
+
+/// What a file of these first bytes is if no reader of tables or logs reads it, with a line that makes one.
+pub fn recognised(path: &Path, start: &[u8]) -> Option<OtherFormat> {
+    let is_table = |row: &&Row| row.table.is_some() || row.packed.is_some();
+    let mut rows = table().iter().filter(is_table);
+    let row = rows.find(|row| row.holds(start))?;
+    let remedy = match (&row.packed, &row.table) {
+        (Some(line), _) => in_shell(line, path),
+        (None, Some(line)) => match line.strip_prefix(':') {
+            Some(code) => to_table(code, path),
+            None => in_shell(line, path),
+        },
+        (None, None) => return None,
+    };
+    let (what, is_packed) = (row.what.clone(), row.packed.is_some());
+    Some(OtherFormat {
+        what,
+        remedy,
+        is_packed,
+    })
+}
+
+/// What holds a model's arrays, by its bytes, else by its ending.
+pub(crate) fn arrays(path: &Path, bytes: &[u8]) -> Option<OtherFormat> {
+    arrays_by_content(path, bytes).or_else(|| arrays_by_ending(path))
+}
+
+/// What holds a model's arrays, by its bytes.
+pub fn arrays_by_content(path: &Path, bytes: &[u8]) -> Option<OtherFormat> {
+    let rows = table().iter().filter(|row| row.holds(bytes));
+    rows.filter_map(|row| row.of_arrays(path)).next()
+}
+
+/// What holds a model's arrays, by its ending.
+pub fn arrays_by_ending(path: &Path) -> Option<OtherFormat> {
+    let ending = path.extension()?.to_string_lossy().to_lowercase();
+    let row = (table().iter()).find(|row| row.endings.contains(&ending))?;
+    row.of_arrays(path)
+}
+
+/// What cannot be read as a file: the name that the files of a TensorFlow checkpoint share, or the folder of a SavedModel.
+pub fn arrays_by_neighbours(path: &Path) -> Option<OtherFormat> {
+    let index = PathBuf::from(format!("{}.index", path.display()));
+    let parts = [index, path.join("saved_model.pb")];
+    let part = parts.iter().find(|part| part.is_file());
+    arrays_by_ending(part.map_or(path, PathBuf::as_path))
+}
+
+impl Row {
+    fn holds(&self, bytes: &[u8]) -> bool {
+        let latin_1 = |text: &str| -> Vec<u8> { text.chars().map(|c| c as u8).collect() };
+        let from = bytes.get(self.at..).unwrap_or_default();
+        let is_signed = |sign: &Vec<String>| {
+            let mut inside = sign.iter().skip(1);
+            from.starts_with(&latin_1(&sign[0])) && inside.all(|text| has(bytes, text.as_bytes()))
+        };
+        self.signs.iter().any(is_signed)
+            || self.test.is_some_and(|test| test.holds(bytes))
+            || (self.ends.as_ref()).is_some_and(|end| bytes.ends_with(&latin_1(end)))
     }
+
+    /// The format with the lines that make arrays of it.
+    fn of_arrays(&self, path: &Path) -> Option<OtherFormat> {
+        let (lines, intent) = match (&self.packed, &self.arrays) {
+            (Some(line), _) => (in_shell(line, path), "the file itself; in a shell"),
+            (None, Some(lines)) => (
+                in_python(lines, path),
+                "an .npz or .safetensors file; in Python",
+            ),
+            (None, None) => return None,
+        };
+        let lines: String = lines.lines().map(|line| format!("\n    {line}")).collect();
+        Some(OtherFormat {
+            what: self.what.clone(),
+            remedy: match lines.is_empty() {
+                true => lines,
+                false => format!("{intent}:{lines}"),
+            },
+            is_packed: self.packed.is_some(),
+        })
+    }
+}
+
+impl Test {
+    fn holds(self, bytes: &[u8]) -> bool {
+        match (self, bytes) {
+            (Self::Safetensors, _) => {
+                bytes.len() > 10 && bytes[6..8] == [0, 0] && bytes[8..10] == *b"{\""
+            }
+            // Field 1 is the version, field 2 the name of the program that wrote it.
+            (Self::Onnx, [0x08, 1..=32, 0x12, length @ 1..=63, name @ ..]) => {
+                let name = name.get(..usize::from(*length));
+                name.is_some_and(|name| name.iter().all(u8::is_ascii_graphic))
+            }
+            (Self::Onnx, _) => false,
+            (Self::WebPage, _) => {
+                let start = bytes.trim_ascii_start();
+                ["<!doctype html", "<html"].iter().any(|tag| {
+                    let start = start.get(..tag.len());
+                    start.is_some_and(|start| start.eq_ignore_ascii_case(tag.as_bytes()))
+                })
+            }
+        }
+    }
+}
+
+/// Whether the first or last bytes contain a text.
+fn has(bytes: &[u8], text: &[u8]) -> bool {
+    let first = &bytes[..bytes.len().min(SEARCHED)];
+    let last = &bytes[bytes.len().saturating_sub(SEARCHED)..];
+    let mut windows = first.windows(text.len()).chain(last.windows(text.len()));
+    windows.any(|window| window == text)
+}
+
+/// Lines with the file's names in them, each as `spelled`.
+fn filled(lines: &str, path: &Path, spelled: impl Fn(&Path) -> String) -> String {
+    let folder = path
+        .parent()
+        .filter(|folder| !folder.as_os_str().is_empty());
+    lines
+        .replace("{folder}", &spelled(folder.unwrap_or(Path::new("."))))
+        .replace("{file}", &spelled(path))
+        .replace("{stem}", &spelled(&path.with_extension("")))
+}
+
+fn in_shell(line: &str, path: &Path) -> String {
+    filled(line, path, shell_path)
+}
+
+/// Names stand in quotes already.
+fn in_python(lines: &str, path: &Path) -> String {
+    let escaped = |path: &Path| {
+        path.display()
+            .to_string()
+            .replace('\\', "\\\\")
+            .replace('"', "\\\"")
+    };
+    filled(lines, path, escaped)
+}
+
+/// Python with NumPy and pandas that makes a table, or the arrays `a` of one.
+fn to_table(code: &str, path: &Path) -> String {
+    let columns = match code.ends_with("index=False)") {
+        true => "",
+        false => TO_COLUMNS,
+    };
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let with_ending = |end: &str| path.with_file_name(format!("{stem}{end}"));
+    let table = match with_ending(".csv") {
+        same if same == path => with_ending("-table.csv"),
+        other => other,
+    };
+    let (file, table) = (shell_path(path), shell_path(&table));
+    format!("python3 -c \"import sys, numpy as np, pandas as pd; {code}{columns}\" {file} {table}")
 }

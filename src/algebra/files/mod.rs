@@ -10,18 +10,15 @@ pub mod magic;
 pub mod size;
 
 mod folder;
-mod foreign;
 mod located;
 mod part;
 mod text;
-mod toml_text;
 mod whole;
 
 pub use folder::{
     Begun, FolderError, check_folder, earlier_files, hex, write_files, write_files_since,
 };
-pub use foreign::ForeignFile;
-pub use located::{Located, Place};
+pub use located::{Fault, Located, Place};
+pub use size::read_toml;
 pub use text::{is_invisible, shell_path, shell_paths, shell_word};
-pub use toml_text::read_toml;
 pub use whole::{EmittedFile, Overwrite, write_whole};

@@ -12,10 +12,8 @@ use super::whole::Overwrite;
 /// How names of parts end, after a random number in hexadecimal digits.
 const ENDING: &str = ".part";
 
-/// Digits of that number.
 const DIGITS: usize = 16;
 
-/// Names that are tried.
 const MAX_TRIED: usize = 16;
 
 /// A new file with a random, hidden name in the folder of its place; removed in the end unless it was moved there.
@@ -117,61 +115,4 @@ fn is_part(name: &str) -> bool {
     number.is_some_and(|(_, digits)| {
         digits.len() == DIGITS && digits.bytes().all(|byte| byte.is_ascii_hexdigit())
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn parts_of_ended_processes_are_removed_and_others_stay() {
-        let folder = tempfile::tempdir().expect("a folder");
-        let own = folder.path().join(".notes.part");
-        let left = folder.path().join(".m.c.0123456789abcdef.part");
-        for path in [&own, &left] {
-            fs::write(path, "half").expect("written");
-        }
-        let living = Part::beside(&folder.path().join("m.c")).expect("a part");
-        remove_left_in(folder.path());
-        assert!(own.exists() && !left.exists() && living.path.exists());
-        let path = living.path.clone();
-        drop(living);
-        assert!(!path.exists());
-    }
-
-    #[test]
-    fn a_place_that_is_taken_is_refused_and_left_as_it_is() {
-        let folder = tempfile::tempdir().expect("a folder");
-        let place = folder.path().join("m.c");
-        let part = |text: &str| {
-            let part = Part::beside(&place).expect("a part");
-            io::Write::write_all(&mut &part.file, text.as_bytes()).expect("written");
-            part
-        };
-        let [mut one, mut other] = [part("one"), part("other")];
-        one.put(Overwrite::Refuse).expect("a free place");
-        let refused = other
-            .put(Overwrite::Refuse)
-            .expect_err("a place that is taken");
-        assert_eq!(refused.kind(), io::ErrorKind::AlreadyExists);
-        drop((one, other));
-        assert_eq!(fs::read_to_string(&place).expect("kept"), "one");
-        part("new").put(Overwrite::Replace).expect("forced");
-        assert_eq!(fs::read_to_string(&place).expect("replaced"), "new");
-        assert_eq!(fs::read_dir(folder.path()).expect("a folder").count(), 1);
-    }
-
-    #[test]
-    fn names_of_parts_are_new_every_time_and_known_again() {
-        let folder = tempfile::tempdir().expect("a folder");
-        let place = folder.path().join("m.c");
-        let (one, other) = (Part::beside(&place), Part::beside(&place));
-        let (one, other) = (one.expect("a part"), other.expect("a part"));
-        assert_ne!(one.path, other.path);
-        for part in [&one, &other] {
-            let name = part.path.file_name().expect("a name").to_string_lossy();
-            assert!(is_part(&name), "{name}");
-        }
-        assert!(!is_part(".m.c.123.part") && !is_part("m.c.0123456789abcdef.part"));
-    }
 }

@@ -47,34 +47,3 @@ pub fn shell_word(text: &str) -> String {
         false => format!("'{}'", text.replace('\'', r"'\''")),
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn letters_are_shown_and_marks_of_direction_act() {
-        for c in "aé跳 ü\u{301}\u{1f916}²-_".chars() {
-            assert!(!is_invisible(c), "{c:?}");
-        }
-        for c in "\0\n\t\u{7f}\u{85}\u{ad}\u{200b}\u{202e}\u{2028}\u{2066}\u{feff}\u{e0041}".chars()
-        {
-            assert!(is_invisible(c), "{c:?}");
-        }
-    }
-
-    #[test]
-    fn words_of_a_shell_are_one_word_and_no_option() {
-        for (path, word) in [
-            ("out/a-1.c", "out/a-1.c"),
-            ("my out", "'my out'"),
-            ("", "''"),
-            ("a'b;$(c)", r"'a'\''b;$(c)'"),
-            ("-o", "./-o"),
-            ("-", "-"),
-            ("~/x", "'~/x'"),
-        ] {
-            assert_eq!(shell_path(Path::new(path)), word);
-        }
-    }
-}

@@ -1,6 +1,6 @@
 //! What the latent state says of the latent input.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 use super::error::{ModelError, check_tensor};
 use super::projection::complement;
@@ -24,30 +24,26 @@ pub struct InputGivenState {
 }
 
 impl InputGivenState {
-    /// Ridge regression of the inputs on the states of `n` samples, in rows of blocks: `[z, dz, u_lat]`, and what the
-    /// model leaves of `ddz`. Shifts of `z` along the columns of `shifts` change no input, as where a robot is does
-    /// not. None for fewer samples than say something.
-    pub fn of_blocks<I>(n: usize, shifts: &DMatrix<f64>, blocks: impl Fn() -> I) -> Option<Self>
-    where
-        I: Iterator<Item = (DMatrix<f64>, DMatrix<f64>)>,
-    {
-        let d = shifts.nrows();
+    /// Ridge regression of the inputs on the states of samples in rows: `[z, dz, u_lat]`, and what the model leaves of
+    /// `ddz`. Shifts of `z` along the columns of `shifts` change no input, as where a robot is does not. None for fewer
+    /// samples than say something.
+    pub fn of_samples(
+        shifts: &DMatrix<f64>,
+        mut variables: DMatrix<f64>,
+        left: &DMatrix<f64>,
+    ) -> Option<Self> {
+        let (d, n) = (shifts.nrows(), variables.nrows());
         if n < LEAST_SAMPLES * (1 + 2 * d) {
             return None;
         }
         let share = 1.0 / n as f64;
-        let mut average = DVector::zeros(3 * d);
-        for (variables, _) in blocks() {
-            average += variables.row_sum().transpose() * share;
+        let average = variables.row_sum().transpose() * share;
+        for mut row in variables.row_iter_mut() {
+            row -= average.transpose();
         }
         let (mut covariance, mut error) = (DMatrix::zeros(3 * d, 3 * d), DMatrix::zeros(d, d));
-        for (mut variables, left) in blocks() {
-            for mut row in variables.row_iter_mut() {
-                row -= average.transpose();
-            }
-            covariance.gemm_tr(share, &variables, &variables, 1.0);
-            error.gemm_tr(share, &left, &left, 1.0);
-        }
+        covariance.gemm_tr(share, &variables, &variables, 1.0);
+        error.gemm_tr(share, left, left, 1.0);
         // States without their shifts.
         let mut still = DMatrix::identity(2 * d, 2 * d);
         still
@@ -121,9 +117,9 @@ mod tests {
     #[test]
     fn states_explain_the_inputs_that_depend_on_them() {
         let n = 4000;
-        let blocks = || std::iter::once(samples(n));
+        let (variables, left) = samples(n);
         let shifts = DMatrix::from_row_slice(2, 1, &[1.0, 0.0]);
-        let given = InputGivenState::of_blocks(n, &shifts, blocks).expect("enough samples");
+        let given = InputGivenState::of_samples(&shifts, variables, &left).expect("enough samples");
         let expected = [2.0, 0.0, 3.0, -1.0, 0.0];
         for (found, expected) in given.mean.row(0).iter().zip(expected) {
             assert!((found - expected).abs() < 0.05, "{}", given.mean);
@@ -140,19 +136,8 @@ mod tests {
     }
 
     #[test]
-    fn blocks_do_not_matter_and_few_samples_say_nothing() {
-        let (n, shifts) = (400, DMatrix::zeros(2, 0));
-        let whole = InputGivenState::of_blocks(n, &shifts, || std::iter::once(samples(n)));
-        let cut = || {
-            let (variables, left) = samples(n);
-            let part = |from: usize, count: usize| {
-                let rows = |m: &DMatrix<f64>| m.rows(from, count).into_owned();
-                (rows(&variables), rows(&left))
-            };
-            vec![part(0, 150), part(150, 250)].into_iter()
-        };
-        let cut = InputGivenState::of_blocks(n, &shifts, cut).expect("enough");
-        assert!((whole.expect("enough").mean - cut.mean).amax() < 1e-9);
-        assert!(InputGivenState::of_blocks(19, &shifts, || std::iter::once(samples(19))).is_none());
+    fn few_samples_say_nothing() {
+        let (variables, left) = samples(19);
+        assert!(InputGivenState::of_samples(&DMatrix::zeros(2, 0), variables, &left).is_none());
     }
 }

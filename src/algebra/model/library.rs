@@ -290,7 +290,7 @@ fn parse_term(
         });
     }
     let known = |name: &str| LatentVariable::from_name(name, latent_dim).is_some();
-    let read = pool.parse_defined(text, &known, &|_| None, ParseLimits::default());
+    let read = pool.parse_defined(text, &known, &|_, _| None, ParseLimits::default());
     read.map(|reading| reading.expr)
         .map_err(|source| LibraryError::Parse {
             index,

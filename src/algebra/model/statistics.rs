@@ -21,25 +21,17 @@ pub struct InputStatistics {
 }
 
 impl InputStatistics {
-    /// Mean and covariance of `n` samples of `input_dim` inputs in the columns of blocks, SI; all zero without a sample.
-    pub fn of_blocks<I>(input_dim: usize, n: usize, blocks: impl Fn() -> I) -> Self
-    where
-        I: Iterator<Item = DMatrix<f64>>,
-    {
-        let mut mean = DVector::zeros(input_dim);
-        for block in blocks() {
-            let columns = block.column_iter();
-            columns.for_each(|column| mean.axpy(1.0 / n as f64, &column, 1.0));
-        }
-        let mut squares = DMatrix::zeros(input_dim, input_dim);
-        for mut block in blocks() {
-            (block.column_iter_mut()).for_each(|mut column| column -= &mean);
-            squares.gemm(1.0, &block, &block.transpose(), 1.0);
-        }
-        let covariance = squares / n.max(1) as f64;
+    /// Mean and covariance of SI inputs in columns; all zero without a sample.
+    pub fn of_samples(samples: &DMatrix<f64>) -> Self {
+        let n = samples.ncols().max(1) as f64;
+        let mut mean = DVector::zeros(samples.nrows());
+        let columns = samples.column_iter();
+        columns.for_each(|column| mean.axpy(1.0 / n, &column, 1.0));
+        let mut deviations = samples.clone();
+        (deviations.column_iter_mut()).for_each(|mut column| column -= &mean);
         Self {
+            covariance: symmetric(&deviations * deviations.transpose() / n),
             mean,
-            covariance: symmetric(covariance),
             given_state: None,
         }
     }

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde::Deserialize;
 
-use super::error::RobotFileError;
+use super::read::RobotFileError;
 use super::read::{from_toml_text, text_of};
 use crate::robot::{Actuators, GRAVITY_M_S2, JOINT_DIM, JOINT_NAMES, Robot};
 

@@ -109,6 +109,25 @@ impl Axis {
     }
 }
 
+impl JointEntry {
+    /// Keys and values of a joint whose angles count along its axis from zero, as TOML spells them.
+    pub(super) fn fields(&self) -> [(&'static str, String); 6] {
+        let axis = match &self.axis {
+            Axis::Name(name) => format!("{name:?}"),
+            Axis::Vector(vector) => format!("{vector:?}"),
+        };
+        let limits = self.limits_rad.unwrap_or_default();
+        [
+            ("name", format!("{:?}", self.name)),
+            ("at", format!("{:?}", self.at)),
+            ("axis", axis),
+            ("limits_rad", format!("{limits:?}")),
+            ("torque_nm", format!("{:?}", self.torque_nm)),
+            ("speed_rad_s", format!("{:?}", self.speed_rad_s)),
+        ]
+    }
+}
+
 impl RobotEntry {
     /// The entry that gives this robot again, bit for bit: signs and offsets are in its axes and
     /// links.
@@ -153,17 +172,10 @@ pub fn to_toml(robot: &Robot) -> String {
     for leg in &entry.leg {
         text.push_str("\n[[leg]]\njoint = [\n");
         for joint in &leg.joint {
-            let axis = match &joint.axis {
-                Axis::Name(name) => format!("{name:?}"),
-                Axis::Vector(vector) => format!("{vector:?}"),
-            };
-            let limits = joint.limits_rad.unwrap_or_default();
-            let _ = writeln!(
-                text,
-                "  {{ name = {:?}, at = {:?}, axis = {axis}, limits_rad = {limits:?}, torque_nm = \
-                 {:?}, speed_rad_s = {:?} }},",
-                joint.name, joint.at, joint.torque_nm, joint.speed_rad_s
-            );
+            let fields = joint
+                .fields()
+                .map(|(key, value)| format!("{key} = {value}"));
+            let _ = writeln!(text, "  {{ {} }},", fields.join(", "));
         }
         let _ = writeln!(text, "]\nfoot = {:?}", leg.foot);
     }

@@ -2,9 +2,9 @@
 
 use nalgebra::Vector3;
 
-use super::entry::{JointEntry, RobotEntry};
-use super::error::{RobotFileError, RobotFileFault};
+use super::entry::RobotEntry;
 use super::legs::{Places, build};
+use super::read::RobotFileError;
 use super::registry::keep;
 use crate::files::{Located, Place};
 use crate::robot::joints::LEG_JOINT_DIM;
@@ -66,9 +66,7 @@ pub(super) fn identified(
                 "{:?}, romc's own robot with other numbers ({differences})",
                 entry.name
             );
-            let expected = "another name".to_owned();
-            let fault = RobotFileFault::Unexpected { found, expected };
-            return Err(Located::new("", Place::Option("--name"), fault));
+            return Err(RobotFileError::option("--name", found, "another name"));
         }
         let kind = match places {
             Places::Keys => "toml",
@@ -92,55 +90,31 @@ pub(super) fn identified(
 
 /// Differences of a robot from another, the first few of them.
 fn differences(robot: &Robot, other: &Robot) -> String {
-    let [own, other] = [robot, other].map(RobotEntry::of);
-    let mut found = Vec::new();
-    let mut compare = |what: String, own: String, other: String| {
-        if own != other {
-            found.push(format!("{what} {own} instead of {other}"));
-        }
-    };
-    let number = |value: f64| value.to_string();
-    compare(
-        "mass_kg".to_owned(),
-        number(own.mass_kg),
-        number(other.mass_kg),
-    );
-    for (leg, other) in own.leg.iter().zip(&other.leg) {
-        for (joint, other) in leg.joint.iter().zip(&other.joint) {
-            for ((key, own), (_, other)) in facts(joint).into_iter().zip(facts(other)) {
-                compare(format!("{} {key}", joint.name), own, other);
+    let fields = |robot: &Robot| {
+        let entry = RobotEntry::of(robot);
+        let mut fields = vec![("mass_kg".to_owned(), format!("{:?}", entry.mass_kg))];
+        for leg in &entry.leg {
+            for joint in &leg.joint {
+                let of_joint = joint.fields().into_iter();
+                fields
+                    .extend(of_joint.map(|(key, value)| (format!("{} {key}", joint.name), value)));
             }
+            let last = leg.joint.last().map_or("", |joint| joint.name.as_str());
+            fields.push((format!("foot from {last}"), format!("{:?}", leg.foot)));
         }
-        let last = leg.joint.last().map_or("", |joint| joint.name.as_str());
-        let place = format!("foot from {last}");
-        compare(
-            place,
-            format!("{:?}", leg.foot),
-            format!("{:?}", other.foot),
-        );
-    }
+        fields
+    };
+    let pairs = fields(robot).into_iter().zip(fields(other));
+    let found = pairs.filter(|((_, own), (_, other))| own != other);
+    let mut found: Vec<String> = found
+        .map(|((what, own), (_, other))| format!("{what} {own} instead of {other}"))
+        .collect();
     let more = found.len().saturating_sub(N_LISTED);
     found.truncate(N_LISTED);
-    let more = match more {
-        0 => String::new(),
-        more => format!(", and {more} more"),
-    };
-    found.join(", ") + &more
-}
-
-fn facts(joint: &JointEntry) -> [(&'static str, String); 6] {
-    let axis = joint.axis.vector().unwrap_or_default();
-    [
-        ("name", joint.name.clone()),
-        ("at", format!("{:?}", joint.at)),
-        ("axis", format!("{axis:?}")),
-        (
-            "limits_rad",
-            format!("{:?}", joint.limits_rad.unwrap_or_default()),
-        ),
-        ("torque_nm", joint.torque_nm.to_string()),
-        ("speed_rad_s", joint.speed_rad_s.to_string()),
-    ]
+    match more {
+        0 => found.join(", "),
+        more => format!("{}, and {more} more", found.join(", ")),
+    }
 }
 
 /// Refuses limits of more than two turns, which are degrees, or bounds of a joint that has none.

@@ -3,8 +3,8 @@
 use nalgebra::{Rotation3, Unit, Vector3};
 
 use super::entry::{JointEntry, LegEntry, RobotEntry};
-use super::error::RobotFileError;
 use super::identity::namesake;
+use super::read::RobotFileError;
 use super::registry::{keep, word};
 use crate::files::is_invisible;
 use crate::robot::joints::LEG_JOINT_DIM;
@@ -166,8 +166,8 @@ impl Reader<'_> {
         &self,
         is_fine: bool,
         place: &str,
-        found: impl Into<String>,
-        expected: impl Into<String>,
+        found: impl Into<Box<str>>,
+        expected: impl Into<Box<str>>,
     ) -> Result<(), RobotFileError> {
         match is_fine {
             true => Ok(()),

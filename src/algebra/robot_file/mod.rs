@@ -23,7 +23,6 @@
 
 mod actuators;
 mod entry;
-mod error;
 mod identity;
 mod legs;
 mod read;
@@ -32,6 +31,7 @@ mod urdf;
 
 pub use actuators::{ActuatorsEntry, read_actuators};
 pub use entry::{RobotEntry, to_toml};
-pub use error::{RobotFileError, RobotFileFault};
 pub use identity::RobotReading;
-pub use read::{RobotOptions, find, from_toml, from_urdf, open, read, urdf_reading};
+pub use read::{
+    RobotFileError, RobotOptions, find, from_toml, from_urdf, open, read, urdf_reading,
+};

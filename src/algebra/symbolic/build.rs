@@ -115,7 +115,6 @@ impl ExprPool {
         }
     }
 
-    /// Adds the coefficients of equal rests and drops what cancels.
     fn collected(&self, mut terms: Vec<(Number, ExprId)>) -> Vec<(Number, ExprId)> {
         terms.sort_by_key(|(_, rest)| *rest);
         let add = |a: Number, b| self.folded(a.checked_add(b));
@@ -178,7 +177,6 @@ impl ExprPool {
         }
     }
 
-    /// Whether `expr` is a product of numbers that do not fold.
     fn is_unfolded(&self, expr: ExprId) -> bool {
         match self.node(expr) {
             Node::Product(factors) => {
@@ -378,7 +376,3 @@ fn fold(
     left_over.sort_unstable();
     left_over
 }
-
-#[cfg(test)]
-#[path = "build_tests.rs"]
-mod tests;

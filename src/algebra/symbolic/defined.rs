@@ -4,12 +4,11 @@
 //! canonical forms would forget them, as `0*log(z)` is 0 wherever it has a value. So each is looked at when it is read.
 //! `0^0` is 1, as in floating point; powers that are not integers have values for bases from zero on only.
 
-use std::collections::HashMap;
-
-use super::canonical::{CanonicalForms, Coefficient};
+use super::canonical::CanonicalForms;
+use super::function::Function;
 use super::id_map::IdMap;
 use super::interval::Interval;
-use super::node::{ExprId, Function, SymbolId};
+use super::node::{ExprId, SymbolId};
 use super::pool::ExprPool;
 
 /// Largest constant, in nodes, of which it is proven that it is zero.
@@ -30,8 +29,6 @@ pub struct Reading {
 #[derive(Debug, Default)]
 pub(super) struct Guards {
     pub(super) found: Vec<ExprId>,
-    /// Symbols that stand for decimals, with their texts.
-    pub(super) decimals: HashMap<SymbolId, String>,
     bounds: IdMap<Interval>,
 }
 
@@ -43,23 +40,11 @@ impl Guards {
         function: Function,
         argument: ExprId,
     ) -> bool {
-        match function {
-            Function::Log => {
-                let guard = pool.apply(Function::Log, argument);
-                self.note(pool, guard) && !self.is_zero(pool, argument)
-            }
-            Function::Sqrt => {
-                let guard = pool.apply(Function::Sqrt, argument);
-                self.note(pool, guard)
-            }
-            Function::Sin
-            | Function::Cos
-            | Function::Tan
-            | Function::Tanh
-            | Function::Exp
-            | Function::Abs
-            | Function::Sign => true,
+        if !matches!(function, Function::Log | Function::Sqrt) {
+            return true;
         }
+        let guard = pool.apply(function, argument);
+        self.note(pool, guard) && (function == Function::Sqrt || !self.is_zero(pool, argument))
     }
 
     /// Notes a quotient by `divisor`; whether it has a value anywhere.
@@ -80,27 +65,17 @@ impl Guards {
 
     /// Adds a guard; whether it has a value anywhere, as far as bounds show it.
     fn note(&mut self, pool: &ExprPool, guard: ExprId) -> bool {
-        if !self.is_constant(pool, guard) {
+        if !is_constant(pool, guard) {
             self.found.push(guard);
         }
         !self.bounds(pool, guard).is_empty()
     }
 
-    fn is_constant(&self, pool: &ExprPool, expr: ExprId) -> bool {
-        let is_decimal = |symbol| self.decimals.contains_key(&symbol);
-        pool.is_constant(expr)
-            || (!self.decimals.is_empty() && pool.symbols_of(expr).into_iter().all(is_decimal))
-    }
-
-    fn decimal(&self, symbol: SymbolId) -> Option<Coefficient> {
-        Coefficient::parse(self.decimals.get(&symbol)?, false)
-    }
-
     fn bounds(&mut self, pool: &ExprPool, expr: ExprId) -> Interval {
         let unseen = pool.walk(&[expr], |part| !self.bounds.contains_key(&part), |_| true);
         for part in unseen {
-            let range_of = |symbol: SymbolId| match self.decimal(symbol) {
-                Some(decimal) => Interval::point(decimal.to_f64()),
+            let range_of = |symbol: SymbolId| match pool.decimal_of(symbol) {
+                Some((_, value)) => Interval::point(value),
                 None => Interval::ENTIRE,
             };
             let bounds = pool.bounds_of_node(part, &range_of, &|operand| self.bounds[&operand]);
@@ -111,7 +86,7 @@ impl Guards {
 
     /// Whether a constant is zero, as `sin(1)^2 + cos(1)^2 - 1` is.
     fn is_zero(&mut self, pool: &ExprPool, expr: ExprId) -> bool {
-        if !self.is_constant(pool, expr) {
+        if !is_constant(pool, expr) {
             return false;
         }
         let bounds = self.bounds(pool, expr);
@@ -121,10 +96,15 @@ impl Guards {
         if pool.reachable(&[expr]).len() > MAX_PROOF {
             return false;
         }
-        let literal = |symbol| self.decimal(symbol);
-        let mut forms = CanonicalForms::new(pool, &[expr], &literal);
+        let mut forms = CanonicalForms::new(pool, &[expr]);
         let form = forms.of(expr);
         let cleared = forms.without_fractions(&form);
         cleared.is_some_and(|form| form.is_zero())
     }
+}
+
+/// Whether an expression has no variables; decimals are none.
+fn is_constant(pool: &ExprPool, expr: ExprId) -> bool {
+    let mut symbols = pool.symbols_of(expr).into_iter();
+    symbols.all(|symbol| pool.decimal_of(symbol).is_some())
 }

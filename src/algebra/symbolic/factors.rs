@@ -1,7 +1,8 @@
 //! Identities of the factors of a product: sines and cosines that are a tangent, tangents of doubles
 //! and halves of an angle, magnitudes and signs.
 
-use super::node::{ExprId, Function, Node};
+use super::function::Function;
+use super::node::{ExprId, Node};
 use super::number::Number;
 use super::order::Exponent;
 use super::pool::ExprPool;

@@ -7,8 +7,9 @@
 
 use std::cmp::Ordering;
 
+use super::function::Function;
 use super::id_map::IdMap;
-use super::node::{ExprId, Function, Node, SymbolId};
+use super::node::{ExprId, Node, SymbolId};
 use super::number::Number;
 use super::pool::ExprPool;
 use super::series::Series;
@@ -17,7 +18,6 @@ use super::slope::Facts;
 /// Largest exponent up to which series are computed.
 pub(super) const LAST_ORDER: i64 = 8;
 
-/// Why a series ends.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Stop {
     /// It depends on whether this expression is zero.
@@ -30,13 +30,6 @@ pub(super) enum Stop {
     Unknown,
 }
 
-/// What an expression is at the point.
-enum Germ {
-    /// It has all derivatives.
-    Smooth,
-    Series(Series),
-}
-
 /// Series of expressions by one variable, on one side of a point of which some facts are known.
 pub(super) struct Germs<'a> {
     pub pool: &'a mut ExprPool,
@@ -46,7 +39,8 @@ pub(super) struct Germs<'a> {
     pub side: Number,
     /// Exponent from which on terms are left out.
     pub order: i64,
-    known: IdMap<Germ>,
+    /// Series of the expressions that are not smooth.
+    known: IdMap<Series>,
 }
 
 impl<'a> Germs<'a> {
@@ -67,7 +61,6 @@ impl<'a> Germs<'a> {
         }
     }
 
-    /// The series of an expression; nothing if it is smooth.
     pub(crate) fn of(&mut self, root: ExprId) -> Result<Option<Series>, Stop> {
         let symbol = self.symbol;
         let wanted = |node| self.pool.may_contain(node, symbol);
@@ -75,19 +68,15 @@ impl<'a> Germs<'a> {
             if !self.pool.affords(1) {
                 return Err(Stop::Order);
             }
-            let germ = match self.germ_of_node(node)? {
-                Some(series) => Germ::Series(self.cut(series)),
-                None => Germ::Smooth,
-            };
-            self.known.insert(node, germ);
+            if let Some(series) = self.series_of_node(node)? {
+                let series = self.cut(series);
+                self.known.insert(node, series);
+            }
         }
-        Ok(match self.is_smooth(root) {
-            true => None,
-            false => Some(self.series(root)),
-        })
+        Ok(self.known.get(&root).cloned())
     }
 
-    fn germ_of_node(&mut self, expr: ExprId) -> Result<Option<Series>, Stop> {
+    fn series_of_node(&mut self, expr: ExprId) -> Result<Option<Series>, Stop> {
         let node = self.pool.node(expr).clone();
         let operands: Vec<ExprId> = node.operands().collect();
         let is_smooth = operands.iter().all(|operand| self.is_smooth(*operand));
@@ -151,7 +140,7 @@ impl<'a> Germs<'a> {
     }
 
     fn is_smooth(&self, expr: ExprId) -> bool {
-        !matches!(self.known.get(&expr), Some(Germ::Series(_)))
+        !self.known.contains_key(&expr)
     }
 
     pub(super) fn vanishes(&mut self, expr: ExprId) -> Result<bool, Stop> {
@@ -159,13 +148,10 @@ impl<'a> Germs<'a> {
     }
 
     fn series(&mut self, expr: ExprId) -> Series {
-        match self.known.get(&expr) {
-            Some(Germ::Series(series)) => series.clone(),
-            _ => self.taylor(expr),
-        }
+        let known = self.known.get(&expr).cloned();
+        known.unwrap_or_else(|| self.taylor(expr))
     }
 
-    /// The Taylor series of a smooth expression.
     fn taylor(&mut self, expr: ExprId) -> Series {
         let mut series = Series::default();
         let (mut derivative, mut factor) = (expr, Some(Number::ONE));
@@ -207,7 +193,7 @@ impl<'a> Germs<'a> {
                 };
             }
         };
-        let symbol = self.pool.symbol_id("argument of a function");
+        let symbol = self.pool.placeholder("argument", 0);
         let variable = self.pool.symbol_expr(symbol);
         let mut derivative = self.pool.apply(function, variable);
         let mut factor = Number::ONE;

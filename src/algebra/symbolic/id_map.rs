@@ -5,9 +5,7 @@ use std::hash::{BuildHasherDefault, Hasher};
 
 use super::node::ExprId;
 
-/// What is known of expressions.
 pub(super) type IdMap<V> = HashMap<ExprId, V, BuildIdHasher>;
-/// Some expressions.
 pub(super) type IdSet = HashSet<ExprId, BuildIdHasher>;
 
 /// A multiplicative hasher for short keys of small integers (ids, numbers): such keys are the
@@ -15,7 +13,6 @@ pub(super) type IdSet = HashSet<ExprId, BuildIdHasher>;
 #[derive(Clone, Copy, Default)]
 pub(super) struct IdHasher(u64);
 
-/// Builds [`IdHasher`]s for the standard maps.
 pub(super) type BuildIdHasher = BuildHasherDefault<IdHasher>;
 
 /// Odd constant with well mixed bits (the golden ratio in fixed point).

@@ -7,7 +7,7 @@
 
 use std::fmt;
 
-use super::node::Function;
+use super::function::Function;
 use super::rounding::{
     is_exact_root, mul_up, power_down, power_up, recip_down, recip_up, sub_up, widen_down, widen_up,
 };
@@ -24,7 +24,7 @@ pub struct Interval {
 
 impl Interval {
     /// All reals.
-    pub(crate) const ENTIRE: Interval = Interval::between(f64::NEG_INFINITY, f64::INFINITY);
+    pub const ENTIRE: Interval = Interval::between(f64::NEG_INFINITY, f64::INFINITY);
     /// No points: the value of an expression that is defined nowhere in its domain.
     pub const EMPTY: Interval = Interval::between(f64::INFINITY, f64::NEG_INFINITY);
     const NON_NEGATIVE: Interval = Interval::between(0.0, f64::INFINITY);
@@ -103,7 +103,6 @@ impl Interval {
         Interval::new(self.lo.max(other.lo), self.hi.min(other.hi))
     }
 
-    /// `1/x` for the points other than zero.
     pub(crate) fn recip(self) -> Interval {
         if self.is_empty() || (self.lo == 0.0 && self.hi == 0.0) {
             return Interval::EMPTY;
@@ -116,7 +115,6 @@ impl Interval {
         }
     }
 
-    /// `|x|`.
     pub(crate) fn abs(self) -> Interval {
         if self.is_empty() || self.lo >= 0.0 {
             self
@@ -127,7 +125,6 @@ impl Interval {
         }
     }
 
-    /// `-1`, `0` or `1`.
     pub(crate) fn sign(self) -> Interval {
         if self.is_empty() {
             return self;
@@ -136,7 +133,6 @@ impl Interval {
         Interval::between(lo, hi)
     }
 
-    /// `x^exponent`.
     pub(crate) fn powi(self, exponent: i64) -> Interval {
         if self.is_empty() {
             return self;
@@ -204,7 +200,6 @@ impl Interval {
         Interval::between(lo, hi)
     }
 
-    /// `exp(x)`.
     pub(crate) fn exp(self) -> Interval {
         self.increasing(f64::exp)
             .intersection(Interval::NON_NEGATIVE)
@@ -219,18 +214,15 @@ impl Interval {
         inside.increasing(f64::ln)
     }
 
-    /// `tanh(x)`.
     pub(crate) fn tanh(self) -> Interval {
         self.increasing(f64::tanh)
             .intersection(Interval::new(-1.0, 1.0))
     }
 
-    /// `sin(x)`.
     pub(crate) fn sin(self) -> Interval {
         self.oscillation(f64::sin, 0.5)
     }
 
-    /// `cos(x)`.
     pub(crate) fn cos(self) -> Interval {
         self.oscillation(f64::cos, 0.0)
     }
@@ -246,7 +238,6 @@ impl Interval {
         self.increasing(f64::tan)
     }
 
-    /// The image under an increasing function, widened.
     fn increasing(self, function: impl Fn(f64) -> f64) -> Interval {
         if self.is_empty() {
             return self;
@@ -281,7 +272,6 @@ impl Interval {
     }
 }
 
-/// The two floats around pi.
 const PI: Interval = Interval::between(std::f64::consts::PI, std::f64::consts::PI.next_up());
 
 impl fmt::Display for Interval {
@@ -352,7 +342,3 @@ impl std::ops::Div for Interval {
         self * other.recip()
     }
 }
-
-#[cfg(test)]
-#[path = "interval_tests.rs"]
-mod tests;

@@ -3,20 +3,18 @@
 use super::number::Number;
 use super::parse::{ParseError, ParseErrorKind, short};
 
-/// A token and where it starts.
+/// A token and the byte at which it starts.
 #[derive(Clone, Copy)]
 pub(super) struct Token<'a> {
-    pub(super) kind: TokenKind<'a>,
-    /// 1 for the first character.
-    pub(super) position: usize,
-    /// The text of the token.
+    pub(super) kind: TokenKind,
+    pub(super) start: usize,
     pub(super) text: &'a str,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum TokenKind<'a> {
+pub(super) enum TokenKind {
     Number(Number),
-    Name(&'a str),
+    Name,
     Plus,
     Minus,
     Times,
@@ -31,50 +29,45 @@ pub(super) enum TokenKind<'a> {
 /// here, before anything is built.
 pub(super) fn tokenize(text: &str) -> Result<Vec<Token<'_>>, ParseError> {
     let mut tokens = Vec::new();
-    let mut rest = text;
-    let mut position = 1;
-    while let Some(first) = rest.chars().next() {
-        let (kind, length) = match first {
+    let mut start = 0;
+    while let Some(first) = text[start..].chars().next() {
+        let rest = &text[start..];
+        let mut length = first.len_utf8();
+        let kind = match first {
             ' ' | '\t' | '\n' | '\r' => {
-                rest = &rest[1..];
-                position += 1;
+                start += 1;
                 continue;
             }
             '0'..='9' | '.' => {
-                let length = number_length(rest);
+                length = number_length(rest);
                 let number = &rest[..length];
-                let refused = || ParseErrorKind::Number(short(number)).at(position);
-                let value = read_number(number).ok_or_else(refused)?;
-                (TokenKind::Number(value), length)
+                let refused = || ParseErrorKind::Number(short(number)).at(text, start);
+                TokenKind::Number(read_number(number).ok_or_else(refused)?)
             }
             'a'..='z' | 'A'..='Z' | '_' => {
-                let length = name_length(rest);
-                (TokenKind::Name(&rest[..length]), length)
+                length = name_length(rest);
+                TokenKind::Name
             }
-            '+' => (TokenKind::Plus, 1),
-            '-' => (TokenKind::Minus, 1),
-            '*' if rest.starts_with("**") => (TokenKind::Caret, 2),
-            '*' => (TokenKind::Times, 1),
-            '\u{2212}' => (TokenKind::Minus, first.len_utf8()),
-            '·' | '⋅' | '×' => (TokenKind::Times, first.len_utf8()),
-            '/' => (TokenKind::Divide, 1),
-            '^' => (TokenKind::Caret, 1),
-            '(' => (TokenKind::Open, 1),
-            ')' => (TokenKind::Close, 1),
-            _ => return Err(ParseErrorKind::Character(first).at(position)),
+            '*' if rest.starts_with("**") => {
+                length = 2;
+                TokenKind::Caret
+            }
+            '+' => TokenKind::Plus,
+            '-' | '\u{2212}' => TokenKind::Minus,
+            '*' | '·' | '⋅' | '×' => TokenKind::Times,
+            '/' => TokenKind::Divide,
+            '^' => TokenKind::Caret,
+            '(' => TokenKind::Open,
+            ')' => TokenKind::Close,
+            _ => return Err(ParseErrorKind::Character(first).at(text, start)),
         };
-        let (text, after) = rest.split_at(length);
-        tokens.push(Token {
-            kind,
-            position,
-            text,
-        });
-        position += text.chars().count();
-        rest = after;
+        let text = &rest[..length];
+        tokens.push(Token { kind, start, text });
+        start += length;
     }
     tokens.push(Token {
         kind: TokenKind::End,
-        position,
+        start,
         text: "",
     });
     Ok(tokens)

@@ -7,17 +7,18 @@
 //!
 //! | files | |
 //! |---|---|
-//! | `node`, `number`, `pool`, `id_map`, `order` | what an expression is and how it is stored |
+//! | `node`, `function`, `number`, `pool`, `id_map`, `order` | what an expression is and how it is stored |
 //! | `build`, `power` | canonical constructors |
 //! | `lexer`, `parse`, `defined`, `display` | the grammar of candidate terms, both ways; constants without a value |
 //! | `eval`, `interval`, `rounding`, `bounds` | values, and bounds over boxes |
 //! | `diff`, `substitute` | derivatives and substitution |
 //! | `slope`, `germ`, `series` | derivatives with values where roots, magnitudes and signs have kinks |
-//! | `expand`, `rational`, `perfect_power`, `trig`, `rules`, `factors` | rewriting, each way when asked |
+//! | `expand`, `polynomial`, `trig`, `rules`, `factors` | rewriting, each way when asked |
 //! | `simplify`, `shorten`, `cost`, `region` | choosing the shortest of equal forms |
 //! | `canonical/` | a normal form with exact coefficients, to decide equality |
 //!
-//! No algorithm recurses on the machine's stack, and none iterates a hash map towards a result.
+//! No algorithm but the parser, whose depth is limited, recurses on the machine's stack, and none iterates a hash map
+//! towards a result.
 //!
 //! ```
 //! use romc::symbolic::ExprPool;
@@ -46,6 +47,7 @@ mod display;
 mod eval;
 mod expand;
 mod factors;
+mod function;
 mod germ;
 mod id_map;
 mod interval;
@@ -54,10 +56,9 @@ mod node;
 mod number;
 mod order;
 mod parse;
-mod perfect_power;
+mod polynomial;
 mod pool;
 mod power;
-mod rational;
 mod region;
 mod rounding;
 mod rules;
@@ -66,16 +67,15 @@ mod shorten;
 mod simplify;
 mod slope;
 mod substitute;
-#[cfg(test)]
-mod testing;
 mod trig;
 
 pub use canonical::{CanonicalForm, CanonicalForms, Coefficient};
 pub use defined::Reading;
 pub use display::Display;
 pub(crate) use eval::integer_power;
+pub use function::Function;
 pub use interval::Interval;
-pub use node::{ExprId, Function, Node, SymbolId};
+pub use node::{ExprId, Node, SymbolId};
 pub use number::Number;
 pub(crate) use number::sum_of_floats;
 pub use parse::{ParseError, ParseErrorKind, ParseLimits};

@@ -39,9 +39,7 @@ impl Number {
     pub const ZERO: Number = Number::integer(0);
     /// The exact `1`.
     pub const ONE: Number = Number::integer(1);
-    /// The exact `-1`.
     pub(crate) const MINUS_ONE: Number = Number::integer(-1);
-    /// The exact `1/2`.
     pub(crate) const HALF: Number = Number(Repr::Rational(1, 2));
 
     /// The exact integer `value` (`i64::MIN` is taken one higher, the range being symmetric).
@@ -107,7 +105,6 @@ impl Number {
         self == Number::ONE
     }
 
-    /// Whether the value is below zero.
     pub(crate) fn is_negative(self) -> bool {
         match self.0 {
             Repr::Rational(numerator, _) => numerator < 0,
@@ -137,25 +134,19 @@ impl Number {
         }
     }
 
-    /// Whether this is an exact even integer.
     pub(crate) fn is_even(self) -> bool {
         self.as_integer().is_some_and(|value| value % 2 == 0)
     }
 
-    /// The magnitude.
     pub(crate) fn abs(self) -> Number {
         if self.is_negative() { -self } else { self }
     }
 
     /// `self + other`, exactly if both are exact and the result fits; `None` on overflow.
     pub fn checked_add(self, other: Number) -> Option<Number> {
-        match self.fractions(other) {
-            // |a d|, |c b| and b d stay below 2^126: their sum fits an i128.
-            Some([a, b, c, d]) => Number::from_ratio(a * d + c * b, b * d),
-            None => self
-                .as_decimals(other, Number::checked_add)
-                .or_else(|| Number::from_f64(self.to_f64() + other.to_f64())),
-        }
+        // |a d|, |c b| and b d stay below 2^126: their sum fits an i128.
+        let sum = |[a, b, c, d]: [i128; 4]| Number::from_ratio(a * d + c * b, b * d);
+        self.combined(other, sum, |a, b| Number::from_f64(a + b))
     }
 
     /// The decimal fraction that is written for a float, if it is short; an exact number itself.
@@ -179,42 +170,45 @@ impl Number {
         (exact.is_exact() && exact.to_f64() == self.to_f64()).then_some(exact)
     }
 
-    /// An operation on two decimal fractions, rounded once; nothing if one is none, or the result is
-    /// too long.
-    fn as_decimals(
+    /// An operation on two exact numbers or on the decimal fractions of floats, the latter rounded once; on the floats
+    /// themselves where one is no short decimal, or the result is too long.
+    fn combined(
         self,
         other: Number,
-        operation: fn(Number, Number) -> Option<Number>,
+        exact: impl Fn([i128; 4]) -> Option<Number>,
+        rounded: impl Fn(f64, f64) -> Option<Number>,
     ) -> Option<Number> {
-        let exact = operation(self.decimal()?, other.decimal()?)?;
-        let (numerator, denominator) = exact.as_rational()?;
+        if let Some(parts) = self.fractions(other) {
+            return exact(parts);
+        }
+        let of_decimals = || exact(self.decimal()?.fractions(other.decimal()?)?)?.rounded();
+        of_decimals().or_else(|| rounded(self.to_f64(), other.to_f64()))
+    }
+
+    /// An exact number of short parts as the nearest float.
+    fn rounded(self) -> Option<Number> {
+        let (numerator, denominator) = self.as_rational()?;
         let is_short = |part: i64| part.unsigned_abs() <= EXACT_INTEGER as u64;
-        (is_short(numerator) && is_short(denominator))
-            .then(|| Number::from_f64(exact.to_f64()))
-            .flatten()
+        let is_rounded_once = is_short(numerator) && is_short(denominator);
+        Number::from_f64(self.to_f64()).filter(|_| is_rounded_once)
     }
 
     /// `self * other`; `None` when a float result overflows or loses digits to underflow.
     pub fn checked_mul(self, other: Number) -> Option<Number> {
-        match self.fractions(other) {
-            Some([a, b, c, d]) => Number::from_ratio(a * c, b * d),
-            _ if self.is_zero() || other.is_zero() => Some(Number::ZERO),
-            _ => self
-                .as_decimals(other, Number::checked_mul)
-                .or_else(|| normal(self.to_f64() * other.to_f64())),
+        if self.is_zero() || other.is_zero() {
+            return Some(Number::ZERO);
         }
+        let product = |[a, b, c, d]: [i128; 4]| Number::from_ratio(a * c, b * d);
+        self.combined(other, product, |a, b| normal(a * b))
     }
 
     /// `self / other`; `None` for a zero divisor, overflow or underflow.
     pub(crate) fn checked_div(self, other: Number) -> Option<Number> {
-        match self.fractions(other) {
-            Some([a, b, c, d]) => Number::from_ratio(a * d, b * c),
-            _ if other.is_zero() => None,
-            _ if self.is_zero() => Some(Number::ZERO),
-            _ => self
-                .as_decimals(other, Number::checked_div)
-                .or_else(|| normal(self.to_f64() / other.to_f64())),
+        if self.is_zero() && !other.is_zero() {
+            return Some(Number::ZERO);
         }
+        let quotient = |[a, b, c, d]: [i128; 4]| Number::from_ratio(a * d, b * c);
+        self.combined(other, quotient, |a, b| normal(a / b))
     }
 
     /// `self ^ exponent` as a multiplication chain (`0^0 = 1`); `None` for zero to a negative
@@ -258,14 +252,10 @@ pub(super) fn exact_sum(numbers: &[Number]) -> Option<Number> {
     let sum = decimals.try_fold(Number::ZERO, |sum, next| {
         sum.checked_add(next?).filter(|sum| sum.is_exact())
     });
-    let is_short = |part: i64| part.unsigned_abs() <= EXACT_INTEGER as u64;
-    match sum.and_then(Number::as_rational) {
-        Some((n, d)) if is_short(n) && is_short(d) => Number::from_f64(n as f64 / d as f64),
-        _ => {
-            let floats: Vec<f64> = numbers.iter().map(|number| number.to_f64()).collect();
-            Number::from_f64(sum_of_floats(&floats))
-        }
-    }
+    sum.and_then(Number::rounded).or_else(|| {
+        let floats: Vec<f64> = numbers.iter().map(|number| number.to_f64()).collect();
+        Number::from_f64(sum_of_floats(&floats))
+    })
 }
 
 /// The sum of floats, rounded once (Shewchuk, Adaptive precision floating-point arithmetic, 1997): what is lost by
@@ -370,54 +360,5 @@ impl fmt::Display for Number {
             }
             Repr::Float(bits) => write!(formatter, "{:?}", f64::from_bits(bits)),
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn float(value: f64) -> Number {
-        Number::from_f64(value).expect("test value is finite")
-    }
-
-    #[test]
-    fn from_f64_integral_value_becomes_exact_and_loses_the_sign_of_zero() {
-        assert_eq!(float(3.0), Number::integer(3));
-        assert_eq!(float(-0.0), Number::ZERO);
-        assert!(!float(0.36).is_exact());
-        assert!(!float(1e300).is_exact());
-        assert_eq!(Number::from_f64(f64::NAN), None);
-        assert_eq!(Number::from_f64(f64::INFINITY), None);
-    }
-
-    #[test]
-    fn rational_arithmetic_is_exact_and_reduced() {
-        let third = Number::rational(2, 6).expect("denominator is not zero");
-        assert_eq!(third.as_rational(), Some((1, 3)));
-        assert_eq!(third.checked_add(third), Number::rational(2, 3));
-        assert_eq!(third.checked_mul(Number::integer(3)), Some(Number::ONE));
-        assert_eq!(third.checked_powi(-2), Some(Number::integer(9)));
-        assert_eq!(Number::rational(1, -2), Some(-Number::HALF));
-        assert_eq!(Number::rational(1, 0), None);
-    }
-
-    #[test]
-    fn rational_overflow_falls_back_to_the_nearest_float() {
-        let large = Number::integer(i64::MAX);
-        let square = large.checked_mul(large).expect("fits a float");
-        assert!(!square.is_exact());
-        assert_eq!(square.to_f64(), (i64::MAX as f64) * (i64::MAX as f64));
-        assert_eq!(-Number::integer(i64::MIN), Number::integer(i64::MAX));
-    }
-
-    #[test]
-    fn order_is_by_value_with_exact_before_float() {
-        let mut numbers = [float(0.5), Number::HALF, float(-1.5), Number::ONE];
-        numbers.sort();
-        assert_eq!(
-            numbers,
-            [float(-1.5), Number::HALF, float(0.5), Number::ONE]
-        );
     }
 }

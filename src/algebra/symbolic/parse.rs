@@ -8,13 +8,14 @@
 //! atom       = number | name | function "(" expression ")" | "(" expression ")"
 //! ```
 //!
-//! `^` binds to the right and more tightly than a sign: `-x^2 = -(x^2)`. The parser keeps its own
-//! stack, so nesting is limited by [`ParseLimits`] and never by the machine's; chains of sums and
-//! products are handed over whole, so time is near linear in the length of the text.
+//! `^` binds to the right and more tightly than a sign: `-x^2 = -(x^2)`. Each rule is a function; nesting is
+//! limited by [`ParseLimits`]. Chains of sums and products are handed over whole, so time is near linear in
+//! the length of the text.
 
 use super::defined::{Guards, Reading};
+use super::function::Function;
 use super::lexer::{Token, TokenKind, tokenize};
-use super::node::{ExprId, Function};
+use super::node::ExprId;
 use super::order::Exponent;
 use super::pool::ExprPool;
 
@@ -86,9 +87,10 @@ pub enum ParseErrorKind {
 }
 
 impl ParseErrorKind {
-    pub(super) fn at(self, position: usize) -> ParseError {
+    /// The fault at a byte of a text.
+    pub(super) fn at(self, text: &str, start: usize) -> ParseError {
         ParseError {
-            position,
+            position: text[..start].chars().count() + 1,
             kind: self,
         }
     }
@@ -123,12 +125,11 @@ impl ExprPool {
         text: &str,
         allowed: &dyn Fn(&str) -> bool,
     ) -> Result<ExprId, ParseError> {
-        self.parse_within(text, allowed, &|_| None, ParseLimits::default())
+        self.parse_within(text, allowed, &|_, _| None, ParseLimits::default())
     }
 
-    /// As [`parse`](ExprPool::parse), within given limits and with symbols for numbers: where
-    /// `literal` gives a name for the text of a number, it is the symbol of that name, so that it is
-    /// never rounded or folded.
+    /// As [`parse`](ExprPool::parse), within given limits and with the expressions that `literal` gives for the
+    /// texts of numbers, such as their [`decimal`](ExprPool::decimal).
     ///
     /// # Errors
     /// As [`parse`](ExprPool::parse).
@@ -136,7 +137,7 @@ impl ExprPool {
         &mut self,
         text: &str,
         allowed: &dyn Fn(&str) -> bool,
-        literal: &dyn Fn(&str) -> Option<String>,
+        literal: &dyn Fn(&mut ExprPool, &str) -> Option<ExprId>,
         limits: ParseLimits,
     ) -> Result<ExprId, ParseError> {
         let reading = self.read_within(text, allowed, literal, limits, None)?;
@@ -152,7 +153,7 @@ impl ExprPool {
         &mut self,
         text: &str,
         allowed: &dyn Fn(&str) -> bool,
-        literal: &dyn Fn(&str) -> Option<String>,
+        literal: &dyn Fn(&mut ExprPool, &str) -> Option<ExprId>,
         limits: ParseLimits,
     ) -> Result<Reading, ParseError> {
         self.read_within(text, allowed, literal, limits, Some(Guards::default()))
@@ -162,13 +163,13 @@ impl ExprPool {
         &mut self,
         text: &str,
         allowed: &dyn Fn(&str) -> bool,
-        literal: &dyn Fn(&str) -> Option<String>,
+        literal: &dyn Fn(&mut ExprPool, &str) -> Option<ExprId>,
         limits: ParseLimits,
         guards: Option<Guards>,
     ) -> Result<Reading, ParseError> {
         if text.len() > limits.length {
             let (found, limit) = (text.len(), limits.length);
-            return Err(ParseErrorKind::TooLong { found, limit }.at(1));
+            return Err(ParseErrorKind::TooLong { found, limit }.at(text, 0));
         }
         let mut parser = Parser {
             pool: self,
@@ -178,272 +179,183 @@ impl ExprPool {
             text,
             tokens: tokenize(text)?,
             next: 0,
-            groups: vec![Group::default()],
             depth: 0,
             guards,
         };
-        loop {
-            if let Some(operand) = parser.read_operand()?
-                && let Some(expr) = parser.after_operand(operand)?
-            {
-                let guards = parser.guards.map(|guards| guards.found);
-                let guards = guards.unwrap_or_default();
-                return Ok(Reading { expr, guards });
-            }
-        }
+        let expr = parser.expression(TokenKind::End)?;
+        let guards = parser.guards.map(|guards| guards.found);
+        Ok(Reading {
+            expr,
+            guards: guards.unwrap_or_default(),
+        })
     }
-}
-
-/// What a group of terms was opened by.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-enum Opener {
-    #[default]
-    Text,
-    Parenthesis,
-    Call(Function),
-}
-
-/// An expression being read: finished terms, the factors of the current term, and the operand
-/// being read, which may be an exponent of pending powers.
-#[derive(Default)]
-struct Group {
-    opener: Opener,
-    /// Where the group, the current term and the current operand start; 0 before their first token.
-    start: usize,
-    term_start: usize,
-    operand_start: usize,
-    terms: Vec<ExprId>,
-    factors: Vec<ExprId>,
-    /// The current term is subtracted.
-    subtract: bool,
-    /// The current operand divides.
-    divide: bool,
-    /// The current operand has a minus before it.
-    negative: bool,
-    /// Bases whose exponent is being read, each with its own sign.
-    powers: Vec<(ExprId, bool)>,
 }
 
 struct Parser<'p> {
     pool: &'p mut ExprPool,
     allowed: &'p dyn Fn(&str) -> bool,
-    /// The symbol that stands for the text of a number.
-    literal: &'p dyn Fn(&str) -> Option<String>,
+    /// What stands for the text of a number, if that is not its value.
+    literal: &'p dyn Fn(&mut ExprPool, &str) -> Option<ExprId>,
     limits: ParseLimits,
     text: &'p str,
     tokens: Vec<Token<'p>>,
     /// Index of the token that is read next.
     next: usize,
-    groups: Vec<Group>,
-    /// Open groups and pending powers.
+    /// Open parentheses and pending exponents.
     depth: usize,
     /// What has to have a value, where that is asked.
     guards: Option<Guards>,
 }
 
 impl<'p> Parser<'p> {
+    fn peek(&self) -> Token<'p> {
+        self.tokens[self.next]
+    }
+
     fn token(&mut self) -> Token<'p> {
         self.next += 1;
         self.tokens[self.next - 1]
     }
 
-    /// Reads signs and one atom; `None` if it opened a group instead.
-    fn read_operand(&mut self) -> Result<Option<ExprId>, ParseError> {
-        let token = self.token();
-        let group = self.group();
-        for start in [&mut group.term_start, &mut group.operand_start] {
-            if *start == 0 {
-                *start = token.position;
-            }
-        }
-        match token.kind {
-            TokenKind::Plus => Ok(None),
-            TokenKind::Minus => {
-                let group = self.group();
-                group.negative = !group.negative;
-                Ok(None)
-            }
-            TokenKind::Number(number) => Ok(Some(match (self.literal)(token.text) {
-                Some(name) => {
-                    if let Some(guards) = &mut self.guards {
-                        let symbol = self.pool.symbol_id(&name);
-                        guards.decimals.insert(symbol, token.text.to_owned());
-                    }
-                    self.pool.symbol(&name)
-                }
-                None => self.pool.constant(number),
-            })),
-            TokenKind::Open => self.open(Opener::Parenthesis, &token).map(|()| None),
-            TokenKind::Name(name) => {
-                let after = self.tokens[self.next];
-                let called = after.kind == TokenKind::Open;
-                match Function::by_name(name) {
-                    Some(function) if called => {
-                        self.next += 1;
-                        self.open(Opener::Call(function), &token).map(|()| None)
-                    }
-                    Some(_) => Err(unexpected(&after, "`(` after a function")),
-                    None if called => {
-                        Err(ParseErrorKind::UnknownFunction(short(name)).at(token.position))
-                    }
-                    None if (self.allowed)(name) => Ok(Some(self.pool.symbol(name))),
-                    None => Err(ParseErrorKind::UnknownName(short(name)).at(token.position)),
-                }
-            }
-            TokenKind::Times
-            | TokenKind::Divide
-            | TokenKind::Caret
-            | TokenKind::Close
-            | TokenKind::End => Err(unexpected(&token, "a number, a name, `(` or a sign")),
-        }
-    }
-
-    /// Reads what follows an operand, closing groups as long as they end; the finished
-    /// expression at the end of the text.
-    fn after_operand(&mut self, mut operand: ExprId) -> Result<Option<ExprId>, ParseError> {
+    /// A sum of terms up to a closing parenthesis or the end, which is read too.
+    fn expression(&mut self, end: TokenKind) -> Result<ExprId, ParseError> {
+        let (mut terms, mut is_subtracted) = (Vec::new(), false);
         loop {
-            let token = &self.token();
-            if token.kind == TokenKind::Caret {
-                self.deepen(token)?;
-                let group = self.group();
-                let negative = std::mem::take(&mut group.negative);
-                group.powers.push((operand, negative));
-                return Ok(None);
-            }
-            self.finish_operand(operand, token)?;
-            let group = self.group();
-            match (token.kind, group.opener) {
-                (TokenKind::Times, _) => return Ok(None),
-                (TokenKind::Divide, _) => {
-                    group.divide = true;
-                    return Ok(None);
+            let term = self.term()?;
+            terms.push(self.pool.negated_if(is_subtracted, term));
+            let token = self.token();
+            is_subtracted = match token.kind {
+                TokenKind::Plus => false,
+                TokenKind::Minus => true,
+                kind if kind == end => return Ok(self.pool.sum(&terms)),
+                _ if end == TokenKind::End => {
+                    return Err(self.unexpected(token, "an operator or the end"));
                 }
-                (TokenKind::Plus | TokenKind::Minus, _) => {
-                    self.finish_term();
-                    self.group().subtract = token.kind == TokenKind::Minus;
-                    return Ok(None);
-                }
-                (TokenKind::Close, Opener::Parenthesis | Opener::Call(_)) => {
-                    operand = self.close(token)?;
-                }
-                (TokenKind::End, Opener::Text) => {
-                    self.finish_term();
-                    let terms = std::mem::take(&mut self.group().terms);
-                    return Ok(Some(self.pool.sum(&terms)));
-                }
-                (_, Opener::Text) => return Err(unexpected(token, "an operator or the end")),
-                (_, _) => return Err(unexpected(token, "an operator or `)`")),
-            }
+                _ => return Err(self.unexpected(token, "an operator or `)`")),
+            };
         }
     }
 
-    fn group(&mut self) -> &mut Group {
-        self.groups
-            .last_mut()
-            .expect("the outermost group is never closed")
+    fn term(&mut self) -> Result<ExprId, ParseError> {
+        let start = self.peek().start;
+        let mut factors = vec![self.signed(start)?];
+        loop {
+            let is_divisor = match self.peek().kind {
+                TokenKind::Times => false,
+                TokenKind::Divide => true,
+                _ => return Ok(self.pool.product(&factors)),
+            };
+            self.next += 1;
+            let operand_start = self.peek().start;
+            let mut value = self.signed(operand_start)?;
+            if is_divisor {
+                self.guarded(start, |guards, pool| guards.division(pool, value))?;
+                let dividend = factors.pop().expect("a divisor follows a factor");
+                value = self.pool.div(dividend, value);
+            }
+            factors.push(value);
+        }
     }
 
-    fn deepen(&mut self, token: &Token) -> Result<(), ParseError> {
+    /// A power with its signs, of the operand that begins at `start`.
+    fn signed(&mut self, start: usize) -> Result<ExprId, ParseError> {
+        let mut is_negative = false;
+        while let TokenKind::Plus | TokenKind::Minus = self.peek().kind {
+            is_negative ^= self.token().kind == TokenKind::Minus;
+        }
+        let mut value = self.atom()?;
+        let caret = self.peek();
+        if caret.kind == TokenKind::Caret {
+            self.next += 1;
+            self.deepen(caret)?;
+            let exponent = self.signed(start)?;
+            self.depth -= 1;
+            value = self.checked_pow(value, exponent, start)?;
+        }
+        Ok(self.pool.negated_if(is_negative, value))
+    }
+
+    fn atom(&mut self) -> Result<ExprId, ParseError> {
+        let token = self.token();
+        match token.kind {
+            TokenKind::Number(number) => {
+                let literal = (self.literal)(self.pool, token.text);
+                Ok(literal.unwrap_or_else(|| self.pool.constant(number)))
+            }
+            TokenKind::Open => self.parenthesis(token),
+            TokenKind::Name => self.name(token),
+            _ => Err(self.unexpected(token, "a number, a name, `(` or a sign")),
+        }
+    }
+
+    fn name(&mut self, token: Token<'p>) -> Result<ExprId, ParseError> {
+        let (name, after) = (token.text, self.peek());
+        let is_called = after.kind == TokenKind::Open;
+        let refused = match Function::by_name(name) {
+            Some(function) if is_called => {
+                self.next += 1;
+                let argument = self.parenthesis(token)?;
+                self.guarded(token.start, |guards, pool| {
+                    guards.call(pool, function, argument)
+                })?;
+                return Ok(self.pool.apply(function, argument));
+            }
+            Some(_) => return Err(self.unexpected(after, "`(` after a function")),
+            None if is_called => ParseErrorKind::UnknownFunction(short(name)),
+            None if (self.allowed)(name) => return Ok(self.pool.symbol(name)),
+            None => ParseErrorKind::UnknownName(short(name)),
+        };
+        Err(refused.at(self.text, token.start))
+    }
+
+    /// What stands between parentheses; the first is read, and is reported with `opener` if it is one too many.
+    fn parenthesis(&mut self, opener: Token<'p>) -> Result<ExprId, ParseError> {
+        self.deepen(opener)?;
+        let expr = self.expression(TokenKind::Close)?;
+        self.depth -= 1;
+        Ok(expr)
+    }
+
+    fn deepen(&mut self, token: Token) -> Result<(), ParseError> {
         self.depth += 1;
         if self.depth > self.limits.depth {
-            return Err(ParseErrorKind::TooDeep(self.limits.depth).at(token.position));
+            return Err(ParseErrorKind::TooDeep(self.limits.depth).at(self.text, token.start));
         }
         Ok(())
     }
 
-    fn open(&mut self, opener: Opener, token: &Token) -> Result<(), ParseError> {
-        self.deepen(token)?;
-        self.groups.push(Group {
-            opener,
-            start: token.position,
-            ..Group::default()
-        });
-        Ok(())
-    }
-
-    /// Ends the innermost group and gives its value.
-    fn close(&mut self, token: &Token) -> Result<ExprId, ParseError> {
-        self.finish_term();
-        let group = self.groups.pop().expect("a group with an opener is open");
-        self.depth -= 1;
-        let sum = self.pool.sum(&group.terms);
-        match group.opener {
-            Opener::Call(function) => {
-                let end = token.position + token.text.len();
-                self.guarded(group.start, end, |guards, pool| {
-                    guards.call(pool, function, sum)
-                })?;
-                Ok(self.pool.apply(function, sum))
-            }
-            Opener::Parenthesis | Opener::Text => Ok(sum),
-        }
-    }
-
-    /// Refuses the part of the text from `start` up to `end` if it has no value.
+    /// Refuses the text from `start` up to the next token if it has no value.
     fn guarded(
         &mut self,
         start: usize,
-        end: usize,
         has_value: impl FnOnce(&mut Guards, &mut ExprPool) -> bool,
     ) -> Result<(), ParseError> {
-        let Some(guards) = &mut self.guards else {
-            return Ok(());
-        };
-        if has_value(guards, self.pool) {
+        let end = self.peek().start;
+        if (self.guards.as_mut()).is_none_or(|guards| has_value(guards, self.pool)) {
             return Ok(());
         }
-        let found = self.text[start - 1..end - 1].trim_end();
-        Err(ParseErrorKind::NoValue(short(found)).at(start))
-    }
-
-    /// Applies pending powers and signs, and puts the operand among the factors.
-    fn finish_operand(&mut self, atom: ExprId, token: &Token) -> Result<(), ParseError> {
-        let mut value = atom;
-        loop {
-            let negative = std::mem::take(&mut self.group().negative);
-            value = self.pool.negated_if(negative, value);
-            let Some((base, negative)) = self.group().powers.pop() else {
-                break;
-            };
-            self.depth -= 1;
-            value = self.checked_pow(base, value, token)?;
-            self.group().negative = negative;
-        }
-        if std::mem::take(&mut self.group().divide) {
-            let start = self.group().term_start;
-            self.guarded(start, token.position, |guards, pool| {
-                guards.division(pool, value)
-            })?;
-            let dividend = self.group().factors.pop();
-            let dividend = dividend.expect("a divisor follows a factor");
-            value = self.pool.div(dividend, value);
-        }
-        self.group().factors.push(value);
-        self.group().operand_start = 0;
-        Ok(())
+        let found = self.text[start..end].trim_end();
+        Err(ParseErrorKind::NoValue(short(found)).at(self.text, start))
     }
 
     fn checked_pow(
         &mut self,
         base: ExprId,
         exponent: ExprId,
-        token: &Token,
+        start: usize,
     ) -> Result<ExprId, ParseError> {
-        let limit = self.limits.exponent;
+        let (text, limit, after) = (self.text, self.limits.exponent, self.peek().start);
         let too_large = |found: super::Number| {
             if found.to_f64().abs() > f64::from(limit) {
                 let found = found.to_string();
-                return Err(ParseErrorKind::Exponent { found, limit }.at(token.position));
+                return Err(ParseErrorKind::Exponent { found, limit }.at(text, after));
             }
             Ok(())
         };
         if let Some(number) = self.pool.as_number(exponent) {
             too_large(number)?;
         }
-        let start = self.group().operand_start;
-        self.guarded(start, token.position, |guards, pool| {
-            guards.power(pool, base, exponent)
-        })?;
+        self.guarded(start, |guards, pool| guards.power(pool, base, exponent))?;
         let power = self.pool.pow(base, exponent);
         for factor in self.pool.factors_of(power) {
             if let (_, Exponent::Number(number)) = self.pool.base_and_exponent(*factor) {
@@ -453,25 +365,20 @@ impl<'p> Parser<'p> {
         Ok(power)
     }
 
-    fn finish_term(&mut self) {
-        let group = self.group();
-        let factors = std::mem::take(&mut group.factors);
-        let subtract = std::mem::take(&mut group.subtract);
-        group.term_start = 0;
-        let term = self.pool.product(&factors);
-        let term = self.pool.negated_if(subtract, term);
-        self.group().terms.push(term);
+    fn unexpected(&self, token: Token, expected: &'static str) -> ParseError {
+        let found = match token.kind {
+            TokenKind::End => "end of text".to_owned(),
+            _ => format!("`{}`", short(token.text)),
+        };
+        ParseErrorKind::Unexpected { found, expected }.at(self.text, token.start)
     }
 }
 
-fn unexpected(token: &Token, expected: &'static str) -> ParseError {
-    let found = match token.kind {
-        TokenKind::End => "end of text".to_owned(),
-        _ => format!("`{}`", short(token.text)),
-    };
-    ParseErrorKind::Unexpected { found, expected }.at(token.position)
-}
-
 #[cfg(test)]
-#[path = "parse_tests.rs"]
-mod tests;
+impl ExprPool {
+    /// The expression of a text that parses.
+    pub(crate) fn parsed(&mut self, text: &str) -> ExprId {
+        self.parse(text, &|_| true)
+            .unwrap_or_else(|error| panic!("{text}: {error}"))
+    }
+}

@@ -3,8 +3,10 @@
 use std::collections::{BTreeSet, HashMap};
 use std::hash::BuildHasher;
 
+use super::canonical::Coefficient;
+use super::function::Function;
 use super::id_map::{BuildIdHasher, IdSet};
-use super::node::{ExprId, Function, Node, SymbolId};
+use super::node::{ExprId, Node, SymbolId};
 use super::number::Number;
 use super::order::SymbolKey;
 use super::slope::Slope;
@@ -57,8 +59,17 @@ struct Work {
 struct Symbol {
     key: SymbolKey,
     expr: ExprId,
-    /// What it stands for, see [`ExprPool::selection`].
-    selection: Option<[ExprId; 3]>,
+    meaning: Meaning,
+}
+
+/// What a symbol stands for.
+#[derive(Clone, Debug)]
+enum Meaning {
+    Variable,
+    /// See [`ExprPool::selection`].
+    Selection([ExprId; 3]),
+    /// See [`ExprPool::decimal`]; with the nearest float.
+    Decimal(Coefficient, f64),
 }
 
 /// What is known about a node without looking at its children.
@@ -170,26 +181,50 @@ impl ExprPool {
 
     /// The variable of that name, made at its first mention.
     pub fn symbol_id(&mut self, name: &str) -> SymbolId {
-        self.symbol_for(name, None)
+        self.symbol_for(name, Meaning::Variable)
+    }
+
+    /// A variable that takes the place of a part while expressions are rewritten; no file has one of its name.
+    pub(super) fn placeholder(&mut self, kind: &str, number: usize) -> SymbolId {
+        self.symbol_id(&format!(" {kind} {number}"))
     }
 
     /// The symbol of a selection: no variable, but `[test, zero, other]`, the value of `zero` where `test` is zero
     /// and that of `other` elsewhere.
     pub(super) fn selection_symbol(&mut self, parts: [ExprId; 3]) -> ExprId {
-        let id = self.symbol_for(
-            &format!("selection {:?}", parts.map(ExprId::index)),
-            Some(parts),
-        );
+        let name = format!("selection {:?}", parts.map(ExprId::index));
+        let id = self.symbol_for(&name, Meaning::Selection(parts));
         self.symbol_expr(id)
+    }
+
+    /// A number as it is written, which is never rounded or folded; see [`Coefficient::parse`]. It prints as its text
+    /// behind `~` if it is rounded, else `#`.
+    pub fn decimal(&mut self, text: &str, is_rounded: bool) -> Option<ExprId> {
+        let coefficient = Coefficient::parse(text, is_rounded)?;
+        let value = coefficient.to_f64();
+        let name = format!("{}{text}", if is_rounded { '~' } else { '#' });
+        let id = self.symbol_for(&name, Meaning::Decimal(coefficient, value));
+        Some(self.symbol_expr(id))
+    }
+
+    /// The number that a symbol of [`ExprPool::decimal`] stands for, and the nearest float.
+    pub fn decimal_of(&self, symbol: SymbolId) -> Option<(&Coefficient, f64)> {
+        match &self.symbols[symbol.index()].meaning {
+            Meaning::Decimal(coefficient, value) => Some((coefficient, *value)),
+            Meaning::Variable | Meaning::Selection(_) => None,
+        }
     }
 
     /// The parts of a symbol that stands for a selection of [`ExprPool::slope`]: test, value where the
     /// test is zero, value elsewhere.
     pub(crate) fn selection(&self, symbol: SymbolId) -> Option<[ExprId; 3]> {
-        self.symbols[symbol.index()].selection
+        match self.symbols[symbol.index()].meaning {
+            Meaning::Selection(parts) => Some(parts),
+            Meaning::Variable | Meaning::Decimal(..) => None,
+        }
     }
 
-    fn symbol_for(&mut self, name: &str, selection: Option<[ExprId; 3]>) -> SymbolId {
+    fn symbol_for(&mut self, name: &str, meaning: Meaning) -> SymbolId {
         if let Some(&id) = self.symbol_ids.get(name) {
             return id;
         }
@@ -200,7 +235,7 @@ impl ExprPool {
         self.symbols.push(Symbol {
             key: SymbolKey::of(name),
             expr: ExprId::ZERO,
-            selection,
+            meaning,
         });
         self.symbols[id.index()].expr = self.intern(Node::Symbol(id));
         id
@@ -456,46 +491,4 @@ impl ExprPool {
 
 fn symbol_bit(symbol: SymbolId) -> u64 {
     1 << symbol.index().min(63)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn split_of_weighted_monomial_gives_coefficient_and_rest() {
-        let mut pool = ExprPool::new();
-        let (x, y) = (pool.symbol("x"), pool.symbol("y"));
-        let xy = pool.mul(x, y);
-        let weight = pool.number(-0.16);
-        let term = pool.mul(weight, xy);
-        let coefficient = Number::from_f64(-0.16).expect("finite");
-        assert_eq!(pool.split(term), (coefficient, xy));
-        assert_eq!(pool.split(xy), (Number::ONE, xy));
-        assert_eq!(pool.split(weight), (coefficient, ExprId::ONE));
-        assert_eq!(pool.factors_of(xy), [x, y]);
-        assert_eq!(pool.factors_of(x), [x]);
-    }
-
-    #[test]
-    fn reachable_lists_operands_before_users_and_each_once() {
-        let mut pool = ExprPool::new();
-        let x = pool.symbol("x");
-        let sine = pool.apply(crate::symbolic::Function::Sin, x);
-        let root = pool.mul(x, sine);
-        let order = pool.reachable(&[root, sine]);
-        assert_eq!(order, [x, sine, root]);
-    }
-
-    #[test]
-    fn symbols_of_many_symbols_is_exact_beyond_the_mask() {
-        let mut pool = ExprPool::new();
-        let symbols: Vec<ExprId> = (0..200).map(|i| pool.symbol(&format!("x{i}"))).collect();
-        let root = pool.sum(&symbols[100..]);
-        let found = pool.symbols_of(root);
-        assert_eq!(found.len(), 100);
-        assert!(found.iter().all(|symbol| symbol.index() >= 100));
-        assert!(!pool.is_constant(root));
-        assert!(pool.is_constant(ExprId::ONE));
-    }
 }

@@ -2,7 +2,8 @@
 
 use num_integer::Integer;
 
-use super::node::{ExprId, Function, Node, Parity};
+use super::function::{Function, Parity};
+use super::node::{ExprId, Node};
 use super::number::Number;
 use super::order::Exponent;
 use super::pool::{ExprPool, Sign};
@@ -226,8 +227,8 @@ impl ExprPool {
     fn special_value(&mut self, function: Function, argument: ExprId) -> Option<ExprId> {
         let is_zero = argument == ExprId::ZERO;
         match (function, self.node(argument)) {
-            (Function::Sin | Function::Tan | Function::Tanh, _) if is_zero => Some(ExprId::ZERO),
             (Function::Cos | Function::Exp, _) if is_zero => Some(ExprId::ONE),
+            (_, _) if is_zero && function.vanishes_at_zero() => Some(ExprId::ZERO),
             (Function::Cos, &Node::Apply(Function::Abs, inner)) => {
                 Some(self.apply(Function::Cos, inner))
             }
@@ -243,7 +244,6 @@ impl ExprPool {
                 let magnitude = self.apply(Function::Abs, rest);
                 Some(self.scale(coefficient.abs(), magnitude))
             }
-            (Function::Sign, _) if is_zero => Some(ExprId::ZERO),
             (Function::Sign, _) if self.sign(argument) == Sign::Positive => Some(ExprId::ONE),
             (Function::Sign, Node::Number(_)) => Some(self.integer(-1)),
             (Function::Sign, Node::Apply(Function::Sign, _)) => Some(argument),

@@ -92,14 +92,12 @@ pub(super) fn power_by(x: f64, exponent: u64, product: impl Fn(f64, f64) -> f64)
     power.expect("no product fails")
 }
 
-/// Whether a computed square root is the exact one.
 pub(super) fn is_exact_root(root: f64, square: f64) -> bool {
     root == f64::INFINITY
         || (square > 1e-290 && root.mul_add(root, -square) == 0.0)
         || square == 0.0
 }
 
-/// A lower bound of a function's value.
 pub(super) fn widen_down(value: f64) -> f64 {
     if value == f64::INFINITY {
         return f64::MAX;
@@ -107,7 +105,6 @@ pub(super) fn widen_down(value: f64) -> f64 {
     (0..FUNCTION_ULPS).fold(value, |value, _| value.next_down())
 }
 
-/// An upper bound of a function's value.
 pub(super) fn widen_up(value: f64) -> f64 {
     if value == f64::NEG_INFINITY {
         return f64::MIN;

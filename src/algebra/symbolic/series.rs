@@ -31,12 +31,10 @@ impl Series {
         }
     }
 
-    /// Whether there is neither a term nor a rest.
     pub(super) fn is_zero(&self) -> bool {
         self.terms.is_empty() && self.rest.is_empty()
     }
 
-    /// Whether a term grows without bound.
     pub(super) fn has_pole(&self, pool: &ExprPool) -> bool {
         let number = |exponent| pool.as_number(exponent).is_some_and(Number::is_negative);
         self.terms.iter().any(|&(exponent, _)| number(exponent))
@@ -62,7 +60,6 @@ impl Germs<'_> {
         self.pool.as_number(exponent).map(Number::to_f64)
     }
 
-    /// Adds a term, together with one of the same exponent.
     pub(super) fn push(&mut self, series: &mut Series, (exponent, coefficient): (ExprId, ExprId)) {
         let value = self.number_of(exponent);
         let is_same = |&(other, _): &(ExprId, ExprId)| {
@@ -158,7 +155,6 @@ impl Germs<'_> {
         self.cut(product)
     }
 
-    /// With every term multiplied by `coefficient t^exponent`.
     pub(super) fn shifted(
         &mut self,
         series: &Series,
@@ -175,7 +171,6 @@ impl Germs<'_> {
         shifted
     }
 
-    /// How two exponents compare at the point.
     pub(super) fn compare(&mut self, a: ExprId, b: ExprId) -> Result<Ordering, Stop> {
         let difference = self.pool.sub(a, b);
         let difference = self.facts.at(self.pool, difference);
@@ -192,7 +187,6 @@ impl Germs<'_> {
         })
     }
 
-    /// Whether an expression that is not zero is positive.
     pub(super) fn is_positive(&mut self, expr: ExprId) -> Result<bool, Stop> {
         self.facts.is_positive(self.pool, expr)
     }

@@ -57,7 +57,6 @@ impl ExprPool {
         exprs.iter().map(|expr| folded[expr]).collect()
     }
 
-    /// The node of `expr` built again from other operands.
     pub(super) fn rebuild(
         &mut self,
         expr: ExprId,
@@ -81,36 +80,6 @@ impl ExprPool {
                 let argument = operand(argument);
                 self.apply(function, argument)
             }
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn substitution_is_simultaneous_and_takes_expressions() {
-        for (text, replacements, expected) in [
-            (
-                "x - 2*sin(y)",
-                &[("x", "y"), ("y", "x")][..],
-                "y - 2*sin(x)",
-            ),
-            (
-                "0.36 + z1^2*sin(z1)",
-                &[("z1", "0.5*body.x - 0.1")],
-                "0.36 + (0.5*body.x - 0.1)^2*sin(0.5*body.x - 0.1)",
-            ),
-            ("x + y", &[("z", "1")], "x + y"),
-        ] {
-            let mut pool = ExprPool::new();
-            let expr = pool.parsed(text);
-            let replacements: Vec<(SymbolId, ExprId)> = (replacements.iter())
-                .map(|(name, by)| (pool.symbol_id(name), pool.parsed(by)))
-                .collect();
-            let expected = pool.parsed(expected);
-            assert_eq!(pool.substitute(expr, &replacements), expected, "{text}");
         }
     }
 }

@@ -14,7 +14,9 @@ use std::collections::BTreeMap;
 
 use num_integer::Integer;
 
-use super::node::{ExprId, Function, Node};
+use super::expand::NARROW;
+use super::function::Function;
+use super::node::{ExprId, Node};
 use super::number::Number;
 use super::pool::ExprPool;
 
@@ -22,8 +24,6 @@ use super::pool::ExprPool;
 const MAX_MULTIPLE: i64 = 6;
 /// Most sines and cosines multiplied in one term that are combined.
 const MAX_TRIG_DEGREE: i64 = 8;
-/// Limits of intermediate expansions; larger ones stay as they are.
-const MAX_TERMS: usize = 500;
 
 /// The unit in which multiples of an angle are counted, by what stands beside the coefficient.
 type Units = BTreeMap<ExprId, Number>;
@@ -116,7 +116,7 @@ impl ExprPool {
 
     fn expanded_product(&mut self, a: ExprId, b: ExprId) -> ExprId {
         let product = self.mul(a, b);
-        self.expand_node(product, MAX_TERMS, &mut MAX_TERMS.clone())
+        self.expand_node(product, NARROW)
     }
 
     /// `expr` with every power of a sine reduced to the first by `sin(x)^2 = 1 - cos(x)^2`, also
@@ -224,9 +224,9 @@ impl ExprPool {
         let (with, without) = (self.sum_of_terms(with), self.sum_of_terms(without));
         let other = self.sub(without, with);
         let product = self.mul(other, base);
-        let product = self.expand_node(product, MAX_TERMS, &mut MAX_TERMS.clone());
+        let product = self.expand_node(product, NARROW);
         let product = self.sines_to_cosines(product);
-        let below = self.expand_region(product, &mut MAX_TERMS.clone());
+        let below = self.rewrite_region(product, |pool, node| pool.expand_node(node, NARROW));
         let below = self.powi(below, -1);
         self.mul(other, below)
     }
@@ -320,60 +320,4 @@ fn note_unit(units: &mut Units, coefficient: Number, rest: ExprId) {
         Number::rational(a.gcd(&b), known_denominator.checked_mul(denominator)?)
     };
     *unit = common().unwrap_or(*unit);
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::testing::assert_rewritten;
-    use super::*;
-
-    #[test]
-    fn expand_angles_of_sums_and_multiples() {
-        assert_rewritten(
-            ExprPool::expand_angles,
-            &[
-                ("sin(x + y)", "sin(x)*cos(y) + sin(y)*cos(x)"),
-                ("cos(x - y)", "sin(x)*sin(y) + cos(x)*cos(y)"),
-                ("sin(x) + sin(2*x)", "sin(x) + 2*sin(x)*cos(x)"),
-                (
-                    "cos(x/2) + cos(x)",
-                    "cos(1/2*x) - sin(1/2*x)^2 + cos(1/2*x)^2",
-                ),
-                ("sin(2*x)", "sin(2*x)"),
-                ("tan(x)", "sin(x)/cos(x)"),
-                ("sin(0.3*x)", "sin(0.3*x)"),
-                ("sin(x) + sin(100*x)", "sin(x) + sin(100*x)"),
-            ],
-        );
-    }
-
-    #[test]
-    fn reduce_squares_either_way() {
-        assert_rewritten(
-            ExprPool::cosines_to_sines,
-            &[("cos(x)^3", "cos(x)*(1 - sin(x)^2)")],
-        );
-        assert_rewritten(
-            ExprPool::sines_to_cosines,
-            &[
-                ("sin(x)^2", "1 - cos(x)^2"),
-                ("1/sin(x)", "sin(x)/(1 - cos(x)^2)"),
-                ("sin(sin(x)^2)", "sin(sin(x)^2)"),
-            ],
-        );
-    }
-
-    #[test]
-    fn combine_angles_turns_products_into_sums() {
-        assert_rewritten(
-            ExprPool::combine_angles,
-            &[
-                ("2*sin(x)*cos(x)", "sin(2*x)"),
-                ("sin(x)^2", "1/2 - 1/2*cos(2*x)"),
-                ("cos(x)^2 - sin(x)^2", "cos(2*x)"),
-                ("z*sin(x)*sin(y)", "1/2*z*cos(x - y) - 1/2*z*cos(x + y)"),
-                ("sin(x) + y", "y + sin(x)"),
-            ],
-        );
-    }
 }

@@ -3,9 +3,9 @@
 use nalgebra::DVector;
 
 use super::super::assign::Assigned;
-use super::super::error::{ImportError, ImportFault};
+use super::super::error::ImportError;
 use super::super::options::WeightVectors;
-use super::super::report::{Layout, Note};
+use super::super::report::Layout;
 use super::super::role::{Part, Role};
 use super::{Assembly, Known};
 use crate::files::Place;
@@ -14,7 +14,6 @@ use crate::model::{Activation, AffineMap, Layer, StateMap};
 /// How much decoding and encoding may change latent states without a note.
 const LARGEST_CHANGE: f64 = 0.5;
 
-/// Weights and bias of a layer.
 type Tensors<'a> = (&'a Assigned<'a>, Option<&'a Assigned<'a>>);
 
 impl<'a> Assembly<'a, '_> {
@@ -27,19 +26,27 @@ impl<'a> Assembly<'a, '_> {
         {
             let found = format!("{activation}, but no map with several layers");
             let expected = "tensors of layers, such as encoder.0.weight and encoder.2.weight";
-            return Err(ImportFault::option("--activation", found, expected));
+            return Err(ImportError::option("--activation", found, expected));
         }
         let has = |layout| {
             let mut used = self.report.used.iter();
             used.any(|used| used.layout == layout && used.role.ends_with(".weight"))
         };
         if has(Layout::Row) && has(Layout::Column) {
-            self.report.notes.push(Note::MixedWeights);
+            let note = "encoder and decoder are stored in different ways, one for row and one for column vectors";
+            self.report.notes.push(note.to_owned());
         }
         if let (Some(encoder), Some(decoder)) = &maps {
             let change = self.change(encoder, decoder)?;
-            let unmatched = (change > LARGEST_CHANGE).then_some(Note::Unmatched(change));
-            self.report.notes.extend(unmatched);
+            let note = || {
+                format!(
+                    "encode(decode(z)) differs from z by {change:.2} of its size: are encoder and decoder those of one \
+                     training?"
+                )
+            };
+            self.report
+                .notes
+                .extend((change > LARGEST_CHANGE).then(note));
         }
         Ok(maps)
     }
@@ -61,7 +68,6 @@ impl<'a> Assembly<'a, '_> {
         Ok((sum / dim as f64).sqrt())
     }
 
-    /// The tensors of a map's layers, in the order of their numbers.
     fn layers(&self, part: Part) -> Result<Vec<Tensors<'a>>, ImportError> {
         let mut layers: Vec<Tensors<'a>> = Vec::new();
         let used = &self.assignment.used;
@@ -97,7 +103,13 @@ impl<'a> Assembly<'a, '_> {
         let tensors = self.layers(part)?;
         let part_name = part.name();
         let Some(last) = tensors.len().checked_sub(1) else {
-            self.report.notes.push(Note::NoMap(part));
+            let lost = match part {
+                Part::Encoder => "the model has latent coordinates only",
+                Part::Decoder => "latent states cannot be mapped back",
+            };
+            let weights = format!("{part_name}.weight");
+            let note = format!("no tensor {weights}, and no --map {weights}=TENSOR: {lost}");
+            self.report.notes.push(note);
             return Ok(None);
         };
         let is_deep = last > 0;
@@ -109,7 +121,8 @@ impl<'a> Assembly<'a, '_> {
             let bias = match bias {
                 Some(bias) => self.list(bias, matrix.nrows())?,
                 None => {
-                    self.report.notes.push(Note::ZeroBias(part));
+                    let note = format!("the {part_name} has no bias: zero");
+                    self.report.notes.push(note);
                     DVector::zeros(matrix.nrows())
                 }
             };
@@ -127,7 +140,8 @@ impl<'a> Assembly<'a, '_> {
         }
         let map = StateMap::new(part_name, layers).map_err(|source| self.unusable(source))?;
         if is_deep {
-            self.report.notes.push(Note::Layers(part, map.summary()));
+            let note = format!("the {part_name} has layers {}", map.summary());
+            self.report.notes.push(note);
         }
         Ok(Some(map))
     }
@@ -205,7 +219,6 @@ fn is_kernel(name: &str) -> bool {
     name.trim_end_matches(":0").ends_with("kernel")
 }
 
-/// The weights in words, for messages.
 fn described(layers: &[Tensors<'_>]) -> String {
     let texts: Vec<String> = layers.iter().map(|(a, _)| a.info.describe()).collect();
     texts.join(", ")

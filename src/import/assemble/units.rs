@@ -4,8 +4,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::super::assign::Assigned;
-use super::super::error::{ImportError, ImportFault};
-use super::super::report::Note;
+use super::super::error::ImportError;
 use super::super::role::Role;
 use super::{Assembly, Parts};
 use crate::model::{
@@ -22,7 +21,7 @@ impl<'a> Assembly<'a, '_> {
         let known = self.options.scaling.clone();
         if known.is_some() && (state.is_some() || input.is_some()) {
             let found = "factors here and in tensors";
-            return Err(ImportFault::option("--scaling", found, "one of the two"));
+            return Err(ImportError::option("--scaling", found, "one of the two"));
         }
         let Some(state) = state else {
             return match (input, given) {
@@ -31,7 +30,7 @@ impl<'a> Assembly<'a, '_> {
                 (None, Some(_)) => {
                     let found = "factors of the inputs alone";
                     let expected = "--scaling, or a tensor scaling.state or std.state";
-                    Err(ImportFault::option("--input-scaling", found, expected))
+                    Err(ImportError::option("--input-scaling", found, expected))
                 }
             };
         };
@@ -39,7 +38,7 @@ impl<'a> Assembly<'a, '_> {
             (Some(_), Some(_)) => {
                 let found = "factors here and in a tensor";
                 let expected = "one of the two";
-                return Err(ImportFault::option("--input-scaling", found, expected));
+                return Err(ImportError::option("--input-scaling", found, expected));
             }
             (Some(input), None) => self.factors(input)?,
             (None, Some(given)) => given,
@@ -112,7 +111,8 @@ impl<'a> Assembly<'a, '_> {
             },
             |last| (last.weights().clone(), last.bias() + &offset),
         )?;
-        self.report.notes.push(Note::FoldedMean);
+        let note = "the mean of the training's states went into the biases";
+        self.report.notes.push(note.to_owned());
         Ok(())
     }
 
@@ -148,7 +148,7 @@ impl<'a> Assembly<'a, '_> {
                 Some(dim) => format!("an encoder or decoder of {dim} coordinates"),
             };
             let expected = "one of 18 coordinates";
-            return Err(ImportFault::option("--order", found, expected));
+            return Err(ImportError::option("--order", found, expected));
         }
         self.change_ends(
             parts,
@@ -170,12 +170,12 @@ impl<'a> Assembly<'a, '_> {
         for (_, statistics) in &mut parts.statistics {
             *statistics = sorted_statistics(statistics, order);
         }
-        self.report.notes.push(Note::Sorted(order.to_string()));
+        let note = format!("coordinates were in the order {order}; the model has romc's");
+        self.report.notes.push(note);
         Ok(())
     }
 }
 
-/// The map with other weights and bias in one layer.
 fn replaced(
     map: &StateMap,
     layer: usize,

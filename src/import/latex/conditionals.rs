@@ -3,13 +3,12 @@
 use std::collections::BTreeSet;
 
 use super::super::error::ImportError;
-use super::definitions::{DEFINITIONS, UNREAD, unread};
+use super::definitions::{DEFINITIONS, UNREAD};
 use super::expander::Expander;
 use super::reader::has;
-use super::scopes::Meaning;
+use super::scopes::{Meaning, Refusal};
 use super::token::{Kind, Token};
 
-/// TeX's conditionals.
 const CONDITIONALS: &str = "if ifcat ifnum ifdim ifodd ifvmode ifhmode ifmmode ifinner ifvoid ifhbox ifvbox ifx ifeof \
     iftrue iffalse ifcase ifdefined ifcsname iffontchar ifincsname ifpdf ifxetex ifluatex ifPDFTeX ifXeTeX ifLuaTeX";
 /// Commands that begin as conditionals do and take arguments, or none.
@@ -20,13 +19,12 @@ const KEEPING: &str = "AtBeginDocument AtEndDocument AtEndPreamble sbox savebox 
 const FOLLOWED: &str =
     "`\\iftrue`, `\\iffalse` or a switch of `\\newif`, or the printed branch alone";
 
-/// Why a command is not followed.
-const CONDITION: (&str, &str) = (", a conditional that is not followed", FOLLOWED);
-const KEPT: (&str, &str) = (
+const CONDITION: Refusal = (", a conditional that is not followed", FOLLOWED);
+const KEPT: Refusal = (
     ", which keeps mathematics for another place",
     "equations where they are printed",
 );
-const UNDECIDED: (&str, &str) = (", a macro that is defined under a condition", FOLLOWED);
+const UNDECIDED: Refusal = (", a macro that is defined under a condition", FOLLOWED);
 
 impl Expander<'_> {
     /// Follows a conditional, or gives the token back if it is none.
@@ -130,7 +128,7 @@ impl Expander<'_> {
         &mut self,
         token: &Token,
         tokens: &[Token],
-        (why, expected): (&'static str, &'static str),
+        refusal: Refusal,
     ) -> Result<Option<Token>, ImportError> {
         let mut open = vec![tokens.to_vec()];
         let mut seen = BTreeSet::new();
@@ -143,8 +141,8 @@ impl Expander<'_> {
                 };
                 if defines {
                     let matters = self.matters(std::slice::from_ref(token));
-                    self.scopes
-                        .define(name.clone(), unread(UNDECIDED, matters), true);
+                    let meaning = Meaning::Unread(UNDECIDED, matters);
+                    self.scopes.define(name.clone(), meaning, true);
                 }
                 defines = !defines && (has(DEFINITIONS, name) || has(UNREAD, name));
                 if let Some(Meaning::Macro(found)) = self.scopes.meaning(name)
@@ -155,13 +153,13 @@ impl Expander<'_> {
             }
         }
         let matters = self.matters(tokens);
-        self.unread(token, why, expected, matters)
+        self.unread(token, refusal, matters)
     }
 
     fn undecided_arguments(
         &mut self,
         token: &Token,
-        why: (&'static str, &'static str),
+        why: Refusal,
     ) -> Result<Option<Token>, ImportError> {
         let is_kept = why == KEPT;
         match self.following_groups(if is_kept { 16 } else { 6 }) {

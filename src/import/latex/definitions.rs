@@ -6,14 +6,13 @@ use super::super::error::ImportError;
 use super::document::{CASES, LAYOUTS, is_one_of};
 use super::expander::{Expander, spelled};
 use super::reader::has;
-use super::scopes::{Macro, Meaning};
+use super::scopes::{Macro, Meaning, Refusal};
 use super::token::{Kind, Token};
 
 /// Commands that LaTeX and amsmath define, so that `\providecommand` leaves them as they are.
 const KERNEL: &str = "sin cos tan cot sec csc sinh cosh tanh exp log ln frac dfrac tfrac sqrt dot ddot dddot left right \
     cdot times lvert rvert vert text mathrm operatorname prime partial alpha beta gamma delta epsilon zeta eta theta \
     iota kappa lambda mu nu xi pi rho sigma tau upsilon phi chi psi omega";
-/// Definitions of macros that are followed.
 pub(super) const DEFINITIONS: &str = "newcommand renewcommand providecommand DeclareRobustCommand def gdef edef xdef let DeclareMathOperator newif";
 /// Definitions of macros whose form is not read: the macro that comes next is unknown from there on.
 pub(super) const UNREAD: &str = "chardef mathchardef font DeclarePairedDelimiter DeclarePairedDelimiterX DeclareMathSymbol \
@@ -24,20 +23,23 @@ pub(super) const UNREAD: &str = "chardef mathchardef font DeclarePairedDelimiter
 /// Definitions of environments whose contents are not read.
 const VERBATIM: &str =
     "excludecomment excludeversion lstnewenvironment DefineVerbatimEnvironment newverbatim";
-/// Why a macro is not read.
-const UNREAD_FORM: (&str, &str) = (
+const UNREAD_FORM: Refusal = (
     ", a macro of a form that is not read",
     "`\\newcommand` with plain arguments",
 );
-const DEFINED_TWICE: (&str, &str) = (
+const DEFINED_TWICE: Refusal = (
     ", a macro that is defined already where it is defined",
     "`\\renewcommand` for its second definition",
 );
-const DELIMITED: (&str, &str) = (
+const DELIMITED: Refusal = (
     ", a macro with delimited arguments",
     "a macro with plain arguments",
 );
-const EXPANDED: (&str, &str) = (
+const CHANGED_DIGITS: Refusal = (
+    ", with options of siunitx that change its digits",
+    "numbers as they are printed",
+);
+const EXPANDED: Refusal = (
     ", a macro whose body is expanded where it is defined",
     "`\\def` or `\\newcommand`",
 );
@@ -72,11 +74,7 @@ impl Expander<'_> {
             "sisetup" => {
                 let options = self.argument().unwrap_or_default();
                 if changes_digits(&options) {
-                    let why = ", with options of siunitx that change its digits";
-                    self.define(
-                        "num".to_owned(),
-                        unread((why, "numbers as they are printed"), false),
-                    );
+                    self.define("num".to_owned(), Meaning::Unread(CHANGED_DIGITS, false));
                 }
             }
             _ if has(VERBATIM, command) => {
@@ -93,7 +91,7 @@ impl Expander<'_> {
                 let earlier = token.with(Kind::Command(name.clone()));
                 let matters =
                     command.contains("Environ") || self.matters(&body) || self.matters(&[earlier]);
-                self.define(name, unread(UNREAD_FORM, matters));
+                self.define(name, Meaning::Unread(UNREAD_FORM, matters));
             }
             _ => return false,
         }
@@ -140,7 +138,7 @@ impl Expander<'_> {
             ("providecommand", true) => {}
             ("newcommand", true) => {
                 let matters = matches!(&meaning, Meaning::Macro(found) if found.matters);
-                self.define(name, unread(DEFINED_TWICE, matters));
+                self.define(name, Meaning::Unread(DEFINED_TWICE, matters));
             }
             _ => self.define(name, meaning),
         }
@@ -158,7 +156,7 @@ impl Expander<'_> {
         let body = self.argument()?;
         Some(match count.unwrap_or(Ok(0)) {
             Ok(parameters @ 0..=9) => self.plain_macro(parameters, default, body),
-            _ => unread(UNREAD_FORM, self.matters(&body)),
+            _ => Meaning::Unread(UNREAD_FORM, self.matters(&body)),
         })
     }
 
@@ -202,8 +200,8 @@ impl Expander<'_> {
         };
         let is_expanded = matches!(command, "edef" | "xdef") && body.iter().any(expands);
         let meaning = match count {
-            None => unread(DELIMITED, matters),
-            Some(_) if is_expanded => unread(EXPANDED, matters),
+            None => Meaning::Unread(DELIMITED, matters),
+            Some(_) if is_expanded => Meaning::Unread(EXPANDED, matters),
             Some(parameters) => self.plain_macro(parameters, None, body),
         };
         self.is_global |= command.starts_with(['g', 'x']);
@@ -233,7 +231,7 @@ impl Expander<'_> {
         body.extend(text);
         body.push(token.with(Kind::Close));
         let meaning = match self.is_defined(&name) {
-            true => unread(DEFINED_TWICE, false),
+            true => Meaning::Unread(DEFINED_TWICE, false),
             false => self.plain_macro(0, None, body),
         };
         self.define(name, meaning);
@@ -262,7 +260,7 @@ impl Expander<'_> {
         };
         let is_again = command == "newenvironment" && self.scopes.meaning(&name).is_some();
         let begin = if is_again {
-            unread(DEFINED_TWICE, true)
+            Meaning::Unread(DEFINED_TWICE, true)
         } else {
             begin
         };
@@ -280,7 +278,7 @@ impl Expander<'_> {
                 Kind::Dollar | Kind::Display => true,
                 Kind::Command(name) => match (self.scopes.meaning(name), name.as_str()) {
                     (Some(Meaning::Macro(found)), _) => found.matters,
-                    (Some(Meaning::Unread { matters, .. }), _) => *matters,
+                    (Some(Meaning::Unread(_, matters)), _) => *matters,
                     (Some(Meaning::Same(_) | Meaning::Verbatim), _) => true,
                     (None, "[" | "(" | "ddot" | "endinput" | "stop" | "bye") => true,
                     (None, "begin" | "end") => {
@@ -295,14 +293,6 @@ impl Expander<'_> {
                 },
                 _ => false,
             })
-    }
-}
-
-pub(super) fn unread((why, expected): (&'static str, &'static str), matters: bool) -> Meaning {
-    Meaning::Unread {
-        why,
-        expected,
-        matters,
     }
 }
 

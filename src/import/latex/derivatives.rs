@@ -4,7 +4,6 @@ use super::names::is_greek;
 use super::reader::{FONTS, INVISIBLE, has};
 use super::token::{Kind, Token, group_length};
 
-/// Most dots that have a command.
 const MAX_DOTS: usize = 3;
 /// Longest group that is looked at: a variable or a differential.
 const MAX_GROUP: usize = 32;
@@ -37,7 +36,6 @@ fn with_each(tokens: &[Token], find: fn(&[Token], usize) -> Option<Derivative>) 
     dotted
 }
 
-/// A derivative written as a fraction at `at`.
 fn fraction(tokens: &[Token], at: usize) -> Option<Derivative> {
     let fractions = ["frac", "dfrac", "tfrac"];
     (fractions.iter().any(|name| tokens[at].is_command(name))).then_some(())?;
@@ -99,13 +97,12 @@ fn differential(tokens: &[Token], at: usize) -> Option<usize> {
 fn power(tokens: &[Token], at: usize) -> (usize, usize) {
     let found = || {
         (tokens.get(at)?.kind == Kind::Superscript).then_some(())?;
-        match argument(tokens, at + 1)? {
-            ([number], behind) => match &number.kind {
-                Kind::Number(text) => Some((text.parse().ok()?, behind)),
-                _ => None,
-            },
+        let (inside, behind) = argument(tokens, at + 1)?;
+        let digits = inside.iter().map(|token| match token.kind {
+            Kind::Character(digit) if digit.is_ascii_digit() => Some(digit),
             _ => None,
-        }
+        });
+        Some((digits.collect::<Option<String>>()?.parse().ok()?, behind))
     };
     found().unwrap_or((1, at))
 }
@@ -150,7 +147,6 @@ fn subscript_end(tokens: &[Token], at: usize) -> Option<usize> {
     Some(argument(tokens, at + 1)?.1)
 }
 
-/// A variable with primes at `at`.
 fn primed(tokens: &[Token], at: usize) -> Option<Derivative> {
     let letter = letter_end(tokens, at)?;
     let subscript = subscript_end(tokens, letter);

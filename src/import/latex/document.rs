@@ -1,9 +1,8 @@
 //! The displays of a document as they are printed.
 
-use super::super::equations::refused;
 use super::super::error::ImportError;
 use super::derivatives::with_dots;
-use super::digits::with_numbers;
+use super::digits::without_operator_braces;
 use super::expander::Expander;
 use super::reader::has;
 use super::token::{Kind, Token};
@@ -20,9 +19,7 @@ pub(super) const WITH_COLUMNS: &str = "alignat alignedat array IEEEeqnarray";
 pub(super) enum Item {
     /// A comment, or a heading in Markdown.
     Comment(String),
-    /// The tokens between the ends of a display.
     Display(Vec<Token>),
-    /// The tokens of mathematics inside a paragraph.
     Inline(Vec<Token>),
 }
 
@@ -80,7 +77,7 @@ fn begin_document(file: &str, items: &mut Vec<Item>) -> Result<(), ImportError> 
         if let Some(token) = tokens.iter().find(|token| token.is_command("ddot")) {
             let found = format!("{} before `\\begin{{document}}`", token.quoted());
             let expected = "equations behind it, where they are printed";
-            return Err(refused(file, token.place, found, expected));
+            return Err(ImportError::at(file, token.place, found, expected));
         }
     }
     items.retain(|item| matches!(item, Item::Comment(_)));
@@ -92,7 +89,7 @@ fn display(expander: &mut Expander, start: &Token) -> Result<Item, ImportError> 
     match formula(expander, |_| false)? {
         Some(tokens) => {
             if let Some((token, expected)) = unread(&tokens) {
-                return Err(refused(
+                return Err(ImportError::at(
                     expander.file,
                     token.place,
                     token.quoted(),
@@ -130,7 +127,7 @@ fn formula(
         if expander.scopes.depth() <= around || ends(&token) {
             expander.scopes.leave_to(around);
             expander.scopes.formula = None;
-            return Ok(Some(with_dots(&with_numbers(tokens))));
+            return Ok(Some(with_dots(&without_operator_braces(tokens))));
         }
         tokens.push(token);
     }

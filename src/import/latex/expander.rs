@@ -3,16 +3,14 @@
 
 use std::rc::Rc;
 
-use super::super::equations::refused;
 use super::super::error::ImportError;
 use super::document::is_one_of;
 use super::reader::has;
-use super::scopes::{Macro, Meaning, Scopes};
+use super::scopes::{Macro, Meaning, Refusal, Scopes};
 use super::token::{Kind, Lexer, Token};
 
 /// Most tokens that macros may make of one document.
 const MAX_EXPANDED: usize = 500_000;
-/// Environments whose contents are no LaTeX.
 const VERBATIM: &str =
     "verbatim Verbatim BVerbatim LVerbatim lstlisting minted comment filecontents";
 /// Environments that old documents begin by their commands: `\let\be\equation`.
@@ -23,7 +21,6 @@ const NOT_PRINTED: &str = "index typeout message hypersetup pdfbookmark nocite @
 /// Commands after which the text reads in another way than is followed here.
 const NOT_FOLLOWED: &str =
     "globaldefs aftergroup afterassignment scantokens mathcode everymath everydisplay";
-/// Commands that print another file.
 const OTHER_FILES: &str = "input include subfile subfileinclude subinputfrom import subimport inputfrom includefrom \
     InputIfFileExists @input";
 
@@ -42,7 +39,6 @@ pub(super) struct Expander<'t> {
 }
 
 impl<'t> Expander<'t> {
-    /// An expander of tokens, then of a text.
     pub(super) fn new(file: &'t str, mut tokens: Vec<Token>, text: &'t str) -> Self {
         tokens.reverse();
         Self {
@@ -63,11 +59,9 @@ impl<'t> Expander<'t> {
             let printed = match &token.kind {
                 Kind::Command(name) => match self.scopes.meaning(name).cloned() {
                     Some(Meaning::Macro(found)) => self.expand(&token, &found).map(|()| None)?,
-                    Some(Meaning::Unread {
-                        why,
-                        expected,
-                        matters,
-                    }) => self.unread(&token, why, expected, matters)?,
+                    Some(Meaning::Unread(refusal, matters)) => {
+                        self.unread(&token, refusal, matters)?
+                    }
                     Some(Meaning::Same(kind)) => self.primitive(token.with(kind))?,
                     Some(Meaning::Verbatim) | None => self.primitive(token)?,
                 },
@@ -95,7 +89,6 @@ impl<'t> Expander<'t> {
         })
     }
 
-    /// The same without comments and empty lines.
     pub(super) fn code(&mut self) -> Option<Token> {
         loop {
             let token = self.raw()?;
@@ -124,15 +117,14 @@ impl<'t> Expander<'t> {
         expected: &str,
     ) -> Result<T, ImportError> {
         let found = format!("{}{why}", token.quoted());
-        Err(refused(self.file, token.place, found, expected))
+        Err(ImportError::at(self.file, token.place, found, expected))
     }
 
     /// What is not followed here: in a formula a token that says so, in text nothing, unless mathematics may be in it.
     pub(super) fn unread(
         &self,
         token: &Token,
-        why: &str,
-        expected: &'static str,
+        (why, expected): Refusal,
         matters: bool,
     ) -> Result<Option<Token>, ImportError> {
         if self.scopes.formula.is_some() {
@@ -158,14 +150,12 @@ impl<'t> Expander<'t> {
         }
     }
 
-    /// Passes a group, if one comes next.
     pub(super) fn skip_group(&mut self) {
         if self.takes(&Kind::Open) {
             self.until(&Kind::Close);
         }
     }
 
-    /// The tokens of `[...]`, if it comes next.
     pub(super) fn optional(&mut self) -> Option<Vec<Token>> {
         let is_next = self.takes(&Kind::Character('['));
         is_next.then(|| self.until(&Kind::Character(']'))).flatten()
@@ -331,7 +321,6 @@ impl<'t> Expander<'t> {
         Ok(())
     }
 
-    /// Ends the text here.
     fn stop(&mut self) {
         self.pending.clear();
         self.lexer.end();
@@ -374,7 +363,7 @@ impl<'t> Expander<'t> {
         if name == "lrbox" {
             return self.refuse(&token, "", "text that is printed where it stands");
         }
-        if matches!(meaning, Some(Meaning::Macro(_) | Meaning::Unread { .. })) {
+        if matches!(meaning, Some(Meaning::Macro(_) | Meaning::Unread(..))) {
             self.scopes
                 .enter(token.clone(), Some(Kind::End(name.clone())));
             self.pending.push(token.with(Kind::Command(name.clone())));
@@ -394,7 +383,7 @@ impl<'t> Expander<'t> {
         }
         if matches!(
             self.scopes.meaning(name),
-            Some(Meaning::Macro(_) | Meaning::Unread { .. })
+            Some(Meaning::Macro(_) | Meaning::Unread(..))
         ) {
             let end = format!("end{name}");
             let is_defined = self.scopes.meaning(&end).is_some();
@@ -419,7 +408,6 @@ impl<'t> Expander<'t> {
     }
 }
 
-/// The characters of a name.
 pub(super) fn spelled(tokens: &[Token]) -> String {
     let mut text = String::new();
     for token in tokens {

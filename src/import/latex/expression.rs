@@ -94,7 +94,6 @@ impl Reader<'_> {
                     self.at = at + 1 + usize::from(self.kind(at + 1) == Some(&Kind::Open));
                     self.takes(&Kind::Dollar);
                     let is_formula = match self.next_kind() {
-                        Some(Kind::Number(_)) => true,
                         Some(Kind::Character(c)) => "+-*/=".contains(c) || c.is_ascii_digit(),
                         _ => false,
                     };
@@ -137,7 +136,7 @@ impl Reader<'_> {
 
     pub(super) fn term(&mut self, leads: bool) -> Read<()> {
         self.peek();
-        let is_literal = matches!(self.kind(self.at), Some(Kind::Number(_)));
+        let is_literal = self.number_at(self.at).is_some();
         let mut last = self.factor(leads)?;
         let behind_literal = is_literal.then_some(self.at);
         let mut after_slash = false;
@@ -222,6 +221,7 @@ impl Reader<'_> {
     /// Whether a token behind a factor is another one; other tokens end the term.
     pub(super) fn starts_factor(&self, kind: &Kind) -> bool {
         match kind {
+            _ if self.number_at(self.at).is_some() => true,
             Kind::Character('|') => self.bars.last() != Some(&true),
             Kind::Character(c) => !"+-=,.;)]<>:!*/".contains(*c),
             Kind::Command(name) => {
@@ -243,13 +243,15 @@ impl Reader<'_> {
             self.at = after;
             return self.call(place, &name);
         }
+        if let Some(number) = self.number_at(self.at) {
+            let place = self.tokens[number.first].place;
+            self.at = number.behind;
+            let literal = self.literal(&number.text, leads);
+            self.push(place, literal);
+            self.powers(place)?;
+            return Ok(Last::Number);
+        }
         let last = match &token.kind {
-            Kind::Number(text) => {
-                self.at += 1;
-                let literal = self.literal(text, leads);
-                self.push(place, literal);
-                Last::Number
-            }
             Kind::Command(name) if name == "num" => self.macro_number(place)?,
             Kind::Command(name) if has("frac dfrac tfrac cfrac nicefrac sfrac", name) => {
                 self.at += 1;
@@ -327,7 +329,7 @@ impl Reader<'_> {
     fn group_sum(&mut self, leads: bool) -> Read<Last> {
         let first = self.at;
         self.sum(leads)?;
-        let is_number = self.at == first + 1 && matches!(self.tokens[first].kind, Kind::Number(_));
+        let is_number = (self.number_at(first)).is_some_and(|number| number.behind == self.at);
         Ok(if is_number { Last::Number } else { Last::Other })
     }
 
@@ -365,7 +367,6 @@ impl Reader<'_> {
         Ok(self.command("right"))
     }
 
-    /// Parentheses of any kind and size.
     pub(super) fn delimited(&mut self, place: (usize, usize)) -> Read<Last> {
         let has_left = self.command("left");
         let closer = match self.next_kind() {

@@ -83,7 +83,6 @@ impl Markdown {
         self.tokens.extend(Lexer::of_part(text, place));
     }
 
-    /// One line outside fences.
     fn line(&mut self, line: &str, (number, _): (usize, usize)) {
         // Places are asked for from left to right.
         let mut counted = (0, 1);
@@ -179,7 +178,6 @@ struct Indented {
 }
 
 impl Indented {
-    /// Whether a line is code.
     fn is_code(&mut self, line: &str) -> bool {
         let content = line.trim_start();
         let is_indented = line.starts_with("    ") || line.starts_with('\t');

@@ -27,8 +27,5 @@ mod sections;
 mod token;
 mod variables;
 
-#[cfg(test)]
-mod tests;
-
 pub use names::{NameError, SymbolNames};
 pub(super) use sections::read;

@@ -10,7 +10,6 @@ const GREEK: &str = "alpha beta gamma delta epsilon varepsilon zeta eta theta va
     lambda mu nu xi pi rho sigma tau upsilon phi varphi chi psi omega Gamma Delta Theta Lambda Xi \
     Pi Sigma Upsilon Phi Psi Omega";
 
-/// Whether a command is a Greek letter.
 pub(super) fn is_greek(command: &str) -> bool {
     has(GREEK, command)
 }

@@ -43,31 +43,32 @@ impl Reader<'_> {
 
     fn behind_power_of_ten(&mut self) -> Option<i32> {
         let is_product = self.command("times") || self.command("cdot");
-        let is_of_ten = is_product && self.takes(&Kind::Number("10".to_owned()));
-        (is_of_ten && self.takes(&Kind::Superscript)).then_some(())?;
+        self.peek();
+        let ten = self
+            .number_at(self.at)
+            .filter(|number| is_product && number.text == "10")?;
+        self.at = ten.behind;
+        self.takes(&Kind::Superscript).then_some(())?;
         let behind = self.after_argument(self.at);
         let text: String = (self.tokens[self.at..behind].iter())
             .map(|token| match &token.kind {
                 Kind::Open | Kind::Close => String::new(),
-                Kind::Character(sign @ ('+' | '-')) => sign.to_string(),
-                Kind::Number(text) => text.clone(),
+                Kind::Character(c @ ('+' | '-' | '0'..='9')) => c.to_string(),
                 _ => "?".to_owned(),
             })
             .collect();
-        let is_one_token = behind == self.at + 1;
         self.at = behind;
-        let exponent = text.parse().ok();
-        exponent.filter(|exponent: &i32| !is_one_token || *exponent < 10)
+        text.parse().ok()
     }
 
-    /// Takes the number that comes next.
     pub(super) fn number(&mut self, expected: &str) -> Read<String> {
-        match self.next_kind() {
-            Some(Kind::Number(text)) => {
-                self.at += 1;
-                Ok(text)
+        self.peek();
+        match self.number_at(self.at) {
+            Some(number) => {
+                self.at = number.behind;
+                Ok(number.text)
             }
-            _ => self.unexpected(expected),
+            None => self.unexpected(expected),
         }
     }
 
@@ -96,7 +97,6 @@ impl Reader<'_> {
             .iter()
             .map(|token| match &token.kind {
                 Kind::Open | Kind::Close | Kind::Comment(_) => Some(String::new()),
-                Kind::Number(text) => Some(text.clone()),
                 Kind::Character(character) => Some(character.to_string()),
                 _ => None,
             });
@@ -148,19 +148,18 @@ impl Reader<'_> {
         Ok(Last::Other)
     }
 
-    /// The index in brackets; 2 without.
     fn index(&mut self) -> Read<u32> {
         if !self.character('[') {
             return Ok(2);
         }
-        let index = match self.peek().map(|token| &token.kind) {
-            Some(Kind::Number(text)) => text.parse().ok(),
-            Some(_) | None => None,
-        };
+        self.peek();
+        let number = self.number_at(self.at);
+        let behind = number.as_ref().map_or(self.at, |number| number.behind);
+        let index = number.and_then(|number| number.text.parse().ok());
         let Some(index @ 2..=99) = index else {
             return self.unexpected("the index of the root, 2 to 99");
         };
-        self.at += 1;
+        self.at = behind;
         match self.character(']') {
             true => Ok(index),
             false => self.unexpected("`]`"),

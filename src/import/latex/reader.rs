@@ -2,13 +2,13 @@
 
 use std::ops::Range;
 
-use super::super::equations::{Piece, refused};
+use super::super::equations::Piece;
 use super::super::error::ImportError;
+use super::digits::around_digits;
 use super::expression::WORDS;
 use super::names::SymbolNames;
 use super::token::{Kind, Token};
 
-/// Most nested groups.
 const MAX_DEPTH: usize = 60;
 /// Commands that change only how the page looks; those of the second list take an argument.
 pub(super) const INVISIBLE: &str = ", ; : ! > quad qquad enspace thinspace medspace thickspace negthinspace \
@@ -39,7 +39,6 @@ pub(super) struct Symbol {
 }
 
 impl Symbol {
-    /// The variable in quotes, for messages.
     pub(super) fn quoted(&self) -> String {
         let dots = ["", "\\dot ", "\\ddot ", "\\dddot "][self.dots.min(3)];
         format!("`{dots}{}`", self.name)
@@ -66,6 +65,8 @@ pub(super) struct Reader<'a> {
     pub(super) tokens: Vec<Token>,
     /// For each opening brace, where it closes.
     pub(super) closing: Vec<usize>,
+    /// Of each token whether it is a brace or font around digits.
+    pub(super) is_around: Vec<bool>,
     pub(super) at: usize,
     pub(super) end: usize,
     pub(super) depth: usize,
@@ -83,7 +84,6 @@ pub(super) fn has(list: &str, word: &str) -> bool {
     list.split_whitespace().any(|known| known == word)
 }
 
-/// Whether a token alone prints nothing.
 pub(super) fn is_blank(kind: &Kind) -> bool {
     match kind {
         Kind::Align | Kind::Break | Kind::Label(_) | Kind::Comment(_) | Kind::Paragraph => true,
@@ -107,6 +107,7 @@ impl<'a> Reader<'a> {
             alone: false,
             digits: None,
             closing: vec![0; end],
+            is_around: around_digits(&tokens),
             tokens,
             at: 0,
             end,
@@ -118,7 +119,7 @@ impl<'a> Reader<'a> {
             None => Ok(reader),
             Some(token) => {
                 let found = format!("{} without its partner", token.quoted());
-                Err(refused(file, token.place, found, "braces in pairs"))
+                Err(ImportError::at(file, token.place, found, "braces in pairs"))
             }
         }
     }
@@ -156,7 +157,6 @@ impl<'a> Reader<'a> {
         (self.at < self.end).then(|| &self.tokens[self.at])
     }
 
-    /// The kind of what [`Self::peek`] gives.
     pub(super) fn next_kind(&mut self) -> Option<Kind> {
         self.peek().map(|token| token.kind.clone())
     }
@@ -199,14 +199,19 @@ impl<'a> Reader<'a> {
     /// Refuses what comes next.
     pub(super) fn unexpected<T>(&mut self, expected: &str) -> Read<T> {
         self.peek();
-        let (place, found) = match self.tokens.get(self.at.min(self.end)) {
-            Some(next) => (next.place, next.quoted()),
-            None => {
+        let number = self.number_at(self.at);
+        let (place, found) = match (number, self.tokens.get(self.at.min(self.end))) {
+            (Some(number), _) => {
+                let found = format!("`{}`", number.text);
+                (self.tokens[number.first].place, found)
+            }
+            (None, Some(next)) => (next.place, next.quoted()),
+            (None, None) => {
                 let place = self.tokens.last().map_or((1, 1), |last| last.place);
                 (place, "the end of the equation".to_owned())
             }
         };
-        Err(refused(self.file, place, found, expected))
+        Err(ImportError::at(self.file, place, found, expected))
     }
 
     pub(super) fn here(&mut self) -> (usize, usize) {
@@ -217,7 +222,6 @@ impl<'a> Reader<'a> {
         self.pieces.push((place, text.into()));
     }
 
-    /// One more nested group.
     pub(super) fn deepen(&mut self) -> Read<()> {
         self.depth += 1;
         match self.depth > MAX_DEPTH {
@@ -235,9 +239,6 @@ impl<'a> Reader<'a> {
         let (at, after) = (self.at, self.after_argument(self.at));
         let (first, end) = match &self.tokens[at].kind {
             Kind::Open => (at + 1, after - 1),
-            Kind::Number(text) if text.len() > 1 => {
-                return self.unexpected("braces around an argument of several digits");
-            }
             _ => (at, after),
         };
         let outer_end = std::mem::replace(&mut self.end, end);
@@ -264,11 +265,11 @@ impl Reader<'_> {
 
     /// Whether the number at a place was read with `\times 10^{-3}` behind it; goes back there if so.
     pub(super) fn number_takes_power_of_ten(&mut self, number: usize) -> bool {
-        let behind = self.tokens[number + 1..self.at].iter();
-        let takes = matches!(self.kind(number), Some(Kind::Number(_)))
-            && behind
-                .take_while(|token| token.kind != Kind::Superscript)
-                .any(|token| token.is_command("times") || token.is_command("cdot"));
+        let takes = self.number_at(number).is_some_and(|found| {
+            let behind = self.tokens[found.behind..self.at].iter();
+            let mut base = behind.take_while(|token| token.kind != Kind::Superscript);
+            base.any(|token| token.is_command("times") || token.is_command("cdot"))
+        });
         if takes {
             self.at = number;
         }
@@ -277,9 +278,15 @@ impl Reader<'_> {
 
     /// Whether a number follows, in braces or without.
     pub(super) fn is_number_next(&self) -> bool {
-        let mut rest = self.tokens[self.at..self.end].iter();
-        let next = rest.find(|token| token.kind != Kind::Open && !is_blank(&token.kind));
-        next.is_some_and(|token| matches!(token.kind, Kind::Number(_)))
+        let is_passed = |at: &usize| {
+            let kind = &self.tokens[*at].kind;
+            *kind == Kind::Open || is_blank(kind)
+        };
+        let next = (self.at..self.end).find(|at| !is_passed(at));
+        [Some(self.at), next]
+            .into_iter()
+            .flatten()
+            .any(|at| self.number_at(at).is_some())
     }
 
     /// The first of some places, in rising order, that is in the argument of a command for text; that command.
@@ -301,33 +308,33 @@ impl Reader<'_> {
     /// Whether a fraction of two integers follows.
     pub(super) fn is_fraction_of_integers(&self) -> bool {
         let is_fraction = matches!(self.kind(self.at), Some(Kind::Command(name)) if has("frac dfrac tfrac cfrac", name));
-        let braces = [Kind::Open, Kind::Close, Kind::Open, Kind::Close];
-        let of_groups =
-            [1, 3, 4, 6].map(|place| self.kind(self.at + place)) == braces.each_ref().map(Some);
-        let places = if of_groups { [2, 5] } else { [1, 2] };
-        is_fraction && places.iter().all(|&place| self.is_integer(self.at + place))
+        let behind_integer = |at: usize| {
+            let behind = self.after_argument(at);
+            let inside = match self.kind(at)? {
+                Kind::Open => at + 1..behind - 1,
+                _ => at..behind,
+            };
+            let is_digit = |token: &Token| matches!(token.kind, Kind::Character('0'..='9'));
+            let is_integer = !inside.is_empty() && self.tokens[inside].iter().all(is_digit);
+            is_integer.then_some(behind)
+        };
+        is_fraction
+            && behind_integer(self.at + 1)
+                .and_then(behind_integer)
+                .is_some()
     }
 
     /// Whether the last thing that follows is an integer alone in parentheses, as equations are numbered by hand.
     pub(super) fn is_lone_integer(&self) -> bool {
         let is_one_of = |at: usize, all: &str| matches!(self.kind(at), Some(Kind::Character(c)) if all.contains(*c));
-        let is_last = match self.kind(self.at + 3) {
+        let is_last = |at: usize| match self.kind(at) {
             Some(Kind::Character(c)) => ".,".contains(*c),
             Some(kind) => kind.ends_term(),
             None => true,
         };
+        let behind = self.behind_integer(self.at + 1);
         is_one_of(self.at, "([")
-            && self.is_integer(self.at + 1)
-            && is_one_of(self.at + 2, ")]")
-            && is_last
-    }
-
-    /// Whether the token at a place is a whole number.
-    fn is_integer(&self, at: usize) -> bool {
-        match self.kind(at) {
-            Some(Kind::Number(text)) => text.bytes().all(|byte| byte.is_ascii_digit()),
-            _ => false,
-        }
+            && behind.is_some_and(|behind| is_one_of(behind, ")]") && is_last(behind + 1))
     }
 }
 

@@ -3,7 +3,6 @@
 use std::collections::HashMap;
 use std::rc::Rc;
 
-use super::super::equations::refused;
 use super::super::error::ImportError;
 use super::document::{CASES, LAYOUTS, is_one_of};
 use super::token::{Kind, Token};
@@ -14,7 +13,6 @@ const WITHOUT_CELLS: &str = "equation displaymath dmath dgroup";
 const WITH_CELLS: &str = "array tabular tabularx longtable matrix pmatrix bmatrix Bmatrix vmatrix Vmatrix smallmatrix \
     subarray substack align";
 
-/// A macro.
 #[derive(Debug, PartialEq)]
 pub(super) struct Macro {
     pub(super) parameters: usize,
@@ -25,23 +23,21 @@ pub(super) struct Macro {
     pub(super) matters: bool,
 }
 
+/// Why something is not read, behind its name, and what would be.
+pub(super) type Refusal = (&'static str, &'static str);
+
 /// What a command means that the document defines.
 #[derive(Clone, Debug)]
 pub(super) enum Meaning {
     Macro(Rc<Macro>),
     /// The meaning that a command or character had when `\let` named it.
     Same(Kind),
-    /// A definition that is not read: why, and what would be.
-    Unread {
-        why: &'static str,
-        expected: &'static str,
-        matters: bool,
-    },
+    /// A definition that is not read, and whether mathematics may be in it.
+    Unread(Refusal, bool),
     /// An environment whose contents are not read.
     Verbatim,
 }
 
-/// A group that is open.
 struct Scope {
     opener: Token,
     /// What ends it; nothing for a cell, which ends with its column, row or environment.
@@ -111,7 +107,6 @@ impl Scopes {
         });
     }
 
-    /// Ends scopes until `depth` are left.
     pub(super) fn leave_to(&mut self, depth: usize) {
         while self.open.len() > depth {
             let Some(scope) = self.open.pop() else { return };
@@ -199,7 +194,7 @@ impl Scopes {
                 }
                 _ => format!("what {} closes before it", token.quoted()),
             };
-            return Err(refused(file, token.place, token.quoted(), expected));
+            return Err(ImportError::at(file, token.place, token.quoted(), expected));
         }
         if let Some(place) = place {
             self.leave_to(place);

@@ -1,11 +1,11 @@
 //! From a document's displays to sections of equations: one per phase.
 
-use super::super::equations::{Section, Sections, complete, refused, text_of};
+use super::super::equations::{Section, Sections, complete, text_of};
 use super::super::error::ImportError;
 use super::document::{Item, LAYOUTS, WITH_COLUMNS, is_one_of, items, unread};
 use super::markdown;
 use super::names::SymbolNames;
-use super::reader::{Digits, Reader};
+use super::reader::{Digits, Reader, Symbol};
 use super::token::{Kind, Token, group_length};
 
 /// Environments that arrange lines only if whole equations are in them.
@@ -64,7 +64,7 @@ pub(in crate::import) fn read(
     }
     if let (true, Some((token, found))) = (document.sections.is_empty(), document.strange) {
         let expected = format!("\\ddot z_1 and so on, with {}", names.expected());
-        return Err(refused(file, token.place, found, expected));
+        return Err(ImportError::at(file, token.place, found, expected));
     }
     let expected = match is_markdown {
         true => "an equation such as $$ \\ddot z_1 = 0.5 z_1 + u_1 $$",
@@ -73,42 +73,42 @@ pub(in crate::import) fn read(
     complete(file, document.sections, text.lines().count(), expected)
 }
 
+/// The left sides of a formula and the coordinates that they are of, if of any.
+fn left_sides(file: &str, names: &SymbolNames, tokens: &[Token]) -> Vec<(Symbol, Option<usize>)> {
+    let Ok(mut reader) = Reader::new(file, names, tokens) else {
+        return Vec::new();
+    };
+    let found = reader.left_sides().into_iter();
+    let with_output = |(_, symbol, _)| {
+        let output = reader.output(&symbol);
+        (symbol, output)
+    };
+    found.map(with_output).collect()
+}
+
 /// Refuses equations in the lines of the text for coordinates that no display has: they would be dropped.
 fn refuse_others_in_lines(document: &Document<'_>, items: &[Item]) -> Result<(), ImportError> {
-    let equations = document
-        .sections
-        .iter()
-        .flat_map(|section| &section.equations);
-    let outputs: Vec<usize> = equations.map(|equation| equation.output).collect();
-    for tokens in items.iter().filter_map(|item| item.equations(true)) {
-        let Ok(mut reader) = Reader::new(document.file, document.names, tokens) else {
-            continue;
-        };
-        let left_sides = reader.left_sides();
-        let mut symbols = left_sides.iter().map(|(_, symbol, _)| symbol);
-        let other =
-            symbols.find(|symbol| reader.output(symbol).is_some_and(|k| !outputs.contains(&k)));
-        if let Some(symbol) = other {
+    let (file, names) = (document.file, document.names);
+    let equations = document.sections.iter().flat_map(|s| &s.equations);
+    let known: Vec<usize> = equations.map(|equation| equation.output).collect();
+    let in_lines = items.iter().filter_map(|item| item.equations(true));
+    let mut found = in_lines.flat_map(|tokens| left_sides(file, names, tokens));
+    match found.find(|(_, output)| output.is_some_and(|output| !known.contains(&output))) {
+        None => Ok(()),
+        Some((symbol, _)) => {
             let found = format!("{} in a line of the text", symbol.quoted());
             let expected = "a display for it, as for the other equations";
-            return Err(refused(document.file, symbol.place, found, expected));
+            Err(ImportError::at(file, symbol.place, found, expected))
         }
     }
-    Ok(())
 }
 
 /// Whether a left side `\ddot z_1` has an index, so that `z` alone is no coordinate.
 fn has_indexed_left_side(file: &str, items: &[Item], in_lines: bool) -> bool {
-    let default = SymbolNames::default();
-    let mut displays = items.iter().filter_map(|item| item.equations(in_lines));
-    displays.any(|tokens| {
-        let Ok(mut reader) = Reader::new(file, &default, tokens) else {
-            return false;
-        };
-        let left_sides = reader.left_sides();
-        let mut symbols = left_sides.iter().map(|(_, symbol, _)| symbol);
-        symbols.any(|symbol| reader.output(symbol).is_some())
-    })
+    let names = SymbolNames::default();
+    let formulas = items.iter().filter_map(|item| item.equations(in_lines));
+    let mut found = formulas.flat_map(|tokens| left_sides(file, &names, tokens));
+    found.any(|(_, output)| output.is_some())
 }
 
 /// The tokens without `\begin` and `\end` of environments that arrange lines, and without the
@@ -144,7 +144,7 @@ fn flattened(file: &str, tokens: &[Token]) -> Result<Vec<Token>, ImportError> {
             {
                 if open.pop().map(|begin| &begin.kind) != Some(&Kind::Begin(name.clone())) {
                     let expected = "environments that end in the order in which they begin";
-                    return Err(refused(file, token.place, token.quoted(), expected));
+                    return Err(ImportError::at(file, token.place, token.quoted(), expected));
                 }
                 let next = tokens.get(at);
                 if next.is_some_and(|token| token.is_command("right")) {
@@ -159,7 +159,7 @@ fn flattened(file: &str, tokens: &[Token]) -> Result<Vec<Token>, ImportError> {
         Some(token) => {
             let found = format!("{} without its end", token.quoted());
             let expected = "environments that end inside their display";
-            Err(refused(file, token.place, found, expected))
+            Err(ImportError::at(file, token.place, found, expected))
         }
     }
 }
@@ -227,7 +227,12 @@ impl Document<'_> {
             return Ok(());
         };
         if let Some((token, expected)) = unread(tokens) {
-            return Err(refused(self.file, token.place, token.quoted(), expected));
+            return Err(ImportError::at(
+                self.file,
+                token.place,
+                token.quoted(),
+                expected,
+            ));
         }
         let flat = flattened(self.file, tokens);
         let mut reader = match &flat {
@@ -242,7 +247,7 @@ impl Document<'_> {
         if let Some(token) = reader.in_text(&places) {
             let (place, found) = (token.place, format!("an equation in {}", token.quoted()));
             let expected = "equations in the formula itself";
-            return Err(refused(self.file, place, found, expected));
+            return Err(ImportError::at(self.file, place, found, expected));
         }
         for (at, symbol, after) in found {
             let token = reader.tokens[at].clone();
@@ -261,7 +266,7 @@ impl Document<'_> {
         }
         flat?;
         let refuse = |token: &Token, found: String, expected: &str| {
-            Err(refused(self.file, token.place, found, expected))
+            Err(ImportError::at(self.file, token.place, found, expected))
         };
         if let Some((token, found)) = strange {
             return refuse(&token, found, &self.names.expected());
@@ -336,7 +341,12 @@ impl Document<'_> {
             {
                 let name = named.unwrap_or_default();
                 let found = format!("phase `{name}` again, as in line {}", earlier.line);
-                return Err(refused(self.file, token.place, found, "each phase once"));
+                return Err(ImportError::at(
+                    self.file,
+                    token.place,
+                    found,
+                    "each phase once",
+                ));
             }
             self.sections.push(Section::new(named, token.place.0));
         }

@@ -19,7 +19,7 @@ pub(super) struct Token {
 pub(super) enum Kind {
     /// `\frac`, `\,`; without its backslash.
     Command(String),
-    /// `\begin{...}`; it, the next two and numbers are made of tokens that follow each other.
+    /// `\begin{...}`; it and the next two are made of tokens that follow each other.
     Begin(String),
     /// `\end{...}`.
     End(String),
@@ -35,11 +35,8 @@ pub(super) enum Kind {
     Dollar,
     /// `$$`, or a fence of mathematics in Markdown.
     Display,
-    /// Digits with at most one point, and an exponent as in `1.2e-3`.
-    Number(String),
     /// `#1`.
     Parameter(usize),
-    /// The text after `%`; a heading in Markdown.
     Comment(String),
     /// An empty line.
     Paragraph,
@@ -49,7 +46,6 @@ pub(super) enum Kind {
 }
 
 impl Kind {
-    /// A token of the kind in quotes, for messages.
     pub(super) fn quoted(&self) -> String {
         let text = match self {
             Kind::Command(name) => format!("\\{name}"),
@@ -64,7 +60,6 @@ impl Kind {
             Kind::Break => "\\\\".to_owned(),
             Kind::Dollar => "$".to_owned(),
             Kind::Display => "$$".to_owned(),
-            Kind::Number(text) => text.clone(),
             Kind::Parameter(number) => format!("#{number}"),
             Kind::Comment(_) => "%".to_owned(),
             Kind::Paragraph => return "an empty line".to_owned(),
@@ -78,26 +73,11 @@ impl Kind {
 
     /// Whether it ends every term that it stands behind.
     pub(super) fn ends_term(&self) -> bool {
-        match self {
-            Kind::Align
-            | Kind::Break
-            | Kind::Close
-            | Kind::Label(_)
-            | Kind::Comment(_)
-            | Kind::Paragraph => true,
-            Kind::Command(_)
-            | Kind::Begin(_)
-            | Kind::End(_)
-            | Kind::Open
-            | Kind::Superscript
-            | Kind::Subscript
-            | Kind::Dollar
-            | Kind::Display
-            | Kind::Number(_)
-            | Kind::Parameter(_)
-            | Kind::Unread(..)
-            | Kind::Character(_) => false,
-        }
+        use Kind::{Align, Break, Close, Comment, Label, Paragraph};
+        matches!(
+            self,
+            Align | Break | Close | Label(_) | Comment(_) | Paragraph
+        )
     }
 }
 
@@ -137,7 +117,6 @@ pub(super) fn group_length<'t>(tokens: impl Iterator<Item = &'t Token>) -> Optio
     None
 }
 
-/// The tokens of a text.
 pub(super) struct Lexer<'t> {
     /// The lines after the one that is read.
     lines: Lines<'t>,
@@ -185,7 +164,6 @@ impl Iterator for Lexer<'_> {
 }
 
 impl<'t> Lexer<'t> {
-    /// The tokens of a TeX file.
     pub(super) fn new(text: &'t str) -> Self {
         Self {
             lines: text.lines(),
@@ -226,7 +204,6 @@ impl<'t> Lexer<'t> {
         self.lines = "".lines();
     }
 
-    /// Ends the text.
     pub(super) fn end(&mut self) {
         self.end_after_line();
         self.next = self.characters.len();
@@ -358,8 +335,9 @@ impl<'t> Lexer<'t> {
         let values = number
             .chars()
             .filter_map(|c| digits.chars().position(|d| d == c));
-        let number: String = values.map(|value| value.to_string()).collect();
-        kinds.extend([Kind::Number(number.clone()), Kind::Close]);
+        let digits = values.filter_map(|value| char::from_digit(value as u32, 10));
+        kinds.extend(digits.map(Kind::Character));
+        kinds.push(Kind::Close);
         (!number.is_empty()).then_some(kinds)
     }
 

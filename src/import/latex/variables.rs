@@ -1,6 +1,6 @@
 //! Functions with their arguments, and variables with dots and subscripts.
 
-use super::super::equations::refused;
+use super::super::error::ImportError;
 use super::names::is_greek;
 use super::reader::{BARE, FONTS, INVISIBLE, Last, Read, Reader, Symbol, has};
 use super::token::Kind;
@@ -136,7 +136,7 @@ impl Reader<'_> {
         let next = self.next_kind();
         let goes_on = match &next {
             Some(Kind::Command(name)) if function(name).is_some() => false,
-            Some(kind) => self.starts_factor(kind) && !matches!(kind, Kind::Number(_)),
+            Some(kind) => self.starts_factor(kind) && self.number_at(self.at).is_none(),
             None => false,
         };
         let is_dot = matches!(&next, Some(Kind::Command(name)) if has("cdot times", name));
@@ -163,7 +163,7 @@ impl Reader<'_> {
             (None, 0) if symbol.name == "pi" => format!("{:?}", std::f64::consts::PI),
             _ => {
                 let (found, expected) = (symbol.quoted(), self.names.expected());
-                return Err(refused(self.file, symbol.place, found, expected));
+                return Err(ImportError::at(self.file, symbol.place, found, expected));
             }
         };
         self.push(place, name);
@@ -196,6 +196,7 @@ impl Reader<'_> {
                 self.subscript(&mut name)?;
                 let end = self.at;
                 self.tokens[power..end].rotate_left(behind - power);
+                self.is_around[power..end].rotate_left(behind - power);
                 self.link(power..end);
                 self.at = power + (end - behind);
             }
@@ -279,8 +280,7 @@ impl Reader<'_> {
         let mut word = String::new();
         for token in &self.tokens[from..to.min(self.end)] {
             match &token.kind {
-                Kind::Character(c) if c.is_ascii_alphabetic() || *c == ',' => word.push(*c),
-                Kind::Number(text) if !text.contains(['.', '+', '-']) => word.push_str(text),
+                Kind::Character(c) if c.is_ascii_alphanumeric() || *c == ',' => word.push(*c),
                 Kind::Command(name) if is_greek(name) => word.push_str(name),
                 Kind::Command(name) if has(FONTS, name) || has(INVISIBLE, name) => {}
                 Kind::Open | Kind::Close => {}

@@ -41,34 +41,25 @@ pub enum ReferenceInput {
     None,
 }
 
-/// One control step along a recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StepRow {
-    /// Segment of the recording, from zero.
     pub segment: usize,
-    /// Time of the measurement, s.
     pub time_s: f64,
-    /// The command.
     pub command: Command,
     /// Lifted input in SI units: with the transpose lift `W_eᵀ u_lat`, with the consistent lift the
     /// torques at the links and the force that they produce.
     pub input: [f64; STATE_DIM],
     /// Recorded torques, N m, averaged over the time that the command is held.
     pub recorded_torque_nm: [f64; JOINT_DIM],
-    /// Reference in latent coordinates.
     pub z_reference: Vec<f64>,
-    /// Measurement in latent coordinates.
     pub z: Vec<f64>,
     /// Latent position that the step's own plan expects at the end of its horizon.
     pub z_planned: Option<Vec<f64>>,
 }
 
-/// All steps along a recording, and what they come to.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Run {
-    /// The steps, segment by segment.
     pub rows: Vec<StepRow>,
-    /// The summary.
     pub summary: Summary,
     /// The model and its baselines, see [`control_metrics`](super::control_metrics); none where only the controller
     /// was at hand.
@@ -293,7 +284,6 @@ pub(super) fn set_reference(
     Ok(())
 }
 
-/// Mean recorded torques over the time that a command is held; none if one is not finite.
 fn held_torque(segment: &Segment, sample: usize, step_s: f64) -> Option<[f64; JOINT_DIM]> {
     let until = segment.time_s[sample] + step_s - 1e-9;
     let count = segment.time_s[sample..]

@@ -11,21 +11,16 @@ use crate::sim::{
     restart_windows,
 };
 
-/// Constants of the pendulum.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Aslip {
-    /// Mass `m`, kg.
     pub mass_kg: f64,
-    /// Spring constant `k_s`, N/m.
     pub stiffness_n_m: f64,
     /// Vertical rest length `l_0`, m; the horizontal one is 0.
     pub rest_length_m: f64,
-    /// Gravity `g`, m/s^2.
     pub gravity_m_s2: f64,
 }
 
 impl Aslip {
-    /// The constants that the paper's comparison uses.
     pub const PUBLISHED: Self = Self {
         mass_kg: 12.01,
         stiffness_n_m: 250.0,
@@ -33,7 +28,6 @@ impl Aslip {
         gravity_m_s2: 9.81,
     };
 
-    /// The constants with their units, for a reader.
     pub fn constants(&self) -> String {
         format!(
             "m = {:.2} kg, k_s = {:.1} N/m, l_0 = {:.3} m, g = {:.2} m/s^2",
@@ -142,17 +136,13 @@ impl OdeSystem for PendulumSpan<'_> {
 /// Body x and z, m, that the pendulum predicts for each sample of a segment; none after a divergence.
 pub type AslipRollout = Vec<Option<Vector2<f64>>>;
 
-/// Residuals of the pendulum.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct AslipSums {
-    /// Body x, m.
     pub x: FitSums,
-    /// Body z, m.
     pub z: FitSums,
 }
 
 impl AslipSums {
-    /// Adds the residuals of a rollout of `segment`.
     pub fn add(&mut self, segment: &Segment, rollout: &[Option<Vector2<f64>>]) {
         for (sample, position) in rollout.iter().enumerate() {
             if let Some(position) = position {
@@ -168,7 +158,6 @@ impl AslipSums {
 pub(super) struct Stance {
     /// Mean position of the feet in contact at the sample where the contact began.
     pub(super) foot_m: Vector2<f64>,
-    /// Force of the legs on the body.
     pub(super) force_n: Vector2<f64>,
 }
 
@@ -200,13 +189,11 @@ pub(super) fn stances(
     Ok(stances)
 }
 
-/// Rotation from the body frame to the world, from roll, pitch and yaw.
 fn orientation(segment: &Segment, sample: usize) -> Rotation3<f64> {
     let angle = |index: usize| segment.x[(JOINT_DIM + 3 + index, sample)];
     Rotation3::from_euler_angles(angle(0), angle(1), angle(2))
 }
 
-/// Mean of the feet in contact in the world's plane of x and z.
 fn mean_foot(robot: &Robot, segment: &Segment, sample: usize) -> Vector2<f64> {
     let joints = segment.joints(sample);
     let (mut sum, mut count) = (Vector3::zeros(), 0.0);
@@ -219,62 +206,4 @@ fn mean_foot(robot: &Robot, segment: &Segment, sample: usize) -> Vector2<f64> {
     let in_world = orientation(segment, sample) * in_body
         + Vector3::new(body[BODY_X], body[BODY_X + 1], body[BODY_Z]);
     Vector2::new(in_world.x, in_world.z)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// A body at rest at `height`, legs bent, without torques; `feet` for all samples.
-    fn at_rest(height: f64, feet: [bool; 4], count: usize) -> Segment {
-        let mut segment = Segment::still("rest", (0..count).map(|k| 0.002 * k as f64).collect());
-        segment.x.row_mut(BODY_Z).fill(height);
-        for joint in 0..JOINT_DIM {
-            segment.x.row_mut(joint).fill([0.0, 0.8, -1.6][joint % 3]);
-        }
-        segment.feet.fill(feet);
-        segment
-    }
-
-    fn rms_z(segment: &Segment) -> f64 {
-        let robot = Robot::by_name("go1").expect("known");
-        let mut sums = AslipSums::default();
-        let rollout = Aslip::PUBLISHED
-            .rollout(&InputRule::published(robot), segment, Restart::Never)
-            .expect("runs");
-        sums.add(segment, &rollout);
-        sums.z.fit().expect("samples").rms
-    }
-
-    #[test]
-    fn pendulum_in_flight_falls_freely() {
-        let count = 101;
-        let expected: f64 = (0..count)
-            .map(|k| (0.5 * 9.81 * (0.002 * k as f64).powi(2)).powi(2))
-            .sum();
-        let expected = (expected / count as f64).sqrt();
-        let found = rms_z(&at_rest(1.0, [false; 4], count));
-        assert!((found - expected).abs() < 1e-8, "{found} {expected}");
-    }
-
-    #[test]
-    fn pendulum_in_contact_swings_about_the_springs_equilibrium() {
-        // feet hang below the hips at f; the spring's rest is f + l0, its equilibrium g m / k below
-        let segment = at_rest(0.3, [true; 4], 201);
-        let robot = Robot::by_name("go1").expect("known");
-        let foot = mean_foot(robot, &segment, 0).y;
-        let Aslip {
-            mass_kg,
-            stiffness_n_m,
-            rest_length_m,
-            gravity_m_s2,
-        } = Aslip::PUBLISHED;
-        let equilibrium = foot + rest_length_m - gravity_m_s2 * mass_kg / stiffness_n_m;
-        let rate = (stiffness_n_m / mass_kg).sqrt();
-        let residual = |t: f64| (0.3 - equilibrium) * (1.0 - (rate * t).cos());
-        let expected: f64 = (0..201).map(|k| residual(0.002 * k as f64).powi(2)).sum();
-        let expected = (expected / 201.0).sqrt();
-        let found = rms_z(&segment);
-        assert!((found - expected).abs() < 1e-7, "{found} {expected}");
-    }
 }

@@ -14,49 +14,31 @@ use crate::recording::{Recording, Segment};
 use crate::robot::Robot;
 use crate::sim::{LatentSegment, Restart, Rollout, rollout};
 
-/// What was recorded and predicted for one segment.
 #[derive(Debug, Clone)]
 pub struct SegmentRun<'a> {
-    /// The recorded samples.
     pub segment: &'a Segment,
-    /// The same as the model sees them.
     pub latent: LatentSegment,
-    /// The model's rollout over the whole segment.
     pub full: Rollout,
-    /// The model's rollouts between restarts.
     pub restarted: Rollout,
     /// The baselines' rollouts over the whole segment, in the order of [`Assessment::baselines`].
     pub baselines: Vec<AslipRollout>,
 }
 
-/// A model compared with recordings.
 #[derive(Debug, Clone)]
 pub struct Assessment<'a> {
-    /// Names of the robot's coordinates.
     pub names: Vec<String>,
-    /// Their units.
     pub units: Vec<String>,
-    /// Time between restarts, in s.
     pub restart_every_s: f64,
-    /// Rollouts, a segment.
     pub runs: Vec<SegmentRun<'a>>,
-    /// Residuals of rollouts over whole segments.
     pub full: CoordinateSums,
-    /// Residuals of restarted rollouts.
     pub restarted: CoordinateSums,
     /// Residuals of a robot that keeps the velocity it has at the start, over whole segments and restarted.
     pub constant_velocity: [CoordinateSums; 2],
-    /// Decoder and latent accelerations.
     pub pointwise: PointwiseSums,
-    /// Template models under the same recorded forces.
     pub baselines: Vec<Baseline>,
-    /// Linearisation of each phase.
     pub linearised: Vec<Option<LinearisedPhase>>,
-    /// What the plain lift loses.
     pub lift: LiftSums,
-    /// Active terms, all phases together.
     pub active_terms: usize,
-    /// What speaks against using the model on these recordings.
     pub remarks: Vec<String>,
 }
 
@@ -135,7 +117,6 @@ impl<'a> Assessment<'a> {
         combined_loss(self.decoder_mean_square()?, self.active_terms, LAMBDA)
     }
 
-    /// Fit of the coordinate with this name.
     pub fn fit(&self, sums: &CoordinateSums, name: &str) -> Option<Fit> {
         let index = self.names.iter().position(|known| known == name)?;
         sums.fits()[index]

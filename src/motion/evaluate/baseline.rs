@@ -12,13 +12,9 @@ use crate::sim::{Restart, SimError};
 /// A template, where its constants come from, and its residuals.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Baseline {
-    /// Its name in tables, such as `ASLIP, published constants`.
     pub name: &'static str,
-    /// The template.
     pub template: Aslip,
-    /// Residuals over whole segments.
     pub full: AslipSums,
-    /// Residuals of rollouts that start again from the recorded state.
     pub restarted: AslipSums,
 }
 
@@ -121,37 +117,4 @@ fn least_squares(rows: &[[f64; 3]], columns: &[usize], right: &DVector<f64>) -> 
     let normal = scaled.tr_mul(&scaled).cholesky()?;
     let solution = normal.solve(&scaled.tr_mul(right));
     Some((solution.iter().zip(&norms)).map(|(s, n)| s / n).collect())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::recording;
-    use crate::robot::Robot;
-
-    #[test]
-    fn fitted_pendulum_explains_short_rollouts_better_than_the_published_one() {
-        let recording = recording::shipped("go1/test_01");
-        let rule = &InputRule::published(Robot::by_name("go1").expect("known"));
-        let segments: Vec<&Segment> = recording.segments.iter().collect();
-        let mut baselines = Baseline::all(rule, &segments).expect("legs are bent");
-        assert_eq!(baselines.len(), 2);
-        for baseline in &mut baselines {
-            let rollout = baseline.add(rule, segments[0], Restart::Every(0.1));
-            rollout.expect("integrates");
-        }
-        let rms = |b: &Baseline| b.restarted.z.fit().expect("samples").rms;
-        assert!(rms(&baselines[1]) < rms(&baselines[0]));
-        let fitted = baselines[1].template;
-        assert!((8.0..30.0).contains(&fitted.mass_kg), "{fitted:?}");
-    }
-
-    #[test]
-    fn least_squares_recovers_coefficients_and_refuses_dependent_columns() {
-        let rows = [[1.0, 2.0], [0.0, 1.0], [3.0, 1.0], [1.0, 1.0]].map(|[a, b]| [a, b, 0.0]);
-        let right = DVector::from_vec(vec![8.0, 3.0, 9.0, 5.0]);
-        let found = least_squares(&rows, &[0, 1], &right).expect("independent");
-        assert!((found[0] - 2.0).abs() < 1e-12 && (found[1] - 3.0).abs() < 1e-12);
-        assert_eq!(least_squares(&rows, &[0, 2], &right), None);
-    }
 }

@@ -19,7 +19,6 @@ const UNNAMED: f64 = 4.0;
 /// Part of the variance below which residuals count as equal.
 const NO_RESIDUAL: f64 = 1e-9;
 
-/// How coefficients are to be read instead.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CoefficientSlip {
     /// The option that states another order of the terms.
@@ -28,7 +27,6 @@ pub struct CoefficientSlip {
     pub exchanged: Option<[String; 2]>,
 }
 
-/// What the readings of coefficients explain.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CoefficientTrials {
     /// R^2 in each order that has a name, without those that are the same in this library.
@@ -161,7 +159,6 @@ fn readings(model: &ReducedModel, given: Option<LibraryOrder>) -> Result<Vec<Rea
     Ok(readings)
 }
 
-/// The option that states an order.
 fn option(model: &ReducedModel, order: LibraryOrder) -> String {
     let (library, name) = (model.library(), order.name());
     match (library.choice(), name, library.as_standard()) {
@@ -174,7 +171,6 @@ fn option(model: &ReducedModel, order: LibraryOrder) -> String {
     }
 }
 
-/// The samples of each phase.
 fn samples(
     model: &ReducedModel,
     segments: &[&Segment],

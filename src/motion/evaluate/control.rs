@@ -6,21 +6,15 @@ use super::metrics::Mean;
 use super::torque::{ByContact, Comparison};
 use crate::mpc::{Command, Status};
 
-/// Times of steps, µs.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct StepTimes {
-    /// Median.
     pub p50: f64,
-    /// 99th percentile.
     pub p99: f64,
-    /// Largest.
     pub max: f64,
 }
 
-/// Summary of a run along a recording.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Summary {
-    /// Control steps.
     pub steps: usize,
     /// Steps with a checked plan within all limits.
     pub solved: usize,
@@ -28,7 +22,6 @@ pub struct Summary {
     pub softened: usize,
     /// Steps without a plan of their own.
     pub failed: usize,
-    /// Wall times of the steps.
     pub step_us: StepTimes,
     /// Wall times of the preparations between steps, which no command waits for:
     /// [`Controller::prepare`](crate::mpc::Controller::prepare).
@@ -43,7 +36,6 @@ pub struct Summary {
     /// Root mean square over all steps, stages and latents of planned minus reference position, in
     /// standard deviations of the reference.
     pub tracking_rms: Option<f64>,
-    /// Steps with a torque beyond the robot's limits.
     pub limit_violations: usize,
     /// Steps that leave a friction cone by more than a thousandth of the weight; none if the
     /// controller constrains none.
@@ -55,7 +47,6 @@ pub struct Summary {
     pub implausible: usize,
 }
 
-/// Everything that a summary is made of.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Tally {
     /// The counts; [`Self::summary`] fills in the rest.
@@ -65,7 +56,6 @@ pub(super) struct Tally {
     inconsistency: Mean,
     pub(super) torque: Comparison,
     pub(super) lift: Comparison,
-    /// Squares of planned minus reference positions.
     pub(super) tracking: Mean,
 }
 

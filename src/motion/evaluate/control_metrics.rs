@@ -27,7 +27,6 @@ pub struct ControlMetrics {
     pub recovery_rms_m: Option<f64>,
     /// Planned minus reference positions after the pushes, in standard deviations of the reference.
     pub tracking_rms: Option<f64>,
-    /// The same figures of others.
     pub baseline: Baselines,
     /// Share of the steps of the same run that have no plan of their own.
     pub unplanned_share: f64,
@@ -35,7 +34,6 @@ pub struct ControlMetrics {
     pub failure: Option<String>,
 }
 
-/// What a model is compared with.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Baselines {
     /// The same controller on a copy of the model with `ddz = g u_lat`, `g` fitted to this very recording.
@@ -48,30 +46,21 @@ pub struct Baselines {
     pub constant_velocity: ConstantVelocity,
 }
 
-/// Figures of the no-dynamics baseline.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NoDynamics {
-    /// See [`ControlMetrics::prediction_rms`].
     pub prediction_rms: Option<PredictionError>,
-    /// See [`ControlMetrics::torque_r2`].
     pub torque_r2: ByContact,
-    /// See [`ControlMetrics::torque_rms_nm`].
     pub torque_rms_nm: Option<f64>,
-    /// See [`ControlMetrics::recovery_rms_m`].
     pub recovery_rms_m: Option<f64>,
 }
 
-/// Figures of a baseline that only differs after pushes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Pushed {
-    /// See [`ControlMetrics::recovery_rms_m`].
     pub recovery_rms_m: Option<f64>,
 }
 
-/// Figures of a baseline that only predicts.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ConstantVelocity {
-    /// See [`ControlMetrics::prediction_rms`].
     pub prediction_rms: Option<PredictionError>,
 }
 

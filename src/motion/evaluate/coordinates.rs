@@ -11,9 +11,7 @@ use crate::sim::{LatentSegment, Rollout};
 #[derive(Debug, Clone, PartialEq)]
 pub struct CoordinateSums {
     sums: Vec<FitSums>,
-    /// The same, a phase apart.
     by_phase: Vec<Vec<FitSums>>,
-    /// Rollout windows added so far.
     pub windows: usize,
     /// Windows that diverged; their samples after that have no prediction and do not count.
     pub diverged: usize,
@@ -73,7 +71,6 @@ impl CoordinateSums {
         self.windows += rollout.windows.len();
     }
 
-    /// Adds the residuals of a predicted sample.
     fn add(&mut self, segment: &Segment, sample: usize, phase: usize, x: &DVector<f64>) {
         let sums = self.sums.iter_mut().zip(&mut self.by_phase[phase]);
         let recorded = segment.x.column(sample);
@@ -107,7 +104,6 @@ pub struct PointwiseSums {
 }
 
 impl PointwiseSums {
-    /// Empty sums for a model's phases.
     pub fn new(model: &ReducedModel) -> Self {
         Self {
             decoder: FitSums::default(),

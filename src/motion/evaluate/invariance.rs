@@ -29,18 +29,14 @@ pub struct Invariance {
     /// Largest change of a decoded joint angle for a body 1 m further on, rad/m: what a controller's joint
     /// targets and a plan's postures are off where x does not count from where the jump begins.
     pub joint_shift_rad_m: f64,
-    /// Each phase under its name.
     pub phases: Vec<PhaseInvariance>,
 }
 
-/// What one phase says.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PhaseInvariance {
-    /// Name of the phase.
     pub phase: String,
     /// Change of the body's acceleration for a robot 0.3 m further on, (m/s^2)/m.
     pub shift_x: f64,
-    /// The same to the left.
     pub shift_y: f64,
     /// Largest difference of forward and upward acceleration between a state with one joint off by 0.1 rad and its
     /// mirror image, m/s^2.
@@ -121,7 +117,6 @@ impl PhaseInvariance {
     }
 }
 
-/// The larger of two values; what is not a number is larger than any.
 fn larger(one: f64, other: f64) -> f64 {
     if other.is_nan() || other > one {
         other
@@ -130,7 +125,6 @@ fn larger(one: f64, other: f64) -> f64 {
     }
 }
 
-/// At rest, and 1 m/s along each axis.
 fn velocities() -> [DVector<f64>; 4] {
     std::array::from_fn(|index| {
         let mut dx = DVector::zeros(STATE_DIM);

@@ -16,7 +16,6 @@ const SMALL_FORCE_N: f64 = 1.0;
 /// recorded velocities and accelerations is added to the lifted torques.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct LiftSums {
-    /// Agreement of the torques over all joints jointly.
     pub torque: Comparison,
     inconsistency: Mean,
 }
@@ -73,33 +72,4 @@ pub const LAMBDA: f64 = 0.001;
 pub fn combined_loss(decoder_mean_square: f64, active_terms: usize, lambda: f64) -> Option<f64> {
     let logarithm = (active_terms > 0).then(|| (active_terms as f64).ln())?;
     Some(2.0 * decoder_mean_square + 2.0 * lambda * logarithm)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::{evaluate::shipped_model, recording};
-
-    #[test]
-    fn combined_loss_follows_equation_29() {
-        let loss = combined_loss(0.01, 10, LAMBDA).expect("terms");
-        assert!((loss - (0.02 + 0.002 * 10f64.ln())).abs() < 1e-15);
-        assert_eq!(combined_loss(0.01, 0, LAMBDA), None);
-    }
-
-    #[test]
-    fn more_latent_coordinates_lose_less_of_the_torques() {
-        let jump = recording::shipped("go1/test_01");
-        let [two, six] = ["go1-d2", "go1-d6"].map(|name| {
-            let (model, mut sums) = (shipped_model(name), LiftSums::default());
-            for segment in &jump.segments {
-                let added = sums.add(&model, segment);
-                added.expect("legs are bent");
-            }
-            sums
-        });
-        assert!(six.torque.r2().contact > two.torque.r2().contact);
-        assert!(six.torque.r2().contact.expect("contact") > 0.9);
-        assert!(six.inconsistency().expect("contact") < 1.0);
-    }
 }

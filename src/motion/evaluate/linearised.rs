@@ -11,7 +11,6 @@ pub const RANK_THRESHOLD: f64 = 0.01;
 /// One phase, linearised at the mean of the recorded `(z, dz, u_lat)` of that phase.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LinearisedPhase {
-    /// Recorded samples in the phase.
     pub samples: usize,
     /// Eigenvalues of `A = [0 I; d ddz/dz  d ddz/d dz]`, in 1/s, by falling real part.
     pub eigenvalues: Vec<Complex<f64>>,
@@ -33,7 +32,7 @@ impl LinearisedPhase {
         (*smallest > 0.0).then(|| largest / smallest)
     }
 
-    /// Number of singular values of the input gain above [`RANK_THRESHOLD`] of the largest.
+    /// Number of singular values of the input gain above 1 % of the largest.
     pub fn input_effective_rank(&self) -> usize {
         let largest = self.input_singular_values.first().copied().unwrap_or(0.0);
         let counts = |value: &&f64| **value > 0.0 && **value >= RANK_THRESHOLD * largest;
@@ -120,103 +119,4 @@ pub fn eigenvalues(matrix: DMatrix<f64>) -> Option<Vec<Complex<f64>>> {
         .find_map(|share| Schur::try_new(matrix.clone(), *share, iterations))?;
     let values = schur.complex_eigenvalues();
     Some(values.iter().map(|value| value * size).collect())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use nalgebra::DVector;
-
-    use crate::model::{FeetRule, Library, Phase, ReducedModel};
-
-    /// The one phase of a model with these terms, linearised at the mean of two samples of all coordinates.
-    fn linearised(terms: &[(&str, f64)], samples: [f64; 2]) -> Option<LinearisedPhase> {
-        let names: Vec<String> = terms.iter().map(|(term, _)| (*term).to_owned()).collect();
-        let library = Library::from_terms(1, &names).expect("terms parse");
-        let xi = terms.iter().map(|(_, coefficient)| *coefficient);
-        let model = ReducedModel::builder("hopper", library)
-            .phase(Phase {
-                name: "contact".to_owned(),
-                feet: FeetRule::Any,
-                xi: DMatrix::from_iterator(terms.len(), 1, xi),
-            })
-            .build()
-            .expect("valid");
-        let compiled = CompiledModel::new(&model).expect("compiles");
-        let row = DMatrix::from_row_slice(1, 2, &samples);
-        let segment = LatentSegment {
-            time_s: vec![0.0, 0.002],
-            z: row.clone(),
-            dz: row.clone(),
-            ddz: row.clone(),
-            u_lat: row,
-            phase: vec![0, 0],
-        };
-        let found = linearise_phases(&compiled, &[&segment]);
-        assert_eq!(found.len(), 1);
-        found.into_iter().next().flatten()
-    }
-
-    #[test]
-    fn a_phase_whose_gain_is_not_finite_at_its_mean_has_no_linearisation() {
-        let found = linearised(&[("dz1", -2.0), ("log(u1)", 3.0)], [0.0; 2]);
-        assert_eq!(found, None);
-    }
-
-    #[test]
-    fn damped_oscillator_has_its_textbook_eigenvalues_and_gain() {
-        let terms = [("z1", -40.0), ("dz1", -2.0), ("u1", 3.0)];
-        let phase = linearised(&terms, [0.1, 0.2]).expect("two samples");
-        // s^2 + 2 s + 40 = 0
-        assert!((phase.growth_rate().expect("one pair") + 1.0).abs() < 1e-12);
-        assert!((phase.eigenvalues[0].im - 39f64.sqrt()).abs() < 1e-9);
-        assert_eq!(phase.input_singular_values, [3.0]);
-        assert_eq!(phase.input_condition(), Some(1.0));
-        assert_eq!(phase.input_effective_rank(), 1);
-    }
-
-    /// `A - s I` is all but singular for each `s` that is found, the `s` add up to the trace, and the plain iteration
-    /// does not always end.
-    #[test]
-    fn eigenvalues_of_stiff_and_sparse_dynamics_are_found() {
-        let mut random = 1u64;
-        let mut next = || {
-            random = random
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1);
-            (random >> 11) as f64 / (1u64 << 53) as f64
-        };
-        let mut hung = 0;
-        for d in 2..=8 {
-            for _ in 0..300 {
-                let jacobian = DMatrix::from_fn(d, 2 * d, |_, _| match next() < 0.3 {
-                    true => (next() - 0.7) * 10f64.powf(5.0 * next()),
-                    false => 0.0,
-                });
-                let matrix = state_matrix(&jacobian);
-                let plain = Schur::try_new(matrix.clone(), f64::EPSILON, 1000);
-                hung += usize::from(plain.is_none());
-                let found = eigenvalues(matrix.clone()).expect("finite");
-                let sum: Complex<f64> = found.iter().sum();
-                let trace = matrix.trace();
-                let size = found.iter().map(|value| value.norm()).fold(1.0, f64::max);
-                assert!((sum.re - trace).abs() < 1e-9 * size && sum.im.abs() < 1e-9 * size);
-                let complex = matrix.map(Complex::from);
-                let size = matrix.norm();
-                for value in found {
-                    let shifted = &complex - DMatrix::identity(2 * d, 2 * d) * value;
-                    let any = DVector::from_fn(2 * d, |i, _| Complex::from(1.0 + (i as f64).sin()));
-                    let solved = shifted.lu().solve(&any);
-                    let grown = solved.map_or(f64::MAX, |solved| solved.norm() / any.norm());
-                    // A pivot near 0 overflows to a number that is none.
-                    let singular = grown.is_nan() || grown >= 1e6 / size;
-                    assert!(singular, "{value} of {matrix}");
-                }
-            }
-        }
-        assert!(
-            hung > 0,
-            "the plain iteration finds them all: larger shares are needed no more"
-        );
-    }
 }

@@ -1,6 +1,5 @@
 //! Root mean square and coefficient of determination.
 
-/// How far predicted samples are from recorded ones.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fit {
     /// Root mean square of the residuals, in the unit of the samples.
@@ -49,7 +48,6 @@ impl FitSums {
         total
     }
 
-    /// Number of pairs added.
     pub fn count(&self) -> usize {
         self.count
     }
@@ -69,7 +67,6 @@ impl FitSums {
     }
 }
 
-/// A running mean.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Mean {
     sum: f64,
@@ -82,43 +79,7 @@ impl Mean {
         self.count += 1;
     }
 
-    /// The mean of all values added so far; `None` before the first.
     pub fn get(&self) -> Option<f64> {
         (self.count > 0).then(|| self.sum / self.count as f64)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn sums(pairs: &[(f64, f64)]) -> FitSums {
-        let mut sums = FitSums::default();
-        pairs.iter().for_each(|&(y, p)| sums.add(y, p));
-        sums
-    }
-
-    #[test]
-    fn exact_prediction_is_perfect_the_mean_explains_nothing_and_a_still_record_has_no_r2() {
-        let fit = |rms, r2| Some(Fit { rms, r2 });
-        let exact: &[(f64, f64)] = &[(1.0, 1.0), (2.0, 2.0), (4.0, 4.0)];
-        for (pairs, expected) in [
-            (exact, fit(0.0, Some(1.0))),
-            (&[(1.0, 2.0), (3.0, 2.0)], fit(1.0, Some(0.0))),
-            (&[(2.0, 2.5)], fit(0.5, None)),
-            (&[], None),
-        ] {
-            assert_eq!(sums(pairs).fit(), expected, "{pairs:?}");
-        }
-    }
-
-    #[test]
-    fn merging_two_coordinates_ignores_the_distance_of_their_means() {
-        let mut merged = sums(&[(0.0, 0.0), (2.0, 1.0)]);
-        merged.merge_keeping_means(&sums(&[(100.0, 100.0), (102.0, 101.0)]));
-        let fit = merged.fit().expect("four pairs");
-        // residual squares 1 + 1, deviations 2 + 2 about the means 1 and 101
-        assert_eq!(fit.r2, Some(0.5));
-        assert_eq!(merged.count(), 4);
     }
 }

@@ -5,6 +5,8 @@
 //! `docs/mathematics.md` defines each figure once. Start with `assessment.rs`, then
 //! [`metrics`](Fit).
 
+#![allow(missing_docs, reason = "names say it all where there is no comment")]
+
 mod along_recording;
 mod aslip;
 mod assessment;
@@ -26,30 +28,23 @@ mod torque;
 mod verdict;
 
 pub use along_recording::{ReferenceInput, Run, StepRow, along_recording, lift_comparison};
-pub use aslip::{Aslip, AslipRollout, AslipSums};
+pub use aslip::{Aslip, AslipSums};
 pub use assessment::{Assessment, SegmentRun};
-pub use baseline::{Baseline, fit_aslip};
-pub use coefficient_trials::{CoefficientSlip, CoefficientTrials};
-pub use control::{StepTimes, Summary};
-pub use control_metrics::{
-    Baselines, ConstantVelocity, ControlMetrics, NoDynamics, Pushed, control_metrics,
-    usual_settings,
-};
+pub use baseline::Baseline;
+pub use control::Summary;
+pub use control_metrics::{ControlMetrics, control_metrics, usual_settings};
 pub use coordinates::{CoordinateSums, PointwiseSums};
 pub use error::EvaluateError;
-pub use invariance::{Invariance, PhaseInvariance};
-pub use lift::{LAMBDA, LiftSums, combined_loss};
-pub use linearised::{
-    LinearisedPhase, RANK_THRESHOLD, eigenvalues, linearise_phases, state_matrix,
-};
+pub use invariance::Invariance;
+pub use lift::{LAMBDA, combined_loss};
+pub(crate) use linearised::state_matrix;
+pub use linearised::{LinearisedPhase, eigenvalues, linearise_phases};
 pub use metrics::{Fit, FitSums};
 pub use prediction::PredictionError;
 pub use remarks::remarks;
-pub use round_trip::{AccelerationSlip, RoundTrip, Slip};
+pub use round_trip::RoundTrip;
 pub use torque::{ByContact, Comparison, is_plausible};
-pub use verdict::{
-    AFTER_A_PUSH, Bound, TORQUES_IN_CONTACT, Verdict, VerdictRow, verdict, verdict_by_default,
-};
+pub use verdict::{AFTER_A_PUSH, Bound, TORQUES_IN_CONTACT, Verdict, verdict, verdict_by_default};
 
 /// A model of the project's own, by the name of its file.
 #[cfg(test)]

@@ -15,19 +15,14 @@ use crate::sim::LatentSegment;
 /// decoder alone loses does not count: both are decoded from latent positions.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PredictionError {
-    /// Body x, m.
     #[serde(rename = "body.x")]
     pub body_x_m: f64,
-    /// Body z, m.
     #[serde(rename = "body.z")]
     pub body_z_m: f64,
-    /// Pitch, rad.
     #[serde(rename = "body.pitch")]
     pub pitch_rad: f64,
-    /// All joints together, rad.
     #[serde(rename = "joints")]
     pub joints_rad: f64,
-    /// Each latent position, scaled units.
     pub latent: Vec<f64>,
 }
 
@@ -42,7 +37,6 @@ impl PredictionError {
     }
 }
 
-/// One stage of a recording in latent coordinates.
 #[derive(Debug, Clone)]
 pub(super) struct RecordedStage {
     pub phase: usize,
@@ -50,7 +44,6 @@ pub(super) struct RecordedStage {
     /// `(z, dz)` at the beginning and at the end.
     pub start: (DVector<f64>, DVector<f64>),
     pub end: (DVector<f64>, DVector<f64>),
-    /// Mean latent input.
     pub input: DVector<f64>,
 }
 

@@ -23,7 +23,6 @@ use crate::robot::{JOINT_DIM, Leg, Robot, STATE_DIM};
 
 /// Speed of a push, m/s.
 const PUSH_M_S: f64 = 0.1;
-/// Directions of the pushes.
 const PUSHES: [[f64; 3]; 4] = [
     [1.0, 0.0, 0.0],
     [-1.0, 0.0, 0.0],
@@ -38,23 +37,18 @@ const MOST_WINDOWS: usize = 50;
 /// Deviation beyond which a run counts with this one, m: the linear geometry ends there.
 const LARGEST_M: f64 = 0.1;
 
-/// What drives the robot after a push.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Driver {
     /// The controller, given the state with the deviation.
     Feedback,
     /// The controller, given the recorded state.
     NoFeedback,
-    /// The recorded torques.
     Replay,
 }
 
-/// Deviations after pushes.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Recovery {
-    /// Squares of the body's deviations.
     deviations: Mean,
-    /// Squares of planned minus reference positions.
     planned: Mean,
 }
 
@@ -191,7 +185,6 @@ impl Deviation {
         (x, dx)
     }
 
-    /// Moves on to the next sample under a difference of the torques.
     fn advance(
         &mut self,
         segment: &Segment,

@@ -26,7 +26,6 @@ const SMALL_ERROR: f64 = 0.01;
 /// Relative error beyond which no slip explains anything, however much larger the error was.
 const UNEXPLAINED: f64 = 0.3;
 
-/// A model on recordings, sample by sample.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RoundTrip {
     /// Mean square of `decode(encode(x)) - x` over the mean square of the deviation of `x` from its
@@ -36,38 +35,34 @@ pub struct RoundTrip {
     pub slip: Option<(Slip, f64)>,
     /// Name of each phase and R^2 of its latent accelerations; none without samples of it.
     pub acceleration_r2: Vec<(String, Option<f64>)>,
-    /// R^2 of the latent accelerations of all phases; none without samples.
     pub all_acceleration_r2: Option<f64>,
-    /// What makes that better, and how good.
     pub acceleration_slip: Option<(AccelerationSlip, f64)>,
-    /// Other readings of the coefficients.
     pub trials: CoefficientTrials,
 }
 
-/// What spoils latent accelerations alone.
 #[derive(Debug, Clone, PartialEq)]
 pub enum AccelerationSlip {
-    /// Coefficients belong to other terms or to another phase.
     Coefficients(CoefficientSlip),
-    /// All inputs have to be multiplied by this.
     InputFactor(f64),
     /// The mean of the training has to be taken off states; the maps hide it where they reproduce it.
     Centred,
 }
 
-/// What a foreign model is easily given wrong.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Slip {
-    /// The coordinates are in another order.
-    Order(CoordinateOrder),
+/// What a foreign model is easily given wrong: order or scaling of the coordinates, or both.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Slip {
+    order: Option<CoordinateOrder>,
+    scaling: Option<ScalingSlip>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum ScalingSlip {
     /// Scaled values are `factor x` in all coordinates.
     Factor(f64),
     /// The mean of the training was subtracted before the factors.
     Centred,
     /// Scaled values are `(x - mean) / standard deviation`.
     Standardised,
-    /// Both the order and the mean, or the order and `(x - mean) / standard deviation`.
-    Both(CoordinateOrder, Box<Slip>),
 }
 
 impl RoundTrip {
@@ -88,7 +83,7 @@ impl RoundTrip {
             return Ok(None);
         }
         let samples = Samples::new((encoder, decoder), model.state_factors()?, segments);
-        let error = samples.error(&samples.given())?;
+        let error = samples.error(&samples.with(&Slip::default()))?;
         let best = samples.best_slip()?;
         let is_explained =
             |found: f64| error > SMALL_ERROR && EXPLAINED * found < error && found < UNEXPLAINED;
@@ -112,7 +107,6 @@ impl RoundTrip {
         }))
     }
 
-    /// Whether the maps fit the recordings.
     pub fn maps_fit(&self) -> bool {
         self.error <= LARGEST_ERROR && self.slip.is_none()
     }
@@ -154,7 +148,7 @@ impl RoundTrip {
                 format!("{found}, {better:.3} {}", slip.advice(tensor))
             }
             Some((AccelerationSlip::Centred, better)) => {
-                format!("{found}, {better:.3} {}", Slip::Centred.advice())
+                format!("{found}, {better:.3} {}", ScalingSlip::Centred.advice())
             }
             Some((AccelerationSlip::InputFactor(factor), better)) => format!(
                 "{found}, {better:.3} with the inputs times {factor}: expected other factors of the \
@@ -164,7 +158,6 @@ impl RoundTrip {
         })
     }
 
-    /// What may be wrong with equations that no slip explains.
     fn unexplained(&self) -> String {
         let (tried, or) = match self.trials.by_order.is_empty() {
             true => (
@@ -190,7 +183,6 @@ impl RoundTrip {
 }
 
 impl CoefficientSlip {
-    /// What to pass where it explains the error.
     fn advice(&self, tensor: &dyn Fn(&str) -> Option<String>) -> String {
         let (mut with, mut expected) = (Vec::new(), Vec::new());
         if let Some([a, b]) = &self.exchanged {
@@ -216,23 +208,30 @@ impl CoefficientSlip {
 }
 
 impl Slip {
-    /// What to pass where it explains the error.
     fn advice(&self) -> String {
-        match self {
-            Slip::Order(order) => format!(
+        match (&self.order, self.scaling.map(ScalingSlip::advice)) {
+            (None, scaling) => scaling.unwrap_or_default(),
+            (Some(order), None) => format!(
                 "in another order: expected --order {order}, or another that swaps left and right"
             ),
-            Slip::Factor(factor) => format!("with factor {factor}: expected --scaling {factor}"),
-            Slip::Centred => {
+            (Some(order), Some(scaling)) => {
+                format!("in another order, {scaling}, and --order {order}")
+            }
+        }
+    }
+}
+
+impl ScalingSlip {
+    fn advice(self) -> String {
+        match self {
+            Self::Factor(factor) => format!("with factor {factor}: expected --scaling {factor}"),
+            Self::Centred => {
                 "with their mean taken off: expected a tensor mean.state (SI units)".to_owned()
             }
-            Slip::Standardised => {
+            Self::Standardised => {
                 "as (x - mean) / standard deviation: expected tensors mean.state and std.state (SI \
                  units)"
                     .to_owned()
-            }
-            Slip::Both(order, slip) => {
-                format!("in another order, {}, and --order {order}", slip.advice())
             }
         }
     }
@@ -278,47 +277,24 @@ impl<'m> Samples<'m> {
         }
     }
 
-    fn given(&self) -> Reading {
-        Reading {
-            order: std::array::from_fn(|k| k),
-            factors: self.factors.clone(),
-            mean: DVector::zeros(STATE_DIM),
-        }
-    }
-
     fn with(&self, slip: &Slip) -> Reading {
-        match slip {
-            Slip::Order(order) => Reading {
-                order: *order.places(),
-                ..self.given()
-            },
-            Slip::Factor(factor) => Reading {
-                factors: self.factors.map(|_| *factor),
-                ..self.given()
-            },
-            Slip::Centred => Reading {
-                mean: self.mean.clone(),
-                ..self.given()
-            },
-            Slip::Standardised => Reading {
-                order: std::array::from_fn(|k| k),
-                factors: self.deviation.map(|v| 1.0 / v.max(1e-9)),
-                mean: self.mean.clone(),
-            },
-            Slip::Both(order, slip) => {
-                let mut reading = self.with(slip);
-                reading.order = *order.places();
-                match **slip {
-                    Slip::Standardised => {
-                        // Factors of coordinates, not of places.
-                        let places = order.places().iter();
-                        let factors = places.map(|place| reading.factors[*place]);
-                        reading.factors = DVector::from_iterator(STATE_DIM, factors);
-                    }
-                    Slip::Order(_) | Slip::Factor(_) | Slip::Centred | Slip::Both(..) => {}
-                }
-                reading
+        let same = std::array::from_fn(|k| k);
+        let order = slip.order.as_ref().map_or(same, |order| *order.places());
+        let none = DVector::zeros(STATE_DIM);
+        let (factors, mean) = match slip.scaling {
+            None => (self.factors.clone(), none),
+            Some(ScalingSlip::Factor(factor)) => (self.factors.map(|_| factor), none),
+            Some(ScalingSlip::Centred) => (self.factors.clone(), self.mean.clone()),
+            Some(ScalingSlip::Standardised) => {
+                // Factors of coordinates, not of places.
+                let factor = |k: usize, _| 1.0 / self.deviation[order[k]].max(1e-9);
+                (DVector::from_fn(STATE_DIM, factor), self.mean.clone())
             }
+        };
+        Reading {
+            order,
+            factors,
+            mean,
         }
     }
 
@@ -341,19 +317,29 @@ impl<'m> Samples<'m> {
 
     /// The slip with the smallest error; two at once only where one is not enough.
     fn best_slip(&self) -> Result<Option<(Slip, f64)>, ModelError> {
+        use ScalingSlip::{Centred, Factor, Standardised};
         let orders = CoordinateOrder::common();
-        let factors = [1.0, 0.1, 10.0, 0.01, 100.0].map(Slip::Factor);
-        let one = (orders.iter().cloned().map(Slip::Order))
-            .chain(factors)
-            .chain([Slip::Centred, Slip::Standardised]);
+        let of_order = |order: &CoordinateOrder, scaling| Slip {
+            order: Some(order.clone()),
+            scaling,
+        };
+        let factors = [1.0, 0.1, 10.0, 0.01, 100.0].map(Factor);
+        let scalings = factors.into_iter().chain([Centred, Standardised]);
+        let scalings = scalings.map(|scaling| Slip {
+            order: None,
+            scaling: Some(scaling),
+        });
+        let one = orders
+            .iter()
+            .map(|order| of_order(order, None))
+            .chain(scalings);
         let best = self.best_of(one)?;
         let error_of = |found: &Option<(Slip, f64)>| found.as_ref().map_or(f64::MAX, |f| f.1);
         if error_of(&best) < SMALL_ERROR * EXPLAINED {
             return Ok(best);
         }
-        let two = orders.into_iter().flat_map(|order| {
-            let both = |slip| Slip::Both(order.clone(), Box::new(slip));
-            [both(Slip::Centred), both(Slip::Standardised)]
+        let two = orders.iter().flat_map(|order| {
+            [Centred, Standardised].map(|scaling| of_order(order, Some(scaling)))
         });
         let two = self.best_of(two)?;
         Ok(match EXPLAINED * error_of(&two) < error_of(&best) {

@@ -12,7 +12,6 @@ pub fn is_plausible(robot: &Robot, torque_nm: &[f64; JOINT_DIM]) -> bool {
     !exceeds(torque_nm, robot.torque_limit_nm(), IMPLAUSIBLE)
 }
 
-/// Whether a torque is not a number or beyond `factor` times its limit.
 pub(super) fn exceeds(
     torque_nm: &[f64; JOINT_DIM],
     limits: &[f64; JOINT_DIM],
@@ -25,9 +24,7 @@ pub(super) fn exceeds(
 /// A figure for samples with and without ground contact; none where there were too few.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize)]
 pub struct ByContact {
-    /// At least one foot on the ground.
     pub contact: Option<f64>,
-    /// No foot on the ground.
     pub flight: Option<f64>,
 }
 
@@ -42,7 +39,6 @@ pub struct Comparison {
 }
 
 impl Comparison {
-    /// Adds one sample.
     pub fn add(
         &mut self,
         feet: ContactFlags,
@@ -79,37 +75,5 @@ impl Comparison {
     /// Root mean square of the difference over all samples and joints, N m.
     pub fn rms(&self) -> Option<f64> {
         FitSums::jointly(&self.all).fit().map(|fit| fit.rms)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn r2_is_one_for_equal_torques_and_zero_for_the_mean() {
-        let recorded = [[1.0; JOINT_DIM], [3.0; JOINT_DIM]];
-        let mut equal = Comparison::default();
-        let mut mean = Comparison::default();
-        for torque in &recorded {
-            equal.add([true; 4], torque, torque);
-            mean.add([false; 4], &[2.0; JOINT_DIM], torque);
-        }
-        let r2 = |contact, flight| ByContact { contact, flight };
-        assert_eq!(equal.r2(), r2(Some(1.0), None));
-        assert_eq!(mean.r2(), r2(None, Some(0.0)));
-        assert_eq!((mean.r2_all(), mean.rms()), (Some(0.0), Some(1.0)));
-    }
-
-    #[test]
-    fn torques_beyond_twice_the_limit_are_not_the_robots() {
-        let go1 = Robot::by_name("go1").expect("known");
-        let mut torque = *go1.torque_limit_nm();
-        torque[3] *= 1.9;
-        assert!(is_plausible(go1, &torque));
-        torque[3] *= 1.1;
-        assert!(!is_plausible(go1, &torque));
-        torque[3] = f64::NAN;
-        assert!(!is_plausible(go1, &torque));
     }
 }

@@ -44,16 +44,13 @@ const NO_DYNAMICS: &str = "no dynamics";
 /// The side of a threshold on which a value passes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum Bound {
-    /// Errors, shares.
     #[serde(rename = "at most")]
     AtMost,
-    /// Coefficients of determination, counts.
     #[serde(rename = "at least")]
     AtLeast,
 }
 
 impl Bound {
-    /// `at most`, `at least`.
     pub fn words(self) -> &'static str {
         match self {
             Self::AtMost => "at most",
@@ -62,26 +59,18 @@ impl Bound {
     }
 }
 
-/// A figure of a model beside that of a baseline.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct VerdictRow {
-    /// What is measured.
     pub name: String,
-    /// The use that the row decides on.
     #[serde(rename = "use")]
     pub of: String,
-    /// Unit of the numbers.
     pub unit: &'static str,
     /// The model's figure, that of the recording on which it is worst; infinite for a rollout that diverges, none where
     /// recordings do not show it.
     pub value: Option<f64>,
-    /// The same figure of the baseline.
     pub baseline: Option<f64>,
-    /// The baseline's name.
     pub baseline_name: &'static str,
-    /// What the value is compared with.
     pub threshold: f64,
-    /// The side on which it passes.
     pub bound: Bound,
     /// Whether it passes; none without a value.
     pub passed: Option<bool>,
@@ -121,7 +110,6 @@ impl VerdictRow {
         }
     }
 
-    /// Whether the row decides that the model fails.
     pub fn is_failed(&self) -> bool {
         self.counts && self.passed == Some(false)
     }
@@ -168,11 +156,8 @@ impl VerdictRow {
 /// `control`; one that recordings or model do not allow to measure is in neither list.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Verdict {
-    /// Uses of which every counted row passes.
     pub fit_for: Vec<String>,
-    /// Uses of which one fails.
     pub failed: Vec<String>,
-    /// Every figure.
     pub rows: Vec<VerdictRow>,
 }
 
@@ -183,13 +168,11 @@ impl Verdict {
         (self.failed.iter()).any(|of| !others.contains(&of.as_str()))
     }
 
-    /// Whether torques or control fail.
     pub fn fails_control(&self) -> bool {
         let mut failed = self.failed.iter();
         failed.any(|of| [TORQUES, CONTROL].contains(&of.as_str()))
     }
 
-    /// Counted rows that fail.
     pub fn failures(&self) -> impl Iterator<Item = &VerdictRow> {
         self.rows.iter().filter(|row| row.is_failed())
     }

@@ -119,7 +119,7 @@ impl RecordingFault {
             "a text table or an MCAP log; this makes one: {}",
             format.remedy
         );
-        Self::unexpected(format.what, expected)
+        Self::unexpected(format.what.clone(), expected)
     }
 
     /// A stretch of fewer samples than are expected.

@@ -3,7 +3,6 @@
 use crate::model::ModelError;
 use crate::recording::RecordingError;
 
-/// Errors of simulation.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SimError {

@@ -14,7 +14,6 @@ use crate::recording::{PhaseRule, Segment};
 /// takes the place of `W_e`, and accelerations have the term `dJ/dt dx`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LatentSegment {
-    /// Increasing times, in s.
     pub time_s: Vec<f64>,
     /// Latent positions `z = W_e (s_x x) + b_e` (equation 9).
     pub z: DMatrix<f64>,
@@ -57,12 +56,10 @@ impl LatentSegment {
         })
     }
 
-    /// Number of samples.
     pub fn len(&self) -> usize {
         self.time_s.len()
     }
 
-    /// Whether there is no sample.
     pub fn is_empty(&self) -> bool {
         self.time_s.is_empty()
     }
@@ -108,19 +105,18 @@ pub fn with_input_statistics(
 ) -> Result<ReducedModel, SimError> {
     let rule = model.input_rule()?;
     let names = model.phases().iter().map(|phase| phase.name.clone());
-    let mut of_phases: Vec<(String, Vec<DVector<f64>>)> =
-        names.map(|name| (name, Vec::new())).collect();
+    let names: Vec<String> = names.collect();
+    let mut of_phases = vec![Vec::new(); names.len()];
     for segment in segments {
         let input = segment.input(&rule)?;
         for (sample, phase) in phases(&model, segment)?.into_iter().enumerate() {
-            of_phases[phase].1.push(input.column(sample).into_owned());
+            of_phases[phase].push(input.column(sample).into_owned());
         }
     }
     let mut builder = model.into_builder();
-    for (name, samples) in of_phases {
-        if let Some(first) = samples.first() {
-            let block = || std::iter::once(DMatrix::from_columns(&samples));
-            let statistics = InputStatistics::of_blocks(first.len(), samples.len(), block);
+    for (name, samples) in names.into_iter().zip(of_phases) {
+        if !samples.is_empty() {
+            let statistics = InputStatistics::of_samples(&DMatrix::from_columns(&samples));
             builder = builder.input_statistics(name, statistics);
         }
     }

@@ -3,6 +3,8 @@
 //! A model and recorded inputs come in; rollouts leave. `rollout.rs` first, `integrate.rs` for the method, `latent.rs`
 //! for how a recording is encoded.
 
+#![allow(missing_docs, reason = "names say it all where there is no comment")]
+
 mod error;
 mod integrate;
 mod latent;

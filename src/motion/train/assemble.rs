@@ -10,7 +10,6 @@ use super::dataset::Dataset;
 use super::dynamics_fit::Fitted;
 use super::error::TrainError;
 use super::features::FeatureValues;
-use super::latent::EncodedSet;
 use super::metrics::PLACE;
 use super::options::{EncoderOptions, TrainOptions};
 use super::report::TrainReport;
@@ -68,17 +67,15 @@ pub fn sha256(bytes: &[u8]) -> String {
 }
 
 impl Task<'_> {
-    /// The model of fitted numbers, with what was learned of the jumps.
     pub fn assemble(
         &self,
         fitted: Fitted,
-        set: EncodedSet<'_>,
         jumps: Option<JumpPrior>,
         provenance: Map<String, Value>,
     ) -> Result<ReducedModel, TrainError> {
         let (options, robot, training) = (self.options, self.robot, &self.training);
         let (d, name) = (options.latent_dim, robot.name());
-        let given_state = self.inputs_given_states(&fitted, set);
+        let given_state = self.inputs_given_states(&fitted);
         let [state, input] = CoordinateNames::of_robot();
         let mut builder = ReducedModel::builder(options.name.clone(), self.library.clone())
             .description(format!("{d} latent coordinates of {name} jumps"))
@@ -93,8 +90,8 @@ impl Task<'_> {
             })
             .sample_time_s(median_step_s(training))
             .provenance(provenance)
-            .encoder(fitted.encoder)
-            .decoder(fitted.decoder)
+            .encoder(fitted.maps.encoder)
+            .decoder(fitted.maps.decoder)
             .jump_prior(jumps);
         let phases = training.phases.patterns.iter().zip(fitted.xi);
         for (index, ((pattern, xi), given_state)) in phases.zip(given_state).enumerate() {
@@ -114,27 +111,18 @@ impl Task<'_> {
     }
 
     /// What the latent state says of the latent input, one entry a phase; of linear encoders.
-    fn inputs_given_states(
-        &self,
-        fitted: &Fitted,
-        set: EncodedSet<'_>,
-    ) -> Vec<Option<InputGivenState>> {
-        let Some(encoder) = fitted.encoder.as_affine() else {
+    fn inputs_given_states(&self, fitted: &Fitted) -> Vec<Option<InputGivenState>> {
+        let Some(encoder) = fitted.maps.encoder.as_affine() else {
             return vec![None; fitted.xi.len()];
         };
         // Where the robot is, and which way it looks, is in `z` but says nothing of its inputs.
         let shifts = encoder.weights().select_columns(&PLACE);
+        let set = fitted.maps.training_set(self);
         let phases = fitted.xi.iter().enumerate();
         let given = phases.map(|(phase, xi)| {
-            let blocks = || {
-                let mut values = FeatureValues::default();
-                let blocks = set.regression_blocks(phase);
-                blocks.map(move |(variables, ddz)| {
-                    let left = ddz - self.features.evaluate(&variables, &mut values) * xi;
-                    (variables, left)
-                })
-            };
-            InputGivenState::of_blocks(set.dataset.samples(Some(phase)), &shifts, blocks)
+            let (variables, ddz) = set.regression_samples(phase);
+            let theta = (self.features).evaluate(&variables, &mut FeatureValues::default());
+            InputGivenState::of_samples(&shifts, variables, &(ddz - theta * xi))
         });
         given.collect()
     }
@@ -150,7 +138,6 @@ fn median_step_s(dataset: &Dataset) -> f64 {
         .map_or(0.002, |step| (step * 1e6).round() / 1e6)
 }
 
-/// How a model came to be: command, version, settings, recordings and figures.
 pub(super) fn provenance(
     options: &TrainOptions,
     method: &str,

@@ -15,7 +15,7 @@ use crate::robot::Robot;
 ///
 /// The encoder's rows span the space of least reconstruction error and lift loss (`subspace`), rotated by
 /// varimax; its bias puts the mean of the training states at `z = 0`. The decoder is the least-squares one over all
-/// phases. Xi of each phase is chosen among many regressions by rollouts ([`select`](super::select)). A cancelled
+/// phases. Xi of each phase is chosen among many regressions by rollouts (`select`). A cancelled
 /// training ends with the seeds begun by then; seeds without a stable model are left out. Deterministic.
 ///
 /// # Errors
@@ -47,7 +47,6 @@ pub fn closed_form(
     seeds.into_model(task, "closed-form", origin)
 }
 
-/// The numbers of one seed, and its score.
 fn fit(task: &Task<'_>, seed: u64, watch: &mut Watch<'_>) -> Outcome {
     let options = task.options;
     watch.stage("searching the latent space", 1);
@@ -56,6 +55,6 @@ fn fit(task: &Task<'_>, seed: u64, watch: &mut Watch<'_>) -> Outcome {
     let encoder = task.encoder_over(&basis)?.into();
     let decoder = least_squares_decoder(&task.training, &encoder, None)?.into();
     let fitted = task.fit_dynamics((encoder, decoder), watch)?;
-    let report = task.seed_report(&fitted, seed, None)?;
+    let report = task.seed_report(&fitted, seed, None);
     Ok((report, fitted))
 }

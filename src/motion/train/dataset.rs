@@ -19,22 +19,16 @@ pub const MIN_SAMPLES: usize = 50;
 /// Factors from SI to scaled units, one a coordinate.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scaling {
-    /// Of the state, 18.
     pub state: DVector<f64>,
-    /// Of the input, 18.
     pub input: DVector<f64>,
 }
 
 /// Factors from SI to scaled units by kind of quantity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ScaleOptions {
-    /// On all 18 states.
     pub state: f64,
-    /// On joint torques.
     pub torque: f64,
-    /// On linear body forces.
     pub force: f64,
-    /// On body moments.
     pub moment: f64,
 }
 
@@ -64,7 +58,6 @@ impl ScaleOptions {
         }
     }
 
-    /// The factor of every coordinate.
     pub fn factors(&self) -> Scaling {
         let input = DVector::from_fn(STATE_DIM, |i, _| match i {
             0..JOINT_DIM => self.torque,
@@ -81,17 +74,19 @@ impl ScaleOptions {
 /// One continuous jump (a segment of a recording); samples are columns, all in scaled units.
 #[derive(Clone, Debug)]
 pub struct Jump {
-    /// File it comes from.
     pub path: PathBuf,
-    /// Time of every sample.
     pub time_s: Vec<f64>,
     /// States, `18 x n`.
     pub x: DMatrix<f64>,
+    /// Velocities, `18 x n`.
+    pub dx: DMatrix<f64>,
+    /// Accelerations smoothed within each phase, `18 x n`.
+    pub ddx: DMatrix<f64>,
     /// Inputs `[tau; F; M]`, `18 x n`.
     pub u: DMatrix<f64>,
-    /// Velocities and accelerations.
-    pub rates: Rates,
-    /// Index of the model's phase at every sample.
+    /// Joint friction and rotor inertia, which recorded torques have on top of those in the inputs, `12 x n`; none
+    /// without actuators.
+    pub losses: Option<DMatrix<f64>>,
     pub phase: Vec<usize>,
     /// Maximal runs of one phase.
     pub spans: Vec<(usize, Range<usize>)>,
@@ -99,19 +94,7 @@ pub struct Jump {
     pub implausible: Vec<usize>,
 }
 
-/// Derivatives of the states of one jump, and what the joints take at them, scaled units.
-#[derive(Clone, Debug)]
-pub struct Rates {
-    /// Velocities, `18 x n`.
-    pub dx: DMatrix<f64>,
-    /// Accelerations smoothed within each phase, `18 x n`.
-    pub ddx: DMatrix<f64>,
-    /// What the recorded torques have on top of those in the inputs, `12 x n`; none without actuators.
-    pub losses: Option<DMatrix<f64>>,
-}
-
 impl Jump {
-    /// Number of samples.
     pub fn samples(&self) -> usize {
         self.time_s.len()
     }
@@ -127,28 +110,13 @@ impl Jump {
 pub struct Dataset {
     /// Jumps in the order of the files and their segments.
     pub jumps: Vec<Jump>,
-    /// Phases in the order of the model file.
     pub phases: PhaseRule,
     /// Units of everything in [`Self::jumps`].
     pub scaling: Scaling,
     /// Window of the moving average over accelerations, in samples.
     pub(super) smoothing: usize,
-    /// How inputs are made of recordings.
     pub(super) rule: InputRule,
 }
-
-/// Which quantity of a [`Jump`] to gather.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Quantity {
-    /// States.
-    X,
-    /// Inputs.
-    U,
-}
-
-/// Columns of a block of samples: a multiple of the depth of the blocks in which products are summed, so that a sum over
-/// blocks has the bits of the sum over all samples.
-const BLOCK: usize = 8192;
 
 impl Dataset {
     /// Takes the samples of recordings, cut into `phases`.
@@ -157,7 +125,7 @@ impl Dataset {
     ///
     /// # Errors
     /// [`TrainError::TooFewSamples`] for a segment under 50 samples; [`TrainError::Recording`] where no phase
-    /// matches or a value is not finite.
+    /// matches, a value is not finite, or a file cannot be read.
     pub fn new(
         recordings: &[Recording],
         rule: &InputRule,
@@ -173,85 +141,40 @@ impl Dataset {
             rule: rule.clone(),
         };
         for segment in recordings.iter().flat_map(|recording| &recording.segments) {
-            let jump = dataset.jump(segment)?;
-            dataset.jumps.push(jump);
+            dataset.jumps.push(dataset.jump(segment)?);
         }
         Ok(dataset)
     }
 
-    /// Samples of one quantity side by side, of one phase or of all, `18 x samples`.
-    pub fn gather(&self, quantity: Quantity, phase: Option<usize>) -> DMatrix<f64> {
-        let all = std::iter::once(self.samples(phase));
-        let mut gathered = self.columns(quantity, phase, all);
-        gathered.next().expect("invariant: one width")
+    /// States of one phase or of all side by side, `18 x samples`.
+    pub fn states(&self, phase: Option<usize>) -> DMatrix<f64> {
+        self.gather(phase, |jump| &jump.x)
     }
 
-    /// The same in blocks.
-    pub fn blocks(
-        &self,
-        quantity: Quantity,
-        phase: Option<usize>,
-    ) -> impl Iterator<Item = DMatrix<f64>> {
-        self.columns(quantity, phase, block_widths(self.samples(phase)))
+    /// Inputs of one phase or of all side by side, `18 x samples`.
+    pub fn inputs(&self, phase: Option<usize>) -> DMatrix<f64> {
+        self.gather(phase, |jump| &jump.u)
     }
 
-    fn columns(
-        &self,
-        quantity: Quantity,
-        phase: Option<usize>,
-        widths: impl Iterator<Item = usize>,
-    ) -> impl Iterator<Item = DMatrix<f64>> {
-        let empty = |width| DMatrix::zeros(STATE_DIM, width);
-        self.cut(phase, widths, empty, move |block, at, jump, range| {
-            let samples = match quantity {
-                Quantity::X => &self.jumps[jump].x,
-                Quantity::U => &self.jumps[jump].u,
-            };
-            let mut columns = block.columns_mut(at, range.len());
-            columns.copy_from(&samples.columns_range(range));
-        })
-    }
-
-    /// Blocks of the samples of one phase or of all, as wide as `widths`: `copy(block, at, jump, range)` fills an
-    /// `empty` block from column `at` on with the samples of the jump of number `jump` in `range`.
-    pub fn cut<B>(
-        &self,
-        phase: Option<usize>,
-        widths: impl Iterator<Item = usize>,
-        empty: impl Fn(usize) -> B,
-        copy: impl Fn(&mut B, usize, usize, Range<usize>),
-    ) -> impl Iterator<Item = B> {
-        let mut spans = self.spans(phase).peekable();
-        widths.map(move |width| {
-            let mut block = empty(width);
-            let mut at = 0;
-            while at < width {
-                let (jump, range) = spans.peek_mut().expect("invariant: as many samples");
-                let count = range.len().min(width - at);
-                copy(&mut block, at, *jump, range.start..range.start + count);
-                (range.start, at) = (range.start + count, at + count);
-                if range.start == range.end {
-                    spans.next();
-                }
-            }
-            block
-        })
-    }
-
-    /// Mean of one quantity over the samples of one phase or of all.
-    pub fn mean(&self, quantity: Quantity, phase: Option<usize>) -> DVector<f64> {
-        mean(STATE_DIM, self.samples(phase), self.blocks(quantity, phase))
+    fn gather(&self, phase: Option<usize>, of: impl Fn(&Jump) -> &DMatrix<f64>) -> DMatrix<f64> {
+        let mut all = DMatrix::zeros(STATE_DIM, self.samples(phase));
+        let mut at = 0;
+        for (jump, range) in self.spans(phase) {
+            let samples = of(&self.jumps[jump]).columns_range(range);
+            all.columns_mut(at, samples.ncols()).copy_from(&samples);
+            at += samples.ncols();
+        }
+        all
     }
 
     /// Standard deviation of every state over all samples.
     pub fn state_std(&self) -> DVector<f64> {
-        let share = 1.0 / self.samples(None) as f64;
-        let mut variance = self.mean(Quantity::X, None).map(|mean| -(mean * mean));
-        for block in self.blocks(Quantity::X, None) {
-            for column in block.column_iter() {
-                for (sum, value) in variance.iter_mut().zip(&column) {
-                    *sum += share * value * value;
-                }
+        let states = self.states(None);
+        let share = 1.0 / states.ncols() as f64;
+        let mut variance = mean(&states).map(|mean| -(mean * mean));
+        for column in states.column_iter() {
+            for (sum, value) in variance.iter_mut().zip(&column) {
+                *sum += share * value * value;
             }
         }
         variance.map(f64::sqrt)
@@ -259,29 +182,23 @@ impl Dataset {
 
     /// Covariance of the states and second moment of the inputs about zero, over all samples.
     pub fn moments(&self) -> Moments {
-        let mean = self.mean(Quantity::X, None);
-        let deviations = self.blocks(Quantity::X, None).map(|x| centred(x, &mean));
-        let n = self.samples(None).max(1) as f64;
+        let (x, u) = (self.states(None), self.inputs(None));
+        let (deviations, n) = (centred(&x, &mean(&x)), x.ncols().max(1) as f64);
         Moments {
-            state: sum_of_squares(deviations) / n,
-            input: sum_of_squares(self.blocks(Quantity::U, None)) / n,
+            state: &deviations * deviations.transpose() / n,
+            input: &u * u.transpose() / n,
         }
     }
 
     /// Mean and covariance of the SI inputs of one phase; all zero without a sample.
     pub fn input_statistics(&self, phase: usize) -> InputStatistics {
-        let blocks = || {
-            self.blocks(Quantity::U, Some(phase)).map(|mut u| {
-                for (mut row, factor) in u.row_iter_mut().zip(&self.scaling.input) {
-                    row /= *factor;
-                }
-                u
-            })
-        };
-        InputStatistics::of_blocks(STATE_DIM, self.samples(Some(phase)), blocks)
+        let mut u = self.inputs(Some(phase));
+        for (mut row, factor) in u.row_iter_mut().zip(&self.scaling.input) {
+            row /= *factor;
+        }
+        InputStatistics::of_samples(&u)
     }
 
-    /// Number of samples of one phase or of all.
     pub fn samples(&self, phase: Option<usize>) -> usize {
         self.spans(phase).map(|(_, range)| range.len()).sum()
     }
@@ -336,63 +253,43 @@ impl Dataset {
             phase[span.range.clone()].fill(span.phase);
             spans.push((span.phase, span.range));
         }
+        let rule = &self.rule;
         Ok(Jump {
             path: segment.path.clone(),
             time_s: segment.time_s.clone(),
             x: scaled(segment.x.clone(), &self.scaling.state),
-            u: scaled(segment.input(&self.rule)?, &self.scaling.input),
-            rates: self.rates(segment, &spans),
+            dx: scaled(segment.dx.clone(), &self.scaling.state),
+            ddx: scaled(self.smoothed(segment, &spans), &self.scaling.state),
+            u: scaled(segment.input(rule)?, &self.scaling.input),
+            losses: (rule.actuators().is_some())
+                .then(|| scaled(segment.losses(rule), &self.scaling.input)),
             phase,
             spans,
             implausible: (0..n)
-                .filter(|&sample| !is_plausible(self.rule.robot(), &segment.torque(sample)))
+                .filter(|&sample| !is_plausible(rule.robot(), &segment.torque(sample)))
                 .collect(),
         })
     }
 
-    fn rates(&self, segment: &Segment, spans: &[(usize, Range<usize>)]) -> Rates {
-        let rule = &self.rule;
+    fn smoothed(&self, segment: &Segment, spans: &[(usize, Range<usize>)]) -> DMatrix<f64> {
         let mut ddx = DMatrix::zeros(STATE_DIM, segment.len());
         for (_, range) in spans {
             let span = segment.ddx.columns_range(range.clone()).into_owned();
             ddx.columns_range_mut(range.clone())
                 .copy_from(&moving_average(&span, self.smoothing));
         }
-        Rates {
-            dx: scaled(segment.dx.clone(), &self.scaling.state),
-            ddx: scaled(ddx, &self.scaling.state),
-            losses: (rule.actuators().is_some())
-                .then(|| scaled(segment.losses(rule), &self.scaling.input)),
-        }
+        ddx
     }
 }
 
-/// Widths of the blocks that so many samples are divided into; the last one is never narrow, as products of a few
-/// columns are summed another way.
-pub fn block_widths(mut samples: usize) -> impl Iterator<Item = usize> {
-    std::iter::from_fn(move || {
-        let width = if samples < 2 * BLOCK { samples } else { BLOCK };
-        samples -= width;
-        (width > 0).then_some(width)
-    })
-}
-
-/// Mean of `n` samples of so many coordinates in the columns of blocks.
-pub fn mean(
-    coordinates: usize,
-    n: usize,
-    blocks: impl Iterator<Item = DMatrix<f64>>,
-) -> DVector<f64> {
-    let mut mean = DVector::zeros(coordinates);
-    for block in blocks {
-        for column in block.column_iter() {
-            mean.axpy(1.0 / n as f64, &column, 1.0);
-        }
+pub fn mean(samples: &DMatrix<f64>) -> DVector<f64> {
+    let mut mean = DVector::zeros(samples.nrows());
+    for column in samples.column_iter() {
+        mean.axpy(1.0 / samples.ncols() as f64, &column, 1.0);
     }
     mean
 }
 
-/// Every row times its factor.
 pub fn scaled(mut rows: DMatrix<f64>, factors: &DVector<f64>) -> DMatrix<f64> {
     rows.row_iter_mut()
         .zip(factors.iter())
@@ -400,24 +297,9 @@ pub fn scaled(mut rows: DMatrix<f64>, factors: &DVector<f64>) -> DMatrix<f64> {
     rows
 }
 
-/// Samples in columns less their mean.
-pub fn centred(mut samples: DMatrix<f64>, mean: &DVector<f64>) -> DMatrix<f64> {
-    samples
-        .column_iter_mut()
-        .for_each(|mut column| column -= mean);
-    samples
-}
-
-/// Sum of `a a^T` over blocks.
-fn sum_of_squares(blocks: impl Iterator<Item = DMatrix<f64>>) -> DMatrix<f64> {
-    let mut sum = DMatrix::zeros(STATE_DIM, STATE_DIM);
-    for block in blocks {
-        sum_product(&mut sum, &block, &block);
-    }
-    sum
-}
-
-/// Adds `a b^T` of one block.
-pub fn sum_product(sum: &mut DMatrix<f64>, a: &DMatrix<f64>, b: &DMatrix<f64>) {
-    sum.gemm(1.0, a, &b.transpose(), 1.0);
+pub fn centred(samples: &DMatrix<f64>, mean: &DVector<f64>) -> DMatrix<f64> {
+    let mut centred = samples.clone();
+    let columns = centred.column_iter_mut();
+    columns.for_each(|mut column| column -= mean);
+    centred
 }

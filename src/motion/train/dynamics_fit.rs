@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::dataset::Quantity;
+use super::dataset::mean;
 use super::error::TrainError;
 use super::features::Features;
 use super::joint::Losses;
@@ -20,12 +20,31 @@ use super::weak_form::check_terms;
 use crate::model::{AffineMap, StateMap};
 use crate::robot::Robot;
 
-/// Numbers of a model before they are put together.
-pub(super) struct Fitted {
+pub(super) struct Maps {
     pub encoder: StateMap,
     pub decoder: StateMap,
     /// `W_e`, of a nonlinear encoder the mean of its Jacobian over the training samples.
     pub weights: DMatrix<f64>,
+    pub training: Vec<Latent>,
+    pub validation: Vec<Latent>,
+}
+
+impl Maps {
+    pub fn training_set<'a>(&'a self, task: &'a Task<'_>) -> EncodedSet<'a> {
+        EncodedSet::new(&task.training, &self.training)
+    }
+
+    /// The jumps that candidates are judged by: those of the training where there are no others.
+    pub fn judged_set<'a>(&'a self, task: &'a Task<'_>) -> EncodedSet<'a> {
+        match self.validation.is_empty() {
+            true => self.training_set(task),
+            false => EncodedSet::new(&task.validation, &self.validation),
+        }
+    }
+}
+
+pub(super) struct Fitted {
+    pub maps: Maps,
     pub xi: Vec<DMatrix<f64>>,
     /// The regression, if Xi was chosen among regressions, and how many were tried.
     pub choice: Option<(Choice, usize)>,
@@ -34,13 +53,9 @@ pub(super) struct Fitted {
 }
 
 impl Fitted {
-    fn measure(&self, features: &Features, set: EncodedSet<'_>) -> Result<SetMetrics, TrainError> {
-        let xi = &self.xi;
-        measure(
-            Candidate { features, xi },
-            [&self.encoder, &self.decoder],
-            set,
-        )
+    fn measure(&self, features: &Features, set: EncodedSet<'_>) -> SetMetrics {
+        let (xi, maps) = (&self.xi, [&self.maps.encoder, &self.maps.decoder]);
+        measure(Candidate { features, xi }, maps, set)
     }
 }
 
@@ -52,7 +67,7 @@ impl Task<'_> {
         let learned = self.canonical_basis(basis).0;
         let rows: Vec<_> = held.chain(learned.column_iter()).collect();
         let weights = DMatrix::from_columns(&rows).transpose();
-        let bias = -(&weights * self.training.mean(Quantity::X, None));
+        let bias = -(&weights * mean(&self.training.states(None)));
         Ok(AffineMap::new("encoder", weights, bias)?)
     }
 
@@ -78,6 +93,16 @@ impl Task<'_> {
         (arranged(basis), arranged(turn))
     }
 
+    pub fn encoded(&self, encoder: StateMap, decoder: StateMap) -> Maps {
+        Maps {
+            weights: mean_jacobian(&encoder, &self.training),
+            training: Latent::of(&self.training, &encoder),
+            validation: Latent::of(&self.validation, &encoder),
+            encoder,
+            decoder,
+        }
+    }
+
     /// Chosen dynamics for an encoder and its decoder.
     ///
     /// # Errors
@@ -87,41 +112,25 @@ impl Task<'_> {
         (encoder, decoder): (StateMap, StateMap),
         watch: &mut Watch<'_>,
     ) -> Result<Fitted, TrainError> {
-        let (training, judged) = (&self.training, self.judged());
-        let latent = Latent::of(training, &encoder);
-        let validated = match self.validation.jumps.is_empty() {
-            true => None,
-            false => Some(Latent::of(judged, &encoder)),
-        };
-        let judged_latent = validated.as_ref().unwrap_or(&latent);
+        let maps = self.encoded(encoder, decoder);
         let (options, features) = (&self.options.regression, &self.features);
-        let judge = Judge::new(features, EncodedSet::new(judged, judged_latent));
-        let set = EncodedSet::new(training, &latent);
+        let judge = Judge::new(features, maps.judged_set(self));
+        let set = maps.training_set(self);
         check_terms(set, features, &self.library)?;
         let (xi, choice, candidates) = select(set, &self.knowledge, &judge, options, watch)?;
         Ok(Fitted {
-            weights: mean_jacobian(&encoder, training),
-            encoder,
-            decoder,
+            maps,
             xi,
             score: choice.score,
             choice: Some((choice, candidates)),
         })
     }
 
-    /// The metrics of one seed.
-    pub fn seed_report(
-        &self,
-        fitted: &Fitted,
-        seed: u64,
-        losses: Option<Losses>,
-    ) -> Result<SeedReport, TrainError> {
+    pub fn seed_report(&self, fitted: &Fitted, seed: u64, losses: Option<Losses>) -> SeedReport {
         let std = self.training.state_std();
         let names = Robot::state_names();
-        let rows = fitted.weights.row_iter();
-        let latent = Latent::of(self.judged(), &fitted.encoder);
-        let judged = EncodedSet::new(self.judged(), &latent);
-        Ok(SeedReport {
+        let rows = fitted.maps.weights.row_iter();
+        SeedReport {
             seed,
             score: fitted.score,
             losses,
@@ -129,25 +138,21 @@ impl Task<'_> {
             dominant: rows
                 .map(|row| names[row.transpose().component_mul(&std).iamax()].clone())
                 .collect(),
-            judged: fitted.measure(&self.features, judged)?,
-        })
+            judged: fitted.measure(&self.features, fitted.maps.judged_set(self)),
+        }
     }
 
-    /// The report of `fitted`: its metrics on the encoded training jumps; `judged` are its metrics on the jumps that
-    /// candidates are judged by, kept only if there are validation jumps.
-    pub fn report(
-        &self,
-        fitted: &Fitted,
-        set: EncodedSet<'_>,
-        judged: &SetMetrics,
-    ) -> Result<TrainReport, TrainError> {
+    /// The report of `fitted`; `judged` are its metrics on the jumps that candidates are judged by, kept only if there
+    /// are validation jumps.
+    pub fn report(&self, fitted: &Fitted, judged: &SetMetrics) -> TrainReport {
         let names = Robot::state_names();
         let phases = self.training.phases.names().into_iter().zip(&fitted.xi);
         let (choice, candidates) = fitted.choice.clone().unzip();
         let validated = !self.validation.jumps.is_empty();
-        Ok(TrainReport {
+        let set = fitted.maps.training_set(self);
+        TrainReport {
             encoded: self.active.iter().map(|&i| names[i].clone()).collect(),
-            lift_loss: self.lift_loss(&fitted.encoder, set),
+            lift_loss: self.lift_loss(&fitted.maps.encoder, set),
             active_terms: phases
                 .map(|(phase, xi)| PhaseTerms {
                     phase,
@@ -159,9 +164,9 @@ impl Task<'_> {
             seeds: Vec::new(),
             support_overlap: None,
             deviations: Vec::new(),
-            training: fitted.measure(&self.features, set)?,
+            training: fitted.measure(&self.features, set),
             validation: validated.then(|| judged.clone()),
-        })
+        }
     }
 
     /// Share of the training input's energy that the latent input cannot carry.

@@ -10,16 +10,12 @@ use crate::limits::OutOfRange;
 use crate::model::ModelError;
 use crate::recording::RecordingError;
 
-/// Why training stopped without a model.
 #[derive(Debug, Error)]
 pub enum TrainError {
-    /// No recording was given.
     #[error("no training recording was given")]
     NoRecording,
-    /// There are fewer jumps than sets to divide them into.
     #[error("{found} jumps cannot be divided into {expected} sets")]
     Split { found: usize, expected: usize },
-    /// A recording is too short to learn from.
     #[error(
         "{path}: {found} samples in a segment starting at row {row}, expected at least {expected}"
     )]
@@ -47,7 +43,6 @@ pub enum TrainError {
         "latent dimension {requested}, expected 1 to {active} (the rows that an encoder can have of the coordinates that move or are actuated; `--coordinates free` and `--mask-std 0` allow more)"
     )]
     LatentDim { requested: usize, active: usize },
-    /// An option is outside its range.
     #[error("{option} is {found}, expected {expected}")]
     Option {
         /// Name of the option as on the command line.
@@ -55,7 +50,6 @@ pub enum TrainError {
         found: String,
         expected: &'static str,
     },
-    /// A number is outside the range of its setting.
     #[error(transparent)]
     Range(#[from] OutOfRange),
     /// Every candidate model left the range of finite numbers on the validation recordings.
@@ -79,7 +73,6 @@ pub enum TrainError {
         /// Magnitude above which squares overflow.
         limit: f64,
     },
-    /// The training was cancelled before there was a model to keep.
     #[error("training was cancelled before the first complete model")]
     Cancelled,
     /// A recording could not be turned into inputs.

@@ -7,15 +7,17 @@
 use nalgebra::DMatrix;
 
 use crate::ir::sin_cos::{LIMIT, reduced_sin_cos, sin_cos};
-use crate::model::{Library, Step, Tape};
-use crate::symbolic::Function;
-use crate::train::vectors::{self, Loop};
+use crate::model::{LatentVariable, Library, Step, Tape};
+use crate::symbolic::{Function, SymbolId};
+use crate::train::vectors::vectorised;
 
 /// A library over batches.
 #[derive(Clone, Debug)]
 pub struct Features {
     tape: Tape,
     latent_dim: usize,
+    occurring: Vec<Vec<bool>>, // term, variable
+    affine: Vec<bool>,
 }
 
 /// Values of all steps on one batch, reused between batches.
@@ -26,66 +28,45 @@ pub struct FeatureValues {
 }
 
 impl Features {
-    /// Prepares the terms of `library`.
     pub fn new(library: &Library) -> Self {
+        let latent_dim = library.latent_dim();
+        let variables = LatentVariable::all(latent_dim).filter_map(|v| library.symbol(v));
+        let variables: Vec<SymbolId> = variables.collect();
+        let mut pool = library.pool().clone();
+        let (mut occurring, mut affine) = (Vec::new(), Vec::new());
+        for term in library.terms() {
+            let own = pool.symbols_of(term.expr());
+            occurring.push(variables.iter().map(|v| own.contains(v)).collect());
+            affine.push(own.into_iter().all(|variable| {
+                let slope = pool.derivative(term.expr(), variable);
+                pool.is_constant(slope)
+            }));
+        }
         Self {
             tape: library.tape().clone(),
-            latent_dim: library.latent_dim(),
+            latent_dim,
+            occurring,
+            affine,
         }
     }
 
-    /// Number of terms.
     pub fn library_dim(&self) -> usize {
         self.tape.terms.len()
     }
 
-    /// Number of latent coordinates.
     pub fn latent_dim(&self) -> usize {
         self.latent_dim
     }
 
     /// For every term whether it is affine in `z`, `dz` and `u_lat`: dynamics of such terms do not run away within the
     /// time of a jump.
-    pub fn affine_terms(&self) -> Vec<bool> {
-        let bent = |inside: u32| if inside == 0 { 0 } else { 2 };
-        // 0 constant, 1 affine, 2 anything else
-        let degrees = self.of_terms(|step, of| match step {
-            Step::Number(_) => 0,
-            Step::Variable(_) => 1,
-            Step::Sum(parts) => parts.iter().map(of).max().unwrap_or(0),
-            Step::Product(parts) => parts.iter().map(of).sum::<u32>().min(2),
-            Step::Integer(base, 1) => of(base),
-            Step::Integer(inner, _)
-            | Step::Sine(inner)
-            | Step::Cosine(inner)
-            | Step::Apply(_, inner) => bent(of(inner)),
-            Step::Power(base, exponent) => bent(of(base).max(of(exponent))),
-        });
-        degrees.iter().map(|degree| *degree < 2).collect()
+    pub fn affine_terms(&self) -> &[bool] {
+        &self.affine
     }
 
-    /// For every term whether it depends on a variable, counted over `z`, `dz`, `u_lat`.
-    pub fn depend_on(&self, variable: usize) -> Vec<bool> {
-        self.of_terms(|step, of| match step {
-            Step::Number(_) => false,
-            Step::Variable(own) => *own == variable,
-            Step::Sum(parts) | Step::Product(parts) => parts.iter().any(of),
-            Step::Integer(inner, _)
-            | Step::Sine(inner)
-            | Step::Cosine(inner)
-            | Step::Apply(_, inner) => of(inner),
-            Step::Power(base, exponent) => of(base) || of(exponent),
-        })
-    }
-
-    /// For every term what `of_step` makes of its step and what it made of the steps before.
-    fn of_terms<T: Copy>(&self, of_step: impl Fn(&Step, &dyn Fn(&usize) -> T) -> T) -> Vec<T> {
-        let mut all = Vec::with_capacity(self.tape.steps.len());
-        for step in &self.tape.steps {
-            let next = of_step(step, &|at: &usize| all[*at]);
-            all.push(next);
-        }
-        self.tape.terms.iter().map(|&step| all[step]).collect()
+    /// Whether a variable, counted over `z`, `dz`, `u_lat`, occurs in a term.
+    pub fn depends_on(&self, term: usize, variable: usize) -> bool {
+        self.occurring[term][variable]
     }
 
     /// The term that is 1.
@@ -132,39 +113,17 @@ impl Features {
         for adjoint in &mut values.adjoints {
             adjoint.resize(theta_gradient.nrows(), 0.0);
         }
-        vectors::run(Backward {
-            features: self,
-            theta_gradient,
-            values,
-            gradient: gradient.as_mut_slice(),
-        });
+        sweep_back(&self.tape, theta_gradient, values, gradient.as_mut_slice());
     }
 
     /// Computes every step for all samples; see [`Self::evaluate`] for the shape of `variables`.
     pub fn forward(&self, variables: &DMatrix<f64>, values: &mut FeatureValues) {
-        vectors::run(Forward {
-            steps: &self.tape.steps,
-            variables,
-            values: &mut values.values,
-        });
+        compute(&self.tape.steps, variables, &mut values.values);
     }
 }
 
-/// All steps in their order, compiled for several vector units.
-struct Forward<'a> {
-    steps: &'a [Step],
-    variables: &'a DMatrix<f64>,
-    values: &'a mut Vec<Vec<f64>>,
-}
-
-impl Loop for Forward<'_> {
-    #[inline(always)]
-    fn run(self) {
-        let Self {
-            steps,
-            variables,
-            values,
-        } = self;
+vectorised! {
+    fn compute(steps: &[Step], variables: &DMatrix<f64>, values: &mut Vec<Vec<f64>>) {
         let n = variables.nrows();
         values.resize(steps.len(), Vec::new());
         for (index, step) in steps.iter().enumerate() {
@@ -205,31 +164,27 @@ impl Loop for Forward<'_> {
     }
 }
 
-/// All steps in the opposite order, compiled for several vector units.
-struct Backward<'a> {
-    features: &'a Features,
-    theta_gradient: &'a DMatrix<f64>,
-    values: &'a mut FeatureValues,
-    gradient: &'a mut [f64],
-}
-
-impl Loop for Backward<'_> {
-    #[inline(always)]
-    fn run(self) {
-        let FeatureValues { values, adjoints } = self.values;
-        let n = self.theta_gradient.nrows();
+vectorised! {
+    fn sweep_back(
+        tape: &Tape,
+        theta_gradient: &DMatrix<f64>,
+        values: &mut FeatureValues,
+        gradient: &mut [f64],
+    ) {
+        let FeatureValues { values, adjoints } = values;
+        let n = theta_gradient.nrows();
         for adjoint in adjoints.iter_mut() {
             adjoint.fill(0.0);
         }
-        let columns = self.theta_gradient.as_slice().chunks_exact(n);
-        for (column, &step) in columns.zip(&self.features.tape.terms) {
+        let columns = theta_gradient.as_slice().chunks_exact(n);
+        for (column, &step) in columns.zip(&tape.terms) {
             add(&mut adjoints[step], column);
         }
-        for (index, step) in self.features.tape.steps.iter().enumerate().rev() {
+        for (index, step) in tape.steps.iter().enumerate().rev() {
             let (earlier, rest) = adjoints.split_at_mut(index);
             add_adjoints(step, values, index, &rest[0], earlier);
             if let Step::Variable(column) = *step {
-                add(&mut self.gradient[n * column..n * (column + 1)], &rest[0]);
+                add(&mut gradient[n * column..n * (column + 1)], &rest[0]);
             }
         }
     }
@@ -259,7 +214,6 @@ fn add(out: &mut [f64], values: &[f64]) {
     }
 }
 
-/// Sines and cosines of all arguments.
 #[inline(always)]
 fn both(arguments: &[f64], sines: &mut Vec<f64>, cosines: &mut Vec<f64>) {
     sines.resize(arguments.len(), 0.0);
@@ -389,23 +343,6 @@ mod tests {
             "(2 + z1)^z2",
         ];
         Library::from_terms(2, &terms.map(String::from)).expect("terms parse")
-    }
-
-    #[test]
-    fn affine_terms_are_those_of_degree_one_at_most() {
-        let terms = [
-            "2",
-            "z1",
-            "3*dz2 - z1 + 1",
-            "u1/4",
-            "z1*u1",
-            "z1^2",
-            "sin(z1)",
-            "exp(dz1)",
-        ];
-        let library = Library::from_terms(2, &terms.map(String::from)).expect("terms parse");
-        let affine = Features::new(&library).affine_terms();
-        assert_eq!(affine, [true, true, true, true, false, false, false, false]);
     }
 
     #[test]

@@ -2,8 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::dataset::{Dataset, Jump, Rates};
-use super::error::TrainError;
+use super::dataset::{Dataset, Jump};
 use super::metrics::{BODY_X, BODY_Z};
 use super::options::Coordinates;
 use crate::robot::{FeetRule, GRAVITY_M_S2, JOINT_DIM, Leg, Robot, STATE_DIM};
@@ -43,18 +42,15 @@ impl Frame {
     /// With [`Coordinates::Named`] and two latent coordinates or more, the first two rows are the centre of mass
     /// forwards and upwards (see `centre_of_mass`) and the others combine the sums of `active` coordinates left and
     /// right that a mirror leaves alone: such an encoder knows nothing of `y`, roll and yaw, nor of left and right.
-    ///
-    /// # Errors
-    /// As [`Dataset::for_each`].
     pub fn new(
         training: &Dataset,
         active: &[usize],
         latent_dim: usize,
         coordinates: Coordinates,
         robot: &Robot,
-    ) -> Result<Self, TrainError> {
+    ) -> Self {
         if coordinates == Coordinates::Free {
-            return Ok(Self::plain(active));
+            return Self::plain(active);
         }
         let (body, held): (&[usize], _) = match latent_dim {
             0 | 1 => (&[BODY_X, BODY_Z], DMatrix::zeros(STATE_DIM, 0)),
@@ -63,16 +59,15 @@ impl Frame {
         let single = body.iter().chain(&[PITCH]).filter(|i| active.contains(i));
         let mut free: Vec<DVector<f64>> = single.map(|&i| unit(i)).collect();
         free.extend(mirrored_joints(active, robot));
-        Ok(Self {
+        Self {
             held,
             free: match free.is_empty() {
                 true => DMatrix::zeros(STATE_DIM, 0),
                 false => DMatrix::from_columns(&free),
             },
-        })
+        }
     }
 
-    /// Largest number of latent coordinates.
     pub fn dim(&self) -> usize {
         self.held.ncols() + self.free.ncols()
     }
@@ -122,7 +117,7 @@ fn centre_of_mass(training: &Dataset, robot: &Robot) -> DMatrix<f64> {
     let mut body = DMatrix::from_columns(&[unit(BODY_X), unit(BODY_Z)]);
     let mut accelerations = Vec::new();
     for jump in &training.jumps {
-        flight_accelerations(training, jump, &jump.rates, &mut accelerations);
+        flight_accelerations(training, jump, &mut accelerations);
     }
     if accelerations.len() < LEAST_WINDOWS {
         return body;
@@ -149,12 +144,7 @@ fn centre_of_mass(training: &Dataset, robot: &Robot) -> DMatrix<f64> {
 }
 
 /// Appends the accelerations over every window in the flights of a jump, scaled units.
-fn flight_accelerations(
-    training: &Dataset,
-    jump: &Jump,
-    rates: &Rates,
-    all: &mut Vec<DVector<f64>>,
-) {
+fn flight_accelerations(training: &Dataset, jump: &Jump, all: &mut Vec<DVector<f64>>) {
     for (phase, range) in &jump.spans {
         if training.phases.patterns[*phase].feet != FeetRule::None || range.len() <= 2 * TRIM {
             continue;
@@ -169,7 +159,7 @@ fn flight_accelerations(
                 break;
             }
             let duration = jump.time_s[last] - jump.time_s[first];
-            all.push((rates.dx.column(last) - rates.dx.column(first)) / duration);
+            all.push((jump.dx.column(last) - jump.dx.column(first)) / duration);
         }
     }
 }
@@ -191,7 +181,7 @@ mod tests {
     fn in_flight(dataset: &Dataset, row: DVector<f64>) -> (f64, f64) {
         let mut all = Vec::new();
         for jump in &dataset.jumps {
-            flight_accelerations(dataset, jump, &jump.rates, &mut all);
+            flight_accelerations(dataset, jump, &mut all);
         }
         let scale = dataset.scaling.state[BODY_Z];
         let values: Vec<f64> = all.iter().map(|ddx| row.dot(ddx) / scale).collect();
@@ -214,34 +204,5 @@ mod tests {
         assert!(of_body > 2.0 * spread, "{of_body}");
         // No leg is so heavy that a radian of a joint moves the whole robot by more than 2 cm.
         assert!(rows.rows(0, JOINT_DIM).amax() < 0.02, "{rows}");
-    }
-
-    #[test]
-    fn named_rows_say_nothing_of_sideways_motion_and_are_the_same_mirrored() {
-        let dataset = go1(["train_01"]);
-        let active: Vec<usize> = (0..STATE_DIM).collect();
-        let frame =
-            Frame::new(&dataset, &active, 6, Coordinates::Named, robot()).expect("in memory");
-        let (y, roll, yaw) = (13, 15, 17);
-        for rows in [&frame.held, &frame.free] {
-            for sideways in [y, roll, yaw] {
-                assert_eq!(rows.row(sideways).amax(), 0.0);
-            }
-            for (right, left) in [(0, 3), (6, 9)] {
-                assert!((rows.row(right) + rows.row(left)).amax() < 1e-15);
-            }
-            for (right, left) in [(1, 4), (2, 5), (7, 10), (8, 11)] {
-                assert!((rows.row(right) - rows.row(left)).amax() < 1e-15);
-            }
-        }
-        assert_eq!((frame.held.ncols(), frame.free.ncols()), (2, 7));
-    }
-
-    #[test]
-    fn nearest_directions_of_a_space_inside_the_frame_span_it() {
-        let frame = Frame::plain(&[1, 2, 5]);
-        let basis = DMatrix::from_columns(&[(unit(1) + unit(5)) / 2f64.sqrt()]);
-        let nearest = frame.nearest(&basis, 1);
-        assert!((nearest.dot(&basis).abs() - 1.0).abs() < 1e-12);
     }
 }

@@ -4,18 +4,17 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::dataset::Dataset;
 use super::features::Features;
 use super::latent::{EncodedSet, Latent};
-use super::rollout::{Candidate, Change, Window, predict, predict_changed, windows};
+use super::rollout::{Candidate, Change, Window, plain, predict, predict_changed, windows};
 use crate::sim::Restart;
 
 /// Weight of whole-jump rollouts against predictions of 0.1 s in a score.
 const ROLLOUT_WEIGHT: f64 = 0.2;
 /// Samples between errors that coefficients are refined by.
 const THINNED: usize = 5;
-/// Samples of a part, of which there are several only for more recordings than fit into little memory.
-const PART: usize = 32_768;
+/// Jumps of a part: with all errors at once, their derivatives would fill the memory for sets of many jumps.
+const JUMPS: usize = 64;
 /// Standard deviations that errors are not taken to be below where others are relative to them.
 const LEAST_ERROR: f64 = 1e-3;
 /// Kinds of windows: 0.1 s, and whole jumps.
@@ -25,37 +24,21 @@ const LONG: usize = 1;
 /// A library, and samples to judge its coefficients on (`library_dim x latent_dim` a phase).
 #[derive(Clone)]
 pub struct Judge<'a> {
-    /// The library.
     pub features: &'a Features,
     set: EncodedSet<'a>,
-    windows: [Vec<Window>; 2],     // short and long
-    parts: Vec<[Range<usize>; 2]>, // those of consecutive jumps
-    scales: [Vec<f64>; 2],         // what errors are multiplied by, a coordinate
+    windows: [Vec<Window>; 2], // short and long
+    scales: [Vec<f64>; 2],     // what errors are multiplied by, a coordinate
 }
 
 impl<'a> Judge<'a> {
-    /// Judges on these jumps.
     pub fn new(features: &'a Features, set: EncodedSet<'a>) -> Self {
-        Self::in_parts(features, set, PART)
-    }
-
-    fn in_parts(features: &'a Features, set: EncodedSet<'a>, samples: usize) -> Self {
         let inverse_std: Vec<f64> = (0..set.latent_dim())
             .map(|row| 1.0 / row_std(set.latent, row).max(f64::MIN_POSITIVE))
             .collect();
-        let windows =
-            [Restart::Every(0.1), Restart::Never].map(|restart| windows(set.dataset, restart));
-        let of_jumps = |windows: &Vec<Window>, jumps: &Range<usize>| {
-            let before = |jump| windows.partition_point(|window| window.jump < jump);
-            before(jumps.start)..before(jumps.end)
-        };
-        let parts = parts_of(set.dataset, samples)
-            .map(|jumps| windows.each_ref().map(|windows| of_jumps(windows, &jumps)));
         Self {
             features,
-            parts: parts.collect(),
             set,
-            windows,
+            windows: [Restart::Every(0.1), Restart::Never].map(|every| windows(set.dataset, every)),
             scales: [inverse_std.clone(), inverse_std],
         }
     }
@@ -94,7 +77,7 @@ impl<'a> Judge<'a> {
 
     /// Parts that [`Self::errors`] can be asked for, one by one so that few predictions are held at a time.
     pub fn parts(&self) -> Range<usize> {
-        0..self.parts.len()
+        0..self.set.dataset.jumps.len().div_ceil(JUMPS)
     }
 
     /// Scaled errors of 0.1 s predictions and of whole jumps of a part, every [`THINNED`]th sample;
@@ -110,7 +93,6 @@ impl<'a> Judge<'a> {
         are_finite(&errors).then_some(errors)
     }
 
-    /// The same with each of the `changes`, one at a time.
     pub fn errors_changed(
         &self,
         xi: &[DMatrix<f64>],
@@ -134,7 +116,6 @@ impl<'a> Judge<'a> {
         pairs.map(|(short, long)| finite([short, long])).collect()
     }
 
-    /// The windows of a part with what is predicted in them.
     fn predictions(
         &self,
         xi: &[DMatrix<f64>],
@@ -142,12 +123,14 @@ impl<'a> Judge<'a> {
         kind: usize,
     ) -> impl Iterator<Item = (&Window, DMatrix<f64>)> {
         let (windows, features) = (self.windows_of(part, kind), self.features);
-        let predictions = predict(Candidate { features, xi }, self.set, windows);
+        let predictions = predict(Candidate { features, xi }, self.set, &plain(windows));
         windows.iter().zip(predictions)
     }
 
     fn windows_of(&self, part: usize, kind: usize) -> &[Window] {
-        &self.windows[kind][self.parts[part][kind].clone()]
+        let windows = &self.windows[kind];
+        let before = |jump| windows.partition_point(|window| window.jump < jump);
+        &windows[before(part * JUMPS)..before((part + 1) * JUMPS)]
     }
 
     /// Adds every [`THINNED`]th error of a window's prediction, scaled.
@@ -202,23 +185,6 @@ fn are_finite(errors: &[DVector<f64>; 2]) -> bool {
     errors.iter().flatten().all(|error| error.is_finite())
 }
 
-/// Consecutive jumps of at most so many samples, or of one jump.
-fn parts_of(dataset: &Dataset, most: usize) -> impl Iterator<Item = Range<usize>> {
-    let mut next = 0;
-    std::iter::from_fn(move || {
-        let start = next;
-        let mut samples = 0;
-        while let Some(jump) = dataset.jumps.get(next) {
-            samples += jump.samples();
-            if next > start && samples > most {
-                break;
-            }
-            next += 1;
-        }
-        (next > start).then_some(start..next)
-    })
-}
-
 /// Standard deviation of a latent coordinate over all samples.
 fn row_std(latent: &[Latent], row: usize) -> f64 {
     let rows = || latent.iter().map(|samples| samples.z.row(row));
@@ -251,52 +217,5 @@ mod tests {
         }
         // What cannot be told apart from none is not divided by.
         assert!(plain.relative_to(&truth).score(&off).is_finite());
-    }
-
-    #[test]
-    fn score_within_a_limit_is_the_score_or_above_the_limit() {
-        let (dataset, latent) = oscillator::jumps(3);
-        let (features, truth) = oscillator::known();
-        let judge = Judge::new(&features, EncodedSet::new(&dataset, &latent));
-        let off: Vec<_> = truth.iter().map(|xi| xi.map(|c| 1.1 * c)).collect();
-        let (score, short) = (judge.score(&off), judge.error(&off, SHORT));
-        assert_eq!(judge.score_within(&off, score), score);
-        assert_eq!(judge.score_within(&off, 0.99 * short), short);
-        assert!(judge.score_within(&off, 0.99 * score) > 0.99 * score);
-    }
-
-    #[test]
-    fn errors_in_parts_are_those_of_all_jumps_together() {
-        let (dataset, latent) = oscillator::jumps(5);
-        let (features, truth) = oscillator::known();
-        let off: Vec<_> = truth.iter().map(|xi| xi.map(|c| 1.1 * c)).collect();
-        let change = Change {
-            place: (0, 1, 0),
-            by: 0.01,
-        };
-        let errors = |judge: &Judge<'_>, part| {
-            let changed = judge.errors_changed(&off, &[change], part)?;
-            Some([judge.errors(&off, part)?, changed[0].clone()])
-        };
-        let set = EncodedSet::new(&dataset, &latent);
-        let together = Judge::new(&features, set);
-        assert_eq!(together.parts(), 0..1);
-        let all = errors(&together, 0).expect("no rollout diverges");
-        assert_ne!(all[0], all[1]);
-        for (samples, n_parts) in [(2 * dataset.jumps[0].samples(), 3), (1, 5)] {
-            let judge = Judge::in_parts(&features, set, samples);
-            assert_eq!(judge.parts(), 0..n_parts);
-            let parts = judge.parts().map(|part| errors(&judge, part));
-            let parts: Option<Vec<_>> = parts.collect();
-            let parts = parts.expect("no rollout diverges");
-            for (moved, all) in all.iter().enumerate() {
-                for (kind, all) in all.iter().enumerate() {
-                    let found = parts.iter().flat_map(|part| part[moved][kind].iter());
-                    assert!(found.eq(all.iter()), "{samples} samples, kind {kind}");
-                }
-            }
-            let (score, whole) = (judge.score(&off), together.score(&off));
-            assert!((score - whole).abs() < 1e-12 * whole, "{score} of {whole}");
-        }
     }
 }

@@ -27,7 +27,6 @@ pub struct Knowledge {
 }
 
 impl Knowledge {
-    /// Nothing is known.
     pub fn nothing(library_dim: usize, latent_dim: usize) -> Self {
         Self {
             known: DMatrix::zeros(library_dim, latent_dim),
@@ -68,8 +67,7 @@ impl Knowledge {
         let fix =
             |knowledge: &mut Self, columns: Range<usize>, is_meant: &dyn Fn(usize) -> bool| {
                 for variable in (0..3 * d).filter(|&i| is_meant(i)) {
-                    let depends = features.depend_on(variable);
-                    for term in (0..p).filter(|&term| depends[term]) {
+                    for term in (0..p).filter(|&term| features.depends_on(term, variable)) {
                         let mut row = knowledge.free.row_mut(term);
                         row.columns_range_mut(columns.clone()).fill(false);
                     }
@@ -116,27 +114,9 @@ impl Knowledge {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::Library;
     use crate::robot::STATE_DIM;
     use crate::train::oscillator;
     use crate::train::sparse::{Pruning, Regression};
-
-    #[test]
-    fn terms_are_found_by_what_they_depend_on() {
-        let (features, _) = oscillator::known();
-        assert_eq!(features.constant_term(), Some(0));
-        assert_eq!(features.variable_term(4), Some(5));
-        assert_eq!(
-            features.depend_on(0),
-            [false, true, false, false, false, false, false]
-        );
-        let terms = ["sin(z1+z2)".to_owned(), "z2^2".to_owned()];
-        let curved = Features::new(&Library::from_terms(2, &terms).expect("two terms"));
-        assert_eq!(
-            (curved.depend_on(0), curved.constant_term()),
-            (vec![true, false], None)
-        );
-    }
 
     #[test]
     fn centre_of_mass_is_moved_by_forces_alone_and_in_flight_by_none() {

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DMatrixViewMut};
 
-use super::dataset::{Dataset, Jump, Quantity, Rates, block_widths, centred, mean, sum_product};
+use super::dataset::{Dataset, Jump, centred, mean};
 use super::error::TrainError;
 use crate::model::{AffineMap, StateMap};
 
@@ -24,24 +24,22 @@ pub struct Latent {
 }
 
 impl Latent {
-    /// Encodes every jump.
     pub fn of(dataset: &Dataset, encoder: &StateMap) -> Vec<Latent> {
-        let linear = (encoder.as_affine())
-            .map(|linear| (linear.weights(), input_projection(linear.weights())));
-        let of_jump = |jump: &Jump| match &linear {
+        let linear = encoder.as_affine().map(AffineMap::weights);
+        let linear = linear.map(|weights| (weights, input_projection(weights)));
+        let encoded = dataset.jumps.iter().map(|jump| match &linear {
             Some((weights, projection)) => Self {
                 z: map_samples(encoder, &jump.x),
-                dz: *weights * &jump.rates.dx,
-                ddz: *weights * &jump.rates.ddx,
+                dz: *weights * &jump.dx,
+                ddz: *weights * &jump.ddx,
                 u_lat: projection * &jump.u,
             },
-            None => Self::along(jump, &jump.rates, encoder),
-        };
-        dataset.jumps.iter().map(of_jump).collect()
+            None => Self::along(jump, encoder),
+        });
+        encoded.collect()
     }
 
-    /// Encodes a jump with the Jacobian at every sample.
-    fn along(jump: &Jump, rates: &Rates, encoder: &StateMap) -> Self {
+    fn along(jump: &Jump, encoder: &StateMap) -> Self {
         let empty = DMatrix::zeros(encoder.output_dim(), jump.samples());
         let mut latent = Self {
             z: empty.clone(),
@@ -51,8 +49,8 @@ impl Latent {
         };
         for sample in 0..jump.samples() {
             let column = |matrix: &DMatrix<f64>| matrix.column(sample).into_owned();
-            let (x, dx) = (column(&jump.x), column(&rates.dx));
-            let mapped = encoder.apply_rates(&x, &dx, &column(&rates.ddx));
+            let (x, dx) = (column(&jump.x), column(&jump.dx));
+            let mapped = encoder.apply_rates(&x, &dx, &column(&jump.ddx));
             let into = [&mut latent.z, &mut latent.dz, &mut latent.ddz];
             for (matrix, value) in into.into_iter().zip(mapped.expect(FITS)) {
                 matrix.set_column(sample, &value);
@@ -72,7 +70,6 @@ impl Latent {
         variables
     }
 
-    /// Writes them into the rows of `variables`.
     fn copy_variables(&self, range: Range<usize>, variables: &mut DMatrixViewMut<'_, f64>) {
         let d = self.z.nrows();
         for (block, source) in [&self.z, &self.dz, &self.u_lat].into_iter().enumerate() {
@@ -83,42 +80,34 @@ impl Latent {
     }
 }
 
-/// A dataset with its latent samples, one of each jump.
 #[derive(Clone, Copy, Debug)]
 pub struct EncodedSet<'a> {
-    /// The jumps.
     pub dataset: &'a Dataset,
-    /// Their latent samples.
     pub latent: &'a [Latent],
 }
 
 impl<'a> EncodedSet<'a> {
-    /// These latent samples of a dataset.
     pub fn new(dataset: &'a Dataset, latent: &'a [Latent]) -> Self {
         Self { dataset, latent }
     }
 
-    /// Number of latent coordinates, 0 without a jump.
     pub fn latent_dim(self) -> usize {
         self.latent.first().map_or(0, |first| first.z.nrows())
     }
 
-    /// Blocks of the samples of one phase: `[z, dz, u_lat]`, `n x 3 latent_dim`, and `ddz^T`, `n x latent_dim`.
-    pub fn regression_blocks(
-        self,
-        phase: usize,
-    ) -> impl Iterator<Item = (DMatrix<f64>, DMatrix<f64>)> {
-        let Self { dataset, latent } = self;
-        let d = self.latent_dim();
-        let widths = block_widths(dataset.samples(Some(phase)));
-        let empty = move |n| (DMatrix::zeros(n, 3 * d), DMatrix::zeros(n, d));
-        dataset.cut(Some(phase), widths, empty, move |block, at, jump, range| {
-            let (variables, target) = block;
-            let (samples, n) = (&latent[jump], range.len());
-            samples.copy_variables(range.clone(), &mut variables.rows_mut(at, n));
-            let mut rows = target.rows_mut(at, n);
+    /// The samples of one phase: `[z, dz, u_lat]`, `n x 3 latent_dim`, and `ddz^T`, `n x latent_dim`.
+    pub fn regression_samples(self, phase: usize) -> (DMatrix<f64>, DMatrix<f64>) {
+        let (n, d) = (self.dataset.samples(Some(phase)), self.latent_dim());
+        let (mut variables, mut target) = (DMatrix::zeros(n, 3 * d), DMatrix::zeros(n, d));
+        let mut at = 0;
+        for (jump, range) in self.dataset.spans(Some(phase)) {
+            let (samples, count) = (&self.latent[jump], range.len());
+            samples.copy_variables(range.clone(), &mut variables.rows_mut(at, count));
+            let mut rows = target.rows_mut(at, count);
             rows.tr_copy_from(&samples.ddz.columns_range(range));
-        })
+            at += count;
+        }
+        (variables, target)
     }
 }
 
@@ -134,7 +123,6 @@ pub fn input_projection(weights: &DMatrix<f64>) -> DMatrix<f64> {
     }
 }
 
-/// A map, linear or not, of samples in columns.
 pub fn map_samples(map: &StateMap, samples: &DMatrix<f64>) -> DMatrix<f64> {
     if let Some(linear) = map.as_affine() {
         let mut mapped = linear.weights() * samples;
@@ -170,12 +158,11 @@ pub fn mean_jacobian(encoder: &StateMap, dataset: &Dataset) -> DMatrix<f64> {
     }
     let (rows, columns) = encoder.shape();
     let mut sum = DMatrix::zeros(rows, columns);
-    for block in dataset.blocks(Quantity::X, None) {
-        for x in block.column_iter() {
-            sum += encoder.jacobian(&x.into_owned()).expect(FITS);
-        }
+    let states = dataset.states(None);
+    for x in states.column_iter() {
+        sum += encoder.jacobian(&x.into_owned()).expect(FITS);
     }
-    sum / dataset.samples(None).max(1) as f64
+    sum / states.ncols().max(1) as f64
 }
 
 /// Decoder of least mean square error over all phases: `x ~ W_d z + b_d`, with `z` the encoded samples after the
@@ -188,26 +175,12 @@ pub fn least_squares_decoder(
     encoder: &StateMap,
     hidden: Option<&StateMap>,
 ) -> Result<AffineMap, TrainError> {
-    let d = hidden.unwrap_or(encoder).output_dim();
-    let x_mean = dataset.mean(Quantity::X, None);
-    let encoded = || {
-        let blocks = dataset.blocks(Quantity::X, None);
-        blocks.map(|x| {
-            let z = map_samples(encoder, &x);
-            match hidden {
-                Some(hidden) => (map_samples(hidden, &z), x),
-                None => (z, x),
-            }
-        })
-    };
-    let z_mean = mean(d, dataset.samples(None), encoded().map(|(z, _)| z));
-    let mut gram = DMatrix::zeros(d, d);
-    let mut cross = DMatrix::zeros(x_mean.len(), d);
-    for (z, x) in encoded() {
-        let (x, z) = (centred(x, &x_mean), centred(z, &z_mean));
-        sum_product(&mut gram, &z, &z);
-        sum_product(&mut cross, &x, &z);
-    }
+    let x = dataset.states(None);
+    let z = map_samples(encoder, &x);
+    let z = hidden.map_or_else(|| z.clone(), |hidden| map_samples(hidden, &z));
+    let (x_mean, z_mean) = (mean(&x), mean(&z));
+    let (x, z) = (centred(&x, &x_mean), centred(&z, &z_mean));
+    let (gram, cross) = (&z * z.transpose(), &x * z.transpose());
     let floor = 1e-12 * gram.trace().max(f64::MIN_POSITIVE);
     let inverse = gram
         .pseudo_inverse(floor)

@@ -3,11 +3,11 @@
 use nalgebra::{DMatrix, DVector, DVectorView};
 use serde::Serialize;
 
-use super::dataset::{Dataset, Rates, Scaling, mean};
+use super::dataset::{Dataset, Jump, Scaling, mean};
 use super::error::TrainError;
 use super::features::{FeatureValues, Features};
 use super::latent::{EncodedSet, Latent, lift_samples, map_samples};
-use super::rollout::{Candidate, Window, predict, windows};
+use super::rollout::{Candidate, Window, plain, predict, windows};
 use crate::model::{ReducedModel, StateMap};
 use crate::recording::Recording;
 use crate::robot::JOINT_DIM;
@@ -32,15 +32,13 @@ pub struct SetMetrics {
     pub ddz_r2: Vec<f64>,
     /// Coefficient of determination of the 12 joint torques of `W_e^T pinv(W_e^T) u` (`J^T pinv(J^T) u`), and what the
     /// joints take on top, against the recorded ones over all plausible samples, all joints together as in
-    /// [`LiftSums::torque`](crate::evaluate::LiftSums::torque).
+    /// the lift of an [`Assessment`](crate::evaluate::Assessment).
     pub torque_r2: f64,
     /// Root mean square error of body x over predictions of 0.1 s with fixed steps.
     pub prediction_x_m: f64,
-    /// The same of body z.
     pub prediction_z_m: f64,
     /// Root mean square error of body x over rollouts of whole jumps with fixed steps; `None` when one diverges.
     pub rollout_x_m: Option<f64>,
-    /// The same of body z.
     pub rollout_z_m: Option<f64>,
 }
 
@@ -68,28 +66,27 @@ pub fn assess(model: &ReducedModel, recordings: &[Recording]) -> Result<SetMetri
     };
     let maps = [model.encoder_map()?, model.decoder_map()?];
     let latent = Latent::of(&dataset, maps[0]);
-    measure(candidate, maps, EncodedSet::new(&dataset, &latent))
+    Ok(measure(candidate, maps, EncodedSet::new(&dataset, &latent)))
 }
 
-/// Measures a model on a dataset that it has encoded.
 pub(super) fn measure(
     candidate: Candidate<'_>,
     [encoder, decoder]: [&StateMap; 2],
     set: EncodedSet<'_>,
-) -> Result<SetMetrics, TrainError> {
+) -> SetMetrics {
     let rms = |restart| body_rms(candidate, decoder, set, &windows(set.dataset, restart));
     let [prediction_x_m, prediction_z_m] = rms(Restart::Every(SHORT_S));
     let [rollout_x_m, rollout_z_m] = rms(Restart::Never);
     let phases = 0..set.dataset.phases.patterns.len();
-    Ok(SetMetrics {
+    SetMetrics {
         decoder_mse: decoder_mse(decoder, set),
         ddz_r2: phases.map(|phase| ddz_r2(candidate, set, phase)).collect(),
-        torque_r2: torque_r2(encoder, set)?,
+        torque_r2: torque_r2(encoder, set),
         prediction_x_m,
         prediction_z_m,
         rollout_x_m: rollout_x_m.is_finite().then_some(rollout_x_m),
         rollout_z_m: rollout_z_m.is_finite().then_some(rollout_z_m),
-    })
+    }
 }
 
 /// Root mean square errors of decoded body x and z, in metres, over all predicted samples of the windows.
@@ -99,7 +96,7 @@ fn body_rms(
     set: EncodedSet<'_>,
     windows: &[Window],
 ) -> [f64; 2] {
-    let predictions = predict(candidate, set, windows);
+    let predictions = predict(candidate, set, &plain(windows));
     let mut squares = [0.0; 2];
     let mut count = 0;
     for (window, prediction) in windows.iter().zip(&predictions) {
@@ -126,51 +123,47 @@ fn decoder_mse(decoder: &StateMap, set: EncodedSet<'_>) -> f64 {
 }
 
 fn ddz_r2(candidate: Candidate<'_>, set: EncodedSet<'_>, phase: usize) -> f64 {
-    let blocks = || {
-        let blocks = set.regression_blocks(phase);
-        blocks.map(|(variables, target)| (variables, target.transpose()))
-    };
-    let (d, n) = (set.latent_dim(), set.dataset.samples(Some(phase)));
-    let mut sums = Determination::about(mean(d, n, blocks().map(|(_, target)| target)));
-    let mut values = FeatureValues::default();
-    for (variables, target) in blocks() {
-        let theta = candidate.features.evaluate(&variables, &mut values);
-        let predicted = (theta * &candidate.xi[phase]).transpose();
-        for (predicted, target) in predicted.column_iter().zip(target.column_iter()) {
-            sums.add(predicted, target);
+    let (variables, target) = set.regression_samples(phase);
+    let theta = (candidate.features).evaluate(&variables, &mut FeatureValues::default());
+    let (predicted, target) = (
+        (theta * &candidate.xi[phase]).transpose(),
+        target.transpose(),
+    );
+    let mut sums = Determination::about(mean(&target));
+    for (predicted, target) in predicted.column_iter().zip(target.column_iter()) {
+        sums.add(predicted, target);
+    }
+    sums.r2()
+}
+
+/// Of the samples whose torques can be the robot's, see [`is_plausible`](crate::evaluate::is_plausible).
+fn torque_r2(encoder: &StateMap, set: EncodedSet<'_>) -> f64 {
+    let jumps = set.dataset.jumps.iter().zip(set.latent);
+    let n: usize = (set.dataset.jumps.iter())
+        .map(|jump| jump.torque_samples().count())
+        .sum();
+    let mut mean = DVector::zeros(JOINT_DIM);
+    for (jump, _) in jumps.clone() {
+        for sample in jump.torque_samples() {
+            let torque = recorded_torque(&jump.u, jump, sample);
+            mean.axpy(1.0 / n as f64, &torque, 1.0);
+        }
+    }
+    let mut sums = Determination::about(mean);
+    for (jump, samples) in jumps {
+        let lift = lift_samples(encoder, &jump.x, &samples.u_lat);
+        for sample in jump.torque_samples() {
+            let torque = |u| recorded_torque(u, jump, sample);
+            sums.add(torque(&lift).as_view(), torque(&jump.u).as_view());
         }
     }
     sums.r2()
 }
 
-/// Of the samples whose torques can be the robot's, see [`is_plausible`].
-fn torque_r2(encoder: &StateMap, set: EncodedSet<'_>) -> Result<f64, TrainError> {
-    let dataset = set.dataset;
-    let n: usize = (dataset.jumps.iter())
-        .map(|jump| jump.torque_samples().count())
-        .sum();
-    let mut mean = DVector::zeros(JOINT_DIM);
-    for jump in &dataset.jumps {
-        for sample in jump.torque_samples() {
-            let torque = recorded_torque(&jump.u, &jump.rates, sample);
-            mean.axpy(1.0 / n as f64, &torque, 1.0);
-        }
-    }
-    let mut sums = Determination::about(mean);
-    for (jump, samples) in dataset.jumps.iter().zip(set.latent) {
-        let lift = lift_samples(encoder, &jump.x, &samples.u_lat);
-        for sample in jump.torque_samples() {
-            let torque = |u| recorded_torque(u, &jump.rates, sample);
-            sums.add(torque(&lift).as_view(), torque(&jump.u).as_view());
-        }
-    }
-    Ok(sums.r2())
-}
-
-/// The motors' torques of a sample for inputs `u`: those at the links and what the joints take.
-fn recorded_torque(u: &DMatrix<f64>, rates: &Rates, sample: usize) -> DVector<f64> {
+/// The motors' torques of a sample for inputs `u`: those at the links, joint friction and rotor inertia.
+fn recorded_torque(u: &DMatrix<f64>, jump: &Jump, sample: usize) -> DVector<f64> {
     let net = u.view((0, sample), (JOINT_DIM, 1)).column(0).into_owned();
-    match &rates.losses {
+    match &jump.losses {
         None => net,
         Some(losses) => net + losses.column(sample),
     }

@@ -2,26 +2,28 @@
 //!
 //! Enters: recordings of jumps, a robot, [`TrainOptions`]. Leaves: a [`Trained`] model, whose provenance says how to
 //! repeat it, and a [`TrainReport`]. Read [`closed_form()`] first: it walks from the dataset over the encoder's row
-//! space ([`subspace`], [`varimax`]) and the decoder ([`latent`]) to the dynamics ([`weak_form`], [`sparse`], [`select`]),
-//! judged by [`rollout`]s.
+//! space (`subspace`, `varimax`) and the decoder (`latent`) to the dynamics (`weak_form`, `sparse`, `select`),
+//! judged by rollouts.
 
-pub mod closed_form;
-pub mod dataset;
-pub mod features;
-pub mod frame;
+#![allow(missing_docs, reason = "names say it all where there is no comment")]
+
+mod closed_form;
+mod dataset;
+mod features;
+mod frame;
 mod growth;
-pub mod joint;
-pub mod jumps;
-pub mod knowledge;
-pub mod latent;
-pub mod metrics;
-pub mod progress;
-pub mod rollout;
-pub mod select;
-pub mod sparse;
-pub mod subspace;
-pub mod varimax;
-pub mod weak_form;
+mod joint;
+mod jumps;
+mod knowledge;
+mod latent;
+mod metrics;
+mod progress;
+mod rollout;
+mod select;
+mod sparse;
+mod subspace;
+mod varimax;
+mod weak_form;
 
 mod assemble;
 mod dynamics_fit;
@@ -37,7 +39,6 @@ mod refine;
 mod report;
 mod seeds;
 mod split;
-mod stepper;
 mod task;
 mod thin;
 mod vectors;

@@ -23,7 +23,6 @@ use crate::recording::phases::CHATTER_SAMPLES;
 use crate::recording::preprocess::BATCH_ROWS;
 use crate::robot::{Actuators, InputRule, JOINT_NAMES, Robot, STATE_DIM, WrenchFrame};
 
-/// How a model is learned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
@@ -56,15 +55,10 @@ impl Method {
 /// Settings of the training; [`TrainOptions::new`] gives the defaults for a latent dimension.
 #[derive(Clone, Debug)]
 pub struct TrainOptions {
-    /// Name of the model.
     pub name: String,
-    /// Number of latent coordinates.
     pub latent_dim: usize,
-    /// Candidate terms.
     pub library: LibraryChoice,
-    /// Which foot patterns form which phase.
     pub phases: PhaseRule,
-    /// Seed of every random choice.
     pub seed: u64,
     /// How many seeds are tried, counting up from `seed`; the best is kept.
     pub n_seeds: usize,
@@ -77,13 +71,10 @@ pub struct TrainOptions {
     pub wrench_frame: WrenchFrame,
     /// Which coordinates the encoder looks at, and what it is to carry.
     pub encoder: EncoderOptions,
-    /// How Xi is fitted and chosen.
     pub regression: RegressionOptions,
-    /// Settings of the joint method only.
     pub joint: JointOptions,
 }
 
-/// Settings of the joint training.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointOptions {
     /// Epochs, thresholding, step length.
@@ -98,7 +89,6 @@ pub struct JointOptions {
     pub unroll: Unroll,
     /// What follows the first step.
     pub transfer: Transfer,
-    /// Shape of encoder and decoder.
     pub maps: MapOptions,
 }
 
@@ -109,7 +99,6 @@ pub struct MapOptions {
     pub encoder_layers: Vec<usize>,
     /// Widths of the decoder's hidden layers; a linear layer to the state follows.
     pub decoder_layers: Vec<usize>,
-    /// Activation of the hidden layers.
     pub activation: Activation,
 }
 
@@ -122,7 +111,6 @@ pub enum Transfer {
     Chosen,
 }
 
-/// Settings of the encoder.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct EncoderOptions {
     /// Weight of the input energy which the latent input cannot carry, against the reconstruction error in scaled
@@ -138,7 +126,6 @@ pub struct EncoderOptions {
     pub rotate: bool,
     /// What the encoder's rows are made of.
     pub coordinates: Coordinates,
-    /// Random starting points of the search.
     pub restarts: usize,
 }
 
@@ -153,7 +140,6 @@ pub enum Coordinates {
     Free,
 }
 
-/// Settings of the regression for Xi.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RegressionOptions {
     /// Window of the moving average over accelerations, in samples.
@@ -234,7 +220,6 @@ impl TrainOptions {
         }
     }
 
-    /// The seeds to try.
     pub fn seeds(&self) -> Vec<u64> {
         let count = self.n_seeds.max(1) as u64;
         (0..count).map(|i| self.seed.wrapping_add(i)).collect()
@@ -363,7 +348,6 @@ impl Default for JointOptions {
 }
 
 impl Default for MapOptions {
-    /// Affine maps.
     fn default() -> Self {
         Self {
             encoder_layers: Vec::new(),

@@ -7,8 +7,8 @@ use std::sync::atomic::AtomicBool;
 
 use nalgebra::{DMatrix, DVector, Vector2};
 
-use super::dataset::{Dataset, Jump, Rates, ScaleOptions};
-use super::dynamics_fit::Fitted;
+use super::dataset::{Dataset, Jump, ScaleOptions};
+use super::dynamics_fit::{Fitted, Maps};
 use super::features::Features;
 use super::growth::Growth;
 use super::judge::Judge;
@@ -36,7 +36,6 @@ fn truth(phase: usize, z: &[f64], dz: &[f64], u: &[f64]) -> [f64; 2] {
     }
 }
 
-/// Shipped jumps of the Go1, such as `train_01`.
 pub(super) fn go1(names: impl IntoIterator<Item = impl Display>) -> Dataset {
     let names = names.into_iter().map(|name| format!("go1/{name}"));
     let jumps: Vec<_> = names.map(|name| shipped(&name)).collect();
@@ -46,7 +45,6 @@ pub(super) fn go1(names: impl IntoIterator<Item = impl Display>) -> Dataset {
     Dataset::new(&jumps[..], &rule, &options.phases, &scaling, 11).expect("jumps")
 }
 
-/// A standard library with inputs.
 pub(super) fn standard_library(latent_dim: usize, degree: u32, trigonometric: bool) -> Library {
     let standard = StandardLibrary {
         degree,
@@ -83,11 +81,9 @@ pub(super) fn jumps(n_jumps: usize) -> (Dataset, Vec<Latent>) {
             time_s: (0..n).map(|i| i as f64 * STEP_S).collect(),
             x: lift(&samples.z),
             u: lift(&samples.u_lat),
-            rates: Rates {
-                dx: lift(&samples.dz),
-                ddx: lift(&samples.ddz),
-                losses: None,
-            },
+            dx: lift(&samples.dz),
+            ddx: lift(&samples.ddz),
+            losses: None,
             phase: (0..n).map(|i| usize::from(i >= LIFT_OFF)).collect(),
             spans: vec![(0, 0..LIFT_OFF), (1, LIFT_OFF..n)],
             implausible: Vec::new(),
@@ -111,9 +107,13 @@ pub(super) fn fitted(weights: DMatrix<f64>, xi: DMatrix<f64>) -> Fitted {
         AffineMap::new("map", w, bias).expect("finite").into()
     };
     Fitted {
-        decoder: map(weights.transpose()),
-        encoder: map(weights.clone()),
-        weights,
+        maps: Maps {
+            decoder: map(weights.transpose()),
+            encoder: map(weights.clone()),
+            weights,
+            training: Vec::new(),
+            validation: Vec::new(),
+        },
         xi: vec![xi],
         choice: None,
         score: 0.0,

@@ -23,7 +23,8 @@ pub(super) fn support_overlap(
     let mut overlaps = Vec::new();
     for (i, first) in runs.iter().enumerate() {
         for second in &runs[i + 1..] {
-            let partner = match_latents(&first.weights, &second.weights, state_covariance);
+            let partner =
+                match_latents(&first.maps.weights, &second.maps.weights, state_covariance);
             overlaps.push(overlap(library, first, second, &partner));
         }
     }

@@ -2,19 +2,15 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// What a training reports while it runs.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Progress {
-    /// A stage began.
     Stage {
-        /// What it does.
         name: &'static str,
         /// Steps it will take, if it is known.
         steps: usize,
     },
     /// Candidates or epochs of the stage that are done.
     Done {
-        /// Steps done since the stage began.
         steps: usize,
         /// Figures of the moment, ready to print.
         text: String,
@@ -43,12 +39,10 @@ impl<'a> Watch<'a> {
         self.cancel
     }
 
-    /// Announces a stage.
     pub fn stage(&mut self, name: &'static str, steps: usize) {
         (self.listener)(Progress::Stage { name, steps });
     }
 
-    /// Announces steps done.
     pub fn done(&mut self, steps: usize, text: String) {
         (self.listener)(Progress::Done { steps, text });
     }

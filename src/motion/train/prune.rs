@@ -14,7 +14,7 @@ const ATTEMPTS: usize = 60;
 const ROUNDS: usize = 3;
 
 /// A share of the energy, and the phase, row and column of the term that it belongs to.
-type Place = (f64, usize, usize, usize);
+type RankedTerm = (f64, usize, usize, usize);
 
 impl Search<'_> {
     /// Drops terms, the least useful to the regression first, fitting the rest of their equation again, as long as
@@ -58,7 +58,7 @@ impl Search<'_> {
     fn attempt(
         &self,
         trial: &mut Trial<'_>,
-        (_, phase, row, column): Place,
+        (_, phase, row, column): RankedTerm,
         active: bool,
         limit: f64,
     ) {
@@ -82,7 +82,7 @@ impl Trial<'_> {
     fn places(
         &self,
         shares: fn(&Regression, usize, &DMatrix<bool>, f64) -> Vec<(usize, f64)>,
-    ) -> Vec<Place> {
+    ) -> Vec<RankedTerm> {
         let mut places = Vec::new();
         for (phase, regression) in self.regressions.iter().enumerate() {
             let support = self.now.xi[phase].map(|value| value != 0.0);

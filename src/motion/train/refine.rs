@@ -18,15 +18,13 @@ use super::sparse::active_terms;
 pub(super) const PRIOR: f64 = 1e-3;
 /// Relative step of the difference quotients.
 const STEP: f64 = 1e-6;
-/// Dampings tried in one step before it is given up.
 const ATTEMPTS: usize = 6;
-/// Coefficients whose rollouts are computed together.
 const TOGETHER: usize = 64;
 /// Share of the squared errors that a step must lower them by to be followed by another.
 const LEAST_GAIN: f64 = 2e-3;
 
 /// Phase, term and latent coordinate of a coefficient.
-pub(super) type Place = (usize, usize, usize);
+pub(super) type CoefficientIndex = (usize, usize, usize);
 
 /// Coefficients of all phases, `library_dim x latent_dim` each, and the score that judges them.
 #[derive(Clone, Debug)]
@@ -36,7 +34,6 @@ pub(super) struct Coefficients {
 }
 
 impl Coefficients {
-    /// Coefficients that are not zero.
     pub(super) fn active(&self) -> usize {
         self.xi.iter().map(active_terms).sum()
     }
@@ -44,32 +41,27 @@ impl Coefficients {
 
 /// Coefficients that may change, and their sizes, which changes are relative to.
 #[derive(Clone)]
-pub(super) struct Free {
-    pub places: Vec<Place>,
+pub(super) struct FreeCoefficients {
+    pub places: Vec<CoefficientIndex>,
     pub scales: Vec<f64>,
 }
 
-impl Free {
-    /// Place and size of every coefficient.
-    pub fn each(&self) -> impl Iterator<Item = (Place, f64)> {
+impl FreeCoefficients {
+    pub fn each(&self) -> impl Iterator<Item = (CoefficientIndex, f64)> {
         let scales = self.scales.iter().copied();
         self.places.iter().copied().zip(scales)
     }
 }
 
-/// What coefficients are refined by.
 pub(super) struct Refiner<'a> {
     pub knowledge: &'a [Knowledge],
-    /// What the coefficients keep to.
     pub growth: &'a Growth,
-    /// Whose errors are lowered.
     pub training: &'a Judge<'a>,
-    /// Which of the coefficients on the way are kept.
     pub judge: &'a Judge<'a>,
 }
 
 /// The squared errors about some coefficients: `|r + J s|^2` for relative changes `s`.
-pub(super) struct Model {
+pub(super) struct ErrorModel {
     squared_error: f64,
     pub gram: DMatrix<f64>,
     pub gradient: DVector<f64>,
@@ -92,14 +84,14 @@ impl Refiner<'_> {
     fn descend(
         &self,
         start: Coefficients,
-        free: &Free,
+        free: &FreeCoefficients,
         weights: [f64; 2],
         steps: usize,
         watch: &mut Watch<'_>,
     ) -> Coefficients {
         let n = free.places.len();
         let moved = |xi: &[DMatrix<f64>]| {
-            let change = |((phase, term, k), scale): (Place, f64)| {
+            let change = |((phase, term, k), scale): (CoefficientIndex, f64)| {
                 (xi[phase][(term, k)] - start.xi[phase][(term, k)]) / scale
             };
             DVector::from_iterator(n, free.each().map(change))
@@ -164,7 +156,7 @@ impl Refiner<'_> {
     fn admit(
         &self,
         xi: &mut [DMatrix<f64>],
-        free: &Free,
+        free: &FreeCoefficients,
         inverse: impl Fn(&DVector<f64>) -> DVector<f64>,
     ) {
         self.growth.hold(xi, |gradient| {
@@ -233,11 +225,11 @@ impl Refiner<'_> {
     pub(super) fn model(
         &self,
         xi: &[DMatrix<f64>],
-        free: &Free,
+        free: &FreeCoefficients,
         weights: [f64; 2],
-    ) -> Option<Model> {
+    ) -> Option<ErrorModel> {
         let n = free.places.len();
-        let mut model = Model {
+        let mut model = ErrorModel {
             squared_error: 0.0,
             gram: DMatrix::zeros(n, n),
             gradient: DVector::zeros(n),
@@ -265,8 +257,7 @@ impl Refiner<'_> {
         Some(model)
     }
 
-    /// Every coefficient that may change.
-    pub(super) fn free(&self, xi: &[DMatrix<f64>]) -> Free {
+    pub(super) fn free(&self, xi: &[DMatrix<f64>]) -> FreeCoefficients {
         let (mut places, mut scales) = (Vec::new(), Vec::new());
         for (phase, (xi, knowledge)) in xi.iter().zip(self.knowledge).enumerate() {
             for (index, (value, free)) in xi.iter().zip(knowledge.free.iter()).enumerate() {
@@ -277,7 +268,7 @@ impl Refiner<'_> {
                 }
             }
         }
-        Free { places, scales }
+        FreeCoefficients { places, scales }
     }
 }
 

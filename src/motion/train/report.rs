@@ -7,12 +7,9 @@ use super::metrics::SetMetrics;
 use super::select::Choice;
 use crate::model::ReducedModel;
 
-/// A trained model and its figures.
 #[derive(Clone, Debug)]
 pub struct Trained {
-    /// The model, with the provenance filled in.
     pub model: ReducedModel,
-    /// The figures.
     pub report: TrainReport,
 }
 
@@ -23,11 +20,9 @@ pub struct TrainReport {
     pub encoded: Vec<String>,
     /// Share of the input's energy that the latent input cannot carry.
     pub lift_loss: f64,
-    /// Active terms of every phase.
     pub active_terms: Vec<PhaseTerms>,
     /// The regression that was chosen, where there was a choice.
     pub choice: Option<Choice>,
-    /// Candidates tried.
     pub candidates: usize,
     /// The seeds that were tried, where there were several; the first is the one kept.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -48,7 +43,6 @@ pub struct TrainReport {
 /// How well the accelerations' deviations in one part of a jump are explained.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PartScore {
-    /// Name of the part.
     pub part: String,
     /// Coefficient of determination of the deviations from the prior, over all latent coordinates and
     /// jumps, each jump left out of prior and fit in turn; 0 is what the prior alone explains.
@@ -58,16 +52,12 @@ pub struct PartScore {
 /// Number of coefficients that are not zero in one phase.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct PhaseTerms {
-    /// Name of the phase.
     pub phase: String,
-    /// Active terms.
     pub active: usize,
 }
 
-/// What one seed came to.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SeedReport {
-    /// The seed.
     pub seed: u64,
     /// What seeds are compared by, less is better: the validation score of rollouts, or with the published method the
     /// combined loss on the validation recordings.
@@ -75,7 +65,6 @@ pub struct SeedReport {
     /// Losses of the last epoch of the first step of a joint training.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub losses: Option<Losses>,
-    /// Active terms over all phases.
     pub active: usize,
     /// For every latent coordinate the robot coordinate that moves it most on the training jumps.
     pub dominant: Vec<String>,

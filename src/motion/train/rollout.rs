@@ -1,42 +1,57 @@
-//! Light rollouts of candidate models, many at once, for choosing between them.
+//! Light rollouts of candidate models, many at once, for choosing between them: the classical Runge-Kutta method with
+//! the vector units of the machine.
+//!
+//! Loops go over indices: iterators of several slices at once are calls in code for other vector units than the rest.
 
 use std::cmp::Reverse;
 
 use nalgebra::DMatrix;
 
 use super::dataset::Dataset;
-use super::features::Features;
+use super::features::{FeatureValues, Features};
 use super::latent::EncodedSet;
-use super::stepper::{Row, Stepper};
+use super::vectors::vectorised;
 use crate::sim::{Restart, restart_windows};
+
+/// Magnitude of a state from which a rollout counts as diverged.
+const DIVERGED: f64 = 1e6;
+/// Input of the step (start, middle, end) that each stage has, and its share of the step.
+const STAGES: [(usize, f64); 4] = [(0, 0.0), (1, 0.5), (1, 0.5), (2, 1.0)];
 
 /// Latent dynamics under trial: `ddz = Xi_phase^T theta(z, dz, u_lat)`.
 #[derive(Clone, Copy, Debug)]
 pub struct Candidate<'a> {
-    /// The library.
     pub features: &'a Features,
     /// Coefficients a phase, `library_dim x latent_dim`.
     pub xi: &'a [DMatrix<f64>],
 }
 
-/// One coefficient that is not as in the candidate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Change {
     /// Phase, term and latent coordinate of the coefficient.
     pub place: (usize, usize, usize),
-    /// What is added to it.
     pub by: f64,
 }
 
-/// Where a rollout starts and how many steps it takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Window {
-    /// Index of the jump.
     pub jump: usize,
     /// First sample; the rollout starts at its true latent state.
     pub start: usize,
     /// Steps to take; the window covers samples `start ..= start + steps`.
     pub steps: usize,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub struct Row {
+    pub window: Window,
+    pub change: Option<Change>,
+}
+
+pub fn plain(windows: &[Window]) -> Vec<Row> {
+    let change = None;
+    let rows = windows.iter().map(|&window| Row { window, change });
+    rows.collect()
 }
 
 /// The windows between restarts of every jump ([`restart_windows`]), each up to the sample that the next one starts
@@ -55,77 +70,233 @@ pub fn windows(dataset: &Dataset, restart: Restart) -> Vec<Window> {
     windows
 }
 
-/// Latent positions predicted in every window, `latent_dim x steps` (samples `start + 1 ..= start + steps`).
+/// Latent positions predicted in every row, `latent_dim x steps` (samples `start + 1 ..= start + steps`).
 ///
 /// RK4 with the recorded sampling; the latent input is interpolated linearly between samples, the phase is the
-/// recorded one of the sample a step starts from. Values beyond 1e6 are set to infinity and stay there.
-pub fn predict(
-    candidate: Candidate<'_>,
-    set: EncodedSet<'_>,
-    windows: &[Window],
-) -> Vec<DMatrix<f64>> {
+/// recorded one of the sample a step starts from. Values beyond 1e6 are set to infinity and stay there. What is
+/// computed for a row does not depend on the others.
+pub fn predict(candidate: Candidate<'_>, set: EncodedSet<'_>, rows: &[Row]) -> Vec<DMatrix<f64>> {
     let d = candidate.features.latent_dim();
-    let empty = windows.iter().map(|window| DMatrix::zeros(d, window.steps));
+    let empty = rows.iter().map(|row| DMatrix::zeros(d, row.window.steps));
     let mut predictions: Vec<_> = empty.collect();
     // The longest first, so that those which still go on are the first rows.
-    let mut order: Vec<usize> = (0..windows.len()).collect();
-    order.sort_by_key(|&window| Reverse(windows[window].steps));
-    let rows = order.iter().map(|&window| Row {
-        window: windows[window],
-        change: None,
-    });
-    let mut stepper = Stepper::new(candidate, set, rows.collect());
-    let longest = order.first().map_or(0, |&window| windows[window].steps);
+    let mut order: Vec<usize> = (0..rows.len()).collect();
+    order.sort_by_key(|&row| Reverse(rows[row].window.steps));
+    let longest = order.first().map_or(0, |&row| rows[row].window.steps);
+    let mut stepper = Stepper::new(candidate, set, order.iter().map(|&row| rows[row]).collect());
     for step in 0..longest {
-        let going = order.partition_point(|&window| windows[window].steps > step);
+        let going = order.partition_point(|&row| rows[row].window.steps > step);
         stepper.keep(going);
         stepper.advance(step);
-        for (row, &window) in order[..going].iter().enumerate() {
-            stepper.write(row, &mut predictions[window], step);
+        for (from, &to) in order[..going].iter().enumerate() {
+            for i in 0..d {
+                predictions[to][(i, step)] = stepper.state[(from, i)];
+            }
         }
     }
     predictions
 }
 
-/// As [`predict`] for one window, once with each of the changes.
-///
-/// They are computed together, each change from the first sample whose phase has it: until then the candidate is what
-/// it is without.
+/// As [`predict`] for one window, once with each of the changes; one of a phase that the window does not have changes
+/// nothing.
 pub fn predict_changed(
     candidate: Candidate<'_>,
     changes: &[Change],
     set: EncodedSet<'_>,
     window: Window,
 ) -> Vec<DMatrix<f64>> {
-    let phase = &set.dataset.jumps[window.jump].phase[window.start..][..window.steps];
-    let first_step = |change: &Change| phase.iter().position(|&phase| phase == change.place.0);
-    let mut joining: Vec<(usize, usize)> = (changes.iter().enumerate())
-        .filter_map(|(number, change)| Some((first_step(change)?, number)))
-        .collect();
-    joining.sort_unstable();
-    let row_of = |number: Option<usize>| Row {
-        window,
-        change: number.map(|number| changes[number]),
-    };
-    let mut stepper = Stepper::new(candidate, set, vec![row_of(None)]);
-    let d = candidate.features.latent_dim();
-    let mut predictions = vec![DMatrix::zeros(d, window.steps); changes.len()];
-    let mut rows = vec![0; changes.len()]; // of the candidate without a change until it joins
-    let mut joined = 0;
-    for step in 0..window.steps {
-        let joins = joining.partition_point(|(first, _)| *first <= step);
-        let new = &joining[joined..joins];
-        stepper.join(new.iter().map(|(_, number)| row_of(Some(*number))));
-        for (_, number) in new {
-            joined += 1;
-            rows[*number] = joined;
-        }
-        stepper.advance(step);
-        for (prediction, row) in predictions.iter_mut().zip(&rows) {
-            stepper.write(*row, prediction, step);
+    let phases = &set.dataset.jumps[window.jump].phase[window.start..][..window.steps];
+    let counts = |change: &&Change| phases.contains(&change.place.0);
+    let counted = changes.iter().filter(counts).copied().map(Some);
+    let rows = std::iter::once(None).chain(counted);
+    let rows: Vec<Row> = rows.map(|change| Row { window, change }).collect();
+    let mut predictions = predict(candidate, set, &rows).into_iter();
+    let unchanged = predictions.next().expect("invariant: one row");
+    let each = changes.iter().map(|change| match counts(&change) {
+        true => predictions.next().expect("invariant: one per change"),
+        false => unchanged.clone(),
+    });
+    each.collect()
+}
+
+struct Stepper<'a> {
+    candidate: Candidate<'a>,
+    set: EncodedSet<'a>,
+    active: Vec<ActiveTerms>, // of every phase
+    rows: Vec<Row>,
+    state: DMatrix<f64>, // z, dz
+    values: FeatureValues,
+    phase: Vec<usize>,
+    step_s: Vec<f64>,
+    input: [DMatrix<f64>; 3], // at the start, middle and end of the step
+    variables: DMatrix<f64>,  // z, dz, u_lat
+    rates: [DMatrix<f64>; 4], // dz, ddz at the four stages
+}
+
+type ActiveTerms = Vec<Vec<(usize, f64)>>;
+
+impl<'a> Stepper<'a> {
+    fn new(candidate: Candidate<'a>, set: EncodedSet<'a>, rows: Vec<Row>) -> Self {
+        let d = candidate.features.latent_dim();
+        let active = |xi: &DMatrix<f64>| {
+            let columns = xi.column_iter().map(|column| {
+                let terms = column.iter().copied().enumerate();
+                terms.filter(|(_, value)| *value != 0.0).collect()
+            });
+            columns.collect()
+        };
+        let state = DMatrix::from_fn(rows.len(), 2 * d, |row, i| {
+            let Window { jump, start, .. } = rows[row].window;
+            let latent = &set.latent[jump];
+            [&latent.z, &latent.dz][i / d][(i % d, start)]
+        });
+        let mut stepper = Self {
+            candidate,
+            set,
+            active: candidate.xi.iter().map(active).collect(),
+            rows,
+            state,
+            values: FeatureValues::default(),
+            phase: Vec::new(),
+            step_s: Vec::new(),
+            input: Default::default(),
+            variables: DMatrix::default(),
+            rates: Default::default(),
+        };
+        stepper.make_room();
+        stepper
+    }
+
+    fn keep(&mut self, n: usize) {
+        if n < self.rows.len() {
+            self.rows.truncate(n);
+            self.state.resize_vertically_mut(n, 0.0);
+            self.make_room();
         }
     }
-    predictions
+
+    /// Fits everything but the state to the number of rows.
+    fn make_room(&mut self) {
+        let (n, d) = (self.rows.len(), self.candidate.features.latent_dim());
+        self.phase = vec![0; n];
+        self.step_s = vec![0.0; n];
+        self.input = std::array::from_fn(|_| DMatrix::zeros(n, d));
+        self.variables = DMatrix::zeros(n, 3 * d);
+        self.rates = std::array::from_fn(|_| DMatrix::zeros(n, 2 * d));
+    }
+
+    fn advance(&mut self, step: usize) {
+        self.load_inputs(step);
+        for stage in 0..STAGES.len() {
+            self.rate(stage);
+        }
+        let rates = self.rates.each_ref().map(DMatrix::as_slice);
+        finish_step(self.state.as_mut_slice(), &self.step_s, rates);
+    }
+
+    fn load_inputs(&mut self, step: usize) {
+        let (n, mut first) = (self.rows.len(), 0);
+        for of_window in self.rows.chunk_by(|a, b| a.window == b.window) {
+            let Window { jump, start, .. } = of_window[0].window;
+            let rows = first..first + of_window.len();
+            first = rows.end;
+            let (sample, samples) = (start + step, &self.set.dataset.jumps[jump]);
+            self.phase[rows.clone()].fill(samples.phase[sample]);
+            self.step_s[rows.clone()].fill(samples.time_s[sample + 1] - samples.time_s[sample]);
+            let u = &self.set.latent[jump].u_lat;
+            for i in 0..u.nrows() {
+                let (before, after) = (u[(i, sample)], u[(i, sample + 1)]);
+                let values = [before, 0.5 * (before + after), after];
+                for (input, value) in self.input.iter_mut().zip(values) {
+                    input.as_mut_slice()[i * n..][rows.clone()].fill(value);
+                }
+            }
+        }
+    }
+
+    fn rate(&mut self, stage: usize) {
+        let (features, n) = (self.candidate.features, self.rows.len());
+        let d = features.latent_dim();
+        let (input, share) = STAGES[stage];
+        let (before, rates) = self.rates.split_at_mut(stage);
+        let (moved, inputs) = self.variables.as_mut_slice().split_at_mut(2 * d * n);
+        let state = self.state.as_slice();
+        match before.last() {
+            None => moved.copy_from_slice(state),
+            Some(rates) => move_along(moved, state, rates.as_slice(), &self.step_s, share),
+        }
+        inputs.copy_from_slice(self.input[input].as_slice());
+        features.forward(&self.variables, &mut self.values);
+        let (dz, ddz) = rates[0].as_mut_slice().split_at_mut(d * n);
+        dz.copy_from_slice(&self.variables.as_slice()[d * n..2 * d * n]);
+        accelerate(ddz, features, &self.values, &self.active, &self.phase);
+        for (row, own) in self.rows.iter().enumerate() {
+            if let Some(Change { place, by }) = own.change
+                && place.0 == self.phase[row]
+            {
+                ddz[place.2 * n + row] += by * features.term(&self.values, place.1)[row];
+            }
+        }
+    }
+}
+
+vectorised! {
+    /// States that are some of the step from `state` along `rates`.
+    fn move_along(moved: &mut [f64], state: &[f64], rates: &[f64], step_s: &[f64], share: f64) {
+        for (column, moved) in moved.chunks_exact_mut(step_s.len()).enumerate() {
+            let n = moved.len();
+            let (state, rates) = (&state[column * n..][..n], &rates[column * n..][..n]);
+            let step_s = &step_s[..n];
+            for row in 0..n {
+                moved[row] = state[row] + share * step_s[row] * rates[row];
+            }
+        }
+    }
+}
+
+vectorised! {
+    /// `ddz = Xi_phase^T theta` of all rows.
+    fn accelerate(
+        ddz: &mut [f64],
+        features: &Features,
+        values: &FeatureValues,
+        active: &[ActiveTerms],
+        phase: &[usize],
+    ) {
+        let n = phase.len();
+        let mut first = 0;
+        for run in phase.chunk_by(|a, b| a == b) {
+            let rows = first..first + run.len();
+            first = rows.end;
+            for (output, active) in active[run[0]].iter().enumerate() {
+                let ddz = &mut ddz[output * n..][rows.clone()];
+                ddz.fill(0.0);
+                for &(term, coefficient) in active {
+                    let theta = &features.term(values, term)[rows.clone()];
+                    for row in 0..ddz.len().min(theta.len()) {
+                        ddz[row] += coefficient * theta[row];
+                    }
+                }
+            }
+        }
+    }
+}
+
+vectorised! {
+    /// The states at the end of a step; infinite where they diverge.
+    fn finish_step(state: &mut [f64], step_s: &[f64], rates: [&[f64]; 4]) {
+        for (column, state) in state.chunks_exact_mut(step_s.len()).enumerate() {
+            let n = state.len();
+            let [k1, k2, k3, k4] = rates.map(|rates| &rates[column * n..][..n]);
+            let step_s = &step_s[..n];
+            for row in 0..n {
+                let mean = (k1[row] + 2.0 * k2[row] + 2.0 * k3[row] + k4[row]) / 6.0;
+                let next = state[row] + step_s[row] * mean;
+                let is_bounded = next.abs() < DIVERGED;
+                state[row] = if is_bounded { next } else { f64::INFINITY };
+            }
+        }
+    }
 }
 
 #[cfg(test)]
@@ -144,21 +315,13 @@ mod tests {
         let set = EncodedSet::new(&dataset, &latent);
         for restart in [Restart::Never, Restart::Every(0.1)] {
             let windows = windows(&dataset, restart);
-            let predictions = predict(of(&features, &xi), set, &windows);
+            let predictions = predict(of(&features, &xi), set, &plain(&windows));
             for (window, prediction) in windows.iter().zip(predictions) {
                 let z = &latent[window.jump].z;
                 let truth = z.columns(window.start + 1, window.steps);
                 assert!((prediction - truth).amax() < 2e-4, "{window:?}");
             }
         }
-    }
-
-    #[test]
-    fn restarted_windows_cover_every_sample_once() {
-        let (dataset, _) = oscillator::jumps(1);
-        let windows = windows(&dataset, Restart::Every(0.1));
-        let places = windows.iter().map(|window| (window.start, window.steps));
-        assert!(places.eq([(0, 50), (50, 50), (100, 50), (150, 49)]));
     }
 
     #[test]
@@ -169,9 +332,9 @@ mod tests {
         let window = |(jump, start, steps)| Window { jump, start, steps };
         let windows = [(0, 110, 20), (1, 0, 199), (0, 0, 1), (1, 130, 60)].map(window);
         let set = EncodedSet::new(&dataset, &latent);
-        let together = predict(candidate, set, &windows);
+        let together = predict(candidate, set, &plain(&windows));
         for (window, prediction) in windows.iter().zip(&together) {
-            let alone = predict(candidate, set, &[*window]);
+            let alone = predict(candidate, set, &plain(&[*window]));
             assert_eq!(prediction, &alone[0], "{window:?}");
         }
         assert!(predict(candidate, set, &[]).is_empty());
@@ -182,8 +345,9 @@ mod tests {
         let (dataset, latent) = oscillator::jumps(1);
         let (features, xi) = oscillator::known();
         let set = EncodedSet::new(&dataset, &latent);
-        let predicted =
-            |xi: &[DMatrix<f64>], window| predict(of(&features, xi), set, &[window]).remove(0);
+        let predicted = |xi: &[DMatrix<f64>], window| {
+            predict(of(&features, xi), set, &plain(&[window])).remove(0)
+        };
         let changes = [((1, 0, 1), 0.3), ((0, 1, 0), -2.0), ((0, 2, 1), 0.5)];
         let changes = changes.map(|(place, by)| Change { place, by });
         for (start, phases) in [(0, [true, true]), (20, [true, false]), (150, [false, true])] {
@@ -203,15 +367,5 @@ mod tests {
                 assert_eq!(*found != unchanged, phases[place.0], "{place:?} {window:?}");
             }
         }
-    }
-
-    #[test]
-    fn diverging_dynamics_predict_infinity() {
-        let (dataset, latent) = oscillator::jumps(1);
-        let (features, mut xi) = oscillator::known();
-        xi[0][(1, 0)] = 1e7;
-        let set = EncodedSet::new(&dataset, &latent);
-        let predictions = predict(of(&features, &xi), set, &windows(&dataset, Restart::Never));
-        assert!(!predictions[0].iter().all(|value| value.is_finite()));
     }
 }

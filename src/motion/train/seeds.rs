@@ -6,7 +6,6 @@ use super::assemble::{Origin, provenance};
 use super::dynamics_fit::Fitted;
 use super::error::TrainError;
 use super::jumps::learn_jumps;
-use super::latent::{EncodedSet, Latent};
 use super::overlap::support_overlap;
 use super::progress::Watch;
 use super::report::{SeedReport, Trained};
@@ -16,11 +15,9 @@ use crate::model::{Library, ModelError};
 /// What a seed came to and its numbers, or why it has none.
 pub(super) type Outcome = Result<(SeedReport, Fitted), TrainError>;
 
-/// Outcomes of the seeds so far.
 #[derive(Default)]
 pub(super) struct Seeds {
     finished: Vec<(SeedReport, Fitted)>,
-    /// Why the first seed without a model has none.
     failure: Option<TrainError>,
 }
 
@@ -58,17 +55,17 @@ impl Seeds {
         origin: &Origin,
     ) -> Result<Trained, TrainError> {
         let (best, reports, overlap) = self.best(&task.library, &task.moments.state)?;
-        let latent = Latent::of(&task.training, &best.encoder);
-        let set = EncodedSet::new(&task.training, &latent);
-        let mut report = task.report(&best, set, &reports[0].judged)?;
+        let maps = &best.maps;
+        let set = maps.training_set(&task);
+        let mut report = task.report(&best, &reports[0].judged);
         // A single seed without losses has nothing that the report does not say.
         if reports.len() > 1 || reports[0].losses.is_some() {
             (report.seeds, report.support_overlap) = (reports, overlap);
         }
-        let (jumps, deviations) = learn_jumps(set, &best.encoder)?;
+        let (jumps, deviations) = learn_jumps(set, &maps.encoder);
         report.deviations = deviations;
         let provenance = provenance(task.options, method, origin, &report);
-        let model = task.assemble(best, set, jumps, provenance)?;
+        let model = task.assemble(best, jumps, provenance)?;
         Ok(Trained { model, report })
     }
 
@@ -113,7 +110,6 @@ fn with_finite_coefficients((mut report, fitted): (SeedReport, Fitted)) -> Outco
     Ok((report, fitted))
 }
 
-/// Whether another seed may do better.
 fn is_of_one_seed(error: &TrainError) -> bool {
     match error {
         TrainError::NoStableModel { .. } | TrainError::TermValue { .. } | TrainError::Model(_) => {
@@ -177,28 +173,11 @@ mod tests {
             outcome(-f64::NAN, 1.0),
             outcome(2.0, 1.0),
         ];
-        let reports = reports(outcomes).expect("three seeds have a model");
-        let scores: Vec<f64> = reports.iter().map(|report| report.score).collect();
+        let found = reports(outcomes).expect("three seeds have a model");
+        let scores: Vec<f64> = found.iter().map(|report| report.score).collect();
         assert_eq!(scores, [2.0, 3.0, f64::INFINITY]);
-    }
-
-    #[test]
-    fn seeds_all_without_a_model_give_the_first_error() {
         let found = reports(vec![unstable(9), outcome(1.0, f64::INFINITY)]);
         let first = matches!(found, Err(TrainError::NoStableModel { candidates: 9 }));
         assert!(first, "{found:?}");
-    }
-
-    #[test]
-    fn seeds_with_an_error_of_all_seeds_end_the_training() {
-        let dimension = TrainError::LatentDim {
-            requested: 9,
-            active: 3,
-        };
-        let found = reports(vec![outcome(1.0, 1.0), Err(dimension)]);
-        assert!(
-            matches!(found, Err(TrainError::LatentDim { .. })),
-            "{found:?}"
-        );
     }
 }

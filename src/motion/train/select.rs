@@ -39,16 +39,12 @@ const SWEEPS: usize = 3;
 /// How a candidate was fitted, and how it did.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Choice {
-    /// Window of the regression in samples, 0 for accelerations.
     pub window: usize,
-    /// Ridge.
     pub ridge: f64,
-    /// Pruning.
     pub pruning: Pruning,
     /// Validation score: root mean square error of the latent state in standard deviations, of 0.1 s predictions
     /// plus 0.2 times that of whole jumps.
     pub score: f64,
-    /// Active terms over all phases.
     pub active: usize,
 }
 
@@ -131,11 +127,9 @@ pub fn select(
     Ok((chosen.now.xi, choice, candidates))
 }
 
-/// A candidate that was fitted and judged.
 #[derive(Clone)]
 pub(super) struct Trial<'a> {
     pub now: Coefficients,
-    /// What it was fitted by, one a phase.
     pub regressions: &'a [Regression],
     pub ridge: f64,
     window: usize,
@@ -143,7 +137,6 @@ pub(super) struct Trial<'a> {
 }
 
 impl Trial<'_> {
-    /// Whether its rollouts stay finite.
     fn is_stable(&self) -> bool {
         self.now.score.is_finite()
     }
@@ -163,12 +156,9 @@ impl Trial<'_> {
     }
 }
 
-/// What candidates are fitted from and judged by.
 #[derive(Clone, Copy)]
 pub(super) struct Search<'a> {
-    /// Of every window, one a phase.
     regressions: &'a [Vec<Regression>; WINDOWS.len()],
-    /// What candidates keep to.
     pub growth: &'a Growth,
     pub judge: &'a Judge<'a>,
 }
@@ -184,7 +174,7 @@ impl<'a> Search<'a> {
             |tried: &[Trial<'_>]| any_stable(tried) || (has_nonlinear && !tried.is_empty());
         let mut tried = self.fit_all(&vec![true; affine.len()], enough, watch);
         if has_nonlinear && !(watch.cancelled() && any_stable(&tried)) {
-            let tame = self.fit_all(&affine, any_stable, watch);
+            let tame = self.fit_all(affine, any_stable, watch);
             let mut grown = best_of(&tame).ok().cloned();
             if let Some(grown) = &mut grown {
                 self.grow(grown, watch);
@@ -238,12 +228,10 @@ impl<'a> Search<'a> {
     }
 }
 
-/// Whether the rollouts of a candidate stay finite.
 fn any_stable(tried: &[Trial<'_>]) -> bool {
     tried.iter().any(Trial::is_stable)
 }
 
-/// The candidate with the best score.
 fn best_of<'t, 'a>(tried: &'t [Trial<'a>]) -> Result<&'t Trial<'a>, TrainError> {
     let best = (tried.iter().filter(|trial| trial.is_stable()))
         .min_by(|a, b| a.now.score.total_cmp(&b.now.score));

@@ -118,7 +118,6 @@ impl Regression {
         }
     }
 
-    /// The support that is left for each of the losses.
     fn eliminate(
         &self,
         column: usize,
@@ -234,7 +233,6 @@ impl Regression {
         free.filter(|&i| support[(i, column)]).collect()
     }
 
-    /// Mean square of a column's accelerations.
     fn energy(&self, column: usize) -> f64 {
         self.target_rms[column].powi(2).max(f64::MIN_POSITIVE)
     }
@@ -271,11 +269,9 @@ impl Regression {
     }
 }
 
-/// The ridge solution of one column on a support.
 struct SupportFit {
     support: Vec<usize>,
     solution: DVector<f64>,
-    /// Of the ridged Gram matrix of the support.
     inverse: DMatrix<f64>,
 }
 
@@ -299,7 +295,6 @@ impl SupportFit {
     }
 }
 
-/// Entries of `xi` that are not zero.
 pub fn active_terms(xi: &DMatrix<f64>) -> usize {
     xi.iter().filter(|value| **value != 0.0).count()
 }
@@ -317,7 +312,6 @@ mod tests {
     use crate::train::random::Random;
 
     impl Regression {
-        /// With one pruning of all terms.
         pub fn fit(&self, ridge: f64, pruning: Pruning) -> DMatrix<f64> {
             let all = vec![true; self.theta_rms.len()];
             self.fit_each(ridge, &[pruning], &all).remove(0)
@@ -400,15 +394,6 @@ mod tests {
         let losses = regression.losses(0, &support, 1e-2);
         let (_, loss) = losses[2]; // of rows 0, 2 and 3
         assert!((gains[1].1 - loss).abs() < 1e-12);
-    }
-
-    #[test]
-    fn fit_column_keeps_the_given_support_only() {
-        let (theta, target) = samples();
-        let support = DMatrix::from_column_slice(4, 1, &[true, false, true, false]);
-        let xi = unconstrained(&theta, &target).fit_column(0, &support, 1e-6);
-        assert_eq!((xi[1], xi[3]), (0.0, 0.0));
-        assert!((xi[0] - 2.0).abs() < 0.1);
     }
 
     #[test]

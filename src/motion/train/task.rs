@@ -14,14 +14,12 @@ use crate::robot::Robot;
 /// Recordings to learn from and to choose by.
 #[derive(Clone, Copy, Debug)]
 pub struct Recordings<'a> {
-    /// Fitted.
     pub training: &'a [Recording],
     /// Used to choose between candidates; without any, the training recordings are.
     pub validation: &'a [Recording],
 }
 
 impl<'a> Recordings<'a> {
-    /// These recordings.
     pub fn new(training: &'a [Recording], validation: &'a [Recording]) -> Self {
         Self {
             training,
@@ -30,19 +28,15 @@ impl<'a> Recordings<'a> {
     }
 }
 
-/// Data, library and options that all seeds share.
 pub(super) struct Task<'a> {
     /// The training recordings cut into phases, scaled.
     pub training: Dataset,
     /// The same of the validation recordings; may have no jump.
     pub validation: Dataset,
-    /// Of the training samples.
     pub moments: Moments,
     pub library: Library,
     pub features: Features,
-    /// Coordinates that the encoder may use.
     pub active: Vec<usize>,
-    /// What the rows of a linear encoder are made of.
     pub frame: Frame,
     /// What is known of the dynamics in its coordinates, one a phase.
     pub knowledge: Vec<Knowledge>,
@@ -72,7 +66,7 @@ impl<'a> Task<'a> {
         let least_std = options.encoder.least_std * options.scaling.state;
         let active = moments.active_coordinates(least_std, options.encoder.least_input_share);
         let (coordinates, requested) = (options.coordinates(), options.latent_dim);
-        let frame = Frame::new(&training, &active, requested, coordinates, robot)?;
+        let frame = Frame::new(&training, &active, requested, coordinates, robot);
         if requested == 0 || requested > frame.dim() {
             return Err(TrainError::LatentDim {
                 requested,
@@ -93,13 +87,5 @@ impl<'a> Task<'a> {
             options,
             robot,
         })
-    }
-
-    /// The jumps that candidates are judged by.
-    pub fn judged(&self) -> &Dataset {
-        match self.validation.jumps.is_empty() {
-            true => &self.training,
-            false => &self.validation,
-        }
     }
 }

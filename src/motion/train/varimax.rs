@@ -86,7 +86,6 @@ fn turn(matrix: &mut DMatrix<f64>, a: usize, b: usize, angle: f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::train::random::Random;
 
     #[test]
     fn varimax_undoes_a_rotation_of_a_simple_structure() {
@@ -101,21 +100,5 @@ mod tests {
                 "{found}"
             );
         }
-    }
-
-    #[test]
-    fn varimax_is_orthogonal() {
-        let loadings = Random::new(2).matrix(9, 4, 1.0);
-        let rotation = varimax(&loadings);
-        assert!((rotation.transpose() * &rotation - DMatrix::identity(4, 4)).amax() < 1e-12);
-    }
-
-    #[test]
-    fn columns_follow_the_named_coordinates_and_point_upwards() {
-        let loadings =
-            DMatrix::from_row_slice(3, 3, &[0.1, 0.0, -3.0, 0.2, 5.0, 0.1, -1.0, 0.1, 0.0]);
-        let (order, signs) = order_and_sign(&loadings, &[0, 1]);
-        assert_eq!(order, [2, 1, 0]);
-        assert_eq!(signs, [-1.0, 1.0, -1.0]);
     }
 }

@@ -67,17 +67,9 @@ pub fn windowed_samples(
 ) -> (DMatrix<f64>, DMatrix<f64>) {
     let (p, d) = (features.library_dim(), features.latent_dim());
     if window == 0 {
-        let n = set.dataset.samples(Some(phase));
-        let (mut theta, mut targets) = (DMatrix::zeros(n, p), DMatrix::zeros(n, d));
-        let (mut at, mut values) = (0, FeatureValues::default());
-        for (variables, target) in set.regression_blocks(phase) {
-            let count = variables.nrows();
-            let block = features.evaluate(&variables, &mut values);
-            theta.rows_mut(at, count).copy_from(&block);
-            targets.rows_mut(at, count).copy_from(&target);
-            at += count;
-        }
-        return (theta, targets);
+        let (variables, target) = set.regression_samples(phase);
+        let theta = features.evaluate(&variables, &mut FeatureValues::default());
+        return (theta, target);
     }
     let (mut theta_rows, mut target_rows) = (Vec::new(), Vec::new());
     let spans = set.dataset.spans(Some(phase));
@@ -96,7 +88,6 @@ pub fn windowed_samples(
     )
 }
 
-/// Running integrals of the library along one phase span.
 struct Span {
     time_s: Vec<f64>,
     z: DMatrix<f64>,

@@ -3,8 +3,8 @@
 use nalgebra::Vector3;
 use roxmltree::{Document, Node};
 
-use crate::files::{Located, Place, shell_word};
-use crate::robot_file::error::{RobotFileError, RobotFileFault};
+use crate::files::{Place, shell_word};
+use crate::robot_file::RobotFileError;
 
 /// Elements for drawings and simulators.
 const UNREAD: [&str; 5] = [
@@ -39,7 +39,7 @@ pub(super) fn document<'x>(file: &str, text: &'x str) -> Result<Document<'x>, Ro
         }
         let at = error.pos();
         let place = Place::Character(at.row as usize, at.col as usize);
-        Located::new(file, place, RobotFileFault::Syntax(error.to_string()))
+        RobotFileError::text(file, place, error.to_string())
     })?;
     // Meshes and extensions of simulators may have signs of xacro in what romc does not read.
     let mut unread_to = 0;
@@ -98,7 +98,6 @@ impl<'x> Element<'x> {
         self.node.tag_name().name()
     }
 
-    /// The children of a kind.
     pub(crate) fn children(self, tag: &'static str) -> impl Iterator<Item = Self> {
         let nodes = (self.node.children()).filter(move |node| node.has_tag_name(tag));
         nodes.map(move |node| Self { node, ..self })
@@ -124,7 +123,6 @@ impl<'x> Element<'x> {
         name.ok_or_else(|| self.fault("", "no name", "name=\"...\""))
     }
 
-    /// A finite number.
     pub(crate) fn number(&self, key: &str) -> Result<f64, RobotFileError> {
         let text = self.attribute(key);
         let value = text.and_then(|text| text.trim().parse::<f64>().ok());
@@ -134,7 +132,6 @@ impl<'x> Element<'x> {
         })
     }
 
-    /// Three finite numbers of an attribute; none if it is not there.
     pub(crate) fn triple(&self, key: &str) -> Result<Option<Vector3<f64>>, RobotFileError> {
         let Some(text) = self.attribute(key) else {
             return Ok(None);
@@ -183,8 +180,8 @@ impl<'x> Element<'x> {
     pub(crate) fn fault(
         &self,
         key: &str,
-        found: impl Into<String>,
-        expected: impl Into<String>,
+        found: impl Into<Box<str>>,
+        expected: impl Into<Box<str>>,
     ) -> RobotFileError {
         let mut place = self.place();
         if !key.is_empty() {

@@ -3,10 +3,10 @@
 use nalgebra::Vector3;
 
 use super::tree::{Body, Tree};
-use crate::files::{Located, Place, shell_word};
+use crate::files::shell_word;
 use crate::robot::FOOT_DIM;
 use crate::robot::joints::LEG_JOINT_DIM;
-use crate::robot_file::error::{RobotFileError, RobotFileFault};
+use crate::robot_file::RobotFileError;
 
 /// Largest distance of two feet that are one, m.
 const SAME_PLACE_M: f64 = 1e-12;
@@ -18,7 +18,6 @@ pub(super) struct Limb {
     pub point: Vector3<f64>,
 }
 
-/// The legs of a robot and the body that they are on.
 pub(super) struct Legs {
     pub legs: Vec<Limb>,
     /// The uppermost link of the body.
@@ -76,11 +75,7 @@ pub(super) fn feet(list: &[String]) -> Result<Vec<(String, Vector3<f64>)>, Robot
     let number = |word: &str| word.trim().parse::<f64>().ok().filter(|v| v.is_finite());
     let refused = |found: String| {
         let expected = "four links, LINK,..., or links with points in their frames, LINK:x,y,z,...";
-        let fault = RobotFileFault::Unexpected {
-            found,
-            expected: expected.to_owned(),
-        };
-        Located::new("", Place::Option("--feet"), fault)
+        RobotFileError::option("--feet", found, expected)
     };
     let mut feet: Vec<(String, Vector3<f64>)> = Vec::new();
     while let Some(word) = words.next() {
@@ -227,7 +222,6 @@ fn foot(tree: &Tree<'_>, joints: &[usize]) -> Result<usize, RobotFileError> {
     }
 }
 
-/// The legs that end in these links.
 fn named_legs(
     tree: &Tree<'_>,
     top: usize,

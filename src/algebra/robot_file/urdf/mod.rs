@@ -11,8 +11,8 @@ mod tree;
 use nalgebra::{Rotation3, Vector3};
 
 use super::entry::{Axis, JointEntry, LegEntry, RobotEntry};
-use super::error::RobotFileError;
 use super::legs::{LegPlaces, Places};
+use super::read::RobotFileError;
 use element::{Element, document};
 use limbs::{Legs, Limb};
 use tree::{Joint, Tree};
@@ -21,7 +21,6 @@ use tree::{Joint, Tree};
 const ROUNDING: f64 = 1e-12;
 /// Limits of a joint that turns without end, rad.
 const ENDLESS_RAD: f64 = 2.0 * std::f64::consts::PI;
-/// Length of an axis.
 const AXIS: std::ops::Range<f64> = 1e-6..1e6;
 
 /// The entry of a URDF, the places of its parts in the file, and what a user should know of it.
@@ -119,7 +118,6 @@ fn notes(tree: &Tree<'_>, legs: &Legs) -> Result<Vec<String>, RobotFileError> {
     Ok(notes)
 }
 
-/// Where in the file the parts of the entry are.
 fn places(robot: Element<'_>, tree: &Tree<'_>, legs: &Legs) -> Places {
     let of = |leg: &Limb| {
         let joints = leg

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::{Rotation3, Vector3};
 
 use super::element::Element;
-use crate::robot_file::error::RobotFileError;
+use crate::robot_file::RobotFileError;
 use crate::robot_file::identity::LARGEST_ANGLE_RAD;
 
 /// Kinds of joints; of them `fixed` alone does not move.
@@ -95,12 +95,10 @@ impl<'x> Tree<'x> {
         Ok(tree)
     }
 
-    /// Another tree than that of a quadruped.
-    pub(crate) fn refused(&self, found: String, expected: impl Into<String>) -> RobotFileError {
+    pub(crate) fn refused(&self, found: String, expected: impl Into<Box<str>>) -> RobotFileError {
         RobotFileError::at(self.file, "the tree", found, expected)
     }
 
-    /// The link that all others are below.
     fn only_root(&self) -> Result<usize, RobotFileError> {
         let roots = (0..self.links.len()).filter(|link| self.links[*link].above.is_none());
         let roots: Vec<usize> = roots.collect();
@@ -151,12 +149,10 @@ impl<'x> Tree<'x> {
         Body { links, moving }
     }
 
-    /// The body that a link belongs to, from that link on.
     pub(crate) fn body(&self, link: usize) -> Body {
         self.below(link, |joint| joint.kind == "fixed")
     }
 
-    /// Mass of a link and all below it, kg.
     pub(crate) fn mass_below(&self, link: usize) -> f64 {
         let mut links = self.below(link, |_| true).links;
         // In the file's order, so that the order of joints does not change the last digit.
@@ -164,12 +160,10 @@ impl<'x> Tree<'x> {
         self.mass(&links)
     }
 
-    /// Mass of links, kg.
     pub(crate) fn mass(&self, links: &[usize]) -> f64 {
         links.iter().map(|link| self.links[*link].mass_kg).sum()
     }
 
-    /// The links from the root to a link.
     pub(crate) fn path(&self, link: usize) -> Vec<usize> {
         let mut path = vec![link];
         while let Some(joint) = self.links[path[path.len() - 1]].above {

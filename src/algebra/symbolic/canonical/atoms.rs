@@ -4,11 +4,10 @@ use num_bigint::{BigInt, BigUint};
 use num_integer::Integer;
 use num_traits::ToPrimitive;
 
+use super::coefficient::Rational;
 use super::polynomial::CanonicalForm;
-use super::rational::Rational;
 use crate::symbolic::node::{ExprId, SymbolId};
 
-/// A factor of a monomial.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(super) enum Atom {
     Symbol(SymbolId),
@@ -25,7 +24,6 @@ pub(super) enum Atom {
     Opaque(ExprId),
 }
 
-/// Largest divisor that is tried.
 const LARGEST_DIVISOR: u64 = 2_000;
 
 /// A positive number as a product of primes to integer powers. What is left after small divisors
@@ -33,7 +31,7 @@ const LARGEST_DIVISOR: u64 = 2_000;
 pub(super) fn prime_powers(value: &Rational) -> Vec<(CanonicalForm, i32)> {
     let form = |prime: BigUint| CanonicalForm::constant(Rational::from(BigInt::from(prime)).into());
     let mut powers = Vec::new();
-    for (part, sign) in [(value.numerator(), 1), (value.denominator(), -1)] {
+    for (part, sign) in [(value.numer(), 1), (value.denom(), -1)] {
         let mut rest = part.magnitude().clone();
         for divisor in (2..=LARGEST_DIVISOR).filter(|d| *d == 2 || d % 2 == 1) {
             if rest == BigUint::from(1_u8) {

@@ -1,44 +1,31 @@
 //! Complex rational coefficients with a radius.
 
-use std::hash::{Hash, Hasher};
-
 use num_bigint::BigInt;
-
-use super::rational::Rational;
+pub(super) use num_rational::BigRational as Rational;
+use num_traits::{One, Signed, ToPrimitive, Zero};
 
 use crate::symbolic::number::Number;
 
 /// Widens a radius by more than the rounding errors of the operations on it.
 const OUTWARD: f64 = 1.0 + 1e-12;
 
-fn power_of_ten(exponent: i32) -> Rational {
-    let power = Rational::from(BigInt::from(10).pow(exponent.unsigned_abs()));
-    if exponent < 0 { power.recip() } else { power }
+/// `numerator / denominator`, whose denominator is not zero.
+pub(super) fn ratio(numerator: impl Into<BigInt>, denominator: impl Into<BigInt>) -> Rational {
+    Rational::new(numerator.into(), denominator.into())
+}
+
+/// The nearest float; infinite beyond the range of floats.
+pub(super) fn nearest(value: &Rational) -> f64 {
+    value.to_f64().unwrap_or(f64::NAN)
 }
 
 /// `re + i im`, known to `radius` in magnitude.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Coefficient {
     pub(super) re: Rational,
     pub(super) im: Rational,
-    /// Bound of the distance from the number that was rounded.
-    pub(super) radius: f64,
-}
-
-impl PartialEq for Coefficient {
-    fn eq(&self, other: &Self) -> bool {
-        self.re == other.re
-            && self.im == other.im
-            && self.radius.to_bits() == other.radius.to_bits()
-    }
-}
-
-impl Eq for Coefficient {}
-
-impl Hash for Coefficient {
-    fn hash<H: Hasher>(&self, state: &mut H) {
-        (&self.re, &self.im, self.radius.to_bits()).hash(state);
-    }
+    /// Bits of the [`radius`](Coefficient::radius), whose order is that of the numbers.
+    radius: u64,
 }
 
 impl From<Rational> for Coefficient {
@@ -51,14 +38,10 @@ impl From<Rational> for Coefficient {
 impl From<Number> for Coefficient {
     fn from(number: Number) -> Self {
         let Some((top, bottom)) = number.as_rational() else {
-            let decimal = Self::parse(&format!("{:?}", number.abs().to_f64()), false);
-            let magnitude = decimal.map_or_else(Rational::zero, |decimal| decimal.re);
-            return Self::from(match number.is_negative() {
-                true => -magnitude,
-                false => magnitude,
-            });
+            let decimal = Self::parse(&format!("{:?}", number.to_f64()), false);
+            return decimal.unwrap_or_else(|| Self::integer(0));
         };
-        Rational::new(top, bottom).into()
+        ratio(top, bottom).into()
     }
 }
 
@@ -78,15 +61,15 @@ impl Coefficient {
         if !(-800..=400).contains(&last) {
             return None;
         }
-        let unit = power_of_ten(last);
+        let unit = ratio(10, 1).pow(last);
         let radius = match is_rounded {
-            true => 0.5 * unit.to_f64(),
+            true => 0.5 * nearest(&unit),
             false => 0.0,
         };
         Some(Self {
-            re: &Rational::from(mantissa) * &unit,
+            re: Rational::from(mantissa) * unit,
             im: Rational::zero(),
-            radius,
+            radius: radius.to_bits(),
         })
     }
 
@@ -95,16 +78,11 @@ impl Coefficient {
     }
 
     pub(super) fn complex(re: Rational, im: Rational) -> Self {
-        Self {
-            re,
-            im,
-            radius: 0.0,
-        }
+        Self { re, im, radius: 0 }
     }
 
-    /// `numerator/denominator` times the imaginary unit.
     pub(super) fn imaginary(numerator: i64, denominator: i64) -> Self {
-        let im = Rational::new(numerator, denominator);
+        let im = ratio(numerator, denominator);
         Self::complex(Rational::zero(), im)
     }
 
@@ -115,34 +93,32 @@ impl Coefficient {
 
     /// The magnitude of the value.
     pub fn magnitude(&self) -> f64 {
-        self.re.to_f64().hypot(self.im.to_f64())
+        nearest(&self.re).hypot(nearest(&self.im))
     }
 
-    /// The real part as the nearest float, or one beside it.
+    /// The real part as the nearest float.
     pub fn to_f64(&self) -> f64 {
-        self.re.to_f64()
+        nearest(&self.re)
     }
 
     /// Largest distance that rounded decimals allow.
     pub fn radius(&self) -> f64 {
-        self.radius
+        f64::from_bits(self.radius)
     }
 
     /// Whether zero is among the numbers that it may stand for.
     pub fn may_be_zero(&self) -> bool {
-        let is_within = || self.magnitude() <= self.radius * (1.0 + 1e-9);
-        self.is_zero() || (self.radius > 0.0 && is_within())
+        let is_within = || self.magnitude() <= self.radius() * (1.0 + 1e-9);
+        self.is_zero() || (self.radius > 0 && is_within())
     }
 
-    /// The value without its radius.
     pub(super) fn exact(&self) -> Self {
         Self {
-            radius: 0.0,
+            radius: 0,
             ..self.clone()
         }
     }
 
-    /// The value if it is real.
     pub(super) fn as_real(&self) -> Option<&Rational> {
         self.im.is_zero().then_some(&self.re)
     }
@@ -161,14 +137,13 @@ impl Coefficient {
         self.re.is_negative() || (self.re.is_zero() && self.im.is_negative())
     }
 
-    /// -1 if it is negative, else 1.
     pub(super) fn sign(&self) -> Self {
         Self::integer(if self.is_negative() { -1 } else { 1 })
     }
 
     /// `|re| + |im|`: a positive factor that scales with the value.
     pub(super) fn size(&self) -> Rational {
-        &self.re.abs() + &self.im.abs()
+        self.re.abs() + self.im.abs()
     }
 
     /// `self - other`.
@@ -178,20 +153,20 @@ impl Coefficient {
 
     /// `self + other`.
     pub fn plus(&self, other: &Self) -> Self {
-        let radius = match (self.radius, other.radius) {
+        let radius = match (self.radius(), other.radius()) {
             (0.0, radius) | (radius, 0.0) => radius,
             (a, b) => (a + b) * OUTWARD,
         };
         Self {
             re: &self.re + &other.re,
             im: &self.im + &other.im,
-            radius,
+            radius: radius.to_bits(),
         }
     }
 
     /// `self * other`.
     pub fn times(&self, other: &Self) -> Self {
-        let radius = match (self.radius, other.radius) {
+        let radius = match (self.radius(), other.radius()) {
             (0.0, 0.0) => 0.0,
             (a, b) => (self.magnitude() * b + other.magnitude() * a + a * b) * OUTWARD,
         };
@@ -200,28 +175,32 @@ impl Coefficient {
             (true, false) => (&self.re * &other.re, &self.re * &other.im),
             (false, true) => (&self.re * &other.re, &self.im * &other.re),
             (false, false) => (
-                &(&self.re * &other.re) + &-(&self.im * &other.im),
-                &(&self.re * &other.im) + &(&self.im * &other.re),
+                &self.re * &other.re - &self.im * &other.im,
+                &self.re * &other.im + &self.im * &other.re,
             ),
         };
-        Self { re, im, radius }
+        Self {
+            re,
+            im,
+            radius: radius.to_bits(),
+        }
     }
 
     /// The reciprocal; `None` for zero, or where zero is within the radius.
     pub(super) fn reciprocal(&self) -> Option<Self> {
-        let square = &(&self.re * &self.re) + &(&self.im * &self.im);
+        let square = &self.re * &self.re + &self.im * &self.im;
         let magnitude = self.magnitude();
-        if square.is_zero() || self.radius >= magnitude {
+        if square.is_zero() || self.radius() >= magnitude {
             return None;
         }
-        let radius = match self.radius {
+        let radius = match self.radius() {
             0.0 => 0.0,
             radius => radius / (magnitude * (magnitude - radius)) * OUTWARD,
         };
         Some(Self {
-            re: &self.re * &square.recip(),
-            im: -(&self.im * &square.recip()),
-            radius,
+            re: &self.re / &square,
+            im: -(&self.im / &square),
+            radius: radius.to_bits(),
         })
     }
 }

@@ -5,10 +5,10 @@ use std::collections::{HashMap, HashSet};
 use num_traits::ToPrimitive;
 
 use super::atoms::Atom;
-use super::coefficient::Coefficient;
+use super::coefficient::{Coefficient, nearest, ratio};
 use super::polynomial::{CanonicalForm, Monomial};
-use super::rational::Rational;
-use crate::symbolic::node::{ExprId, Function, Node, SymbolId};
+use crate::symbolic::function::Function;
+use crate::symbolic::node::{ExprId, Node};
 use crate::symbolic::number::Number;
 use crate::symbolic::pool::ExprPool;
 
@@ -19,13 +19,11 @@ const MAX_FRACTION_TRIES: usize = 300;
 const MAX_REMOVALS: usize = 40;
 /// Most sums under roots and logarithms by which others are divided.
 const MAX_SUMS: usize = 12;
-/// Largest index of a root.
 pub(super) const MAX_ROOT: i64 = 1_000;
 
 /// Normal forms of the expressions of a pool; the documentation of this folder has the method.
 pub struct CanonicalForms<'p> {
     pub(super) pool: &'p ExprPool,
-    pub(super) literal: &'p dyn Fn(SymbolId) -> Option<Coefficient>,
     pub(super) atoms: Vec<Atom>,
     pub(super) numbers: HashMap<Atom, u32>,
     pub(super) forms: HashMap<ExprId, CanonicalForm>,
@@ -34,7 +32,6 @@ pub struct CanonicalForms<'p> {
     /// Atoms that are positive wherever all given expressions are defined, and sums that are.
     pub(super) positive: HashSet<u32>,
     pub(super) positive_sums: Vec<CanonicalForm>,
-    /// Atoms that are negative there.
     pub(super) negative: HashSet<u32>,
     rounding: f64,
     /// Whether any argument has radii.
@@ -46,16 +43,9 @@ pub struct CanonicalForms<'p> {
 impl<'p> CanonicalForms<'p> {
     /// Forms of expressions that are compared where all of `exprs` have values: what stands under a
     /// logarithm or root of one of these is taken as positive in all others.
-    ///
-    /// `literal` gives the symbols that stand for decimals.
-    pub fn new(
-        pool: &'p ExprPool,
-        exprs: &[ExprId],
-        literal: &'p dyn Fn(SymbolId) -> Option<Coefficient>,
-    ) -> Self {
+    pub fn new(pool: &'p ExprPool, exprs: &[ExprId]) -> Self {
         let mut forms = Self {
             pool,
-            literal,
             atoms: Vec::new(),
             numbers: HashMap::new(),
             forms: HashMap::new(),
@@ -207,8 +197,8 @@ impl<'p> CanonicalForms<'p> {
         let pool = self.pool;
         match pool.node(expr) {
             Node::Number(number) => Some(CanonicalForm::constant(Coefficient::from(*number))),
-            Node::Symbol(symbol) => Some(match (self.literal)(*symbol) {
-                Some(literal) => CanonicalForm::constant(literal),
+            Node::Symbol(symbol) => Some(match pool.decimal_of(*symbol) {
+                Some((decimal, _)) => CanonicalForm::constant(decimal.clone()),
                 None => self.atom(Atom::Symbol(*symbol)),
             }),
             Node::Sum(terms) => {
@@ -247,8 +237,7 @@ impl<'p> CanonicalForms<'p> {
         let exponent = self.argument(exponent);
         if let Some(constant) = exponent.as_constant()
             && let Some(value) = constant.as_real()
-            && let (Some(top), Some(bottom)) =
-                (value.numerator().to_i32(), value.denominator().to_i64())
+            && let (Some(top), Some(bottom)) = (value.numer().to_i32(), value.denom().to_i64())
             && bottom <= MAX_ROOT
         {
             return match bottom {
@@ -273,7 +262,7 @@ impl<'p> CanonicalForms<'p> {
             Function::Sin | Function::Cos => {
                 let argument = self.argument(argument.clone());
                 let [plus, minus] = exponentials(&argument, true);
-                let half = Coefficient::from(Rational::new(1, 2));
+                let half = Coefficient::from(ratio(1, 2));
                 Some(match function {
                     Function::Sin => plus.minus(&minus).scaled(&Coefficient::imaginary(-1, 2)),
                     _ => plus.plus(&minus).scaled(&half),
@@ -351,7 +340,6 @@ impl<'p> CanonicalForms<'p> {
         None
     }
 
-    /// The atoms of a form that multiplying out would remove.
     fn fractions(&self, form: &CanonicalForm) -> HashSet<u32> {
         let atoms = form.terms.keys().flat_map(|monomial| &monomial.powers);
         let atoms = atoms.map(|(atom, _)| *atom);
@@ -384,17 +372,17 @@ impl Argument {
     /// largest distance of their coefficients.
     fn take(&mut self, other: &CanonicalForm) -> Option<f64> {
         let radius = |form: &CanonicalForm, monomial: &Monomial| {
-            form.terms.get(monomial).map_or(0.0, |c| c.radius)
+            form.terms.get(monomial).map_or(0.0, |c| c.radius())
         };
         let mut room = self.room.clone();
         let mut largest = 0.0_f64;
         for (monomial, difference) in &other.minus(&self.form).terms {
             let (own, its) = (radius(&self.form, monomial), radius(other, monomial));
             let slack = 1e-9 * (own + its);
-            let distance = difference.re.to_f64();
+            let distance = nearest(&difference.re);
             let (low, high) = room.get(monomial).copied().unwrap_or((-own, own));
             let (low, high) = (low.max(distance - its), high.min(distance + its));
-            if low > high + slack || difference.im.to_f64().abs() > own + its + slack {
+            if low > high + slack || nearest(&difference.im).abs() > own + its + slack {
                 return None;
             }
             largest = largest.max(difference.magnitude());
@@ -425,19 +413,10 @@ fn of_odd_power(pool: &ExprPool, mut expr: ExprId) -> (i64, ExprId) {
 
 /// `exp(argument)` and `exp(-argument)`, with `i * argument` for angles.
 pub(super) fn exponentials(argument: &CanonicalForm, is_angle: bool) -> [CanonicalForm; 2] {
-    let exponent: Vec<_> = (argument.terms.iter())
-        .map(|(monomial, coefficient)| {
-            let (re, im) = (coefficient.re.clone(), coefficient.im.clone());
-            (
-                monomial.clone(),
-                if is_angle { (-im, re) } else { (re, im) },
-            )
-        })
-        .collect();
-    let plus = Monomial {
-        powers: Vec::new(),
-        exponent,
+    let unit = match is_angle {
+        true => Coefficient::imaginary(1, 1),
+        false => Coefficient::integer(1),
     };
-    let minus = plus.reciprocal();
-    [plus, minus].map(CanonicalForm::monomial)
+    let minus_unit = Coefficient::integer(-1).times(&unit);
+    [unit, minus_unit].map(|factor| CanonicalForm::exponential(argument.scaled(&factor)))
 }

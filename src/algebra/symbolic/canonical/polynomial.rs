@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 
 use super::coefficient::Coefficient;
-use super::rational::Rational;
 
 /// Most terms of a form, and most products of terms that one multiplication makes.
 const MAX_TERMS: usize = 2_000;
@@ -14,20 +13,20 @@ const MAX_PRODUCTS: usize = 40_000;
 pub(super) struct Monomial {
     /// Atoms by their numbers, ascending, with powers that are not zero.
     pub(super) powers: Vec<(u32, i32)>,
-    /// The exponential's argument: real and imaginary parts of its coefficients, not both zero.
-    pub(super) exponent: Vec<(Monomial, (Rational, Rational))>,
+    /// The exponential's argument, without radii.
+    pub(super) exponent: CanonicalForm,
 }
 
 impl Monomial {
     pub(super) fn atom(atom: u32, power: i32) -> Self {
         Self {
             powers: vec![(atom, power)],
-            exponent: Vec::new(),
+            exponent: CanonicalForm::default(),
         }
     }
 
     pub(super) fn is_one(&self) -> bool {
-        self.powers.is_empty() && self.exponent.is_empty()
+        self.powers.is_empty() && self.exponent.is_zero()
     }
 
     pub(super) fn power_of(&self, atom: u32) -> i32 {
@@ -55,46 +54,25 @@ impl Monomial {
             *sum = sum.saturating_add(*power);
         }
         powers.retain(|_, power| *power != 0);
-        let exponent = match (self.exponent.is_empty(), other.exponent.is_empty()) {
-            (_, true) => self.exponent.clone(),
-            (true, _) => other.exponent.clone(),
-            (false, false) => {
-                let mut sum: BTreeMap<Monomial, (Rational, Rational)> =
-                    self.exponent.iter().cloned().collect();
-                for (monomial, (re, im)) in &other.exponent {
-                    let entry = sum
-                        .entry(monomial.clone())
-                        .or_insert_with(|| (Rational::zero(), Rational::zero()));
-                    entry.0 = &entry.0 + re;
-                    entry.1 = &entry.1 + im;
-                }
-                sum.retain(|_, (re, im)| !re.is_zero() || !im.is_zero());
-                sum.into_iter().collect()
-            }
-        };
         Self {
             powers: powers.into_iter().collect(),
-            exponent,
+            exponent: self.exponent.plus(&other.exponent),
         }
     }
 
     pub(super) fn reciprocal(&self) -> Self {
-        let negated = |(monomial, (re, im)): &(Monomial, (Rational, Rational))| {
-            (monomial.clone(), (-re.clone(), -im.clone()))
-        };
+        let powers = self.powers.iter();
         Self {
-            powers: self
-                .powers
-                .iter()
+            powers: powers
                 .map(|(atom, power)| (*atom, power.saturating_neg()))
                 .collect(),
-            exponent: self.exponent.iter().map(negated).collect(),
+            exponent: self.exponent.scaled(&Coefficient::integer(-1)),
         }
     }
 }
 
 /// A sum in normal form, made by [`CanonicalForms`](super::CanonicalForms).
-#[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct CanonicalForm {
     pub(super) terms: BTreeMap<Monomial, Coefficient>,
 }
@@ -122,13 +100,20 @@ impl CanonicalForm {
         Self::term(Coefficient::integer(1), monomial)
     }
 
+    pub(super) fn exponential(exponent: CanonicalForm) -> Self {
+        Self::monomial(Monomial {
+            powers: Vec::new(),
+            exponent,
+        })
+    }
+
     /// Adds a term. A coefficient of value zero is kept as long as it has a radius.
     pub(super) fn add(&mut self, coefficient: Coefficient, monomial: Monomial) {
         let sum = match self.terms.remove(&monomial) {
             Some(before) => before.plus(&coefficient),
             None => coefficient,
         };
-        if !sum.is_zero() || sum.radius > 0.0 {
+        if !sum.is_zero() || sum.radius() > 0.0 {
             self.terms.insert(monomial, sum);
         }
     }
@@ -148,7 +133,6 @@ impl CanonicalForm {
         self.terms.values()
     }
 
-    /// The value if there is nothing but a number.
     pub(super) fn as_constant(&self) -> Option<Coefficient> {
         let mut terms = self.terms.iter();
         match (terms.next(), terms.next()) {
@@ -158,16 +142,14 @@ impl CanonicalForm {
         }
     }
 
-    /// The atom that the form is, if it is nothing else.
     pub(super) fn as_atom(&self) -> Option<u32> {
         let (coefficient, monomial) = self.as_term()?;
         match monomial.powers[..] {
-            [(atom, 1)] if coefficient.is_one() && monomial.exponent.is_empty() => Some(atom),
+            [(atom, 1)] if coefficient.is_one() && monomial.exponent.is_zero() => Some(atom),
             _ => None,
         }
     }
 
-    /// Coefficient and monomial if there is one term.
     pub(super) fn as_term(&self) -> Option<(&Coefficient, &Monomial)> {
         let mut terms = self.terms.iter();
         match (terms.next(), terms.next()) {
@@ -195,10 +177,9 @@ impl CanonicalForm {
     pub(super) fn has_radius(&self) -> bool {
         self.terms
             .values()
-            .any(|coefficient| coefficient.radius > 0.0)
+            .any(|coefficient| coefficient.radius() > 0.0)
     }
 
-    /// The values without their radii.
     pub(super) fn exact(&self) -> Self {
         let terms = self
             .terms
@@ -219,7 +200,6 @@ impl CanonicalForm {
         scaled
     }
 
-    /// `self + other`.
     pub(crate) fn plus(&self, other: &Self) -> Self {
         let (mut sum, rest) = match self.terms.len() >= other.terms.len() {
             true => (self.clone(), other),

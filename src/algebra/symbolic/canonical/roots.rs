@@ -1,16 +1,14 @@
 //! Roots, logarithms, exponentials and magnitudes of normal forms.
 
-use std::cmp::Ordering;
 use std::collections::BTreeSet;
 
 use num_bigint::BigInt;
-use num_traits::ToPrimitive;
+use num_traits::{ToPrimitive, Zero};
 
 use super::atoms::{Atom, prime_powers};
-use super::coefficient::Coefficient;
+use super::coefficient::{Coefficient, Rational, ratio};
 use super::forms::{CanonicalForms, MAX_ROOT, exponentials};
 use super::polynomial::{CanonicalForm, Monomial};
-use super::rational::Rational;
 
 impl CanonicalForms<'_> {
     /// `scale * prod base^power * exp(E)` of a form that is positive where it is used: a positive
@@ -40,7 +38,7 @@ impl CanonicalForms<'_> {
             if let Some((divisor, quotient)) = self.positive_divisor(&form) {
                 // sqrt(2 + 3*x + x^2) = sqrt(1 + x) sqrt(2 + x) where 1 + x is positive.
                 let (mut split, other) = (self.split(&divisor)?, self.split(&quotient)?);
-                split.scale = &split.scale * &other.scale;
+                split.scale *= other.scale;
                 split.factors.extend(other.factors);
                 split.exponent = split.exponent.plus(&other.exponent);
                 return Some(split);
@@ -82,15 +80,10 @@ impl CanonicalForms<'_> {
             }
             _ => factors.push((CanonicalForm::term(sign, rest), 1)),
         }
-        let mut exponent = CanonicalForm::default();
-        for (monomial, (re, im)) in &monomial.exponent {
-            let coefficient = Coefficient::complex(re.clone(), im.clone());
-            exponent.add(coefficient, monomial.clone());
-        }
         Some(Split {
             scale,
             factors,
-            exponent,
+            exponent: monomial.exponent.clone(),
         })
     }
 
@@ -100,27 +93,19 @@ impl CanonicalForms<'_> {
         &mut self,
         form: &CanonicalForm,
     ) -> Option<(CanonicalForm, Option<CanonicalForm>)> {
-        let all = form.terms.keys().flat_map(|monomial| &monomial.exponent);
-        let names: BTreeSet<&Monomial> = all.map(|(name, _)| name).collect();
+        let all = form
+            .terms
+            .keys()
+            .flat_map(|monomial| monomial.exponent.terms.keys());
+        let names: BTreeSet<&Monomial> = all.collect();
         let power = |monomial: &Monomial, name: &Monomial| {
-            let found = monomial.exponent.iter().find(|(known, _)| known == name);
-            found.map_or_else(Rational::zero, |(_, (re, _))| re.clone())
+            let found = monomial.exponent.terms.get(name);
+            found.map_or_else(Rational::zero, |power| power.re.clone())
         };
         let powers = |monomial: &Monomial| -> Vec<Rational> {
             names.iter().map(|name| power(monomial, name)).collect()
         };
-        // Rationals compare by their parts: their order is one of differences only by value.
-        let largest = form.terms.keys().map(powers).max_by(|a, b| {
-            let differences = a.iter().zip(b).map(|(a, b)| a + &-b.clone());
-            let first = differences
-                .into_iter()
-                .find(|difference| !difference.is_zero());
-            match first {
-                None => Ordering::Equal,
-                Some(difference) if difference.is_negative() => Ordering::Less,
-                Some(_) => Ordering::Greater,
-            }
-        })?;
+        let largest = form.terms.keys().map(powers).max()?;
         let mut exponent = CanonicalForm::default();
         for (name, power) in names.into_iter().zip(largest) {
             exponent.add(power.into(), name.clone());
@@ -170,7 +155,7 @@ impl CanonicalForms<'_> {
         powers.retain(|(_, power)| *power != 0);
         Monomial {
             powers,
-            exponent: Vec::new(),
+            exponent: CanonicalForm::default(),
         }
     }
 
@@ -184,7 +169,7 @@ impl CanonicalForms<'_> {
         for (base, power) in split.factors {
             let (base, index) = self.radicand(base);
             let log = self.atom(Atom::Log(base));
-            sum = sum.plus(&log.scaled(&Rational::new(power, index).into()));
+            sum = sum.plus(&log.scaled(&ratio(power, index).into()));
         }
         Some(sum)
     }
@@ -194,11 +179,11 @@ impl CanonicalForms<'_> {
             return Some(CanonicalForm::default());
         }
         let split = self.split(form)?;
-        let mut root = self.exp(split.exponent.scaled(&Rational::new(1, index).into()))?;
+        let mut root = self.exp(split.exponent.scaled(&ratio(1, index).into()))?;
         let primes = prime_powers(&split.scale).into_iter();
         for (base, power) in primes.chain(split.factors) {
             let (base, inner) = self.radicand(base);
-            let exponent = Rational::new(power, BigInt::from(index) * inner);
+            let exponent = ratio(power, BigInt::from(index) * inner);
             let factor = self.positive_power(&base, &exponent)?;
             root = self.product(&root, &factor)?;
         }
@@ -213,7 +198,6 @@ impl CanonicalForms<'_> {
         }
     }
 
-    /// `base ^ exponent` of a positive base.
     pub(super) fn positive_power(
         &mut self,
         base: &CanonicalForm,
@@ -221,16 +205,13 @@ impl CanonicalForms<'_> {
     ) -> Option<CanonicalForm> {
         let whole = exponent.floor();
         let power = self.power(base, whole.to_i32()?)?;
-        let rest = exponent + &Rational::from(-whole);
+        let rest = exponent - whole;
         if rest.is_zero() {
             return Some(power);
         }
-        let index = rest
-            .denominator()
-            .to_i64()
-            .filter(|index| *index <= MAX_ROOT)?;
+        let index = rest.denom().to_i64().filter(|index| *index <= MAX_ROOT)?;
         let root = self.number(Atom::Root(base.clone(), u32::try_from(index).ok()?));
-        let root = Monomial::atom(root, rest.numerator().to_i32()?);
+        let root = Monomial::atom(root, rest.numer().to_i32()?);
         self.product(&power, &CanonicalForm::monomial(root))
     }
 
@@ -240,7 +221,7 @@ impl CanonicalForms<'_> {
         let mut rest = CanonicalForm::default();
         let mut product = CanonicalForm::one();
         for (monomial, coefficient) in &argument.terms {
-            let log = match (monomial.powers.as_slice(), monomial.exponent.is_empty()) {
+            let log = match (monomial.powers.as_slice(), monomial.exponent.is_zero()) {
                 ([(atom, 1)], true) => match &self.atoms[*atom as usize] {
                     Atom::Log(base) => Some(base.clone()),
                     _ => None,
@@ -279,10 +260,7 @@ impl CanonicalForms<'_> {
         let Some((_, monomial)) = normed.as_term().filter(|(c, _)| c.is_one()) else {
             return Some(self.atom(Atom::Abs(normed)).scaled(&scale));
         };
-        let mut product = CanonicalForm::monomial(Monomial {
-            powers: Vec::new(),
-            exponent: monomial.exponent.clone(),
-        });
+        let mut product = CanonicalForm::exponential(monomial.exponent.clone());
         for &(atom, power) in &monomial.powers {
             let base = match self.is_positive(atom) || power % 2 == 0 {
                 true => CanonicalForm::atom(atom),
@@ -357,7 +335,6 @@ impl CanonicalForms<'_> {
     }
 }
 
-/// See [`CanonicalForms::split`].
 pub(super) struct Split {
     pub(super) scale: Rational,
     pub(super) factors: Vec<(CanonicalForm, i32)>,

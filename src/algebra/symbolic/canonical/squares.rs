@@ -1,13 +1,13 @@
 //! Sums that are squares.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
-use super::coefficient::Coefficient;
+use num_traits::Signed;
+
+use super::coefficient::{Coefficient, Rational, nearest, ratio};
 use super::forms::CanonicalForms;
 use super::polynomial::{CanonicalForm, Monomial};
-use super::rational::Rational;
 
-/// Most terms of a sum whose root is looked for.
 const MAX_TERMS: usize = 60;
 
 impl CanonicalForms<'_> {
@@ -46,7 +46,7 @@ impl CanonicalForms<'_> {
                 return None;
             }
             last = weight;
-            root.add(coefficient.times(&Rational::new(1, 2).into()), next);
+            root.add(coefficient.times(&ratio(1, 2).into()), next);
         }
         None
     }
@@ -67,7 +67,6 @@ impl CanonicalForms<'_> {
         })
     }
 
-    /// `form / divisor`, if the division leaves no remainder.
     fn divided(&mut self, form: &CanonicalForm, divisor: &CanonicalForm) -> Option<CanonicalForm> {
         let order = Order::of(&form.plus(divisor));
         let (leading, coefficient) = order.largest(divisor)?;
@@ -94,16 +93,13 @@ impl CanonicalForms<'_> {
 
 /// The monomial whose square this is, if powers are even.
 fn halved(monomial: &Monomial) -> Option<Monomial> {
-    let half = Rational::new(1, 2);
     let powers = monomial.powers.iter();
     let powers: Option<Vec<_>> = powers
         .map(|&(atom, power)| (power % 2 == 0).then_some((atom, power / 2)))
         .collect();
-    let exponent = monomial.exponent.iter();
-    let exponent = exponent.map(|(of, (re, im))| (of.clone(), (re * &half, im * &half)));
     Some(Monomial {
         powers: powers?,
-        exponent: exponent.collect(),
+        exponent: monomial.exponent.scaled(&ratio(1, 2).into()),
     })
 }
 
@@ -114,8 +110,11 @@ struct Order {
 
 impl Order {
     fn of(form: &CanonicalForm) -> Self {
-        let all = form.terms.keys().flat_map(|monomial| &monomial.exponent);
-        let distinct: std::collections::BTreeSet<&Monomial> = all.map(|(of, _)| of).collect();
+        let all = form
+            .terms
+            .keys()
+            .flat_map(|monomial| monomial.exponent.terms.keys());
+        let distinct: BTreeSet<&Monomial> = all.collect();
         let weighted = (distinct.into_iter().enumerate())
             .map(|(place, of)| (of.clone(), (place as f64 + 2.7).sqrt()));
         Self {
@@ -126,9 +125,9 @@ impl Order {
     fn weight(&self, monomial: &Monomial) -> f64 {
         let powers = monomial.powers.iter();
         let powers = powers.map(|&(atom, power)| f64::from(power) * (f64::from(atom) + 3.1).ln());
-        let exponents = monomial.exponent.iter().map(|(of, (re, im))| {
+        let exponents = monomial.exponent.terms.iter().map(|(of, power)| {
             let weight = self.exponents.get(of).copied().unwrap_or(1.0);
-            weight * (re.to_f64() + 1.618 * im.to_f64())
+            weight * (nearest(&power.re) + 1.618 * nearest(&power.im))
         });
         powers.chain(exponents).sum()
     }

@@ -11,8 +11,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
 use super::Summands;
+use crate::symbolic::function::Function;
 use crate::symbolic::interval::Interval;
-use crate::symbolic::node::{ExprId, Function, Node, SymbolId};
+use crate::symbolic::node::{ExprId, Node, SymbolId};
 use crate::symbolic::pool::ExprPool;
 use crate::symbolic::rounding::power_by;
 
@@ -30,9 +31,7 @@ const EVALUATION: f64 = 1e-11;
 /// Multiples of the golden ratio fill an interval evenly.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
-/// Values at many points.
 type Column = Rc<[f64]>;
-/// The values of each variable at many points.
 type Points = BTreeMap<SymbolId, Column>;
 
 /// Floating-point numbers of generated code.
@@ -89,7 +88,6 @@ struct Far {
 }
 
 impl Agreement {
-    /// The comparison with `sum`.
     pub(super) fn with(pool: &ExprPool, sum: &Summands) -> Self {
         let symbols: BTreeSet<SymbolId> = (sum.iter())
             .flat_map(|&(_, expr)| pool.symbols_of(expr))

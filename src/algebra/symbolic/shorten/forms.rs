@@ -2,17 +2,19 @@
 
 use super::agreement::Agreement;
 use super::search::Shortener;
-use super::units::{in_f64, in_units};
 use super::{Scaled, Summands};
-use crate::symbolic::expand::MAX_PRODUCTS;
+use crate::symbolic::function::Function;
 use crate::symbolic::id_map::IdMap;
-use crate::symbolic::node::{ExprId, Function, Node};
+use crate::symbolic::node::{ExprId, Node};
 use crate::symbolic::number::Number;
 use crate::symbolic::pool::ExprPool;
 
 /// Largest group whose forms are searched, and largest whose terms are chosen one by one.
 const MAX_GROUP: usize = 64;
 const MAX_CHOSEN: usize = 16;
+/// Largest numerator and denominator of a ratio of coefficients.
+const MAX_NUMERATOR: f64 = 4096.0;
+const MAX_DENOMINATOR: i32 = 64;
 
 impl Shortener<'_> {
     /// The shortest form of a sum that is shorter and agrees with what was written first, if there is one.
@@ -23,7 +25,7 @@ impl Shortener<'_> {
         let singles: Scaled = (scaled.iter())
             .map(|&(number, expr)| (number, self.single(expr)))
             .collect();
-        let mut candidates = vec![collected(self.pool, &singles, Keep::Sums)];
+        let mut candidates = vec![collected(self.pool, &singles, NestedSums::Kept)];
         if old.len() <= MAX_GROUP && self.pool.affords(1) {
             candidates.extend(self.candidates(unit, &singles));
             candidates.extend(self.beside_common_factors(unit, &singles));
@@ -83,7 +85,7 @@ impl Shortener<'_> {
                 _ => terms.push((number, expr)),
             }
         }
-        collected(self.pool, &terms, Keep::Sums)
+        collected(self.pool, &terms, NestedSums::Kept)
     }
 
     /// Terms of a sum with those of sums inside products and fractions.
@@ -141,7 +143,6 @@ impl Shortener<'_> {
 
     /// Forms of a group: of its sum as a whole, and of each term chosen by itself.
     fn candidates(&mut self, unit: Number, singles: &Scaled) -> Vec<Scaled> {
-        let mut budget = MAX_PRODUCTS;
         let mut candidates = Vec::new();
         let products: Vec<ExprId> = (singles.iter())
             .map(|&(number, expr)| {
@@ -150,14 +151,14 @@ impl Shortener<'_> {
             })
             .collect();
         let sum = self.pool.sum(&products);
-        let mut forms = self.pool.forms(sum, &mut budget);
+        let mut forms = self.pool.forms(sum);
         forms.push(self.pool.simplify(sum));
         for form in forms {
             let terms = self.pool.terms_of(form);
             if let [(number, rest)] = terms.as_slice()
                 && let Node::Sum(_) = self.pool.node(*rest)
             {
-                candidates.push(collected(self.pool, &[(*number, *rest)], Keep::Nothing));
+                candidates.push(collected(self.pool, &[(*number, *rest)], NestedSums::Split));
             }
             candidates.push(terms);
             if singles.len() == 1
@@ -196,7 +197,7 @@ impl Shortener<'_> {
             let terms: Scaled = terms
                 .map(|(number, expr)| (number, self.pool.product(&[common, expr])))
                 .collect();
-            collected(self.pool, &terms, Keep::Sums)
+            collected(self.pool, &terms, NestedSums::Kept)
         });
         with_factors.collect()
     }
@@ -215,7 +216,7 @@ impl Shortener<'_> {
                     let mut sum = singles.clone();
                     sum[first] = product;
                     sum.remove(second);
-                    found.push(collected(self.pool, &sum, Keep::Sums));
+                    found.push(collected(self.pool, &sum, NestedSums::Kept));
                 }
             }
         }
@@ -271,7 +272,6 @@ impl Shortener<'_> {
         if singles.len() < 2 || singles.len() > MAX_CHOSEN {
             return Vec::new();
         }
-        let mut budget = MAX_PRODUCTS;
         let summands: Summands = (singles.iter())
             .map(|&(number, expr)| (number.to_f64(), expr))
             .collect();
@@ -279,10 +279,10 @@ impl Shortener<'_> {
         let mut forms: Vec<Vec<ExprId>> = Vec::new();
         for &(_, expr) in singles {
             let normal = self.normal(expr, waves);
-            let mut own = vec![expr, self.pool.expand_region(expr, &mut budget), normal];
+            let mut own = vec![expr, self.pool.expand_region(expr), normal];
             if self.pool.has_waves(normal) {
                 let sines = self.pool.cosines_to_sines(normal);
-                own.push(self.pool.expand_region(sines, &mut budget));
+                own.push(self.pool.expand_region(sines));
                 own.push(self.pool.combine_angles(normal));
             } else {
                 own.extend([normal, normal]);
@@ -326,34 +326,38 @@ impl Shortener<'_> {
         let mut parts = Scaled::new();
         for (term, &(number, _)) in singles.iter().enumerate() {
             let form = forms[term][choice[term]];
-            let keep = match choice[term] {
-                0 => Keep::Sums,
-                _ => Keep::Nothing,
+            let sums = match choice[term] {
+                0 => NestedSums::Kept,
+                _ => NestedSums::Split,
             };
-            parts.extend(collected(self.pool, &[(number, form)], keep));
+            parts.extend(collected(self.pool, &[(number, form)], sums));
         }
-        let sum = collected(self.pool, &parts, Keep::Sums);
+        let sum = collected(self.pool, &parts, NestedSums::Kept);
         self.pool.spend(parts.len());
         let length = self.length(unit, &sum);
         (sum, length)
     }
 }
 
-/// Whether sums among the terms stay terms.
+/// Whether sums among the terms stay terms, or become their own terms.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Keep {
-    Sums,
-    Nothing,
+pub(super) enum NestedSums {
+    Kept,
+    Split,
 }
 
 /// Summands with the numbers of their terms in the coefficients and like terms added, in the order
 /// of their first appearance.
-pub(super) fn collected(pool: &ExprPool, summands: &[(Number, ExprId)], keep: Keep) -> Scaled {
+pub(super) fn collected(
+    pool: &ExprPool,
+    summands: &[(Number, ExprId)],
+    sums: NestedSums,
+) -> Scaled {
     let mut result = Scaled::new();
     let mut place: IdMap<usize> = IdMap::default();
     for &(number, expr) in summands {
         let parts = match pool.node(expr) {
-            Node::Sum(_) if keep == Keep::Sums => vec![(Number::ONE, expr)],
+            Node::Sum(_) if sums == NestedSums::Kept => vec![(Number::ONE, expr)],
             _ => pool.terms_of(expr),
         };
         for (factor, rest) in parts {
@@ -373,4 +377,49 @@ pub(super) fn collected(pool: &ExprPool, summands: &[(Number, ExprId)], keep: Ke
     }
     result.retain(|(number, _)| !number.is_zero());
     result
+}
+
+/// A unit, and the coefficients as multiples of it: small fractions if all are such.
+fn in_units(summands: &Summands) -> (Number, Scaled) {
+    let unit = summands[0].0;
+    let ratios: Option<Scaled> = (summands.iter())
+        .map(|&(coefficient, expr)| Some((small_ratio(coefficient, unit)?, expr)))
+        .collect();
+    match ratios {
+        Some(scaled) => (decimal(unit), scaled),
+        None => {
+            let exact = summands.iter().map(|&(c, expr)| (decimal(c), expr));
+            (Number::ONE, exact.collect())
+        }
+    }
+}
+
+/// `a / b` as a fraction of small numbers, if it is one to a unit in the last place.
+fn small_ratio(a: f64, b: f64) -> Option<Number> {
+    let ratio = a / b;
+    (1..=MAX_DENOMINATOR).find_map(|denominator| {
+        let numerator = (ratio * f64::from(denominator)).round();
+        let error = (numerator * b / f64::from(denominator) - a).abs();
+        let fits =
+            numerator != 0.0 && numerator.abs() <= MAX_NUMERATOR && error <= f64::EPSILON * a.abs();
+        fits.then(|| Number::rational(numerator as i64, i64::from(denominator)))?
+    })
+}
+
+/// The decimal fraction that is written for a float, if it is short; the float itself otherwise.
+fn decimal(value: f64) -> Number {
+    let number = Number::from_f64(value).expect("coefficients are finite");
+    number.decimal().unwrap_or(number)
+}
+
+/// `number * unit`, rounded once if the unit is a short decimal fraction, else twice.
+fn in_f64(number: Number, unit: Number) -> f64 {
+    match number.as_rational() {
+        Some((numerator, denominator)) if !unit.is_exact() => {
+            numerator as f64 * unit.to_f64() / denominator as f64
+        }
+        _ => number
+            .checked_mul(unit)
+            .map_or(f64::INFINITY, Number::to_f64),
+    }
 }

@@ -1,47 +1,59 @@
 //! Which summands can interact.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 
 use super::Summands;
-use super::search::{Block, Reach, Shortener};
-use crate::symbolic::expand::MAX_PRODUCTS;
+use super::search::{Block, Distance, Shortener};
+use crate::symbolic::function::Function;
 use crate::symbolic::id_map::IdMap;
-use crate::symbolic::node::{ExprId, Function, Node};
+use crate::symbolic::node::{ExprId, Node};
 use crate::symbolic::number::Number;
-use crate::symbolic::perfect_power::MAX_POWER;
+use crate::symbolic::polynomial::MAX_POWER;
 use crate::symbolic::pool::ExprPool;
 use crate::symbolic::simplify::MAX_WORK;
 
 /// Most terms that can be powers of the parts of a sum.
 const MAX_PARTS: usize = 64;
-/// Summands that can interact have a monomial in common. Those with logarithms are given one with the logarithm of
-/// this number, which no model has.
-const OF_LOGARITHMS: i64 = -1;
-/// The same for denominators of the same variables.
-const OF_SAME_VARIABLES: i64 = -2;
-/// The same for tangents of an angle and their inverses.
-const OF_TANGENTS: i64 = -3;
 /// Relative error of coefficients that fit a power.
 const ROUNDING: f64 = 1e-13;
 
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) enum Link {
+    /// A monomial of their normal forms.
+    Monomial(ExprId),
+    /// Logarithms, with this cofactor.
+    Logarithm(ExprId),
+    /// Denominators that have the variables of this product.
+    Variables(ExprId),
+    /// Tangents of an angle or their inverses: cofactor times tangent.
+    Tangent(ExprId),
+}
+
+impl Link {
+    /// Whether terms of [`Distance::Far`] alone meet by it.
+    fn is_far(self) -> bool {
+        matches!(self, Link::Monomial(ExprId::ONE) | Link::Variables(_))
+    }
+}
+
 impl Shortener<'_> {
     /// Positions of blocks that can interact, or that are worth a look alone.
-    pub(super) fn groups(&mut self, blocks: &[Block], reach: Reach) -> Vec<Vec<usize>> {
+    pub(super) fn groups(&mut self, blocks: &[Block], distance: Distance) -> Vec<Vec<usize>> {
         let (places, summands): (Vec<usize>, Summands) = (blocks.iter().enumerate())
             .flat_map(|(place, block)| block.summands.iter().map(move |&summand| (place, summand)))
             .unzip();
         let waves = self.all_angles(&summands);
         let mut leader: Vec<usize> = (0..blocks.len()).collect();
-        let mut owner: IdMap<usize> = IdMap::default();
+        let mut owner: HashMap<Link, usize> = HashMap::new();
         let mut is_plain = vec![true; blocks.len()];
         for (place, block) in blocks.iter().enumerate() {
             for &(_, expr) in &block.summands {
                 is_plain[place] &= self.is_plain(expr);
-                for monomial in self.monomials_of(expr, waves) {
-                    if reach == Reach::Near && self.is_far(monomial) {
+                for link in self.links_of(expr, waves) {
+                    if distance == Distance::Near && link.is_far() {
                         continue;
                     }
-                    let other = *owner.entry(monomial).or_insert(place);
+                    let other = *owner.entry(link).or_insert(place);
                     let (a, b) = (root(&leader, place), root(&leader, other));
                     leader[a.max(b)] = a.min(b);
                 }
@@ -57,18 +69,6 @@ impl Shortener<'_> {
         }
         let is_worth = |group: &Vec<usize>| group.len() > 1 || !is_plain[group[0]];
         groups.into_values().filter(is_worth).collect()
-    }
-
-    /// Whether a monomial is one by which terms of [`Reach::Far`] alone meet.
-    fn is_far(&mut self, monomial: ExprId) -> bool {
-        let hub = self.meeting(OF_SAME_VARIABLES);
-        monomial == ExprId::ONE || self.pool.factors_of(monomial).contains(&hub)
-    }
-
-    /// The factor by which terms of a kind meet.
-    fn meeting(&mut self, kind: i64) -> ExprId {
-        let number = self.pool.integer(kind);
-        self.pool.apply(Function::Log, number)
     }
 
     /// Pairs of summands that belong to one power of a sum: of `p*a^n`, `q*a^(n-1)*b` and `r*b^n`
@@ -137,75 +137,73 @@ impl Shortener<'_> {
         self.pool.sum(&sines)
     }
 
-    /// The monomials of a term's normal forms.
-    fn monomials_of(&mut self, expr: ExprId, waves: ExprId) -> Vec<ExprId> {
+    fn links_of(&mut self, expr: ExprId, waves: ExprId) -> Vec<Link> {
         let is_tangent =
             |factor: &ExprId| matches!(self.pool.node(*factor), Node::Apply(Function::Tan, _));
         let is_alone = self.plain[&expr] && !self.pool.factors_of(expr).iter().any(is_tangent);
         if is_alone || !self.pool.affords(1) {
-            return vec![expr];
+            return vec![Link::Monomial(expr)];
         }
-        if let Some(known) = self.monomials.get(&(expr, waves)) {
+        if let Some(known) = self.links.get(&(expr, waves)) {
             return known.clone();
         }
         let rests = |pool: &ExprPool, expr| {
             let terms = pool.terms_of(expr).into_iter();
-            terms.map(|(_, rest)| rest).collect::<Vec<_>>()
+            terms
+                .map(|(_, rest)| Link::Monomial(rest))
+                .collect::<Vec<_>>()
         };
         let normal = self.normal(expr, waves);
-        let expanded = self.pool.expand_region(normal, &mut MAX_PRODUCTS.clone());
-        let mut monomials = rests(self.pool, expanded);
+        let expanded = self.pool.expand_region(normal);
+        let mut links = rests(self.pool, expanded);
         if let Some((cofactor, _)) = self.pool.as_log_term(self.pool.split(expr).1) {
-            let common = self.meeting(OF_LOGARITHMS);
-            monomials.push(self.pool.product(&[cofactor, common]));
+            links.push(Link::Logarithm(cofactor));
         }
-        monomials.extend(self.monomials_of_fraction(expr));
-        monomials.extend(rests(self.pool, normal));
+        links.extend(self.links_of_fraction(expr));
+        links.extend(rests(self.pool, normal));
         if self.pool.has_waves(normal) {
             let combined = self.pool.combine_angles(normal);
-            monomials.extend(rests(self.pool, combined));
+            links.extend(rests(self.pool, combined));
         }
-        monomials.extend(rests(self.pool, expr));
-        monomials.push(self.pool.split(expr).1);
-        self.monomials.insert((expr, waves), monomials.clone());
-        monomials
+        links.extend(rests(self.pool, expr));
+        links.push(Link::Monomial(self.pool.split(expr).1));
+        self.links.insert((expr, waves), links.clone());
+        links
     }
 
     /// What a term with sines, cosines or sums in its denominator can be added to.
-    fn monomials_of_fraction(&mut self, expr: ExprId) -> Vec<ExprId> {
-        let mut monomials = Vec::new();
+    fn links_of_fraction(&mut self, expr: ExprId) -> Vec<Link> {
+        let mut links = Vec::new();
         for base in self.denominators(expr) {
             // Fractions: with the same denominator, or denominators of the same variables.
-            monomials.push(self.pool.powi(base, -1));
-            let mut variables: Vec<ExprId> = (self.pool.symbols_of(base).into_iter())
+            links.push(Link::Monomial(self.pool.powi(base, -1)));
+            let variables: Vec<ExprId> = (self.pool.symbols_of(base).into_iter())
                 .map(|symbol| self.pool.symbol_expr(symbol))
                 .collect();
-            variables.push(self.meeting(OF_SAME_VARIABLES));
-            monomials.push(self.pool.product(&variables));
+            links.push(Link::Variables(self.pool.product(&variables)));
             // Terms that have a term of the numerator when they are multiplied by the denominator.
             let numerator = self.pool.product(&[expr, base]);
-            let numerator = (self.pool).expand_region(numerator, &mut MAX_PRODUCTS.clone());
+            let numerator = (self.pool).expand_region(numerator);
             for (_, above) in self.pool.terms_of(numerator) {
                 for (_, below) in self.pool.terms_of(base) {
-                    monomials.push(self.pool.div(above, below));
+                    links.push(Link::Monomial(self.pool.div(above, below)));
                 }
             }
         }
         for factor in self.pool.factors_of(expr).to_vec() {
             match self.pool.function_power(factor) {
                 Some((Function::Sin | Function::Cos, _, power)) if power < 0 => {
-                    monomials.push(self.pool.div(expr, factor));
+                    links.push(Link::Monomial(self.pool.div(expr, factor)));
                 }
                 Some((Function::Tan, angle, _)) => {
                     let cofactor = self.pool.div(expr, factor);
-                    let common = self.meeting(OF_TANGENTS);
                     let tangent = self.pool.apply(Function::Tan, angle);
-                    monomials.push(self.pool.product(&[cofactor, common, tangent]));
+                    links.push(Link::Tangent(self.pool.mul(cofactor, tangent)));
                 }
                 _ => {}
             }
         }
-        monomials
+        links
     }
 
     /// The sums in the denominator of a term.
@@ -222,12 +220,10 @@ impl Shortener<'_> {
 
     /// The normal form of a term, with its angles in the units of all.
     pub(super) fn normal(&mut self, expr: ExprId, waves: ExprId) -> ExprId {
-        let mut budget = MAX_PRODUCTS;
-        let arguments = &mut MAX_PRODUCTS.clone();
         self.pool.limited(MAX_WORK / 2, |pool| {
-            let expanded = pool.map_regions(expr, |pool, part| pool.expand_region(part, arguments));
+            let expanded = pool.map_regions(expr, ExprPool::expand_region);
             let expanded = pool.expand_angles_like(expanded, waves);
-            pool.normal_form(expanded, &mut budget)
+            pool.normal_form(expanded)
         })
     }
 }

@@ -15,16 +15,12 @@
 //! differs by more than rounding explains, or has no value where there was one, is dropped.
 //!
 //! `search.rs` replaces group by group, `groups.rs` finds the groups, `forms.rs` the shortest form of
-//! one, `units.rs` its coefficients, `agreement.rs` compares it with what it replaces. Read `search.rs` first.
+//! one, `agreement.rs` compares it with what it replaces. Read `search.rs` first.
 
 mod agreement;
 mod forms;
 mod groups;
 mod search;
-mod units;
-
-#[cfg(test)]
-mod tests;
 
 pub(crate) use search::{Shortened, Shortener};
 

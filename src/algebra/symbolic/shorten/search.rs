@@ -3,17 +3,18 @@
 use std::collections::HashMap;
 
 use super::agreement::Agreement;
-use super::forms::{Keep, collected};
+use super::forms::{NestedSums, collected};
+use super::groups::Link;
 use super::{Scaled, Summands};
 use crate::symbolic::cost::Costs;
+use crate::symbolic::function::Function;
 use crate::symbolic::id_map::{IdMap, IdSet};
-use crate::symbolic::node::{ExprId, Function, Node, SymbolId};
+use crate::symbolic::node::{ExprId, Node, SymbolId};
 use crate::symbolic::number::Number;
 use crate::symbolic::order::Exponent;
 use crate::symbolic::pool::ExprPool;
 use crate::symbolic::simplify::MAX_WORK;
 
-/// Most rounds of searching for groups.
 const MAX_ROUNDS: usize = 4;
 
 /// Summands that a shorter form takes the place of.
@@ -33,12 +34,12 @@ pub(crate) struct Shortener<'a> {
     singles: IdMap<ExprId>,
     pub(super) plain: IdMap<bool>,
     /// By term and by the sum of all waves beside it.
-    pub(super) monomials: HashMap<(ExprId, ExprId), Vec<ExprId>>,
+    pub(super) links: HashMap<(ExprId, ExprId), Vec<Link>>,
 }
 
 /// How far terms are looked for that can interact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Reach {
+pub(super) enum Distance {
     /// Those whose normal forms share a monomial that is not the constant one, or a denominator.
     Near,
     /// Those that share a constant too, or have denominators of the same variables.
@@ -78,18 +79,16 @@ pub(super) struct Block {
 }
 
 impl<'a> Shortener<'a> {
-    /// A shortener of sums over `pool`.
     pub(crate) fn new(pool: &'a mut ExprPool) -> Self {
         Self {
             pool,
             costs: Costs::default(),
             singles: IdMap::default(),
             plain: IdMap::default(),
-            monomials: HashMap::new(),
+            links: HashMap::new(),
         }
     }
 
-    /// The pool, with the expressions that were made.
     pub(crate) fn pool(&self) -> &ExprPool {
         self.pool
     }
@@ -154,7 +153,7 @@ impl<'a> Shortener<'a> {
             let Some(written_out) = written_out else {
                 continue;
             };
-            let by = collected(self.pool, &written_out, Keep::Sums).into_iter();
+            let by = collected(self.pool, &written_out, NestedSums::Kept).into_iter();
             let mut by: Summands = by.map(|(number, expr)| (number.to_f64(), expr)).collect();
             let lost: Summands = new.positions.iter().map(|&at| written[at]).collect();
             let mut length =
@@ -199,9 +198,9 @@ impl<'a> Shortener<'a> {
     /// Shortens group after group: first those that share a term, then all that can interact.
     fn run(&mut self, blocks: &mut Vec<Block>, summands: &[(f64, ExprId)]) {
         for _ in 0..MAX_ROUNDS {
-            let is_changed = [Reach::Near, Reach::Far].into_iter().any(|reach| {
+            let is_changed = [Distance::Near, Distance::Far].into_iter().any(|distance| {
                 let mut is_changed = false;
-                for group in self.groups(blocks, reach) {
+                for group in self.groups(blocks, distance) {
                     is_changed |= self.shorten_group(blocks, &group, summands);
                 }
                 blocks.retain(|block| !block.positions.is_empty());
@@ -254,8 +253,7 @@ impl<'a> Shortener<'a> {
                 .map(|(number, rest)| Some(self.pool.scale(number.checked_mul(least)?, rest)))
                 .collect();
             let Some(angle) = angle else { continue };
-            // No file has a variable of this name.
-            let variable = self.pool.symbol_id(&format!(" angle {place}"));
+            let variable = self.pool.placeholder("angle", place);
             let symbol = self.pool.symbol_expr(variable);
             for (factor, angle) in angles {
                 let multiple = factor.checked_div(least);
@@ -312,8 +310,7 @@ impl<'a> Shortener<'a> {
                 let variable = match known {
                     Some(&(variable, _)) => variable,
                     None => {
-                        // No file has a variable of this name.
-                        let variable = self.pool.symbol_id(&format!(" factor {}", parts.len()));
+                        let variable = self.pool.placeholder("factor", parts.len());
                         parts.push((variable, part));
                         variable
                     }

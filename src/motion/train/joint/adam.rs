@@ -1,6 +1,5 @@
 //! The Adam optimiser (Kingma and Ba 2015) on one block of numbers.
 
-/// Moments of one block.
 #[derive(Clone, Debug)]
 pub struct Adam {
     learning_rate: f64,
@@ -15,7 +14,6 @@ const BETA_SQUARE: f64 = 0.999;
 const EPSILON: f64 = 1e-7;
 
 impl Adam {
-    /// A fresh optimiser for a block of `len` numbers.
     pub fn new(len: usize, learning_rate: f64) -> Self {
         Self {
             learning_rate,
@@ -25,7 +23,6 @@ impl Adam {
         }
     }
 
-    /// Moves `values` one step against `gradient`.
     pub fn step(&mut self, values: &mut [f64], gradient: &[f64]) {
         self.steps = self.steps.saturating_add(1);
         let mean_correction = 1.0 - BETA_MEAN.powi(self.steps);
@@ -38,31 +35,5 @@ impl Adam {
             *square += (1.0 - BETA_SQUARE) * (g * g - *square);
             *value -= rate * *mean / (square.sqrt() + epsilon);
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn first_step_has_the_length_of_the_learning_rate() {
-        let mut values = [1.0, -2.0];
-        Adam::new(2, 0.1).step(&mut values, &[5.0, -1e-3]);
-        assert!(
-            (values[0] - 0.9).abs() < 1e-6 && (values[1] + 1.9).abs() < 1e-4,
-            "{values:?}"
-        );
-    }
-
-    #[test]
-    fn repeated_steps_find_the_minimum_of_a_parabola() {
-        let mut values = [3.0];
-        let mut adam = Adam::new(1, 0.05);
-        for _ in 0..2000 {
-            let gradient = [2.0 * (values[0] - 0.5)];
-            adam.step(&mut values, &gradient);
-        }
-        assert!((values[0] - 0.5).abs() < 1e-3, "{values:?}");
     }
 }

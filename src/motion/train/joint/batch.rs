@@ -11,7 +11,6 @@ use crate::train::error::TrainError;
 /// Consecutive samples of one phase, rows are samples, scaled units.
 #[derive(Clone, Debug)]
 pub struct Batch {
-    /// Phase of all its samples.
     pub phase: usize,
     /// States, `n x 18`.
     pub x: DMatrix<f64>,
@@ -21,7 +20,6 @@ pub struct Batch {
     pub ddx: DMatrix<f64>,
     /// Inputs, `n x 18`.
     pub u: DMatrix<f64>,
-    /// Time between samples.
     pub step_s: f64,
     /// `[x, 1]^T [x, 1] / n`, `19 x 19`.
     pub state_moment: DMatrix<f64>,
@@ -32,7 +30,6 @@ pub struct Batch {
 }
 
 impl Batch {
-    /// A batch of samples in rows.
     pub fn new(phase: usize, [x, dx, ddx, u]: [DMatrix<f64>; 4], step_s: f64) -> Self {
         let n = x.nrows();
         let extended = x.clone().insert_column(x.ncols(), 1.0);
@@ -49,7 +46,6 @@ impl Batch {
         }
     }
 
-    /// Number of samples.
     pub fn samples(&self) -> usize {
         self.x.nrows()
     }

@@ -11,14 +11,11 @@ use crate::model::{AffineMap, Layer, ModelError, StateMap};
 pub struct LatentBasis {
     /// Invertible, `d x d`.
     pub turn: DMatrix<f64>,
-    /// Its inverse.
     pub back: DMatrix<f64>,
-    /// `d`.
     pub shift: DVector<f64>,
 }
 
 impl LatentBasis {
-    /// The basis as it is.
     pub fn unchanged(latent_dim: usize) -> Self {
         Self {
             turn: DMatrix::identity(latent_dim, latent_dim),

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::batch::Batch;
-use super::loss::{At, DecoderLoss, LossWeights, Losses, Maps, XiLoss, l1_subgradient};
+use super::loss::{DecoderLoss, LossPoint, LossWeights, Losses, Maps, XiLoss, l1_subgradient};
 use super::multiply::{Columns, add_product, add_transposed, product_into};
 use super::network::Dense;
 use super::parameters::Parameters;
@@ -30,7 +30,7 @@ impl LinearMaps {
 
     /// (16): with `E = [W_e^T; b_e]` and `M = E W_d^T + [0; b_d] - [I; 0]` it is `tr(M^T S M) / 18`, `S` the moment
     /// of `[x, 1]`. No matrix of samples is formed.
-    fn reconstruction(&self, at: At<'_>, gradient: &mut Parameters) -> f64 {
+    fn reconstruction(&self, at: LossPoint<'_>, gradient: &mut Parameters) -> f64 {
         let (encoder, decoder) = layers(at.parameters);
         let moment = &at.batch.state_moment;
         let (n, d) = encoder.weights.shape();
@@ -58,7 +58,7 @@ impl LinearMaps {
     }
 
     /// Share of the input's energy outside the row space: `1 - tr((V^T V)^-1 V^T S V) / tr S`, `V = W_e^T`.
-    fn lift(&self, at: At<'_>, gradient: &mut Parameters) -> f64 {
+    fn lift(&self, at: LossPoint<'_>, gradient: &mut Parameters) -> f64 {
         let moment = &at.batch.input_moment;
         let total = moment.trace().max(f64::MIN_POSITIVE);
         let seen = moment * &self.projection.weights; // S V A^-1
@@ -72,7 +72,7 @@ impl LinearMaps {
 }
 
 impl Maps for LinearMaps {
-    fn encode(&mut self, at: At<'_>) -> DMatrix<f64> {
+    fn encode(&mut self, at: LossPoint<'_>) -> DMatrix<f64> {
         let (encoder, batch) = (layers(at.parameters).0, at.batch);
         let d = encoder.bias.len();
         self.projection = InputProjection::new(&encoder.weights);
@@ -89,7 +89,7 @@ impl Maps for LinearMaps {
         variables
     }
 
-    fn residual(&self, at: At<'_>, predicted: &DMatrix<f64>) -> DMatrix<f64> {
+    fn residual(&self, at: LossPoint<'_>, predicted: &DMatrix<f64>) -> DMatrix<f64> {
         let mut residual = predicted.clone();
         let encoder = &layers(at.parameters).0.weights;
         add_product(&mut residual, -1.0, &at.batch.ddx, encoder);
@@ -99,7 +99,7 @@ impl Maps for LinearMaps {
     /// (18) comes from the moments of predictions and accelerations: no `n x 18` matrix is formed.
     fn decode(
         &mut self,
-        at: At<'_>,
+        at: LossPoint<'_>,
         predicted: &DMatrix<f64>,
         adjoint: &DMatrix<f64>,
         gradient: &mut Parameters,
@@ -125,7 +125,7 @@ impl Maps for LinearMaps {
 
     fn encode_adjoint(
         &mut self,
-        at: At<'_>,
+        at: LossPoint<'_>,
         onto_ddz: &DMatrix<f64>,
         onto_variables: &DMatrix<f64>,
         gradient: &mut Parameters,
@@ -150,14 +150,14 @@ impl Maps for LinearMaps {
     }
 
     /// Quadratic in the decoder: the batch enters by moments that are computed once.
-    fn decoder_loss<'a>(&'a self, parameters: &Parameters, batch: &'a Batch) -> DecoderLoss<'a> {
+    fn decoder_loss(&self, parameters: &Parameters, batch: &Batch) -> Option<DecoderLoss> {
         let (n, d) = layers(parameters).0.weights.shape();
         let count = batch.samples() as f64;
         let z = encode(parameters, batch).insert_column(d, 1.0);
         let gram = z.tr_mul(&z) / count;
         let cross = z.tr_mul(&batch.x) / count;
         let energy = batch.x.norm_squared() / count;
-        Box::new(move |decoder, gradient| {
+        Some(Box::new(move |decoder, gradient| {
             let decoder = &decoder.layers[0];
             let mut extended = decoder.weights.clone().insert_row(d, 0.0);
             extended.row_mut(d).tr_copy_from(&decoder.bias);
@@ -169,11 +169,16 @@ impl Maps for LinearMaps {
             own.weights.copy_from(&adjoint.rows(0, d));
             own.bias.tr_copy_from(&adjoint.row(d));
             square / n as f64
-        })
+        }))
     }
 
     /// Quadratic in Xi: the batch enters by moments that are computed once.
-    fn xi_loss(&self, parameters: &Parameters, batch: &Batch, features: &Features) -> XiLoss {
+    fn xi_loss(
+        &self,
+        parameters: &Parameters,
+        batch: &Batch,
+        features: &Features,
+    ) -> Option<XiLoss> {
         let (encoder, decoder) = layers(parameters);
         let theta = theta(parameters, batch, features);
         let ddz = &batch.ddx * &encoder.weights;
@@ -183,7 +188,7 @@ impl Maps for LinearMaps {
         let decoder_gram = &decoder.weights * decoder.weights.transpose();
         let (ddz_energy, ddx_energy) = (ddz.norm_squared(), batch.ddx_energy);
         let (n, state_dim) = (batch.samples() as f64, batch.x.ncols() as f64);
-        Box::new(move |xi: &DMatrix<f64>, weights: LossWeights| {
+        Some(Box::new(move |xi: &DMatrix<f64>, weights: LossWeights| {
             let latent_scale = 1.0 / (n * xi.ncols() as f64);
             let real_scale = 1.0 / (n * state_dim);
             let product = &gram * xi;
@@ -197,7 +202,7 @@ impl Maps for LinearMaps {
             gradient += (decoded - &real) * (2.0 * weights.ddx * real_scale);
             losses.l1 = l1_subgradient(xi, weights.l1 / xi.len() as f64, &mut gradient);
             (losses, gradient)
-        })
+        }))
     }
 }
 

@@ -57,7 +57,6 @@ pub struct Losses {
 }
 
 impl Losses {
-    /// The combined loss (20).
     pub fn total(&self, weights: &LossWeights) -> f64 {
         self.decoder
             + weights.ddz * self.ddz
@@ -80,19 +79,15 @@ impl Losses {
     }
 }
 
-/// Parameters and samples at which a loss is evaluated.
 #[derive(Clone, Copy, Debug)]
-pub struct At<'a> {
-    /// Maps and coefficients.
+pub struct LossPoint<'a> {
     pub parameters: &'a Parameters,
-    /// Samples of one phase.
     pub batch: &'a Batch,
-    /// Weights of the losses.
     pub weights: LossWeights,
 }
 
 /// (16) of one batch as a function of the decoder; overwrites its gradient.
-pub type DecoderLoss<'a> = Box<dyn FnMut(&Network, &mut Network) -> f64 + 'a>;
+pub type DecoderLoss = Box<dyn Fn(&Network, &mut Network) -> f64>;
 /// (17) to (19) of one batch as functions of Xi, with their weighted gradient.
 pub type XiLoss = Box<dyn Fn(&DMatrix<f64>, LossWeights) -> (Losses, DMatrix<f64>)>;
 
@@ -101,15 +96,15 @@ pub type XiLoss = Box<dyn Fn(&DMatrix<f64>, LossWeights) -> (Losses, DMatrix<f64
 /// One evaluation calls `encode`, `residual`, `decode` and `encode_adjoint` in this order on the same batch.
 pub trait Maps {
     /// `z`, `dz` and `u_lat` of all samples (9, 11, 13), `n x 3d`.
-    fn encode(&mut self, at: At<'_>) -> DMatrix<f64>;
+    fn encode(&mut self, at: LossPoint<'_>) -> DMatrix<f64>;
 
     /// `predicted - ddz` (12), `n x d`.
-    fn residual(&self, at: At<'_>, predicted: &DMatrix<f64>) -> DMatrix<f64>;
+    fn residual(&self, at: LossPoint<'_>, predicted: &DMatrix<f64>) -> DMatrix<f64>;
 
     /// (16) and (18), and the adjoint of `predicted`: `adjoint`, which comes from (17), plus the one from (18).
     fn decode(
         &mut self,
-        at: At<'_>,
+        at: LossPoint<'_>,
         predicted: &DMatrix<f64>,
         adjoint: &DMatrix<f64>,
         gradient: &mut Parameters,
@@ -119,17 +114,21 @@ pub trait Maps {
     /// `-ddz` and of the variables, mean for the encoder.
     fn encode_adjoint(
         &mut self,
-        at: At<'_>,
+        at: LossPoint<'_>,
         onto_ddz: &DMatrix<f64>,
         onto_variables: &DMatrix<f64>,
         gradient: &mut Parameters,
     ) -> f64;
 
-    /// The loss of the second step, in which the encoder stays.
-    fn decoder_loss<'a>(&'a self, parameters: &Parameters, batch: &'a Batch) -> DecoderLoss<'a>;
+    /// The loss of the second step, in which the encoder stays, where less than the whole loss gives it.
+    fn decoder_loss(&self, _: &Parameters, _: &Batch) -> Option<DecoderLoss> {
+        None
+    }
 
-    /// The loss of the third step, in which both maps stay; without (41).
-    fn xi_loss(&self, parameters: &Parameters, batch: &Batch, features: &Features) -> XiLoss;
+    /// The loss of the third step, in which both maps stay, where less than the whole loss gives it; without (41).
+    fn xi_loss(&self, _: &Parameters, _: &Batch, _: &Features) -> Option<XiLoss> {
+        None
+    }
 }
 
 /// The loss over one library, with its scratch space.
@@ -137,7 +136,6 @@ pub struct JointLoss<'a> {
     pub(super) features: &'a Features,
     pub(super) maps: Box<dyn Maps>,
     pub(super) weights: LossWeights,
-    /// The weights in the present epoch.
     current: LossWeights,
     unroll: Unroll,
     values: FeatureValues,
@@ -163,10 +161,20 @@ impl<'a> JointLoss<'a> {
         }
     }
 
-    /// Takes the weights of an epoch of `schedule`, and returns them.
     pub(super) fn start_epoch(&mut self, epoch: usize, schedule: &Schedule) -> LossWeights {
         self.current = schedule.weights_at(epoch, self.weights);
         self.current
+    }
+
+    /// Counts nothing but (16).
+    pub(super) fn count_reconstruction_only(&mut self) {
+        self.current = LossWeights {
+            ddz: 0.0,
+            ddx: 0.0,
+            l1: 0.0,
+            lift: 0.0,
+            bptt: 0.0,
+        };
     }
 
     /// Gradient of the last [`Self::evaluate`]; of Xi only the phase of that batch has one.
@@ -178,7 +186,7 @@ impl<'a> JointLoss<'a> {
     pub fn evaluate(&mut self, parameters: &Parameters, batch: &Batch) -> Losses {
         self.gradient.clear();
         let weights = self.current;
-        let at = At {
+        let at = LossPoint {
             parameters,
             batch,
             weights,
@@ -211,7 +219,7 @@ impl<'a> JointLoss<'a> {
     /// evaluated here and adds its own.
     fn library_adjoint(
         &mut self,
-        at: At<'_>,
+        at: LossPoint<'_>,
         variables: &DMatrix<f64>,
         theta: &DMatrix<f64>,
         adjoint: &DMatrix<f64>,
@@ -264,6 +272,7 @@ mod tests {
     use crate::train::joint::linear::LinearMaps;
     use crate::train::joint::nonlinear::NonlinearMaps;
     use crate::train::joint::parameters::Frame;
+    use crate::train::joint::unroll::Integrator;
     use crate::train::oscillator::standard_library;
     use crate::train::random::Random;
 
@@ -301,11 +310,13 @@ mod tests {
         features: &'a Features,
         maps: Box<dyn Maps>,
         parameters: &Parameters,
+        integrator: Integrator,
     ) -> JointLoss<'a> {
         let unroll = Unroll {
             window: 3,
             stride: 2,
-            ..Unroll::default()
+            decay: 0.9,
+            integrator,
         };
         JointLoss::new(features, maps, (WEIGHTS, unroll), parameters)
     }
@@ -328,7 +339,11 @@ mod tests {
             factors,
             latent: 0.6,
         };
-        for phi in Activation::ALL {
+        let integrators = [Integrator::Rk2, Integrator::Rk4, Integrator::Euler];
+        for (phi, integrator) in Activation::ALL
+            .into_iter()
+            .zip(integrators.into_iter().cycle())
+        {
             if phi == Activation::Relu {
                 continue; // its Jacobian jumps, and the loss on velocities with it
             }
@@ -342,7 +357,7 @@ mod tests {
                 true => linear(coordinate_weights()),
                 false => Box::new(NonlinearMaps::new(coordinate_weights(), frame.clone())),
             };
-            let mut loss = loss(&features, maps, &parameters);
+            let mut loss = loss(&features, maps, &parameters, integrator);
             loss.evaluate(&parameters, &batch);
             let mut gradient = loss.gradient().clone();
             let masked = gradient.encoder.layers[0].weights.row(4).amax() == 0.0;
@@ -376,7 +391,8 @@ mod tests {
             map.layers[0].bias.fill(0.0);
         }
         let maps = linear(DVector::from_element(7, 1.0));
-        let losses = loss(&features, maps, &parameters).evaluate(&parameters, &batch);
+        let mut loss = loss(&features, maps, &parameters, Integrator::Rk2);
+        let losses = loss.evaluate(&parameters, &batch);
         let encoder = &parameters.encoder.layers[0].weights;
         let decoder = &parameters.decoder.layers[0].weights;
         let inverse = encoder.clone().pseudo_inverse(1e-12).expect("positive");
@@ -404,8 +420,9 @@ mod tests {
         let (features, batch, parameters) = setup((&[7, 3], &[3, 7]), Activation::Linear);
         let plain = Frame::plain(&[true; 7]);
         let networks = Box::new(NonlinearMaps::new(coordinate_weights(), plain));
-        let mut found = loss(&features, networks, &parameters);
-        let mut expected = loss(&features, linear(coordinate_weights()), &parameters);
+        let mut found = loss(&features, networks, &parameters, Integrator::Rk2);
+        let linear = linear(coordinate_weights());
+        let mut expected = loss(&features, linear, &parameters, Integrator::Rk2);
         let losses = found.evaluate(&parameters, &batch);
         let reference = expected.evaluate(&parameters, &batch);
         let (a, b) = (losses.total(&WEIGHTS), reference.total(&WEIGHTS));

@@ -5,11 +5,10 @@
 
 use nalgebra::DMatrix;
 
-use crate::train::vectors::{self, Loop};
+use crate::train::vectors::vectorised;
 
 const LANES: usize = 16;
 
-/// Consecutive columns of a matrix.
 #[derive(Clone, Copy)]
 pub struct Columns<'a> {
     values: &'a [f64],
@@ -17,7 +16,6 @@ pub struct Columns<'a> {
 }
 
 impl<'a> Columns<'a> {
-    /// All columns.
     pub fn all(matrix: &'a DMatrix<f64>) -> Self {
         Self {
             values: matrix.as_slice(),
@@ -25,7 +23,6 @@ impl<'a> Columns<'a> {
         }
     }
 
-    /// `count` columns from `start` on.
     pub fn some(matrix: &'a DMatrix<f64>, start: usize, count: usize) -> Self {
         let rows = matrix.nrows();
         Self {
@@ -44,8 +41,7 @@ pub fn product_into(out: &mut DMatrix<f64>, start: usize, a: Columns<'_>, b: &DM
     let rows = a.rows;
     let out = &mut out.as_mut_slice()[rows * start..rows * (start + b.ncols())];
     out.fill(0.0);
-    let scale = 1.0;
-    vectors::run(AddProduct { out, scale, a, b });
+    add_columns(out, 1.0, a, b);
 }
 
 /// `a b`.
@@ -57,27 +53,16 @@ pub fn product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
 
 /// `out += scale a b`.
 pub fn add_product(out: &mut DMatrix<f64>, scale: f64, a: &DMatrix<f64>, b: &DMatrix<f64>) {
-    let (out, a) = (out.as_mut_slice(), Columns::all(a));
-    vectors::run(AddProduct { out, scale, a, b });
+    add_columns(out.as_mut_slice(), scale, Columns::all(a), b);
 }
 
 /// `out += scale a^T b`.
 pub fn add_transposed(out: &mut DMatrix<f64>, scale: f64, a: Columns<'_>, b: Columns<'_>) {
-    let out = out.as_mut_slice();
-    vectors::run(AddTransposed { out, scale, a, b });
+    add_dots(out.as_mut_slice(), scale, a, b);
 }
 
-struct AddProduct<'a> {
-    out: &'a mut [f64],
-    scale: f64,
-    a: Columns<'a>,
-    b: &'a DMatrix<f64>,
-}
-
-impl Loop for AddProduct<'_> {
-    #[inline(always)]
-    fn run(self) {
-        let Self { out, scale, a, b } = self;
+vectorised! {
+    fn add_columns(out: &mut [f64], scale: f64, a: Columns<'_>, b: &DMatrix<f64>) {
         assert_eq!((a.count(), out.len()), (b.nrows(), a.rows * b.ncols()));
         let each = b.as_slice().chunks_exact(b.nrows());
         for (out, factors) in out.chunks_exact_mut(a.rows).zip(each) {
@@ -100,17 +85,8 @@ impl Loop for AddProduct<'_> {
     }
 }
 
-struct AddTransposed<'a> {
-    out: &'a mut [f64],
-    scale: f64,
-    a: Columns<'a>,
-    b: Columns<'a>,
-}
-
-impl Loop for AddTransposed<'_> {
-    #[inline(always)]
-    fn run(self) {
-        let Self { out, scale, a, b } = self;
+vectorised! {
+    fn add_dots(out: &mut [f64], scale: f64, a: Columns<'_>, b: Columns<'_>) {
         assert_eq!((out.len(), a.rows), (a.count() * b.count(), b.rows));
         let mut entries = out.iter_mut();
         for right in b.values.chunks_exact(b.rows) {

@@ -6,12 +6,10 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::batch::Batch;
-use super::loss::{At, DecoderLoss, LossWeights, Losses, Maps, XiLoss, l1_subgradient};
-use super::multiply::{Columns, add_transposed, product};
+use super::loss::{LossPoint, Maps};
 use super::network::{Jacobians, Tape};
 use super::parameters::{Frame, Parameters};
 use super::projection::InputProjections;
-use crate::train::features::{FeatureValues, Features};
 
 /// Networks in their frame, with the forward pass of the last batch.
 pub struct NonlinearMaps {
@@ -23,7 +21,6 @@ pub struct NonlinearMaps {
     decoded: DMatrix<f64>, // adjoint of z, dz and the predicted ddz, 3n x d
 }
 
-/// A batch in latent coordinates.
 #[derive(Default)]
 struct Encoded {
     stack: DMatrix<f64>, // z, dz, ddz: 3n x d
@@ -76,20 +73,20 @@ impl NonlinearMaps {
 }
 
 impl Maps for NonlinearMaps {
-    fn encode(&mut self, at: At<'_>) -> DMatrix<f64> {
+    fn encode(&mut self, at: LossPoint<'_>) -> DMatrix<f64> {
         let tape = &mut self.encoder_tape;
         self.encoded = Encoded::new(at.parameters, at.batch, &self.frame, tape);
         self.encoded.variables()
     }
 
-    fn residual(&self, at: At<'_>, predicted: &DMatrix<f64>) -> DMatrix<f64> {
+    fn residual(&self, at: LossPoint<'_>, predicted: &DMatrix<f64>) -> DMatrix<f64> {
         let n = at.batch.samples();
         predicted - self.encoded.stack.rows(2 * n, n)
     }
 
     fn decode(
         &mut self,
-        at: At<'_>,
+        at: LossPoint<'_>,
         predicted: &DMatrix<f64>,
         adjoint: &DMatrix<f64>,
         gradient: &mut Parameters,
@@ -128,7 +125,7 @@ impl Maps for NonlinearMaps {
 
     fn encode_adjoint(
         &mut self,
-        at: At<'_>,
+        at: LossPoint<'_>,
         onto_ddz: &DMatrix<f64>,
         onto_variables: &DMatrix<f64>,
         gradient: &mut Parameters,
@@ -151,106 +148,5 @@ impl Maps for NonlinearMaps {
         let at_affine = encoder.jacobian_adjoint(tape, &encoded.jacobians, &onto_rows, own);
         encoder.backward(tape, onto_stack * self.frame.latent, &at_affine, own);
         1.0 - projections.carried / total
-    }
-
-    fn decoder_loss<'a>(&'a self, parameters: &Parameters, batch: &'a Batch) -> DecoderLoss<'a> {
-        let (n, frame) = (batch.samples(), &self.frame);
-        let mut tape = Tape::default();
-        let states = frame.enter(batch).rows(0, n).into_owned();
-        let z = parameters.encoder.forward(states, n, &mut tape);
-        Box::new(move |decoder, gradient| {
-            gradient.clear();
-            let mut leaving = decoder.forward(z.clone(), n, &mut tape);
-            let (mut loss, share) = (0.0, 1.0 / leaving.len() as f64);
-            for (i, mut column) in leaving.column_iter_mut().enumerate() {
-                for (value, x) in column.iter_mut().zip(batch.x.column(i).iter()) {
-                    let residual = frame.mean[i] + frame.spread[i] * *value - x;
-                    loss += share * residual * residual;
-                    *value = 2.0 * share * frame.spread[i] * residual;
-                }
-            }
-            decoder.backward(&tape, leaving, &[], gradient);
-            loss
-        })
-    }
-
-    fn xi_loss(&self, parameters: &Parameters, batch: &Batch, features: &Features) -> XiLoss {
-        let samples = XiSamples::new(parameters, batch, features, &self.frame);
-        Box::new(move |xi, weights| samples.evaluate(xi, weights))
-    }
-}
-
-/// (17) and (18) of one batch as quadratic functions of the predicted `ddz`, so that the networks are evaluated once:
-/// with the decoder's Jacobian `J_D` at every sample, the decoded acceleration is `J_D ddz + (dJ_D/dt) dz`.
-struct XiSamples {
-    theta: DMatrix<f64>,
-    ddz: DMatrix<f64>,
-    gram: Vec<DVector<f64>>, // J_D^T J_D of all samples, entry by entry, row-major
-    cross: DMatrix<f64>,     // J_D^T (ddx - dJ_D/dt dz), n x d
-    energy: f64,             // sum of squares of ddx - dJ_D/dt dz
-    state_dim: usize,
-}
-
-impl XiSamples {
-    fn new(parameters: &Parameters, batch: &Batch, features: &Features, frame: &Frame) -> Self {
-        let (n, d, state_dim) = (batch.samples(), features.latent_dim(), batch.x.ncols());
-        let mut tape = Tape::default();
-        let encoded = Encoded::new(parameters, batch, frame, &mut tape);
-        let theta = features.evaluate(&encoded.variables(), &mut FeatureValues::default());
-        let ddz = encoded.stack.rows(2 * n, n).into_owned();
-        let mut entering = encoded.stack;
-        entering.rows_mut(2 * n, n).fill(0.0);
-        entering /= frame.latent;
-        let leaving = parameters.decoder.forward(entering, n, &mut tape);
-        let jacobians = parameters.decoder.jacobian(&tape).rows;
-        let mut samples = Self {
-            theta,
-            ddz,
-            gram: vec![DVector::zeros(n); d * d],
-            cross: DMatrix::zeros(n, d),
-            energy: 0.0,
-            state_dim,
-        };
-        for i in 0..state_dim {
-            let rows = jacobians.rows(i * n, n) * (frame.spread[i] / frame.latent);
-            let drift = leaving.view((2 * n, i), (n, 1)) * frame.spread[i];
-            let rest = batch.ddx.column(i) - drift.column(0);
-            samples.energy += rest.norm_squared();
-            for a in 0..d {
-                let mut cross = samples.cross.column_mut(a);
-                cross += rows.column(a).component_mul(&rest);
-                for b in 0..d {
-                    samples.gram[a * d + b] += rows.column(a).component_mul(&rows.column(b));
-                }
-            }
-        }
-        samples
-    }
-
-    fn evaluate(&self, xi: &DMatrix<f64>, weights: LossWeights) -> (Losses, DMatrix<f64>) {
-        let (n, d) = self.ddz.shape();
-        let predicted = product(&self.theta, xi);
-        let mut decoded = DMatrix::zeros(n, d);
-        for a in 0..d {
-            for b in 0..d {
-                let mut column = decoded.column_mut(a);
-                column += self.gram[a * d + b].component_mul(&predicted.column(b));
-            }
-        }
-        let (latent_scale, real_scale) = (1.0 / (n * d) as f64, 1.0 / (n * self.state_dim) as f64);
-        let residual = &predicted - &self.ddz;
-        let square = predicted.dot(&decoded) - 2.0 * predicted.dot(&self.cross) + self.energy;
-        let mut losses = Losses {
-            ddz: latent_scale * residual.norm_squared(),
-            ddx: real_scale * square,
-            ..Losses::default()
-        };
-        let adjoint = residual * (2.0 * weights.ddz * latent_scale)
-            + (decoded - &self.cross) * (2.0 * weights.ddx * real_scale);
-        let mut gradient = DMatrix::zeros(xi.nrows(), d);
-        let (theta, adjoint) = (Columns::all(&self.theta), Columns::all(&adjoint));
-        add_transposed(&mut gradient, 1.0, theta, adjoint);
-        losses.l1 = l1_subgradient(xi, weights.l1 / xi.len() as f64, &mut gradient);
-        (losses, gradient)
     }
 }

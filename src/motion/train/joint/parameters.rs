@@ -33,7 +33,6 @@ impl Parameters {
         }
     }
 
-    /// Sets every number to zero.
     pub fn clear(&mut self) {
         self.maps_mut().for_each(|block| block.fill(0.0));
         self.xi.iter_mut().for_each(|xi| xi.fill(0.0));
@@ -44,7 +43,6 @@ impl Parameters {
         self.encoder.blocks().chain(self.decoder.blocks())
     }
 
-    /// The same, to be changed.
     pub fn maps_mut(&mut self) -> impl Iterator<Item = &mut [f64]> {
         self.encoder.blocks_mut().chain(self.decoder.blocks_mut())
     }

@@ -169,28 +169,3 @@ fn solve(factor: &[f64], right: &mut [f64]) {
         right[i] = (right[i] - known) / factor[i * d + i];
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::train::random::Random;
-
-    #[test]
-    fn latent_inputs_and_carried_energy_equal_their_definitions() {
-        const N: usize = 4;
-        const D: usize = 3;
-        let mut random = Random::new(8);
-        let (rows, u) = (random.matrix(D * N, 7, 1.0), random.matrix(N, 7, 1.0));
-        let found = InputProjections::new(&rows, &u);
-        let mut carried = 0.0;
-        for s in 0..N {
-            let jacobian = DMatrix::from_fn(D, 7, |i, j| rows[(i * N + s, j)]);
-            let u = u.row(s).transpose();
-            let projection = jacobian.transpose().pseudo_inverse(1e-12).unwrap();
-            let expected = projection * &u;
-            assert!((found.u_lat.row(s).transpose() - &expected).amax() < 1e-9);
-            carried += (jacobian.transpose() * expected).norm_squared();
-        }
-        assert!((found.carried - carried).abs() < 1e-9);
-    }
-}

@@ -16,7 +16,6 @@ use super::stages::{train_decoder, train_together, train_xi};
 use crate::model::{AffineMap, Layer, ModelError, StateMap};
 use crate::robot::{Robot, STATE_DIM};
 use crate::train::assemble::Origin;
-use crate::train::dataset::Quantity;
 use crate::train::dynamics_fit::Fitted;
 use crate::train::error::TrainError;
 use crate::train::latent::{EncodedSet, Latent, least_squares_decoder, map_samples, mean_jacobian};
@@ -78,7 +77,7 @@ fn frame(task: &Task<'_>) -> Frame {
     if options.joint.maps.is_linear() || options.joint.transfer == Transfer::Published {
         return plain;
     }
-    let x = task.training.gather(Quantity::X, None);
+    let x = task.training.states(None);
     let least = options.encoder.least_std * options.scaling.state;
     let spread: DVector<f64> = x
         .column_variance()
@@ -92,14 +91,12 @@ fn frame(task: &Task<'_>) -> Frame {
     }
 }
 
-/// What all seeds share.
 struct Trainer<'a> {
     task: &'a Task<'a>,
     batches: &'a [Batch],
     frame: Frame,
 }
 
-/// What one seed has learned.
 struct Run {
     seed: u64,
     parameters: Parameters,
@@ -167,7 +164,7 @@ impl Trainer<'_> {
         let losses = train_together(&mut parameters, &first, &mut loss, schedule, &mut listener);
         let quiet = &mut |_: usize, _: &Losses, _: usize| !cancel.load(Ordering::Relaxed);
         if published {
-            train_decoder(&mut parameters, &all, &loss, schedule, quiet);
+            train_decoder(&mut parameters, &all, &mut loss, schedule, quiet);
             for phase in 0..parameters.xi.len() {
                 let own: Vec<&Batch> = of_phase(phase).collect();
                 parameters.xi[phase].fill(options.xi_start);
@@ -181,7 +178,6 @@ impl Trainer<'_> {
         }
     }
 
-    /// The loss of maps like those of `parameters`.
     fn loss(&self, weights: LossWeights, parameters: &Parameters) -> JointLoss<'_> {
         let coordinate_weights = self.task.options.encoder.coordinate_weights();
         let maps: Box<dyn Maps> = match self.is_linear() {
@@ -200,7 +196,6 @@ impl Trainer<'_> {
         self.task.options.joint.transfer == Transfer::Published
     }
 
-    /// Coordinates that the encoder may use.
     fn mask(&self) -> Vec<bool> {
         let factors = self.frame.factors.iter();
         factors.map(|factor| *factor != 0.0).collect()
@@ -220,7 +215,7 @@ impl Trainer<'_> {
         if self.is_linear() {
             let encoder = &mut start.encoder.layers[0];
             if !self.is_published() {
-                let mean = training.gather(Quantity::X, Some(0)).column_mean();
+                let mean = training.states(Some(0)).column_mean();
                 encoder.bias = -(encoder.weights.tr_mul(&mean));
                 start.decoder.layers[0].bias = mean;
             }
@@ -229,7 +224,6 @@ impl Trainer<'_> {
         start
     }
 
-    /// The model numbers of a run, and its score.
     fn finish(&self, run: Run, judged: &[Batch], watch: &mut Watch<'_>) -> Outcome {
         let fitted = if self.is_published() {
             self.published(run.parameters, judged)?
@@ -240,11 +234,10 @@ impl Trainer<'_> {
             };
             self.task.fit_dynamics(maps, watch)?
         };
-        let report = (self.task).seed_report(&fitted, run.seed, Some(run.losses))?;
+        let report = (self.task).seed_report(&fitted, run.seed, Some(run.losses));
         Ok((report, fitted))
     }
 
-    /// Mean combined loss over batches of all phases.
     fn published_score(&self, parameters: &Parameters, judged: &[Batch]) -> f64 {
         let weights = self.task.options.joint.weights;
         let mut loss = self.loss(weights, parameters);
@@ -253,15 +246,12 @@ impl Trainer<'_> {
         total / judged.len().max(1) as f64
     }
 
-    /// The numbers as Adam left them.
     fn published(&self, parameters: Parameters, judged: &[Batch]) -> Result<Fitted, TrainError> {
         let plain = LatentBasis::unchanged(self.task.options.latent_dim);
         let (encoder, decoder) = self.state_maps(&parameters, &plain)?;
         Ok(Fitted {
             score: self.published_score(&parameters, judged),
-            weights: mean_jacobian(&encoder, &self.task.training),
-            encoder,
-            decoder,
+            maps: self.task.encoded(encoder, decoder),
             xi: parameters.xi,
             choice: None,
         })
@@ -315,7 +305,7 @@ impl Trainer<'_> {
     /// the latents in canonical order and their mean at 0.
     fn basis(&self, encoder: &StateMap) -> LatentBasis {
         let (d, training) = (self.task.options.latent_dim, &self.task.training);
-        let x = training.gather(Quantity::X, None);
+        let x = training.states(None);
         let gram = x.column_iter().fold(DMatrix::zeros(d, d), |sum, x| {
             let jacobian = encoder
                 .jacobian(&x.into_owned())

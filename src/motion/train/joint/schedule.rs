@@ -5,7 +5,6 @@ use nalgebra::DMatrix;
 use super::adam::Adam;
 use super::loss::LossWeights;
 
-/// Epochs, thresholding and step length.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Schedule {
     /// Epochs with the L1 term and thresholding.
@@ -16,12 +15,10 @@ pub struct Schedule {
     pub threshold: f64,
     /// Epochs between two thresholdings.
     pub threshold_every: usize,
-    /// Step length of Adam.
     pub learning_rate: f64,
 }
 
 impl Default for Schedule {
-    /// The author's schedule.
     fn default() -> Self {
         Self {
             epochs: 501,
@@ -34,7 +31,6 @@ impl Default for Schedule {
 }
 
 impl Schedule {
-    /// Epochs of one step, refinement included.
     pub fn total(&self) -> usize {
         self.epochs + self.refinement
     }
@@ -64,7 +60,6 @@ pub(super) struct MaskedAdam {
 }
 
 impl MaskedAdam {
-    /// Nothing masked yet.
     pub fn new(xi: &DMatrix<f64>, schedule: &Schedule) -> Self {
         Self {
             optimiser: Adam::new(xi.len(), schedule.learning_rate),
@@ -82,13 +77,11 @@ impl MaskedAdam {
         }
     }
 
-    /// One step along the gradient.
     pub fn step(&mut self, xi: &mut DMatrix<f64>, gradient: &DMatrix<f64>) {
         self.optimiser.step(xi.as_mut_slice(), gradient.as_slice());
         self.apply(xi);
     }
 
-    /// Coefficients that are not masked.
     pub fn active(&self) -> usize {
         self.support.iter().filter(|kept| **kept).count()
     }

@@ -1,6 +1,6 @@
 //! The three transfer steps of section IV-D.
 //!
-//! Steps two and three move only the decoder or only Xi, on losses for which most of each batch is computed once
+//! Steps two and three move only the decoder or only Xi; of linear maps on losses that compute most of a batch once
 //! ([`Maps::decoder_loss`](super::loss::Maps::decoder_loss), [`Maps::xi_loss`](super::loss::Maps::xi_loss)); the
 //! iterates are those of the whole loss.
 
@@ -54,21 +54,32 @@ pub fn train_together(
 pub fn train_decoder(
     parameters: &mut Parameters,
     batches: &[&Batch],
-    loss: &JointLoss<'_>,
+    loss: &mut JointLoss<'_>,
     schedule: &Schedule,
     listener: &mut Listener<'_>,
 ) {
-    let mut losses: Vec<DecoderLoss<'_>> = (batches.iter())
-        .map(|batch| loss.maps.decoder_loss(parameters, batch))
-        .collect();
-    let decoder = &mut parameters.decoder;
-    let mut maps = optimisers(decoder.blocks(), schedule);
-    let mut gradient = decoder.clone();
+    let part = |batch: &&Batch| loss.maps.decoder_loss(parameters, batch);
+    let parts: Option<Vec<DecoderLoss>> = batches.iter().map(part).collect();
+    loss.count_reconstruction_only();
+    let mut optimisers = optimisers(parameters.decoder.blocks(), schedule);
+    let mut gradient = parameters.decoder.clone();
     for epoch in 0..schedule.total() {
         let mut mean = Losses::default();
-        for loss in &mut losses {
-            mean.decoder += loss(decoder, &mut gradient) / batches.len() as f64;
-            step(&mut maps, decoder.blocks_mut(), gradient.blocks());
+        for (index, batch) in batches.iter().enumerate() {
+            let value = match &parts {
+                Some(parts) => parts[index](&parameters.decoder, &mut gradient),
+                None => {
+                    let losses = loss.evaluate(parameters, batch);
+                    gradient.clone_from(&loss.gradient().decoder);
+                    losses.decoder
+                }
+            };
+            mean.decoder += value / batches.len() as f64;
+            step(
+                &mut optimisers,
+                parameters.decoder.blocks_mut(),
+                gradient.blocks(),
+            );
         }
         if !listener(epoch + 1, &mean, 0) {
             break;
@@ -88,8 +99,10 @@ pub fn train_xi(
     listener: &mut Listener<'_>,
 ) {
     let xi_loss = |batch: &&Batch| loss.maps.xi_loss(parameters, batch, loss.features);
-    let parts: Option<Vec<XiLoss>> =
-        (loss.weights.bptt == 0.0).then(|| batches.iter().map(xi_loss).collect());
+    let parts: Option<Vec<XiLoss>> = match loss.weights.bptt == 0.0 {
+        true => batches.iter().map(xi_loss).collect(),
+        false => None,
+    };
     let mut masked = MaskedAdam::new(&parameters.xi[phase], schedule);
     for epoch in 0..schedule.total() {
         masked.start_epoch(epoch, schedule, &mut parameters.xi[phase]);
@@ -112,13 +125,11 @@ pub fn train_xi(
     }
 }
 
-/// Adam for every block.
 fn optimisers<'a>(blocks: impl Iterator<Item = &'a [f64]>, schedule: &Schedule) -> Vec<Adam> {
     let rate = schedule.learning_rate;
     blocks.map(|block| Adam::new(block.len(), rate)).collect()
 }
 
-/// One step of every block along its gradient.
 fn step<'a>(
     optimisers: &mut [Adam],
     blocks: impl Iterator<Item = &'a mut [f64]>,
@@ -152,145 +163,95 @@ mod tests {
         bptt: 0.0,
     };
     const MASK: [bool; 6] = [true, true, false, true, true, true];
-    const KINDS: [Activation; 2] = [Activation::Linear, Activation::Elu];
 
-    /// Linear maps for the linear activation, else networks with a hidden layer; two phases.
-    fn setup(kind: Activation) -> (Features, Vec<Batch>, Parameters) {
-        let features = Features::new(&standard_library(2, 1, true));
+    /// Linear maps for the linear activation, else networks with a hidden layer; batches of two phases.
+    fn setup(kind: Activation, features: &Features) -> (Vec<Batch>, Parameters, JointLoss<'_>) {
         let mut random = Random::new(21);
         let batch = |i: usize| {
             let blocks = std::array::from_fn(|_| random.matrix(40, 6, 0.5));
             Batch::new(i % 2, blocks, 0.002)
         };
         let batches = (0..4).map(batch).collect();
-        let widths: (&[usize], &[usize]) = match kind {
-            Activation::Linear => (&[6, 2], &[2, 6]),
-            _ => (&[6, 5, 2], &[2, 5, 6]),
+        let is_linear = kind == Activation::Linear;
+        let widths: (&[usize], &[usize]) = match is_linear {
+            true => (&[6, 2], &[2, 6]),
+            false => (&[6, 5, 2], &[2, 5, 6]),
         };
         let shape = (features.library_dim(), 2, 0.1);
-        let parameters = Parameters::random(widths, kind, shape, &mut Random::new(22));
-        (features, batches, parameters)
-    }
-
-    fn loss<'a>(
-        features: &'a Features,
-        parameters: &mut Parameters,
-        weights: LossWeights,
-    ) -> JointLoss<'a> {
+        let mut parameters = Parameters::random(widths, kind, shape, &mut Random::new(22));
         let uniform = DVector::from_element(6, 1.0);
-        let maps: Box<dyn Maps> = if parameters.encoder.layers.len() == 1 {
+        let maps: Box<dyn Maps> = if is_linear {
             mask_rows(&mut parameters.encoder.layers[0].weights, &MASK);
             Box::new(LinearMaps::new(uniform, MASK.to_vec()))
         } else {
             Box::new(NonlinearMaps::new(uniform, Frame::plain(&MASK)))
         };
-        JointLoss::new(features, maps, (weights, Unroll::default()), parameters)
+        let loss = JointLoss::new(features, maps, (WEIGHTS, Unroll::default()), &parameters);
+        (batches, parameters, loss)
     }
 
-    fn short(epochs: usize) -> Schedule {
-        Schedule {
-            epochs,
+    #[test]
+    fn xi_or_decoder_alone_moves_as_in_the_whole_loss() {
+        let schedule = Schedule {
+            epochs: 4,
             refinement: 0,
             threshold_every: 0,
             learning_rate: 1e-2,
             ..Schedule::default()
+        };
+        let features = Features::new(&standard_library(2, 1, true));
+        let (batches, mut fast, mut loss) = setup(Activation::Linear, &features);
+        let all: Vec<&Batch> = batches.iter().collect();
+        let own: Vec<&Batch> = batches.iter().filter(|batch| batch.phase == 1).collect();
+        let mut slow = fast.clone();
+        let mut go = |_: usize, _: &Losses, _: usize| true;
+        train_xi(&mut fast, 1, &own, &mut loss, &schedule, &mut go);
+        let mut optimiser = Adam::new(slow.xi[1].len(), 1e-2);
+        for batch in own.iter().cycle().take(4 * own.len()) {
+            loss.evaluate(&slow, batch);
+            let gradient = loss.gradient().xi[1].as_slice();
+            optimiser.step(slow.xi[1].as_mut_slice(), gradient);
+        }
+        assert!((&fast.xi[1] - &slow.xi[1]).amax() < 1e-10);
+        assert_eq!(fast.xi[0], slow.xi[0]);
+        train_decoder(&mut fast, &all, &mut loss, &schedule, &mut go);
+        let mut maps = optimisers(slow.decoder.blocks(), &schedule);
+        for batch in batches.iter().cycle().take(4 * batches.len()) {
+            loss.evaluate(&slow, batch); // counts what the step before left it to count
+            let gradient = loss.gradient().decoder.blocks();
+            step(&mut maps, slow.decoder.blocks_mut(), gradient);
+        }
+        for (fast, slow) in fast.decoder.blocks().zip(slow.decoder.blocks()) {
+            assert!(fast.iter().zip(slow).all(|(a, b)| (a - b).abs() < 1e-10));
         }
     }
 
-    fn go(_: usize, _: &Losses, _: usize) -> bool {
-        true
-    }
-
     #[test]
-    fn xi_alone_moves_as_xi_in_the_whole_loss() {
-        for kind in KINDS {
-            let (features, batches, mut fast) = setup(kind);
-            let own: Vec<&Batch> = batches.iter().filter(|batch| batch.phase == 1).collect();
-            let mut loss = loss(&features, &mut fast, WEIGHTS);
-            let mut slow = fast.clone();
-            train_xi(&mut fast, 1, &own, &mut loss, &short(4), &mut go);
-            let mut optimiser = Adam::new(slow.xi[1].len(), 1e-2);
-            for _ in 0..4 {
-                for batch in &own {
-                    loss.evaluate(&slow, batch);
-                    let gradient = loss.gradient().xi[1].as_slice();
-                    optimiser.step(slow.xi[1].as_mut_slice(), gradient);
-                }
-            }
-            assert!((&fast.xi[1] - &slow.xi[1]).amax() < 1e-10);
-            assert_eq!(fast.xi[0], slow.xi[0]);
-        }
-    }
-
-    #[test]
-    fn decoder_alone_moves_as_the_decoder_in_the_whole_loss() {
-        for kind in KINDS {
-            let (features, batches, mut fast) = setup(kind);
+    fn training_together_lowers_the_loss_and_masks_coordinates_and_small_coefficients() {
+        let schedule = Schedule {
+            epochs: 40,
+            refinement: 20,
+            threshold: 0.09,
+            threshold_every: 10,
+            learning_rate: 1e-2,
+        };
+        let features = Features::new(&standard_library(2, 1, true));
+        for kind in [Activation::Linear, Activation::Elu] {
+            let (batches, mut parameters, mut loss) = setup(kind, &features);
             let all: Vec<&Batch> = batches.iter().collect();
-            let only_decoder = LossWeights {
-                ddz: 0.0,
-                ddx: 0.0,
-                l1: 0.0,
-                lift: 0.0,
-                bptt: 0.0,
-            };
-            let mut loss = loss(&features, &mut fast, only_decoder);
-            let mut slow = fast.clone();
-            train_decoder(&mut fast, &all, &loss, &short(5), &mut go);
-            let mut maps = optimisers(slow.decoder.blocks(), &short(5));
-            for _ in 0..5 {
-                for batch in &batches {
-                    loss.evaluate(&slow, batch);
-                    let gradient = loss.gradient().decoder.blocks();
-                    step(&mut maps, slow.decoder.blocks_mut(), gradient);
-                }
-            }
-            for (fast, slow) in fast.decoder.blocks().zip(slow.decoder.blocks()) {
-                assert!(fast.iter().zip(slow).all(|(a, b)| (a - b).abs() < 1e-10));
-            }
-        }
-    }
-
-    #[test]
-    fn training_together_lowers_the_loss_and_keeps_masked_coordinates_out() {
-        for kind in KINDS {
-            let (features, batches, mut parameters) = setup(kind);
-            let all: Vec<&Batch> = batches.iter().collect();
-            let mut loss = loss(&features, &mut parameters, WEIGHTS);
             let masked = parameters.encoder.layers[0].weights.row(2).into_owned();
-            let mut history = Vec::new();
-            let mut listen = |_: usize, losses: &Losses, _: usize| {
+            let (mut history, mut counts) = (Vec::new(), Vec::new());
+            let mut listen = |_: usize, losses: &Losses, active: usize| {
                 history.push(losses.total(&WEIGHTS));
-                true
-            };
-            train_together(&mut parameters, &all, &mut loss, &short(60), &mut listen);
-            assert!(history[59] < 0.7 * history[0], "{history:?}");
-            assert_eq!(parameters.encoder.layers[0].weights.row(2), masked);
-        }
-    }
-
-    #[test]
-    fn thresholding_masks_small_coefficients_of_every_phase_for_good() {
-        for kind in KINDS {
-            let (features, batches, mut parameters) = setup(kind);
-            let all: Vec<&Batch> = batches.iter().collect();
-            let mut loss = loss(&features, &mut parameters, WEIGHTS);
-            let schedule = Schedule {
-                epochs: 30,
-                refinement: 20,
-                threshold: 0.09,
-                threshold_every: 10,
-                learning_rate: 1e-2,
-            };
-            let mut counts = Vec::new();
-            let mut listen = |_: usize, _: &Losses, active: usize| {
                 counts.push(active);
                 true
             };
             train_together(&mut parameters, &all, &mut loss, &schedule, &mut listen);
-            assert!(counts[49] < counts[0] && counts.windows(2).all(|pair| pair[1] <= pair[0]));
+            assert!(history[59] < 0.7 * history[0], "{history:?}");
+            assert_eq!(parameters.encoder.layers[0].weights.row(2), masked);
+            assert!(counts[59] < counts[0] && counts.windows(2).all(|pair| pair[1] <= pair[0]));
             let left = |xi: &DMatrix<f64>| xi.iter().filter(|value| **value != 0.0).count();
-            assert_eq!(parameters.xi.iter().map(left).sum::<usize>(), counts[49]);
+            assert_eq!(parameters.xi.iter().map(left).sum::<usize>(), counts[59]);
         }
     }
 }

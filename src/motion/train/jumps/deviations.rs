@@ -14,7 +14,6 @@ use crate::model::{FEATURE_DIM, GOAL_DIM, GoalRange, complement};
 /// Ridge relative to the variance of each column.
 const RIDGE: f64 = 1e-2;
 
-/// What is fitted to one part.
 pub struct Deviations {
     /// `(3 d) x d`.
     pub xi: DMatrix<f64>,

@@ -16,21 +16,16 @@ const LEAST_SAMPLES: usize = 8;
 /// A part of every jump of a kind.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Landmark {
-    /// Its name.
     pub name: String,
-    /// Index of the model's phase.
     pub phase: usize,
     /// Feet on the ground: those that select the phase, as many as it allows.
     pub feet: ContactFlags,
 }
 
-/// A jump with its borders.
 pub struct Cut {
-    /// The parts.
     pub kind: Vec<Landmark>,
     /// First sample of each part, and the last sample of the last.
     borders: Vec<usize>,
-    /// Their times, s.
     times_s: Vec<f64>,
 }
 
@@ -40,7 +35,6 @@ impl Cut {
         self.borders[part]..self.borders[part + 1] + 1
     }
 
-    /// Duration of a part, s.
     pub fn duration_s(&self, part: usize) -> f64 {
         self.times_s[part + 1] - self.times_s[part]
     }
@@ -51,7 +45,6 @@ impl Cut {
         lands.then(|| self.borders[self.kind.len() - 1])
     }
 
-    /// The last sample of the last part.
     pub fn end(&self) -> usize {
         self.borders[self.kind.len()]
     }
@@ -59,16 +52,13 @@ impl Cut {
 
 /// The cut of every jump; none where a jump has no flight with contact before it.
 pub fn cuts(training: &Dataset) -> Vec<Option<Cut>> {
-    let scale = training.scaling.state[BODY_Z];
-    let of_jump = |jump: &Jump| {
-        let dx = &jump.rates.dx;
-        let rising = |sample: usize| dx[(BODY_Z, sample)] / scale > THRUST_SPEED_M_S;
-        cut(training, jump, rising)
-    };
-    training.jumps.iter().map(of_jump).collect()
+    let jumps = training.jumps.iter();
+    jumps.map(|jump| cut(training, jump)).collect()
 }
 
-fn cut(training: &Dataset, jump: &Jump, rising: impl Fn(usize) -> bool) -> Option<Cut> {
+fn cut(training: &Dataset, jump: &Jump) -> Option<Cut> {
+    let scale = training.scaling.state[BODY_Z];
+    let rising = |sample: usize| jump.dx[(BODY_Z, sample)] / scale > THRUST_SPEED_M_S;
     let patterns = &training.phases.patterns;
     let flies = |phase: usize| patterns[phase].feet == FeetRule::None;
     let spans = jump.spans.iter().enumerate();

@@ -13,7 +13,6 @@ mod regression;
 use nalgebra::{DMatrix, DVector};
 
 use super::dataset::Dataset;
-use super::error::TrainError;
 use super::latent::{EncodedSet, Latent};
 use super::metrics::{BODY_X, BODY_Z};
 use super::report::PartScore;
@@ -28,7 +27,6 @@ pub const LEAST_JUMPS: usize = 6;
 /// Significant digits of what is kept: beyond those of any recording.
 const DIGITS: usize = 6;
 
-/// Everything of one jump that the prior is made of.
 struct Sampled {
     goal: [f64; GOAL_DIM],
     parts: Vec<PartNodes>,
@@ -36,22 +34,16 @@ struct Sampled {
 
 /// Landmarks and prior of the training jumps, and how well its deviations are explained in each of its parts; none for
 /// a nonlinear encoder or too few jumps of one kind.
-///
-/// # Errors
-/// As [`Dataset::for_each`].
-pub fn learn_jumps(
-    set: EncodedSet<'_>,
-    encoder: &StateMap,
-) -> Result<(Option<JumpPrior>, Vec<PartScore>), TrainError> {
+pub fn learn_jumps(set: EncodedSet<'_>, encoder: &StateMap) -> (Option<JumpPrior>, Vec<PartScore>) {
     let (training, latent) = (set.dataset, set.latent);
     let nothing = (None, Vec::new());
     let Some(affine) = encoder.as_affine() else {
-        return Ok(nothing);
+        return nothing;
     };
     let cuts = landmarks::cuts(training);
     let chosen = of_commonest_kind(&cuts);
     if chosen.len() < LEAST_JUMPS {
-        return Ok(nothing);
+        return nothing;
     }
     let (kind, scale) = (&chosen[0].1.kind, &training.scaling.state);
     let counts: Vec<usize> = (0..kind.len())
@@ -96,7 +88,7 @@ pub fn learn_jumps(
         end_height_m: range_of(end_heights),
         landing_height_m: range_of(landing_heights)[0],
     };
-    Ok((Some(prior), scores))
+    (Some(prior), scores)
 }
 
 /// Distance, rise of the body at the apex and height at the start of a jump, m.
@@ -167,7 +159,6 @@ fn input_covariance(all: &[&PartNodes]) -> DMatrix<f64> {
     covariance + DMatrix::identity(d, d) * floor
 }
 
-/// The least and the most of some numbers.
 fn range_of(values: impl Iterator<Item = f64>) -> [f64; 2] {
     let nothing = [f64::INFINITY, f64::NEG_INFINITY];
     let range = values.fold(nothing, |[least, most], v| [least.min(v), most.max(v)]);

@@ -13,11 +13,8 @@ const INTERVALS: [usize; 2] = [10, 60];
 
 /// Nodes of one part of one jump; one row per node, scaled units.
 pub struct PartNodes {
-    /// Duration of the part, s.
     pub duration_s: f64,
-    /// Latent positions.
     pub z: DMatrix<f64>,
-    /// Latent velocities.
     pub dz: DMatrix<f64>,
     /// Latent inputs, averaged over half an interval to each side.
     pub u_lat: DMatrix<f64>,
@@ -36,7 +33,6 @@ pub fn intervals(mean_duration_s: f64) -> usize {
     ((mean_duration_s / NODE_STEP_S).round() as usize).clamp(least, most)
 }
 
-/// Samples one part at `count + 1` nodes.
 pub fn sample(jump: &Jump, latent: &Latent, cut: &Cut, part: usize, count: usize) -> PartNodes {
     let samples = cut.samples(part);
     let times = &jump.time_s[samples.clone()];

@@ -15,7 +15,6 @@ pub struct GoalRegression {
 }
 
 impl GoalRegression {
-    /// The regression over the goals of these jumps.
     pub fn of<'a>(
         jumps: impl IntoIterator<Item = &'a Sampled>,
         goal: &[GoalRange; GOAL_DIM],
@@ -31,7 +30,6 @@ impl GoalRegression {
         }
     }
 
-    /// Coefficients of one number per jump.
     pub fn numbers(&self, values: &[f64]) -> [f64; FEATURE_DIM] {
         let fitted = &self.solution * DVector::from_column_slice(values);
         std::array::from_fn(|k| fitted[k])

@@ -13,7 +13,7 @@ fn training() -> Dataset {
 
 fn learned(training: &Dataset) -> (Option<JumpPrior>, Vec<PartScore>) {
     let latent = Latent::of(training, &encoder());
-    learn_jumps(EncodedSet::new(training, &latent), &encoder()).unwrap()
+    learn_jumps(EncodedSet::new(training, &latent), &encoder())
 }
 
 fn prior_of(training: &Dataset) -> JumpPrior {
@@ -63,23 +63,6 @@ fn prior_at_the_goal_of_a_jump_is_nearer_to_it_than_the_mean_jump() {
     let at_goal = error(&|jump| prior.features(prior.jumps[jump]));
     let at_mean = error(&|_| [1.0, 0.0, 0.0, 0.0]);
     assert!(at_goal < 0.2 * at_mean, "{at_goal} {at_mean}");
-}
-
-#[test]
-fn deviations_know_nothing_of_where_the_robot_stands() {
-    let prior = prior_of(&training());
-    for part in &prior.parts {
-        let xi = part.xi.as_ref().unwrap();
-        assert!(xi.row(0).amax() < 1e-9 * xi.amax(), "{}", part.name);
-        assert!(xi.rows(4, 8).amax() > 0.0);
-    }
-}
-
-#[test]
-fn too_few_jumps_have_no_prior() {
-    let mut training = training();
-    training.jumps.truncate(LEAST_JUMPS - 1);
-    assert_eq!(learned(&training), (None, Vec::new()));
 }
 
 #[test]

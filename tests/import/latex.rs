@@ -1,23 +1,28 @@
 //! Constructs that are read, with what they mean, and constructs that are refused, with their place.
 
-use super::*;
-use crate::files::Place;
-use crate::import::error::ImportError;
-use crate::symbolic::ExprPool;
+use romc::files::Place;
+use romc::import::{Format, ImportError, Sections, SymbolNames, read_equations};
+use romc::symbolic::ExprPool;
 
 /// Phases with the texts of their right sides.
 type Phases = Vec<(Option<String>, Vec<String>)>;
 
+fn read(file: &str, text: &str, names: &SymbolNames) -> Result<Sections, ImportError> {
+    let known = ["contact", "flight", "rear stance"].map(str::to_owned);
+    read_equations(file, Format::Latex, text.as_bytes(), names, &known)
+}
+
 fn named(text: &str, names: &[&str]) -> Result<Phases, ImportError> {
     let names = SymbolNames::parse(names).expect("names of the test");
-    let known = ["contact", "flight", "rear stance"].map(str::to_owned);
-    let sections = read("paper.tex", text.as_bytes(), &names, &known)?;
+    let sections = read("paper.tex", text, &names)?;
     let mut pool = ExprPool::new();
     let mut found = Vec::new();
     for section in &sections.sections {
         let mut texts = Vec::new();
         for equation in &section.equations {
-            let expr = equation.parse("paper.tex", sections.latent_dim, &mut pool)?;
+            let expr = pool
+                .parse(&equation.text(), &|_| true)
+                .expect("it was read");
             texts.push(pool.display(expr).to_string());
         }
         found.push((section.phase.clone(), texts));
@@ -468,7 +473,7 @@ fn markdown_has_mathematics_in_its_lines_and_code_that_is_none() {
             &["z1"],
         ),
     ] {
-        let read = read("notes.md", text.as_bytes(), &SymbolNames::default(), &[]);
+        let read = read("notes.md", text, &SymbolNames::default());
         let read = read.unwrap_or_else(|error| panic!("{text}: {error}"));
         let equations = read.sections.iter().flat_map(|section| &section.equations);
         let texts: Vec<String> = equations

@@ -1,27 +1,22 @@
-//! Equal expressions get equal forms, different ones do not.
+//! Equal expressions get equal normal forms, different ones do not.
 
-use super::*;
-use crate::symbolic::{ExprPool, ParseLimits, SymbolId};
+use romc::symbolic::{CanonicalForm, CanonicalForms, ExprPool, ParseLimits};
 
 /// The form of `a - b` without fractions; decimals are rounded where their text starts with `~`.
 fn difference(a: &str, b: &str) -> (CanonicalForm, f64) {
     let mut pool = ExprPool::new();
     let parse = |pool: &mut ExprPool, text: &str| {
-        let mark = if text.starts_with('~') { '~' } else { '#' };
-        let named = |number: &str| number.contains('.').then(|| format!("{mark}{number}"));
+        let is_rounded = text.starts_with('~');
+        let decimal = |pool: &mut ExprPool, number: &str| match number.contains('.') {
+            true => pool.decimal(number, is_rounded),
+            false => None,
+        };
         let (text, limits) = (text.trim_start_matches('~'), ParseLimits::default());
-        let parsed = pool.parse_within(text, &|_| true, &named, limits);
+        let parsed = pool.parse_within(text, &|_| true, &decimal, limits);
         parsed.unwrap_or_else(|error| panic!("{text}: {error}"))
     };
     let (left, right) = (parse(&mut pool, a), parse(&mut pool, b));
-    let literal = |symbol: SymbolId| {
-        let name = pool.symbol_name(symbol);
-        let rounded = name.strip_prefix('~').map(|digits| (digits, true));
-        let (digits, is_rounded) =
-            rounded.or(name.strip_prefix('#').map(|digits| (digits, false)))?;
-        Coefficient::parse(digits, is_rounded)
-    };
-    let mut forms = CanonicalForms::new(&pool, &[left, right], &literal);
+    let mut forms = CanonicalForms::new(&pool, &[left, right]);
     let difference = forms.of(left).minus(&forms.of(right));
     let cleared = forms.without_fractions(&difference).expect("small enough");
     (cleared, forms.rounding())

@@ -1,12 +1,14 @@
-//! Quotients: common denominators and exact division.
+//! Sums as polynomials in powers of common bases: common denominators, exact division, perfect powers.
 
 use std::collections::BTreeMap;
 
-use super::expand::{MAX_TERMS, Terms};
-use super::node::{ExprId, Function, Node};
+use num_integer::Integer;
+
+use super::expand::{Terms, WIDE};
+use super::function::Function;
+use super::node::{ExprId, Node};
 use super::number::Number;
 use super::order::Exponent;
-use super::perfect_power::add;
 use super::pool::ExprPool;
 use super::rules::common_unit;
 
@@ -17,12 +19,16 @@ const MAX_EXPONENT: i64 = 1 << 32;
 /// Most different denominators that are brought together: the numerator grows with all of them.
 const MAX_DENOMINATORS: usize = 12;
 
+/// Largest power that is looked for, and longest sum.
+pub(super) const MAX_POWER: i64 = 4;
+const MAX_POWER_TERMS: usize = 35;
+
 /// Exact coefficients by the exponents of common [`Bases`], in their units.
-pub(super) type Monomials = BTreeMap<Vec<i64>, Number>;
+type Monomials = BTreeMap<Vec<i64>, Number>;
 
 /// What polynomials are in: `x` of `x^2 + x`, `x` with the unit 1/2 of `x + sqrt(x)`, `exp(x)` of
 /// `exp(2*x) + exp(-x)`.
-pub(super) struct Bases {
+struct Bases {
     /// In canonical order; all exponents of a base are multiples of its unit.
     units: Vec<(ExprId, Number)>,
     /// Whether a coefficient is a float, so that results are written as such.
@@ -31,7 +37,7 @@ pub(super) struct Bases {
 
 impl Bases {
     /// A coefficient as the float that it is written as, if one of the terms had a float.
-    pub(super) fn written(&self, coefficient: Number) -> Number {
+    fn written(&self, coefficient: Number) -> Number {
         let float = Number::from_f64(coefficient.to_f64());
         let is_decimal = |float: &Number| float.decimal() == Some(coefficient);
         let written = float.filter(|float| self.has_floats && is_decimal(float));
@@ -45,8 +51,8 @@ impl ExprPool {
     /// `x/(x + y) + y/(x + y)` becomes `1`, `(x^2 - 1)/(x - 1)` becomes `1 + x`.
     ///
     /// Nothing changes unless a sum or a function occurs in a denominator, or if there are too
-    /// many different ones. Numerators that would exceed `budget` products stay products.
-    pub(super) fn together(&mut self, expr: ExprId, budget: &mut usize) -> ExprId {
+    /// many different ones.
+    pub(super) fn together(&mut self, expr: ExprId) -> ExprId {
         let terms = self.terms_of(expr);
         let mut denominators: Vec<(ExprId, Number)> = Vec::new();
         for (_, rest) in &terms {
@@ -76,7 +82,7 @@ impl ExprPool {
             factors.push(rest);
             let numerator = self.product(&factors);
             let numerator = self.scale(coefficient, numerator);
-            numerators.push(self.expand_node(numerator, MAX_TERMS, budget));
+            numerators.push(self.expand_node(numerator, WIDE));
         }
         let numerator = self.sum(&numerators);
         self.cancel(numerator, &denominators)
@@ -190,7 +196,7 @@ impl ExprPool {
 
     /// The bases of the powers in some terms; `None` for roots of numbers and for exponents without
     /// a common unit.
-    pub(super) fn bases_of<'t>(
+    fn bases_of<'t>(
         &mut self,
         terms: impl IntoIterator<Item = &'t (Number, ExprId)>,
     ) -> Option<Bases> {
@@ -239,7 +245,7 @@ impl ExprPool {
     }
 
     /// Terms by exponents; `None` for floats that are not written as short decimals.
-    pub(super) fn monomials(&mut self, terms: &Terms, bases: &Bases) -> Option<Monomials> {
+    fn monomials(&mut self, terms: &Terms, bases: &Bases) -> Option<Monomials> {
         let mut monomials = Monomials::new();
         for (coefficient, rest) in terms {
             let mut exponents = vec![0_i64; bases.units.len()];
@@ -256,11 +262,7 @@ impl ExprPool {
     }
 
     /// The sum of some monomials, exponentials being merged.
-    pub(super) fn sum_of_monomials(
-        &mut self,
-        monomials: &Monomials,
-        bases: &Bases,
-    ) -> Option<ExprId> {
+    fn sum_of_monomials(&mut self, monomials: &Monomials, bases: &Bases) -> Option<ExprId> {
         let mut terms = Vec::with_capacity(monomials.len());
         for (exponents, &coefficient) in monomials {
             let (mut powers, mut arguments) = (Vec::new(), Vec::new());
@@ -280,6 +282,36 @@ impl ExprPool {
             terms.push(self.scale(bases.written(coefficient), product));
         }
         Some(self.sum(&terms))
+    }
+
+    /// `c*(a + b)^n` for a sum that is such a power multiplied out, as `x^2 + 2*x*y + y^2` is.
+    pub(super) fn as_power(&mut self, expr: ExprId) -> Option<ExprId> {
+        let terms = match self.node(expr) {
+            Node::Sum(terms) if (3..=MAX_POWER_TERMS).contains(&terms.len()) => self.terms_of(expr),
+            _ => return None,
+        };
+        let bases = self.bases_of(&terms)?;
+        let dividend = self.monomials(&terms, &bases)?;
+        (2..=MAX_POWER).rev().find_map(|power| {
+            let (content, root) = root_of(&dividend, power)?;
+            let root = self.sum_of_monomials(&root, &bases)?;
+            let whole = self.pow_number(root, Number::integer(power));
+            Some(self.scale(bases.written(content), whole))
+        })
+    }
+
+    /// A term whose factors are powers to multiples of `n`, to the power `1/n`.
+    pub(super) fn whole_root(&mut self, expr: ExprId, n: i64) -> Option<ExprId> {
+        let mut factors: Terms = Vec::new();
+        for (base, exponent) in self.numeric_powers(expr) {
+            let exponent = exponent.checked_div(Number::integer(n))?;
+            exponent.as_integer().filter(|exponent| *exponent > 0)?;
+            factors.push((exponent, base));
+        }
+        let powers: Vec<ExprId> = (factors.into_iter())
+            .map(|(exponent, base)| self.pow_number(base, exponent))
+            .collect();
+        Some(self.product(&powers))
     }
 }
 
@@ -317,60 +349,73 @@ fn divided(dividend: Monomials, divisor: &Monomials) -> Option<(Monomials, Monom
     None
 }
 
-#[cfg(test)]
-mod tests {
-    use super::super::testing::assert_rewritten;
-    use super::*;
-
-    #[test]
-    fn together_finds_the_common_denominator_and_cancels() {
-        let together = |pool: &mut ExprPool, expr| pool.together(expr, &mut 100_000);
-        assert_rewritten(
-            together,
-            &[
-                ("x/(x + y) + y/(x + y)", "1"),
-                ("(x^2 - 1)/(x - 1)", "1 + x"),
-                ("1/(x + 1) - 1/(x + 2)", "1/((1 + x)*(2 + x))"),
-                ("1/x - 1/(x*(x + 1))", "1/(1 + x)"),
-                ("(x + 1)/(x^2 - 1)", "-1/(1 - x)"),
-                ("(x^2 + 3*x + 2)/(x^2 + 4*x + 3)", "(2 + x)/(3 + x)"),
-                ("(exp(x)^2 - 1)/(2*exp(x) + 2)", "-1/2 + 1/2*exp(x)"),
-                ("(x + y)/(x^2 - y^2)", "1/(x - y)"),
-                ("(x^2 + 1)/(x^2 - 1)", "-(1 + x^2)/(1 - x^2)"),
-                ("(x^3 - y^3)/(x - y)^2", "(x^2 + x*y + y^2)/(x - y)"),
-                // Without sums in denominators nothing changes.
-                ("1/x + 1/y", "1/x + 1/y"),
-                ("x + y", "x + y"),
-            ],
-        );
+/// `content` and `root` of a polynomial `content * root^power`, the root's coefficients being whole.
+///
+/// Each next term of the root is what is left over, divided by the derivative of the power.
+fn root_of(polynomial: &Monomials, power: i64) -> Option<(Number, Monomials)> {
+    let (highest, leading) = polynomial.last_key_value()?;
+    let divisible = highest.iter().all(|exponent| exponent % power == 0);
+    let first: Vec<i64> = highest.iter().map(|exponent| exponent / power).collect();
+    if !divisible {
+        return None;
     }
-
-    #[test]
-    fn divide_exactly_refuses_remainders_and_long_floats() {
-        let mut pool = ExprPool::new();
-        let mut divide = |a: &str, b: &str| {
-            let (a, b) = (pool.parsed(a), pool.parsed(b));
-            let quotient = pool.divide_exactly(a, b)?;
-            Some(pool.display(quotient).to_string())
+    // A power of k terms has at least n (k - 1) + 1.
+    let most = (polynomial.len() - 1) / usize::try_from(power).ok()?;
+    let slope = leading.checked_mul(Number::integer(power))?;
+    let mut root = Monomials::from([(first.clone(), Number::ONE)]);
+    loop {
+        let mut whole = Monomials::from([(vec![0; first.len()], *leading)]);
+        for _ in 0..power {
+            whole = product(&whole, &root)?;
+        }
+        for (exponents, coefficient) in polynomial {
+            add(&mut whole, exponents.clone(), -*coefficient)?;
+        }
+        let Some((exponents, excess)) = whole.last_key_value() else {
+            break;
         };
-        for (a, b, expected) in [
-            ("x^2 + 2*x*y + y^2", "x + y", Some("x + y")),
-            ("2*x + 2", "3*x + 3", Some("2/3")),
-            ("0.5*x^2 - 0.5", "x - 1", Some("0.5 + 0.5*x")),
-            ("x - 1", "sqrt(x) - 1", Some("1 + sqrt(x)")),
-            ("x - y", "sqrt(x) - sqrt(y)", Some("sqrt(x) + sqrt(y)")),
-            ("1/x - x", "1 - x", Some("1 + 1/x")),
-            (
-                "exp(2*x + y) - exp(-y)",
-                "exp(x + y) - 1",
-                Some("exp(x) + exp(-y)"),
-            ),
-            ("exp(0.6*x) - 1", "exp(0.3*x) - 1", Some("1 + exp(0.3*x)")),
-            ("x^2 + 1", "x + 1", None),
-            ("exp(x) + 1", "exp(y) + 1", None),
-            ("0.12345678901234567*x - 1", "x - 1", None),
-        ] {
-            assert_eq!(divide(a, b).as_deref(), expected, "({a})/({b})");
+        let next: Vec<i64> = (exponents.iter().zip(&first))
+            .map(|(exponent, first)| exponent - (power - 1) * first)
+            .collect();
+        let is_lower = root.first_key_value().is_some_and(|(last, _)| next < *last);
+        if !is_lower || root.len() > most {
+            return None;
+        }
+        root.insert(next, (-*excess).checked_div(slope)?);
+    }
+    let mut denominators = root.values().map(|number| number.as_rational());
+    let common = denominators.try_fold(1_i64, |common, number| {
+        let (_, denominator) = number?;
+        common.checked_mul(denominator / common.gcd(&denominator))
+    })?;
+    let common = Number::integer(common);
+    let content = leading.checked_div(common.checked_powi(power)?)?;
+    for coefficient in root.values_mut() {
+        *coefficient = coefficient.checked_mul(common)?;
+    }
+    content.is_exact().then_some((content, root))
+}
+
+fn product(a: &Monomials, b: &Monomials) -> Option<Monomials> {
+    let mut product = Monomials::new();
+    for (exponents_a, coefficient_a) in a {
+        for (exponents_b, coefficient_b) in b {
+            let exponents = exponents_a.iter().zip(exponents_b).map(|(a, b)| a + b);
+            let coefficient = coefficient_a.checked_mul(*coefficient_b)?;
+            add(&mut product, exponents.collect(), coefficient)?;
         }
     }
+    Some(product)
+}
+
+/// Adds a term to a polynomial; nothing if a coefficient is no longer exact.
+fn add(to: &mut Monomials, exponents: Vec<i64>, coefficient: Number) -> Option<()> {
+    let entry = to.entry(exponents.clone()).or_insert(Number::ZERO);
+    // Floats may cancel to an exact zero where what they stand for does not.
+    let sum = (entry.checked_add(coefficient)).filter(|sum| sum.is_exact());
+    *entry = sum.filter(|_| coefficient.is_exact())?;
+    if entry.is_zero() {
+        to.remove(&exponents);
+    }
+    Some(())
 }

@@ -1,0 +1,208 @@
+//! The elementary functions, each a row of a table.
+
+use std::fmt;
+
+use super::interval::Interval;
+use super::node::ExprId;
+use super::number::Number;
+use super::pool::ExprPool;
+
+/// The elementary functions. Arguments are real, in radians where they are angles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[allow(missing_docs, reason = "the names say it")]
+pub enum Function {
+    Sin,
+    Cos,
+    Tan,
+    Tanh,
+    Exp,
+    /// Natural logarithm.
+    Log,
+    /// Non-negative square root.
+    Sqrt,
+    Abs,
+    /// `-1`, `0` or `1`: the derivative of [`Function::Abs`].
+    Sign,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Parity {
+    /// `f(-x) = f(x)`.
+    Even,
+    /// `f(-x) = -f(x)`.
+    Odd,
+    Neither,
+}
+
+struct Row {
+    function: Function,
+    /// Names in the term grammar; the first is printed.
+    names: &'static [&'static str],
+    parity: Parity,
+    value: fn(f64) -> f64,
+    image: fn(Interval) -> Interval,
+    /// Whether slopes are bounded on an interval of arguments, and no jump lies in it.
+    is_lipschitz: fn(Interval) -> bool,
+    /// `f'(x)`, given `x` and `f(x)`, written with the latter where that saves work.
+    derivative: fn(&mut ExprPool, ExprId, ExprId) -> ExprId,
+}
+
+const ROWS: [Row; 9] = [
+    Row {
+        function: Function::Sin,
+        names: &["sin"],
+        parity: Parity::Odd,
+        value: f64::sin,
+        image: Interval::sin,
+        is_lipschitz: |_| true,
+        derivative: |pool, x, _| pool.apply(Function::Cos, x),
+    },
+    Row {
+        function: Function::Cos,
+        names: &["cos"],
+        parity: Parity::Even,
+        value: f64::cos,
+        image: Interval::cos,
+        is_lipschitz: |_| true,
+        derivative: |pool, x, _| {
+            let sine = pool.apply(Function::Sin, x);
+            pool.neg(sine)
+        },
+    },
+    Row {
+        function: Function::Tan,
+        names: &["tan"],
+        parity: Parity::Odd,
+        value: f64::tan,
+        image: Interval::tan,
+        is_lipschitz: |x| x.tan() != Interval::ENTIRE,
+        derivative: |pool, _, value| {
+            let square = pool.powi(value, 2);
+            pool.add(ExprId::ONE, square)
+        },
+    },
+    Row {
+        function: Function::Tanh,
+        names: &["tanh"],
+        parity: Parity::Odd,
+        value: f64::tanh,
+        image: Interval::tanh,
+        is_lipschitz: |_| true,
+        derivative: |pool, _, value| {
+            let square = pool.powi(value, 2);
+            pool.sub(ExprId::ONE, square)
+        },
+    },
+    Row {
+        function: Function::Exp,
+        names: &["exp"],
+        parity: Parity::Neither,
+        value: f64::exp,
+        image: Interval::exp,
+        is_lipschitz: |_| true,
+        derivative: |_, _, value| value,
+    },
+    Row {
+        function: Function::Log,
+        names: &["log", "ln"],
+        parity: Parity::Neither,
+        value: f64::ln,
+        image: Interval::log,
+        is_lipschitz: |x| x.lo() > 0.0,
+        derivative: |pool, x, _| pool.powi(x, -1),
+    },
+    Row {
+        function: Function::Sqrt,
+        names: &["sqrt"],
+        parity: Parity::Neither,
+        value: f64::sqrt,
+        image: Interval::sqrt,
+        is_lipschitz: |x| x.lo() > 0.0,
+        derivative: |pool, _, value| {
+            let reciprocal = pool.powi(value, -1);
+            pool.scale(Number::HALF, reciprocal)
+        },
+    },
+    Row {
+        function: Function::Abs,
+        names: &["abs"],
+        parity: Parity::Even,
+        value: f64::abs,
+        image: Interval::abs,
+        is_lipschitz: |_| true,
+        derivative: |pool, x, _| pool.apply(Function::Sign, x),
+    },
+    Row {
+        function: Function::Sign,
+        names: &["sign", "sgn"],
+        parity: Parity::Odd,
+        // f64::signum gives 1 for zero.
+        value: |x| if x == 0.0 { 0.0 } else { x.signum() },
+        image: Interval::sign,
+        is_lipschitz: |x| !x.contains(0.0),
+        derivative: |_, _, _| ExprId::ZERO,
+    },
+];
+
+impl Function {
+    /// All functions, in the order in which sums list them.
+    pub const ALL: [Function; ROWS.len()] = {
+        let mut all = [Function::Sin; ROWS.len()];
+        let mut place = 0;
+        while place < ROWS.len() {
+            all[place] = ROWS[place].function;
+            assert!(all[place] as usize == place);
+            place += 1;
+        }
+        all
+    };
+
+    fn row(self) -> &'static Row {
+        &ROWS[self as usize]
+    }
+
+    pub(crate) fn name(self) -> &'static str {
+        self.row().names[0]
+    }
+
+    /// The function of that name; `ln` and `sgn` are names of the logarithm and the sign too.
+    pub fn by_name(name: &str) -> Option<Function> {
+        let row = ROWS.iter().find(|row| row.names.contains(&name))?;
+        Some(row.function)
+    }
+
+    /// How the function answers a change of its argument's sign.
+    pub(crate) fn parity(self) -> Parity {
+        self.row().parity
+    }
+
+    /// The value at `argument`; NaN or infinite where the function has none.
+    pub fn evaluate(self, argument: f64) -> f64 {
+        (self.row().value)(argument)
+    }
+
+    /// Whether it is zero where its argument is; in floats, nowhere else: none is a multiple of pi.
+    pub(super) fn vanishes_at_zero(self) -> bool {
+        self.evaluate(0.0) == 0.0
+    }
+
+    pub(super) fn image(self, argument: Interval) -> Interval {
+        (self.row().image)(argument)
+    }
+
+    /// Whether slopes are bounded on an interval of arguments, and no jump lies in it.
+    pub(super) fn is_lipschitz_on(self, argument: Interval) -> bool {
+        (self.row().is_lipschitz)(argument)
+    }
+
+    /// `f'(x)`, given `x` and `f(x)`.
+    pub(super) fn derivative(self, pool: &mut ExprPool, x: ExprId, value: ExprId) -> ExprId {
+        (self.row().derivative)(pool, x, value)
+    }
+}
+
+impl fmt::Display for Function {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(self.name())
+    }
+}

@@ -1,0 +1,345 @@
+//! Files that appear whole or not at all, folders of emitted files, and texts on their way out.
+
+use std::fs;
+use std::io::{self, Read as _};
+use std::path::Path;
+
+use romc::files::magic::recognised;
+use romc::files::size::{Capped, Format, read_capped};
+use romc::files::{
+    Begun, EmittedFile, FolderError, Overwrite, Place, check_folder, earlier_files, is_invisible,
+    read_toml, shell_path, write_files, write_files_since, write_whole,
+};
+
+const LIST: &str = ".romc-emitted";
+
+fn folder() -> tempfile::TempDir {
+    tempfile::tempdir().expect("a folder")
+}
+
+fn files(contents: &str) -> Vec<EmittedFile> {
+    ["m.c", "m/src/lib.rs"]
+        .map(|name| EmittedFile::new(name, contents))
+        .to_vec()
+}
+
+fn text(path: &Path) -> String {
+    fs::read_to_string(path).expect("readable")
+}
+
+fn names(folder: &Path) -> Vec<String> {
+    let entries = fs::read_dir(folder).expect("a folder");
+    let name = |entry: io::Result<fs::DirEntry>| entry.expect("an entry").file_name();
+    let mut names: Vec<String> = entries
+        .map(|entry| name(entry).to_string_lossy().into_owned())
+        .collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn second_run_replaces_own_files_and_leaves_no_part() {
+    let folder = folder();
+    let out = folder.path().join("new/out");
+    write_files(&out, &files("one"), Overwrite::Refuse).expect("first");
+    let written = write_files(&out, &files("two"), Overwrite::Refuse).expect("second");
+    assert_eq!(written, [out.join("m.c"), out.join("m/src/lib.rs")]);
+    for path in written {
+        assert_eq!(text(&path), "two");
+    }
+    assert_eq!(names(&out), [LIST, "m", "m.c"]);
+}
+
+#[test]
+fn a_place_that_cannot_be_taken_leaves_no_part() {
+    let folder = folder();
+    let mut files = files("one");
+    let below = "a file stands where a folder should";
+    files.push(EmittedFile::new("m.c/below", below));
+    let found = write_files(folder.path(), &files, Overwrite::Refuse);
+    assert!(
+        matches!(found, Err(FolderError::Foreign { .. })),
+        "{found:?}"
+    );
+    let left = names(folder.path());
+    assert!(!left.iter().any(|name| name.ends_with(".part")), "{left:?}");
+}
+
+#[test]
+fn runs_into_one_folder_at_a_time_know_all_files_as_their_own() {
+    let folder = folder();
+    let write = |own: &str, contents: &str| {
+        let files = [
+            EmittedFile::new(own, contents),
+            EmittedFile::new("CMakeLists.txt", "of all"),
+        ];
+        write_files(folder.path(), &files, Overwrite::Refuse).expect("written")
+    };
+    std::thread::scope(|scope| {
+        for name in ["a.c", "b.c", "c.c", "d.c"] {
+            scope.spawn(move || {
+                for run in 0..50 {
+                    write(name, &format!("{name} {run}"));
+                }
+            });
+        }
+    });
+    write("e.c", "alone");
+    let list = text(&folder.path().join(LIST));
+    let mut names: Vec<&str> = list
+        .lines()
+        .map(|line| line.split_once("  ").expect("digest and name").1)
+        .collect();
+    names.sort_unstable();
+    assert_eq!(names, ["CMakeLists.txt", "a.c", "b.c", "c.c", "d.c", "e.c"]);
+}
+
+#[test]
+fn foreign_file_is_refused_and_kept_unless_forced() {
+    let folder = folder();
+    let foreign = folder.path().join("m.c");
+    fs::write(&foreign, "mine").expect("written");
+    let found = write_files(folder.path(), &files("new"), Overwrite::Refuse);
+    assert!(matches!(found, Err(FolderError::Foreign { path }) if path == foreign));
+    assert_eq!(text(&foreign), "mine");
+    assert!(!folder.path().join("m").exists());
+    write_files(folder.path(), &files("new"), Overwrite::Replace).expect("forced");
+    assert_eq!(text(&foreign), "new");
+}
+
+#[test]
+fn an_emitted_file_that_was_changed_is_refused_and_kept() {
+    let folder = folder();
+    write_files(folder.path(), &files("one"), Overwrite::Refuse).expect("first");
+    let own = folder.path().join("m.c");
+    fs::write(&own, "my own work").expect("written");
+    let found = write_files(folder.path(), &files("two"), Overwrite::Refuse);
+    assert!(matches!(found, Err(FolderError::Changed { path }) if path == own));
+    assert_eq!(text(&own), "my own work");
+    assert_eq!(text(&folder.path().join("m/src/lib.rs")), "one");
+    let checked = check_folder(folder.path(), &["m.c"], Overwrite::Refuse);
+    assert!(matches!(checked, Err(FolderError::Changed { .. })));
+    // What romc would write anyway is no loss.
+    fs::write(&own, "two").expect("written");
+    write_files(folder.path(), &files("two"), Overwrite::Refuse).expect("the same bytes");
+}
+
+#[test]
+fn a_lock_file_that_cargo_rewrote_is_replaced_and_one_of_the_users_kept() {
+    let folder = folder();
+    let lock = |text: &str| vec![EmittedFile::new("m/Cargo.lock", text)];
+    let path = folder.path().join("m/Cargo.lock");
+    write_files(folder.path(), &lock("version = 4"), Overwrite::Refuse).expect("first");
+    let cargos = "# This file is automatically @generated by Cargo.\nversion = 4";
+    fs::write(&path, cargos).expect("written");
+    write_files(folder.path(), &lock("version = 5"), Overwrite::Refuse).expect("again");
+    assert_eq!(text(&path), "version = 5");
+    fs::write(&path, "my own").expect("written");
+    let found = write_files(folder.path(), &lock("version = 6"), Overwrite::Refuse);
+    assert!(matches!(found, Err(FolderError::Changed { .. })));
+}
+
+#[test]
+fn of_two_commands_at_a_time_the_second_is_refused_unless_it_writes_the_same() {
+    let folder = folder();
+    let begin = || Begun::of(folder.path()).expect("readable");
+    let write = |begun: &Begun, text: &str, overwrite| {
+        write_files_since(begun, folder.path(), &files(text), overwrite)
+    };
+    let before = begin();
+    write(&begin(), "one", Overwrite::Refuse).expect("the first");
+    write(&before, "one", Overwrite::Refuse).expect("the same");
+    let found = write(&before, "two", Overwrite::Refuse);
+    assert!(
+        matches!(&found, Err(FolderError::Concurrent { path }) if path.ends_with("m.c")),
+        "{found:?}"
+    );
+    assert_eq!(text(&folder.path().join("m/src/lib.rs")), "one");
+    write(&begin(), "two", Overwrite::Refuse).expect("one after the other");
+    write(&before, "three", Overwrite::Replace).expect("forced");
+}
+
+#[test]
+fn files_of_earlier_runs_are_named_unless_changed() {
+    let folder = folder();
+    let write = |name: &str| {
+        let file = EmittedFile::new(name, "text");
+        write_files(folder.path(), &[file], Overwrite::Refuse).expect("written")
+    };
+    write("old.c");
+    write("mine.c");
+    fs::write(folder.path().join("mine.c"), "changed").expect("written");
+    write("new.c");
+    let now = [EmittedFile::new("new.c", "text")];
+    let earlier = earlier_files(folder.path(), &now).expect("a list");
+    assert_eq!(earlier, [folder.path().join("old.c")]);
+}
+
+#[cfg(unix)]
+#[test]
+fn links_in_the_way_are_refused_and_what_they_lead_to_is_kept() {
+    let folder = folder();
+    let victim = folder.path().join("victim");
+    fs::write(&victim, "precious").expect("written");
+    for name in [LIST, "m.c"] {
+        let link = folder.path().join(name);
+        std::os::unix::fs::symlink(&victim, &link).expect("a link");
+        let found = write_files(folder.path(), &files("one"), Overwrite::Refuse);
+        assert!(matches!(found, Err(FolderError::Foreign { path }) if path == link));
+        fs::remove_file(link).expect("removed");
+    }
+    assert_eq!(text(&victim), "precious");
+}
+
+#[cfg(unix)]
+#[test]
+fn write_whole_replaces_the_file_behind_a_link_and_nothing_that_is_no_file() {
+    let folder = folder();
+    let [file, link, socket] = ["file", "link", "socket"].map(|name| folder.path().join(name));
+    fs::write(&file, "old").expect("written");
+    std::os::unix::fs::symlink(&file, &link).expect("linked");
+    write_whole(&link, Overwrite::Replace, |out| out.write_all(b"new")).expect("written");
+    assert_eq!(text(&file), "new");
+    assert!(link.symlink_metadata().expect("there").is_symlink());
+    let _listener = std::os::unix::net::UnixListener::bind(&socket).expect("a socket");
+    assert!(write_whole(&socket, Overwrite::Replace, |out| out.write_all(b"new")).is_err());
+    assert!(!socket.metadata().expect("still there").is_file());
+}
+
+#[test]
+fn write_whole_leaves_the_old_file_when_filling_fails() {
+    let folder = folder();
+    let path = folder.path().join("model.json");
+    write_whole(&path, Overwrite::Refuse, |out| out.write_all(b"first")).expect("a new file");
+    let failed = write_whole(&path, Overwrite::Replace, |out| {
+        out.write_all(b"half")?;
+        Err(io::Error::other("disk full"))
+    });
+    assert!(failed.is_err());
+    assert_eq!(text(&path), "first");
+    assert_eq!(names(folder.path()), ["model.json"]);
+}
+
+/// Parts of processes that have ended go; files of other names, and the part that is being written, stay.
+#[test]
+fn parts_of_ended_processes_are_removed_and_others_stay() {
+    let folder = folder();
+    let others = [".m.c.123.part", ".notes.part", "m.c.0123456789abcdef.part"];
+    let left = ".m.c.0123456789abcdef.part";
+    for name in others.iter().chain([&left]) {
+        fs::write(folder.path().join(name), "half").expect("written");
+    }
+    let write = |name: &str, fill: &dyn Fn()| {
+        write_whole(&folder.path().join(name), Overwrite::Refuse, |out| {
+            fill();
+            out.write_all(b"whole")
+        })
+    };
+    write("m.c", &|| {
+        write("other.c", &|| {}).expect("written meanwhile")
+    })
+    .expect("written");
+    let mut expected = [&others[..], &["m.c", "other.c"]].concat();
+    expected.sort_unstable();
+    assert_eq!(names(folder.path()), expected);
+}
+
+#[test]
+fn a_file_that_appears_meanwhile_is_refused_and_left_as_it_is() {
+    let folder = folder();
+    let path = folder.path().join("m.c");
+    let write = |overwrite| {
+        write_whole(&path, overwrite, |out| {
+            fs::write(&path, "other").expect("written meanwhile");
+            out.write_all(b"one")
+        })
+    };
+    let refused = write(Overwrite::Refuse).expect_err("a place that is taken");
+    assert_eq!(refused.kind(), io::ErrorKind::AlreadyExists);
+    assert_eq!(text(&path), "other");
+    write(Overwrite::Replace).expect("forced");
+    assert_eq!(text(&path), "one");
+    assert_eq!(names(folder.path()), ["m.c"]);
+}
+
+#[test]
+fn columns_count_letters_not_bytes() {
+    let text = "a = 1\nµ = x";
+    let byte = text.find('x').expect("it is there");
+    assert_eq!(Place::of_byte(text, byte), Place::Character(2, 5));
+    assert_eq!(Place::of_byte(text, 0), Place::Character(1, 1));
+}
+
+#[test]
+fn names_of_files_stand_in_the_line_as_a_shell_reads_them() {
+    let found = recognised("my logs/a.bag".as_ref(), b"#ROSBAG V2.0\n").expect("a bag");
+    let remedy = "mcap convert 'my logs/a.bag' 'my logs/a'.mcap";
+    assert_eq!(found.remedy, remedy);
+    let zip = [&b"PK\x03\x04"[..], &[0; 22], &[5, 0, 0, 0], b"q.npy"].concat();
+    let found = recognised("a.csv".as_ref(), &zip).expect("arrays");
+    assert_eq!(found.what, "NumPy arrays (.npz)");
+    let remedy = found.remedy;
+    assert!(remedy.ends_with("\" a.csv a-table.csv"), "{remedy}");
+    assert_eq!(recognised("a.csv".as_ref(), b"Time,fr.hx Position\n"), None);
+}
+
+#[test]
+fn a_source_of_the_most_bytes_is_read_and_one_byte_more_is_not() {
+    let read = |count: u64| {
+        let source = io::repeat(1).take(count);
+        io::copy(&mut Capped::new(source, Format::Model, 10), &mut io::sink())
+    };
+    assert_eq!(read(10).expect("the most"), 10);
+    let error = read(11).expect_err("more");
+    assert_eq!(error.kind(), io::ErrorKind::FileTooLarge);
+    assert!(
+        error.to_string().starts_with("more than 10 bytes"),
+        "{error}"
+    );
+}
+
+#[cfg(unix)]
+#[test]
+fn a_device_without_end_is_refused() {
+    let error = read_capped("/dev/zero".as_ref(), Format::Settings).expect_err("endless");
+    assert_eq!(error.kind(), io::ErrorKind::FileTooLarge);
+}
+
+#[test]
+fn a_file_of_too_many_tables_is_refused() {
+    let folder = folder();
+    let path = folder.path().join("settings.toml");
+    let read = |count: usize| {
+        fs::write(&path, format!("a{} = 0", ".b".repeat(count))).expect("written");
+        read_toml(&path)
+    };
+    assert_eq!(read(2).expect("settings"), "a.b.b = 0");
+    assert!(read(20_000).is_ok());
+    let error = read(20_001).expect_err("too many");
+    assert_eq!(error.kind(), io::ErrorKind::InvalidData);
+}
+
+#[test]
+fn letters_are_shown_and_marks_of_direction_act() {
+    for c in "aé跳 ü\u{301}\u{1f916}²-_".chars() {
+        assert!(!is_invisible(c), "{c:?}");
+    }
+    for c in "\0\n\t\u{7f}\u{85}\u{ad}\u{200b}\u{202e}\u{2028}\u{2066}\u{feff}\u{e0041}".chars() {
+        assert!(is_invisible(c), "{c:?}");
+    }
+}
+
+#[test]
+fn words_of_a_shell_are_one_word_and_no_option() {
+    for (path, word) in [
+        ("out/a-1.c", "out/a-1.c"),
+        ("my out", "'my out'"),
+        ("", "''"),
+        ("a'b;$(c)", r"'a'\''b;$(c)'"),
+        ("-o", "./-o"),
+        ("-", "-"),
+        ("~/x", "'~/x'"),
+    ] {
+        assert_eq!(shell_path(Path::new(path)), word);
+    }
+}
