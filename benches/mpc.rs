@@ -225,14 +225,10 @@ fn by_default(program: &ConeProgram) -> (f64, f64, f64) {
     (setup, solve, cost_of(program, solver.solution()))
 }
 
+/// The cost of a point; the program's quadratic part is diagonal.
 fn cost_of(program: &ConeProgram, x: &[f64]) -> f64 {
-    let mut px = vec![0.0; x.len()];
-    program.p.symmetric_multiply_add(x, &mut px);
-    x.iter()
-        .zip(&px)
-        .zip(&program.q)
-        .map(|((x, px), q)| x * (0.5 * px + q))
-        .sum()
+    let pairs = x.iter().zip(&program.p.nzval).zip(&program.q);
+    pairs.map(|((x, p), q)| x * (0.5 * p * x + q)).sum()
 }
 
 fn touches_a_limit(controller: &Controller, command: &Command) -> bool {
@@ -304,10 +300,10 @@ fn dump(model: &romc::model::ReducedModel, segments: &[Segment], push: f64, path
             let equalities = program.cones.first().map_or(0, |cone| cone.dim());
             let matrix = |matrix: &romc::mpc::SparseColumns| {
                 serde_json::json!({
-                    "shape": [matrix.csc().m, matrix.csc().n],
-                    "indptr": matrix.csc().colptr,
-                    "indices": matrix.csc().rowval,
-                    "data": matrix.values(),
+                    "shape": [matrix.m, matrix.n],
+                    "indptr": matrix.colptr,
+                    "indices": matrix.rowval,
+                    "data": matrix.nzval,
                 })
             };
             let problem = serde_json::json!({

@@ -20,7 +20,7 @@ use std::io::Write as _;
 
 use romc::mpc::problem::Row;
 use romc::mpc::widest::{prepare, solve};
-use romc::mpc::{Cone, ConeProgram, QpSettings, QpSolver, SparseColumns, needed_rows};
+use romc::mpc::{Cone, ConeProgram, QpSettings, QpSolver, needed_rows, sparse};
 use romc::solver::{Cost, Links, Outcome, Pairs, Program, RowMatrices, Settings, Shape, Stage};
 
 #[path = "shared/clock.rs"]
@@ -344,10 +344,10 @@ impl Conic {
         for k in 0..horizon {
             for i in 0..NX {
                 let row = k * NX + i;
-                entries.extend((0..NU).map(|j| (row, k * width + j)));
-                entries.push((row, k * width + NU + i));
+                entries.extend((0..NU).map(|j| (row, k * width + j, 0.0)));
+                entries.push((row, k * width + NU + i, 0.0));
                 if k > 0 {
-                    entries.extend((0..NX).map(|j| (row, (k - 1) * width + NU + j)));
+                    entries.extend((0..NX).map(|j| (row, (k - 1) * width + NU + j, 0.0)));
                 }
             }
             for number in 0..rows {
@@ -357,13 +357,13 @@ impl Conic {
                     NU
                 };
                 let row = equalities + k * rows + number;
-                entries.extend((0..NU).map(|j| (row, k * width + offset + j)));
+                entries.extend((0..NU).map(|j| (row, k * width + offset + j, 0.0)));
             }
         }
         let m = equalities + rows * horizon;
-        let mut a = SparseColumns::from_pattern(m, n, &entries);
-        let diagonal: Vec<(usize, usize)> = (0..n).map(|i| (i, i)).collect();
-        let mut p = SparseColumns::from_pattern(n, n, &diagonal);
+        let mut a = sparse(m, n, &entries);
+        let diagonal: Vec<_> = (0..n).map(|i| (i, i, 0.0)).collect();
+        let mut p = sparse(n, n, &diagonal);
         for k in 0..horizon {
             let factor = if k + 1 == horizon {
                 shared.terminal
@@ -372,12 +372,12 @@ impl Conic {
             };
             for j in 0..NU {
                 let at = k * width + j;
-                p.set(at, at, 2.0 * shared.input_weight[j]);
+                p.set_entry((at, at), 2.0 * shared.input_weight[j]);
             }
             for i in 0..NX {
                 let at = k * width + NU + i;
-                p.set(at, at, 2.0 * factor * shared.state_weight[i]);
-                a.set(k * NX + i, at, -1.0);
+                p.set_entry((at, at), 2.0 * factor * shared.state_weight[i]);
+                a.set_entry((k * NX + i, at), -1.0);
             }
             let all = shared.input_rows.iter().chain(&shared.joint_rows);
             for (number, (row, _)) in all.enumerate() {
@@ -388,7 +388,7 @@ impl Conic {
                 };
                 for (j, entry) in row.iter().enumerate() {
                     let at = equalities + k * rows + number;
-                    a.set(at, k * width + offset + j, *entry);
+                    a.set_entry((at, k * width + offset + j), *entry);
                 }
             }
         }
@@ -421,14 +421,16 @@ impl Conic {
                 let row = k * NX + i;
                 let mut right = -defect::<NX>(step, k, i);
                 for j in 0..NU {
-                    program.a.set(row, k * width + j, step.b[row * NU + j]);
+                    program
+                        .a
+                        .set_entry((row, k * width + j), step.b[row * NU + j]);
                 }
                 for j in 0..NX {
                     let entry = step.a[row * NX + j];
                     if k == 0 {
                         right -= entry * (step.x0[j] - step.reference[j]);
                     } else {
-                        program.a.set(row, (k - 1) * width + NU + j, entry);
+                        program.a.set_entry((row, (k - 1) * width + NU + j), entry);
                     }
                 }
                 program.b[row] = right;

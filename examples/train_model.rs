@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 
 use romc::recording::{self, Recording};
 use romc::robot::Robot;
-use romc::train::{self, Origin, Recordings, TrainOptions, Watch};
+use romc::train::{self, Monitor, Origin, Recordings, TrainOptions};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let latent_dim = std::env::args().nth(1).map_or(Ok(4), |text| text.parse())?;
@@ -40,7 +40,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         robot,
         &options,
         &Origin::new(command, files),
-        &mut Watch::new(&mut listener, &cancel),
+        &mut Monitor::new(&mut listener, &cancel),
     )?;
     println!(
         "trained in {:.2} s: {:#?}",

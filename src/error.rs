@@ -50,7 +50,7 @@ pub enum Error {
     #[error(transparent)]
     Sim(#[from] crate::sim::SimError),
     #[error(transparent)]
-    Physical(#[from] crate::equations::PhysicalError),
+    Physical(#[from] PhysicalError),
     #[error(transparent)]
     Evaluate(#[from] crate::evaluate::EvaluateError),
     #[error(transparent)]
@@ -61,55 +61,44 @@ pub enum Error {
     Mpc(#[from] crate::mpc::MpcError),
     #[error(transparent)]
     Plan(#[from] crate::plan::PlanError),
-    /// A plan that nothing should carry out.
     #[error("no plan to be trusted: {0} (--force writes it all the same)")]
     Distrusted(String),
-    /// A file of settings that cannot be used; the message of its parser names line, key and what was expected.
+    /// A file that cannot be used or written as the command line asks.
     #[error("{path}: {message}", path = path.display())]
     Config { path: PathBuf, message: String },
-    /// An MCAP file holds one stretch of time.
-    #[error("found {0} segments, expected one for an MCAP file")]
-    OneSegment(usize),
-    /// The ending of an output says its format.
-    #[error("{path}: found {found}, expected a name that ends in {expected}", path = path.display())]
-    Ending {
-        path: PathBuf,
+    /// An output whose name the command does not accept.
+    #[error("{path}: {message}", path = path.display())]
+    Output { path: PathBuf, message: String },
+    /// Another number of files or segments than one.
+    #[error("found {found}, expected one {expected}")]
+    NotOne {
         found: String,
-        expected: String,
+        expected: &'static str,
     },
-    /// An output that would replace an input.
-    #[error("{path}: the command reads this file{other}, and does not replace it; choose another name for the output", path = path.display(), other = other_name(path, input))]
-    IsRead { path: PathBuf, input: PathBuf },
     /// A flag that the command would ignore.
     #[error("{flag} has no effect here; it needs {needs}")]
     Idle {
         flag: &'static str,
         needs: &'static str,
     },
-    /// A map is guessed of one log at a time.
-    #[error("found {0} files, expected one log to guess a map of")]
-    OneLog(usize),
     /// An imported model that does not fit the recordings given with it.
     #[error("{file}: {fault}; --unchecked writes the model all the same", file = file.display())]
     Mismatch { file: PathBuf, fault: String },
-    /// A file that romc would have to replace.
     #[error("{0}: already exists; pass --force to replace it, or choose another name")]
     Exists(PathBuf),
-    /// An output that is no file.
-    #[error("{0}: is a folder; expected the name of a file")]
-    IsFolder(PathBuf),
-    /// An output in a folder that is not there.
-    #[error("{path}: there is no folder `{folder}`; make it first", path = path.display(), folder = folder.display())]
-    NoFolder { path: PathBuf, folder: PathBuf },
-    /// The file system refused an input.
     #[error("{path}: cannot read", path = path.display())]
     Read { path: PathBuf, source: io::Error },
-    /// The file system refused an output.
     #[error("{path}: cannot write")]
     Write { path: PathBuf, source: io::Error },
 }
 
 impl Error {
+    /// A file that cannot be used or written as the command line asks.
+    pub(crate) fn refused(path: &Path, message: impl Into<String>) -> Self {
+        let (path, message) = (path.to_owned(), message.into());
+        Self::Config { path, message }
+    }
+
     /// Whether an option had a value that it cannot have, as opposed to a run that failed.
     pub fn is_usage(&self) -> bool {
         match self {
@@ -121,44 +110,10 @@ impl Error {
             Self::Simplify(error) => {
                 matches!(error, SimplifyError::NoSamples | SimplifyError::Margin)
             }
-            // Exit code 1 of `check` says that two files differ.
-            Self::Rename(_)
-            | Self::Name(_)
-            | Self::Check(_)
-            | Self::OneLog(_)
-            | Self::Ending { .. }
-            | Self::IsRead { .. }
-            | Self::Idle { .. }
-            | Self::OneSegment(_) => true,
-            Self::Recording(_)
-            | Self::Identify(_)
-            | Self::Model(_)
-            | Self::Emit(_)
-            | Self::Typeset(_)
-            | Self::Codegen(_)
-            | Self::Folder(_)
-            | Self::Lower(_)
-            | Self::Sim(_)
-            | Self::Study(_)
-            | Self::Evaluate(_)
-            | Self::Mpc(_)
-            | Self::Plan(_)
-            | Self::Distrusted(_)
-            | Self::Config { .. }
-            | Self::Mismatch { .. }
-            | Self::Exists(_)
-            | Self::IsFolder(_)
-            | Self::NoFolder { .. }
-            | Self::Read { .. }
-            | Self::Write { .. } => false,
+            // Exit code 1 of `check` means that two files differ.
+            Self::Check(_) | Self::Rename(_) | Self::Name(_) => true,
+            Self::Output { .. } | Self::NotOne { .. } | Self::Idle { .. } => true,
+            _ => false, // faults of files and runs
         }
-    }
-}
-
-/// The name by which a file is read, where it is not the one by which it is written.
-fn other_name(path: &Path, input: &Path) -> String {
-    match path == input {
-        true => String::new(),
-        false => format!(" as {}", input.display()),
     }
 }

@@ -266,6 +266,21 @@ fn emission_is_the_same_twice_and_names_its_origin_in_every_source() {
                 .contains(&format!("{name} = {{ version = \"={version}\""))
         );
     }
+    let lock = (files.iter())
+        .find(|file| file.path == "go1_d4-controller/Cargo.lock")
+        .expect("a lock file");
+    let names = (lock.contents.lines()).filter_map(|line| line.strip_prefix("name = "));
+    let names: Vec<&str> = names.map(|name| name.trim_matches('"')).collect();
+    for needed in ["clarabel", "nalgebra", "amd", "go1_d4", "go1_d4-controller"] {
+        assert!(names.contains(&needed), "{needed}");
+    }
+    for other in ["romc", "clap", "zip"] {
+        assert!(!names.contains(&other), "{other}");
+    }
+    assert!(names.is_sorted());
+    // Both versions of thiserror: clarabel's and romc's own.
+    let both = names.iter().filter(|name| **name == "thiserror");
+    assert_eq!(both.count(), 2);
 }
 
 #[test]

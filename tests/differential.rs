@@ -12,8 +12,12 @@ mod drivers;
 mod functions;
 #[path = "differential/kinks.rs"]
 mod kinks;
+#[path = "differential/lowered.rs"]
+mod lowered;
 #[path = "differential/models.rs"]
 mod models;
+#[path = "differential/sines.rs"]
+mod sines;
 #[path = "differential/single.rs"]
 mod single;
 #[path = "differential/slopes.rs"]
@@ -31,7 +35,7 @@ use drivers::{Build, Workshop, contents};
 use functions::{Function, Random, functions as functions_of};
 use nalgebra::DVector;
 use romc::equations::Equations;
-use romc::ir::{Interpreter, Statement};
+use romc::ir::Interpreter;
 use romc::lower::CompiledModel;
 use romc::lower::{Form, Map, dynamics_jacobian};
 use romc::model::{LatentVariable, ReducedModel};
@@ -218,13 +222,6 @@ fn random_models_have_all_shapes() {
         let xi = &model.phases()[0].xi;
         model.phases()[0].active_count() as f64 / xi.len() as f64
     };
-    some("sums of vectors", &|model| {
-        let system = Equations::of(model);
-        let lowered = dynamics_jacobian(&system, 0, Form::default());
-        let (program, _) = lowered.expect("lowers");
-        let mut statements = program.statements().iter();
-        statements.any(|statement| matches!(statement, Statement::Quads { .. }))
-    });
     some("dense Xi", &|model| density(model) > 0.8);
     some("sparse Xi", &|model| density(model) < 0.2);
 }
@@ -237,7 +234,6 @@ fn generated_code_with_tables_equals_the_interpreter() {
     let cases = [Case::new(models, 100, Form::Tables)];
     check_all("tables", &cases, |_| {
         let mut builds = Build::exact();
-        builds.push(Build::c_scalar_lanes());
         builds.extend(tools::thorough_or(Some(Build::c_fast()), None));
         builds
     });

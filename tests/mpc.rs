@@ -4,10 +4,14 @@
 mod control;
 #[path = "mpc/failures.rs"]
 mod failures;
+#[path = "mpc/interface.rs"]
+mod interface;
 #[path = "mpc/lift_pyramids.rs"]
 mod lift_pyramids;
 #[path = "mpc/lifts.rs"]
 mod lifts;
+#[path = "mpc/linearise.rs"]
+mod linearise;
 #[path = "mpc/nonlinear.rs"]
 mod nonlinear;
 mod outside;
@@ -19,6 +23,8 @@ mod random;
 mod recordings;
 #[path = "mpc/riccati.rs"]
 mod riccati;
+#[path = "mpc/rows.rs"]
+mod rows;
 #[path = "mpc/swing.rs"]
 mod swing;
 #[path = "mpc/synthetic.rs"]

@@ -3,6 +3,8 @@
 
 #[path = "command_line/mod.rs"]
 mod command_line;
+#[path = "plan/planned.rs"]
+mod planned;
 
 use std::fs;
 use std::path::Path;
@@ -75,7 +77,7 @@ fn plan_is_a_recording_that_other_commands_take() {
             "compile",
             &model,
             "--emit",
-            "controller-c",
+            "controller,controller-c",
             "--plan",
             "plan.csv",
             "--out-dir",
@@ -83,6 +85,18 @@ fn plan_is_a_recording_that_other_commands_take() {
         ],
     );
     assert!(emitted.contains("controller"), "{emitted}");
+    let of_example = folder.join("code/go1_d6-controller/examples/go1_d6_plan.c");
+    let source = fs::read_to_string(of_example).expect("the plan of the example");
+    let written = source.split([',', '{', '}', '\n', ' ']);
+    let written: Vec<f64> = (written.filter(|word| word.contains('e')))
+        .flat_map(str::parse)
+        .collect();
+    let count = x.ncols();
+    assert_eq!(written.len(), count * (1 + 3 * 18));
+    for (found, expected) in written[count..].iter().zip(x.iter()) {
+        let error = (found - expected).abs();
+        assert!(error <= 1e-8 * expected.abs(), "{found} {expected}");
+    }
     let again = [&plan[..], &goal].concat();
     let output = romc(folder, &again);
     let stderr = text(&output.stderr);

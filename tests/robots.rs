@@ -5,6 +5,8 @@
 //! `examples/robots/reference.py`.
 
 mod command_line;
+#[path = "robots/formulas.rs"]
+mod formulas;
 #[path = "robots/made.rs"]
 mod made;
 mod tools;
@@ -17,10 +19,11 @@ use std::process::Command;
 
 use nalgebra::{Matrix3, Vector3};
 use romc::artifact;
+use romc::ir::Interpreter;
 use romc::lower;
-use romc::model::{Library, ReducedModel};
-use romc::robot::{InputRule, Leg, LegGeometry, Robot, WrenchFrame};
-use romc::robot_file::{self, RobotEntry, RobotOptions};
+use romc::model::{AffineMap, Library, ReducedModel, Scaling, StateMap};
+use romc::robot::{Actuators, InputRule, Leg, LegGeometry, Robot, WrenchFrame};
+use romc::robot_file::{self, RobotEntry, RobotFileError, RobotOptions};
 use serde_json::Value;
 
 use command_line::{romc, text};
@@ -35,8 +38,13 @@ fn file(name: &str) -> PathBuf {
     root().join("examples/robots").join(name)
 }
 
+fn from_text(file: &str, text: &str) -> Result<&'static Robot, RobotFileError> {
+    let read = robot_file::from_text(file, text, &RobotOptions::default())?;
+    Ok(read.robot)
+}
+
 fn robot(name: &str) -> &'static Robot {
-    robot_file::read(&file(name), &[]).expect("an example")
+    robot_file::find(&file(name).to_string_lossy()).expect("an example")
 }
 
 fn numbers(value: &Value) -> Vec<f64> {
@@ -57,7 +65,7 @@ fn feet_and_jacobians_are_those_of_pinocchio() {
         "<link name=\"world\"/><joint name=\"held\" type=\"fixed\"><parent link=\"world\"/><child link=\"torso\"/>\
          <origin xyz=\"0.3 -0.1 2\" rpy=\"0.1 0.2 0.7\"/></joint></robot>",
     );
-    let below_world = robot_file::from_urdf("t.urdf", &below_world, &[]).expect("reads");
+    let below_world = from_text("t.urdf", &below_world).expect("reads");
     let robots = FILES.map(|name| (name, robot(name)));
     for (name, robot) in robots.into_iter().chain([("hare.urdf", below_world)]) {
         let mut legs = 0;
@@ -122,7 +130,7 @@ fn legs_are_matched_by_where_they_stand() {
 #[test]
 fn robot_of_a_urdf_comes_back_from_its_own_toml_bit_for_bit() {
     let hare = robot("hare.urdf");
-    let again = robot_file::from_toml("hare.toml", &robot_file::to_toml(hare)).expect("its text");
+    let again = from_text("hare.toml", &robot_file::to_toml(hare)).expect("its text");
     assert!(std::ptr::eq(again, hare));
     assert!((hare.mass_kg() - 11.6).abs() < 1e-12);
     let turned = hare.joint_limit_rad()[8];
@@ -174,42 +182,27 @@ fn model_file_carries_its_robot() {
 }
 
 #[test]
-fn generalised_input_of_any_robot_is_that_of_its_rule() {
-    let mut random = 1_u64;
-    let mut between = |low: f64, high: f64| {
-        random = random
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1);
-        low + (high - low) * ((random >> 11) as f64 / (1_u64 << 53) as f64)
-    };
+fn generalised_input_of_robots_of_files_is_that_of_the_rule_also_where_it_is_damped() {
+    let mut random = Random(1);
     for name in FILES {
         let robot = robot(name);
-        assert!(
-            Leg::ALL
-                .iter()
-                .all(|leg| matches!(robot.geometry(*leg), LegGeometry::Chain(_)))
-        );
+        let is_chain = |leg: &Leg| matches!(robot.geometry(*leg), LegGeometry::Chain(_));
+        assert!(Leg::ALL.iter().all(is_chain));
         for frame in WrenchFrame::ALL {
-            let model = over_robot(robot, frame);
-            let program = lower::generalised_input(&model)
-                .expect("lowers")
-                .expect("a robot");
-            let mut interpreter = romc::ir::Interpreter::new(&program);
+            let rule = InputRule::new(robot, None, frame);
+            let mut input = Input::of(&rule);
             let mut damped = 0;
             for _ in 0..300 {
-                let x: [f64; 18] = std::array::from_fn(|_| between(-2.0, 2.0));
-                let tau: [f64; 12] = std::array::from_fn(|_| between(-20.0, 20.0));
-                let feet: [bool; 4] = std::array::from_fn(|_| between(0.0, 1.0) < 0.6);
+                let x: [f64; 18] = std::array::from_fn(|_| random.between(-2.0, 2.0));
+                let tau: [f64; 12] = std::array::from_fn(|_| random.between(-20.0, 20.0));
+                let feet: [bool; 4] = std::array::from_fn(|_| random.between(0.0, 1.0) < 0.6);
                 let joints: [f64; 12] = std::array::from_fn(|k| x[k]);
                 damped += usize::from(Leg::ALL.iter().any(|leg| {
                     let spans = robot.geometry(*leg).spans(&leg.of_joints(&joints));
                     feet[leg.index()] && (spans[0] < 0.3 || spans[1] < 0.12)
                 }));
-                let rule = InputRule::new(robot, None, frame);
                 let expected = rule.wrench(&x, &tau, feet).expect("finite");
-                let mut u = [0.0; 18];
-                let feet = feet.map(|foot| f64::from(u8::from(foot)));
-                interpreter.run(&[&x, &[0.0; 18], &tau, &feet], &mut [&mut u]);
+                let u = input.run(&x, &[0.0; 18], &tau, &numbers_of(feet));
                 for (found, expected) in u[12..].iter().zip(&expected) {
                     let bound = 1e-9 * (1.0 + expected.abs());
                     assert!(
@@ -223,19 +216,157 @@ fn generalised_input_of_any_robot_is_that_of_its_rule() {
     }
 }
 
+/// Every built-in robot with and without losses of the joints, in both frames.
+fn rules() -> Vec<InputRule> {
+    let actuators = Actuators::of_leg([1.0, 0.6, 0.5], [0.2, 0.0, 0.3], [0.01; 3]);
+    let mut rules = Vec::new();
+    for name in Robot::known_names() {
+        let robot = Robot::by_name(name).expect("a known robot");
+        for frame in WrenchFrame::ALL {
+            rules.push(InputRule::new(robot, None, frame));
+            rules.push(InputRule::new(robot, Some(actuators.clone()), frame));
+        }
+    }
+    rules
+}
+
+/// A state and its velocities.
+fn sample(random: &mut Random, knee: (f64, f64)) -> [[f64; 18]; 2] {
+    let x = std::array::from_fn(|k| match (k < 12, k % 3) {
+        (true, 0) => random.between(-0.8, 0.8),
+        (true, 1) => random.between(-0.3, 3.0),
+        (true, _) => random.between(knee.0, knee.1),
+        (false, _) => random.between(-1.4, 1.4),
+    });
+    let dx = std::array::from_fn(|k| match k % 4 {
+        0 => random.between(-0.1, 0.1),
+        _ => random.between(-12.0, 12.0),
+    });
+    [x, dx]
+}
+
+#[test]
+fn generalised_input_is_that_of_the_rule_for_every_frame_and_contact_with_losses_of_the_joints() {
+    let mut random = Random(11);
+    for rule in rules() {
+        let mut input = Input::of(&rule);
+        for k in 0..40 {
+            // Also knees that are nearly stretched, and feet at the height of their hips.
+            let knee = if k % 4 == 0 {
+                (-0.2, 0.2)
+            } else {
+                (-2.7, -0.9)
+            };
+            let [x, dx] = sample(&mut random, knee);
+            let tau: [f64; 12] = std::array::from_fn(|_| random.between(-30.0, 30.0));
+            let losses = rule.losses(&std::array::from_fn(|i| dx[i]), &[0.0; 12]);
+            let net: [f64; 12] = std::array::from_fn(|i| tau[i] - losses[i]);
+            for bits in 0..16_usize {
+                let contact: [bool; 4] = std::array::from_fn(|k| bits >> k & 1 == 1);
+                let u = input.run(&x, &dx, &tau, &numbers_of(contact));
+                let wrench = rule.wrench(&x, &net, contact).expect("finite");
+                for i in 0..12 {
+                    assert!((u[i] - net[i]).abs() < 1e-14 * (1.0 + tau[i].abs() + losses[i].abs()));
+                }
+                for i in 0..6 {
+                    let largest = wrench.rows(i / 3 * 3, 3).amax() + 1e-3 * wrench.amax();
+                    let error = (u[12 + i] - wrench[i]).abs();
+                    assert!(error <= 1e-11 * largest, "{rule:?} {i}: {u:?} {wrench}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn generalised_input_of_a_stretched_leg_is_bounded_and_zero_in_the_air() {
+    for rule in rules() {
+        let mut input = Input::of(&rule);
+        let mut at = |feet: f64| input.run(&[0.0; 18], &[0.0; 18], &[20.0; 12], &[feet; 4]);
+        let on_ground = at(1.0);
+        let force = on_ground[12..].iter().fold(0.0_f64, |m, f| m.max(f.abs()));
+        assert!(force > 1.0 && force < 4000.0, "{rule:?} {on_ground:?}");
+        assert_eq!(at(0.0)[12..], [0.0; 6]);
+    }
+}
+
+#[test]
+fn actuator_torque_undoes_the_friction_of_generalised_input_and_adds_the_inertia() {
+    let mut random = Random(5);
+    for rule in rules() {
+        let [x, dx] = sample(&mut random, (-2.0, -1.0));
+        let tau: [f64; 12] = std::array::from_fn(|_| random.between(-30.0, 30.0));
+        let u = Input::of(&rule).run(&x, &dx, &tau, &[1.0; 4]);
+        let program = lower::actuator_torque(&over_robot(&rule)).expect("lowers");
+        let mut interpreter = Interpreter::new(&program.expect("a robot"));
+        for acceleration in [0.0, 70.0] {
+            let inputs = [&dx[..], &[acceleration; 18], &u[..12]].map(<[f64]>::to_vec);
+            let back = interpreter.results(&inputs).remove(0);
+            let inertia = rule.actuators().map_or(0.0, |_| 0.01 * acceleration);
+            for (found, tau) in back.into_iter().zip(tau) {
+                assert!((found - tau - inertia).abs() < 1e-13 * 50.0, "{rule:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn generalised_input_weighs_a_foot_with_its_number() {
+    let go1 = InputRule::published(Robot::by_name("go1").expect("a known robot"));
+    let mut input = Input::of(&go1);
+    let x: [f64; 18] = std::array::from_fn(|k| match (k < 12, k % 3) {
+        (true, joint) => [0.1, 0.7, -1.4][joint],
+        (false, _) => 0.0,
+    });
+    let tau: [f64; 12] = std::array::from_fn(|k| k as f64 - 4.0);
+    let [full, half] =
+        [1.0, 0.5].map(|foot| input.run(&x, &[0.0; 18], &tau, &[foot, 0.0, 0.0, 0.0]));
+    for i in 12..18 {
+        assert!((half[i] - 0.5 * full[i]).abs() < 1e-12, "{i}");
+    }
+}
+
+/// Numbers that are the same in every run.
+struct Random(u64);
+
+impl Random {
+    fn between(&mut self, low: f64, high: f64) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005);
+        self.0 = self.0.wrapping_add(1_442_695_040_888_963_407);
+        low + (high - low) * ((self.0 >> 11) as f64 / (1_u64 << 53) as f64)
+    }
+}
+
+fn numbers_of(feet: [bool; 4]) -> [f64; 4] {
+    feet.map(|foot| f64::from(u8::from(foot)))
+}
+
+/// The program of generalised inputs.
+struct Input(Interpreter);
+
+impl Input {
+    fn of(rule: &InputRule) -> Self {
+        let program = lower::generalised_input(&over_robot(rule)).expect("lowers");
+        Self(Interpreter::new(&program.expect("a robot")))
+    }
+
+    fn run(&mut self, x: &[f64], dx: &[f64], tau: &[f64], feet: &[f64]) -> [f64; 18] {
+        let mut u = [0.0; 18];
+        self.0.run(&[x, dx, tau, feet], &mut [&mut u]);
+        u
+    }
+}
+
 /// A model over the 18 coordinates of a robot.
-fn over_robot(robot: &'static Robot, frame: WrenchFrame) -> ReducedModel {
-    use romc::model::{AffineMap, ScaleFactors, Scaling, StateMap};
+fn over_robot(rule: &InputRule) -> ReducedModel {
     let weights = nalgebra::DMatrix::from_fn(1, 18, |_, k| 0.1 + 0.01 * k as f64);
     let encoder = AffineMap::new("encoder", weights, nalgebra::DVector::zeros(1)).expect("fits");
-    model_on(robot)
+    model_on(rule.robot())
         .into_builder()
         .encoder(StateMap::from(encoder))
-        .scaling(Scaling {
-            state: ScaleFactors::Uniform(1.0),
-            input: ScaleFactors::Uniform(1.0),
-        })
-        .wrench_frame(frame)
+        .scaling(Scaling::uniform(1.0))
+        .wrench_frame(rule.wrench_frame())
+        .actuators(rule.actuators().cloned())
         .build()
         .expect("a model")
 }
@@ -276,9 +407,7 @@ fn trees_of_other_robots_are_told_apart() {
             "link `l0_2` beyond joint `j0_2`: found no link on a fixed joint",
         ),
     ] {
-        let error = robot_file::from_urdf("t.urdf", &tree(&limbs), &[])
-            .unwrap_err()
-            .to_string();
+        let error = from_text("t.urdf", &tree(&limbs)).unwrap_err().to_string();
         assert!(
             error.starts_with("t.urdf: ") && error.contains(said),
             "{error}"
@@ -304,9 +433,7 @@ fn trees_of_other_robots_are_told_apart() {
     ] {
         assert!(hare.contains(from), "{from}");
         let wrong = hare.replace(from, to);
-        let error = robot_file::from_urdf("t.urdf", &wrong, &[])
-            .unwrap_err()
-            .to_string();
+        let error = from_text("t.urdf", &wrong).unwrap_err().to_string();
         assert!(error.contains(said), "{error}");
     }
 }
@@ -318,7 +445,8 @@ fn command_shows_a_robot_and_writes_its_toml() {
     let done = romc(folder.path(), &["robot", &urdf, "--output", "hare.toml"]);
     assert!(done.status.success(), "{}", text(&done.stderr));
     assert!(text(&done.stdout).contains("ne_swing"));
-    let written = robot_file::read(&folder.path().join("hare.toml"), &[]).expect("its TOML");
+    let written =
+        robot_file::find(&folder.path().join("hare.toml").to_string_lossy()).expect("its TOML");
     assert!(std::ptr::eq(written, robot("hare.urdf")));
     let feet = "se_paw,nw_paw,sw_paw,ne_paw";
     let named = romc(folder.path(), &["robot", &urdf, "--feet", feet, "--json"]);
@@ -403,18 +531,14 @@ fn names_that_act_on_the_text_around_them_are_refused() {
             let hostile = format!("{name}{acts}x");
             let quoted = Value::from(hostile.as_str()).to_string();
             let text = solo12.replace(&format!("\"{name}\""), &quoted);
-            let error = robot_file::from_toml("r.toml", &text)
-                .expect_err("a fault")
-                .to_string();
+            let error = from_text("r.toml", &text).expect_err("a fault").to_string();
             let found =
                 format!("r.toml: {place}: found {hostile:?}, expected a name of at most 80 bytes");
             assert!(error.starts_with(&found), "{error}");
         }
     }
     let text = robot_file::to_toml(robot("solo12.toml")).replace("FL_HAA", "FL*/HAA");
-    let error = robot_file::from_toml("r.toml", &text)
-        .unwrap_err()
-        .to_string();
+    let error = from_text("r.toml", &text).unwrap_err().to_string();
     assert!(
         error.contains("leg[1].joint[0].name: found \"FL*/HAA\""),
         "{error}"
@@ -431,7 +555,8 @@ fn known_robots_are_planar_and_come_back_from_their_own_text_as_themselves() {
                 "{name} {leg}"
             );
         }
-        let again = robot_file::from_toml(name, &robot_file::to_toml(robot)).expect("its own text");
+        let again =
+            from_text(&format!("{name}.toml"), &robot_file::to_toml(robot)).expect("its own text");
         assert!(std::ptr::eq(again, robot), "{name}");
         assert!(std::ptr::eq(robot_file::find(name).expect("known"), robot));
     }
@@ -470,7 +595,7 @@ fn faults_name_the_entry() {
         ("axis = \"y\"", "axis = \"z\"", "parallel axes"),
     ] {
         assert!(good.contains(from), "{from}");
-        let error = robot_file::from_toml("r.toml", &good.replacen(from, to, 1))
+        let error = from_text("r.toml", &good.replacen(from, to, 1))
             .unwrap_err()
             .to_string();
         assert!(error.contains(said), "{error}");
@@ -515,7 +640,7 @@ fn signs_and_offsets_turn_the_same_leg_at_other_angles() {
         "_calf_joint\", at = [0.0, 0.0, -0.213], axis = \"y\"",
         "_calf_joint\", at = [0.0, 0.0, -0.213], axis = \"y\", sign = -1.0, offset_rad = 0.4",
     );
-    let turned = robot_file::from_toml("mine.toml", &text).unwrap();
+    let turned = from_text("mine.toml", &text).unwrap();
     for leg in Leg::ALL {
         let q = [0.1, 0.7, -1.4];
         let read = [q[0], q[1], 0.4 - q[2]];

@@ -17,8 +17,8 @@ use romc::recording::{self, Recording};
 use romc::robot::{Actuators, Robot, WrenchFrame};
 use romc::sim::{LatentSegment, Restart, rollout};
 use romc::train::{
-    self, Coordinates, EncoderOptions, Origin, Progress, Recordings, ScaleOptions, SetMetrics,
-    Split, TrainError, TrainOptions, Trained, Transfer, Watch,
+    self, Coordinates, EncoderOptions, Monitor, Origin, Progress, Recordings, ScaleOptions,
+    SetMetrics, Split, TrainError, TrainOptions, Trained, Transfer,
 };
 
 fn jumps(set: &str, count: usize) -> Vec<Recording> {
@@ -67,7 +67,7 @@ fn train_with(
         go1(),
         options,
         &origin,
-        &mut Watch::new(&mut listener, &cancel),
+        &mut Monitor::new(&mut listener, &cancel),
     )
 }
 
@@ -403,7 +403,7 @@ fn cancelled_training_ends_without_a_model_when_none_is_complete() {
         go1(),
         &TrainOptions::new("m", 2),
         &Origin::new("romc train", paths(&training)),
-        &mut Watch::new(&mut listener, &cancel),
+        &mut Monitor::new(&mut listener, &cancel),
     );
     assert!(matches!(result, Err(TrainError::Cancelled)));
 }
@@ -422,8 +422,8 @@ fn cancelled_at(
     };
     let training = jumps("train", 2);
     let recordings = Recordings::new(&training, &[]);
-    let mut watch = Watch::new(&mut listener, &cancel);
-    method(recordings, go1(), options, &Origin::default(), &mut watch)
+    let mut monitor = Monitor::new(&mut listener, &cancel);
+    method(recordings, go1(), options, &Origin::default(), &mut monitor)
 }
 
 type Method = fn(
@@ -431,7 +431,7 @@ type Method = fn(
     &'static Robot,
     &TrainOptions,
     &Origin,
-    &mut Watch<'_>,
+    &mut Monitor<'_>,
 ) -> Result<Trained, TrainError>;
 
 fn tells(progress: &Progress, part: &str) -> bool {
@@ -505,8 +505,8 @@ fn joint(training: &[Recording], options: &TrainOptions, news: &mut Vec<String>)
     };
     let recordings = Recordings::new(training, &[]);
     let origin = Origin::new("romc train", paths(training));
-    let mut watch = Watch::new(&mut listener, &cancel);
-    train::joint(recordings, go1(), options, &origin, &mut watch).expect("trains")
+    let mut monitor = Monitor::new(&mut listener, &cancel);
+    train::joint(recordings, go1(), options, &origin, &mut monitor).expect("trains")
 }
 
 fn few_epochs(activation: Activation) -> TrainOptions {
@@ -588,8 +588,14 @@ fn hidden_layers_are_refused_where_they_make_no_sense() {
     let training = jumps("train", 1);
     let (cancel, mut listener) = (AtomicBool::new(false), |_: Progress| ());
     let recordings = Recordings::new(&training, &[]);
-    let mut watch = Watch::new(&mut listener, &cancel);
-    let narrow = train::joint(recordings, go1(), &options, &Origin::default(), &mut watch);
+    let mut monitor = Monitor::new(&mut listener, &cancel);
+    let narrow = train::joint(
+        recordings,
+        go1(),
+        &options,
+        &Origin::default(),
+        &mut monitor,
+    );
     assert!(
         matches!(&narrow, Err(TrainError::Option { option: "encoder-layers", found, .. }) if found == "[8, 1]"),
         "{narrow:?}"

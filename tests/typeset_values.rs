@@ -1,6 +1,13 @@
 //! Printed equations mean what the model computes: the typeset tree is evaluated as a reader
 //! would and compared with the model.
 
+#[path = "typeset_values/names.rs"]
+mod names;
+#[path = "typeset_values/numbers.rs"]
+mod numbers;
+#[path = "typeset_values/texts.rs"]
+mod texts;
+
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;

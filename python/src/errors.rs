@@ -109,16 +109,14 @@ impl Fault {
                 column: Some(Column::Index(*column)),
                 ..Fault::of(Class::Model)
             },
-            ModelError::RankDeficient { matrix, .. } => Fault::at_tensor(matrix),
             ModelError::UnreachablePhase { phase, .. } => {
                 Fault::at_tensor(&format!("phases[{phase}].feet"))
             }
-            ModelError::Library(_) => Fault::at_tensor("library"),
+            ModelError::Term { .. } => Fault::at_tensor("library"),
             ModelError::Incomplete { part, .. } | ModelError::Missing { part, .. } => {
                 Fault::at_tensor(part)
             }
             ModelError::Nonlinear { part, .. } => Fault::at_tensor(part),
-            ModelError::Dimension { what, .. } => Fault::at_tensor(what),
             ModelError::Name { .. } | ModelError::Robot(_) | ModelError::PhaseIndex { .. } => {
                 Fault::of(Class::Model)
             }

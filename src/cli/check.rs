@@ -4,9 +4,9 @@ use std::fmt::Write as _;
 
 use serde_json::{Value, json};
 
+use super::Answer;
 use super::args::CheckArguments;
 use super::output::extend;
-use super::{Answer, DONE, FAILED};
 use crate::Error;
 use crate::check::{
     CheckDomain, CheckError, CheckOptions, Comparison, EquationComparison, Gap, Side,
@@ -18,7 +18,7 @@ use crate::typeset::significant;
 use crate::typeset::words::counted;
 
 /// Compares two files. The exit code is 0 if they are proven equal and 1 otherwise.
-pub fn run(arguments: &CheckArguments) -> Result<(Answer, u8), Error> {
+pub(crate) fn run(arguments: &CheckArguments) -> Result<Answer, Error> {
     let options = CheckOptions {
         exact: arguments.exact,
         symbols: SymbolNames::parse(&arguments.symbols)?,
@@ -34,20 +34,16 @@ pub fn run(arguments: &CheckArguments) -> Result<(Answer, u8), Error> {
         return Err(CheckError::Domain { path, message }.into());
     }
     let is_equal = comparison.says_the_same();
-    let answer = Answer {
-        text: text(&left, &right, &comparison),
-        json: json!({
-            "files": [&left.file, &right.file],
-            "equal": is_equal,
-            "exact": comparison.verdicts().all(|verdict| *verdict == Verdict::Equal),
-            "phases": comparison.phases.iter().map(|phase| json!({
-                "phase": phase.name,
-                "equations": phase.equations.iter().map(equation_json).collect::<Vec<_>>(),
-            })).collect::<Vec<_>>(),
-        }),
-    };
-    let code = if is_equal { DONE } else { FAILED };
-    Ok((answer, code))
+    let json = json!({
+        "files": [&left.file, &right.file],
+        "equal": is_equal,
+        "exact": comparison.verdicts().all(|verdict| *verdict == Verdict::Equal),
+        "phases": comparison.phases.iter().map(|phase| json!({
+            "phase": phase.name,
+            "equations": phase.equations.iter().map(equation_json).collect::<Vec<_>>(),
+        })).collect::<Vec<_>>(),
+    });
+    Ok(Answer::new(text(&left, &right, &comparison), json).failed_if(!is_equal))
 }
 
 fn domain(arguments: &CheckArguments) -> Result<CheckDomain, CheckError> {
@@ -61,7 +57,6 @@ fn domain(arguments: &CheckArguments) -> Result<CheckDomain, CheckError> {
     CheckDomain::from_toml(path, &text)
 }
 
-/// The comparison for people.
 fn text(left: &Side, right: &Side, comparison: &Comparison) -> String {
     let mut text = format!("A: {}\nB: {}\n", left.file, right.file);
     for phase in &comparison.phases {
@@ -123,7 +118,6 @@ fn dropping(verdict: &Verdict, [left, right]: [&Side; 2]) -> String {
     notes.collect()
 }
 
-/// The letter of a file.
 fn side(is_second: bool) -> &'static str {
     if is_second { "B" } else { "A" }
 }

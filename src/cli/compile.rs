@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use super::Answer;
 use super::args::{CompileArguments, UnitsChoice};
 use super::destination::{Format, Inputs};
-use super::output::{lines, names, note_mismatches, quoted, read_recordings, refused};
+use super::output::{lines, names, quoted, read_jump, shown};
 use super::simplification::{self, Outcome, exact_words};
 use crate::deploy::{self, EmitOptions, PlannedJump, Target};
 use crate::equations::Equations;
@@ -17,8 +17,7 @@ use crate::model::ReducedModel;
 use crate::typeset::{NumberStyle, PrintOptions, Rounding, SymbolTable, Table};
 use crate::{Error, artifact};
 
-/// Compiles a model into a folder.
-pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
+pub(crate) fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
     let save_model = arguments.simplification.save_model.as_deref();
     let (simplification, model) = (&arguments.simplification, &arguments.model);
     let inputs = Inputs::default()
@@ -68,29 +67,27 @@ pub fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
     if let Some(path) = save_model {
         artifact::write(path, model, arguments.force)?;
     }
-    Ok(Answer {
-        text: twice(&arguments.emit)
-            + &exact_words(&exact)
-            + &summary
-            + &text(arguments, equations, &written)
-            + &earlier_in_words(&earlier),
-        json: json!({
+    let text = twice(&arguments.emit)
+        + &exact_words(&exact)
+        + &summary
+        + &text(arguments, equations, &written)
+        + &earlier_in_words(&earlier);
+    let json = json!({
             "model": arguments.model.display().to_string(),
             "name": model.name(),
             "digest": artifact::digest(model).to_string(),
             "targets": arguments.emit.iter().map(|target| target.name()).collect::<Vec<_>>(),
             "exact": exact.steps(),
             "simplification": certificate,
-            "saved_model": save_model.map(|path| path.display().to_string()),
+            "saved_model": shown(&simplification.save_model),
             "files": written.iter().map(|(path, bytes)| {
                 json!({ "path": path.display().to_string(), "bytes": bytes })
             }).collect::<Vec<_>>(),
             "earlier_files": names(&earlier),
-        }),
-    })
+    });
+    Ok(Answer::new(text, json))
 }
 
-/// A note on a target that is named twice.
 fn twice(targets: &[Target]) -> String {
     let mut named = targets.iter().enumerate();
     let twice = named.find(|(place, target)| targets[..*place].contains(target));
@@ -99,7 +96,6 @@ fn twice(targets: &[Target]) -> String {
     lines("note: ", note)
 }
 
-/// The model and the written files as text.
 fn text(
     arguments: &CompileArguments,
     equations: &Equations<'_>,
@@ -154,18 +150,9 @@ fn planned(
     if !jumps(Target::Controller) && !jumps(Target::ControllerC) {
         let message =
             "--plan without a target that jumps it; add --emit controller or controller-c";
-        return Err(refused(path, message));
+        return Err(Error::refused(path, message));
     }
-    let reading = &arguments.simplification.reading;
-    let mut recording =
-        read_recordings(std::slice::from_ref(path), reading, model.robot().ok())?.swap_remove(0);
-    note_mismatches(&recording, model.robot()?);
-    if recording.segments.len() > 1 {
-        let found = recording.segments.len();
-        let message = format!("--plan takes one jump: found {found} segments");
-        return Err(refused(path, message));
-    }
-    let motion = recording.segments.swap_remove(0);
+    let motion = read_jump(model, path, &arguments.simplification.reading)?;
     Ok(Some(PlannedJump {
         u: motion.input(&model.input_rule()?)?,
         time_s: motion.time_s,

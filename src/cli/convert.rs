@@ -16,8 +16,7 @@ use crate::recording::{
 };
 use crate::{Error, artifact};
 
-/// Reads, chains and writes.
-pub fn run(arguments: &ConvertArguments) -> Result<Answer, Error> {
+pub(crate) fn run(arguments: &ConvertArguments) -> Result<Answer, Error> {
     Inputs::default()
         .and(&arguments.recordings)
         .and(&arguments.inputs_of)
@@ -44,16 +43,15 @@ pub fn run(arguments: &ConvertArguments) -> Result<Answer, Error> {
     let inputs = inputs.as_deref();
     write_recording(&arguments.output, segments, inputs, arguments.force)?;
     let output = arguments.output.display().to_string();
-    Ok(Answer {
-        text: format!("{output}: {samples} samples in {count} segments\n"),
-        json: json!({
-            "recordings": names(&arguments.recordings),
-            "output": output,
-            "samples": samples,
-            "segments": count,
-            "inputs": rule.is_some(),
-        }),
-    })
+    let text = format!("{output}: {samples} samples in {count} segments\n");
+    let json = json!({
+        "recordings": names(&arguments.recordings),
+        "output": output,
+        "samples": samples,
+        "segments": count,
+        "inputs": rule.is_some(),
+    });
+    Ok(Answer::new(text, json))
 }
 
 /// The segments one after the other; where there are several, each begins at 0 s.
@@ -74,8 +72,8 @@ fn chained(recordings: Vec<Recording>) -> Vec<Segment> {
 /// Writes a recording in the format that the ending of its name says.
 ///
 /// # Errors
-/// [`Error::OneSegment`] for an MCAP file of several, [`Error::Exists`], [`Error::Recording`] if the file system refuses.
-pub fn write_recording(
+/// [`Error::NotOne`] for an MCAP file of several, [`Error::Exists`], [`Error::Recording`] if the file system refuses.
+pub(crate) fn write_recording(
     path: &Path,
     segments: Vec<Segment>,
     inputs: Option<&[DMatrix<f64>]>,
@@ -83,7 +81,10 @@ pub fn write_recording(
 ) -> Result<(), Error> {
     let written = if (path.extension()).is_some_and(|ending| ending.eq_ignore_ascii_case("mcap")) {
         let [segment] = &segments[..] else {
-            return Err(Error::OneSegment(segments.len()));
+            return Err(Error::NotOne {
+                found: format!("{} segments", segments.len()),
+                expected: "for an MCAP file",
+            });
         };
         write_mcap(path, segment, inputs.map(|inputs| &inputs[0]), overwrite)
     } else {

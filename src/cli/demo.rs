@@ -12,8 +12,7 @@ use super::args::DemoArguments;
 use super::destination::Inputs;
 use super::output::{lines, names, spinner};
 use super::simplification::RESTART_S;
-use super::{Answer, code};
-use super::{mpc as mpc_command, report};
+use super::{Answer, mpc as mpc_command, report};
 use crate::deploy::{self, EmitOptions, Target};
 use crate::equations::Equations;
 use crate::evaluate::{Assessment, verdict};
@@ -27,10 +26,8 @@ use crate::simplify::Tolerance;
 use crate::train::sha256;
 use crate::{Error, artifact, recording};
 
-/// The shipped model that the demo works with.
 const MODEL: (&str, &[u8]) = ("go1-d4.json", include_bytes!("../../models/go1-d4.json"));
 
-/// Recorded jumps that its training did not see.
 const JUMPS: [(&str, &[u8]); 3] = [
     (
         "test_01",
@@ -46,12 +43,11 @@ const JUMPS: [(&str, &[u8]); 3] = [
     ),
 ];
 
-/// The tolerance within which the report lists changes.
 const REPORT_TOLERANCE: Tolerance = Tolerance::ShareOfRms(0.01);
 
 /// Runs the whole path and reports its files and metrics. The exit code is 1 if predictions of body x or z, the
 /// self-test or a run fail.
-pub fn run(arguments: &DemoArguments) -> Result<(Answer, u8), Error> {
+pub(crate) fn run(arguments: &DemoArguments) -> Result<Answer, Error> {
     let inputs = Inputs::default().into_folder(Some(&arguments.out_dir))?;
     let progress = spinner("reading the shipped model and recordings");
     let model = artifact::read_from_bytes(MODEL.0, MODEL.1)?;
@@ -119,11 +115,9 @@ pub fn run(arguments: &DemoArguments) -> Result<(Answer, u8), Error> {
         "failed": failed,
         "files": names(&made),
     });
-    let answer = Answer { text, json };
-    Ok((answer, code(is_failed)))
+    Ok(Answer::new(text, json).failed_if(is_failed))
 }
 
-/// The files, a line each.
 fn made_in(folder: &Path, made: &[PathBuf], files: &[EmittedFile]) -> String {
     let mut text = format!("made in {}:\n", folder.display());
     for (path, file) in made.iter().zip(files) {

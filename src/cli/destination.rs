@@ -11,19 +11,14 @@ use crate::robot::Robot;
 
 /// What an output file holds: the endings that it may have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Format(&'static [&'static str]);
+pub(crate) struct Format(&'static [&'static str]);
 
 impl Format {
-    /// A table as CSV.
-    pub const TABLE: Self = Self(&[".csv"]);
-    /// A recording.
-    pub const RECORDING: Self = Self(&[".csv", ".csv.gz", ".mcap"]);
-    /// A model file.
-    pub const MODEL: Self = Self(&[".json"]);
-    /// A robot, its actuators, a map of columns.
-    pub const TOML: Self = Self(&[".toml"]);
-    /// A report.
-    pub const PAGE: Self = Self(&[".html", ".htm"]);
+    pub(crate) const TABLE: Self = Self(&[".csv"]);
+    pub(crate) const RECORDING: Self = Self(&[".csv", ".csv.gz", ".mcap"]);
+    pub(crate) const MODEL: Self = Self(&[".json"]);
+    pub(crate) const TOML: Self = Self(&[".toml"]);
+    pub(crate) const PAGE: Self = Self(&[".html", ".htm"]);
 
     /// Refuses a name whose ending says another format. What is there and no file of a disk is refused elsewhere.
     fn check(self, path: &Path) -> Result<(), Error> {
@@ -33,16 +28,17 @@ impl Format {
         if is_device || self.0.iter().any(|ending| name.ends_with(ending)) {
             return Ok(());
         }
-        Err(Error::Ending {
+        let found = match path.extension() {
+            Some(ending) => format!(".{}", ending.to_string_lossy()),
+            None => "no ending".to_owned(),
+        };
+        let expected = match self.0 {
+            [all @ .., last] if !all.is_empty() => format!("{} or {last}", all.join(", ")),
+            all => all.concat(),
+        };
+        Err(Error::Output {
             path: path.to_owned(),
-            found: match path.extension() {
-                Some(ending) => format!(".{}", ending.to_string_lossy()),
-                None => "no ending".to_owned(),
-            },
-            expected: match self.0 {
-                [all @ .., last] if !all.is_empty() => format!("{} or {last}", all.join(", ")),
-                all => all.concat(),
-            },
+            message: format!("found {found}, expected a name that ends in {expected}"),
         })
     }
 }
@@ -50,11 +46,10 @@ impl Format {
 /// The files that a command reads, none of which it may replace, forced or not; and the folder that it writes into, as it
 /// is when the command begins.
 #[derive(Debug, Default)]
-pub struct Inputs<'a>(Vec<&'a Path>, Option<Begun>);
+pub(crate) struct Inputs<'a>(Vec<&'a Path>, Option<Begun>);
 
 impl<'a> Inputs<'a> {
-    /// These and more.
-    pub fn and<P: AsRef<Path> + ?Sized + 'a>(
+    pub(crate) fn and<P: AsRef<Path> + ?Sized + 'a>(
         mut self,
         more: impl IntoIterator<Item = &'a P>,
     ) -> Self {
@@ -63,13 +58,13 @@ impl<'a> Inputs<'a> {
     }
 
     /// The same for a command that writes into this folder.
-    pub fn into_folder(mut self, folder: Option<&Path>) -> Result<Self, Error> {
+    pub(crate) fn into_folder(mut self, folder: Option<&Path>) -> Result<Self, Error> {
         self.1 = folder.map(Begun::of).transpose()?;
         Ok(self)
     }
 
     /// These and the file of a robot, unless the name is that of one of romc's own.
-    pub fn and_robot(self, name: Option<&'a str>) -> Self {
+    pub(crate) fn and_robot(self, name: Option<&'a str>) -> Self {
         let is_file = |name: &&str| !Robot::known_names().contains(name);
         self.and(name.filter(is_file))
     }
@@ -83,19 +78,28 @@ impl<'a> Inputs<'a> {
             (input.canonicalize())
                 .is_ok_and(|input| input == place || Some(&*input) == place.parent())
         };
-        match self.0.iter().find(is_read) {
-            Some(input) if place.is_file() => Err(Error::IsRead {
-                path: output.to_owned(),
-                input: input.to_path_buf(),
-            }),
-            Some(_) | None => Ok(()),
-        }
+        let Some(input) = self.0.iter().find(is_read).filter(|_| place.is_file()) else {
+            return Ok(());
+        };
+        let other = match output == *input {
+            true => String::new(),
+            false => format!(" as {}", input.display()),
+        };
+        Err(Error::Output {
+            path: output.to_owned(),
+            message: format!(
+                "the command reads this file{other}, and does not replace it; choose another name for the output"
+            ),
+        })
     }
 
     /// Refuses an output by its name alone: a folder, a name that says another format, one of the inputs.
-    pub fn check_name(&self, path: &Path, format: Format) -> Result<(), Error> {
+    pub(crate) fn check_name(&self, path: &Path, format: Format) -> Result<(), Error> {
         if path.is_dir() || path.file_name().is_none() {
-            return Err(Error::IsFolder(path.to_owned()));
+            return Err(Error::refused(
+                path,
+                "is a folder; expected the name of a file",
+            ));
         }
         format.check(path)?;
         self.check(path)
@@ -103,7 +107,7 @@ impl<'a> Inputs<'a> {
 
     /// Refuses an output that could not be written, before long work begins: by its name, as it is there and may not be
     /// replaced, or as its folder is not.
-    pub fn check_output(
+    pub(crate) fn check_output(
         &self,
         path: Option<&Path>,
         format: Format,
@@ -116,17 +120,16 @@ impl<'a> Inputs<'a> {
         }
         match path.parent() {
             Some(folder) if !folder.as_os_str().is_empty() && !folder.is_dir() => {
-                Err(Error::NoFolder {
-                    path: path.to_owned(),
-                    folder: folder.to_owned(),
-                })
+                let folder = folder.display();
+                let message = format!("there is no folder `{folder}`; make it first");
+                Err(Error::refused(path, message))
             }
             Some(_) | None => Ok(()),
         }
     }
 
     /// Writes files into a folder, none of them one of these, nor one of that name that romc did not make.
-    pub fn write_folder(
+    pub(crate) fn write_folder(
         &self,
         folder: &Path,
         files: &[EmittedFile],
@@ -141,7 +144,7 @@ impl<'a> Inputs<'a> {
     }
 
     /// Writes figures into a folder, and says so in the answer.
-    pub fn write_figures(
+    pub(crate) fn write_figures(
         &self,
         folder: &Path,
         figures: &[Figure],

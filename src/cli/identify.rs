@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use super::Answer;
 use super::args::IdentifyArguments;
 use super::destination::{Format, Inputs};
-use super::output::{lines, names, note_repeated, read_with, reader, spinner, write_file};
+use super::output::{lines, names, note_repeated, read_with, reader, shown, spinner, write_file};
 use super::robot;
 use crate::Error;
 use crate::identify::{Identification, Legs, identify};
@@ -16,8 +16,7 @@ use crate::recording::Clocks;
 use crate::robot::Robot;
 use crate::typeset::{Table, significant};
 
-/// Identifies the robot and writes the file, if one is asked for.
-pub fn run(arguments: &IdentifyArguments) -> Result<Answer, Error> {
+pub(crate) fn run(arguments: &IdentifyArguments) -> Result<Answer, Error> {
     Inputs::default()
         .and(&arguments.recordings)
         .and(&arguments.reading.columns)
@@ -37,10 +36,7 @@ pub fn run(arguments: &IdentifyArguments) -> Result<Answer, Error> {
         write_file(path, found.to_toml().as_bytes(), arguments.force)?;
         let _ = writeln!(text, "\nwritten: {}", path.display());
     }
-    Ok(Answer {
-        text,
-        json: report(&found, arguments),
-    })
+    Ok(Answer::new(text, report(&found, arguments)))
 }
 
 fn text(found: &Identification, robot: &Robot, recordings: usize) -> String {
@@ -100,7 +96,6 @@ fn text(found: &Identification, robot: &Robot, recordings: usize) -> String {
     )
 }
 
-/// A table of values with their standard errors.
 fn quantities<const N: usize>(what: &str, rows: [(&str, &str, [f64; 2]); N]) -> Table {
     Table::of(rows)
         .column(what, "", |(name, ..)| *name)
@@ -140,6 +135,6 @@ fn report(found: &Identification, arguments: &IdentifyArguments) -> Value {
         "force_alone": { "gravity_m_s2": alone.gravity_m_s2, "mass_kg": alone.mass_kg },
         "samples": found.samples,
         "notes": found.notes,
-        "output": arguments.output.as_ref().map(|path| path.display().to_string()),
+        "output": shown(&arguments.output),
     })
 }

@@ -21,7 +21,6 @@ use crate::sim::with_input_statistics;
 use crate::typeset::Table;
 use crate::{Error, artifact};
 
-/// Imports a model and writes it.
 pub fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
     let library = match &arguments.library {
         Some(LibraryArgument::File(path)) => Some(path),
@@ -81,7 +80,7 @@ pub fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
         "lacking": lacking,
         "check": check.as_ref().map(|check| check_json(check, fault.as_deref())),
     });
-    Ok(Answer { text, json })
+    Ok(Answer::new(text, json))
 }
 
 /// An imported model, compared with recordings if there are any.
@@ -155,7 +154,6 @@ pub fn import_compared(
     }
 }
 
-/// A model without both maps cannot be compared with recordings.
 fn needs_maps(report: &ImportReport) -> Error {
     let unused = report
         .unused
@@ -221,7 +219,6 @@ fn options(arguments: &ImportArguments) -> Result<ImportOptions, Error> {
     })
 }
 
-/// The report of an import as text.
 fn describe(report: &ImportReport) -> String {
     let mut text = format!(
         "{} ({}): {} latent coordinates, ",
@@ -301,7 +298,6 @@ fn describe_check(check: &RoundTrip, fault: Option<&str>) -> String {
     text + "\n" + &lines("warning: ", fault) + "\n"
 }
 
-/// The same as JSON.
 fn check_json(check: &RoundTrip, fault: Option<&str>) -> Value {
     let orders: Map<String, Value> = (check.trials.by_order.iter())
         .map(|(order, r2)| (order.name().unwrap_or_default().to_owned(), json!(r2)))

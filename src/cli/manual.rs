@@ -11,8 +11,7 @@ use super::output::names;
 use crate::Error;
 use crate::files::{EmittedFile, write_files};
 
-/// Writes `romc.1` and `romc-COMMAND.1` for each command.
-pub fn pages(arguments: &ManualArguments) -> Result<Answer, Error> {
+pub(crate) fn pages(arguments: &ManualArguments) -> Result<Answer, Error> {
     let mut root = Arguments::command();
     root.build();
     let mut files = vec![file(&arguments.out_dir, "romc", root.clone())?];
@@ -25,10 +24,8 @@ pub fn pages(arguments: &ManualArguments) -> Result<Answer, Error> {
     }
     let written = write_files(&arguments.out_dir, &files, arguments.force)?;
     let paths = names(&written);
-    Ok(Answer {
-        text: format!("{}\n", paths.join("\n")),
-        json: json!({ "files": paths }),
-    })
+    let text = format!("{}\n", paths.join("\n"));
+    Ok(Answer::new(text, json!({ "files": paths })))
 }
 
 fn file(folder: &Path, name: &str, command: clap::Command) -> Result<EmittedFile, Error> {
@@ -46,8 +43,7 @@ fn file(folder: &Path, name: &str, command: clap::Command) -> Result<EmittedFile
     Ok(EmittedFile::new(path, String::from_utf8_lossy(&page)))
 }
 
-/// The completions of one shell.
-pub fn completions(arguments: &CompletionsArguments) -> Answer {
+pub(crate) fn completions(arguments: &CompletionsArguments) -> Answer {
     let mut script = Vec::new();
     let mut command = Arguments::command();
     clap_complete::generate(arguments.shell, &mut command, "romc", &mut script);
@@ -56,11 +52,6 @@ pub fn completions(arguments: &CompletionsArguments) -> Answer {
     let names = format!("compgen -W \"{robots}\"");
     let text =
         String::from_utf8_lossy(&script).replace(&names, &format!("compgen -f -W \"{robots}\""));
-    Answer {
-        json: json!({
-            "shell": arguments.shell.to_string(),
-            "script": text,
-        }),
-        text,
-    }
+    let json = json!({ "shell": arguments.shell.to_string(), "script": text });
+    Answer::new(text, json)
 }

@@ -13,8 +13,6 @@ mod destination;
 mod identify;
 mod import;
 mod inspect;
-mod inspect_model;
-mod inspect_recording;
 mod manual;
 mod mpc;
 mod output;
@@ -49,6 +47,22 @@ pub struct Answer {
     pub text: String,
     /// The same as one JSON object; that of a command gets the command's name before these entries.
     pub json: serde_json::Value,
+    /// The exit code of a command that ran: 0, 130 for a training that Ctrl-C cut short, or 1 where its own purpose
+    /// fails: files that `check` finds different; torques or control for `mpc`, predictions of body x or z for
+    /// `simulate` and `demo`, every use for `report`.
+    pub code: u8,
+}
+
+impl Answer {
+    fn new(text: String, json: serde_json::Value) -> Self {
+        let code = DONE;
+        Self { text, json, code }
+    }
+
+    fn failed_if(self, is_failed: bool) -> Self {
+        let code = if is_failed { FAILED } else { DONE };
+        Self { code, ..self }
+    }
 }
 
 /// Parses the process's arguments, runs the command, prints its answer.
@@ -75,7 +89,7 @@ pub fn run_with(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         }
     };
     match execute(arguments.command) {
-        Ok((Answer { text, json }, code)) => {
+        Ok(Answer { text, json, code }) => {
             let text = match arguments.json {
                 true => format!("{}\n", printable_json(&json.to_string())),
                 false => printable(&text).into_owned(),
@@ -99,41 +113,29 @@ const DONE: u8 = 0;
 const FAILED: u8 = 1;
 const WRONG_USAGE: u8 = 2;
 
-/// The exit code of a command that ran to its end.
-fn code(is_failed: bool) -> u8 {
-    if is_failed { FAILED } else { DONE }
-}
-
-/// Runs a command; the exit code of one that ran is 0, 130 for a training that Ctrl-C cut short, or 1 where its own
-/// purpose fails: files that `check` finds different; torques or control for `mpc`, predictions of body x or z for
-/// `simulate` and `demo`, every use for `report`.
-fn execute(command: Command) -> Result<(Answer, u8), Error> {
+fn execute(command: Command) -> Result<Answer, Error> {
     args::refuse_idle(&command)?;
-    let done = |answer: Result<Answer, Error>| answer.map(|answer| (answer, DONE));
-    let (name, ran) = match command {
-        Command::Check(arguments) => ("check", check::run(&arguments)),
-        Command::Demo(arguments) => ("demo", demo::run(&arguments)),
-        Command::Inspect(arguments) => ("inspect", done(inspect::run(&arguments))),
-        Command::Train(arguments) => ("train", train::run(&arguments)),
-        Command::Study(arguments) => ("study", done(study::run(&arguments))),
-        Command::Convert(arguments) => ("convert", done(convert::run(&arguments))),
-        Command::Identify(arguments) => ("identify", done(identify::run(&arguments))),
-        Command::Import(arguments) => ("import", done(import::run(&arguments))),
-        Command::Robot(arguments) => ("robot", done(robot::run(&arguments))),
-        Command::Compile(arguments) => ("compile", done(compile::run(&arguments))),
-        Command::Simulate(arguments) => ("simulate", simulate::run(&arguments)),
-        Command::Mpc(arguments) => ("mpc", mpc::run(&arguments)),
-        Command::Plan(arguments) => ("plan", done(plan::run(&arguments))),
-        Command::Report(arguments) => ("report", report::run(&arguments)),
-        Command::Manual(arguments) => ("manual", done(manual::pages(&arguments))),
-        Command::Completions(arguments) => {
-            ("completions", Ok((manual::completions(&arguments), DONE)))
-        }
+    let (name, mut answer) = match &command {
+        Command::Check(arguments) => ("check", check::run(arguments)?),
+        Command::Demo(arguments) => ("demo", demo::run(arguments)?),
+        Command::Inspect(arguments) => ("inspect", inspect::run(arguments)?),
+        Command::Train(arguments) => ("train", train::run(arguments)?),
+        Command::Study(arguments) => ("study", study::run(arguments)?),
+        Command::Convert(arguments) => ("convert", convert::run(arguments)?),
+        Command::Identify(arguments) => ("identify", identify::run(arguments)?),
+        Command::Import(arguments) => ("import", import::run(arguments)?),
+        Command::Robot(arguments) => ("robot", robot::run(arguments)?),
+        Command::Compile(arguments) => ("compile", compile::run(arguments)?),
+        Command::Simulate(arguments) => ("simulate", simulate::run(arguments)?),
+        Command::Mpc(arguments) => ("mpc", mpc::run(arguments)?),
+        Command::Plan(arguments) => ("plan", plan::run(arguments)?),
+        Command::Report(arguments) => ("report", report::run(arguments)?),
+        Command::Manual(arguments) => ("manual", manual::pages(arguments)?),
+        Command::Completions(arguments) => ("completions", manual::completions(arguments)),
     };
-    let (mut answer, code) = ran?;
     let entries = std::mem::replace(&mut answer.json, json!({ "command": name }));
     extend(&mut answer.json, entries);
-    Ok((answer, code))
+    Ok(answer)
 }
 
 /// Prints to stdout; a reader that has gone away (`| head`) is no failure.
@@ -150,7 +152,6 @@ fn print(text: &str) -> u8 {
     }
 }
 
-/// Prints an error and its chain of causes to stderr.
 fn print_error(error: &Error) {
     eprintln!("error: {}", printable(&error.to_string()));
     let first = std::error::Error::source(error);

@@ -4,13 +4,13 @@ use std::fmt::Write as _;
 
 use serde_json::{Value, json};
 
+use super::Answer;
 use super::args::MpcArguments;
 use super::destination::{Format, Inputs};
 use super::output::{
-    extend, lines, note, numbered, progress_bar, read_recordings, show_progress, write_file,
+    extend, lines, note, numbered, progress_bar, read_for, show_progress, shown, write_file,
 };
 use super::simplification::RESTART_S;
-use super::{Answer, code};
 use crate::evaluate::{
     Assessment, ControlMetrics, ReferenceInput, Verdict, along_recording, control_metrics,
     usual_settings, verdict,
@@ -27,7 +27,7 @@ use crate::{Error, artifact};
 
 /// Runs the controller along each recording. The exit code is 1 if the model is not fit for torques or control there, or
 /// if most steps along one of them have no plan.
-pub fn run(arguments: &MpcArguments) -> Result<(Answer, u8), Error> {
+pub(crate) fn run(arguments: &MpcArguments) -> Result<Answer, Error> {
     let inputs = Inputs::default()
         .and([&arguments.model])
         .and(&arguments.recordings)
@@ -43,11 +43,7 @@ pub fn run(arguments: &MpcArguments) -> Result<(Answer, u8), Error> {
         torque_rate_nm_s: arguments.torque_rate,
         ..MpcSettings::default()
     };
-    let recordings = read_recordings(
-        &arguments.recordings,
-        &arguments.reading,
-        model.robot().ok(),
-    )?;
+    let recordings = read_for(&model, &arguments.recordings, &arguments.reading)?;
     let runs = run_all(&model, &recordings, settings, arguments.reference_input)?;
     let assessment = Assessment::over(&model, &recordings, RESTART_S)?;
     let verdict = verdict(&model, &assessment, &judged(&runs));
@@ -62,17 +58,15 @@ pub fn run(arguments: &MpcArguments) -> Result<(Answer, u8), Error> {
         let table = command_table(&model, &runs);
         write_file(path, table.csv().as_bytes(), arguments.force)?;
     }
-    Ok((answer, code(is_failed)))
+    Ok(answer.failed_if(is_failed))
 }
 
-/// What the verdict takes of runs.
-pub fn judged(runs: &[NamedRun]) -> Vec<&ControlMetrics> {
+pub(crate) fn judged(runs: &[NamedRun]) -> Vec<&ControlMetrics> {
     let metrics = runs.iter().filter_map(|(_, run)| run.metrics.as_ref());
     metrics.collect()
 }
 
-/// Runs a fresh controller along each recording.
-pub fn run_all(
+pub(crate) fn run_all(
     model: &ReducedModel,
     recordings: &[Recording],
     settings: MpcSettings,
@@ -96,7 +90,7 @@ pub fn run_all(
 
 /// Runs with default settings: with the plain lift, then with the consistent one. Recordings of fewer samples than a
 /// default stage has are followed at the rate of the slowest, which a note says.
-pub fn run_with_both_lifts(
+pub(crate) fn run_with_both_lifts(
     model: &ReducedModel,
     recordings: &[Recording],
 ) -> Result<[Vec<NamedRun>; 2], Error> {
@@ -139,7 +133,7 @@ fn answer(
         let torques = torques.join(" ");
         let _ = writeln!(text, "first torque command (N m): {torques}");
     }
-    let output = arguments.output.as_ref().map(|path| path.display());
+    let output = shown(&arguments.output);
     text += &lines("every step: ", &output);
     let json = json!({
         "model": arguments.model.display().to_string(),
@@ -149,16 +143,16 @@ fn answer(
         "failed": failed,
         "verdict": verdict,
         "runs": runs.iter().map(run_json).collect::<Vec<_>>(),
-        "output": output.map(|path| path.to_string()),
+        "output": output,
     });
-    Answer { text, json }
+    Answer::new(text, json)
 }
 
 /// One run: figures that depend on the dynamics, and what happened.
 ///
 /// `steps` to `prepare_us` count and time the solver's work, `lift` is what the maps and the lift make of recorded inputs:
 /// none of these depends on whether the dynamics are right.
-pub fn run_json((path, run): &NamedRun) -> Value {
+pub(crate) fn run_json((path, run): &NamedRun) -> Value {
     let summary = &run.summary;
     let mut value = json!({
         "recording": path.display().to_string(),
@@ -182,8 +176,7 @@ pub fn run_json((path, run): &NamedRun) -> Value {
     value
 }
 
-/// One row per control step, for a CSV file.
-pub fn command_table(model: &ReducedModel, runs: &[NamedRun]) -> Table {
+pub(crate) fn command_table(model: &ReducedModel, runs: &[NamedRun]) -> Table {
     let latent = |name| numbered(name, model.latent_dim());
     let inputs = match model.input() {
         Some(input) => input.names.clone(),

@@ -14,15 +14,16 @@ use serde_json::Value;
 use super::args::ReadingArguments;
 use crate::Error;
 use crate::files::{Overwrite, is_invisible, read_toml, write_whole};
-pub use crate::files::{
+pub(crate) use crate::files::{
     shell_path as quoted, shell_paths as quoted_all, shell_word as quoted_text,
 };
+use crate::model::ReducedModel;
 use crate::recording::{Clocks, ColumnMap, Reader, ReadingNotes, Recording, Segment, mismatch};
 use crate::robot::Robot;
 use crate::train::sha256;
 
 /// Writes a whole file, unless it is there, also since a moment ago, and may not be replaced.
-pub fn write_file(path: &Path, contents: &[u8], overwrite: Overwrite) -> Result<(), Error> {
+pub(crate) fn write_file(path: &Path, contents: &[u8], overwrite: Overwrite) -> Result<(), Error> {
     let written = write_whole(path, overwrite, |out| out.write_all(contents));
     written.map_err(|source| match source.kind() {
         std::io::ErrorKind::AlreadyExists => Error::Exists(path.to_owned()),
@@ -33,35 +34,25 @@ pub fn write_file(path: &Path, contents: &[u8], overwrite: Overwrite) -> Result<
     })
 }
 
-/// Reads a text of settings.
-pub fn read_text(path: &Path) -> Result<String, Error> {
+pub(crate) fn read_text(path: &Path) -> Result<String, Error> {
     read_toml(path).map_err(|source| Error::Read {
         path: path.to_owned(),
         source,
     })
 }
 
-/// The settings of a TOML file, checked.
-pub fn read_settings<T: DeserializeOwned>(
+pub(crate) fn read_settings<T: DeserializeOwned>(
     path: &Path,
     check: impl Fn(&T) -> Result<(), String>,
 ) -> Result<T, Error> {
     let settings = toml::from_str(&read_text(path)?)
-        .map_err(|error| refused(path, error.to_string().trim_end()))?;
-    check(&settings).map_err(|message| refused(path, message))?;
+        .map_err(|error| Error::refused(path, error.to_string().trim_end()))?;
+    check(&settings).map_err(|message| Error::refused(path, message))?;
     Ok(settings)
 }
 
-/// A file of settings that cannot be used.
-pub fn refused(path: &Path, message: impl Into<String>) -> Error {
-    Error::Config {
-        path: path.to_owned(),
-        message: message.into(),
-    }
-}
-
 /// The reader that the arguments ask for, with this treatment of clocks unless they name another.
-pub fn reader(arguments: &ReadingArguments, clocks: Clocks) -> Result<Reader, Error> {
+pub(crate) fn reader(arguments: &ReadingArguments, clocks: Clocks) -> Result<Reader, Error> {
     let map = arguments.columns.as_deref().map(ColumnMap::read);
     Ok(Reader::new(
         map.transpose()?,
@@ -69,8 +60,31 @@ pub fn reader(arguments: &ReadingArguments, clocks: Clocks) -> Result<Reader, Er
     ))
 }
 
+pub(crate) fn read_for(
+    model: &ReducedModel,
+    paths: &[PathBuf],
+    arguments: &ReadingArguments,
+) -> Result<Vec<Recording>, Error> {
+    read_recordings(paths, arguments, model.robot().ok())
+}
+
+/// The one jump of the recording after `--plan`, of a model's robot.
+pub(crate) fn read_jump(
+    model: &ReducedModel,
+    path: &PathBuf,
+    arguments: &ReadingArguments,
+) -> Result<Segment, Error> {
+    let mut recording = read_for(model, std::slice::from_ref(path), arguments)?.swap_remove(0);
+    note_mismatches(&recording, model.robot()?);
+    if let found @ 2.. = recording.segments.len() {
+        let message = format!("--plan takes one jump: found {found} segments");
+        return Err(Error::refused(path, message));
+    }
+    Ok(recording.segments.swap_remove(0))
+}
+
 /// Reads recordings of a robot, if it is known, showing which; what reading did besides goes to stderr.
-pub fn read_recordings(
+pub(crate) fn read_recordings(
     paths: &[PathBuf],
     arguments: &ReadingArguments,
     robot: Option<&'static Robot>,
@@ -85,7 +99,7 @@ pub fn read_recordings(
 }
 
 /// [`read_recordings`] by a reader.
-pub fn read_with(reader: &Reader, paths: &[PathBuf]) -> Result<Vec<Recording>, Error> {
+pub(crate) fn read_with(reader: &Reader, paths: &[PathBuf]) -> Result<Vec<Recording>, Error> {
     let progress = spinner("reading recordings");
     let mut notes = ReadingNotes::default();
     let read = (paths.iter())
@@ -103,17 +117,16 @@ pub fn read_with(reader: &Reader, paths: &[PathBuf]) -> Result<Vec<Recording>, E
 
 /// A text for a terminal: characters that act instead of being shown, as a file's name or cell may have them, are
 /// written out. Line ends and tabs stay.
-pub fn printable(text: &str) -> Cow<'_, str> {
+pub(crate) fn printable(text: &str) -> Cow<'_, str> {
     escaped(text, |c| c.escape_unicode().to_string())
 }
 
-/// Prints a note to stderr.
-pub fn note(text: &str) {
+pub(crate) fn note(text: &str) {
     eprintln!("note: {}", printable(text));
 }
 
 /// Prints on stderr what cannot be true of a recording of this robot.
-pub fn note_mismatches(recording: &Recording, robot: &Robot) {
+pub(crate) fn note_mismatches(recording: &Recording, robot: &Robot) {
     for found in mismatch::notes(recording, robot) {
         note(&found);
     }
@@ -121,7 +134,7 @@ pub fn note_mismatches(recording: &Recording, robot: &Robot) {
 
 /// Prints on stderr which recordings are given twice, under whatever name: a jump in two sets judges nothing, and one that
 /// counts twice says less than two.
-pub fn note_repeated(sets: &[(&str, Vec<&Path>)]) {
+pub(crate) fn note_repeated(sets: &[(&str, Vec<&Path>)]) {
     let mut first: BTreeMap<String, (&str, &Path)> = BTreeMap::new();
     let sets = sets.iter();
     let all = sets.flat_map(|(set, paths)| paths.iter().map(move |path| (*set, *path)));
@@ -145,7 +158,7 @@ pub fn note_repeated(sets: &[(&str, Vec<&Path>)]) {
 }
 
 /// Prints a note where restarts come later than every recording ends, so that restarted rollouts are whole ones.
-pub fn note_late_restarts(recordings: &[Recording], restart_every_s: f64) {
+pub(crate) fn note_late_restarts(recordings: &[Recording], restart_every_s: f64) {
     let segments = recordings.iter().flat_map(|recording| &recording.segments);
     let longest_s = segments.map(Segment::duration_s).fold(0.0, f64::max);
     if restart_every_s >= longest_s {
@@ -155,13 +168,12 @@ pub fn note_late_restarts(recordings: &[Recording], restart_every_s: f64) {
     }
 }
 
-/// Prints a warning to stderr.
-pub fn warn(text: &str) {
+pub(crate) fn warn(text: &str) {
     eprintln!("warning: {}", printable(text));
 }
 
 /// As [`printable`], for one JSON object.
-pub fn printable_json(text: &str) -> Cow<'_, str> {
+pub(crate) fn printable_json(text: &str) -> Cow<'_, str> {
     // Those of JSON itself have been escaped, so that all of them are in strings.
     escaped(text, |c| {
         let units = c.encode_utf16(&mut [0; 2]).to_vec();
@@ -184,43 +196,44 @@ fn escaped(text: &str, written: impl Fn(char) -> String) -> Cow<'_, str> {
     Cow::Owned(out)
 }
 
-/// Reports on stderr what reading did besides reading.
-pub fn report_reading(notes: &ReadingNotes) {
+pub(crate) fn report_reading(notes: &ReadingNotes) {
     notes.lines().iter().for_each(|line| note(line));
 }
 
 /// Each of these on a line of its own, behind the same words.
-pub fn lines<T: Display>(words: &str, items: impl IntoIterator<Item = T>) -> String {
+pub(crate) fn lines<T: Display>(words: &str, items: impl IntoIterator<Item = T>) -> String {
     let lines = items.into_iter().map(|item| format!("{words}{item}\n"));
     lines.collect()
 }
 
-/// Paths as JSON shows them.
-pub fn names(paths: &[PathBuf]) -> Vec<String> {
+pub(crate) fn shown(path: &Option<PathBuf>) -> Option<String> {
+    path.as_ref().map(|path| path.display().to_string())
+}
+
+pub(crate) fn names(paths: &[PathBuf]) -> Vec<String> {
     let names = paths.iter().map(|path| path.display().to_string());
     names.collect()
 }
 
 /// `name_1`, `name_2` and so on.
-pub fn numbered(name: &str, count: usize) -> impl Iterator<Item = String> {
+pub(crate) fn numbered(name: &str, count: usize) -> impl Iterator<Item = String> {
     (1..=count).map(move |index| format!("{name}_{index}"))
 }
 
-/// Adds the entries of one object to another.
-pub fn extend(object: &mut Value, more: Value) {
+pub(crate) fn extend(object: &mut Value, more: Value) {
     if let (Value::Object(object), Value::Object(more)) = (object, more) {
         object.extend(more);
     }
 }
 
 /// The name of a model: as given, or that of its file without folder and ending.
-pub fn named(given: Option<&str>, output: &Path) -> String {
+pub(crate) fn named(given: Option<&str>, output: &Path) -> String {
     let stem = output.file_stem().unwrap_or_default().to_string_lossy();
     given.map_or_else(|| stem.into_owned(), str::to_owned)
 }
 
 /// A spinner on stderr, shown only when stderr is a terminal.
-pub fn spinner(message: impl Into<String>) -> ProgressBar {
+pub(crate) fn spinner(message: impl Into<String>) -> ProgressBar {
     let bar = styled(
         ProgressBar::new_spinner(),
         "{spinner} {msg} [{elapsed}]",
@@ -231,7 +244,7 @@ pub fn spinner(message: impl Into<String>) -> ProgressBar {
 }
 
 /// A bar on stderr for a known number of steps, shown only when stderr is a terminal.
-pub fn progress_bar(message: impl Into<String>) -> ProgressBar {
+pub(crate) fn progress_bar(message: impl Into<String>) -> ProgressBar {
     styled(ProgressBar::new(0), "{msg} {wide_bar} {pos}/{len}", message)
 }
 
@@ -242,8 +255,7 @@ fn styled(bar: ProgressBar, template: &str, message: impl Into<String>) -> Progr
     bar
 }
 
-/// Shows on a bar how many steps are done.
-pub fn show_progress(bar: &ProgressBar, done: usize, total: usize) {
+pub(crate) fn show_progress(bar: &ProgressBar, done: usize, total: usize) {
     bar.set_length(total as u64);
     bar.set_position(done as u64);
 }

@@ -10,10 +10,10 @@ use super::convert::write_recording;
 use super::destination::{Format, Inputs};
 use super::output::{
     extend, lines, note_mismatches, progress_bar, read_settings, read_with, reader, show_progress,
-    spinner, warn,
+    shown, spinner, warn,
 };
 use crate::files::Overwrite;
-use crate::plan::{self, Goal, Plan, PlanSettings, Reach, Verdict};
+use crate::plan::{self, Goal, GoalMap, Plan, PlanSettings, Verdict};
 use crate::recording::Clocks;
 use crate::report::{plan_figures, plan_json, reach_figure};
 use crate::robot::Robot;
@@ -21,7 +21,7 @@ use crate::typeset::{Cell, Table};
 use crate::{Error, artifact};
 
 /// Plans a jump and writes it unless it is not to be trusted and not forced, or maps what can be planned.
-pub fn run(arguments: &PlanArguments) -> Result<Answer, Error> {
+pub(crate) fn run(arguments: &PlanArguments) -> Result<Answer, Error> {
     let inputs = Inputs::default()
         .and([&arguments.model])
         .and(&arguments.start)
@@ -75,7 +75,6 @@ pub fn run(arguments: &PlanArguments) -> Result<Answer, Error> {
     Ok(answer)
 }
 
-/// The goal of the arguments.
 fn goal(arguments: &PlanArguments, robot: &'static Robot) -> Result<Goal, Error> {
     let (Some(distance_m), Some(apex_m)) = (arguments.distance, arguments.apex) else {
         unreachable!("clap asks for both without --reach");
@@ -131,12 +130,11 @@ fn answer(arguments: &PlanArguments, planned: &Plan) -> Answer {
     text += &lines(&word, planned.verdict.reasons());
     let mut json = json!({ "model": arguments.model.display().to_string() });
     extend(&mut json, plan_json(planned));
-    let output = arguments.output.as_ref();
-    json["output"] = json!(output.map(|path| path.display().to_string()));
-    Answer { text, json }
+    json["output"] = json!(shown(&arguments.output));
+    Answer::new(text, json)
 }
 
-fn reach_answer(arguments: &PlanArguments, reach: &Reach) -> Answer {
+fn reach_answer(arguments: &PlanArguments, reach: &GoalMap) -> Answer {
     let first = std::iter::once("apex, m \\ distance, m".to_owned());
     let heads = first.chain(reach.distances_m.iter().map(|d| format!("{d:.2}")));
     let mut table = Table::new(heads);
@@ -160,19 +158,13 @@ fn reach_answer(arguments: &PlanArguments, reach: &Reach) -> Answer {
             "solve_ms": point.solve_ms,
         })
     });
-    Answer {
-        text: format!(
-            "{}: largest deviation of the planned input from the recorded ones, in standard \
-             deviations\n\n{table}\nin brackets: refused; -: no plan\n",
-            arguments.model.display()
-        ),
-        json: json!({
-            "model": arguments.model.display().to_string(),
-            "reach": points.collect::<Vec<_>>(),
-            "solve_ms": {
-                "median": times[times.len() / 2],
-                "max": times[times.len() - 1],
-            },
-        }),
-    }
+    let model = arguments.model.display().to_string();
+    let text = format!(
+        "{model}: largest deviation of the planned input from the recorded ones, in standard \
+         deviations\n\n{table}\nin brackets: refused; -: no plan\n"
+    );
+    let solve_ms = json!({ "median": times[times.len() / 2], "max": times[times.len() - 1] });
+    let points = points.collect::<Vec<_>>();
+    let json = json!({ "model": model, "reach": points, "solve_ms": solve_ms });
+    Answer::new(text, json)
 }

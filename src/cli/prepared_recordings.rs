@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde_json::{Map, Value, json};
 
 use super::args::{ReadingArguments, TrainArguments, TrainSettings};
-use super::inspect_recording::finding_json;
+use super::inspect::finding_json;
 use super::output::{note, reader, report_reading};
 use super::train_settings;
 use crate::Error;
@@ -19,13 +19,12 @@ use crate::robot::Robot;
 use crate::typeset::words::counted;
 
 /// A jump of a divided set: its file, its segment there, and the first row.
-type Place = (PathBuf, usize, usize);
+type DividedJump = (PathBuf, usize, usize);
 
-/// Names of the sets of a training.
 const SETS: [&str; 3] = ["training", "validation", "test"];
 
 /// The recordings of a training.
-pub struct RecordedSets {
+pub(crate) struct RecordedSets {
     /// Jumps that the model is fitted to, those that choose between candidates, and those used only for the final
     /// metrics; empty before [`Self::read`].
     pub sets: [RecordingSet; 3],
@@ -33,14 +32,14 @@ pub struct RecordedSets {
     robot: &'static Robot,
     reader: Reader,
     /// The jumps of each set, if they were divided.
-    pub divided: Option<[Vec<Place>; 3]>,
+    pub divided: Option<[Vec<DividedJump>; 3]>,
     options: ConditionOptions,
 }
 
 impl RecordedSets {
     /// The recordings that the arguments name, divided by their shares if they have any, to be conditioned as the
     /// settings say.
-    pub fn new(
+    pub(crate) fn new(
         arguments: &TrainArguments,
         settings: &TrainSettings,
         robot: &'static Robot,
@@ -54,8 +53,9 @@ impl RecordedSets {
         };
         let jumps = jumps_of(&arguments.recordings, &reader)?;
         let sets = split.of(jumps.len(), seed)?;
-        let sets = sets
-            .map(|set| -> Vec<Place> { set.into_iter().map(|jump| jumps[jump].clone()).collect() });
+        let sets = sets.map(|set| -> Vec<DividedJump> {
+            set.into_iter().map(|jump| jumps[jump].clone()).collect()
+        });
         let files = sets.each_ref().map(|set| chosen_segments(set));
         Ok(Self {
             divided: Some(sets),
@@ -63,8 +63,7 @@ impl RecordedSets {
         })
     }
 
-    /// Whole files for training, validation and test.
-    pub fn whole(
+    pub(crate) fn whole(
         paths: [&[PathBuf]; 3],
         settings: &TrainSettings,
         robot: &'static Robot,
@@ -95,13 +94,13 @@ impl RecordedSets {
     }
 
     /// The first training recordings as recorded.
-    pub fn first(&self, count: usize) -> Result<Vec<Recording>, RecordingError> {
+    pub(crate) fn first(&self, count: usize) -> Result<Vec<Recording>, RecordingError> {
         let files = &self.files[0];
         as_recorded(&files[..count.min(files.len())], self.robot, &self.reader)
     }
 
     /// Reads all sets, those of the test first.
-    pub fn read(&mut self) -> Result<(), RecordingError> {
+    pub(crate) fn read(&mut self) -> Result<(), RecordingError> {
         for set in [2, 0, 1] {
             let files = &self.files[set];
             self.sets[set].read(files, self.robot, &self.options, &self.reader)?;
@@ -110,7 +109,7 @@ impl RecordedSets {
     }
 
     /// Which jumps came into which set, file and first row of each, if they were divided: in words and as JSON.
-    pub fn division(&self) -> Option<(String, Value)> {
+    pub(crate) fn division(&self) -> Option<(String, Value)> {
         let (mut text, mut json) = (String::new(), Map::new());
         for (name, places) in SETS.into_iter().zip(self.divided.as_ref()?) {
             let places = || (places.iter()).map(|(path, _, row)| (path.display().to_string(), row));
@@ -126,15 +125,15 @@ impl RecordedSets {
     }
 
     /// The sets that the jumps of a file came into, if they were divided.
-    pub fn sets_of(&self, path: &str) -> Vec<&'static str> {
+    pub(crate) fn sets_of(&self, path: &str) -> Vec<&'static str> {
         let sets = SETS.into_iter().zip(self.divided.iter().flatten());
-        let is_of = |(file, ..): &Place| file.display().to_string() == path;
+        let is_of = |(file, ..): &DividedJump| file.display().to_string() == path;
         let with = sets.filter(|(_, places)| places.iter().any(is_of));
         with.map(|(name, _)| name).collect()
     }
 
     /// The files of each set, those with jumps in several in the first.
-    pub fn files(&self) -> [(&'static str, Vec<&Path>); 3] {
+    pub(crate) fn files(&self) -> [(&'static str, Vec<&Path>); 3] {
         let mut seen: Vec<&Path> = Vec::new();
         std::array::from_fn(|set| {
             let files = self.files[set].iter();
@@ -147,7 +146,7 @@ impl RecordedSets {
     }
 
     /// Reports on stderr which files have implausible samples, and what became of them.
-    pub fn report_findings(&self) {
+    pub(crate) fn report_findings(&self) {
         report_reading(&self.sets[0].reading);
         for (file, mismatch) in self.sets.iter().flat_map(|set| &set.mismatches) {
             note(&format!("{}: {mismatch}", file.display()));
@@ -186,7 +185,7 @@ impl RecordedSets {
     }
 
     /// Every finding with its place, and how many samples were left out.
-    pub fn findings_json(&self) -> Value {
+    pub(crate) fn findings_json(&self) -> Value {
         let of_file = |file: &Path, mut value: Value| {
             value["file"] = json!(file.display().to_string());
             value
@@ -218,7 +217,10 @@ fn report_singular(findings: &[&(PathBuf, Finding)]) {
 }
 
 /// The reader of a training: clocks are repaired unless told otherwise, or to train as published.
-pub fn reader_for(arguments: &ReadingArguments, settings: &TrainSettings) -> Result<Reader, Error> {
+pub(crate) fn reader_for(
+    arguments: &ReadingArguments,
+    settings: &TrainSettings,
+) -> Result<Reader, Error> {
     let clocks = match settings.paper {
         true => Clocks::Recorded,
         false => Clocks::Repaired,
@@ -226,8 +228,7 @@ pub fn reader_for(arguments: &ReadingArguments, settings: &TrainSettings) -> Res
     reader(arguments, clocks)
 }
 
-/// Every jump of these files.
-fn jumps_of(paths: &[PathBuf], reader: &Reader) -> Result<Vec<Place>, Error> {
+fn jumps_of(paths: &[PathBuf], reader: &Reader) -> Result<Vec<DividedJump>, Error> {
     let mut jumps = Vec::new();
     for path in paths {
         let recording = reader.read(path)?.recording;
@@ -238,7 +239,7 @@ fn jumps_of(paths: &[PathBuf], reader: &Reader) -> Result<Vec<Place>, Error> {
 }
 
 /// The files of a set of jumps; neighbours in the same file are read together.
-fn chosen_segments(jumps: &[Place]) -> Vec<RecordingFile> {
+fn chosen_segments(jumps: &[DividedJump]) -> Vec<RecordingFile> {
     let mut files: Vec<RecordingFile> = Vec::new();
     for (path, segment, _) in jumps {
         match files.last_mut() {

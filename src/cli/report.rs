@@ -9,14 +9,14 @@ use super::args::ReportArguments;
 use super::destination::{Format, Inputs};
 use super::mpc::{judged, run_with_both_lifts};
 use super::output::{
-    lines, names, note, note_late_restarts, note_mismatches, quoted, quoted_all, read_recordings,
-    refused, spinner, write_file,
+    lines, names, note, note_late_restarts, quoted, quoted_all, read_for, read_jump, spinner,
+    write_file,
 };
-use super::{Answer, code, simplification};
+use super::{Answer, simplification};
 use crate::evaluate::{Assessment, LAMBDA, Verdict, verdict};
 use crate::files::EmittedFile;
 use crate::model::ReducedModel;
-use crate::recording::Recording;
+use crate::recording::{Recording, Segment};
 use crate::report::{
     Content, Introduction, PageOptions, all_figures, figure_files, introduction, page,
     verdict_lines, without_statistics,
@@ -27,7 +27,7 @@ use crate::train::sha256;
 use crate::{Error, artifact};
 
 /// Writes the page, and the figures if a folder for them is given. The exit code is 1 if the model is fit for nothing.
-pub fn run(arguments: &ReportArguments) -> Result<(Answer, u8), Error> {
+pub(crate) fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
     let inputs = Inputs::default()
         .and([&arguments.model])
         .and(&arguments.recordings)
@@ -36,11 +36,7 @@ pub fn run(arguments: &ReportArguments) -> Result<(Answer, u8), Error> {
         .into_folder(arguments.figures.as_deref())?;
     inputs.check_output(Some(&arguments.output), Format::PAGE, arguments.force)?;
     let model = artifact::read(&arguments.model)?;
-    let recordings = read_recordings(
-        &arguments.recordings,
-        &arguments.reading,
-        model.robot().ok(),
-    )?;
+    let recordings = read_for(&model, &arguments.recordings, &arguments.reading)?;
     note_late_restarts(&recordings, arguments.restart_every);
     let study = match &arguments.study {
         None => None,
@@ -55,22 +51,9 @@ pub fn run(arguments: &ReportArguments) -> Result<(Answer, u8), Error> {
             Some(summary)
         }
     };
-    let plan = match &arguments.plan {
-        None => None,
-        Some(path) => {
-            let mut read = read_recordings(
-                std::slice::from_ref(path),
-                &arguments.reading,
-                model.robot().ok(),
-            )?;
-            note_mismatches(&read[0], model.robot()?);
-            if let found @ 2.. = read[0].segments.len() {
-                let message = format!("--plan takes one jump: found {found} segments");
-                return Err(refused(path, message));
-            }
-            Some(read.swap_remove(0))
-        }
-    };
+    let plan = arguments.plan.as_ref();
+    let plan = plan.map(|path| read_jump(&model, path, &arguments.reading));
+    let plan = plan.transpose()?;
     let beside = (study.as_ref(), plan.as_ref());
     let made = make(&model, &recordings, beside, arguments)?;
     // The figures come first: files that romc did not make are refused with nothing written.
@@ -106,30 +89,23 @@ pub fn run(arguments: &ReportArguments) -> Result<(Answer, u8), Error> {
         "figures": names(&written),
         "remarks": made.remarks,
     });
-    Ok((Answer { text, json }, code(made.verdict.fit_for.is_empty())))
+    Ok(Answer::new(text, json).failed_if(made.verdict.fit_for.is_empty()))
 }
 
-/// A report in memory.
-pub struct Made {
-    /// The page.
+pub(crate) struct Made {
     pub page: String,
-    /// Its first words.
     pub introduction: Introduction,
-    /// What the model is fit for.
     pub verdict: Verdict,
-    /// Every figure as SVG, PDF and CSV.
     pub files: Vec<EmittedFile>,
-    /// Number of figures.
     pub n_figures: usize,
     /// What speaks against using the model on these recordings.
     pub remarks: Vec<String>,
 }
 
-/// Assesses the model, runs the controller and draws everything.
 fn make(
     model: &ReducedModel,
     recordings: &[Recording],
-    (study, plan): (Option<&Summary>, Option<&Recording>),
+    (study, plan): (Option<&Summary>, Option<&Segment>),
     arguments: &ReportArguments,
 ) -> Result<Made, Error> {
     let progress = spinner("rolling the model out");
@@ -153,7 +129,7 @@ fn make(
         plain: &plain,
         consistent: &consistent,
         study,
-        plan: plan.and_then(|recording| recording.segments.first()),
+        plan,
         digests: &digests,
     };
     let commands = commands(arguments, can_control);
@@ -162,8 +138,7 @@ fn make(
     made
 }
 
-/// Draws the assessment and the controller's runs.
-pub fn page_of(
+pub(crate) fn page_of(
     content: &Content<'_>,
     tolerance: Tolerance,
     commands: Vec<String>,
@@ -194,7 +169,6 @@ pub fn page_of(
 
 const LADDER_CAPTION: &str = "Size of the equations within each tolerance: active terms, digits of all coefficients, operations; errors as shares of the root mean square of their ddz, the largest of all equations; errors of rollouts over whole jumps and restarted";
 
-/// The commands that reproduce the page.
 fn commands(arguments: &ReportArguments, has_control: bool) -> Vec<String> {
     let model = quoted(&arguments.model);
     let recordings = quoted_all(&arguments.recordings) + &arguments.reading.as_flags();

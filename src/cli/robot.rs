@@ -7,14 +7,14 @@ use serde_json::json;
 use super::Answer;
 use super::args::RobotArguments;
 use super::destination::{Format, Inputs};
-use super::output::{note, write_file};
+use super::output::{note, shown, write_file};
 use crate::Error;
 use crate::robot::{JOINT_NAMES, Leg, Robot};
 use crate::robot_file::{self, RobotEntry, RobotOptions};
 use crate::typeset::Table;
 
 /// The robot of `--robot`; of a file, how its joints were matched goes to stderr.
-pub fn chosen(name_or_file: &str) -> Result<&'static Robot, Error> {
+pub(crate) fn chosen(name_or_file: &str) -> Result<&'static Robot, Error> {
     let read = robot_file::open(name_or_file, &RobotOptions::default())?;
     let robot = read.robot;
     if Robot::by_name(name_or_file).is_err() {
@@ -35,8 +35,7 @@ fn note_all(file: &str, notes: &[String]) {
         .for_each(|text| note(&format!("{file}: {text}")));
 }
 
-/// Shows a robot, and writes its TOML.
-pub fn run(arguments: &RobotArguments) -> Result<Answer, Error> {
+pub(crate) fn run(arguments: &RobotArguments) -> Result<Answer, Error> {
     Inputs::default()
         .and_robot(Some(&arguments.robot))
         .check_output(arguments.output.as_deref(), Format::TOML, arguments.force)?;
@@ -76,9 +75,9 @@ pub fn run(arguments: &RobotArguments) -> Result<Answer, Error> {
     let json = json!({
         "robot": RobotEntry::of(robot),
         "notes": read.notes,
-        "output": arguments.output.as_ref().map(|path| path.display().to_string()),
+        "output": shown(&arguments.output),
     });
-    Ok(Answer { text, json })
+    Ok(Answer::new(text, json))
 }
 
 fn vector(vector: [f64; 3]) -> String {

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 
 use super::args::SimplifyArguments;
-use super::output::{lines, names, read_recordings, read_text, spinner};
+use super::output::{lines, names, read_for, read_text, spinner};
 use crate::equations::Equations;
 use crate::evaluate::Assessment;
 use crate::files::EmittedFile;
@@ -22,9 +22,8 @@ use crate::typeset::{Cell, Rounding, Table, significant};
 use crate::{Error, artifact};
 
 /// Time between restarts of the short rollouts, as in the paper's second test.
-pub const RESTART_S: f64 = 0.1;
+pub(crate) const RESTART_S: f64 = 0.1;
 
-/// A domain with the samples that it was made from.
 struct Basis {
     domain: Domain,
     samples: Option<Samples>,
@@ -57,7 +56,7 @@ impl Basis {
                 margin: None,
             });
         }
-        let recordings = read_recordings(files, &arguments.reading, model.robot().ok())?;
+        let recordings = read_for(model, files, &arguments.reading)?;
         if model.encoder_map().is_err() {
             let model = model.name().to_owned();
             return Err(SimplifyError::NoEncoder { model }.into());
@@ -96,9 +95,7 @@ impl Basis {
     }
 }
 
-/// A simplified model with its certificate and effects.
-pub struct Outcome {
-    /// The model.
+pub(crate) struct Outcome {
     pub model: ReducedModel,
     original: ReducedModel,
     certificate: Certificate,
@@ -108,7 +105,7 @@ pub struct Outcome {
 }
 
 /// Simplifies a model as typed; nothing if no domain was given.
-pub fn run(
+pub(crate) fn run(
     equations: &Equations<'_>,
     arguments: &SimplifyArguments,
 ) -> Result<Option<Outcome>, Error> {
@@ -152,7 +149,7 @@ impl Outcome {
 
     /// How coefficients are printed unless digits are given: in full if simplification has already
     /// chosen their digits.
-    pub fn rounding(&self) -> Rounding {
+    pub(crate) fn rounding(&self) -> Rounding {
         match self.certificate.n_changes() {
             0 => Rounding::default(),
             _ => Rounding::Exact,
@@ -161,7 +158,7 @@ impl Outcome {
 
     /// Adds the certificate to the emitted files and, if anything changed, a comment to those that can hold one; its
     /// summary, and the same as JSON. `equations` are those of the model as they are printed, `rounding` is how.
-    pub fn add_to(
+    pub(crate) fn add_to(
         &self,
         files: &mut Vec<EmittedFile>,
         equations: &Equations<'_>,
@@ -241,7 +238,7 @@ fn comment_marks(path: &Path) -> Option<[&'static str; 2]> {
 }
 
 /// What exact simplification did, one line for each step; nothing if it did nothing.
-pub fn exact_words(equations: &Equations<'_>) -> String {
+pub(crate) fn exact_words(equations: &Equations<'_>) -> String {
     match equations.steps() {
         [] => String::new(),
         steps => format!("simplified exactly:\n{}\n", lines("  ", steps)),
@@ -257,13 +254,12 @@ fn printed_json(equation: &PrintedEquation) -> Value {
     })
 }
 
-/// Tolerances that a report compares.
 const LADDER: [f64; 4] = [0.001, 0.01, 0.05, 0.1];
 
 /// Simplifies a model within several tolerances over the recordings of an assessment: a table with a row per tolerance
 /// (size, error and rollouts of the simplified equations), one of the errors of each equation within `chosen`, and one
 /// of every change within it.
-pub fn ladder(
+pub(crate) fn ladder(
     model: &ReducedModel,
     assessment: &Assessment<'_>,
     chosen: Tolerance,

@@ -5,10 +5,10 @@ use std::fmt::Write as _;
 use nalgebra::DVector;
 use serde_json::json;
 
+use super::Answer;
 use super::args::SimulateArguments;
 use super::destination::{Format, Inputs};
-use super::output::{lines, note_late_restarts, numbered, read_recordings, spinner, write_file};
-use super::{Answer, code};
+use super::output::{lines, note_late_restarts, numbered, read_for, shown, spinner, write_file};
 use crate::evaluate::{Assessment, verdict_by_default};
 use crate::model::ReducedModel;
 use crate::report::{
@@ -19,18 +19,14 @@ use crate::typeset::{Table, significant};
 use crate::{Error, artifact};
 
 /// Rolls the model out over every segment of every recording. The exit code is 1 if predictions of body x or z fail.
-pub fn run(arguments: &SimulateArguments) -> Result<(Answer, u8), Error> {
+pub(crate) fn run(arguments: &SimulateArguments) -> Result<Answer, Error> {
     Inputs::default()
         .and([&arguments.model])
         .and(&arguments.recordings)
         .and(&arguments.reading.columns)
         .check_output(arguments.output.as_deref(), Format::TABLE, arguments.force)?;
     let model = artifact::read(&arguments.model)?;
-    let recordings = read_recordings(
-        &arguments.recordings,
-        &arguments.reading,
-        model.robot().ok(),
-    )?;
+    let recordings = read_for(&model, &arguments.recordings, &arguments.reading)?;
     note_late_restarts(&recordings, arguments.restart_every);
     let progress = spinner("simulating");
     let assessment = Assessment::over(&model, &recordings, arguments.restart_every)?;
@@ -58,12 +54,11 @@ pub fn run(arguments: &SimulateArguments) -> Result<(Answer, u8), Error> {
         "rollouts": assessment_json(&model, &assessment),
         "verdict": verdict,
         "unmeasured": unmeasured,
-        "output": arguments.output.as_ref().map(|path| path.display().to_string()),
+        "output": shown(&arguments.output),
     });
-    Ok((Answer { text, json }, code(verdict.fails_predictions())))
+    Ok(Answer::new(text, json).failed_if(verdict.fails_predictions()))
 }
 
-/// All metrics of an assessment as text.
 fn metrics_text(model: &ReducedModel, assessment: &Assessment<'_>) -> String {
     let mut text = format!("{}\n", coordinate_table(model, assessment));
     for (kind, sums) in [
@@ -156,7 +151,6 @@ fn columns(latent_dim: usize, names: &[String]) -> Vec<String> {
         .collect()
 }
 
-/// Adds each recorded value with its two predictions to a row.
 fn add<'a>(
     row: &mut Vec<String>,
     recorded: impl Iterator<Item = &'a f64>,

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use super::Answer;
 use super::args::{StudyArguments, TrainSettings};
 use super::destination::Inputs;
-use super::output::{note, refused, spinner};
+use super::output::{note, spinner};
 use super::prepared_recordings::{RecordedSets, reader_for};
 use super::train_settings;
 use crate::Error;
@@ -18,11 +18,9 @@ use crate::study::{self, CellId, FOLDS, Outcome, Plan, Shard, Spread, Store, Sum
 use crate::train::{Method, Origin};
 use crate::typeset::{Cell, Table, significant};
 
-/// The tables of a study.
 const TABLES: [&str; 2] = ["cells.csv", "summary.csv"];
 
-/// Trains what is missing, or joins parts, and writes the tables of the study.
-pub fn run(arguments: &StudyArguments) -> Result<Answer, Error> {
+pub(crate) fn run(arguments: &StudyArguments) -> Result<Answer, Error> {
     check_folder(&arguments.out_dir, &TABLES, arguments.force)?;
     let store = match arguments.merge.is_empty() {
         true => trained(arguments)?,
@@ -95,14 +93,13 @@ fn trained(arguments: &StudyArguments) -> Result<Store, Error> {
     Ok(store)
 }
 
-/// The settings of the file with those of the command line over them.
 fn settings(arguments: &StudyArguments) -> Result<TrainSettings, Error> {
     let mut settings = TrainSettings::default();
     if let Some(path) = &arguments.config {
         settings = train_settings::read(path)?;
         if let Some(name) = train_settings::first(&settings, &["latent-dim", "seed", "seeds"]) {
             let message = format!("`{name}` is not a setting of a study, which runs over them");
-            return Err(refused(path, message));
+            return Err(Error::refused(path, message));
         }
     }
     settings.paper |= arguments.paper;
@@ -190,5 +187,5 @@ fn answer(folder: &Path, store: &Store, cells: &[study::Cell], summary: &Summary
         "missing": missing,
         "refused": refused,
     });
-    Answer { text, json }
+    Answer::new(text, json)
 }

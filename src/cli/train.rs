@@ -15,13 +15,12 @@ use crate::model::ReducedModel;
 use crate::recording::{Recording, RecordingSet};
 use crate::robot::{BODY_X, BODY_Z};
 use crate::train::{
-    Method, Origin, Progress, Recordings, SetMetrics, TrainOptions, TrainReport, Trained, Watch,
+    Method, Monitor, Origin, Progress, Recordings, SetMetrics, TrainOptions, TrainReport, Trained,
 };
 use crate::typeset::{Cell, Table, significant};
 use crate::{Error, artifact, train};
 
-/// Learns a model and writes it.
-pub fn run(arguments: &TrainArguments) -> Result<(Answer, u8), Error> {
+pub(crate) fn run(arguments: &TrainArguments) -> Result<Answer, Error> {
     let settings = train_settings::effective(arguments)?;
     Inputs::default()
         .and(&arguments.recordings)
@@ -60,8 +59,8 @@ pub fn run(arguments: &TrainArguments) -> Result<(Answer, u8), Error> {
         Progress::Stage { name, .. } => bar.set_message(name),
         Progress::Done { text, .. } => bar.set_message(text),
     };
-    let mut watch = Watch::new(&mut listener, stop_on_interrupt());
-    let mut trained = method.learn(sets, robot, &options, &origin, &mut watch)?;
+    let mut monitor = Monitor::new(&mut listener, stop_on_interrupt());
+    let mut trained = method.learn(sets, robot, &options, &origin, &mut monitor)?;
     bar.finish_and_clear();
     let is_interrupted = INTERRUPTED.load(Ordering::Relaxed);
     if is_interrupted {
@@ -91,14 +90,15 @@ pub fn run(arguments: &TrainArguments) -> Result<(Answer, u8), Error> {
         let _ = write!(answer.text, "\n{text}");
     }
     if !is_interrupted {
-        return Ok((answer, 0));
+        return Ok(answer);
     }
     let _ = writeln!(
         answer.text,
         "\ninterrupted by Ctrl-C: the model is the best until then, and the command in its provenance, which says so, \
          does not give it again"
     );
-    Ok((answer, INTERRUPTED_CODE))
+    answer.code = INTERRUPTED_CODE;
+    Ok(answer)
 }
 
 /// Where whole jumps are worse than standing still: of the validation, or else of the training, and of the test.
@@ -122,7 +122,6 @@ const INTERRUPTED_CODE: u8 = 130;
 /// Becomes true at the first Ctrl-C, so that a training ends with the best so far; the second one ends the process.
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
-/// The model with a provenance that says that its training did not come to its end.
 fn marked_as_interrupted(model: ReducedModel) -> ReducedModel {
     let mut provenance = model.provenance().clone();
     provenance.insert("interrupted".to_owned(), true.into());
@@ -140,7 +139,6 @@ fn stop_on_interrupt() -> &'static AtomicBool {
     &INTERRUPTED
 }
 
-/// The command that repeats this training, as the provenance keeps it.
 fn command_line(
     arguments: &TrainArguments,
     settings: &TrainSettings,
@@ -187,10 +185,9 @@ fn answer(arguments: &TrainArguments, trained: &Trained, tested: Option<&SetMetr
         "report": report,
         "test": tested,
     });
-    Answer { text, json }
+    Answer::new(text, json)
 }
 
-/// Every metric on each set of recordings.
 fn metrics_table(report: &TrainReport, tested: Option<&SetMetrics>) -> Table {
     let mut sets = vec![
         ("training", Some(&report.training)),
@@ -250,7 +247,6 @@ fn seed_table(report: &TrainReport) -> String {
     format!("\n{table}")
 }
 
-/// Rows of the body's position forwards and upwards.
 const BODY: [usize; 2] = [BODY_X, BODY_Z];
 
 /// A note if rollouts of whole jumps end up further off than a body would be that stays where each jump starts: root mean

@@ -6,7 +6,7 @@ use std::path::Path;
 use serde_json::{Map, Value};
 
 use super::args::{PhaseSet, TrainArguments, TrainSettings, Widths};
-use super::output::{note, quoted_text, read_settings, refused};
+use super::output::{note, quoted_text, read_settings};
 use super::prepared_recordings::RecordedSets;
 use super::robot::chosen;
 use crate::Error;
@@ -29,7 +29,7 @@ const IDENTIFIED: &str = "identify";
 const IDENTIFIED_FROM: usize = 20;
 
 /// The options that the settings describe; actuators that recordings tell are still to be [`identified`].
-pub(super) fn options(
+pub(crate) fn options(
     settings: &TrainSettings,
     latent_dim: usize,
     name: String,
@@ -88,7 +88,7 @@ pub(super) fn options(
 ///
 /// # Errors
 /// [`IdentifyError::Contradiction`] for recordings that are not of one robot, also where no actuators are wanted.
-pub(super) fn identified(
+pub(crate) fn identified(
     options: &mut TrainOptions,
     settings: &TrainSettings,
     recorded: &RecordedSets,
@@ -115,13 +115,11 @@ pub(super) fn identified(
     Ok(())
 }
 
-/// The robot of a training.
-pub(super) fn robot(settings: &TrainSettings) -> Result<&'static Robot, Error> {
+pub(crate) fn robot(settings: &TrainSettings) -> Result<&'static Robot, Error> {
     chosen(settings.robot.as_deref().unwrap_or("go1"))
 }
 
-/// How recordings are prepared for the training.
-pub(super) fn conditioning(settings: &TrainSettings) -> ConditionOptions {
+pub(crate) fn conditioning(settings: &TrainSettings) -> ConditionOptions {
     let rows = settings.smooth_rows.unwrap_or_default();
     ConditionOptions {
         implausible: match settings.leave_out_implausible {
@@ -147,7 +145,7 @@ fn maps(settings: &TrainSettings) -> MapOptions {
 }
 
 /// The method that is asked for: the joint one if a setting is given that it alone knows.
-pub(super) fn method(settings: &TrainSettings) -> Method {
+pub(crate) fn method(settings: &TrainSettings) -> Method {
     let default = match of_the_joint_method(settings) {
         None => Method::ClosedForm,
         Some(_) => Method::Joint,
@@ -156,7 +154,7 @@ pub(super) fn method(settings: &TrainSettings) -> Method {
 }
 
 /// Where the joints' losses come from: a file, [`NONE`] or [`IDENTIFIED`].
-pub(super) fn actuators(settings: &TrainSettings) -> &str {
+pub(crate) fn actuators(settings: &TrainSettings) -> &str {
     let default = match settings.paper {
         true => NONE,
         false => IDENTIFIED,
@@ -164,7 +162,6 @@ pub(super) fn actuators(settings: &TrainSettings) -> &str {
     settings.actuators.as_deref().unwrap_or(default)
 }
 
-/// The first setting that the closed form would ignore.
 fn of_the_joint_method(settings: &TrainSettings) -> Option<&'static str> {
     let layers = match settings.encoder_layers {
         Some(_) => "encoder-layers",
@@ -185,8 +182,7 @@ const WINDOW: [&str; 4] = [
     "bptt-integrator",
 ];
 
-/// The first of these settings that is given.
-pub(super) fn first(settings: &TrainSettings, names: &[&'static str]) -> Option<&'static str> {
+pub(crate) fn first(settings: &TrainSettings, names: &[&'static str]) -> Option<&'static str> {
     let given = given(settings);
     names.iter().copied().find(|name| given.contains_key(*name))
 }
@@ -211,7 +207,6 @@ fn set<T>(option: &mut T, given: Option<impl Into<T>>) {
     }
 }
 
-/// The settings that were given, by the names of their flags.
 fn given(settings: &TrainSettings) -> Map<String, Value> {
     let Ok(Value::Object(mut given)) = serde_json::to_value(settings) else {
         unreachable!("settings are a struct of numbers, texts and switches");
@@ -221,7 +216,7 @@ fn given(settings: &TrainSettings) -> Map<String, Value> {
 }
 
 /// The flags that were given, with a space before each.
-pub(super) fn as_flags(settings: &TrainSettings) -> String {
+pub(crate) fn as_flags(settings: &TrainSettings) -> String {
     let mut line = String::new();
     for (name, value) in given(settings) {
         let text = match value {
@@ -244,7 +239,7 @@ pub(super) fn as_flags(settings: &TrainSettings) -> String {
 }
 
 /// The settings of the command line over those of its file, if it names one.
-pub(super) fn effective(arguments: &TrainArguments) -> Result<TrainSettings, Error> {
+pub(crate) fn effective(arguments: &TrainArguments) -> Result<TrainSettings, Error> {
     let mut settings = arguments.settings.clone();
     if let Some(path) = &arguments.config {
         let mut merged = given(&read(path)?);
@@ -252,7 +247,7 @@ pub(super) fn effective(arguments: &TrainArguments) -> Result<TrainSettings, Err
         settings = serde_json::from_value(Value::Object(merged)).expect("names are all known");
         if settings.latent_dim.is_none() {
             let message = "`latent-dim` is missing, here and on the command line";
-            return Err(refused(path, message));
+            return Err(Error::refused(path, message));
         }
     }
     check_pairs(&settings)?;
@@ -261,73 +256,70 @@ pub(super) fn effective(arguments: &TrainArguments) -> Result<TrainSettings, Err
 
 /// Refuses settings that the method does not use, an activation without hidden layers, rows to filter without a filter,
 /// and named coordinates where a method learns others.
-pub(super) fn check_pairs(settings: &TrainSettings) -> Result<(), Error> {
-    let refused = |option, found, expected| {
-        Err(Error::Train(TrainError::Option {
-            option,
-            found,
-            expected,
-        }))
-    };
-    if let (Method::ClosedForm, Some(name)) = (method(settings), of_the_joint_method(settings)) {
-        return refused(
-            name,
-            "set for the closed form, which does not use it".to_owned(),
-            "`--method joint`, or no method",
-        );
-    }
-    let weight = settings.bptt_weight.map_or(0.0, f64::from);
-    if let (Some(name), true) = (first(settings, &WINDOW), weight == 0.0) {
-        return refused(
-            name,
-            "set for a loss without weight".to_owned(),
-            "`--bptt-weight` above 0 beside it",
-        );
-    }
-    if let (Some(activation), true) = (settings.activation, maps(settings).is_linear()) {
-        return refused(
-            "activation",
-            format!("{activation} without hidden layers"),
-            "`--encoder-layers` or `--decoder-layers` beside it",
-        );
-    }
-    let named = settings.coordinates == Some(Coordinates::Named);
-    if named && !maps(settings).is_linear() {
-        return refused(
-            "coordinates",
-            "named with hidden layers".to_owned(),
-            "free, or maps without hidden layers",
-        );
-    }
-    if named && settings.paper && method(settings) == Method::Joint {
-        return refused(
-            "coordinates",
-            "named with the published joint training".to_owned(),
-            "free, or a training without `--paper`",
-        );
-    }
+pub(crate) fn check_pairs(settings: &TrainSettings) -> Result<(), Error> {
+    let (method, is_linear) = (method(settings), maps(settings).is_linear());
+    let given = |names: &[&'static str], when: bool| first(settings, names).filter(|_| when);
+    let has_weight = settings
+        .bptt_weight
+        .is_some_and(|weight| f64::from(weight) != 0.0);
+    let is_named = settings.coordinates == Some(Coordinates::Named);
+    let is_published = settings.paper && method == Method::Joint;
+    let activation = settings.activation.unwrap_or_default();
     let of_choice = ["slack", "refinements", "growth", "no-rotation"];
-    if let (Some(name), true) = (first(settings, &of_choice), settings.paper) {
-        return refused(
-            name,
-            "set for the published training, which neither chooses terms nor turns the basis"
-                .to_owned(),
+    let faults = [
+        (
+            of_the_joint_method(settings).filter(|_| method == Method::ClosedForm),
+            "set for the closed form, which does not use it",
+            "`--method joint`, or no method",
+        ),
+        (
+            given(&WINDOW, !has_weight),
+            "set for a loss without weight",
+            "`--bptt-weight` above 0 beside it",
+        ),
+        (
+            given(&["activation"], is_linear),
+            &format!("{activation} without hidden layers"),
+            "`--encoder-layers` or `--decoder-layers` beside it",
+        ),
+        (
+            given(&["coordinates"], is_named && !is_linear),
+            "named with hidden layers",
+            "free, or maps without hidden layers",
+        ),
+        (
+            given(&["coordinates"], is_named && is_published),
+            "named with the published joint training",
+            "free, or a training without `--paper`",
+        ),
+        (
+            given(&of_choice, settings.paper),
+            "set for the published training, which neither chooses terms nor turns the basis",
             "a training without `--paper`",
-        );
-    }
-    if settings.smooth_rows.is_some() && settings.smooth.is_none() {
-        return refused(
-            "smooth-rows",
-            "set without a filter".to_owned(),
+        ),
+        (
+            given(&["smooth-rows"], settings.smooth.is_none()),
+            "set without a filter",
             "`--smooth` beside it",
-        );
+        ),
+    ];
+    for (option, found, expected) in faults {
+        if let Some(option) = option {
+            let found = found.to_owned();
+            return Err(TrainError::Option {
+                option,
+                found,
+                expected,
+            }
+            .into());
+        }
     }
     Ok(())
 }
 
 /// The first setting that this training does not depend on, in words: two named coordinates are those of the
 /// centre of mass, which nothing searches, and the search of the closed form ends in one model from every start.
-pub(super) fn without_effect(settings: &TrainSettings, options: &TrainOptions) -> Option<String> {
+pub(crate) fn without_effect(settings: &TrainSettings, options: &TrainOptions) -> Option<String> {
     let is_closed = method(settings) == Method::ClosedForm;
     let is_held = options.coordinates() == Coordinates::Named && options.latent_dim == 2;
     let searched = ["lift-weight", "body-weight", "no-rotation"];
@@ -342,8 +334,7 @@ pub(super) fn without_effect(settings: &TrainSettings, options: &TrainOptions) -
     ))
 }
 
-/// The settings of a file.
-pub(super) fn read(path: &Path) -> Result<TrainSettings, Error> {
+pub(crate) fn read(path: &Path) -> Result<TrainSettings, Error> {
     read_settings(path, check)
 }
 

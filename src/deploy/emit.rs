@@ -1,12 +1,13 @@
 //! Equations to the files of the chosen targets.
 
 use clap::ValueEnum as _;
+use once_cell::unsync::OnceCell;
 
 use super::controller;
 use super::controller_c;
 use super::error::EmitError;
 use super::planned::PlannedJump;
-use crate::codegen::script::{matlab, python};
+use crate::codegen::script::Script;
 use crate::codegen::{Precision, SineCosine, Units, c, interface::ModelInterface, rust};
 use crate::equations::Equations;
 use crate::files::EmittedFile;
@@ -87,10 +88,10 @@ pub fn emit(
     let provenance = provenance(equations.model(), options.print.digest.as_deref());
     let (precision, sines) = (options.precision, options.sines);
     let (form, units) = (options.form, options.units);
-    let for_compilers = || compiled(equations, options, units);
+    let made = [const { OnceCell::new() }; 2];
+    let for_compilers = || made[0].get_or_try_init(|| compiled(equations, options, units));
     // Languages that compute in double precision alone.
-    let for_scripts = || Ok(ModelInterface::new(equations, form, units)?);
-    let (mut in_precision, mut scripts) = (None, None);
+    let for_scripts = || made[1].get_or_try_init(|| ModelInterface::new(equations, form, units));
     let control = equations.in_scaled_units();
     let mut files = Vec::new();
     for (position, target) in targets.iter().enumerate() {
@@ -98,17 +99,11 @@ pub fn emit(
             continue;
         }
         files.extend(match target {
-            Target::C => {
-                let entries = made(&mut in_precision, for_compilers)?;
-                c::emit(entries, &provenance, precision, sines)?
-            }
-            Target::Rust => {
-                let entries = made(&mut in_precision, for_compilers)?;
-                rust::emit(entries, &provenance, precision, sines)?
-            }
-            Target::Python => python::emit(made(&mut scripts, for_scripts)?, &provenance)?,
-            Target::Casadi => python::emit_casadi(made(&mut scripts, for_scripts)?, &provenance)?,
-            Target::Matlab => matlab::emit(made(&mut scripts, for_scripts)?, &provenance)?,
+            Target::C => c::emit(for_compilers()?, &provenance, precision, sines)?,
+            Target::Rust => rust::emit(for_compilers()?, &provenance, precision, sines)?,
+            Target::Python => Script::NumPy.emit(for_scripts()?, &provenance)?,
+            Target::Casadi => Script::Casadi.emit(for_scripts()?, &provenance)?,
+            Target::Matlab => Script::Matlab.emit(for_scripts()?, &provenance)?,
             Target::Latex => latex::emit(equations, &options.print)?,
             Target::Markdown => markdown::emit(equations, &options.print)?,
             Target::Mathml => mathml::emit(equations, &options.print)?,
@@ -134,15 +129,6 @@ pub(super) fn compiled(
     let entries = ModelInterface::new(&folded, options.form, units)?;
     options.precision.check(&entries)?;
     Ok(entries)
-}
-
-/// What code is generated from, made when the first target asks.
-fn made(
-    place: &mut Option<ModelInterface>,
-    make: impl FnOnce() -> Result<ModelInterface, EmitError>,
-) -> Result<&ModelInterface, EmitError> {
-    let entries = place.take().map_or_else(make, Ok)?;
-    Ok(place.insert(entries))
 }
 
 /// The first line of generated code, without comment signs.

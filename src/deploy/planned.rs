@@ -1,14 +1,11 @@
 //! A planned jump as C arrays: what an example of a generated controller jumps.
 
-use std::fmt::Write as _;
-
 use nalgebra::DMatrix;
 
+use super::controller_c::numbers::{integers, list, nested};
 use crate::files::EmittedFile;
 use crate::robot::{ContactFlags, STATE_DIM};
 
-/// Values on a line of an array.
-const PER_LINE: usize = 6;
 /// Significant digits, beyond those of any sensor.
 const DIGITS: usize = 9;
 
@@ -60,71 +57,26 @@ impl PlannedJump {
 
     fn source(&self, name: &str, provenance: &str) -> String {
         let upper = name.to_ascii_uppercase();
-        let mut text = format!("/* {provenance} */\n#include \"{name}_plan.h\"\n");
-        let open = |text: &mut String, kind: &str, of: &str, width: &str| {
-            let array = format!("{name}_plan_{of}[{upper}_PLAN_COUNT]{width}");
-            let _ = write!(text, "\nconst {kind} {array} = {{\n");
+        let one = |value: &f64| format!("{value:.*e}", DIGITS - 1);
+        let columns = |rows: &DMatrix<f64>| {
+            let columns = rows.column_iter();
+            nested(columns.map(|column| list(column.iter().map(one))))
         };
-        open(&mut text, "double", "time_s", "");
-        push_lines(&mut text, self.time_s.iter().copied());
-        text.push_str("};\n");
-        for (rows, of) in [(&self.x, "x"), (&self.dx, "dx"), (&self.u, "u")] {
-            open(&mut text, "double", of, &format!("[{STATE_DIM}]"));
-            for column in rows.column_iter() {
-                text.push_str("    {\n");
-                push_lines(&mut text, column.iter().copied());
-                text.push_str("    },\n");
-            }
-            text.push_str("};\n");
-        }
-        open(&mut text, "uint8_t", "feet", "[4]");
-        for feet in &self.feet {
-            let [a, b, c, d] = feet.map(u8::from);
-            let _ = writeln!(text, "    {{ {a}, {b}, {c}, {d} }},");
-        }
-        text.push_str("};\n");
-        text
-    }
-}
-
-fn push_lines(text: &mut String, values: impl Iterator<Item = f64>) {
-    let values: Vec<String> = values
-        .map(|value| format!("{value:.*e}", DIGITS - 1))
-        .collect();
-    for line in values.chunks(PER_LINE) {
-        let _ = writeln!(text, "    {},", line.join(", "));
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn arrays_hold_every_sample_and_read_back() {
-        let plan = PlannedJump {
-            time_s: vec![0.0, 0.002],
-            x: DMatrix::from_fn(18, 2, |i, j| 1.0 / (1.0 + i as f64) - j as f64),
-            dx: DMatrix::zeros(18, 2),
-            u: DMatrix::from_element(18, 2, -2.5),
-            torque_nm: DMatrix::zeros(12, 2),
-            feet: vec![[true; 4], [false, true, false, false]],
-        };
-        let [header, source] = plan.files("examples", "hop", "made by a test");
-        assert_eq!(header.path, "examples/hop_plan.h");
-        assert!(header.contents.contains("HOP_PLAN_COUNT = 2"));
-        assert!(source.contents.contains("{ 0, 1, 0, 0 }"));
-        let numbers = source.contents.split([',', '{', '}', '\n', ' ']);
-        let numbers: Vec<f64> = numbers
-            .filter(|w| w.contains('e'))
-            .flat_map(str::parse)
-            .collect();
-        assert_eq!(numbers.len(), 2 + 3 * 36);
-        for (found, expected) in numbers[2..38].iter().zip(plan.x.iter()) {
-            assert!(
-                (found - expected).abs() <= 1e-8 * expected.abs(),
-                "{found} {expected}"
-            );
-        }
+        let feet = self.feet.iter().map(|feet| integers(feet.map(i64::from)));
+        let states = format!("[{STATE_DIM}]");
+        let arrays = [
+            ("double", "time_s", "", list(self.time_s.iter().map(one))),
+            ("double", "x", &states, columns(&self.x)),
+            ("double", "dx", &states, columns(&self.dx)),
+            ("double", "u", &states, columns(&self.u)),
+            ("uint8_t", "feet", "[4]", nested(feet)),
+        ];
+        let arrays = arrays.map(|(kind, of, width, values)| {
+            format!("\nconst {kind} {name}_plan_{of}[{upper}_PLAN_COUNT]{width} = {values};\n")
+        });
+        format!(
+            "/* {provenance} */\n#include \"{name}_plan.h\"\n{}",
+            arrays.concat()
+        )
     }
 }

@@ -14,6 +14,7 @@
 //! which `--phase` names. A line without `=` continues the equation before it. Names may have underscores (`ddz_1`).
 
 use super::error::ImportError;
+use super::pysindy::tokens;
 use crate::files::Place;
 use crate::model::{LatentVariable, MAX_LATENT_DIM};
 use crate::symbolic::{ExprId, ExprPool, ParseErrorKind, ParseLimits};
@@ -194,23 +195,17 @@ pub(super) fn plain_name(name: &str) -> Option<String> {
 
 /// A text that starts at a place, each name with another spelling in a piece of its own.
 fn pieces((line, column): (usize, usize), text: &str) -> Vec<Piece> {
-    let is_part = |c: char| c.is_ascii_alphanumeric() || "_.".contains(c);
     let mut pieces = vec![((line, column), String::new())];
-    let (mut column, mut rest) = (column, text);
-    while let Some(first) = rest.chars().next() {
-        let length = rest
-            .find(|c| !is_part(c))
-            .unwrap_or(rest.len())
-            .max(first.len_utf8());
-        let (word, after) = rest.split_at(length);
-        let behind = column + word.chars().count();
+    let mut behind = column;
+    for word in tokens(text) {
+        let start = behind;
+        behind += word.chars().count();
         match (plain_name(word), pieces.last_mut()) {
             (Some(name), _) => {
-                pieces.extend([((line, column), name), ((line, behind), String::new())]);
+                pieces.extend([((line, start), name), ((line, behind), String::new())]);
             }
             (None, last) => last.into_iter().for_each(|(_, text)| text.push_str(word)),
         }
-        (column, rest) = (behind, after);
     }
     pieces
 }

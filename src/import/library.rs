@@ -1,5 +1,6 @@
 //! The candidate terms of imported coefficients.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use serde_json::Value;
@@ -41,46 +42,37 @@ pub(super) fn order(
     latent_dim: usize,
     stated: Option<LibraryOrder>,
 ) -> Result<LibraryOrder, ImportError> {
-    let texts = |order| standard.texts_in(order, latent_dim);
-    let unusable = |source| ImportError::unusable("", source);
-    let orders = LibraryOrder::NAMED.map(texts);
-    let [paper, interleaved, romc] = orders;
-    let orders = [
-        paper.map_err(unusable)?,
-        interleaved.map_err(unusable)?,
-        romc.map_err(unusable)?,
-    ];
+    let texts = |order: &LibraryOrder| standard.texts_in(*order, latent_dim);
+    let orders: Result<Vec<Vec<String>>, _> = LibraryOrder::NAMED.iter().map(texts).collect();
+    let orders = orders.map_err(|source| ImportError::unusable("", source))?;
     if let Some(stated) = stated {
         return Ok(stated);
     }
-    let differs = |a: usize, b: usize| (orders[a].iter().zip(&orders[b])).position(|(a, b)| a != b);
-    let mut rows: Vec<usize> = [(0, 1), (0, 2), (1, 2)]
-        .iter()
-        .filter_map(|&(a, b)| differs(a, b))
+    let differs = |(a, b): (usize, usize)| {
+        let mut rows = orders[a].iter().zip(&orders[b]);
+        rows.position(|(a, b)| a != b)
+    };
+    let rows: BTreeSet<usize> = [(0, 1), (0, 2), (1, 2)]
+        .into_iter()
+        .filter_map(differs)
         .collect();
-    rows.sort_unstable();
-    rows.dedup();
     if rows.is_empty() {
         return Ok(LibraryOrder::ROMC);
     }
-    let choices = LibraryOrder::NAMED
+    let choice = |(order, texts): (&LibraryOrder, &Vec<String>)| {
+        let terms = rows
+            .iter()
+            .map(|&row| format!("{} in row {}", texts[row], row + 1));
+        let (name, terms) = (order.name().unwrap_or_default(), terms.collect::<Vec<_>>());
+        format!("--library-order {name} ({})", terms.join(", "))
+    };
+    let choices: Vec<String> = LibraryOrder::NAMED
         .iter()
         .zip(&orders)
-        .map(|(order, texts)| {
-            let terms = rows
-                .iter()
-                .map(|&row| format!("{} in row {}", texts[row], row + 1));
-            let terms: Vec<String> = terms.collect();
-            format!(
-                "--library-order {} ({})",
-                order.name().unwrap_or_default(),
-                terms.join(", ")
-            )
-        });
-    let expected = format!(
-        "one of {}: the order of the rows of Xi, counted from 1",
-        choices.collect::<Vec<_>>().join(", ")
-    );
+        .map(choice)
+        .collect();
+    let choices = choices.join(", ");
+    let expected = format!("one of {choices}: the order of the rows of Xi, counted from 1");
     let found = format!("no order of the terms of {}", standard_text(standard));
     Err(ImportError::option("--library-order", found, expected))
 }

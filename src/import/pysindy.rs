@@ -103,7 +103,7 @@ fn number_after_first(token: &str) -> Option<(char, usize)> {
 }
 
 /// Names, digits with points (an exponent is tokens of its own), runs of white space, `**`, and single characters.
-fn tokens(text: &str) -> impl Iterator<Item = &str> {
+pub(super) fn tokens(text: &str) -> impl Iterator<Item = &str> {
     let mut rest = text;
     std::iter::from_fn(move || {
         let first = rest.chars().next()?;

@@ -11,11 +11,11 @@ const LEGEND: [(Role, &str); 2] = [
 /// Figures 10 (decoder error and active coefficients) and 11 (combined loss) of a study; bars are one standard deviation
 /// over the seeds to either side.
 pub(crate) fn study_figures(summary: &Summary) -> Vec<Figure> {
-    let figure = |id: &str, caption: &str, panels: Vec<Panel>| Figure {
-        x_label: "latent coordinates".to_owned(),
-        panel_size: (360.0, 210.0),
-        columns: 2,
-        ..Figure::over_time(id, caption, panels, &LEGEND)
+    let figure = |id: &str, caption: &str, panels: Vec<Panel>| {
+        let figure = Figure::over_time(id, caption, panels, &LEGEND);
+        figure
+            .over("latent coordinates")
+            .in_columns(2, (360.0, 210.0))
     };
     type Row = (&'static str, fn(&DimensionSummary) -> Bar);
     let over_dimensions: [Row; 4] = [
@@ -40,7 +40,6 @@ pub(crate) fn study_figures(summary: &Summary) -> Vec<Figure> {
     ]
 }
 
-/// Lower end, middle and upper end of a bar.
 type Bar = [f64; 3];
 
 fn range(Spread { mean, std }: Spread) -> Bar {
@@ -66,42 +65,4 @@ fn panel(title: &str, rows: &[DimensionSummary], bar: impl Fn(&DimensionSummary)
     }
     let bars = Series::through(Role::SecondBaseline, bars);
     Panel::lines(title, vec![bars, Series::through(Role::Recorded, means)])
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::report::figures::Drawing;
-
-    #[test]
-    fn bars_reach_a_standard_deviation_to_either_side_and_do_not_join() {
-        let spread = |mean, std| Spread { mean, std };
-        let row = |latent_dim, active| DimensionSummary {
-            latent_dim,
-            trained: 5,
-            refused: 0,
-            decoder_mse: spread(1e-4, 2e-4),
-            active,
-            combined_loss: spread(1.0, 0.0),
-            torque_r2: spread(0.9, 0.0),
-            prediction_x_m: spread(0.002, 0.001),
-            prediction_z_m: spread(0.002, 0.001),
-        };
-        let summary = Summary {
-            lambda: 0.001,
-            dimensions: vec![row(1, spread(10.0, 2.0)), row(2, spread(20.0, 3.0))],
-        };
-        let figures = study_figures(&summary);
-        let [decoder, active] = [0, 1].map(|panel| match &figures[0].panels[panel].drawing {
-            Drawing::Lines { series, .. } => series,
-            other => panic!("{other:?}"),
-        });
-        let [bars, means] = [0, 1].map(|line| active[line].points.as_slice());
-        assert_eq!(
-            bars[..3],
-            [(1.0, Some(8.0)), (1.0, Some(12.0)), (1.0, None)]
-        );
-        assert_eq!(means, [(1.0, Some(10.0)), (2.0, Some(20.0))]);
-        assert_eq!(decoder[0].points[0], (1.0, Some(-5.0)));
-    }
 }

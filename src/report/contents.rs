@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use super::complexity::study_figures;
 use super::control::{latent_inputs, torques};
 use super::figures::{Drawing, Figure, Film, HeatMap, Panel, subscript};
-use super::jump::{Jump, Place};
+use super::jump::{Jump, JumpName};
 use super::tables::NamedRun;
 use crate::evaluate::{Assessment, SegmentRun, Verdict};
 use crate::model::{ModelError, ReducedModel};
@@ -13,23 +13,17 @@ use crate::mpc::Lift;
 use crate::recording::Segment;
 use crate::study::Summary;
 
-/// Jumps that get figures of their own; tables cover all.
 const MAX_JUMPS: usize = 3;
 
-/// The model and results that a report shows.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Content<'a> {
-    /// The model.
     pub model: &'a ReducedModel,
-    /// The model compared with the recordings.
     pub assessment: &'a Assessment<'a>,
-    /// What the model is fit for on the recordings.
     pub verdict: &'a Verdict,
     /// The controller along each recording with the plain lift; empty if it did not run.
     pub plain: &'a [NamedRun],
     /// The same with the lift that keeps torques and forces consistent.
     pub consistent: &'a [NamedRun],
-    /// A study over the latent dimension, if there is one.
     pub study: Option<&'a Summary>,
     /// The plan that the first jump follows, if there is one.
     pub plan: Option<&'a Segment>,
@@ -37,27 +31,20 @@ pub(crate) struct Content<'a> {
     pub digests: &'a [(PathBuf, String)],
 }
 
-/// Figures by section of the page.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct AllFigures {
-    /// The encoder's weights.
     pub encoder: Vec<Figure>,
-    /// The first jumps of the recordings.
     pub jumps: Vec<JumpFigures>,
-    /// Accuracy against complexity.
     pub study: Vec<Figure>,
 }
 
-/// The figures of one jump.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct JumpFigures {
-    /// The jump, in words.
     pub title: String,
     /// Root mean square errors of body x and z over the whole jump, in m.
     pub body_rms_m: [Option<f64>; 2],
     /// The robot recorded and predicted, as a strip for paper and animated.
     pub motion: Option<(Figure, Film)>,
-    /// Position and orientation of the body.
     pub body: Figure,
     /// Figures to fold away, each with a title: accelerations, template models, joints, and the controller's run if this
     /// is the first jump of a recording.
@@ -65,7 +52,6 @@ pub(crate) struct JumpFigures {
 }
 
 impl AllFigures {
-    /// All figures, in the order of the page.
     pub(crate) fn iter(&self) -> impl Iterator<Item = &Figure> {
         let jumps = self.jumps.iter();
         let jumps = jumps.flat_map(|jump| {
@@ -77,10 +63,6 @@ impl AllFigures {
     }
 }
 
-/// The figures of a report.
-///
-/// # Errors
-/// [`ModelError`] for a model without encoder or decoder.
 pub(crate) fn all_figures(content: &Content<'_>) -> Result<AllFigures, ModelError> {
     let mut figures = AllFigures::default();
     let (model, assessment) = (content.model, content.assessment);
@@ -120,12 +102,11 @@ pub(crate) fn all_figures(content: &Content<'_>) -> Result<AllFigures, ModelErro
     Ok(figures)
 }
 
-/// Every jump of an assessment, named.
 pub(super) fn jumps<'a>(content: &Content<'a>) -> Vec<Jump<'a>> {
     let (model, assessment) = (content.model, content.assessment);
     let jump = |(index, run): (usize, &'a SegmentRun<'a>)| {
         let path = &run.segment.path;
-        let mut place = Place::of_recording(index, path);
+        let mut place = JumpName::of_recording(index, path);
         let same = assessment.runs.iter().map(|run| &run.segment.path);
         if same.filter(|other| *other == path).count() > 1 {
             place.words += &format!(", from row {}", run.segment.first_row);
@@ -168,10 +149,6 @@ fn encoder(
             values,
         }),
     };
-    Ok(Figure {
-        x_label: String::new(),
-        panel_size: (120.0 + 40.0 * d.min(18) as f64, 330.0),
-        columns: 1,
-        ..Figure::over_time("encoder", caption, vec![map], &[])
-    })
+    let figure = Figure::over_time("encoder", caption, vec![map], &[]).over("");
+    Ok(figure.in_columns(1, (120.0 + 40.0 * d.min(18) as f64, 330.0)))
 }

@@ -2,7 +2,7 @@
 //! latent tracking, solve times.
 
 use super::figures::{Figure, Panel, Role, Series};
-use super::jump::Place;
+use super::jump::JumpName;
 use super::tables::NamedRun;
 use crate::evaluate::{Run, StepRow};
 use crate::model::ReducedModel;
@@ -17,7 +17,7 @@ pub(crate) fn control_figures(
     runs: &[NamedRun],
 ) -> Vec<Figure> {
     let figures = runs.iter().enumerate().flat_map(|(index, (path, run))| {
-        let place = Place::of_recording(index, path);
+        let place = JumpName::of_recording(index, path);
         [
             torques(model, settings.lift, run, &place),
             latent_inputs(model, run, &place),
@@ -35,15 +35,13 @@ pub(crate) fn without_statistics(model: &ReducedModel) -> Option<&str> {
     without.map(|(_, phase)| phase.name.as_str())
 }
 
-/// A line over the steps of a run.
 fn line(run: &Run, role: Role, value: impl Fn(&StepRow) -> Option<f64>) -> Series {
     let points = run.rows.iter().map(|row| (row.time_s, value(row)));
     Series::through(role, points)
 }
 
-/// Commanded torques beside the recorded ones, between the limits.
-pub(super) fn torques(model: &ReducedModel, lift: Lift, run: &Run, place: &Place) -> Figure {
-    let Place { suffix, words } = place;
+pub(super) fn torques(model: &ReducedModel, lift: Lift, run: &Run, place: &JumpName) -> Figure {
+    let JumpName { suffix, words } = place;
     let limits = model.robot().ok().map(Robot::torque_limit_nm);
     let panel = |joint: usize| {
         let limit = |sign: f64| limits.map(|limits| sign * limits[joint]);
@@ -74,9 +72,8 @@ pub(super) fn torques(model: &ReducedModel, lift: Lift, run: &Run, place: &Place
     )
 }
 
-/// The controller's latent inputs.
-pub(super) fn latent_inputs(model: &ReducedModel, run: &Run, place: &Place) -> Figure {
-    let Place { suffix, words } = place;
+pub(super) fn latent_inputs(model: &ReducedModel, run: &Run, place: &JumpName) -> Figure {
+    let JumpName { suffix, words } = place;
     let panel = |latent: usize| {
         let chosen = line(run, Role::Full, |row| {
             row.command.u_lat.get(latent).copied()
@@ -96,7 +93,7 @@ fn latent_tracking(
     model: &ReducedModel,
     settings: &MpcSettings,
     run: &Run,
-    Place { suffix, words }: &Place,
+    JumpName { suffix, words }: &JumpName,
 ) -> Figure {
     let horizon_s = settings.horizon as f64 * settings.step_s;
     let panel = |latent: usize| {
@@ -122,27 +119,23 @@ fn latent_tracking(
     )
 }
 
-/// Wall time and iterations of every step.
-fn solve_times(settings: &MpcSettings, run: &Run, place: &Place) -> Figure {
+fn solve_times(settings: &MpcSettings, run: &Run, place: &JumpName) -> Figure {
     let milliseconds = line(run, Role::Recorded, |row| Some(1e-3 * row.command.solve_us));
     let iterations = line(run, Role::Recorded, |row| {
         Some(f64::from(row.command.iterations))
     });
-    Figure {
-        panel_size: (360.0, 170.0),
-        columns: 2,
-        ..Figure::over_time(
-            format!("solve_times_{}", place.suffix),
-            format!(
-                "Steps along {}: wall time from measurement to command, {} stages of {} s each, and \
-                 interior-point iterations.",
-                place.words, settings.horizon, settings.step_s
-            ),
-            vec![
-                Panel::lines("time of a step, ms", vec![milliseconds]),
-                Panel::lines("iterations", vec![iterations]),
-            ],
-            &[(Role::Recorded, "one step")],
-        )
-    }
+    let caption = format!(
+        "Steps along {}: wall time from measurement to command, {} stages of {} s each, and \
+         interior-point iterations.",
+        place.words, settings.horizon, settings.step_s
+    );
+    let panels = vec![
+        Panel::lines("time of a step, ms", vec![milliseconds]),
+        Panel::lines("iterations", vec![iterations]),
+    ];
+    let (id, legend) = (
+        format!("solve_times_{}", place.suffix),
+        [(Role::Recorded, "one step")],
+    );
+    Figure::over_time(id, caption, panels, &legend).in_columns(2, (360.0, 170.0))
 }

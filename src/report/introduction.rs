@@ -14,18 +14,15 @@ use crate::recording::Segment;
 use crate::typeset::words::counted;
 use crate::typeset::{Table, rounded};
 
-/// An assessment in words.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Introduction {
     /// One line: fit for what, and for what not.
     pub headline: String,
-    /// Sentences that give the reasons.
     pub sentences: Vec<String>,
     /// The jumps: where from, how long, seen in training or not, errors.
     pub recordings: Table,
 }
 
-/// Whether a model was made with a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Seen {
     Yes,
@@ -34,10 +31,6 @@ enum Seen {
     Unknown,
 }
 
-/// The assessment in words.
-///
-/// # Errors
-/// [`ModelError`] for a model without encoder or decoder.
 pub(crate) fn introduction(content: &Content<'_>) -> Result<Introduction, ModelError> {
     let mut sentences = vec![subject(content)?, compared(content), errors(content)];
     sentences.extend(beside_pendulum(content));
@@ -50,7 +43,6 @@ pub(crate) fn introduction(content: &Content<'_>) -> Result<Introduction, ModelE
     })
 }
 
-/// What a model is fit for, in one line.
 pub(crate) fn headline(verdict: &Verdict, is_doubtful: bool) -> String {
     let words = |of: &String| match of.as_str() {
         "whole motion" => "predictions of the whole motion".to_owned(),
@@ -91,7 +83,6 @@ fn cause(content: &Content<'_>) -> Option<String> {
     })
 }
 
-/// What the model is.
 fn subject(content: &Content<'_>) -> Result<String, ModelError> {
     let (model, assessment) = (content.model, content.assessment);
     let robot = model.robot().map_or("a robot", |robot| robot.name());
@@ -119,7 +110,6 @@ fn subject(content: &Content<'_>) -> Result<String, ModelError> {
     ))
 }
 
-/// `a, b and c`.
 fn listed(names: &[String]) -> String {
     match names {
         [] => String::new(),
@@ -128,7 +118,6 @@ fn listed(names: &[String]) -> String {
     }
 }
 
-/// The digests of the recordings that a model was made with.
 fn known_digests(model: &ReducedModel) -> BTreeSet<&str> {
     let recordings = model.provenance().get("recordings");
     let entries = recordings.and_then(Value::as_array).into_iter().flatten();
@@ -150,7 +139,6 @@ fn seen(content: &Content<'_>, known: &BTreeSet<&str>, path: &Path) -> Seen {
 
 const FLATTERS: &str = "which flatters the figures below";
 
-/// What it is compared with.
 fn compared(content: &Content<'_>) -> String {
     let runs = &content.assessment.runs;
     let seconds: f64 = runs.iter().map(|run| run.segment.duration_s()).sum();
@@ -176,7 +164,6 @@ fn compared(content: &Content<'_>) -> String {
     )
 }
 
-/// Millimetres with two digits.
 fn millimetres(metres: f64) -> String {
     format!("{} mm", rounded(1e3 * metres, 2))
 }
@@ -186,7 +173,6 @@ fn pair([x, z]: [Option<f64>; 2]) -> String {
     format!("{} in body.x and {} in body.z", shown(x), shown(z))
 }
 
-/// Errors over whole jumps and between restarts.
 fn errors(content: &Content<'_>) -> String {
     let assessment = content.assessment;
     let [whole, short] =
@@ -204,7 +190,6 @@ fn errors(content: &Content<'_>) -> String {
     )
 }
 
-/// How it compares with the better of the template models over whole jumps.
 fn beside_pendulum(content: &Content<'_>) -> Option<String> {
     let assessment = content.assessment;
     let own = body_rms(assessment, &assessment.full);
@@ -264,7 +249,6 @@ fn commands(content: &Content<'_>) -> Option<String> {
     })
 }
 
-/// One row per jump.
 fn recordings(content: &Content<'_>) -> Result<Table, ModelError> {
     let known = known_digests(content.model);
     let mut rows = Vec::new();
@@ -329,13 +313,5 @@ mod tests {
         assert!(of(&[], &[]).starts_with("Not judged"));
         let doubtful = headline(&Verdict::default(), true);
         assert!(doubtful.starts_with("Do not rely on it here"), "{doubtful}");
-    }
-
-    #[test]
-    fn lists_and_counts_read_as_english() {
-        let names = ["a", "b", "c"].map(str::to_owned);
-        assert_eq!(listed(&names), "a, b and c");
-        assert_eq!(listed(&names[..1]), "a");
-        assert_eq!([1, 2].map(|n| counted(n, "jump")), ["1 jump", "2 jumps"]);
     }
 }

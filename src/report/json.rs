@@ -38,7 +38,6 @@ pub fn assessment_json(model: &ReducedModel, assessment: &Assessment<'_>) -> Val
     })
 }
 
-/// A value of each phase under its name.
 fn by_phase(model: &ReducedModel, value: impl Fn(usize) -> Value) -> Map<String, Value> {
     let names = model.phases().iter().map(|phase| phase.name.clone());
     names.zip((0..).map(value)).collect()

@@ -14,18 +14,13 @@ use crate::recording::{Segment, stretches};
 use crate::robot::{BODY_X, BODY_Z, JOINT_DIM, STATE_DIM};
 use crate::sim::Rollout;
 
-/// Instants of a film strip.
 const FRAMES: usize = 10;
 
-/// Yaw at the first sample, in rad.
 pub(super) fn heading_rad(segment: &Segment) -> f64 {
     segment.x[(STATE_DIM - 1, 0)]
 }
 
 /// Whether each coordinate of the robot enters a latent one at the beginning of a run.
-///
-/// # Errors
-/// [`ModelError`] for a model without encoder.
 pub(crate) fn modelled(
     model: &ReducedModel,
     run: &SegmentRun<'_>,
@@ -35,16 +30,14 @@ pub(crate) fn modelled(
     Ok(columns.map(|column| column.amax() != 0.0).collect())
 }
 
-/// Which jump a figure shows.
-pub(super) struct Place {
+pub(super) struct JumpName {
     /// Number from 1, which ends the figure's name.
     pub suffix: String,
     /// Name of the recording, with the row where the jump begins if there may be several.
     pub words: String,
 }
 
-impl Place {
-    /// A recording.
+impl JumpName {
     pub(crate) fn of_recording(index: usize, path: &Path) -> Self {
         let name = file_name(path);
         let stem = name.trim_end_matches(".gz").trim_end_matches(".csv");
@@ -58,12 +51,11 @@ impl Place {
 /// A value of every sample; none where a rollout did not arrive.
 type Samples = Vec<Option<DVector<f64>>>;
 
-/// One segment of a recording beside its rollouts.
 pub(super) struct Jump<'a> {
     pub model: &'a ReducedModel,
     pub assessment: &'a Assessment<'a>,
     pub run: &'a SegmentRun<'a>,
-    pub place: Place,
+    pub place: JumpName,
 }
 
 impl Jump<'_> {
@@ -114,7 +106,6 @@ impl Jump<'_> {
         Ok(states)
     }
 
-    /// A function's value at every predicted sample.
     fn predicted(
         &self,
         rollout: &Rollout,
@@ -127,7 +118,6 @@ impl Jump<'_> {
         states.enumerate().map(value).collect()
     }
 
-    /// Coordinates of the robot along a rollout.
     fn decoded(&self, rollout: &Rollout) -> Result<Samples, ModelError> {
         self.predicted(rollout, |_, z, _| self.model.decode(z))
     }
@@ -136,12 +126,10 @@ impl Jump<'_> {
         Series::over(role, &self.run.latent.time_s, value)
     }
 
-    /// Lines over the samples; flight is shaded.
     fn panel(&self, title: impl Into<String>, series: Vec<Series>) -> Panel {
         Panel::shaded(title, series, self.flights())
     }
 
-    /// Times without a foot down.
     fn flights(&self) -> Vec<(f64, f64)> {
         let Segment { time_s, feet, .. } = self.run.segment;
         let in_air = |sample: usize| !feet[sample].contains(&true);
@@ -264,11 +252,8 @@ impl Jump<'_> {
             panel(BODY_Z, 1, "body.z, m"),
         ];
         let id = format!("aslip_{}", self.place.suffix);
-        Ok(Figure {
-            panel_size: (360.0, 180.0),
-            columns: 2,
-            ..Figure::over_time(id, caption, panels, &legend)
-        })
+        let figure = Figure::over_time(id, caption, panels, &legend);
+        Ok(figure.in_columns(2, (360.0, 180.0)))
     }
 
     /// Root mean square errors of body x and z over the whole jump, in m; none where the rollout arrives nowhere.

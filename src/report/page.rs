@@ -20,20 +20,15 @@ use crate::typeset::{
 /// Longest line of an equation, in em.
 const WIDTH_EM: f64 = 44.0;
 
-/// The parts of the page that do not follow from its [`Content`].
 #[derive(Debug, Clone, Default)]
 pub(crate) struct PageOptions {
     /// Effects of simplification within several tolerances, and every change of the chosen one; tables without rows
     /// are left out.
     pub simplification: Vec<Table>,
-    /// Commands that reproduce the report, in order.
     pub commands: Vec<String>,
 }
 
 /// The report as one HTML page: no request to anywhere, one small script for animations and for copying equations.
-///
-/// # Errors
-/// [`TypesetError::Template`].
 pub(crate) fn page(
     content: &Content<'_>,
     introduction: &Introduction,
@@ -74,7 +69,6 @@ struct Page<'a> {
     phases: Vec<(&'a EquationSystem, &'a PhaseEquations)>,
     rounding: String,
     jumps: &'a [JumpFigures],
-    /// Jumps without figures.
     rest: usize,
     sections: Vec<Section<'a>>,
     origin: Origin,
@@ -99,7 +93,6 @@ fn errors(jump: &JumpFigures) -> String {
     format!("body x off by {x}, body z by {z} over the whole jump")
 }
 
-/// With which feet a phase holds.
 fn holds(phase: &PhaseEquations) -> String {
     html(&feet(&phase.feet))
 }
@@ -115,7 +108,6 @@ fn latex(equations: &EquationSystem) -> String {
     lines.collect()
 }
 
-/// How a figure's panels are laid out.
 fn layout(figure: &Figure) -> &'static str {
     match (figure.panels.len(), figure.columns) {
         (1, _) => "one",

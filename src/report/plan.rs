@@ -3,15 +3,13 @@
 
 use super::figures::{Figure, Motion, Panel, Role, Series, film_strip, floor_m};
 use crate::model::JumpPrior;
-use crate::plan::{Plan, Reach};
+use crate::plan::{GoalMap, Plan};
 use crate::robot::{BODY_X, BODY_Z, JOINT_DIM, Robot};
 
-/// Postures in the film strip.
 const FRAMES: usize = 8;
 /// Half the size of the cross of a recorded jump, m.
 const CROSS_M: f64 = 0.004;
 
-/// The figures of a plan for a robot.
 pub(crate) fn plan_figures(plan: &Plan, robot: &Robot) -> Vec<Figure> {
     let motion = &plan.motion;
     let [distance_m, apex_m] = plan.goal_m;
@@ -36,7 +34,6 @@ fn over_time(plan: &Plan, role: Role, value: impl Fn(usize) -> f64) -> Series {
     Series::over(role, &plan.motion.time_s, |sample| Some(value(sample)))
 }
 
-/// Times without a foot on the ground.
 fn flights(plan: &Plan) -> Vec<(f64, f64)> {
     let mut start = 0.0;
     let mut flights = Vec::new();
@@ -57,19 +54,14 @@ fn panel(plan: &Plan, title: String, series: Vec<Series>) -> Panel {
     Panel::shaded(title, series, flights(plan))
 }
 
-/// Height over distance of the body.
 fn path(plan: &Plan, goal: &str) -> Figure {
     let x = &plan.motion.x;
     let points = (0..plan.motion.len()).map(|k| (x[(BODY_X, k)], Some(x[(BODY_Z, k)])));
     let body = Series::through(Role::Full, points);
     let panels = vec![Panel::lines("body z, m", vec![body])];
     let caption = format!("Path of the body in {goal}.");
-    Figure {
-        x_label: "body x, m".to_owned(),
-        panel_size: (360.0, 220.0),
-        columns: 1,
-        ..Figure::over_time("plan_path", caption, panels, &[(Role::Full, "planned")])
-    }
+    let figure = Figure::over_time("plan_path", caption, panels, &[(Role::Full, "planned")]);
+    figure.over("body x, m").in_columns(1, (360.0, 220.0))
 }
 
 /// Body and its speeds over time, the flight shaded, with the borders of the parts.
@@ -100,7 +92,6 @@ fn phases(plan: &Plan, goal: &str) -> Figure {
     }
 }
 
-/// Torques between their limits.
 fn torques(plan: &Plan, robot: &Robot, goal: &str) -> Figure {
     let names = Robot::state_names();
     let panels = (0..JOINT_DIM).map(|joint| {
@@ -122,17 +113,13 @@ fn torques(plan: &Plan, robot: &Robot, goal: &str) -> Figure {
 }
 
 /// Distances and apexes that can be planned, with the recorded jumps.
-pub(crate) fn reach_figure(reach: &Reach, prior: &JumpPrior) -> Figure {
+pub(crate) fn reach_figure(reach: &GoalMap, prior: &JumpPrior) -> Figure {
     let crosses = prior.jumps.iter().flat_map(|&[distance, apex, _]| {
         let at = |x: f64, y: f64| (distance + x * CROSS_M, Some(apex + 0.25 * y * CROSS_M));
-        [
-            at(-1.0, -1.0),
-            at(1.0, 1.0),
-            (distance, None),
-            at(-1.0, 1.0),
-            at(1.0, -1.0),
-            (distance, None),
-        ]
+        let gap = (distance, None);
+        [[-1.0, 1.0], [1.0, -1.0]]
+            .map(|[from, to]| [at(-1.0, from), at(1.0, to), gap])
+            .concat()
     });
     let series = vec![
         Series::through(Role::Recorded, crosses),
@@ -146,16 +133,12 @@ pub(crate) fn reach_figure(reach: &Reach, prior: &JumpPrior) -> Figure {
         (Role::Full, "trusted"),
         (Role::Restarted, "with a warning"),
     ];
-    Figure {
-        x_label: "distance, m".to_owned(),
-        panel_size: (420.0, 280.0),
-        columns: 1,
-        ..Figure::over_time("plan_reach", caption, panels, &legend)
-    }
+    let figure = Figure::over_time("plan_reach", caption, panels, &legend);
+    figure.over("distance, m").in_columns(1, (420.0, 280.0))
 }
 
 /// The outline of the goals with one of these verdicts: for each apex, the stretch of distances.
-fn border(reach: &Reach, role: Role, words: &[&str]) -> Series {
+fn border(reach: &GoalMap, role: Role, words: &[&str]) -> Series {
     let rows = reach.points.chunks_exact(reach.distances_m.len());
     let stretches: Vec<[f64; 3]> = rows
         .zip(&reach.apexes_m)

@@ -10,7 +10,6 @@ const LONGEST_LIST: usize = 24;
 /// Digits of a digest that are shown.
 const DIGEST: usize = 12;
 
-/// The origin of a model, ready for a page.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Origin {
     /// Name and value of each entry that fits a cell.
@@ -19,7 +18,6 @@ pub(crate) struct Origin {
     pub lists: Vec<Table>,
 }
 
-/// The entries of a provenance in their order.
 pub(crate) fn origin(provenance: &Map<String, Value>) -> Origin {
     let mut origin = Origin::default();
     for (key, value) in provenance {
@@ -40,7 +38,6 @@ pub(crate) fn origin(provenance: &Map<String, Value>) -> Origin {
     origin
 }
 
-/// Adds a value under its place to the facts, or a table of its own to the lists.
 fn add(facts: &mut Vec<(String, String)>, lists: &mut Vec<Table>, place: &str, value: &Value) {
     match value {
         Value::Object(entries) => {
@@ -59,7 +56,6 @@ fn spaced(key: &str) -> String {
     key.replace('_', " ")
 }
 
-/// A list of objects as a table with the keys of the first as columns.
 fn list(place: &str, items: &[Value]) -> Table {
     let keys: Vec<&String> = (items.iter().find_map(Value::as_object))
         .map(|entries| entries.keys().collect())

@@ -11,7 +11,6 @@ use super::tables::{
 use crate::evaluate::{AFTER_A_PUSH, CoordinateSums, Invariance, TORQUES_IN_CONTACT};
 use crate::typeset::{Table, rounded, significant};
 
-/// A section in the template.
 pub(super) struct Section<'a> {
     pub id: &'static str,
     pub title: &'static str,
@@ -34,13 +33,11 @@ impl<'a> Section<'a> {
         }
     }
 
-    /// Adds paragraphs.
     fn and(mut self, notes: impl IntoIterator<Item = String>) -> Self {
         self.paragraphs.extend(notes);
         self
     }
 
-    /// Adds figures and tables.
     fn with(self, figures: &'a [Figure], tables: impl IntoIterator<Item = Table>) -> Self {
         Self {
             tables: tables.into_iter().collect(),
@@ -49,7 +46,6 @@ impl<'a> Section<'a> {
         }
     }
 
-    /// Adds tables that are folded away.
     fn folding(mut self, tables: impl IntoIterator<Item = Table>) -> Self {
         self.folded
             .extend(tables.into_iter().filter(|table| !table.is_empty()));
@@ -57,7 +53,6 @@ impl<'a> Section<'a> {
     }
 }
 
-/// The numbers at the top of the page, each with its name.
 pub(super) fn tiles(content: &Content<'_>) -> Vec<(String, String)> {
     let (model, assessment) = (content.model, content.assessment);
     let every = assessment.restart_every_s;
@@ -112,7 +107,6 @@ pub(super) fn tiles(content: &Content<'_>) -> Vec<(String, String)> {
     tiles.map(|(name, value)| (name.to_owned(), value)).into()
 }
 
-/// The sections below the jumps, in their order.
 pub(super) fn sections<'a>(
     content: &Content<'_>,
     figures: &'a AllFigures,

@@ -23,7 +23,6 @@ fn r2(fit: Option<Fit>) -> Cell {
     r2.map(|r2| format!("{r2:.3}")).into()
 }
 
-/// A row for each coordinate, so far with its name and unit.
 fn coordinates(assessment: &Assessment<'_>) -> Table {
     let mut table = Table::default();
     table.column("coordinate", "", &assessment.names);
@@ -54,12 +53,10 @@ pub(crate) fn coordinate_table(model: &ReducedModel, assessment: &Assessment<'_>
     table
 }
 
-/// Fit of every coordinate, and its restarted residuals in each phase.
 pub(crate) fn error_table(model: &ReducedModel, assessment: &Assessment<'_>) -> Table {
     with_phases(coordinate_table(model, assessment), model, assessment)
 }
 
-/// Restarted residuals of every coordinate, one column per phase.
 pub(crate) fn phase_table(model: &ReducedModel, assessment: &Assessment<'_>) -> Table {
     with_phases(coordinates(assessment), model, assessment)
 }
@@ -72,7 +69,6 @@ fn with_phases(mut table: Table, model: &ReducedModel, assessment: &Assessment<'
     table
 }
 
-/// Root mean square errors of body x and z.
 pub(crate) fn body_rms(assessment: &Assessment<'_>, sums: &CoordinateSums) -> [Option<f64>; 2] {
     ["body.x", "body.z"].map(|name| rms(assessment.fit(sums, name)))
 }
@@ -82,7 +78,6 @@ pub(crate) fn template_rms(sums: &AslipSums) -> [Option<f64>; 2] {
     [sums.x, sums.z].map(|sums| rms(sums.fit()))
 }
 
-/// The model beside the template models, body x and z.
 pub(crate) fn baseline_table(assessment: &Assessment<'_>) -> Table {
     let every = format!("restarted every {} s", assessment.restart_every_s);
     let titles = ["body.x", "body.z"]
@@ -103,7 +98,6 @@ pub(crate) fn baseline_table(assessment: &Assessment<'_>) -> Table {
     table
 }
 
-/// Latent accelerations, stability and input gain of each phase.
 pub(crate) fn dynamics_table(model: &ReducedModel, assessment: &Assessment<'_>) -> Table {
     let fits = assessment.pointwise.acceleration.iter().map(FitSums::fit);
     let phases = model.phases().iter();
@@ -130,7 +124,6 @@ pub(crate) fn dynamics_table(model: &ReducedModel, assessment: &Assessment<'_>) 
         .table()
 }
 
-/// What a model says of known physics, one row per phase.
 pub(crate) fn invariance_table(invariance: &Invariance) -> Table {
     let shown = |value: Option<f64>| value.map_or("-".to_owned(), significant);
     let words = format!(
@@ -201,7 +194,6 @@ fn driven(metrics: &ControlMetrics) -> [Driven<'_>; 5] {
     ]
 }
 
-/// The rows of the verdict that fail along each recording.
 pub(crate) fn failures(runs: &[NamedRun]) -> Vec<String> {
     let failed = runs.iter().filter_map(|(path, run)| {
         let failure = run.metrics.as_ref()?.failure.as_ref()?;
@@ -210,7 +202,6 @@ pub(crate) fn failures(runs: &[NamedRun]) -> Vec<String> {
     failed.collect()
 }
 
-/// The rows of a verdict, one by one.
 pub(crate) fn verdict_table(verdict: &Verdict) -> Table {
     let number = |value: Option<f64>| match value {
         Some(value) if !value.is_finite() => "diverges".to_owned(),
@@ -256,7 +247,6 @@ pub(crate) fn verdict_lines(verdict: &Verdict) -> String {
     text
 }
 
-/// The runs that controlled nothing, and why.
 pub(crate) fn failed_runs(runs: &[NamedRun]) -> Vec<String> {
     let failed = (runs.iter())
         .filter_map(|(path, run)| Some(format!("{}: {}", file_name(path), run.failure()?)));

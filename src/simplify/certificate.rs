@@ -14,9 +14,7 @@ use crate::symbolic::Interval;
 /// A count before and after simplification.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct BeforeAfter {
-    /// In the model.
     pub before: usize,
-    /// In the simplified model.
     pub after: usize,
 }
 
@@ -36,42 +34,29 @@ impl std::iter::Sum for BeforeAfter {
     }
 }
 
-/// The kind of a change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ChangeKind {
-    /// It is gone.
     Dropped,
-    /// A constant took its place.
     Constant,
     /// A straight line took its place: multiples of variables, perhaps with a constant.
     Linear,
-    /// Its coefficient has fewer digits.
     Rounded {
-        /// Significant digits that are left.
         digits: usize,
     },
 }
 
-/// Another coefficient that a change altered.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Effect {
-    /// The term in the library's syntax.
     pub term: String,
-    /// Its coefficient before the change.
     pub before: f64,
-    /// And after it.
     pub after: f64,
 }
 
-/// One change of one equation.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Change {
-    /// Its kind.
     #[serde(flatten, serialize_with = "kind")]
     pub kind: ChangeKind,
-    /// The term in the library's syntax.
     pub term: String,
-    /// Its coefficient before this change.
     pub before: f64,
     /// And after it; zero unless the change is a rounding.
     pub after: f64,
@@ -88,12 +73,10 @@ pub struct Change {
 /// One equation of one phase; all errors in scaled units per second squared.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct EquationCertificate {
-    /// Index of the latent coordinate.
     #[serde(rename = "equation", serialize_with = "equation")]
     pub output: usize,
     /// Root mean square of the model's `ddz` over the recorded samples.
     pub rms: Option<f64>,
-    /// The largest error that the tolerance allows.
     pub allowed: f64,
     /// Contains `ddz` of the model minus `ddz` of the simplified model at every point of the domain;
     /// found from the two models, not from the list of changes.
@@ -104,18 +87,14 @@ pub struct EquationCertificate {
     pub sum_of_bounds: Interval,
     /// The difference at the recorded samples.
     pub measured: Option<Measured>,
-    /// Active terms.
     pub terms: BeforeAfter,
     /// Significant decimal digits that the coefficients need, added up.
     pub digits: BeforeAfter,
-    /// The changes, in order.
     pub changes: Vec<Change>,
 }
 
-/// One phase.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PhaseCertificate {
-    /// The phase's name.
     pub name: String,
     /// The box: each variable's name and range. `None` if there is no sample of the phase, so that
     /// its equations were kept.
@@ -130,9 +109,8 @@ pub struct PhaseCertificate {
     pub operations: BeforeAfter,
     /// Variables that some `ddz` of the phase depended on, and none does any more: inputs among them
     /// can no longer be used for control.
-    #[serde(rename = "no_longer_depends_on", serialize_with = "names")]
+    #[serde(rename = "no_longer_depends_on")]
     pub lost: Vec<LatentVariable>,
-    /// One entry per latent coordinate.
     pub equations: Vec<EquationCertificate>,
 }
 
@@ -224,17 +202,14 @@ pub fn certificate_json(certificate: &Certificate) -> Value {
     })
 }
 
-/// `ddz1` for the first latent coordinate.
 fn equation<S: Serializer>(output: &usize, to: S) -> Result<S::Ok, S::Error> {
     to.collect_str(&format_args!("ddz{}", output + 1))
 }
 
-/// The lower and the upper end of an interval.
 fn ends<S: Serializer>(interval: &Interval, to: S) -> Result<S::Ok, S::Error> {
     [interval.lo(), interval.hi()].serialize(to)
 }
 
-/// Ranges under their variables' names.
 fn ranges<S: Serializer>(
     domain: &Option<Vec<(String, Interval)>>,
     to: S,
@@ -243,11 +218,6 @@ fn ranges<S: Serializer>(
         return to.serialize_none();
     };
     to.collect_map((ranges.iter()).map(|(name, range)| (name, [range.lo(), range.hi()])))
-}
-
-/// Names of variables.
-fn names<S: Serializer>(lost: &[LatentVariable], to: S) -> Result<S::Ok, S::Error> {
-    to.collect_seq(lost.iter().map(ToString::to_string))
 }
 
 /// The kind of a change, with the digits of a rounding.

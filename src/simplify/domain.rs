@@ -55,36 +55,28 @@ impl Domain {
     /// The domain with these boxes, one per phase of the model.
     ///
     /// # Errors
-    /// [`SimplifyError::PhaseCount`], [`SimplifyError::BoxDimension`], [`SimplifyError::Range`].
+    /// [`SimplifyError::Domain`] for another number of boxes or ranges, and for a range that is empty or infinite.
     pub fn new(
         model: &ReducedModel,
         boxes: Vec<Option<Vec<Interval>>>,
     ) -> Result<Self, SimplifyError> {
-        if boxes.len() != model.phases().len() {
-            return Err(SimplifyError::PhaseCount {
-                found: boxes.len(),
-                expected: model.phases().len(),
-            });
-        }
-        let expected = 3 * model.latent_dim();
+        check_count(boxes.len(), model.phases().len())?;
+        let refused = |message| Err(SimplifyError::Domain(message));
+        let variables: Vec<_> = LatentVariable::all(model.latent_dim()).collect();
         for (ranges, phase) in boxes.iter().zip(model.phases()) {
             let Some(ranges) = ranges else { continue };
-            if ranges.len() != expected {
-                return Err(SimplifyError::BoxDimension {
-                    phase: phase.name.clone(),
-                    found: ranges.len(),
-                    expected,
-                });
+            let (name, found, expected) = (&phase.name, ranges.len(), variables.len());
+            if found != expected {
+                return refused(format!(
+                    "of phase `{name}` has {found} ranges, expected {expected} (z, dz, u of each latent coordinate)"
+                ));
             }
-            let variables = LatentVariable::all(model.latent_dim());
-            for (range, variable) in ranges.iter().zip(variables) {
+            for (range, variable) in ranges.iter().zip(&variables) {
                 if range.is_empty() || !range.magnitude().is_finite() {
-                    return Err(SimplifyError::Range {
-                        phase: phase.name.clone(),
-                        variable: variable.to_string(),
-                        lo: range.lo(),
-                        hi: range.hi(),
-                    });
+                    let (lo, hi) = (range.lo(), range.hi());
+                    return refused(format!(
+                        "of `{variable}` in phase `{name}` is {lo} to {hi}, expected finite numbers in order"
+                    ));
                 }
             }
         }
@@ -92,9 +84,6 @@ impl Domain {
     }
 
     /// The smallest boxes that hold all samples, each side moved out by `margin` times the width.
-    ///
-    /// # Errors
-    /// As `Domain::new`, for samples of another model.
     pub fn around(
         model: &ReducedModel,
         samples: &Samples,
@@ -164,18 +153,11 @@ impl Domain {
         Self::new(model, boxes)
     }
 
-    /// The box of a phase: `3 latent_dim` ranges.
-    ///
-    /// # Panics
-    /// If there is no such phase.
     pub(crate) fn phase(&self, phase: usize) -> Option<&[Interval]> {
         self.boxes[phase].as_deref()
     }
 
     /// Whether a point lies in a box; `false` for a phase without one.
-    ///
-    /// # Panics
-    /// If there is no such phase.
     pub(crate) fn contains(&self, phase: usize, point: impl Iterator<Item = f64>) -> bool {
         let is_inside = |ranges: &[Interval]| {
             (ranges.iter().zip(point)).all(|(range, value)| range.contains(value))
@@ -201,6 +183,15 @@ impl Domain {
             .filter(|&k| self.contains(phase, samples.column(k).iter().copied()))
             .collect();
         library.evaluate_points(&samples.select_columns(&inside))
+    }
+}
+
+pub(super) fn check_count(found: usize, expected: usize) -> Result<(), SimplifyError> {
+    match found == expected {
+        true => Ok(()),
+        false => Err(SimplifyError::Domain(format!(
+            "has {found} boxes, expected one for each of {expected} phases"
+        ))),
     }
 }
 

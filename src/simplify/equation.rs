@@ -1,11 +1,10 @@
-//! Which changes are made to one equation.
+//! Replacements of a term (nothing, a constant, a straight line), and which changes are made to one equation.
 //!
 //! Each change is made to the equation as the changes before it left it, and its error is enclosed
 //! over the box. The errors add, as intervals, to what all changes together may cost.
 
 use super::certificate::ChangeKind;
 use super::ranges::Ranges;
-use super::rewrite::{Rewrite, rewrites};
 use super::workspace::{Workspace, has_function};
 use crate::symbolic::Interval;
 use crate::typeset::rounded;
@@ -14,6 +13,11 @@ use crate::typeset::rounded;
 const REMOVAL_SHARE: f64 = 0.75;
 /// A coefficient of this many significant digits reads back as itself.
 const MAX_DIGITS: usize = 17;
+
+/// Terms of more variables than this are not made linear.
+const MAX_LINEAR_SYMBOLS: usize = 4;
+/// A constant or slope that would lower the error by less than this share is left out.
+const WORTHWHILE: f64 = 0.05;
 
 /// Whether two floats are the same number but for the rounding of a product: `-0.9810000000000001` is 9.81 times -0.1.
 pub(super) fn is_same_decimal(before: f64, after: f64) -> bool {
@@ -33,6 +37,16 @@ pub(super) struct Step {
     pub bound: Interval,
 }
 
+/// A replacement of a term `theta`: `theta = sum r_k theta_k + error`.
+#[derive(Clone, Debug, PartialEq)]
+struct Rewrite {
+    kind: ChangeKind,
+    /// Rows and factors `r_k`.
+    parts: Vec<(usize, f64)>,
+    /// All values of the error over the box.
+    error: Interval,
+}
+
 /// Terms of one phase, and what may replace them over its box.
 #[derive(Debug)]
 pub(super) struct Terms<'a> {
@@ -43,25 +57,107 @@ pub(super) struct Terms<'a> {
 
 impl<'a> Terms<'a> {
     pub(crate) fn new(workspace: &'a Workspace, ranges: Ranges) -> Self {
+        let known = vec![None; workspace.len()];
         Self {
             workspace,
             ranges,
-            known: vec![None; workspace.len()],
+            known,
         }
     }
 
+    /// All replacements of a term, simplest first; none for a term without finite values in the box.
     fn rewrites(&mut self, row: usize) -> &[Rewrite] {
-        let (workspace, ranges) = (self.workspace, &mut self.ranges);
-        self.known[row].get_or_insert_with(|| rewrites(workspace, ranges, row))
+        if self.known[row].is_none() {
+            self.known[row] = Some(self.found(row));
+        }
+        self.known[row].as_deref().expect("found now or before")
+    }
+
+    fn found(&mut self, row: usize) -> Vec<Rewrite> {
+        let range = self.ranges.term(row);
+        if range.is_empty() || !range.magnitude().is_finite() {
+            return Vec::new();
+        }
+        let mut all = vec![Rewrite {
+            kind: ChangeKind::Dropped,
+            parts: Vec::new(),
+            error: range,
+        }];
+        if self.workspace.constant() == Some(row) {
+            return all;
+        }
+        all.extend(self.centred(ChangeKind::Constant, Vec::new(), range));
+        let Some(parts) = self.slopes(row) else {
+            return all;
+        };
+        let negated = (parts.iter()).map(|&(row, factor)| (row, Interval::point(-factor)));
+        let one = (row, Interval::point(1.0));
+        let difference: Vec<_> = std::iter::once(one).chain(negated).collect();
+        let error = self.ranges.combination(&difference);
+        if error.magnitude().is_finite() {
+            let kind = ChangeKind::Linear;
+            let with_constant = self.centred(kind, parts.clone(), error);
+            all.extend(with_constant.or(Some(Rewrite { kind, parts, error })));
+        }
+        all
+    }
+
+    /// The replacement with a constant that puts the middle of the error at zero, where that is worth it.
+    fn centred(
+        &self,
+        kind: ChangeKind,
+        mut parts: Vec<(usize, f64)>,
+        error: Interval,
+    ) -> Option<Rewrite> {
+        let middle = error.middle();
+        if middle.abs() <= WORTHWHILE * error.magnitude() {
+            return None;
+        }
+        parts.push((self.workspace.constant()?, middle));
+        let error = error - Interval::point(middle);
+        Some(Rewrite { kind, parts, error })
+    }
+
+    /// Slopes of the chords along each variable through the middle of the box, exact for products.
+    fn slopes(&mut self, row: usize) -> Option<Vec<(usize, f64)>> {
+        let expr = self.ranges.expr(row);
+        let sides = self.ranges.sides(expr);
+        let pool = self.ranges.pool();
+        let is_affine = (sides.iter()).all(|&(symbol, _, _)| {
+            let slope = pool.derivative(expr, symbol);
+            pool.is_constant(slope)
+        });
+        if is_affine || sides.len() > MAX_LINEAR_SYMBOLS {
+            return None;
+        }
+        let size = self.ranges.term(row).width();
+        let mut parts = Vec::new();
+        for (moved, &(symbol, _, half)) in sides.iter().enumerate() {
+            // where one variable is so many half widths from its centre and the others are at theirs
+            let mut value = |step: f64| {
+                self.ranges.pool().evaluate(expr, &|symbol| {
+                    let place = sides.iter().position(|(known, _, _)| *known == symbol);
+                    place.map_or(f64::NAN, |place| {
+                        let (_, centre, half) = sides[place];
+                        let step = if place == moved { step } else { 0.0 };
+                        centre + step * half
+                    })
+                })
+            };
+            let rise = value(1.0) - value(-1.0);
+            if half == 0.0 || rise.abs() <= WORTHWHILE * size {
+                continue;
+            }
+            parts.push((self.workspace.variable(symbol)?, rise / (2.0 * half)));
+        }
+        let is_line = !parts.is_empty() && parts.iter().all(|part| part.1.is_finite());
+        is_line.then_some(parts)
     }
 }
 
-/// An equation on its way.
 #[derive(Clone, Debug)]
 pub(super) struct Equation {
-    /// Coefficients now, by row.
     pub xi: Vec<f64>,
-    /// The changes so far, in order.
     pub steps: Vec<Step>,
     /// Encloses the original equation minus the present one.
     pub spent: Interval,
@@ -70,7 +166,6 @@ pub(super) struct Equation {
 }
 
 impl Equation {
-    /// An equation as it is.
     pub(crate) fn new(xi: Vec<f64>, known: Option<usize>) -> Self {
         Self {
             xi,

@@ -5,53 +5,28 @@
 use std::path::PathBuf;
 
 use crate::lower::LowerError;
-use crate::model::{LibraryError, ModelError};
+use crate::model::ModelError;
 
 /// Errors of simplification.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SimplifyError {
-    /// The number of boxes differs from the number of phases.
-    #[error("the domain has {found} boxes, expected one for each of {expected} phases")]
-    PhaseCount { found: usize, expected: usize },
-    /// A box of the wrong dimension.
-    #[error(
-        "the domain of phase `{phase}` has {found} ranges, expected {expected} (z, dz, u of each latent coordinate)"
-    )]
-    BoxDimension {
-        phase: String,
-        found: usize,
-        expected: usize,
-    },
-    /// A range that is empty or infinite.
-    #[error(
-        "the domain of `{variable}` in phase `{phase}` is {lo} to {hi}, expected finite numbers in order"
-    )]
-    Range {
-        phase: String,
-        variable: String,
-        lo: f64,
-        hi: f64,
-    },
-    /// A file of ranges that cannot be read as such.
+    #[error("the domain {0}")]
+    Domain(String),
     #[error("{path}: {message}", path = path.display())]
     DomainFile { path: PathBuf, message: String },
-    /// Recordings for a model that cannot encode them.
     #[error(
         "model `{model}` has no encoder, so recordings give it no domain; give a .toml file with one table per phase, such as [contact], and a range for each of z1, dz1, u1, ..., such as z1 = [-0.2, 0.4]"
     )]
     NoEncoder { model: String },
-    /// A share of the recorded accelerations without recordings.
     #[error(
         "a tolerance in percent is a share of the root mean square of each ddz over recordings, and the domain has none; give a number in scaled units per s^2"
     )]
     NoSamples,
-    /// A margin around ranges, which are taken as they are.
     #[error(
         "a margin widens the box around recordings; the ranges of a .toml file are taken as they are"
     )]
     Margin,
-    /// A recorded sample has a larger error than the certified one: a defect of romc.
     #[error(
         "internal error: in phase `{phase}`, ddz{output} of the simplified model is off by {measured:e} at a recorded sample, beyond the bound {bound:e}", output = output + 1
     )]
@@ -61,13 +36,8 @@ pub enum SimplifyError {
         measured: f64,
         bound: f64,
     },
-    /// The simplified model is not a model.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// A model that cannot be lowered to code.
     #[error(transparent)]
     Lower(#[from] LowerError),
-    /// The simplified model's terms are no library.
-    #[error(transparent)]
-    Library(#[from] LibraryError),
 }

@@ -3,8 +3,8 @@
 //! A model, a [`Domain`] (a box of latent states and inputs per phase, from recordings or given) and a
 //! [`Tolerance`] enter; a simpler model leaves with a [`Certificate`] that lists every change with
 //! the interval in which its error lies over the whole box, and with its error at the recorded
-//! samples. `docs/simplification.md` has the mathematics. Read `run.rs` first, then `rewrite.rs` (what
-//! may take a term's place), `equation.rs` (which changes are made) and `ranges.rs` (the intervals).
+//! samples. `docs/simplification.md` has the mathematics. Read `run.rs` first, then `equation.rs` (what
+//! may take a term's place, and which changes are made) and `ranges.rs` (the intervals).
 //!
 //! ```
 //! use nalgebra::DMatrix;
@@ -39,29 +39,22 @@ mod certificate;
 mod domain;
 mod equation;
 mod error;
-mod markdown;
 mod measure;
-mod printing;
 mod ranges;
-mod rewrite;
 mod rollouts;
 mod run;
 mod tables;
 mod tolerance;
 mod workspace;
 
-#[cfg(test)]
-mod tests;
-
 pub use certificate::{Certificate, certificate_json};
 pub use domain::{Domain, MARGIN, Samples};
 pub use error::SimplifyError;
-pub(crate) use markdown::lost_words;
-pub use markdown::markdown;
-pub use printing::PrintedEquation;
-pub(crate) use printing::printed;
+pub use measure::PrintedEquation;
+pub(crate) use measure::printed;
 pub use rollouts::RolloutEffect;
 pub(crate) use rollouts::{RolloutBasis, rollouts_json};
 pub use run::{Simplified, simplify};
-pub(crate) use tables::{bound_words, change_table, equation_table, rollout_table};
+pub use tables::markdown;
+pub(crate) use tables::{bound_words, change_table, equation_table, lost_words, rollout_table};
 pub use tolerance::{Tolerance, ToleranceError};

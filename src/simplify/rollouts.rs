@@ -10,7 +10,6 @@ use crate::model::ReducedModel;
 use crate::recording::Segment;
 use crate::sim::{LatentSegment, Restart, Rollout, Window, rollout};
 
-/// Names of the coordinates in which rollouts are compared.
 const BODY: &str = "body.";
 
 /// Errors of a model's rollouts in the robot's body coordinates.
@@ -40,24 +39,15 @@ pub struct RolloutEffect {
     pub after: RolloutErrors,
 }
 
-/// Recordings to roll out over.
 #[derive(Clone, Debug)]
 pub(crate) struct RolloutBasis<'a> {
-    /// Where bounds hold.
     pub domain: &'a Domain,
-    /// Recorded samples.
     pub segments: Vec<&'a Segment>,
-    /// The same, encoded.
     pub latent: Vec<&'a LatentSegment>,
-    /// Time between restarts, s.
     pub restart_every_s: f64,
 }
 
 impl RolloutBasis<'_> {
-    /// Rolls both models out, whole and restarted.
-    ///
-    /// # Errors
-    /// [`EvaluateError::Model`] for a latent-only model, [`EvaluateError::Sim`] if the integrator refuses.
     pub(crate) fn effect(
         &self,
         model: &ReducedModel,
@@ -73,10 +63,6 @@ impl RolloutBasis<'_> {
         })
     }
 
-    /// Rolls one model out, whole and restarted.
-    ///
-    /// # Errors
-    /// As [`RolloutBasis::effect`].
     pub(crate) fn errors(&self, model: &ReducedModel) -> Result<RolloutErrors, EvaluateError> {
         let coordinates: Vec<usize> = body(model).map(|(index, _, _)| index).collect();
         let compiled = CompiledModel::new(model)?;
@@ -104,7 +90,6 @@ impl RolloutBasis<'_> {
         Ok(errors)
     }
 
-    /// Predicted samples outside the domain.
     fn outside(&self, latent: &LatentSegment, run: &Rollout) -> usize {
         let is_inside = |(sample, window, column): &(usize, &Window, usize)| {
             let z = window.z.column(*column);

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use super::certificate::{
     BeforeAfter, Certificate, Change, Effect, EquationCertificate, PhaseCertificate,
 };
-use super::domain::{Domain, Samples};
+use super::domain::{Domain, Samples, check_count};
 use super::equation::{Equation, Step, Terms, is_same_decimal};
 use super::error::SimplifyError;
 use super::measure::Differences;
@@ -46,7 +46,7 @@ pub struct Simplified {
 /// tolerance changes nothing.
 ///
 /// # Errors
-/// [`SimplifyError::NoSamples`], [`SimplifyError::PhaseCount`] for samples of another model, and the
+/// [`SimplifyError::NoSamples`], [`SimplifyError::Domain`] for samples of another model, and the
 /// internal error [`SimplifyError::Contradiction`] if a sample refutes the result.
 pub fn simplify(
     equations: &Equations<'_>,
@@ -59,12 +59,7 @@ pub fn simplify(
     }
     let original = equations.model();
     let n_phases = equations.phases().len();
-    if let Some(found) = samples.map(|s| s.phases.len()).filter(|&n| n != n_phases) {
-        return Err(SimplifyError::PhaseCount {
-            found,
-            expected: n_phases,
-        });
-    }
+    check_count(samples.map_or(n_phases, |s| s.phases.len()), n_phases)?;
     let workspace = Workspace::new(equations)?;
     let mut xi = Vec::new();
     let mut phases = Vec::new();
@@ -104,7 +99,6 @@ pub fn simplify(
     })
 }
 
-/// What the simplified model file says about itself.
 fn provenance_of(model: &ReducedModel, certificate: &Certificate) -> Value {
     let phase = |phase: &PhaseCertificate| {
         let bounds = phase.equations.iter().map(|e| e.bound.magnitude());
@@ -135,7 +129,6 @@ fn gravity(model: &ReducedModel) -> Option<f64> {
     Some(-GRAVITY_M_S2 * factors[BODY_Z])
 }
 
-/// One phase with its box and samples.
 struct PhaseProblem<'a> {
     name: &'a str,
     workspace: &'a Workspace,
@@ -239,7 +232,6 @@ impl<'a> PhaseProblem<'a> {
         (self.equation(output), Interval::point(0.0))
     }
 
-    /// Root mean square of an acceleration over the samples.
     fn rms(&self, output: usize) -> Option<f64> {
         let all = self.coefficients(output);
         let active = Differences::between(&all, &vec![0.0; all.len()]);
@@ -327,7 +319,7 @@ fn operations(system: &Equations<'_>, phase: usize) -> Result<usize, SimplifyErr
     let counted = program.statements().iter().enumerate();
     Ok(counted
         .map(|(index, statement)| match statement {
-            Statement::Constant(_) | Statement::Input { .. } | Statement::Constants { .. } => 0,
+            Statement::Constant(_) | Statement::Input { .. } => 0,
             _ => program.values_of(index).len(),
         })
         .sum())

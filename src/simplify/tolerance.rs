@@ -37,7 +37,6 @@ impl Tolerance {
         }
     }
 
-    /// Whether nothing may change.
     pub(crate) fn is_zero(self) -> bool {
         match self {
             Tolerance::ShareOfRms(value) | Tolerance::Absolute(value) => value == 0.0,
@@ -72,27 +71,6 @@ impl fmt::Display for Tolerance {
                 write!(f, "{}%", rounded(share * 100.0, 13))
             }
             Tolerance::Absolute(value) => write!(f, "{value}"),
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn tolerance_reads_shares_and_numbers_and_prints_them_alike() {
-        for (text, expected) in [
-            ("1%", Tolerance::ShareOfRms(0.01)),
-            ("0.3%", Tolerance::ShareOfRms(0.003)),
-            ("0.05", Tolerance::Absolute(0.05)),
-            ("0", Tolerance::Absolute(0.0)),
-        ] {
-            assert_eq!(text.parse(), Ok(expected));
-            assert_eq!(expected.to_string(), text);
-        }
-        for text in ["", "%", "-1%", "nan", "inf", "1 percent"] {
-            assert!(text.parse::<Tolerance>().is_err(), "{text}");
         }
     }
 }

@@ -7,7 +7,7 @@ use nalgebra::DMatrix;
 use super::error::SimplifyError;
 use super::ranges::Ranges;
 use crate::equations::Equations;
-use crate::model::{LatentVariable, Library, LibraryError, ReducedModel};
+use crate::model::{LatentVariable, Library, ModelError, ReducedModel};
 use crate::symbolic::{ExprId, ExprPool, Interval, Node, SymbolId};
 
 /// A library of terms, counted by rows, and the rows of `1` and of variables.
@@ -22,10 +22,8 @@ pub(super) struct Workspace {
 
 impl Workspace {
     /// The terms of `equations`, extended by `1` and by every variable of those summands that are not affine.
-    ///
-    /// # Errors
-    /// [`LibraryError`] if the equations' own terms are refused, which equations exclude.
-    pub(crate) fn new(equations: &Equations<'_>) -> Result<Self, LibraryError> {
+    /// Where these would be too many for a library, nothing is appended.
+    pub(crate) fn new(equations: &Equations<'_>) -> Result<Self, ModelError> {
         let own = equations.terms();
         let mut texts: Vec<String> = own.iter().map(|term| term.text().to_owned()).collect();
         let mut pool = equations.pool().clone();
@@ -39,10 +37,8 @@ impl Workspace {
             }
         }
         let dim = equations.latent_dim();
-        let library = match Library::from_terms(dim, &texts) {
-            Err(LibraryError::TooManyTerms { .. }) => Library::from_terms(dim, &texts[..own.len()]),
-            library => library,
-        }?;
+        let library = Library::from_terms(dim, &texts)
+            .or_else(|_| Library::from_terms(dim, &texts[..own.len()]))?;
         Ok(Self {
             original: own.len(),
             rows: rows(&library),
@@ -50,32 +46,26 @@ impl Workspace {
         })
     }
 
-    /// Number of terms.
     pub(crate) fn len(&self) -> usize {
         self.library.len()
     }
 
-    /// The library with the appended terms.
     pub(crate) fn library(&self) -> &Library {
         &self.library
     }
 
-    /// The text of a term.
     pub(crate) fn text(&self, row: usize) -> &str {
         self.library.terms()[row].text()
     }
 
-    /// The row of a variable.
     pub(crate) fn variable(&self, symbol: SymbolId) -> Option<usize> {
         self.rows.get(&Some(symbol)).copied()
     }
 
-    /// The row of `1`.
     pub(crate) fn constant(&self) -> Option<usize> {
         self.rows.get(&None).copied()
     }
 
-    /// Ranges over a box, `3 latent_dim` intervals.
     pub(crate) fn ranges(&self, domain: &[Interval]) -> Ranges {
         let variables = LatentVariable::all(self.library.latent_dim());
         let symbols = variables.filter_map(|variable| self.library.symbol(variable));
@@ -125,7 +115,6 @@ impl Workspace {
     }
 }
 
-/// The rows of `1` and of variables.
 fn rows(library: &Library) -> BTreeMap<Option<SymbolId>, usize> {
     let mut pool = library.pool().clone();
     let mut exprs = vec![(None, pool.number(1.0))];

@@ -8,7 +8,7 @@ use super::plan::{CellId, FOLDS, Shard};
 use super::store::Store;
 use crate::recording::Recording;
 use crate::robot::Robot;
-use crate::train::{Method, Origin, Recordings, TrainError, TrainOptions, Trained, Watch};
+use crate::train::{Method, Monitor, Origin, Recordings, TrainError, TrainOptions, Trained};
 
 /// Trains the cells of a shard that the store misses; each is kept as soon as it is finished.
 ///
@@ -74,8 +74,8 @@ fn train(
     let learn = |options: &TrainOptions| -> Result<Trained, TrainError> {
         let never = AtomicBool::new(false);
         let mut deaf = |_| {};
-        let mut watch = Watch::new(&mut deaf, &never);
-        method.learn(sets, robot, options, &Origin::default(), &mut watch)
+        let mut monitor = Monitor::new(&mut deaf, &never);
+        method.learn(sets, robot, options, &Origin::default(), &mut monitor)
     };
     let mut trained = learn(&options);
     if matches!(trained, Err(TrainError::LatentDim { .. })) {

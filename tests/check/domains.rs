@@ -2,7 +2,7 @@
 //! are equal with a note.
 
 use romc::check::{CheckOptions, Side, Verdict, compare};
-use romc::model::{Library, LibraryError};
+use romc::model::{Library, ModelError};
 use romc::symbolic::ParseErrorKind;
 
 use crate::tools;
@@ -76,7 +76,7 @@ fn constant(random: &mut Random, depth: usize) -> (String, Fraction) {
 /// Whether each way of reading refuses the term for want of a value.
 fn is_refused(term: &str) -> bool {
     let library = Library::from_terms(1, &[term.to_owned()]);
-    let by_library = matches!(&library, Err(LibraryError::Parse { source, .. })
+    let by_library = matches!(&library, Err(ModelError::Term { source, .. })
         if matches!(source.kind, ParseErrorKind::NoValue(_)));
     let text = format!("ddz1 = {term}");
     let side = Side::from_bytes("a.txt", text.as_bytes(), &CheckOptions::default(), &[]);

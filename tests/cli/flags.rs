@@ -1,11 +1,13 @@
-//! Flags that a command would ignore: refused by name.
+//! Flags that a command would ignore, and numbers outside the range of their flag: refused by name.
 
 use std::collections::BTreeSet;
 
+use clap::error::ErrorKind;
 use clap::{CommandFactory as _, Parser as _};
 
 use romc::Error;
 use romc::cli::args::{Arguments, Command, refuse_idle};
+use romc::limits::{Range, table};
 
 /// Command lines with a flag that does nothing there, and that flag.
 const IDLE: [(&str, &str); 32] = [
@@ -162,4 +164,59 @@ fn every_flag_is_in_the_table_or_known_to_be_used_or_refused_elsewhere() {
             assert!(is_known, "--{flag} of {name}: can it be without effect?");
         }
     }
+}
+
+/// Flags that take a number and have no range of the table: any seed will do.
+const WITHOUT: [&str; 1] = ["seed"];
+
+fn range(command: &str, flag: &str) -> Option<Range> {
+    match (command, flag) {
+        ("import", "latent-dim") => Some(table::IMPORTED_LATENT_DIM),
+        (_, flag) if flag.ends_with("-layers") => Some(table::LAYER_WIDTH),
+        (_, flag) => table::of_training(flag).copied(),
+    }
+}
+
+/// Whether a command refuses the value of a flag as such.
+fn refuses(command: &str, flag: &str, value: &str) -> bool {
+    let flag = format!("--{flag}={value}");
+    let found = Arguments::command().try_get_matches_from(["romc", command, &flag]);
+    found.is_err_and(|error| error.kind() == ErrorKind::ValueValidation)
+}
+
+#[test]
+fn every_flag_that_takes_a_number_refuses_what_lies_outside_its_range() {
+    let mut met = BTreeSet::new();
+    for command in Arguments::command().get_subcommands() {
+        let name = command.get_name();
+        let flags = command
+            .get_arguments()
+            .filter_map(|argument| argument.get_long());
+        for flag in flags.filter(|flag| !WITHOUT.contains(flag)) {
+            let takes_one_of = |values: [&str; 3]| {
+                let mut values = values.into_iter();
+                values.any(|value| !refuses(name, flag, value))
+            };
+            let takes_numbers = refuses(name, flag, "words")
+                && takes_one_of(["1", "0.5", "3"])
+                && !takes_one_of(["1%", "1..2", "x=1"]);
+            if !takes_numbers {
+                continue;
+            }
+            let range = range(name, flag);
+            let range = range.unwrap_or_else(|| panic!("--{flag} of {name} has no range"));
+            met.insert(range.name);
+            let (least, most) = (range.least, range.most);
+            assert!(!refuses(name, flag, &most.to_string()), "--{flag}={most}");
+            let outside = match range.is_whole() {
+                true => [least - 1.0, most + 1.0],
+                false => [least - 1e-9 * most, most * (1.0 + 1e-9)],
+            };
+            for value in outside.into_iter().chain([f64::NAN, 1e300]) {
+                let value = value.to_string();
+                assert!(refuses(name, flag, &value), "--{flag}={value} of {name}");
+            }
+        }
+    }
+    assert!(met.len() >= 25, "{met:?}");
 }

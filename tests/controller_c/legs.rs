@@ -15,7 +15,7 @@ use crate::tools::is_thorough;
 /// The model on the robot of a file, with forces in one of the frames.
 fn on_robot(name: &str, frame: WrenchFrame) -> ReducedModel {
     let path = root().join("examples/robots").join(name);
-    let robot = romc::robot_file::read(&path, &[]).expect("an example");
+    let robot = romc::robot_file::find(&path.to_string_lossy()).expect("an example");
     let builder = shipped("go1-d4").into_builder().robot(robot);
     builder.wrench_frame(frame).build().expect("a sound model")
 }

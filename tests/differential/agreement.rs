@@ -117,9 +117,7 @@ fn is_transcendental(program: &Program) -> bool {
             | Statement::Input { .. }
             | Statement::Select(_)
             | Statement::Accumulate { .. }
-            | Statement::Quads { .. }
-            | Statement::Constants { .. }
-            | Statement::Separable { .. }
+            | Statement::Scaled { .. }
             | Statement::Call { .. } => false,
         });
     own || program.callees().iter().any(is_transcendental)

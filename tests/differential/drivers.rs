@@ -310,12 +310,6 @@ impl Build {
         }
     }
 
-    /// As a compiler without types for lanes takes it.
-    pub fn c_scalar_lanes() -> Self {
-        let flags = ["-O1", "-ffp-contract=off", "-DROMC_SCALAR_LANES"];
-        Self::c_of("C, -O1 -ffp-contract=off, scalar lanes", cc(), &flags)
-    }
-
     pub fn rust() -> Self {
         Self {
             name: "Rust",

@@ -203,15 +203,16 @@ pub fn robot_file(bytes: &[u8]) {
     let Ok(text) = std::str::from_utf8(bytes) else {
         return;
     };
-    let robot = match text.trim_start().starts_with('<') {
-        true => robot_file::from_urdf("fuzz.urdf", text, &[]),
-        false => robot_file::from_toml("fuzz.toml", text),
+    let file = match text.trim_start().starts_with('<') {
+        true => "fuzz.urdf",
+        false => "fuzz.toml",
     };
-    if let Ok(robot) = robot {
-        let text = robot_file::to_toml(robot);
-        let again = robot_file::from_toml("again.toml", &text);
+    let read = |file: &str, text: &str| robot_file::from_text(file, text, &Default::default());
+    if let Ok(read_first) = read(file, text) {
+        let text = robot_file::to_toml(read_first.robot);
+        let again = read("again.toml", &text);
         let again = again.unwrap_or_else(|error| panic!("{error}\n{text}"));
-        assert_eq!(robot_file::to_toml(again), text);
+        assert_eq!(robot_file::to_toml(again.robot), text);
     }
 }
 

@@ -491,6 +491,8 @@ fn settings_out_of_range_are_refused_by_name() {
         }),
         "horizon"
     );
+    let most = romc::limits::table::HORIZON.most;
+    assert_eq!(most as usize, romc::mpc::MAX_HORIZON);
     assert_eq!(
         refused(MpcSettings {
             step_s: f64::NAN,

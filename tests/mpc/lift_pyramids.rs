@@ -2,7 +2,7 @@
 
 use romc::mpc::{
     Cone, ConeProgram, ConsistentLift, ControlModel, MpcSettings, Outcome, QpSettings, QpSolver,
-    Solver, SolverProfile, SparseColumns, StanceState, foot_forces,
+    Solver, SolverProfile, StanceState, foot_forces, sparse,
 };
 use romc::robot::{JOINT_DIM, STATE_DIM};
 
@@ -131,24 +131,16 @@ fn by_clarabel(
     cost: &(Vec<Vec<f64>>, Vec<f64>, f64),
     rows: &[([f64; JOINT_DIM], f64)],
 ) -> [f64; JOINT_DIM] {
-    let upper: Vec<(usize, usize)> = (0..JOINT_DIM)
-        .flat_map(|col| (0..=col).map(move |row| (row, col)))
+    let hessian = (0..JOINT_DIM).flat_map(|col| (0..=col).map(move |row| (row, col)));
+    let hessian: Vec<_> = hessian
+        .map(|(row, col)| (row, col, cost.0[row][col]))
         .collect();
-    let all: Vec<(usize, usize)> = (0..rows.len())
-        .flat_map(|row| (0..JOINT_DIM).map(move |col| (row, col)))
-        .collect();
-    let mut p = SparseColumns::from_pattern(JOINT_DIM, JOINT_DIM, &upper);
-    let mut a = SparseColumns::from_pattern(rows.len(), JOINT_DIM, &all);
-    for &(row, col) in &upper {
-        p.set(row, col, cost.0[row][col]);
-    }
-    for &(row, col) in &all {
-        a.set(row, col, rows[row].0[col]);
-    }
+    let all = (0..rows.len()).flat_map(|row| (0..JOINT_DIM).map(move |col| (row, col)));
+    let all: Vec<_> = all.map(|(row, col)| (row, col, rows[row].0[col])).collect();
     let program = ConeProgram {
-        p,
+        p: sparse(JOINT_DIM, JOINT_DIM, &hessian),
         q: cost.1.clone(),
-        a,
+        a: sparse(rows.len(), JOINT_DIM, &all),
         b: rows.iter().map(|(_, bound)| *bound).collect(),
         cones: vec![Cone::Nonnegative(rows.len())],
     };

@@ -1,31 +1,25 @@
 //! Solutions of the conic solver against references that do not share its method.
 
 use nalgebra::{DMatrix, DVector};
-use romc::mpc::{Cone, ConeProgram, Outcome, QpSettings, QpSolver, SparseColumns};
+use romc::mpc::{Cone, ConeProgram, Outcome, QpSettings, QpSolver, SparseColumns, sparse};
 
 use crate::random::Random;
 
 fn upper(matrix: &DMatrix<f64>) -> SparseColumns {
-    let entries: Vec<(usize, usize)> = (0..matrix.ncols())
-        .flat_map(|col| (0..=col).map(move |row| (row, col)))
-        .collect();
-    filled(matrix, &entries)
+    filled(&matrix.upper_triangle(), |row, col| row <= col)
 }
 
 fn full(matrix: &DMatrix<f64>) -> SparseColumns {
-    let (n_rows, n_cols) = matrix.shape();
-    let entries: Vec<(usize, usize)> = (0..n_cols)
-        .flat_map(|col| (0..n_rows).map(move |row| (row, col)))
-        .collect();
-    filled(matrix, &entries)
+    filled(matrix, |_, _| true)
 }
 
-fn filled(matrix: &DMatrix<f64>, entries: &[(usize, usize)]) -> SparseColumns {
-    let mut sparse = SparseColumns::from_pattern(matrix.nrows(), matrix.ncols(), entries);
-    for &(row, col) in entries {
-        sparse.set(row, col, matrix[(row, col)]);
-    }
-    sparse
+fn filled(matrix: &DMatrix<f64>, is_in: fn(usize, usize) -> bool) -> SparseColumns {
+    let (n_rows, n_cols) = matrix.shape();
+    let places = (0..n_cols).flat_map(|col| (0..n_rows).map(move |row| (row, col)));
+    let entries: Vec<_> = (places.filter(|&(row, col)| is_in(row, col)))
+        .map(|(row, col)| (row, col, matrix[(row, col)]))
+        .collect();
+    sparse(n_rows, n_cols, &entries)
 }
 
 fn program(
@@ -289,4 +283,15 @@ fn sizes_that_disagree_are_refused() {
     let error =
         QpSolver::new(wrong, QpSettings::default()).expect_err("three rows of cone, two of matrix");
     assert!(error.to_string().contains("cones"), "{error}");
+}
+
+#[test]
+fn entries_named_twice_exist_once_and_add_up() {
+    let entries = [(1, 2, 5.0), (0, 0, 2.0), (1, 0, -1.0), (0, 0, 0.5)];
+    let mut matrix = sparse(2, 3, &entries);
+    assert_eq!(matrix.colptr, [0, 2, 2, 3]);
+    assert_eq!(matrix.rowval, [0, 1, 1]);
+    assert_eq!(matrix.nzval, [2.5, -1.0, 5.0]);
+    matrix.set_entry((1, 2), 7.0);
+    assert_eq!(matrix.nzval, [2.5, -1.0, 7.0]);
 }

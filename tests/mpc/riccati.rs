@@ -2,8 +2,7 @@
 
 use romc::evaluate::{ReferenceInput, along_recording};
 use romc::mpc::{
-    Cone, ConeProgram, Controller, Lift, MpcSettings, Outcome, QpSettings, QpSolver, Solver,
-    SparseColumns,
+    Cone, ConeProgram, Controller, Lift, MpcSettings, Outcome, QpSettings, QpSolver, Solver, sparse,
 };
 use romc::solver::{self, Cost, Links, Pairs, Program, Real, RowMatrices, Settings, Shape, Stage};
 
@@ -239,20 +238,16 @@ impl RandomProgram {
                 (0..NU).for_each(|j| add(row, (k - 1) * WIDTH + j, -self.link[number - LINKS][j]));
             }
         }
-        let places: Vec<(usize, usize)> = entries.iter().map(|entry| (entry.0, entry.1)).collect();
-        let mut a = SparseColumns::from_pattern(m, n, &places);
-        entries
-            .iter()
-            .for_each(|entry| a.set(entry.0, entry.1, entry.2));
-        let diagonal: Vec<(usize, usize)> = (0..n).map(|i| (i, i)).collect();
-        let mut p = SparseColumns::from_pattern(n, n, &diagonal);
+        let a = sparse(m, n, &entries);
+        let diagonal: Vec<_> = (0..n).map(|i| (i, i, 0.0)).collect();
+        let mut p = sparse(n, n, &diagonal);
         let mut q = vec![0.0; n];
         for k in 0..HORIZON {
             let factor = if k + 1 == HORIZON { 3.0 } else { 1.0 };
-            (0..NU).for_each(|j| p.set(k * WIDTH + j, k * WIDTH + j, self.weight[j]));
+            (0..NU).for_each(|j| p.set_entry((k * WIDTH + j, k * WIDTH + j), self.weight[j]));
             for i in 0..NX {
                 let at = k * WIDTH + NU + i;
-                p.set(at, at, factor * self.state[i]);
+                p.set_entry((at, at), factor * self.state[i]);
             }
             q[k * WIDTH + NU + NX] = PRICE;
         }

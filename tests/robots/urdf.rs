@@ -4,14 +4,20 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Point3, Vector3};
 use romc::robot::{Leg, Robot};
-use romc::robot_file::{RobotOptions, RobotReading, from_urdf, urdf_reading};
+use romc::robot_file::{RobotFileError, RobotOptions, RobotReading, from_text};
 
 use super::command_line::{romc, text};
 use super::made::{Joint, LEGS, Made, fixed};
 use super::tools::is_thorough;
 
 fn read(text: &str) -> RobotReading {
-    urdf_reading("t.urdf", text, &RobotOptions::default()).unwrap_or_else(|error| panic!("{error}"))
+    from_text("t.urdf", text, &RobotOptions::default()).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// The robot of a URDF with feet at these links, if any are named.
+fn from_urdf(file: &str, text: &str, feet: &[String]) -> Result<&'static Robot, RobotFileError> {
+    let options = RobotOptions { feet, name: None };
+    from_text(file, text, &options).map(|read| read.robot)
 }
 
 fn refusal(text: &str) -> String {

@@ -1,51 +1,48 @@
 //! What targets spell differently.
 
-use super::code::{ConstTable, Index, Span};
-use super::fours::{FourBlock, Fours};
-use super::lanes::Row;
-use super::precision::Precision;
+use super::code::{Index, Span};
+use super::options::Precision;
 use super::printer::subscript;
-use crate::ir::{Binary, Unary};
+use crate::ir::{Table, Unary};
 
-/// Lines, each with its depth of indentation.
-pub(crate) type Lines = Vec<(usize, String)>;
-
-/// Spelling of a target language. The printer owns precedence and parentheses, the
-/// dialect everything that differs between languages.
-pub(crate) trait Dialect {
+/// What a language spells the same everywhere.
+pub(crate) struct Spelling {
     /// Words that no variable may be called, with blanks between them.
-    fn reserved(&self) -> &'static str;
-
+    pub reserved: &'static str,
     /// What ends a statement.
-    fn terminator(&self) -> &'static str {
-        ";"
-    }
-
+    pub terminator: &'static str,
     /// What follows the head of a loop, and what closes its body.
-    fn loop_ends(&self) -> (&'static str, Option<&'static str>) {
-        (" {", Some("}"))
-    }
-
+    pub loop_ends: (&'static str, Option<&'static str>),
     /// What ends a line that goes on in the next.
-    fn continuation(&self) -> &'static str {
-        ""
-    }
-
+    pub continuation: &'static str,
     /// Whether there is `+=`.
-    fn adds_in_place(&self) -> bool {
-        true
-    }
+    pub adds_in_place: bool,
+    /// Sum, difference, product and quotient, with the spaces around them.
+    pub operators: [&'static str; 4],
+    /// Function `f(a, b, c) = a*b + c` for loops, in a language whose compilers never fuse the two
+    /// operations by themselves.
+    pub multiply_add: Option<&'static str>,
+}
 
-    /// An operator between numbers, with the spaces around it.
-    fn operator(&self, op: Binary) -> &'static str {
-        match op {
-            Binary::Add => " + ",
-            Binary::Sub => " - ",
-            Binary::Mul => "*",
-            Binary::Div => "/",
-            Binary::Pow => unreachable!("powers are functions"),
+impl Spelling {
+    /// As in C.
+    pub(crate) const fn with_braces(reserved: &'static str) -> Self {
+        Self {
+            reserved,
+            terminator: ";",
+            loop_ends: (" {", Some("}")),
+            continuation: "",
+            adds_in_place: true,
+            operators: [" + ", " - ", "*", "/"],
+            multiply_add: None,
         }
     }
+}
+
+/// A target language. The printer owns precedence and parentheses, the dialect everything that differs between
+/// languages.
+pub(crate) trait Dialect {
+    fn spelling(&self) -> &'static Spelling;
 
     /// A power of printed operands.
     fn power(&self, base: &str, exponent: &str) -> String;
@@ -53,29 +50,14 @@ pub(crate) trait Dialect {
     /// The second printed operand where the first is zero, else the third.
     fn select(&self, operands: [String; 3]) -> String;
 
-    /// An element of an array.
     fn element(&self, array: &str, index: &Index) -> String {
         format!("{array}[{}]", subscript(index))
     }
 
-    /// An entry of a table.
     fn entry(&self, table: &str, row: &Index, col: &Index) -> String {
         format!("{table}[{}][{}]", subscript(row), subscript(col))
     }
 
-    /// Lines that compute the columns of a row side by side in lanes; nothing in languages whose loops take column
-    /// after column.
-    fn row(&self, _: &Row) -> Option<Lines> {
-        None
-    }
-
-    /// Lines that compute a block of sums of vectors of four numbers side by side; nothing in languages that take one
-    /// number after the other.
-    fn four_block(&self, _: &Fours, _: &FourBlock) -> Option<Lines> {
-        None
-    }
-
-    /// A number in the target's precision.
     fn literal(&self, value: f64) -> String {
         Precision::Double.digits(value)
     }
@@ -83,29 +65,21 @@ pub(crate) trait Dialect {
     /// A function applied to a printed argument; never [`Unary::Neg`], which is an operator.
     fn apply(&self, function: Unary, argument: &str) -> String;
 
-    /// Definition of a scalar.
     fn let_scalar(&self, name: &str, value: &str) -> String {
-        format!("{name} = {value}{}", self.terminator())
+        format!("{name} = {value}{}", self.spelling().terminator)
     }
 
     /// Definition of an array by its printed elements.
     fn let_array(&self, name: &str, elements: &[String]) -> String;
 
-    /// Declaration of an array that is assigned later; without [`Self::row`] of zeros.
+    /// Declaration of an array that is assigned later.
     fn declare(&self, name: &str, len: usize) -> String;
 
-    /// Head of a loop.
     fn for_loop(&self, variable: &str, count: usize) -> String;
 
     /// Beginning of the names of constant tables.
     fn table_base(&self, _prefix: &str) -> String {
         "TABLE".to_owned()
-    }
-
-    /// Function `f(a, b, c) = a*b + c` for loops, in a language whose compilers never fuse the two
-    /// operations by themselves.
-    fn multiply_add(&self) -> Option<&'static str> {
-        None
     }
 
     /// A call of the sine-and-cosine kernel, or of a generated function (`callee`).
@@ -120,31 +94,14 @@ pub(crate) trait Dialect {
 
     /// The rows of a constant table: entries between `open` and `close`, with `between` after every
     /// eight of them.
-    fn rows(&self, table: &ConstTable, [open, between, close]: [&str; 3]) -> String {
+    fn rows(&self, table: &Table, [open, between, close]: [&str; 3]) -> String {
         let row = |row: &[f64]| {
             let entries: Vec<String> = row.iter().map(|&entry| self.literal(entry)).collect();
             let lines: Vec<String> = entries.chunks(8).map(|line| line.join(", ")).collect();
             format!("{open}{}{close}\n", lines.join(between))
         };
-        (0..table.values.rows())
-            .map(|r| row(table.values.row(r)))
-            .collect()
+        (0..table.rows()).map(|r| row(table.row(r))).collect()
     }
 
-    /// Definition of a constant table; nothing for a table that the language prints as plain numbers.
-    fn table(&self, table: &ConstTable) -> Option<String>;
-}
-
-/// What most targets call a function.
-pub(crate) fn name(function: Unary) -> &'static str {
-    match function {
-        Unary::Neg => unreachable!("the printer spells negation as an operator"),
-        Unary::Sqrt => "sqrt",
-        Unary::Abs => "abs",
-        Unary::Sign => "sign",
-        Unary::Tan => "tan",
-        Unary::Tanh => "tanh",
-        Unary::Exp => "exp",
-        Unary::Log => "log",
-    }
+    fn table(&self, name: &str, table: &Table) -> String;
 }

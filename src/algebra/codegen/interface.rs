@@ -2,7 +2,7 @@
 
 use super::code::{Parameter, Role};
 use super::map_equations::{in_matrices, points, titles, without_factors};
-use super::units::Units;
+use super::options::Units;
 use crate::equations::{Equations, LatentUnits, Unit, summand_words};
 use crate::ir::{Program, Slot, Statement};
 use crate::lower::{self, Form, JacobianPattern, LowerError, Map};
@@ -90,7 +90,6 @@ impl ModelInterface {
         })
     }
 
-    /// The units of latent and robot quantities.
     pub(super) fn units_in_words(&self) -> String {
         let robot = self.units.of_robot();
         match self.is_physical {
@@ -101,12 +100,10 @@ impl ModelInterface {
         }
     }
 
-    /// Whether a function has such a statement.
     pub(super) fn has(&self, is_wanted: impl Fn(&Statement) -> bool) -> bool {
         self.all().any(|entry| entry.program.has(&is_wanted))
     }
 
-    /// All entries in the order in which they are generated.
     pub(crate) fn all(&self) -> impl Iterator<Item = &FunctionSpec> {
         let phases = self
             .phases
@@ -116,7 +113,6 @@ impl ModelInterface {
     }
 }
 
-/// Whether a statement computes sines and cosines.
 pub(super) fn computes_angles(statement: &Statement) -> bool {
     matches!(statement, Statement::SinCos { .. })
 }

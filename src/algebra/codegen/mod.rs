@@ -1,41 +1,31 @@
 //! From programs to source code: C, Rust, Python, CasADi, MATLAB.
 //!
 //! A `ModelInterface` enters: every function that is generated for a model, as a program. Text leaves.
-//! `interface` lists the functions, `translate` turns programs into the statements of `code`, `printer`
-//! prints them with what a `dialect` spells, templates place them. Nothing mathematical is decided here.
+//! `interface` lists the functions, `translate` and `arrays` turn programs into the statements that `printer`
+//! prints with what a `dialect` spells, templates place them. Nothing mathematical is decided here.
 
+mod arrays;
 #[doc(hidden)] // for `deploy`, in the crate above
 pub mod c;
 mod code;
 mod dialect;
-mod error;
-mod fours;
-mod functions;
 mod ident;
 #[doc(hidden)] // for `deploy`, in the crate above
 pub mod interface;
-mod lanes;
 #[doc(hidden)] // for `deploy`, in the crate above
 pub mod line_wrapping;
 mod map_equations;
 mod model_text;
-mod precision;
+mod options;
 mod printer;
 #[doc(hidden)] // for `deploy`, in the crate above
 pub mod rust;
 #[doc(hidden)] // for `deploy`, in the crate above
 pub mod script;
 mod sin_cos;
-mod sines;
-mod storage;
 mod tables;
 mod test_points;
 mod test_vectors;
 mod translate;
-mod translate_arrays;
-mod units;
 
-pub use error::CodegenError;
-pub use precision::Precision;
-pub use sines::SineCosine;
-pub use units::Units;
+pub use options::{CodegenError, Precision, SineCosine, Units};

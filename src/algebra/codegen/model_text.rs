@@ -2,19 +2,15 @@
 
 use super::code::Function;
 use super::dialect::Dialect;
-use super::functions::{function, lanes};
 use super::ident::{Ident, Namer};
 use super::interface::{FunctionSpec, ModelInterface, computes_angles};
-use super::printer::Printer;
-use super::sines::SineCosine;
+use super::options::SineCosine;
 use super::tables::Tables;
-use crate::ir::Statement;
+use super::translate::{function, lanes};
 
 /// What the files of all languages say of a model; `F` is what they print of a function.
 pub(crate) struct ModelText<'a, F> {
-    /// What is generated.
     pub entries: &'a ModelInterface,
-    /// Constant tables.
     pub tables: Vec<String>,
     /// Maps between robot and latent coordinates.
     pub maps: Vec<F>,
@@ -23,11 +19,9 @@ pub(crate) struct ModelText<'a, F> {
 
 /// A phase in the templates; `F` is what they print of a function.
 pub(crate) struct PhaseText<F> {
-    /// Name of the phase as an identifier.
     pub identifier: String,
     /// The same in upper case, the beginning of its constants.
     pub upper: String,
-    /// Number of structural nonzeros of the Jacobian.
     pub nnz: usize,
     pub rows: String,
     pub cols: String,
@@ -49,8 +43,11 @@ impl<'a, F> ModelText<'a, F> {
         print: impl Fn(Function, &Tables) -> F,
         numbers: fn(&[usize]) -> String,
     ) -> Self {
-        let mut globals = Namer::new(dialect.reserved());
-        let mut tables = Tables::new(Namer::new(dialect.reserved()), &dialect.table_base(prefix));
+        let mut globals = Namer::new(dialect.spelling().reserved);
+        let mut tables = Tables::new(
+            Namer::new(dialect.spelling().reserved),
+            &dialect.table_base(prefix),
+        );
         let mut text = |entry: &FunctionSpec, callees: &[Ident]| {
             let name = globals.mint(&format!("{prefix}{}", entry.name));
             let function = function(entry, name.clone(), dialect, callees, &mut tables);
@@ -73,7 +70,8 @@ impl<'a, F> ModelText<'a, F> {
             }
         });
         let phases = phases.collect();
-        let tables = tables.iter().filter_map(|table| dialect.table(table));
+        let tables = tables.known.iter();
+        let tables = tables.map(|(name, table)| dialect.table(&name.to_string(), table));
         Self {
             entries,
             tables: tables.collect(),
@@ -85,25 +83,13 @@ impl<'a, F> ModelText<'a, F> {
     /// The same with the loops over the lanes of batches that run in blocks.
     pub(crate) fn with_lanes(mut self, dialect: &dyn Dialect, sines: SineCosine) -> Self {
         for (text, phase) in self.phases.iter_mut().zip(&self.entries.phases) {
-            let lanes = lanes(&phase.dynamics.program, dialect, sines);
-            text.lanes = lanes.map(|lanes| Printer::new(dialect).statements(&lanes, 3));
+            text.lanes = lanes(&phase.dynamics.program, dialect, sines);
         }
         self
     }
 
-    /// Whether a batch runs in blocks.
     pub(crate) fn has_lanes(&self) -> bool {
         self.phases.iter().any(|phase| phase.lanes.is_some())
-    }
-
-    /// Whether rows of functions are added in lanes, so that wide registers read rows of tables.
-    pub(crate) fn has_rows(&self) -> bool {
-        (self.entries).has(|s| matches!(s, Statement::Separable { .. }))
-    }
-
-    /// Whether there are sums of vectors of four numbers.
-    pub(crate) fn has_fours(&self) -> bool {
-        (self.entries).has(|s| matches!(s, Statement::Quads { .. }))
     }
 
     /// Name of the first phase's accelerations, for an example of a call.

@@ -1,7 +1,7 @@
 //! The one place that owns precedence, parentheses, indentation and line width.
 
-use super::code::{Expr, Function, Index, Stmt};
-use super::dialect::{Dialect, Lines};
+use super::code::{Expr, Index};
+use super::dialect::Dialect;
 use super::ident::Ident;
 use crate::ir::{Binary, Unary};
 
@@ -17,159 +17,94 @@ enum Precedence {
     Atom,
 }
 
-/// Prints statements in one dialect.
-#[derive(Clone, Copy)]
+/// Prints statements in one dialect, at a depth of indentation.
 pub(crate) struct Printer<'a> {
-    dialect: &'a dyn Dialect,
+    pub dialect: &'a dyn Dialect,
     /// Function that sums with a product are printed with.
     multiply_add: Option<&'static str>,
+    depth: usize,
+    text: String,
 }
 
 impl<'a> Printer<'a> {
-    /// A printer for a dialect.
-    pub(crate) fn new(dialect: &'a dyn Dialect) -> Self {
+    /// For the statements of a function or, `in_loop`, of a loop's body.
+    pub(crate) fn new(dialect: &'a dyn Dialect, depth: usize, in_loop: bool) -> Self {
         Self {
             dialect,
-            multiply_add: None,
+            multiply_add: dialect.spelling().multiply_add.filter(|_| in_loop),
+            depth,
+            text: String::new(),
         }
     }
 
-    /// A function behind its head, with a mention of each parameter that nothing reads; ends without
-    /// a newline.
-    pub(crate) fn function(
-        &self,
-        head: &str,
-        mention: impl Fn(&Ident) -> String,
-        function: &Function,
-    ) -> String {
-        let mut text = format!("{head} {{\n");
-        for parameter in &function.unused {
-            self.line(&mention(parameter), 1, &mut text);
-        }
-        self.block(&function.body, 1, &mut text);
-        text.push('}');
-        text
+    pub(crate) fn into_text(self) -> String {
+        self.text
     }
 
-    /// This printer for the bodies of loops.
-    fn in_loop(&self) -> Self {
-        Self {
-            multiply_add: self.dialect.multiply_add(),
-            ..*self
-        }
+    pub(crate) fn let_scalar(&mut self, name: &Ident, value: &Expr) {
+        let value = self.expression(value);
+        self.line(&self.dialect.let_scalar(&name.to_string(), &value));
     }
 
-    /// Statements of a loop's body at a depth of indentation; ends with a newline.
-    pub(crate) fn statements(&self, statements: &[Stmt], depth: usize) -> String {
-        let mut text = String::new();
-        self.in_loop().block(statements, depth, &mut text);
-        text
+    pub(crate) fn let_array(&mut self, name: &Ident, elements: &[Expr]) {
+        let elements: Vec<_> = elements.iter().map(|e| self.expression(e)).collect();
+        self.line(&self.dialect.let_array(&name.to_string(), &elements));
     }
 
-    fn block(&self, statements: &[Stmt], depth: usize, text: &mut String) {
-        for statement in statements {
-            let line = match statement {
-                Stmt::For(variable, count, body) => {
-                    let head = self.dialect.for_loop(&variable.to_string(), *count);
-                    self.in_loop().looped(&head, body, depth, text);
-                    continue;
-                }
-                Stmt::Row(row) => {
-                    let lines = self.dialect.row(row);
-                    self.side_by_side(lines, || row.in_columns(), depth, text);
-                    continue;
-                }
-                Stmt::Fours(fours) => {
-                    let blocks = fours.blocks.iter();
-                    let blocks = blocks.map(|block| self.dialect.four_block(fours, block));
-                    let lines = blocks.collect::<Option<Vec<_>>>().map(|all| all.concat());
-                    self.side_by_side(lines, || fours.one_by_one(), depth, text);
-                    continue;
-                }
-                Stmt::SinCosLane {
-                    argument,
-                    sine,
-                    cosine,
-                    is_used,
-                } => {
-                    let argument = self.expression(argument);
-                    let names = [sine.to_string(), cosine.to_string()];
-                    for line in self.dialect.sin_cos_lane(&argument, &names, *is_used) {
-                        self.line(&line, depth, text);
-                    }
-                    continue;
-                }
-                Stmt::Let(name, value) => {
-                    let value = self.expression(value);
-                    self.dialect.let_scalar(&name.to_string(), &value)
-                }
-                Stmt::LetArray(name, elements) => {
-                    let elements: Vec<_> = elements.iter().map(|e| self.expression(e)).collect();
-                    self.dialect.let_array(&name.to_string(), &elements)
-                }
-                Stmt::Declare(name, len) => self.dialect.declare(&name.to_string(), *len),
-                Stmt::Assign(target, value) => self.assign(target, " = ", value),
-                Stmt::AddAssign(target, value) => {
-                    let is_product = matches!(value, Expr::Infix(Binary::Mul, ..));
-                    let is_fused = self.multiply_add.is_some() && is_product;
-                    match is_fused || !self.dialect.adds_in_place() {
-                        true => {
-                            let sum = Expr::infix(Binary::Add, target.clone(), value.clone());
-                            self.assign(target, " = ", &sum)
-                        }
-                        false => self.assign(target, " += ", value),
-                    }
-                }
-                Stmt::Call {
-                    callee,
-                    read,
-                    written,
-                } => {
-                    let callee = callee.as_ref().map(Ident::to_string);
-                    self.dialect.call(callee.as_deref(), read, written)
-                }
-            };
-            self.line(&line, depth, text);
+    /// An array that is assigned later.
+    pub(crate) fn declare(&mut self, name: &Ident, len: usize) {
+        self.line(&self.dialect.declare(&name.to_string(), len));
+    }
+
+    pub(crate) fn assign(&mut self, target: &Expr, value: &Expr) {
+        self.assign_by(" = ", target, value);
+    }
+
+    /// `target += value`
+    pub(crate) fn add_assign(&mut self, target: &Expr, value: Expr) {
+        let is_fused = self.multiply_add.is_some() && product(&value).is_some();
+        match is_fused || !self.dialect.spelling().adds_in_place {
+            true => self.assign(target, &Expr::infix(Binary::Add, target.clone(), value)),
+            false => self.assign_by(" += ", target, &value),
         }
     }
 
-    /// A loop whose body this printer prints.
-    fn looped(&self, head: &str, body: &[Stmt], depth: usize, text: &mut String) {
-        let (open, close) = self.dialect.loop_ends();
-        self.line(&format!("{head}{open}"), depth, text);
-        self.block(body, depth + 1, text);
-        if let Some(close) = close {
-            self.line(close, depth, text);
+    /// Sine and cosine of one argument by the kernel's core, see [`Dialect::sin_cos_lane`].
+    pub(crate) fn sin_cos_lane(&mut self, argument: &Expr, names: &[Ident; 2], used: [bool; 2]) {
+        let argument = self.expression(argument);
+        let names = names.each_ref().map(Ident::to_string);
+        for line in self.dialect.sin_cos_lane(&argument, &names, used) {
+            self.line(&line);
         }
     }
 
-    /// Lines as they are, or statements where a language has none.
-    fn side_by_side(
-        &self,
-        lines: Option<Lines>,
-        one_by_one: impl FnOnce() -> Vec<Stmt>,
-        depth: usize,
-        text: &mut String,
-    ) {
-        let Some(lines) = lines else {
-            return self.block(&one_by_one(), depth, text);
-        };
-        for (inner, line) in lines {
-            self.line(&line, depth + inner, text);
-        }
-    }
-
-    fn assign(&self, target: &Expr, op: &str, value: &Expr) -> String {
+    fn assign_by(&mut self, op: &str, target: &Expr, value: &Expr) {
         let [target, value] = [target, value].map(|expr| self.expression(expr));
-        format!("{target}{op}{value}{}", self.dialect.terminator())
+        let end = self.dialect.spelling().terminator;
+        self.line(&format!("{target}{op}{value}{end}"));
+    }
+
+    /// A loop of the variable from 0 to below the count.
+    pub(crate) fn looped(&mut self, variable: &Ident, count: usize, body: impl FnOnce(&mut Self)) {
+        let (open, close) = self.dialect.spelling().loop_ends;
+        let head = self.dialect.for_loop(&variable.to_string(), count);
+        self.line(&format!("{head}{open}"));
+        let outer = std::mem::replace(&mut self.multiply_add, self.dialect.spelling().multiply_add);
+        self.depth += 1;
+        body(self);
+        self.depth -= 1;
+        self.multiply_add = outer;
+        if let Some(close) = close {
+            self.line(close);
+        }
     }
 
     /// Adds a line, broken at spaces if it is too wide.
-    fn line(&self, line: &str, depth: usize, text: &mut String) {
-        let mut indent = 4 * depth;
+    pub(crate) fn line(&mut self, line: &str) {
+        let mut indent = 4 * self.depth;
         let mut rest = line;
         loop {
-            text.extend(std::iter::repeat_n(' ', indent));
+            self.text.extend(std::iter::repeat_n(' ', indent));
             let room = WIDTH.saturating_sub(indent);
             let cut = if rest.len() > room {
                 let within = rest[..=room].rfind(' ');
@@ -178,20 +113,19 @@ impl<'a> Printer<'a> {
                 None
             };
             let Some(cut) = cut.filter(|&cut| cut > 0) else {
-                text.push_str(rest);
-                text.push('\n');
+                self.text.push_str(rest);
+                self.text.push('\n');
                 return;
             };
-            text.push_str(&rest[..cut]);
-            text.push_str(self.dialect.continuation());
-            text.push('\n');
+            self.text.push_str(&rest[..cut]);
+            self.text.push_str(self.dialect.spelling().continuation);
+            self.text.push('\n');
             rest = &rest[cut + 1..];
-            indent = 4 * depth + 4;
+            indent = 4 * self.depth + 4;
         }
     }
 
-    /// An expression.
-    pub fn expression(&self, expr: &Expr) -> String {
+    fn expression(&self, expr: &Expr) -> String {
         match expr {
             Expr::Literal(literal) => self.dialect.literal(*literal),
             Expr::Name(name) => name.to_string(),
@@ -223,8 +157,14 @@ impl<'a> Printer<'a> {
                 } else {
                     right
                 };
+                let [add, sub, mul, div] = self.dialect.spelling().operators;
+                let operator = match op {
+                    Binary::Add => add,
+                    Binary::Sub => sub,
+                    Binary::Mul => mul,
+                    Binary::Div | Binary::Pow => div,
+                };
                 let left = self.operand(a, own);
-                let operator = self.dialect.operator(*op);
                 format!("{left}{operator}{}", self.operand(b, right))
             }
         }

@@ -1,30 +1,23 @@
 //! The constants of the sine-and-cosine kernel as text.
 
 use super::dialect::Dialect;
-use super::precision::Precision;
+use super::options::Precision;
 use crate::ir::{sin_cos, sin_cos_f32};
 
 /// Spelled constants, in the order in which kernels use them.
 #[derive(Clone, Debug)]
 pub(crate) struct KernelText {
-    /// Largest magnitude of an argument.
     pub limit: String,
-    /// 2/pi.
     pub two_over_pi: String,
-    /// What rounds to an integer when added.
     pub round: String,
-    /// pi/2 in three parts.
     pub pi_2: Vec<String>,
-    /// Coefficients of the sine.
     pub sin: Vec<String>,
-    /// Coefficients of the cosine.
     pub cos: Vec<String>,
     /// From bit 1 of a number to its sign.
     pub to_sign: usize,
 }
 
 impl KernelText {
-    /// The constants in a precision, spelled in a language.
     pub(crate) fn new(precision: Precision, dialect: &dyn Dialect) -> Self {
         let wide = |values: [f32; 3]| values.map(f64::from);
         let (single, lists) = match precision {

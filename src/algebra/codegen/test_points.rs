@@ -1,7 +1,7 @@
 //! Points of self-tests, where possible those at which the functions have finite values.
 
 use super::interface::{FunctionSpec, PhaseInterface};
-use super::precision::Precision;
+use super::options::Precision;
 use crate::ir::{Binary, Interpreter, Statement, Unary};
 use crate::robot::JOINT_DIM;
 use crate::robot::joints::LEG_JOINT_DIM;
@@ -15,9 +15,7 @@ const REACHES: [f64; 6] = [1.0, 3.0, 0.3, 10.0, 0.1, 0.01];
 /// Inputs of a function and what it computes from them.
 #[derive(Clone, Debug)]
 pub(crate) struct TestPoint {
-    /// An array per input of the program.
     pub inputs: Vec<Vec<f64>>,
-    /// An array per output of the program.
     pub outputs: Vec<Vec<f64>>,
     /// How many results are not finite in the precision.
     undefined: usize,
@@ -62,7 +60,6 @@ impl TestPoint {
         }
     }
 
-    /// Whether every result is finite.
     pub(crate) fn is_defined(&self) -> bool {
         self.undefined == 0
     }
@@ -147,11 +144,8 @@ pub(crate) const N_BATCH: usize = 21;
 /// `u_lat + 0.01 (i mod 83)`, except for `far_angle` in point 3 of `z1` and in the last but one of `dz1`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct BatchPoints {
-    /// First element of `z`.
     pub z: f64,
-    /// First element of `dz`.
     pub dz: f64,
-    /// First element of `u_lat`.
     pub u_lat: f64,
     /// An angle beyond the limit of the inline sine, where the accelerations do not overflow there.
     pub far_angle: f64,
@@ -160,13 +154,17 @@ pub(crate) struct BatchPoints {
 impl BatchPoints {
     /// Numbers of both signs, or positive ones where the accelerations are finite at more of these.
     pub(crate) fn new(phase: &PhaseInterface, precision: Precision) -> Self {
-        let overflows = phase.dynamics.program.statements().iter().any(|statement| {
-            use Unary::{Exp, Log, Tan, Tanh};
-            matches!(
-                statement,
-                Statement::Unary(Exp | Tan | Tanh | Log, _) | Statement::Binary(Binary::Pow, ..)
-            )
-        });
+        let overflows =
+            phase
+                .dynamics
+                .program
+                .statements()
+                .iter()
+                .any(|statement| match statement {
+                    Statement::Unary(op, _) => op.is_by_library(),
+                    Statement::Binary(op, ..) => *op == Binary::Pow,
+                    _ => false,
+                });
         let far_angle = match (overflows, precision) {
             (true, _) => 0.125,
             (false, Precision::Double) => 9000.125,
@@ -190,7 +188,6 @@ impl BatchPoints {
         }
     }
 
-    /// A point of the batch.
     pub(crate) fn at(
         &self,
         phase: &PhaseInterface,
@@ -218,7 +215,6 @@ impl BatchPoints {
 pub(crate) struct Random(u64);
 
 impl Random {
-    /// The numbers of every self-test.
     pub(crate) fn new() -> Self {
         Self(0x5eed)
     }

@@ -3,7 +3,7 @@
 use super::code::Role;
 use super::dialect::Dialect;
 use super::interface::{FunctionSpec, ModelInterface, PhaseInterface};
-use super::precision::{Precision, rounded_up};
+use super::options::{Precision, rounded_up};
 use super::test_points::{BatchPoints, N_BATCH, Random, point};
 use crate::ir::Interpreter;
 
@@ -15,11 +15,8 @@ pub(crate) const N_POINTS: usize = 6;
 /// none for a wrong coefficient.
 pub(crate) const TOLERANCE_F64: f64 = 1e-11;
 
-/// What the self-test of a model compares.
 pub(crate) struct TestVectors<'a> {
-    /// Of each function.
     pub functions: Vec<FunctionVectors>,
-    /// Of the batch of each phase.
     pub batches: Vec<Batch<'a>>,
 }
 
@@ -55,9 +52,7 @@ impl<'a> TestVectors<'a> {
     }
 }
 
-/// The batch of a phase.
 pub(crate) struct Batch<'a> {
-    /// Name of the phase as an identifier.
     pub phase: &'a str,
     /// First elements of the arrays, and an angle that the batch meets.
     pub points: BatchPoints,
@@ -79,12 +74,9 @@ impl<'a> Batch<'a> {
     }
 }
 
-/// The vectors of a function.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct FunctionVectors {
-    /// Name of the function without the model's.
     pub name: String,
-    /// Those of its parameters, in order.
     pub parameters: Vec<ParameterVectors>,
     /// Whether all results are finite at one of the points.
     pub is_defined: bool,
@@ -101,10 +93,8 @@ impl FunctionVectors {
 /// What a parameter holds at each point: before the call, and what is expected after it.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct ParameterVectors {
-    /// What it is for.
     pub role: Role,
     pub name: String,
-    /// Number of elements.
     pub len: usize,
     /// Values before the call, a row a point; empty for outputs.
     pub before: Vec<Vec<String>>,
@@ -115,12 +105,10 @@ pub(crate) struct ParameterVectors {
 }
 
 impl ParameterVectors {
-    /// Whether the function writes it.
     pub(crate) fn is_written(&self) -> bool {
         matches!(self.role, Role::Output | Role::InOut)
     }
 
-    /// The tolerance of single precision in print.
     pub(crate) fn tolerance(&self) -> String {
         rounded_up(self.tolerance_single)
     }

@@ -68,7 +68,6 @@ pub struct LatentUnits {
 }
 
 impl LatentUnits {
-    /// The unit of a variable of the equations.
     pub(crate) fn of(&self, variable: LatentVariable) -> Unit {
         match variable {
             LatentVariable::Z(i) => self.position[i],
@@ -77,7 +76,6 @@ impl LatentUnits {
         }
     }
 
-    /// The unit of a latent acceleration.
     pub(crate) fn acceleration(&self, output: usize) -> Unit {
         self.position[output].per_second().per_second()
     }

@@ -84,7 +84,7 @@ impl<'a> Equations<'a> {
     /// was simplified.
     ///
     /// # Errors
-    /// [`ModelError::Library`] if new terms make the library too large.
+    /// [`ModelError::Invalid`] if new terms make the library too large.
     pub fn to_model(&self) -> Result<Cow<'_, ReducedModel>, ModelError> {
         if self.steps.is_empty() {
             return Ok(Cow::Borrowed(&self.model));

@@ -43,7 +43,6 @@ impl Unit {
         self / SECOND
     }
 
-    /// The unit of a power.
     pub(crate) fn power(self, exponent: i8) -> Self {
         Self(self.0.map(|own| own.saturating_mul(exponent)))
     }

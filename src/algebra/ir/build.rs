@@ -3,8 +3,7 @@
 use std::collections::HashMap;
 
 use super::program::{
-    Binary, Group, Program, QUAD, QuadSum, ResultEntry, Slot, Statement, Table, TableId, Unary,
-    ValueId,
+    Binary, Program, ResultEntry, Slot, Statement, Table, TableId, Unary, ValueId,
 };
 use super::validate::{IrError, validate};
 
@@ -74,17 +73,14 @@ impl ProgramBuilder {
         self.numbered(Key::Binary(op, low, high), Statement::Binary(op, a, b))
     }
 
-    /// `a + b`.
     pub(crate) fn add(&mut self, a: ValueId, b: ValueId) -> ValueId {
         self.binary(Binary::Add, a, b)
     }
 
-    /// `a * b`.
     pub(crate) fn mul(&mut self, a: ValueId, b: ValueId) -> ValueId {
         self.binary(Binary::Mul, a, b)
     }
 
-    /// `a / b`.
     pub(crate) fn div(&mut self, a: ValueId, b: ValueId) -> ValueId {
         self.binary(Binary::Div, a, b)
     }
@@ -105,59 +101,28 @@ impl ProgramBuilder {
         (values[..n].to_vec(), values[n..].to_vec())
     }
 
-    /// A constant table for groups of functions.
-    pub(crate) fn table(&mut self, table: Table) -> TableId {
-        TableId(place_of(&mut self.program.tables, &table) as u32)
+    fn table(&mut self, table: &Table) -> TableId {
+        TableId(place_of(&mut self.program.tables, table) as u32)
     }
 
-    /// Matrix-vector accumulation, see [`Statement::Accumulate`].
-    pub(crate) fn accumulate(&mut self, table: Table, sections: Vec<Vec<ValueId>>) -> Vec<ValueId> {
-        let cols = table.cols;
-        let table = self.table(table);
-        self.push_array(Statement::Accumulate { table, sections }, cols)
+    /// Matrix-vector product with an offset, see [`Statement::Accumulate`].
+    pub(crate) fn accumulate(&mut self, table: &Table, weights: Vec<ValueId>) -> Vec<ValueId> {
+        let id = self.table(table);
+        let statement = Statement::Accumulate { table: id, weights };
+        self.push_array(statement, table.cols)
     }
 
-    /// Sums of vectors, see [`Statement::Quads`]; defines [`QUAD`] values per sum.
-    pub(crate) fn quads(
+    /// Tables with scaled columns, see [`Statement::Scaled`].
+    pub(crate) fn scaled(
         &mut self,
-        table: Table,
-        weights: Vec<ValueId>,
-        sums: Vec<QuadSum>,
-    ) -> Vec<ValueId> {
-        let n = QUAD * sums.len();
-        let statement = Statement::Quads {
-            table: self.table(table),
-            weights,
-            sums,
-        };
-        self.push_array(statement, n)
-    }
-
-    /// All entries of a constant table, row-major.
-    pub(crate) fn constants(&mut self, table: Table) -> Vec<ValueId> {
-        let n = table.entries.len();
-        let table = self.table(table);
-        self.push_array(Statement::Constants { table }, n)
-    }
-
-    /// Sums of functions of one variable each, and their slopes, see
-    /// [`Statement::Separable`].
-    pub(crate) fn separable(
-        &mut self,
-        start: Vec<ValueId>,
         base: Option<Vec<ValueId>>,
-        groups: Vec<Group>,
-        cols: usize,
-    ) -> (Vec<ValueId>, Vec<ValueId>) {
-        let rows = start.len();
-        let statement = Statement::Separable {
-            start,
-            base,
-            groups,
-            cols,
-        };
-        let values = self.push_array(statement, rows + rows * cols);
-        (values[..rows].to_vec(), values[rows..].to_vec())
+        groups: Vec<(Table, Option<Vec<ValueId>>)>,
+    ) -> Vec<ValueId> {
+        let n_values = groups[0].0.entries.len();
+        let groups = groups.into_iter();
+        let groups = groups.map(|(table, weights)| (self.table(&table), weights));
+        let groups = groups.collect();
+        self.push_array(Statement::Scaled { base, groups }, n_values)
     }
 
     /// Evaluates another program; returns the values of each of its outputs.
@@ -187,27 +152,6 @@ impl ProgramBuilder {
         self.program
             .results
             .extend(entries.map(|(index, &value)| ResultEntry { slot, index, value }));
-    }
-
-    /// Whether `b` follows `a` in an input array or in an array that a statement defines, so that
-    /// generated loops can read both in place.
-    pub(crate) fn are_adjacent(&self, a: ValueId, b: ValueId) -> bool {
-        let program = &self.program;
-        let ((first, at), (second, next)) = (program.definition(a), program.definition(b));
-        match (&program.statements[first], &program.statements[second]) {
-            (
-                Statement::Input { slot, index },
-                Statement::Input {
-                    slot: other,
-                    index: following,
-                },
-            ) => slot == other && index + 1 == *following,
-            // Sines and cosines are two arrays.
-            (Statement::SinCos { arguments }, _) => {
-                first == second && at + 1 == next && next != arguments.len()
-            }
-            _ => first == second && at + 1 == next,
-        }
     }
 
     /// The finished program.

@@ -30,5 +30,5 @@ mod validate;
 pub use build::ProgramBuilder;
 pub use interpret::Interpreter;
 pub use program::{Binary, Program, Slot, Statement, Unary, ValueId};
-pub(crate) use program::{Group, LANES, QUAD, Quad, QuadSum, Slopes, Table, TableId};
+pub(crate) use program::{Table, TableId};
 pub use validate::IrError;

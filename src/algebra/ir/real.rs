@@ -12,6 +12,7 @@ use super::{sin_cos, sin_cos_f32};
 pub trait Real:
     Copy
     + Debug
+    + PartialEq
     + Add<Output = Self>
     + Sub<Output = Self>
     + Mul<Output = Self>
@@ -21,20 +22,11 @@ pub trait Real:
     /// A constant of a program.
     fn constant(value: f64) -> Self;
 
-    /// `a * a`.
-    #[inline]
-    fn square(self) -> Self {
-        self * self
-    }
-
     /// A function of one number.
     fn unary(op: Unary, a: Self) -> Self;
 
     /// `self ^ exponent`.
     fn power(self, exponent: Self) -> Self;
-
-    /// `zero` where `test` is zero, else `other`.
-    fn select(test: Self, zero: Self, other: Self) -> Self;
 
     /// Sine and cosine by the kernel of this precision.
     fn sin_cos(self) -> (Self, Self);
@@ -69,11 +61,6 @@ macro_rules! real {
             #[inline]
             fn power(self, exponent: $float) -> $float {
                 self.powf(exponent)
-            }
-
-            #[inline]
-            fn select(test: $float, zero: $float, other: $float) -> $float {
-                if test == 0.0 { zero } else { other }
             }
 
             #[inline]

@@ -1,65 +1,13 @@
 //! What every program promises, checked once when it is built.
 
-use super::program::{LANES, Program, QUAD, Quad, Statement, TableId, ValueId};
+use super::program::{Program, Statement, Table, TableId, ValueId};
 
 /// Why a program is refused.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum IrError {
-    /// A statement breaks a promise; the results count as the last one.
-    #[error("program `{program}`: statement {statement} {fault}")]
-    Statement {
-        /// Name of the program.
-        program: String,
-        /// Position of the statement.
-        statement: usize,
-        /// What is wrong with it.
-        fault: Fault,
-    },
-    /// An input or output without elements, or two with the same name.
-    #[error("program `{program}`: the array `{slot}` is empty or named twice")]
-    Slot {
-        /// Name of the program.
-        program: String,
-        /// Name of the array.
-        slot: String,
-    },
-    /// The results do not cover the outputs.
-    #[error("program `{program}`: {found} results for {expected} output elements")]
-    Results {
-        /// Name of the program.
-        program: String,
-        /// Number of results.
-        found: usize,
-        /// Number of output elements.
-        expected: usize,
-    },
-}
-
-/// What is wrong with a statement.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum Fault {
-    /// It reads this value, which is not defined before it.
-    #[error("reads value {0}, defined only later")]
-    UndefinedValue(usize),
-    /// It reads an input element that does not exist.
-    #[error("reads element {index} of input {slot}")]
-    UndefinedInput {
-        /// Input slot.
-        slot: usize,
-        /// Element of the slot.
-        index: usize,
-    },
-    /// A constant is infinite or not a number.
-    #[error("holds the non-finite constant {0}")]
-    NonFinite(f64),
-    /// The operands of an array statement do not fit its table or callee.
-    #[error("has {found} operands, expected {expected}")]
-    OperandCount {
-        /// Operands of the statement.
-        found: usize,
-        /// Operands that its table or callee asks for.
-        expected: usize,
-    },
+#[error("program `{program}`: {fault}")]
+pub struct IrError {
+    program: String,
+    fault: String,
 }
 
 /// Checks definitions before uses, finite constants, table shapes and slots.
@@ -67,56 +15,46 @@ pub enum Fault {
 /// # Errors
 /// The first promise that is broken, in schedule order.
 pub(crate) fn validate(program: &Program) -> Result<(), IrError> {
-    check_slots(program)?;
-    let at = |statement: usize, found: Result<(), Fault>| {
-        found.map_err(|fault| IrError::Statement {
-            program: program.name.clone(),
-            statement,
-            fault,
-        })
-    };
-    for (position, statement) in program.statements.iter().enumerate() {
-        at(position, check_operands(program, position, statement))?;
-        at(position, check_shape(program, statement))?;
-    }
-    let expected = program.outputs.iter().map(|slot| slot.len).sum();
-    if program.results.len() != expected {
-        return Err(IrError::Results {
-            program: program.name.clone(),
-            found: program.results.len(),
-            expected,
-        });
-    }
-    let end = program.statements.len();
-    let mut values = program.results.iter().map(|entry| entry.value);
-    values.try_for_each(|value| at(end, check_value(program, end, value)))
+    faults(program).map_err(|fault| IrError {
+        program: program.name.clone(),
+        fault,
+    })
 }
 
-fn check_slots(program: &Program) -> Result<(), IrError> {
+fn faults(program: &Program) -> Result<(), String> {
     for slots in [&program.inputs, &program.outputs] {
         for (position, slot) in slots.iter().enumerate() {
-            let twice = slots[..position]
-                .iter()
-                .any(|other| other.name == slot.name);
-            if slot.len == 0 || twice {
-                return Err(IrError::Slot {
-                    program: program.name.clone(),
-                    slot: slot.name.clone(),
-                });
+            let is_twice = slots[..position].iter().any(|s| s.name == slot.name);
+            if slot.len == 0 || is_twice {
+                return Err(format!("the array `{}` is empty or named twice", slot.name));
             }
         }
     }
-    Ok(())
+    for (position, statement) in program.statements.iter().enumerate() {
+        check_operands(program, position, statement)
+            .and_then(|()| check_shape(program, statement))
+            .map_err(|fault| format!("statement {position} {fault}"))?;
+    }
+    let expected: usize = program.outputs.iter().map(|slot| slot.len).sum();
+    let found = program.results.len();
+    if found != expected {
+        return Err(format!("{found} results for {expected} output elements"));
+    }
+    let end = program.statements.len();
+    let mut values = program.results.iter().map(|entry| entry.value);
+    values
+        .try_for_each(|value| check_value(program, end, value))
+        .map_err(|fault| format!("statement {end} {fault}"))
 }
 
-fn check_value(program: &Program, position: usize, value: ValueId) -> Result<(), Fault> {
+fn check_value(program: &Program, position: usize, value: ValueId) -> Result<(), String> {
     match value.0 < program.first[position] {
         true => Ok(()),
-        false => Err(Fault::UndefinedValue(value.index())),
+        false => Err(format!("reads value {}, defined only later", value.index())),
     }
 }
 
-fn check_operands(program: &Program, position: usize, statement: &Statement) -> Result<(), Fault> {
+fn check_operands(program: &Program, position: usize, statement: &Statement) -> Result<(), String> {
     for value in statement.operands() {
         check_value(program, position, value)?;
     }
@@ -124,81 +62,37 @@ fn check_operands(program: &Program, position: usize, statement: &Statement) -> 
         Statement::Input { slot, index }
             if (program.inputs.get(slot)).is_none_or(|input| index >= input.len) =>
         {
-            Err(Fault::UndefinedInput { slot, index })
+            Err(format!("reads element {index} of input {slot}"))
         }
         _ => Ok(()),
     }
 }
 
-fn check_shape(program: &Program, statement: &Statement) -> Result<(), Fault> {
+fn check_shape(program: &Program, statement: &Statement) -> Result<(), String> {
     let count = |found: usize, expected: usize| match found == expected {
         true => Ok(()),
-        false => Err(Fault::OperandCount { found, expected }),
+        false => Err(format!("has {found} operands, expected {expected}")),
     };
     let finite = |values: &[f64]| match values.iter().find(|value| !value.is_finite()) {
         None => Ok(()),
-        Some(&value) => Err(Fault::NonFinite(value)),
+        Some(value) => Err(format!("holds the non-finite constant {value}")),
     };
-    let table = |id: &TableId| &program.tables[id.index()];
+    let table = |id: &TableId| -> Result<&Table, String> {
+        let table = &program.tables[id.index()];
+        finite(&table.entries).map(|()| table)
+    };
     match statement {
         Statement::Constant(value) => finite(&[*value]),
-        Statement::Accumulate {
-            table: id,
-            sections,
-        } => {
-            finite(&table(id).entries)?;
-            let n_weights: usize = sections.iter().map(Vec::len).sum();
-            count(n_weights + 1, table(id).rows)
-        }
-        Statement::Quads {
-            table: id,
-            weights,
-            sums,
-        } => {
-            finite(&table(id).entries)?;
-            count(table(id).cols, QUAD)?;
-            let below = |found: usize, end: usize| match found < end {
-                true => Ok(()),
-                false => count(found + 1, end),
-            };
-            for (position, sum) in sums.iter().enumerate() {
-                for vector in sum.vectors() {
-                    match vector {
-                        Quad::Row(row) => below(row, table(id).rows)?,
-                        Quad::Sum(earlier) => below(earlier, position)?,
-                    }
-                }
-                for &(weight, _) in &sum.terms {
-                    below(weight, weights.len())?;
-                }
-            }
-            Ok(())
-        }
-        Statement::Constants { table: id } => finite(&table(id).entries),
-        Statement::Separable {
-            start,
-            base,
-            groups,
-            cols,
-        } => {
-            let width = (*cols).max(1).next_multiple_of(LANES);
+        Statement::Accumulate { table: id, weights } => count(weights.len() + 1, table(id)?.rows),
+        Statement::Scaled { base, groups } => {
+            let shape = table(&groups[0].0)?;
             if let Some(base) = base {
-                let row = (base.len() / start.len().max(1)).next_multiple_of(LANES);
-                count(base.len(), start.len() * row.min(width))?;
+                count(base.len(), shape.entries.len())?;
             }
-            let widest = groups.iter().map(|group| table(&group.table).cols).max();
-            count(widest.unwrap_or(0), width)?;
-            for group in groups {
-                let behind = group.values.len().saturating_sub(*cols);
-                count(program.n_zeros_behind(&group.values).min(behind), behind)?;
-                let table = table(&group.table);
-                finite(&table.entries)?;
-                count(table.rows, start.len())?;
-                count(table.cols, table.cols.next_multiple_of(LANES))?;
-                count(group.values.len(), table.cols)?;
-                if let Some(slopes) = group.slopes.values() {
-                    count(slopes.len(), table.cols)?;
-                }
+            for (id, weights) in groups {
+                count(table(id)?.rows, shape.rows)?;
+                count(table(id)?.cols, shape.cols)?;
+                count(weights.as_ref().map_or(shape.cols, Vec::len), shape.cols)?;
             }
             Ok(())
         }
@@ -216,84 +110,35 @@ fn check_shape(program: &Program, statement: &Statement) -> Result<(), Fault> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Group, ProgramBuilder, Slopes, Table};
+    use super::super::ProgramBuilder;
     use super::*;
 
-    fn finished(build: impl FnOnce(&mut ProgramBuilder)) -> Result<Program, IrError> {
-        let mut builder = ProgramBuilder::new("p");
-        build(&mut builder);
-        builder.finish()
-    }
-
     #[test]
-    fn statement_that_breaks_a_promise_is_refused() {
-        let refused = |at: usize, fault: Fault, build: fn(&mut ProgramBuilder)| {
-            let program = "p".to_owned();
-            let error = IrError::Statement {
-                program,
-                statement: at,
-                fault,
-            };
-            assert_eq!(finished(build), Err(error));
+    fn program_that_breaks_a_promise_is_refused() {
+        let refused = |expected: &str, build: fn(&mut ProgramBuilder)| {
+            let mut builder = ProgramBuilder::new("p");
+            build(&mut builder);
+            let error = builder.finish().expect_err(expected);
+            assert_eq!(error.to_string(), format!("program `p`: {expected}"));
         };
-        refused(0, Fault::NonFinite(f64::INFINITY), |builder| {
+        refused("statement 0 holds the non-finite constant inf", |builder| {
             let value = builder.constant(f64::INFINITY);
             builder.output("y", &[value]);
         });
         // Values of another program.
-        refused(1, Fault::UndefinedValue(2), |builder| {
+        refused("statement 1 reads value 2, defined only later", |builder| {
             let values = ProgramBuilder::new("other").input("x", 3);
             builder.input("x", 1);
             let sum = builder.add(values[0], values[2]);
             builder.output("y", &[sum]);
         });
-        let (found, expected) = (2, 3);
-        refused(1, Fault::OperandCount { found, expected }, |builder| {
+        refused("statement 1 has 2 operands, expected 3", |builder| {
             let x = builder.input("x", 1);
-            let y = builder.accumulate(Table::new(3, 2, vec![1.0; 6]), vec![x]);
+            let y = builder.accumulate(&Table::new(3, 2, vec![1.0; 6]), x);
             builder.output("y", &y);
         });
-    }
-
-    /// One row over two variables; the value behind them is zero or not.
-    fn separable(builder: &mut ProgramBuilder, is_padded: bool) {
-        let x = builder.input("x", 3);
-        let start = builder.constant(0.0);
-        let mut values = vec![start; LANES];
-        values[..2].copy_from_slice(&x[..2]);
-        if !is_padded {
-            values[2] = x[2];
-        }
-        let group = Group {
-            table: builder.table(Table::new(1, LANES, vec![1.0; LANES])),
-            values,
-            slopes: Slopes::One,
-        };
-        let (sums, slopes) = builder.separable(vec![start], None, vec![group], 2);
-        builder.output("y", &sums);
-        builder.output("slopes", &slopes);
-    }
-
-    #[test]
-    fn separable_has_groups_and_zeros_behind_the_variables() {
-        assert!(finished(|builder| separable(builder, true)).is_ok());
-        let without_zeros = finished(|builder| separable(builder, false));
-        let without_groups = finished(|builder| {
-            let start = builder.input("x", 1);
-            let (sums, _) = builder.separable(start, None, Vec::new(), 0);
-            builder.output("y", &sums);
+        refused("the array `y` is empty or named twice", |builder| {
+            builder.output("y", &[]);
         });
-        for found in [without_zeros, without_groups] {
-            let Err(IrError::Statement { fault, .. }) = &found else {
-                panic!("{found:?}");
-            };
-            assert!(matches!(fault, Fault::OperandCount { .. }), "{found:?}");
-        }
-    }
-
-    #[test]
-    fn output_without_elements_is_refused() {
-        let found = finished(|builder| builder.output("y", &[]));
-        assert!(matches!(found, Err(IrError::Slot { .. })), "{found:?}");
     }
 }

@@ -1,109 +1,82 @@
-//! The ranges.
+//! The ranges; the command line's help says what each setting is.
+
+#![allow(missing_docs, reason = "the name of a range is that of its flag")]
 
 use super::Range;
 
-/// Latent coordinates of a training, at most the robot's coordinates.
-pub const LATENT_DIM: Range = Range::whole("latent-dim", 1, 18);
-/// Latent coordinates of a model from elsewhere.
-pub const IMPORTED_LATENT_DIM: Range = Range::whole("latent-dim", 1, 64);
-/// Seeds of a training, and of each latent dimension of a study.
-pub const SEEDS: Range = Range::whole("seeds", 1, 10_000);
-/// Epochs of a step of the joint method.
-pub const EPOCHS: Range = Range::whole("epochs", 1, 1_000_000);
-/// Weight of the input energy that the latent input does not represent.
-pub const LIFT_WEIGHT: Range = Range::real("lift-weight", 0.0, 1e6);
-/// Weight of body x, y, z in the reconstruction error.
-pub const BODY_WEIGHT: Range = Range::real("body-weight", 1e-6, 1e6);
-/// Weight of the loss over a window of predictions.
-pub const BPTT_WEIGHT: Range = Range::real("bptt-weight", 0.0, 1e6);
-/// Steps of that window.
-pub const BPTT_WINDOW: Range = Range::whole("bptt-window", 1, 1000);
-/// Steps of the refinement by rollouts.
-pub const REFINEMENTS: Range = Range::whole("refinements", 0, 1000);
-/// Growth rate of deviations, 1/s.
-pub const GROWTH: Range = Range::real("growth", 1e-2, 1e6);
-/// Samples per step of that window.
-pub const BPTT_STRIDE: Range = Range::whole("bptt-stride", 1, 1000);
-/// Weight of a prediction relative to the previous one.
-pub const BPTT_DECAY: Range = Range::above("bptt-decay", 0.0, 1.0);
-/// Accepted increase of the validation error for fewer terms.
-pub const SLACK: Range = Range::real("slack", 0.0, 1e3);
-/// Highest degree of polynomial candidate terms.
-pub const DEGREE: Range = Range::whole("degree", 0, 8);
-/// Samples of the mean over accelerations.
-pub const MOVING_AVERAGE: Range = Range::whole("moving-average", 1, 10_001);
-/// Standard deviation under which a coordinate is masked, rad or m.
-pub const MASK_STD: Range = Range::real("mask-std", 0.0, 1e3);
-/// Share of the input's energy from which a coordinate counts as actuated.
-pub const MASK_INPUT_SHARE: Range = Range::real("mask-input-share", 0.0, 1.0);
-/// Scaled units of the state in one rad or m. Squares of far smaller ones underflow, and rollouts with far larger
-/// ones would count as diverged.
-pub const STATE_SCALING: Range = Range::real("state-scaling", 1e-6, 1e4);
-/// Scaled units of joint torques in one N m.
-pub const TORQUE_SCALING: Range = Range::real("torque-scaling", 1e-6, 1e4);
-/// Scaled units of forces on the body in one N.
-pub const FORCE_SCALING: Range = Range::real("force-scaling", 1e-6, 1e4);
-/// Scaled units of moments on the body in one N m.
-pub const MOMENT_SCALING: Range = Range::real("moment-scaling", 1e-6, 1e4);
-/// Width of a hidden layer.
-pub const LAYER_WIDTH: Range = Range::whole("layers", 1, 1024);
-/// Weight of the complexity in the combined loss of a study.
-pub const LAMBDA: Range = Range::real("lambda", 0.0, 1e6);
-/// Stages of the controller's horizon.
-pub const HORIZON: Range = Range::whole("horizon", 1, 500);
-/// Length of a stage in seconds.
-pub const STEP: Range = Range::real("step", 1e-4, 1.0);
-/// Largest change of a commanded torque in N m/s.
-pub const TORQUE_RATE: Range = Range::real("torque-rate", 1e-3, 1e9);
-/// Time between restarts of rollouts in seconds.
-pub const RESTART_EVERY: Range = Range::real("restart-every", 1e-3, 1e4);
-/// Reach of a domain beyond the recordings, as a share of each variable's range.
-pub const MARGIN: Range = Range::real("margin", 0.0, 100.0);
-/// Longest printed line in em.
-pub const WIDTH: Range = Range::real("width", 1.0, 1000.0);
-/// Decimal places of printed coefficients.
-pub const DIGITS: Range = Range::whole("digits", 0, 40);
-/// Significant digits of printed coefficients.
-pub const SIGNIFICANT: Range = Range::whole("significant", 1, 40);
-/// Scaled units in one SI unit, of a model from elsewhere.
-pub const SCALING: Range = Range::real("scaling", 1e-9, 1e9);
-/// As [`SCALING`], of the inputs.
-pub const INPUT_SCALING: Range = Range::real("input-scaling", 1e-9, 1e9);
-/// Sampling period of training recordings in seconds.
-pub const SAMPLE_TIME: Range = Range::real("sample-time", 1e-6, 1.0);
+/// Constants and the list of them.
+macro_rules! ranges {
+    ($($(#[$doc:meta])* $name:ident = $range:expr;)*) => {
+        $($(#[$doc])* pub const $name: Range = $range;)*
 
-/// Distance of the body in a planned jump, m.
-pub const DISTANCE: Range = Range::real("distance", -1000.0, 1000.0);
-/// Rise of the body in a planned jump, m.
-pub const APEX: Range = Range::real("apex", -1000.0, 1000.0);
+        /// All ranges; of two with one name that of `romc train` comes first.
+        pub static ALL: &[Range] = &[$($name),*];
+    };
+}
 
-/// The settings of `romc train`, as flags and in files.
-pub static TRAINING: [Range; 20] = [
-    LATENT_DIM,
-    SEEDS,
-    EPOCHS,
-    LIFT_WEIGHT,
-    BODY_WEIGHT,
-    BPTT_WEIGHT,
-    BPTT_WINDOW,
-    REFINEMENTS,
-    GROWTH,
-    BPTT_STRIDE,
-    BPTT_DECAY,
-    SLACK,
-    DEGREE,
-    MOVING_AVERAGE,
-    MASK_STD,
-    MASK_INPUT_SHARE,
-    STATE_SCALING,
-    TORQUE_SCALING,
-    FORCE_SCALING,
-    MOMENT_SCALING,
-];
+ranges! {
+    LATENT_DIM = Range::whole("latent-dim", 1, 18);
+    /// Latent coordinates of a model from elsewhere.
+    IMPORTED_LATENT_DIM = Range::whole("latent-dim", 1, 64);
+    SEEDS = Range::whole("seeds", 1, 10_000);
+    EPOCHS = Range::whole("epochs", 1, 1_000_000);
+    LIFT_WEIGHT = Range::real("lift-weight", 0.0, 1e6);
+    BODY_WEIGHT = Range::real("body-weight", 1e-6, 1e6);
+    BPTT_WEIGHT = Range::real("bptt-weight", 0.0, 1e6);
+    BPTT_WINDOW = Range::whole("bptt-window", 1, 1000);
+    REFINEMENTS = Range::whole("refinements", 0, 1000);
+    /// Growth rate of deviations, 1/s.
+    GROWTH = Range::real("growth", 1e-2, 1e6);
+    /// Samples per step of the window of predictions.
+    BPTT_STRIDE = Range::whole("bptt-stride", 1, 1000);
+    BPTT_DECAY = Range::above("bptt-decay", 0.0, 1.0);
+    SLACK = Range::real("slack", 0.0, 1e3);
+    DEGREE = Range::whole("degree", 0, 8);
+    /// Samples of the mean over accelerations.
+    MOVING_AVERAGE = Range::whole("moving-average", 1, 10_001);
+    /// Standard deviation under which a coordinate is masked, rad or m.
+    MASK_STD = Range::real("mask-std", 0.0, 1e3);
+    /// Share of the input's energy from which a coordinate counts as actuated.
+    MASK_INPUT_SHARE = Range::real("mask-input-share", 0.0, 1.0);
+    /// Scaled units of the state in one rad or m. Squares of far smaller ones underflow, and rollouts with far larger
+    /// ones would count as diverged.
+    STATE_SCALING = Range::real("state-scaling", 1e-6, 1e4);
+    /// Scaled units of joint torques in one N m.
+    TORQUE_SCALING = Range::real("torque-scaling", 1e-6, 1e4);
+    /// Scaled units of forces on the body in one N.
+    FORCE_SCALING = Range::real("force-scaling", 1e-6, 1e4);
+    /// Scaled units of moments on the body in one N m.
+    MOMENT_SCALING = Range::real("moment-scaling", 1e-6, 1e4);
+    LAYER_WIDTH = Range::whole("layers", 1, 1024);
+    LAMBDA = Range::real("lambda", 0.0, 1e6);
+    /// Stages of the controller's horizon.
+    HORIZON = Range::whole("horizon", 1, 500);
+    /// Length of a stage in seconds.
+    STEP = Range::real("step", 1e-4, 1.0);
+    /// Largest change of a commanded torque in N m/s.
+    TORQUE_RATE = Range::real("torque-rate", 1e-3, 1e9);
+    /// Time between restarts of rollouts in seconds.
+    RESTART_EVERY = Range::real("restart-every", 1e-3, 1e4);
+    /// Reach of a domain beyond the recordings, as a share of each variable's range.
+    MARGIN = Range::real("margin", 0.0, 100.0);
+    /// Longest printed line in em.
+    WIDTH = Range::real("width", 1.0, 1000.0);
+    DIGITS = Range::whole("digits", 0, 40);
+    SIGNIFICANT = Range::whole("significant", 1, 40);
+    /// Scaled units in one SI unit, of a model from elsewhere.
+    SCALING = Range::real("scaling", 1e-9, 1e9);
+    INPUT_SCALING = Range::real("input-scaling", 1e-9, 1e9);
+    /// Sampling period of training recordings in seconds.
+    SAMPLE_TIME = Range::real("sample-time", 1e-6, 1.0);
+    /// Distance of the body in a planned jump, m.
+    DISTANCE = Range::real("distance", -1000.0, 1000.0);
+    /// Rise of the body in a planned jump, m.
+    APEX = Range::real("apex", -1000.0, 1000.0);
+}
 
 /// The range of a setting of `romc train` by its name.
 pub fn of_training(name: &str) -> Option<&'static Range> {
-    TRAINING.iter().find(|range| range.name == name)
+    ALL.iter().find(|range| range.name == name)
 }
 
 #[cfg(test)]

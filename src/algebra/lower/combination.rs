@@ -71,7 +71,6 @@ impl Combination {
         Self::collect(pool, summands)
     }
 
-    /// Whether the combination is the number zero.
     pub(crate) fn is_zero(&self) -> bool {
         self.items.is_empty() && self.constant == 0.0
     }

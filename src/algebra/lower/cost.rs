@@ -19,13 +19,9 @@ pub enum Form {
 /// Least number of coefficients for which loops are worth their overhead.
 const FEWEST_COEFFICIENTS: usize = 120;
 
-/// Least share of a table that is not zero. A vectorised loop works on four numbers at once, so that
-/// even a half-empty table is faster than straight-line code, which also has to be
-/// fetched and decoded; with few equations its sums have little to overlap with.
-const LEAST_FILL: f64 = 0.35;
-const LEAST_FILL_OF_FEW: f64 = 0.45;
-/// Fewer equations than these are few.
-const MANY_EQUATIONS: usize = 8;
+/// Least share of a table that is not zero: a vectorised loop works on four numbers at once, so that even a half-empty
+/// table is faster than straight-line code, which also has to be fetched and decoded.
+const LEAST_FILL: f64 = 0.45;
 
 impl Form {
     /// Whether the equations should become loops over tables.
@@ -36,11 +32,7 @@ impl Form {
             Self::Automatic => {
                 let active: usize = equations.iter().map(|e| e.items.len()).sum();
                 let entries = equations.len() * distinct(equations).len();
-                let least_fill = match equations.len() < MANY_EQUATIONS {
-                    true => LEAST_FILL_OF_FEW,
-                    false => LEAST_FILL,
-                };
-                active >= FEWEST_COEFFICIENTS && active as f64 >= least_fill * entries as f64
+                active >= FEWEST_COEFFICIENTS && active as f64 >= LEAST_FILL * entries as f64
             }
         }
     }

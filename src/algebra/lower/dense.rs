@@ -1,21 +1,15 @@
-//! Dense models: tables of coefficients instead of one operation a coefficient.
+//! Dense models: tables of coefficients instead of one operation per coefficient.
 //!
-//! The accelerations are a matrix-vector product over the distinct candidate terms. For the
-//! Jacobian the terms are divided: variables, sines and cosines of variables each touch one
-//! column and go through [`Statement::Separable`](crate::ir::Statement), which shares
-//! each table between sum and slope; the derivatives of all other terms are another
-//! matrix-vector product over the flattened Jacobian; variables that occur only
-//! linearly have constant columns, which the separable loops share as well where there are any.
+//! The accelerations are a matrix-vector product over the distinct candidate terms. Of their Jacobian the columns of
+//! variables that occur only linearly are constants; in the others the derivatives of sines and cosines of variables
+//! are tables whose columns are scaled, and those of all other terms another matrix-vector product.
 
 use std::collections::{BTreeSet, HashMap};
 
 use super::combination::Combination;
 use super::expression::ExpressionLowering;
-use crate::ir::{Group, LANES, Slopes, Table, ValueId};
+use crate::ir::{Table, ValueId};
 use crate::symbolic::{ExprId, ExprPool, Function, Node, SymbolId};
-
-/// Fewest weights for which a loop of their own is worth it.
-const SHORTEST_RUN: usize = 4;
 
 /// The distinct candidate terms that equations use.
 pub(super) fn distinct(equations: &[Combination]) -> Vec<ExprId> {
@@ -32,18 +26,19 @@ pub(super) fn matrix_vector(
     lowering: &mut ExpressionLowering,
     sums: &[Combination],
 ) -> Vec<ValueId> {
-    // Weights in the order of their values are runs of arrays, which loops read in place.
-    let mut weights: Vec<(ValueId, ExprId)> = distinct(sums)
+    let terms = distinct(sums);
+    if terms.is_empty() {
+        let constants = sums.iter().map(|sum| sum.constant);
+        return constants.map(|c| lowering.builder.constant(c)).collect();
+    }
+    // Weights in the order of their values are runs of arrays, which are copied fast.
+    let mut weights: Vec<(ValueId, ExprId)> = terms
         .into_iter()
         .map(|expr| (lowering.value(expr), expr))
         .collect();
     weights.sort();
-    let sections = sections(lowering, &mut weights);
-    let row_of: HashMap<ExprId, usize> = weights
-        .iter()
-        .enumerate()
-        .map(|(position, &(_, expr))| (expr, position + 1))
-        .collect();
+    let rows = weights.iter().enumerate();
+    let row_of: HashMap<ExprId, usize> = rows.map(|(k, &(_, expr))| (expr, k + 1)).collect();
     let cols = sums.len();
     let mut entries = vec![0.0; (weights.len() + 1) * cols];
     for (col, sum) in sums.iter().enumerate() {
@@ -53,112 +48,27 @@ pub(super) fn matrix_vector(
         }
     }
     let table = Table::new(weights.len() + 1, cols, entries);
-    lowering.builder.accumulate(table, sections)
+    let weights = weights.into_iter().map(|(value, _)| value).collect();
+    lowering.builder.accumulate(&table, weights)
 }
 
-/// [`matrix_vector`] whose table has no columns for combinations that are zero.
-fn matrix_vector_without_zeros(
-    lowering: &mut ExpressionLowering,
-    sums: &[Combination],
-) -> Vec<ValueId> {
-    let rest = sums.iter().filter(|sum| !sum.is_zero());
-    let rest: Vec<Combination> = rest.cloned().collect();
-    if rest.len() == sums.len() {
-        return matrix_vector(lowering, sums);
-    }
-    let zero = lowering.builder.constant(0.0);
-    let values = (!rest.is_empty()).then(|| matrix_vector(lowering, &rest));
-    let mut values = values.into_iter().flatten();
-    let value = |sum: &Combination| match sum.is_zero() {
-        true => zero,
-        false => values.next().expect("one value a sum"),
-    };
-    sums.iter().map(value).collect()
-}
-
-/// Divides sorted weights into runs that loops read in place; what is scattered goes to the
-/// end, as one section.
-fn sections(
-    lowering: &ExpressionLowering,
-    weights: &mut Vec<(ValueId, ExprId)>,
-) -> Vec<Vec<ValueId>> {
-    let adjacent =
-        |a: &(ValueId, ExprId), b: &(ValueId, ExprId)| lowering.builder.are_adjacent(a.0, b.0);
-    let (mut runs, mut scattered) = (Vec::new(), Vec::new());
-    for run in weights.chunk_by(adjacent) {
-        if run.len() >= SHORTEST_RUN {
-            runs.push(run.to_vec());
-        } else {
-            scattered.extend_from_slice(run);
-        }
-    }
-    if !scattered.is_empty() {
-        runs.push(scattered);
-    }
-    *weights = runs.concat();
-    let values = |run: Vec<(ValueId, ExprId)>| run.into_iter().map(|(value, _)| value).collect();
-    runs.into_iter().map(values).collect()
-}
-
-/// A candidate term that touches one column of the Jacobian.
-#[derive(Clone, Copy, PartialEq, Eq, Hash)]
-enum Kind {
-    Variable,
-    Sine,
-    Cosine,
-}
-
-/// What a candidate term is, and of which variable; nothing for all other terms.
-fn kind(pool: &ExprPool, expr: ExprId) -> Option<(Kind, SymbolId)> {
+/// Function and variable of a sine or cosine of a variable alone.
+fn angle_of(pool: &ExprPool, expr: ExprId) -> Option<(Function, SymbolId)> {
     match pool.node(expr) {
-        Node::Symbol(symbol) => Some((Kind::Variable, *symbol)),
-        Node::Apply(Function::Sin, argument) => Some((Kind::Sine, pool.as_symbol(*argument)?)),
-        Node::Apply(Function::Cos, argument) => Some((Kind::Cosine, pool.as_symbol(*argument)?)),
-        Node::Number(_) | Node::Sum(_) | Node::Product(_) | Node::Power(..) | Node::Apply(..) => {
-            None
+        Node::Apply(function @ (Function::Sin | Function::Cos), argument) => {
+            Some((*function, pool.as_symbol(*argument)?))
         }
+        _ => None,
     }
 }
 
-/// Derivatives of each equation by each variable.
-fn slopes(
-    pool: &mut ExprPool,
-    equations: &[Combination],
-    variables: &[SymbolId],
-) -> Vec<Vec<Combination>> {
-    let mut row = |equation: &Combination| {
-        let by = |&symbol| equation.derivative(pool, symbol);
-        variables.iter().map(by).collect()
-    };
-    equations.iter().map(&mut row).collect()
-}
-
-/// Rows up to the last column in which any is not zero, with zeros up to a multiple of [`LANES`].
-fn padded(mut rows: Vec<Vec<Combination>>) -> Vec<Vec<Combination>> {
-    let last = |row: &Vec<Combination>| row.iter().rposition(|slope| !slope.is_zero());
-    let used = (rows.iter().filter_map(last).max()).map_or(0, |last| last + 1);
-    for row in &mut rows {
-        row.truncate(used);
-        row.resize(used.next_multiple_of(LANES), Combination::default());
-    }
-    rows
-}
-
-/// How the equations divide; `columns` are the variables in the order of the Jacobian.
+/// The Jacobian of equations, divided into what has a form of its own.
 pub(super) struct DenseJacobian {
-    /// Variables whose columns of the Jacobian vary.
     curved: Vec<SymbolId>,
     /// Variables that occur only linearly.
     linear: Vec<SymbolId>,
-    /// All of these variables, in the order of the Jacobian.
-    used: Vec<SymbolId>,
-    /// Whether sines or cosines of variables occur.
-    has_angles: bool,
-    /// What is not in a separable group, one combination a row.
-    rest: Vec<Combination>,
-    /// Derivatives of `rest`, row by row: with angles one a used variable up to the last of which there
-    /// are any, and zeros up to a multiple of [`LANES`]; otherwise one a curved variable.
-    rest_slopes: Vec<Combination>,
+    /// Derivatives by the curved variables, row by row, of all terms but sines and cosines of variables.
+    slopes: Vec<Combination>,
 }
 
 impl DenseJacobian {
@@ -168,180 +78,116 @@ impl DenseJacobian {
         equations: &[Combination],
         columns: &[SymbolId],
     ) -> Self {
-        let mut curved_set = BTreeSet::new();
-        let mut has_angles = false;
+        let (mut curved, mut linear) = (BTreeSet::new(), BTreeSet::new());
         for expr in distinct(equations) {
-            match kind(pool, expr) {
-                Some((Kind::Variable, _)) => {}
-                Some((Kind::Sine | Kind::Cosine, symbol)) => {
-                    has_angles = true;
-                    curved_set.insert(symbol);
-                }
-                None => curved_set.extend(pool.symbols_of(expr)),
+            match pool.as_symbol(expr) {
+                Some(symbol) => linear.extend([symbol]),
+                None => curved.extend(pool.symbols_of(expr)),
             }
         }
-        let is_linear = |symbol: &SymbolId| {
-            let used = |&(_, expr): &(f64, ExprId)| pool.as_symbol(expr) == Some(*symbol);
-            !curved_set.contains(symbol) && equations.iter().any(|e| e.items.iter().any(used))
+        let of = |is_member: &dyn Fn(&SymbolId) -> bool| -> Vec<SymbolId> {
+            columns.iter().copied().filter(is_member).collect()
         };
-        let columns = columns.iter().copied();
-        let linear: Vec<SymbolId> = columns.clone().filter(is_linear).collect();
-        let is_curved = |symbol: &SymbolId| curved_set.contains(symbol);
-        let curved: Vec<SymbolId> = columns.clone().filter(is_curved).collect();
-        let is_used = |symbol: &SymbolId| curved.contains(symbol) || linear.contains(symbol);
-        let used: Vec<SymbolId> = columns.filter(is_used).collect();
-        // With angles, linear terms share the angles' loop.
-        let in_group = |expr| match kind(pool, expr) {
-            Some((Kind::Variable, symbol)) => has_angles && used.contains(&symbol),
-            Some((Kind::Sine | Kind::Cosine, _)) => true,
-            None => false,
-        };
-        let mut rest = equations.to_vec();
-        for equation in &mut rest {
-            equation.items.retain(|&(_, expr)| !in_group(expr));
+        let linear = of(&|symbol| linear.contains(symbol) && !curved.contains(symbol));
+        let curved = of(&|symbol| curved.contains(symbol));
+        let mut slopes = Vec::new();
+        for equation in equations {
+            let mut rest = equation.clone();
+            rest.items
+                .retain(|&(_, expr)| angle_of(pool, expr).is_none());
+            slopes.extend(curved.iter().map(|&by| rest.derivative(pool, by)));
         }
-        let rest_slopes = match has_angles {
-            true => padded(slopes(pool, &rest, &used)),
-            false => slopes(pool, &rest, &curved),
-        };
         Self {
             curved,
             linear,
-            used,
-            has_angles,
-            rest,
-            rest_slopes: rest_slopes.concat(),
+            slopes,
         }
     }
 
-    /// All expressions that the code needs besides the equations.
     pub(crate) fn expressions(&self) -> Vec<ExprId> {
-        distinct(&self.rest_slopes)
+        distinct(&self.slopes)
     }
 
-    /// The accelerations, and the value of each entry that may be nonzero by (row, variable).
+    /// The value of each entry that may be nonzero, by (row, variable).
     pub fn lower(
         &self,
         lowering: &mut ExpressionLowering,
         equations: &[Combination],
-    ) -> (Vec<ValueId>, HashMap<(usize, SymbolId), ValueId>) {
-        let ddz = matrix_vector(lowering, &self.rest);
-        let has_rest_slopes = self.rest_slopes.iter().any(|slope| !slope.is_zero());
+    ) -> HashMap<(usize, SymbolId), ValueId> {
         let mut entries = HashMap::new();
-        let mut enter = |variables: &[SymbolId], values: &[ValueId]| {
-            for (row, values) in values.chunks(variables.len().max(1)).enumerate() {
-                let row = variables.iter().map(|&symbol| (row, symbol));
-                entries.extend(row.zip(values.iter().copied()));
+        let mut enter = |variables: &[SymbolId], values: Vec<ValueId>| {
+            for (k, value) in values.into_iter().enumerate() {
+                let (row, col) = (k / variables.len(), k % variables.len());
+                entries.insert((row, variables[col]), value);
             }
         };
-        if self.has_angles {
-            // The loops add to an entry for every row and variable.
-            let base = has_rest_slopes.then(|| matrix_vector(lowering, &self.rest_slopes));
-            let groups = self.groups(lowering, equations);
-            let builder = &mut lowering.builder;
-            let (ddz, slopes) = builder.separable(ddz, base, groups, self.used.len());
-            enter(&self.used, &slopes);
-            return (ddz, entries);
-        }
         if !self.curved.is_empty() {
-            let slopes = matrix_vector_without_zeros(lowering, &self.rest_slopes);
-            enter(&self.curved, &slopes);
+            enter(&self.curved, self.curved_columns(lowering, equations));
         }
-        enter(&self.linear, &self.linear_slopes(lowering, equations));
-        (ddz, entries)
+        if !self.linear.is_empty() {
+            let pool = lowering.pool;
+            let of = |expr| pool.as_symbol(expr);
+            let table = coefficients(equations, &self.linear, 1.0, of);
+            enter(
+                &self.linear,
+                lowering.builder.scaled(None, vec![(table, None)]),
+            );
+        }
+        entries
     }
 
-    /// Coefficients of the terms of one kind, rows x variables.
-    fn coefficients(
-        pool: &ExprPool,
-        equations: &[Combination],
-        variables: &[SymbolId],
-        of: Kind,
-    ) -> Vec<Vec<f64>> {
-        let columns = variables.iter().enumerate();
-        let column: HashMap<_, _> = columns.map(|(col, &s)| ((of, s), col)).collect();
-        let row = |equation: &Combination| {
-            let mut row = vec![0.0; variables.len()];
-            for &(coefficient, expr) in &equation.items {
-                if let Some(&col) = kind(pool, expr).and_then(|kind| column.get(&kind)) {
-                    row[col] = coefficient;
-                }
-            }
-            row
-        };
-        equations.iter().map(row).collect()
-    }
-
-    fn groups(&self, lowering: &mut ExpressionLowering, equations: &[Combination]) -> Vec<Group> {
-        let zero = lowering.builder.constant(0.0);
-        let variables: Vec<ExprId> = self
-            .used
-            .iter()
-            .map(|&symbol| lowering.pool.symbol_expr(symbol))
-            .collect();
-        let values: Vec<ValueId> = variables.iter().map(|&v| lowering.value(v)).collect();
-        let variables = self.used.iter().zip(variables);
-        let is_curved = |(symbol, _): &(&SymbolId, ExprId)| self.curved.contains(symbol);
-        let angles: Vec<ExprId> = variables
-            .clone()
-            .filter(is_curved)
-            .map(|(_, v)| v)
-            .collect();
-        lowering.sines_and_cosines(&angles);
-        let angle = |variable: (&SymbolId, ExprId)| match is_curved(&variable) {
-            true => lowering.angle(variable.1),
-            false => (zero, zero),
-        };
-        let (sines, cosines): (Vec<_>, Vec<_>) = variables.map(angle).unzip();
-        let width = self.used.len().next_multiple_of(LANES);
-        let mut is_first = true;
-        let mut group = |of: Kind, values: &[ValueId], slopes: Slopes<&[ValueId]>| {
-            let mut rows = Self::coefficients(lowering.pool, equations, &self.used, of);
-            let last = rows
-                .iter()
-                .filter_map(|row| row.iter().rposition(|&x| x != 0.0));
-            let last = last.max()?;
-            // One group has a part in every column.
-            let cols = match std::mem::take(&mut is_first) {
-                true => width,
-                false => (last + 1).next_multiple_of(LANES),
-            };
-            let filled = |values: &[ValueId]| {
-                let mut values = values.to_vec();
-                values.resize(cols, zero);
-                values
-            };
-            for row in &mut rows {
-                row.resize(cols, 0.0);
-            }
-            Some(Group {
-                table: lowering
-                    .builder
-                    .table(Table::new(rows.len(), cols, rows.concat())),
-                values: filled(values),
-                slopes: slopes.map(|values| filled(values)),
-            })
-        };
-        [
-            group(Kind::Variable, &values, Slopes::One),
-            group(Kind::Sine, &sines, Slopes::Plus(cosines.as_slice())),
-            group(Kind::Cosine, &cosines, Slopes::Minus(sines.as_slice())),
-        ]
-        .into_iter()
-        .flatten()
-        .collect()
-    }
-
-    fn linear_slopes(
+    fn curved_columns(
         &self,
         lowering: &mut ExpressionLowering,
         equations: &[Combination],
     ) -> Vec<ValueId> {
-        if self.linear.is_empty() {
-            return Vec::new();
+        let (pool, variables) = (lowering.pool, &self.curved);
+        // The derivative of a sine is a cosine, that of a cosine a negated sine.
+        let mut tables = [(Function::Sin, 1.0), (Function::Cos, -1.0)].map(|(wanted, sign)| {
+            let of = |expr| angle_of(pool, expr).and_then(|(f, v)| (f == wanted).then_some(v));
+            let table = coefficients(equations, variables, sign, of);
+            Some(table).filter(|table| table.entries().iter().any(|&entry| entry != 0.0))
+        });
+        let is_constant = self.slopes.iter().all(|slope| slope.items.is_empty());
+        if tables.iter().all(Option::is_none) {
+            return matrix_vector(lowering, &self.slopes);
         }
-        let rows = Self::coefficients(lowering.pool, equations, &self.linear, Kind::Variable);
-        let table = Table::new(rows.len(), self.linear.len(), rows.concat());
-        lowering.builder.constants(table)
+        let mut groups = Vec::new();
+        let mut base = None;
+        if !is_constant {
+            base = Some(matrix_vector(lowering, &self.slopes));
+        } else if self.slopes.iter().any(|slope| slope.constant != 0.0) {
+            let constants = self.slopes.iter().map(|slope| slope.constant).collect();
+            let table = Table::new(equations.len(), variables.len(), constants);
+            groups.push((table, None));
+        }
+        let angles: Vec<ExprId> = variables.iter().map(|&v| pool.symbol_expr(v)).collect();
+        lowering.sines_and_cosines(&angles);
+        let pairs = angles.into_iter().map(|angle| lowering.angle(angle));
+        let (sines, cosines): (Vec<ValueId>, Vec<ValueId>) = pairs.unzip();
+        for (table, weights) in tables.iter_mut().zip([cosines, sines]) {
+            groups.extend(table.take().map(|table| (table, Some(weights))));
+        }
+        lowering.builder.scaled(base, groups)
     }
+}
+
+/// Coefficients times a sign of the terms that are `of` a variable, rows x variables.
+fn coefficients(
+    equations: &[Combination],
+    variables: &[SymbolId],
+    sign: f64,
+    of: impl Fn(ExprId) -> Option<SymbolId>,
+) -> Table {
+    let columns = variables.iter().enumerate();
+    let column: HashMap<SymbolId, usize> = columns.map(|(col, &symbol)| (symbol, col)).collect();
+    let mut entries = vec![0.0; equations.len() * variables.len()];
+    for (row, equation) in equations.iter().enumerate() {
+        for &(coefficient, expr) in &equation.items {
+            if let Some(col) = of(expr).and_then(|symbol| column.get(&symbol)) {
+                entries[row * variables.len() + col] = sign * coefficient;
+            }
+        }
+    }
+    Table::new(equations.len(), variables.len(), entries)
 }

@@ -7,7 +7,6 @@ use super::cost::Form;
 use super::dense::{DenseJacobian, distinct, matrix_vector};
 use super::error::LowerError;
 use super::expression::ExpressionLowering;
-use super::gradient::Gradient;
 use super::nested::{Demand, Nested, Shared};
 use crate::equations::Equations;
 use crate::ir::{Program, ProgramBuilder, ValueId};
@@ -24,7 +23,6 @@ pub struct JacobianPattern {
 }
 
 impl JacobianPattern {
-    /// Row and column of each entry.
     pub(super) fn places(&self) -> impl Iterator<Item = (usize, usize)> {
         self.rows.iter().copied().zip(self.cols.iter().copied())
     }
@@ -47,23 +45,8 @@ impl JacobianPattern {
 /// [`LowerError::Model`] if there is no such phase, [`LowerError::NonFinite`] if a
 /// coefficient overflows when folded.
 pub fn dynamics(system: &Equations<'_>, phase: usize, form: Form) -> Result<Program, LowerError> {
-    let equations = accelerations(system, phase)?;
-    let mut pool = system.pool().clone();
-    let (mut builder, ddz) = if form.uses_tables(&equations) {
-        let mut lowering = start(system, &pool, "dynamics");
-        lowering.prepare(&distinct(&equations));
-        let ddz = matrix_vector(&mut lowering, &equations);
-        (lowering.builder, ddz)
-    } else {
-        let demand = Demand::new(&mut pool, &equations);
-        let nest = |equation| demand.nest(&mut pool, equation);
-        let sums: Vec<Nested> = equations.iter().map(nest).collect();
-        let mut lowering = start(system, &pool, "dynamics");
-        let ddz = values(&mut lowering, &sums);
-        (lowering.builder, ddz)
-    };
-    builder.output("ddz", &ddz);
-    Ok(builder.finish()?)
+    let (program, _) = with_derivatives(system, phase, form, "dynamics", &[])?;
+    Ok(program)
 }
 
 /// The program of the accelerations and the structural nonzeros of their exact Jacobian
@@ -77,6 +60,19 @@ pub fn dynamics_jacobian(
     phase: usize,
     form: Form,
 ) -> Result<(Program, JacobianPattern), LowerError> {
+    let variables = LatentVariable::all(system.latent_dim());
+    let columns: Vec<SymbolId> = variables.map(|variable| system.symbol(variable)).collect();
+    with_derivatives(system, phase, form, "dynamics_jacobian", &columns)
+}
+
+/// The program of the accelerations and of their derivatives by some variables.
+fn with_derivatives(
+    system: &Equations<'_>,
+    phase: usize,
+    form: Form,
+    name: &str,
+    columns: &[SymbolId],
+) -> Result<(Program, JacobianPattern), LowerError> {
     let equations = accelerations(system, phase)?;
     let mut pool = system.pool().clone();
     let mut entries = Vec::new();
@@ -84,8 +80,6 @@ pub fn dynamics_jacobian(
         rows: Vec::new(),
         cols: Vec::new(),
     };
-    let variables = LatentVariable::all(system.latent_dim());
-    let columns: Vec<SymbolId> = variables.map(|variable| system.symbol(variable)).collect();
     for (row, equation) in equations.iter().enumerate() {
         for (col, &variable) in columns.iter().enumerate() {
             let derivative = equation.derivative(&mut pool, variable);
@@ -97,20 +91,21 @@ pub fn dynamics_jacobian(
             }
         }
     }
-    let n_terms = equations.iter().chain(&entries).map(|sum| sum.items.len());
-    let n_terms = n_terms.sum();
-    let gradient = Gradient::new(form, &mut pool, &equations, &columns, n_terms);
-    let (mut builder, ddz, jacobian) = if let Some(gradient) = gradient {
-        let mut lowering = start(system, &pool, "dynamics_jacobian");
-        lowering.prepare(gradient.expressions());
-        let (ddz, slopes) = gradient.lower(&mut lowering, system.latent_dim());
-        let jacobian = pattern.places().map(|place| slopes[&place]).collect();
+    let (mut builder, ddz, jacobian) = if form.uses_tables(&equations) {
+        let dense = DenseJacobian::new(&mut pool, &equations, columns);
+        let mut lowering = start(system, &pool, name);
+        let mut roots = distinct(&equations);
+        roots.extend(dense.expressions());
+        lowering.prepare(&roots);
+        let ddz = matrix_vector(&mut lowering, &equations);
+        let entries = dense.lower(&mut lowering, &equations);
+        let places = pattern.places();
+        let jacobian = places.map(|(row, col)| entries[&(row, columns[col])]);
+        let jacobian = jacobian.collect();
         (lowering.builder, ddz, jacobian)
-    } else if form.uses_tables(&equations) {
-        dense_jacobian(system, &mut pool, &equations, &columns, &pattern)
     } else {
-        let sums = nested_jacobian(&mut pool, &equations, &columns, entries, &pattern);
-        let mut lowering = start(system, &pool, "dynamics_jacobian");
+        let sums = nested(&mut pool, &equations, columns, entries, &pattern);
+        let mut lowering = start(system, &pool, name);
         let mut ddz = values(&mut lowering, &sums);
         let jacobian = ddz.split_off(equations.len());
         (lowering.builder, ddz, jacobian)
@@ -124,7 +119,7 @@ pub fn dynamics_jacobian(
 
 /// Accelerations, then the entries of the pattern, in nested form: what a variable was taken
 /// out of in an acceleration is a part of its derivative by that variable.
-fn nested_jacobian(
+fn nested(
     pool: &mut ExprPool,
     equations: &[Combination],
     columns: &[SymbolId],
@@ -146,26 +141,6 @@ fn nested_jacobian(
         sums.push(sum);
     }
     sums
-}
-
-/// Accelerations and the entries of the pattern by tables.
-fn dense_jacobian(
-    system: &Equations<'_>,
-    pool: &mut ExprPool,
-    equations: &[Combination],
-    columns: &[SymbolId],
-    pattern: &JacobianPattern,
-) -> (ProgramBuilder, Vec<ValueId>, Vec<ValueId>) {
-    let dense = DenseJacobian::new(pool, equations, columns);
-    let mut lowering = start(system, pool, "dynamics_jacobian");
-    let mut roots = distinct(equations);
-    roots.extend(dense.expressions());
-    lowering.prepare(&roots);
-    let (ddz, entries) = dense.lower(&mut lowering, equations);
-    let places = pattern.places();
-    let jacobian = places.map(|(row, col)| entries[&(row, columns[col])]);
-    let jacobian = jacobian.collect();
-    (lowering.builder, ddz, jacobian)
 }
 
 /// The right-hand sides with folded coefficients, one a latent coordinate.

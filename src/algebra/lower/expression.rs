@@ -14,7 +14,6 @@ pub(super) struct ExpressionLowering<'a> {
     pub pool: &'a ExprPool,
     pub builder: ProgramBuilder,
     values: HashMap<ExprId, ValueId>,
-    /// Sine and cosine of an argument.
     angles: HashMap<ExprId, (ValueId, ValueId)>,
     variables: HashMap<SymbolId, ValueId>,
     /// Expressions that wait for a function of the library or the kernel.
@@ -56,7 +55,7 @@ impl<'a> ExpressionLowering<'a> {
                     level += 1;
                     true
                 }
-                Node::Apply(function, _) => is_slow(*function),
+                Node::Apply(function, _) => unary(*function).is_none_or(Unary::is_by_library),
                 Node::Power(_, exponent) => self.pool.as_number(*exponent).is_none(),
                 Node::Number(_) | Node::Symbol(_) | Node::Sum(_) | Node::Product(_) => false,
             };
@@ -121,7 +120,6 @@ impl<'a> ExpressionLowering<'a> {
         value
     }
 
-    /// The value of a linear combination.
     pub(crate) fn combination(&mut self, combination: &Combination) -> ValueId {
         let terms = self.terms(combination);
         linear_combination(&mut self.builder, combination.constant, &terms)
@@ -246,22 +244,16 @@ impl<'a> ExpressionLowering<'a> {
     }
 
     fn apply(&mut self, function: Function, argument: ExprId) -> ValueId {
-        let op = match function {
-            Function::Sin => return self.angle(argument).0,
-            Function::Cos => return self.angle(argument).1,
-            Function::Tan => Unary::Tan,
-            Function::Tanh => Unary::Tanh,
-            Function::Exp => Unary::Exp,
-            Function::Log => Unary::Log,
-            Function::Sqrt => Unary::Sqrt,
-            Function::Abs => Unary::Abs,
-            Function::Sign => Unary::Sign,
-        };
-        let argument = self.value(argument);
-        self.builder.unary(op, argument)
+        match (function, unary(function)) {
+            (Function::Sin, _) => self.angle(argument).0,
+            (_, None) => self.angle(argument).1,
+            (_, Some(op)) => {
+                let argument = self.value(argument);
+                self.builder.unary(op, argument)
+            }
+        }
     }
 
-    /// Sine and cosine of an argument.
     pub(crate) fn angle(&mut self, argument: ExprId) -> (ValueId, ValueId) {
         self.sines_and_cosines(&[argument]);
         self.angles[&argument]
@@ -278,15 +270,16 @@ fn reciprocal_power(pool: &ExprPool, factor: ExprId) -> Option<(ExprId, u32)> {
     Some((*base, magnitude))
 }
 
-/// Whether a function takes many times longer than a product.
-fn is_slow(function: Function) -> bool {
-    match function {
-        Function::Sin
-        | Function::Cos
-        | Function::Tan
-        | Function::Tanh
-        | Function::Exp
-        | Function::Log => true,
-        Function::Sqrt | Function::Abs | Function::Sign => false,
-    }
+/// The operation of a function; none for sines and cosines, which are computed together.
+fn unary(function: Function) -> Option<Unary> {
+    Some(match function {
+        Function::Sin | Function::Cos => return None,
+        Function::Tan => Unary::Tan,
+        Function::Tanh => Unary::Tanh,
+        Function::Exp => Unary::Exp,
+        Function::Log => Unary::Log,
+        Function::Sqrt => Unary::Sqrt,
+        Function::Abs => Unary::Abs,
+        Function::Sign => Unary::Sign,
+    })
 }

@@ -6,7 +6,6 @@
 //! a rounding is made here: which subexpressions are shared, in which order sums are
 //! added, that a power is a chain of products. Read `dynamics` first, then `expression`.
 
-mod chain;
 mod combination;
 mod compiled;
 mod cost;
@@ -14,7 +13,6 @@ mod dense;
 mod dynamics;
 mod error;
 mod expression;
-mod gradient;
 mod maps;
 mod nested;
 mod network;

@@ -22,7 +22,6 @@ pub(super) struct Nested {
     pub groups: Vec<Group>,
 }
 
-/// Which group of which sum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Shared {
     pub sum: usize,
@@ -32,7 +31,6 @@ pub(super) struct Shared {
 /// A factor taken out of a part of a sum.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Group {
-    /// The factor.
     pub factor: ExprId,
     /// What it multiplies and does not contain it: the derivative of these terms by the factor.
     pub single: Combination,
@@ -219,95 +217,4 @@ fn quotients(pool: &mut ExprPool, expr: ExprId) -> Vec<Quotient> {
         }
     }
     quotients
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::expression::ExpressionLowering;
-    use super::*;
-    use crate::ir::{Binary, Interpreter, ProgramBuilder, Statement};
-
-    const VARIABLES: [&str; 4] = ["w", "x", "y", "z"];
-
-    /// Products of three variables, each in one sum only, and two that both sums have.
-    fn sums(pool: &mut ExprPool) -> [Combination; 2] {
-        let texts = [
-            "0.5 + 2*w*x*y - 3*w*w*y + 1.5*w*z*z - 0.25*x*y*z + 4*w + 7*y*z",
-            "1.25*w*x*z - 2.5*w*w*w + 0.125*w*y*y - 6*y*z + w",
-        ];
-        texts.map(|text| {
-            let expr = pool.parsed(text);
-            Combination::collect(pool, [(1.0, expr)])
-        })
-    }
-
-    /// Values of the sums at a point, and how many products that takes.
-    fn evaluated(pool: &mut ExprPool, sums: &[Nested], point: &[f64; 4]) -> (Vec<f64>, usize) {
-        let mut builder = ProgramBuilder::new("sums");
-        let inputs = builder.input("x", VARIABLES.len());
-        let symbols = VARIABLES.map(|name| pool.symbol_id(name));
-        let variables = symbols.into_iter().zip(inputs).collect();
-        let mut lowering = ExpressionLowering::new(pool, builder, variables);
-        let values: Vec<_> = sums
-            .iter()
-            .map(|sum| lowering.nested(sum, None).0)
-            .collect();
-        let mut builder = lowering.builder;
-        builder.output("y", &values);
-        let program = builder.finish().expect("valid program");
-        let is_product = |s: &&Statement| matches!(s, Statement::Binary(Binary::Mul, ..));
-        let products = program.statements().iter().filter(is_product).count();
-        let mut results = Interpreter::new(&program).results(&[point.to_vec()]);
-        (results.remove(0), products)
-    }
-
-    #[test]
-    fn nested_sums_have_the_same_values_with_fewer_products() {
-        let mut pool = ExprPool::new();
-        let sums = sums(&mut pool);
-        let demand = Demand::new(&mut pool, &sums);
-        let nested = sums.each_ref().map(|sum| demand.nest(&mut pool, sum));
-        let flat = sums.map(|flat| Nested {
-            flat,
-            shared: None,
-            groups: Vec::new(),
-        });
-        for point in [[0.5, -1.25, 2.0, 0.75], [-3.0, 0.1, 0.7, -0.3]] {
-            let (expected, n_flat) = evaluated(&mut pool, &flat, &point);
-            let (found, n_nested) = evaluated(&mut pool, &nested, &point);
-            assert!(n_nested + 4 <= n_flat, "{n_nested} against {n_flat}");
-            for (a, b) in found.iter().zip(&expected) {
-                assert!((a - b).abs() <= 1e-13 * b.abs().max(1.0), "{a} {b}");
-            }
-        }
-    }
-
-    #[test]
-    fn single_part_of_a_group_is_found_in_the_derivative_by_its_factor() {
-        let mut pool = ExprPool::new();
-        let [sum, _] = sums(&mut pool);
-        let demand = Demand::new(&mut pool, [&sum]);
-        let nested = demand.nest(&mut pool, &sum);
-        let symbol = pool.symbol_id("w");
-        let factor = pool.symbol_expr(symbol);
-        let derivative = sum.derivative(&mut pool, symbol);
-        let group = nested.part_of(factor, &derivative);
-        let group = group.expect("w was taken out");
-        let other = pool.symbol_id("z");
-        let wrong = sum.derivative(&mut pool, other);
-        assert_eq!(nested.groups[group].factor, factor);
-        assert_eq!(nested.part_of(factor, &wrong), None);
-    }
-
-    #[test]
-    fn product_that_many_sums_share_stays_flat() {
-        let mut pool = ExprPool::new();
-        let expr = pool.parsed("2*x*y");
-        let sum = Combination::collect(&pool, [(1.0, expr)]);
-        let sums = vec![sum; 5];
-        let demand = Demand::new(&mut pool, &sums);
-        for sum in &sums {
-            assert!(demand.nest(&mut pool, sum).groups.is_empty());
-        }
-    }
 }

@@ -16,7 +16,6 @@ use crate::model::{
     Activation, DENSITY_AT_ZERO, GELU_CUBIC, GELU_RATE, ReducedModel, StateMap, TAIL,
 };
 
-/// The program of a map over layers.
 pub(super) fn lower(map: Map, model: &ReducedModel) -> Result<Program, LowerError> {
     let (name, (from, to)) = map.words();
     let (at, factors, layers) = match map {
@@ -63,7 +62,7 @@ pub(super) fn lower(map: Map, model: &ReducedModel) -> Result<Program, LowerErro
             let rows = (0..model.latent_dim()).map(|row| network.jacobian_row(row, &slopes));
             let rows: Vec<Vec<Number>> = rows.collect();
             let factors = model.input_factors()?;
-            let scaled = given.iter().zip(&factors).map(|(u, &s_u)| u.scaled(s_u));
+            let scaled = given.iter().zip(&factors).map(|(&u, &s_u)| s_u * u);
             pinv_times(sheet, &rows, &scaled.collect::<Vec<_>>())
         }
         // u = (J_E(s_x x)^T u_lat) / s_u
@@ -82,7 +81,6 @@ pub(super) fn lower(map: Map, model: &ReducedModel) -> Result<Program, LowerErro
 /// Slopes of one layer's activation; `None` where it is linear.
 type Slopes<'b> = Option<Vec<Number<'b>>>;
 
-/// A program over the layers of one map.
 struct Network<'b> {
     sheet: &'b Sheet<'b>,
     map: &'b StateMap,
@@ -122,13 +120,12 @@ impl<'b> Network<'b> {
         g
     }
 
-    /// Row `row` of `J`.
     fn jacobian_row(&self, row: usize, slopes: &[Slopes<'b>]) -> Vec<Number<'b>> {
         let last = self.map.layers().len() - 1;
         let weights = self.map.layers()[last].map.weights().row(row);
         let slope = slopes[last].as_ref().map(|slopes| slopes[row]);
         let entry = |&weight: &f64| match slope {
-            Some(slope) => slope.scaled(weight),
+            Some(slope) => weight * slope,
             None => Number::known(self.sheet, weight),
         };
         let g: Vec<Number> = weights.iter().map(entry).collect();
@@ -165,8 +162,7 @@ impl<'b> Network<'b> {
     }
 
     fn accumulated(&self, table: Table, weights: &[Number<'b>]) -> Vec<Number<'b>> {
-        let sections = vec![ids(weights)];
-        let sums = self.sheet.borrow_mut().accumulate(table, sections);
+        let sums = self.sheet.borrow_mut().accumulate(&table, ids(weights));
         numbers(self.sheet, &sums)
     }
 }
@@ -233,7 +229,7 @@ fn sigmoid(a: Number) -> (Number, Number) {
     (value, value * (1.0 - value))
 }
 
-/// `a Phi(a)` and `Phi(a) + a phi(a)`, as in `model/normal.rs`.
+/// `a Phi(a)` and `Phi(a) + a phi(a)`, as in `model/activation.rs`.
 fn gelu(a: Number) -> (Number, Number) {
     let x = std::f64::consts::FRAC_1_SQRT_2 * a.abs();
     let t = 2.0 / (2.0 + x);
@@ -263,33 +259,4 @@ fn gelu_tanh(a: Number) -> (Number, Number) {
     let bend = (GELU_RATE + 3.0 * cubic) * (1.0 - t * t);
     let bend = 0.5 * a * bend;
     (a * half, half + bend)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::ir::Interpreter;
-
-    #[test]
-    fn lowered_activations_have_the_values_and_slopes_of_the_model() {
-        for phi in Activation::ALL {
-            let mut builder = ProgramBuilder::new("phi");
-            let a = builder.input("a", 1);
-            let sheet = &Sheet::new(&mut builder);
-            let (value, slope) = activation(phi, Number::new(sheet, a[0]));
-            let y = ids(&[value, slope.unwrap_or(Number::known(sheet, 1.0))]);
-            builder.output("y", &y);
-            let program = builder.finish().expect("a program");
-            for a in [-30.0, -6.0, -0.7, -1e-9, 0.0, 0.3, 2.5, 9.0, 400.0] {
-                let found = Interpreter::new(&program).results(&[vec![a]]).remove(0);
-                for (found, expected) in found.into_iter().zip([phi.value(a), phi.slope(a)]) {
-                    let bound = 4e-15 * (1.0 + expected.abs());
-                    assert!(
-                        (found - expected).abs() <= bound,
-                        "{phi} at {a}: {found} {expected}"
-                    );
-                }
-            }
-        }
-    }
 }

@@ -3,41 +3,51 @@
 use std::cell::RefCell;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-use super::sums::scaled;
 use crate::ir::{Binary, ProgramBuilder, Unary, ValueId};
 
 /// The program, while formulas add to it.
 pub(super) type Sheet<'b> = RefCell<&'b mut ProgramBuilder>;
 
-/// A value of the program; each operator adds an operation, in the order in which Rust evaluates them.
+/// A number that is known, or a value of the program. Each operator adds an operation, in the order in which Rust
+/// evaluates them, unless its result is known, or is an operand.
 #[derive(Clone, Copy)]
 pub(super) struct Number<'b> {
-    pub id: ValueId,
     sheet: &'b Sheet<'b>,
+    scalar: Scalar,
 }
+
+#[derive(Clone, Copy)]
+enum Scalar {
+    Known(f64),
+    Value(ValueId),
+}
+use Scalar::{Known, Value};
 
 impl<'b> Number<'b> {
     pub(crate) fn new(sheet: &'b Sheet<'b>, id: ValueId) -> Self {
-        Self { id, sheet }
+        let scalar = Value(id);
+        Self { sheet, scalar }
     }
 
     pub(crate) fn known(sheet: &'b Sheet<'b>, value: f64) -> Self {
-        Self::new(sheet, sheet.borrow_mut().constant(value))
+        let scalar = Known(value);
+        Self { sheet, scalar }
     }
 
-    /// A constant of the same program.
     pub(crate) fn constant(self, value: f64) -> Self {
         Self::known(self.sheet, value)
     }
 
-    /// `coefficient * self` without needless operations.
-    pub(crate) fn scaled(self, coefficient: f64) -> Self {
-        let id = scaled(&mut self.sheet.borrow_mut(), coefficient, self.id);
-        Self::new(self.sheet, id)
+    pub(crate) fn id(self) -> ValueId {
+        match self.scalar {
+            Known(number) => self.sheet.borrow_mut().constant(number),
+            Value(id) => id,
+        }
     }
 
     pub(crate) fn unary(self, op: Unary) -> Self {
-        Self::new(self.sheet, self.sheet.borrow_mut().unary(op, self.id))
+        let id = self.id();
+        Self::new(self.sheet, self.sheet.borrow_mut().unary(op, id))
     }
 
     pub(crate) fn abs(self) -> Self {
@@ -45,8 +55,23 @@ impl<'b> Number<'b> {
     }
 
     fn binary(self, op: Binary, other: Self) -> Self {
-        let id = self.sheet.borrow_mut().binary(op, self.id, other.id);
-        Self::new(self.sheet, id)
+        match (op, self.scalar, other.scalar) {
+            (Binary::Add, Known(a), Known(b)) => self.constant(a + b),
+            (Binary::Sub, Known(a), Known(b)) => self.constant(a - b),
+            (Binary::Mul, Known(a), Known(b)) => self.constant(a * b),
+            (Binary::Add | Binary::Sub, _, Known(0.0)) => self,
+            (Binary::Add, Known(0.0), _) => other,
+            (Binary::Sub, Known(0.0), _) => -other,
+            (Binary::Mul, Known(0.0), _) | (Binary::Mul, _, Known(0.0)) => self.constant(0.0),
+            (Binary::Mul | Binary::Div, _, Known(1.0)) => self,
+            (Binary::Mul, Known(1.0), _) => other,
+            (Binary::Mul, _, Known(-1.0)) => -self,
+            (Binary::Mul, Known(-1.0), _) => -other,
+            _ => {
+                let (a, b) = (self.id(), other.id());
+                Self::new(self.sheet, self.sheet.borrow_mut().binary(op, a, b))
+            }
+        }
     }
 }
 
@@ -55,14 +80,17 @@ pub(super) fn numbers<'b>(sheet: &'b Sheet<'b>, ids: &[ValueId]) -> Vec<Number<'
 }
 
 pub(super) fn ids(numbers: &[Number]) -> Vec<ValueId> {
-    numbers.iter().map(|number| number.id).collect()
+    numbers.iter().map(|number| number.id()).collect()
 }
 
 impl Neg for Number<'_> {
     type Output = Self;
 
     fn neg(self) -> Self {
-        self.unary(Unary::Neg)
+        match self.scalar {
+            Known(number) => self.constant(-number),
+            Value(_) => self.unary(Unary::Neg),
+        }
     }
 }
 

@@ -55,7 +55,6 @@ fn partial_sums(
     sums.pop()
 }
 
-/// Adds the terms one after the other.
 fn chain(builder: &mut ProgramBuilder, start: Option<ValueId>, terms: &[Term]) -> Option<ValueId> {
     terms.iter().fold(start, |sum, term| {
         Some(match sum {

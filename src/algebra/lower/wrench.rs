@@ -15,21 +15,25 @@
 //! det = up c_fwd - fwd c_up
 //! ```
 //!
-//! for a leg of the usual shape; `chain.rs` has that of any other. `1 / d` of both divisors is
+//! for a leg of the usual shape; other legs move as [`Moved`] says. `1 / d` of both divisors is
 //! `d / max(d^2, least^2)`, see
 //! [`LegGeometry::least_levers`](crate::robot::LegGeometry::least_levers).
 
-use super::chain::{JointAngles, chain_wrench};
 use super::error::LowerError;
 use super::number::{Number, Sheet};
 use crate::ir::{Program, ProgramBuilder, Unary, ValueId};
 use crate::model::ReducedModel;
 use crate::robot::actuators::DRY_SPEED_RAD_S;
+use crate::robot::chain::{Moved, cross, dot, sum};
 use crate::robot::joints::LEG_JOINT_DIM;
 use crate::robot::kinematics::least_levers;
 use crate::robot::{
-    BODY_DIM, FOOT_DIM, InputRule, JOINT_DIM, Leg, LegGeometry, PlanarLeg, STATE_DIM, WrenchFrame,
+    BODY_DIM, ChainLeg, FOOT_DIM, InputRule, JOINT_DIM, Leg, LegGeometry, PlanarLeg, STATE_DIM,
+    WrenchFrame,
 };
+
+/// Sine and cosine of each joint's angle.
+type JointAngles<'b> = [(Number<'b>, Number<'b>); 3];
 
 /// `u = [net; F; M]` with the torques at the links `net` and the force and moment of the feet on the
 /// ground, by the model's rule (equations 4 to 7, 22 and 23): inputs `x` and `dx` (18 robot coordinates
@@ -71,10 +75,8 @@ fn torque_of(rule: &InputRule) -> Result<Program, LowerError> {
     let sheet = &Sheet::new(&mut builder);
     let tau = (0..JOINT_DIM).map(|joint| {
         let [dx, ddx, net] = [dx[joint], ddx[joint], net[joint]].map(|id| Number::new(sheet, id));
-        let friction = friction(rule, joint, dx);
         let armature = rule.actuators().map_or(0.0, |a| a.armature[joint]);
-        let losses = sum(friction, scaled(armature, ddx));
-        losses.map_or(net, |losses| net + losses).id
+        (net + (friction(rule, joint, dx) + armature * ddx)).id()
     });
     let tau: Vec<ValueId> = tau.collect();
     builder.output("tau", &tau);
@@ -90,11 +92,8 @@ fn input_of(rule: &InputRule) -> Result<Program, LowerError> {
     let feet = builder.input("feet", FOOT_DIM);
     let sheet = &Sheet::new(&mut builder);
     let number = |id: ValueId| Number::new(sheet, id);
-    let net: [Number; JOINT_DIM] = std::array::from_fn(|joint| {
-        let tau = number(tau[joint]);
-        let friction = friction(rule, joint, number(dx[joint]));
-        friction.map_or(tau, |friction| tau - friction)
-    });
+    let net: [Number; JOINT_DIM] =
+        std::array::from_fn(|joint| number(tau[joint]) - friction(rule, joint, number(dx[joint])));
     let joint = |kind: usize| (0..FOOT_DIM).map(move |leg| LEG_JOINT_DIM * leg + kind);
     // Abductions, then flexions, then of planar legs the angles of the calves, flexion plus knee, of
     // others those of the knees.
@@ -102,7 +101,7 @@ fn input_of(rule: &InputRule) -> Result<Program, LowerError> {
     for leg in Leg::ALL {
         let k = LEG_JOINT_DIM * leg.index() + 1;
         angles.push(match robot.geometry(leg) {
-            LegGeometry::Planar(_) => (number(x[k]) + number(x[k + 1])).id,
+            LegGeometry::Planar(_) => (number(x[k]) + number(x[k + 1])).id(),
             LegGeometry::Chain(_) => x[k + 1],
         });
     }
@@ -132,41 +131,26 @@ fn input_of(rule: &InputRule) -> Result<Program, LowerError> {
         WrenchFrame::Body => wrench,
         WrenchFrame::World => in_world([0, 1, 2].map(|angle| at(JOINT_DIM + angle)), wrench),
     };
-    let u: Vec<ValueId> = net.into_iter().chain(wrench).map(|u| u.id).collect();
+    let u: Vec<ValueId> = net.into_iter().chain(wrench).map(Number::id).collect();
     builder.output("u", &u);
     Ok(builder.finish()?)
 }
 
-/// `factor value`; nothing is computed for a factor of zero.
-fn scaled(factor: f64, value: Number) -> Option<Number> {
-    (factor != 0.0).then(|| factor * value)
-}
-
-/// The sum of what is there.
-fn sum<'b>(a: Option<Number<'b>>, b: Option<Number<'b>>) -> Option<Number<'b>> {
-    match (a, b) {
-        (Some(a), Some(b)) => Some(a + b),
-        (one, None) | (None, one) => one,
+/// Viscous and dry friction of a joint at a velocity.
+fn friction<'b>(rule: &InputRule, joint: usize, velocity: Number<'b>) -> Number<'b> {
+    let of = rule.actuators().map(|a| (a.viscous[joint], a.dry[joint]));
+    match of {
+        None => velocity.constant(0.0),
+        Some((viscous, 0.0)) => viscous * velocity,
+        Some((viscous, dry)) => {
+            let slow = (velocity / DRY_SPEED_RAD_S).unary(Unary::Tanh);
+            viscous * velocity + dry * slow
+        }
     }
 }
 
-/// `a value_a + b value_b`.
-fn combined<'b>((a, of_a): (f64, Number<'b>), (b, of_b): (f64, Number<'b>)) -> Number<'b> {
-    let combined = sum(scaled(a, of_a), scaled(b, of_b));
-    combined.unwrap_or_else(|| of_a.constant(0.0))
-}
-
-/// Viscous and dry friction of a joint at a velocity; none without any.
-fn friction<'b>(rule: &InputRule, joint: usize, velocity: Number<'b>) -> Option<Number<'b>> {
-    let actuators = rule.actuators()?;
-    let viscous = scaled(actuators.viscous[joint], velocity);
-    let dry = actuators.dry[joint];
-    let dry = (dry != 0.0).then(|| dry * (velocity / DRY_SPEED_RAD_S).unary(Unary::Tanh));
-    sum(viscous, dry)
-}
-
 /// `numerator / divisor`, with `divisor / max(divisor^2, least^2)` for the reciprocal.
-pub(super) fn damped<'b>(numerator: Number<'b>, divisor: Number<'b>, least: f64) -> Number<'b> {
+fn damped<'b>(numerator: Number<'b>, divisor: Number<'b>, least: f64) -> Number<'b> {
     let (square, floor) = (divisor * divisor, divisor.constant(least * least));
     let twice_larger = (square + floor) + (square - floor).abs();
     2.0 * (numerator * divisor) / twice_larger
@@ -178,9 +162,7 @@ fn about_body<'b>(hip: [f64; 3], wrench: [Number<'b>; BODY_DIM]) -> [Number<'b>;
     for axis in 0..3 {
         let (next, last) = ((axis + 1) % 3, (axis + 2) % 3);
         for (lever, force) in [(hip[next], wrench[last]), (-hip[last], wrench[next])] {
-            if let Some(part) = scaled(lever, force) {
-                moved[3 + axis] = moved[3 + axis] + part;
-            }
+            moved[3 + axis] = moved[3 + axis] + lever * force;
         }
     }
     moved
@@ -208,15 +190,14 @@ fn in_world<'b>(
 /// of the calf, flexion plus knee.
 fn leg_wrench<'b>(
     geometry: &PlanarLeg,
-    [abduction, of_thigh, (calf_sin, calf_cos)]: JointAngles<'b>,
+    [abduction, (thigh_sin, thigh_cos), (calf_sin, calf_cos)]: JointAngles<'b>,
     torques: [Number<'b>; LEG_JOINT_DIM],
     foot: Number<'b>,
 ) -> [Number<'b>; BODY_DIM] {
     let (thigh, calf, forward) = (geometry.thigh_m, geometry.calf_m, geometry.foot_forward_m);
-    let calf_forward = combined((-calf, calf_sin), (forward, calf_cos));
-    let calf_up = combined((-calf, calf_cos), (-forward, calf_sin));
-    let thigh_forward = combined((-thigh, of_thigh.0), (0.0, of_thigh.0));
-    let thigh_up = combined((-thigh, of_thigh.1), (0.0, of_thigh.1));
+    let calf_forward = -calf * calf_sin + forward * calf_cos;
+    let calf_up = -calf * calf_cos + -forward * calf_sin;
+    let (thigh_forward, thigh_up) = (-thigh * thigh_sin, -thigh * thigh_cos);
     let (fwd, up) = (thigh_forward + calf_forward, thigh_up + calf_up);
     // The same as up c_fwd - fwd c_up, without what cancels.
     let det = thigh_up * calf_forward - thigh_forward * calf_up;
@@ -241,151 +222,34 @@ fn turned<'b>((s, c): (Number<'b>, Number<'b>), a: Number<'b>, b: Number<'b>) ->
     [a * s + b * c, b * s - a * c]
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::ir::Interpreter;
-    use crate::robot::{Actuators, ContactFlags, Robot};
+/// Force and moment of a leg with any axes about its first joint, in axes parallel to the body's.
+fn chain_wrench<'b>(
+    leg: &ChainLeg,
+    angles: JointAngles<'b>,
+    torques: [Number<'b>; 3],
+    foot: Number<'b>,
+) -> [Number<'b>; BODY_DIM] {
+    let known = |vector: [f64; 3]| vector.map(|component| foot.constant(component));
+    let one = foot.constant(1.0);
+    let moved = Moved::new(leg.axes.map(known), leg.links.map(known), angles, one);
+    let (columns, normal) = (moved.columns, moved.normal);
+    // F = -J^-T tau by area and lever, as ChainLeg::damped_force_map.
+    let [area, lever] = moved.levers();
+    let [least_area, least_lever] = least_levers(leg.lengths());
+    let of_area = damped(one, area, least_area);
+    let of_lever = damped(one, lever, least_lever);
+    let torques = torques.map(|torque| foot * torque);
+    // In the plane: (c_2 x n) tau_1 + (n x c_1) tau_2 over the area.
+    let (of_second, of_third) = (cross(columns[2], normal), cross(normal, columns[1]));
+    let in_plane = sum(times(torques[1], of_second), times(torques[2], of_third));
+    let in_plane = times(of_area, in_plane);
+    // Along the normal: tau_0 - c_0 . (the force in the plane, reversed) over the lever.
+    let along = (torques[0] - dot(columns[0], in_plane)) * of_lever;
+    let force = sum(in_plane, times(along, normal)).map(|component| -component);
+    let ([f_x, f_y, f_z], [m_x, m_y, m_z]) = (force, cross(moved.foot, force));
+    [f_x, f_y, f_z, m_x, m_y, m_z]
+}
 
-    /// Numbers in [0, 1), the same in every run.
-    struct Random(u64);
-
-    impl Random {
-        fn between(&mut self, low: f64, high: f64) -> f64 {
-            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005);
-            self.0 = self.0.wrapping_add(1_442_695_040_888_963_407);
-            low + (high - low) * ((self.0 >> 11) as f64 / (1_u64 << 53) as f64)
-        }
-    }
-
-    fn rules() -> Vec<InputRule> {
-        let actuators = Actuators::of_leg([1.0, 0.6, 0.5], [0.2, 0.0, 0.3], [0.01; 3]);
-        let robots = Robot::known_names().into_iter();
-        let robots = robots.map(|name| Robot::by_name(name).expect("a known robot"));
-        let rules = robots.flat_map(|robot| {
-            WrenchFrame::ALL.map(|frame| {
-                [None, Some(actuators.clone())]
-                    .map(|actuators| InputRule::new(robot, actuators, frame))
-            })
-        });
-        rules.flatten().collect()
-    }
-
-    fn run(rule: &InputRule, x: &[f64], dx: &[f64], tau: &[f64], feet: &[f64]) -> Vec<f64> {
-        let program = input_of(rule).expect("lowers");
-        let inputs = [x, dx, tau, feet].map(<[f64]>::to_vec);
-        Interpreter::new(&program).results(&inputs).remove(0)
-    }
-
-    fn contacts() -> impl Iterator<Item = ContactFlags> {
-        (0..16_usize).map(|bits| std::array::from_fn(|k| bits >> k & 1 == 1))
-    }
-
-    /// Against the rule, torques without the motors' inertia.
-    fn assert_is_input(
-        rule: &InputRule,
-        [x, dx]: [&[f64; STATE_DIM]; 2],
-        tau: &[f64; JOINT_DIM],
-        contact: ContactFlags,
-    ) {
-        let feet = contact.map(|on| f64::from(u8::from(on)));
-        let u = run(rule, x, dx, tau, &feet);
-        let dq = std::array::from_fn(|i| dx[i]);
-        let losses = rule.losses(&dq, &[0.0; JOINT_DIM]);
-        let net = std::array::from_fn(|i| tau[i] - losses[i]);
-        let wrench = rule.wrench(x, &net, contact).expect("finite");
-        for i in 0..JOINT_DIM {
-            assert!((u[i] - net[i]).abs() < 1e-14 * (1.0 + tau[i].abs() + losses[i].abs()));
-        }
-        for part in [0..3, 3..6] {
-            let largest = (wrench.rows(part.start, 3)).amax() + 1e-3 * wrench.amax();
-            for i in part {
-                let (found, expected) = (u[JOINT_DIM + i], wrench[i]);
-                assert!(
-                    (found - expected).abs() <= 1e-11 * largest,
-                    "{rule:?} {i}: {found} {expected}"
-                );
-            }
-        }
-    }
-
-    fn sample(random: &mut Random, knee: (f64, f64)) -> ([f64; STATE_DIM], [f64; STATE_DIM]) {
-        let x = std::array::from_fn(|k| match (k < JOINT_DIM, k % 3) {
-            (true, 0) => random.between(-0.8, 0.8),
-            (true, 1) => random.between(-0.3, 3.0),
-            (true, _) => random.between(knee.0, knee.1),
-            (false, _) => random.between(-1.4, 1.4),
-        });
-        let dx = std::array::from_fn(|k| match k % 4 {
-            0 => random.between(-0.1, 0.1),
-            _ => random.between(-12.0, 12.0),
-        });
-        (x, dx)
-    }
-
-    #[test]
-    fn generalised_input_is_that_of_the_rule_for_every_robot_frame_and_contact() {
-        let mut random = Random(11);
-        for rule in rules() {
-            for k in 0..40 {
-                // Also knees that are nearly stretched, and feet at the height of their hips.
-                let knee = if k % 4 == 0 {
-                    (-0.2, 0.2)
-                } else {
-                    (-2.7, -0.9)
-                };
-                let (x, dx) = sample(&mut random, knee);
-                let tau = std::array::from_fn(|_| random.between(-30.0, 30.0));
-                for contact in contacts() {
-                    assert_is_input(&rule, [&x, &dx], &tau, contact);
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn generalised_input_of_a_stretched_leg_is_bounded_and_zero_in_the_air() {
-        for rule in rules() {
-            let (x, still) = ([0.0; STATE_DIM], [0.0; STATE_DIM]);
-            let u = run(&rule, &x, &still, &[20.0; JOINT_DIM], &[1.0; FOOT_DIM]);
-            let force = u[JOINT_DIM..].iter().fold(0.0_f64, |m, f| m.max(f.abs()));
-            assert!(force > 1.0 && force < 4000.0, "{rule:?} {u:?}");
-            let u = run(&rule, &x, &still, &[20.0; JOINT_DIM], &[0.0; FOOT_DIM]);
-            assert_eq!(u[JOINT_DIM..], [0.0; BODY_DIM]);
-        }
-    }
-
-    #[test]
-    fn actuator_torque_undoes_the_friction_of_generalised_input_and_adds_the_inertia() {
-        let mut random = Random(5);
-        for rule in rules() {
-            let (x, dx) = sample(&mut random, (-2.0, -1.0));
-            let tau: [f64; JOINT_DIM] = std::array::from_fn(|_| random.between(-30.0, 30.0));
-            let u = run(&rule, &x, &dx, &tau, &[1.0; FOOT_DIM]);
-            let program = torque_of(&rule).expect("lowers");
-            let mut interpreter = Interpreter::new(&program);
-            for acceleration in [0.0, 70.0] {
-                let ddx = [acceleration; STATE_DIM];
-                let inputs = [&dx[..], &ddx, &u[..JOINT_DIM]].map(<[f64]>::to_vec);
-                let back = interpreter.results(&inputs).remove(0);
-                let inertia = rule.actuators().map_or(0.0, |_| 0.01 * acceleration);
-                for (found, tau) in back.into_iter().zip(tau) {
-                    assert!((found - tau - inertia).abs() < 1e-13 * 50.0, "{rule:?}");
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn generalised_input_weighs_a_foot_with_its_number() {
-        let go1 = InputRule::published(Robot::by_name("go1").expect("a known robot"));
-        let x = [[0.1, 0.7, -1.4].repeat(4), vec![0.0; BODY_DIM]].concat();
-        let tau: [f64; JOINT_DIM] = std::array::from_fn(|k| k as f64 - 4.0);
-        let still = [0.0; STATE_DIM];
-        let full = run(&go1, &x, &still, &tau, &[1.0, 0.0, 0.0, 0.0]);
-        let half = run(&go1, &x, &still, &tau, &[0.5, 0.0, 0.0, 0.0]);
-        for i in JOINT_DIM..STATE_DIM {
-            assert!((half[i] - 0.5 * full[i]).abs() < 1e-12, "{i}");
-        }
-    }
+fn times<'b>(factor: Number<'b>, vector: [Number<'b>; 3]) -> [Number<'b>; 3] {
+    vector.map(|component| factor * component)
 }

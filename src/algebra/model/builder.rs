@@ -4,17 +4,14 @@ use std::collections::HashMap;
 
 use serde_json::{Map, Value};
 
-use super::affine::AffineMap;
-use super::coordinate_names::CoordinateNames;
-use super::error::{ModelError, check_tensor};
+use super::coordinates::{CoordinateNames, Scaling};
+use super::error::{ModelError, check, check_tensor};
 use super::identifier::{Identifier, identifier_of};
 use super::jump_prior::JumpPrior;
 use super::library::Library;
-use super::phase::{Phase, all_patterns, selected};
-use super::projection::pinv_of_transpose;
-use super::rom::ReducedModel;
-use super::scaling::Scaling;
-use super::state_map::StateMap;
+use super::maps::pinv_of_transpose;
+use super::rom::{Phase, ReducedModel, selected};
+use super::state_map::{AffineMap, StateMap};
 use super::statistics::InputStatistics;
 use crate::robot::{Actuators, FeetRule, JOINT_NAMES, Robot, WrenchFrame};
 
@@ -22,6 +19,17 @@ const MAX_PHASES: usize = 16;
 const MAX_STATE_DIM: usize = 256;
 const MAX_DESCRIPTION_LEN: usize = 10_000;
 const MAX_SAMPLE_TIME_S: f64 = 1.0;
+
+/// A method for each part that replaces it.
+macro_rules! setters {
+    ($($(#[$doc:meta])* $part:ident: $value:ty;)*) => {
+        $($(#[$doc])*
+        pub fn $part(mut self, $part: $value) -> Self {
+            self.$part = $part.into();
+            self
+        })*
+    };
+}
 
 /// Collects the parts of a model; [`ModelBuilder::build`] checks them against each other.
 #[derive(Clone, Debug, PartialEq)]
@@ -66,33 +74,38 @@ impl ModelBuilder {
         }
     }
 
-    /// Sets the name.
-    pub fn name(mut self, name: impl Into<String>) -> Self {
-        self.name = name.into();
-        self
-    }
-
-    /// Sets the free text about the model.
-    pub fn description(mut self, description: impl Into<String>) -> Self {
-        self.description = description.into();
-        self
-    }
-
-    /// Replaces the library; the phases' Xi must then have a row for each of its terms.
-    pub fn library(mut self, library: Library) -> Self {
-        self.library = library;
-        self
+    setters! {
+        /// The name.
+        name: impl Into<String>;
+        /// Free text about the model.
+        description: impl Into<String>;
+        /// The library; the phases' Xi must then have a row for each of its terms.
+        library: Library;
+        /// All phases; rules are tried in their order.
+        phases: Vec<Phase>;
+        /// Names and units of the state.
+        state: impl Into<Option<CoordinateNames>>;
+        /// Names and units of the input.
+        input: impl Into<Option<CoordinateNames>>;
+        /// The scale factors.
+        scaling: impl Into<Option<Scaling>>;
+        /// The robot.
+        robot: impl Into<Option<&'static Robot>>;
+        /// Losses of the joints, subtracted from the motors' torques; without them torques count as they are.
+        actuators: Option<Actuators>;
+        /// The axes of force and moment in the inputs [default: the body's].
+        wrench_frame: WrenchFrame;
+        /// Landmarks and prior of the training jumps.
+        jump_prior: Option<JumpPrior>;
+        /// The sampling period of the recordings, s.
+        sample_time_s: impl Into<Option<f64>>;
+        /// The model's origin: free JSON.
+        provenance: Map<String, Value>;
     }
 
     /// Appends a phase; rules are tried in the order of appending.
     pub fn phase(mut self, phase: Phase) -> Self {
         self.phases.push(phase);
-        self
-    }
-
-    /// Replaces all phases.
-    pub fn phases(mut self, phases: Vec<Phase>) -> Self {
-        self.phases = phases;
         self
     }
 
@@ -112,71 +125,15 @@ impl ModelBuilder {
         self
     }
 
-    /// Sets names and units of the state.
-    pub fn state(mut self, state: impl Into<Option<CoordinateNames>>) -> Self {
-        self.state = state.into();
-        self
-    }
-
-    /// Sets names and units of the input.
-    pub fn input(mut self, input: impl Into<Option<CoordinateNames>>) -> Self {
-        self.input = input.into();
-        self
-    }
-
-    /// Sets the scale factors.
-    pub fn scaling(mut self, scaling: impl Into<Option<Scaling>>) -> Self {
-        self.scaling = scaling.into();
-        self
-    }
-
-    /// Sets the encoder, an [`AffineMap`] or a [`StateMap`] (scaled units,
-    /// `latent_dim x state_dim`).
+    /// Sets the encoder, an [`AffineMap`] or a [`StateMap`] (scaled units, `latent_dim x state_dim`).
     pub fn encoder(mut self, encoder: impl Into<StateMap>) -> Self {
         self.encoder = Some(encoder.into());
         self
     }
 
-    /// Sets the decoder, an [`AffineMap`] or a [`StateMap`] (scaled units,
-    /// `state_dim x latent_dim`).
+    /// Sets the decoder, an [`AffineMap`] or a [`StateMap`] (scaled units, `state_dim x latent_dim`).
     pub fn decoder(mut self, decoder: impl Into<StateMap>) -> Self {
         self.decoder = Some(decoder.into());
-        self
-    }
-
-    /// Sets the robot.
-    pub fn robot(mut self, robot: impl Into<Option<&'static Robot>>) -> Self {
-        self.robot = robot.into();
-        self
-    }
-
-    /// Sets what the joints take of the motors' torques, or that torques count as they are.
-    pub fn actuators(mut self, actuators: Option<Actuators>) -> Self {
-        self.actuators = actuators;
-        self
-    }
-
-    /// Sets the axes of force and moment in the inputs, the body's unless set.
-    pub fn wrench_frame(mut self, frame: WrenchFrame) -> Self {
-        self.wrench_frame = frame;
-        self
-    }
-
-    /// Sets landmarks and prior of the training jumps.
-    pub fn jump_prior(mut self, prior: Option<JumpPrior>) -> Self {
-        self.jump_prior = prior;
-        self
-    }
-
-    /// Sets the sampling period of the recordings, s.
-    pub fn sample_time_s(mut self, sample_time_s: impl Into<Option<f64>>) -> Self {
-        self.sample_time_s = sample_time_s.into();
-        self
-    }
-
-    /// Sets where the model comes from.
-    pub fn provenance(mut self, provenance: Map<String, Value>) -> Self {
-        self.provenance = provenance;
         self
     }
 
@@ -213,11 +170,12 @@ impl ModelBuilder {
     }
 
     fn check_phase_names(&self) -> Result<Vec<Identifier>, ModelError> {
-        if !(1..=MAX_PHASES).contains(&self.phases.len()) {
-            let found = format!("{} phases", self.phases.len());
-            let expected = format!("1 to {MAX_PHASES}");
-            return Err(ModelError::invalid("`phases`", found, expected));
-        }
+        let n_phases = self.phases.len();
+        let (fits, expected) = (
+            (1..=MAX_PHASES).contains(&n_phases),
+            format!("1 to {MAX_PHASES}"),
+        );
+        check(fits, "`phases`", || format!("{n_phases} phases"), expected)?;
         let mut first_use = HashMap::new();
         let mut identifiers = Vec::with_capacity(self.phases.len());
         for (second, phase) in self.phases.iter().enumerate() {
@@ -242,15 +200,13 @@ impl ModelBuilder {
             if let FeetRule::Patterns(patterns) = &phase.feet {
                 let repeated = (1..patterns.len())
                     .find(|&second| patterns[..second].contains(&patterns[second]));
-                if let Some(second) = repeated {
-                    let place = format!("phases[{index}].feet[{second}]");
-                    let found = "a pattern that is in the list already";
-                    return Err(ModelError::invalid(place, found, "each pattern once"));
-                }
+                let place = format!("phases[{index}].feet[{}]", repeated.unwrap_or(0));
+                let found = || "a pattern that is in the list already";
+                check(repeated.is_none(), &place, found, "each pattern once")?;
             }
         }
         for (index, phase) in self.phases.iter().enumerate() {
-            if !all_patterns().any(|feet| selected(&self.phases, feet) == Some(index)) {
+            if !FeetRule::all_patterns().any(|feet| selected(&self.phases, feet) == Some(index)) {
                 return Err(ModelError::UnreachablePhase {
                     phase: index,
                     name: phase.name.clone(),
@@ -261,20 +217,16 @@ impl ModelBuilder {
     }
 
     fn check_texts(&self) -> Result<(), ModelError> {
+        let text = &self.description;
         let printable = |c: char| !c.is_control() || c == '\n';
-        if self.description.len() > MAX_DESCRIPTION_LEN || !self.description.chars().all(printable)
-        {
-            let found = format!("{} bytes or a control character", self.description.len());
-            let expected = format!("at most {MAX_DESCRIPTION_LEN} bytes of text");
-            return Err(ModelError::invalid("`description`", found, expected));
-        }
-        match self.sample_time_s {
-            Some(found) if !(found > 0.0 && found <= MAX_SAMPLE_TIME_S) => {
-                let expected = format!("a positive number up to {MAX_SAMPLE_TIME_S}");
-                Err(ModelError::invalid("`sample_time_s`", found, expected))
-            }
-            _ => Ok(()),
-        }
+        let fits = text.len() <= MAX_DESCRIPTION_LEN && text.chars().all(printable);
+        let found = || format!("{} bytes or a control character", text.len());
+        let expected = format!("at most {MAX_DESCRIPTION_LEN} bytes of text");
+        check(fits, "`description`", found, expected)?;
+        let time_s = self.sample_time_s.unwrap_or(MAX_SAMPLE_TIME_S);
+        let fits = time_s > 0.0 && time_s <= MAX_SAMPLE_TIME_S;
+        let expected = format!("a positive number up to {MAX_SAMPLE_TIME_S}");
+        check(fits, "`sample_time_s`", || time_s, expected)
     }
 
     /// Number of robot coordinates, by the first of the parts that has it.
@@ -299,11 +251,14 @@ impl ModelBuilder {
         let Some(dim) = state_dim else {
             return Ok(None);
         };
-        if !(latent_dim..=MAX_STATE_DIM).contains(&dim) {
-            let found = format!("{dim} robot coordinates");
-            let expected = format!("{latent_dim} (one per latent coordinate) to {MAX_STATE_DIM}");
-            return Err(ModelError::invalid("`state`", found, expected));
-        }
+        let fits = (latent_dim..=MAX_STATE_DIM).contains(&dim);
+        let expected = format!("{latent_dim} (one per latent coordinate) to {MAX_STATE_DIM}");
+        check(
+            fits,
+            "`state`",
+            || format!("{dim} robot coordinates"),
+            expected,
+        )?;
         if let Some(encoder) = &self.encoder {
             encoder.check("encoder", (latent_dim, dim))?;
             encoder.check_widths(latent_dim)?;
@@ -370,13 +325,10 @@ impl ModelBuilder {
     fn check_statistics(&mut self, state_dim: Option<usize>) -> Result<(), ModelError> {
         let place_of = |name: &str| self.phases.iter().position(|phase| phase.name == name);
         for (index, (name, statistics)) in self.statistics.iter().enumerate() {
-            let is_repeated = self.statistics[..index]
-                .iter()
-                .any(|(first, _)| first == name);
-            if place_of(name).is_none() || is_repeated {
-                let (found, expected) = (format!("{name:?}"), "the name of one phase, each once");
-                return Err(ModelError::invalid("`input_statistics`", found, expected));
-            }
+            let mut earlier = self.statistics[..index].iter();
+            let fits = place_of(name).is_some() && !earlier.any(|(first, _)| first == name);
+            let (found, expected) = (|| format!("{name:?}"), "the name of one phase, each once");
+            check(fits, "`input_statistics`", found, expected)?;
             let dim = state_dim.ok_or(ModelError::Incomplete {
                 part: "input_statistics",
                 needs: "encoder",

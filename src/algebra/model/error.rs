@@ -6,8 +6,6 @@ use nalgebra::{Dim, Matrix, RawStorage};
 use thiserror::Error;
 
 use super::identifier::IdentifierError;
-use super::library::{MAX_LATENT_DIM, MAX_LIBRARY_DIM, MAX_TERM_LEN};
-use super::standard_library::MAX_DEGREE;
 use crate::robot::RobotError;
 use crate::symbolic::ParseError;
 
@@ -23,7 +21,7 @@ pub enum ModelError {
         #[source]
         source: IdentifierError,
     },
-    /// A part has another size or value than it can have, or does not fit the others.
+    /// A part has another size or value than it can have, or does not fit the others; a vector has the wrong length.
     #[error("{place}: found {found}, expected {expected}")]
     Invalid {
         /// Path in the model file, such as `` `phases[0].xi` ``.
@@ -31,37 +29,26 @@ pub enum ModelError {
         found: String,
         expected: String,
     },
-    /// The foot rule of a phase can never be the first that matches.
+    /// A candidate term, counted from 0, is no expression over the model's variables.
+    #[error("`library`[{index}]: {text:?} is not a candidate term")]
+    Term {
+        index: usize,
+        text: String,
+        #[source]
+        source: Box<ParseError>,
+    },
     #[error(
         "phases[{phase}].feet of {name:?}: no foot pattern selects this phase, because earlier phases take all that it names"
     )]
     UnreachablePhase { phase: usize, name: String },
-    /// A tensor holds an infinity or a NaN.
+    /// A tensor holds an infinity or a NaN; row and column count from 0.
     #[error("`{tensor}`[{row}][{column}]: found {found}, expected a finite number")]
     NonFinite {
         tensor: String,
-        /// Row, from 0.
         row: usize,
-        /// Column, from 0.
         column: usize,
         found: f64,
     },
-    /// The rows of the encoder or of its Jacobian are (nearly) linearly dependent, so that latent
-    /// inputs have no unique lift.
-    #[error(
-        "{matrix}: found singular values from {smallest:e} to {largest:e}, expected full row rank {expected} (smallest above {tolerance:e} times the largest)"
-    )]
-    RankDeficient {
-        matrix: &'static str,
-        smallest: f64,
-        largest: f64,
-        expected: usize,
-        tolerance: f64,
-    },
-    /// The library was refused.
-    #[error(transparent)]
-    Library(#[from] LibraryError),
-    /// The robot is unknown.
     #[error(transparent)]
     Robot(#[from] RobotError),
     /// A part of the file makes sense only with another.
@@ -70,91 +57,22 @@ pub enum ModelError {
         part: &'static str,
         needs: &'static str,
     },
-    /// The model was asked for something it does not carry.
+    /// The model was asked for something it does not carry; `part` is the key of the model file.
     #[error("model {model} has no `{part}`, needed for {purpose}")]
     Missing {
         model: String,
-        /// Key of the model file which is absent.
         part: &'static str,
         purpose: &'static str,
     },
-    /// Something needs a linear encoder or decoder, and the model's has activations.
+    /// `part` is `encoder` or `decoder`.
     #[error("model {model}: found a nonlinear {part}, expected a linear one, needed for {purpose}")]
     Nonlinear {
         model: String,
-        /// `encoder` or `decoder`.
         part: &'static str,
         purpose: &'static str,
     },
-    /// A vector has the wrong length.
-    #[error("{what}: found {found} entries, expected {expected}")]
-    Dimension {
-        what: &'static str,
-        found: usize,
-        expected: usize,
-    },
-    /// There is no phase with this index.
     #[error("found phase {found}, expected one below {count}")]
     PhaseIndex { found: usize, count: usize },
-}
-
-/// Why a library was refused.
-#[derive(Clone, Debug, PartialEq, Error)]
-pub enum LibraryError {
-    /// Too few or too many latent coordinates.
-    #[error("`latent_dim`: found {found}, expected 1 to {MAX_LATENT_DIM}")]
-    LatentDim { found: usize },
-    /// No term at all.
-    #[error("`library`: found no term, expected at least one")]
-    Empty,
-    /// More terms than can be handled.
-    #[error("`library`: found {found} terms, expected at most {MAX_LIBRARY_DIM}")]
-    TooManyTerms { found: usize },
-    /// The shorthand asks for a polynomial degree beyond the bound.
-    #[error("`library.degree`: found {found}, expected at most {MAX_DEGREE}")]
-    Degree { found: u32 },
-    /// A term is too long or has control characters.
-    #[error(
-        "`library`[{index}]: found {found} bytes or a control character, expected one line of at most {MAX_TERM_LEN} bytes"
-    )]
-    TermText {
-        /// Index of the term, from 0.
-        index: usize,
-        found: usize,
-    },
-    /// A term is no expression over the model's variables.
-    #[error("`library`[{index}]: {text:?} is not a candidate term")]
-    Parse {
-        /// Index of the term, from 0.
-        index: usize,
-        text: String,
-        #[source]
-        source: Box<ParseError>,
-    },
-    /// A term equals an earlier one, which a library to be trained on must not have.
-    #[error("`library`[{second}]: {text:?} equals [{first}] {earlier:?}")]
-    Duplicate {
-        first: usize,
-        second: usize,
-        text: String,
-        earlier: String,
-    },
-    /// A part of a term without variables is beyond the range of floats, such as `exp(1000)`.
-    #[error(
-        "`library`[{index}]: a constant part of {text:?} has no value that floats hold (up to 1.8e308)"
-    )]
-    NotFinite {
-        /// Index of the term, from 0.
-        index: usize,
-        text: String,
-    },
-    /// A term vanishes for all arguments.
-    #[error("`library`[{index}]: {text:?} is zero everywhere")]
-    Zero {
-        /// Index of the term, from 0.
-        index: usize,
-        text: String,
-    },
 }
 
 impl ModelError {
@@ -179,18 +97,25 @@ impl ModelError {
 
     /// Refuses a vector of another length than expected.
     pub(super) fn check_dimension(
-        what: &'static str,
+        what: &str,
         found: usize,
         expected: usize,
     ) -> Result<(), ModelError> {
-        match found == expected {
-            true => Ok(()),
-            false => Err(ModelError::Dimension {
-                what,
-                found,
-                expected,
-            }),
-        }
+        let found_entries = || format!("{found} entries");
+        check(found == expected, what, found_entries, expected)
+    }
+}
+
+/// Refuses what is found at a place unless it is as expected.
+pub(super) fn check<F: ToString>(
+    is_expected: bool,
+    place: &str,
+    found: impl FnOnce() -> F,
+    expected: impl ToString,
+) -> Result<(), ModelError> {
+    match is_expected {
+        true => Ok(()),
+        false => Err(ModelError::invalid(place, found(), expected.to_string())),
     }
 }
 
@@ -218,23 +143,20 @@ pub(super) fn check_tensor<R: Dim, C: Dim, S: RawStorage<f64, R, C>>(
     check_finite(tensor, found)
 }
 
-/// Refuses the first entry that is infinite or not a number.
+/// Refuses the first entry, row by row, that is infinite or not a number.
 pub(super) fn check_finite<R: Dim, C: Dim, S: RawStorage<f64, R, C>>(
     tensor: &str,
     values: &Matrix<f64, R, C, S>,
 ) -> Result<(), ModelError> {
-    for row in 0..values.nrows() {
-        for column in 0..values.ncols() {
-            let found = values[(row, column)];
-            if !found.is_finite() {
-                return Err(ModelError::NonFinite {
-                    tensor: tensor.to_owned(),
-                    row,
-                    column,
-                    found,
-                });
-            }
-        }
+    let columns = values.ncols();
+    let mut places = (0..values.len()).map(|k| (k / columns, k % columns));
+    match places.find(|&place| !values[place].is_finite()) {
+        None => Ok(()),
+        Some((row, column)) => Err(ModelError::NonFinite {
+            tensor: tensor.to_owned(),
+            row,
+            column,
+            found: values[(row, column)],
+        }),
     }
-    Ok(())
 }

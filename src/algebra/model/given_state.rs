@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::error::{ModelError, check_tensor};
-use super::projection::complement;
+use super::maps::complement;
 use super::statistics::{check_covariance, symmetric};
 
 /// Samples per number of a regression, below which it is left out.

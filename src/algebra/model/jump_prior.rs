@@ -8,15 +8,14 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::error::{ModelError, check_tensor};
-use super::phase::{Phase, selected};
+use super::error::{ModelError, check, check_tensor};
+use super::rom::{Phase, selected};
 use crate::robot::{ContactFlags, STATE_DIM};
 
 /// Numbers of a goal: distance, rise of the body at the apex, height of the body at the start, m.
 pub const GOAL_DIM: usize = 3;
 /// Features of the prior: one, and the normalised numbers of the goal.
 pub const FEATURE_DIM: usize = 1 + GOAL_DIM;
-/// Most nodes of a part.
 const MAX_NODES: usize = 200;
 
 /// The features of a goal that the prior multiplies.
@@ -112,6 +111,53 @@ impl JumpPart {
         let terms = self.duration_s.iter().zip(features);
         terms.map(|(c, f)| c * f).sum()
     }
+
+    fn check(&self, name: &str, d: usize, phases: &[Phase]) -> Result<(), ModelError> {
+        let place = |key: &str| format!("`{name}{key}`");
+        let expected = format!("one below {}", phases.len());
+        check(
+            self.phase < phases.len(),
+            &place(""),
+            || self.phase,
+            expected,
+        )?;
+        let fits = selected(phases, self.feet) == Some(self.phase);
+        let expected = format!("feet that select {}", phases[self.phase].name);
+        check(fits, &place(""), || format!("{:?}", self.feet), expected)?;
+        let nodes = self.nodes();
+        let (fits, expected) = (
+            (3..=MAX_NODES).contains(&nodes),
+            format!("3 to {MAX_NODES}"),
+        );
+        check(fits, &place(".z"), || format!("{nodes} nodes"), expected)?;
+        let of_nodes = (nodes, FEATURE_DIM * d);
+        let xi = self.xi.as_ref().map(|xi| ("xi", xi, (3 * d, d)));
+        let tables = [
+            ("z", &self.z, of_nodes),
+            ("dz", &self.dz, of_nodes),
+            ("u_lat", &self.u_lat, of_nodes),
+            ("input_covariance", &self.input_covariance, (d, d)),
+        ];
+        for (key, table, shape) in tables.into_iter().chain(xi) {
+            check_tensor(&format!("{name}.{key}"), table, shape)?;
+        }
+        let is_definite = self.input_covariance.clone().cholesky().is_some();
+        let expected = "a positive definite matrix";
+        check(
+            is_definite,
+            &place(".input_covariance"),
+            || "another",
+            expected,
+        )?;
+        let tensor = format!("{name}.acceleration_std");
+        check_tensor(&tensor, &self.acceleration_std, (d, 1))?;
+        let (durations, range) = (&self.duration_s, &self.duration_range_s);
+        let is_finite = durations.iter().chain(range).all(|v| v.is_finite());
+        let fits = is_finite && 0.0 < range[0] && range[0] <= range[1];
+        let found = || format!("{durations:?} within {range:?}");
+        let expected = "finite durations, the range positive";
+        check(fits, &place(".duration_s"), found, expected)
+    }
 }
 
 /// Landmarks and prior of a model's training jumps.
@@ -142,88 +188,32 @@ impl JumpPrior {
         GoalRange::features(&self.ranges(), &goal)
     }
 
-    /// Complains unless every table fits the model's dimensions and phases and every number is one.
+    /// Refuses tables that do not fit the model's dimensions and phases, and numbers that are none.
     pub(super) fn check(&self, d: usize, phases: &[Phase]) -> Result<(), ModelError> {
+        let (n_jumps, n_parts) = (self.jumps.len(), self.parts.len());
         let mut numbers = self.jumps.iter().flatten();
-        if self.jumps.len() < 2 || numbers.any(|v| !(v.is_finite() && v.abs() < 1e3)) {
-            let found = format!("{} jumps, or numbers that are none", self.jumps.len());
-            let expected = "2 or more, all numbers below 1000 m";
-            return Err(ModelError::invalid("`landmarks.jumps`", found, expected));
-        }
+        let fits = n_jumps >= 2 && numbers.all(|v| v.is_finite() && v.abs() < 1e3);
+        let found = || format!("{n_jumps} jumps, or numbers that are none");
+        let expected = "2 or more, all numbers below 1000 m";
+        check(fits, "`landmarks.jumps`", found, expected)?;
         check_tensor("landmarks.start", &self.start, (STATE_DIM, 1))?;
         check_tensor("prior.state_std", &self.state_std, (2 * d, 1))?;
-        if let Some(found) = self.state_std.iter().find(|v| **v <= 0.0) {
-            return Err(ModelError::invalid("`prior.state_std`", found, "positive"));
-        }
-        let heights = [
-            self.end_height_m[0],
-            self.end_height_m[1],
-            self.landing_height_m,
-        ];
-        if heights.iter().any(|v| !v.is_finite()) || heights[0] > heights[1] {
-            let (place, found) = ("`landmarks`, heights at the end", format!("{heights:?}"));
-            return Err(ModelError::invalid(place, found, "ordered"));
-        }
-        if self.parts.len() < 2 {
-            let found = format!("{} parts", self.parts.len());
-            return Err(ModelError::invalid("`landmarks.parts`", found, "2 or more"));
-        }
+        let least = self.state_std.min();
+        check(least > 0.0, "`prior.state_std`", || least, "positive")?;
+        let [low, high] = self.end_height_m;
+        let heights = [low, high, self.landing_height_m];
+        let fits = heights.iter().all(|v| v.is_finite()) && low <= high;
+        let place = "`landmarks`, heights at the end";
+        check(fits, place, || format!("{heights:?}"), "ordered")?;
+        let parts = "`landmarks.parts`";
+        let found = || format!("{n_parts} parts");
+        check(n_parts >= 2, parts, found, "2 or more")?;
         for (index, part) in self.parts.iter().enumerate() {
-            check_part(part, &format!("prior.parts[{index}]"), d, phases)?;
+            part.check(&format!("prior.parts[{index}]"), d, phases)?;
         }
-        let in_air = |part: &&JumpPart| !part.feet.contains(&true);
-        let first = &self.parts[0];
-        if self.parts.iter().filter(in_air).count() != 1 || in_air(&first) {
-            let expected = "exactly one part without a foot on the ground, not the first";
-            return Err(ModelError::invalid("`landmarks.parts`", "others", expected));
-        }
-        Ok(())
+        let mut in_air = self.parts.iter().map(|part| !part.feet.contains(&true));
+        let fits = in_air.next() == Some(false) && in_air.filter(|in_air| *in_air).count() == 1;
+        let expected = "exactly one part without a foot on the ground, not the first";
+        check(fits, parts, || "others", expected)
     }
-}
-
-fn check_part(part: &JumpPart, name: &str, d: usize, phases: &[Phase]) -> Result<(), ModelError> {
-    let invalid = |key: &str, found: String, expected: &str| {
-        Err(ModelError::invalid(
-            format!("`{name}{key}`"),
-            found,
-            expected,
-        ))
-    };
-    let Some(phase) = phases.get(part.phase) else {
-        let expected = format!("one below {}", phases.len());
-        return invalid("", part.phase.to_string(), &expected);
-    };
-    if selected(phases, part.feet) != Some(part.phase) {
-        let expected = format!("feet that select {}", phase.name);
-        return invalid("", format!("{:?}", part.feet), &expected);
-    }
-    let nodes = part.nodes();
-    if !(3..=MAX_NODES).contains(&nodes) {
-        return invalid(".z", format!("{nodes} nodes"), &format!("3 to {MAX_NODES}"));
-    }
-    let of_nodes = (nodes, FEATURE_DIM * d);
-    for (key, table, shape) in [
-        ("z", Some(&part.z), of_nodes),
-        ("dz", Some(&part.dz), of_nodes),
-        ("u_lat", Some(&part.u_lat), of_nodes),
-        ("xi", part.xi.as_ref(), (3 * d, d)),
-        ("input_covariance", Some(&part.input_covariance), (d, d)),
-    ] {
-        if let Some(table) = table {
-            check_tensor(&format!("{name}.{key}"), table, shape)?;
-        }
-    }
-    if part.input_covariance.clone().cholesky().is_none() {
-        let (found, expected) = ("another".to_owned(), "a positive definite matrix");
-        return invalid(".input_covariance", found, expected);
-    }
-    let tensor = format!("{name}.acceleration_std");
-    check_tensor(&tensor, &part.acceleration_std, (d, 1))?;
-    let mut durations = part.duration_s.iter().chain(&part.duration_range_s);
-    let [least, most] = part.duration_range_s;
-    if durations.any(|v| !v.is_finite()) || !(0.0 < least && least <= most) {
-        let found = format!("{:?} within {:?}", part.duration_s, part.duration_range_s);
-        return invalid(".duration_s", found, "finite durations, the range positive");
-    }
-    Ok(())
 }

@@ -4,12 +4,11 @@ use std::collections::HashMap;
 use std::fmt;
 
 use nalgebra::{DMatrix, DVector};
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
-use super::error::{LibraryError, ModelError, check_shape};
+use super::error::{ModelError, check, check_shape};
 use super::evaluation::Tape;
 use super::standard_library::StandardLibrary;
-use super::variable::LatentVariable;
 use crate::symbolic::{ExprId, ExprPool, ParseLimits, SymbolId};
 
 /// Largest number of latent coordinates.
@@ -18,6 +17,70 @@ pub const MAX_LATENT_DIM: usize = 64;
 pub(crate) const MAX_LIBRARY_DIM: usize = 20_000;
 /// Longest candidate term in bytes.
 pub(crate) const MAX_TERM_LEN: usize = 1_000;
+
+/// A variable of candidate terms; indices count from 0, names in files from 1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum LatentVariable {
+    /// Latent coordinate, `z1` for index 0.
+    Z(usize),
+    /// Latent velocity, `dz1` for index 0.
+    Dz(usize),
+    /// Latent input, `u1` for index 0.
+    U(usize),
+}
+
+/// The kinds in the order of [`LatentVariable::all`], with their names.
+const KINDS: [(&str, fn(usize) -> LatentVariable); 3] = [
+    ("z", LatentVariable::Z),
+    ("dz", LatentVariable::Dz),
+    ("u", LatentVariable::U),
+];
+
+impl LatentVariable {
+    /// The variable with this name, if there is one at `latent_dim`.
+    pub fn from_name(name: &str, latent_dim: usize) -> Option<Self> {
+        let digits_at = name.find(|c: char| c.is_ascii_digit())?;
+        let (kind, digits) = name.split_at(digits_at);
+        let canonical = !digits.starts_with('0') && digits.bytes().all(|b| b.is_ascii_digit());
+        let number: usize = digits.parse().ok().filter(|_| canonical)?;
+        let index = number.checked_sub(1).filter(|&index| index < latent_dim)?;
+        let (_, variable) = KINDS.iter().find(|(known, _)| *known == kind)?;
+        Some(variable(index))
+    }
+
+    /// Its kind's place in [`KINDS`], and its index.
+    fn parts(self) -> (usize, usize) {
+        match self {
+            LatentVariable::Z(index) => (0, index),
+            LatentVariable::Dz(index) => (1, index),
+            LatentVariable::U(index) => (2, index),
+        }
+    }
+
+    /// Its place in [`Self::all`], if it is there at `latent_dim`.
+    pub fn place(self, latent_dim: usize) -> Option<usize> {
+        let (kind, index) = self.parts();
+        (index < latent_dim).then_some(kind * latent_dim + index)
+    }
+
+    /// All variables at `latent_dim`: z, then dz, then u.
+    pub fn all(latent_dim: usize) -> impl Iterator<Item = Self> {
+        (KINDS.into_iter()).flat_map(move |(_, variable)| (0..latent_dim).map(variable))
+    }
+}
+
+impl Serialize for LatentVariable {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        to.collect_str(self)
+    }
+}
+
+impl fmt::Display for LatentVariable {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (kind, index) = self.parts();
+        write!(f, "{}{}", KINDS[kind].0, index + 1)
+    }
+}
 
 /// One column of Theta.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -54,7 +117,7 @@ pub enum LibraryChoice {
 }
 
 /// Candidate terms in order, over `z1..zd`, `dz1..dzd`, `u1..ud`.
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 pub struct Library {
     latent_dim: usize,
     /// The shorthand, if the library was given by it.
@@ -67,40 +130,30 @@ pub struct Library {
 
 impl Library {
     /// The library with these terms, in the expression syntax of the model file.
-    ///
-    /// # Errors
-    /// Each variant of [`LibraryError`] except [`LibraryError::Degree`] and
-    /// [`LibraryError::Duplicate`].
-    pub fn from_terms(latent_dim: usize, texts: &[String]) -> Result<Self, LibraryError> {
+    pub fn from_terms(latent_dim: usize, texts: &[String]) -> Result<Self, ModelError> {
         Self::of(latent_dim, LibraryChoice::Terms(texts.to_vec()))
     }
 
     /// The standard library, in the order of the published arrays.
-    ///
-    /// # Errors
-    /// [`LibraryError::LatentDim`], [`LibraryError::Degree`], [`LibraryError::TooManyTerms`].
-    pub fn standard(latent_dim: usize, standard: StandardLibrary) -> Result<Self, LibraryError> {
+    pub fn standard(latent_dim: usize, standard: StandardLibrary) -> Result<Self, ModelError> {
         Self::of(latent_dim, LibraryChoice::Standard(standard))
     }
 
     /// The library with the terms that were chosen.
     ///
     /// # Errors
-    /// As [`Self::from_terms`] and [`Self::standard`].
-    pub fn of(latent_dim: usize, choice: LibraryChoice) -> Result<Self, LibraryError> {
-        if !(1..=MAX_LATENT_DIM).contains(&latent_dim) {
-            return Err(LibraryError::LatentDim { found: latent_dim });
-        }
+    /// [`ModelError::Invalid`] for a number of coordinates, a degree or a number of terms beyond its bound, and for a
+    /// term that is zero everywhere or has a constant part beyond the range of floats; [`ModelError::Term`].
+    pub fn of(latent_dim: usize, choice: LibraryChoice) -> Result<Self, ModelError> {
+        let fits = (1..=MAX_LATENT_DIM).contains(&latent_dim);
+        let expected = format!("1 to {MAX_LATENT_DIM}");
+        check(fits, "`latent_dim`", || latent_dim, expected)?;
         let (texts, standard) = match choice {
             LibraryChoice::Terms(texts) => (texts, None),
             LibraryChoice::Standard(standard) => (standard.texts(latent_dim)?, Some(standard)),
         };
-        if texts.is_empty() {
-            return Err(LibraryError::Empty);
-        }
-        if texts.len() > MAX_LIBRARY_DIM {
-            return Err(LibraryError::TooManyTerms { found: texts.len() });
-        }
+        check(!texts.is_empty(), "`library`", || "no term", "at least one")?;
+        check_term_count(texts.len())?;
         let mut pool = ExprPool::new();
         let symbols: Vec<SymbolId> = LatentVariable::all(latent_dim)
             .map(|variable| pool.symbol_id(&variable.to_string()))
@@ -108,12 +161,6 @@ impl Library {
         let mut terms: Vec<CandidateTerm> = Vec::with_capacity(texts.len());
         for (index, text) in texts.into_iter().enumerate() {
             let expr = parse_term(&mut pool, latent_dim, index, &text)?;
-            if expr == ExprId::ZERO {
-                return Err(LibraryError::Zero { index, text });
-            }
-            if !constants_are_finite(&pool, expr) {
-                return Err(LibraryError::NotFinite { index, text });
-            }
             terms.push(CandidateTerm { text, expr });
         }
         let exprs: Vec<ExprId> = terms.iter().map(CandidateTerm::expr).collect();
@@ -132,17 +179,14 @@ impl Library {
     /// coefficients cannot be learned.
     ///
     /// # Errors
-    /// [`LibraryError::Duplicate`] for the first such term.
-    pub fn check_distinct(&self) -> Result<(), LibraryError> {
+    /// [`ModelError::Invalid`] for the first such term.
+    pub fn check_distinct(&self) -> Result<(), ModelError> {
         let mut first_use = HashMap::new();
         for (second, term) in self.terms.iter().enumerate() {
             if let Some(first) = first_use.insert(term.expr, second) {
-                return Err(LibraryError::Duplicate {
-                    first,
-                    second,
-                    text: term.text.clone(),
-                    earlier: self.terms[first].text.clone(),
-                });
+                let (place, earlier) = (place(second), &self.terms[first].text);
+                let found = format!("{:?}, which equals [{first}] {earlier:?}", term.text);
+                return Err(ModelError::invalid(place, found, "different terms"));
             }
         }
         Ok(())
@@ -219,7 +263,7 @@ impl Library {
     /// Theta at one point: the value of each term, in order.
     ///
     /// # Errors
-    /// [`ModelError::Dimension`] if an argument is not `latent_dim` long.
+    /// [`ModelError::Invalid`] if an argument is not `latent_dim` long.
     pub fn evaluate(
         &self,
         z: &DVector<f64>,
@@ -267,14 +311,14 @@ impl PartialEq for Library {
     }
 }
 
-impl fmt::Debug for Library {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Library")
-            .field("latent_dim", &self.latent_dim)
-            .field("standard", &self.standard)
-            .field("terms", &self.terms)
-            .finish_non_exhaustive()
-    }
+pub(super) fn check_term_count(found: usize) -> Result<(), ModelError> {
+    let expected = format!("at most {MAX_LIBRARY_DIM}");
+    let fits = found <= MAX_LIBRARY_DIM;
+    check(fits, "`library`", || format!("{found} terms"), expected)
+}
+
+fn place(index: usize) -> String {
+    format!("`library`[{index}]")
 }
 
 fn parse_term(
@@ -282,21 +326,31 @@ fn parse_term(
     latent_dim: usize,
     index: usize,
     text: &str,
-) -> Result<ExprId, LibraryError> {
+) -> Result<ExprId, ModelError> {
     if text.len() > MAX_TERM_LEN || text.chars().any(char::is_control) {
-        return Err(LibraryError::TermText {
-            index,
-            found: text.len(),
-        });
+        let found = format!("{} bytes or a control character", text.len());
+        let expected = format!("one line of at most {MAX_TERM_LEN} bytes");
+        return Err(ModelError::invalid(place(index), found, expected));
     }
     let known = |name: &str| LatentVariable::from_name(name, latent_dim).is_some();
     let read = pool.parse_defined(text, &known, &|_, _| None, ParseLimits::default());
-    read.map(|reading| reading.expr)
-        .map_err(|source| LibraryError::Parse {
-            index,
-            text: text.to_owned(),
-            source: Box::new(source),
-        })
+    let reading = read.map_err(|source| ModelError::Term {
+        index,
+        text: text.to_owned(),
+        source: Box::new(source),
+    })?;
+    let expected = if reading.expr == ExprId::ZERO {
+        "a term that is not zero everywhere"
+    } else if !constants_are_finite(pool, reading.expr) {
+        "constant parts with values that floats hold (up to 1.8e308)"
+    } else {
+        return Ok(reading.expr);
+    };
+    Err(ModelError::invalid(
+        place(index),
+        format!("{text:?}"),
+        expected,
+    ))
 }
 
 /// Whether every part without variables has a finite value.
@@ -309,82 +363,4 @@ fn constants_are_finite(pool: &ExprPool, expr: ExprId) -> bool {
     let no_symbol = |_| f64::NAN;
     let values = pool.evaluate_all(&constants, &no_symbol);
     values.into_iter().all(f64::is_finite)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::symbolic::ParseErrorKind;
-
-    fn terms(texts: &[&str]) -> Vec<String> {
-        texts.iter().map(|&text| text.to_owned()).collect()
-    }
-
-    #[test]
-    fn library_with_equal_terms_is_accepted_but_not_distinct() {
-        let library = Library::from_terms(2, &terms(&["1", "z1*z2", "u1", "z2*z1"])).unwrap();
-        assert_eq!(library.len(), 4);
-        let error = library.check_distinct().unwrap_err();
-        assert!(matches!(
-            error,
-            LibraryError::Duplicate {
-                first: 1,
-                second: 3,
-                ..
-            }
-        ));
-    }
-
-    #[test]
-    fn library_with_vanishing_oversized_or_missing_terms_is_refused() {
-        assert!(matches!(
-            Library::from_terms(1, &terms(&["z1 - z1"])),
-            Err(LibraryError::Zero { index: 0, .. })
-        ));
-        for text in ["z1/0", "log(0)*z1", "z1^(1/0)", "sqrt(-1) + z1"] {
-            let error = Library::from_terms(1, &terms(&[text])).unwrap_err();
-            assert!(
-                matches!(&error, LibraryError::Parse { index: 0, source, .. }
-                    if matches!(source.kind, ParseErrorKind::NoValue(_))),
-                "{text}: {error:?}"
-            );
-        }
-        let error = Library::from_terms(1, &terms(&["exp(1000)*z1"])).unwrap_err();
-        assert!(matches!(error, LibraryError::NotFinite { index: 0, .. }));
-        for text in ["z1+".repeat(400) + "z1", "z1\n+1".to_owned()] {
-            let found = Library::from_terms(1, &[text]);
-            assert!(matches!(
-                found,
-                Err(LibraryError::TermText { index: 0, .. })
-            ));
-        }
-        assert_eq!(Library::from_terms(1, &[]), Err(LibraryError::Empty));
-    }
-
-    #[test]
-    fn library_values_agree_with_the_pool_for_every_node() {
-        let texts = [
-            "z1^7 - 2/z1^3",
-            "abs(z1)^dz1",
-            "tanh(log(2 + u1^2))^1.5",
-            "cos(tan(z1)*sqrt(2))",
-            "0.1*z1*dz1*u1",
-        ];
-        let library = Library::from_terms(1, &terms(&texts)).unwrap();
-        let points = [[0.3, -0.7, 2.0], [-1.25, 0.5, -0.1], [2.0, 3.0, 0.0]];
-        let variables = DMatrix::from_fn(3, 3, |row, point| points[point][row]);
-        let all = library.evaluate_points(&variables).unwrap();
-        for (point, values) in points.iter().enumerate() {
-            let [z, dz, u_lat] = values.map(|value| DVector::from_element(1, value));
-            let alone = library.evaluate(&z, &dz, &u_lat).unwrap();
-            assert_eq!(alone.transpose(), all.row(point));
-            let exprs: Vec<ExprId> = library.terms().iter().map(CandidateTerm::expr).collect();
-            let expected = library
-                .pool()
-                .evaluate_all(&exprs, &|symbol| values[symbol.index()]);
-            for (term, expected) in expected.iter().enumerate() {
-                assert_eq!(all[(point, term)], *expected, "{}", texts[term]);
-            }
-        }
-    }
 }

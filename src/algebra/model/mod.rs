@@ -33,9 +33,8 @@
 //! ```
 
 mod activation;
-mod affine;
 mod builder;
-mod coordinate_names;
+mod coordinates;
 mod error;
 mod evaluation;
 mod given_state;
@@ -43,42 +42,27 @@ mod identifier;
 mod jump_prior;
 mod library;
 mod maps;
-mod normal;
 mod order;
-mod phase;
-mod projection;
 mod rom;
-mod scaling;
 mod standard_library;
 mod state_map;
 mod statistics;
-mod tangent;
-mod variable;
-
-#[cfg(test)]
-mod tests;
 
 pub use crate::robot::FeetRule;
 pub use activation::Activation;
-pub(crate) use activation::{GELU_CUBIC, GELU_RATE};
-pub use affine::AffineMap;
+pub(crate) use activation::{DENSITY_AT_ZERO, GELU_CUBIC, GELU_RATE, TAIL};
 pub use builder::ModelBuilder;
-pub use coordinate_names::CoordinateNames;
-pub use error::{LibraryError, ModelError};
+pub use coordinates::{CoordinateNames, ScaleFactors, Scaling};
+pub use error::ModelError;
 pub use evaluation::{Step, Tape};
 pub use given_state::InputGivenState;
 pub use identifier::{Identifier, IdentifierError, check_name};
 pub use jump_prior::{FEATURE_DIM, GOAL_DIM, GoalFeatures, GoalRange, JumpPart, JumpPrior};
 pub(crate) use library::MAX_TERM_LEN;
-pub use library::{CandidateTerm, Library, LibraryChoice, MAX_LATENT_DIM};
-pub(crate) use normal::{DENSITY_AT_ZERO, TAIL};
+pub use library::{CandidateTerm, LatentVariable, Library, LibraryChoice, MAX_LATENT_DIM};
+pub use maps::{Tangent, complement};
 pub use order::CoordinateOrder;
-pub use phase::Phase;
-pub use projection::complement;
-pub use rom::ReducedModel;
-pub use scaling::{ScaleFactors, Scaling};
+pub use rom::{Phase, ReducedModel};
 pub use standard_library::{LibraryOrder, StandardLibrary};
-pub use state_map::{Layer, MAX_LAYER_WIDTH, MAX_LAYERS, StateMap};
+pub use state_map::{AffineMap, Layer, MAX_LAYER_WIDTH, MAX_LAYERS, StateMap};
 pub use statistics::InputStatistics;
-pub use tangent::Tangent;
-pub use variable::LatentVariable;

@@ -12,20 +12,50 @@
 //!
 //! These are the linear maps. A nonlinear encoder or decoder ([`StateMap`]) has a Jacobian `J` at a
 //! state instead of `W`; `maps.rs` states what becomes of the equations.
+//!
+//! A function that needs a part which the model lacks returns [`ModelError::Missing`]; one that gets a vector of the
+//! wrong length, [`ModelError::Invalid`].
 
 use nalgebra::{DMatrix, DVector};
 use serde_json::{Map, Value};
 
 use super::builder::ModelBuilder;
-use super::coordinate_names::CoordinateNames;
-use super::error::ModelError;
+use super::coordinates::{CoordinateNames, Scaling};
+use super::error::{ModelError, check};
 use super::identifier::Identifier;
 use super::jump_prior::JumpPrior;
 use super::library::{CandidateTerm, Library};
-use super::phase::{Phase, selected};
-use super::scaling::Scaling;
 use super::statistics::InputStatistics;
-use crate::robot::{Actuators, ContactFlags, InputRule, Robot, WrenchFrame};
+use crate::robot::{Actuators, ContactFlags, FeetRule, InputRule, Robot, WrenchFrame};
+
+/// One dynamics regime: `ddz = Xi^T Theta(z, dz, u_lat)`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Phase {
+    /// Name, such as `contact`.
+    pub name: String,
+    /// Foot patterns that select it; the first phase that matches wins.
+    pub feet: FeetRule,
+    /// Coefficients, `library_dim x latent_dim`, in scaled units.
+    pub xi: DMatrix<f64>,
+}
+
+impl Phase {
+    /// Number of coefficients that are not zero.
+    pub fn active_count(&self) -> usize {
+        self.xi.iter().filter(|&&value| value != 0.0).count()
+    }
+
+    /// Indices of the active terms of one output, the rows of Xi, with their coefficients, in library order.
+    pub fn active_terms(&self, output: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
+        let coefficients = self.xi.column(output).into_iter().copied();
+        (coefficients.enumerate()).filter(|&(_, value)| value != 0.0)
+    }
+}
+
+/// Index of the first phase whose rule matches the feet.
+pub(super) fn selected(phases: &[Phase], feet: ContactFlags) -> Option<usize> {
+    phases.iter().position(|phase| phase.feet.matches(feet))
+}
 
 /// A checked reduced-order model; made by [`ReducedModel::builder`] or read from a model file.
 #[derive(Clone, Debug, PartialEq)]
@@ -101,10 +131,7 @@ impl ReducedModel {
 
     /// Index of the phase with this name.
     pub fn phase_named(&self, name: &str) -> Option<usize> {
-        self.parts
-            .phases
-            .iter()
-            .position(|phase| phase.name == name)
+        self.phases().iter().position(|phase| phase.name == name)
     }
 
     /// Names and units of the state, if the file has them.
@@ -118,40 +145,27 @@ impl ReducedModel {
     }
 
     /// The scale factors.
-    ///
-    /// # Errors
-    /// [`ModelError::Missing`] if the model has none.
     pub fn scaling(&self) -> Result<&Scaling, ModelError> {
         let purpose = "going between SI and scaled units";
         self.require(self.parts.scaling.as_ref(), "scaling", purpose)
     }
 
-    /// `s_x`, one factor a robot coordinate.
-    ///
-    /// # Errors
-    /// [`ModelError::Missing`] if the model has no scaling, or neither encoder nor decoder.
+    /// `s_x`, one factor per robot coordinate.
     pub fn state_factors(&self) -> Result<DVector<f64>, ModelError> {
         Ok(self.scaling()?.state.expand(self.require_state_dim()?))
     }
 
-    /// `s_u`, one factor an input coordinate.
-    ///
-    /// # Errors
-    /// As [`ReducedModel::state_factors`].
+    /// `s_u`, one factor per input coordinate.
     pub fn input_factors(&self) -> Result<DVector<f64>, ModelError> {
         Ok(self.scaling()?.input.expand(self.require_state_dim()?))
     }
 
-    /// The robot whose coordinates the model speaks of.
-    ///
-    /// # Errors
-    /// [`ModelError::Missing`] if the file names none.
+    /// The robot whose coordinates are the model's state.
     pub fn robot(&self) -> Result<&'static Robot, ModelError> {
         self.require(self.parts.robot, "robot", "kinematics and limits")
     }
 
-    /// What the joints take of the motors' torques before they count as input; none if the model's
-    /// inputs are the motors' torques.
+    /// Losses of the joints, subtracted from the motors' torques; none if these are the model's inputs.
     pub fn actuators(&self) -> Option<&Actuators> {
         self.parts.actuators.as_ref()
     }
@@ -161,37 +175,24 @@ impl ReducedModel {
         self.parts.wrench_frame
     }
 
-    /// How samples of the robot become the model's inputs: what everything that feeds recorded
-    /// torques to the model, or makes commands of its inputs, goes by.
-    ///
-    /// # Errors
-    /// [`ModelError::Missing`] if the file names no robot.
+    /// How samples of the robot become the model's inputs, and its inputs commands.
     pub fn input_rule(&self) -> Result<InputRule, ModelError> {
         let (robot, actuators) = (self.robot()?, self.parts.actuators.clone());
         Ok(InputRule::new(robot, actuators, self.parts.wrench_frame))
     }
 
     /// Sampling period of the recordings behind the model, s.
-    ///
-    /// # Errors
-    /// [`ModelError::Missing`] if the file does not tell.
     pub fn sample_time_s(&self) -> Result<f64, ModelError> {
         self.require(self.parts.sample_time_s, "sample_time_s", "sampling")
     }
 
     /// Landmarks and prior of the training jumps.
-    ///
-    /// # Errors
-    /// [`ModelError::Missing`] if the file has none.
     pub fn jump_prior(&self) -> Result<&JumpPrior, ModelError> {
         let purpose = "planning; `romc train` on jumps of one kind with a linear encoder makes it";
         self.require(self.parts.jump_prior.as_ref(), "prior", purpose)
     }
 
     /// Mean and covariance of the training inputs of one phase, SI units.
-    ///
-    /// # Errors
-    /// [`ModelError::Missing`] if the file has none for the phase, [`ModelError::PhaseIndex`].
     pub fn input_statistics(&self, phase: usize) -> Result<&InputStatistics, ModelError> {
         let phase = &self.phase(phase)?.name;
         let mut statistics = self.parts.statistics.iter();
@@ -203,9 +204,6 @@ impl ReducedModel {
 
     /// Latent acceleration `ddz = Xi^T Theta(z, dz, u_lat)` of one phase, term by term in library
     /// order: the slow and plain evaluation which compiled programs are tested against.
-    ///
-    /// # Errors
-    /// [`ModelError::PhaseIndex`], [`ModelError::Dimension`].
     pub fn ddz(
         &self,
         phase: usize,
@@ -213,51 +211,36 @@ impl ReducedModel {
         dz: &DVector<f64>,
         u_lat: &DVector<f64>,
     ) -> Result<DVector<f64>, ModelError> {
-        let xi = &self.phase(phase)?.xi;
+        let phase = self.phase(phase)?;
         let theta = self.parts.library.evaluate(z, dz, u_lat)?;
         Ok(DVector::from_fn(self.latent_dim(), |output, _| {
-            let mut sum = 0.0;
-            for (&coefficient, &value) in xi.column(output).iter().zip(theta.iter()) {
-                if coefficient != 0.0 {
-                    sum += coefficient * value;
-                }
-            }
-            sum
+            let terms = phase.active_terms(output);
+            terms.fold(0.0, |sum, (term, coefficient)| {
+                sum + coefficient * theta[term]
+            })
         }))
     }
 
     /// Active terms of one output of a phase with their coefficients, in library order (the order
     /// in which the paper prints them).
-    ///
-    /// # Errors
-    /// [`ModelError::PhaseIndex`]; [`ModelError::Dimension`] if `output` is not below `latent_dim`.
     pub fn active_terms(
         &self,
         phase: usize,
         output: usize,
     ) -> Result<Vec<(f64, &CandidateTerm)>, ModelError> {
-        let phase = self.phase(phase)?;
-        if output >= self.latent_dim() {
-            return Err(ModelError::Dimension {
-                what: "index of a latent coordinate",
-                found: output,
-                expected: self.latent_dim(),
-            });
-        }
-        Ok(phase
-            .active_terms(output)
+        let (phase, dim) = (self.phase(phase)?, self.latent_dim());
+        let place = "index of a latent coordinate";
+        check(output < dim, place, || output, format!("below {dim}"))?;
+        let terms = phase.active_terms(output);
+        Ok(terms
             .map(|(term, coefficient)| (coefficient, &self.library().terms()[term]))
             .collect())
     }
 
-    /// The phase with this index.
-    ///
-    /// # Errors
-    /// [`ModelError::PhaseIndex`].
     pub(crate) fn phase(&self, phase: usize) -> Result<&Phase, ModelError> {
-        self.parts.phases.get(phase).ok_or(ModelError::PhaseIndex {
+        self.phases().get(phase).ok_or(ModelError::PhaseIndex {
             found: phase,
-            count: self.parts.phases.len(),
+            count: self.phases().len(),
         })
     }
 

@@ -6,8 +6,8 @@ use clap::ValueEnum;
 use clap::builder::PossibleValue;
 use serde::{Deserialize, Serialize};
 
-use super::error::LibraryError;
-use super::library::MAX_LIBRARY_DIM;
+use super::error::{ModelError, check};
+use super::library::check_term_count;
 
 /// Largest polynomial degree of the standard library.
 pub(crate) const MAX_DEGREE: u32 = 8;
@@ -16,15 +16,6 @@ pub(crate) const MAX_DEGREE: u32 = 8;
 ///
 /// Order: constant; z; dz; monomials of degree 2 to `degree` over `(z, dz)`, graded, each with
 /// indices `i <= j <= k`; sin z; sin dz; cos z; cos dz; u.
-///
-/// ```
-/// use romc::model::{Library, StandardLibrary};
-///
-/// let library = Library::standard(1, StandardLibrary { degree: 2, trigonometric: false, inputs: true })?;
-/// let texts: Vec<&str> = library.terms().iter().map(|term| term.text()).collect();
-/// assert_eq!(texts, ["1", "z1", "dz1", "z1^2", "z1*dz1", "dz1^2", "u1"]);
-/// # Ok::<(), romc::model::LibraryError>(())
-/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StandardLibrary {
@@ -80,15 +71,6 @@ impl Run {
 }
 
 /// The order in which a trainer keeps the terms of a standard library.
-///
-/// ```
-/// use romc::model::{LibraryOrder, StandardLibrary};
-///
-/// let standard = StandardLibrary { degree: 1, trigonometric: true, inputs: false };
-/// let texts = standard.texts_in(LibraryOrder::PAPER, 1)?;
-/// assert_eq!(texts, ["1", "z1", "dz1", "sin(z1)", "cos(z1)", "sin(dz1)", "cos(dz1)"]);
-/// # Ok::<(), romc::model::LibraryError>(())
-/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LibraryOrder {
     groups: [Group; 5],
@@ -125,11 +107,27 @@ impl LibraryOrder {
     /// The orders that have names.
     pub const NAMED: [Self; 3] = [Self::PAPER, Self::INTERLEAVED, Self::ROMC];
 
+    /// Names and descriptions of [`Self::NAMED`].
+    const NAMES: [(&str, &str); 3] = [
+        (
+            "paper",
+            "sin z, cos z, sin dz, cos dz: Appendix B of the paper",
+        ),
+        (
+            "interleaved",
+            "sin z1, cos z1, sin z2, ..., then dz: the paper's training code, PySINDy",
+        ),
+        ("romc", "sin z, sin dz, cos z, cos dz: model files of romc"),
+    ];
+
+    fn named(&self) -> Option<(&'static str, &'static str)> {
+        let place = Self::NAMED.iter().position(|named| named == self)?;
+        Some(Self::NAMES[place])
+    }
+
     /// `paper`, `interleaved` or `romc`, for orders that have a name.
     pub fn name(&self) -> Option<&'static str> {
-        let names = ["paper", "interleaved", "romc"];
-        let place = Self::NAMED.iter().position(|named| named == self)?;
-        Some(names[place])
+        self.named().map(|(name, _)| name)
     }
 
     /// Orders that trainers may have: those with names first, then others in which the constant or
@@ -176,14 +174,8 @@ impl ValueEnum for LibraryOrder {
     }
 
     fn to_possible_value(&self) -> Option<PossibleValue> {
-        let help = match self.run {
-            Run::Half => "sin z, cos z, sin dz, cos dz: Appendix B of the paper",
-            Run::Single => {
-                "sin z1, cos z1, sin z2, ..., then dz: the paper's training code, PySINDy"
-            }
-            Run::All => "sin z, sin dz, cos z, cos dz: model files of romc",
-        };
-        Some(PossibleValue::new(self.name()?).help(help))
+        let (name, help) = self.named()?;
+        Some(PossibleValue::new(name).help(help))
     }
 }
 
@@ -218,26 +210,24 @@ impl StandardLibrary {
     }
 
     /// The terms in the syntax of the model file.
-    pub(super) fn texts(&self, latent_dim: usize) -> Result<Vec<String>, LibraryError> {
+    pub(super) fn texts(&self, latent_dim: usize) -> Result<Vec<String>, ModelError> {
         self.texts_in(LibraryOrder::ROMC, latent_dim)
     }
 
     /// The terms in another order; the texts are the same.
     ///
     /// # Errors
-    /// [`LibraryError::Degree`], [`LibraryError::TooManyTerms`].
+    /// [`ModelError::Invalid`] for a degree or a number of terms beyond its bound.
     pub fn texts_in(
         &self,
         order: LibraryOrder,
         latent_dim: usize,
-    ) -> Result<Vec<String>, LibraryError> {
-        if self.degree > MAX_DEGREE {
-            return Err(LibraryError::Degree { found: self.degree });
-        }
+    ) -> Result<Vec<String>, ModelError> {
+        let expected = format!("at most {MAX_DEGREE}");
+        let fits = self.degree <= MAX_DEGREE;
+        check(fits, "`library.degree`", || self.degree, expected)?;
         let count = self.term_count(latent_dim).unwrap_or(usize::MAX);
-        if count > MAX_LIBRARY_DIM {
-            return Err(LibraryError::TooManyTerms { found: count });
-        }
+        check_term_count(count)?;
         let name = |kind: &'static str| (1..=latent_dim).map(move |i| format!("{kind}{i}"));
         let names: Vec<String> = name("z").chain(name("dz")).collect();
         let state: Vec<usize> = match order.is_paired {
@@ -265,14 +255,11 @@ impl StandardLibrary {
     }
 
     /// For each term in another order its row in romc's.
-    ///
-    /// # Errors
-    /// As [`Self::texts_in`].
     pub fn rows_in(
         &self,
         order: LibraryOrder,
         latent_dim: usize,
-    ) -> Result<Vec<usize>, LibraryError> {
+    ) -> Result<Vec<usize>, ModelError> {
         let own = self.texts(latent_dim)?;
         let rows: HashMap<&str, usize> = (own.iter().map(String::as_str)).zip(0..).collect();
         let texts = self.texts_in(order, latent_dim)?;
@@ -315,86 +302,4 @@ fn monomial_text(names: &[String], factors: &[usize]) -> String {
         })
         .collect();
     powers.join("*")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn standard_library_follows_the_published_order_with_indices_that_do_not_fall() {
-        let degree_two = "1 z1 z2 dz1 dz2 \
-            z1^2 z1*z2 z1*dz1 z1*dz2 z2^2 z2*dz1 z2*dz2 dz1^2 dz1*dz2 dz2^2 \
-            sin(z1) sin(z2) sin(dz1) sin(dz2) cos(z1) cos(z2) cos(dz1) cos(dz2) u1 u2";
-        let degree_three = "1 z1 dz1 z1^2 z1*dz1 dz1^2 z1^3 z1^2*dz1 z1*dz1^2 dz1^3";
-        for (latent_dim, degree, has_more, expected) in
-            [(2, 2, true, degree_two), (1, 3, false, degree_three)]
-        {
-            let standard = StandardLibrary {
-                degree,
-                trigonometric: has_more,
-                inputs: has_more,
-            };
-            assert_eq!(standard.texts(latent_dim).unwrap().join(" "), expected);
-        }
-    }
-
-    #[test]
-    fn orders_have_the_same_terms_and_rows_that_lead_back() {
-        let standard = StandardLibrary {
-            degree: 3,
-            ..StandardLibrary::default()
-        };
-        let own = standard.texts(2).unwrap();
-        for order in LibraryOrder::common() {
-            let texts = standard.texts_in(order, 2).unwrap();
-            let rows = standard.rows_in(order, 2).unwrap();
-            let back: Vec<&String> = rows.iter().map(|&row| &own[row]).collect();
-            assert_eq!(back, texts.iter().collect::<Vec<_>>());
-            let mut sorted = rows;
-            sorted.sort_unstable();
-            assert!(sorted.into_iter().eq(0..own.len()));
-        }
-        let trigonometric = |order| {
-            let library = StandardLibrary {
-                degree: 0,
-                trigonometric: true,
-                inputs: false,
-            };
-            library.texts_in(order, 2).unwrap()[1..].join(" ")
-        };
-        assert_eq!(
-            trigonometric(LibraryOrder::PAPER),
-            "sin(z1) sin(z2) cos(z1) cos(z2) sin(dz1) sin(dz2) cos(dz1) cos(dz2)"
-        );
-        assert_eq!(
-            trigonometric(LibraryOrder::INTERLEAVED),
-            "sin(z1) cos(z1) sin(z2) cos(z2) sin(dz1) cos(dz1) sin(dz2) cos(dz2)"
-        );
-    }
-
-    #[test]
-    fn standard_library_count_agrees_with_terms_made() {
-        for latent_dim in 1..=5 {
-            for degree in 0..=4 {
-                for (trigonometric, inputs) in [(false, true), (true, false), (true, true)] {
-                    let standard = StandardLibrary {
-                        degree,
-                        trigonometric,
-                        inputs,
-                    };
-                    assert_eq!(
-                        standard.term_count(latent_dim),
-                        Some(standard.texts(latent_dim).unwrap().len())
-                    );
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn standard_library_of_published_degree_has_seven_d_plus_one_terms() {
-        let count = |latent_dim| StandardLibrary::default().term_count(latent_dim);
-        assert!((1..=18).all(|latent_dim| count(latent_dim) == Some(7 * latent_dim + 1)));
-    }
 }

@@ -7,13 +7,71 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::activation::Activation;
-use super::affine::AffineMap;
-use super::error::{ModelError, check_shape};
+use super::error::{ModelError, check, check_finite, check_shape};
 
 /// Most layers of a map.
 pub const MAX_LAYERS: usize = 16;
 /// Most units of a layer.
 pub const MAX_LAYER_WIDTH: usize = 1024;
+
+/// The map `x -> W x + b`, in scaled units.
+///
+/// As an encoder `W_e` is `latent_dim x state_dim`, as a decoder `W_d` is `state_dim x latent_dim`.
+/// Positions take the bias, velocities and accelerations do not.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AffineMap {
+    weights: DMatrix<f64>,
+    bias: DVector<f64>,
+}
+
+impl AffineMap {
+    /// The map with these weights and this bias; `tensor` names it in errors.
+    ///
+    /// # Errors
+    /// [`ModelError::Invalid`] unless `bias` has one entry per row of `weights`,
+    /// [`ModelError::NonFinite`] if an entry is infinite or not a number.
+    pub fn new(
+        tensor: &str,
+        weights: DMatrix<f64>,
+        bias: DVector<f64>,
+    ) -> Result<Self, ModelError> {
+        let bias_name = format!("{tensor}.bias");
+        check_shape(&bias_name, bias.shape(), (weights.nrows(), 1))?;
+        check_finite(&format!("{tensor}.weights"), &weights)?;
+        check_finite(&bias_name, &bias)?;
+        Ok(Self { weights, bias })
+    }
+
+    /// `W`, `output_dim x input_dim`.
+    pub fn weights(&self) -> &DMatrix<f64> {
+        &self.weights
+    }
+
+    /// `b`, `output_dim`.
+    pub fn bias(&self) -> &DVector<f64> {
+        &self.bias
+    }
+
+    /// Columns of `W`.
+    pub fn input_dim(&self) -> usize {
+        self.weights.ncols()
+    }
+
+    pub(crate) fn output_dim(&self) -> usize {
+        self.weights.nrows()
+    }
+
+    /// `W x + b`: how positions map.
+    fn apply(&self, x: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
+        Ok(self.apply_linear(x)? + &self.bias)
+    }
+
+    /// `W dx`: how velocities and accelerations map.
+    fn apply_linear(&self, dx: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
+        ModelError::check_dimension("argument of an affine map", dx.len(), self.input_dim())?;
+        Ok(&self.weights * dx)
+    }
+}
 
 /// One layer: `y -> phi(W y + b)`, the activation applied to each unit.
 #[derive(Clone, Debug, PartialEq)]
@@ -49,20 +107,26 @@ impl StateMap {
     /// [`ModelError::Invalid`] unless there are 1 to [`MAX_LAYERS`], each of at most
     /// [`MAX_LAYER_WIDTH`] units, and each takes the outputs of the layer before it.
     pub fn new(tensor: &str, layers: Vec<Layer>) -> Result<Self, ModelError> {
-        if !(1..=MAX_LAYERS).contains(&layers.len()) {
-            let place = format!("`{tensor}.layers`");
-            let found = format!("{} layers", layers.len());
-            let expected = format!("1 to {MAX_LAYERS}");
-            return Err(ModelError::invalid(place, found, expected));
-        }
+        let n_layers = layers.len();
+        let (fits, place) = (
+            (1..=MAX_LAYERS).contains(&n_layers),
+            format!("`{tensor}.layers`"),
+        );
+        let expected = format!("1 to {MAX_LAYERS}");
+        check(fits, &place, || format!("{n_layers} layers"), expected)?;
         for (index, layer) in layers.iter().enumerate() {
             let (rows, columns) = layer.map.weights().shape();
             let name = format!("{tensor}.layers[{index}].weights");
-            if rows > MAX_LAYER_WIDTH {
-                let found = format!("{rows} units");
-                let expected = format!("at most {MAX_LAYER_WIDTH}");
-                return Err(ModelError::invalid(format!("`{name}`"), found, expected));
-            }
+            let (fits, expected) = (
+                rows <= MAX_LAYER_WIDTH,
+                format!("at most {MAX_LAYER_WIDTH}"),
+            );
+            check(
+                fits,
+                &format!("`{name}`"),
+                || format!("{rows} units"),
+                expected,
+            )?;
             let expected = match index {
                 0 => columns,
                 _ => layers[index - 1].map.output_dim(),
@@ -101,9 +165,6 @@ impl StateMap {
     }
 
     /// How positions map.
-    ///
-    /// # Errors
-    /// [`ModelError::Dimension`] if `x` is not `input_dim` long.
     pub fn apply(&self, x: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
         let (first, rest) = self.layers.split_first().expect("a map has a layer");
         let y = first.activated(first.map.apply(x)?);
@@ -114,9 +175,6 @@ impl StateMap {
     /// How positions, velocities and accelerations map: `y`, `J(x) dx` and `J(x) ddx + dJ/dt dx`.
     ///
     /// Each layer takes `dy -> phi'(a) W dy` and `ddy -> phi''(a) (W dy)^2 + phi'(a) W ddy`.
-    ///
-    /// # Errors
-    /// [`ModelError::Dimension`] if an argument is not `input_dim` long.
     pub fn apply_rates(
         &self,
         x: &DVector<f64>,
@@ -139,9 +197,6 @@ impl StateMap {
     }
 
     /// The Jacobian `J(x) = dy/dx`, `output_dim x input_dim`.
-    ///
-    /// # Errors
-    /// [`ModelError::Dimension`] if `x` is not `input_dim` long.
     pub fn jacobian(&self, x: &DVector<f64>) -> Result<DMatrix<f64>, ModelError> {
         let mut y = x.clone();
         let mut jacobian = None;
@@ -180,15 +235,17 @@ impl StateMap {
     /// rank.
     pub(super) fn check_widths(&self, latent_dim: usize) -> Result<(), ModelError> {
         let widths = self.layers.iter().map(|layer| layer.map.output_dim());
-        match widths.enumerate().find(|&(_, width)| width < latent_dim) {
-            None => Ok(()),
-            Some((layer, found)) => {
-                let expected = format!("at least {latent_dim}, one per latent coordinate");
-                let place = format!("`encoder.layers[{layer}]`");
-                let found = format!("{found} units");
-                Err(ModelError::invalid(place, found, expected))
-            }
+        for (layer, width) in widths.enumerate() {
+            let place = format!("`encoder.layers[{layer}]`");
+            let expected = format!("at least {latent_dim}, one per latent coordinate");
+            check(
+                width >= latent_dim,
+                &place,
+                || format!("{width} units"),
+                expected,
+            )?;
         }
+        Ok(())
     }
 
     /// The layers in words: `18 -> 32 elu -> 4`.
@@ -210,127 +267,5 @@ impl Layer {
             a.apply(|a| *a = self.activation.value(*a));
         }
         a
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn wave(rows: usize, cols: usize, seed: f64) -> DMatrix<f64> {
-        DMatrix::from_fn(rows, cols, |i, j| {
-            (seed + 1.7 * i as f64 + 0.9 * j as f64 + 0.3 * (i * j) as f64).sin()
-        })
-    }
-
-    fn chain(activations: &[Activation]) -> StateMap {
-        let widths = [5, 7, 6, 3];
-        let layers = activations.iter().enumerate().map(|(k, &activation)| {
-            let output = if k + 1 == activations.len() {
-                3
-            } else {
-                widths[k + 1]
-            };
-            let input = widths[k];
-            let bias = DVector::from_fn(output, |i, _| (0.4 * i as f64 - k as f64).cos());
-            let map = AffineMap::new("encoder", wave(output, input, k as f64), bias);
-            Layer {
-                map: map.expect("shapes fit"),
-                activation,
-            }
-        });
-        StateMap::new("encoder", layers.collect()).expect("a chain")
-    }
-
-    fn all() -> Vec<StateMap> {
-        use Activation::{Elu, Linear, Sigmoid, Tanh};
-        vec![
-            chain(&[Linear]),
-            chain(&[Tanh]),
-            chain(&[Elu, Linear]),
-            chain(&[Elu, Tanh, Linear]),
-            chain(&[Sigmoid, Elu, Tanh]),
-        ]
-    }
-
-    fn vector(seed: f64) -> DVector<f64> {
-        DVector::from_fn(5, |i, _| (seed + 2.3 * i as f64).sin())
-    }
-
-    fn velocity(map: &StateMap, x: &DVector<f64>, dx: &DVector<f64>) -> DVector<f64> {
-        let [_, dy, _] = map.apply_rates(x, dx, &vector(9.0)).unwrap();
-        dy
-    }
-
-    #[test]
-    fn jacobian_and_velocity_equal_central_differences() {
-        let (x, dx) = (vector(0.2), vector(1.4));
-        let h = 1e-6;
-        for map in all() {
-            let forward = map.apply(&(&x + &dx * h)).unwrap();
-            let backward = map.apply(&(&x - &dx * h)).unwrap();
-            let expected = (forward - backward) / (2.0 * h);
-            let found = velocity(&map, &x, &dx);
-            assert!((&found - &expected).amax() < 1e-8, "{found} {expected}");
-            let product = map.jacobian(&x).unwrap() * &dx;
-            assert!((&found - product).amax() < 1e-13);
-        }
-    }
-
-    #[test]
-    fn acceleration_equals_central_difference_of_velocity_along_a_parabola() {
-        let (x, dx, ddx) = (vector(0.2), vector(1.4), vector(-0.7));
-        let h = 1e-5;
-        for map in all() {
-            let velocity = |t: f64| {
-                let at = &x + &dx * t + &ddx * (0.5 * t * t);
-                velocity(&map, &at, &(&dx + &ddx * t))
-            };
-            let expected = (velocity(h) - velocity(-h)) / (2.0 * h);
-            let [y, _, found] = map.apply_rates(&x, &dx, &ddx).unwrap();
-            assert_eq!(Ok(y), map.apply(&x));
-            assert!((&found - &expected).amax() < 1e-7, "{found} {expected}");
-        }
-    }
-
-    #[test]
-    fn single_linear_layer_is_the_affine_map() {
-        let map = chain(&[Activation::Linear]);
-        let affine = map.as_affine().expect("linear").clone();
-        let x = vector(0.5);
-        assert_eq!(map.apply(&x), affine.apply(&x));
-        assert_eq!(
-            Ok(velocity(&map, &vector(3.0), &x)),
-            affine.apply_linear(&x)
-        );
-        assert!(chain(&[Activation::Tanh]).as_affine().is_none());
-    }
-
-    #[test]
-    fn summary_names_widths_and_activations() {
-        let map = chain(&[Activation::Elu, Activation::Tanh, Activation::Linear]);
-        assert_eq!(map.summary(), "5 -> 7 elu -> 6 tanh -> 3");
-    }
-
-    #[test]
-    fn layers_that_do_not_fit_are_refused() {
-        let layer = |rows, cols| Layer {
-            map: AffineMap::new("m", wave(rows, cols, 0.0), DVector::zeros(rows)).unwrap(),
-            activation: Activation::Elu,
-        };
-        let refusal = |layers| {
-            let error = StateMap::new("encoder", layers).expect_err("no chain");
-            error.to_string()
-        };
-        assert_eq!(
-            refusal(vec![layer(4, 5), layer(2, 3)]),
-            "`encoder.layers[1].weights`: found 2 x 3, expected 2 x 4 (rows x columns)"
-        );
-        assert_eq!(
-            refusal(Vec::new()),
-            format!("`encoder.layers`: found 0 layers, expected 1 to {MAX_LAYERS}")
-        );
-        let wide = refusal(vec![layer(MAX_LAYER_WIDTH + 1, 2)]);
-        assert!(wide.contains("units, expected at most"), "{wide}");
     }
 }

@@ -63,30 +63,3 @@ impl Actuators {
         })
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn unusable_names_the_array_and_joint_of_a_negative_value() {
-        let mut actuators = Actuators::of_leg([1.0, 0.6, 0.6], [0.2; 3], [0.01; 3]);
-        assert_eq!((actuators.viscous[3], actuators.viscous[5]), (1.0, 0.6));
-        assert_eq!(actuators.unusable(), None);
-        actuators.dry[7] = -0.1;
-        assert_eq!(actuators.unusable(), Some(("dry", 7, -0.1)));
-    }
-
-    #[test]
-    fn losses_oppose_the_motion_and_are_dry_friction_alone_when_slow() {
-        let actuators = Actuators {
-            viscous: [0.6; JOINT_DIM],
-            dry: [0.2; JOINT_DIM],
-            armature: [0.01; JOINT_DIM],
-        };
-        let losses = actuators.losses(&[-2.0; JOINT_DIM], &[30.0; JOINT_DIM]);
-        assert!((losses[0] - (-1.2 - 0.2 + 0.3)).abs() < 1e-12);
-        let slow = actuators.losses(&[0.5; JOINT_DIM], &[0.0; JOINT_DIM])[3];
-        assert!((slow - 0.5).abs() < 1e-8, "{slow}");
-    }
-}

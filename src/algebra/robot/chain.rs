@@ -5,6 +5,8 @@
 //! `R_i = R(a_i, q_i)` of each joint the foot is at `p = R_0 (l_1 + R_1 (l_2 + R_2 l_3))` from the
 //! first joint. The last two axes are parallel: both joints move the foot in one plane.
 
+use core::ops::{Add, Mul, Sub};
+
 use nalgebra::{Matrix3, Vector3};
 
 use super::kinematics::least_levers;
@@ -19,55 +21,86 @@ pub struct ChainLeg {
 }
 
 /// Where the foot is and how each joint moves it.
-struct Moved {
-    foot: Vector3<f64>,
+pub struct Moved<T> {
+    /// Foot position from the first joint, m.
+    pub foot: [T; 3],
     /// Velocity of the foot per joint velocity.
-    columns: [Vector3<f64>; 3],
+    pub columns: [[T; 3]; 3],
     /// Axis of the second joint: the normal of the plane in which the last two move the foot.
-    normal: Vector3<f64>,
+    pub normal: [T; 3],
 }
 
-impl Moved {
-    fn levers(&self) -> [f64; 2] {
-        let [first, second, third] = &self.columns;
-        let area = second.cross(third).dot(&self.normal);
-        [area, first.dot(&self.normal)]
+/// A number of the formulas: a float, or a value of a program that is being built.
+pub trait Value: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {}
+
+impl<T: Copy + Add<Output = T> + Sub<Output = T> + Mul<Output = T>> Value for T {}
+
+impl<T: Value> Moved<T> {
+    /// Of axes and links at sine and cosine of each joint's angle; `one` is the number 1.
+    pub fn new(axes: [[T; 3]; 3], links: [[T; 3]; 3], angles: [(T, T); 3], one: T) -> Self {
+        // `v cos + (a x v) sin + a (a . v) (1 - cos)`
+        let turned = |joint: usize, vector: [T; 3]| {
+            let (axis, (sin, cos)) = (axes[joint], angles[joint]);
+            let across = cross(axis, vector);
+            let along = dot(axis, vector) * (one - cos);
+            core::array::from_fn(|i| vector[i] * cos + across[i] * sin + axis[i] * along)
+        };
+        let [hip, thigh, calf] = links;
+        let beyond_knee = turned(0, turned(1, turned(2, calf)));
+        let beyond_second = sum(turned(0, turned(1, thigh)), beyond_knee);
+        let foot = sum(turned(0, hip), beyond_second);
+        let normal = turned(0, axes[1]);
+        let knee_axis = turned(0, turned(1, axes[2]));
+        Self {
+            foot,
+            columns: [
+                cross(axes[0], foot),
+                cross(normal, beyond_second),
+                cross(knee_axis, beyond_knee),
+            ],
+            normal,
+        }
     }
+
+    /// See [`ChainLeg::levers`].
+    pub fn levers(&self) -> [T; 2] {
+        let [first, second, third] = self.columns;
+        let area = dot(cross(second, third), self.normal);
+        [area, dot(first, self.normal)]
+    }
+}
+
+/// `a + b`
+pub fn sum<T: Value>(a: [T; 3], b: [T; 3]) -> [T; 3] {
+    core::array::from_fn(|i| a[i] + b[i])
+}
+
+/// `a . b`
+pub fn dot<T: Value>(a: [T; 3], b: [T; 3]) -> T {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// `a x b`
+pub fn cross<T: Value>(a: [T; 3], b: [T; 3]) -> [T; 3] {
+    core::array::from_fn(|i| {
+        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+        a[j] * b[k] - a[k] * b[j]
+    })
 }
 
 impl ChainLeg {
     /// Foot position from the first joint, in m, at joint angles `q` in rad.
     pub fn foot_position(&self, q: &[f64; 3]) -> Vector3<f64> {
-        self.moved(q).foot
+        self.moved(q).foot.into()
     }
 
     /// Jacobian of [`Self::foot_position`]: column `j` is `axis_j x (foot - joint_j)`, in m.
     pub fn foot_jacobian(&self, q: &[f64; 3]) -> Matrix3<f64> {
-        Matrix3::from_columns(&self.moved(q).columns)
+        Matrix3::from_columns(&self.moved(q).columns.map(Vector3::from))
     }
 
-    fn moved(&self, q: &[f64; 3]) -> Moved {
-        let [first, second, third] = self.axes.map(Vector3::from);
-        let [hip, thigh, calf] = self.links.map(Vector3::from);
-        let turned = |joint: usize, vector: Vector3<f64>| {
-            let axis = Vector3::from(self.axes[joint]);
-            let (sin, cos) = q[joint].sin_cos();
-            vector * cos + axis.cross(&vector) * sin + axis * (axis.dot(&vector) * (1.0 - cos))
-        };
-        let beyond_knee = turned(0, turned(1, turned(2, calf)));
-        let beyond_second = turned(0, turned(1, thigh)) + beyond_knee;
-        let foot = turned(0, hip) + beyond_second;
-        let normal = turned(0, second);
-        let knee_axis = turned(0, turned(1, third));
-        Moved {
-            foot,
-            columns: [
-                first.cross(&foot),
-                normal.cross(&beyond_second),
-                knee_axis.cross(&beyond_knee),
-            ],
-            normal,
-        }
+    fn moved(&self, q: &[f64; 3]) -> Moved<f64> {
+        Moved::new(self.axes, self.links, q.map(f64::sin_cos), 1.0)
     }
 
     /// Lengths of thigh and calf across the second joint's axis, in m.
@@ -78,7 +111,7 @@ impl ChainLeg {
 
     /// Area that thigh and calf span, with its sign, in m^2, and lever of the first joint along the
     /// normal of their plane, in m; their product is `det J`.
-    pub(super) fn levers(&self, q: &[f64; 3]) -> [f64; 2] {
+    pub fn levers(&self, q: &[f64; 3]) -> [f64; 2] {
         self.moved(q).levers()
     }
 
@@ -104,7 +137,8 @@ impl ChainLeg {
         }
         let reciprocal = |d: f64, least: f64| d / (d * d).max(least * least);
         let (of_area, of_lever) = (reciprocal(area, least_area), reciprocal(lever, least_lever));
-        let ([first, second, third], normal) = (&moved.columns, moved.normal);
+        let [first, second, third] = &moved.columns.map(Vector3::from);
+        let normal = Vector3::from(moved.normal);
         let column = |in_plane: Vector3<f64>, share: f64| {
             -(in_plane * of_area + normal * (share * of_area * of_lever))
         };

@@ -9,7 +9,6 @@ use super::joints::Leg;
 /// Faults of the robot stage.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum RobotError {
-    /// No robot of that name is registered.
     #[error("unknown robot `{found}`; known: {known}")]
     UnknownRobot { found: String, known: String },
     /// The leg is so close to full extension (or its foot so close to the axis
@@ -28,7 +27,6 @@ pub enum RobotError {
         determinant: f64,
         bound: f64,
     },
-    /// A joint angle or torque of a leg in contact is NaN or infinite.
     #[error("{robot}: leg {leg} has the {quantity} {found}, expected a finite number")]
     NotFinite {
         robot: String,

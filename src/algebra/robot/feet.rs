@@ -15,7 +15,6 @@ pub enum FeetRule {
     Patterns(Vec<ContactFlags>),
 }
 
-/// Number of patterns of four feet.
 const N_PATTERNS: usize = 16;
 
 impl fmt::Display for FeetRule {
@@ -34,18 +33,13 @@ impl fmt::Display for FeetRule {
 
 impl FeetRule {
     /// The rule of a phase that holds whatever the feet do: all patterns.
-    ///
-    /// ```
-    /// use romc::robot::FeetRule;
-    ///
-    /// let always = FeetRule::always();
-    /// assert!(always.matches([false; 4]) && always.matches([true, false, false, true]));
-    /// assert_eq!(always.to_string(), "always");
-    /// ```
     pub fn always() -> Self {
-        let patterns =
-            (0..N_PATTERNS).map(|code| std::array::from_fn(|foot| (code >> foot) & 1 == 1));
-        FeetRule::Patterns(patterns.collect())
+        FeetRule::Patterns(Self::all_patterns().collect())
+    }
+
+    /// From no foot to four feet.
+    pub(crate) fn all_patterns() -> impl Iterator<Item = ContactFlags> {
+        (0..N_PATTERNS).map(|code| std::array::from_fn(|foot| (code >> foot) & 1 == 1))
     }
 
     /// Whether it is the rule of all patterns, each in it once.
@@ -54,16 +48,6 @@ impl FeetRule {
     }
 
     /// Whether the rule names this pattern.
-    ///
-    /// ```
-    /// use romc::robot::FeetRule;
-    ///
-    /// let rear_pair = FeetRule::Patterns(vec![[false, false, true, true]]);
-    /// assert!(rear_pair.matches([false, false, true, true]));
-    /// assert!(!rear_pair.matches([true; 4]));
-    /// assert!(FeetRule::Any.matches([true, false, false, false]));
-    /// assert!(FeetRule::None.matches([false; 4]));
-    /// ```
     pub fn matches(&self, feet: ContactFlags) -> bool {
         match self {
             FeetRule::Any => feet.contains(&true),

@@ -115,25 +115,3 @@ impl fmt::Display for Leg {
         f.write_str(self.short_name())
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn joint_names_start_with_the_name_of_their_leg() {
-        for leg in Leg::ALL {
-            for (offset, kind) in ["hx", "hy", "kn"].iter().enumerate() {
-                let name = JOINT_NAMES[LEG_JOINT_DIM * leg.index() + offset];
-                assert_eq!(name, format!("{leg}.{kind}"));
-            }
-        }
-    }
-
-    #[test]
-    fn leg_of_joints_takes_its_own_three_entries() {
-        let joints: [f64; JOINT_DIM] = std::array::from_fn(|i| i as f64);
-        assert_eq!(Leg::FrontRight.of_joints(&joints), [0.0, 1.0, 2.0]);
-        assert_eq!(Leg::RearLeft.of_joints(&joints), [9.0, 10.0, 11.0]);
-    }
-}

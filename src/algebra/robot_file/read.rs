@@ -28,7 +28,7 @@ pub struct RobotOptions<'a> {
 /// The robot of a name, or of a file that ends in `.toml` or `.urdf`.
 ///
 /// # Errors
-/// [`RobotFileError`] without a file for what is neither, else as [`read`].
+/// [`RobotFileError`] without a file for what is neither, else as [`from_text`].
 pub fn find(name_or_file: &str) -> Result<&'static Robot, RobotFileError> {
     Ok(open(name_or_file, &RobotOptions::default())?.robot)
 }
@@ -56,7 +56,9 @@ pub fn open(
             let found = format!("romc's own {name_or_file}");
             Err(RobotFileError::option(option, found, "a file"))
         }
-        (Err(_), "toml" | "urdf" | "xml" | "xacro") => read_with(path, options),
+        (Err(_), "toml" | "urdf" | "xml" | "xacro") => {
+            from_text(name_or_file, &text_of(path)?, options)
+        }
         (Err(unknown), _) => {
             let text = format!("{unknown}, or a file that ends in .toml or .urdf");
             Err(RobotFileError::text("", Place::Whole, text))
@@ -69,28 +71,6 @@ fn ending(path: &Path) -> String {
     ending.to_string_lossy().to_lowercase()
 }
 
-/// Reads a robot from a TOML or, by its ending, a URDF file; `feet` names the links of the feet of a
-/// URDF, empty to find them.
-///
-/// # Errors
-/// [`RobotFileError`] with the entry that is wrong or missing.
-pub fn read(path: &Path, feet: &[String]) -> Result<&'static Robot, RobotFileError> {
-    Ok(read_with(path, &RobotOptions { feet, name: None })?.robot)
-}
-
-fn read_with(path: &Path, options: &RobotOptions<'_>) -> Result<RobotReading, RobotFileError> {
-    let file = path.display().to_string();
-    let text = text_of(path)?;
-    match ending(path).as_str() {
-        "toml" if options.feet.is_empty() => toml_reading(&file, &text, options.name),
-        "toml" => {
-            let found = format!("{file} with links of feet");
-            Err(RobotFileError::option("--feet", found, "a URDF"))
-        }
-        _ => urdf_reading(&file, &text, options),
-    }
-}
-
 /// The text of a file of bounded size.
 pub(super) fn text_of(path: &Path) -> Result<String, RobotFileError> {
     let text = match ending(path).as_str() {
@@ -101,52 +81,26 @@ pub(super) fn text_of(path: &Path) -> Result<String, RobotFileError> {
     text.map_err(|source| RobotFileError::io(&file, "read the file", source))
 }
 
-/// Reads a robot from TOML; `file` names it in errors.
+/// Reads a robot from TOML or, by the ending of `file`, which names it in errors, URDF.
 ///
 /// # Errors
-/// As [`read`].
-pub fn from_toml(file: &str, text: &str) -> Result<&'static Robot, RobotFileError> {
-    Ok(toml_reading(file, text, None)?.robot)
-}
-
-fn toml_reading(
-    file: &str,
-    text: &str,
-    name: Option<&str>,
-) -> Result<RobotReading, RobotFileError> {
-    let entry = from_toml_text::<RobotEntry>(file, text)?;
-    identified(file, entry, &Places::Keys, name, Vec::new())
-}
-
-/// Reads a robot from URDF; `feet` names the links of its feet, empty to find them.
-///
-/// # Errors
-/// As [`read`].
-pub fn from_urdf(
-    file: &str,
-    text: &str,
-    feet: &[String],
-) -> Result<&'static Robot, RobotFileError> {
-    Ok(urdf_reading(file, text, &RobotOptions { feet, name: None })?.robot)
-}
-
-/// [`from_urdf`] with options and notes.
-///
-/// # Errors
-/// As [`read`].
-pub fn urdf_reading(
+/// [`RobotFileError`] with the entry that is wrong or missing.
+pub fn from_text(
     file: &str,
     text: &str,
     options: &RobotOptions<'_>,
 ) -> Result<RobotReading, RobotFileError> {
-    let reading = urdf::read(file, text, options.feet, options.name)?;
-    identified(
-        file,
-        reading.entry,
-        &reading.places,
-        options.name,
-        reading.notes,
-    )
+    if ending(Path::new(file)) != "toml" {
+        let reading = urdf::read(file, text, options.feet, options.name)?;
+        let (entry, places) = (reading.entry, &reading.places);
+        return identified(file, entry, places, options.name, reading.notes);
+    }
+    if !options.feet.is_empty() {
+        let found = format!("{file} with links of feet");
+        return Err(RobotFileError::option("--feet", found, "a URDF"));
+    }
+    let entry = from_toml_text::<RobotEntry>(file, text)?;
+    identified(file, entry, &Places::Keys, options.name, Vec::new())
 }
 
 pub(super) fn from_toml_text<T: DeserializeOwned>(

@@ -50,7 +50,7 @@ impl ExprPool {
                 Some(integer) => child(*base).powi(integer),
                 None => child(*base).pow(child(*exponent)),
             },
-            Node::Apply(function, argument) => function.image(child(*argument)),
+            Node::Apply(function, argument) => (function.row().image)(child(*argument)),
         }
     }
 
@@ -131,7 +131,7 @@ impl ExprPool {
                 Some(integer) => integer > 0 || !range(base).contains(0.0),
                 None => range(base).lo() > 0.0,
             },
-            Node::Apply(function, argument) => function.is_lipschitz_on(range(argument)),
+            Node::Apply(function, argument) => (function.row().is_lipschitz)(range(argument)),
         })
     }
 }

@@ -137,10 +137,7 @@ impl ExprPool {
     }
 
     fn push_terms(&self, expr: ExprId, terms: &mut Vec<(Number, ExprId)>) {
-        match self.node(expr) {
-            Node::Sum(operands) => terms.extend(operands.iter().map(|term| self.split(*term))),
-            _ => terms.push(self.split(expr)),
-        }
+        terms.extend(self.summands_of(expr).iter().map(|term| self.split(*term)));
     }
 
     /// `coefficient * expr`; a factor of `1` or `-1` goes into the terms of a sum.
@@ -188,9 +185,26 @@ impl ExprPool {
 
     /// Whether the canonical text of `expr` starts with a minus.
     pub(super) fn starts_negative(&self, expr: ExprId) -> bool {
-        match self.node(expr) {
-            Node::Sum(terms) => self.split(terms[0]).0.is_negative(),
-            _ => self.split(expr).0.is_negative(),
+        self.split(self.summands_of(expr)[0]).0.is_negative()
+    }
+
+    /// Splits an expression into a number and the rest, which is the same for all its multiples: that of `2*x - 4*y` is
+    /// `x - 2*y`.
+    pub(super) fn content(&mut self, expr: ExprId) -> (Number, ExprId) {
+        let (mut number, mut rest) = self.split(expr);
+        loop {
+            let terms = self.terms_of(rest);
+            let first = terms.first().map_or(Number::ONE, |term| term.0);
+            if terms.len() < 2 || first.is_one() {
+                return (number, rest);
+            }
+            let quotients = (terms.iter()).map(|&(n, rest)| Some((n.checked_div(first)?, rest)));
+            let (Some(terms), Some(product)) = (quotients.collect(), number.checked_mul(first))
+            else {
+                return (number, rest);
+            };
+            // A part that is no longer multiplied may be a sum itself.
+            (number, rest) = (product, self.sum_of_terms(terms));
         }
     }
 

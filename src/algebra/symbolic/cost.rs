@@ -138,17 +138,11 @@ impl ExprPool {
             let powers = self.factors_of(*term).iter();
             powers.filter_map(|f| self.function_power(*f)).count() as u64
         };
-        match self.node(expr) {
-            Node::Sum(terms) => terms.iter().map(of_term).sum(),
-            _ => of_term(&expr),
-        }
+        self.summands_of(expr).iter().map(of_term).sum()
     }
 
     fn n_terms(&self, expr: ExprId) -> u64 {
-        match self.node(expr) {
-            Node::Sum(terms) => terms.len() as u64,
-            _ => 1,
-        }
+        self.summands_of(expr).len() as u64
     }
 }
 

@@ -94,7 +94,7 @@ impl ExprPool {
             }
             Node::Apply(function, argument) => {
                 let d_argument = inner(self, argument);
-                let outer = function.derivative(self, argument, expr);
+                let outer = (function.row().derivative)(self, argument, expr);
                 self.product(&[outer, d_argument])
             }
         }

@@ -38,11 +38,11 @@ impl ExprPool {
         }
         let factors = self.factors_of(expr).to_vec();
         let mut plain = Vec::new();
-        let mut sums: Vec<(ExprId, usize)> = Vec::new();
+        let mut sums: Vec<(ExprId, i64)> = Vec::new();
         for factor in factors {
-            match self.as_sum_power(factor) {
-                Some(sum_power) => sums.push(sum_power),
-                None => plain.push(factor),
+            match self.sum_power(factor) {
+                Some((sum, exponent @ 0..)) => sums.push((sum, exponent)),
+                _ => plain.push(factor),
             }
         }
         if sums.is_empty() {
@@ -65,17 +65,6 @@ impl ExprPool {
             }
         }
         self.sum_of_terms(terms)
-    }
-
-    fn as_sum_power(&self, factor: ExprId) -> Option<(ExprId, usize)> {
-        match *self.node(factor) {
-            Node::Sum(_) => Some((factor, 1)),
-            Node::Power(base, exponent) if matches!(self.node(base), Node::Sum(_)) => {
-                let exponent = self.as_integer(exponent)?;
-                Some((base, usize::try_from(exponent).ok()?))
-            }
-            _ => None,
-        }
     }
 
     fn multiply(&mut self, a: &Terms, b: &Terms) -> Terms {

@@ -26,7 +26,7 @@ pub enum Function {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Parity {
+pub(super) enum Parity {
     /// `f(-x) = f(x)`.
     Even,
     /// `f(-x) = -f(x)`.
@@ -34,17 +34,18 @@ pub(crate) enum Parity {
     Neither,
 }
 
-struct Row {
+/// What the algebra uses of a function.
+pub(super) struct Row {
     function: Function,
     /// Names in the term grammar; the first is printed.
     names: &'static [&'static str],
-    parity: Parity,
+    pub(super) parity: Parity,
     value: fn(f64) -> f64,
-    image: fn(Interval) -> Interval,
+    pub(super) image: fn(Interval) -> Interval,
     /// Whether slopes are bounded on an interval of arguments, and no jump lies in it.
-    is_lipschitz: fn(Interval) -> bool,
+    pub(super) is_lipschitz: fn(Interval) -> bool,
     /// `f'(x)`, given `x` and `f(x)`, written with the latter where that saves work.
-    derivative: fn(&mut ExprPool, ExprId, ExprId) -> ExprId,
+    pub(super) derivative: fn(&mut ExprPool, ExprId, ExprId) -> ExprId,
 }
 
 const ROWS: [Row; 9] = [
@@ -53,7 +54,7 @@ const ROWS: [Row; 9] = [
         names: &["sin"],
         parity: Parity::Odd,
         value: f64::sin,
-        image: Interval::sin,
+        image: |x| x.oscillation(f64::sin, 0.5),
         is_lipschitz: |_| true,
         derivative: |pool, x, _| pool.apply(Function::Cos, x),
     },
@@ -62,7 +63,7 @@ const ROWS: [Row; 9] = [
         names: &["cos"],
         parity: Parity::Even,
         value: f64::cos,
-        image: Interval::cos,
+        image: |x| x.oscillation(f64::cos, 0.0),
         is_lipschitz: |_| true,
         derivative: |pool, x, _| {
             let sine = pool.apply(Function::Sin, x);
@@ -86,7 +87,10 @@ const ROWS: [Row; 9] = [
         names: &["tanh"],
         parity: Parity::Odd,
         value: f64::tanh,
-        image: Interval::tanh,
+        image: |x| {
+            x.increasing(f64::tanh)
+                .intersection(Interval::new(-1.0, 1.0))
+        },
         is_lipschitz: |_| true,
         derivative: |pool, _, value| {
             let square = pool.powi(value, 2);
@@ -157,7 +161,7 @@ impl Function {
         all
     };
 
-    fn row(self) -> &'static Row {
+    pub(super) fn row(self) -> &'static Row {
         &ROWS[self as usize]
     }
 
@@ -171,11 +175,6 @@ impl Function {
         Some(row.function)
     }
 
-    /// How the function answers a change of its argument's sign.
-    pub(crate) fn parity(self) -> Parity {
-        self.row().parity
-    }
-
     /// The value at `argument`; NaN or infinite where the function has none.
     pub fn evaluate(self, argument: f64) -> f64 {
         (self.row().value)(argument)
@@ -184,20 +183,6 @@ impl Function {
     /// Whether it is zero where its argument is; in floats, nowhere else: none is a multiple of pi.
     pub(super) fn vanishes_at_zero(self) -> bool {
         self.evaluate(0.0) == 0.0
-    }
-
-    pub(super) fn image(self, argument: Interval) -> Interval {
-        (self.row().image)(argument)
-    }
-
-    /// Whether slopes are bounded on an interval of arguments, and no jump lies in it.
-    pub(super) fn is_lipschitz_on(self, argument: Interval) -> bool {
-        (self.row().is_lipschitz)(argument)
-    }
-
-    /// `f'(x)`, given `x` and `f(x)`.
-    pub(super) fn derivative(self, pool: &mut ExprPool, x: ExprId, value: ExprId) -> ExprId {
-        (self.row().derivative)(pool, x, value)
     }
 }
 

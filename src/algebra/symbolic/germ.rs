@@ -40,27 +40,11 @@ pub(super) struct Germs<'a> {
     /// Exponent from which on terms are left out.
     pub order: i64,
     /// Series of the expressions that are not smooth.
-    known: IdMap<Series>,
+    pub known: IdMap<Series>,
 }
 
-impl<'a> Germs<'a> {
-    pub(crate) fn new(
-        pool: &'a mut ExprPool,
-        facts: &'a Facts,
-        symbol: SymbolId,
-        side: Number,
-        order: i64,
-    ) -> Self {
-        Self {
-            pool,
-            facts,
-            symbol,
-            side,
-            order,
-            known: IdMap::default(),
-        }
-    }
-
+impl Germs<'_> {
+    /// The series of an expression; nothing if it is smooth.
     pub(crate) fn of(&mut self, root: ExprId) -> Result<Option<Series>, Stop> {
         let symbol = self.symbol;
         let wanted = |node| self.pool.may_contain(node, symbol);

@@ -214,19 +214,6 @@ impl Interval {
         inside.increasing(f64::ln)
     }
 
-    pub(crate) fn tanh(self) -> Interval {
-        self.increasing(f64::tanh)
-            .intersection(Interval::new(-1.0, 1.0))
-    }
-
-    pub(crate) fn sin(self) -> Interval {
-        self.oscillation(f64::sin, 0.5)
-    }
-
-    pub(crate) fn cos(self) -> Interval {
-        self.oscillation(f64::cos, 0.0)
-    }
-
     /// `tan(x)`: all reals if a pole may lie inside.
     pub(crate) fn tan(self) -> Interval {
         if self.is_empty() {
@@ -238,7 +225,7 @@ impl Interval {
         self.increasing(f64::tan)
     }
 
-    fn increasing(self, function: impl Fn(f64) -> f64) -> Interval {
+    pub(super) fn increasing(self, function: impl Fn(f64) -> f64) -> Interval {
         if self.is_empty() {
             return self;
         }
@@ -246,7 +233,7 @@ impl Interval {
     }
 
     /// The image under sine or cosine, whose maxima are at `(2k + offset) pi`.
-    fn oscillation(self, function: impl Fn(f64) -> f64, offset: f64) -> Interval {
+    pub(super) fn oscillation(self, function: impl Fn(f64) -> f64, offset: f64) -> Interval {
         if self.is_empty() {
             return self;
         }

@@ -75,23 +75,16 @@ pub(super) fn tokenize(text: &str) -> Result<Vec<Token<'_>>, ParseError> {
 
 /// Digits, a point, digits, and an exponent with at least one digit.
 fn number_length(text: &str) -> usize {
-    let bytes = text.as_bytes();
-    let digits = |from: usize| {
-        let count = bytes[from..]
-            .iter()
-            .take_while(|b| b.is_ascii_digit())
-            .count();
-        from + count
-    };
-    let mut end = digits(0);
-    if bytes.get(end) == Some(&b'.') {
-        end = digits(end + 1);
+    let n_digits = |text: &str| text.bytes().take_while(u8::is_ascii_digit).count();
+    let mut end = n_digits(text);
+    if let Some(fraction) = text[end..].strip_prefix('.') {
+        end += 1 + n_digits(fraction);
     }
-    if matches!(bytes.get(end), Some(b'e' | b'E')) {
-        let sign = usize::from(matches!(bytes.get(end + 1), Some(b'+' | b'-')));
-        let exponent_end = digits((end + 1 + sign).min(bytes.len()));
-        if exponent_end > end + 1 + sign {
-            end = exponent_end;
+    if let Some(exponent) = text[end..].strip_prefix(['e', 'E']) {
+        let sign = usize::from(exponent.starts_with(['+', '-']));
+        match n_digits(&exponent[sign..]) {
+            0 => {}
+            n => end += 1 + sign + n,
         }
     }
     end
@@ -99,20 +92,16 @@ fn number_length(text: &str) -> usize {
 
 /// Letters, digits and underscores; parts may be joined by points, as in `body.x`.
 fn name_length(text: &str) -> usize {
-    let bytes = text.as_bytes();
     let is_word = |byte: &u8| byte.is_ascii_alphanumeric() || *byte == b'_';
-    let mut end = 0;
-    loop {
-        end += bytes[end..].iter().take_while(|byte| is_word(byte)).count();
-        let joins = bytes.get(end) == Some(&b'.')
-            && bytes
-                .get(end + 1)
-                .is_some_and(|byte| byte.is_ascii_alphabetic() || *byte == b'_');
-        if !joins {
-            return end;
-        }
-        end += 1;
+    let is_start = |c: char| c.is_ascii_alphabetic() || c == '_';
+    let word = |text: &str| text.bytes().take_while(is_word).count();
+    let mut end = word(text);
+    while let Some(part) = text[end..].strip_prefix('.')
+        && part.starts_with(is_start)
+    {
+        end += 1 + word(part);
     }
+    end
 }
 
 /// The value of a number token: exact if it is written as an integer that fits; nothing for what floats hold as

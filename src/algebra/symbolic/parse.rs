@@ -54,34 +54,25 @@ pub struct ParseError {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[allow(missing_docs, reason = "each variant's message names its fields")]
 pub enum ParseErrorKind {
-    /// A character that the grammar does not have.
     #[error("found `{}`, expected {}", .0.escape_debug(), spelling(*.0))]
     Character(char),
-    /// A number that cannot be read, or is too large or too small for a float.
     #[error("found `{0}`, expected a finite number that floats hold (5e-324 to 1.8e308 in size)")]
     Number(String),
-    /// A part that has no value, such as `1/0` or `log(-2)`.
     #[error("`{0}` has no value")]
     NoValue(String),
-    /// A token in quotes, or `end of text`, in the wrong place.
     #[error("found {found}, expected {expected}")]
     Unexpected {
         found: String,
         expected: &'static str,
     },
-    /// A variable that is not allowed here.
     #[error("found the unknown name `{0}`")]
     UnknownName(String),
-    /// A call of something that is not a function.
-    #[error("found `{0}`, expected sin, cos, tan, tanh, exp, log, sqrt, abs or sign")]
+    #[error("found `{found}`, expected {expected}", found = .0, expected = function_names())]
     UnknownFunction(String),
-    /// The text is longer than allowed.
     #[error("found a text of {found} bytes, expected at most {limit}")]
     TooLong { found: usize, limit: usize },
-    /// Too many open parentheses and exponents.
     #[error("found too many open parentheses and exponents, expected at most {0}")]
     TooDeep(usize),
-    /// A constant exponent is larger than allowed.
     #[error("found the exponent {found}, expected at most {limit}")]
     Exponent { found: String, limit: u32 },
 }
@@ -105,6 +96,11 @@ fn spelling(character: char) -> &'static str {
         'π' => "3.141592653589793",
         _ => "numbers, names, functions and + - * / ^ ( )",
     }
+}
+
+fn function_names() -> String {
+    let [names @ .., last] = Function::ALL.map(Function::name);
+    format!("{} or {last}", names.join(", "))
 }
 
 /// The start of a token, for messages.

@@ -309,10 +309,18 @@ impl ExprPool {
     /// The terms of a sum in canonical order, each as `(coefficient, rest)`; anything else is a
     /// sum of one term, and zero of none.
     pub fn terms_of(&self, expr: ExprId) -> Vec<(Number, ExprId)> {
-        match self.node(expr) {
-            Node::Sum(terms) => terms.iter().map(|term| self.split(*term)).collect(),
-            _ if expr == ExprId::ZERO => Vec::new(),
-            _ => vec![self.split(expr)],
+        if expr == ExprId::ZERO {
+            return Vec::new();
+        }
+        let terms = self.summands_of(expr).iter();
+        terms.map(|term| self.split(*term)).collect()
+    }
+
+    /// The terms of a sum in canonical order; anything else is its own only term.
+    pub(super) fn summands_of(&self, expr: ExprId) -> &[ExprId] {
+        match &self.nodes[expr.index()] {
+            Node::Sum(terms) => terms,
+            _ => std::slice::from_ref(&self.facts[expr.index()].itself),
         }
     }
 

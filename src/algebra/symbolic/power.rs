@@ -216,10 +216,11 @@ impl ExprPool {
         if let Some(value) = self.special_value(function, argument) {
             return value;
         }
-        if function.parity() != Parity::Neither && self.starts_negative(argument) {
+        let parity = function.row().parity;
+        if parity != Parity::Neither && self.starts_negative(argument) {
             let positive = self.neg(argument);
             let value = self.apply(function, positive);
-            return self.negated_if(function.parity() == Parity::Odd, value);
+            return self.negated_if(parity == Parity::Odd, value);
         }
         self.intern(Node::Apply(function, argument))
     }

@@ -95,6 +95,12 @@ impl ExprPool {
         }
     }
 
+    /// A factor as an integer power of a sum.
+    pub(super) fn sum_power(&self, factor: ExprId) -> Option<(ExprId, i64)> {
+        let is_sum = |(base, _): &(ExprId, i64)| matches!(self.node(*base), Node::Sum(_));
+        self.integer_power(factor).filter(is_sum)
+    }
+
     /// What `pick` takes of the factors of a product, and its other factors.
     pub(super) fn partition_factors<T>(
         &mut self,

@@ -119,14 +119,11 @@ impl ExprPool {
 
     /// `1/(a^2 + a*b) = 1/(a*(a + b))`, also with the least negative powers in front.
     fn split_divisor(&mut self, expr: ExprId) -> ExprId {
-        let Some((base, power @ ..0)) = self.integer_power(expr) else {
-            return expr;
-        };
-        let Node::Sum(terms) = self.node(base) else {
+        let Some((base, power @ ..0)) = self.sum_power(expr) else {
             return expr;
         };
         let exponent = Number::integer(power);
-        let terms = terms.to_vec();
+        let terms = self.summands_of(base).to_vec();
         let mut shared: Vec<(ExprId, Number)> = Vec::new();
         let powers: Vec<Vec<(ExprId, Number)>> = (terms.iter())
             .map(|term| self.powers_with_exponentials(*term))

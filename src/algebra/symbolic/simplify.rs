@@ -19,7 +19,6 @@
 use super::canonical::CanonicalForms;
 use super::cost::Costs;
 use super::function::Function;
-use super::id_map::IdMap;
 use super::node::{ExprId, Node};
 use super::order::Exponent;
 use super::pool::ExprPool;
@@ -117,10 +116,7 @@ impl ExprPool {
         match self.node(expr) {
             Node::Sum(_) => self.shorter_sum(expr),
             Node::Product(factors) => {
-                let is_divisor = |factor: &ExprId| match self.integer_power(*factor) {
-                    Some((base, -1)) => matches!(self.node(base), Node::Sum(_)),
-                    _ => false,
-                };
+                let is_divisor = |factor: &ExprId| matches!(self.sum_power(*factor), Some((_, -1)));
                 let (divisors, mut rest): (Vec<ExprId>, Vec<ExprId>) =
                     factors.iter().partition(|factor| is_divisor(factor));
                 let sums: Vec<ExprId> = (divisors.iter())
@@ -217,15 +213,13 @@ impl ExprPool {
 
     /// How many divisors that are sums stand below each other at most.
     fn levels_of_divisors(&self, expr: ExprId) -> usize {
-        let mut levels: IdMap<usize> = IdMap::default();
-        for part in self.reachable(&[expr]) {
-            let (base, exponent) = self.base_and_exponent(part);
+        let levels = self.fold_up(&[expr], |pool, part, levels_of| {
+            let (base, exponent) = pool.base_and_exponent(part);
             let is_divisor = matches!(exponent, Exponent::Number(number) if number.is_negative());
-            let own = usize::from(is_divisor && matches!(self.node(base), Node::Sum(_)));
-            let below = self.children(part).map(|child| levels[&child]).max();
-            levels.insert(part, own + below.unwrap_or(0));
-        }
-        levels[&expr]
+            let own = usize::from(is_divisor && matches!(pool.node(base), Node::Sum(_)));
+            own + pool.children(part).map(levels_of).max().unwrap_or(0)
+        });
+        levels[0]
     }
 
     /// Whether sines, cosines or tangents are among the atoms of a region.

@@ -16,6 +16,7 @@ use std::cmp::Ordering;
 
 use super::function::Function;
 use super::germ::{Germs, LAST_ORDER, Stop};
+use super::id_map::IdMap;
 use super::node::{ExprId, Node, SymbolId};
 use super::number::Number;
 use super::pool::{ExprPool, Sign};
@@ -89,7 +90,7 @@ impl Facts {
         if pool.sign(expr) != Sign::Any {
             return Ok(true);
         }
-        let (content, rest) = content(pool, expr);
+        let (content, rest) = pool.content(expr);
         let sign = pool.apply(Function::Sign, rest);
         let below = pool.sub(sign, ExprId::ONE);
         Ok(self.is_zero(pool, below)? != content.is_negative())
@@ -165,42 +166,19 @@ impl Facts {
     }
 }
 
-/// Splits an expression into a number and the rest, which is the same for all its multiples.
-fn content(pool: &mut ExprPool, expr: ExprId) -> (Number, ExprId) {
-    let (mut number, mut rest) = pool.split(expr);
-    loop {
-        let terms = pool.terms_of(rest);
-        let first = terms.first().map_or(Number::ONE, |term| term.0);
-        if terms.len() < 2 || first.is_one() {
-            return (number, rest);
-        }
-        let quotients = terms
-            .iter()
-            .map(|&(n, rest)| Some((n.checked_div(first)?, rest)));
-        let Some(terms) = quotients.collect() else {
-            return (number, rest);
-        };
-        let Some(product) = number.checked_mul(first) else {
-            return (number, rest);
-        };
-        // A part that is no longer multiplied may be a sum itself.
-        (number, rest) = (product, pool.sum_of_terms(terms));
-    }
-}
-
 /// What is zero exactly where an expression is, in floats: none but zero is a multiple of pi.
 fn core(pool: &mut ExprPool, expr: ExprId) -> ExprId {
     if pool.as_number(expr).is_some() {
         return expr;
     }
-    let mut core = content(pool, expr).1;
+    let mut core = pool.content(expr).1;
     loop {
         core = match *pool.node(core) {
             Node::Power(base, exponent) if pool.sign(exponent) == Sign::Positive => base,
             Node::Apply(function, inner) if function.vanishes_at_zero() => inner,
             _ => return core,
         };
-        core = content(pool, core).1;
+        core = pool.content(core).1;
     }
 }
 
@@ -377,7 +355,15 @@ impl ExprPool {
         for side in [Number::ONE, Number::MINUS_ONE] {
             let mut order = 2;
             let stop = loop {
-                match Germs::new(self, facts, symbol, side, order).slope(expr) {
+                let mut germs = Germs {
+                    pool: self,
+                    facts,
+                    symbol,
+                    side,
+                    order,
+                    known: IdMap::default(),
+                };
+                match germs.slope(expr) {
                     Ok(Outcome::Finite(slope) | Outcome::Infinite(slope))
                         if self.has_pole(slope) =>
                     {

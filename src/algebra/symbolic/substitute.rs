@@ -23,38 +23,45 @@ impl ExprPool {
             symbols.any(|symbol| self.may_contain(expr, symbol))
         };
         let order = self.walk(exprs, affected, |_| true);
-        let mut replaced: IdMap<ExprId> = IdMap::default();
-        for expr in order {
-            let symbol = self.as_symbol(expr);
-            let known = replacements.iter().find(|(old, _)| Some(*old) == symbol);
-            let new = match known {
-                Some((_, new)) => *new,
-                None => self.rebuild(expr, |child| replaced.get(&child).copied().unwrap_or(child)),
-            };
-            replaced.insert(expr, new);
-        }
-        exprs
-            .iter()
-            .map(|expr| replaced.get(expr).copied().unwrap_or(*expr))
-            .collect()
+        // The first entry of a symbol is inserted last.
+        let new = replacements.iter().rev();
+        let new = new.map(|&(symbol, new)| (self.symbol_expr(symbol), new));
+        let replaced = new.collect();
+        self.replace(exprs, order, replaced)
     }
 
     /// The expressions with every part that has no variable but a finite value as a number: `exp(3)*x` is
     /// `20.085536923187668*x`.
     pub(crate) fn fold_constants(&mut self, exprs: &[ExprId]) -> Vec<ExprId> {
+        let order = self.reachable(exprs);
         let mut folded: IdMap<ExprId> = IdMap::default();
-        for expr in self.reachable(exprs) {
-            let value = match self.is_constant(expr) && self.as_number(expr).is_none() {
-                true => self.evaluate(expr, &|_| f64::NAN),
-                false => f64::NAN,
-            };
-            let new = match value.is_finite() {
-                true => self.number(value),
-                false => self.rebuild(expr, |child| folded[&child]),
-            };
-            folded.insert(expr, new);
+        for &expr in &order {
+            if self.is_constant(expr) && self.as_number(expr).is_none() {
+                let value = self.evaluate(expr, &|_| f64::NAN);
+                if value.is_finite() {
+                    folded.insert(expr, self.number(value));
+                }
+            }
         }
-        exprs.iter().map(|expr| folded[expr]).collect()
+        self.replace(exprs, order, folded)
+    }
+
+    /// The expressions with the parts that `replaced` has, and what is made of these, built again; `order` lists their
+    /// parts, operands first.
+    pub(super) fn replace(
+        &mut self,
+        exprs: &[ExprId],
+        order: Vec<ExprId>,
+        mut replaced: IdMap<ExprId>,
+    ) -> Vec<ExprId> {
+        let of = |replaced: &IdMap<ExprId>, expr| replaced.get(&expr).copied().unwrap_or(expr);
+        for expr in order {
+            if !replaced.contains_key(&expr) {
+                let new = self.rebuild(expr, |operand| of(&replaced, operand));
+                replaced.insert(expr, new);
+            }
+        }
+        exprs.iter().map(|expr| of(&replaced, *expr)).collect()
     }
 
     pub(super) fn rebuild(

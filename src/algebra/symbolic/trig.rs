@@ -203,12 +203,9 @@ impl ExprPool {
     /// `1/(a + b*sin(x)) = (a - b*sin(x))/(a^2 - b^2*(1 - cos(x)^2))`, for the first angle of a sum with
     /// sines to the first power.
     pub(super) fn without_sine_below(&mut self, expr: ExprId) -> ExprId {
-        let Some((base, -1)) = self.integer_power(expr) else {
+        let Some((base, -1)) = self.sum_power(expr) else {
             return expr;
         };
-        if !matches!(self.node(base), Node::Sum(_)) {
-            return expr;
-        }
         let terms = self.terms_of(base);
         let sine_of = |pool: &ExprPool, rest: ExprId| {
             pool.factors_of(rest)

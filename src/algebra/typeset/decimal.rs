@@ -132,17 +132,14 @@ impl Decimal {
         !self.digits.contains(|digit| ('1'..='9').contains(&digit))
     }
 
-    /// Whether it prints as one.
     pub(crate) fn is_one(&self) -> bool {
         self.exponent.is_none() && self.value().abs() == 1.0
     }
 
-    /// Whether it is below zero.
     pub(crate) fn is_negative(&self) -> bool {
         self.negative
     }
 
-    /// The number without its sign.
     pub(crate) fn magnitude(&self) -> Self {
         Self {
             negative: false,
@@ -192,63 +189,5 @@ impl fmt::Display for Decimal {
         let sign = if self.negative { "-" } else { "" };
         write!(f, "{sign}{}", self.digits)?;
         self.exponent.map_or(Ok(()), |power| write!(f, "e{power}"))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_are_rounded_by_decimals_by_significant_digits_or_as_each_needs() {
-        let adaptive = Rounding::default();
-        for (value, rounding, text) in [
-            (-1.0, Rounding::Decimals(2), "-1.00"),
-            (51.05, Rounding::Decimals(2), "51.05"),
-            (0.004, Rounding::Decimals(2), "0.00"),
-            (0.36, adaptive, "0.36"),
-            (-1.0, adaptive, "-1.00"),
-            (0.05, adaptive, "0.05"),
-            (0.0537, adaptive, "0.054"),
-            (0.00612, adaptive, "0.006"),
-            (3.14e-9, adaptive, "3.1e-9"),
-            (123456789.0, adaptive, "1.2e8"),
-            (0.36, Rounding::Significant(3), "0.360"),
-            (51.05, Rounding::Significant(3), "51.0"),
-            (51234.0, Rounding::Significant(3), "51200"),
-            (9.996, Rounding::Significant(3), "10.0"),
-            (-1.25e-7, Rounding::Significant(2), "-1.2e-7"),
-            (1.6e308, Rounding::Significant(1), "1.6e308"),
-            (-f64::MAX, Rounding::Significant(3), "-1.79769e308"),
-        ] {
-            let rounded = Decimal::rounded(value, rounding).to_string();
-            assert_eq!(rounded, text, "{value} by {rounding:?}");
-        }
-        assert!(Decimal::rounded(-0.004, Rounding::Decimals(2)).is_zero());
-    }
-
-    #[test]
-    fn adaptive_rounding_keeps_the_promised_relative_error() {
-        let rounding = Rounding::default();
-        let mut value = 1.37e-12;
-        while value < 1e12 {
-            let printed = Decimal::rounded(value, rounding).value();
-            assert!((printed - value).abs() <= 0.05 * value, "{value} {printed}");
-            value *= 1.713;
-        }
-    }
-
-    #[test]
-    fn absurd_numbers_of_digits_are_cut_to_forty() {
-        let digits = |rounding| Decimal::rounded(0.1, rounding).digits().len();
-        assert_eq!(digits(Rounding::Decimals(1_000_000)), 42);
-        assert_eq!(digits(Rounding::Significant(1_000_000)), 42);
-    }
-
-    #[test]
-    fn exact_numbers_read_back_bit_for_bit() {
-        for value in [0.1, 1.0 / 3.0, -2.5e-300, 1e22, 5e-324, 12345.678, 0.0] {
-            assert_eq!(Decimal::exact(value).value().to_bits(), value.to_bits());
-        }
     }
 }

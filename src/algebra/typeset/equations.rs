@@ -83,13 +83,11 @@ impl Typeset {
     }
 }
 
-/// Every coefficient of all equations.
 pub(super) fn coefficients(system: &Equations<'_>) -> impl Iterator<Item = f64> {
     let equations = system.phases().iter().flat_map(|phase| &phase.ddz);
     equations.flatten().map(|summand| summand.coefficient)
 }
 
-/// The coefficients of all phases beside each other.
 fn table(
     system: &Equations<'_>,
     phases: &[(&String, DMatrix<f64>)],

@@ -86,14 +86,3 @@ pub fn markdown_text(text: &str) -> String {
     }
     markdown
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn markdown_text_starts_no_link_code_html_or_mathematics() {
-        let text = markdown_text("[a](b) `c` <i> $d$ |e| #f\n- g");
-        assert_eq!(text, r"\[a\](b) \`c\` \<i\> \$d\$ \|e\| \#f - g");
-    }
-}

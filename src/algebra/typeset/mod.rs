@@ -8,7 +8,6 @@
 
 mod decimal;
 pub mod equations;
-mod error;
 pub mod expression;
 pub mod latex;
 pub mod markdown;
@@ -28,14 +27,13 @@ pub(crate) use decimal::MOST_DIGITS;
 pub use decimal::{Decimal, Rounding};
 pub(crate) use equations::{CoefficientRow, CoefficientTable};
 pub use equations::{Equation, EquationSystem, Typeset};
-pub use error::{RenameError, TypesetError};
 pub use expression::expression;
-pub use options::{Form, NumberStyle, PrintOptions};
+pub use options::{Form, NumberStyle, PrintOptions, TypesetError};
 pub use page::rendered;
 pub use robot::RobotTypeset;
 pub use rounder::{Place, RoundingReport};
-pub use symbols::SymbolTable;
+pub use symbols::{RenameError, SymbolTable};
 pub use table::{Cell, Rows, Table, rounded, rounded_up, significant};
-pub(crate) use tree::{GREEK, Glyph};
+pub(crate) use tree::Glyph;
 pub use tree::{Math, Signed, Symbol};
 pub(crate) use width::{EQUALS, break_lines, symbol_width, width};

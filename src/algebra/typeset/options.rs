@@ -1,4 +1,4 @@
-//! What a user can choose about printed equations.
+//! What a user can choose about printed equations, and why they cannot be printed.
 
 use super::decimal::Rounding;
 use super::symbols::SymbolTable;
@@ -44,4 +44,20 @@ pub struct PrintOptions {
     pub numbers: NumberStyle,
     /// How equations are arranged in LaTeX.
     pub form: Form,
+}
+
+/// Why the equations of a model could not be printed.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "each variant's message names its fields")]
+pub enum TypesetError {
+    /// A coefficient in robot coordinates is too large once folded with weights and scale factors.
+    #[error("robot coordinates, {output}: the coefficient of {term:?} is {value} in SI units")]
+    NotFinite {
+        output: String,
+        term: String,
+        value: f64,
+    },
+    /// A template failed to render.
+    #[error("a template failed")]
+    Template(#[from] askama::Error),
 }

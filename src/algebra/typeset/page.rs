@@ -14,7 +14,6 @@ const WIDTH_EM: f64 = 44.0;
 
 /// How a page spells text and mathematics.
 pub(super) trait Markup: Spelling {
-    /// The equations of a phase.
     fn system(system: &EquationSystem, width_em: f64) -> String;
     /// The head of a column: an acceleration of a phase, with its unit where that is physical.
     fn head(symbol: &Symbol, phase: &str, unit: Option<Unit>) -> String;
@@ -37,7 +36,6 @@ pub(super) struct Page {
 }
 
 impl Page {
-    /// The page of a model's equations.
     pub(crate) fn new<M: Markup>(equations: &Equations<'_>, options: &PrintOptions) -> Self {
         let model = equations.model();
         let width_em = options.width_em.unwrap_or(WIDTH_EM);

@@ -10,8 +10,8 @@ use crate::model::{AffineMap, LatentVariable};
 
 use super::decimal::{Decimal, Rounding};
 use super::equations::{EquationSystem, coefficients};
-use super::error::TypesetError;
 use super::expression::terms;
+use super::options::TypesetError;
 use super::rounder::{Rounder, RoundingReport};
 use super::symbols::{SymbolTable, glyph};
 use super::tree::{Glyph, Math, Signed, Symbol};
@@ -85,7 +85,6 @@ impl RobotTypeset {
     }
 }
 
-/// The rows of the encoder in SI units, and how many weights were left out.
 fn encoder(
     encoder: &AffineMap,
     factors: &DVector<f64>,
@@ -154,48 +153,5 @@ fn coordinate_symbols(names: &[String]) -> Vec<Symbol> {
         Some(_) | None => (1..=names.len())
             .map(|number| spelled(vec![Glyph::Digits(number.to_string())]))
             .collect(),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn robot_equations_with_an_overflowing_coefficient_are_refused() {
-        let text = r#"{ "schema": "romc-model/1", "name": "huge", "latent_dim": 1,
-            "state": { "names": ["a", "b"], "units": ["m", "m"] }, "scaling": { "state": 0.5, "input": 1.0 },
-            "encoder": { "weights": [[1.0, 0.0]], "bias": [0.0] },
-            "decoder": { "weights": [[1.0], [0.0]], "bias": [0.0, 0.0] }, "library": ["z1"],
-            "phases": [ { "name": "contact", "feet": "any", "xi": [[1e308]] } ] }"#;
-        let found = |text: &str| {
-            let model = crate::artifact::read_from_bytes("huge.json", text.as_bytes())
-                .expect("all numbers are finite");
-            let (equations, symbols) = (Equations::of(&model), SymbolTable::default());
-            let refused = RobotTypeset::new(&equations, &symbols, Rounding::Exact);
-            refused.expect_err("too large").to_string()
-        };
-        assert_eq!(
-            found(text),
-            "robot coordinates, dd(a): the coefficient of \"z1\" is inf in SI units"
-        );
-        let large_weight = text
-            .replace("1e308", "1.0")
-            .replace("[[1.0, 0.0]]", "[[1e308, 0.0]]");
-        let large_weight = large_weight.replace("\"state\": 0.5", "\"state\": 2.5");
-        assert_eq!(
-            found(&large_weight),
-            "robot coordinates, z1: the coefficient of \"q_a\" is inf in SI units"
-        );
-    }
-
-    #[test]
-    fn coordinate_symbols_fall_back_to_numbers_when_names_look_alike() {
-        let symbols = |names: [&str; 2]| -> Vec<String> {
-            let symbols = coordinate_symbols(&names.map(str::to_owned));
-            symbols.iter().map(Symbol::to_string).collect()
-        };
-        assert_eq!(symbols(["a.b", "a-b"]), ["q_1", "q_2"]);
-        assert_eq!(symbols(["fr.hx", "body.x"]), ["q_fr,hx", "q_body,x"]);
     }
 }

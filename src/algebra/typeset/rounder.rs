@@ -84,7 +84,6 @@ impl Rounder {
         }
     }
 
-    /// A coefficient as it is printed.
     pub(super) fn round(&self, coefficient: f64) -> Decimal {
         let is_whole = self.is_exact && coefficient.fract() == 0.0;
         match self.rounding {

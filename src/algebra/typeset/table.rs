@@ -43,29 +43,16 @@ pub fn rounded_up(value: f64, digits: usize) -> f64 {
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Cell(String);
 
-impl From<String> for Cell {
-    fn from(text: String) -> Self {
-        Self(text)
-    }
+macro_rules! cells {
+    ($($shown:ty),*) => {$(
+        impl From<$shown> for Cell {
+            fn from(shown: $shown) -> Self {
+                Self(shown.to_string())
+            }
+        }
+    )*};
 }
-
-impl From<&str> for Cell {
-    fn from(text: &str) -> Self {
-        Self(text.to_owned())
-    }
-}
-
-impl From<&String> for Cell {
-    fn from(text: &String) -> Self {
-        Self(text.clone())
-    }
-}
-
-impl From<usize> for Cell {
-    fn from(count: usize) -> Self {
-        Self(count.to_string())
-    }
-}
+cells!(String, &str, &String, usize);
 
 impl From<f64> for Cell {
     fn from(value: f64) -> Self {
@@ -83,7 +70,6 @@ impl<T: Into<Cell>> From<Option<T>> for Cell {
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Table {
     caption: String,
-    /// Name and unit of each column.
     columns: Vec<(String, String)>,
     rows: Vec<Vec<String>>,
 }
@@ -286,82 +272,5 @@ impl fmt::Display for Table {
         let rule: Vec<String> = widths.iter().map(|&width| "-".repeat(width)).collect();
         line(f, &rule)?;
         self.rows.iter().try_for_each(|row| line(f, row))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_keep_so_many_digits() {
-        for (value, text) in [
-            (0.0123449, "0.01234"),
-            (12.3456, "12.35"),
-            (0.0, "0"),
-            (1.23456e-7, "1.235e-7"),
-            (f64::NAN, "diverged"),
-        ] {
-            assert_eq!(significant(value), text);
-        }
-        assert_eq!(rounded(-0.123456, 2), -0.12);
-        assert_eq!(rounded(99.6, 1), 100.0);
-        assert_eq!(rounded(6.02214e23, 3), 6.02e23);
-        assert_eq!(rounded(0.1 + 0.2, 17), 0.1 + 0.2);
-        assert_eq!(rounded(1.6e308, 1), 1.6e308);
-        assert_eq!(rounded(-f64::MAX, 4), -1.79769e308);
-    }
-
-    #[test]
-    fn rounded_up_is_never_below_and_at_most_a_unit_of_the_last_digit_above() {
-        let mut value = 1.23456789e-8;
-        while value < 1e6 {
-            for (digits, share) in [(2, 0.11), (4, 1.1e-3)] {
-                for value in [value, -value] {
-                    let shown = rounded_up(value, digits);
-                    assert!(
-                        shown >= value && shown - value <= share * value.abs(),
-                        "{value}"
-                    );
-                    let text = format!("{shown:.*e}", digits - 1);
-                    assert_eq!(text.parse(), Ok(shown), "{value}");
-                }
-            }
-            value *= 1.0373;
-        }
-        assert_eq!(rounded_up(9.96e-3, 2), 1e-2);
-        assert_eq!(rounded_up(0.0, 2), 0.0);
-    }
-
-    #[test]
-    fn every_rendering_has_the_same_cells() {
-        let items = [("body.x", Some(0.5)), ("a|<b>, c", None)];
-        let mut table = Table::of(items)
-            .column("coordinate", "", |row| row.0)
-            .column("rms", "m", |row| row.1)
-            .table();
-        table.column("count", "", [3, 12]);
-        assert_eq!(
-            table.to_string(),
-            "  coordinate  rms, m  count\n  ----------  ------  -----\n  body.x      0.5000      3\n  a|<b>, c         -     12\n"
-        );
-        assert_eq!(
-            table.markdown(),
-            "| coordinate | rms, m | count |\n|---|---|---|\n| body.x | 0.5000 | 3 |\n| a\\|\\<b>, c | - | 12 |\n"
-        );
-        assert_eq!(
-            table.csv(),
-            "coordinate,rms,count\nbody.x,0.5000,3\n\"a|<b>, c\",-,12\n"
-        );
-        let mut by_columns = Table::default();
-        by_columns.column("coordinate", "", ["body.x", "a|<b>, c"]);
-        by_columns.column("rms", "m", [Some(0.5), None]);
-        assert_eq!(*by_columns.column("count", "", [3, 12]), table);
-        let html = table.captioned("Errors & more").html();
-        assert!(html.starts_with("<table>\n<caption>Errors &amp; more</caption>\n<thead><tr><th scope=\"col\">coordinate</th>"), "{html}");
-        assert!(
-            html.contains("<tr><th scope=\"row\">a|&lt;b&gt;, c</th><td>–</td><td>12</td></tr>\n"),
-            "{html}"
-        );
     }
 }

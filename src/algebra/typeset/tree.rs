@@ -81,7 +81,7 @@ pub struct Symbol {
 pub enum Glyph {
     /// One Latin letter, italic.
     Letter(char),
-    /// A Greek letter, by its place in [`GREEK`].
+    /// A Greek letter, by its place in `GREEK`.
     Greek(usize),
     /// Digits, upright.
     Digits(String),
@@ -90,42 +90,22 @@ pub enum Glyph {
 }
 
 /// The Greek letters that a symbol can be renamed to: TeX's name and the character.
-pub(crate) const GREEK: [(&str, char); 34] = [
-    ("alpha", 'α'),
-    ("beta", 'β'),
-    ("gamma", 'γ'),
-    ("delta", 'δ'),
-    ("epsilon", 'ϵ'),
-    ("varepsilon", 'ε'),
-    ("zeta", 'ζ'),
-    ("eta", 'η'),
-    ("theta", 'θ'),
-    ("iota", 'ι'),
-    ("kappa", 'κ'),
-    ("lambda", 'λ'),
-    ("mu", 'μ'),
-    ("nu", 'ν'),
-    ("xi", 'ξ'),
-    ("pi", 'π'),
-    ("rho", 'ρ'),
-    ("sigma", 'σ'),
-    ("tau", 'τ'),
-    ("upsilon", 'υ'),
-    ("phi", 'ϕ'),
-    ("varphi", 'φ'),
-    ("chi", 'χ'),
-    ("psi", 'ψ'),
-    ("omega", 'ω'),
-    ("Gamma", 'Γ'),
-    ("Delta", 'Δ'),
-    ("Theta", 'Θ'),
-    ("Lambda", 'Λ'),
-    ("Xi", 'Ξ'),
-    ("Phi", 'Φ'),
-    ("Psi", 'Ψ'),
-    ("Omega", 'Ω'),
-    ("Sigma", 'Σ'),
-];
+const GREEK: &str = "
+    alpha α beta β gamma γ delta δ epsilon ϵ varepsilon ε zeta ζ eta η theta θ iota ι kappa κ
+    lambda λ mu μ nu ν xi ξ pi π rho ρ sigma σ tau τ upsilon υ phi ϕ varphi φ chi χ psi ψ omega ω
+    Gamma Γ Delta Δ Theta Θ Lambda Λ Xi Ξ Phi Φ Psi Ψ Omega Ω Sigma Σ
+";
+
+/// Names and characters of the Greek letters, in the order of [`Glyph::Greek`].
+pub(super) fn greek() -> impl Iterator<Item = (&'static str, &'static str)> {
+    let words = GREEK.split_whitespace();
+    words.clone().step_by(2).zip(words.skip(1).step_by(2))
+}
+
+/// Name and character of a Greek letter.
+pub(super) fn greek_letter(place: usize) -> (&'static str, &'static str) {
+    greek().nth(place).expect("a place in the table")
+}
 
 /// The name of a function as it is read: `ln` for the natural logarithm, `sgn` for the sign.
 pub(super) fn function_name(function: Function) -> &'static str {

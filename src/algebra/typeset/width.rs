@@ -18,7 +18,6 @@ const MINUS: f64 = 0.778;
 /// Of a character in a script of the same, whose font is wider than the large one scaled to its size.
 const SCRIPT: f64 = 0.8;
 
-/// The width of `math` in em.
 pub(crate) fn width(math: &Math) -> f64 {
     match math {
         Math::Number(number) => {
@@ -52,7 +51,6 @@ pub(crate) fn width(math: &Math) -> f64 {
     }
 }
 
-/// The width of signed terms one after the other.
 fn sum_width(terms: &[Signed]) -> f64 {
     let mut total = 0.0;
     for (place, term) in terms.iter().enumerate() {
@@ -66,7 +64,6 @@ fn sum_width(terms: &[Signed]) -> f64 {
     total
 }
 
-/// The width of a symbol in em.
 pub(crate) fn symbol_width(symbol: &Symbol) -> f64 {
     let commas = symbol.subscript.len().saturating_sub(1) as f64 * POINT;
     let subscript: f64 = symbol.subscript.iter().map(glyph_width).sum();

@@ -100,7 +100,6 @@ fn pairs(patterns: &[ContactFlags]) -> String {
     }
 }
 
-/// The feet of one pattern by name.
 fn by_name(pattern: &ContactFlags) -> String {
     let feet = Leg::ALL.iter().zip(pattern).filter(|(_, down)| **down);
     let feet: Vec<&str> = feet.map(|(leg, _)| leg.short_name()).collect();
@@ -163,38 +162,4 @@ fn summand<S: Spelling>(place: &Place) -> String {
 fn at_most(error: f64) -> Decimal {
     let error = rounded_up(error * (1.0 - 1e-9), 2);
     Decimal::rounded(error, Rounding::Significant(2))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn words(patterns: &[[u8; 4]]) -> String {
-        let flags = |pattern: &[u8; 4]| pattern.map(|foot| foot == 1);
-        feet(&FeetRule::Patterns(patterns.iter().map(flags).collect()))
-    }
-
-    #[test]
-    fn patterns_read_as_pairs_where_they_are_pairs() {
-        let mut front = Vec::new();
-        for bits in 0..16u8 {
-            let feet: [u8; 4] = std::array::from_fn(|foot| bits >> foot & 1);
-            if feet[0] + feet[1] > 0 {
-                front.push(feet);
-            }
-        }
-        assert_eq!(words(&front), "a front foot on the ground");
-        assert_ne!(words(&front[1..]), "a front foot on the ground");
-        let rear = &[[0, 0, 1, 0], [0, 0, 0, 1], [0, 0, 1, 1]];
-        for (patterns, text) in [
-            (&rear[..], "a rear foot and no front foot"),
-            (&[[1, 1, 0, 0]], "both front feet and no rear foot"),
-            (&[[1, 1, 1, 1]], "all four feet"),
-            (&[[0; 4]], "no foot"),
-            (&[[1, 0, 0, 1], [0, 1, 1, 0]], "fr and rl, or fl and rr"),
-            (&[[1, 0, 0, 0], [1, 1, 1, 0]], "fr alone, or fr, fl and rr"),
-        ] {
-            assert_eq!(words(patterns), format!("{text} on the ground"));
-        }
-    }
 }

@@ -7,9 +7,8 @@ use clap::{ArgAction, Args, Parser, Subcommand};
 
 use super::compile::CompileArguments;
 use super::import::ImportArguments;
-use super::reading::ReadingArguments;
 use super::train::{StudyArguments, TrainArguments};
-use super::value::{RobotParser, count, overwrite, real};
+use super::value::{ReadingArguments, RobotParser, count, overwrite, real};
 use crate::evaluate::ReferenceInput;
 use crate::files::Overwrite;
 use crate::limits::table::{APEX, DISTANCE, HORIZON, RESTART_EVERY, STEP, TORQUE_RATE};
@@ -69,7 +68,6 @@ pub enum Command {
     Completions(CompletionsArguments),
 }
 
-/// `romc demo`
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  romc demo --out-dir out/demo")]
 pub struct DemoArguments {
@@ -81,7 +79,6 @@ pub struct DemoArguments {
     pub force: Overwrite,
 }
 
-/// `romc inspect`
 #[derive(Debug, Args)]
 #[command(
     after_help = "Example:\n  romc inspect models/go1-d4.json examples/recordings/go1/test_01.csv.gz\n  romc inspect --guess my-log.csv > my-log.toml"
@@ -106,7 +103,6 @@ pub struct InspectArguments {
     pub reading: ReadingArguments,
 }
 
-/// `romc convert`
 #[derive(Debug, Args)]
 #[command(
     after_help = "The ending of the output says its format: .csv, .csv.gz or .mcap. Clocks stay as recorded unless\n\
@@ -132,7 +128,6 @@ pub struct ConvertArguments {
     pub reading: ReadingArguments,
 }
 
-/// `romc identify`
 #[derive(Debug, Args)]
 #[command(
     after_help = "Recordings should hold jumps: flight shows gravity and the legs' inertia,\n\
@@ -157,7 +152,6 @@ pub struct IdentifyArguments {
     pub reading: ReadingArguments,
 }
 
-/// `romc robot`
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  romc robot go1\n  \
                   romc robot solo12.urdf --output solo12.toml\n  \
@@ -182,7 +176,6 @@ pub struct RobotArguments {
     pub force: Overwrite,
 }
 
-/// `romc check`
 #[derive(Debug, Args)]
 #[command(
     after_help = "Phases of LaTeX go by a comment `% Phase NAME` (in Markdown a heading) or a label that ends in\n\
@@ -213,7 +206,6 @@ pub struct CheckArguments {
     pub symbols: Vec<String>,
 }
 
-/// `romc simulate`
 #[derive(Debug, Args)]
 #[command(
     after_help = "Example:\n  romc simulate models/go1-d4.json examples/recordings/go1/test_*.csv.gz"
@@ -238,7 +230,6 @@ pub struct SimulateArguments {
     pub reading: ReadingArguments,
 }
 
-/// `romc mpc`
 #[derive(Debug, Args)]
 #[command(
     after_help = "Example:\n  romc mpc models/go1-d4.json examples/recordings/go1/test_01.csv.gz --output mpc.csv"
@@ -281,7 +272,6 @@ pub struct MpcArguments {
     pub reading: ReadingArguments,
 }
 
-/// `romc plan`
 #[derive(Debug, Args)]
 #[command(
     after_help = "Exit code 1 and a reason where there is no plan to be trusted.\n\n\
@@ -333,7 +323,6 @@ pub struct PlanArguments {
     pub reading: ReadingArguments,
 }
 
-/// `romc report`
 #[derive(Debug, Args)]
 #[command(
     after_help = "Example:\n  romc report models/go1-d4.json examples/recordings/go1/test_*.csv.gz --output report.html"
@@ -375,7 +364,6 @@ pub struct ReportArguments {
     pub reading: ReadingArguments,
 }
 
-/// `romc manual`
 #[derive(Debug, Args)]
 #[command(
     after_help = "Example:\n  romc manual --out-dir ~/.local/share/man/man1 && man romc-compile"
@@ -389,7 +377,6 @@ pub struct ManualArguments {
     pub force: Overwrite,
 }
 
-/// `romc completions`
 #[derive(Debug, Args)]
 #[command(
     after_help = "Example:\n  romc completions bash > ~/.local/share/bash-completion/completions/romc"

@@ -4,8 +4,7 @@ use std::path::PathBuf;
 
 use clap::{ArgAction, Args, ValueEnum};
 
-use super::reading::ReadingArguments;
-use super::value::{count, overwrite, real};
+use super::value::{ReadingArguments, count, overwrite, real};
 use crate::codegen::{Precision, SineCosine, Units};
 use crate::deploy::Target;
 use crate::files::Overwrite;
@@ -13,7 +12,6 @@ use crate::limits::table::{DIGITS, MARGIN, SIGNIFICANT, WIDTH};
 use crate::simplify::Tolerance;
 use crate::typeset::Form;
 
-/// `romc compile`
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  romc compile models/paper-2d.json --emit latex,c,rust --out-dir out/paper-2d\n  romc compile models/go1-d4.json --emit latex,c --out-dir out/short --tolerance 5% \\\n      --domain examples/recordings/go1/train_*.csv.gz --save-model out/go1-d4-short.json"

@@ -1,12 +1,12 @@
-//! Flags that a command would ignore beside its other arguments: one row each, refused as wrong usage.
+//! Flags that a command would ignore beside its other arguments, refused as wrong usage.
 //!
 //! What files would have to be read for, such as settings of a training, is refused or noted by the command itself.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::{
-    CheckArguments, Command, CompileArguments, ImportArguments, InspectArguments, MpcArguments,
-    PlanArguments, ReadingArguments, RobotArguments, StudyArguments, UnitsChoice,
+    CheckArguments, Command, CompileArguments, ImportArguments, InspectArguments, ReadingArguments,
+    UnitsChoice,
 };
 use crate::Error;
 use crate::artifact::is_standard_input;
@@ -16,23 +16,38 @@ use crate::import::Format;
 use crate::mpc::Lift;
 use crate::robot::Robot;
 
-/// A flag with whether it was given, whether anything uses it, and what would.
-type Row = (&'static str, bool, bool, &'static str);
-
 /// Refuses the first flag that has no effect.
 ///
 /// # Errors
 /// [`Error::Idle`].
 pub fn refuse_idle(command: &Command) -> Result<(), Error> {
-    let rows = match command {
+    match command {
         Command::Compile(arguments) => of_compile(arguments),
         Command::Inspect(arguments) => of_inspect(arguments),
         Command::Check(arguments) => of_check(arguments),
-        Command::Mpc(arguments) => of_mpc(arguments),
-        Command::Plan(arguments) => of_plan(arguments),
         Command::Import(arguments) => of_import(arguments),
-        Command::Robot(arguments) => of_robot(arguments),
-        Command::Study(arguments) => of_study(arguments),
+        Command::Mpc(arguments) => {
+            let (lift, rate) = (arguments.lift, arguments.torque_rate);
+            let flags = [("--torque-rate", rate.is_some())];
+            refuse(lift == Lift::Transpose, "--lift transpose", &flags)
+        }
+        Command::Plan(arguments) => {
+            let has_start = arguments.start.is_some();
+            refuse(has_start, "--start", &reading(&arguments.reading))
+        }
+        Command::Robot(arguments) => {
+            let is_file = !Robot::known_names().contains(&arguments.robot.as_str());
+            let flags = [("--feet", !arguments.feet.is_empty())];
+            refuse(is_file, "a URDF file", &flags)
+        }
+        Command::Study(arguments) => {
+            let needs = "recordings, which --merge does not read";
+            refuse(
+                arguments.merge.is_empty(),
+                needs,
+                &reading(&arguments.reading),
+            )
+        }
         Command::Demo(_)
         | Command::Train(_)
         | Command::Convert(_)
@@ -40,12 +55,24 @@ pub fn refuse_idle(command: &Command) -> Result<(), Error> {
         | Command::Simulate(_)
         | Command::Report(_)
         | Command::Manual(_)
-        | Command::Completions(_) => Vec::new(),
-    };
-    let idle = rows.into_iter().find(|(_, given, used, _)| *given && !used);
-    idle.map_or(Ok(()), |(flag, _, _, needs)| {
-        Err(Error::Idle { flag, needs })
-    })
+        | Command::Completions(_) => Ok(()),
+    }
+}
+
+/// Refuses the first flag that was given, unless what it needs is there.
+fn refuse(is_used: bool, needs: &'static str, flags: &[(&'static str, bool)]) -> Result<(), Error> {
+    match flags.iter().find(|(_, given)| *given && !is_used) {
+        Some(&(flag, _)) => Err(Error::Idle { flag, needs }),
+        None => Ok(()),
+    }
+}
+
+fn reading(arguments: &ReadingArguments) -> [(&'static str, bool); 2] {
+    let (columns, clock) = (&arguments.columns, arguments.clock);
+    [
+        ("--columns", columns.is_some()),
+        ("--clock", clock.is_some()),
+    ]
 }
 
 fn ending(path: &Path) -> String {
@@ -53,152 +80,104 @@ fn ending(path: &Path) -> String {
     ending.to_string_lossy().to_lowercase()
 }
 
-fn reading(arguments: &ReadingArguments, is_used: bool, needs: &'static str) -> [Row; 2] {
-    [
-        ("--columns", arguments.columns.is_some(), is_used, needs),
-        ("--clock", arguments.clock.is_some(), is_used, needs),
-    ]
-}
-
-fn of_compile(arguments: &CompileArguments) -> Vec<Row> {
+fn of_compile(arguments: &CompileArguments) -> Result<(), Error> {
     use Target::{C, Casadi, ControllerC, Latex, Markdown, Mathml, Matlab, Python, Rust};
-    const COMPILED: &str = "--emit with c, rust or controller-c";
     const PRINTED: &str = "--emit with latex, markdown or mathml";
-    const LATEX: &str = "--emit with latex";
     let emits = |targets: &[Target]| targets.iter().any(|target| arguments.emit.contains(target));
+    let (is_code, is_printed) = (
+        emits(&[C, Rust, Python, Casadi, Matlab]),
+        emits(&[Latex, Markdown, Mathml]),
+    );
+    let (code, print, simplify) = (
+        &arguments.code,
+        &arguments.equations,
+        &arguments.simplification,
+    );
+    let compiled = [
+        ("--precision", code.precision != Precision::default()),
+        ("--sincos", code.sincos != SineCosine::default()),
+    ];
     let is_compiled = emits(&[C, Rust, ControllerC]);
-    let is_code = emits(&[C, Rust, Python, Casadi, Matlab]);
-    let is_printed = emits(&[Latex, Markdown, Mathml]);
-    let (code, print) = (&arguments.code, &arguments.equations);
-    let domain = &arguments.simplification.domain;
-    let has_table = domain.iter().any(|path| ending(path) == "toml");
-    let has_recordings = !domain.is_empty() && !has_table || arguments.plan.is_some();
-    let is_rounded = is_printed || !domain.is_empty();
-    let precision = code.precision != Precision::default();
-    let sines = code.sincos != SineCosine::default();
-    let [scaled, physical] = [UnitsChoice::Scaled, UnitsChoice::Physical].map(|u| code.units == u);
-    let mut rows = vec![
-        ("--precision", precision, is_compiled, COMPILED),
-        ("--sincos", sines, is_compiled, COMPILED),
-        (
-            "--units scaled",
-            scaled,
-            is_code,
-            "--emit with c, rust, python, casadi or matlab",
-        ),
-        (
-            "--units physical",
-            physical,
-            is_code || is_printed,
-            "--emit with equations or code of functions",
-        ),
-        ("--digits", print.digits.is_some(), is_rounded, PRINTED),
-        (
-            "--significant",
-            print.significant.is_some(),
-            is_rounded,
-            PRINTED,
-        ),
-        ("--rename", !print.rename.is_empty(), is_printed, PRINTED),
-        ("--width", print.width.is_some(), is_printed, PRINTED),
-        ("--form", print.form.is_some(), emits(&[Latex]), LATEX),
-        ("--siunitx", print.siunitx, emits(&[Latex]), LATEX),
+    refuse(
+        is_compiled,
+        "--emit with c, rust or controller-c",
+        &compiled,
+    )?;
+    let scaled = [("--units scaled", code.units == UnitsChoice::Scaled)];
+    refuse(
+        is_code,
+        "--emit with c, rust, python, casadi or matlab",
+        &scaled,
+    )?;
+    let physical = [("--units physical", code.units == UnitsChoice::Physical)];
+    let needs = "--emit with equations or code of functions";
+    refuse(is_code || is_printed, needs, &physical)?;
+    let rounding = [
+        ("--digits", print.digits.is_some()),
+        ("--significant", print.significant.is_some()),
     ];
-    let recordings = "recordings after --domain or --plan";
-    rows.extend(reading(
-        &arguments.simplification.reading,
-        has_recordings,
-        recordings,
-    ));
-    rows
+    refuse(
+        is_printed || !simplify.domain.is_empty(),
+        PRINTED,
+        &rounding,
+    )?;
+    let printed = [
+        ("--rename", !print.rename.is_empty()),
+        ("--width", print.width.is_some()),
+    ];
+    refuse(is_printed, PRINTED, &printed)?;
+    let latex = [
+        ("--form", print.form.is_some()),
+        ("--siunitx", print.siunitx),
+    ];
+    refuse(emits(&[Latex]), "--emit with latex", &latex)?;
+    let has_table = simplify.domain.iter().any(|path| ending(path) == "toml");
+    let has_domain = !simplify.domain.is_empty() && !has_table;
+    let needs = "recordings after --domain or --plan";
+    let is_read = has_domain || arguments.plan.is_some();
+    refuse(is_read, needs, &reading(&simplify.reading))
 }
 
-fn of_inspect(arguments: &InspectArguments) -> Vec<Row> {
-    let is_model = |path: &std::path::PathBuf| is_standard_input(path) || ending(path) == "json";
+fn of_inspect(arguments: &InspectArguments) -> Result<(), Error> {
+    let is_model = |path: &PathBuf| is_standard_input(path) || ending(path) == "json";
     let has_recording = !arguments.files.iter().all(is_model);
-    let is_chosen = arguments.robot != "go1";
-    let mut rows = vec![("--robot", is_chosen, has_recording, "a recording")];
-    let is_read = has_recording && !arguments.guess;
+    let robot = [("--robot", arguments.robot != "go1")];
+    refuse(has_recording, "a recording", &robot)?;
     let needs = "a recording, which --guess does not read by a map";
-    rows.extend(reading(&arguments.reading, is_read, needs));
-    rows
+    let is_read = has_recording && !arguments.guess;
+    refuse(is_read, needs, &reading(&arguments.reading))
 }
 
-fn of_check(arguments: &CheckArguments) -> Vec<Row> {
-    let files = [&arguments.left, &arguments.right];
-    let mut formats = files.into_iter().map(|path| Format::of_path(path));
-    let has_latex = formats.any(|format| matches!(format, Ok(Format::Latex)));
-    let needs = "a file of LaTeX or Markdown";
-    vec![
-        ("--exact", arguments.exact, has_latex, needs),
-        ("--symbols", !arguments.symbols.is_empty(), has_latex, needs),
-    ]
-}
-
-fn of_mpc(arguments: &MpcArguments) -> Vec<Row> {
-    let is_transpose = arguments.lift == Lift::Transpose;
-    let needs = "--lift transpose";
-    vec![(
-        "--torque-rate",
-        arguments.torque_rate.is_some(),
-        is_transpose,
-        needs,
-    )]
-}
-
-fn of_plan(arguments: &PlanArguments) -> Vec<Row> {
-    reading(&arguments.reading, arguments.start.is_some(), "--start").into()
-}
-
-fn of_import(arguments: &ImportArguments) -> Vec<Row> {
-    let format = arguments
-        .format
-        .map_or_else(|| Format::of_path(&arguments.file).ok(), Some);
-    let is = |wanted: &[Format]| format.is_none_or(|format| wanted.contains(&format));
-    let is_latex = is(&[Format::Latex]);
-    let has_tensors = is(&[Format::Safetensors, Format::Npz]);
-    let tensors = "a file of tensors";
-    let mut rows = vec![
-        (
-            "--symbols",
-            !arguments.symbols.is_empty(),
-            is_latex,
-            "a file of LaTeX or Markdown",
-        ),
-        (
-            "--activation",
-            arguments.activation.is_some(),
-            has_tensors,
-            tensors,
-        ),
-        ("--order", arguments.order.is_some(), has_tensors, tensors),
-        ("--robot", arguments.robot.is_some(), has_tensors, tensors),
-        (
-            "--scaling",
-            !arguments.scaling.is_empty(),
-            has_tensors,
-            tensors,
-        ),
+fn of_check(arguments: &CheckArguments) -> Result<(), Error> {
+    let is_latex = |path: &PathBuf| matches!(Format::of_path(path), Ok(Format::Latex));
+    let has_latex = [&arguments.left, &arguments.right]
+        .into_iter()
+        .any(is_latex);
+    let flags = [
+        ("--exact", arguments.exact),
+        ("--symbols", !arguments.symbols.is_empty()),
     ];
-    rows.extend(reading(
-        &arguments.reading,
-        !arguments.inputs_from.is_empty(),
-        "--inputs-from",
-    ));
-    rows
+    refuse(has_latex, "a file of LaTeX or Markdown", &flags)
 }
 
-fn of_robot(arguments: &RobotArguments) -> Vec<Row> {
-    let is_file = !Robot::known_names().contains(&arguments.robot.as_str());
-    vec![("--feet", !arguments.feet.is_empty(), is_file, "a URDF file")]
-}
-
-fn of_study(arguments: &StudyArguments) -> Vec<Row> {
-    let trains = arguments.merge.is_empty();
-    reading(
-        &arguments.reading,
-        trains,
-        "recordings, which --merge does not read",
-    )
-    .into()
+fn of_import(arguments: &ImportArguments) -> Result<(), Error> {
+    let of_path = || Format::of_path(&arguments.file).ok();
+    let format = arguments.format.or_else(of_path);
+    let is = |wanted: &[Format]| format.is_none_or(|format| wanted.contains(&format));
+    let symbols = [("--symbols", !arguments.symbols.is_empty())];
+    refuse(
+        is(&[Format::Latex]),
+        "a file of LaTeX or Markdown",
+        &symbols,
+    )?;
+    let of_tensors = [
+        ("--activation", arguments.activation.is_some()),
+        ("--order", arguments.order.is_some()),
+        ("--robot", arguments.robot.is_some()),
+        ("--scaling", !arguments.scaling.is_empty()),
+    ];
+    let has_tensors = is(&[Format::Safetensors, Format::Npz]);
+    refuse(has_tensors, "a file of tensors", &of_tensors)?;
+    let is_read = !arguments.inputs_from.is_empty();
+    refuse(is_read, "--inputs-from", &reading(&arguments.reading))
 }

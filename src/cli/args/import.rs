@@ -4,8 +4,7 @@ use std::path::PathBuf;
 
 use clap::{ArgAction, Args};
 
-use super::reading::ReadingArguments;
-use super::value::{RobotParser, count, overwrite, real, wrench_frame};
+use super::value::{ReadingArguments, RobotParser, count, overwrite, real, wrench_frame};
 use crate::files::Overwrite;
 use crate::import::{
     Format, ImportError, Mapping, PhaseRule, WeightVectors, XiLayout, parse_standard,
@@ -36,7 +35,6 @@ fn library_argument(text: &str) -> Result<LibraryArgument, ImportError> {
     }
 }
 
-/// `romc import`
 #[derive(Debug, Args)]
 #[command(
     after_help = "Tensors are found by the names of the parts, encoder.weight, encoder.bias, decoder.weight,\n\

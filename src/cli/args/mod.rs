@@ -12,7 +12,6 @@ mod command;
 mod compile;
 mod idle;
 mod import;
-mod reading;
 mod train;
 mod value;
 
@@ -24,5 +23,5 @@ pub use command::{
 pub use compile::{CompileArguments, SimplifyArguments, UnitsChoice};
 pub use idle::refuse_idle;
 pub use import::{ImportArguments, LibraryArgument};
-pub use reading::ReadingArguments;
 pub use train::{PhaseSet, StudyArguments, TrainArguments, TrainSettings, Widths};
+pub use value::ReadingArguments;

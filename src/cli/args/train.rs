@@ -6,8 +6,7 @@ use std::str::FromStr;
 use clap::{ArgAction, Args, ValueEnum};
 use serde::{Deserialize, Serialize};
 
-use super::reading::ReadingArguments;
-use super::value::{RobotParser, count, finite, overwrite, real, wrench_frame};
+use super::value::{ReadingArguments, RobotParser, count, finite, overwrite, real, wrench_frame};
 use crate::files::Overwrite;
 use crate::limits::table;
 use crate::model::Activation;
@@ -72,7 +71,6 @@ pub enum PhaseSet {
     ContactRearFlight,
 }
 
-/// `romc train`
 #[derive(Debug, Args)]
 #[command(
     after_help = "Example:\n  romc train examples/recordings/go1/train_*.csv.gz \\\n      --validation examples/recordings/go1/validation_*.csv.gz \\\n      --latent-dim 4 --method closed-form --output my-model.json"
@@ -236,7 +234,6 @@ pub struct TrainSettings {
     pub moment_scaling: Option<Finite>,
 }
 
-/// `romc study`
 #[derive(Debug, Args)]
 #[command(
     after_help = "Example:\n  romc study examples/recordings/go1/train_*.csv.gz \\\n      --validation examples/recordings/go1/validation_*.csv.gz --latent-dims 1..18 --seeds 5\n\nA stopped study goes on when the same command is given again. On a cluster, `--shard 3/8` computes a part,\n`romc study --merge part1 part2 --out-dir whole` joins parts."

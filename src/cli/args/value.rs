@@ -1,10 +1,15 @@
-//! Parsers of numbers by their ranges, and of names.
+//! Parsers of numbers by their ranges, and of names; how recordings are read.
+
+use std::path::PathBuf;
 
 use clap::builder::{BoolValueParser, PossibleValue, StringValueParser, TypedValueParser};
+use clap::{Args, ValueEnum as _};
 
 use super::train::Finite;
+use crate::cli::output::quoted;
 use crate::files::Overwrite;
 use crate::limits::Range;
+use crate::recording::Clocks;
 use crate::robot::{Robot, WrenchFrame};
 
 /// A whole number in a range.
@@ -54,88 +59,26 @@ pub fn wrench_frame(text: &str) -> Result<WrenchFrame, String> {
     WrenchFrame::by_name(text).ok_or_else(|| format!("found `{text}`, expected `world` or `body`"))
 }
 
-#[cfg(test)]
-mod tests {
-    use std::collections::BTreeSet;
+/// How recordings are read.
+#[derive(Debug, Clone, Default, Args)]
+pub struct ReadingArguments {
+    /// What the columns of the recordings are: names, units, signs, order, clocks of another program's log
+    /// (`romc inspect --guess LOG` writes a first one)
+    #[arg(long, value_name = "MAP.toml")]
+    pub columns: Option<PathBuf>,
+    /// Whether clocks and angular rates that disagree with the motion are mended (unless given they are, but not by
+    /// `inspect`, `convert` and `plan`; by `identify` always)
+    #[arg(long, value_enum, hide_possible_values = false)]
+    pub clock: Option<Clocks>,
+}
 
-    use clap::CommandFactory as _;
-    use clap::error::ErrorKind;
-
-    use crate::cli::args::Arguments;
-    use crate::limits::{Range, table};
-
-    /// Flags that take a number and have no range of the table: any seed will do.
-    const WITHOUT: [&str; 1] = ["seed"];
-
-    /// Ranges by command and flag where it is not the training's.
-    fn range(command: &str, flag: &str) -> Option<Range> {
-        let others = [
-            table::LAMBDA,
-            table::HORIZON,
-            table::STEP,
-            table::TORQUE_RATE,
-            table::RESTART_EVERY,
-            table::MARGIN,
-            table::WIDTH,
-            table::DIGITS,
-            table::SIGNIFICANT,
-            table::SCALING,
-            table::INPUT_SCALING,
-            table::SAMPLE_TIME,
-            table::DISTANCE,
-            table::APEX,
-        ];
-        if (command, flag) == ("import", "latent-dim") {
-            return Some(table::IMPORTED_LATENT_DIM);
-        }
-        if flag.ends_with("-layers") {
-            return Some(table::LAYER_WIDTH);
-        }
-        let of_training = table::of_training(flag).copied();
-        of_training.or_else(|| others.into_iter().find(|range| range.name == flag))
-    }
-
-    /// Whether a command refuses the value of a flag as such.
-    fn refuses(command: &str, flag: &str, value: &str) -> bool {
-        let flag = format!("--{flag}={value}");
-        let found = Arguments::command().try_get_matches_from(["romc", command, &flag]);
-        found.is_err_and(|error| error.kind() == ErrorKind::ValueValidation)
-    }
-
-    #[test]
-    fn every_flag_that_takes_a_number_refuses_what_lies_outside_its_range() {
-        let mut met = BTreeSet::new();
-        for command in Arguments::command().get_subcommands() {
-            let name = command.get_name();
-            let flags = command
-                .get_arguments()
-                .filter_map(|argument| argument.get_long());
-            for flag in flags.filter(|flag| !WITHOUT.contains(flag)) {
-                let takes_one_of = |values: [&str; 3]| {
-                    let mut values = values.into_iter();
-                    values.any(|value| !refuses(name, flag, value))
-                };
-                let takes_numbers = refuses(name, flag, "words")
-                    && takes_one_of(["1", "0.5", "3"])
-                    && !takes_one_of(["1%", "1..2", "x=1"]);
-                if !takes_numbers {
-                    continue;
-                }
-                let range = range(name, flag);
-                let range = range.unwrap_or_else(|| panic!("--{flag} of {name} has no range"));
-                met.insert(range.name);
-                let (least, most) = (range.least, range.most);
-                assert!(!refuses(name, flag, &most.to_string()), "--{flag}={most}");
-                let outside = match range.is_whole() {
-                    true => [least - 1.0, most + 1.0],
-                    false => [least - 1e-9 * most, most * (1.0 + 1e-9)],
-                };
-                for value in outside.into_iter().chain([f64::NAN, 1e300]) {
-                    let value = value.to_string();
-                    assert!(refuses(name, flag, &value), "--{flag}={value} of {name}");
-                }
-            }
-        }
-        assert!(met.len() >= 25, "{met:?}");
+impl ReadingArguments {
+    /// The flags as typed, with a blank before each.
+    pub fn as_flags(&self) -> String {
+        let columns = self.columns.iter();
+        let columns = columns.map(|path| format!(" --columns {}", quoted(path)));
+        let clock = self.clock.and_then(|clock| clock.to_possible_value());
+        let clock = clock.map(|clock| format!(" --clock {}", clock.get_name()));
+        columns.chain(clock).collect()
     }
 }

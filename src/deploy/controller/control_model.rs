@@ -8,10 +8,8 @@ use crate::codegen::interface::{ModelInterface, PhaseInterface};
 use crate::mpc::{ControlModel, ControlModelParts, ControlPhase};
 use crate::robot::{Leg, LegGeometry, Robot, STATE_DIM, WrenchFrame};
 
-/// Numbers per line.
 const WIDTH: usize = 5;
 
-/// `src/control_model.rs`.
 #[derive(Template)]
 #[template(
     path = "controller/control_model.askama",
@@ -24,11 +22,9 @@ pub(crate) struct ControlModelText<'a> {
     robot: String,
     leg_types: &'static str,
     frame: &'static str,
-    /// Names and values of the actuators' arrays.
     actuators: Vec<(&'static str, String)>,
     plant: &'a ControlModel,
     parts: &'a ControlModelParts,
-    /// Whether a phase knows its inputs given states.
     knows_inputs: bool,
     /// Each phase with its constants' beginning.
     phases: Vec<(String, &'a PhaseInterface, &'a ControlPhase)>,
@@ -51,7 +47,6 @@ fn array<R: Dim, C: Dim, S: RawStorage<f64, R, C>>(
 }
 
 impl<'a> ControlModelText<'a> {
-    /// The text for a plant.
     pub(crate) fn new(
         entries: &'a ModelInterface,
         plant: &'a ControlModel,

@@ -6,133 +6,73 @@
 use std::collections::BTreeSet;
 use std::sync::LazyLock;
 
-/// romc's own lock file.
-const OWN: &str = include_str!("../../../Cargo.lock");
-
 /// What a generated controller depends on, besides its model.
 const DIRECT: [&str; 3] = ["clarabel", "nalgebra", "thiserror"];
 
-/// Locked packages.
-#[derive(Debug, Clone)]
-pub(crate) struct Lock<'a> {
-    packages: Vec<Package<'a>>,
-}
-
-#[derive(Debug, Clone)]
-struct Package<'a> {
-    name: &'a str,
-    version: &'a str,
+struct Package {
+    name: &'static str,
+    version: &'static str,
     /// Names, with a version where one name has several.
-    dependencies: Vec<&'a str>,
-    text: &'a str,
+    dependencies: Vec<&'static str>,
+    text: &'static str,
 }
 
-impl<'a> Package<'a> {
-    fn parse(text: &'a str) -> Option<Self> {
-        let field = |key: &str| {
-            let line = text.lines().find_map(|line| line.strip_prefix(key))?;
-            Some(line.trim_matches([' ', '=', '"']))
-        };
+static PACKAGES: LazyLock<Vec<Package>> = LazyLock::new(|| {
+    let own = include_str!("../../../Cargo.lock");
+    let package = |text: &'static str| {
+        let field = |key| Some(text.lines().find_map(|line| line.strip_prefix(key))?);
         let listed = text.lines().filter_map(|line| line.strip_prefix(" \""));
-        Some(Self {
-            name: field("name")?,
-            version: field("version")?,
+        Some(Package {
+            name: field("name = ")?.trim_matches('"'),
+            version: field("version = ")?.trim_matches('"'),
             dependencies: listed
                 .map(|line| line.trim_end_matches([',', '"']))
                 .collect(),
             text: text.trim_end(),
         })
-    }
+    };
+    own.split("[[package]]\n").filter_map(package).collect()
+});
+
+/// A package by its name, with its version where one name has several.
+fn package(spelled: &str) -> &'static Package {
+    let (name, version) = spelled.split_once(' ').unwrap_or((spelled, ""));
+    let mut packages = PACKAGES.iter();
+    let found = packages
+        .find(|package| package.name == name && (version.is_empty() || package.version == version));
+    found.expect("the lock file has all that its entries name")
 }
 
-impl Lock<'static> {
-    /// romc's own, parsed once.
-    pub(crate) fn own() -> &'static Self {
-        static PARSED: LazyLock<Lock<'static>> = LazyLock::new(|| {
-            let blocks = OWN.split("[[package]]\n").skip(1);
-            Lock {
-                packages: blocks.filter_map(Package::parse).collect(),
-            }
-        });
-        &PARSED
-    }
+/// A direct dependency of the crate with the controller, as its own entry spells it.
+fn direct(name: &str) -> &'static str {
+    let mut dependencies = package("romc-motion").dependencies.iter();
+    let found = dependencies.find(|spelled| spelled.split(' ').next() == Some(name));
+    found.expect("the controller depends on it")
 }
 
-impl<'a> Lock<'a> {
-    /// The version of a direct dependency of romc.
-    pub(crate) fn version(&self, name: &str) -> &'a str {
-        self.packages[self.position(self.direct(name))].version
-    }
-
-    /// The lock file of a controller whose model's crate is `name`.
-    pub(crate) fn text(&self, banner: &str, name: &str) -> String {
-        let mut dependencies = DIRECT.map(|name| self.direct(name)).to_vec();
-        let mut needed = BTreeSet::new();
-        let mut open = dependencies.clone();
-        while let Some(spelled) = open.pop() {
-            let position = self.position(spelled);
-            if needed.insert(position) {
-                open.extend(&self.packages[position].dependencies);
-            }
-        }
-        dependencies.push(name);
-        dependencies.sort_unstable();
-        let list = dependencies.iter().map(|name| format!(" \"{name}\",\n"));
-        let list = list.collect::<String>();
-        let own = format!("name = \"{name}\"\nversion = \"0.1.0\"");
-        let controller =
-            format!("name = \"{name}-controller\"\nversion = \"0.1.0\"\ndependencies = [\n{list}]");
-        let mut texts = vec![own.as_str(), &controller];
-        texts.extend(needed.iter().map(|&position| self.packages[position].text));
-        texts.sort_unstable();
-        let packages: String = texts
-            .iter()
-            .map(|text| format!("\n[[package]]\n{text}\n"))
-            .collect();
-        format!("{banner}\nversion = 4\n{packages}")
-    }
-
-    /// A direct dependency of the crate with the controller, as its own entry spells it, with a version if it needs one.
-    fn direct(&self, name: &str) -> &'a str {
-        let own = &self.packages[self.position("romc-motion")].dependencies;
-        let is_named = |dependency: &&&str| dependency.split(' ').next() == Some(name);
-        own.iter()
-            .find(is_named)
-            .expect("the controller depends on it")
-    }
-
-    fn position(&self, spelled: &str) -> usize {
-        let mut words = spelled.split(' ');
-        let (name, version) = (words.next(), words.next());
-        let is_it = |package: &Package<'_>| {
-            name == Some(package.name) && version.is_none_or(|version| version == package.version)
-        };
-        let position = self.packages.iter().position(is_it);
-        position.expect("the lock file has all that its entries name")
-    }
+/// The version of a direct dependency.
+pub(super) fn version(name: &str) -> &'static str {
+    package(direct(name)).version
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn lock_of_a_controller_has_the_solver_and_what_it_needs_and_no_more() {
-        let text = Lock::own().text("# made by a test", "go1_d4");
-        let names: Vec<&str> = text
-            .lines()
-            .filter_map(|line| Some(line.strip_prefix("name = ")?.trim_matches('"')))
-            .collect();
-        for needed in ["clarabel", "nalgebra", "amd", "go1_d4", "go1_d4-controller"] {
-            assert!(names.contains(&needed), "{needed}");
+/// The lock file of a controller whose model's crate is `name`.
+pub(super) fn text(banner: &str, name: &str) -> String {
+    let mut dependencies = DIRECT.map(direct).to_vec();
+    let mut texts = BTreeSet::new();
+    let mut open = dependencies.clone();
+    while let Some(spelled) = open.pop() {
+        let package = package(spelled);
+        if texts.insert(package.text) {
+            open.extend(&package.dependencies);
         }
-        for other in ["romc", "clap", "zip"] {
-            assert!(!names.contains(&other), "{other}");
-        }
-        assert!(names.is_sorted());
-        assert!(!Lock::own().version("clarabel").is_empty());
-        // Both versions of thiserror: clarabel's and romc's own.
-        let both = names.iter().filter(|name| **name == "thiserror");
-        assert_eq!(both.count(), 2);
     }
+    dependencies.push(name);
+    dependencies.sort_unstable();
+    let list: String = (dependencies.iter().map(|name| format!(" \"{name}\",\n"))).collect();
+    let own = format!("name = \"{name}\"\nversion = \"0.1.0\"");
+    let controller =
+        format!("name = \"{name}-controller\"\nversion = \"0.1.0\"\ndependencies = [\n{list}]");
+    texts.extend([own.as_str(), &controller]);
+    let packages = texts.iter().map(|text| format!("\n[[package]]\n{text}\n"));
+    format!("{banner}\nversion = 4\n{}", packages.collect::<String>())
 }

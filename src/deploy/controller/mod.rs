@@ -23,7 +23,6 @@ use crate::mpc::ControlModel;
 use crate::mpc::interface::{Settings, all_codes};
 use crate::robot::{InputRule, Leg, Robot, STATE_DIM, WrenchFrame};
 use control_model::ControlModelText;
-use lock::Lock;
 use settings::{SettingText, quoted_names};
 
 /// What the files of a controller, as a crate or in C, take from the model, the robot and romc.
@@ -39,9 +38,7 @@ pub(super) struct Facts<'a> {
     joint_names: String,
     /// How `u` comes from torques, lines of a comment.
     pub(super) input_is: String,
-    /// Constant and value of every code.
     pub(super) codes: Vec<(String, i32)>,
-    /// Every code with its text.
     pub(super) texts: Vec<(i32, String)>,
     pub(super) defaults: Settings,
     pub(super) settings: Vec<SettingText>,
@@ -78,7 +75,7 @@ impl<'a> Facts<'a> {
 
     /// The version of a package that the crate needs.
     fn version(&self, package: &str) -> &'static str {
-        Lock::own().version(package)
+        lock::version(package)
     }
 }
 
@@ -176,7 +173,6 @@ fn input_in_words(rule: &InputRule, name: &str) -> String {
     wrapped(&text, 100, "").join("\n * ")
 }
 
-/// What is the same for all models but for names.
 fn project(
     entries: &ModelInterface,
     plant: &ControlModel,
@@ -205,7 +201,7 @@ fn project(
     let mut files: Vec<(String, String)> = (templates.into_iter())
         .map(|(path, text)| (path.replace("NAME", name), tidy(&text)))
         .collect();
-    files.push(("Cargo.lock".to_owned(), Lock::own().text(hash, name)));
+    files.push(("Cargo.lock".to_owned(), lock::text(hash, name)));
     for (path, text) in sources::LICENCES {
         files.push((path.to_owned(), text.to_owned()));
     }

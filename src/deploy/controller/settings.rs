@@ -10,7 +10,6 @@ pub(in crate::deploy) struct SettingText {
 }
 
 impl SettingText {
-    /// All, in the order of the structures.
     pub(super) fn all() -> Vec<Self> {
         let defaults = Settings::default().numbers();
         let all = SETTINGS.iter().zip(defaults);

@@ -7,7 +7,7 @@
 
 mod jump;
 mod legs;
-mod numbers;
+pub(super) mod numbers;
 mod ros2_control;
 mod selftest;
 mod source;

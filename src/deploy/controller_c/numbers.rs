@@ -41,7 +41,7 @@ impl Numbers {
 }
 
 /// An initialiser of initialisers, one per line.
-pub(super) fn nested(rows: impl IntoIterator<Item = String>) -> String {
+pub(in crate::deploy) fn nested(rows: impl IntoIterator<Item = String>) -> String {
     let rows: Vec<String> = rows.into_iter().collect();
     match rows.is_empty() {
         true => "{{0}}".to_owned(),
@@ -50,12 +50,12 @@ pub(super) fn nested(rows: impl IntoIterator<Item = String>) -> String {
 }
 
 /// An initialiser of integers.
-pub(super) fn integers(values: impl IntoIterator<Item = i64>) -> String {
+pub(in crate::deploy) fn integers(values: impl IntoIterator<Item = i64>) -> String {
     list(values.into_iter().map(|value| value.to_string()))
 }
 
 /// An initialiser with one zero at least.
-fn list(values: impl Iterator<Item = String>) -> String {
+pub(in crate::deploy) fn list(values: impl Iterator<Item = String>) -> String {
     let values: Vec<String> = values.collect();
     if values.is_empty() {
         return "{0}".to_owned();

@@ -65,7 +65,7 @@ pub(super) fn around_digits(tokens: &[Token]) -> Vec<bool> {
     is_around
 }
 
-/// The tokens without braces around a lone operator, such as `{\times}` for less space around the sign.
+/// The tokens without braces around a lone operator or point, such as `{\times}` for less space around the sign.
 pub(super) fn without_operator_braces(tokens: Vec<Token>) -> Vec<Token> {
     let is_lone = |at: usize| match &tokens[at..tokens.len().min(at + 3)] {
         [open, inside, close] if open.kind == Kind::Open && close.kind == Kind::Close => {
@@ -104,7 +104,7 @@ fn is_operator(kind: &Kind, behind: &[Token]) -> bool {
         _ => None,
     };
     match kind {
-        Kind::Character(c) => "+-*/=".contains(*c),
+        Kind::Character(c) => "+-*/=.".contains(*c),
         Kind::Command(name) if name == "cdot" => {
             digit(0).is_none() || [0, 1, 2].map(digit) == [Some('1'), Some('0'), None]
         }
@@ -166,8 +166,7 @@ impl Reader<'_> {
     fn digits(&self, number: &mut Number) {
         while let Some((digit, at)) = self.digit(number.behind) {
             number.text.push(digit);
-            let is_end = |at: &usize| self.is_around[*at] && self.tokens[*at].kind == Kind::Close;
-            let behind = (at + 1..self.end).find(|at| !is_end(at));
+            let behind = (at + 1..self.end).find(|at| !self.is_around[*at]);
             number.behind = behind.unwrap_or(self.end);
         }
     }

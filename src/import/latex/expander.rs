@@ -290,17 +290,11 @@ impl<'t> Expander<'t> {
                 Some(name) if has(BY_COMMAND, name) => {
                     return Ok(Some(token.with(Kind::End(name.to_owned()))));
                 }
-                _ => return self.assignment_or_condition(token),
+                _ if self.follows_definition(&token)? => {}
+                _ => return self.condition(token),
             },
         }
         Ok(None)
-    }
-
-    fn assignment_or_condition(&mut self, token: Token) -> Result<Option<Token>, ImportError> {
-        match self.follows_definition(&token)? {
-            true => Ok(None),
-            false => self.condition(token),
-        }
     }
 
     /// `\catcode`\@=11`, which makes `@` a letter; other characters stay what they are here.

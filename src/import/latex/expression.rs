@@ -11,6 +11,18 @@ use crate::model::LatentVariable;
 
 /// What can stand where a factor begins.
 const FACTOR: &str = "a number, a variable, a function or a group";
+const BARS: &[&str] = &["|", "\\rvert", "\\vert", "\\|"];
+/// What opens a sum, and what closes it.
+const DELIMITERS: [(&str, &[&str]); 8] = [
+    ("(", &[")"]),
+    ("[", &["]"]),
+    ("\\{", &["\\}"]),
+    ("\\lbrace", &["\\rbrace"]),
+    ("|", BARS),
+    ("\\lvert", BARS),
+    ("\\vert", BARS),
+    ("\\|", BARS),
+];
 /// Commands whose argument is text.
 pub(super) const WORDS: &str = "text textrm textit mbox intertext shortintertext";
 
@@ -266,13 +278,12 @@ impl Reader<'_> {
                 }
             }
             Kind::Command(name) if name == "sqrt" => self.root(place)?,
-            Kind::Command(name) if has("abs lvert vert", name) => self.absolute(place, name)?,
-            Kind::Character('|') => self.absolute(place, "|")?,
-            Kind::Command(name) if name == "left" && self.opens_bar() => {
-                self.absolute(place, "left")?
+            Kind::Command(name) if name == "abs" => {
+                self.at += 1;
+                self.enclosed_sum(place, "abs(")?
             }
-            Kind::Character('(' | '[') => self.delimited(place)?,
-            Kind::Command(name) if name == "left" || name == "{" => self.delimited(place)?,
+            Kind::Character('(' | '[' | '|') => self.delimited(place)?,
+            Kind::Command(name) if has("left { lvert vert", name) => self.delimited(place)?,
             kind => self.variable_or_braces(place, kind)?,
         };
         self.powers(place)?;
@@ -333,30 +344,6 @@ impl Reader<'_> {
         Ok(if is_number { Last::Number } else { Last::Other })
     }
 
-    pub(super) fn opens_bar(&self) -> bool {
-        match self.kind(self.at + 1) {
-            Some(Kind::Character('|')) => true,
-            Some(Kind::Command(name)) => matches!(name.as_str(), "lvert" | "vert" | "|"),
-            _ => false,
-        }
-    }
-
-    fn absolute(&mut self, place: (usize, usize), opener: &str) -> Read<Last> {
-        self.at += 1 + usize::from(opener == "left");
-        if opener == "abs" {
-            return self.enclosed_sum(place, "abs(");
-        }
-        self.push(place, "abs(");
-        let has_right = self.sum_between(true)?;
-        let closed =
-            self.character('|') || ["rvert", "vert", "|"].iter().any(|name| self.command(name));
-        if !closed || has_right != (opener == "left") {
-            return self.unexpected("an operator or the closing bar");
-        }
-        self.push(place, ")");
-        Ok(Last::Other)
-    }
-
     /// A sum between bars or parentheses; whether `\right` stands behind it.
     fn sum_between(&mut self, are_bars: bool) -> Read<bool> {
         self.deepen()?;
@@ -367,25 +354,33 @@ impl Reader<'_> {
         Ok(self.command("right"))
     }
 
+    /// A sum between delimiters of any size.
     pub(super) fn delimited(&mut self, place: (usize, usize)) -> Read<Last> {
         let has_left = self.command("left");
-        let closer = match self.next_kind() {
-            Some(Kind::Character('(')) => Kind::Character(')'),
-            Some(Kind::Character('[')) => Kind::Character(']'),
-            Some(Kind::Command(name)) if name == "{" => Kind::Command("}".to_owned()),
-            Some(Kind::Command(name)) if name == "lbrace" => Kind::Command("rbrace".to_owned()),
-            _ => return self.unexpected("`(`, `[`, `\\{` or `|`"),
+        let mut openers = DELIMITERS.iter();
+        let Some((_, closers)) = openers.find(|(opener, _)| self.delimiter(opener)) else {
+            return self.unexpected("`(`, `[`, `\\{` or `|`");
         };
-        self.at += 1;
-        self.push(place, "(");
-        let has_right = self.sum_between(false)?;
-        if has_left != has_right || !self.takes(&closer) {
-            let quoted = closer.quoted();
+        let are_bars = *closers == BARS;
+        self.push(place, if are_bars { "abs(" } else { "(" });
+        let has_right = self.sum_between(are_bars)?;
+        if has_left != has_right || !closers.iter().any(|closer| self.delimiter(closer)) {
             let right = if has_left { "`\\right` and " } else { "" };
-            return self.unexpected(&format!("an operator or {right}{quoted}"));
+            let expected = match are_bars {
+                true => "an operator or the closing bar".to_owned(),
+                false => format!("an operator or {right}`{}`", closers[0]),
+            };
+            return self.unexpected(&expected);
         }
         self.push(place, ")");
         Ok(Last::Other)
+    }
+
+    fn delimiter(&mut self, wanted: &str) -> bool {
+        match wanted.strip_prefix('\\') {
+            Some(command) => self.command(command),
+            None => wanted.chars().all(|character| self.character(character)),
+        }
     }
 
     /// The sum in the argument that comes next, between an opening text and a parenthesis.

@@ -50,8 +50,9 @@ impl Reader<'_> {
         self.at = ten.behind;
         self.takes(&Kind::Superscript).then_some(())?;
         let behind = self.after_argument(self.at);
-        let text: String = (self.tokens[self.at..behind].iter())
-            .map(|token| match &token.kind {
+        let seen = (self.at..behind).filter(|at| !self.is_around[*at]);
+        let text: String = seen
+            .map(|at| match &self.tokens[at].kind {
                 Kind::Open | Kind::Close => String::new(),
                 Kind::Character(c @ ('+' | '-' | '0'..='9')) => c.to_string(),
                 _ => "?".to_owned(),

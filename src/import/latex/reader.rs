@@ -237,8 +237,13 @@ impl<'a> Reader<'a> {
         }
         self.deepen()?;
         let (at, after) = (self.at, self.after_argument(self.at));
+        let is_digit = |at: usize| matches!(self.kind(at), Some(Kind::Character('0'..='9')));
         let (first, end) = match &self.tokens[at].kind {
             Kind::Open => (at + 1, after - 1),
+            // TeX would take the space for the argument.
+            _ if is_blank(&self.tokens[at - 1].kind) && is_digit(at) && is_digit(at + 1) => {
+                return self.unexpected("braces around an argument of several digits");
+            }
             _ => (at, after),
         };
         let outer_end = std::mem::replace(&mut self.end, end);
@@ -258,9 +263,9 @@ impl<'a> Reader<'a> {
 impl Reader<'_> {
     /// Whether a row or column ends right before a place.
     pub(super) fn breaks_before(&self, at: usize) -> bool {
-        let blanks = self.tokens[..at].iter().rev();
-        (blanks.take_while(|token| is_blank(&token.kind)))
-            .any(|token| matches!(token.kind, Kind::Align | Kind::Break))
+        let is_passed = |at: &usize| self.is_around[*at] || is_blank(&self.tokens[*at].kind);
+        let mut blanks = (0..at).rev().take_while(is_passed);
+        blanks.any(|at| matches!(self.tokens[at].kind, Kind::Align | Kind::Break))
     }
 
     /// Whether the number at a place was read with `\times 10^{-3}` behind it; goes back there if so.
@@ -314,9 +319,9 @@ impl Reader<'_> {
                 Kind::Open => at + 1..behind - 1,
                 _ => at..behind,
             };
-            let is_digit = |token: &Token| matches!(token.kind, Kind::Character('0'..='9'));
-            let is_integer = !inside.is_empty() && self.tokens[inside].iter().all(is_digit);
-            is_integer.then_some(behind)
+            let mut seen = inside.filter(|at| !self.is_around[*at]).peekable();
+            let is_digit = |at: usize| matches!(self.tokens[at].kind, Kind::Character('0'..='9'));
+            (seen.peek().is_some() && seen.all(is_digit)).then_some(behind)
         };
         is_fraction
             && behind_integer(self.at + 1)
@@ -327,14 +332,15 @@ impl Reader<'_> {
     /// Whether the last thing that follows is an integer alone in parentheses, as equations are numbered by hand.
     pub(super) fn is_lone_integer(&self) -> bool {
         let is_one_of = |at: usize, all: &str| matches!(self.kind(at), Some(Kind::Character(c)) if all.contains(*c));
-        let is_last = |at: usize| match self.kind(at) {
+        let behind = |at: usize| (at..self.end).find(|at| !self.is_around[*at]);
+        let is_last = |at: usize| match behind(at).and_then(|at| self.kind(at)) {
             Some(Kind::Character(c)) => ".,".contains(*c),
             Some(kind) => kind.ends_term(),
             None => true,
         };
-        let behind = self.behind_integer(self.at + 1);
+        let closer = self.behind_integer(self.at + 1);
         is_one_of(self.at, "([")
-            && behind.is_some_and(|behind| is_one_of(behind, ")]") && is_last(behind + 1))
+            && closer.is_some_and(|closer| is_one_of(closer, ")]") && is_last(closer + 1))
     }
 }
 

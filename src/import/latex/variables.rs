@@ -80,7 +80,7 @@ impl Reader<'_> {
         let argument = self.here();
         let last = match self.next_kind() {
             Some(Kind::Character('(' | '[')) => self.delimited(argument)?,
-            Some(Kind::Command(opener)) if opener == "left" && !self.opens_bar() => {
+            Some(Kind::Command(opener)) if opener == "left" && !self.is_bar_behind() => {
                 self.delimited(argument)?
             }
             // Braces do not print: a sum or a power of what is in them would read otherwise without.
@@ -126,6 +126,15 @@ impl Reader<'_> {
             None => {}
         }
         Ok(last)
+    }
+
+    /// Whether `\left` at the reader's place opens a bar.
+    fn is_bar_behind(&self) -> bool {
+        match self.kind(self.at + 1) {
+            Some(Kind::Character(bar)) => *bar == '|',
+            Some(Kind::Command(name)) => has("lvert vert |", name),
+            _ => false,
+        }
     }
 
     /// `\sin 2\dot z_1`: numbers and one more factor.

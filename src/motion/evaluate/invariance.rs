@@ -47,7 +47,7 @@ impl Invariance {
     /// Of a model over the robot's coordinates; `None` without encoder, decoder, scaling or robot.
     ///
     /// # Errors
-    /// [`ModelError::RankDeficient`] if the Jacobian of an encoder with layers lacks rank where the model is asked.
+    /// [`ModelError::Invalid`] if the Jacobian of an encoder with layers lacks rank where the model is asked.
     pub fn of(model: &ReducedModel) -> Result<Option<Self>, ModelError> {
         match Self::of_complete(model) {
             Ok(invariance) => Ok(Some(invariance)),

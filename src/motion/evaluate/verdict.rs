@@ -309,29 +309,14 @@ fn without_predictions(rows: &mut [VerdictRow], fails_soon: bool) {
 fn control_rows(metrics: &ControlMetrics) -> [VerdictRow; 5] {
     let baseline = &metrics.baseline;
     let blind = &baseline.no_dynamics;
-    let torque = |name, own: Option<f64>, other: Option<f64>| {
-        let threshold = other.map_or(TORQUE_R2, |other| other.max(TORQUE_R2));
-        let against = (NO_DYNAMICS, other);
-        VerdictRow::new(
-            (TORQUES, name, ""),
-            own,
-            against,
-            (Bound::AtLeast, threshold),
-        )
+    let torque = |name, own, other: Option<f64>| {
+        let least = other.map_or(TORQUE_R2, |other| other.max(TORQUE_R2));
+        let (row, against) = ((TORQUES, name, ""), (NO_DYNAMICS, other));
+        VerdictRow::new(row, own, against, (Bound::AtLeast, least))
     };
-    let [contact, flight] = [
-        (
-            TORQUES_IN_CONTACT,
-            metrics.torque_r2.contact,
-            blind.torque_r2.contact,
-        ),
-        (
-            "R^2 of torques in flight",
-            metrics.torque_r2.flight,
-            blind.torque_r2.flight,
-        ),
-    ]
-    .map(|(name, own, other)| torque(name, own, other));
+    let (own, other) = (metrics.torque_r2, blind.torque_r2);
+    let contact = torque(TORQUES_IN_CONTACT, own.contact, other.contact);
+    let flight = torque("R^2 of torques in flight", own.flight, other.flight);
     let stage = |name, other: &Option<_>| {
         let share = (metrics.prediction_rms.as_ref())
             .zip(other.as_ref())
@@ -339,10 +324,8 @@ fn control_rows(metrics: &ControlMetrics) -> [VerdictRow; 5] {
         let row = (CONTROL, ONE_STAGE, "");
         VerdictRow::new(row, share, (name, Some(1.0)), (Bound::AtMost, NO_BETTER))
     };
-    let constant = stage(
-        CONSTANT_VELOCITY,
-        &baseline.constant_velocity.prediction_rms,
-    );
+    let constant = &baseline.constant_velocity.prediction_rms;
+    let constant = stage(CONSTANT_VELOCITY, constant);
     let uninformed = stage(NO_DYNAMICS, &blind.prediction_rms);
     let stage = match uninformed.margin() < constant.margin() {
         true => uninformed,

@@ -17,31 +17,23 @@ use crate::recording::RecordingError;
 #[non_exhaustive]
 #[allow(missing_docs, reason = "each variant's message names its fields")]
 pub enum MpcError {
-    /// The model lacks something that the controller needs.
     #[error("the model cannot be used for control")]
     Model(#[from] ModelError),
-    /// The model's dynamics do not compile.
     #[error("the model's dynamics cannot be compiled")]
     Lower(#[from] LowerError),
-    /// The recording cannot serve as a reference.
     #[error("the recording cannot be used for control")]
     Recording(#[from] RecordingError),
-    /// The model is not over the robot's generalised coordinates.
     #[error("the model's encoder takes {found} coordinates, the robot has {expected}")]
     StateDim { found: usize, expected: usize },
-    /// A covariance of the training inputs is no covariance.
     #[error("input statistics of phase `{phase}`: the covariance cannot be factorised")]
     Statistics { phase: String },
-    /// A controller that acts more often than there are samples.
     #[error("{}: a sample every {:.3} ms; found a step of {} s, expected at least as long (`romc mpc --step {}`)", path.display(), recorded_s * 1e3, found_s, (recorded_s * 1e4).ceil() / 1e4)]
     Step {
         path: PathBuf,
-        /// Duration of a stage, s.
         found_s: f64,
         /// Time between samples, s.
         recorded_s: f64,
     },
-    /// A controller whose commands are held for longer than any stretch of the recording.
     #[error("{}: {longest_s:.3} s without a gap, found a step of {found_s:.3e} s, expected a shorter one or a longer recording", path.display())]
     NoStep {
         path: PathBuf,
@@ -49,7 +41,6 @@ pub enum MpcError {
         /// The recording's longest segment, s.
         longest_s: f64,
     },
-    /// A setting, a reference or the solver.
     #[error(transparent)]
     Control(#[from] ControlError),
 }

@@ -6,10 +6,10 @@
 //!
 //! `of_model` takes from the model what the controller needs; `online` is the controller itself,
 //! the folder that is emitted for a robot. Read `online/problem` first, which states the optimal
-//! control problem. From there one torque is made by `reference` (what to follow, encoded), `horizon` (phases and linearised dynamics of the stages,
-//! with `linearise`), `layout` and `transcribe` (the conic program), `qp` (clarabel, and the check of what it
-//! returns), `controller` (plan to command; what to do without a plan) and, if asked for, `lift`
-//! (torques that the ground can answer).
+//! control problem. From there one torque is made by `reference` (the trajectory, encoded), `horizon` (phases and
+//! linearised dynamics, with `linearise`), `stage` (one stage, scaled), the solvers behind `engine` (`conic` and `qp`
+//! for clarabel, `structured`), `controller` and `step` (plan to command), `fallback` (without a plan) and, if asked
+//! for, `lift` (torques that the ground can answer).
 //! [`evaluate::along_recording()`](crate::evaluate::along_recording()) runs it all on recorded jumps.
 
 mod error;
@@ -20,12 +20,3 @@ mod online;
 pub use error::MpcError;
 pub use of_model::STEP_SLACK;
 pub use online::*;
-
-#[cfg(test)]
-mod tests {
-    #[test]
-    fn the_range_of_the_horizon_ends_where_the_controller_does() {
-        let most = crate::limits::table::HORIZON.most;
-        assert_eq!(most as usize, super::MAX_HORIZON);
-    }
-}

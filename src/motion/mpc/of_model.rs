@@ -8,8 +8,8 @@ use nalgebra::{Cholesky, DMatrix, DVector, SMatrix, SVector};
 
 use super::error::MpcError;
 use super::online::{
-    ControlModel, ControlModelParts, ControlPhase, Controller, InputGivenState, InputMaps,
-    LatentDynamics, MpcSettings, NonlinearMaps,
+    ControlModel, ControlModelParts, ControlPhase, Controller, InputGivenState, LatentDynamics,
+    MpcSettings, NonlinearMaps,
 };
 use crate::lower::CompiledModel;
 use crate::model::ReducedModel;
@@ -120,20 +120,16 @@ impl NonlinearMaps for ModelMaps {
         jacobian.expect(CHECKED)
     }
 
-    fn inputs(&self, x: &[f64]) -> Option<InputMaps> {
+    fn inputs(&self, x: &[f64]) -> Option<[DMatrix<f64>; 2]> {
         let tangent = self.0.tangent(&DVector::from_column_slice(x)).ok()?;
-        Some(InputMaps {
-            lift: tangent.lift,
-            projection: tangent.project,
-        })
+        Some([tangent.lift, tangent.project])
     }
 
     fn phases(&self, x: &[f64]) -> Option<Vec<ControlPhase>> {
-        phases_under(&self.0, &self.inputs(x)?.projection).ok()
+        phases_under(&self.0, &self.inputs(x)?[1]).ok()
     }
 }
 
-/// The statistics of all phases with latent inputs `projection u`.
 fn phases_under(
     model: &ReducedModel,
     projection: &DMatrix<f64>,

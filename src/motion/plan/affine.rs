@@ -1,6 +1,6 @@
 //! Affine expressions of a program's variables, and sparse matrices made of them.
 
-use crate::mpc::{Cone, ConeProgram, SparseColumns};
+use crate::mpc::{Cone, ConeProgram, sparse};
 
 /// `constant + sum of factor times variable`.
 #[derive(Clone, Debug, Default)]
@@ -10,13 +10,11 @@ pub(crate) struct Affine {
 }
 
 impl Affine {
-    /// A constant.
     pub(crate) fn of(constant: f64) -> Self {
         let terms = Vec::new();
         Self { terms, constant }
     }
 
-    /// Adds `factor` times a variable.
     pub(crate) fn add(&mut self, variable: usize, factor: f64) {
         if factor != 0.0 {
             self.terms.push((variable, factor));
@@ -29,7 +27,6 @@ impl Affine {
         self
     }
 
-    /// Adds `factor` times another expression.
     pub(crate) fn add_scaled(&mut self, other: &Affine, factor: f64) {
         self.constant += factor * other.constant;
         for &(variable, f) in &other.terms {
@@ -37,7 +34,6 @@ impl Affine {
         }
     }
 
-    /// The value at `y`.
     pub(crate) fn at(&self, y: &[f64]) -> f64 {
         self.constant + self.terms.iter().map(|&(i, f)| f * y[i]).sum::<f64>()
     }
@@ -70,7 +66,6 @@ impl Builder {
         }
     }
 
-    /// Adds `factor` times a variable to the cost.
     pub(crate) fn linear(&mut self, variable: usize, factor: f64) {
         self.linear.push((variable, factor));
     }
@@ -85,7 +80,6 @@ impl Builder {
         self.at_most.push(expression);
     }
 
-    /// The program over so many variables.
     pub(crate) fn program(self, variables: usize) -> ConeProgram {
         let mut q = vec![0.0; variables];
         for (variable, factor) in self.linear {
@@ -103,28 +97,11 @@ impl Builder {
             cones.push(Cone::Nonnegative(self.at_most.len()));
         }
         ConeProgram {
-            p: sparse(variables, variables, self.cost),
+            p: sparse(variables, variables, &self.cost),
             q,
-            a: sparse(rows, variables, entries),
+            a: sparse(rows, variables, &entries),
             b,
             cones,
         }
     }
-}
-
-/// The matrix of `(row, column, value)`, values of one place added.
-fn sparse(rows: usize, columns: usize, mut entries: Vec<(usize, usize, f64)>) -> SparseColumns {
-    entries.sort_unstable_by_key(|&(row, column, _)| (column, row));
-    let places: Vec<(usize, usize)> = entries.iter().map(|&(row, col, _)| (row, col)).collect();
-    let mut matrix = SparseColumns::from_pattern(rows, columns, &places);
-    let values = matrix.values_mut();
-    let (mut at, mut last) = (0, None);
-    for (row, column, value) in entries {
-        if last.is_some_and(|place| place != (row, column)) {
-            at += 1;
-        }
-        values[at] += value;
-        last = Some((row, column));
-    }
-    matrix
 }

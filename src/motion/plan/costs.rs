@@ -30,7 +30,7 @@ pub(crate) fn value(task: &Task<'_>, y: &[f64]) -> f64 {
 
 /// What is squared, and its weight.
 fn squares(task: &Task<'_>, y: &[f64]) -> Vec<(Affine, f64)> {
-    let (d, settings) = (task.layout.latent_dim, task.settings);
+    let (d, settings) = (task.seed.latent_dim, task.settings);
     let share = 1.0 / d as f64;
     let one = |variable: usize, weight: f64| (Affine::default().plus(variable, 1.0), weight);
     let mut out = Vec::new();
@@ -39,7 +39,7 @@ fn squares(task: &Task<'_>, y: &[f64]) -> Vec<(Affine, f64)> {
         for node in 0..of.z.len() {
             let end = node == 0 || node == of.intervals();
             let time = step / TIME_UNIT_S * if end { 0.5 } else { 1.0 };
-            let at = task.layout.node(part, node);
+            let at = task.node(part, node);
             for i in 0..d {
                 if i >= FIRST_OF_POSTURE {
                     out.push(one(at + i, settings.posture * share * time));
@@ -48,7 +48,7 @@ fn squares(task: &Task<'_>, y: &[f64]) -> Vec<(Affine, f64)> {
                 out.push(one(at + 2 * d + i, settings.input * share * time));
             }
             if node < of.intervals() {
-                let next = task.layout.node(part, node + 1);
+                let next = task.node(part, node + 1);
                 let per_unit = (TIME_UNIT_S / step).powi(2) * step / TIME_UNIT_S;
                 for i in 0..d {
                     let change = Affine::default().plus(next + 2 * d + i, 1.0);
@@ -62,7 +62,7 @@ fn squares(task: &Task<'_>, y: &[f64]) -> Vec<(Affine, f64)> {
             _ => settings.duration[usize::from(!of.is_grounded())],
         };
         // A little for every duration keeps the program strictly convex.
-        out.push(one(task.layout.duration(part), weight.max(1e-3)));
+        out.push(one(task.duration(part), weight.max(1e-3)));
     }
     for part in 0..task.seed.parts.len() {
         add_feet(task, y, part, &mut out);
@@ -109,7 +109,7 @@ pub(crate) fn moved_foot(
     let before = foot_place(task.seed, leg, &task.seed.parts[part].z[node]);
     std::array::from_fn(|axis| {
         let mut moved = Affine::of(now.at[axis] - before.at[axis]);
-        for i in 0..task.layout.latent_dim {
+        for i in 0..task.seed.latent_dim {
             let slope = now.by_z[(axis, i)];
             moved.add_scaled(&task.latent(part, node, i), slope);
             moved.constant -= slope * z[i];

@@ -12,14 +12,12 @@ use crate::recording::RecordingError;
 /// Why a jump could not be planned.
 #[derive(Debug, Error)]
 pub enum PlanError {
-    /// A number of the goal or of the settings that no jump has.
     #[error("{what}: found {found}, expected {expected}")]
     Goal {
         what: &'static str,
         found: f64,
         expected: String,
     },
-    /// The convex programs have no solution from here on.
     #[error(
         "no plan for {distance_m} m with an apex of {apex_m} m: {outcome:?} in convex program {iteration}"
     )]
@@ -30,7 +28,6 @@ pub enum PlanError {
         /// Number of the program, from 1.
         iteration: usize,
     },
-    /// The convex programs do not settle on a trajectory.
     #[error(
         "no plan for {distance_m} m with an apex of {apex_m} m: the equations are still off by \
          {defect:.1e} after {iterations} convex programs"
@@ -42,16 +39,12 @@ pub enum PlanError {
         defect: f64,
         iterations: usize,
     },
-    /// The model lacks what planning needs.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// The equations of a phase do not compile.
     #[error(transparent)]
     Lower(#[from] LowerError),
-    /// The solver refused a program.
     #[error(transparent)]
     Control(#[from] ControlError),
-    /// The planned motion makes no input.
     #[error(transparent)]
     Recording(#[from] RecordingError),
 }

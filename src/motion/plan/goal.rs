@@ -44,7 +44,6 @@ impl Goal {
         self
     }
 
-    /// Distance and rise of the body, m.
     pub(crate) fn goal_m(&self) -> [f64; 2] {
         self.goal_m
     }

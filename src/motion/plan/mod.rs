@@ -28,12 +28,9 @@ mod solve;
 mod transcribe;
 mod verdict;
 
-#[cfg(test)]
-mod tests;
-
 pub use error::PlanError;
 pub use goal::Goal;
-pub use reach::{Reach, ReachPoint, reach};
+pub use reach::{GoalMap, MappedGoal, reach};
 pub use settings::PlanSettings;
 pub use solve::{Plan, PlannedPart, plan};
 pub use verdict::Verdict;

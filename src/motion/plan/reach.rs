@@ -11,7 +11,7 @@ const STEPS: [i32; 2] = [4, 3];
 
 /// A goal of the map.
 #[derive(Clone, Debug, PartialEq)]
-pub struct ReachPoint {
+pub struct MappedGoal {
     /// Distance and apex, m.
     pub goal_m: [f64; 2],
     /// Word of the verdict, or `no plan`.
@@ -24,13 +24,13 @@ pub struct ReachPoint {
 
 /// The map of a model.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Reach {
+pub struct GoalMap {
     /// Distances, m, ascending.
     pub distances_m: Vec<f64>,
     /// Apexes, m, ascending.
     pub apexes_m: Vec<f64>,
     /// One point per distance and apex, distances of one apex together.
-    pub points: Vec<ReachPoint>,
+    pub points: Vec<MappedGoal>,
 }
 
 /// Plans a grid of goals around the training jumps; `done` is told how many of how many.
@@ -41,7 +41,7 @@ pub fn reach(
     model: &ReducedModel,
     settings: &PlanSettings,
     mut done: impl FnMut(usize, usize),
-) -> Result<Reach, PlanError> {
+) -> Result<GoalMap, PlanError> {
     let prior = model.jump_prior()?;
     let axis = |i: usize| -> Vec<f64> {
         let range = &prior.ranges()[i];
@@ -61,7 +61,7 @@ pub fn reach(
             done(points.len(), total);
         }
     }
-    Ok(Reach {
+    Ok(GoalMap {
         distances_m,
         apexes_m,
         points,
@@ -72,7 +72,7 @@ fn point(
     model: &ReducedModel,
     goal_m: [f64; 2],
     settings: &PlanSettings,
-) -> Result<ReachPoint, PlanError> {
+) -> Result<MappedGoal, PlanError> {
     let clock = std::time::Instant::now();
     let made = Goal::new(goal_m[0], goal_m[1]).and_then(|goal| plan(model, &goal, settings));
     let solve_ms = 1e3 * clock.elapsed().as_secs_f64();
@@ -87,7 +87,7 @@ fn point(
             | PlanError::Recording(_),
         ) => ("no plan", None),
     };
-    Ok(ReachPoint {
+    Ok(MappedGoal {
         goal_m,
         status,
         input_deviation,

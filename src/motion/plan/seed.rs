@@ -9,7 +9,6 @@ use crate::lower::CompiledModel;
 use crate::model::{JumpPart, JumpPrior, ReducedModel};
 use crate::robot::{BODY_NAMES, BODY_Z, InputRule, JOINT_DIM, JOINT_NAMES, STATE_DIM};
 
-/// Pitch of the body in the state.
 pub(crate) const PITCH: usize = 16;
 
 /// Difference of an angle of the start to its decoded one that is told, rad.
@@ -17,7 +16,6 @@ const LOST_ANGLE_RAD: f64 = 0.15;
 /// Difference of a place of the body at the start to its decoded one that is told, m.
 const LOST_PLACE_M: f64 = 0.03;
 
-/// Everything that the program of one goal is made of.
 pub(crate) struct Seed<'a> {
     pub prior: &'a JumpPrior,
     pub rule: InputRule,
@@ -53,12 +51,10 @@ pub(crate) struct SeedPart<'a> {
 }
 
 impl SeedPart<'_> {
-    /// Number of intervals.
     pub(crate) fn intervals(&self) -> usize {
         self.z.len() - 1
     }
 
-    /// Whether a foot is on the ground.
     pub(crate) fn is_grounded(&self) -> bool {
         self.part.feet.contains(&true)
     }
@@ -106,7 +102,6 @@ impl<'a> Seed<'a> {
         })
     }
 
-    /// A coordinate of the decoded state.
     pub(crate) fn decoded(&self, z: &DVector<f64>) -> [f64; STATE_DIM] {
         let x = &self.decode * z + &self.decode_bias;
         std::array::from_fn(|i| x[i])

@@ -2,125 +2,110 @@
 
 use serde::{Deserialize, Serialize};
 
-/// What a plan is weighed and bounded by. Deviations are those from the prior, each in standard
-/// deviations of the training, averaged over the coordinates and summed over time in units of 10 ms.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct PlanSettings {
+/// No upper end of a setting.
+const ANY: f64 = f64::INFINITY;
+
+/// Makes [`PlanSettings`] of a table: field, default, and the upper end of its range from zero.
+macro_rules! settings {
+    ($($(#[$doc:meta])* $field:ident: $type:ty = $default:expr, $most:expr;)*) => {
+        /// What a plan is weighed and bounded by. Deviations are those from the prior, each in standard
+        /// deviations of the training, averaged over the coordinates and summed over time in units of 10 ms.
+        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+        #[serde(default, deny_unknown_fields)]
+        pub struct PlanSettings {
+            $($(#[$doc])* pub $field: $type,)*
+            /// Convex programs at most.
+            pub programs: usize,
+        }
+
+        impl Default for PlanSettings {
+            fn default() -> Self {
+                Self { $($field: $default,)* programs: 8 }
+            }
+        }
+
+        impl PlanSettings {
+            /// Complains about the first number that no plan can be made with.
+            ///
+            /// # Errors
+            /// The name with what was found and expected.
+            pub fn check(&self) -> Result<(), String> {
+                $(check(stringify!($field), self.$field.numbers(), $most)?;)*
+                if self.foot_m.contains(&0.0) || self.input == 0.0 || self.programs == 0 {
+                    return Err(
+                        "`foot_m`, `input` or `programs` is 0, expected a positive number".to_owned(),
+                    );
+                }
+                Ok(())
+            }
+        }
+    };
+}
+
+settings! {
     /// Weight of the input's deviation.
-    pub input: f64,
+    input: f64 = 2.0, ANY;
     /// Weight of the deviation of the posture: the latent coordinates after the second.
-    pub posture: f64,
+    posture: f64 = 0.5, ANY;
     /// Weight of the deviation of the latent velocities.
-    pub rate: f64,
+    rate: f64 = 0.1, ANY;
     /// Weight of the change of the input's deviation in 10 ms.
-    pub smoothness: f64,
+    smoothness: f64 = 3.0, ANY;
     /// Weight of feet that leave their place, per [`Self::foot_m`].
-    pub feet: f64,
+    feet: f64 = 3.0, ANY;
     /// Displacement of a foot along and above the floor that counts one, m.
-    pub foot_m: [f64; 2],
+    foot_m: [f64; 2] = [0.005, 0.004], 1.0;
     /// Weight of durations, per 15 % of change: of parts on the ground, and of the flight.
-    pub duration: [f64; 2],
+    duration: [f64; 2] = [4.0, 0.0], ANY;
     /// Weight of the duration of the first part, which leads to the thrust.
-    pub first_duration: f64,
+    first_duration: f64 = 400.0, ANY;
     /// Share of the training jumps' ranges of goals, at either end, that the prior is kept out of.
-    pub inset: f64,
+    inset: f64 = 0.3, 0.5;
     /// Share of the torque limits that a plan may use at its nodes.
-    pub torque_share: f64,
+    torque_share: f64 = 0.9, 1.0;
     /// Friction between feet and floor.
-    pub friction: f64,
+    friction: f64 = 0.6, ANY;
     /// Force that may exceed the friction cone, N: the input's force is not free of noise.
-    pub friction_slack_n: f64,
+    friction_slack_n: f64 = 10.0, ANY;
     /// Most speed of the body at the end, of jumps that land, m/s.
-    pub end_speed_m_s: f64,
+    end_speed_m_s: f64 = 0.03, ANY;
     /// Most pitch of the body at the end, of jumps that land, rad.
-    pub end_pitch_rad: f64,
+    end_pitch_rad: f64 = 0.06, ANY;
     /// Height below that of the training jumps' landings, and around that of their ends, m.
-    pub height_slack_m: f64,
-    /// Convex programs at most.
-    pub programs: usize,
+    height_slack_m: f64 = 0.02, ANY;
     /// Input deviation beyond which a plan comes with a warning.
-    pub warn_deviation: f64,
+    warn_deviation: f64 = 0.6, ANY;
     /// Input deviation beyond which a plan is refused.
-    pub refuse_deviation: f64,
+    refuse_deviation: f64 = 1.2, ANY;
     /// Distance of goals from the range of the training jumps, in widths of it, beyond which they
     /// are not tried.
-    pub reach: f64,
+    reach: f64 = 1.5, ANY;
 }
 
-impl Default for PlanSettings {
-    fn default() -> Self {
-        Self {
-            input: 2.0,
-            posture: 0.5,
-            rate: 0.1,
-            smoothness: 3.0,
-            feet: 3.0,
-            foot_m: [0.005, 0.004],
-            duration: [4.0, 0.0],
-            first_duration: 400.0,
-            inset: 0.3,
-            torque_share: 0.9,
-            friction: 0.6,
-            friction_slack_n: 10.0,
-            end_speed_m_s: 0.03,
-            end_pitch_rad: 0.06,
-            height_slack_m: 0.02,
-            programs: 8,
-            warn_deviation: 0.6,
-            refuse_deviation: 1.2,
-            reach: 1.5,
-        }
+trait Numbers {
+    fn numbers(&self) -> &[f64];
+}
+
+impl Numbers for f64 {
+    fn numbers(&self) -> &[f64] {
+        std::slice::from_ref(self)
     }
 }
 
-impl PlanSettings {
-    /// Complains about the first number that no plan can be made with.
-    ///
-    /// # Errors
-    /// The name with what was found and expected.
-    pub fn check(&self) -> Result<(), String> {
-        let at_least_zero = [
-            ("input", self.input),
-            ("posture", self.posture),
-            ("rate", self.rate),
-            ("smoothness", self.smoothness),
-            ("feet", self.feet),
-            ("duration", self.duration[0]),
-            ("duration", self.duration[1]),
-            ("first_duration", self.first_duration),
-            ("friction", self.friction),
-            ("friction_slack_n", self.friction_slack_n),
-            ("end_speed_m_s", self.end_speed_m_s),
-            ("end_pitch_rad", self.end_pitch_rad),
-            ("height_slack_m", self.height_slack_m),
-            ("warn_deviation", self.warn_deviation),
-            ("refuse_deviation", self.refuse_deviation),
-            ("reach", self.reach),
-        ];
-        for (name, found) in at_least_zero {
-            if !(found.is_finite() && found >= 0.0) {
-                return Err(format!(
-                    "`{name}` is {found}, expected a number of at least 0"
-                ));
-            }
-        }
-        let inside = [
-            ("inset", self.inset, 0.5),
-            ("torque_share", self.torque_share, 1.0),
-            ("foot_m", self.foot_m[0], 1.0),
-            ("foot_m", self.foot_m[1], 1.0),
-        ];
-        for (name, found, most) in inside {
-            if !(0.0..=most).contains(&found) {
-                return Err(format!("`{name}` is {found}, expected 0 to {most}"));
-            }
-        }
-        if self.foot_m.contains(&0.0) || self.input == 0.0 || self.programs == 0 {
-            return Err(
-                "`foot_m`, `input` or `programs` is 0, expected a positive number".to_owned(),
-            );
-        }
-        Ok(())
+impl Numbers for [f64; 2] {
+    fn numbers(&self) -> &[f64] {
+        self
     }
+}
+
+fn check(name: &str, numbers: &[f64], most: f64) -> Result<(), String> {
+    let is_out = |found: &&f64| !(found.is_finite() && (0.0..=most).contains(*found));
+    let Some(found) = numbers.iter().find(is_out) else {
+        return Ok(());
+    };
+    let expected = match most {
+        ANY => "a number of at least 0".to_owned(),
+        most => format!("0 to {most}"),
+    };
+    Err(format!("`{name}` is {found}, expected {expected}"))
 }

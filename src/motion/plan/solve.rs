@@ -85,7 +85,7 @@ pub fn plan(model: &ReducedModel, goal: &Goal, settings: &PlanSettings) -> Resul
         })
         .collect();
     let goal_m = goal.goal_m();
-    let slack = Bound::ALL.map(|bound| (bound, y[task.layout.slack(bound)]));
+    let slack = Bound::ALL.map(|bound| (bound, y[task.slack(bound)]));
     let input_deviation = input_deviation(&task, &y);
     let findings = Findings {
         input_deviation,
@@ -156,11 +156,11 @@ fn solve(task: &mut Task<'_>) -> Result<(Vec<f64>, usize), PlanError> {
 
 /// Largest `|mu| / sqrt(latent_dim)` of a node.
 fn input_deviation(task: &Task<'_>, y: &[f64]) -> f64 {
-    let d = task.layout.latent_dim;
+    let d = task.seed.latent_dim;
     let mut most = 0.0_f64;
     for (part, of) in task.seed.parts.iter().enumerate() {
         for node in 0..of.z.len() {
-            let at = task.layout.node(part, node) + 2 * d;
+            let at = task.node(part, node) + 2 * d;
             let square: f64 = y[at..at + d].iter().map(|mu| mu * mu).sum();
             most = most.max((square / d as f64).sqrt());
         }
@@ -178,7 +178,6 @@ fn outside(seed: &Seed<'_>, goal_m: [f64; 2]) -> [f64; 2] {
     })
 }
 
-/// Distance and rise of the body in a motion, m.
 fn reached(motion: &Segment) -> [f64; 2] {
     let (x, last) = (&motion.x, motion.len() - 1);
     let height = x.row(BODY_Z);

@@ -55,70 +55,21 @@ pub(crate) enum Bound {
 }
 
 impl Bound {
-    /// All of them.
     pub(crate) const ALL: [Self; 4] = [Self::Torque, Self::Joint, Self::Friction, Self::Height];
 }
 
 /// Places of the variables.
-#[derive(Clone, Debug)]
-pub struct Layout {
-    pub latent_dim: usize,
-    first: Vec<usize>,
-    durations: usize,
-    slacks: usize,
-}
-
-impl Layout {
-    /// The layout of a seed's program.
-    pub(crate) fn new(seed: &Seed<'_>) -> Self {
-        let d = seed.latent_dim;
-        let mut first = Vec::new();
-        let mut next = 0;
-        for part in &seed.parts {
-            first.push(next);
-            next += 3 * d * part.z.len();
-        }
-        Self {
-            latent_dim: d,
-            durations: next,
-            slacks: next + seed.parts.len(),
-            first,
-        }
-    }
-
-    /// Number of variables.
-    pub(crate) fn len(&self) -> usize {
-        self.slacks + Bound::ALL.len()
-    }
-
-    /// First of the `3 latent_dim` variables of a node.
-    pub(crate) fn node(&self, part: usize, node: usize) -> usize {
-        self.first[part] + 3 * self.latent_dim * node
-    }
-
-    /// The variable of a part's duration.
-    pub(crate) fn duration(&self, part: usize) -> usize {
-        self.durations + part
-    }
-
-    /// The violation of a kind of bounds.
-    pub(crate) fn slack(&self, bound: Bound) -> usize {
-        self.slacks + bound as usize
-    }
-}
-
-/// Values of a node at an iterate.
 pub(crate) struct NodeValues {
     pub z: DVector<f64>,
     pub dz: DVector<f64>,
     pub u_lat: DVector<f64>,
 }
 
-/// A seed, its layout and the settings.
 pub(crate) struct Task<'a> {
     pub seed: &'a Seed<'a>,
-    pub layout: Layout,
     pub settings: &'a PlanSettings,
+    /// First variable of each part's nodes, and of the durations.
+    first: Vec<usize>,
     /// Node of the flight where the apex is asked for.
     pub apex_node: usize,
 }
@@ -126,27 +77,46 @@ pub(crate) struct Task<'a> {
 impl<'a> Task<'a> {
     /// The program of a seed, its apex where the prior has it.
     pub(crate) fn new(seed: &'a Seed<'a>, settings: &'a PlanSettings) -> Self {
+        let mut first = vec![0];
+        for part in &seed.parts {
+            first.push(first[first.len() - 1] + 3 * seed.latent_dim * part.z.len());
+        }
         let mut task = Self {
-            layout: Layout::new(seed),
             seed,
             settings,
+            first,
             apex_node: 0,
         };
         task.place_apex(&task.prior_point());
         task
     }
 
-    /// Duration of a part at an iterate, s.
+    /// First of the `3 latent_dim` variables of a node.
+    pub(crate) fn node(&self, part: usize, node: usize) -> usize {
+        self.first[part] + 3 * self.seed.latent_dim * node
+    }
+
+    pub(crate) fn duration(&self, part: usize) -> usize {
+        self.first[self.seed.parts.len()] + part
+    }
+
+    pub(crate) fn slack(&self, bound: Bound) -> usize {
+        self.duration(self.seed.parts.len()) + bound as usize
+    }
+
+    fn variables(&self) -> usize {
+        self.duration(self.seed.parts.len()) + Bound::ALL.len()
+    }
+
     pub(crate) fn duration_s(&self, part: usize, y: &[f64]) -> f64 {
-        let tau = y[self.layout.duration(part)];
+        let tau = y[self.duration(part)];
         self.seed.parts[part].duration_s * (1.0 + DURATION_SHARE * tau)
     }
 
-    /// Values of a node at an iterate.
     pub(crate) fn values(&self, part: usize, node: usize, y: &[f64]) -> NodeValues {
-        let d = self.layout.latent_dim;
+        let d = self.seed.latent_dim;
         let of = &self.seed.parts[part];
-        let at = self.layout.node(part, node);
+        let at = self.node(part, node);
         let std = &self.seed.prior.state_std;
         let mu = DVector::from_column_slice(&y[at + 2 * d..at + 3 * d]);
         NodeValues {
@@ -161,7 +131,7 @@ impl<'a> Task<'a> {
         let of = &self.seed.parts[part];
         let mut sum = Affine::of(of.ddz[interval][i]);
         for node in [interval, interval + 1] {
-            let at = self.layout.node(part, node);
+            let at = self.node(part, node);
             for (column, slope) in of.slope[node].row(i).iter().enumerate() {
                 sum.add(at + column, 0.5 * slope);
             }
@@ -172,18 +142,18 @@ impl<'a> Task<'a> {
     /// Latent position `i` of a node, from `latent_dim` on a velocity.
     pub(crate) fn latent(&self, part: usize, node: usize, i: usize) -> Affine {
         let of = &self.seed.parts[part];
-        let prior = match i.checked_sub(self.layout.latent_dim) {
+        let prior = match i.checked_sub(self.seed.latent_dim) {
             None => of.z[node][i],
             Some(i) => of.dz[node][i],
         };
-        let variable = self.layout.node(part, node) + i;
+        let variable = self.node(part, node) + i;
         Affine::of(prior).plus(variable, self.seed.prior.state_std[i])
     }
 
     /// A coordinate of the decoded state at a node.
     pub fn x(&self, part: usize, node: usize, coordinate: usize) -> Affine {
         let mut value = Affine::of(self.seed.decode_bias[coordinate]);
-        for i in 0..self.layout.latent_dim {
+        for i in 0..self.seed.latent_dim {
             let factor = self.seed.decode[(coordinate, i)];
             value.add_scaled(&self.latent(part, node, i), factor);
         }
@@ -192,7 +162,7 @@ impl<'a> Task<'a> {
 
     /// A coordinate of the decoded velocity at a node.
     pub(crate) fn dx(&self, part: usize, node: usize, coordinate: usize) -> Affine {
-        let (mut value, d) = (Affine::default(), self.layout.latent_dim);
+        let (mut value, d) = (Affine::default(), self.seed.latent_dim);
         for i in 0..d {
             let factor = self.seed.decode[(coordinate, i)];
             value.add_scaled(&self.latent(part, node, d + i), factor);
@@ -203,19 +173,19 @@ impl<'a> Task<'a> {
     /// An entry of the lifted input at a node, SI units.
     pub(crate) fn input(&self, part: usize, node: usize, entry: usize) -> Affine {
         let of = &self.seed.parts[part];
-        let d = self.layout.latent_dim;
+        let d = self.seed.latent_dim;
         let row = self.seed.lift.row(entry);
         let mut value = Affine::of((row * &of.u_lat[node])[0]);
         let by_mu = row * &of.root;
         for (i, factor) in by_mu.iter().enumerate() {
-            value.add(self.layout.node(part, node) + 2 * d + i, *factor);
+            value.add(self.node(part, node) + 2 * d + i, *factor);
         }
         value
     }
 
     /// What the joints take at a node of an iterate, N m.
     pub(crate) fn losses(&self, part: usize, node: usize, y: &[f64]) -> [f64; JOINT_DIM] {
-        let d = self.layout.latent_dim;
+        let d = self.seed.latent_dim;
         let of = &self.seed.parts[part];
         let rates = &self.seed.decode * self.values(part, node, y).dz;
         let last = of.intervals() - 1;
@@ -231,7 +201,6 @@ impl<'a> Task<'a> {
             .losses(&first(&rates), &first(&accelerations))
     }
 
-    /// The program about an iterate.
     pub(crate) fn program(&self, y: &[f64]) -> ConeProgram {
         let mut builder = Builder::default();
         costs::add(self, y, &mut builder);
@@ -241,23 +210,22 @@ impl<'a> Task<'a> {
         }
         self.ends(y, &mut builder);
         for bound in Bound::ALL {
-            let slack = self.layout.slack(bound);
+            let slack = self.slack(bound);
             builder.linear(slack, SLACK_COST);
             builder.at_most(Affine::default().plus(slack, -1.0));
         }
-        builder.program(self.layout.len())
+        builder.program(self.variables())
     }
 
-    /// The part's equations, linearised.
     fn equations(&self, part: usize, y: &[f64], builder: &mut Builder) {
         let of = &self.seed.parts[part];
-        let d = self.layout.latent_dim;
+        let d = self.seed.latent_dim;
         let step = self.duration_s(part, y) / of.intervals() as f64;
         for interval in 0..of.intervals() {
             for i in 0..2 * d {
                 let (mut row, rate) = self.equation(part, interval, i, step);
                 // h = h_0 (1 + share tau): the product with the rate, by its slope at the iterate.
-                let tau = self.layout.duration(part);
+                let tau = self.duration(part);
                 let by_tau = -of.duration_s / of.intervals() as f64 * DURATION_SHARE * rate.at(y);
                 row.add(tau, by_tau);
                 row.constant -= by_tau * y[tau];
@@ -265,7 +233,7 @@ impl<'a> Task<'a> {
             }
         }
         for sign in [-1.0, 1.0] {
-            let tau = self.layout.duration(part);
+            let tau = self.duration(part);
             let bound = DURATION_BOUND.min(sign * y[tau] + DURATION_STEP);
             builder.at_most(Affine::of(-bound).plus(tau, sign));
         }
@@ -274,7 +242,7 @@ impl<'a> Task<'a> {
     /// The difference that an equation demands to be zero with a step of `step` s, and the rate that
     /// the step multiplies; `i` below `latent_dim` is a position, above a velocity.
     fn equation(&self, part: usize, interval: usize, i: usize, step: f64) -> (Affine, Affine) {
-        let d = self.layout.latent_dim;
+        let d = self.seed.latent_dim;
         let [here, next] = [interval, interval + 1];
         let rate = match i.checked_sub(d) {
             None => {
@@ -297,7 +265,7 @@ impl<'a> Task<'a> {
         for (part, of) in self.seed.parts.iter().enumerate() {
             let step = self.duration_s(part, y) / of.intervals() as f64;
             for interval in 0..of.intervals() {
-                for i in 0..2 * self.layout.latent_dim {
+                for i in 0..2 * self.seed.latent_dim {
                     let (row, _) = self.equation(part, interval, i, step);
                     worst = worst.max((row.at(y) / self.seed.prior.state_std[i]).abs());
                 }
@@ -309,7 +277,7 @@ impl<'a> Task<'a> {
 
     /// Start, borders of the parts, apex, end.
     fn ends(&self, y: &[f64], builder: &mut Builder) {
-        let d = self.layout.latent_dim;
+        let d = self.seed.latent_dim;
         let std = &self.seed.prior.state_std;
         let each = || (0..d).flat_map(|i| [i, d + i]);
         for i in each() {
@@ -335,7 +303,7 @@ impl<'a> Task<'a> {
         }
         let [least, most] = self.seed.prior.end_height_m;
         let slack = self.settings.height_slack_m;
-        let height = self.layout.slack(Bound::Height);
+        let height = self.slack(Bound::Height);
         let range = [least - slack, most + slack];
         within(builder, &self.x(part, node, BODY_Z), range, Some(height));
     }
@@ -352,7 +320,6 @@ impl<'a> Task<'a> {
         within(builder, &self.x(part, node, PITCH), [-pitch, pitch], None);
     }
 
-    /// The last node.
     pub(crate) fn last(&self) -> (usize, usize) {
         let part = self.seed.parts.len() - 1;
         (part, self.seed.parts[part].intervals())
@@ -368,7 +335,7 @@ impl<'a> Task<'a> {
         let of = &self.seed.parts[part];
         let robot = self.seed.rule.robot();
         let landing = part + 1 == self.seed.parts.len() && of.is_grounded();
-        let [torque, joint, friction, height] = Bound::ALL.map(|b| self.layout.slack(b));
+        let [torque, joint, friction, height] = Bound::ALL.map(|b| self.slack(b));
         for node in 0..of.z.len() {
             let losses = self.losses(part, node, y);
             for j in 0..JOINT_DIM {
@@ -420,7 +387,6 @@ impl<'a> Task<'a> {
         self.apex_node = highest.expect("invariant: a part has nodes");
     }
 
-    /// The part in the air.
     pub(crate) fn flight(&self) -> usize {
         let mut parts = self.seed.parts.iter();
         let flight = parts.position(|part| !part.is_grounded());
@@ -446,9 +412,8 @@ impl<'a> Task<'a> {
         height
     }
 
-    /// The variables of the prior itself: all zero.
     pub(crate) fn prior_point(&self) -> Vec<f64> {
-        vec![0.0; self.layout.len()]
+        vec![0.0; self.variables()]
     }
 }
 

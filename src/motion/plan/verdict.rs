@@ -46,7 +46,6 @@ impl Verdict {
     }
 }
 
-/// What is known of a plan.
 pub(crate) struct Findings<'a> {
     pub input_deviation: f64,
     pub slack: [(Bound, f64); 4],
@@ -59,7 +58,6 @@ pub(crate) struct Findings<'a> {
     pub start_lost: Vec<String>,
 }
 
-/// The verdict over the findings.
 pub(crate) fn verdict(settings: &PlanSettings, found: &Findings<'_>) -> Verdict {
     let mut refused = Vec::new();
     for (bound, slack) in found.slack {

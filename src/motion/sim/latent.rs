@@ -2,11 +2,21 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::error::SimError;
-use crate::model::{InputStatistics, ReducedModel};
+use crate::model::{InputStatistics, ModelError, ReducedModel};
 use crate::recording::phases::{CHATTER_SAMPLES, PhasePattern};
 use crate::recording::segment::between;
-use crate::recording::{PhaseRule, Segment};
+use crate::recording::{PhaseRule, RecordingError, Segment};
+
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SimError {
+    /// The model lacks a part, or a shape does not fit.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// The recording cannot be turned into inputs.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+}
 
 /// Latent samples of one recorded segment; every matrix is `latent_dim x n`, a column a sample.
 ///

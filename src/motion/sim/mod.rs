@@ -5,12 +5,10 @@
 
 #![allow(missing_docs, reason = "names say it all where there is no comment")]
 
-mod error;
 mod integrate;
 mod latent;
 mod rollout;
 
-pub use error::SimError;
 pub use integrate::{Integration, IntegrationMethod, IntegrationOptions, OdeSystem, integrate};
-pub use latent::{LatentSegment, phase_rule, with_input_statistics};
+pub use latent::{LatentSegment, SimError, phase_rule, with_input_statistics};
 pub use rollout::{Restart, Rollout, Window, integrate_stretches, restart_windows, rollout};

@@ -4,7 +4,7 @@ use super::assemble::Origin;
 use super::error::TrainError;
 use super::latent::least_squares_decoder;
 use super::options::TrainOptions;
-use super::progress::Watch;
+use super::progress::Monitor;
 use super::report::Trained;
 use super::seeds::{Outcome, Seeds};
 use super::subspace::find_subspace;
@@ -26,7 +26,7 @@ pub fn closed_form(
     robot: &'static Robot,
     options: &TrainOptions,
     origin: &Origin,
-    watch: &mut Watch<'_>,
+    monitor: &mut Monitor<'_>,
 ) -> Result<Trained, TrainError> {
     let maps = &options.joint.maps;
     if !maps.is_linear() {
@@ -39,22 +39,22 @@ pub fn closed_form(
     let task = Task::new(recordings, robot, options)?;
     let mut seeds = Seeds::default();
     for seed in options.seeds() {
-        if watch.cancelled() {
+        if monitor.cancelled() {
             break;
         }
-        seeds.add(seed, fit(&task, seed, watch), watch)?;
+        seeds.add(seed, fit(&task, seed, monitor), monitor)?;
     }
     seeds.into_model(task, "closed-form", origin)
 }
 
-fn fit(task: &Task<'_>, seed: u64, watch: &mut Watch<'_>) -> Outcome {
+fn fit(task: &Task<'_>, seed: u64, monitor: &mut Monitor<'_>) -> Outcome {
     let options = task.options;
-    watch.stage("searching the latent space", 1);
+    monitor.stage("searching the latent space", 1);
     let (frame, d) = (&task.frame, options.latent_dim);
     let basis = find_subspace(&task.moments, frame, d, &options.encoder, seed);
     let encoder = task.encoder_over(&basis)?.into();
     let decoder = least_squares_decoder(&task.training, &encoder, None)?.into();
-    let fitted = task.fit_dynamics((encoder, decoder), watch)?;
+    let fitted = task.fit_dynamics((encoder, decoder), monitor)?;
     let report = task.seed_report(&fitted, seed, None);
     Ok((report, fitted))
 }

@@ -9,7 +9,7 @@ use super::joint::Losses;
 use super::judge::Judge;
 use super::latent::{EncodedSet, Latent, input_projection, lift_samples, mean_jacobian};
 use super::metrics::{BODY_X, BODY_Z, SetMetrics, measure};
-use super::progress::Watch;
+use super::progress::Monitor;
 use super::report::{PhaseTerms, SeedReport, TrainReport};
 use super::rollout::Candidate;
 use super::select::{Choice, select};
@@ -110,14 +110,14 @@ impl Task<'_> {
     pub fn fit_dynamics(
         &self,
         (encoder, decoder): (StateMap, StateMap),
-        watch: &mut Watch<'_>,
+        monitor: &mut Monitor<'_>,
     ) -> Result<Fitted, TrainError> {
         let maps = self.encoded(encoder, decoder);
         let (options, features) = (&self.options.regression, &self.features);
         let judge = Judge::new(features, maps.judged_set(self));
         let set = maps.training_set(self);
         check_terms(set, features, &self.library)?;
-        let (xi, choice, candidates) = select(set, &self.knowledge, &judge, options, watch)?;
+        let (xi, choice, candidates) = select(set, &self.knowledge, &judge, options, monitor)?;
         Ok(Fitted {
             maps,
             xi,

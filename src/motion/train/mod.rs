@@ -11,6 +11,7 @@ mod closed_form;
 mod dataset;
 mod features;
 mod frame;
+mod grow;
 mod growth;
 mod joint;
 mod jumps;
@@ -33,7 +34,6 @@ mod options;
 #[cfg(test)]
 mod oscillator;
 mod overlap;
-mod prune;
 mod random;
 mod refine;
 mod report;
@@ -53,7 +53,7 @@ pub use options::{
     Coordinates, EncoderOptions, JointOptions, MapOptions, Method, RegressionOptions, TrainOptions,
     Transfer,
 };
-pub use progress::{Progress, Watch};
+pub use progress::{Monitor, Progress};
 pub use report::{PartScore, PhaseTerms, SeedReport, TrainReport, Trained};
 pub use split::Split;
 pub use task::Recordings;

@@ -10,7 +10,7 @@ use super::dataset::ScaleOptions;
 use super::error::TrainError;
 use super::joint::{LossWeights, Schedule, Unroll, joint};
 use super::metrics::{BODY_X, BODY_Z};
-use super::progress::Watch;
+use super::progress::Monitor;
 use super::report::Trained;
 use super::task::Recordings;
 use crate::limits::table;
@@ -43,11 +43,11 @@ impl Method {
         robot: &'static Robot,
         options: &TrainOptions,
         origin: &Origin,
-        watch: &mut Watch<'_>,
+        monitor: &mut Monitor<'_>,
     ) -> Result<Trained, TrainError> {
         match self {
-            Self::ClosedForm => closed_form(recordings, robot, options, origin, watch),
-            Self::Joint => joint(recordings, robot, options, origin, watch),
+            Self::ClosedForm => closed_form(recordings, robot, options, origin, monitor),
+            Self::Joint => joint(recordings, robot, options, origin, monitor),
         }
     }
 }

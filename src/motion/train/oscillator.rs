@@ -15,7 +15,7 @@ use super::judge::Judge;
 use super::knowledge::Knowledge;
 use super::latent::{EncodedSet, Latent};
 use super::options::TrainOptions;
-use super::progress::{Progress, Watch};
+use super::progress::{Monitor, Progress};
 use super::refine::Refiner;
 use crate::model::{AffineMap, Library, StandardLibrary};
 use crate::recording::{PhaseRule, shipped};
@@ -124,7 +124,7 @@ pub(super) fn fitted(weights: DMatrix<f64>, xi: DMatrix<f64>) -> Fitted {
 pub(super) fn with_refiner<T>(
     bound_per_s: Option<f64>,
     knowledge: &[Knowledge],
-    work: impl FnOnce(&Refiner<'_>, &mut Watch<'_>) -> T,
+    work: impl FnOnce(&Refiner<'_>, &mut Monitor<'_>) -> T,
 ) -> T {
     let ((dataset, latent), (features, _)) = (jumps(3), known());
     let set = EncodedSet::new(&dataset, &latent);
@@ -136,7 +136,7 @@ pub(super) fn with_refiner<T>(
         judge: &judge,
     };
     let (mut nothing, cancel) = (|_: Progress| {}, AtomicBool::new(false));
-    work(&refiner, &mut Watch::new(&mut nothing, &cancel))
+    work(&refiner, &mut Monitor::new(&mut nothing, &cancel))
 }
 
 fn simulate(seed: usize) -> Latent {

@@ -18,12 +18,12 @@ pub enum Progress {
 }
 
 /// Listens to a training and may stop it.
-pub struct Watch<'a> {
+pub struct Monitor<'a> {
     listener: &'a mut dyn FnMut(Progress),
     cancel: &'a AtomicBool,
 }
 
-impl<'a> Watch<'a> {
+impl<'a> Monitor<'a> {
     /// Sends progress to `listener` and stops soon after `cancel` becomes true.
     pub fn new(listener: &'a mut dyn FnMut(Progress), cancel: &'a AtomicBool) -> Self {
         Self { listener, cancel }

@@ -10,7 +10,7 @@ use nalgebra::{DMatrix, DVector};
 use super::growth::Growth;
 use super::judge::Judge;
 use super::knowledge::Knowledge;
-use super::progress::Watch;
+use super::progress::Monitor;
 use super::rollout::Change;
 use super::sparse::active_terms;
 
@@ -71,13 +71,18 @@ impl Refiner<'_> {
     /// Lowers the errors that `training` measures in at most `steps` steps, and gives the coefficients that `judge`
     /// scores best on the way. Which terms are active does not change, but for those that would drive where they may
     /// only brake, nor do coefficients that are known.
-    pub fn refine(&self, start: Coefficients, steps: usize, watch: &mut Watch<'_>) -> Coefficients {
+    pub fn refine(
+        &self,
+        start: Coefficients,
+        steps: usize,
+        monitor: &mut Monitor<'_>,
+    ) -> Coefficients {
         let free = self.free(&start.xi);
         let Some(weights) = self.weights(&start.xi).filter(|_| !free.places.is_empty()) else {
             return start;
         };
-        watch.stage("refining coefficients by rollouts", steps);
-        self.descend(start, &free, weights, steps, watch)
+        monitor.stage("refining coefficients by rollouts", steps);
+        self.descend(start, &free, weights, steps, monitor)
     }
 
     /// Levenberg-Marquardt on relative changes; the coefficients that `judge` scores best.
@@ -87,7 +92,7 @@ impl Refiner<'_> {
         free: &FreeCoefficients,
         weights: [f64; 2],
         steps: usize,
-        watch: &mut Watch<'_>,
+        monitor: &mut Monitor<'_>,
     ) -> Coefficients {
         let n = free.places.len();
         let moved = |xi: &[DMatrix<f64>]| {
@@ -107,7 +112,7 @@ impl Refiner<'_> {
         };
         let mut damping = 1e-3;
         for step in 0..steps {
-            if watch.cancelled() {
+            if monitor.cancelled() {
                 break;
             }
             let Some(model) = self.model(&current, free, weights) else {
@@ -136,7 +141,7 @@ impl Refiner<'_> {
                 break;
             };
             let score = self.score(&trial);
-            watch.done(step + 1, format!("score {score:.4}"));
+            monitor.done(step + 1, format!("score {score:.4}"));
             if score < best.score {
                 best = Coefficients {
                     xi: trial.clone(),
@@ -298,9 +303,12 @@ mod tests {
     use crate::train::oscillator;
 
     fn refined(xi: Vec<DMatrix<f64>>, knowledge: &[Knowledge]) -> (f64, Coefficients) {
-        oscillator::with_refiner(Some(1.0), knowledge, |refiner, watch| {
+        oscillator::with_refiner(Some(1.0), knowledge, |refiner, monitor| {
             let score = refiner.score(&xi);
-            (score, refiner.refine(Coefficients { xi, score }, 20, watch))
+            (
+                score,
+                refiner.refine(Coefficients { xi, score }, 20, monitor),
+            )
         })
     }
 

@@ -7,7 +7,7 @@ use super::dynamics_fit::Fitted;
 use super::error::TrainError;
 use super::jumps::learn_jumps;
 use super::overlap::support_overlap;
-use super::progress::Watch;
+use super::progress::Monitor;
 use super::report::{SeedReport, Trained};
 use super::task::Task;
 use crate::model::{Library, ModelError};
@@ -30,13 +30,13 @@ impl Seeds {
         &mut self,
         seed: u64,
         outcome: Outcome,
-        watch: &mut Watch<'_>,
+        monitor: &mut Monitor<'_>,
     ) -> Result<(), TrainError> {
         match outcome.and_then(with_finite_coefficients) {
             Ok(finished) => self.finished.push(finished),
             Err(error) if is_of_one_seed(&error) => {
-                watch.stage("leaving out a seed without a model", 1);
-                watch.done(1, format!("seed {seed}: {error}"));
+                monitor.stage("leaving out a seed without a model", 1);
+                monitor.done(1, format!("seed {seed}: {error}"));
                 self.failure.get_or_insert(error);
             }
             Err(error) => return Err(error),
@@ -151,10 +151,10 @@ mod tests {
 
     fn reports(outcomes: Vec<Outcome>) -> Result<Vec<SeedReport>, TrainError> {
         let (cancel, mut listener) = (AtomicBool::new(false), |_: Progress| ());
-        let mut watch = Watch::new(&mut listener, &cancel);
+        let mut monitor = Monitor::new(&mut listener, &cancel);
         let mut seeds = Seeds::default();
         for (seed, outcome) in outcomes.into_iter().enumerate() {
-            seeds.add(seed as u64, outcome, &mut watch)?;
+            seeds.add(seed as u64, outcome, &mut monitor)?;
         }
         let best = seeds.best(&standard_library(2, 1, false), &DMatrix::identity(2, 2))?;
         Ok(best.1)

@@ -11,44 +11,40 @@ use super::judge::Judge;
 use super::knowledge::Knowledge;
 use super::latent::EncodedSet;
 use super::options::RegressionOptions;
-use super::progress::Watch;
+use super::progress::Monitor;
 use super::refine::{Coefficients, Refiner};
-use super::sparse::{Pruning, Regression};
+use super::sparse::Regression;
 use super::weak_form::windowed_samples;
 
 /// Windows (samples) over which the dynamics are integrated before regression; 0 means the accelerations.
 const WINDOWS: [usize; 3] = [0, 25, 50];
 /// Ridges on the normalised columns.
 const RIDGES: [f64; 3] = [1e-4, 1e-3, 1e-2];
-/// Prunings; eliminations share the walk that drops terms one by one.
-const PRUNINGS: [Pruning; 10] = [
-    Pruning::Elimination(1e-3),
-    Pruning::Elimination(3e-3),
-    Pruning::Elimination(1e-2),
-    Pruning::Elimination(2e-2),
-    Pruning::Elimination(3e-2),
-    Pruning::Elimination(5e-2),
-    Pruning::Threshold(0.0),
-    Pruning::Threshold(0.03),
-    Pruning::Threshold(0.1),
-    Pruning::Threshold(0.2),
-];
-/// How many candidates are pruned further, a term at a time, while their score stays within the slack.
-const SWEEPS: usize = 3;
+/// Shares of the accelerations' energy that eliminations may lose; they share the walk that drops terms one by one.
+const ELIMINATIONS: [f64; 7] = [1e-3, 3e-3, 1e-2, 2e-2, 3e-2, 5e-2, 0.0];
+/// How many candidates are refined.
+const REFINED: usize = 3;
+
+/// Backward elimination of terms.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Elimination {
+    /// Share of the accelerations' energy that may be lost.
+    pub elimination: f64,
+}
 
 /// How a candidate was fitted, and how it did.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Choice {
     pub window: usize,
     pub ridge: f64,
-    pub pruning: Pruning,
+    pub pruning: Elimination,
     /// Validation score: root mean square error of the latent state in standard deviations, of 0.1 s predictions
     /// plus 0.2 times that of whole jumps.
     pub score: f64,
     pub active: usize,
 }
 
-/// Fits all combinations of windows, ridges and prunings and takes, among those within the slack of the best, the
+/// Fits all combinations of windows, ridges and eliminations and takes, among those within the slack of the best, the
 /// sparsest: Xi of every phase (`library_dim x latent_dim`), what it was fitted with, and how many candidates there
 /// were.
 ///
@@ -62,7 +58,7 @@ pub fn select(
     knowledge: &[Knowledge],
     judge: &Judge<'_>,
     options: &RegressionOptions,
-    watch: &mut Watch<'_>,
+    monitor: &mut Monitor<'_>,
 ) -> Result<(Vec<DMatrix<f64>>, Choice, usize), TrainError> {
     let features = judge.features;
     let regressions = &WINDOWS.map(|window| {
@@ -78,7 +74,7 @@ pub fn select(
         growth,
         judge,
     };
-    let mut tried = search.all(watch);
+    let mut tried = search.all(monitor);
     let candidates = tried.len();
     let reference = best_of(&tried)?.now.xi.clone();
     let training = Judge::new(features, set).relative_to(&reference);
@@ -87,10 +83,6 @@ pub fn select(
         trial.score_by(relative);
     }
     let limit = (1.0 + options.slack) * best_of(&tried)?.now.score;
-    let search = Search {
-        judge: relative,
-        ..search
-    };
     let refiner = Refiner {
         knowledge,
         growth,
@@ -101,15 +93,14 @@ pub fn select(
     for mut trial in starts(tried, limit) {
         trial.hold(growth);
         trial.score_by(relative);
-        search.sweep(&mut trial, limit, watch);
-        trial.now = refiner.refine(trial.now, options.refinements, watch);
+        trial.now = refiner.refine(trial.now, options.refinements, monitor);
         refined.push(trial);
     }
     let best = best_of(&refined)?;
     let limit = (1.0 + options.slack) * best.now.score;
     if options.refinements > 0 {
         let mut thinned = best.clone();
-        thinned.now = refiner.thin(thinned.now, limit, watch);
+        thinned.now = refiner.thin(thinned.now, limit, monitor);
         refined.push(thinned);
     }
     let all = refined.into_iter();
@@ -120,7 +111,9 @@ pub fn select(
     let choice = Choice {
         window: chosen.window,
         ridge: chosen.ridge,
-        pruning: chosen.pruning,
+        pruning: Elimination {
+            elimination: chosen.elimination,
+        },
         score: chosen.now.score,
         active: chosen.now.active(),
     };
@@ -133,7 +126,7 @@ pub(super) struct Trial<'a> {
     pub regressions: &'a [Regression],
     pub ridge: f64,
     window: usize,
-    pruning: Pruning,
+    elimination: f64,
 }
 
 impl Trial<'_> {
@@ -164,20 +157,20 @@ pub(super) struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    /// Every combination of windows, ridges and prunings; where the library has terms that are not affine, also those
+    /// Every combination of windows, ridges and eliminations; where the library has terms that are not affine, also those
     /// without them, and the best of these grown by such terms: rollouts of full libraries diverge more often than not.
-    fn all(&self, watch: &mut Watch<'_>) -> Vec<Trial<'a>> {
+    fn all(&self, monitor: &mut Monitor<'_>) -> Vec<Trial<'a>> {
         let affine = self.judge.features.affine_terms();
         let has_nonlinear = affine.contains(&false);
         // The affine terms are still to come where full libraries diverge.
         let enough =
             |tried: &[Trial<'_>]| any_stable(tried) || (has_nonlinear && !tried.is_empty());
-        let mut tried = self.fit_all(&vec![true; affine.len()], enough, watch);
-        if has_nonlinear && !(watch.cancelled() && any_stable(&tried)) {
-            let tame = self.fit_all(affine, any_stable, watch);
+        let mut tried = self.fit_all(&vec![true; affine.len()], enough, monitor);
+        if has_nonlinear && !(monitor.cancelled() && any_stable(&tried)) {
+            let tame = self.fit_all(affine, any_stable, monitor);
             let mut grown = best_of(&tame).ok().cloned();
             if let Some(grown) = &mut grown {
-                self.grow(grown, watch);
+                self.grow(grown, monitor);
             }
             tried.extend(tame);
             tried.extend(grown);
@@ -185,26 +178,27 @@ impl<'a> Search<'a> {
         tried
     }
 
-    /// Every combination of windows, ridges and prunings with the terms that are `allowed`; if cancelled, those until
+    /// Every combination of windows, ridges and eliminations with the terms that are `allowed`; if cancelled, those until
     /// there are `enough`.
     fn fit_all(
         &self,
         allowed: &[bool],
         enough: impl Fn(&[Trial<'_>]) -> bool,
-        watch: &mut Watch<'_>,
+        monitor: &mut Monitor<'_>,
     ) -> Vec<Trial<'a>> {
         let mut tried = Vec::new();
-        let steps = WINDOWS.len() * RIDGES.len() * PRUNINGS.len();
-        watch.stage("fitting the dynamics", steps);
+        let steps = WINDOWS.len() * RIDGES.len() * ELIMINATIONS.len();
+        monitor.stage("fitting the dynamics", steps);
         for (window, regressions) in WINDOWS.into_iter().zip(self.regressions) {
             for ridge in RIDGES {
-                if watch.cancelled() && enough(&tried) {
+                if monitor.cancelled() && enough(&tried) {
                     return tried;
                 }
                 let each = regressions.iter();
-                let fits = each.map(|regression| regression.fit_each(ridge, &PRUNINGS, allowed));
+                let fits =
+                    each.map(|regression| regression.fit_each(ridge, &ELIMINATIONS, allowed));
                 let fits: Vec<Vec<DMatrix<f64>>> = fits.collect();
-                for (number, pruning) in PRUNINGS.into_iter().enumerate() {
+                for (number, elimination) in ELIMINATIONS.into_iter().enumerate() {
                     let xi: Vec<_> = fits.iter().map(|phase| phase[number].clone()).collect();
                     let score = self.judge.score(&xi);
                     let mut trial = Trial {
@@ -212,14 +206,14 @@ impl<'a> Search<'a> {
                         regressions,
                         ridge,
                         window,
-                        pruning,
+                        elimination,
                     };
                     if !trial.is_stable() {
                         trial.hold(self.growth);
                         trial.score_by(self.judge);
                     }
                     let (active, score) = (trial.now.active(), trial.now.score);
-                    watch.done(tried.len() + 1, format!("{active} terms, score {score:.4}"));
+                    monitor.done(tried.len() + 1, format!("{active} terms, score {score:.4}"));
                     tried.push(trial);
                 }
             }
@@ -240,7 +234,7 @@ fn best_of<'t, 'a>(tried: &'t [Trial<'a>]) -> Result<&'t Trial<'a>, TrainError> 
     })
 }
 
-/// Candidates to prune and refine, at most [`SWEEPS`]: of every window the one with the best score, then all others
+/// Candidates to refine, at most [`REFINED`]: of every window the one with the best score, then all others
 /// within the limit, best first.
 fn starts<'a>(mut tried: Vec<Trial<'a>>, limit: f64) -> impl Iterator<Item = Trial<'a>> {
     tried.retain(|trial| trial.now.score <= limit);
@@ -248,5 +242,5 @@ fn starts<'a>(mut tried: Vec<Trial<'a>>, limit: f64) -> impl Iterator<Item = Tri
     let mut seen = BTreeSet::new();
     let (first, later): (Vec<_>, Vec<_>) =
         (tried.into_iter()).partition(|trial| seen.insert(trial.window));
-    first.into_iter().chain(later).take(SWEEPS)
+    first.into_iter().chain(later).take(REFINED)
 }

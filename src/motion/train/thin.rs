@@ -6,7 +6,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::progress::Watch;
+use super::progress::Monitor;
 use super::refine::{CoefficientIndex, Coefficients, ErrorModel, FreeCoefficients, PRIOR, Refiner};
 
 /// Damping of the changes, relative to each coefficient's own weight.
@@ -20,14 +20,19 @@ impl Refiner<'_> {
     /// Drops terms one at a time, those first that training misses least, while `judge` scores at most `limit`. What is
     /// known and what must be kept stay, and so do inputs: a controller needs what they do, whether or not the recorded
     /// ones differ enough for a prediction to miss them.
-    pub fn thin(&self, refined: Coefficients, limit: f64, watch: &mut Watch<'_>) -> Coefficients {
+    pub fn thin(
+        &self,
+        refined: Coefficients,
+        limit: f64,
+        monitor: &mut Monitor<'_>,
+    ) -> Coefficients {
         let Some(weights) = self.weights(&refined.xi) else {
             return refined;
         };
         let mut thinned = refined;
         let total = self.free(&thinned.xi).places.len();
-        watch.stage("dropping terms that rollouts do not miss", total);
-        while !watch.cancelled() {
+        monitor.stage("dropping terms that rollouts do not miss", total);
+        while !monitor.cancelled() {
             let free = self.free(&thinned.xi);
             let before = free.places.len();
             let model = self.model(&thinned.xi, &free, weights);
@@ -37,7 +42,7 @@ impl Refiner<'_> {
                 break;
             };
             thinned = fewer;
-            watch.done(total - before + 1, format!("score {:.4}", thinned.score));
+            monitor.done(total - before + 1, format!("score {:.4}", thinned.score));
         }
         thinned
     }
@@ -156,9 +161,9 @@ mod tests {
         knowledge[0].kept[(3, 0)] = true;
         (xi[0][(2, 0)], xi[0][(4, 0)], xi[0][(4, 1)]) = (0.3, 0.02, -0.05);
         (xi[0][(5, 1)], xi[1][(1, 0)]) = (0.01, 0.02);
-        oscillator::with_refiner(None, &knowledge, |refiner, watch| {
+        oscillator::with_refiner(None, &knowledge, |refiner, monitor| {
             let score = refiner.score(&xi);
-            let thinned = refiner.thin(Coefficients { xi, score }, limit * score, watch);
+            let thinned = refiner.thin(Coefficients { xi, score }, limit * score, monitor);
             assert!(thinned.score <= limit * score);
             thinned.xi
         })

@@ -151,7 +151,7 @@ mod tests {
     use super::*;
     use crate::train::knowledge::Knowledge;
     use crate::train::oscillator;
-    use crate::train::sparse::{Pruning, Regression};
+    use crate::train::sparse::Regression;
 
     #[test]
     fn windows_and_accelerations_recover_the_same_known_coefficients() {
@@ -160,8 +160,7 @@ mod tests {
         for window in [0, 20, 60] {
             let set = EncodedSet::new(&dataset, &latent);
             let (theta, target) = windowed_samples(set, &features, 0, window);
-            let xi = Regression::new(&theta, &target, Knowledge::nothing(7, 2))
-                .fit(1e-9, Pruning::Threshold(1e-3));
+            let xi = Regression::new(&theta, &target, Knowledge::nothing(7, 2)).fit(1e-9, 1e-6);
             let active = xi
                 .iter()
                 .zip(truth[0].iter())

@@ -1,7 +1,6 @@
-//! From a panel to marks on a plane; y grows downwards, lengths are points.
+//! From a panel to marks on a plane; y grows downwards, lengths are points. Round numbers along an axis.
 
 use super::figure::{Drawing, Figure, HeatMap, Panel, Role, Series, StickPlot};
-use super::ticks::{number, padded, range, ticks};
 
 /// Space left of the axes, for their numbers.
 const LEFT: f64 = 38.0;
@@ -12,10 +11,8 @@ const BOTTOM: f64 = 26.0;
 const RIGHT: f64 = 8.0;
 /// Points of a line that are drawn; CSV has them all.
 const MAX_POINTS: usize = 240;
-/// Size of letters.
 pub(super) const FONT: f64 = 9.0;
 
-/// Where a text is held.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Anchor {
     Start,
@@ -23,12 +20,9 @@ pub(crate) enum Anchor {
     End,
 }
 
-/// With what a mark is drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Paint {
-    /// The frame.
     Axis,
-    /// Lines across the frame.
     Grid,
     /// The ground of a flight.
     Shade,
@@ -36,14 +30,12 @@ pub(crate) enum Paint {
     Heat(f64),
 }
 
-/// One thing to draw.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Mark {
     /// A filled rectangle: corner, width, height.
     Rectangle([f64; 4], Paint),
     /// A straight line between two points.
     Rule([f64; 4], Paint),
-    /// A data line.
     Line(Vec<(f64, f64)>, Role),
     /// A text at the left end of its baseline, or as anchored.
     Text(f64, f64, Anchor, String),
@@ -52,7 +44,6 @@ pub(crate) enum Mark {
 /// Height of the legend's line.
 const LEGEND: f64 = 18.0;
 
-/// Size of a figure on a page of its own.
 pub(super) fn figure_size(figure: &Figure) -> (f64, f64) {
     let columns = figure.columns.min(figure.panels.len()).max(1);
     let rows = figure.panels.len().div_ceil(columns);
@@ -256,7 +247,6 @@ fn draw_heat(title: &str, map: &HeatMap, size: (f64, f64), x_label: &str) -> Vec
     marks
 }
 
-/// The title, and the shades from zero to the largest magnitude.
 fn heat_scale(title: &str, left: f64, largest: f64) -> Vec<Mark> {
     const SHADES: usize = 6;
     const CELL: f64 = 9.0;
@@ -275,7 +265,6 @@ fn heat_scale(title: &str, left: f64, largest: f64) -> Vec<Mark> {
     marks
 }
 
-/// Robots on their floor; the title stands above.
 fn draw_sticks(title: &str, plot: &StickPlot, size: (f64, f64)) -> Vec<Mark> {
     let (x, z) = (plot.extent.forward_m, plot.extent.up_m);
     let (width, height) = (size.0 - 2.0 * RIGHT, size.1 - TOP - RIGHT);
@@ -297,21 +286,63 @@ fn draw_sticks(title: &str, plot: &StickPlot, size: (f64, f64)) -> Vec<Mark> {
     marks
 }
 
+/// Round values within `low..=high`, about `count` of them, and the decimal places that they need.
+fn ticks(low: f64, high: f64, count: usize) -> (Vec<f64>, usize) {
+    let rough = (high - low) / count.max(1) as f64;
+    if !rough.is_finite() || rough <= 0.0 {
+        return (vec![low], 2);
+    }
+    let power = 10f64.powf(rough.log10().floor());
+    let step = [1.0, 2.0, 5.0, 10.0]
+        .map(|factor| factor * power)
+        .into_iter()
+        .find(|step| *step >= rough * 0.999)
+        .unwrap_or(10.0 * power);
+    let places = (-step.log10().floor()).max(0.0) as usize;
+    let first = (low / step - 1e-9).ceil() as i64;
+    let last = (high / step + 1e-9).floor() as i64;
+    let values = (first..=last).map(|index| index as f64 * step).collect();
+    (values, places)
+}
+
+/// A value along an axis or in a title, with so many decimal places and a minus of the width of a plus.
+fn number(value: f64, places: usize) -> String {
+    format!("{value:.places$}").replace('-', "\u{2212}")
+}
+
+pub(crate) fn subscript(index: usize) -> String {
+    let below = |digit: char| match digit.to_digit(10) {
+        Some(value) => char::from_u32(0x2080 + value).unwrap_or(digit),
+        None => digit,
+    };
+    index.to_string().chars().map(below).collect()
+}
+
+/// The least and the largest of some values; infinities in reverse where there is none.
+pub(crate) fn range(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
+    let none = (f64::INFINITY, f64::NEG_INFINITY);
+    let values = values.into_iter();
+    values.fold(none, |(low, high), value| (low.min(value), high.max(value)))
+}
+
+/// The range of values with a margin; a range around a constant.
+fn padded(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    let (low, high) = range(values.filter(|value| value.is_finite()));
+    if low > high {
+        return (0.0, 1.0);
+    }
+    let margin = 0.06 * (high - low);
+    if margin > 0.0 {
+        (low - margin, high + margin)
+    } else {
+        let around = 0.05 * low.abs() + 1e-6;
+        (low - around, high + around)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn thinned_line_keeps_its_ends_and_gaps() {
-        let points: Vec<_> = (0..1000)
-            .map(|k| (f64::from(k), (k != 501).then_some(f64::from(k))))
-            .collect();
-        let thin = thinned(&points);
-        assert!(thin.len() <= MAX_POINTS + 2);
-        assert_eq!(thin.first(), points.first());
-        assert_eq!(thin.last(), points.last());
-        assert!(thin.iter().any(|point| point.1.is_none()));
-    }
 
     #[test]
     fn every_mark_of_a_runaway_prediction_stays_inside_the_frame() {

@@ -13,38 +13,25 @@ pub enum Role {
     Restarted,
     /// A template model, or the first of two things compared.
     Baseline,
-    /// A second template model.
     SecondBaseline,
     /// A bound that the others keep, always within the frame.
     Limit,
 }
 
+/// Of each role the class of its lines in SVG, their colour on white (red, green and blue from 0 to 255), and the lengths of
+/// dashes and gaps as SVG and PDF list them, none for a full line; by these lines differ in grey print too.
+pub(crate) const STYLES: [(&str, [u8; 3], &str); 6] = [
+    ("recorded", [31, 95, 168], ""),
+    ("full", [194, 87, 12], "6 2.5"),
+    ("restarted", [35, 122, 62], "2 1.6"),
+    ("baseline", [123, 63, 160], "8 2 2 2"),
+    ("baseline2", [110; 3], "1 2"),
+    ("limit", [110; 3], "1 2"),
+];
+
 impl Role {
-    pub(crate) const ALL: [Self; 6] = [
-        Self::Recorded,
-        Self::Full,
-        Self::Restarted,
-        Self::Baseline,
-        Self::SecondBaseline,
-        Self::Limit,
-    ];
-
-    /// Class of its lines in SVG.
     pub(crate) fn class(self) -> &'static str {
-        self.style().0
-    }
-
-    /// Class of its lines in SVG, their colour on white (red, green and blue from 0 to 255), and the lengths of dashes
-    /// and gaps as SVG and PDF list them, none for a full line; by these lines differ in grey print too.
-    pub(crate) fn style(self) -> (&'static str, [u8; 3], &'static str) {
-        match self {
-            Self::Recorded => ("recorded", [31, 95, 168], ""),
-            Self::Full => ("full", [194, 87, 12], "6 2.5"),
-            Self::Restarted => ("restarted", [35, 122, 62], "2 1.6"),
-            Self::Baseline => ("baseline", [123, 63, 160], "8 2 2 2"),
-            Self::SecondBaseline => ("baseline2", [110; 3], "1 2"),
-            Self::Limit => ("limit", [110; 3], "1 2"),
-        }
+        STYLES[self as usize].0
     }
 }
 
@@ -71,7 +58,6 @@ impl Series {
     }
 }
 
-/// One frame of a figure.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Panel {
     /// The quantity with its unit, such as `body.x, m`, or the instant, such as `0.12 s`.
@@ -79,7 +65,6 @@ pub(crate) struct Panel {
     pub drawing: Drawing,
 }
 
-/// What a panel shows.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Drawing {
     /// Lines over one axis; shaded are ranges of x with a grey ground, such as flight.
@@ -87,13 +72,10 @@ pub(crate) enum Drawing {
         series: Vec<Series>,
         shaded: Vec<(f64, f64)>,
     },
-    /// Magnitudes of a matrix as shades.
     Heat(HeatMap),
-    /// Robots.
     Sticks(StickPlot),
 }
 
-/// Magnitudes of a matrix as shades.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct HeatMap {
     pub rows: Vec<String>,
@@ -107,14 +89,11 @@ pub(crate) struct HeatMap {
 pub(crate) struct StickPlot {
     /// The robots, the first below the others.
     pub sticks: Vec<(Role, Sticks)>,
-    /// The part of the plane that is in sight.
     pub extent: Extent,
-    /// Height of the floor, in m.
     pub floor_m: f64,
 }
 
 impl Panel {
-    /// Lines over one axis, without shaded ranges.
     pub(crate) fn lines(title: impl Into<String>, series: Vec<Series>) -> Self {
         Self::shaded(title, series, Vec::new())
     }
@@ -132,12 +111,10 @@ impl Panel {
     }
 }
 
-/// Panels that belong together, with a caption and a legend.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Figure {
     /// Stem of its files.
     pub id: String,
-    /// Caption, as in a paper.
     pub caption: String,
     /// The common axis below, such as `time, s`.
     pub x_label: String,
@@ -145,9 +122,7 @@ pub(crate) struct Figure {
     pub panel_size: (f64, f64),
     /// Panels side by side when drawn on a page of their own.
     pub columns: usize,
-    /// The panels.
     pub panels: Vec<Panel>,
-    /// The meaning of each line, in the order of the legend.
     pub legend: Vec<(Role, String)>,
 }
 
@@ -169,5 +144,20 @@ impl Figure {
             panels,
             legend: legend.iter().map(words).collect(),
         }
+    }
+
+    /// The same with panels of another size, so many side by side.
+    pub(crate) fn in_columns(self, columns: usize, panel_size: (f64, f64)) -> Self {
+        Self {
+            columns,
+            panel_size,
+            ..self
+        }
+    }
+
+    /// The same over another axis than time.
+    pub(crate) fn over(self, x_label: &str) -> Self {
+        let x_label = x_label.to_owned();
+        Self { x_label, ..self }
     }
 }

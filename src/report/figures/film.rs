@@ -7,7 +7,6 @@ use super::sticks::{Extent, Motion, Sticks};
 use crate::robot::Robot;
 use crate::typeset::mathml::HtmlText;
 
-/// Instants of an animation at most.
 const MOST_FRAMES: usize = 72;
 
 /// An animation: the drawing at its first instant in sight, and the lines of every instant.
@@ -20,11 +19,9 @@ pub(crate) struct Film {
     pub frames: String,
     /// The instant that the drawing shows: the highest point of the first motion.
     pub shown: usize,
-    /// Number of instants.
     pub count: usize,
     /// Time of the instant that is shown, from the first sample, in s.
     pub shown_s: f64,
-    /// What each line means.
     pub legend: Vec<(Role, String)>,
 }
 
@@ -118,45 +115,4 @@ fn svg(
         text.push_str("</g>");
     }
     text + "</svg>"
-}
-
-#[cfg(test)]
-mod tests {
-    use nalgebra::DVector;
-
-    use super::*;
-    use crate::robot::STATE_DIM;
-
-    #[test]
-    fn film_has_every_instant_and_shows_the_highest() {
-        let state = |height: f64| {
-            let mut x = DVector::zeros(STATE_DIM);
-            x[14] = height;
-            Some(x)
-        };
-        let heights = (0..201).map(|k| 0.3 - (f64::from(k) - 120.0).powi(2) / 1e5);
-        let recorded = Motion {
-            role: Role::Recorded,
-            words: "recorded".to_owned(),
-            states: heights.map(state).collect(),
-        };
-        let mut predicted = recorded.clone();
-        predicted.role = Role::Full;
-        predicted.states[150..].fill(None);
-        let time_s: Vec<f64> = (0..201).map(|k| 1.0 + 0.002 * f64::from(k)).collect();
-        let robot = Robot::by_name("go1").unwrap();
-        let motions = [recorded, predicted];
-        let film = film(robot, (&time_s, &motions), (0.0, 0.0));
-        assert!(film.count <= MOST_FRAMES && film.count > MOST_FRAMES / 2);
-        assert!((film.shown_s - 0.24).abs() < 0.003, "{}", film.shown_s);
-        let frames: serde_json::Value = serde_json::from_str(&film.frames).unwrap();
-        assert_eq!(frames["time"].as_array().unwrap().len(), film.count);
-        let last = |motion: usize| frames["lines"][motion][film.count - 1].as_str().unwrap();
-        assert_eq!(last(0).split(';').count(), Sticks::NAMES.len());
-        assert_eq!(last(1), "");
-        // the drawing holds the lines of the instant that it shows
-        let shown = frames["lines"][0][film.shown].as_str().unwrap();
-        let mut lines = shown.split(';');
-        assert!(lines.all(|line| film.svg.contains(&format!("\"{line}\""))));
-    }
 }

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::draw::{Anchor, FONT, Mark, Paint, figure_size, placed_marks};
-use super::figure::Figure;
+use super::figure::{Figure, STYLES};
 
 /// A figure as a PDF file (version 1.4).
 pub(crate) fn pdf(figure: &Figure) -> String {
@@ -72,7 +72,7 @@ fn write_mark(text: &mut String, mark: &Mark, (dx, dy): (f64, f64), height: f64)
             )
         }
         Mark::Line(points, role) => {
-            let (_, colour, dashes) = role.style();
+            let (_, colour, dashes) = STYLES[*role as usize];
             let [r, g, b] = colour.map(|part| f64::from(part) / 255.0);
             let mut path = format!("[{dashes}] 0 d 1.1 w {r:.3} {g:.3} {b:.3} RG");
             for (place, (x, y)) in points.iter().enumerate() {

@@ -2,8 +2,8 @@
 
 use nalgebra::{DVector, Vector3};
 
+use super::draw::range;
 use super::figure::{Drawing, Figure, Panel, Role, StickPlot};
-use super::ticks::range;
 use crate::recording::Segment;
 use crate::robot::input_rule::rotation;
 use crate::robot::{FOOT_DIM, JOINT_DIM, Leg, Robot, STATE_DIM};
@@ -11,10 +11,8 @@ use crate::robot::{FOOT_DIM, JOINT_DIM, Leg, Robot, STATE_DIM};
 /// Half the height of the box that stands for a trunk, in m.
 const TRUNK_HALF_HEIGHT_M: f64 = 0.05;
 
-/// Space around the robots in sight, in m.
 const MARGIN_M: f64 = 0.04;
 
-/// A robot's lines in a vertical plane: pairs of forward and up, in m.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Sticks {
     /// The trunk as a closed box, then hip, knee and foot of each leg, as named in [`Sticks::NAMES`].
@@ -22,7 +20,6 @@ pub(crate) struct Sticks {
 }
 
 impl Sticks {
-    /// Names of the lines.
     pub(crate) const NAMES: [&str; 1 + FOOT_DIM] = ["trunk", "fr", "fl", "rr", "rl"];
 
     /// `robot` at the state `x` (18: joint angles in rad, body position in m, roll, pitch and yaw in rad), projected on
@@ -58,12 +55,9 @@ impl Sticks {
     }
 }
 
-/// A part of a vertical plane, in m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Extent {
-    /// Least and largest distance forward.
     pub forward_m: (f64, f64),
-    /// Least and largest height.
     pub up_m: (f64, f64),
 }
 
@@ -84,19 +78,15 @@ impl Extent {
     }
 }
 
-/// A motion of a robot.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Motion {
-    /// The line that it is drawn with.
     pub role: Role,
-    /// Its name in the legend.
     pub words: String,
     /// The state (18, as [`Sticks::of`] takes it) at each time; none where there is no prediction.
     pub states: Vec<Option<DVector<f64>>>,
 }
 
 impl Motion {
-    /// What was recorded of a segment.
     pub(crate) fn recorded(segment: &Segment) -> Self {
         Self {
             role: Role::Recorded,
@@ -132,13 +122,11 @@ impl Motion {
         }
     }
 
-    /// The robot at a sample, for drawing.
     pub(crate) fn sticks(&self, robot: &Robot, heading_rad: f64, sample: usize) -> Option<Sticks> {
         let state = self.states.get(sample)?.as_ref()?;
         Some(Sticks::of(robot, state.as_slice(), heading_rad))
     }
 
-    /// What each motion's lines mean.
     pub(super) fn legend(motions: &[Self]) -> Vec<(Role, String)> {
         let entry = |motion: &Self| (motion.role, motion.words.clone());
         motions.iter().map(entry).collect()
@@ -210,7 +198,6 @@ pub(crate) fn film_strip(
 mod tests {
     use super::*;
 
-    /// Standing straight: hips above feet, knees behind.
     fn standing(x_m: f64, yaw_rad: f64) -> DVector<f64> {
         let mut x = DVector::zeros(STATE_DIM);
         for leg in 0..FOOT_DIM {
@@ -271,38 +258,5 @@ mod tests {
         assert!((forward(250).unwrap() - 1.5).abs() < 1e-9);
         assert!((forward(500).unwrap() - 2.0).abs() < 1e-9);
         assert_eq!(forward(501), None);
-    }
-
-    #[test]
-    fn film_strip_shows_first_and_last_sample_and_all_of_the_motion() {
-        let time_s: Vec<f64> = (0..101).map(|k| 3.0 + 0.01 * f64::from(k)).collect();
-        let motion = |role, speed: f64| Motion {
-            role,
-            words: "a".to_owned(),
-            states: (0..101)
-                .map(|k| Some(standing(speed * f64::from(k), 0.0)))
-                .collect(),
-        };
-        let mut runaway = motion(Role::Full, 0.02);
-        runaway.states[100] = None;
-        let motions = [motion(Role::Recorded, 0.01), runaway];
-        let names = ("strip".to_owned(), String::new());
-        let figure = film_strip(go1(), names, (&time_s, &motions), (0.0, 0.0), 5);
-        let plots: Vec<&StickPlot> = (figure.panels.iter())
-            .map(|panel| match &panel.drawing {
-                Drawing::Sticks(plot) => plot,
-                other => panic!("{other:?}"),
-            })
-            .collect();
-        assert_eq!(plots.len(), 5);
-        assert_eq!(
-            [0, 4].map(|frame| &figure.panels[frame].title),
-            ["0.00 s", "1.00 s"]
-        );
-        assert_eq!((plots[0].sticks.len(), plots[4].sticks.len()), (2, 1));
-        // the second motion is 1.5 m on at its last frame, its front hip further
-        assert!(plots[0].extent.forward_m.1 > 1.5 + 0.18);
-        let (_, last) = &plots[4].sticks[0];
-        assert_eq!(*last, Sticks::of(go1(), standing(1.0, 0.0).as_slice(), 0.0));
     }
 }

@@ -3,10 +3,9 @@
 use std::fmt::Write as _;
 
 use super::draw::{Anchor, FONT, Mark, Paint, draw_panel, figure_size, placed_marks};
-use super::figure::{Figure, Panel, Role};
+use super::figure::{Figure, Panel, STYLES};
 use crate::typeset::mathml::HtmlText;
 
-/// One panel as an `svg` element that takes its colours from the page.
 pub(crate) fn panel_svg(figure: &Figure, panel: &Panel) -> String {
     let (width, height) = figure.panel_size;
     let title = HtmlText(&panel.title);
@@ -46,8 +45,7 @@ fn style() -> String {
          .axis{{stroke:#444;stroke-width:.7}}.grid{{stroke:#ddd;stroke-width:.5}}\
          .shade{{fill:#eee}}.heat{{fill:#1f5fa8}}polyline{{fill:none;stroke-width:1.2}}"
     );
-    for role in Role::ALL {
-        let (class, [r, g, b], dashes) = role.style();
+    for (class, [r, g, b], dashes) in STYLES {
         let dashes = if dashes.is_empty() { "none" } else { dashes };
         let _ = write!(
             text,

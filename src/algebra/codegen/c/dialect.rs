@@ -1,28 +1,21 @@
 //! How C99 spells statements.
 
-use super::lanes;
-use crate::codegen::code::{ConstTable, Function, Index, Parameter, Role, Span};
-use crate::codegen::dialect::{Dialect, Lines, name};
-use crate::codegen::fours::{FourBlock, Fours};
-use crate::codegen::lanes::Row;
+use crate::codegen::code::{Function, Parameter, Role, Span};
+use crate::codegen::dialect::{Dialect, Spelling};
 use crate::codegen::line_wrapping::{braced, comment_lines};
-use crate::codegen::precision::Precision;
-use crate::codegen::printer::{Printer, subscript};
-use crate::ir::{QUAD, Quad, Unary};
+use crate::codegen::options::Precision;
+use crate::ir::{Table, Unary};
 
-/// C99 with the names of one model.
 #[derive(Clone, Debug)]
 pub(crate) struct CDialect {
     /// Identifier of the model, the beginning of all external and helper names.
     pub name: String,
-    /// Floating-point numbers of the code.
     pub precision: Precision,
-    /// Whether elements are those of the first of several lanes.
-    pub in_lanes: bool,
 }
 
 /// Keywords of C and C++, and the library names that generated files use.
-const RESERVED: &str = "
+static SPELLING: Spelling = Spelling::with_braces(
+    "
     auto break case char const continue default do double else enum extern float for goto if inline
     int long register restrict return short signed sizeof static struct switch typedef union
     unsigned void volatile while bool true false catch class delete explicit export friend mutable
@@ -31,11 +24,12 @@ const RESERVED: &str = "
     uint64_t y0 y1 yn j0 j1 jn gamma signgam abs asm typeof constexpr concept requires import module
     alignas alignof static_assert thread_local decltype div index time erf I NULL errno stdin stdout
     stderr
-";
+",
+);
 
 impl Dialect for CDialect {
-    fn reserved(&self) -> &'static str {
-        RESERVED
+    fn spelling(&self) -> &'static Spelling {
+        &SPELLING
     }
 
     fn literal(&self, value: f64) -> String {
@@ -46,7 +40,7 @@ impl Dialect for CDialect {
         let name = match function {
             Unary::Abs => "fabs",
             Unary::Sign => return format!("{}_sign({argument})", self.name),
-            named => name(named),
+            named => named.name(),
         };
         format!("{name}{}({argument})", self.suffix())
     }
@@ -108,105 +102,33 @@ impl Dialect for CDialect {
         ]
     }
 
-    fn element(&self, array: &str, index: &Index) -> String {
-        self.read(format!("{array}[{}]", subscript(index)))
-    }
-
-    fn entry(&self, table: &str, row: &Index, col: &Index) -> String {
-        self.read(format!("{table}[{}][{}]", subscript(row), subscript(col)))
-    }
-
-    fn row(&self, row: &Row) -> Option<Lines> {
-        Some(lanes::row(self, row))
-    }
-
-    fn four_block(&self, fours: &Fours, block: &FourBlock) -> Option<Lines> {
-        let (upper, y, weights) = (self.upper(), &fours.array, &fours.weights);
-        let vector = |vector: Quad| match vector {
-            Quad::Row(row) => format!("{}[{row}]", fours.table.1),
-            Quad::Sum(sum) => format!("&{y}[{}]", QUAD * sum),
-        };
-        let name = |sum: usize| &fours.names[sum - block.sums.start];
-        let names = block.sums.clone().map(|sum| name(sum).to_string());
-        let names = names.collect::<Vec<_>>().join(", ");
-        let mut lines = vec![
-            (0, "{".to_owned()),
-            (1, format!("{}_four {names};", self.name)),
-        ];
-        for sum in block.sums.clone() {
-            let start = vector(fours.sums[sum].start);
-            lines.push((1, format!("{upper}_START_FOUR({}, {start});", name(sum))));
-        }
-        for four in &block.terms {
-            let part = match fours.lanes(four.vector) {
-                [false, false, ..] => "HIGH",
-                [_, _, false, false] => "LOW",
-                _ => "FOUR",
-            };
-            let (sum, vector) = (name(four.sum), vector(four.vector));
-            let weight = format!("{}[{}]", weights.array, weights.offset + four.weight);
-            lines.push((1, format!("{upper}_ADD_{part}({sum}, {vector}, {weight});")));
-        }
-        for sum in block.sums.clone() {
-            let at = QUAD * sum;
-            lines.push((1, format!("{upper}_STORE_FOUR(&{y}[{at}], {});", name(sum))));
-        }
-        lines.push((0, "}".to_owned()));
-        Some(lines)
-    }
-
     fn table_base(&self, prefix: &str) -> String {
         format!("{prefix}table")
     }
 
-    fn table(&self, table: &ConstTable) -> Option<String> {
-        let rows = self.rows(table, ["    {", ",\n     ", "},"]);
-        let aligned = match table.is_in_lanes {
-            true => format!(" {}_ALIGNED", self.upper()),
-            false => String::new(),
-        };
-        Some(format!(
-            "static const {}{aligned} {}[{}][{}] = {{\n{rows}}};",
-            self.real(),
-            table.name,
-            table.values.rows(),
-            table.values.cols(),
-        ))
+    fn table(&self, name: &str, table: &Table) -> String {
+        let (rows, cols, real) = (table.rows(), table.cols(), self.real());
+        let entries = self.rows(table, ["    {", ",\n     ", "},"]);
+        format!("static const {real} {name}[{rows}][{cols}] = {{\n{entries}}};")
     }
 }
 
 impl CDialect {
-    /// An element, or that of each lane if it is the first lane's.
-    fn read(&self, element: String) -> String {
-        match self.in_lanes {
-            true => format!("{}_READ({element})", self.upper()),
-            false => element,
-        }
-    }
-
-    /// What macros begin with.
     pub(crate) fn upper(&self) -> String {
         self.name.to_ascii_uppercase()
     }
 
     /// The definition of a function; the header has its documentation.
     pub(crate) fn definition(&self, function: &Function) -> String {
-        // Without `restrict` on what lanes assign, gcc keeps in registers what it has read for them;
-        // with it, it reads tables once for each use.
-        let head = self.head(function, |parameter| {
-            match function.in_lanes.contains(&parameter.name) {
-                true => "",
-                false => "restrict ",
-            }
-        });
-        Printer::new(self).function(&head, |unused| format!("(void){unused};"), function)
+        let head = self.head(function, "restrict ");
+        function.definition(&head, |unused| format!("(void){unused};"))
     }
 
-    /// The function's name and parameters, arrays with what `qualifier` says of each.
-    fn head(&self, function: &Function, qualifier: impl Fn(&Parameter) -> &'static str) -> String {
+    /// The function's name and parameters, arrays with a qualifier.
+    fn head(&self, function: &Function, qualifier: &str) -> String {
         let parameters = function.parameters.iter();
         let parameters: Vec<String> = parameters
-            .map(|parameter| self.declared(parameter, qualifier(parameter)))
+            .map(|parameter| self.declared(parameter, qualifier))
             .collect();
         format!("void {}({})", function.name, parameters.join(", "))
     }
@@ -220,7 +142,6 @@ impl CDialect {
         }
     }
 
-    /// The type of numbers.
     pub(crate) fn real(&self) -> &'static str {
         match self.precision {
             Precision::Double => "double",
@@ -239,7 +160,7 @@ impl CDialect {
     /// The documented prototype for the header; `restrict` is left to the definition, so
     /// that C++ can include it.
     pub(crate) fn prototype(&self, function: &Function) -> String {
-        let signature = self.head(function, |_| "");
+        let signature = self.head(function, "");
         format!("{}{signature};", documentation(&function.docs))
     }
 }

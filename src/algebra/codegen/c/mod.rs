@@ -1,24 +1,22 @@
 //! C99: `NAME.h`, `NAME.c`, `NAME_selftest.c` and `CMakeLists.txt`.
 
 mod dialect;
-mod lanes;
-mod selftest;
 
 use askama::Template;
 
-use super::error::CodegenError;
+use super::code::Role;
 use super::interface::{ModelInterface, computes_angles};
 use super::line_wrapping::{braced, tidy};
 use super::model_text::ModelText;
-use super::precision::Precision;
+use super::options::CodegenError;
+use super::options::Precision;
+use super::options::SineCosine;
 use super::sin_cos::KernelText;
-use super::sines::SineCosine;
 use super::tables::Tables;
-use super::test_vectors::TestVectors;
+use super::test_vectors::{N_POINTS, ParameterVectors, TOLERANCE_F64, TestVectors};
 use crate::files::EmittedFile;
 use crate::ir::{Binary, Statement, Unary};
 use dialect::CDialect;
-use selftest::SelfTest;
 
 /// Functions are prototypes and definitions.
 type Text<'a> = ModelText<'a, (String, String)>;
@@ -65,7 +63,6 @@ pub fn emit(
     let d = &CDialect {
         name: name.to_owned(),
         precision,
-        in_lanes: false,
     };
     let print = |f, _: &Tables| (d.prototype(&f), d.definition(&f));
     let text = ModelText::new(entries, d, &format!("{name}_"), print, numbers);
@@ -125,4 +122,29 @@ fn batch_prototype(dialect: &CDialect, phase: &str) -> String {
          const {real} *u_lat, {real} *ddz);",
         dialect::documentation(&docs)
     )
+}
+
+#[derive(Template)]
+#[template(path = "c/selftest.askama", config = "../../templates/askama.toml")]
+struct SelfTest<'a> {
+    banner: &'a str,
+    d: &'a CDialect,
+    latent_dim: usize,
+    vectors: TestVectors<'a>,
+}
+
+fn initialiser(rows: &[Vec<String>]) -> String {
+    let rows = rows
+        .iter()
+        .map(|row| format!("\n        {}", braced(row, "\n         ")));
+    format!("{{{}\n    }}", rows.collect::<Vec<_>>().join(","))
+}
+
+fn argument(parameter: &ParameterVectors) -> String {
+    let name = &parameter.name;
+    match parameter.role {
+        Role::Input => format!("{name}_in[point]"),
+        Role::Scalar => format!("{name}_in[point][0]"),
+        Role::Output | Role::InOut => name.clone(),
+    }
 }

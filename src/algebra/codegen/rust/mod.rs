@@ -2,21 +2,20 @@
 //! `NAME/tests/selftest.rs`.
 
 mod dialect;
-mod selftest;
 
 use askama::Template;
 
-use super::error::CodegenError;
+use super::code::Role;
 use super::interface::{ModelInterface, computes_angles};
 use super::line_wrapping::{tidy, wrapped};
 use super::model_text::ModelText;
-use super::precision::Precision;
+use super::options::CodegenError;
+use super::options::Precision;
+use super::options::SineCosine;
 use super::sin_cos::KernelText;
-use super::sines::SineCosine;
-use super::test_vectors::TestVectors;
+use super::test_vectors::{N_POINTS, ParameterVectors, TOLERANCE_F64, TestVectors};
 use crate::files::EmittedFile;
 use dialect::RustDialect;
-use selftest::SelfTest;
 
 #[derive(Template)]
 #[template(path = "rust/cargo.askama", config = "../../templates/askama.toml")]
@@ -79,4 +78,28 @@ pub fn emit(
 fn numbers(values: &[usize]) -> String {
     let texts: Vec<String> = values.iter().map(usize::to_string).collect();
     wrapped(&texts.join(", "), 90, " ").join("\n   ")
+}
+
+#[derive(Template)]
+#[template(path = "rust/selftest.askama", config = "../../templates/askama.toml")]
+struct SelfTest<'a> {
+    banner: &'a str,
+    name: &'a str,
+    d: RustDialect,
+    latent_dim: usize,
+    vectors: TestVectors<'a>,
+}
+
+fn array(row: &[String]) -> String {
+    let lines = wrapped(&row.join(", "), 80, " ");
+    format!("[{}]", lines.join("\n           "))
+}
+
+fn argument(parameter: &ParameterVectors) -> String {
+    let upper = parameter.name.to_ascii_uppercase();
+    match parameter.role {
+        Role::Input => format!("&{upper}_IN[point]"),
+        Role::Scalar => format!("{upper}_IN[point][0]"),
+        Role::Output | Role::InOut => format!("&mut {}", parameter.name),
+    }
 }

@@ -1,19 +1,15 @@
 //! Functions that return what they compute, as text for the templates.
 
 use crate::codegen::code::{Function, Parameter, Role};
-use crate::codegen::dialect::Dialect;
 use crate::codegen::line_wrapping::comment_lines;
-use crate::codegen::printer::Printer;
 use crate::codegen::tables::Tables;
 
 /// A function of a script. A parameter that is read and written is taken and returned.
 pub(crate) struct FunctionText {
     parameters: Vec<Parameter>,
-    /// Its name.
     pub name: String,
     /// Lines of documentation, not yet escaped.
     pub docs: Vec<String>,
-    /// Its statements.
     pub body: String,
     /// Whether values that are not numbers are computed and not selected.
     pub selects: bool,
@@ -22,10 +18,9 @@ pub(crate) struct FunctionText {
 }
 
 impl FunctionText {
-    /// The text of a function that reads some of the tables.
-    pub(crate) fn new(function: Function, tables: &Tables, dialect: &dyn Dialect) -> Self {
-        let body = Printer::new(dialect).statements(&function.body, 1);
-        let names = tables.iter().map(|table| table.name.to_string());
+    pub(crate) fn new(function: Function, tables: &Tables) -> Self {
+        let body = function.body;
+        let names = tables.known.iter().map(|(name, _)| name.to_string());
         let is_read = |name: &String| {
             body.contains(&format!("{name}[")) || body.contains(&format!("{name}("))
         };
@@ -39,23 +34,19 @@ impl FunctionText {
         }
     }
 
-    /// Parameters of these roles.
     fn of(&self, roles: &[Role]) -> Vec<&Parameter> {
         let parameters = self.parameters.iter();
         parameters.filter(|p| roles.contains(&p.role)).collect()
     }
 
-    /// What it takes.
     pub(crate) fn inputs(&self) -> Vec<&Parameter> {
         self.of(&[Role::Input, Role::InOut, Role::Scalar])
     }
 
-    /// What it returns.
     pub(crate) fn outputs(&self) -> Vec<&Parameter> {
         self.of(&[Role::Output, Role::InOut])
     }
 
-    /// The parameters that are arrays.
     pub(crate) fn arrays(&self) -> Vec<&Parameter> {
         self.of(&[Role::Input, Role::InOut])
     }
@@ -71,12 +62,10 @@ impl FunctionText {
     }
 }
 
-/// Joins what is printed of each element.
 pub(crate) fn list<T>(elements: &[T], print: impl Fn(&T) -> String) -> String {
     elements.iter().map(print).collect::<Vec<_>>().join(", ")
 }
 
-/// Names of parameters.
 pub(crate) fn names(parameters: Vec<&Parameter>) -> String {
     list(&parameters, |parameter| parameter.name.to_string())
 }

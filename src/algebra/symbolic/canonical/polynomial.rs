@@ -35,15 +35,9 @@ impl Monomial {
     }
 
     pub(super) fn without(&self, atom: u32) -> Self {
-        let powers = self
-            .powers
-            .iter()
-            .copied()
-            .filter(|(known, _)| *known != atom);
-        Self {
-            powers: powers.collect(),
-            exponent: self.exponent.clone(),
-        }
+        let mut rest = self.clone();
+        rest.powers.retain(|(known, _)| *known != atom);
+        rest
     }
 
     /// The product; powers saturate far beyond what is ever expanded.
@@ -169,22 +163,15 @@ impl CanonicalForm {
 
     /// The coefficient of the last monomial.
     pub(super) fn leading(&self) -> Option<&Coefficient> {
-        self.terms
-            .last_key_value()
-            .map(|(_, coefficient)| coefficient)
+        self.terms.values().next_back()
     }
 
     pub(super) fn has_radius(&self) -> bool {
-        self.terms
-            .values()
-            .any(|coefficient| coefficient.radius() > 0.0)
+        self.terms.values().any(|c| c.radius() > 0.0)
     }
 
     pub(super) fn exact(&self) -> Self {
-        let terms = self
-            .terms
-            .iter()
-            .filter(|(_, coefficient)| !coefficient.is_zero());
+        let terms = self.terms.iter().filter(|(_, c)| !c.is_zero());
         Self {
             terms: terms
                 .map(|(monomial, c)| (monomial.clone(), c.exact()))

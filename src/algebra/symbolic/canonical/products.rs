@@ -34,23 +34,20 @@ impl CanonicalForms<'_> {
             if steps > MAX_STEPS {
                 return None;
             }
-            match self.rewritten(&monomial)? {
-                None => form.add(coefficient, monomial),
-                Some((rest, factor)) => pending.extend(
-                    (factor.terms.iter())
-                        .map(|(other, scale)| (coefficient.times(scale), rest.times(other))),
-                ),
-            }
+            let Some((rest, factor)) = self.rewritten(&monomial) else {
+                form.add(coefficient, monomial);
+                continue;
+            };
+            let factor = factor?.terms.into_iter();
+            let term = |(other, scale)| (coefficient.times(&scale), rest.times(&other));
+            pending.extend(factor.map(term));
         }
         Some(form)
     }
 
-    /// A monomial with one atom out of range, as a monomial without it times a form. The outer
-    /// option is empty if that is too large.
-    pub(super) fn rewritten(
-        &mut self,
-        monomial: &Monomial,
-    ) -> Option<Option<(Monomial, CanonicalForm)>> {
+    /// A monomial with one atom out of range, as a monomial without it times a form, or nothing for one that is too
+    /// large.
+    fn rewritten(&mut self, monomial: &Monomial) -> Option<(Monomial, Option<CanonicalForm>)> {
         for &(atom, power) in &monomial.powers {
             let with_power = |power: i32| match power {
                 0 => monomial.without(atom),
@@ -58,19 +55,19 @@ impl CanonicalForms<'_> {
             };
             match self.atoms[atom as usize].clone() {
                 Atom::Sum(sum) if power > 0 => {
-                    return Some(Some((with_power(0), self.power(&sum, power)?)));
+                    return Some((with_power(0), self.power(&sum, power)));
                 }
                 Atom::Root(base, index) => {
-                    let index = i32::try_from(index).ok()?;
+                    let index = i32::try_from(index).expect("indices are at most `MAX_ROOT`");
                     let (whole, rest) = (power.div_euclid(index), power.rem_euclid(index));
                     if whole != 0 {
-                        return Some(Some((with_power(rest), self.power(&base, whole)?)));
+                        return Some((with_power(rest), self.power(&base, whole)));
                     }
                 }
                 Atom::Abs(base) => {
                     let rest = power.rem_euclid(2);
                     if rest != power {
-                        return Some(Some((with_power(rest), self.power(&base, power - rest)?)));
+                        return Some((with_power(rest), self.power(&base, power - rest)));
                     }
                     let sum = self.numbers.get(&Atom::Sum(base.clone())).copied();
                     let shared = base.as_atom().or(sum);
@@ -78,22 +75,22 @@ impl CanonicalForms<'_> {
                     if let Some(shared) = shared {
                         // |x| / x = sign(x).
                         let rest = monomial.without(atom).times(&Monomial::atom(shared, 1));
-                        return Some(Some((rest, self.atom(Atom::Sign(base)))));
+                        return Some((rest, Some(self.atom(Atom::Sign(base)))));
                     }
                     let sign = self.numbers.get(&Atom::Sign(base.clone())).copied();
                     let sign = sign.map_or((0, 0), |sign| (sign, monomial.power_of(sign)));
                     if sign.1 > 0 {
                         // |x| sign(x) = x, |x| sign(x)^2 = |x|.
                         let rest = monomial.without(sign.0);
-                        return Some(Some(match sign.1 % 2 {
-                            0 => (rest, CanonicalForm::one()),
-                            _ => (rest.without(atom), base),
-                        }));
+                        return Some(match sign.1 % 2 {
+                            0 => (rest, Some(CanonicalForm::one())),
+                            _ => (rest.without(atom), Some(base)),
+                        });
                     }
                 }
                 Atom::Sign(_) if !(0..=2).contains(&power) => {
                     let rest = 2 - power.rem_euclid(2);
-                    return Some(Some((with_power(rest), CanonicalForm::one())));
+                    return Some((with_power(rest), Some(CanonicalForm::one())));
                 }
                 Atom::Sign(base) => {
                     let shared = base.as_atom().filter(|base| monomial.power_of(*base) != 0);
@@ -101,20 +98,21 @@ impl CanonicalForms<'_> {
                         // x sign(x) = |x|, x sign(x)^2 = x, sign(x)/x as it is.
                         let rest = monomial.without(atom);
                         let is_over = monomial.power_of(shared) > 0;
-                        return Some(Some(match power {
-                            2 => (rest, CanonicalForm::one()),
+                        let magnitude = Atom::Abs(base);
+                        return Some(match power {
+                            2 => (rest, Some(CanonicalForm::one())),
                             _ if !is_over => continue,
-                            _ => (
-                                rest.times(&Monomial::atom(shared, -1)),
-                                self.atom(Atom::Abs(base)),
-                            ),
-                        }));
+                            _ => {
+                                let rest = rest.times(&Monomial::atom(shared, -1));
+                                (rest, Some(self.atom(magnitude)))
+                            }
+                        });
                     }
                 }
                 _ => {}
             }
         }
-        Some(None)
+        None
     }
 
     pub(super) fn power(&mut self, base: &CanonicalForm, exponent: i32) -> Option<CanonicalForm> {

@@ -50,9 +50,7 @@ impl CanonicalForms<'_> {
         }
         None
     }
-}
 
-impl CanonicalForms<'_> {
     /// A sum that is positive where it is used and divides the form, and the quotient, which is a sum too.
     pub(super) fn positive_divisor(
         &mut self,

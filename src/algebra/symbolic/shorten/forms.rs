@@ -97,9 +97,7 @@ impl Shortener<'_> {
                     Node::Power(base, _) => base,
                     _ => factor,
                 };
-                if let Node::Sum(terms) = self.pool.node(base) {
-                    count += terms.len() - 1;
-                }
+                count += self.pool.summands_of(base).len() - 1;
             }
         }
         count
@@ -123,15 +121,13 @@ impl Shortener<'_> {
     /// Functions that are written, each as often as it is.
     fn calls(&self, summands: &Scaled) -> usize {
         let roots: Vec<ExprId> = summands.iter().map(|&(_, expr)| expr).collect();
-        let mut calls: IdMap<usize> = IdMap::default();
-        for expr in self.pool.reachable(&roots) {
-            let own = usize::from(matches!(self.pool.node(expr), Node::Apply(..)));
-            let of_operands = self.pool.children(expr).map(|operand| calls[&operand]);
-            let count = of_operands.fold(own, usize::saturating_add);
-            calls.insert(expr, count);
-        }
-        let of_roots = roots.iter().map(|root| calls[root]);
-        of_roots.fold(0, usize::saturating_add)
+        let calls = self.pool.fold_up(&roots, |pool, expr, calls_of| {
+            let own = usize::from(matches!(pool.node(expr), Node::Apply(..)));
+            pool.children(expr)
+                .map(calls_of)
+                .fold(own, usize::saturating_add)
+        });
+        calls.into_iter().fold(0, usize::saturating_add)
     }
 
     fn length(&mut self, unit: Number, summands: &Scaled) -> u64 {

@@ -49,17 +49,8 @@ pub(super) enum Distance {
 /// Summands with variables for parts, and these parts.
 type Seen = (Summands, Vec<(SymbolId, ExprId)>);
 
-/// What of the terms is a variable while they are searched.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum View {
-    /// Sums that are factors, and functions other than waves that are factors of several terms:
-    /// `(a + b)^2*sin(c)^2` is searched as `f^2*sin(c)^2`.
-    Factors,
-    /// Sums that are angles.
-    Angles,
-    /// Nothing.
-    Whole,
-}
+/// Summands with variables in the place of some parts; nothing if there are none of these.
+type View<'a> = fn(&mut Shortener<'a>, &[(f64, ExprId)]) -> Option<Seen>;
 
 fn blocks_of(summands: &[(f64, ExprId)]) -> Vec<Block> {
     (summands.iter().enumerate())
@@ -76,6 +67,20 @@ pub(super) struct Block {
     positions: Vec<usize>,
     pub(super) summands: Summands,
     is_new: bool,
+}
+
+/// Puts blocks together at the place of the first, with new summands; the others lose their positions.
+fn merge(blocks: &mut [Block], places: &[usize], summands: Summands) {
+    let mut positions = Vec::new();
+    for &place in places {
+        positions.append(&mut blocks[place].positions);
+    }
+    positions.sort_unstable();
+    blocks[places[0]] = Block {
+        positions,
+        summands,
+        is_new: true,
+    };
 }
 
 impl<'a> Shortener<'a> {
@@ -105,7 +110,8 @@ impl<'a> Shortener<'a> {
         let mut blocks = blocks_of(summands);
         for _ in 0..MAX_ROUNDS {
             let mut is_changed = false;
-            for view in [View::Factors, View::Angles, View::Whole] {
+            let views: [View<'a>; 3] = [Self::whole_factors, Self::whole_angles, Self::unchanged];
+            for view in views {
                 is_changed |= self.pass(&mut blocks, view);
             }
             if !is_changed {
@@ -129,17 +135,12 @@ impl<'a> Shortener<'a> {
     }
 
     /// Shortens all blocks in one view; whether anything changed.
-    fn pass(&mut self, blocks: &mut Vec<Block>, view: View) -> bool {
+    fn pass(&mut self, blocks: &mut Vec<Block>, view: View<'a>) -> bool {
         let flat: Vec<(usize, (f64, ExprId))> = (blocks.iter().enumerate())
             .flat_map(|(place, block)| block.summands.iter().map(move |&summand| (place, summand)))
             .collect();
         let written: Summands = flat.iter().map(|&(_, summand)| summand).collect();
-        let seen = match view {
-            View::Whole => Some((written.clone(), Vec::new())),
-            View::Angles => self.whole_angles(&written),
-            View::Factors => self.whole_factors(&written),
-        };
-        let Some((summands, parts)) = seen else {
+        let Some((summands, parts)) = view(self, &written) else {
             return false;
         };
         let mut found = blocks_of(&summands);
@@ -173,9 +174,8 @@ impl<'a> Shortener<'a> {
                     *place = places[0];
                 }
             }
-            let (mut positions, mut left) = (Vec::new(), Summands::new());
+            let mut left = Summands::new();
             for &place in &places {
-                positions.append(&mut blocks[place].positions);
                 left.append(&mut blocks[place].summands);
             }
             for summand in lost {
@@ -184,12 +184,7 @@ impl<'a> Shortener<'a> {
                 }
             }
             by.extend(left);
-            positions.sort_unstable();
-            blocks[places[0]] = Block {
-                positions,
-                summands: by,
-                is_new: true,
-            };
+            merge(blocks, &places, by);
         }
         blocks.retain(|block| !block.positions.is_empty());
         is_changed
@@ -224,19 +219,10 @@ impl<'a> Shortener<'a> {
             else {
                 continue;
             };
-            let (outer, inner) = self.pool.split(angle);
-            let terms = self.pool.terms_of(inner);
-            let Some(&(first, _)) = terms.get(1).and(terms.first()) else {
+            let (factor, monic) = self.pool.content(angle);
+            if !matches!(self.pool.node(monic), Node::Sum(_)) {
                 continue;
-            };
-            let Some(factor) = outer.checked_mul(first) else {
-                continue;
-            };
-            let monic: Option<Vec<ExprId>> = (terms.into_iter())
-                .map(|(number, rest)| Some(self.pool.scale(number.checked_div(first)?, rest)))
-                .collect();
-            let Some(monic) = monic else { continue };
-            let monic = self.pool.sum(&monic);
+            }
             match families.iter_mut().find(|(known, _)| *known == monic) {
                 Some((_, angles)) => angles.push((factor, angle)),
                 None => families.push((monic, vec![(factor, angle)])),
@@ -267,20 +253,13 @@ impl<'a> Shortener<'a> {
         if replaced.is_empty() {
             return None;
         }
-        for expr in order {
-            if !replaced.contains_key(&expr) {
-                let known = &replaced;
-                let operand = |child: ExprId| known.get(&child).copied().unwrap_or(child);
-                let new = self.pool.rebuild(expr, operand);
-                replaced.insert(expr, new);
-            }
-        }
-        let whole = summands.iter().map(|(c, expr)| (*c, replaced[expr]));
+        let whole = self.pool.replace(&exprs, order, replaced);
+        let whole = summands.iter().zip(whole).map(|((c, _), expr)| (*c, expr));
         Some((whole.collect(), variables))
     }
 
-    /// The summands with a variable of its own in the place of each factor of [`View::Factors`], and
-    /// these; nothing if there is none.
+    /// The summands with a variable of its own in the place of each sum that is a factor, and of each function other than
+    /// waves that is a factor of several terms: `(a + b)^2*sin(c)^2` is searched as `f^2*sin(c)^2`.
     fn whole_factors(&mut self, summands: &[(f64, ExprId)]) -> Option<Seen> {
         let mut n_terms: IdMap<usize> = IdMap::default();
         for &(_, expr) in summands {
@@ -321,6 +300,10 @@ impl<'a> Shortener<'a> {
             whole.push((coefficient, self.pool.product(&factors)));
         }
         (!parts.is_empty()).then_some((whole, parts))
+    }
+
+    fn unchanged(&mut self, summands: &[(f64, ExprId)]) -> Option<Seen> {
+        Some((summands.to_vec(), Vec::new()))
     }
 
     /// Whether the terms are distinct monomials that cannot interact.
@@ -393,18 +376,11 @@ impl<'a> Shortener<'a> {
             .collect();
         positions.sort_unstable();
         let replaced: Summands = positions.iter().map(|&place| original[place]).collect();
-        let Some(new) = self.shortest(&old, &replaced) else {
-            return false;
-        };
-        for &place in &group[1..] {
-            blocks[place].positions.clear();
-            blocks[place].is_new = false;
+        let new = self.shortest(&old, &replaced);
+        let is_shorter = new.is_some();
+        if let Some(new) = new {
+            merge(blocks, group, new);
         }
-        blocks[group[0]] = Block {
-            positions,
-            summands: new,
-            is_new: true,
-        };
-        true
+        is_shorter
     }
 }

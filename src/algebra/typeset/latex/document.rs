@@ -139,7 +139,6 @@ enum Document<'a> {
         two_columns: bool,
         /// Whether there is a file of the robot's equations.
         has_robot: bool,
-        /// Whether the latent quantities have units.
         is_physical: bool,
         /// References to the tables of coefficients.
         tables: String,
@@ -169,9 +168,7 @@ impl Spelling for Tex {
 
 /// One system of equations in the template.
 struct System {
-    /// What it is, in a comment.
     comment: String,
-    /// What it is, in a sentence of the running text.
     introduction: String,
     block: Block,
 }

@@ -19,9 +19,7 @@ pub(super) const CASES_LINES: usize = 30;
 /// The lines of one phase and whether they are for `align`.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Block {
-    /// Stem of its labels.
     pub label: String,
-    /// Number of its equations.
     pub count: usize,
     /// Whether the lines belong into `align` rather than `cases`.
     pub aligned: bool,

@@ -2,8 +2,8 @@
 
 use crate::equations::Unit;
 use crate::symbolic::Function;
-use crate::typeset::tree::function_name;
-use crate::typeset::{Decimal, GREEK, Glyph, Math, NumberStyle, Signed, Symbol};
+use crate::typeset::tree::{function_name, greek_letter};
+use crate::typeset::{Decimal, Glyph, Math, NumberStyle, Signed, Symbol};
 
 /// A typeset tree with its numbers in one style.
 pub(crate) fn tex(math: &Math, numbers: NumberStyle) -> String {
@@ -60,7 +60,6 @@ pub(crate) fn tex_terms(terms: &[Signed], numbers: NumberStyle, continues: bool)
     text
 }
 
-/// A number with its sign.
 pub(crate) fn tex_number(number: &Decimal, numbers: NumberStyle) -> String {
     match (numbers, number.exponent()) {
         (NumberStyle::Plain, None) => number.to_string(),
@@ -112,7 +111,7 @@ fn script(text: String) -> String {
 fn glyph(glyph: &Glyph) -> String {
     match glyph {
         Glyph::Letter(letter) => letter.to_string(),
-        Glyph::Greek(place) => format!(r"\{}", GREEK[*place].0),
+        Glyph::Greek(place) => format!(r"\{}", greek_letter(*place).0),
         Glyph::Digits(digits) => digits.clone(),
         Glyph::Word(word) => format!(r"\mathrm{{{word}}}"),
     }

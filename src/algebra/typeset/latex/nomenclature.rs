@@ -21,7 +21,6 @@ fn entry(symbol: impl Into<String>, meaning: impl Into<String>) -> Entry {
 const ROBOT_STATE: &str = r"$\mathbf{x}$, $\mathbf{u}$";
 const ENCODER: &str = r"$\mathbf{W}_e$, $\mathbf{b}_e$";
 
-/// The list of symbols of the equations.
 pub(super) fn entries(
     system: &Equations<'_>,
     symbols: &SymbolTable,

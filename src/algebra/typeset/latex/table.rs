@@ -18,21 +18,14 @@ const LONGEST: usize = 40;
 /// One table no wider than its column of text.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct TableBlock {
-    /// Column specification.
     pub columns: String,
-    /// Caption, escaped.
     pub caption: String,
     /// What `\ref` can name: its own label, and for the first that of the whole.
     pub labels: Vec<String>,
-    /// Row of phase names over the columns.
     pub phases: String,
-    /// Rules below the phase names.
     pub rules: String,
-    /// Row of accelerations.
     pub heads: String,
-    /// Rows of coefficients.
     pub rows: Vec<String>,
-    /// Whether it must break across pages.
     pub long: bool,
 }
 

@@ -1,7 +1,7 @@
 //! The MathML spelling of the typeset tree (MathML Core), without the `math` element around it.
 
-use crate::typeset::tree::function_name;
-use crate::typeset::{Decimal, GREEK, Glyph, Math, Signed, Symbol};
+use crate::typeset::tree::{function_name, greek_letter};
+use crate::typeset::{Decimal, Glyph, Math, Signed, Symbol};
 
 const INVISIBLE_TIMES: &str = "<mo>\u{2062}</mo>";
 /// What TeX puts before a function's name.
@@ -79,7 +79,6 @@ pub(crate) fn mathml_terms(terms: &[Signed], continues: bool) -> String {
     text
 }
 
-/// A number with its sign.
 fn mathml_number(number: &Decimal) -> String {
     let digits = format!("<mn>{}</mn>", number.digits());
     let size = match number.exponent() {
@@ -100,7 +99,6 @@ fn mathml_number(number: &Decimal) -> String {
     }
 }
 
-/// A symbol with its dots and subscript.
 pub(crate) fn mathml_symbol(symbol: &Symbol) -> String {
     let base = accented(symbol);
     match symbol.subscript.is_empty() {
@@ -135,7 +133,7 @@ fn subscript(symbol: &Symbol) -> String {
 fn element(glyph: &Glyph) -> String {
     match glyph {
         Glyph::Letter(letter) => format!("<mi>{letter}</mi>"),
-        Glyph::Greek(place) => format!("<mi>{}</mi>", GREEK[*place].1),
+        Glyph::Greek(place) => format!("<mi>{}</mi>", greek_letter(*place).1),
         Glyph::Digits(digits) => format!("<mn>{digits}</mn>"),
         Glyph::Word(word) => format!("<mi>{word}</mi>"),
     }

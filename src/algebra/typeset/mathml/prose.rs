@@ -121,25 +121,3 @@ fn mathematics(word: &str) -> Option<String> {
     };
     Some(mathml_symbol(&symbol))
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn symbols_become_mathematics_and_names_stay() {
-        let html = |text: &str| HtmlProse(text).to_string();
-        assert!(html("torque R^2 contact").contains("<math><msup>"));
-        assert!(html("W_e^T u_lat").matches("<math>").count() == 2);
-        assert!(html("ddz3").contains("<mover>"));
-        for name in [
-            "test_01", "go1-d4", "a.z1", "z1.csv", "body.x", "u-1", "k_spring", "dddz1", "ddu1",
-            "x1",
-        ] {
-            assert_eq!(html(name), name);
-        }
-        assert_eq!(html("-"), "–");
-        assert_eq!(html("-0.346"), "\u{2212}0.346");
-        assert_eq!(html("1-2 <b>"), "1-2 &lt;b&gt;");
-    }
-}

@@ -2,105 +2,71 @@
 
 use crate::robot::JOINT_DIM;
 
-/// How a control step ended, each with its number for interfaces without enumerations: zero solved, positive a
-/// fallback or a changed problem, negative refused input.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Status {
-    /// A plan whose optimality conditions were checked.
-    Solved = 0,
-    /// The same, but the plan leaves the joint limits somewhere: they cannot be kept from here.
-    Softened = 1,
-    /// The same, on a contact schedule that was changed: the feet are already in the phase that the
-    /// reference enters later.
-    ContactEarly = 2,
-    /// The same: the feet are still in the phase that the reference has left.
-    ContactLate = 3,
-    /// The same: the feet are in a phase that the model does not have, where the reference's was used,
-    /// or that the reference is not near, where it was used for the first stage.
-    ContactUnknown = 4,
-    /// The solver's point fails the optimality conditions.
-    Inaccurate = 10,
-    /// The constraints contradict each other.
-    Infeasible = 11,
-    /// The solver reached its iteration cap.
-    IterationCap = 12,
-    /// The solver broke down, or the linearisation is not finite.
-    NumericalFailure = 13,
-    /// The measurement is far from what the last plan predicts and is not believed yet.
-    MeasurementJump = 14,
-    /// No torques could be made from the latent input: a leg in contact is singular, or the lift's
-    /// own program failed.
-    LiftFailed = 15,
-    /// A measurement, or the time, is infinite or not a number.
-    NotFinite = -1,
-    /// A measurement has the wrong number of values.
-    WrongDimension = -2,
-    /// No reference has been set.
-    NoReference = -3,
+/// Makes [`Status`] of a table: code, word, and text that begins with the word.
+macro_rules! statuses {
+    ($($name:ident = $code:literal, $word:literal, $text:literal;)*) => {
+        /// How a control step ended, each with its number for interfaces without enumerations: zero solved, positive a
+        /// fallback or a changed problem, negative refused input.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+        pub enum Status {
+            $(#[doc = $text] $name = $code,)*
+        }
+
+        impl Status {
+            /// Every status.
+            pub const ALL: &[Self] = &[$(Self::$name),*];
+
+            /// The status in one word, as tables have it.
+            pub fn word(self) -> &'static str {
+                match self {
+                    $(Self::$name => $word,)*
+                }
+            }
+
+            /// The status in words, with a final nul.
+            pub(super) fn text(self) -> &'static str {
+                match self {
+                    $(Self::$name => concat!($text, "\0"),)*
+                }
+            }
+        }
+    };
+}
+
+statuses! {
+    Solved = 0, "solved", "solved: a plan whose optimality conditions were checked";
+    Softened = 1, "softened", "softened: a checked plan that leaves the joint limits somewhere";
+    ContactEarly = 2, "contact_early",
+        "contact early: a checked plan, the feet are in the reference's next phase";
+    ContactLate = 3, "contact_late",
+        "contact late: a checked plan, the feet are in the reference's last phase";
+    ContactUnknown = 4, "contact_unknown",
+        "contact unknown: a checked plan, the feet are in no phase of the model or in one far from the reference";
+    Inaccurate = 10, "inaccurate",
+        "inaccurate: the solver's point fails the optimality conditions; fallback";
+    Infeasible = 11, "infeasible", "infeasible: the constraints contradict each other; fallback";
+    IterationCap = 12, "iteration_cap", "iteration cap: the solver reached its deadline; fallback";
+    NumericalFailure = 13, "numerical_failure",
+        "numerical failure: the solver broke down; fallback";
+    MeasurementJump = 14, "measurement_jump",
+        "measurement jump: a measurement far from the prediction; fallback";
+    LiftFailed = 15, "lift_failed", "lift failed: no torques for the latent input; fallback";
+    NotFinite = -1, "not_finite",
+        "not finite: a number is infinite or not a number; fallback";
+    WrongDimension = -2, "wrong_dimension",
+        "wrong dimension: the wrong number of values or too few samples; fallback";
+    NoReference = -3, "no_reference", "no reference: none has been set; fallback";
 }
 
 impl Status {
-    /// Every status.
-    pub const ALL: [Status; 14] = [
-        Status::Solved,
-        Status::Softened,
-        Status::ContactEarly,
-        Status::ContactLate,
-        Status::ContactUnknown,
-        Status::Inaccurate,
-        Status::Infeasible,
-        Status::IterationCap,
-        Status::NumericalFailure,
-        Status::MeasurementJump,
-        Status::LiftFailed,
-        Status::NotFinite,
-        Status::WrongDimension,
-        Status::NoReference,
-    ];
-
     /// Whether the command comes from this step's own plan.
     pub fn has_plan(self) -> bool {
-        match self {
-            Status::Solved
-            | Status::Softened
-            | Status::ContactEarly
-            | Status::ContactLate
-            | Status::ContactUnknown => true,
-            Status::Inaccurate
-            | Status::Infeasible
-            | Status::IterationCap
-            | Status::NumericalFailure
-            | Status::MeasurementJump
-            | Status::LiftFailed
-            | Status::NotFinite
-            | Status::WrongDimension
-            | Status::NoReference => false,
-        }
+        (Self::Solved.code()..Self::Inaccurate.code()).contains(&self.code())
     }
 
     /// The status as a number.
     pub fn code(self) -> i32 {
         self as i32
-    }
-
-    /// The status in one word, as tables have it.
-    pub fn word(self) -> &'static str {
-        match self {
-            Status::Solved => "solved",
-            Status::Softened => "softened",
-            Status::ContactEarly => "contact_early",
-            Status::ContactLate => "contact_late",
-            Status::ContactUnknown => "contact_unknown",
-            Status::Inaccurate => "inaccurate",
-            Status::Infeasible => "infeasible",
-            Status::IterationCap => "iteration_cap",
-            Status::NumericalFailure => "numerical_failure",
-            Status::MeasurementJump => "measurement_jump",
-            Status::LiftFailed => "lift_failed",
-            Status::NotFinite => "not_finite",
-            Status::WrongDimension => "wrong_dimension",
-            Status::NoReference => "no_reference",
-        }
     }
 }
 

@@ -62,15 +62,6 @@ pub struct ControlPhase {
     pub torque_precision: SMatrix<f64, JOINT_DIM, JOINT_DIM>,
 }
 
-/// The maps between inputs and latent inputs at one state, in SI units on the robot's side.
-#[derive(Debug, Clone)]
-pub struct InputMaps {
-    /// `J_Eᵀ / s_u`, `18 × latent_dim`.
-    pub lift: DMatrix<f64>,
-    /// `pinv(J_Eᵀ) s_u`, `latent_dim × 18`.
-    pub projection: DMatrix<f64>,
-}
-
 /// A nonlinear encoder and decoder with their Jacobians, in SI units on the robot's side.
 ///
 /// The matrices of a [`ControlModel`] are then those at one state, and
@@ -88,8 +79,9 @@ pub trait NonlinearMaps: Debug + Send + Sync {
     /// `J_D / s_x` at `z`, `18 × latent_dim`.
     fn decoder_jacobian(&self, z: &[f64]) -> DMatrix<f64>;
 
-    /// Lift and projection at `x`; none where the Jacobian does not have full row rank.
-    fn inputs(&self, x: &[f64]) -> Option<InputMaps>;
+    /// Lift `J_Eᵀ / s_u` (`18 × latent_dim`) and projection `pinv(J_Eᵀ) s_u` at `x`; none where the Jacobian does not
+    /// have full row rank.
+    fn inputs(&self, x: &[f64]) -> Option<[DMatrix<f64>; 2]>;
 
     /// The phases with the statistics of the training inputs projected at `x`; none as for
     /// [`NonlinearMaps::inputs`].
@@ -134,7 +126,7 @@ impl ControlModel {
         let encoder_bias = DVector::from_vec(value) - &encoder * DVector::from_column_slice(x);
         let decoded = DVector::from_column_slice(&maps.decode(z));
         let decoder_bias = decoded - &decoder * DVector::from_column_slice(z);
-        let InputMaps { lift, projection } = maps.inputs(x)?;
+        let [lift, projection] = maps.inputs(x)?;
         Some(Self {
             parts: ControlModelParts {
                 encoder,
@@ -246,7 +238,9 @@ impl ControlModel {
     pub fn project(&self, x: &[f64], u: &[f64], u_lat: &mut [f64]) {
         u_lat.fill(0.0);
         let local = self.nonlinear.as_ref().and_then(|maps| maps.inputs(x));
-        let projection = (local.as_ref()).map_or(&self.parts.projection, |maps| &maps.projection);
+        let projection = local
+            .as_ref()
+            .map_or(&self.parts.projection, |[_, local]| local);
         add_product(projection, u, u_lat);
     }
 

@@ -2,21 +2,21 @@
 
 use std::time::Instant;
 
-use super::command::Command;
-use super::control_model::{ControlModel, ControlPhase};
+use super::command::{Command, Status};
+use super::control_model::ControlModel;
 use super::effectiveness::Effectiveness;
-use super::engine::Engine;
+use super::engine::StageSolver;
 use super::error::ControlError;
 use super::fallback::Memory;
-use super::horizon::{Contact, Horizon, StageInputs};
+use super::horizon::{Horizon, StageInputs};
 use super::lift::{ConsistentLift, LiftFailure, StanceState};
 use super::linearise::LatentDynamics;
 use super::plan::Plan;
-use super::problem::{ROW_MARGIN, StageRows, row_selection};
+use super::problem::{ROW_MARGIN, StageRows, row_selection, stage_cost};
 use super::qp::QpSolver;
 use super::reference::{Reference, ReferenceSamples};
 use super::settings::{Lift, Linearisation, MissingInput, MpcSettings, RowSelection};
-use super::transcribe::StepData;
+use super::stage::StageShape;
 use crate::robot::{ContactFlags, JOINT_DIM, STATE_DIM};
 
 /// Violation of a joint limit, in half ranges, from which a plan counts as softened: beyond what the
@@ -39,8 +39,8 @@ pub struct Controller {
     pub(super) settings: MpcSettings,
     /// Rows for any reference, and those that matter near the present one.
     rows: StageRows,
-    near_rows: StageRows,
-    pub(super) engine: Engine,
+    pub(super) near_rows: StageRows,
+    pub(super) engine: Box<dyn StageSolver>,
     pub(super) horizon: Horizon,
     pub(super) consistent: Option<ConsistentLift>,
     pub(super) reference: Option<Reference>,
@@ -78,9 +78,8 @@ impl Controller {
         settings.check()?;
         let d = plant.latent_dim();
         let rows = StageRows::new(&plant, &settings);
-        let horizon = Horizon::new(d, settings.horizon);
-        // Nothing is asked of it before a reference sets the weights.
-        let engine = Engine::new(d, &rows, &vec![1.0; 2 * d], &settings)?;
+        // No program is solved before a reference sets the weights.
+        let (horizon, engine) = program(d, &rows, &vec![1.0; 2 * d], &settings)?;
         let consistent = match settings.lift {
             Lift::Transpose => None,
             Lift::Consistent => Some(ConsistentLift::new(&plant, &settings)?),
@@ -180,7 +179,7 @@ impl Controller {
             RowSelection::All => self.rows.clone(),
             RowSelection::Needed => self.rows.clone().near(&reference),
         };
-        self.engine = Engine::new(d, &rows, &state_weights, &self.settings)?;
+        (self.horizon, self.engine) = program(d, &rows, &state_weights, &self.settings)?;
         self.near_rows = rows;
         self.reference = Some(reference);
         self.reset();
@@ -215,7 +214,11 @@ impl Controller {
         let reference = self.reference.as_ref();
         let deviation = reference.map_or(&[][..], |reference| &reference.deviation()[..d]);
         (0..self.settings.horizon).flat_map(move |stage| {
-            let pairs = self.plan.end(stage).iter().zip(self.horizon.end(stage));
+            let pairs = self
+                .plan
+                .end(stage)
+                .iter()
+                .zip(&self.horizon.stage(stage).end);
             let scaled = pairs.zip(deviation);
             scaled.map(|((planned, reference), scale)| (planned - reference) / scale)
         })
@@ -248,7 +251,7 @@ impl Controller {
     }
 
     /// Writes the horizon from a time on and its gains; none without a reference.
-    pub(super) fn prepare_stages(&mut self, time_s: f64, feet: ContactFlags) -> Option<Contact> {
+    pub(super) fn prepare_stages(&mut self, time_s: f64, feet: ContactFlags) -> Option<Status> {
         let inputs = StageInputs {
             plant: &self.plant,
             settings: &self.settings,
@@ -258,9 +261,8 @@ impl Controller {
         };
         let dynamics = self.dynamics.as_mut();
         let contact = self.horizon.prepare(&inputs, dynamics, time_s, feet);
-        let (horizon, memory) = (&self.horizon, &self.memory);
-        let step = step_data(horizon, memory, inputs.reference, self.plant.phases());
-        self.engine.prepare(&step, &self.horizon);
+        let (stages, shift, is_new) = self.horizon.prepared();
+        self.engine.prepare(stages, shift, is_new);
         Some(contact)
     }
 
@@ -299,23 +301,17 @@ impl Controller {
     }
 }
 
-/// The horizon's numbers as the engine takes them.
-pub(super) fn step_data<'a>(
-    horizon: &'a Horizon,
-    memory: &'a Memory,
-    reference: &'a Reference,
-    phases: &'a [ControlPhase],
-) -> StepData<'a> {
-    let stages = horizon.stages();
-    let latent_dim = memory.input.len();
-    StepData {
-        stages,
-        last_position: &horizon.end(stages.len() - 1)[..latent_dim],
-        measured: &memory.measured,
-        last_input: &memory.input,
-        deviation: reference.deviation(),
-        phases,
-    }
+fn program(
+    latent_dim: usize,
+    rows: &StageRows,
+    state_weights: &[f64],
+    settings: &MpcSettings,
+) -> Result<(Horizon, Box<dyn StageSolver>), ControlError> {
+    let (solver, length) = (settings.solver, settings.horizon);
+    let shape = StageShape::of(latent_dim, rows, solver.friction());
+    let cost = stage_cost(state_weights, settings);
+    let engine = solver.of_horizon(length, shape, &cost, settings.qp)?;
+    Ok((Horizon::new(length, &shape), engine))
 }
 
 /// Mean of states, 18 values per sample.

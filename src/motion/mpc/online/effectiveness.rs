@@ -16,10 +16,9 @@
 //! the thrust, where models err most, does not outweigh what came before; it fades by
 //! `exp(−age/T)`. Inputs are divided by `γ̂` before they are lifted.
 
-use nalgebra::DMatrix;
-
 use super::control_model::ControlModel;
 use super::controller::Measurement;
+use super::linearise::StageModel;
 use super::plan::Plan;
 use super::settings::Effectiveness as Settings;
 use crate::robot::{JOINT_DIM, STATE_DIM};
@@ -43,7 +42,7 @@ pub(super) struct Effectiveness {
     /// Whether the plan's first stage has feet on the ground, and the change of the velocities at its
     /// end by its input.
     is_grounded: bool,
-    by_input: DMatrix<f64>,
+    by_input: Vec<f64>,
     /// Posture and joint velocities that the motors' PD holds; none before a command.
     held: Option<[[f64; JOINT_DIM]; 2]>,
     /// Latent input of the PD at the last command, and at the present measurement.
@@ -56,7 +55,7 @@ impl Effectiveness {
     pub(super) fn full(latent_dim: usize) -> Self {
         Self {
             estimate: 1.0,
-            by_input: DMatrix::zeros(latent_dim, latent_dim),
+            by_input: vec![0.0; latent_dim * latent_dim],
             at_command: vec![0.0; latent_dim],
             drives: vec![0.0; latent_dim],
             ..Self::default()
@@ -68,12 +67,14 @@ impl Effectiveness {
         self.estimate
     }
 
-    /// Begins the first stage of a plan; `by_input` is the change of the state at its end by its
-    /// input, 2d by d.
-    pub(super) fn begin(&mut self, by_input: &DMatrix<f64>, is_grounded: bool) {
+    pub(super) fn begin(&mut self, model: &StageModel, is_grounded: bool) {
         self.is_grounded = is_grounded;
         let d = self.drives.len();
-        self.by_input.copy_from(&by_input.rows(d, d));
+        for i in 0..d {
+            for k in 0..d {
+                self.by_input[i * d + k] = model.b(d + i, k);
+            }
+        }
     }
 
     /// Keeps what was commanded at a measurement: posture and joint velocities.
@@ -92,7 +93,6 @@ impl Effectiveness {
         }
     }
 
-    /// Forgets the last command: what follows it says nothing.
     pub(super) fn interrupt(&mut self) {
         self.held = None;
     }
@@ -119,7 +119,7 @@ impl Effectiveness {
         for i in 0..d {
             let (mut by_plan, mut by_drives) = (0.0, 0.0);
             for k in 0..d {
-                let by_input = share * self.by_input[(i, k)] / deviation[i];
+                let by_input = share * self.by_input[i * d + k] / deviation[i];
                 by_plan += by_input * input[k];
                 by_drives += by_input * (0.5 * (self.at_command[k] + self.drives[k]));
             }

@@ -12,24 +12,20 @@ use crate::robot::ContactFlags;
 #[non_exhaustive]
 #[allow(missing_docs, reason = "each variant's message names its fields")]
 pub enum ControlError {
-    /// A matrix or vector of the plant does not fit the others.
     #[error("plant: `{name}` is {found:?}, expected {expected:?} (rows, columns)")]
     Shape {
         name: &'static str,
         found: (usize, usize),
         expected: (usize, usize),
     },
-    /// A setting is out of its range.
     #[error("setting `{name}` is {found}, expected {expected}")]
     Setting {
         name: &'static str,
         found: f64,
         expected: &'static str,
     },
-    /// A reference has fewer samples than a trajectory needs.
     #[error("the reference has {found} samples, at least {expected} are needed")]
     ReferenceLen { found: usize, expected: usize },
-    /// The arrays of a reference do not fit together.
     #[error("reference `{name}` has {found} values, expected {expected}")]
     ReferenceShape {
         name: &'static str,
@@ -37,7 +33,6 @@ pub enum ControlError {
         /// The length that the number of samples asks for.
         expected: usize,
     },
-    /// A value of a reference is infinite or not a number.
     #[error("reference `{name}`, sample {sample}, coordinate {coordinate}: {found} is not finite")]
     ReferenceValue {
         name: &'static str,
@@ -45,7 +40,6 @@ pub enum ControlError {
         coordinate: usize,
         found: f64,
     },
-    /// The time of a reference does not increase.
     #[error(
         "reference time does not increase from sample {sample} ({before} s) to the next ({after} s)"
     )]
@@ -54,15 +48,12 @@ pub enum ControlError {
         before: f64,
         after: f64,
     },
-    /// No phase of the model is selected by a foot pattern of the reference.
     #[error(
         "reference sample {sample}: no phase of the model has the feet {feet:?} (fr fl rr rl) in contact"
     )]
     ReferencePhase { sample: usize, feet: ContactFlags },
-    /// The structured solver is not compiled for a latent dimension.
     #[error("the Riccati solver takes up to {largest} latent coordinates, the model has {found}")]
     StructuredDim { found: usize, largest: usize },
-    /// The conic solver refused the problem it was handed, in its own words.
     #[error("the conic solver refused the problem: {reason}")]
     Solver { reason: String },
 }

@@ -41,7 +41,6 @@ pub struct InputGivenState {
     pub acceleration_error: DMatrix<f64>,
 }
 
-/// A trajectory whose input is looked for.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Motion<'a> {
     /// Time of each sample, s.
@@ -52,7 +51,6 @@ pub(super) struct Motion<'a> {
     pub phase: &'a [usize],
 }
 
-/// What one sample says about its input.
 struct Evidence {
     sample: usize,
     /// `y`.

@@ -8,7 +8,6 @@ use super::controller::Controller;
 use super::lift::StanceState;
 use crate::robot::JOINT_DIM;
 
-/// What a fallback goes back to.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Memory {
     pub measured: Vec<f64>,
@@ -36,7 +35,6 @@ impl Memory {
 }
 
 impl Controller {
-    /// The command without a plan of this step.
     pub(super) fn fall_back(&mut self, time_s: f64, command: &mut Command) {
         let now = self.time_or_one_stage_on(time_s);
         let stages = (self.settings.fallback.plan_stages).min(self.settings.horizon);
@@ -95,7 +93,6 @@ impl Controller {
         command.source = Source::Hold;
     }
 
-    /// The reference's posture at a time.
     fn reference_posture(&mut self, now: f64) -> Option<[f64; JOINT_DIM]> {
         let d = self.plant.latent_dim();
         let reference = self.reference.as_ref()?;

@@ -1,53 +1,55 @@
-//! The stages of the horizon at a control step: phases, reference, linearised dynamics.
+//! The stages of the horizon at a control step: phases, reference, linearised dynamics, scaled programs.
 
+use super::command::Status;
 use super::control_model::ControlModel;
+use super::engine::Start;
 use super::linearise::{LatentDynamics, Lineariser, StageModel};
 use super::plan::Plan;
 use super::problem::StageRows;
 use super::reference::Reference;
 use super::settings::{Drift, Linearisation, MpcSettings};
-use super::transcribe::Stage;
+use super::stage::{StageQp, StageScale, StageShape};
 use crate::robot::ContactFlags;
 
-/// How the feet's phase relates to the reference's at a control step.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Contact {
-    /// The same.
-    AsScheduled,
-    /// The feet are already in a phase that the reference enters later: it is entered now.
-    Early,
-    /// The feet are still in a phase that the reference has left: it lasts for one more stage.
-    Late,
-    /// The feet are in a phase that the reference is not near, or in none of the model's.
-    Unknown,
+#[derive(Debug, Clone)]
+pub(super) struct Stage {
+    /// Linearised dynamics.
+    pub model: StageModel,
+    /// `F̄ + A (x_r − x̄) + B (u_r − ū) + e − x_r⁺`: what is left of the dynamics at the reference.
+    defect: Vec<f64>,
+    /// Reference state at the beginning and at the end, `2 latent_dim`.
+    state: Vec<f64>,
+    pub end: Vec<f64>,
+    /// Reference input, `latent_dim`.
+    input: Vec<f64>,
+    pub phase: usize,
+    /// Its beginning, if its linearisation belongs to it.
+    made_for: Option<f64>,
+    /// Its own rows, where they are not the same at all stages.
+    rows: Option<StageRows>,
 }
 
-/// Stages that are kept from step to step.
 #[derive(Debug, Clone)]
-pub struct Horizon {
+pub(super) struct Horizon {
     stages: Vec<Stage>,
-    /// Beginning of each stage and whether its linearisation belongs to it.
-    made_for: Vec<Option<f64>>,
-    /// Reference state at the end of each stage.
-    ends: Vec<Vec<f64>>,
+    /// The same as the solvers take them.
+    programs: Vec<StageQp>,
     phases: Vec<usize>,
     /// Stages by which the last preparation moved on, and those that it made.
     shift: usize,
     is_new: Vec<bool>,
+    start: Start,
+    /// Rows of the friction cone `(μ F_z, F_x, F_y) / weight` of a stage.
+    force: Vec<f64>,
     lineariser: Lineariser,
     nominal: StageModel,
 }
 
-/// What the stages are prepared from.
 #[derive(Debug, Clone, Copy)]
-pub struct StageInputs<'a> {
-    /// The model's numbers.
+pub(super) struct StageInputs<'a> {
     pub plant: &'a ControlModel,
-    /// The settings.
     pub settings: &'a MpcSettings,
-    /// What to follow.
     pub reference: &'a Reference,
-    /// The last good plan.
     pub plan: &'a Plan,
     /// The rows of every stage, as far as the maps are the same at all of them.
     pub rows: &'a StageRows,
@@ -57,65 +59,116 @@ pub struct StageInputs<'a> {
 const TIME_TOLERANCE_S: f64 = 1e-9;
 
 impl Horizon {
-    /// Memory for a horizon.
-    pub fn new(latent_dim: usize, length: usize) -> Self {
+    pub(super) fn new(length: usize, shape: &StageShape) -> Self {
+        let latent_dim = shape.inputs;
+        let stage = Stage {
+            model: StageModel::zeros(latent_dim),
+            defect: vec![0.0; 2 * latent_dim],
+            state: vec![0.0; 2 * latent_dim],
+            end: vec![0.0; 2 * latent_dim],
+            input: vec![0.0; latent_dim],
+            phase: 0,
+            made_for: None,
+            rows: None,
+        };
         Self {
-            stages: vec![Stage::zeros(latent_dim); length],
-            made_for: vec![None; length],
-            ends: vec![vec![0.0; 2 * latent_dim]; length],
+            stages: vec![stage; length],
+            programs: vec![StageQp::zeros(shape); length],
             phases: vec![0; length],
             shift: 0,
             is_new: vec![true; length],
+            start: Start {
+                state: vec![0.0; shape.states],
+                rate_before: vec![0.0; shape.rate_rows],
+            },
+            force: vec![0.0; 3 * latent_dim],
             lineariser: Lineariser::new(latent_dim),
             nominal: StageModel::zeros(latent_dim),
         }
     }
 
-    /// Forgets all linearisations: the reference has changed.
-    pub fn forget(&mut self) {
-        self.made_for.fill(None);
+    pub(super) fn forget(&mut self) {
+        for stage in &mut self.stages {
+            stage.made_for = None;
+        }
     }
 
-    /// The stages of the last preparation.
-    pub fn stages(&self) -> &[Stage] {
-        &self.stages
+    pub(super) fn stage(&self, stage: usize) -> &Stage {
+        &self.stages[stage]
     }
 
-    /// By how many stages the last preparation moved on.
-    pub fn shift(&self) -> usize {
-        self.shift
+    /// The stages as the solvers take them, by how many the last preparation moved on, and whether it made each anew.
+    pub(super) fn prepared(&self) -> (&[StageQp], usize, &[bool]) {
+        (&self.programs, self.shift, &self.is_new)
     }
 
-    /// Whether the last preparation made each stage anew.
-    pub fn is_new(&self) -> &[bool] {
-        &self.is_new
+    /// The stages as the solvers take them, and what a solve starts from: the measured state, and the input of the
+    /// command before. Rows are those of every stage, as far as they are the same.
+    pub(super) fn start(
+        &mut self,
+        (measured, deviation): (&[f64], &[f64]),
+        last_input: &[f64],
+        rows: &StageRows,
+    ) -> (&[StageQp], &Start) {
+        let first = &self.stages[0];
+        for (i, out) in self.start.state.iter_mut().enumerate() {
+            *out = (measured[i] - first.state[i]) / deviation[i];
+        }
+        let rows = first.rows.as_ref().unwrap_or(rows);
+        for (out, rate) in self.start.rate_before.iter_mut().zip(&rows.rate) {
+            *out = 0.0;
+            for (entry, input) in rate.row.iter().zip(last_input) {
+                *out += entry * input;
+            }
+        }
+        (&self.programs, &self.start)
     }
 
-    /// Reference state at the end of a stage.
-    pub fn end(&self, stage: usize) -> &[f64] {
-        &self.ends[stage]
+    /// Writes what a stage has in the solution: its latent input `u_r + C_p û` and the latent state at
+    /// its end `x_r⁺ + σ x̂⁺`.
+    pub(super) fn unscale(
+        &self,
+        index: usize,
+        (scaled_input, scaled_end): (&[f64], &[f64]),
+        plant: &ControlModel,
+        deviation: &[f64],
+        (input, end): (&mut [f64], &mut [f64]),
+    ) {
+        let stage = &self.stages[index];
+        let root = &plant.phases()[stage.phase].latent_root;
+        for row in 0..input.len() {
+            let mut sum = 0.0;
+            for col in 0..=row {
+                sum += root[(row, col)] * scaled_input[col];
+            }
+            input[row] = stage.input[row] + sum;
+        }
+        for row in 0..end.len() {
+            end[row] = stage.end[row] + deviation[row] * scaled_end[row];
+        }
     }
 
-    /// Prepares all stages from a time on with the feet as measured then.
-    pub fn prepare(
+    /// Prepares all stages from a time on with the feet as measured then; the status of a plan for them.
+    pub(super) fn prepare(
         &mut self,
         inputs: &StageInputs<'_>,
         dynamics: &mut dyn LatentDynamics,
         time_s: f64,
         feet: ContactFlags,
-    ) -> Contact {
+    ) -> Status {
         let contact = self.schedule(inputs, time_s, feet);
         self.reuse(inputs.settings, time_s);
         for index in 0..self.stages.len() {
             let start_s = time_s + index as f64 * inputs.settings.step_s;
-            let is_made = self.made_for[index]
-                .is_some_and(|made| (made - start_s).abs() < TIME_TOLERANCE_S)
-                && self.stages[index].phase == self.phases[index];
+            let stage = &self.stages[index];
+            let is_near = |made: f64| (made - start_s).abs() < TIME_TOLERANCE_S;
+            let is_made = stage.made_for.is_some_and(is_near) && stage.phase == self.phases[index];
             self.is_new[index] = !is_made;
             if !is_made {
                 self.make_reference(inputs, index, start_s);
                 self.linearise(inputs, dynamics, index, start_s);
-                self.made_for[index] = match inputs.settings.linearisation {
+                self.write_program(inputs, index, start_s);
+                self.stages[index].made_for = match inputs.settings.linearisation {
                     Linearisation::Reference => Some(start_s),
                     Linearisation::LastPlan => None,
                 };
@@ -125,7 +178,7 @@ impl Horizon {
     }
 
     /// Phases of all stages: the reference's, changed where the feet disagree.
-    fn schedule(&mut self, inputs: &StageInputs<'_>, time_s: f64, feet: ContactFlags) -> Contact {
+    fn schedule(&mut self, inputs: &StageInputs<'_>, time_s: f64, feet: ContactFlags) -> Status {
         let (plant, step_s) = (inputs.plant, inputs.settings.step_s);
         let scheduled = |time_s: f64| {
             let phase = plant.phase_for(inputs.reference.feet_at(time_s));
@@ -135,10 +188,10 @@ impl Horizon {
             *phase = scheduled(time_s + (index as f64 + 0.5) * step_s);
         }
         let Some(measured) = plant.phase_for(feet) else {
-            return Contact::Unknown;
+            return Status::ContactUnknown;
         };
         if measured == scheduled(time_s) || measured == self.phases[0] {
-            return Contact::AsScheduled;
+            return Status::Solved;
         }
         let length = self.phases.len();
         let next = self.phases.iter().position(|&phase| phase == measured);
@@ -146,15 +199,15 @@ impl Horizon {
         match (next, last) {
             (None, None) => {
                 self.phases[0] = measured;
-                Contact::Unknown
+                Status::ContactUnknown
             }
             (Some(next), last) if last.is_none_or(|last| next <= last) => {
                 self.phases[..next].fill(measured);
-                Contact::Early
+                Status::ContactEarly
             }
             (_, _) => {
                 self.phases[0] = measured;
-                Contact::Late
+                Status::ContactLate
             }
         }
     }
@@ -162,7 +215,7 @@ impl Horizon {
     /// Moves stages that the last step made for the instants of this one to their new places.
     fn reuse(&mut self, settings: &MpcSettings, time_s: f64) {
         self.shift = 0;
-        let Some(first) = self.made_for.first().copied().flatten() else {
+        let Some(first) = self.stages[0].made_for else {
             return;
         };
         let passed = (time_s - first) / settings.step_s;
@@ -172,8 +225,7 @@ impl Horizon {
             let shift = shift as usize;
             self.shift = shift;
             self.stages.rotate_left(shift);
-            self.made_for.rotate_left(shift);
-            self.ends.rotate_left(shift);
+            self.programs.rotate_left(shift);
         }
     }
 
@@ -182,25 +234,37 @@ impl Horizon {
         let stage = &mut self.stages[index];
         stage.phase = self.phases[index];
         reference.state_at(start_s, &mut stage.state);
-        reference.state_at(start_s + settings.step_s, &mut self.ends[index]);
+        reference.state_at(start_s + settings.step_s, &mut stage.end);
         if !reference.mean_input(start_s, settings.step_s, &mut stage.input) {
             let mean = &plant.phases()[stage.phase].latent_mean;
             stage.input.copy_from_slice(mean.as_slice());
         }
-        stage.losses_nm = plant.planned_losses(&stage.state, &self.ends[index], settings.step_s);
-        stage.rows = reference.robot_state_at(start_s).and_then(|x| {
-            let z = &self.ends[index][..plant.latent_dim()];
-            let local = plant.tangent_at(&x, z)?;
-            inputs.rows.with_maps_of(&local, settings)
-        });
+        let z = &stage.end[..plant.latent_dim()];
+        let local = plant.tangent_at(&reference.robot_state_at(start_s), z);
+        stage.rows = local.and_then(|local| inputs.rows.with_maps_of(&local, settings));
+    }
+
+    fn write_program(&mut self, inputs: &StageInputs<'_>, index: usize, start_s: f64) {
+        let (plant, step_s) = (inputs.plant, inputs.settings.step_s);
+        let (stage, program) = (&self.stages[index], &mut self.programs[index]);
+        let phase = &plant.phases()[stage.phase];
+        let scale = StageScale {
+            root: &phase.latent_root,
+            input: &stage.input,
+            deviation: inputs.reference.deviation(),
+        };
+        program.write_dynamics(&stage.model, &stage.defect, &scale);
         let rows = stage.rows.as_ref().unwrap_or(inputs.rows);
+        let losses_nm = plant.planned_losses(&stage.state, &stage.end, step_s);
+        program.write_rows(rows, &losses_nm, &stage.end, &scale);
         if let Some(friction) = &rows.friction {
-            let middle_s = start_s + 0.5 * settings.step_s;
-            if plant.phases()[stage.phase].is_grounded {
-                friction.turned(reference.attitude_at(middle_s), &mut stage.force);
+            if phase.is_grounded {
+                let attitude = inputs.reference.attitude_at(start_s + 0.5 * step_s);
+                friction.turned(attitude, &mut self.force);
             } else {
-                stage.force.fill(0.0);
+                self.force.fill(0.0);
             }
+            program.write_friction(&self.force, &scale);
         }
     }
 
@@ -221,38 +285,38 @@ impl Horizon {
             Linearisation::Reference => None,
             Linearisation::LastPlan => inputs.plan.at(start_s),
         };
-        let stage = &mut self.stages[index];
-        let phase = stage.phase;
+        let Stage {
+            model,
+            defect,
+            state,
+            end,
+            input,
+            phase,
+            ..
+        } = &mut self.stages[index];
         let mut evaluate = |z: &[f64], dz: &[f64], u: &[f64], ddz: &mut [f64], jacobian: &mut _| {
-            dynamics.jacobian(phase, z, dz, u, ddz, jacobian);
+            dynamics.jacobian(*phase, z, dz, u, ddz, jacobian);
         };
-        let (end, lineariser) = (&self.ends[index], &mut self.lineariser);
-        if let Some((state, input)) = point {
-            lineariser.stage(state, input, step_s, &mut evaluate, &mut stage.model);
-            for (row, defect) in stage.defect.iter_mut().enumerate() {
-                *defect = stage.model.next[row] - end[row];
-                for (col, value) in state.iter().enumerate() {
-                    *defect += stage.model.a[(row, col)] * (stage.state[col] - value);
-                }
-                for (col, value) in input.iter().enumerate() {
-                    *defect += stage.model.b[(row, col)] * (stage.input[col] - value);
-                }
+        let (x, u) = point.unwrap_or((state, input));
+        (self.lineariser).stage(x, u, step_s, &mut evaluate, model);
+        for (row, defect) in defect.iter_mut().enumerate() {
+            *defect = model.next[row] - end[row];
+            for (col, value) in x.iter().enumerate() {
+                *defect += model.a(row, col) * (state[col] - value);
             }
-            if trusts_reference {
-                let (state, input, nominal) = (&stage.state, &stage.input, &mut self.nominal);
-                lineariser.stage(state, input, step_s, &mut evaluate, nominal);
-                for (row, defect) in stage.defect.iter_mut().enumerate() {
+            for (col, value) in u.iter().enumerate() {
+                *defect += model.b(row, col) * (input[col] - value);
+            }
+        }
+        match (trusts_reference, point) {
+            (false, _) => {}
+            (true, None) => defect.fill(0.0),
+            (true, Some(_)) => {
+                let nominal = &mut self.nominal;
+                (self.lineariser).stage(state, input, step_s, &mut evaluate, nominal);
+                for (row, defect) in defect.iter_mut().enumerate() {
                     *defect += end[row] - nominal.next[row];
                 }
-            }
-        } else {
-            let (state, input, model) = (&stage.state, &stage.input, &mut stage.model);
-            lineariser.stage(state, input, step_s, &mut evaluate, model);
-            for (row, defect) in stage.defect.iter_mut().enumerate() {
-                *defect = match trusts_reference {
-                    true => 0.0,
-                    false => stage.model.next[row] - end[row],
-                };
             }
         }
     }

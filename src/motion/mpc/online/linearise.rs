@@ -21,7 +21,7 @@
 
 use std::fmt::Debug;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 /// The latent accelerations of every phase with their derivatives.
 ///
@@ -47,37 +47,40 @@ pub trait LatentDynamics: Debug + Send {
 #[derive(Debug, Clone, PartialEq)]
 pub struct StageModel {
     /// `F(x̄, ū)`, `2 latent_dim`: positions first.
-    pub next: DVector<f64>,
-    /// `∂F/∂x`, `2 latent_dim` square.
-    pub a: DMatrix<f64>,
-    /// `∂F/∂u`, `2 latent_dim × latent_dim`.
-    pub b: DMatrix<f64>,
+    pub next: Vec<f64>,
+    /// `(∂F/∂x ∂F/∂u)`, `2 latent_dim × 3 latent_dim`, row-major.
+    by: Vec<f64>,
 }
 
 impl StageModel {
     /// A stage of zeros.
     pub fn zeros(latent_dim: usize) -> Self {
         Self {
-            next: DVector::zeros(2 * latent_dim),
-            a: DMatrix::zeros(2 * latent_dim, 2 * latent_dim),
-            b: DMatrix::zeros(2 * latent_dim, latent_dim),
+            next: vec![0.0; 2 * latent_dim],
+            by: vec![0.0; 6 * latent_dim * latent_dim],
         }
+    }
+
+    /// Entry of `∂F/∂x`.
+    pub fn a(&self, row: usize, col: usize) -> f64 {
+        self.by[row * 3 * (self.next.len() / 2) + col]
+    }
+
+    /// Entry of `∂F/∂u`.
+    pub fn b(&self, row: usize, col: usize) -> f64 {
+        self.a(row, self.next.len() + col)
     }
 }
 
 /// Working memory of [`Lineariser::stage`].
 #[derive(Debug, Clone)]
 pub struct Lineariser {
-    latent_dim: usize,
     state: Vec<f64>,
     slope: Vec<f64>,
-    slope_sum: Vec<f64>,
     jacobian: DMatrix<f64>,
-    /// `S_i`, `2d × 3d`, row-major.
+    /// `S_i` and `K_i`, `2d × 3d`, row-major.
     sensitivity: Vec<f64>,
-    /// `K_i`, `2d × 3d`, row-major.
     slope_sensitivity: Vec<f64>,
-    sensitivity_sum: Vec<f64>,
 }
 
 /// Nodes of the classical Runge-Kutta method: the internal state is `x + node · h · previous slope`.
@@ -90,14 +93,11 @@ impl Lineariser {
     pub fn new(latent_dim: usize) -> Self {
         let (state_dim, point_dim) = (2 * latent_dim, 3 * latent_dim);
         Self {
-            latent_dim,
             state: vec![0.0; state_dim],
             slope: vec![0.0; state_dim],
-            slope_sum: vec![0.0; state_dim],
             jacobian: DMatrix::zeros(latent_dim, point_dim),
             sensitivity: vec![0.0; state_dim * point_dim],
             slope_sensitivity: vec![0.0; state_dim * point_dim],
-            sensitivity_sum: vec![0.0; state_dim * point_dim],
         }
     }
 
@@ -113,46 +113,46 @@ impl Lineariser {
         mut dynamics: impl FnMut(&[f64], &[f64], &[f64], &mut [f64], &mut DMatrix<f64>),
         stage: &mut StageModel,
     ) {
-        let d = self.latent_dim;
+        let (d, point_dim) = (u.len(), 3 * u.len());
         self.slope.fill(0.0);
-        self.slope_sum.fill(0.0);
         self.slope_sensitivity.fill(0.0);
-        self.sensitivity_sum.fill(0.0);
+        stage.next.fill(0.0);
+        stage.by.fill(0.0);
         for (node, weight) in NODES.into_iter().zip(WEIGHTS) {
-            for ((state, x), slope) in self.state.iter_mut().zip(x).zip(&self.slope) {
-                *state = x + node * step_s * slope;
+            let scale = node * step_s;
+            for i in 0..2 * d {
+                self.state[i] = x[i] + scale * self.slope[i];
             }
-            self.advance_sensitivity(node * step_s);
+            for (sensitivity, slope) in self.sensitivity.iter_mut().zip(&self.slope_sensitivity) {
+                *sensitivity = scale * slope;
+            }
+            for row in 0..2 * d {
+                self.sensitivity[row * point_dim + row] += 1.0;
+            }
             let (z, dz) = self.state.split_at(d);
             let (velocity, acceleration) = self.slope.split_at_mut(d);
             velocity.copy_from_slice(dz);
             dynamics(z, dz, u, acceleration, &mut self.jacobian);
             self.differentiate_slope();
-            for (sum, slope) in self.slope_sum.iter_mut().zip(&self.slope) {
+            for (sum, slope) in stage.next.iter_mut().zip(&self.slope) {
                 *sum += weight * slope;
             }
-            for (sum, slope) in self.sensitivity_sum.iter_mut().zip(&self.slope_sensitivity) {
+            for (sum, slope) in stage.by.iter_mut().zip(&self.slope_sensitivity) {
                 *sum += weight * slope;
             }
         }
-        self.write(x, step_s, stage);
-    }
-
-    /// `S = (I 0) + scale · K`.
-    fn advance_sensitivity(&mut self, scale: f64) {
-        let point_dim = 3 * self.latent_dim;
-        for (sensitivity, slope) in self.sensitivity.iter_mut().zip(&self.slope_sensitivity) {
-            *sensitivity = scale * slope;
-        }
-        for row in 0..2 * self.latent_dim {
-            self.sensitivity[row * point_dim + row] += 1.0;
+        for row in 0..2 * d {
+            stage.next[row] = x[row] + step_s * stage.next[row];
+            for entry in &mut stage.by[row * point_dim..][..point_dim] {
+                *entry *= step_s;
+            }
+            stage.by[row * point_dim + row] += 1.0;
         }
     }
 
     /// `K` from `S` and the Jacobian of `f`.
     fn differentiate_slope(&mut self) {
-        let d = self.latent_dim;
-        let point_dim = 3 * d;
+        let (d, point_dim) = self.jacobian.shape();
         let (velocity, acceleration) = self.slope_sensitivity.split_at_mut(d * point_dim);
         velocity.copy_from_slice(&self.sensitivity[d * point_dim..]);
         for (row, out) in acceleration.chunks_exact_mut(point_dim).enumerate() {
@@ -165,103 +165,9 @@ impl Lineariser {
                     }
                 }
             }
-            for (col, out) in out[2 * d..].iter_mut().enumerate() {
-                *out += self.jacobian[(row, 2 * d + col)];
+            for col in 2 * d..point_dim {
+                out[col] += self.jacobian[(row, col)];
             }
-        }
-    }
-
-    fn write(&self, x: &[f64], step_s: f64, stage: &mut StageModel) {
-        let d = self.latent_dim;
-        for (row, sums) in self.sensitivity_sum.chunks_exact(3 * d).enumerate() {
-            stage.next[row] = x[row] + step_s * self.slope_sum[row];
-            let (by_state, by_input) = sums.split_at(2 * d);
-            for (col, sum) in by_state.iter().enumerate() {
-                let identity = if row == col { 1.0 } else { 0.0 };
-                stage.a[(row, col)] = identity + step_s * sum;
-            }
-            for (col, sum) in by_input.iter().enumerate() {
-                stage.b[(row, col)] = step_s * sum;
-            }
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// A stiff, nonlinear pair of oscillators with inputs inside and outside the sine.
-    fn sample(z: &[f64], dz: &[f64], u: &[f64], ddz: &mut [f64], jacobian: &mut DMatrix<f64>) {
-        ddz[0] = -40.0 * z[0].sin() + z[1] * dz[0] + u[0];
-        ddz[1] = -3.0 * dz[1] + (z[0] * u[1]).cos() + 2.0 * u[0];
-        let slope = -(z[0] * u[1]).sin();
-        let rows = [
-            [-40.0 * z[0].cos(), dz[0], z[1], 0.0, 1.0, 0.0],
-            [slope * u[1], 0.0, 0.0, -3.0, 2.0, slope * z[0]],
-        ];
-        jacobian.copy_from(&DMatrix::from_row_slice(2, 6, &rows.concat()));
-    }
-
-    fn stage_at(x: &[f64], u: &[f64]) -> StageModel {
-        let mut stage = StageModel::zeros(2);
-        Lineariser::new(2).stage(x, u, 0.02, sample, &mut stage);
-        stage
-    }
-
-    #[test]
-    fn sensitivities_match_central_differences_of_the_step() {
-        let x = [0.3, -0.7, 1.1, 0.4];
-        let u = [0.9, -1.3];
-        let stage = stage_at(&x, &u);
-        let delta = 1e-5;
-        for col in 0..6 {
-            let moved = |sign: f64| {
-                let (mut x, mut u) = (x, u);
-                if col < 4 {
-                    x[col] += sign * delta
-                } else {
-                    u[col - 4] += sign * delta
-                }
-                stage_at(&x, &u).next
-            };
-            let difference = (moved(1.0) - moved(-1.0)) / (2.0 * delta);
-            for row in 0..4 {
-                let exact = match col < 4 {
-                    true => stage.a[(row, col)],
-                    false => stage.b[(row, col - 4)],
-                };
-                let off = (exact - difference[row]).abs();
-                assert!(off < 1e-8, "row {row}, column {col}");
-            }
-        }
-    }
-
-    #[test]
-    fn step_of_a_linear_oscillator_is_the_taylor_polynomial_of_order_four() {
-        let mut stage = StageModel::zeros(1);
-        let oscillator =
-            |z: &[f64], _: &[f64], u: &[f64], ddz: &mut [f64], jacobian: &mut DMatrix<f64>| {
-                ddz[0] = -z[0] + u[0];
-                jacobian.copy_from_slice(&[-1.0, 0.0, 1.0]);
-            };
-        let h: f64 = 0.5;
-        Lineariser::new(1).stage(&[2.0, 0.0], &[0.0], h, oscillator, &mut stage);
-        let (cosine, sine) = (
-            1.0 - h.powi(2) / 2.0 + h.powi(4) / 24.0,
-            h - h.powi(3) / 6.0,
-        );
-        let found = [
-            stage.a[(0, 0)],
-            stage.a[(0, 1)],
-            stage.next[0],
-            stage.b[(0, 0)],
-        ];
-        for (found, exact) in found
-            .into_iter()
-            .zip([cosine, sine, 2.0 * cosine, 1.0 - cosine])
-        {
-            assert!((found - exact).abs() < 1e-15, "{found} {exact}");
         }
     }
 }

@@ -6,6 +6,7 @@
 //! folder. Read `problem` first.
 
 mod command;
+mod conic;
 mod control_model;
 mod controller;
 mod dense;
@@ -16,10 +17,7 @@ pub mod estimate;
 mod fallback;
 mod horizon;
 pub mod interface;
-mod layout;
 pub(super) mod lift;
-mod lift_cones;
-mod lift_pyramids;
 pub mod linearise;
 mod plan;
 pub mod problem;
@@ -27,25 +25,22 @@ mod prune;
 mod qp;
 mod reference;
 mod settings;
-mod sparse;
+mod stage;
 mod step;
 mod structured;
 mod swing;
-mod transcribe;
 
 /// Numbers that the controller in C shares, which are no settings.
 pub mod shared {
     pub use super::controller::SOFTENED_FROM;
     pub use super::effectiveness::{LARGEST_WEIGHT, PRIOR_WEIGHT, RANGE as EFFECTIVENESS_RANGE};
     pub use super::estimate::HALF_WINDOW_S;
-    pub use super::lift::LIFT_ITERATIONS;
-    pub use super::lift_pyramids::{CURVATURE as LIFT_CURVATURE, torque_deviation};
+    pub use super::lift::{CURVATURE as LIFT_CURVATURE, LIFT_ITERATIONS, torque_deviation};
     pub use super::plan::POSTURE_SHARE;
-    pub use super::problem::STATE_REACH;
+    pub use super::problem::{SLACK_PRICE, STATE_REACH};
     pub use super::reference::{DEVIATION_FLOOR, STILL_SHARE, STILL_TIME_S};
     pub use super::structured::{GAP, RATE_SOFTNESS, RATE_TOLERANCE, TOLERANCE};
     pub use super::swing::MOST_TURN_RAD;
-    pub use super::transcribe::SLACK_PRICE;
 }
 
 /// The structured solver with the widest vectors that the processor has.
@@ -54,7 +49,7 @@ pub mod widest {
 }
 
 pub use command::{Command, Source, Status};
-pub use control_model::{ControlModel, ControlModelParts, ControlPhase, InputMaps, NonlinearMaps};
+pub use control_model::{ControlModel, ControlModelParts, ControlPhase, NonlinearMaps};
 pub use controller::{Controller, Measurement};
 pub use error::ControlError;
 pub use estimate::InputGivenState;
@@ -63,11 +58,13 @@ pub use linearise::LatentDynamics;
 pub use plan::Plan;
 pub use problem::{to_upright, upright};
 pub use prune::needed_rows;
-pub use qp::{Cone, ConeProgram, Outcome, QpSettings, QpSolver, Residuals, SolverProfile};
+pub use qp::{
+    Cone, ConeProgram, Outcome, QpSettings, QpSolver, Residuals, SolverProfile, SparseColumns,
+    sparse,
+};
 pub use reference::{Reference, ReferenceSamples};
 pub use settings::{
     Drift, Effectiveness, FallbackSettings, Lift, Linearisation, MAX_HORIZON, MissingInput,
     MpcSettings, RowSelection, Solver,
 };
-pub use sparse::SparseColumns;
 pub use structured::MAX_STRUCTURED_DIM;

@@ -16,7 +16,6 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Memory for a plan; there is none yet.
     pub(super) fn new(latent_dim: usize, horizon: usize, step_s: f64) -> Self {
         Self {
             step_s,
@@ -27,7 +26,6 @@ impl Plan {
         }
     }
 
-    /// Forgets the plan.
     pub(super) fn clear(&mut self) {
         self.start_s = None;
     }
@@ -39,7 +37,6 @@ impl Plan {
         self.states[0].copy_from_slice(state);
     }
 
-    /// Duration of a stage, s.
     pub(super) fn step_s(&self) -> f64 {
         self.step_s
     }

@@ -45,7 +45,12 @@ use super::control_model::ControlModel;
 use super::prune::needed_rows;
 use super::reference::Reference;
 use super::settings::{Lift, MpcSettings, RowSelection};
+use super::stage::StageCost;
 use crate::robot::{GRAVITY_M_S2, JOINT_DIM, WrenchFrame};
+
+/// Price of a slack in the program; the whole cost is scaled to it. clarabel starts with all
+/// multipliers near one and needs two iterations more if it has to bring them to 100.
+pub const SLACK_PRICE: f64 = 10.0;
 
 /// Distance from the reference, in its standard deviations, within which joint limits matter.
 pub const STATE_REACH: f64 = 4.0;
@@ -171,6 +176,16 @@ impl StageRows {
     }
 }
 
+pub(super) fn stage_cost(state_weights: &[f64], settings: &MpcSettings) -> StageCost {
+    let scale = SLACK_PRICE / settings.joint_penalty;
+    StageCost {
+        state: state_weights.iter().map(|weight| scale * weight).collect(),
+        terminal: settings.terminal_weight,
+        input: scale * settings.input_weight,
+        slack: SLACK_PRICE,
+    }
+}
+
 /// The rows with both sides of a limit first, side by side; else the order stays.
 fn pairs_first(rows: Vec<Row>) -> Vec<Row> {
     let is_paired = |row: &&Row| rows.iter().any(|other| other.is_opposite(row));
@@ -187,12 +202,10 @@ pub fn pairs(rows: &[Row]) -> usize {
 }
 
 impl Row {
-    /// Whether the row constrains anything.
     fn is_not_zero(&self) -> bool {
         self.row.iter().any(|entry| *entry != 0.0)
     }
 
-    /// Whether another row is the other side of a limit.
     fn is_opposite(&self, other: &Row) -> bool {
         let opposite = other.row.iter().map(|entry| -entry);
         self.joint == other.joint && self.row.iter().copied().eq(opposite)

@@ -12,13 +12,12 @@
 //! [`Outcome`], and it is `Solved` only if the optimality conditions hold for the returned point
 //! by [`QpSolver::residuals`], which is computed here from the problem's own data.
 
-pub use clarabel::algebra::CscMatrix;
+use clarabel::algebra::{CscMatrix, VectorMath};
 use clarabel::solver::{
     DefaultSettings, DefaultSettingsBuilder, DefaultSolver, IPSolver, SolverStatus, SupportedConeT,
 };
 
 use super::error::ControlError;
-use super::sparse::SparseColumns;
 
 /// One factor of the cone that holds the slack `s = b − A x`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -38,6 +37,33 @@ impl Cone {
             Cone::Zero(dim) | Cone::Nonnegative(dim) | Cone::SecondOrder(dim) => dim,
         }
     }
+}
+
+/// A matrix in compressed sparse columns.
+pub type SparseColumns = CscMatrix<f64>;
+
+/// The matrix of `(row, column, value)` in any order, each inside `n_rows` by `n_cols`, zeros among them; values of
+/// one place are added.
+pub fn sparse(n_rows: usize, n_cols: usize, entries: &[(usize, usize, f64)]) -> SparseColumns {
+    let mut entries = entries.to_vec();
+    entries.sort_unstable_by_key(|&(row, col, _)| (col, row));
+    let rows = entries.iter().map(|entry| entry.0).collect();
+    let columns = entries.iter().map(|entry| entry.1).collect();
+    let values = entries.iter().map(|entry| entry.2).collect();
+    CscMatrix::new_from_triplets(n_rows, n_cols, rows, columns, values)
+}
+
+fn entries(matrix: &SparseColumns) -> impl Iterator<Item = (usize, usize, f64)> {
+    let column = move |col| (matrix.colptr[col]..matrix.colptr[col + 1]).map(move |at| (col, at));
+    let entries = (0..matrix.n).flat_map(column);
+    entries.map(|(col, at)| (matrix.rowval[at], col, matrix.nzval[at]))
+}
+
+/// Position of an entry among the values, or none if the pattern lacks it.
+pub(super) fn position(matrix: &SparseColumns, row: usize, col: usize) -> Option<usize> {
+    let start = matrix.colptr[col];
+    let rows = &matrix.rowval[start..matrix.colptr[col + 1]];
+    Some(start + rows.binary_search(&row).ok()?)
 }
 
 /// A convex quadratic program over cones; see the module for its mathematics.
@@ -160,9 +186,9 @@ impl QpSolver {
         let cones: Vec<SupportedConeT<f64>> =
             program.cones.iter().map(|&cone| supported(cone)).collect();
         let solver = DefaultSolver::new(
-            program.p.csc(),
+            &program.p,
             &program.q,
-            program.a.csc(),
+            &program.a,
             &program.b,
             &cones,
             clarabel_settings(&settings),
@@ -196,7 +222,11 @@ impl QpSolver {
 
     /// Solves the program with its present values.
     pub fn solve(&mut self) -> Outcome {
-        if !self.data_is_finite() {
+        let ConeProgram { p, q, a, b, .. } = &self.program;
+        if ![q, b, &p.nzval, &a.nzval]
+            .iter()
+            .all(|values| values.is_finite())
+        {
             return Outcome::NumericalFailure;
         }
         // An iterator of all positions would do without whole vectors, at the price of a division per
@@ -204,8 +234,8 @@ impl QpSolver {
         let (program, solver) = (&self.program, &mut self.solver);
         let updated = solver.update_q(&program.q).is_ok()
             && solver.update_b(&program.b).is_ok()
-            && solver.update_P(&program.p.csc().nzval).is_ok()
-            && solver.update_A(&program.a.csc().nzval).is_ok();
+            && solver.update_P(&program.p.nzval).is_ok()
+            && solver.update_A(&program.a.nzval).is_ok();
         if !updated {
             return Outcome::NumericalFailure;
         }
@@ -234,14 +264,6 @@ impl QpSolver {
         self.residuals
     }
 
-    fn data_is_finite(&self) -> bool {
-        let finite = |values: &[f64]| values.iter().all(|value| value.is_finite());
-        finite(&self.program.q)
-            && finite(&self.program.b)
-            && finite(self.program.p.values())
-            && finite(self.program.a.values())
-    }
-
     fn outcome(&self) -> Outcome {
         let accurate = self.residuals.worst() <= self.settings.accepted_residual;
         match self.solver.solution.status {
@@ -265,30 +287,36 @@ impl QpSolver {
     /// The optimality conditions at the returned point, from the program's data alone.
     fn check(&mut self) -> Residuals {
         let (x, y) = (&self.solver.solution.x, &self.solver.solution.z);
-        let program = &self.program;
+        let ConeProgram { p, q, a, b, cones } = &self.program;
+        let (slack, gradient) = (&mut self.row_work, &mut self.column_work);
 
-        self.row_work.fill(0.0);
-        program.a.multiply_add(x, &mut self.row_work);
-        let ax_size = norm_inf(&self.row_work);
-        for (slack, b) in self.row_work.iter_mut().zip(&program.b) {
-            *slack = b - *slack;
-        }
-        let primal = cone_violation(&program.cones, &self.row_work, Side::Primal)
-            / ax_size.max(norm_inf(&program.b)).max(1.0);
+        slack.fill(0.0);
+        entries(a).for_each(|(row, col, value)| slack[row] += value * x[col]);
+        let primal_size = slack.norm_inf().max(b.norm_inf()).max(1.0);
+        slack.axpby(1.0, b, -1.0);
+        let primal = cone_violation(cones, slack, Side::Primal) / primal_size;
 
-        self.column_work.fill(0.0);
-        program.p.symmetric_multiply_add(x, &mut self.column_work);
-        let px_size = norm_inf(&self.column_work);
-        let xpx = dot(x, &self.column_work);
-        for (gradient, q) in self.column_work.iter_mut().zip(&program.q) {
-            *gradient += q;
-        }
-        program.a.transpose_multiply_add(y, &mut self.column_work);
-        let dual_size = px_size.max(norm_inf(&program.q)).max(norm_inf(y)).max(1.0);
-        let dual = norm_inf(&self.column_work).max(cone_violation(&program.cones, y, Side::Dual))
+        gradient.fill(0.0);
+        entries(p).for_each(|(row, col, value)| {
+            gradient[row] += value * x[col];
+            if row != col {
+                gradient[col] += value * x[row];
+            }
+        });
+        let dual_size = gradient
+            .norm_inf()
+            .max(q.norm_inf())
+            .max(y.norm_inf())
+            .max(1.0);
+        let xpx = x.dot(gradient);
+        gradient.axpby(1.0, q, 1.0);
+        entries(a).for_each(|(row, col, value)| gradient[col] += value * y[row]);
+        let dual = gradient
+            .norm_inf()
+            .max(cone_violation(cones, y, Side::Dual))
             / dual_size;
 
-        let (qx, by) = (dot(&program.q, x), dot(&program.b, y));
+        let (qx, by) = (q.dot(x), b.dot(y));
         let (primal_cost, dual_cost) = (0.5 * xpx + qx, -0.5 * xpx - by);
         let gap = (primal_cost - dual_cost).abs() / primal_cost.abs().min(dual_cost.abs()).max(1.0);
         Residuals { primal, dual, gap }
@@ -310,13 +338,13 @@ fn cone_violation(cones: &[Cone], values: &[f64], side: Side) -> f64 {
         let part = &values[start..start + cone.dim()];
         start += cone.dim();
         let violation = match (cone, side) {
-            (Cone::Zero(_), Side::Primal) => norm_inf(part),
+            (Cone::Zero(_), Side::Primal) => part.norm_inf(),
             (Cone::Zero(_), Side::Dual) => 0.0,
             (Cone::Nonnegative(_), _) => {
                 part.iter().fold(0.0, |worst, &value| larger(worst, -value))
             }
             (Cone::SecondOrder(_), _) => match part.split_first() {
-                Some((head, tail)) => dot(tail, tail).sqrt() - head,
+                Some((head, tail)) => tail.norm() - head,
                 None => 0.0,
             },
         };
@@ -328,15 +356,6 @@ fn cone_violation(cones: &[Cone], values: &[f64], side: Side) -> f64 {
 /// The larger of two numbers, or not a number if either is (unlike `f64::max`).
 fn larger(a: f64, b: f64) -> f64 {
     if b > a || b.is_nan() { b } else { a }
-}
-
-fn norm_inf(values: &[f64]) -> f64 {
-    let sizes = values.iter().map(|value| value.abs());
-    sizes.fold(0.0, larger)
-}
-
-pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 fn supported(cone: Cone) -> SupportedConeT<f64> {

@@ -35,9 +35,7 @@ pub struct Reference {
     /// Latent input of each sample.
     input: Option<Vec<f64>>,
     feet: Vec<ContactFlags>,
-    /// Roll and pitch, one pair per sample.
-    attitude: Vec<[f64; 2]>,
-    /// Robot states, 18 a sample, for maps that depend on them; else empty.
+    /// Robot states, 18 per sample.
     x: Vec<f64>,
     deviation: Vec<f64>,
 }
@@ -67,7 +65,6 @@ impl Reference {
             plant.encode(row(samples.x, sample), z);
             plant.encode_velocity(row(samples.x, sample), row(samples.dx, sample), dz);
         }
-        let states = samples.x.chunks_exact(STATE_DIM);
         Ok(Self {
             latent_dim: d,
             deviation: deviations(&state, &still_deviations(plant)),
@@ -75,11 +72,7 @@ impl Reference {
             input: samples.u.map(|u| project_all(plant, samples.x, u)),
             time_s: samples.time_s.to_vec(),
             feet: samples.feet.to_vec(),
-            attitude: states.map(|x| [x[15], x[16]]).collect(),
-            x: match plant.is_nonlinear() {
-                true => samples.x.to_vec(),
-                false => Vec::new(),
-            },
+            x: samples.x.to_vec(),
         })
     }
 
@@ -143,16 +136,12 @@ impl Reference {
         }
     }
 
-    /// The robot's state at a time, between samples on the line from one to the next; none if it
-    /// was not kept because the maps are the same at every state.
-    pub fn robot_state_at(&self, time_s: f64) -> Option<[f64; STATE_DIM]> {
+    /// The robot's state at a time, between samples on the line from one to the next.
+    pub fn robot_state_at(&self, time_s: f64) -> [f64; STATE_DIM] {
         let (before, share) = self.locate(time_s);
-        let earlier = self.x.chunks_exact(STATE_DIM).nth(before)?;
-        let later = self.x.chunks_exact(STATE_DIM).nth(before + 1);
-        let later = later.unwrap_or(earlier);
-        Some(std::array::from_fn(|i| {
-            earlier[i] + share * (later[i] - earlier[i])
-        }))
+        let earlier = row(&self.x, before);
+        let later = row(&self.x, (before + 1).min(self.time_s.len() - 1));
+        std::array::from_fn(|i| earlier[i] + share * (later[i] - earlier[i]))
     }
 
     /// Writes the mean latent input over `[time_s, time_s + duration_s]` into `out`, false if the
@@ -197,7 +186,8 @@ impl Reference {
 
     /// Roll and pitch, rad, of the last sample at or before the time.
     pub fn attitude_at(&self, time_s: f64) -> [f64; 2] {
-        self.attitude[self.locate(time_s).0]
+        let x = row(&self.x, self.locate(time_s).0);
+        [x[15], x[16]]
     }
 
     /// The last sample at or before a time and how far the time is on the way to the next one.

@@ -395,31 +395,3 @@ impl MpcSettings {
         Accepts::NotNegative.check("fallback.damping_nm_s", fallback.damping_nm_s)
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn default_settings_are_those_of_the_library() {
-        let settings = Settings::default().to_mpc().expect("sound");
-        assert_eq!(settings, MpcSettings::default());
-    }
-
-    #[test]
-    fn choices_come_back_by_their_numbers() {
-        for choices in [
-            (Lift::Transpose, Linearisation::Reference, Solver::Clarabel),
-            (Lift::Consistent, Linearisation::LastPlan, Solver::Riccati),
-        ] {
-            let settings = Settings {
-                lift: choices.0 as i32,
-                linearisation: choices.1 as i32,
-                solver: choices.2 as i32,
-                ..Settings::default()
-            };
-            let read = settings.to_mpc().expect("sound");
-            assert_eq!((read.lift, read.linearisation, read.solver), choices);
-        }
-    }
-}

@@ -3,8 +3,7 @@
 use nalgebra::SVector;
 
 use super::command::{Command, Source, Status};
-use super::controller::{Controller, Measurement, SOFTENED_FROM, step_data};
-use super::horizon::Contact;
+use super::controller::{Controller, Measurement, SOFTENED_FROM};
 use super::lift::StanceState;
 use super::qp::Outcome;
 use crate::robot::{JOINT_DIM, STATE_DIM};
@@ -69,8 +68,11 @@ impl Controller {
         let (Some(contact), Some(reference)) = (prepared, &self.reference) else {
             return Status::NoReference;
         };
-        let step = step_data(&self.horizon, &self.memory, reference, self.plant.phases());
-        let (outcome, iterations) = self.engine.solve(&step);
+        let deviation = reference.deviation();
+        let (measured, last_input) = (&self.memory.measured, &self.memory.input);
+        let (stages, start) =
+            (self.horizon).start((measured, deviation), last_input, &self.near_rows);
+        let (outcome, iterations) = self.engine.solve(stages, start);
         command.iterations = iterations;
         match outcome {
             Outcome::Solved => {}
@@ -79,15 +81,16 @@ impl Controller {
             Outcome::IterationCap => return Status::IterationCap,
             Outcome::Unbounded | Outcome::NumericalFailure => return Status::NumericalFailure,
         }
-        let phase = step.stages[0].phase;
-        let (plan, engine) = (&mut self.plan, &self.engine);
-        plan.begin(measurement.time_s, phase, &self.memory.measured);
+        let first = self.horizon.stage(0);
+        let (plan, phase) = (&mut self.plan, first.phase);
+        plan.begin(measurement.time_s, phase, measured);
         for stage in 0..self.settings.horizon {
-            let of_stage = (&mut plan.inputs[stage][..], &mut plan.states[stage + 1][..]);
-            engine.write(stage, &step, self.horizon.end(stage), of_stage);
+            let out = (&mut plan.inputs[stage][..], &mut plan.states[stage + 1][..]);
+            let scaled = self.engine.stage(stage);
+            (self.horizon).unscale(stage, scaled, &self.plant, deviation, out);
         }
-        let (by_input, planned) = (&step.stages[0].model.b, &self.plant.phases()[phase]);
-        self.effectiveness.begin(by_input, planned.is_grounded);
+        let is_grounded = self.plant.phases()[phase].is_grounded;
+        self.effectiveness.begin(&first.model, is_grounded);
         command.slack = self.largest_violation();
         self.memory.stance = Some(StanceState::at(measurement.x, measurement.feet, phase));
         if !self.write_plan(0, command) {
@@ -95,11 +98,8 @@ impl Controller {
         }
         command.source = Source::Plan;
         match contact {
-            Contact::Early => Status::ContactEarly,
-            Contact::Late => Status::ContactLate,
-            Contact::Unknown => Status::ContactUnknown,
-            Contact::AsScheduled if command.slack > SOFTENED_FROM => Status::Softened,
-            Contact::AsScheduled => Status::Solved,
+            Status::Solved if command.slack > SOFTENED_FROM => Status::Softened,
+            status => status,
         }
     }
 

@@ -1,15 +1,8 @@
-//! The optimal control problem for the structured [`solver`](crate::solver).
-//!
-//! The same numbers as [`transcribe`](super::transcribe) writes for clarabel, stage by stage and
-//! without the zeros in between: unknowns are the scaled inputs `û_k`, the states `x̂_{k+1}` that follow
-//! from them, and the slacks. A friction cone becomes the pyramid `|F_x|, |F_y| <= μ F_z / √2` inside it.
+//! Stages for the structured [`solver`](crate::solver).
 
-use std::fmt::Debug;
-
-use super::problem::{StageRows, pairs};
-use super::qp::Outcome;
-use super::settings::MpcSettings;
-use super::transcribe::{SLACK_PRICE, Stage as StageData, StepData};
+use super::engine::{StageSolver, Start};
+use super::qp::{Outcome, QpSettings};
+use super::stage::{Rows, StageCost, StageQp, StageShape};
 use crate::solver::{
     self, Cost, Links, Pairs, Program, Report, RowMatrices, Settings, Shape, Stage,
 };
@@ -23,48 +16,32 @@ pub const GAP: f64 = 1e-8;
 pub const RATE_TOLERANCE: f64 = 1e-12;
 /// How soft the rows of such a program are within a step, see [`Links`].
 pub const RATE_SOFTNESS: f64 = 1e-8;
-/// Rows of a friction pyramid.
-pub(super) const PYRAMID_ROWS: usize = 4;
 /// Most latent coordinates that the solver is compiled for.
 pub const MAX_STRUCTURED_DIM: usize = 8;
 
-/// The horizon's program for one latent dimension or another.
-pub(super) trait StructuredProgram: Debug + Send {
-    /// Moves the horizon on by a stage; the last has to be written then.
-    fn shift(&mut self);
-
-    /// Overwrites a stage, with the reference state at its end.
-    fn write(&mut self, stage: usize, step: &StepData<'_>, end: &[f64]);
-
-    /// Forgets the last solution.
-    fn forget(&mut self);
-
-    /// Computes the gains of all stages for the next [`StructuredProgram::solve`], unless the present gains are those of the stages.
-    fn prepare(&mut self);
-
-    /// Solves from the measurement; how it ended, and iterations.
-    fn solve(&mut self, step: &StepData<'_>) -> (Outcome, u32);
-
-    /// Scaled input of a stage, and scaled state at its end.
-    fn stage(&self, stage: usize) -> (&[f64], &[f64]);
-}
-
-/// A program, or none for a latent dimension above [`MAX_STRUCTURED_DIM`]. An odd dimension is filled up to the next
-/// even one with inputs and states that nothing moves, which changes no bit and halves what has to be compiled.
-pub(super) fn structured_program(
-    latent_dim: usize,
-    rows: &StageRows,
-    state_weights: &[f64],
-    settings: &MpcSettings,
-) -> Option<Box<dyn StructuredProgram>> {
+/// The solver of a horizon, or none for a latent dimension above [`MAX_STRUCTURED_DIM`]. An odd dimension is filled up
+/// to the next even one with inputs and states that nothing moves, which changes no bit and halves what has to be compiled.
+pub(super) fn structured(
+    horizon: usize,
+    shape: StageShape,
+    cost: &StageCost,
+    settings: QpSettings,
+) -> Option<Box<dyn StageSolver>> {
+    let is_linked = shape.rate_rows > 0;
+    let settings = Settings {
+        max_iterations: settings.max_iterations,
+        tolerance: if is_linked { RATE_TOLERANCE } else { TOLERANCE },
+        gap: if is_linked { 0.0 } else { GAP },
+        accepted_residual: settings.accepted_residual,
+    };
     macro_rules! of_dimension {
         ($($dim:literal),*) => {
-            match (latent_dim.next_multiple_of(2), rows.rate.is_empty()) {
-                $(($dim, true) => Some(Box::new(
-                    Horizon::<{ 2 * $dim }, $dim, false>::new(latent_dim, rows, state_weights, settings)
-                )),)*
+            match (shape.inputs.next_multiple_of(2), is_linked) {
                 $(($dim, false) => Some(Box::new(
-                    Horizon::<{ 2 * $dim }, $dim, true>::new(latent_dim, rows, state_weights, settings)
+                    Structured::<{ 2 * $dim }, $dim, false>::new(horizon, shape, cost, settings)
+                )),)*
+                $(($dim, true) => Some(Box::new(
+                    Structured::<{ 2 * $dim }, $dim, true>::new(horizon, shape, cost, settings)
                 )),)*
                 _ => None,
             }
@@ -73,21 +50,19 @@ pub(super) fn structured_program(
     of_dimension!(2, 4, 6, 8)
 }
 
-/// Memory of a program; `NX` is twice `NU`, `LINKED` if torque rates are limited.
+/// Memory of a program with up to `NX` states and `NU` inputs, `LINKED` if torque rates are limited.
 #[derive(Debug)]
-struct Horizon<const NX: usize, const NU: usize, const LINKED: bool> {
-    /// Inputs that the model has; what is beyond them, up to `NU`, and beyond twice as many states stays zero.
-    latent_dim: usize,
+pub(super) struct Structured<const NX: usize, const NU: usize, const LINKED: bool> {
+    /// States and inputs that the stages have; what is beyond them stays zero.
+    states: usize,
+    inputs: usize,
     stages: Vec<Stage<f64, NX, NU>>,
     memory: Vec<f64>,
-    /// Rows on the inputs, those of a stage one after the other; the same for the states.
+    /// Rows on the inputs, on the states and of the rates, those of a stage one after the other.
     input_rows: Vec<[f64; NU]>,
     soft_rows: Vec<[f64; NU]>,
-    /// Rows of the rates, and their products with the reference's input: place by place.
     rate_rows: Vec<[f64; NU]>,
-    rate_at_reference: Vec<f64>,
     rate_gains: Vec<[[f64; NU]; NU]>,
-    rows: StageRows,
     first: usize,
     shape: Shape,
     cost: Cost<f64, NX, NU>,
@@ -98,30 +73,25 @@ struct Horizon<const NX: usize, const NU: usize, const LINKED: bool> {
     has_gains: bool,
 }
 
-impl<const NX: usize, const NU: usize, const LINKED: bool> Horizon<NX, NU, LINKED> {
-    fn new(
-        latent_dim: usize,
-        rows: &StageRows,
-        state_weights: &[f64],
-        settings: &MpcSettings,
+impl<const NX: usize, const NU: usize, const LINKED: bool> Structured<NX, NU, LINKED> {
+    pub(super) fn new(
+        horizon: usize,
+        of: StageShape,
+        cost: &StageCost,
+        settings: Settings<f64>,
     ) -> Self {
-        let horizon = settings.horizon;
-        let pyramid = rows.friction.as_ref().map_or(0, |_| PYRAMID_ROWS);
         let shape = Shape {
-            input: rows.torque.len() + pyramid,
-            soft: rows.joint.len(),
-            link: rows.rate.len(),
+            input: of.input_rows,
+            soft: of.soft_rows,
+            link: of.rate_rows,
             pairs: Pairs {
-                input: pairs(&rows.torque),
+                input: of.pairs,
                 hard: 0,
             },
             ..Shape::default()
         };
-        let scale = SLACK_PRICE / settings.joint_penalty;
         let mut state = [0.0; NX];
-        for (entry, weight) in state.iter_mut().zip(state_weights) {
-            *entry = scale * weight;
-        }
+        state[..of.states].copy_from_slice(&cost.state);
         let stage = |index: usize| {
             let mut stage = Stage::zeros();
             stage.input_rows = index * shape.input;
@@ -129,38 +99,33 @@ impl<const NX: usize, const NU: usize, const LINKED: bool> Horizon<NX, NU, LINKE
             stage
         };
         Self {
-            latent_dim,
+            states: of.states,
+            inputs: of.inputs,
             stages: (0..horizon).map(stage).collect(),
             memory: vec![0.0; horizon * shape.memory()],
             input_rows: vec![[0.0; NU]; horizon * shape.input],
             soft_rows: vec![[0.0; NU]; horizon * shape.soft],
             rate_rows: vec![[0.0; NU]; horizon * shape.link],
-            rate_at_reference: vec![0.0; horizon * shape.link],
             rate_gains: vec![[[0.0; NU]; NU]; if LINKED { horizon } else { 0 }],
-            rows: rows.clone(),
             first: 0,
             shape,
             cost: Cost {
                 state,
-                terminal: state.map(|weight| settings.terminal_weight * weight),
-                input: [scale * settings.input_weight; NU],
-                slack: SLACK_PRICE,
+                terminal: state.map(|weight| cost.terminal * weight),
+                input: [cost.input; NU],
+                slack: cost.slack,
             },
-            settings: Settings {
-                max_iterations: settings.qp.max_iterations,
-                tolerance: if LINKED { RATE_TOLERANCE } else { TOLERANCE },
-                gap: if LINKED { 0.0 } else { GAP },
-                accepted_residual: settings.qp.accepted_residual,
-            },
+            settings,
             is_warm: false,
             has_gains: false,
         }
     }
 
     fn program(&mut self) -> Program<'_, f64, NX, NU, LINKED> {
+        let memory = self.stages.len() * self.shape.memory();
         Program {
             stages: &mut self.stages,
-            rows: &mut self.memory,
+            rows: &mut self.memory[..memory],
             first: self.first,
             shape: self.shape,
             matrices: RowMatrices {
@@ -181,91 +146,95 @@ impl<const NX: usize, const NU: usize, const LINKED: bool> Horizon<NX, NU, LINKE
         (self.first + stage) % self.stages.len()
     }
 
-    fn write_dynamics(&mut self, place: usize, data: &StageData, step: &StepData<'_>) {
-        let (model, deviation) = (&data.model, step.deviation);
-        let root = &step.phases[data.phase].latent_root;
+    /// The number of rows on the input may change where there is a single stage.
+    fn write(&mut self, place: usize, qp: &StageQp) {
+        let (nx, nu) = (self.states, self.inputs);
+        self.shape.input = qp.input.bounds.len();
         let stage = &mut self.stages[place];
-        let dim = self.latent_dim;
-        for row in 0..2 * dim {
-            let scale = 1.0 / deviation[row];
-            for col in 0..dim {
-                let mut sum = 0.0;
-                for k in col..dim {
-                    sum += model.b[(row, k)] * root[(k, col)];
-                }
-                stage.b[row][col] = scale * sum;
-            }
-            for col in 0..2 * dim {
-                stage.a[row][col] = scale * model.a[(row, col)] * deviation[col];
-            }
-            stage.c[row] = scale * data.defect[row];
+        for row in 0..nx {
+            stage.a[row][..nx].copy_from_slice(&qp.a[row * nx..][..nx]);
+            stage.b[row][..nu].copy_from_slice(&qp.b[row * nu..][..nu]);
+            stage.c[row] = qp.c[row];
+        }
+        let shape = &self.shape;
+        let bounds = &mut self.memory[place * shape.memory()..][..shape.input + shape.soft];
+        let (of_inputs, of_states) = bounds.split_at_mut(shape.input);
+        of_inputs.copy_from_slice(&qp.input.bounds);
+        of_states.copy_from_slice(&qp.soft.bounds);
+        for (matrix, count, rows) in [
+            (&mut self.input_rows, shape.input, &qp.input),
+            (&mut self.soft_rows, shape.soft, &qp.soft),
+            (&mut self.rate_rows, shape.link, &qp.rate),
+        ] {
+            write_rows(&mut matrix[place * count..][..count], rows, nu);
         }
     }
 
-    fn write_rows(&mut self, place: usize, data: &StageData, step: &StepData<'_>, end: &[f64]) {
-        let (root, deviation) = (&step.phases[data.phase].latent_root, step.deviation);
-        let own = data.rows.as_ref().unwrap_or(&self.rows);
-        let dim = self.latent_dim;
+    /// Bounds of the rates: those of a stage depend on the stage before.
+    fn write_rate_bounds(&mut self, stages: &[StageQp], start: &Start) {
         let (count, memory) = (self.shape.rows(), self.shape.memory());
-        let bounds = &mut self.memory[place * memory..][..count];
-        let matrix = &mut self.input_rows[place * self.shape.input..][..self.shape.input];
-        for (number, row) in own.torque.iter().enumerate() {
-            let (scaled, at_reference) = scaled(&row.row, root, &data.input);
-            matrix[number] = scaled;
-            bounds[number] = row.bound - row.per_loss * data.losses_nm[row.joint] - at_reference;
-        }
-        if self.rows.friction.is_some() {
-            let pull = std::f64::consts::FRAC_1_SQRT_2;
-            for side in 0..PYRAMID_ROWS {
-                let (axis, sign) = (1 + side / 2, if side % 2 == 0 { 1.0 } else { -1.0 });
-                let row: [f64; NU] = std::array::from_fn(|j| match j < dim {
-                    true => sign * data.force[axis * dim + j] - pull * data.force[j],
-                    false => 0.0,
-                });
-                let (scaled, at_reference) = scaled(&row[..dim], root, &data.input);
-                let number = own.torque.len() + side;
-                matrix[number] = scaled;
-                // Without contact nothing is asked for.
-                let is_free = row.iter().all(|entry| *entry == 0.0);
-                bounds[number] = if is_free { 1.0 } else { -at_reference };
+        let mut before = &start.rate_before[..];
+        for (index, stage) in stages.iter().enumerate() {
+            let first = self.place(index) * memory + count - self.shape.link;
+            for row in 0..self.shape.link {
+                self.memory[first + row] =
+                    stage.rate.bounds[row] - stage.rate_at_reference[row] + before[row];
             }
-        }
-        let first = place * self.shape.link;
-        for (number, row) in own.rate.iter().enumerate() {
-            (
-                self.rate_rows[first + number],
-                self.rate_at_reference[first + number],
-            ) = scaled(&row.row, root, &data.input);
-        }
-        let matrix = &mut self.soft_rows[place * self.shape.soft..][..self.shape.soft];
-        let bounds = &mut bounds[self.shape.input..];
-        for (number, row) in own.joint.iter().enumerate() {
-            let mut at_reference = 0.0;
-            for j in 0..dim {
-                matrix[number][j] = row.row[j] * deviation[j];
-                at_reference += row.row[j] * end[j];
-            }
-            bounds[number] = row.bound - at_reference;
+            before = &stage.rate_at_reference;
         }
     }
+}
 
-    /// Bounds of the rates: those of a stage depend on the stage before, those of the first on the last command.
-    fn write_rate_bounds(&mut self, first: &StageData, last_input: &[f64]) {
-        let (count, memory, link) = (self.shape.rows(), self.shape.memory(), self.shape.link);
-        let own = first.rows.as_ref().unwrap_or(&self.rows);
-        for number in 0..link {
-            let mut before = 0.0;
-            for (entry, input) in own.rate[number].row.iter().zip(last_input) {
-                before += entry * input;
-            }
-            for stage in 0..self.stages.len() {
-                let place = self.place(stage);
-                let at_reference = self.rate_at_reference[place * link + number];
-                let bound = &mut self.memory[place * memory + count - link + number];
-                *bound = self.rows.rate[number].bound - at_reference + before;
-                before = at_reference;
-            }
+fn write_rows<const NU: usize>(matrix: &mut [[f64; NU]], rows: &Rows, width: usize) {
+    for (number, row) in matrix.iter_mut().enumerate() {
+        row[..width].copy_from_slice(&rows.entries[number * width..][..width]);
+    }
+}
+
+impl<const NX: usize, const NU: usize, const LINKED: bool> StageSolver
+    for Structured<NX, NU, LINKED>
+{
+    fn forget(&mut self) {
+        (self.is_warm, self.has_gains) = (false, false);
+    }
+
+    fn prepare(&mut self, stages: &[StageQp], shift: usize, is_new: &[bool]) {
+        for _ in 0..shift {
+            let mut program = self.program();
+            program.shift();
+            self.first = program.first;
+            self.has_gains = false;
         }
+        for index in (0..stages.len()).filter(|&index| is_new[index]) {
+            self.write(self.place(index), &stages[index]);
+            self.has_gains = false;
+        }
+        self.has_gains = self.has_gains || prepare(&mut self.program());
+    }
+
+    fn solve(&mut self, stages: &[StageQp], start: &Start) -> (Outcome, u32) {
+        if !self.has_gains {
+            return (Outcome::NumericalFailure, 0);
+        }
+        self.write_rate_bounds(stages, start);
+        let mut x0 = [0.0; NX];
+        x0[..self.states].copy_from_slice(&start.state);
+        let (is_warm, settings) = (self.is_warm, self.settings);
+        let report = solve(&mut self.program(), &x0, is_warm, &settings);
+        self.is_warm = report.outcome == solver::Outcome::Solved;
+        self.has_gains = report.iterations == 0;
+        let outcome = match report.outcome {
+            solver::Outcome::Solved => Outcome::Solved,
+            solver::Outcome::Inaccurate => Outcome::Inaccurate,
+            solver::Outcome::IterationCap => Outcome::IterationCap,
+            solver::Outcome::NumericalFailure => Outcome::NumericalFailure,
+        };
+        (outcome, report.iterations)
+    }
+
+    fn stage(&self, stage: usize) -> (&[f64], &[f64]) {
+        let stage = &self.stages[self.place(stage)];
+        (&stage.v[..self.inputs], &stage.x[..self.states])
     }
 }
 
@@ -295,80 +264,4 @@ pub fn solve<const NX: usize, const NU: usize, const LINKED: bool>(
         return unsafe { program.solve_avx2(x0, is_warm, settings) };
     }
     program.solve(x0, is_warm, settings)
-}
-
-/// How a solve ended, in the words that all solvers share.
-pub(super) fn outcome_of(outcome: solver::Outcome) -> Outcome {
-    match outcome {
-        solver::Outcome::Solved => Outcome::Solved,
-        solver::Outcome::Inaccurate => Outcome::Inaccurate,
-        solver::Outcome::IterationCap => Outcome::IterationCap,
-        solver::Outcome::NumericalFailure => Outcome::NumericalFailure,
-    }
-}
-
-/// `row C` for a lower triangular `C`, and `row · input`.
-fn scaled<const NU: usize>(
-    row: &[f64],
-    root: &nalgebra::DMatrix<f64>,
-    input: &[f64],
-) -> ([f64; NU], f64) {
-    let mut out = [0.0; NU];
-    let mut at_reference = 0.0;
-    for col in 0..row.len() {
-        for k in col..row.len() {
-            out[col] += row[k] * root[(k, col)];
-        }
-        at_reference += row[col] * input[col];
-    }
-    (out, at_reference)
-}
-
-impl<const NX: usize, const NU: usize, const LINKED: bool> StructuredProgram
-    for Horizon<NX, NU, LINKED>
-{
-    fn shift(&mut self) {
-        let mut program = self.program();
-        program.shift();
-        self.first = program.first;
-        self.has_gains = false;
-    }
-
-    fn write(&mut self, stage: usize, step: &StepData<'_>, end: &[f64]) {
-        let (place, data) = (self.place(stage), &step.stages[stage]);
-        self.write_dynamics(place, data, step);
-        self.write_rows(place, data, step, end);
-        self.has_gains = false;
-    }
-
-    fn forget(&mut self) {
-        (self.is_warm, self.has_gains) = (false, false);
-    }
-
-    fn prepare(&mut self) {
-        self.has_gains = self.has_gains || prepare(&mut self.program());
-    }
-
-    fn solve(&mut self, step: &StepData<'_>) -> (Outcome, u32) {
-        if !self.has_gains {
-            return (Outcome::NumericalFailure, 0);
-        }
-        let first = &step.stages[0];
-        self.write_rate_bounds(first, step.last_input);
-        let x0 = std::array::from_fn(|i| match i < 2 * self.latent_dim {
-            true => (step.measured[i] - first.state[i]) / step.deviation[i],
-            false => 0.0,
-        });
-        let (is_warm, settings) = (self.is_warm, self.settings);
-        let report = solve(&mut self.program(), &x0, is_warm, &settings);
-        let outcome = outcome_of(report.outcome);
-        self.is_warm = outcome == Outcome::Solved;
-        self.has_gains = report.iterations == 0;
-        (outcome, report.iterations)
-    }
-
-    fn stage(&self, stage: usize) -> (&[f64], &[f64]) {
-        let (stage, dim) = (&self.stages[self.place(stage)], self.latent_dim);
-        (&stage.v[..dim], &stage.x[..2 * dim])
-    }
 }

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::network::Network;
-use super::parameters::Frame;
+use super::parameters::{Frame, Parameters};
 use crate::model::{AffineMap, Layer, ModelError, StateMap};
 
 /// Another basis of the latent space: `z_new = turn z + shift`.
@@ -30,21 +30,26 @@ impl LatentBasis {
 /// # Errors
 /// [`ModelError`] for numbers that are not finite, as a training that diverged leaves them.
 pub fn folded(
-    (encoder, decoder): (&Network, &Network),
+    parameters: &Parameters,
     frame: &Frame,
     basis: &LatentBasis,
 ) -> Result<(StateMap, StateMap), ModelError> {
     let factors = DMatrix::from_diagonal(&frame.factors);
     let offset = -frame.factors.component_mul(&frame.mean);
     let (before, turn) = ((&factors, &offset), &basis.turn * frame.latent);
-    let encoder = between("encoder", encoder, before, (&turn, &basis.shift))?;
+    let encoder = between(
+        "encoder",
+        &parameters.encoder,
+        before,
+        (&turn, &basis.shift),
+    )?;
     let back = &basis.back / frame.latent;
     let offset = -(&back * &basis.shift);
     let spread = DMatrix::from_diagonal(&frame.spread);
     let after = (&spread, &frame.mean);
     Ok((
         encoder,
-        between("decoder", decoder, (&back, &offset), after)?,
+        between("decoder", &parameters.decoder, (&back, &offset), after)?,
     ))
 }
 
@@ -105,7 +110,12 @@ mod tests {
             let mut back: Vec<usize> = widths.to_vec();
             back.reverse();
             let decoding = Network::random(&back, Activation::Tanh, &mut random);
-            let maps = folded((&network, &decoding), &frame, &basis);
+            let parameters = Parameters {
+                encoder: network.clone(),
+                decoder: decoding.clone(),
+                xi: Vec::new(),
+            };
+            let maps = folded(&parameters, &frame, &basis);
             let (folded, unfolded) = maps.expect("finite");
             let mut tape = Tape::default();
             let stack = network.forward(frame.enter(&batch), 3, &mut tape);

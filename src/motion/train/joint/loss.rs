@@ -4,10 +4,10 @@ use nalgebra::DMatrix;
 use serde::Serialize;
 
 use super::batch::Batch;
+use super::descent::Schedule;
 use super::multiply::{Columns, add_transposed, product};
 use super::network::Network;
 use super::parameters::Parameters;
-use super::schedule::Schedule;
 use super::unroll::{Adjoints, Unroll, Window};
 use crate::train::features::{FeatureValues, Features};
 

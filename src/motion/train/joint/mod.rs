@@ -14,13 +14,12 @@ mod projection;
 mod stages;
 mod unroll;
 
-mod adam;
+mod descent;
 mod fold;
 mod multiply;
 mod run;
-mod schedule;
 
+pub use descent::Schedule;
 pub use loss::{LossWeights, Losses};
 pub use run::joint;
-pub use schedule::Schedule;
 pub use unroll::{Integrator, Unroll};

@@ -9,18 +9,17 @@ use super::batch::{Batch, batches};
 use super::fold::{LatentBasis, folded};
 use super::linear::{LinearMaps, mask_rows};
 use super::loss::{JointLoss, LossWeights, Losses, Maps};
-use super::network::Network;
 use super::nonlinear::NonlinearMaps;
 use super::parameters::{Frame, Parameters};
 use super::stages::{train_decoder, train_together, train_xi};
-use crate::model::{AffineMap, Layer, ModelError, StateMap};
+use crate::model::{Layer, ModelError, StateMap};
 use crate::robot::{Robot, STATE_DIM};
 use crate::train::assemble::Origin;
 use crate::train::dynamics_fit::Fitted;
 use crate::train::error::TrainError;
 use crate::train::latent::{EncodedSet, Latent, least_squares_decoder, map_samples, mean_jacobian};
 use crate::train::options::{TrainOptions, Transfer};
-use crate::train::progress::Watch;
+use crate::train::progress::Monitor;
 use crate::train::random::Random;
 use crate::train::report::Trained;
 use crate::train::seeds::{Outcome, Seeds};
@@ -40,7 +39,7 @@ pub fn joint(
     robot: &'static Robot,
     options: &TrainOptions,
     origin: &Origin,
-    watch: &mut Watch<'_>,
+    monitor: &mut Monitor<'_>,
 ) -> Result<Trained, TrainError> {
     let task = Task::new(recordings, robot, options)?;
     let cut = |set| batches(set, &task.training);
@@ -50,7 +49,7 @@ pub fn joint(
         batches: &training,
         frame: frame(&task),
     };
-    let runs = trainer.run_seeds(watch);
+    let runs = trainer.run_seeds(monitor);
 
     let validation = cut(recordings.validation)?;
     let judged = if validation.is_empty() {
@@ -61,9 +60,9 @@ pub fn joint(
     let mut seeds = Seeds::default();
     for run in runs {
         let seed = run.seed;
-        let outcome = trainer.finish(run, judged, watch);
+        let outcome = trainer.finish(run, judged, monitor);
         let outcome = outcome.map_err(|error| trainer.explained(error, seed));
-        seeds.add(seed, outcome, watch)?;
+        seeds.add(seed, outcome, monitor)?;
     }
     seeds.into_model(task, "joint", origin)
 }
@@ -106,15 +105,15 @@ struct Run {
 impl Trainer<'_> {
     /// Trains all seeds on the threads of the options, in rounds, none of which begins after a cancellation; results
     /// are in the order of the seeds.
-    fn run_seeds(&self, watch: &mut Watch<'_>) -> Vec<Run> {
+    fn run_seeds(&self, monitor: &mut Monitor<'_>) -> Vec<Run> {
         let options = &self.task.options.joint;
         let (threads, epochs) = (options.threads.max(1), options.schedule.total());
-        let (seeds, cancel) = (self.task.options.seeds(), watch.cancel_flag());
+        let (seeds, cancel) = (self.task.options.seeds(), monitor.cancel_flag());
         let steps = seeds.len() * epochs;
-        watch.stage("training encoder, decoder and dynamics", steps);
+        monitor.stage("training encoder, decoder and dynamics", steps);
         let mut runs = Vec::new();
         for (round, group) in seeds.chunks(threads).enumerate() {
-            if watch.cancelled() {
+            if monitor.cancelled() {
                 break;
             }
             let (sender, receiver) = channel();
@@ -126,7 +125,7 @@ impl Trainer<'_> {
                 let workers: Vec<_> = started.collect();
                 drop(sender);
                 for (done, text) in receiver.iter().enumerate() {
-                    watch.done(round * threads * epochs + done + 1, text);
+                    monitor.done(round * threads * epochs + done + 1, text);
                 }
                 for worker in workers {
                     runs.push(worker.join().expect("a seed does not panic"));
@@ -224,7 +223,7 @@ impl Trainer<'_> {
         start
     }
 
-    fn finish(&self, run: Run, judged: &[Batch], watch: &mut Watch<'_>) -> Outcome {
+    fn finish(&self, run: Run, judged: &[Batch], monitor: &mut Monitor<'_>) -> Outcome {
         let fitted = if self.is_published() {
             self.published(run.parameters, judged)?
         } else {
@@ -232,7 +231,7 @@ impl Trainer<'_> {
                 true => self.linear_maps(&run.parameters)?,
                 false => self.nonlinear_maps(&run.parameters)?,
             };
-            self.task.fit_dynamics(maps, watch)?
+            self.task.fit_dynamics(maps, monitor)?
         };
         let report = (self.task).seed_report(&fitted, run.seed, Some(run.losses));
         Ok((report, fitted))
@@ -257,22 +256,13 @@ impl Trainer<'_> {
         })
     }
 
-    /// Encoder and decoder between scaled states and latent coordinates in `basis`, which linear maps ignore.
+    /// Encoder and decoder between scaled states and latent coordinates in `basis`.
     fn state_maps(
         &self,
         parameters: &Parameters,
         basis: &LatentBasis,
     ) -> Result<(StateMap, StateMap), TrainError> {
-        let (encoder, decoder) = (&parameters.encoder, &parameters.decoder);
-        if !self.is_linear() {
-            return Ok(folded((encoder, decoder), &self.frame, basis)?);
-        }
-        let affine = |tensor, network: &Network| {
-            let layer = &network.layers[0];
-            AffineMap::new(tensor, layer.weights.transpose(), layer.bias.clone())
-        };
-        let encoder = affine("encoder", encoder)?.into();
-        Ok((encoder, affine("decoder", decoder)?.into()))
+        Ok(folded(parameters, &self.frame, basis)?)
     }
 
     /// The encoder over the learned row space, and its least-squares decoder.

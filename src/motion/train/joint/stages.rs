@@ -6,11 +6,10 @@
 
 use std::collections::BTreeSet;
 
-use super::adam::Adam;
 use super::batch::Batch;
+use super::descent::{Adam, MaskedAdam, Schedule};
 use super::loss::{DecoderLoss, JointLoss, Losses, XiLoss};
 use super::parameters::Parameters;
-use super::schedule::{MaskedAdam, Schedule};
 
 /// Called after every epoch with its number, the losses and the active terms. Returns whether to go on.
 pub type Listener<'a> = dyn FnMut(usize, &Losses, usize) -> bool + 'a;

@@ -1,0 +1,251 @@
+//! Array statements as loops and calls, and where their values live: which arrays hold them, in place or copied.
+
+use super::code::{Expr, Index, Role, Span};
+use super::ident::Ident;
+use super::translate::Translator;
+use crate::ir::{Binary, TableId, ValueId};
+
+/// Where the rows of a matrix of values live: `stride` apart in an array, from the home's first element on.
+struct MatrixStorage {
+    home: Span,
+    stride: usize,
+}
+
+impl MatrixStorage {
+    fn element(&self, row: &Ident, col: &Ident) -> Expr {
+        let row = Index::fixed(0).plus(self.stride, row);
+        self.home.element(&row.plus(1, col))
+    }
+}
+
+impl Translator<'_> {
+    pub(super) fn sin_cos(&mut self, first: usize, arguments: &[ValueId]) {
+        let n = arguments.len();
+        if self.lane.is_some() {
+            for (k, &argument) in arguments.iter().enumerate() {
+                self.sin_cos_lane([first + k, first + n + k], argument);
+            }
+            return;
+        }
+        let read = self.span(arguments);
+        let written = [(first, "s"), (first + n, "c")].map(|(first, name)| {
+            let home = self.declared(n, name);
+            self.allocate(first, home)
+        });
+        let call = self.printer.dialect.call(None, &[read], &written);
+        self.printer.line(&call);
+    }
+
+    fn sin_cos_lane(&mut self, values: [usize; 2], argument: ValueId) {
+        let argument = self.named(argument);
+        let names = ["s", "c"].map(|name| self.locals.mint(name));
+        for (value, name) in values.iter().zip(&names) {
+            self.spell(*value, Expr::Name(name.clone()));
+        }
+        let is_used = values.map(|value| self.n_uses[value] > 0);
+        self.printer.sin_cos_lane(&argument, &names, is_used);
+    }
+
+    fn table(&mut self, id: TableId) -> (Ident, usize) {
+        let table = &self.program.tables()[id.index()];
+        (self.tables.name(table), table.cols())
+    }
+
+    /// A loop over four rows at a time.
+    pub(super) fn accumulate(&mut self, first: usize, table: TableId, weights: &[ValueId]) {
+        let (name, cols) = self.table(table);
+        let w = self.span(weights);
+        let home = self.matrix_storage(first, 1, cols, "y").home;
+        let (i, k) = (self.locals.mint("i"), self.locals.mint("k"));
+        let target = home.element(&Index::variable(&i));
+        let entry = |row: Index| Expr::Entry(name.clone(), row, Index::variable(&i));
+        let product = |index: Index| {
+            let weight = w.element(&index);
+            Expr::infix(Binary::Mul, entry(index.shifted(1)), weight)
+        };
+        let printer = &mut self.printer;
+        let offset = entry(Index::fixed(0));
+        printer.looped(&i, cols, |body| body.assign(&target, &offset));
+        let blocks = weights.len() / 4;
+        if blocks > 0 {
+            let term = |n: usize| product(Index::fixed(n).plus(4, &k));
+            let pair = |n: usize| Expr::infix(Binary::Add, term(n), term(n + 1));
+            let sum = Expr::infix(Binary::Add, pair(0), pair(2));
+            printer.looped(&k, blocks, |body| {
+                body.looped(&i, cols, |body| body.add_assign(&target, sum));
+            });
+        }
+        for n in 4 * blocks..weights.len() {
+            let term = product(Index::fixed(n));
+            printer.looped(&i, cols, |body| body.add_assign(&target, term));
+        }
+    }
+
+    /// One loop over the rows.
+    pub(super) fn scaled(
+        &mut self,
+        first: usize,
+        base: Option<&[ValueId]>,
+        groups: &[(TableId, Option<Vec<ValueId>>)],
+    ) {
+        let shape = &self.program.tables()[groups[0].0.index()];
+        let (rows, cols) = (shape.rows(), shape.cols());
+        let (r, i) = (self.locals.mint("r"), self.locals.mint("i"));
+        let mut sum = base.map(|base| {
+            let home = self.span(base);
+            MatrixStorage { home, stride: cols }.element(&r, &i)
+        });
+        for (table, weights) in groups {
+            let (name, _) = self.table(*table);
+            let mut term = Expr::Entry(name, Index::variable(&r), Index::variable(&i));
+            if let Some(weights) = weights {
+                let weight = self.span(weights).element(&Index::variable(&i));
+                term = Expr::infix(Binary::Mul, term, weight);
+            }
+            sum = Some(match sum {
+                None => term,
+                Some(sum) => Expr::infix(Binary::Add, sum, term),
+            });
+        }
+        let target = self.matrix_storage(first, rows, cols, "m").element(&r, &i);
+        let sum = sum.expect("at least one group");
+        self.printer.looped(&r, rows, |row| {
+            row.looped(&i, cols, |body| body.assign(&target, &sum));
+        });
+    }
+
+    pub(super) fn call(&mut self, first: usize, callee: usize, arguments: &[ValueId]) {
+        let program = &self.program.callees()[callee];
+        let (mut read, mut written) = (Vec::new(), Vec::new());
+        let mut rest = arguments;
+        for slot in program.inputs() {
+            let (these, others) = rest.split_at(slot.len);
+            read.push(match self.contiguous(these).filter(Span::is_whole) {
+                Some(span) => span,
+                None => self.copied(these),
+            });
+            rest = others;
+        }
+        let mut next = first;
+        for slot in program.outputs() {
+            let output = self.output_matrix(next, 1, slot.len);
+            let output = output.map(|matrix| matrix.home).filter(Span::is_whole);
+            let home = output.unwrap_or_else(|| self.declared(slot.len, &slot.name));
+            written.push(self.allocate(next, home));
+            next += slot.len;
+        }
+        let callee = self.callees[callee].to_string();
+        let call = self.printer.dialect.call(Some(&callee), &read, &written);
+        self.printer.line(&call);
+    }
+
+    /// The values as contiguous elements of one array: in place if they are, copied if not.
+    fn span(&mut self, values: &[ValueId]) -> Span {
+        self.contiguous(values)
+            .unwrap_or_else(|| self.copied(values))
+    }
+
+    fn contiguous(&self, values: &[ValueId]) -> Option<Span> {
+        let (array, offset) = self.element(*values.first()?)?;
+        let follows = |(k, &value)| self.element(value) == Some((array, offset + k));
+        if !values.iter().enumerate().all(follows) {
+            return None;
+        }
+        let whole = self.arrays.iter().find(|known| known.array == *array)?;
+        Some(Span {
+            offset,
+            len: values.len(),
+            ..whole.clone()
+        })
+    }
+
+    fn element(&self, value: ValueId) -> Option<(&Ident, usize)> {
+        match self.spelled[value.index()].as_ref() {
+            Some((Expr::Element(array, index), _)) if index.terms.is_empty() => {
+                Some((array, index.offset))
+            }
+            _ => None,
+        }
+    }
+
+    /// The values copied to an array of their own.
+    fn copied(&mut self, values: &[ValueId]) -> Span {
+        let known = self.copies.iter().find(|(copied, _)| copied == values);
+        if let Some((_, span)) = known {
+            return span.clone();
+        }
+        let array = self.locals.mint("a");
+        let elements: Vec<Expr> = values.iter().map(|&value| self.read(value).0).collect();
+        self.printer.let_array(&array, &elements);
+        let span = Span::whole(&array, values.len(), false);
+        self.copies.push((values.to_vec(), span.clone()));
+        span
+    }
+
+    fn declared(&mut self, len: usize, wanted: &str) -> Span {
+        let array = self.locals.mint(wanted);
+        self.printer.declare(&array, len);
+        let span = Span::whole(&array, len, false);
+        self.arrays.push(span.clone());
+        span
+    }
+
+    /// Spells values as the elements of a span.
+    fn allocate(&mut self, first: usize, home: Span) -> Span {
+        for k in 0..home.len {
+            self.spell(first + k, home.element(&Index::fixed(k)));
+        }
+        home
+    }
+
+    /// Reserves `rows x cols` elements for values, row by row in an output where they belong
+    /// if possible.
+    fn matrix_storage(
+        &mut self,
+        first: usize,
+        rows: usize,
+        cols: usize,
+        wanted: &str,
+    ) -> MatrixStorage {
+        let output = self.output_matrix(first, rows, cols);
+        let matrix = output.unwrap_or_else(|| MatrixStorage {
+            home: self.declared(rows * cols, wanted),
+            stride: cols,
+        });
+        for r in 0..rows {
+            let row = Span {
+                offset: matrix.home.offset + matrix.stride * r,
+                len: cols,
+                ..matrix.home.clone()
+            };
+            self.allocate(first + r * cols, row);
+        }
+        matrix
+    }
+
+    /// The output array in which each row is a run of elements, all equally far apart, if nothing in it is still
+    /// to be read.
+    fn output_matrix(&self, first: usize, rows: usize, cols: usize) -> Option<MatrixStorage> {
+        let results = self.program.results();
+        let find = |value: usize| results.iter().position(|e| e.value.index() == value);
+        let at = find(first)?;
+        let stride = match rows {
+            0 | 1 => cols,
+            _ => find(first + cols)?.checked_sub(at)?,
+        };
+        let slot = results[at].slot;
+        let output = &self.outputs[slot];
+        let fits = (0..rows * cols).all(|k| {
+            let entry = results.get(at + k / cols * stride + k % cols);
+            entry.is_some_and(|entry| entry.slot == slot && entry.value.index() == first + k)
+        });
+        (fits && output.role == Role::Output).then(|| MatrixStorage {
+            home: Span {
+                offset: results[at].index,
+                len: rows * cols,
+                ..Span::whole(&output.name, output.len, true)
+            },
+            stride,
+        })
+    }
+}

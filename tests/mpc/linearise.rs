@@ -1,0 +1,73 @@
+//! The step of a stage and its derivatives.
+
+use nalgebra::{DMatrix, DVector};
+use romc::mpc::linearise::{Lineariser, StageModel};
+
+/// A stiff, nonlinear pair of oscillators with inputs inside and outside the sine.
+fn sample(z: &[f64], dz: &[f64], u: &[f64], ddz: &mut [f64], jacobian: &mut DMatrix<f64>) {
+    ddz[0] = -40.0 * z[0].sin() + z[1] * dz[0] + u[0];
+    ddz[1] = -3.0 * dz[1] + (z[0] * u[1]).cos() + 2.0 * u[0];
+    let slope = -(z[0] * u[1]).sin();
+    let rows = [
+        [-40.0 * z[0].cos(), dz[0], z[1], 0.0, 1.0, 0.0],
+        [slope * u[1], 0.0, 0.0, -3.0, 2.0, slope * z[0]],
+    ];
+    jacobian.copy_from(&DMatrix::from_row_slice(2, 6, &rows.concat()));
+}
+
+fn stage_at(x: &[f64], u: &[f64]) -> StageModel {
+    let mut stage = StageModel::zeros(2);
+    Lineariser::new(2).stage(x, u, 0.02, sample, &mut stage);
+    stage
+}
+
+#[test]
+fn sensitivities_match_central_differences_of_the_step() {
+    let x = [0.3, -0.7, 1.1, 0.4];
+    let u = [0.9, -1.3];
+    let stage = stage_at(&x, &u);
+    let delta = 1e-5;
+    for col in 0..6 {
+        let moved = |sign: f64| {
+            let (mut x, mut u) = (x, u);
+            if col < 4 {
+                x[col] += sign * delta
+            } else {
+                u[col - 4] += sign * delta
+            }
+            DVector::from_vec(stage_at(&x, &u).next)
+        };
+        let difference = (moved(1.0) - moved(-1.0)) / (2.0 * delta);
+        for row in 0..4 {
+            let exact = match col < 4 {
+                true => stage.a(row, col),
+                false => stage.b(row, col - 4),
+            };
+            let off = (exact - difference[row]).abs();
+            assert!(off < 1e-8, "row {row}, column {col}");
+        }
+    }
+}
+
+#[test]
+fn step_of_a_linear_oscillator_is_the_taylor_polynomial_of_order_four() {
+    let mut stage = StageModel::zeros(1);
+    let oscillator =
+        |z: &[f64], _: &[f64], u: &[f64], ddz: &mut [f64], jacobian: &mut DMatrix<f64>| {
+            ddz[0] = -z[0] + u[0];
+            jacobian.copy_from_slice(&[-1.0, 0.0, 1.0]);
+        };
+    let h: f64 = 0.5;
+    Lineariser::new(1).stage(&[2.0, 0.0], &[0.0], h, oscillator, &mut stage);
+    let (cosine, sine) = (
+        1.0 - h.powi(2) / 2.0 + h.powi(4) / 24.0,
+        h - h.powi(3) / 6.0,
+    );
+    let found = [stage.a(0, 0), stage.a(0, 1), stage.next[0], stage.b(0, 0)];
+    for (found, exact) in found
+        .into_iter()
+        .zip([cosine, sine, 2.0 * cosine, 1.0 - cosine])
+    {
+        assert!((found - exact).abs() < 1e-15, "{found} {exact}");
+    }
+}

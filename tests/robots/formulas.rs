@@ -1,0 +1,364 @@
+//! Joints, legs, forces and inputs of robots: formulas against differences, virtual work and a physics engine.
+
+use nalgebra::{SVector, Vector3, Vector6};
+use romc::robot::input_rule::rotation;
+use romc::robot::joints::LEG_JOINT_DIM;
+use romc::robot::{
+    Actuators, ContactFlags, InputRule, JOINT_DIM, JOINT_NAMES, Leg, LegGeometry, PlanarLeg, Robot,
+    RobotError, STATE_DIM, WrenchFrame,
+};
+
+#[test]
+fn joint_names_start_with_the_name_of_their_leg() {
+    for leg in Leg::ALL {
+        for (offset, kind) in ["hx", "hy", "kn"].iter().enumerate() {
+            let name = JOINT_NAMES[LEG_JOINT_DIM * leg.index() + offset];
+            assert_eq!(name, format!("{leg}.{kind}"));
+        }
+    }
+}
+
+#[test]
+fn leg_of_joints_takes_its_own_three_entries() {
+    let joints: [f64; JOINT_DIM] = std::array::from_fn(|i| i as f64);
+    assert_eq!(Leg::FrontRight.of_joints(&joints), [0.0, 1.0, 2.0]);
+    assert_eq!(Leg::RearLeft.of_joints(&joints), [9.0, 10.0, 11.0]);
+}
+
+#[test]
+fn unusable_names_the_array_and_joint_of_a_negative_value() {
+    let mut actuators = Actuators::of_leg([1.0, 0.6, 0.6], [0.2; 3], [0.01; 3]);
+    assert_eq!((actuators.viscous[3], actuators.viscous[5]), (1.0, 0.6));
+    assert_eq!(actuators.unusable(), None);
+    actuators.dry[7] = -0.1;
+    assert_eq!(actuators.unusable(), Some(("dry", 7, -0.1)));
+}
+
+#[test]
+fn losses_oppose_the_motion_and_are_dry_friction_alone_when_slow() {
+    let actuators = Actuators {
+        viscous: [0.6; JOINT_DIM],
+        dry: [0.2; JOINT_DIM],
+        armature: [0.01; JOINT_DIM],
+    };
+    let losses = actuators.losses(&[-2.0; JOINT_DIM], &[30.0; JOINT_DIM]);
+    assert!((losses[0] - (-1.2 - 0.2 + 0.3)).abs() < 1e-12);
+    let slow = actuators.losses(&[0.5; JOINT_DIM], &[0.0; JOINT_DIM])[3];
+    assert!((slow - 0.5).abs() < 1e-8, "{slow}");
+}
+
+const LEG: PlanarLeg = PlanarLeg {
+    hip_m: 0.08,
+    thigh_m: 0.213,
+    calf_m: 0.21,
+    foot_forward_m: 0.0,
+};
+const RIGHT: PlanarLeg = PlanarLeg {
+    hip_m: -0.08,
+    ..LEG
+};
+const BENT: PlanarLeg = PlanarLeg {
+    foot_forward_m: -0.03,
+    ..LEG
+};
+
+fn postures() -> Vec<[f64; 3]> {
+    let mut out = Vec::new();
+    for hx in [-0.8, -0.1, 0.0, 0.6] {
+        for hy in [-0.6, 0.3, 1.2, 3.0] {
+            for kn in [-2.7, -1.5, -0.9] {
+                out.push([hx, hy, kn]);
+            }
+        }
+    }
+    out
+}
+
+#[test]
+fn manipulability_is_the_normalised_determinant() {
+    for geometry in [LEG, RIGHT, BENT] {
+        for q in postures() {
+            let determinant = geometry.foot_jacobian(&q).determinant();
+            let leg = LegGeometry::Planar(geometry);
+            let expected = determinant.abs() / leg.volume_m3();
+            assert!((leg.manipulability(&q) - expected).abs() < 1e-13, "{q:?}");
+        }
+    }
+}
+
+#[test]
+fn mirrored_joints_of_known_robots_are_abductions_against_and_flexions_alike() {
+    for name in Robot::known_names() {
+        let robot = Robot::by_name(name).unwrap();
+        let signs = (0..JOINT_DIM).map(|joint| robot.mirror_sign(joint));
+        assert!(signs.eq([-1.0, 1.0, 1.0].repeat(4)), "{name}");
+    }
+}
+
+#[test]
+fn by_name_unknown_robot_lists_the_known_ones() {
+    let error = Robot::by_name("spot").unwrap_err();
+    let RobotError::UnknownRobot { found, known } = &error else {
+        panic!("{error:?}");
+    };
+    assert_eq!(found, "spot");
+    assert_eq!(known, &Robot::known_names().join(", "));
+    assert!(error.to_string().contains("`spot`; known: go1"));
+}
+
+#[test]
+fn state_and_input_names_are_in_the_order_of_the_contract() {
+    let [state, input] = [Robot::state_names(), Robot::input_names()];
+    let ends = |names: &[String]| [0, 11, 12, 17].map(|i| names[i].clone());
+    assert_eq!(ends(&state), ["fr.hx", "rl.kn", "body.x", "body.yaw"]);
+    assert_eq!(ends(&input), ["fr.hx", "rl.kn", "force.x", "moment.z"]);
+    assert_eq!(input[..12], state[..12]);
+    assert_eq!(Robot::state_units()[14], "m");
+    assert_eq!(Robot::input_units()[14..16], ["N", "N m"]);
+}
+
+#[test]
+fn registered_robots_stand_inside_their_limits_with_an_invertible_jacobian() {
+    for name in Robot::known_names() {
+        let robot = Robot::by_name(name).unwrap();
+        for (joint, (low, high)) in robot.joint_limit_rad().iter().enumerate() {
+            let stand = [0.0, 0.8, -1.5][joint % 3];
+            assert!(*low < stand && stand < *high, "{name} joint {joint}");
+        }
+        let leg = robot.geometry(Leg::RearLeft);
+        assert!(leg.manipulability(&[0.0, 0.8, -1.5]) > 0.3);
+        assert!(robot.torque_limit_nm().iter().all(|limit| *limit > 0.0));
+    }
+}
+
+#[test]
+fn foot_positions_agree_with_a_physics_engine() {
+    // Foot sphere minus hip body in MuJoCo's Go1 and Go2, trunk upright.
+    let postures = [
+        (Leg::FrontRight, [0.31, 0.72, -1.43]),
+        (Leg::RearLeft, [-0.2, 1.1, -2.0]),
+    ];
+    let expected = [
+        [-0.001608342, 0.021940214, -0.330737735],
+        [-0.022978536, 0.032906295, -0.240347313],
+        [-0.003125066, 0.007576739, -0.33670767],
+        [-0.024221756, 0.047786081, -0.244962113],
+    ];
+    let legs = ["go1", "go2"].map(|name| postures.map(|(leg, q)| (name, leg, q)));
+    for ((name, leg, q), expected) in legs.into_iter().flatten().zip(expected) {
+        let foot = Robot::by_name(name).unwrap().foot_position(leg, &q);
+        let error = (foot - Vector3::from(expected)).norm();
+        assert!(error < 2e-9, "{name} {leg}: {error:e}");
+    }
+}
+
+#[test]
+fn hip_positions_lie_on_the_side_of_their_leg() {
+    let go1 = Robot::by_name("go1").unwrap();
+    for leg in Leg::ALL {
+        let hip = go1.hip_position(leg);
+        assert!(hip.y * leg.side() > 0.0);
+        assert_eq!(hip.x > 0.0, leg.is_front());
+    }
+}
+
+fn go1() -> &'static Robot {
+    Robot::by_name("go1").unwrap()
+}
+
+fn stand() -> [f64; JOINT_DIM] {
+    std::array::from_fn(|i| [0.05, 0.7, -1.3][i % 3] + 0.01 * i as f64)
+}
+
+fn torques() -> [f64; JOINT_DIM] {
+    std::array::from_fn(|i| 3.0 - 0.7 * i as f64 + 0.2 * (i * i) as f64)
+}
+
+#[test]
+fn foot_force_of_a_leg_beyond_the_singular_bound_is_an_error_with_leg_and_angles() {
+    let force = |knee: f64| go1().foot_force(Leg::RearLeft, &[0.0, 0.2, knee], &[1.0; 3]);
+    for knee in [0.0, -1e-4] {
+        let Err(RobotError::SingularLeg {
+            leg, joints_rad, ..
+        }) = force(knee)
+        else {
+            panic!("{knee}: {:?}", force(knee));
+        };
+        assert_eq!((leg, joints_rad), (Leg::RearLeft, [0.0, 0.2, knee]));
+    }
+    let text = force(0.0).unwrap_err().to_string();
+    assert!(text.contains("go1: leg rl is singular"), "{text}");
+    assert!(text.contains("kn 0.0000"), "{text}");
+    assert!(force(-2e-2).is_ok());
+}
+
+#[test]
+fn foot_force_not_finite_argument_is_an_error() {
+    let (q, nan) = ([0.0, 0.7, -1.4], f64::NAN);
+    for (q, tau, said) in [
+        (q, [0.0, nan, 0.0], "leg fr has the torque NaN"),
+        ([f64::INFINITY, 0.7, -1.4], [0.0; 3], "joint angle inf"),
+    ] {
+        let error = go1().foot_force(Leg::FrontRight, &q, &tau).unwrap_err();
+        assert!(error.to_string().contains(said), "{error}");
+    }
+}
+
+#[test]
+fn body_wrench_without_contact_is_zero_even_at_a_singular_posture() {
+    let wrench = go1()
+        .body_wrench(&[0.0; 12], &torques(), [false; 4])
+        .unwrap();
+    assert_eq!(wrench, Vector6::zeros());
+    for frame in WrenchFrame::ALL {
+        let rule = InputRule::new(go1(), None, frame);
+        let map = rule.wrench_map(&[0.0; 12], [0.0; 3], [false; 4]).unwrap();
+        assert!(map.iter().all(|entry| *entry == 0.0));
+    }
+}
+
+#[test]
+fn damped_force_map_is_the_exact_one_away_from_singularities() {
+    for leg in Leg::ALL {
+        for q in [[0.1, 0.8, -1.6], [-0.3, 1.2, -2.4], [0.0, 0.3, -0.4]] {
+            let exact = go1().foot_force_map(leg, &q).unwrap();
+            assert_eq!(go1().damped_force_map(leg, &q).unwrap(), exact);
+        }
+    }
+}
+
+#[test]
+fn damped_force_map_is_continuous_and_bounded_through_both_singularities() {
+    // Down to a stretched knee, and a folded leg that swings its foot past the hip's height.
+    let stretch = |t: f64| [0.1, 0.5, -0.6 * (1.0 - t)];
+    let swing = |t: f64| [0.1, 1.6 + 1.6 * t, -2.6];
+    let paths: [&dyn Fn(f64) -> [f64; 3]; 2] = [&stretch, &swing];
+    let geometry = go1().geometry(Leg::RearLeft);
+    for (path, singular) in paths.into_iter().zip([0, 1]) {
+        let mut nearest = f64::INFINITY;
+        let mut before = go1().damped_force_map(Leg::RearLeft, &path(0.0)).unwrap();
+        for k in 1..=4000 {
+            let q = path(f64::from(k) / 4000.0);
+            let map = go1().damped_force_map(Leg::RearLeft, &q).unwrap();
+            assert!((map - before).norm() < 0.2, "{q:?}: {map} {before}");
+            // 30 N m of each joint: some 1 kN along a stretched leg, not more anywhere.
+            assert!((map * Vector3::repeat(30.0)).norm() < 1500.0, "{q:?}");
+            nearest = nearest.min(geometry.spans(&q)[singular]);
+            before = map;
+        }
+        assert!(nearest < 1e-3, "the path passes the singularity: {nearest}");
+    }
+}
+
+#[test]
+fn body_wrench_moment_is_arm_cross_force() {
+    let contact = [false, true, false, false];
+    let wrench = go1().body_wrench(&stand(), &torques(), contact).unwrap();
+    let q = Leg::FrontLeft.of_joints(&stand());
+    let arm = go1().foot_position(Leg::FrontLeft, &q);
+    let force = Vector3::new(wrench[0], wrench[1], wrench[2]);
+    let moment = Vector3::new(wrench[3], wrench[4], wrench[5]);
+    assert!((moment - arm.cross(&force)).norm() < 1e-12 * moment.norm());
+    assert!(moment.norm() > 1.0);
+}
+
+const CONTACTS: [ContactFlags; 3] = [
+    [true; 4],
+    [false, false, true, true],
+    [true, false, false, true],
+];
+
+fn rule(name: &str) -> InputRule {
+    InputRule::new(Robot::by_name(name).unwrap(), None, WrenchFrame::World)
+}
+
+fn state() -> [f64; STATE_DIM] {
+    std::array::from_fn(|i| match i {
+        0..JOINT_DIM => [0.1, 0.8, -1.5][i % 3] + 0.02 * i as f64,
+        12..=14 => 0.3 * i as f64 - 3.0,
+        15 => 0.3,
+        16 => -0.9,
+        _ => 0.7,
+    })
+}
+
+#[test]
+fn world_wrench_does_the_work_of_the_feet_on_the_bodys_coordinates() {
+    // Virtual work: F_k . d(foot k)/dx_i over the feet in contact is -tau_i for a joint of a leg
+    // in contact, and the generalised force for a coordinate of the body.
+    for name in Robot::known_names() {
+        let rule = rule(name);
+        let (x, tau) = (state(), torques());
+        for contact in CONTACTS {
+            let wrench = rule.wrench(&x, &tau, contact).unwrap();
+            let joints = std::array::from_fn(|i| x[i]);
+            let turn = rotation([x[15], x[16], x[17]]);
+            let legs = Leg::down(contact);
+            let forces: Vec<(Leg, Vector3<f64>)> = legs
+                .map(|leg| {
+                    let (q, tau) = (leg.of_joints(&joints), leg.of_joints(&tau));
+                    (leg, turn * rule.robot().foot_force(leg, &q, &tau).unwrap())
+                })
+                .collect();
+            for i in 0..STATE_DIM {
+                let step = 1e-6;
+                let (mut lower, mut upper) = (x, x);
+                lower[i] -= step;
+                upper[i] += step;
+                let work: f64 = (forces.iter())
+                    .map(|(leg, force)| {
+                        let foot = |x| rule.robot().foot_in_world(*leg, x);
+                        force.dot(&(foot(&upper) - foot(&lower))) / (2.0 * step)
+                    })
+                    .sum();
+                let expected = match i {
+                    0..JOINT_DIM if contact[i / LEG_JOINT_DIM] => -tau[i],
+                    0..JOINT_DIM => 0.0,
+                    _ => wrench[i - JOINT_DIM],
+                };
+                assert!(
+                    (work - expected).abs() < 1e-6 * wrench.norm(),
+                    "{name} {contact:?} {i}: {work} {expected}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn wrench_is_the_wrench_map_times_torques_in_both_frames() {
+    let (x, tau) = (state(), torques());
+    for frame in WrenchFrame::ALL {
+        let rule = InputRule::new(Robot::by_name("go2").unwrap(), None, frame);
+        for contact in CONTACTS {
+            let joints = std::array::from_fn(|i| x[i]);
+            let map = rule.wrench_map(&joints, [x[15], x[16], x[17]], contact);
+            let product = map.unwrap() * SVector::<f64, JOINT_DIM>::from(tau);
+            let wrench = rule.wrench(&x, &tau, contact).unwrap();
+            assert!(
+                (wrench - product).norm() < 1e-12 * wrench.norm(),
+                "{frame:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn world_and_body_force_agree_for_a_level_robot_that_looks_along_x() {
+    let mut x = state();
+    x[15..].fill(0.0);
+    let world = rule("go1").wrench(&x, &torques(), [true; 4]).unwrap();
+    let body = InputRule::published(Robot::by_name("go1").unwrap());
+    let body = body.wrench(&x, &torques(), [true; 4]).unwrap();
+    assert!((world - body).rows(0, 3).norm() < 1e-12 * body.norm());
+    // The arms differ: about the body's origin a front foot that pushes up pitches it back.
+    assert!((world - body).rows(3, 3).norm() > 1.0);
+}
+
+#[test]
+fn names_of_frames_are_read_back() {
+    for frame in WrenchFrame::ALL {
+        assert_eq!(WrenchFrame::by_name(frame.name()), Some(frame));
+    }
+    assert_eq!(WrenchFrame::by_name("World"), None);
+}
