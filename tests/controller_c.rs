@@ -28,6 +28,8 @@ mod programs;
 mod random;
 #[path = "controller_c/ros2.rs"]
 mod ros2;
+#[path = "controller_c/solver.rs"]
+mod solver;
 mod tools;
 use emitted::Emitted;
 use programs::{root, shipped, succeed, with_losses};

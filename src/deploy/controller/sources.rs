@@ -25,7 +25,7 @@ const SOURCES: &[(&str, &str)] = sources! {
     "algebra/robot":
         actuators chain error feet geometry input_rule joints kinematics mod registry wrench;
     "motion/solver":
-        interior links lower mod point problem riccati rows scalar solve wide;
+        interior links lower mod point problem riccati rows scalar solve;
 };
 
 /// The sources below the generated crate, each with a first line that says what it is.

@@ -1,15 +1,16 @@
 //! The controller in C99 alone: `NAME-controller-c/`.
 //!
 //! In: a complete linear model. Out: the model's equations as `--emit c` makes them, and beside them
-//! the controller: reference, horizon, structured solver, commands and fallbacks in one file, with
-//! the operations of `mpc/online` and `solver` in their order, so that both give the same bits. Read
-//! `templates/controller_c/source.askama` first.
+//! the controller: reference, horizon, structured solver, commands and fallbacks in one file. The solver is made from
+//! its Rust (`src/translate`), the rest has the operations of `mpc/online` in their order, so that both give the same
+//! bits. Read `templates/controller_c/source.askama` first.
 
 mod jump;
 mod legs;
 pub(super) mod numbers;
 mod ros2_control;
 mod selftest;
+mod solver;
 mod source;
 
 use std::ops::Deref;
@@ -27,6 +28,7 @@ use crate::files::EmittedFile;
 use crate::mpc::problem::StageRows;
 use crate::mpc::shared::torque_deviation;
 use crate::mpc::{ControlModel, ControlPhase, MpcError, MpcSettings};
+use crate::solver::Shape;
 use jump::Jump;
 use numbers::Numbers;
 use source::Source;
@@ -47,6 +49,10 @@ struct Facts<'a> {
     /// Suffix of libm's functions.
     f: &'static str,
     max_rows: usize,
+    /// Numbers that the solver keeps per row.
+    row_numbers: usize,
+    /// The solver's stage, as C.
+    solver_stage: String,
     n_phases: usize,
     /// Whether the model knows what its states say of its inputs, in all phases.
     has_given_state: bool,
@@ -155,13 +161,21 @@ fn facts<'a>(
     let joint_limit = |side: fn(&(f64, f64)) -> f64| {
         Numbers(Precision::Double).vector(plant.robot().joint_limit_rad().iter().map(side))
     };
+    let controller = controller::Facts::new(entries, plant);
+    let real = match precision {
+        Precision::Double => "double",
+        Precision::Single => "float",
+    };
+    let one_row = Shape {
+        input: 1,
+        ..Shape::default()
+    };
     Facts {
-        controller: controller::Facts::new(entries, plant),
+        solver_stage: solver::stage(&controller.name, &controller.upper, real),
+        row_numbers: one_row.memory(),
+        controller,
         banner: format!("/* {provenance} */"),
-        real: match precision {
-            Precision::Double => "double",
-            Precision::Single => "float",
-        },
+        real,
         torque_limit: Numbers(Precision::Double)
             .vector(plant.robot().torque_limit_nm().iter().copied()),
         joint_lower: joint_limit(|limit| limit.0),

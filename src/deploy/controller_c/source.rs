@@ -8,6 +8,7 @@ use nalgebra::DMatrix;
 use super::Facts;
 use super::legs::Legs;
 use super::numbers::{Numbers, integers, nested};
+use super::solver;
 use crate::codegen::Precision;
 use crate::codegen::interface::{ModelInterface, PhaseInterface};
 use crate::mpc::interface::Accepts;
@@ -19,9 +20,6 @@ use crate::mpc::shared::{
 };
 use crate::mpc::{ControlModel, ControlModelParts, FallbackSettings, InputGivenState, MpcSettings};
 use crate::robot::{DRY_SPEED_RAD_S, GRAVITY_M_S2, JOINT_DIM, SINGULAR_BOUND, WrenchFrame};
-use crate::solver::{
-    AGAIN, COLD, FAR, FAR_CHANGE, LEFT, MARGIN, MARGIN_FACTOR, PATIENCE, SHORT_STEP, WARM,
-};
 
 /// Complementarity and residual in single precision, at which rounding ends the progress.
 const SINGLE: (f64, f64) = (1e-4, 1e-3);
@@ -47,6 +45,8 @@ pub(super) struct Source<'a> {
     acceleration_error: String,
     is_body_frame: bool,
     solver: SolverNumbers,
+    functions: String,
+    lift_functions: String,
     legs: Legs,
     torque_mean: String,
     torque_deviation: String,
@@ -128,6 +128,8 @@ impl<'a> Source<'a> {
             has_actuators: plant.input_rule().actuators().is_some(),
             is_body_frame: plant.input_rule().wrench_frame() == WrenchFrame::Body,
             solver: SolverNumbers::new(precision, mpc.qp.accepted_residual),
+            functions: solver::of_horizon(&facts.name),
+            lift_functions: solver::of_lift(),
             legs: Legs::of(robot, numbers),
             torque_mean: numbers
                 .matrix(phases.iter().map(|phase| phase.torque_mean.iter().copied())),

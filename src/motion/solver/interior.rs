@@ -2,9 +2,9 @@
 
 use super::links::{Before, answer_before, pull_before, take_answer};
 use super::lower::Lower;
-use super::point::{Point, boundary_share};
-use super::problem::{Program, Settings};
-use super::riccati::{Products, add_multiple, answer, eliminate, plus_columns, plus_product, pull};
+use super::point::{Centring, Point, boundary_share};
+use super::problem::{Program, Settings, Stage};
+use super::riccati::{Products, add_multiple, add_product, eliminate};
 use super::rows::{Rows, add_weighted, dot, largest_of, part, part_mut, sum_of};
 use super::scalar::Real;
 
@@ -22,8 +22,8 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
     /// First point of the iterations, to be centred: the guess, or the point of the gains.
     #[inline(always)]
     pub(super) fn start(&mut self, x0: &[T; NX], is_warm: bool) {
-        let (price, soft) = (self.cost.slack, self.shape.soft);
-        let slack_row = self.shape.input + soft;
+        let shape = self.shape;
+        let price = self.cost.slack;
         let mut x = *x0;
         for k in 0..self.stages.len() {
             let at = self.at(k);
@@ -32,15 +32,13 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
                 stage.v = stage.dv;
                 stage.t = T::ZERO;
             }
-            stage.x = plus_product(&stage.b, &stage.v, plus_product(&stage.a, &x, stage.c));
-            x = stage.x;
-            stage.keep_columns();
+            let mut end = [T::ZERO; NX];
+            stage.end(&x, &stage.v, &mut end);
+            stage.x = end;
+            x = end;
             if !is_warm {
-                let rows = self.rows_of(k);
-                rows.multiplier.fill(T::ZERO);
-                if soft > 0 {
-                    rows.multiplier[slack_row] = price;
-                }
+                let mut rows = self.rows_of(k);
+                rows.write_multipliers(shape.soft, shape.slack_row(), price);
             }
         }
     }
@@ -48,50 +46,57 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
     /// How far the optimum without rows moved since the last program, in units of the input's rows.
     #[inline(always)]
     pub(super) fn change_of_gains(&mut self) -> T {
-        let shape = self.shape;
         let mut largest = T::ZERO;
         for k in 0..self.stages.len() {
             let at = self.at(k);
-            let links = self.link_rows(k);
             let stage = &mut self.stages[at];
             let mut change = stage.dv;
             for i in 0..NU {
                 change[i] = change[i] - stage.plain[i];
             }
             stage.plain = stage.dv;
-            let matrix = &self.matrices.input[stage.input_rows..][..shape.input];
-            for row in matrix.iter().chain(links) {
-                largest = dot(row, &change).magnitude().or_larger(largest);
+            let input = &self.matrices.input[stage.input_rows..][..self.shape.input];
+            for i in 0..self.shape.input {
+                largest = dot(&input[i], &change).magnitude().or_larger(largest);
+            }
+            if LINKED {
+                let links = self.link_rows(k);
+                for i in 0..self.shape.link {
+                    largest = dot(&links[i], &change).magnitude().or_larger(largest);
+                }
             }
         }
         largest
     }
 
-    /// Slacks and multipliers of the present point, none smaller than these: slacks, and products of
-    /// the two.
+    /// Slacks and multipliers of the present point, none smaller than these.
     #[inline(always)]
-    pub(super) fn centre(&mut self, (smallest, product): (f64, f64)) -> Point<T> {
-        let (smallest, product) = (T::of(smallest), T::of(product));
-        let (mut residual, mut sum, mut largest) = (T::ZERO, T::ZERO, T::ZERO);
+    pub(super) fn centre(&mut self, smallest: Centring) -> Point<T> {
+        let mut residual = T::ZERO;
+        let mut sum = T::ZERO;
+        let mut largest = T::ZERO;
         let mut before = [T::ZERO; NU];
         for k in 0..self.stages.len() {
             let stage = &self.stages[self.at(k)];
-            let (v, x, t) = (stage.v, stage.x, stage.t);
-            let rows = self.rows_times(k, (&before, &v), &x, t);
+            let v = stage.v;
+            let x = stage.x;
+            let t = stage.t;
+            let rows = self.rows_times(k, &before, &v, &x, t);
             before = v;
-            for i in 0..rows.bound.len() {
+            for i in 0..rows.count {
                 let room = rows.bound[i] - rows.target[i];
-                let slack = smallest.or_larger(room);
+                let slack = T::of(smallest.slack).or_larger(room);
+                let multiplier = T::of(smallest.product) / slack;
                 rows.slack[i] = slack;
-                rows.multiplier[i] = (product / slack).or_larger(rows.multiplier[i]);
+                rows.multiplier[i] = multiplier.or_larger(rows.multiplier[i]);
                 rows.residual[i] = slack - room;
             }
-            residual = largest_of(rows.residual, residual);
-            for i in 0..rows.bound.len() {
+            residual = largest_of(rows.residual, rows.count, residual);
+            for i in 0..rows.count {
                 rows.target[i] = rows.slack[i] * rows.multiplier[i];
             }
-            sum += sum_of(rows.target);
-            largest = largest_of(rows.target, largest);
+            sum += sum_of(rows.target, rows.count);
+            largest = largest_of(rows.target, rows.count, largest);
         }
         Point {
             left: T::ONE,
@@ -103,20 +108,21 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
         }
     }
 
-    /// One step of Mehrotra's method; its length, none if a Hessian is not positive definite.
+    /// One step of Mehrotra's method; its length, negative if a Hessian is not positive definite.
     #[inline(always)]
-    pub(super) fn step(&mut self, point: &mut Point<T>, settings: &Settings<T>) -> Option<T> {
+    pub(super) fn step(&mut self, point: &mut Point<T>, settings: &Settings<T>) -> T {
         if !self.predict(point.kept) {
-            return None;
+            return -T::ONE;
         }
         let count = T::of((self.shape.rows() * self.stages.len()) as f64);
         let complementarity = point.sum / count;
         let share = boundary_share(complementarity);
         let mut longest = T::ZERO;
+        let mut aim = T::ZERO;
         // A loop of two turns, so that the passes over the stages are compiled once: the first looks for
         // the step that does not centre, the second takes the one that does.
-        let mut aim = T::ZERO;
-        for is_corrected in [false, true] {
+        for turn in 0..2 {
+            let is_corrected = turn > 0;
             if is_corrected {
                 self.pull_all(point.kept, aim);
             }
@@ -125,13 +131,15 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
             if !is_corrected {
                 // What is left of the products, exactly: a change that does not centre cancels their
                 // first order.
-                let (rest, square) = (T::ONE - longest, longest * longest);
+                let rest = T::ONE - longest;
+                let square = longest * longest;
                 let predicted = Point {
                     left: rest * point.left,
                     kept: rest * point.kept,
+                    residual: point.residual,
                     sum: rest * point.sum + square * reach.second_sum,
                     largest: rest * point.largest + square * reach.second_largest,
-                    ..*point
+                    value: point.value,
                 };
                 if predicted.is_optimal(settings) {
                     break;
@@ -143,28 +151,32 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
             }
         }
         self.move_by(longest, point);
-        Some(longest)
+        longest
     }
 
     /// Gains with the weights of the rows, and the constant parts of the inputs' changes for a step that
     /// does not centre; `left` is the share of the rows' residuals that is left.
     #[inline(always)]
     fn predict(&mut self, left: T) -> bool {
-        let (horizon, shape) = (self.stages.len(), self.shape);
-        let mut after = Before::none();
-        let mut products = Products::new();
+        let shape = self.shape;
+        let memory = shape.memory();
+        let horizon = self.stages.len();
+        let mut after: Before<T, NX, NU> = Before::zeros();
+        let mut products: Products<T, NX, NU> = Products::zeros();
         let mut p = [[T::ZERO; NX]; NX];
         let mut by_x = [T::ZERO; NX];
         for k in (0..horizon).rev() {
             let weight = self.cost.state_at(k, horizon);
-            let (at, memory) = (self.at(k), shape.memory());
-            let (own_links, earlier_links) = self.link_pairs(k);
-            let mut rows = Rows::of(&mut self.rows[at * memory..][..memory], shape.rows());
-            match LINKED {
-                true => rows.weigh_softened(self.links.softness),
-                false => rows.weigh(left),
+            let at = self.at(k);
+            let before = if k > 0 { self.at(k - 1) } else { 0 };
+            let mut rows: Rows<T> = Rows::of(&mut self.rows[at * memory..][..memory], shape.rows());
+            if LINKED {
+                rows.weigh_softened(self.links.softness);
+            } else {
+                rows.weigh(left);
             }
-            let (w, y) = (&*rows.weight, &*rows.dmultiplier);
+            let w = &rows.weight[..rows.count];
+            let y = &rows.dmultiplier[..rows.count];
             let stage = &mut self.stages[at];
             let mut by_v = [T::ZERO; NU];
             for i in 0..NX {
@@ -174,61 +186,73 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
             for i in 0..NU {
                 by_v[i] = self.cost.input[i] * stage.v[i];
             }
-            let mut hessian = Lower::diagonal(&self.cost.input);
+            let mut hessian: Lower<T, NU> = Lower::diagonal(&self.cost.input);
             let input = &self.matrices.input[stage.input_rows..];
-            let (numbers, pairs) = ((&w[..shape.input], &y[..shape.input]), shape.pairs.input);
-            add_weighted(numbers, input, pairs, &mut hessian, &mut by_v);
-            let first_link = w.len() - shape.link;
-            let links = (&w[first_link..], &y[first_link..]);
-            let (w, y) = (&w[shape.input..], &y[shape.input..]);
-            if shape.soft > 0 {
+            add_weighted(
+                w,
+                y,
+                input,
+                shape.pairs.input,
+                shape.input,
+                &mut hessian,
+                &mut by_v,
+            );
+            if NU <= NX && shape.soft > 0 {
                 let soft = &self.matrices.soft[stage.soft_rows..];
-                let mut square = Lower::zeros();
-                let by_z = part_mut(&mut by_x, 0);
-                let mut pull = [T::ZERO; NU];
-                let mut curvature = T::ZERO;
-                let mut by_t = self.cost.slack;
-                for ((w, y), row) in w[..shape.soft].iter().zip(y).zip(soft) {
-                    curvature += *w;
-                    by_t -= *y;
-                    add_multiple(*w, row, &mut pull);
-                }
-                let numbers = (&w[..shape.soft], &y[..shape.soft]);
-                add_weighted(numbers, soft, 0, &mut square, by_z);
-                stage.soft_pull = pull;
-                stage.soft_inverse = T::ONE / (curvature + w[shape.soft]);
-                stage.dt = -(by_t - y[shape.soft]) * stage.soft_inverse;
-                for j in 0..NU {
-                    by_z[j] = by_z[j] - stage.soft_pull[j] * stage.dt;
-                }
-                square.add_square(-stage.soft_inverse, &pull);
-                square.add_to(0, &mut p);
+                let by_z: &mut [T; NU] = part_mut(&mut by_x, 0);
+                let w_soft = &w[shape.input..];
+                let y_soft = &y[shape.input..];
+                stage.add_soft_rows(
+                    w_soft,
+                    y_soft,
+                    soft,
+                    shape.soft,
+                    self.cost.slack,
+                    by_z,
+                    &mut p,
+                );
             }
-            if shape.hard > 0 {
-                let own = shape.soft + usize::from(shape.soft > 0);
+            if NU <= NX && shape.hard > 0 {
                 let hard = &self.matrices.hard[stage.hard_rows..];
-                let mut square = Lower::zeros();
-                let by_z = part_mut(&mut by_x, shape.hard_offset);
-                let numbers = (&w[own..][..shape.hard], &y[own..][..shape.hard]);
-                add_weighted(numbers, hard, shape.pairs.hard, &mut square, by_z);
+                let by_z: &mut [T; NU] = part_mut(&mut by_x, shape.hard_offset);
+                let w_hard = &w[shape.first_hard()..];
+                let y_hard = &y[shape.first_hard()..];
+                let mut square: Lower<T, NU> = Lower::zeros();
+                add_weighted(
+                    w_hard,
+                    y_hard,
+                    hard,
+                    shape.pairs.hard,
+                    shape.hard,
+                    &mut square,
+                    by_z,
+                );
                 square.add_to(shape.hard_offset, &mut p);
             }
-            if !LINKED {
-                if !eliminate::<T, NX, NU, false>(stage, &mut p, hessian.rows(), &mut products) {
+            products.clear_hessian();
+            if LINKED {
+                let link = shape.link;
+                let w_link = &w[shape.first_link()..];
+                let y_link = &y[shape.first_link()..];
+                let own = &self.links.rows[at * link..];
+                let earlier = &self.links.rows[before * link..];
+                add_weighted(w_link, y_link, own, 0, link, &mut hessian, &mut by_v);
+                hessian.write_rows(&mut products.hvv);
+                after.add_to(stage, &mut by_v, &mut products);
+                if !eliminate(stage, &mut p, &mut products) {
                     return false;
                 }
-                pull(stage, &mut by_x, by_v);
-                continue;
-            }
-            add_weighted(links, own_links, 0, &mut hessian, &mut by_v);
-            let hessian = after.add_to(stage, &hessian, &mut by_v, &mut products.hvx);
-            if !eliminate::<T, NX, NU, true>(stage, &mut p, hessian, &mut products) {
-                return false;
-            }
-            let h = pull(stage, &mut by_x, by_v);
-            if k > 0 {
-                let gain = &mut self.links.gains[at];
-                after = Before::of_stage(stage, gain, links, (own_links, earlier_links), &h);
+                stage.pull(&mut by_x, &mut by_v);
+                if k > 0 {
+                    let gain = &mut self.links.gains[at];
+                    after.write(stage, gain, w_link, y_link, own, earlier, link, &by_v);
+                }
+            } else {
+                hessian.write_rows(&mut products.hvv);
+                if !eliminate(stage, &mut p, &mut products) {
+                    return false;
+                }
+                stage.pull(&mut by_x, &mut by_v);
             }
         }
         true
@@ -238,54 +262,49 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
     /// multipliers, with the second order of the step that does not centre.
     #[inline(always)]
     fn pull_all(&mut self, left: T, aim: T) {
-        let (horizon, shape) = (self.stages.len(), self.shape);
+        let shape = self.shape;
+        let horizon = self.stages.len();
         let softness = self.links.softness;
         let mut p = [T::ZERO; NX];
         let mut by_after = [T::ZERO; NU];
         for k in (0..horizon).rev() {
-            let rows = self.rows_of(k);
-            for i in 0..rows.slack.len() {
-                let second = rows.dslack[i] * rows.dmultiplier[i];
-                let residual = match LINKED {
-                    true => rows.residual[i] + softness * rows.multiplier[i],
-                    false => left * rows.residual[i],
-                };
-                rows.dmultiplier[i] = rows.weight[i] * residual + (aim - second) * rows.inverse[i];
+            let at = self.at(k);
+            let mut rows = self.rows_of(k);
+            if LINKED {
+                rows.aim_softened(softness, aim);
+            } else {
+                rows.aim_at(left, aim);
             }
-            let stage = &self.stages[self.at(k)];
+            let stage = &self.stages[at];
             let weight = self.cost.state_at(k, horizon);
             let mut by_v = [T::ZERO; NU];
-            let mut by_x = p;
             for i in 0..NX {
-                by_x[i] += weight[i] * stage.x[i];
+                p[i] += weight[i] * stage.x[i];
             }
             for i in 0..NU {
                 by_v[i] = self.cost.input[i] * stage.v[i];
             }
-            let (count, memory) = (shape.rows(), shape.memory());
-            let aims = &self.rows[self.at(k) * memory + 7 * count..][..count];
-            let by_t = self.add_rows_pull(k, aims, &mut by_v, &mut by_x);
-            let at = self.at(k);
-            let stage = &mut self.stages[at];
-            if shape.soft > 0 {
-                stage.dt = -by_t * stage.soft_inverse;
-                for j in 0..NU {
-                    by_x[j] = by_x[j] - stage.soft_pull[j] * stage.dt;
+            let aims = &self.rows[at * shape.memory() + 7 * shape.rows()..][..shape.rows()];
+            let by_t = self.add_rows_pull(k, aims, &mut by_v, &mut p);
+            if LINKED {
+                for i in 0..NU {
+                    by_v[i] += by_after[i];
+                }
+                if k > 0 {
+                    let y = &aims[shape.first_link()..];
+                    pull_before(y, self.link_rows(k - 1), shape.link, &mut by_after);
                 }
             }
-            p = by_x;
-            if !LINKED {
-                pull(stage, &mut p, by_v);
-                continue;
+            let stage = &mut self.stages[at];
+            if NU <= NX && shape.soft > 0 {
+                stage.dt = -by_t * stage.soft_inverse;
+                for j in 0..NU {
+                    p[j] = p[j] - stage.soft_pull[j] * stage.dt;
+                }
             }
-            for i in 0..NU {
-                by_v[i] += by_after[i];
-            }
-            let h = pull(stage, &mut p, by_v);
-            if k > 0 {
-                let aims = &self.rows[at * memory + 8 * count - shape.link..][..shape.link];
-                by_after = pull_before(aims, self.link_pairs(k).1);
-                take_answer(&self.links.gains[at], &h, &mut by_after);
+            stage.pull(&mut p, &mut by_v);
+            if LINKED && k > 0 {
+                take_answer(&self.links.gains[at], &by_v, &mut by_after);
             }
         }
     }
@@ -294,66 +313,50 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
     /// every product zero to first order, so that their changes follow from those of the slacks.
     #[inline(always)]
     fn advance(&mut self, left: T, is_corrected: bool) -> Reach<T> {
-        let shape = self.shape;
-        let (mut times, mut second_sum, mut second_largest) = (T::ZERO, T::ZERO, T::ZERO);
+        let soft = self.shape.soft;
         let softness = self.links.softness;
+        let mut times = T::ZERO;
+        let mut second_sum = T::ZERO;
+        let mut second_largest = T::ZERO;
         let mut dx = [T::ZERO; NX];
         let mut before = [T::ZERO; NU];
         for k in 0..self.stages.len() {
             let at = self.at(k);
             let stage = &mut self.stages[at];
-            stage.dv = answer(stage, &dx);
+            let mut dv = [T::ZERO; NU];
+            stage.answer(&dx, &mut dv);
             if LINKED && k > 0 {
-                answer_before(&self.links.gains[at], &before, &mut stage.dv);
+                answer_before(&self.links.gains[at], &before, &mut dv);
             }
-            dx = plus_columns(&stage.a_columns, &dx, [T::ZERO; NX]);
-            dx = plus_columns(&stage.b_columns, &stage.dv, dx);
+            let mut end = [T::ZERO; NX];
+            add_product(&stage.a, &dx, &mut end);
+            add_product(&stage.b, &dv, &mut end);
+            dx = end;
+            stage.dv = dv;
             stage.dx = dx;
-            if shape.soft > 0 {
+            if NU <= NX && soft > 0 {
                 // Without its own share the slack's change was kept by the gradient's pass.
                 let z: &[T; NU] = part(&dx, 0);
-                let pulled = dot(&stage.soft_pull, z);
-                stage.dt += pulled * stage.soft_inverse;
+                stage.dt += dot(&stage.soft_pull, z) * stage.soft_inverse;
             }
-            let (dv, dt) = (stage.dv, stage.dt);
-            let mut rows = self.rows_times(k, (&before, &dv), &dx, dt);
+            let dt = stage.dt;
+            let mut rows = self.rows_times(k, &before, &dv, &dx, dt);
             before = dv;
             if LINKED {
                 rows.change_softened(softness);
-                times = largest_of(rows.target, times);
-                if is_corrected {
-                    continue;
-                }
             } else if is_corrected {
-                for i in 0..rows.target.len() {
-                    let change = rows.target[i];
-                    let dslack = -(left * rows.residual[i]) - change;
-                    let dmultiplier =
-                        rows.dmultiplier[i] - rows.multiplier[i] + rows.weight[i] * change;
-                    rows.dslack[i] = dslack;
-                    rows.dmultiplier[i] = dmultiplier;
-                    let to_slack = -dslack * rows.inverse[i];
-                    let to_multiplier = -dmultiplier / rows.multiplier[i];
-                    rows.target[i] = to_slack.or_larger(to_multiplier);
-                }
-                times = largest_of(rows.target, times);
-                continue;
+                rows.change_corrected(left);
             } else {
-                for i in 0..rows.target.len() {
-                    let dslack = -(left * rows.residual[i]) - rows.target[i];
-                    rows.dslack[i] = dslack;
-                    rows.dmultiplier[i] = -rows.multiplier[i] - rows.weight[i] * dslack;
-                    // The relative changes of slack and multiplier have the sum of minus one.
-                    let to_slack = -dslack * rows.inverse[i];
-                    rows.target[i] = to_slack.or_larger(T::ONE - to_slack);
+                rows.change(left);
+            }
+            times = largest_of(rows.target, rows.count, times);
+            if !is_corrected {
+                for i in 0..rows.count {
+                    rows.target[i] = rows.dslack[i] * rows.dmultiplier[i];
                 }
-                times = largest_of(rows.target, times);
+                second_sum += sum_of(rows.target, rows.count);
+                second_largest = largest_of(rows.target, rows.count, second_largest);
             }
-            for i in 0..rows.target.len() {
-                rows.target[i] = rows.dslack[i] * rows.dmultiplier[i];
-            }
-            second_sum += sum_of(rows.target);
-            second_largest = largest_of(rows.target, second_largest);
         }
         Reach {
             times,
@@ -365,9 +368,14 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
     /// Moves all unknowns along their changes.
     #[inline(always)]
     fn move_by(&mut self, length: T, point: &mut Point<T>) {
-        let (mut sum, mut largest, mut value) = (T::ZERO, T::ZERO, T::ZERO);
+        let horizon = self.stages.len();
+        let softness = self.links.softness;
+        // The rows are linear: each step takes its share of all residuals.
+        let rest = T::ONE - length;
+        let mut sum = T::ZERO;
+        let mut largest = T::ZERO;
+        let mut value = T::ZERO;
         let mut residual = T::ZERO;
-        let (horizon, softness) = (self.stages.len(), self.links.softness);
         for k in 0..horizon {
             let weight = self.cost.state_at(k, horizon);
             let at = self.at(k);
@@ -382,33 +390,64 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
             }
             stage.t += length * stage.dt;
             let rows = self.rows_of(k);
-            for i in 0..rows.slack.len() {
+            for i in 0..rows.count {
                 rows.slack[i] += length * rows.dslack[i];
                 rows.multiplier[i] += length * rows.dmultiplier[i];
                 rows.target[i] = rows.slack[i] * rows.multiplier[i];
             }
-            sum += sum_of(rows.target);
-            largest = largest_of(rows.target, largest);
+            sum += sum_of(rows.target, rows.count);
+            largest = largest_of(rows.target, rows.count, largest);
             if LINKED {
-                for i in 0..rows.residual.len() {
-                    rows.residual[i] = (T::ONE - length) * rows.residual[i]
-                        + length * (softness * rows.dmultiplier[i]);
+                for i in 0..rows.count {
+                    rows.residual[i] =
+                        rest * rows.residual[i] + length * (softness * rows.dmultiplier[i]);
                     residual = rows.residual[i].magnitude().or_larger(residual);
                 }
             }
         }
-        // The rows are linear: each step takes its share of all residuals.
-        let rest = T::ONE - length;
-        *point = Point {
-            left: rest * point.left,
-            kept: match LINKED {
-                true => point.kept,
-                false => rest * point.kept,
-            },
-            residual: if LINKED { residual } else { point.residual },
-            sum,
-            largest,
-            value,
-        };
+        point.left = rest * point.left;
+        if LINKED {
+            point.residual = residual;
+        } else {
+            point.kept = rest * point.kept;
+        }
+        point.sum = sum;
+        point.largest = largest;
+        point.value = value;
+    }
+}
+
+impl<T: Real, const NX: usize, const NU: usize> Stage<T, NX, NU> {
+    /// Adds the `count` soft rows, with weights `w` and multipliers `y`, to gradient and Hessian by the state; the slack is
+    /// eliminated.
+    #[inline(always)]
+    fn add_soft_rows(
+        &mut self,
+        w: &[T],
+        y: &[T],
+        rows: &[[T; NU]],
+        count: usize,
+        price: T,
+        by_z: &mut [T; NU],
+        p: &mut [[T; NX]; NX],
+    ) {
+        let mut square: Lower<T, NU> = Lower::zeros();
+        let mut pull = [T::ZERO; NU];
+        let mut curvature = T::ZERO;
+        let mut by_t = price;
+        for i in 0..count {
+            curvature += w[i];
+            by_t -= y[i];
+            add_multiple(w[i], &rows[i], &mut pull);
+        }
+        add_weighted(w, y, rows, 0, count, &mut square, by_z);
+        self.soft_pull = pull;
+        self.soft_inverse = T::ONE / (curvature + w[count]);
+        self.dt = -(by_t - y[count]) * self.soft_inverse;
+        for j in 0..NU {
+            by_z[j] = by_z[j] - pull[j] * self.dt;
+        }
+        square.add_square(-self.soft_inverse, &pull);
+        square.add_to(0, p);
     }
 }

@@ -17,13 +17,15 @@
 
 use super::lower::Lower;
 use super::problem::{Program, Stage};
-use super::riccati::{WIDE, add_multiple};
+use super::riccati::{
+    Products, add_multiple, scale_rows, solve_lower_rows, solve_upper_rows, subtract_multiple,
+};
 use super::scalar::Real;
 
 /// Rows that link inputs, and memory for their gains.
 #[derive(Debug)]
 pub struct Links<'m, T, const NU: usize, const LINKED: bool> {
-    /// `L`: [`Shape::link`](super::Shape::link) rows for each place of the ring of stages.
+    /// `L`: `Shape::link` rows for each place of the ring of stages.
     pub rows: &'m [[T; NU]],
     /// Memory of the solver, one for each place.
     pub gains: &'m mut [[[T; NU]; NU]],
@@ -49,13 +51,13 @@ pub(super) struct Before<T, const NX: usize, const NU: usize> {
     /// `N`, of which the lower triangle is written.
     square: [[T; NU]; NU],
     /// Gradient.
-    pub linear: [T; NU],
+    linear: [T; NU],
 }
 
 impl<T: Real, const NX: usize, const NU: usize> Before<T, NX, NU> {
     /// No cost, as after the last stage.
     #[inline(always)]
-    pub fn none() -> Self {
+    pub fn zeros() -> Self {
         Self {
             by_state: [[T::ZERO; NX]; NU],
             square: [[T::ZERO; NU]; NU],
@@ -63,102 +65,88 @@ impl<T: Real, const NX: usize, const NU: usize> Before<T, NX, NU> {
         }
     }
 
-    /// Hessian of a stage's input with this cost of it, and beginnings of its gradient and of `H_vx`.
+    /// Adds this cost of a stage's input to its gradient and to the beginnings of its Hessians.
     #[inline(always)]
     pub fn add_to(
         &self,
         stage: &Stage<T, NX, NU>,
-        hessian: &Lower<T, NU>,
         by_v: &mut [T; NU],
-        hvx: &mut [[T; NX]; NU],
-    ) -> [[T; WIDE]; NU] {
-        let mut rows = hessian.rows();
+        products: &mut Products<T, NX, NU>,
+    ) {
         let mut product = [[T::ZERO; NU]; NU];
         for i in 0..NU {
-            hvx[i] = [T::ZERO; NX];
             for j in 0..NX {
-                add_multiple(self.by_state[i][j], &stage.a[j], &mut hvx[i]);
+                add_multiple(self.by_state[i][j], &stage.a[j], &mut products.hvx[i]);
                 add_multiple(self.by_state[i][j], &stage.b[j], &mut product[i]);
             }
         }
         for i in 0..NU {
             by_v[i] += self.linear[i];
             for j in 0..=i {
-                rows[i][j] += self.square[i][j] + (product[i][j] + product[j][i]);
+                products.hvv[i][j] += self.square[i][j] + (product[i][j] + product[j][i]);
             }
         }
-        rows
     }
 
-    /// The cost of the input before a stage that was eliminated, with weights and multipliers of its links, the rows
-    /// of both stages, and the gradient `h` by the stage's own input. Writes the gain.
+    /// Becomes the cost of the input before a stage that was eliminated, with weights and multipliers of its `count`
+    /// links, their rows of both stages, and the gradient `h` by the stage's own input. Writes the gain.
     #[inline(always)]
-    pub fn of_stage(
+    pub fn write(
+        &mut self,
         stage: &Stage<T, NX, NU>,
         gain: &mut [[T; NU]; NU],
-        (w, y): (&[T], &[T]),
-        (own, earlier): (&[[T; NU]], &[[T; NU]]),
+        w: &[T],
+        y: &[T],
+        own: &[[T; NU]],
+        earlier: &[[T; NU]],
+        count: usize,
         h: &[T; NU],
-    ) -> Self {
-        let mut before = Self::none();
-        let mut square = Lower::zeros();
+    ) {
+        let mut square: Lower<T, NU> = Lower::zeros();
         let mut cross = [[T::ZERO; NU]; NU];
-        for (w, (own, earlier)) in w.iter().zip(own.iter().zip(earlier)) {
-            square.add_square(*w, earlier);
+        for row in 0..count {
+            square.add_square(w[row], &earlier[row]);
             for i in 0..NU {
-                add_multiple(-(*w * own[i]), earlier, &mut cross[i]);
+                add_multiple(-(w[row] * own[row][i]), &earlier[row], &mut cross[i]);
             }
         }
-        for i in 0..NU {
-            for j in 0..NU {
-                add_multiple(-cross[i][j], &stage.gain[i], &mut before.by_state[j]);
+        for j in 0..NU {
+            self.by_state[j] = [T::ZERO; NX];
+            for i in 0..NU {
+                add_multiple(-cross[i][j], &stage.gain[i], &mut self.by_state[j]);
             }
         }
         // Y = L⁻¹ C, Z = D⁻¹ Y; N = … − Yᵀ Z; K_before = L⁻ᵀ Z.
-        let factor = &stage.factor;
-        for i in 1..NU {
-            for k in 0..i {
-                for j in 0..NU {
-                    cross[i][j] = cross[i][j] - factor[i][k] * cross[k][j];
-                }
-            }
-        }
-        for i in 0..NU {
-            for j in 0..NU {
-                gain[i][j] = factor[i][i] * cross[i][j];
-            }
-        }
-        let rows = square.rows();
+        solve_lower_rows(&stage.factor, &mut cross);
+        scale_rows(&stage.factor, &cross, gain);
         for i in 0..NU {
             for j in 0..=i {
-                let mut entry = rows[i][j];
+                let mut entry = square.entry(i, j);
                 for k in 0..NU {
                     entry = entry - cross[k][i] * gain[k][j];
                 }
-                before.square[i][j] = entry;
+                self.square[i][j] = entry;
             }
         }
-        for i in (0..NU).rev() {
-            for k in i + 1..NU {
-                for j in 0..NU {
-                    gain[i][j] = gain[i][j] - factor[k][i] * gain[k][j];
-                }
-            }
-        }
-        before.linear = pull_before(y, earlier);
-        take_answer(gain, h, &mut before.linear);
-        before
+        solve_upper_rows(&stage.factor, gain);
+        pull_before(y, earlier, count, &mut self.linear);
+        take_answer(gain, h, &mut self.linear);
     }
 }
 
-/// Share of links with multipliers `y` in the gradient by the input before their stage.
+/// Share of `count` links with multipliers `y` in the gradient by the input before their stage.
 #[inline(always)]
-pub(super) fn pull_before<T: Real, const NU: usize>(y: &[T], earlier: &[[T; NU]]) -> [T; NU] {
+pub(super) fn pull_before<T: Real, const NU: usize>(
+    y: &[T],
+    earlier: &[[T; NU]],
+    count: usize,
+    by_before: &mut [T; NU],
+) {
     let mut sum = [T::ZERO; NU];
-    for (y, row) in y.iter().zip(earlier) {
-        add_multiple(-*y, row, &mut sum);
+    for row in 0..count {
+        add_multiple(-y[row], &earlier[row], &mut sum);
     }
-    sum
+    *by_before = sum;
 }
 
 /// Takes what a stage's input answers off the gradient by the input before: `− K_beforeᵀ h`.
@@ -169,9 +157,7 @@ pub(super) fn take_answer<T: Real, const NU: usize>(
     by_before: &mut [T; NU],
 ) {
     for i in 0..NU {
-        for j in 0..NU {
-            by_before[j] = by_before[j] - gain[i][j] * h[i];
-        }
+        subtract_multiple(h[i], &gain[i], by_before);
     }
 }
 
@@ -192,21 +178,9 @@ pub(super) fn answer_before<T: Real, const NU: usize>(
 impl<'m, T: Real, const NX: usize, const NU: usize, const LINKED: bool>
     Program<'m, T, NX, NU, LINKED>
 {
-    /// `L` of a stage; nothing of a program without links.
+    /// `L` of a stage, of a program with links.
     #[inline(always)]
     pub(super) fn link_rows(&self, k: usize) -> &'m [[T; NU]] {
-        match LINKED {
-            true => &self.links.rows[self.at(k) * self.shape.link..][..self.shape.link],
-            false => &[],
-        }
-    }
-
-    /// `L` of a stage and of the one before; nothing of a program without links.
-    #[inline(always)]
-    pub(super) fn link_pairs(&self, k: usize) -> (&'m [[T; NU]], &'m [[T; NU]]) {
-        match LINKED && k > 0 {
-            true => (self.link_rows(k), self.link_rows(k - 1)),
-            false => (self.link_rows(k), &[]),
-        }
+        &self.links.rows[self.at(k) * self.shape.link..][..self.shape.link]
     }
 }

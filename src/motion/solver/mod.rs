@@ -45,11 +45,12 @@
 //! assert_eq!(report.outcome, Outcome::Solved);
 //! assert!((program.stages[0].v[0] + 1.0).abs() < 1e-8);
 //! ```
-// Loops over indices and sums written out have the order of operations of the C that is made of them.
+// Written in the subset of Rust that `src/translate` makes C of: loops over indices, plain structs, no closures.
 #![allow(
     clippy::needless_range_loop,
     clippy::assign_op_pattern,
-    clippy::neg_cmp_op_on_partial_ord
+    clippy::neg_cmp_op_on_partial_ord,
+    clippy::too_many_arguments
 )]
 
 mod interior;
@@ -61,13 +62,8 @@ mod riccati;
 mod rows;
 mod scalar;
 mod solve;
-#[cfg(target_arch = "x86_64")]
-mod wide;
 
 pub use links::Links;
-pub use point::{
-    AGAIN, COLD, FAR, FAR_CHANGE, LEFT, MARGIN, MARGIN_FACTOR, PATIENCE, SHORT_STEP, WARM,
-};
 pub use problem::{
     Cost, Outcome, Pairs, Program, Report, Residuals, RowMatrices, Settings, Shape, Stage,
 };

@@ -3,29 +3,52 @@
 use super::problem::Settings;
 use super::scalar::Real;
 
-/// Share of the way to the boundary that a step leaves: the least and the most.
-pub const MARGIN: (f64, f64) = (1e-3, 5e-3);
+/// Least share of the way to the boundary that a step leaves.
+const LEAST_MARGIN: f64 = 1e-3;
+/// Most of it.
+const MOST_MARGIN: f64 = 5e-3;
 /// The share between the two, in units of the mean complementarity: near the optimum steps may go further.
-pub const MARGIN_FACTOR: f64 = 10.0;
-/// Smallest slack and smallest product of slack and multiplier at a start from the gains.
-pub const COLD: (f64, f64) = (3e-1, 3.0);
-/// The same at a start from a guess.
-pub const WARM: (f64, f64) = (1e-2, 1e-3);
-/// The same at a start from a guess at the solution of quite another program.
-pub const FAR: (f64, f64) = (3e-1, 1.0);
-/// The same where a guess turned out to be poor, or the iterations go round in a circle.
-pub const AGAIN: (f64, f64) = (1e-1, 2e-1);
+const MARGIN_FACTOR: f64 = 10.0;
+/// Where slacks and multipliers are centred.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Centring {
+    /// Smallest slack.
+    pub slack: f64,
+    /// Smallest product of slack and multiplier.
+    pub product: f64,
+}
+
+/// At a start from the gains.
+pub(super) const COLD: Centring = Centring {
+    slack: 3e-1,
+    product: 3.0,
+};
+/// At a start from a guess.
+pub(super) const WARM: Centring = Centring {
+    slack: 1e-2,
+    product: 1e-3,
+};
+/// At a start from a guess at the solution of quite another program.
+pub(super) const FAR: Centring = Centring {
+    slack: 3e-1,
+    product: 1.0,
+};
+/// Where a guess turned out to be poor, or the iterations go round in a circle.
+pub(super) const AGAIN: Centring = Centring {
+    slack: 1e-1,
+    product: 2e-1,
+};
 /// A guess is of quite another program if the optimum without rows moved further than this, in units of
 /// the input's rows.
-pub const FAR_CHANGE: f64 = 3.0;
+pub(super) const FAR_CHANGE: f64 = 3.0;
 /// A first step from a guess that is shorter than this shows that the guess is not near a solution.
-pub const SHORT_STEP: f64 = 0.4;
+pub(super) const SHORT_STEP: f64 = 0.4;
 /// Iterations after which slacks and multipliers are centred again: now and then the method goes round
 /// in a circle.
-pub const PATIENCE: u32 = 16;
+pub(super) const PATIENCE: u32 = 16;
 
 /// Share of the residuals at the last centring, those of the gradient among them, that may be left.
-pub const LEFT: f64 = 1e-6;
+const LEFT: f64 = 1e-6;
 
 /// How far a point is from the optimum.
 #[derive(Debug, Clone, Copy)]
@@ -45,6 +68,18 @@ pub(super) struct Point<T> {
 }
 
 impl<T: Real> Point<T> {
+    #[inline(always)]
+    pub fn zeros() -> Self {
+        Self {
+            left: T::ZERO,
+            kept: T::ZERO,
+            residual: T::ZERO,
+            sum: T::ZERO,
+            largest: T::ZERO,
+            value: T::ZERO,
+        }
+    }
+
     /// Largest residual of a row.
     #[inline(always)]
     pub fn infeasibility(&self) -> T {
@@ -65,11 +100,10 @@ impl<T: Real> Point<T> {
 /// Share of the way to the boundary that a step goes at a mean complementarity.
 #[inline(always)]
 pub(super) fn boundary_share<T: Real>(complementarity: T) -> T {
-    let (least, most) = (T::of(MARGIN.0), T::of(MARGIN.1));
     let margin = T::of(MARGIN_FACTOR) * complementarity;
-    if margin < most {
-        T::ONE - least.or_larger(margin)
+    if margin < T::of(MOST_MARGIN) {
+        T::ONE - T::of(LEAST_MARGIN).or_larger(margin)
     } else {
-        T::ONE - most
+        T::ONE - T::of(MOST_MARGIN)
     }
 }

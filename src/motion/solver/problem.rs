@@ -38,9 +38,6 @@ pub struct Stage<T, const NX: usize, const NU: usize> {
     pub(super) soft_inverse: T,
     /// Input of the optimum without rows, of the last program.
     pub(super) plain: [T; NU],
-    /// Columns of `a` and `b`, with which sums over rows are sums of vectors.
-    pub(super) a_columns: [[T; NX]; NX],
-    pub(super) b_columns: [[T; NX]; NU],
 }
 
 impl<T: Real, const NX: usize, const NU: usize> Stage<T, NX, NU> {
@@ -66,21 +63,6 @@ impl<T: Real, const NX: usize, const NU: usize> Stage<T, NX, NU> {
             soft_pull: [z; NU],
             soft_inverse: z,
             plain: [z; NU],
-            a_columns: [[z; NX]; NX],
-            b_columns: [[z; NX]; NU],
-        }
-    }
-
-    /// Writes the columns of the dynamics.
-    #[inline(always)]
-    pub(super) fn keep_columns(&mut self) {
-        for i in 0..NX {
-            for j in 0..NX {
-                self.a_columns[j][i] = self.a[i][j];
-            }
-            for j in 0..NU {
-                self.b_columns[j][i] = self.b[i][j];
-            }
         }
     }
 }
@@ -115,10 +97,23 @@ pub struct Pairs {
 impl Shape {
     /// Rows of a stage; a slack's own `t >= 0` follows its soft rows.
     pub fn rows(&self) -> usize {
-        self.input + self.soft + usize::from(self.soft > 0) + self.hard + self.link
+        self.first_link() + self.link
     }
 
-    /// Numbers that a stage's rows need of `Memory::rows`.
+    /// The row of the slack, if there are soft rows.
+    pub(super) fn slack_row(&self) -> usize {
+        self.input + self.soft
+    }
+
+    pub(super) fn first_hard(&self) -> usize {
+        self.input + self.soft + usize::from(self.soft > 0)
+    }
+
+    pub(super) fn first_link(&self) -> usize {
+        self.first_hard() + self.hard
+    }
+
+    /// Numbers that a stage's rows need of [`Program::rows`].
     pub fn memory(&self) -> usize {
         ROW_NUMBERS * self.rows()
     }
@@ -155,9 +150,10 @@ pub struct Cost<T, const NX: usize, const NU: usize> {
 
 impl<T: Real, const NX: usize, const NU: usize> Cost<T, NX, NU> {
     pub(super) fn state_at(&self, stage: usize, horizon: usize) -> &[T; NX] {
-        match stage + 1 == horizon {
-            true => &self.terminal,
-            false => &self.state,
+        if stage + 1 == horizon {
+            &self.terminal
+        } else {
+            &self.state
         }
     }
 }
@@ -186,37 +182,41 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
     #[inline(always)]
     pub fn at(&self, stage: usize) -> usize {
         let place = self.first + stage;
-        match place < self.stages.len() {
-            true => place,
-            false => place - self.stages.len(),
+        if place < self.stages.len() {
+            place
+        } else {
+            place - self.stages.len()
         }
     }
 
     /// Right-hand sides of a stage's rows: input, soft, hard, link; the one of `t >= 0` in between is zero.
     pub fn bounds_mut(&mut self, stage: usize) -> &mut [T] {
-        let (rows, memory) = (self.shape.rows(), self.shape.memory());
-        let place = self.at(stage);
-        &mut self.rows[place * memory..][..rows]
+        let first = self.at(stage) * self.shape.memory();
+        &mut self.rows[first..][..self.shape.rows()]
     }
 
     /// Multipliers of a stage's rows in the last solution.
     pub fn multipliers(&self, stage: usize) -> &[T] {
-        let (rows, memory) = (self.shape.rows(), self.shape.memory());
-        &self.rows[self.at(stage) * memory + 2 * rows..][..rows]
+        let rows = self.shape.rows();
+        &self.rows[self.at(stage) * self.shape.memory() + 2 * rows..][..rows]
     }
 
     /// Moves the horizon on by one stage: the second becomes the first, and the first the last, whose
     /// data have to be written then. Inputs, slacks and multipliers stay as a guess at the next solution.
     pub fn shift(&mut self) {
-        let (rows, memory) = (self.shape.rows(), self.shape.memory());
-        let (last, new) = (self.at(self.stages.len() - 1), self.first);
-        self.stages[new].v = self.stages[last].v;
-        self.stages[new].t = self.stages[last].t;
-        self.stages[new].plain = self.stages[last].plain;
-        let from = last * memory + 2 * rows;
-        self.rows
-            .copy_within(from..from + rows, new * memory + 2 * rows);
-        self.first = self.at(1);
+        let rows = self.shape.rows();
+        let memory = self.shape.memory();
+        let last = self.at(self.stages.len() - 1);
+        let fresh = self.first;
+        if last != fresh {
+            self.stages[fresh].v = self.stages[last].v;
+            self.stages[fresh].t = self.stages[last].t;
+            self.stages[fresh].plain = self.stages[last].plain;
+            for i in 2 * rows..3 * rows {
+                self.rows[fresh * memory + i] = self.rows[last * memory + i];
+            }
+            self.first = self.at(1);
+        }
     }
 }
 

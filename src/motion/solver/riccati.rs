@@ -6,140 +6,189 @@
 //! H = [ R + Bᵀ P B   Bᵀ P A ]        K = H_vv⁻¹ H_vx,   v = −K x − H_vv⁻¹ h
 //!     [ Aᵀ P B       Aᵀ P A ]        P ← H_xx − H_xv K + Q
 //! ```
-//!
-//! All loops have a fixed number of turns and a fixed order of additions: the generated C has the same.
 
 use super::problem::Stage;
-use super::rows::part;
+use super::rows::{part, part_mut};
 use super::scalar::Real;
 
 /// Most inputs, and the width of rows of `NU` numbers that are filled up with zeros: vectors of four
 /// then have no odd ends.
 pub(super) const WIDE: usize = 12;
 
+/// Products of [`eliminate`], kept from stage to stage so that they need not be cleared.
+pub(super) struct Products<T, const NX: usize, const NU: usize> {
+    pa: [[T; NX]; NX],
+    pb: [[T; WIDE]; NX],
+    b: [[T; WIDE]; NX],
+    /// `H_vv` before the stage's end is added to it; the lower triangle is read.
+    pub hvv: [[T; WIDE]; NU],
+    /// The same of `H_vx`.
+    pub hvx: [[T; NX]; NU],
+    z: [[T; NX]; NU],
+}
+
+impl<T: Real, const NX: usize, const NU: usize> Products<T, NX, NU> {
+    #[inline(always)]
+    pub fn zeros() -> Self {
+        Self {
+            pa: [[T::ZERO; NX]; NX],
+            pb: [[T::ZERO; WIDE]; NX],
+            b: [[T::ZERO; WIDE]; NX],
+            hvv: [[T::ZERO; WIDE]; NU],
+            hvx: [[T::ZERO; NX]; NU],
+            z: [[T::ZERO; NX]; NU],
+        }
+    }
+
+    #[inline(always)]
+    pub fn clear_hessian(&mut self) {
+        for i in 0..NU {
+            self.hvv[i] = [T::ZERO; WIDE];
+            self.hvx[i] = [T::ZERO; NX];
+        }
+    }
+
+    /// `P A` and `P B`.
+    #[inline(always)]
+    fn multiply_end(&mut self, a: &[[T; NX]; NX], p: &[[T; NX]; NX]) {
+        // Two rows at a time: what is read of A and B serves both.
+        for i in (0..NX - NX % 2).step_by(2) {
+            let mut first_a = [T::ZERO; NX];
+            let mut second_a = [T::ZERO; NX];
+            let mut first_b = [T::ZERO; WIDE];
+            let mut second_b = [T::ZERO; WIDE];
+            for k in 0..NX {
+                add_multiple(p[i][k], &a[k], &mut first_a);
+                add_multiple(p[i + 1][k], &a[k], &mut second_a);
+                add_wide::<T, NU>(p[i][k], &self.b[k], &mut first_b);
+                add_wide::<T, NU>(p[i + 1][k], &self.b[k], &mut second_b);
+            }
+            self.pa[i] = first_a;
+            self.pa[i + 1] = second_a;
+            self.pb[i] = first_b;
+            self.pb[i + 1] = second_b;
+        }
+        for i in NX - NX % 2..NX {
+            self.pa[i] = [T::ZERO; NX];
+            self.pb[i] = [T::ZERO; WIDE];
+            for k in 0..NX {
+                add_multiple(p[i][k], &a[k], &mut self.pa[i]);
+                add_wide::<T, NU>(p[i][k], &self.b[k], &mut self.pb[i]);
+            }
+        }
+    }
+
+    /// `H_vx += Bᵀ P A` and `H_vv += Bᵀ P B`.
+    #[inline(always)]
+    fn add_hessian(&mut self) {
+        for i in (0..NU - NU % 2).step_by(2) {
+            let mut first_x = self.hvx[i];
+            let mut second_x = self.hvx[i + 1];
+            let mut first_v = self.hvv[i];
+            let mut second_v = self.hvv[i + 1];
+            for k in 0..NX {
+                add_multiple(self.b[k][i], &self.pa[k], &mut first_x);
+                add_multiple(self.b[k][i + 1], &self.pa[k], &mut second_x);
+                add_wide::<T, NU>(self.b[k][i], &self.pb[k], &mut first_v);
+                add_wide::<T, NU>(self.b[k][i + 1], &self.pb[k], &mut second_v);
+            }
+            self.hvx[i] = first_x;
+            self.hvx[i + 1] = second_x;
+            self.hvv[i] = first_v;
+            self.hvv[i + 1] = second_v;
+        }
+        for i in NU - NU % 2..NU {
+            for k in 0..NX {
+                add_multiple(self.b[k][i], &self.pa[k], &mut self.hvx[i]);
+                add_wide::<T, NU>(self.b[k][i], &self.pb[k], &mut self.hvv[i]);
+            }
+        }
+    }
+
+    /// `P = Aᵀ P A − Yᵀ Z` by its lower triangle, with `Y` in the place of `H_vx`.
+    #[inline(always)]
+    fn write_beginning(&self, a: &[[T; NX]; NX], p: &mut [[T; NX]; NX]) {
+        if NX >= 4 {
+            for i in (0..NX - NX % 4).step_by(4) {
+                for j in (0..i + 4).step_by(8) {
+                    if j + 8 <= i + 4 {
+                        self.write_block::<8>(i, j, a, p);
+                    } else {
+                        self.write_block::<4>(i, j, a, p);
+                    }
+                }
+            }
+        }
+        for i in NX - NX % 4..NX {
+            let mut row = [T::ZERO; NX];
+            for k in 0..NX {
+                add_multiple(a[k][i], &self.pa[k], &mut row);
+            }
+            for k in 0..NU {
+                subtract_multiple(self.hvx[k][i], &self.z[k], &mut row);
+            }
+            p[i] = row;
+        }
+        for i in 0..NX {
+            for j in 0..i {
+                p[j][i] = p[i][j];
+            }
+        }
+    }
+
+    /// `W` columns of four rows of `P`, from this row and column on: a block that stays in registers.
+    #[inline(always)]
+    fn write_block<const W: usize>(
+        &self,
+        i: usize,
+        j: usize,
+        a: &[[T; NX]; NX],
+        p: &mut [[T; NX]; NX],
+    ) {
+        let mut block = [[T::ZERO; W]; 4];
+        for k in 0..NX {
+            let row: &[T; W] = part(&self.pa[k], j);
+            for r in 0..4 {
+                add_multiple(a[k][i + r], row, &mut block[r]);
+            }
+        }
+        for k in 0..NU {
+            let row: &[T; W] = part(&self.z[k], j);
+            for r in 0..4 {
+                subtract_multiple(self.hvx[k][i + r], row, &mut block[r]);
+            }
+        }
+        for r in 0..4 {
+            let row: &mut [T; W] = part_mut(&mut p[i + r], j);
+            *row = block[r];
+        }
+    }
+}
+
 /// `P` of one stage's end to `P` of its beginning, without the costs there; gain and factor of the
-/// stage are overwritten. Of `hvv`, the input's own Hessian, the lower triangle is read. False if the
-/// whole Hessian of the input is not positive definite. `H_vx` begins at what is there if `BEGUN`, else at zero.
+/// stage are overwritten. False if the whole Hessian of the input is not positive definite.
 #[inline(always)]
-pub(super) fn eliminate<T: Real, const NX: usize, const NU: usize, const BEGUN: bool>(
+pub(super) fn eliminate<T: Real, const NX: usize, const NU: usize>(
     stage: &mut Stage<T, NX, NU>,
     p: &mut [[T; NX]; NX],
-    mut hvv: [[T; WIDE]; NU],
-    Products { pa, pb, b, hvx, z }: &mut Products<T, NX, NU>,
+    products: &mut Products<T, NX, NU>,
 ) -> bool {
-    let a = &stage.a;
-    let wide = NU.div_ceil(4) * 4;
     for k in 0..NX {
         for j in 0..NU {
-            b[k][j] = stage.b[k][j];
+            products.b[k][j] = stage.b[k][j];
         }
     }
-    // Two rows at a time: what is read of A and B serves both.
-    for i in (0..NX - NX % 2).step_by(2) {
-        let (mut first_a, mut second_a) = ([T::ZERO; NX], [T::ZERO; NX]);
-        let (mut first_b, mut second_b) = ([T::ZERO; WIDE], [T::ZERO; WIDE]);
-        for k in 0..NX {
-            add_multiple(p[i][k], &a[k], &mut first_a);
-            add_multiple(p[i + 1][k], &a[k], &mut second_a);
-            for j in 0..wide {
-                first_b[j] += p[i][k] * b[k][j];
-            }
-            for j in 0..wide {
-                second_b[j] += p[i + 1][k] * b[k][j];
-            }
-        }
-        (pa[i], pa[i + 1]) = (first_a, second_a);
-        (pb[i], pb[i + 1]) = (first_b, second_b);
-    }
-    for i in NX - NX % 2..NX {
-        (pa[i], pb[i]) = ([T::ZERO; NX], [T::ZERO; WIDE]);
-        for k in 0..NX {
-            add_multiple(p[i][k], &a[k], &mut pa[i]);
-            add_multiple(p[i][k], &b[k], &mut pb[i]);
-        }
-    }
-    for i in (0..NU - NU % 2).step_by(2) {
-        let (mut first_x, mut second_x) = match BEGUN {
-            true => (hvx[i], hvx[i + 1]),
-            false => ([T::ZERO; NX], [T::ZERO; NX]),
-        };
-        let (mut first_v, mut second_v) = (hvv[i], hvv[i + 1]);
-        for k in 0..NX {
-            add_multiple(b[k][i], &pa[k], &mut first_x);
-            add_multiple(b[k][i + 1], &pa[k], &mut second_x);
-            for j in 0..wide {
-                first_v[j] += b[k][i] * pb[k][j];
-            }
-            for j in 0..wide {
-                second_v[j] += b[k][i + 1] * pb[k][j];
-            }
-        }
-        (hvx[i], hvx[i + 1]) = (first_x, second_x);
-        (hvv[i], hvv[i + 1]) = (first_v, second_v);
-    }
-    for i in NU - NU % 2..NU {
-        if !BEGUN {
-            hvx[i] = [T::ZERO; NX];
-        }
-        for k in 0..NX {
-            add_multiple(b[k][i], &pa[k], &mut hvx[i]);
-            add_multiple(b[k][i], &pb[k], &mut hvv[i]);
-        }
-    }
-    if !factorise(&hvv, &mut stage.factor) {
+    products.multiply_end(&stage.a, p);
+    products.add_hessian();
+    if !factorise(&products.hvv, &mut stage.factor) {
         return false;
     }
     // Y = L⁻¹ H_vx, Z = D⁻¹ Y; P = H_xx − Yᵀ Z; K = L⁻ᵀ Z.
-    let factor = &stage.factor;
-    let y = hvx;
-    for i in 1..NU {
-        for k in 0..i {
-            let entry = factor[i][k];
-            for j in 0..NX {
-                y[i][j] = y[i][j] - entry * y[k][j];
-            }
-        }
-    }
-    for i in 0..NU {
-        for j in 0..NX {
-            z[i][j] = factor[i][i] * y[i][j];
-        }
-    }
-    for i in (0..NX - NX % 4).step_by(4) {
-        for j in (0..i + 4).step_by(8) {
-            match j + 8 <= i + 4 {
-                true => lower_block::<T, NX, NU, 8>((i, j), a, pa, y, z, p),
-                false => lower_block::<T, NX, NU, 4>((i, j), a, pa, y, z, p),
-            }
-        }
-    }
-    for i in NX - NX % 4..NX {
-        let mut row = [T::ZERO; NX];
-        for k in 0..NX {
-            add_multiple(a[k][i], &pa[k], &mut row);
-        }
-        for k in 0..NU {
-            let entry = y[k][i];
-            for j in 0..NX {
-                row[j] = row[j] - entry * z[k][j];
-            }
-        }
-        p[i] = row;
-    }
-    for i in 0..NX {
-        for j in 0..i {
-            p[j][i] = p[i][j];
-        }
-    }
-    for i in (0..NU).rev() {
-        for k in i + 1..NU {
-            let entry = factor[k][i];
-            for j in 0..NX {
-                z[i][j] = z[i][j] - entry * z[k][j];
-            }
-        }
-    }
-    stage.gain = *z;
+    solve_lower_rows(&stage.factor, &mut products.hvx);
+    scale_rows(&stage.factor, &products.hvx, &mut products.z);
+    products.write_beginning(&stage.a, p);
+    solve_upper_rows(&stage.factor, &mut products.z);
+    stage.gain = products.z;
     true
 }
 
@@ -175,12 +224,9 @@ fn factorise<T: Real, const NU: usize>(
     true
 }
 
-/// `H_vv⁻¹ h` by a factor of [`factorise`].
+/// `H_vv⁻¹ h` by a factor of [`factorise`], in the place of `h`.
 #[inline(always)]
-pub(super) fn solve_factored<T: Real, const NU: usize>(
-    factor: &[[T; NU]; NU],
-    mut h: [T; NU],
-) -> [T; NU] {
+fn solve_factored<T: Real, const NU: usize>(factor: &[[T; NU]; NU], h: &mut [T; NU]) {
     for i in 1..NU {
         for k in 0..i {
             h[i] = h[i] - factor[i][k] * h[k];
@@ -194,13 +240,78 @@ pub(super) fn solve_factored<T: Real, const NU: usize>(
             h[i] = h[i] - factor[k][i] * h[k];
         }
     }
-    h
+}
+
+/// `M ← L⁻¹ M`.
+#[inline(always)]
+pub(super) fn solve_lower_rows<T: Real, const NU: usize, const N: usize>(
+    factor: &[[T; NU]; NU],
+    matrix: &mut [[T; N]; NU],
+) {
+    for i in 1..NU {
+        for k in 0..i {
+            let entry = factor[i][k];
+            for j in 0..N {
+                matrix[i][j] = matrix[i][j] - entry * matrix[k][j];
+            }
+        }
+    }
+}
+
+/// `out = D⁻¹ M`.
+#[inline(always)]
+pub(super) fn scale_rows<T: Real, const NU: usize, const N: usize>(
+    factor: &[[T; NU]; NU],
+    matrix: &[[T; N]; NU],
+    out: &mut [[T; N]; NU],
+) {
+    for i in 0..NU {
+        for j in 0..N {
+            out[i][j] = factor[i][i] * matrix[i][j];
+        }
+    }
+}
+
+/// `M ← L⁻ᵀ M`.
+#[inline(always)]
+pub(super) fn solve_upper_rows<T: Real, const NU: usize, const N: usize>(
+    factor: &[[T; NU]; NU],
+    matrix: &mut [[T; N]; NU],
+) {
+    for i in (0..NU).rev() {
+        for k in i + 1..NU {
+            let entry = factor[k][i];
+            for j in 0..N {
+                matrix[i][j] = matrix[i][j] - entry * matrix[k][j];
+            }
+        }
+    }
 }
 
 /// `out += factor row`.
 #[inline(always)]
 pub(super) fn add_multiple<T: Real, const N: usize>(factor: T, row: &[T; N], out: &mut [T; N]) {
     for j in 0..N {
+        out[j] += factor * row[j];
+    }
+}
+
+/// `out −= factor row`.
+#[inline(always)]
+pub(super) fn subtract_multiple<T: Real, const N: usize>(
+    factor: T,
+    row: &[T; N],
+    out: &mut [T; N],
+) {
+    for j in 0..N {
+        out[j] = out[j] - factor * row[j];
+    }
+}
+
+/// `out += factor row` of rows of `NU` numbers and zeros.
+#[inline(always)]
+fn add_wide<T: Real, const NU: usize>(factor: T, row: &[T; WIDE], out: &mut [T; WIDE]) {
+    for j in 0..NU.div_ceil(4) * 4 {
         out[j] += factor * row[j];
     }
 }
@@ -217,125 +328,73 @@ pub(super) fn add_transposed<T: Real, const ROWS: usize, const COLS: usize>(
     }
 }
 
-/// `out + M x`, each row summed in the order of its entries.
+/// `out += M x`, each row summed in the order of its entries; four rows at a time, as their sums do not wait for each
+/// other.
 #[inline(always)]
-pub(super) fn plus_product<T: Real, const ROWS: usize, const COLS: usize>(
+pub(super) fn add_product<T: Real, const ROWS: usize, const COLS: usize>(
     matrix: &[[T; COLS]; ROWS],
     x: &[T; COLS],
-    mut out: [T; ROWS],
-) -> [T; ROWS] {
-    for i in 0..ROWS {
+    out: &mut [T; ROWS],
+) {
+    for i in (0..ROWS - ROWS % 4).step_by(4) {
+        let mut sums = [T::ZERO; 4];
+        for r in 0..4 {
+            sums[r] = out[i + r];
+        }
+        for j in 0..COLS {
+            for r in 0..4 {
+                sums[r] += matrix[i + r][j] * x[j];
+            }
+        }
+        for r in 0..4 {
+            out[i + r] = sums[r];
+        }
+    }
+    for i in ROWS - ROWS % 4..ROWS {
         let mut sum = out[i];
         for j in 0..COLS {
             sum += matrix[i][j] * x[j];
         }
         out[i] = sum;
     }
-    out
 }
 
-/// Gradient pass of one stage: from `p` at its end, with the cost's gradient there added already, to
-/// `p` at its beginning; the stage's constant part of the input is overwritten. Returns the whole gradient by the
-/// input.
-#[inline(always)]
-pub(super) fn pull<T: Real, const NX: usize, const NU: usize>(
-    stage: &mut Stage<T, NX, NU>,
-    p: &mut [T; NX],
-    mut h: [T; NU],
-) -> [T; NU] {
-    add_transposed(&stage.b, p, &mut h);
-    stage.feed = solve_factored(&stage.factor, h);
-    let mut next = [T::ZERO; NX];
-    add_transposed(&stage.a, p, &mut next);
-    for k in 0..NU {
-        for j in 0..NX {
-            next[j] = next[j] - stage.gain[k][j] * h[k];
-        }
+impl<T: Real, const NX: usize, const NU: usize> Stage<T, NX, NU> {
+    /// State at the stage's end: `A x + B v + c`.
+    #[inline(always)]
+    pub(super) fn end(&self, x: &[T; NX], v: &[T; NU], end: &mut [T; NX]) {
+        let mut sum = self.c;
+        add_product(&self.a, x, &mut sum);
+        add_product(&self.b, v, &mut sum);
+        *end = sum;
     }
-    *p = next;
-    h
-}
 
-/// Input of a stage from the state at its beginning: `−feed − K x`.
-#[inline(always)]
-pub(super) fn answer<T: Real, const NX: usize, const NU: usize>(
-    stage: &Stage<T, NX, NU>,
-    x: &[T; NX],
-) -> [T; NU] {
-    let mut v = [T::ZERO; NU];
-    for i in 0..NU {
-        let mut sum = stage.feed[i];
-        for j in 0..NX {
-            sum += stage.gain[i][j] * x[j];
-        }
-        v[i] = -sum;
-    }
-    v
-}
-
-/// `out + M x` for a matrix given by its columns: each row is summed in the order of its entries.
-#[inline(always)]
-pub(super) fn plus_columns<T: Real, const ROWS: usize, const COLS: usize>(
-    columns: &[[T; ROWS]; COLS],
-    x: &[T; COLS],
-    mut out: [T; ROWS],
-) -> [T; ROWS] {
-    for j in 0..COLS {
-        add_multiple(x[j], &columns[j], &mut out);
-    }
-    out
-}
-
-/// `W` columns of four rows of `P`, from this row and column on: a block that stays in registers.
-#[inline(always)]
-fn lower_block<T: Real, const NX: usize, const NU: usize, const W: usize>(
-    (i, j): (usize, usize),
-    a: &[[T; NX]; NX],
-    pa: &[[T; NX]; NX],
-    y: &[[T; NX]; NU],
-    z: &[[T; NX]; NU],
-    p: &mut [[T; NX]; NX],
-) {
-    let mut block = [[T::ZERO; W]; 4];
-    for k in 0..NX {
-        let row = part(&pa[k], j);
-        for r in 0..4 {
-            add_multiple(a[k][i + r], row, &mut block[r]);
-        }
-    }
-    for k in 0..NU {
-        let row: &[T; W] = part(&z[k], j);
-        for r in 0..4 {
-            for c in 0..W {
-                block[r][c] = block[r][c] - y[k][i + r] * row[c];
+    /// Gradient pass: from `p` at the stage's end, with the cost's gradient there added already, to
+    /// `p` at its beginning, and from the gradient `h` by the input to the whole one; the constant part of the
+    /// input is overwritten.
+    #[inline(always)]
+    pub(super) fn pull(&mut self, p: &mut [T; NX], h: &mut [T; NU]) {
+        add_transposed(&self.b, p, h);
+        let mut feed = *h;
+        solve_factored(&self.factor, &mut feed);
+        self.feed = feed;
+        let mut next = [T::ZERO; NX];
+        add_transposed(&self.a, p, &mut next);
+        for k in 0..NU {
+            for j in 0..NX {
+                next[j] = next[j] - self.gain[k][j] * h[k];
             }
         }
+        *p = next;
     }
-    for r in 0..4 {
-        p[i + r][j..][..W].copy_from_slice(&block[r]);
-    }
-}
 
-/// Products of [`eliminate`], kept from stage to stage so that they need not be cleared.
-pub(super) struct Products<T, const NX: usize, const NU: usize> {
-    pa: [[T; NX]; NX],
-    pb: [[T; WIDE]; NX],
-    b: [[T; WIDE]; NX],
-    pub hvx: [[T; NX]; NU],
-    z: [[T; NX]; NU],
-}
-
-impl<T: Real, const NX: usize, const NU: usize> Products<T, NX, NU> {
-    /// Zeros.
+    /// Input from the state at the stage's beginning: `−feed − K x`.
     #[inline(always)]
-    pub fn new() -> Self {
-        let z = T::ZERO;
-        Self {
-            pa: [[z; NX]; NX],
-            pb: [[z; WIDE]; NX],
-            b: [[z; WIDE]; NX],
-            hvx: [[z; NX]; NU],
-            z: [[z; NX]; NU],
+    pub(super) fn answer(&self, x: &[T; NX], v: &mut [T; NU]) {
+        let mut sum = self.feed;
+        add_product(&self.gain, x, &mut sum);
+        for i in 0..NU {
+            v[i] = -sum[i];
         }
     }
 }

@@ -5,16 +5,19 @@ use super::problem::Program;
 use super::riccati::add_multiple;
 use super::scalar::Real;
 
-/// The numbers of one stage's rows.
+/// The numbers of one stage's rows, as many of each kind.
 pub(super) struct Rows<'a, T> {
+    pub count: usize,
     pub bound: &'a mut [T],
     pub slack: &'a mut [T],
     pub multiplier: &'a mut [T],
     pub weight: &'a mut [T],
+    /// Products of the rows with a point, and later numbers that are made of them.
     pub target: &'a mut [T],
     pub residual: &'a mut [T],
     pub dslack: &'a mut [T],
     pub dmultiplier: &'a mut [T],
+    /// Inverse of the slack.
     pub inverse: &'a mut [T],
 }
 
@@ -29,8 +32,9 @@ impl<'a, T: Real> Rows<'a, T> {
         let (residual, rest) = rest.split_at_mut(count);
         let (dslack, rest) = rest.split_at_mut(count);
         let (dmultiplier, rest) = rest.split_at_mut(count);
-        let (inverse, _) = rest.split_at_mut(count);
+        let inverse = &mut rest[..count];
         Self {
+            count,
             bound,
             slack,
             multiplier,
@@ -46,7 +50,7 @@ impl<'a, T: Real> Rows<'a, T> {
     /// Weights of the rows, and multipliers aimed at by a step that does not centre, in `dmultiplier`.
     #[inline(always)]
     pub fn weigh(&mut self, left: T) {
-        for i in 0..self.slack.len() {
+        for i in 0..self.count {
             let inverse = T::ONE / self.slack[i];
             let weight = self.multiplier[i] * inverse;
             self.inverse[i] = inverse;
@@ -58,7 +62,7 @@ impl<'a, T: Real> Rows<'a, T> {
     /// The same of rows that are softened.
     #[inline(always)]
     pub fn weigh_softened(&mut self, softness: T) {
-        for i in 0..self.slack.len() {
+        for i in 0..self.count {
             let yield_of_row = softness * self.multiplier[i];
             let inverse = T::ONE / (self.slack[i] + yield_of_row);
             let weight = self.multiplier[i] * inverse;
@@ -68,11 +72,60 @@ impl<'a, T: Real> Rows<'a, T> {
         }
     }
 
-    /// Changes of slacks and multipliers of rows that are softened, from the products of the rows in `target` and
-    /// the multipliers aimed at in `dmultiplier`; into `target`, how often they go into what is left of each.
+    /// Multipliers aimed at by a step that aims at this product of slacks and multipliers, from the changes of
+    /// the step that does not centre.
+    #[inline(always)]
+    pub fn aim_at(&mut self, left: T, aim: T) {
+        for i in 0..self.count {
+            let second = self.dslack[i] * self.dmultiplier[i];
+            let residual = left * self.residual[i];
+            self.dmultiplier[i] = self.weight[i] * residual + (aim - second) * self.inverse[i];
+        }
+    }
+
+    /// The same of rows that are softened.
+    #[inline(always)]
+    pub fn aim_softened(&mut self, softness: T, aim: T) {
+        for i in 0..self.count {
+            let second = self.dslack[i] * self.dmultiplier[i];
+            let residual = self.residual[i] + softness * self.multiplier[i];
+            self.dmultiplier[i] = self.weight[i] * residual + (aim - second) * self.inverse[i];
+        }
+    }
+
+    /// Changes of slacks and multipliers of a step that does not centre, from the products of the rows in `target`;
+    /// into `target`, how often they go into what is left of each.
+    #[inline(always)]
+    pub fn change(&mut self, left: T) {
+        for i in 0..self.count {
+            let dslack = -(left * self.residual[i]) - self.target[i];
+            self.dslack[i] = dslack;
+            self.dmultiplier[i] = -self.multiplier[i] - self.weight[i] * dslack;
+            // The relative changes of slack and multiplier have the sum of minus one.
+            let to_slack = -dslack * self.inverse[i];
+            self.target[i] = to_slack.or_larger(T::ONE - to_slack);
+        }
+    }
+
+    /// The same of a step that centres, from the multipliers aimed at in `dmultiplier`.
+    #[inline(always)]
+    pub fn change_corrected(&mut self, left: T) {
+        for i in 0..self.count {
+            let change = self.target[i];
+            let dslack = -(left * self.residual[i]) - change;
+            let dmultiplier = self.dmultiplier[i] - self.multiplier[i] + self.weight[i] * change;
+            self.dslack[i] = dslack;
+            self.dmultiplier[i] = dmultiplier;
+            let to_slack = -dslack * self.inverse[i];
+            let to_multiplier = -dmultiplier / self.multiplier[i];
+            self.target[i] = to_slack.or_larger(to_multiplier);
+        }
+    }
+
+    /// The same of either step, of rows that are softened.
     #[inline(always)]
     pub fn change_softened(&mut self, softness: T) {
-        for i in 0..self.slack.len() {
+        for i in 0..self.count {
             let change = self.target[i];
             let dmultiplier = self.dmultiplier[i] - self.multiplier[i] + self.weight[i] * change;
             let dslack = softness * dmultiplier - (self.residual[i] + change);
@@ -82,14 +135,25 @@ impl<'a, T: Real> Rows<'a, T> {
             self.target[i] = (-dslack / self.slack[i]).or_larger(to_multiplier);
         }
     }
+
+    /// Multipliers of a stage where no row is active: the whole price at the slack.
+    #[inline(always)]
+    pub fn write_multipliers(&mut self, soft: usize, slack_row: usize, price: T) {
+        for i in 0..self.count {
+            self.multiplier[i] = T::ZERO;
+        }
+        if soft > 0 {
+            self.multiplier[slack_row] = price;
+        }
+    }
 }
 
 impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, T, NX, NU, LINKED> {
     #[inline(always)]
     pub(super) fn rows_of(&mut self, stage: usize) -> Rows<'_, T> {
-        let (count, memory) = (self.shape.rows(), self.shape.memory());
+        let memory = self.shape.memory();
         let first = self.at(stage) * memory;
-        Rows::of(&mut self.rows[first..][..memory], count)
+        Rows::of(&mut self.rows[first..][..memory], self.shape.rows())
     }
 
     /// The rows of a stage times a point, into their `target`; `before` is the input of the stage before.
@@ -97,36 +161,44 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
     pub(super) fn rows_times(
         &mut self,
         k: usize,
-        (before, v): (&[T; NU], &[T; NU]),
+        before: &[T; NU],
+        v: &[T; NU],
         x: &[T; NX],
         t: T,
     ) -> Rows<'_, T> {
+        let shape = self.shape;
+        let memory = shape.memory();
         let place = self.at(k);
-        let (own, earlier) = self.link_pairs(k);
-        let (shape, stage, matrices) = (self.shape, &self.stages[place], self.matrices);
-        let (count, memory) = (shape.rows(), shape.memory());
-        let rows = Rows::of(&mut self.rows[place * memory..][..memory], count);
-        let (input, rest) = rows.target.split_at_mut(shape.input);
-        let on_input = &matrices.input[stage.input_rows..];
-        times(on_input, shape.pairs.input, v, input);
-        let (soft, rest) = rest.split_at_mut(shape.soft);
-        if shape.soft > 0 {
+        let before_place = if k > 0 { self.at(k - 1) } else { 0 };
+        let rows: Rows<T> = Rows::of(&mut self.rows[place * memory..][..memory], shape.rows());
+        let stage = &self.stages[place];
+        let input = &self.matrices.input[stage.input_rows..];
+        times(input, shape.pairs.input, shape.input, v, rows.target);
+        if NU <= NX && shape.soft > 0 {
             let z: &[T; NU] = part(x, 0);
-            for (out, row) in soft.iter_mut().zip(&matrices.soft[stage.soft_rows..]) {
-                *out = dot(row, z) - t;
+            let soft = &self.matrices.soft[stage.soft_rows..][..shape.soft];
+            let products = &mut rows.target[shape.input..][..shape.soft];
+            for i in 0..shape.soft {
+                products[i] = dot(&soft[i], z) - t;
             }
-            rest[0] = -t;
+            rows.target[shape.slack_row()] = -t;
         }
-        if shape.hard > 0 {
+        if NU <= NX && shape.hard > 0 {
             let z: &[T; NU] = part(x, shape.hard_offset);
-            let hard = &mut rest[usize::from(shape.soft > 0)..][..shape.hard];
-            times(&matrices.hard[stage.hard_rows..], shape.pairs.hard, z, hard);
+            let hard = &self.matrices.hard[stage.hard_rows..];
+            let products = &mut rows.target[shape.first_hard()..];
+            times(hard, shape.pairs.hard, shape.hard, z, products);
         }
         if LINKED {
-            let link = &mut rows.target[count - shape.link..];
-            times(own, 0, v, link);
-            for (out, row) in link.iter_mut().zip(earlier) {
-                *out = *out - dot(row, before);
+            let products = &mut rows.target[shape.first_link()..];
+            let first = place * shape.link;
+            times(&self.links.rows[first..], 0, shape.link, v, products);
+            if k > 0 {
+                let first_earlier = before_place * shape.link;
+                let earlier = &self.links.rows[first_earlier..][..shape.link];
+                for i in 0..shape.link {
+                    products[i] = products[i] - dot(&earlier[i], before);
+                }
             }
         }
         rows
@@ -142,27 +214,31 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
         by_v: &mut [T; NU],
         by_x: &mut [T; NX],
     ) -> T {
-        let (shape, stage, matrices) = (self.shape, &self.stages[self.at(k)], self.matrices);
-        let (input, rest) = y.split_at(shape.input);
-        let on_input = &matrices.input[stage.input_rows..];
-        add_rows(input, on_input, shape.pairs.input, by_v);
+        let shape = self.shape;
+        let stage = &self.stages[self.at(k)];
+        let input = &self.matrices.input[stage.input_rows..];
+        add_rows(y, input, shape.pairs.input, shape.input, by_v);
         let mut by_t = T::ZERO;
-        if shape.soft > 0 {
+        if NU <= NX && shape.soft > 0 {
+            let y_soft = &y[shape.input..][..shape.soft + 1];
             by_t = self.cost.slack;
-            for y in &rest[..shape.soft] {
-                by_t -= *y;
+            for i in 0..shape.soft {
+                by_t -= y_soft[i];
             }
-            let soft = &matrices.soft[stage.soft_rows..];
-            add_rows(&rest[..shape.soft], soft, 0, part_mut(by_x, 0));
-            by_t -= rest[shape.soft];
+            let soft = &self.matrices.soft[stage.soft_rows..];
+            let by_z: &mut [T; NU] = part_mut(by_x, 0);
+            add_rows(y_soft, soft, 0, shape.soft, by_z);
+            by_t -= y_soft[shape.soft];
         }
-        if shape.hard > 0 {
-            let y = &rest[shape.soft + usize::from(shape.soft > 0)..][..shape.hard];
-            let hard = &matrices.hard[stage.hard_rows..];
-            add_rows(y, hard, shape.pairs.hard, part_mut(by_x, shape.hard_offset));
+        if NU <= NX && shape.hard > 0 {
+            let hard = &self.matrices.hard[stage.hard_rows..];
+            let by_z: &mut [T; NU] = part_mut(by_x, shape.hard_offset);
+            let y_hard = &y[shape.first_hard()..];
+            add_rows(y_hard, hard, shape.pairs.hard, shape.hard, by_z);
         }
         if LINKED {
-            add_rows(&y[y.len() - shape.link..], self.link_rows(k), 0, by_v);
+            let y_link = &y[shape.first_link()..];
+            add_rows(y_link, self.link_rows(k), 0, shape.link, by_v);
         }
         by_t
     }
@@ -170,82 +246,92 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
 
 /// Entries of a vector from this one on.
 #[inline(always)]
-pub(super) fn part<T, const NX: usize, const NU: usize>(x: &[T; NX], first: usize) -> &[T; NU] {
-    (x[first..].first_chunk()).expect("a part ends before its vector")
+pub(super) fn part<T, const N: usize>(values: &[T], first: usize) -> &[T; N] {
+    (values[first..].first_chunk()).expect("a part ends before its vector")
 }
 
 #[inline(always)]
-pub(super) fn part_mut<T, const NX: usize, const NU: usize>(
-    x: &mut [T; NX],
-    first: usize,
-) -> &mut [T; NU] {
-    (x[first..].first_chunk_mut()).expect("a part ends before its vector")
+pub(super) fn part_mut<T, const N: usize>(values: &mut [T], first: usize) -> &mut [T; N] {
+    (values[first..].first_chunk_mut()).expect("a part ends before its vector")
 }
 
-/// Pairs of numbers, and the numbers behind them.
+/// `out = rows x` of `count` rows, of which so many pairs of opposite ones come first.
 #[inline(always)]
-fn paired<V>(values: &[V], pairs: usize) -> (&[[V; 2]], &[V]) {
-    let (paired, single) = values.split_at(2 * pairs);
-    (paired.as_chunks().0, single)
-}
-
-/// `out = rows x`, of which so many pairs of opposite rows come first.
-#[inline(always)]
-fn times<T: Real, const N: usize>(rows: &[[T; N]], pairs: usize, x: &[T; N], out: &mut [T]) {
-    let (row_pairs, row_singles) = paired(rows, pairs);
-    let (out_pairs, out_singles) = out.split_at_mut(2 * pairs);
-    for (out, [row, _]) in out_pairs.as_chunks_mut().0.iter_mut().zip(row_pairs) {
-        let product = dot(row, x);
-        *out = [product, -product];
+fn times<T: Real, const NU: usize>(
+    rows: &[[T; NU]],
+    pairs: usize,
+    count: usize,
+    x: &[T; NU],
+    out: &mut [T],
+) {
+    let rows = &rows[..count];
+    let out = &mut out[..count];
+    for pair in 0..pairs {
+        let product = dot(&rows[2 * pair], x);
+        out[2 * pair] = product;
+        out[2 * pair + 1] = -product;
     }
-    for (out, row) in out_singles.iter_mut().zip(row_singles) {
-        *out = dot(row, x);
+    for i in 2 * pairs..count {
+        out[i] = dot(&rows[i], x);
     }
 }
 
-/// `sum += Σ y row`, of which so many pairs of opposite rows come first.
+/// `sum += Σ y row` of `count` rows, of which so many pairs of opposite ones come first.
 #[inline(always)]
-fn add_rows<T: Real, const N: usize>(y: &[T], rows: &[[T; N]], pairs: usize, sum: &mut [T; N]) {
+fn add_rows<T: Real, const NU: usize>(
+    y: &[T],
+    rows: &[[T; NU]],
+    pairs: usize,
+    count: usize,
+    sum: &mut [T; NU],
+) {
+    let y = &y[..count];
+    let rows = &rows[..count];
     // A local sum stays in registers.
     let mut local = *sum;
-    let (row_pairs, row_singles) = paired(rows, pairs);
-    let (y_pairs, y_singles) = paired(y, pairs);
-    for ([y, opposite], [row, _]) in y_pairs.iter().zip(row_pairs) {
-        add_multiple(*y - *opposite, row, &mut local);
+    for pair in 0..pairs {
+        let both = y[2 * pair] - y[2 * pair + 1];
+        add_multiple(both, &rows[2 * pair], &mut local);
     }
-    for (y, row) in y_singles.iter().zip(row_singles) {
-        add_multiple(*y, row, &mut local);
+    for i in 2 * pairs..count {
+        add_multiple(y[i], &rows[i], &mut local);
     }
     *sum = local;
 }
 
-/// `square += Σ w row rowᵀ` and `sum += Σ y row`, of which so many pairs of opposite rows come first.
+/// `square += Σ w row rowᵀ` and `sum += Σ y row` of `count` rows, of which so many pairs of opposite ones come first.
 #[inline(always)]
-pub(super) fn add_weighted<T: Real, const N: usize>(
-    (w, y): (&[T], &[T]),
-    rows: &[[T; N]],
+pub(super) fn add_weighted<T: Real, const NU: usize>(
+    w: &[T],
+    y: &[T],
+    rows: &[[T; NU]],
     pairs: usize,
-    square: &mut Lower<T, N>,
-    sum: &mut [T; N],
+    count: usize,
+    square: &mut Lower<T, NU>,
+    sum: &mut [T; NU],
 ) {
-    let (mut local, mut local_sum) = (*square, *sum);
-    let (row_pairs, row_singles) = paired(rows, pairs);
-    let ((w_pairs, w_singles), (y_pairs, y_singles)) = (paired(w, pairs), paired(y, pairs));
-    for (([w, other_w], [y, other_y]), [row, _]) in w_pairs.iter().zip(y_pairs).zip(row_pairs) {
-        local.add_square(*w + *other_w, row);
-        add_multiple(*y - *other_y, row, &mut local_sum);
+    let w = &w[..count];
+    let y = &y[..count];
+    let rows = &rows[..count];
+    let mut local = *square;
+    let mut local_sum = *sum;
+    for pair in 0..pairs {
+        let row = &rows[2 * pair];
+        local.add_square(w[2 * pair] + w[2 * pair + 1], row);
+        add_multiple(y[2 * pair] - y[2 * pair + 1], row, &mut local_sum);
     }
-    for ((w, y), row) in w_singles.iter().zip(y_singles).zip(row_singles) {
-        local.add_square(*w, row);
-        add_multiple(*y, row, &mut local_sum);
+    for i in 2 * pairs..count {
+        local.add_square(w[i], &rows[i]);
+        add_multiple(y[i], &rows[i], &mut local_sum);
     }
-    (*square, *sum) = (local, local_sum);
+    *square = local;
+    *sum = local_sum;
 }
 
 #[inline(always)]
-pub(super) fn dot<T: Real, const N: usize>(row: &[T; N], x: &[T; N]) -> T {
+pub(super) fn dot<T: Real, const NU: usize>(row: &[T; NU], x: &[T; NU]) -> T {
     let mut sum = row[0] * x[0];
-    for j in 1..N {
+    for j in 1..NU {
         sum += row[j] * x[j];
     }
     sum
@@ -253,33 +339,37 @@ pub(super) fn dot<T: Real, const N: usize>(row: &[T; N], x: &[T; N]) -> T {
 
 /// The largest of numbers and one more, four at a time.
 #[inline(always)]
-pub(super) fn largest_of<T: Real>(values: &[T], so_far: T) -> T {
+pub(super) fn largest_of<T: Real>(values: &[T], count: usize, so_far: T) -> T {
+    let values = &values[..count];
+    let fours = count / 4;
     let mut lanes = [so_far; 4];
-    let (fours, rest) = values.as_chunks::<4>();
-    for four in fours {
+    for four in 0..fours {
+        let next: &[T; 4] = part(values, 4 * four);
         for j in 0..4 {
-            lanes[j] = four[j].or_larger(lanes[j]);
+            lanes[j] = next[j].or_larger(lanes[j]);
         }
     }
-    for (lane, value) in lanes.iter_mut().zip(rest) {
-        *lane = value.or_larger(*lane);
+    for i in 4 * fours..count {
+        lanes[i % 4] = values[i].or_larger(lanes[i % 4]);
     }
-    let (first, second) = (lanes[0].or_larger(lanes[1]), lanes[2].or_larger(lanes[3]));
-    first.or_larger(second)
+    let first = lanes[0].or_larger(lanes[1]);
+    first.or_larger(lanes[2].or_larger(lanes[3]))
 }
 
 /// The sum of numbers in four parts, those of every fourth one.
 #[inline(always)]
-pub(super) fn sum_of<T: Real>(values: &[T]) -> T {
+pub(super) fn sum_of<T: Real>(values: &[T], count: usize) -> T {
+    let values = &values[..count];
+    let fours = count / 4;
     let mut parts = [T::ZERO; 4];
-    let (fours, rest) = values.as_chunks::<4>();
-    for four in fours {
+    for four in 0..fours {
+        let next: &[T; 4] = part(values, 4 * four);
         for j in 0..4 {
-            parts[j] += four[j];
+            parts[j] += next[j];
         }
     }
-    for (part, value) in parts.iter_mut().zip(rest) {
-        *part += *value;
+    for i in 4 * fours..count {
+        parts[i % 4] += values[i];
     }
     (parts[0] + parts[1]) + (parts[2] + parts[3])
 }

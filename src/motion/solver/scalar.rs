@@ -41,6 +41,12 @@ pub trait Real:
         if self > other { self } else { other }
     }
 
+    /// The larger of two; not a number if either is not.
+    #[inline(always)]
+    fn or_kept_larger(self, other: Self) -> Self {
+        if self <= other { other } else { self }
+    }
+
     /// Whether it is neither infinite nor not a number.
     #[inline(always)]
     fn is_finite_number(self) -> bool {

@@ -1,9 +1,9 @@
 //! The solve: the linear-quadratic optimum if it keeps every row, otherwise iterations from a guess.
 
 use super::links::pull_before;
-use super::point::{AGAIN, COLD, FAR, FAR_CHANGE, PATIENCE, SHORT_STEP, WARM};
+use super::point::{AGAIN, COLD, FAR, FAR_CHANGE, PATIENCE, Point, SHORT_STEP, WARM};
 use super::problem::{Outcome, Program, Report, Residuals, Settings};
-use super::riccati::{Products, WIDE, add_transposed, answer, eliminate, plus_product, pull};
+use super::riccati::{Products, add_product, add_transposed, eliminate};
 use super::scalar::Real;
 
 impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, T, NX, NU, LINKED> {
@@ -12,25 +12,26 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
     #[inline(always)]
     pub fn prepare(&mut self) -> bool {
         let horizon = self.stages.len();
-        let mut products = Products::new();
+        let mut products: Products<T, NX, NU> = Products::zeros();
         let mut p = [[T::ZERO; NX]; NX];
         let mut linear = [T::ZERO; NX];
         for k in (0..horizon).rev() {
             let weight = self.cost.state_at(k, horizon);
+            let at = self.at(k);
+            let stage = &mut self.stages[at];
             for i in 0..NX {
                 p[i][i] += weight[i];
             }
-            let at = self.at(k);
-            let stage = &mut self.stages[at];
-            linear = plus_product(&p, &stage.c, linear);
-            let mut hessian = [[T::ZERO; WIDE]; NU];
+            add_product(&p, &stage.c, &mut linear);
+            products.clear_hessian();
             for i in 0..NU {
-                hessian[i][i] = self.cost.input[i];
+                products.hvv[i][i] = self.cost.input[i];
             }
-            if !eliminate::<T, NX, NU, false>(stage, &mut p, hessian, &mut products) {
+            if !eliminate(stage, &mut p, &mut products) {
                 return false;
             }
-            pull(stage, &mut linear, [T::ZERO; NU]);
+            let mut by_v = [T::ZERO; NU];
+            stage.pull(&mut linear, &mut by_v);
         }
         true
     }
@@ -43,7 +44,7 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
     pub fn solve(&mut self, x0: &[T; NX], is_warm: bool, settings: &Settings<T>) -> Report<T> {
         let worst = self.follow_gains(x0);
         if !worst.is_finite_number() {
-            return self.broken(0);
+            return failure(0);
         }
         let mut iterations = 0;
         let mut is_capped = false;
@@ -52,45 +53,49 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
         } else {
             self.start(x0, is_warm);
             let is_far = self.change_of_gains() > T::of(FAR_CHANGE);
+            let mut smallest = COLD;
+            if is_warm {
+                smallest = if is_far { FAR } else { WARM };
+            }
             let mut may_restart = is_warm;
-            let mut smallest = match (is_warm, is_far) {
-                (false, _) => COLD,
-                (true, true) => FAR,
-                (true, false) => WARM,
-            };
-            // First points and restarts are centred in one place, so that the pass is compiled once.
-            'centred: loop {
-                let mut point = self.centre(smallest);
-                loop {
-                    if !(point.infeasibility() + point.sum).is_finite_number() {
-                        return self.broken(iterations);
-                    }
-                    if point.is_optimal(settings) {
-                        break 'centred;
-                    }
-                    is_capped = iterations == settings.max_iterations;
-                    if is_capped {
-                        break 'centred;
-                    }
-                    iterations += 1;
-                    // Where rounding ends the progress the residuals decide what the point is worth.
-                    let Some(length) = self.step(&mut point, settings) else {
-                        break 'centred;
-                    };
-                    let is_poor = may_restart && length < T::of(SHORT_STEP);
-                    may_restart = false;
-                    if is_poor || iterations % PATIENCE == 0 {
-                        smallest = AGAIN;
-                        break;
-                    }
+            let mut must_centre = true;
+            let mut point: Point<T> = Point::zeros();
+            loop {
+                // First points and restarts are centred in one place, so that the pass is compiled once.
+                if must_centre {
+                    point = self.centre(smallest);
+                    must_centre = false;
                 }
+                if !(point.infeasibility() + point.sum).is_finite_number() {
+                    return failure(iterations);
+                }
+                if point.is_optimal(settings) {
+                    break;
+                }
+                is_capped = iterations == settings.max_iterations;
+                if is_capped {
+                    break;
+                }
+                iterations += 1;
+                let length = self.step(&mut point, settings);
+                if length < T::ZERO {
+                    // Where rounding ends the progress the residuals decide what the point is worth.
+                    break;
+                }
+                if (may_restart && length < T::of(SHORT_STEP)) || iterations % PATIENCE == 0 {
+                    smallest = AGAIN;
+                    must_centre = true;
+                }
+                may_restart = false;
             }
         }
         let residuals = self.residuals(x0);
-        let outcome = match residuals.within(settings.accepted_residual) {
-            _ if is_capped => Outcome::IterationCap,
-            true => Outcome::Solved,
-            false => Outcome::Inaccurate,
+        let outcome = if is_capped {
+            Outcome::IterationCap
+        } else if residuals.within(settings.accepted_residual) {
+            Outcome::Solved
+        } else {
+            Outcome::Inaccurate
         };
         Report {
             outcome,
@@ -99,37 +104,26 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
         }
     }
 
-    fn broken(&self, iterations: u32) -> Report<T> {
-        let none = T::ONE / T::ZERO;
-        Report {
-            outcome: Outcome::NumericalFailure,
-            iterations,
-            residuals: Residuals {
-                primal: none,
-                dual: none,
-                gap: none,
-            },
-        }
-    }
-
     /// States and inputs that the gains give, kept if no row is violated; returns the largest violation.
     #[inline(always)]
     fn follow_gains(&mut self, x0: &[T; NX]) -> T {
-        let horizon = self.stages.len();
         let mut worst = T::ZERO;
         let mut x = *x0;
         let mut before = [T::ZERO; NU];
-        for k in 0..horizon {
+        for k in 0..self.stages.len() {
             let at = self.at(k);
             let stage = &mut self.stages[at];
-            stage.dv = answer(stage, &x);
-            stage.dx = plus_product(&stage.b, &stage.dv, plus_product(&stage.a, &x, stage.c));
-            x = stage.dx;
-            let (v, x) = (stage.dv, stage.dx);
-            let rows = self.rows_times(k, (&before, &v), &x, T::ZERO);
+            let mut v = [T::ZERO; NU];
+            let mut end = [T::ZERO; NX];
+            stage.answer(&x, &mut v);
+            stage.end(&x, &v, &mut end);
+            stage.dv = v;
+            stage.dx = end;
+            x = end;
+            let rows = self.rows_times(k, &before, &v, &x, T::ZERO);
             before = v;
-            for (product, bound) in rows.target.iter().zip(rows.bound.iter()) {
-                let violation = *product - *bound;
+            for i in 0..rows.count {
+                let violation = rows.target[i] - rows.bound[i];
                 // Written so that a violation that is not a number is kept.
                 if !(violation <= worst) {
                     worst = violation;
@@ -145,7 +139,8 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
     /// Takes the point of the gains for the solution: no row is active.
     #[inline(always)]
     fn take_gains(&mut self) {
-        let soft = self.shape.soft;
+        let shape = self.shape;
+        let price = self.cost.slack;
         for k in 0..self.stages.len() {
             let at = self.at(k);
             let stage = &mut self.stages[at];
@@ -153,42 +148,44 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
             stage.plain = stage.dv;
             stage.x = stage.dx;
             stage.t = T::ZERO;
-            let price = self.cost.slack;
-            let slack_row = self.shape.input + soft;
-            let rows = self.rows_of(k);
-            rows.multiplier.fill(T::ZERO);
-            if soft > 0 {
-                rows.multiplier[slack_row] = price;
-            }
+            let mut rows = self.rows_of(k);
+            rows.write_multipliers(shape.soft, shape.slack_row(), price);
         }
     }
 
     /// Residuals of the optimality conditions at the present point, from the program's own numbers.
     #[inline(always)]
     pub fn residuals(&mut self, x0: &[T; NX]) -> Residuals<T> {
-        let (horizon, shape) = (self.stages.len(), self.shape);
-        let (mut primal, mut dual, mut gap) = (T::ZERO, T::ZERO, T::ZERO);
-        let (mut size, mut multipliers, mut value) = (T::ONE, T::ONE, T::ZERO);
+        let horizon = self.stages.len();
+        let shape = self.shape;
+        let mut primal = T::ZERO;
+        let mut dual = T::ZERO;
+        let mut gap = T::ZERO;
+        let mut value = T::ZERO;
+        let mut size = T::ONE;
+        let mut multipliers = T::ONE;
+        let mut x_before = *x0;
         let mut v_before = [T::ZERO; NU];
         for k in 0..horizon {
             let stage = &self.stages[self.at(k)];
-            let before = match k {
-                0 => *x0,
-                _ => self.stages[self.at(k - 1)].x,
-            };
-            let next = plus_product(&stage.b, &stage.v, plus_product(&stage.a, &before, stage.c));
-            let (v, x, t) = (stage.v, stage.x, stage.t);
+            let v = stage.v;
+            let x = stage.x;
+            let t = stage.t;
+            let mut end = [T::ZERO; NX];
+            stage.end(&x_before, &v, &mut end);
             for i in 0..NX {
-                primal = kept_larger((next[i] - x[i]).magnitude(), primal);
-                size = kept_larger(x[i].magnitude(), size);
+                primal = (end[i] - x[i]).magnitude().or_kept_larger(primal);
+                size = x[i].magnitude().or_kept_larger(size);
             }
-            let rows = self.rows_times(k, (&v_before, &v), &x, t);
+            let rows = self.rows_times(k, &v_before, &v, &x, t);
+            x_before = x;
             v_before = v;
-            for i in 0..rows.bound.len() {
-                let (room, multiplier) = (rows.bound[i] - rows.target[i], rows.multiplier[i]);
-                primal = kept_larger(-room, primal);
-                dual = kept_larger(-multiplier, dual);
-                multipliers = kept_larger(multiplier, multipliers);
+            for i in 0..rows.count {
+                let room = rows.bound[i] - rows.target[i];
+                let multiplier = rows.multiplier[i];
+                primal = (-room).or_kept_larger(primal);
+                dual = (-multiplier).or_kept_larger(dual);
+                multipliers = multiplier.or_kept_larger(multipliers);
                 gap += multiplier * room;
             }
         }
@@ -196,7 +193,8 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
         let mut by_before = [T::ZERO; NU];
         for k in (0..horizon).rev() {
             let weight = self.cost.state_at(k, horizon);
-            let stage = &self.stages[self.at(k)];
+            let at = self.at(k);
+            let stage = &self.stages[at];
             let mut by_v = [T::ZERO; NU];
             for i in 0..NU {
                 by_v[i] = self.cost.input[i] * stage.v[i];
@@ -204,23 +202,25 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
             }
             for i in 0..NX {
                 let pulled = weight[i] * stage.x[i];
-                multipliers = kept_larger(pulled.magnitude(), multipliers);
+                multipliers = pulled.magnitude().or_kept_larger(multipliers);
                 value += pulled * stage.x[i];
                 p[i] += pulled;
             }
-            let (count, memory) = (shape.rows(), shape.memory());
-            let y = &self.rows[self.at(k) * memory + 2 * count..][..count];
+            let y = &self.rows[at * shape.memory() + 2 * shape.rows()..][..shape.rows()];
             let by_t = self.add_rows_pull(k, y, &mut by_v, &mut p);
             if LINKED {
                 for i in 0..NU {
                     by_v[i] += by_before[i];
                 }
-                by_before = pull_before(&y[count - shape.link..], self.link_pairs(k).1);
+                if k > 0 {
+                    let y_link = &y[shape.first_link()..];
+                    pull_before(y_link, self.link_rows(k - 1), shape.link, &mut by_before);
+                }
             }
-            dual = kept_larger(by_t.magnitude(), dual);
+            dual = by_t.magnitude().or_kept_larger(dual);
             add_transposed(&stage.b, &p, &mut by_v);
-            for entry in by_v {
-                dual = kept_larger(entry.magnitude(), dual);
+            for i in 0..NU {
+                dual = by_v[i].magnitude().or_kept_larger(dual);
             }
             let mut next = [T::ZERO; NX];
             add_transposed(&stage.a, &p, &mut next);
@@ -229,13 +229,45 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
         Residuals {
             primal: primal / size,
             dual: dual / multipliers,
-            gap: gap.magnitude() / kept_larger(value, T::ONE),
+            gap: gap.magnitude() / value.or_kept_larger(T::ONE),
         }
     }
 }
 
-/// The larger of two numbers, or not a number if the new one is not.
-#[inline(always)]
-fn kept_larger<T: Real>(new: T, so_far: T) -> T {
-    if new <= so_far { so_far } else { new }
+/// The end of a solve that met a number that is not finite.
+fn failure<T: Real>(iterations: u32) -> Report<T> {
+    let zero = T::ZERO;
+    let infinite = T::ONE / zero;
+    Report {
+        outcome: Outcome::NumericalFailure,
+        iterations,
+        residuals: Residuals {
+            primal: infinite,
+            dual: infinite,
+            gap: infinite,
+        },
+    }
+}
+
+/// The same code for vector units of 256 bits: sums keep their order and products are not contracted, so
+/// that the bits are those of [`Program::prepare`] and [`Program::solve`].
+#[cfg(target_arch = "x86_64")]
+impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, T, NX, NU, LINKED> {
+    /// [`Program::prepare`] on a processor with AVX2.
+    ///
+    /// # Safety
+    /// The processor must have AVX2.
+    #[target_feature(enable = "avx2")]
+    pub fn prepare_avx2(&mut self) -> bool {
+        self.prepare()
+    }
+
+    /// [`Program::solve`] on a processor with AVX2.
+    ///
+    /// # Safety
+    /// The processor must have AVX2.
+    #[target_feature(enable = "avx2")]
+    pub fn solve_avx2(&mut self, x0: &[T; NX], is_warm: bool, settings: &Settings<T>) -> Report<T> {
+        self.solve(x0, is_warm, settings)
+    }
 }

@@ -1,0 +1,213 @@
+//! Calls: which function of the sources they mean, and its const arguments.
+
+use std::collections::BTreeMap;
+
+use syn::{Expr, Lit};
+
+use crate::Fault;
+use crate::expression::Value;
+use crate::function::{Instance, Writer};
+use crate::items::Function;
+use crate::types::Type;
+
+impl Writer<'_> {
+    pub fn call(
+        &mut self,
+        instance: &mut Instance<'_>,
+        call: &syn::ExprCall,
+        expected: Option<&Type>,
+    ) -> Result<Value, Fault> {
+        let Expr::Path(path) = call.func.as_ref() else {
+            return Err(self.outside(instance, call, "a call of a value"));
+        };
+        let segments = &path.path.segments;
+        let name = segments.last().expect("a path has segments");
+        let owner = match segments.len() {
+            1 => String::new(),
+            _ => segments[segments.len() - 2].ident.to_string(),
+        };
+        let owner = if owner == "Self" {
+            instance.owner.to_owned()
+        } else {
+            owner
+        };
+        match (owner.as_str(), name.ident.to_string().as_str()) {
+            ("T", "of") => {
+                let value = self.value(instance, &call.args[0])?;
+                let text = format!("(real){}", value.at_least(15));
+                Ok(Value::new(text, Type::Real, 15))
+            }
+            ("usize", "from") => {
+                let value = self.value(instance, &call.args[0])?;
+                let text = format!("{} ? 1 : 0", value.at_least(4));
+                Ok(Value::new(text, Type::Int, 3))
+            }
+            ("", "part" | "part_mut") => {
+                let Some(ty) = expected else {
+                    let what = "a part without a type in its `let`";
+                    return Err(self.outside(instance, call, what));
+                };
+                let whole = self.value(instance, &call.args[0])?;
+                let first = self.value(instance, &call.args[1])?;
+                let text = format!("{} + {}", whole.at_least(12), first.at_least(13));
+                Ok(Value::new(text, ty.clone(), 12))
+            }
+            (owner, function) => {
+                let key = (owner.to_owned(), function.to_owned());
+                let items = self.items;
+                let Some((key, function)) = items.functions.get_key_value(&key) else {
+                    return Err(self.outside(instance, call, "a function from elsewhere"));
+                };
+                let arguments: Vec<&Expr> = call.args.iter().collect();
+                self.apply(instance, key, function, None, &arguments, &name.arguments)
+            }
+        }
+    }
+
+    pub fn method(
+        &mut self,
+        instance: &mut Instance<'_>,
+        call: &syn::ExprMethodCall,
+    ) -> Result<Value, Fault> {
+        let method = call.method.to_string();
+        let receiver = self.value(instance, &call.receiver)?;
+        if method == "len"
+            && let (Expr::Field(field), Type::Slice(_)) =
+                (call.receiver.as_ref(), receiver.ty.referent())
+            && let syn::Member::Named(name) = &field.member
+            && let Type::Named(of) = self.value(instance, &field.base)?.ty.referent()
+        {
+            self.lengths.insert((of.clone(), name.to_string()));
+            return Ok(Value::new(format!("{}_len", receiver.text), Type::Int, 16));
+        }
+        if method == "div_ceil"
+            && let [Expr::Lit(by)] = call.args.iter().collect::<Vec<_>>().as_slice()
+            && let Lit::Int(by) = &by.lit
+            && let Ok(by) = by.base10_parse::<u32>()
+        {
+            let text = format!("({} + {}) / {by}", receiver.at_least(12), by - 1);
+            return Ok(Value::new(text, Type::Int, 13));
+        }
+        let owner = match receiver.ty.referent() {
+            Type::Real => "Real",
+            Type::Named(name) => name,
+            _ => return Err(self.outside(instance, call, "a method of this")),
+        };
+        let items = self.items;
+        let Some((key, function)) = (items.functions).get_key_value(&(owner.to_owned(), method))
+        else {
+            return Err(self.outside(instance, call, "a method from elsewhere"));
+        };
+        let takes_pointer = matches!(function.parameters[0].1, Type::Ref(..));
+        let is_pointer = matches!(receiver.ty, Type::Ref(..));
+        let receiver = match (takes_pointer, is_pointer) {
+            (true, false) => {
+                let ty = receiver.ty.clone().reference(true);
+                Value::new(format!("&{}", receiver.at_least(15)), ty, 15)
+            }
+            _ => receiver,
+        };
+        let arguments: Vec<&Expr> = call.args.iter().collect();
+        let given = match &call.turbofish {
+            Some(given) => syn::PathArguments::AngleBracketed(given.clone()),
+            None => syn::PathArguments::None,
+        };
+        self.apply(instance, key, function, Some(receiver), &arguments, &given)
+    }
+
+    /// A call: its const arguments follow from the types of the others, or are given.
+    fn apply(
+        &mut self,
+        instance: &mut Instance<'_>,
+        (owner, name): &(String, String),
+        function: &Function,
+        receiver: Option<Value>,
+        arguments: &[&Expr],
+        given: &syn::PathArguments,
+    ) -> Result<Value, Fault> {
+        let mut sizes: BTreeMap<String, String> = BTreeMap::new();
+        if let syn::PathArguments::AngleBracketed(given) = given {
+            let lengths = given.args.iter().filter_map(|argument| match argument {
+                syn::GenericArgument::Const(value) => Some(value.clone()),
+                syn::GenericArgument::Type(syn::Type::Path(path)) if !path.path.is_ident("T") => {
+                    Some(Expr::Path(syn::ExprPath {
+                        attrs: Vec::new(),
+                        qself: None,
+                        path: path.path.clone(),
+                    }))
+                }
+                _ => None,
+            });
+            for (parameter, length) in function.const_parameters.iter().zip(lengths) {
+                let length = self.value(instance, &length)?.text;
+                sizes.insert(parameter.clone(), length);
+            }
+        }
+        let skipped = usize::from(receiver.is_some());
+        let mut texts: Vec<String> = receiver.iter().map(|value| value.text.clone()).collect();
+        for ((_, ty, _), argument) in function.parameters.iter().skip(skipped).zip(arguments) {
+            let ty = &self.resolve(ty, &BTreeMap::new());
+            let value = self.value_as(instance, argument, Some(ty))?;
+            if matches!(ty, Type::Ref(..)) && !matches!(value.ty, Type::Ref(..)) {
+                return Err(self.outside(instance, argument, "a value in place of a reference"));
+            }
+            if !infer(ty, &value.ty, &function.const_parameters, &mut sizes) {
+                let message = format!("{:?} where `{name}` has {ty:?}", value.ty);
+                return Err(self.outside(instance, argument, &message));
+            }
+            texts.push(value.text);
+        }
+        for (parameter, size) in &sizes {
+            if !function.sizes.contains(parameter) && parameter != size {
+                let message = format!("`{name}` for {parameter} = {size}");
+                return Err(self.outside(instance, arguments[0], &message));
+            }
+        }
+        sizes.retain(|parameter, _| function.sizes.contains(parameter));
+        if let Some(missing) = function
+            .sizes
+            .iter()
+            .find(|size| !sizes.contains_key(*size))
+        {
+            let message = format!("`{name}` with unknown {missing}");
+            return Err(self.outside(instance, arguments[0], &message));
+        }
+        let output = self.resolve(&function.output, &sizes);
+        let c_name = self.function(owner, name, function, sizes)?;
+        Ok(Value::new(
+            format!("{c_name}({})", texts.join(", ")),
+            output,
+            16,
+        ))
+    }
+}
+
+/// Whether an argument fits a parameter; lengths that are const parameters become known.
+fn infer(
+    parameter: &Type,
+    argument: &Type,
+    names: &[String],
+    sizes: &mut BTreeMap<String, String>,
+) -> bool {
+    match (parameter, argument) {
+        (Type::Ref(of, is_mutable), Type::Ref(given, given_mutable)) => {
+            (*given_mutable || !is_mutable) && infer(of, given, names, sizes)
+        }
+        (Type::Slice(of), Type::Slice(given) | Type::Array(given, _)) => {
+            infer(of, given, names, sizes)
+        }
+        (Type::Array(of, length), Type::Array(given, given_length)) => {
+            let fits = match names.contains(length) {
+                true => {
+                    let known = sizes.entry(length.clone());
+                    *known.or_insert(given_length.clone()) == *given_length
+                }
+                false => length == given_length,
+            };
+            fits && infer(of, given, names, sizes)
+        }
+        (Type::Real, Type::Real) | (Type::Int, Type::Int) | (Type::Bool, Type::Bool) => true,
+        (Type::Named(of), Type::Named(given)) => of == given,
+        _ => false,
+    }
+}

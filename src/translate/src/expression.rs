@@ -1,0 +1,403 @@
+//! Expressions, their types, and the functions that they call.
+
+use std::collections::BTreeMap;
+
+use syn::{BinOp, Expr, Lit, UnOp};
+
+use crate::Fault;
+use crate::function::{Instance, Writer};
+use crate::items::Items;
+use crate::types::Type;
+
+/// An expression of C.
+#[derive(Debug, Clone)]
+pub(crate) struct Value {
+    pub text: String,
+    pub ty: Type,
+    /// How tightly C binds it: 16 a name or call, 15 a sign, 13 a product, 12 a sum, 10 to 3 conditions.
+    pub rank: u8,
+    /// The element of `[element; N]`.
+    pub repeated: Option<String>,
+}
+
+impl Value {
+    pub fn new(text: impl Into<String>, ty: Type, rank: u8) -> Self {
+        Self {
+            text: text.into(),
+            ty,
+            rank,
+            repeated: None,
+        }
+    }
+
+    /// The text as an operand, in parentheses if it binds more loosely than this.
+    pub fn at_least(&self, rank: u8) -> String {
+        match self.rank < rank {
+            true => format!("({})", self.text),
+            false => self.text.clone(),
+        }
+    }
+
+    fn is_literal(&self) -> bool {
+        self.text.parse::<f64>().is_ok()
+    }
+}
+
+/// A binary operator of C, its rank, and whether its result is a condition.
+fn operator(op: &BinOp) -> Option<(&'static str, u8, bool)> {
+    Some(match op {
+        BinOp::Add(_) => ("+", 12, false),
+        BinOp::Sub(_) => ("-", 12, false),
+        BinOp::Mul(_) => ("*", 13, false),
+        BinOp::Div(_) => ("/", 13, false),
+        BinOp::Rem(_) => ("%", 13, false),
+        BinOp::Lt(_) => ("<", 10, true),
+        BinOp::Le(_) => ("<=", 10, true),
+        BinOp::Gt(_) => (">", 10, true),
+        BinOp::Ge(_) => (">=", 10, true),
+        BinOp::Eq(_) => ("==", 9, true),
+        BinOp::Ne(_) => ("!=", 9, true),
+        BinOp::And(_) => ("&&", 5, true),
+        BinOp::Or(_) => ("||", 4, true),
+        BinOp::AddAssign(_) => ("+=", 2, false),
+        BinOp::SubAssign(_) => ("-=", 2, false),
+        BinOp::MulAssign(_) => ("*=", 2, false),
+        _ => return None,
+    })
+}
+
+/// A number as C writes it.
+fn number(literal: &Lit) -> Option<(String, Type)> {
+    match literal {
+        Lit::Int(number) => Some((number.base10_digits().to_owned(), Type::Int)),
+        Lit::Float(number) => Some((number.base10_digits().to_owned(), Type::Double)),
+        Lit::Bool(flag) => Some((flag.value.to_string(), Type::Bool)),
+        _ => None,
+    }
+}
+
+/// The value of a constant: a number, or a struct of numbers.
+pub(crate) fn constant(items: &Items<'_>, source: usize, value: &Expr) -> Result<String, Fault> {
+    match value {
+        Expr::Lit(literal) => match number(&literal.lit) {
+            Some((text, _)) => Ok(text),
+            None => Err(items.fault(source, value, "a constant that is no number")),
+        },
+        Expr::Struct(fields) => {
+            let field = |field: &syn::FieldValue| {
+                let syn::Member::Named(name) = &field.member else {
+                    return Err(items.fault(source, field, "a field without name"));
+                };
+                Ok(format!(
+                    ".{name} = {}",
+                    constant(items, source, &field.expr)?
+                ))
+            };
+            let fields: Result<Vec<_>, _> = fields.fields.iter().map(field).collect();
+            Ok(format!("{{{}}}", fields?.join(", ")))
+        }
+        other => Err(items.fault(source, other, "a constant that is no number")),
+    }
+}
+
+impl Writer<'_> {
+    pub fn value(
+        &mut self,
+        instance: &mut Instance<'_>,
+        expression: &Expr,
+    ) -> Result<Value, Fault> {
+        self.value_as(instance, expression, None)
+    }
+
+    /// The value of an expression, where a type is expected or not.
+    pub fn value_as(
+        &mut self,
+        instance: &mut Instance<'_>,
+        expression: &Expr,
+        expected: Option<&Type>,
+    ) -> Result<Value, Fault> {
+        match expression {
+            Expr::Paren(inner) => self.value_as(instance, &inner.expr, expected),
+            Expr::Lit(literal) => match number(&literal.lit) {
+                Some((text, ty)) => Ok(Value::new(text, ty, 16)),
+                None => Err(self.outside(instance, literal, "this literal")),
+            },
+            Expr::Path(path) => self.path(instance, path),
+            Expr::Field(field) => self.field(instance, field),
+            Expr::Index(index) => self.index(instance, index),
+            Expr::Unary(unary) => self.unary(instance, unary),
+            Expr::Binary(binary) => self.binary(instance, binary),
+            Expr::Reference(reference) => self.reference(instance, reference, expected),
+            Expr::Cast(cast) => {
+                let (source, owner) = (instance.function.source, instance.owner);
+                let ty = self.items.ty(source, &cast.ty, owner)?;
+                let value = self.value(instance, &cast.expr)?;
+                let spelled = ty.declare("", &|of| self.spelling(of));
+                let text = format!("({}){}", spelled.trim(), value.at_least(15));
+                Ok(Value::new(text, ty, 15))
+            }
+            Expr::If(branch) => self.choice(instance, branch, expected),
+            Expr::Repeat(repeat) => self.repeat(instance, repeat),
+            Expr::Struct(literal) => self.struct_literal(instance, literal),
+            Expr::Call(call) => self.call(instance, call, expected),
+            Expr::MethodCall(call) => self.method(instance, call),
+            other => Err(self.outside(instance, other, "this expression")),
+        }
+    }
+
+    fn path(&mut self, instance: &Instance<'_>, path: &syn::ExprPath) -> Result<Value, Fault> {
+        let words: Vec<String> = (path.path.segments.iter())
+            .map(|segment| segment.ident.to_string())
+            .collect();
+        let words: Vec<&str> = words.iter().map(String::as_str).collect();
+        match words.as_slice() {
+            ["T" | "Self", "ZERO"] => Ok(Value::new("0", Type::Real, 16)),
+            ["T" | "Self", "ONE"] => Ok(Value::new("1", Type::Real, 16)),
+            [of, variant] if self.items.enums.contains_key(*of) => {
+                let ty = self.resolve(&Type::Named((*of).to_owned()), &BTreeMap::new());
+                Ok(Value::new(self.items.constant_name(variant), ty, 16))
+            }
+            [name] => {
+                if let Some(ty) = instance.variable(name) {
+                    return Ok(Value::new(*name, ty.clone(), 16));
+                }
+                if let Some(size) = instance.sizes.get(*name) {
+                    let rank = if size.contains(' ') { 3 } else { 16 };
+                    return Ok(Value::new(size, Type::Int, rank));
+                }
+                if *name == "LINKED" {
+                    return Ok(Value::new(*name, Type::Bool, 16));
+                }
+                if instance.function.const_parameters.iter().any(|p| p == name)
+                    || ["NX", "NU"].contains(name)
+                {
+                    return Ok(Value::new(*name, Type::Int, 16));
+                }
+                if self.items.constants.contains_key(*name) {
+                    let ty = self.items.constants[*name].ty.clone();
+                    return Ok(Value::new(self.constant(name), ty, 16));
+                }
+                Err(self.outside(instance, path, "a name of something else"))
+            }
+            _ => Err(self.outside(instance, path, "this path")),
+        }
+    }
+
+    fn field(
+        &mut self,
+        instance: &mut Instance<'_>,
+        field: &syn::ExprField,
+    ) -> Result<Value, Fault> {
+        let base = self.value(instance, &field.base)?;
+        let (Type::Named(of), syn::Member::Named(name)) = (base.ty.referent(), &field.member)
+        else {
+            return Err(self.outside(instance, field, "a field of what is no struct"));
+        };
+        let name = name.to_string();
+        let items = self.items;
+        let fields = items.structs.get(of).map_or(&[][..], |found| &found.fields);
+        let Some(found) = fields.iter().find(|field| field.name == name) else {
+            return Err(self.outside(instance, field, "a field of what is no struct"));
+        };
+        let ty = self.resolve(&found.ty, &BTreeMap::new());
+        let arrow = if matches!(base.ty, Type::Ref(..)) {
+            "->"
+        } else {
+            "."
+        };
+        Ok(Value::new(
+            format!("{}{arrow}{name}", base.at_least(16)),
+            ty,
+            16,
+        ))
+    }
+
+    /// An element, or from a range what follows its beginning.
+    fn index(
+        &mut self,
+        instance: &mut Instance<'_>,
+        index: &syn::ExprIndex,
+    ) -> Result<Value, Fault> {
+        let base = self.value(instance, &index.expr)?;
+        let Some(element) = base.ty.element().cloned() else {
+            return Err(self.outside(instance, index, "an index of what is no array"));
+        };
+        if let Expr::Range(range) = index.index.as_ref() {
+            let slice = Type::Slice(Box::new(element));
+            return Ok(match &range.start {
+                None => Value { ty: slice, ..base },
+                Some(start) => {
+                    let start = self.value(instance, start)?;
+                    let text = format!("{} + {}", base.at_least(12), start.at_least(13));
+                    Value::new(text, slice, 12)
+                }
+            });
+        }
+        let at = self.value(instance, &index.index)?;
+        Ok(Value::new(
+            format!("{}[{}]", base.at_least(16), at.text),
+            element,
+            16,
+        ))
+    }
+
+    fn unary(
+        &mut self,
+        instance: &mut Instance<'_>,
+        unary: &syn::ExprUnary,
+    ) -> Result<Value, Fault> {
+        let value = self.value(instance, &unary.expr)?;
+        match unary.op {
+            UnOp::Neg(_) if value.text.starts_with('-') => {
+                Ok(Value::new(format!("-({})", value.text), value.ty, 15))
+            }
+            UnOp::Neg(_) => Ok(Value::new(format!("-{}", value.at_least(15)), value.ty, 15)),
+            UnOp::Not(_) => Ok(Value::new(
+                format!("!{}", value.at_least(15)),
+                Type::Bool,
+                15,
+            )),
+            UnOp::Deref(_) => match value.ty.referent().clone() {
+                ty @ Type::Array(..) => Ok(Value { ty, ..value }),
+                ty => Ok(Value::new(format!("*{}", value.at_least(15)), ty, 15)),
+            },
+            _ => Err(self.outside(instance, unary, "this operator")),
+        }
+    }
+
+    fn binary(
+        &mut self,
+        instance: &mut Instance<'_>,
+        binary: &syn::ExprBinary,
+    ) -> Result<Value, Fault> {
+        let left = self.value(instance, &binary.left)?;
+        let right = self.value(instance, &binary.right)?;
+        let Some((sign, rank, is_condition)) = operator(&binary.op) else {
+            return Err(self.outside(instance, binary, "this operator"));
+        };
+        if !left.ty.is_scalar() && !matches!(left.ty, Type::Named(_)) {
+            return Err(self.outside(instance, binary, "an operator on what is no number"));
+        }
+        let ty = match (is_condition, &left.ty) {
+            (true, _) => Type::Bool,
+            (false, Type::Int | Type::Double) if right.ty == Type::Real => Type::Real,
+            (false, ty) => ty.clone(),
+        };
+        // Numbers of Rust's reals are integers in C.
+        let is_integer = left.is_literal() && right.is_literal() && ty == Type::Real;
+        let cast = if is_integer { "(real)" } else { "" };
+        // `a && b || c` has parentheses, as C's compilers ask for.
+        let left_rank = if rank == 4 { 9 } else { rank };
+        let right_rank = match rank {
+            4 => 9,
+            2 => 2,
+            rank => rank + 1,
+        };
+        let text = format!(
+            "{cast}{} {sign} {}",
+            left.at_least(left_rank),
+            right.at_least(right_rank)
+        );
+        Ok(Value::new(text, ty, rank))
+    }
+
+    fn reference(
+        &mut self,
+        instance: &mut Instance<'_>,
+        reference: &syn::ExprReference,
+        expected: Option<&Type>,
+    ) -> Result<Value, Fault> {
+        let is_mutable = reference.mutability.is_some();
+        if let Expr::Array(array) = reference.expr.as_ref()
+            && array.elems.is_empty()
+            && let Some(ty) = expected
+        {
+            return Ok(Value::new("NULL", ty.clone(), 16));
+        }
+        let value = self.value(instance, &reference.expr)?;
+        let ty = value.ty.clone().reference(is_mutable);
+        Ok(match &value.ty {
+            Type::Array(..) | Type::Slice(_) => Value { ty, ..value },
+            Type::Ref(of, _) if matches!(of.as_ref(), Type::Slice(_) | Type::Array(..)) => Value {
+                ty: of.as_ref().clone().reference(is_mutable),
+                ..value
+            },
+            _ => Value::new(format!("&{}", value.at_least(15)), ty, 15),
+        })
+    }
+
+    /// An `if` as a value.
+    fn choice(
+        &mut self,
+        instance: &mut Instance<'_>,
+        branch: &syn::ExprIf,
+        expected: Option<&Type>,
+    ) -> Result<Value, Fault> {
+        let condition = self.value(instance, &branch.cond)?;
+        let only = |block: &syn::Block| match block.stmts.as_slice() {
+            [syn::Stmt::Expr(expression, None)] => Some(expression.clone()),
+            _ => None,
+        };
+        let other = match branch.else_branch.as_ref().map(|(_, other)| other.as_ref()) {
+            Some(Expr::Block(block)) => only(&block.block),
+            Some(next @ Expr::If(_)) => Some(next.clone()),
+            _ => None,
+        };
+        let (Some(first), Some(other)) = (only(&branch.then_branch), other) else {
+            return Err(self.outside(instance, branch, "a value of a block with statements"));
+        };
+        let first = self.value_as(instance, &first, expected)?;
+        let other = self.value_as(instance, &other, expected)?;
+        let text = format!(
+            "{} ? {} : {}",
+            condition.at_least(4),
+            first.at_least(4),
+            other.at_least(3)
+        );
+        Ok(Value::new(text, first.ty, 3))
+    }
+
+    fn repeat(
+        &mut self,
+        instance: &mut Instance<'_>,
+        repeat: &syn::ExprRepeat,
+    ) -> Result<Value, Fault> {
+        let element = self.value(instance, &repeat.expr)?;
+        let length = self.items.length(instance.function.source, &repeat.len)?;
+        let ty = Type::Array(Box::new(element.ty.clone()), length);
+        let ty = self.resolve(&ty, &instance.sizes);
+        let innermost = element.repeated.clone().unwrap_or(element.text.clone());
+        Ok(Value {
+            repeated: Some(innermost),
+            ..Value::new(format!("{{{}}}", element.text), ty, 16)
+        })
+    }
+
+    /// The fields of a struct on a line each, in braces.
+    fn struct_literal(
+        &mut self,
+        instance: &mut Instance<'_>,
+        literal: &syn::ExprStruct,
+    ) -> Result<Value, Fault> {
+        if literal.rest.is_some() {
+            return Err(self.outside(instance, literal, "the rest of another struct"));
+        }
+        let name = literal.path.segments.last().expect("a path has segments");
+        let name = match name.ident.to_string() {
+            name if name == "Self" => instance.owner.to_owned(),
+            name => name,
+        };
+        let mut text = "{\n".to_owned();
+        for field in &literal.fields {
+            let value = self.value(instance, &field.expr)?;
+            let is_copy = matches!(value.ty, Type::Array(..)) && value.repeated.is_none();
+            let (syn::Member::Named(name), false) = (&field.member, is_copy) else {
+                return Err(self.outside(instance, field, "a field that is a copied array"));
+            };
+            text += &format!(".{name} = {},\n", value.text);
+        }
+        text.push('}');
+        let ty = self.resolve(&Type::Named(name), &BTreeMap::new());
+        Ok(Value::new(text, ty, 16))
+    }
+}

@@ -1,0 +1,362 @@
+//! What the sources define: structs, enums, constants and functions, by name.
+
+use std::collections::BTreeMap;
+
+use syn::spanned::Spanned;
+use syn::{Expr, FnArg, GenericParam, ImplItem, Item, Pat, ReturnType, TraitItem};
+
+use crate::text::snake;
+use crate::types::Type;
+use crate::{Fault, Source, Unit};
+
+/// Const parameters that stay names in C.
+pub(crate) const SIZES: [&str; 3] = ["NX", "NU", "LINKED"];
+
+/// A struct or enum, a constant or a function belongs to a source, of which faults name the path.
+pub(crate) struct Items<'a> {
+    pub prefix: &'a str,
+    sources: &'a [Source],
+    pub structs: BTreeMap<String, Struct>,
+    pub enums: BTreeMap<String, (Vec<String>, Vec<String>)>,
+    pub constants: BTreeMap<String, Constant>,
+    /// By owner and name; functions without one have an empty owner, the scalar's have `Real`.
+    pub functions: BTreeMap<(String, String), Function>,
+}
+
+pub(crate) struct Struct {
+    pub docs: Vec<String>,
+    pub fields: Vec<Field>,
+}
+
+pub(crate) struct Field {
+    pub docs: Vec<String>,
+    pub name: String,
+    pub ty: Type,
+}
+
+pub(crate) struct Constant {
+    pub docs: Vec<String>,
+    pub source: usize,
+    pub ty: Type,
+    pub value: Expr,
+}
+
+pub(crate) struct Function {
+    pub docs: Vec<String>,
+    pub source: usize,
+    /// Const parameters of its own, which [`SIZES`] are not.
+    pub sizes: Vec<String>,
+    /// All of its const parameters in their order.
+    pub const_parameters: Vec<String>,
+    /// Name, type, and whether the function changes its copy.
+    pub parameters: Vec<(String, Type, bool)>,
+    pub output: Type,
+    pub body: syn::Block,
+}
+
+/// The lines of documentation among attributes.
+fn docs(attributes: &[syn::Attribute]) -> Vec<String> {
+    let line = |attribute: &syn::Attribute| match &attribute.meta {
+        syn::Meta::NameValue(pair) if pair.path.is_ident("doc") => match &pair.value {
+            Expr::Lit(syn::ExprLit {
+                lit: syn::Lit::Str(text),
+                ..
+            }) => Some(text.value()),
+            _ => None,
+        },
+        _ => None,
+    };
+    attributes.iter().filter_map(line).collect()
+}
+
+/// Whether an item is compiled under a condition only: copies for one processor, tests.
+fn is_conditional(attributes: &[syn::Attribute]) -> bool {
+    attributes.iter().any(|a| a.path().is_ident("cfg"))
+}
+
+impl<'a> Items<'a> {
+    pub fn read(sources: &'a [Source], unit: &Unit<'a>) -> Result<Self, Fault> {
+        let mut items = Self {
+            prefix: unit.prefix,
+            sources,
+            structs: BTreeMap::new(),
+            enums: BTreeMap::new(),
+            constants: BTreeMap::new(),
+            functions: BTreeMap::new(),
+        };
+        for (source, Source { path, text }) in sources.iter().enumerate() {
+            let file = syn::parse_file(text).map_err(|error| Fault {
+                path: path.clone(),
+                line: error.span().start().line,
+                message: error.to_string(),
+            })?;
+            for item in &file.items {
+                items.add(source, item)?;
+            }
+        }
+        Ok(items)
+    }
+
+    pub fn fault(&self, source: usize, at: &impl Spanned, message: impl Into<String>) -> Fault {
+        Fault {
+            path: self.sources[source].path.clone(),
+            line: at.span().start().line,
+            message: message.into(),
+        }
+    }
+
+    /// The line comments directly above a line, in their order.
+    pub fn comments_above(&self, source: usize, at: &impl Spanned) -> Vec<String> {
+        let first = at.span().start().line.saturating_sub(1);
+        let lines: Vec<&str> = self.sources[source].text.lines().take(first).collect();
+        let above = lines.iter().rev().map_while(|line| {
+            let text = line.trim().strip_prefix("//")?;
+            (!text.starts_with('/')).then(|| text.trim().to_owned())
+        });
+        let mut above: Vec<String> = above.collect();
+        above.reverse();
+        above
+    }
+
+    /// A name of C: `solver_before`, `solver_before_write`.
+    pub fn name(&self, parts: &[&str]) -> String {
+        let words = parts.iter().filter(|part| !part.is_empty());
+        let words: Vec<String> = words.map(|part| snake(part)).collect();
+        format!("{}_{}", self.prefix, words.join("_"))
+    }
+
+    /// A name of C for a constant or the value of an enum.
+    pub fn constant_name(&self, name: &str) -> String {
+        match name.chars().any(|letter| letter.is_ascii_lowercase()) {
+            true => self.name(&[name]).to_ascii_uppercase(),
+            false => format!("{}_{name}", self.prefix.to_ascii_uppercase()),
+        }
+    }
+
+    fn add(&mut self, source: usize, item: &Item) -> Result<(), Fault> {
+        match item {
+            Item::Struct(item) if !is_conditional(&item.attrs) => self.add_struct(source, item),
+            Item::Enum(item) => {
+                let variants = item.variants.iter();
+                if let Some(variant) = variants.clone().find(|v| !v.fields.is_empty()) {
+                    return Err(self.fault(source, variant, "an enum with data"));
+                }
+                let names = variants.map(|variant| variant.ident.to_string());
+                let plain = (docs(&item.attrs), names.collect());
+                self.enums.insert(item.ident.to_string(), plain);
+                Ok(())
+            }
+            Item::Const(item) => {
+                let constant = Constant {
+                    docs: docs(&item.attrs),
+                    source,
+                    ty: self.ty(source, &item.ty, "")?,
+                    value: (*item.expr).clone(),
+                };
+                self.constants.insert(item.ident.to_string(), constant);
+                Ok(())
+            }
+            Item::Fn(item) if !is_conditional(&item.attrs) => {
+                self.add_function(source, "", &item.attrs, &item.sig, &item.block)
+            }
+            Item::Trait(item) if item.ident == "Real" => {
+                for method in &item.items {
+                    if let TraitItem::Fn(method) = method
+                        && let Some(body) = &method.default
+                    {
+                        self.add_function(source, "Real", &method.attrs, &method.sig, body)?;
+                    }
+                }
+                Ok(())
+            }
+            Item::Impl(item) if item.trait_.is_none() && !is_conditional(&item.attrs) => {
+                let syn::Type::Path(owner) = item.self_ty.as_ref() else {
+                    return Err(self.fault(
+                        source,
+                        &item.self_ty,
+                        "methods of a type without name",
+                    ));
+                };
+                let owner = owner.path.segments.last().expect("a path has segments");
+                let owner = owner.ident.to_string();
+                for method in &item.items {
+                    if let ImplItem::Fn(method) = method {
+                        let (attributes, body) = (&method.attrs, &method.block);
+                        self.add_function(source, &owner, attributes, &method.sig, body)?;
+                    }
+                }
+                Ok(())
+            }
+            // `use`, `mod`, implementations of traits and what is compiled under a condition: nothing to translate.
+            _ => Ok(()),
+        }
+    }
+
+    fn add_struct(&mut self, source: usize, item: &syn::ItemStruct) -> Result<(), Fault> {
+        let field = |field: &syn::Field| {
+            let Some(name) = &field.ident else {
+                return Err(self.fault(source, field, "a field without name"));
+            };
+            Ok(Field {
+                docs: docs(&field.attrs),
+                name: name.to_string(),
+                ty: self.ty(source, &field.ty, "")?,
+            })
+        };
+        let fields = item.fields.iter().map(field).collect::<Result<_, _>>()?;
+        let docs = docs(&item.attrs);
+        let found = Struct { docs, fields };
+        self.structs.insert(item.ident.to_string(), found);
+        Ok(())
+    }
+
+    fn add_function(
+        &mut self,
+        source: usize,
+        owner: &str,
+        attributes: &[syn::Attribute],
+        signature: &syn::Signature,
+        body: &syn::Block,
+    ) -> Result<(), Fault> {
+        let const_parameters: Vec<String> = (signature.generics.params.iter())
+            .filter_map(|parameter| match parameter {
+                GenericParam::Const(size) => Some(size.ident.to_string()),
+                _ => None,
+            })
+            .collect();
+        let parameter = |input: &FnArg| match input {
+            FnArg::Receiver(receiver) => {
+                let of = match owner {
+                    "Real" => Type::Real,
+                    owner => Type::Named(owner.to_owned()),
+                };
+                let ty = match receiver.reference {
+                    Some(_) => of.reference(receiver.mutability.is_some()),
+                    None => of,
+                };
+                Ok(("self".to_owned(), ty, false))
+            }
+            FnArg::Typed(typed) => {
+                let Pat::Ident(name) = typed.pat.as_ref() else {
+                    return Err(self.fault(source, typed, "a parameter that is a pattern"));
+                };
+                let ty = self.ty(source, &typed.ty, owner)?;
+                if matches!(ty, Type::Array(..)) {
+                    return Err(self.fault(source, typed, "an array by value: pass a reference"));
+                }
+                Ok((name.ident.to_string(), ty, name.mutability.is_some()))
+            }
+        };
+        // Functions that the C never calls may have any parameters.
+        let Ok(parameters) = signature.inputs.iter().map(parameter).collect() else {
+            return Ok(());
+        };
+        let output = match &signature.output {
+            ReturnType::Default => Type::Unit,
+            ReturnType::Type(_, ty) => match self.ty(source, ty, owner) {
+                Ok(ty) => ty,
+                Err(_) => return Ok(()),
+            },
+        };
+        let is_own = |size: &String| !SIZES.contains(&size.as_str());
+        let function = Function {
+            docs: docs(attributes),
+            source,
+            sizes: const_parameters
+                .iter()
+                .filter(|s| is_own(s))
+                .cloned()
+                .collect(),
+            const_parameters,
+            parameters,
+            output,
+            body: body.clone(),
+        };
+        let key = (owner.to_owned(), signature.ident.to_string());
+        self.functions.insert(key, function);
+        Ok(())
+    }
+
+    /// A type as it is written; `owner` is what `Self` stands for.
+    pub fn ty(&self, source: usize, ty: &syn::Type, owner: &str) -> Result<Type, Fault> {
+        Ok(match ty {
+            syn::Type::Reference(reference) => {
+                let of = self.ty(source, &reference.elem, owner)?;
+                of.reference(reference.mutability.is_some())
+            }
+            syn::Type::Slice(slice) => {
+                Type::Slice(Box::new(self.ty(source, &slice.elem, owner)?))
+            }
+            syn::Type::Array(array) => {
+                let element = self.ty(source, &array.elem, owner)?;
+                Type::Array(Box::new(element), self.length(source, &array.len)?)
+            }
+            syn::Type::Path(path) => {
+                let last = path.path.segments.last().expect("a path has segments");
+                match last.ident.to_string().as_str() {
+                    "T" => Type::Real,
+                    "Self" if owner == "Real" => Type::Real,
+                    "Self" => Type::Named(owner.to_owned()),
+                    "f64" => Type::Double,
+                    "usize" | "u32" => Type::Int,
+                    "bool" => Type::Bool,
+                    name => Type::Named(self.with_sizes(source, name, last)?),
+                }
+            }
+            other => return Err(self.fault(source, other, "a type outside the subset")),
+        })
+    }
+
+    /// The name of a struct whose const arguments are the names that its parameters have.
+    fn with_sizes(
+        &self,
+        source: usize,
+        name: &str,
+        segment: &syn::PathSegment,
+    ) -> Result<String, Fault> {
+        if let syn::PathArguments::AngleBracketed(arguments) = &segment.arguments {
+            for argument in &arguments.args {
+                let is_plain = match argument {
+                    syn::GenericArgument::Lifetime(_) => true,
+                    syn::GenericArgument::Type(syn::Type::Path(path)) => {
+                        let is = |name: &&str| path.path.is_ident(name);
+                        path.path.is_ident("T") || SIZES.iter().any(|name| is(&name))
+                    }
+                    _ => false,
+                };
+                if !is_plain {
+                    let message = "arguments of a struct are T, NX, NU and LINKED";
+                    return Err(self.fault(source, argument, message));
+                }
+            }
+        }
+        Ok(name.to_owned())
+    }
+
+    /// A length, with the names that it has in Rust.
+    pub fn length(&self, source: usize, length: &Expr) -> Result<String, Fault> {
+        Ok(match length {
+            Expr::Lit(syn::ExprLit {
+                lit: syn::Lit::Int(number),
+                ..
+            }) => number.base10_digits().to_owned(),
+            Expr::Path(path) => match path.path.get_ident().map(ToString::to_string) {
+                Some(name) => name,
+                None => return Err(self.fault(source, length, "a length that is a path")),
+            },
+            Expr::Binary(binary) => {
+                let left = self.length(source, &binary.left)?;
+                let right = self.length(source, &binary.right)?;
+                let operator = match binary.op {
+                    syn::BinOp::Add(_) => "+",
+                    syn::BinOp::Sub(_) => "-",
+                    syn::BinOp::Mul(_) => "*",
+                    syn::BinOp::Div(_) => "/",
+                    _ => return Err(self.fault(source, length, "an operator in a length")),
+                };
+                format!("{left} {operator} {right}")
+            }
+            other => return Err(self.fault(source, other, "a length outside the subset")),
+        })
+    }
+}

@@ -1,0 +1,160 @@
+//! C99 from the small subset of Rust that romc's structured solver is written in.
+//!
+//! In: sources, a prefix for names, the functions that the C is for. Out: the text of these functions, of all
+//! that they call, and of the types and constants that they need, with their comments. The solver's C under
+//! `templates/controller_c/` is made so; `cargo run -p romc-translate` writes it anew, and a test of
+//! `tests/controller_c.rs` compares it byte for byte. Read `function` first.
+//!
+//! | Rust | C |
+//! |---|---|
+//! | `T: Real`, `f64`, `usize` and `u32`, `bool` | `real`, `double`, `int`, `bool` |
+//! | const parameters of structs, `LINKED` | names that whoever includes the C defines |
+//! | other const parameters of a function | one function for each value: `add_multiple_nx` |
+//! | structs, arrays, enums without data, constants | the same |
+//! | `&mut [T; N]`, `&[T]` | pointers; those of `&mut` parameters are `restrict` |
+//! | `stages.len()` of a field | a field `stages_len` |
+//! | `part(x, i)`, `&x[i..]`, `x.split_at_mut(n)` | `x + i` |
+//! | assignment of arrays | `memcpy` |
+//! | `while`, `loop`, `for` over ranges, also reversed or in steps; `if`, also as a value | the same |
+//!
+//! Anything else is a [`Fault`] with file and line. Indices are not checked in C: the Rust's tests have to reach them.
+//! A sum or product keeps the order that it has in Rust, so that both have the same bits without contraction.
+
+mod call;
+mod definitions;
+mod expression;
+mod function;
+mod items;
+mod text;
+mod types;
+
+use std::fmt;
+use std::fs;
+use std::path::Path;
+
+/// A source: its path for faults, and its text.
+#[derive(Debug, Clone)]
+pub struct Source {
+    /// Path that faults name.
+    pub path: String,
+    /// Rust.
+    pub text: String,
+}
+
+/// A construct that is outside the subset.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Fault {
+    /// Path of the source.
+    pub path: String,
+    /// Line, from 1.
+    pub line: usize,
+    /// The construct, and what is expected in its place.
+    pub message: String,
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            path,
+            line,
+            message,
+        } = self;
+        write!(f, "{path}:{line}: {message}")
+    }
+}
+
+impl std::error::Error for Fault {}
+
+/// The names of the C.
+#[derive(Debug, Clone, Copy)]
+pub struct Unit<'a> {
+    /// Before every name: `solver` for `solver_solve` and `SOLVER_WIDE`.
+    pub prefix: &'a str,
+    /// Functions that the C is for, as `Type::function` or `function`.
+    pub roots: &'a [&'a str],
+    /// Structs whose text stands apart, for a header.
+    pub header: &'a [&'a str],
+}
+
+/// The text of a unit.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Translated {
+    /// Structs of [`Unit::header`] and what they need.
+    pub header: String,
+    /// All else, in an order in which everything is declared before it is used.
+    pub source: String,
+}
+
+/// Translates the functions of a unit, and all that they need.
+///
+/// # Errors
+/// [`Fault`] for the first construct that is outside the subset.
+pub fn translate(sources: &[Source], unit: &Unit<'_>) -> Result<Translated, Fault> {
+    let items = items::Items::read(sources, unit)?;
+    let mut writer = function::Writer::new(&items);
+    for root in unit.roots {
+        writer.root(root)?;
+    }
+    writer.finish(unit)
+}
+
+/// Files of the solver, below the workspace's folder.
+const SOLVER: [&str; 9] = [
+    "interior.rs",
+    "links.rs",
+    "lower.rs",
+    "point.rs",
+    "problem.rs",
+    "riccati.rs",
+    "rows.rs",
+    "scalar.rs",
+    "solve.rs",
+];
+
+/// The C of the structured solver, as paths below the workspace's folder and texts.
+///
+/// # Errors
+/// [`Fault`] for the first construct that is outside the subset, or a source that cannot be read.
+pub fn solver(root: &Path) -> Result<[(&'static str, String); 2], Fault> {
+    let read = |name: &&str| {
+        let path = format!("src/motion/solver/{name}");
+        let text = fs::read_to_string(root.join(&path)).map_err(|error| Fault {
+            path: path.clone(),
+            line: 0,
+            message: error.to_string(),
+        })?;
+        Ok(Source { path, text })
+    };
+    let sources = SOLVER.iter().map(read).collect::<Result<Vec<_>, Fault>>()?;
+    solver_of(&sources)
+}
+
+/// The same from sources of the solver.
+///
+/// # Errors
+/// [`Fault`] for the first construct that is outside the subset.
+pub fn solver_of(sources: &[Source]) -> Result<[(&'static str, String); 2], Fault> {
+    let unit = Unit {
+        prefix: "solver",
+        roots: &[
+            "Program::bounds_mut",
+            "Program::shift",
+            "Program::prepare",
+            "Program::solve",
+        ],
+        header: &["Stage"],
+    };
+    let Translated { header, source } = translate(sources, &unit)?;
+    let head = |what: &str| {
+        format!(
+            "/* @generated from src/motion/solver by `cargo run -p romc-translate`: {what} Names that are defined\n \
+             * elsewhere: real, the type of numbers; NX and NU, how many states and inputs there are. */\n\n"
+        )
+    };
+    let types = head("a stage of the structured solver.") + &header;
+    let functions = head("the structured solver.") + &source;
+    Ok([
+        ("templates/controller_c/solver_stage.h", types),
+        ("templates/controller_c/solver.c", functions),
+    ])
+}

@@ -1,0 +1,88 @@
+//! Names, comments and lines of C.
+
+/// Most columns of a line.
+const WIDTH: usize = 118;
+
+/// `IterationCap` or `write_rows` in one case: `iteration_cap`.
+pub(crate) fn snake(name: &str) -> String {
+    let mut out = String::new();
+    for letter in name.chars() {
+        if letter.is_ascii_uppercase() && !out.is_empty() && !out.ends_with('_') {
+            out.push('_');
+        }
+        out.push(letter.to_ascii_lowercase());
+    }
+    out
+}
+
+/// The signs of comments in ASCII; links of rustdoc become plain words.
+pub(crate) fn ascii(comment: &str) -> String {
+    const SIGNS: [(&str, &str); 15] = [
+        ("⁻¹", "^-1"),
+        ("⁻ᵀ", "^-T"),
+        ("ᵀ", "^T"),
+        ("½", "1/2"),
+        ("Σ", "sum of"),
+        ("−", "-"),
+        ("·", "."),
+        ("←", "<-"),
+        ("…", "..."),
+        ("₀", "_0"),
+        ("≤", "<="),
+        ("[`", ""),
+        ("`]", ""),
+        ("`", ""),
+        ("*/", "* /"),
+    ];
+    let mut text = comment.to_owned();
+    for (sign, plain) in SIGNS {
+        text = text.replace(sign, plain);
+    }
+    text
+}
+
+/// A comment of C above a definition.
+pub(crate) fn comment(lines: &[String], indent: &str) -> String {
+    let lines: Vec<String> = lines.iter().map(|line| ascii(line.trim())).collect();
+    match lines.as_slice() {
+        [] => String::new(),
+        lines => format!(
+            "{indent}/* {} */\n",
+            lines
+                .join(&format!("\n{indent} * "))
+                .replace(" * \n", " *\n")
+        ),
+    }
+}
+
+/// Breaks lines that are too long behind a comma or before an operator.
+pub(crate) fn wrapped(text: &str) -> String {
+    let mut out = String::new();
+    for line in text.lines() {
+        let depth = line.len() - line.trim_start().len();
+        let mut rest = line.to_owned();
+        while rest.len() > WIDTH && !rest.trim_start().starts_with("/*") {
+            let at = |mark: &str, keep: usize| {
+                let found = rest[..WIDTH.min(rest.len())].rfind(mark)?;
+                (found > depth + 12).then_some(found + keep)
+            };
+            let places = [
+                (" || ", 0),
+                (" && ", 0),
+                (" ? ", 0),
+                (" : ", 0),
+                (", ", 1),
+                (" + ", 0),
+            ];
+            let Some(at) = places.iter().find_map(|(mark, keep)| at(mark, *keep)) else {
+                break;
+            };
+            out += rest[..at].trim_end();
+            out.push('\n');
+            rest = format!("{}{}", " ".repeat(depth + 8), rest[at..].trim_start());
+        }
+        out += &rest;
+        out.push('\n');
+    }
+    out
+}
