@@ -289,10 +289,14 @@ impl Table {
         for (side, expr) in whole.into_iter().enumerate() {
             let mut open = vec![(ExprId::ONE, Coefficient::from(Number::ONE), expr)];
             while let Some((factor, scale, expr)) = open.pop() {
-                let (coefficient, numbers, rest) = parted(pool, expr);
+                let factors = pool.factors_of(expr).iter();
+                let (numbers, rest): (Vec<ExprId>, Vec<ExprId>) =
+                    factors.partition(|factor| value_of(pool, **factor).is_some());
+                let values = numbers.iter().filter_map(|number| value_of(pool, *number));
+                let value = values.reduce(|product, value| product.times(&value));
+                let coefficient = value.map_or_else(|| scale.clone(), |value| scale.times(&value));
                 let rest = pool.product(&rest);
                 let factor = pool.product(&[&[factor], numbers.as_slice()].concat());
-                let coefficient = scale.times(&coefficient);
                 if let Node::Sum(terms) = pool.node(rest) {
                     let terms = terms.iter();
                     open.extend(terms.map(|&term| (factor, coefficient.clone(), term)));
@@ -349,22 +353,7 @@ impl Table {
     }
 }
 
-/// A term taken apart: the product of its numbers, these numbers, and its other factors.
-fn parted(pool: &ExprPool, expr: ExprId) -> (Coefficient, Vec<ExprId>, Vec<ExprId>) {
-    let mut coefficient = Coefficient::from(Number::ONE);
-    let (mut numbers, mut rest) = (Vec::new(), Vec::new());
-    for &factor in pool.factors_of(expr) {
-        match value_of(pool, factor) {
-            Some(value) => {
-                coefficient = coefficient.times(&value);
-                numbers.push(factor);
-            }
-            None => rest.push(factor),
-        }
-    }
-    (coefficient, numbers, rest)
-}
-
+/// The value of a number or decimal.
 fn value_of(pool: &ExprPool, factor: ExprId) -> Option<Coefficient> {
     match pool.node(factor) {
         Node::Number(number) => Some(Coefficient::from(*number)),

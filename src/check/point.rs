@@ -34,6 +34,17 @@ impl Gap {
     fn size(&self) -> f64 {
         (self.left - self.right).abs()
     }
+
+    fn relative_size(&self) -> f64 {
+        self.size() / (1.0 + self.left.abs().max(self.right.abs()))
+    }
+
+    fn is_one_sided(&self) -> bool {
+        match [self.left, self.right] {
+            [none, value] | [value, none] if none.is_nan() => value.is_finite(),
+            _ => false,
+        }
+    }
 }
 
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -45,6 +56,27 @@ pub(super) struct Search {
     /// A point where only one side has a value (the other is NaN).
     pub(super) one_sided: Option<Gap>,
     pub(super) has_common_point: bool,
+}
+
+impl Search {
+    fn add(&mut self, gap: Gap, are_apart: impl FnOnce() -> bool) {
+        if !(gap.left.is_finite() && gap.right.is_finite()) {
+            if gap.is_one_sided() {
+                self.one_sided.get_or_insert(gap);
+            }
+            return;
+        }
+        self.has_common_point = true;
+        let best = self.gap.as_ref().map(Gap::relative_size);
+        let largest = self.largest.as_ref().map_or(0.0, Gap::size);
+        if are_apart() {
+            if best.is_none_or(|best| gap.relative_size() > best) {
+                self.gap = Some(gap);
+            }
+        } else if self.gap.is_none() && gap.size() > largest {
+            self.largest = Some(gap);
+        }
+    }
 }
 
 pub(super) struct Sides<'s> {
@@ -80,7 +112,6 @@ pub(super) fn search(
         groups.iter().map(|expr| pool.symbols_of(*expr)).collect();
     let mut random = ChaCha8Rng::seed_from_u64(12);
     let mut search = Search::default();
-    let mut best = 0.0;
     let last = if is_proven { POINTS_OF_EQUALS } else { POINTS };
     let nothing = BTreeSet::new();
     for attempt in 0..=last {
@@ -109,28 +140,7 @@ pub(super) fn search(
                 (*symbol, value)
             })
             .collect();
-        let gap = sides.at(&values);
-        if !(gap.left.is_finite() && gap.right.is_finite()) {
-            let is_one_sided = match [gap.left, gap.right] {
-                [none, value] | [value, none] if none.is_nan() => value.is_finite(),
-                _ => false,
-            };
-            if is_one_sided && search.one_sided.is_none() {
-                search.one_sided = Some(gap);
-            }
-            continue;
-        }
-        search.has_common_point = true;
-        let size = gap.size() / (1.0 + gap.left.abs().max(gap.right.abs()));
-        if sides.are_apart(&values) {
-            if search.gap.is_none() || size > best {
-                (best, search.gap) = (size, Some(gap));
-            }
-        } else if search.gap.is_none()
-            && gap.size() > search.largest.as_ref().map_or(0.0, Gap::size)
-        {
-            search.largest = Some(gap);
-        }
+        search.add(sides.at(&values), || sides.are_apart(&values));
         if search.gap.is_some() && attempt >= ENOUGH {
             break;
         }

@@ -18,21 +18,8 @@ use crate::typeset::{NumberStyle, PrintOptions, Rounding, SymbolTable, Table};
 use crate::{Error, artifact};
 
 pub(crate) fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
-    let save_model = arguments.simplification.save_model.as_deref();
-    let (simplification, model) = (&arguments.simplification, &arguments.model);
-    let inputs = Inputs::default()
-        .and([model])
-        .and(&arguments.plan)
-        .and(&simplification.domain)
-        .and(&simplification.reading.columns)
-        .into_folder(Some(&arguments.out_dir))?;
-    // What would be the same file again may stay; it is compared once there is a model.
-    match save_model {
-        Some(path) if path.parent() == Some(&arguments.out_dir) => {
-            inputs.check_name(path, Format::MODEL)?;
-        }
-        Some(_) | None => inputs.check_output(save_model, Format::MODEL, Overwrite::Replace)?,
-    }
+    let (inputs, simplification) = (inputs(arguments)?, &arguments.simplification);
+    let save_model = simplification.save_model.as_deref();
     let read = artifact::read(&arguments.model)?;
     if arguments.code.units == UnitsChoice::Scaled && read.encoder_map().is_err() {
         let (flag, needs) = ("--units scaled", "a model with an encoder and a decoder");
@@ -43,7 +30,7 @@ pub(crate) fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
         false => Equations::of,
     };
     let exact = form(&read);
-    let simplified = simplification::run(&exact, &arguments.simplification)?;
+    let simplified = simplification::run(&exact, simplification)?;
     let model = simplified.as_ref().map_or(&read, |outcome| &outcome.model);
     let approximate = simplified.as_ref().map(|_| form(model));
     let equations = approximate.as_ref().unwrap_or(&exact);
@@ -72,20 +59,41 @@ pub(crate) fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
         + &summary
         + &text(arguments, equations, &written)
         + &earlier_in_words(&earlier);
+    let files = written.iter().map(|(path, bytes)| {
+        let path = path.display().to_string();
+        json!({ "path": path, "bytes": bytes })
+    });
     let json = json!({
-            "model": arguments.model.display().to_string(),
-            "name": model.name(),
-            "digest": artifact::digest(model).to_string(),
-            "targets": arguments.emit.iter().map(|target| target.name()).collect::<Vec<_>>(),
-            "exact": exact.steps(),
-            "simplification": certificate,
-            "saved_model": shown(&simplification.save_model),
-            "files": written.iter().map(|(path, bytes)| {
-                json!({ "path": path.display().to_string(), "bytes": bytes })
-            }).collect::<Vec<_>>(),
-            "earlier_files": names(&earlier),
+        "model": arguments.model.display().to_string(),
+        "name": model.name(),
+        "digest": artifact::digest(model).to_string(),
+        "targets": arguments.emit.iter().map(|target| target.name()).collect::<Vec<_>>(),
+        "exact": exact.steps(),
+        "simplification": certificate,
+        "saved_model": shown(&simplification.save_model),
+        "files": files.collect::<Vec<_>>(),
+        "earlier_files": names(&earlier),
     });
     Ok(Answer::new(text, json))
+}
+
+/// The files that are read, after a check of the one that the model is saved to.
+fn inputs(arguments: &CompileArguments) -> Result<Inputs<'_>, Error> {
+    let simplification = &arguments.simplification;
+    let inputs = Inputs::default()
+        .and([&arguments.model])
+        .and(&arguments.plan)
+        .and(&simplification.domain)
+        .and(&simplification.reading.columns)
+        .into_folder(Some(&arguments.out_dir))?;
+    // What would be the same file again may stay; it is compared once there is a model.
+    match simplification.save_model.as_deref() {
+        Some(path) if path.parent() == Some(&arguments.out_dir) => {
+            inputs.check_name(path, Format::MODEL)?;
+        }
+        path => inputs.check_output(path, Format::MODEL, Overwrite::Replace)?,
+    }
+    Ok(inputs)
 }
 
 fn twice(targets: &[Target]) -> String {

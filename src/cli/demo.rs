@@ -10,6 +10,7 @@ use serde_json::json;
 
 use super::args::DemoArguments;
 use super::destination::Inputs;
+use super::mpc::runs_json;
 use super::output::{lines, names, spinner};
 use super::simplification::RESTART_S;
 use super::{Answer, mpc as mpc_command, report};
@@ -56,10 +57,7 @@ pub(crate) fn run(arguments: &DemoArguments) -> Result<Answer, Error> {
         .collect::<Result<Vec<_>, _>>()?;
 
     progress.set_message("compiling equations and code");
-    let targets = [Target::Latex, Target::C, Target::Rust];
-    let mut options = EmitOptions::default();
-    options.print.digest = Some(artifact::digest(&model).short());
-    let mut files = deploy::emit(&Equations::of(&model), &targets, &options)?;
+    let mut files = emitted(&model)?;
     progress.set_message("rolling the model out");
     let evaluation = Assessment::over(&model, &jumps, RESTART_S)?;
     progress.set_message("running the controller");
@@ -104,18 +102,23 @@ pub(crate) fn run(arguments: &DemoArguments) -> Result<Answer, Error> {
     };
     let _ = writeln!(text, "\nself-test of the emitted C: {self_test}\n");
     text += &made_in(&arguments.out_dir, &made, &files);
-    let [plain, consistent] =
-        (control.each_ref()).map(|runs| runs.iter().map(mpc_command::run_json).collect::<Vec<_>>());
     let json = json!({
         "model": MODEL.0,
         "rollouts": assessment_json(&model, &evaluation),
-        "mpc": { "transpose": plain, "consistent": consistent },
+        "mpc": { "transpose": runs_json(&control[0]), "consistent": runs_json(&control[1]) },
         "self_test": self_test,
         "verdict": verdict,
         "failed": failed,
         "files": names(&made),
     });
     Ok(Answer::new(text, json).failed_if(is_failed))
+}
+
+fn emitted(model: &ReducedModel) -> Result<Vec<EmittedFile>, Error> {
+    let targets = [Target::Latex, Target::C, Target::Rust];
+    let mut options = EmitOptions::default();
+    options.print.digest = Some(artifact::digest(model).short());
+    Ok(deploy::emit(&Equations::of(model), &targets, &options)?)
 }
 
 fn made_in(folder: &Path, made: &[PathBuf], files: &[EmittedFile]) -> String {

@@ -53,14 +53,7 @@ pub fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
     } = import_compared(read, options, &segments, arguments.unchecked)?;
     artifact::write(&arguments.output, &model, arguments.force)?;
     let mut text = describe(&report);
-    let has_axes = model.robot().is_ok() && model.encoder_map().is_ok();
-    let axes = (has_axes && arguments.wrench_frame.is_none()).then(|| {
-        let frame = model.wrench_frame().name();
-        format!(
-            "force and moment of the inputs are along the {frame}'s axes, as published \
-             (--wrench-frame says otherwise)"
-        )
-    });
+    let axes = axes(&model).filter(|_| arguments.wrench_frame.is_none());
     text += &lines("note: ", &axes);
     text.extend(
         check
@@ -81,6 +74,17 @@ pub fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
         "check": check.as_ref().map(|check| check_json(check, fault.as_deref())),
     });
     Ok(Answer::new(text, json))
+}
+
+fn axes(model: &ReducedModel) -> Option<String> {
+    let has_axes = model.robot().is_ok() && model.encoder_map().is_ok();
+    let frame = model.wrench_frame().name();
+    has_axes.then(|| {
+        format!(
+            "force and moment of the inputs are along the {frame}'s axes, as published \
+             (--wrench-frame says otherwise)"
+        )
+    })
 }
 
 /// An imported model, compared with recordings if there are any.

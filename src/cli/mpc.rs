@@ -142,17 +142,21 @@ fn answer(
         "remarks": remarks,
         "failed": failed,
         "verdict": verdict,
-        "runs": runs.iter().map(run_json).collect::<Vec<_>>(),
+        "runs": runs_json(runs),
         "output": output,
     });
     Answer::new(text, json)
+}
+
+pub(crate) fn runs_json(runs: &[NamedRun]) -> Vec<Value> {
+    runs.iter().map(run_json).collect()
 }
 
 /// One run: figures that depend on the dynamics, and what happened.
 ///
 /// `steps` to `prepare_us` count and time the solver's work, `lift` is what the maps and the lift make of recorded inputs:
 /// none of these depends on whether the dynamics are right.
-pub(crate) fn run_json((path, run): &NamedRun) -> Value {
+fn run_json((path, run): &NamedRun) -> Value {
     let summary = &run.summary;
     let mut value = json!({
         "recording": path.display().to_string(),

@@ -45,52 +45,44 @@ impl RecordedSets {
         robot: &'static Robot,
         seed: u64,
     ) -> Result<Self, Error> {
-        let reader = reader_for(&arguments.reading, settings)?;
-        let Some(split) = arguments.split else {
-            let (training, validation) = (&arguments.recordings, &arguments.validation);
-            let paths = [training.as_slice(), validation, &arguments.test];
-            return Ok(Self::whole(paths, settings, robot, reader));
-        };
-        let jumps = jumps_of(&arguments.recordings, &reader)?;
-        let sets = split.of(jumps.len(), seed)?;
-        let sets = sets.map(|set| -> Vec<DividedJump> {
-            set.into_iter().map(|jump| jumps[jump].clone()).collect()
-        });
-        let files = sets.each_ref().map(|set| chosen_segments(set));
-        Ok(Self {
-            divided: Some(sets),
-            ..Self::of_files(files, settings, robot, reader)
-        })
+        let (training, validation) = (&arguments.recordings, &arguments.validation);
+        let paths = [training.as_slice(), validation, &arguments.test];
+        let mut recorded = Self::whole(paths, &arguments.reading, settings, robot)?;
+        if let Some(split) = arguments.split {
+            let jumps = jumps_of(training, &recorded.reader)?;
+            let sets = split.of(jumps.len(), seed)?;
+            let sets = sets.map(|set| -> Vec<DividedJump> {
+                set.into_iter().map(|jump| jumps[jump].clone()).collect()
+            });
+            recorded.files = sets.each_ref().map(|set| chosen_segments(set));
+            recorded.divided = Some(sets);
+        }
+        Ok(recorded)
     }
 
+    /// Whole files; clocks are repaired unless told otherwise, or to train as published.
     pub(crate) fn whole(
         paths: [&[PathBuf]; 3],
+        reading: &ReadingArguments,
         settings: &TrainSettings,
         robot: &'static Robot,
-        reader: Reader,
-    ) -> Self {
+    ) -> Result<Self, Error> {
+        let clocks = match settings.paper {
+            true => Clocks::Recorded,
+            false => Clocks::Repaired,
+        };
         let whole = |path: &PathBuf| RecordingFile {
             path: path.clone(),
             segments: None,
         };
-        let files = paths.map(|paths| paths.iter().map(whole).collect());
-        Self::of_files(files, settings, robot, reader)
-    }
-
-    fn of_files(
-        files: [Vec<RecordingFile>; 3],
-        settings: &TrainSettings,
-        robot: &'static Robot,
-        reader: Reader,
-    ) -> Self {
-        Self {
+        Ok(Self {
             sets: Default::default(),
-            files,
+            files: paths.map(|paths| paths.iter().map(whole).collect()),
             robot,
-            reader,
+            reader: reader(reading, clocks)?,
             divided: None,
             options: train_settings::conditioning(settings),
-        }
+        })
     }
 
     /// The first training recordings as recorded.
@@ -214,18 +206,6 @@ fn report_singular(findings: &[&(PathBuf, Finding)]) {
             runs[0].1
         ));
     }
-}
-
-/// The reader of a training: clocks are repaired unless told otherwise, or to train as published.
-pub(crate) fn reader_for(
-    arguments: &ReadingArguments,
-    settings: &TrainSettings,
-) -> Result<Reader, Error> {
-    let clocks = match settings.paper {
-        true => Clocks::Recorded,
-        false => Clocks::Repaired,
-    };
-    reader(arguments, clocks)
 }
 
 fn jumps_of(paths: &[PathBuf], reader: &Reader) -> Result<Vec<DividedJump>, Error> {

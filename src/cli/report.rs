@@ -1,7 +1,7 @@
 //! `romc report`: a one-page assessment of a model, and its figures as files.
 
 use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde_json::json;
 
@@ -38,19 +38,7 @@ pub(crate) fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
     let model = artifact::read(&arguments.model)?;
     let recordings = read_for(&model, &arguments.recordings, &arguments.reading)?;
     note_late_restarts(&recordings, arguments.restart_every);
-    let study = match &arguments.study {
-        None => None,
-        Some(folder) => {
-            let summary = Summary::of(&Store::open(folder)?.cells()?, LAMBDA);
-            if summary.dimensions.is_empty() {
-                let folder = folder.display();
-                note(&format!(
-                    "{folder}: no training of the study has a model, so that its figures are left out"
-                ));
-            }
-            Some(summary)
-        }
-    };
+    let study = (arguments.study.as_deref()).map(summary).transpose()?;
     let plan = arguments.plan.as_ref();
     let plan = plan.map(|path| read_jump(&model, path, &arguments.reading));
     let plan = plan.transpose()?;
@@ -90,6 +78,17 @@ pub(crate) fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
         "remarks": made.remarks,
     });
     Ok(Answer::new(text, json).failed_if(made.verdict.fit_for.is_empty()))
+}
+
+fn summary(folder: &Path) -> Result<Summary, Error> {
+    let summary = Summary::of(&Store::open(folder)?.cells()?, LAMBDA);
+    if summary.dimensions.is_empty() {
+        let folder = folder.display();
+        note(&format!(
+            "{folder}: no training of the study has a model, so that its figures are left out"
+        ));
+    }
+    Ok(summary)
 }
 
 pub(crate) struct Made {

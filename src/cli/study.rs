@@ -8,7 +8,7 @@ use super::Answer;
 use super::args::{StudyArguments, TrainSettings};
 use super::destination::Inputs;
 use super::output::{note, spinner};
-use super::prepared_recordings::{RecordedSets, reader_for};
+use super::prepared_recordings::RecordedSets;
 use super::train_settings;
 use crate::Error;
 use crate::files::{EmittedFile, check_folder};
@@ -59,10 +59,10 @@ fn trained(arguments: &StudyArguments) -> Result<Store, Error> {
     let robot = train_settings::robot(&settings)?;
     let mut recorded = RecordedSets::whole(
         [&arguments.recordings, &arguments.validation, &[]],
+        &arguments.reading,
         &settings,
         robot,
-        reader_for(&arguments.reading, &settings)?,
-    );
+    )?;
     recorded.read()?;
     recorded.report_findings();
     let [training, validation, _] = &recorded.sets;

@@ -11,7 +11,6 @@ use super::destination::{Format, Inputs};
 use super::output::{named, note, note_repeated, quoted, quoted_all, quoted_text, spinner};
 use super::prepared_recordings::RecordedSets;
 use super::train_settings;
-use crate::model::ReducedModel;
 use crate::recording::{Recording, RecordingSet};
 use crate::robot::{BODY_X, BODY_Z};
 use crate::train::{
@@ -31,9 +30,7 @@ pub(crate) fn run(arguments: &TrainArguments) -> Result<Answer, Error> {
         .and_robot(settings.robot.as_deref())
         .and(&settings.actuators)
         .check_output(Some(&arguments.output), Format::MODEL, arguments.force)?;
-    let latent_dim = settings
-        .latent_dim
-        .expect("checked by clap, or with the file");
+    let latent_dim = settings.latent_dim.expect("clap or the file's check asks");
     let method = train_settings::method(&settings);
     let robot = train_settings::robot(&settings)?;
     let name = named(arguments.name.as_deref(), &arguments.output);
@@ -64,16 +61,11 @@ pub(crate) fn run(arguments: &TrainArguments) -> Result<Answer, Error> {
     bar.finish_and_clear();
     let is_interrupted = INTERRUPTED.load(Ordering::Relaxed);
     if is_interrupted {
-        trained.model = marked_as_interrupted(trained.model);
-        note(
-            "interrupted: this is the best model so far; its provenance says so, its command does not repeat it",
-        );
+        trained = marked_as_interrupted(trained);
     }
     artifact::write(&arguments.output, &trained.model, arguments.force)?;
-    let tested = match test.is_empty() {
-        true => None,
-        false => Some(train::assess(&trained.model, test)?),
-    };
+    let tested = (!test.is_empty()).then(|| train::assess(&trained.model, test));
+    let tested = tested.transpose()?;
     let mut answer = answer(arguments, &trained, tested.as_ref());
     let notes = notes(&trained.report, tested.as_ref(), &recorded.sets);
     notes.iter().for_each(|text| note(text));
@@ -89,17 +81,14 @@ pub(crate) fn run(arguments: &TrainArguments) -> Result<Answer, Error> {
         answer.json["split"] = json;
         let _ = write!(answer.text, "\n{text}");
     }
-    if !is_interrupted {
-        return Ok(answer);
+    if is_interrupted {
+        answer.text += INTERRUPTED_TEXT;
+        answer.code = INTERRUPTED_CODE;
     }
-    let _ = writeln!(
-        answer.text,
-        "\ninterrupted by Ctrl-C: the model is the best until then, and the command in its provenance, which says so, \
-         does not give it again"
-    );
-    answer.code = INTERRUPTED_CODE;
     Ok(answer)
 }
+
+const INTERRUPTED_TEXT: &str = "\ninterrupted by Ctrl-C: the model is the best until then, and the command in its provenance, which says so, does not give it again\n";
 
 /// Where whole jumps are worse than standing still: of the validation, or else of the training, and of the test.
 fn notes(
@@ -122,11 +111,15 @@ const INTERRUPTED_CODE: u8 = 130;
 /// Becomes true at the first Ctrl-C, so that a training ends with the best so far; the second one ends the process.
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
-fn marked_as_interrupted(model: ReducedModel) -> ReducedModel {
-    let mut provenance = model.provenance().clone();
+fn marked_as_interrupted(trained: Trained) -> Trained {
+    note(
+        "interrupted: this is the best model so far; its provenance says so, its command does not repeat it",
+    );
+    let mut provenance = trained.model.provenance().clone();
     provenance.insert("interrupted".to_owned(), true.into());
-    let builder = model.into_builder().provenance(provenance);
-    builder.build().expect("the model was sound before")
+    let builder = trained.model.into_builder().provenance(provenance);
+    let model = builder.build().expect("the model was sound before");
+    Trained { model, ..trained }
 }
 
 fn stop_on_interrupt() -> &'static AtomicBool {

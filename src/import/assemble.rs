@@ -33,7 +33,6 @@ impl Parts {
     }
 }
 
-/// Dimensions as far as they are known before a tensor is looked at.
 #[derive(Clone, Copy, Debug, Default)]
 struct Known {
     latent: Option<usize>,
@@ -324,7 +323,6 @@ impl<'a> Assembly<'a, '_> {
         Ok(xi.zip_map(&mask, |value, flag| if flag == 0.0 { 0.0 } else { value }))
     }
 
-    /// A tensor of one number per term and latent coordinate.
     fn terms_by_latent(
         &mut self,
         assigned: &Assigned<'_>,

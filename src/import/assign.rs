@@ -198,7 +198,6 @@ fn mapped<'f>(
     Ok(used)
 }
 
-/// The phases of the model: those given, then the others whose coefficients the file has.
 fn phases(
     tensors: &TensorFile<'_>,
     options: &ImportOptions,

@@ -78,7 +78,6 @@ pub(super) fn read(file: &str, bytes: &[u8]) -> Result<Sections, ImportError> {
     complete(file, reader.sections, text.lines().count(), expected)
 }
 
-/// The bytes of a file as text, without a byte order mark.
 pub(super) fn text_of<'b>(file: &str, bytes: &'b [u8]) -> Result<&'b str, ImportError> {
     let text = std::str::from_utf8(bytes).map_err(|error| {
         let before = String::from_utf8_lossy(&bytes[..error.valid_up_to()]);
@@ -210,7 +209,6 @@ fn pieces((line, column): (usize, usize), text: &str) -> Vec<Piece> {
     pieces
 }
 
-/// The sections with their equations in order, if each phase has all of them.
 pub(super) fn complete(
     file: &str,
     mut sections: Vec<Section>,

@@ -12,7 +12,6 @@ pub(super) fn too_large(file: &str, place: Place, max: u64, unit: &str) -> Impor
     ImportError::text(file, place, text)
 }
 
-/// A container that is damaged, in the words of its reader.
 pub(super) fn damaged(file: &str, format: &str, found: &str) -> ImportError {
     let text = format!("not a usable {format} file: {found}");
     ImportError::text(file, Place::Whole, text)

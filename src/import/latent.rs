@@ -87,7 +87,6 @@ struct Row {
     factor: f64,
 }
 
-/// Refuses options that only tensors can follow, and another dimension.
 fn check_options(latent_dim: usize, options: &ImportOptions) -> Result<(), ImportError> {
     if let Some(given) = options.latent_dim.filter(|given| *given != latent_dim) {
         let expected = format!("{latent_dim}, as the equations have");

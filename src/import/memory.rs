@@ -1,12 +1,10 @@
 //! Tensors in memory, as another program of the same process holds them.
 
-use std::borrow::Cow;
-
 use sha2::digest::Output;
 use sha2::{Digest as _, Sha256};
 
 use super::error::{ImportError, shape_text};
-use super::tensors::{Element, TensorFile, TensorInfo};
+use super::tensors::{Container, TensorFile, TensorInfo};
 
 /// A named array of numbers.
 #[derive(Clone, Debug)]
@@ -38,18 +36,15 @@ pub(super) fn open<'t>(
         infos.push(TensorInfo {
             name: tensor.name.clone(),
             shape: tensor.shape.clone(),
-            element: Element::F64,
             is_column_major: tensor.is_column_major,
-            is_big_endian: false,
             member: index,
-            start: 0,
+            ..TensorInfo::default()
         });
     }
-    let bytes = |info: &TensorInfo, _| Ok(Cow::Owned(little_endian(&tensors[info.member])));
-    TensorFile::new(source, infos, Box::new(bytes))
+    TensorFile::new(source, infos, Container::Memory(tensors))
 }
 
-fn little_endian(tensor: &Tensor<'_>) -> Vec<u8> {
+pub(super) fn little_endian(tensor: &Tensor<'_>) -> Vec<u8> {
     let values = tensor.values.iter();
     values.flat_map(|value| value.to_le_bytes()).collect()
 }

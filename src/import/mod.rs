@@ -40,7 +40,6 @@ mod pysindy;
 mod report;
 mod role;
 mod run;
-mod safetensors;
 mod tensors;
 mod terms;
 

@@ -5,14 +5,13 @@
 //! version (1 to 3), the length of the rest (2 or 4 bytes, little endian), and a Python dictionary:
 //! `{'descr': '<f8', 'fortran_order': False, 'shape': (18, 4), }`.
 
-use std::borrow::Cow;
 use std::fmt::Display;
 use std::io::{self, Cursor, Read};
 
 use zip::ZipArchive;
 
 use super::error::{self, ImportError, too_large};
-use super::tensors::{Element, TensorFile, TensorInfo};
+use super::tensors::{Container, Element, TensorFile, TensorInfo};
 use crate::files::Place;
 
 const MAX_MEMBERS: usize = 10_000;
@@ -22,7 +21,6 @@ const MAX_RANK: usize = 32;
 
 type Archive<'b> = ZipArchive<Cursor<&'b [u8]>>;
 
-/// Opens a file; only the headers of its arrays are read.
 pub(super) fn open<'b>(file: &str, bytes: &'b [u8]) -> Result<TensorFile<'b>, ImportError> {
     let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(|e| damaged(file, e))?;
     if archive.has_duplicate_names() {
@@ -36,16 +34,13 @@ pub(super) fn open<'b>(file: &str, bytes: &'b [u8]) -> Result<TensorFile<'b>, Im
     for member in 0..archive.len() {
         infos.extend(describe(file, &mut archive, member)?);
     }
-    let name = file.to_owned();
-    let read = move |info: &TensorInfo, length| numbers(&name, bytes, info, length).map(Cow::from);
-    TensorFile::new(file, infos, Box::new(read))
+    TensorFile::new(file, infos, Container::Npz(bytes))
 }
 
 fn damaged(file: &str, error: impl Display) -> ImportError {
     error::damaged(file, "npz", &error.to_string())
 }
 
-/// Describes a member; `None` for one that is no array.
 fn describe(
     file: &str,
     archive: &mut Archive<'_>,
@@ -66,7 +61,7 @@ fn describe(
     }
 }
 
-fn numbers(
+pub(super) fn numbers(
     file: &str,
     bytes: &[u8],
     info: &TensorInfo,
@@ -136,13 +131,12 @@ fn parse_header(text: &str, start: usize) -> Option<TensorInfo> {
         _ => return None,
     };
     Some(TensorInfo {
-        name: String::new(),
         shape: parse_shape(value("shape")?)?,
         element,
         is_column_major,
         is_big_endian,
-        member: 0,
         start,
+        ..TensorInfo::default()
     })
 }
 

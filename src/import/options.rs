@@ -32,9 +32,6 @@ pub enum Format {
 
 impl Format {
     /// The kind of a file by its ending.
-    ///
-    /// # Errors
-    /// [`ImportError`], which states how to convert files of known other kinds.
     pub(crate) fn of_path(path: &Path) -> Result<Self, ImportError> {
         let ending = (path.extension()).map(|ending| ending.to_string_lossy().to_lowercase());
         let found = match ending.as_deref() {
@@ -86,7 +83,6 @@ impl Format {
     }
 }
 
-/// The refusal of a file that has to be converted first.
 pub(super) fn refusal(path: &Path, found: OtherFormat) -> Option<ImportError> {
     let file = path.display().to_string();
     let refused = || ImportError::at(&file, Place::Whole, found.what, found.remedy.as_str());
@@ -265,7 +261,6 @@ impl ImportOptions {
         }
     }
 
-    /// The first option given that is of use with an encoder or decoder alone.
     pub(super) fn of_maps(&self) -> Option<&'static str> {
         let given = [
             ("--robot", self.robot.is_some()),
@@ -306,7 +301,6 @@ impl ImportOptions {
         }
     }
 
-    /// The note that a phase got the usual rule, unless its rule was given.
     pub(super) fn usual_feet(&self, phase: &str, feet: &FeetRule) -> Option<String> {
         let note = || format!("phase {phase} holds for feet `{feet}`, the usual rule of its name");
         self.given(phase).is_none().then(note)

@@ -17,7 +17,6 @@ pub enum Part {
 impl Part {
     pub(super) const ALL: [Self; 2] = [Part::Encoder, Part::Decoder];
 
-    /// Whether a tensor lies in the module of this map.
     pub(super) fn holds(self, name: &str) -> bool {
         let mut modules = name.split(['.', '/']);
         modules.next_back();
@@ -76,7 +75,6 @@ const OF_PHASES: [(&str, fn(String) -> Role); 5] = [
     ("input_mean", Role::InputMean),
     ("input_covariance", Role::InputCovariance),
 ];
-/// Parts of which a model has one.
 const SINGLE: [Role; 5] = [
     Role::StateScaling,
     Role::InputScaling,
@@ -180,7 +178,7 @@ impl Role {
     /// The part that the name of a tensor stands for: the part's own name, alone or behind the
     /// names of the modules that hold it, as in `autoencoder.encoder.0.weight`. A mask has the
     /// phase `always` where its phase is at most a word of its name.
-    pub(crate) fn of_name(name: &str) -> Option<Self> {
+    pub fn of_name(name: &str) -> Option<Self> {
         // TensorFlow's ends of names.
         let name = name
             .strip_suffix("/.ATTRIBUTES/VARIABLE_VALUE")
@@ -273,66 +271,6 @@ impl FromStr for Mapping {
                 let expected = "PART=TENSOR, such as encoder.weight=net.enc.0.weight";
                 Err(ImportError::option("--map", format!("{text:?}"), expected))
             }
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn role_text_reads_back() {
-        let names = "encoder.weight decoder.bias encoder.0.weight decoder.12.bias xi.contact \
-                     mask.rear_stance input_mean.contact input_covariance.contact scaling.state \
-                     scaling.input mean.state std.state std.input";
-        for text in names.split_whitespace() {
-            let role: Role = text.parse().expect("the name of a part");
-            assert_eq!(role.to_string(), text);
-            assert_eq!(Role::of_name(&text.replace('.', "_")), Some(role));
-        }
-    }
-
-    #[test]
-    fn names_are_those_of_parts_alone_or_behind_modules() {
-        let named = |name| Role::of_name(name).map(|role| role.to_string());
-        for (name, expected) in [
-            ("module.encoder.weight", Some("encoder.weight")),
-            ("net/decoder.2.bias", Some("decoder.2.bias")),
-            ("model.xi.rear.stance", Some("xi.rear.stance")),
-            ("autoencoder.sindy_coefficients.contact", Some("xi.contact")),
-            ("Xi", Some("xi.always")),
-            ("net.sindy_coefficients", Some("xi.always")),
-            ("normalizer.mean_state", Some("mean.state")),
-            ("mean.input", None),
-            ("W_e", None),
-            ("encoder.weight.mean", None),
-            ("encoder.running_mean", None),
-            ("myencoder.weight", None),
-            ("encoder/kernel:0", Some("encoder.weight")),
-            (
-                "autoencoder/encoder/dense_1/kernel",
-                Some("encoder.1.weight"),
-            ),
-            ("encoder/dense/bias", Some("encoder.0.bias")),
-            ("encoder/kernel/Adam_1", None),
-            (
-                "encoder/layer-2/kernel/.ATTRIBUTES/VARIABLE_VALUE",
-                Some("encoder.2.weight"),
-            ),
-            (
-                "net.decoder.layers.4.linear.weight",
-                Some("decoder.4.weight"),
-            ),
-            ("net.Decoder", Some("decoder.weight")),
-            ("Xi_contact", Some("xi.contact")),
-            ("coefficient_mask", Some("mask.always")),
-            ("xi_mask", Some("mask.always")),
-            ("flight.sparsity_mask", Some("mask.always")),
-            ("xi.", None),
-            ("", None),
-        ] {
-            assert_eq!(named(name).as_deref(), expected, "{name}");
         }
     }
 }

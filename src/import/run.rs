@@ -16,7 +16,7 @@ use super::memory::{self, Tensor};
 use super::npz;
 use super::options::{Format, ImportOptions, refusal};
 use super::report::ImportReport;
-use super::safetensors;
+use super::tensors::open_safetensors;
 use crate::files::{Place, hex, magic};
 use crate::model::{CoordinateNames, ReducedModel};
 use crate::symbolic::ExprPool;
@@ -69,7 +69,7 @@ pub fn import_from_bytes(
     let (parts, mut report) = match format {
         Format::Safetensors => {
             check_size(file, bytes, MAX_FILE_BYTES)?;
-            assemble::parts(&safetensors::open(file, bytes)?, options)?
+            assemble::parts(&open_safetensors(file, bytes)?, options)?
         }
         Format::Npz => {
             check_size(file, bytes, MAX_FILE_BYTES)?;
@@ -108,7 +108,6 @@ pub(super) fn check_size(file: &str, bytes: &[u8], max: u64) -> Result<(), Impor
     }
 }
 
-/// The equations of a file in memory, their right sides not looked at.
 fn sections(
     file: &str,
     format: Format,
@@ -153,7 +152,6 @@ pub fn read_equations(
     Ok(read)
 }
 
-/// From the parts to the model; the report has the file, its kind and the decisions.
 fn finish(
     parts: Parts,
     report: ImportReport,

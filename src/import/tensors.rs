@@ -3,19 +3,22 @@
 use std::borrow::Cow;
 
 use nalgebra::DMatrix;
+use safetensors::{Dtype, SafeTensors};
 
-use super::error::{ImportError, shape_text, too_large};
+use super::error::{ImportError, damaged, shape_text, too_large};
+use super::memory::{self, Tensor};
+use super::npz;
 use crate::files::Place;
 
 /// Largest tensor that is read: the coefficients of the largest library fit twice.
 const MAX_ELEMENTS: usize = 4 << 20;
 
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) enum Element {
     F32,
+    #[default]
     F64,
     Bool,
-    /// Any other type, by its name in the file.
     Other(String),
 }
 
@@ -40,7 +43,7 @@ impl Element {
     }
 }
 
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct TensorInfo {
     pub(super) name: String,
     pub(super) shape: Vec<usize>,
@@ -55,7 +58,6 @@ pub(super) struct TensorInfo {
 }
 
 impl TensorInfo {
-    /// `net.0.weight (18 x 4)`.
     pub(super) fn describe(&self) -> String {
         format!("`{}` ({})", self.name, shape_text(&self.shape))
     }
@@ -68,7 +70,6 @@ impl TensorInfo {
         }
     }
 
-    /// The index of the number at a position of the file.
     fn index_of(&self, position: usize) -> Vec<usize> {
         let mut rest = position;
         let mut index = vec![0; self.shape.len()];
@@ -84,23 +85,25 @@ impl TensorInfo {
     }
 }
 
-/// Hands out the bytes of a tensor's numbers, as many as its shape and type need.
-pub(super) type ByteReader<'b> =
-    dyn Fn(&TensorInfo, usize) -> Result<Cow<'b, [u8]>, ImportError> + 'b;
+/// What the numbers of tensors are in.
+pub(super) enum Container<'b> {
+    Safetensors(&'b [u8]),
+    Npz(&'b [u8]),
+    Memory(&'b [Tensor<'b>]),
+}
 
-/// A file of tensors: their descriptions, and the container's reader.
+/// A file of tensors: their descriptions, and their numbers, which are read one tensor at a time.
 pub(super) struct TensorFile<'b> {
     file: String,
     infos: Vec<TensorInfo>,
-    bytes: Box<ByteReader<'b>>,
+    container: Container<'b>,
 }
 
 impl<'b> TensorFile<'b> {
-    /// The tensors that a container describes; numbers are read one tensor at a time.
     pub(super) fn new(
         file: &str,
         mut infos: Vec<TensorInfo>,
-        bytes: Box<ByteReader<'b>>,
+        container: Container<'b>,
     ) -> Result<TensorFile<'b>, ImportError> {
         infos.sort_by(|a, b| a.name.cmp(&b.name));
         if let Some(pair) = infos.windows(2).find(|pair| pair[0].name == pair[1].name) {
@@ -109,7 +112,20 @@ impl<'b> TensorFile<'b> {
             return Err(ImportError::at(file, place, found, "different names"));
         }
         let file = file.to_owned();
-        Ok(TensorFile { file, infos, bytes })
+        Ok(TensorFile {
+            file,
+            infos,
+            container,
+        })
+    }
+
+    /// The bytes of a tensor's numbers, as many as its shape and type need.
+    fn bytes(&self, info: &TensorInfo, length: usize) -> Result<Cow<'b, [u8]>, ImportError> {
+        Ok(match self.container {
+            Container::Safetensors(bytes) => Cow::from(&bytes[info.start..info.start + length]),
+            Container::Npz(bytes) => npz::numbers(&self.file, bytes, info, length)?.into(),
+            Container::Memory(tensors) => memory::little_endian(&tensors[info.member]).into(),
+        })
     }
 
     pub(super) fn file(&self) -> &str {
@@ -164,7 +180,7 @@ impl<'b> TensorFile<'b> {
             let (max, unit) = (MAX_ELEMENTS as u64, "numbers");
             return Err(too_large(&self.file, place(&[]), max, unit));
         };
-        let bytes = (self.bytes)(info, size * count)?;
+        let bytes = self.bytes(info, size * count)?;
         let numbers = bytes.chunks_exact(size);
         let values: Vec<f64> = numbers.map(|number| decode(info, number)).collect();
         match values.iter().position(|value| !value.is_finite()) {
@@ -177,7 +193,32 @@ impl<'b> TensorFile<'b> {
     }
 }
 
-/// One number from its bytes, as many as its type has.
+/// Bytes before the header: its length.
+const LENGTH_BYTES: usize = 8;
+
+/// Opens a file; offsets and lengths of its tensors are checked against the file.
+pub(super) fn open_safetensors<'b>(
+    file: &str,
+    bytes: &'b [u8],
+) -> Result<TensorFile<'b>, ImportError> {
+    let (header, metadata) = SafeTensors::read_metadata(bytes)
+        .map_err(|error| damaged(file, "safetensors", &error.to_string()))?;
+    let tensors = metadata.tensors().into_iter();
+    let infos = tensors.map(|(name, info)| TensorInfo {
+        name,
+        shape: info.shape.clone(),
+        element: match info.dtype {
+            Dtype::F32 => Element::F32,
+            Dtype::F64 => Element::F64,
+            Dtype::BOOL => Element::Bool,
+            other => Element::Other(other.to_string()),
+        },
+        start: LENGTH_BYTES + header + info.data_offsets.0,
+        ..TensorInfo::default()
+    });
+    TensorFile::new(file, infos.collect(), Container::Safetensors(bytes))
+}
+
 fn decode(info: &TensorInfo, number: &[u8]) -> f64 {
     let mut little = [0; 8];
     let little = &mut little[..number.len()];

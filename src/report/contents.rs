@@ -69,11 +69,11 @@ pub(crate) fn all_figures(content: &Content<'_>) -> Result<AllFigures, ModelErro
     if let Some(run) = assessment.runs.first() {
         figures.encoder.push(encoder(model, assessment, run)?);
     }
-    for (index, jump) in jumps(content).into_iter().take(MAX_JUMPS).enumerate() {
-        let [joints, body] = jump.coordinates()?;
+    for (index, jump) in jumps(content)?.into_iter().take(MAX_JUMPS).enumerate() {
+        let [joints, body] = jump.coordinates();
         let mut folded = vec![
             ("Latent accelerations", jump.accelerations()?),
-            ("Beside the pendulum", jump.baselines()?),
+            ("Beside the pendulum", jump.baselines()),
             ("Joint angles", joints),
         ];
         let path = &jump.run.segment.path;
@@ -90,8 +90,8 @@ pub(crate) fn all_figures(content: &Content<'_>) -> Result<AllFigures, ModelErro
         let plan = content.plan.filter(|_| index == 0);
         figures.jumps.push(JumpFigures {
             title: jump.place.words.clone(),
-            body_rms_m: jump.body_rms_m()?,
-            motion: jump.motion(plan)?,
+            body_rms_m: jump.body_rms_m(),
+            motion: jump.motion(plan),
             body,
             folded,
         });
@@ -102,7 +102,7 @@ pub(crate) fn all_figures(content: &Content<'_>) -> Result<AllFigures, ModelErro
     Ok(figures)
 }
 
-pub(super) fn jumps<'a>(content: &Content<'a>) -> Vec<Jump<'a>> {
+pub(super) fn jumps<'a>(content: &Content<'a>) -> Result<Vec<Jump<'a>>, ModelError> {
     let (model, assessment) = (content.model, content.assessment);
     let jump = |(index, run): (usize, &'a SegmentRun<'a>)| {
         let path = &run.segment.path;
@@ -111,12 +111,7 @@ pub(super) fn jumps<'a>(content: &Content<'a>) -> Vec<Jump<'a>> {
         if same.filter(|other| *other == path).count() > 1 {
             place.words += &format!(", from row {}", run.segment.first_row);
         }
-        Jump {
-            model,
-            assessment,
-            run,
-            place,
-        }
+        Jump::new(model, assessment, run, place)
     };
     assessment.runs.iter().enumerate().map(jump).collect()
 }

@@ -252,8 +252,8 @@ fn commands(content: &Content<'_>) -> Option<String> {
 fn recordings(content: &Content<'_>) -> Result<Table, ModelError> {
     let known = known_digests(content.model);
     let mut rows = Vec::new();
-    for jump in jumps(content) {
-        let rms = jump.body_rms_m()?;
+    for jump in jumps(content)? {
+        let rms = jump.body_rms_m();
         rows.push((jump.place.words, jump.run.segment, rms));
     }
     let names = content.assessment.names.iter();

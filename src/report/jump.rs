@@ -51,28 +51,59 @@ impl JumpName {
 /// A value of every sample; none where a rollout did not arrive.
 type Samples = Vec<Option<DVector<f64>>>;
 
+fn predicted(
+    run: &SegmentRun<'_>,
+    rollout: &Rollout,
+    value: impl Fn(usize, &DVector<f64>, &DVector<f64>) -> Result<DVector<f64>, ModelError>,
+) -> Result<Samples, ModelError> {
+    let states = rollout.states(run.latent.len()).into_iter();
+    let value = |(sample, state): (usize, Option<(DVector<f64>, DVector<f64>)>)| {
+        state.map(|(z, dz)| value(sample, &z, &dz)).transpose()
+    };
+    states.enumerate().map(value).collect()
+}
+
 pub(super) struct Jump<'a> {
     pub model: &'a ReducedModel,
     pub assessment: &'a Assessment<'a>,
     pub run: &'a SegmentRun<'a>,
     pub place: JumpName,
+    /// Coordinates of the robot along the rollout over the whole jump, and along the restarted one.
+    full: Samples,
+    restarted: Samples,
+    modelled: Vec<bool>,
 }
 
-impl Jump<'_> {
+impl<'a> Jump<'a> {
+    /// # Errors
+    /// [`ModelError`] for a model without encoder or decoder.
+    pub(crate) fn new(
+        model: &'a ReducedModel,
+        assessment: &'a Assessment<'a>,
+        run: &'a SegmentRun<'a>,
+        place: JumpName,
+    ) -> Result<Self, ModelError> {
+        let decoded = |rollout| predicted(run, rollout, |_, z, _| model.decode(z));
+        Ok(Self {
+            full: decoded(&run.full)?,
+            restarted: decoded(&run.restarted)?,
+            modelled: modelled(model, run)?,
+            model,
+            assessment,
+            run,
+            place,
+        })
+    }
+
     /// The robot as it moved and as the model predicts it over the whole jump, as a strip and as an animation; none for a
     /// model without a robot.
-    pub(crate) fn motion(
-        &self,
-        plan: Option<&Segment>,
-    ) -> Result<Option<(Figure, Film)>, ModelError> {
-        let Ok(robot) = self.model.robot() else {
-            return Ok(None);
-        };
+    pub(crate) fn motion(&self, plan: Option<&Segment>) -> Option<(Figure, Film)> {
+        let robot = self.model.robot().ok()?;
         let segment = self.run.segment;
         let predicted = Motion {
             role: Role::Full,
             words: "model, whole jump".to_owned(),
-            states: self.states()?,
+            states: self.states(),
         };
         let mut motions = vec![Motion::recorded(segment), predicted];
         motions.extend(plan.map(|plan| Motion::planned(plan, segment)));
@@ -86,40 +117,23 @@ impl Jump<'_> {
         );
         let from = (heading_rad(segment), floor_m(robot, segment));
         let motions = (segment.time_s.as_slice(), motions.as_slice());
-        Ok(Some((
+        Some((
             film_strip(robot, names, motions, from, FRAMES),
             film(robot, motions, from),
-        )))
+        ))
     }
 
     /// The robot along the rollout over the whole jump; coordinates that the model does not encode stay as recorded.
-    fn states(&self) -> Result<Samples, ModelError> {
+    fn states(&self) -> Samples {
         let recorded = &self.run.segment.x;
-        let modelled = modelled(self.model, self.run)?;
-        let mut states = self.decoded(&self.run.full)?;
+        let mut states = self.full.clone();
         for (sample, state) in states.iter_mut().enumerate() {
             let Some(state) = state else { continue };
-            for row in (0..STATE_DIM).filter(|&row| !modelled[row]) {
+            for row in (0..STATE_DIM).filter(|&row| !self.modelled[row]) {
                 state[row] = recorded[(row, sample)];
             }
         }
-        Ok(states)
-    }
-
-    fn predicted(
-        &self,
-        rollout: &Rollout,
-        value: impl Fn(usize, &DVector<f64>, &DVector<f64>) -> Result<DVector<f64>, ModelError>,
-    ) -> Result<Samples, ModelError> {
-        let states = rollout.states(self.run.latent.len()).into_iter();
-        let value = |(sample, state): (usize, Option<(DVector<f64>, DVector<f64>)>)| {
-            state.map(|(z, dz)| value(sample, &z, &dz)).transpose()
-        };
-        states.enumerate().map(value).collect()
-    }
-
-    fn decoded(&self, rollout: &Rollout) -> Result<Samples, ModelError> {
-        self.predicted(rollout, |_, z, _| self.model.decode(z))
+        states
     }
 
     fn series(&self, role: Role, value: impl Fn(usize) -> Option<f64>) -> Series {
@@ -170,16 +184,14 @@ impl Jump<'_> {
     }
 
     /// Figures 7, 13 and 14 of the paper: joints, then body.
-    pub(crate) fn coordinates(&self) -> Result<[Figure; 2], ModelError> {
+    pub(crate) fn coordinates(&self) -> [Figure; 2] {
         let (names, units) = (&self.assessment.names, &self.assessment.units);
-        let full = self.decoded(&self.run.full)?;
-        let restarted = self.decoded(&self.run.restarted)?;
-        let modelled = modelled(self.model, self.run)?;
+        let rollouts = [&self.full, &self.restarted];
         let panel = |row: usize| {
             let recorded = |k| self.run.segment.x[(row, k)];
             let title = format!("{}, {}", names[row], units[row]);
-            match modelled[row] {
-                true => self.beside_rollouts(title, recorded, [&full, &restarted], row),
+            match self.modelled[row] {
+                true => self.beside_rollouts(title, recorded, rollouts, row),
                 false => {
                     let line = self.series(Role::Recorded, |k| Some(recorded(k)));
                     self.panel(format!("{title} (not modelled)"), vec![line])
@@ -194,10 +206,10 @@ impl Jump<'_> {
             self.rollout_figure(id, caption, rows.map(panel).collect())
         };
         let body = JOINT_DIM..names.len();
-        Ok([
+        [
             figure("joints", "Joint angles", 0..JOINT_DIM),
             figure("body", "Body position and orientation", body),
-        ])
+        ]
     }
 
     /// Figure 12 of the paper.
@@ -207,8 +219,8 @@ impl Jump<'_> {
             let u_lat = latent.u_lat.column(k).into_owned();
             self.model.ddz(latent.phase[k], z, dz, &u_lat)
         };
-        let full = self.predicted(&self.run.full, ddz)?;
-        let restarted = self.predicted(&self.run.restarted, ddz)?;
+        let full = predicted(self.run, &self.run.full, ddz)?;
+        let restarted = predicted(self.run, &self.run.restarted, ddz)?;
         let panel = |row: usize| {
             let title = format!("d²z{}/dt²", subscript(row + 1));
             let recorded = |k| latent.ddz[(row, k)];
@@ -223,14 +235,13 @@ impl Jump<'_> {
     }
 
     /// Figure 8 of the paper, with the fitted pendulum beside the published one.
-    pub(crate) fn baselines(&self) -> Result<Figure, ModelError> {
+    pub(crate) fn baselines(&self) -> Figure {
         let run = self.run;
-        let full = self.decoded(&run.full)?;
         let roles = [Role::Baseline, Role::SecondBaseline];
         let panel = |row: usize, axis: usize, title: &str| {
             let mut lines = vec![
                 self.series(Role::Recorded, |k| Some(run.segment.x[(row, k)])),
-                self.series(Role::Full, |k| full[k].as_ref().map(|x| x[row])),
+                self.series(Role::Full, |k| self.full[k].as_ref().map(|x| x[row])),
             ];
             for (role, rollout) in roles.into_iter().zip(&run.baselines) {
                 lines.push(self.series(role, |k| rollout[k].map(|at| at[axis])));
@@ -253,21 +264,20 @@ impl Jump<'_> {
         ];
         let id = format!("aslip_{}", self.place.suffix);
         let figure = Figure::over_time(id, caption, panels, &legend);
-        Ok(figure.in_columns(2, (360.0, 180.0)))
+        figure.in_columns(2, (360.0, 180.0))
     }
 
     /// Root mean square errors of body x and z over the whole jump, in m; none where the rollout arrives nowhere.
-    pub(crate) fn body_rms_m(&self) -> Result<[Option<f64>; 2], ModelError> {
-        let predicted = self.decoded(&self.run.full)?;
+    pub(crate) fn body_rms_m(&self) -> [Option<f64>; 2] {
         let of = |row: usize| {
             let mut sums = FitSums::default();
-            for (sample, state) in predicted.iter().enumerate() {
+            for (sample, state) in self.full.iter().enumerate() {
                 if let Some(state) = state {
                     sums.add(self.run.segment.x[(row, sample)], state[row]);
                 }
             }
             sums.fit().map(|fit| fit.rms)
         };
-        Ok([BODY_X, BODY_Z].map(of))
+        [BODY_X, BODY_Z].map(of)
     }
 }

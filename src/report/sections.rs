@@ -62,49 +62,35 @@ pub(super) fn tiles(content: &Content<'_>) -> Vec<(String, String)> {
             .map(|rms| rms.map_or("-".to_owned(), |rms| rounded(1e3 * rms, 2).to_string()));
         format!("{x}, {z} mm")
     };
-    let restarted = format!("body x, z: rms error, restarted every {every} s");
-    let of_row = |name: &str| content.verdict.rows.iter().find(|row| row.name == name);
-    let pair = |name: &str, unit: f64, digits: usize| match of_row(name) {
-        Some(row) => {
-            let shown = |value: Option<f64>| match value {
-                Some(value) => rounded(unit * value, digits).to_string(),
-                None => "-".to_owned(),
-            };
-            format!("{}, {}", shown(row.value), shown(row.baseline))
-        }
-        None => "-".to_owned(),
+    let pair = |name: &str, unit: f64| {
+        let Some(row) = content.verdict.rows.iter().find(|row| row.name == name) else {
+            return "-".to_owned();
+        };
+        let shown = |value: f64| rounded(unit * value, 3).to_string();
+        let [value, baseline] =
+            [row.value, row.baseline].map(|value| value.map_or("-".to_owned(), shown));
+        format!("{value}, {baseline}")
     };
+    let mut tiles = Vec::new();
+    let mut tile = |name: &str, value: String| tiles.push((name.to_owned(), value));
+    let whole = errors(&assessment.full);
+    tile("body x, z: rms error over whole jumps", whole);
+    let restarted = format!("body x, z: rms error, restarted every {every} s");
+    tile(&restarted, errors(&assessment.restarted));
+    let torques =
+        "torque R² in contact that the controller finds itself: worst recording; no dynamics";
+    tile(torques, pair(TORQUES_IN_CONTACT, 1.0));
+    let push = "deviation after a push, mm: worst recording; feedback off";
+    tile(push, pair(AFTER_A_PUSH, 1e3));
+    let (d, terms) = (model.latent_dim(), assessment.active_terms);
+    let size =
+        "size alone: latent coordinates, active terms, combined loss of accuracy and size L_mod";
     let loss = shown(assessment.combined_loss());
-    let size = format!(
-        "{}, {}, {loss}",
-        model.latent_dim(),
-        assessment.active_terms
-    );
-    let lift = shown(assessment.lift.torque.r2().contact);
-    let tiles = [
-        (
-            "body x, z: rms error over whole jumps",
-            errors(&assessment.full),
-        ),
-        (restarted.as_str(), errors(&assessment.restarted)),
-        (
-            "torque R² in contact that the controller finds itself: worst recording; no dynamics",
-            pair(TORQUES_IN_CONTACT, 1.0, 3),
-        ),
-        (
-            "deviation after a push, mm: worst recording; feedback off",
-            pair(AFTER_A_PUSH, 1e3, 3),
-        ),
-        (
-            "size alone: latent coordinates, active terms, combined loss of accuracy and size L_mod",
-            size,
-        ),
-        (
-            "encoder and decoder alone, whatever the dynamics: torque R² of the plain lift, contact",
-            lift,
-        ),
-    ];
-    tiles.map(|(name, value)| (name.to_owned(), value)).into()
+    tile(size, format!("{d}, {terms}, {loss}"));
+    let lift =
+        "encoder and decoder alone, whatever the dynamics: torque R² of the plain lift, contact";
+    tile(lift, shown(assessment.lift.torque.r2().contact));
+    tiles
 }
 
 pub(super) fn sections<'a>(

@@ -7,7 +7,6 @@ use std::path::PathBuf;
 
 #[derive(Debug, thiserror::Error)]
 pub enum StudyError {
-    /// A range of dimensions or seeds that cannot be trained.
     #[error("{found}, expected {expected}")]
     Range {
         found: String,
@@ -24,10 +23,8 @@ pub enum StudyError {
     },
     #[error("{path}: {message}")]
     Broken { path: PathBuf, message: String },
-    /// Two parts computed the same training with different results.
     #[error("{first} and {second} are the same training with different results")]
     Contradiction { first: PathBuf, second: PathBuf },
-    /// The file system refused to `read`, `write` or `make the folder`.
     #[error("{path}: cannot {action}")]
     File {
         path: PathBuf,

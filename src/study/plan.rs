@@ -38,9 +38,6 @@ pub(crate) struct CellId {
 
 impl Plan {
     /// Refuses dimensions and seeds that no training can have.
-    ///
-    /// # Errors
-    /// [`StudyError::Range`].
     pub(crate) fn check(&self) -> Result<(), StudyError> {
         let refuse =
             |found: String, expected: &'static str| Err(StudyError::Range { found, expected });
@@ -76,9 +73,6 @@ impl Shard {
     pub(crate) const WHOLE: Self = Self { index: 1, count: 1 };
 
     /// Reads `3/8`.
-    ///
-    /// # Errors
-    /// The expected form, if it is anything else.
     pub(crate) fn parse(text: &str) -> Result<Self, String> {
         let expected = || format!("found `{text}`, expected a part such as 3/8");
         let (index, count) = text.split_once('/').ok_or_else(expected)?;

@@ -17,9 +17,6 @@ use crate::train::{Method, Monitor, Origin, Recordings, TrainError, TrainOptions
 /// recordings matter. Where the encoder may look at fewer coordinates than the latent space has, the mask is lifted.
 /// `[training, validation]` are the recordings, `options` the settings but for name, latent dimension and seed,
 /// `finished` is called for every cell. The result does not depend on the number of threads.
-///
-/// # Errors
-/// [`StudyError::File`], one of several if more than one file fails. A training that refuses is an outcome, not an error.
 pub(crate) fn run(
     store: &Store,
     shard: Shard,

@@ -23,9 +23,6 @@ pub(crate) struct Store {
 
 impl Store {
     /// The store of `plan` in `folder`, which is made if it is not there.
-    ///
-    /// # Errors
-    /// [`StudyError::OtherStudy`] if the folder has trainings of another plan, [`StudyError::File`].
     pub(crate) fn create(folder: &Path, plan: Plan) -> Result<Self, StudyError> {
         plan.check()?;
         fs::create_dir_all(folder).map_err(refused(folder, "make the folder"))?;
@@ -44,9 +41,6 @@ impl Store {
     }
 
     /// The store that is in `folder`.
-    ///
-    /// # Errors
-    /// [`StudyError::File`] and [`StudyError::Broken`] for its plan.
     pub(crate) fn open(folder: &Path) -> Result<Self, StudyError> {
         let plan: Plan = read_json(&folder.join(PLAN))?;
         plan.check()?;
@@ -59,9 +53,6 @@ impl Store {
     }
 
     /// A finished training, if it is there.
-    ///
-    /// # Errors
-    /// [`StudyError::Broken`] if the file holds something else.
     pub(crate) fn get(&self, id: CellId) -> Result<Option<Cell>, StudyError> {
         let path = self.path(id);
         if !path.exists() {
@@ -79,17 +70,11 @@ impl Store {
     }
 
     /// Keeps a finished training; the file appears whole.
-    ///
-    /// # Errors
-    /// [`StudyError::File`].
     pub(crate) fn put(&self, cell: &Cell) -> Result<(), StudyError> {
         write_json(&self.path(cell.id), cell, Overwrite::Replace)
     }
 
     /// All finished trainings in the order of the plan.
-    ///
-    /// # Errors
-    /// As [`Self::get`].
     pub(crate) fn cells(&self) -> Result<Vec<Cell>, StudyError> {
         let ids = self.plan.cells().into_iter();
         ids.filter_map(|id| self.get(id).transpose()).collect()
@@ -101,9 +86,6 @@ impl Store {
     }
 
     /// Takes over all finished trainings of another part of the same study.
-    ///
-    /// # Errors
-    /// [`StudyError::OtherStudy`], [`StudyError::Contradiction`].
     pub(crate) fn merge(&self, part: &Store) -> Result<(), StudyError> {
         if let Some(difference) = difference(&part.plan, &self.plan) {
             let path = part.folder.join(PLAN);

@@ -309,3 +309,58 @@ fn two_arrays_of_one_name_are_refused() {
     let said = error.expect_err("one of two").to_string();
     assert!(said.contains("two arrays of one name"), "{said}");
 }
+
+#[test]
+fn role_text_reads_back() {
+    let names = "encoder.weight decoder.bias encoder.0.weight decoder.12.bias xi.contact \
+                 mask.rear_stance input_mean.contact input_covariance.contact scaling.state \
+                 scaling.input mean.state std.state std.input";
+    for text in names.split_whitespace() {
+        let role: Role = text.parse().expect("the name of a part");
+        assert_eq!(role.to_string(), text);
+        assert_eq!(Role::of_name(&text.replace('.', "_")), Some(role));
+    }
+}
+
+#[test]
+fn names_are_those_of_parts_alone_or_behind_modules() {
+    let named = |name| Role::of_name(name).map(|role| role.to_string());
+    for (name, expected) in [
+        ("module.encoder.weight", Some("encoder.weight")),
+        ("net/decoder.2.bias", Some("decoder.2.bias")),
+        ("model.xi.rear.stance", Some("xi.rear.stance")),
+        ("autoencoder.sindy_coefficients.contact", Some("xi.contact")),
+        ("Xi", Some("xi.always")),
+        ("net.sindy_coefficients", Some("xi.always")),
+        ("normalizer.mean_state", Some("mean.state")),
+        ("mean.input", None),
+        ("W_e", None),
+        ("encoder.weight.mean", None),
+        ("encoder.running_mean", None),
+        ("myencoder.weight", None),
+        ("encoder/kernel:0", Some("encoder.weight")),
+        (
+            "autoencoder/encoder/dense_1/kernel",
+            Some("encoder.1.weight"),
+        ),
+        ("encoder/dense/bias", Some("encoder.0.bias")),
+        ("encoder/kernel/Adam_1", None),
+        (
+            "encoder/layer-2/kernel/.ATTRIBUTES/VARIABLE_VALUE",
+            Some("encoder.2.weight"),
+        ),
+        (
+            "net.decoder.layers.4.linear.weight",
+            Some("decoder.4.weight"),
+        ),
+        ("net.Decoder", Some("decoder.weight")),
+        ("Xi_contact", Some("xi.contact")),
+        ("coefficient_mask", Some("mask.always")),
+        ("xi_mask", Some("mask.always")),
+        ("flight.sparsity_mask", Some("mask.always")),
+        ("xi.", None),
+        ("", None),
+    ] {
+        assert_eq!(named(name).as_deref(), expected, "{name}");
+    }
+}

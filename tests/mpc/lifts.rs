@@ -170,9 +170,13 @@ fn consistent_lift_of_a_slipping_push_stays_in_the_cones_and_nothing_near_is_bet
     );
     let best = cost(&plant, &found, &wanted, settings.lift_prior_weight);
     let mut tried = 0;
+    // All four cones are active: neighbours are tried on their inner side.
+    let inward = torque_for([Vector3::new(0.0, 0.0, 10.0); 4]);
     for _ in 0..20_000 {
         let size = 10f64.powf(2.0 * random.signed() - 2.0);
-        let near = found.map(|torque| torque + size * random.normal());
+        let near = std::array::from_fn(|joint| {
+            found[joint] + size * (random.normal() + random.signed().abs() * inward[joint])
+        });
         let within = near
             .iter()
             .zip(go1().torque_limit_nm())

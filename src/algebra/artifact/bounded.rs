@@ -10,7 +10,6 @@ use serde_json::{Map, Number, Value};
 /// Most values; the provenance of a training with a thousand recordings has some ten thousand.
 const MOST: usize = 100_000;
 
-/// Reads one value; none for `null`.
 pub(super) fn value<'de, D: Deserializer<'de>>(source: D) -> Result<Option<Value>, D::Error> {
     let value = Bounded(&Cell::new(MOST)).deserialize(source)?;
     Ok(Some(value).filter(|value| !value.is_null()))

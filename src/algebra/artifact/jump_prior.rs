@@ -85,9 +85,6 @@ pub(super) fn entries_of(model: &ReducedModel) -> (Option<LandmarksEntry>, Optio
 }
 
 /// The prior that the two keys describe; its numbers are checked with the model.
-///
-/// # Errors
-/// For one key without the other, parts that do not pair up, an unknown phase, rows of unequal length.
 pub(super) fn prior_of(
     file: &str,
     keys: (Option<LandmarksEntry>, Option<PriorEntry>),

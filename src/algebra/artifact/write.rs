@@ -47,8 +47,7 @@ fn check_text(path: &Path, text: &str, overwrite: Overwrite) -> Result<(), Artif
 /// Writes a model file: into a new file beside `path`, which is then moved there.
 ///
 /// # Errors
-/// [`Fault::Text`](crate::files::Fault::Text) if a different file is there and `overwrite` refuses,
-/// [`ArtifactFault::Io`].
+/// As [`check_place`], and those of the file system.
 pub fn write(path: &Path, model: &ReducedModel, overwrite: Overwrite) -> Result<(), ArtifactError> {
     let text = to_text(model);
     let written = write_whole(path, overwrite, |out| out.write_all(text.as_bytes()));

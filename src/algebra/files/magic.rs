@@ -97,7 +97,6 @@ pub fn recognised(path: &Path, start: &[u8]) -> Option<OtherFormat> {
     })
 }
 
-/// What holds a model's arrays, by its bytes, else by its ending.
 pub(crate) fn arrays(path: &Path, bytes: &[u8]) -> Option<OtherFormat> {
     arrays_by_content(path, bytes).or_else(|| arrays_by_ending(path))
 }
@@ -136,7 +135,6 @@ impl Row {
             || (self.ends.as_ref()).is_some_and(|end| bytes.ends_with(&latin_1(end)))
     }
 
-    /// The format with the lines that make arrays of it.
     fn of_arrays(&self, path: &Path) -> Option<OtherFormat> {
         let (lines, intent) = match (&self.packed, &self.arrays) {
             (Some(line), _) => (in_shell(line, path), "the file itself; in a shell"),
@@ -181,7 +179,6 @@ impl Test {
     }
 }
 
-/// Whether the first or last bytes contain a text.
 fn has(bytes: &[u8], text: &[u8]) -> bool {
     let first = &bytes[..bytes.len().min(SEARCHED)];
     let last = &bytes[bytes.len().saturating_sub(SEARCHED)..];

@@ -30,7 +30,6 @@ pub enum Format {
 const MB: u64 = 1 << 20;
 
 impl Format {
-    /// Most bytes, and the format in words.
     const fn facts(self) -> (u64, &'static str) {
         match self {
             Self::Settings => (2 * MB, "settings"),
@@ -56,7 +55,6 @@ impl Format {
         (RATIO.saturating_mul(packed).saturating_add(ALWAYS)).min(self.most_bytes())
     }
 
-    /// The error of a file with more bytes.
     pub(crate) fn too_large(self, most: u64) -> io::Error {
         let text = format!(
             "more than {most} bytes, expected at most so many of {}",

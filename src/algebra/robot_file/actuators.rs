@@ -9,7 +9,6 @@ use super::read::RobotFileError;
 use super::read::{from_toml_text, text_of};
 use crate::robot::{Actuators, GRAVITY_M_S2, JOINT_DIM, JOINT_NAMES, Robot};
 
-/// How many numbers an array has.
 const COUNT: &str = "12, or 3 for hx, hy, kn";
 
 /// The table that is read; a file of `romc identify` has others as well.

@@ -78,7 +78,6 @@ pub enum Axis {
     Vector([f64; 3]),
 }
 
-/// The six axes that have names.
 const NAMED: [(&str, [f64; 3]); 6] = [
     ("x", [1.0, 0.0, 0.0]),
     ("y", [0.0, 1.0, 0.0]),
@@ -89,7 +88,6 @@ const NAMED: [(&str, [f64; 3]); 6] = [
 ];
 
 impl Axis {
-    /// The axis of a vector, by name where it has one.
     pub(crate) fn of(vector: [f64; 3]) -> Self {
         let named = NAMED.iter().find(|(_, known)| *known == vector);
         named.map_or(Axis::Vector(vector), |(name, _)| {

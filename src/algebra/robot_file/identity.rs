@@ -19,7 +19,6 @@ const USUAL_ANGLE_RAD: f64 = 9.5;
 const TORQUE_SHARE: std::ops::RangeInclusive<f64> = 0.02..=3.0;
 /// Largest speed of a joint, rad/s.
 const LARGEST_SPEED_RAD_S: f64 = 100.0;
-/// How many differences a message lists.
 const N_LISTED: usize = 4;
 
 /// A robot of a file, and notes for the user.
@@ -39,9 +38,6 @@ pub(super) fn namesake(robot: &Robot) -> Option<String> {
 
 /// The robot of an entry from a file. Numbers other than those of romc's robot of that name make it another robot,
 /// with the kind of the file in its name.
-///
-/// # Errors
-/// [`RobotFileError`] with the part that is wrong, or for a name that a user `chose` and romc's own robot has.
 pub(super) fn identified(
     file: &str,
     mut entry: RobotEntry,
@@ -88,7 +84,6 @@ pub(super) fn identified(
     })
 }
 
-/// Differences of a robot from another, the first few of them.
 fn differences(robot: &Robot, other: &Robot) -> String {
     let fields = |robot: &Robot| {
         let entry = RobotEntry::of(robot);
@@ -146,7 +141,6 @@ fn refuse_degrees(file: &str, entry: &RobotEntry, places: &Places) -> Result<(),
     Ok(())
 }
 
-/// Numbers that can hardly be true, one sentence for each kind.
 fn doubts(robot: &Robot) -> Vec<String> {
     let (torque_nm, speed_rad_s) = (robot.torque_limit_nm(), robot.joint_speed_limit_rad_s());
     let (limits, mass_kg) = (robot.joint_limit_rad(), robot.mass_kg());

@@ -10,7 +10,6 @@ use crate::files::is_invisible;
 use crate::robot::joints::LEG_JOINT_DIM;
 use crate::robot::{ChainLeg, FOOT_DIM, JOINT_DIM, Leg, LegGeometry, Robot};
 
-/// Longest name of a robot or joint.
 const MAX_NAME_LEN: usize = 80;
 /// Largest length of a link, m.
 const MAX_LINK_M: f64 = 10.0;
@@ -21,7 +20,6 @@ const MAX_TILT: f64 = 1e-3;
 /// Smallest sine of the angle between the first axis and the second.
 const MIN_ABDUCTION: f64 = 0.1;
 
-/// How faults name the parts of an entry.
 pub(super) enum Places {
     /// By the keys of TOML and JSON.
     Keys,
@@ -85,7 +83,6 @@ impl Places {
     }
 }
 
-/// A file and its parts, and the means to complain of them.
 struct Reader<'f> {
     file: &'f str,
     places: &'f Places,
@@ -111,7 +108,6 @@ impl RobotEntry {
     }
 }
 
-/// The robot of an entry, whatever its name.
 pub(super) fn build(
     file: &str,
     entry: &RobotEntry,
@@ -161,7 +157,6 @@ pub(super) fn build(
 }
 
 impl Reader<'_> {
-    /// Refuses `found` unless it is fine.
     fn check(
         &self,
         is_fine: bool,

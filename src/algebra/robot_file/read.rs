@@ -71,7 +71,6 @@ fn ending(path: &Path) -> String {
     ending.to_string_lossy().to_lowercase()
 }
 
-/// The text of a file of bounded size.
 pub(super) fn text_of(path: &Path) -> Result<String, RobotFileError> {
     let text = match ending(path).as_str() {
         "toml" => read_toml(path),
@@ -91,9 +90,7 @@ pub fn from_text(
     options: &RobotOptions<'_>,
 ) -> Result<RobotReading, RobotFileError> {
     if ending(Path::new(file)) != "toml" {
-        let reading = urdf::read(file, text, options.feet, options.name)?;
-        let (entry, places) = (reading.entry, &reading.places);
-        return identified(file, entry, places, options.name, reading.notes);
+        return urdf::read(file, text, options);
     }
     if !options.feet.is_empty() {
         let found = format!("{file} with links of feet");

@@ -47,13 +47,11 @@ impl Guards {
         self.note(pool, guard) && (function == Function::Sqrt || !self.is_zero(pool, argument))
     }
 
-    /// Notes a quotient by `divisor`; whether it has a value anywhere.
     pub(super) fn division(&mut self, pool: &mut ExprPool, divisor: ExprId) -> bool {
         let guard = pool.powi(divisor, -1);
         self.note(pool, guard) && !self.is_zero(pool, divisor)
     }
 
-    /// Notes a power; whether it has a value anywhere.
     pub(super) fn power(&mut self, pool: &mut ExprPool, base: ExprId, exponent: ExprId) -> bool {
         let Some(number) = pool.as_number(exponent) else {
             let guard = pool.pow(base, exponent);

@@ -31,7 +31,6 @@ impl ExprPool {
         self.rewrite_region(region, |pool, node| pool.expand_node(node, WIDE))
     }
 
-    /// Multiplies out one product or power whose operands are expanded.
     pub(super) fn expand_node(&mut self, expr: ExprId, limits: Limits) -> ExprId {
         if !matches!(self.node(expr), Node::Product(_) | Node::Power(..)) {
             return expr;

@@ -15,7 +15,6 @@ use super::pool::ExprPool;
 use super::series::Series;
 use super::slope::Facts;
 
-/// Largest exponent up to which series are computed.
 pub(super) const LAST_ORDER: i64 = 8;
 
 #[derive(Clone, Copy, Debug)]
@@ -44,7 +43,6 @@ pub(super) struct Germs<'a> {
 }
 
 impl Germs<'_> {
-    /// The series of an expression; nothing if it is smooth.
     pub(crate) fn of(&mut self, root: ExprId) -> Result<Option<Series>, Stop> {
         let symbol = self.symbol;
         let wanted = |node| self.pool.may_contain(node, symbol);

@@ -120,7 +120,6 @@ impl Number {
         }
     }
 
-    /// Numerators and denominators, `a/b` and `c/d`, of two exact numbers.
     fn fractions(self, other: Number) -> Option<[i128; 4]> {
         let ((a, b), (c, d)) = (self.as_rational()?, other.as_rational()?);
         Some([a, b, c, d].map(i128::from))

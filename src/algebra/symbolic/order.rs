@@ -20,7 +20,6 @@ const NOT_POLYNOMIAL: u32 = 1 << 31;
 pub(super) struct SymbolKey {
     prefix_len: usize,
     prefix: String,
-    /// The number at the end of the name.
     index: Option<u64>,
     pub(super) name: String,
 }
@@ -37,7 +36,6 @@ impl SymbolKey {
     }
 }
 
-/// Exponent of a factor; numeric ones need no expression.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Exponent {
     Number(Number),

@@ -78,7 +78,6 @@ pub enum ParseErrorKind {
 }
 
 impl ParseErrorKind {
-    /// The fault at a byte of a text.
     pub(super) fn at(self, text: &str, start: usize) -> ParseError {
         ParseError {
             position: text[..start].chars().count() + 1,
@@ -103,7 +102,6 @@ fn function_names() -> String {
     format!("{} or {last}", names.join(", "))
 }
 
-/// The start of a token, for messages.
 pub(super) fn short(token: &str) -> String {
     token.chars().take(40).collect()
 }
@@ -195,9 +193,7 @@ struct Parser<'p> {
     limits: ParseLimits,
     text: &'p str,
     tokens: Vec<Token<'p>>,
-    /// Index of the token that is read next.
     next: usize,
-    /// Open parentheses and pending exponents.
     depth: usize,
     /// What has to have a value, where that is asked.
     guards: Option<Guards>,
@@ -253,7 +249,6 @@ impl<'p> Parser<'p> {
         }
     }
 
-    /// A power with its signs, of the operand that begins at `start`.
     fn signed(&mut self, start: usize) -> Result<ExprId, ParseError> {
         let mut is_negative = false;
         while let TokenKind::Plus | TokenKind::Minus = self.peek().kind {
@@ -372,7 +367,6 @@ impl<'p> Parser<'p> {
 
 #[cfg(test)]
 impl ExprPool {
-    /// The expression of a text that parses.
     pub(crate) fn parsed(&mut self, text: &str) -> ExprId {
         self.parse(text, &|_| true)
             .unwrap_or_else(|error| panic!("{text}: {error}"))

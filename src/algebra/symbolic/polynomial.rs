@@ -88,7 +88,6 @@ impl ExprPool {
         self.cancel(numerator, &denominators)
     }
 
-    /// The factors of a term as powers with constant exponents.
     pub(super) fn numeric_powers(&self, rest: ExprId) -> Vec<(ExprId, Number)> {
         self.factors_of(rest)
             .iter()
@@ -184,7 +183,6 @@ impl ExprPool {
         self.sum_of_monomials(&quotient.collect(), &bases)
     }
 
-    /// See [`divided`]; nothing if that would be too much work.
     fn divided(
         &mut self,
         dividend: Monomials,
@@ -261,7 +259,6 @@ impl ExprPool {
         Some(monomials)
     }
 
-    /// The sum of some monomials, exponentials being merged.
     fn sum_of_monomials(&mut self, monomials: &Monomials, bases: &Bases) -> Option<ExprId> {
         let mut terms = Vec::with_capacity(monomials.len());
         for (exponents, &coefficient) in monomials {

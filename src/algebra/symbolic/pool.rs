@@ -39,20 +39,13 @@ pub struct ExprPool {
     places: HashMap<u64, ExprId, BuildIdHasher>,
     symbols: Vec<Symbol>,
     symbol_ids: HashMap<String, SymbolId>,
-    /// See [`ExprPool::exact`].
     is_exact: bool,
-    work: Work,
+    /// Constructors that were called and steps of about that effort, and how many of them there may be.
+    work_done: u64,
+    work_limit: u64,
     /// Derivatives found so far; expressions never change, so entries stay valid.
     pub(super) derivatives: HashMap<(ExprId, SymbolId), ExprId, BuildIdHasher>,
-    /// Slopes found so far.
     pub(super) slopes: HashMap<(ExprId, SymbolId), Slope, BuildIdHasher>,
-}
-
-/// What rewriting may cost: constructors that are called, and steps of about that effort.
-#[derive(Clone, Copy, Debug)]
-struct Work {
-    done: u64,
-    limit: u64,
 }
 
 #[derive(Clone, Debug)]
@@ -62,11 +55,9 @@ struct Symbol {
     meaning: Meaning,
 }
 
-/// What a symbol stands for.
 #[derive(Clone, Debug)]
 enum Meaning {
     Variable,
-    /// See [`ExprPool::selection`].
     Selection([ExprId; 3]),
     /// See [`ExprPool::decimal`]; with the nearest float.
     Decimal(Coefficient, f64),
@@ -79,7 +70,6 @@ struct Facts {
     itself: ExprId,
     /// The node without its numeric factor.
     rest: ExprId,
-    /// First sorting key, see [`super::order`].
     grade: u32,
     /// The symbols that occur: bit `i` for symbol `i`, the last bit for all from 63 on.
     symbols: u64,
@@ -110,10 +100,8 @@ impl ExprPool {
             symbols: Vec::new(),
             symbol_ids: HashMap::new(),
             is_exact: false,
-            work: Work {
-                done: 0,
-                limit: u64::MAX,
-            },
+            work_done: 0,
+            work_limit: u64::MAX,
             derivatives: HashMap::default(),
             slopes: HashMap::default(),
         };
@@ -132,7 +120,6 @@ impl ExprPool {
         }
     }
 
-    /// Whether this is an [`ExprPool::exact`] pool.
     pub(super) fn is_exact(&self) -> bool {
         self.is_exact
     }
@@ -142,31 +129,29 @@ impl ExprPool {
     pub(super) fn limited<T>(&mut self, work: u64, step: impl FnOnce(&mut Self) -> T) -> T {
         let outer = self.limit_work(work);
         let result = step(self);
-        self.work.limit = outer;
+        self.work_limit = outer;
         result
     }
 
     /// Lowers the limit to so much work from here on; the limit before.
     pub(super) fn limit_work(&mut self, work: u64) -> u64 {
-        let outer = self.work.limit;
-        self.work.limit = outer.min(self.work.done.saturating_add(work));
+        let outer = self.work_limit;
+        self.work_limit = outer.min(self.work_done.saturating_add(work));
         outer
     }
 
-    /// Ends a limit, given the one before.
     pub(super) fn restore_limit(&mut self, limit: u64) {
-        self.work.limit = limit;
+        self.work_limit = limit;
     }
 
     /// Counts some steps; whether they are within the limit.
     pub(super) fn spend(&mut self, steps: usize) -> bool {
-        self.work.done = self.work.done.saturating_add(steps as u64);
-        self.work.done <= self.work.limit
+        self.work_done = self.work_done.saturating_add(steps as u64);
+        self.work_done <= self.work_limit
     }
 
-    /// Whether so many more steps are within the limit.
     pub(super) fn affords(&self, steps: usize) -> bool {
-        self.work.done.saturating_add(steps as u64) <= self.work.limit
+        self.work_done.saturating_add(steps as u64) <= self.work_limit
     }
 
     /// A folded number, if this pool takes it.
@@ -403,7 +388,7 @@ impl ExprPool {
 
     /// The id of a node that is canonical already.
     pub(super) fn intern(&mut self, node: Node) -> ExprId {
-        self.work.done += 1;
+        self.work_done += 1;
         let mut place = match self.place_of(&node) {
             Ok(id) => return id,
             Err(free) => free,
@@ -443,7 +428,6 @@ impl ExprPool {
         Err(place)
     }
 
-    /// The product without its number, if it has exactly one.
     fn rest_of(&mut self, node: &Node) -> Option<ExprId> {
         let Node::Product(factors) = node else {
             return None;

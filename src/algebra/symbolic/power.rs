@@ -28,7 +28,6 @@ impl ExprPool {
         self.intern(Node::Power(base, exponent))
     }
 
-    /// `base ^ exponent` for a constant exponent.
     pub(crate) fn pow_number(&mut self, base: ExprId, exponent: Number) -> ExprId {
         let exponent = half_integer(exponent);
         if exponent.is_zero() {

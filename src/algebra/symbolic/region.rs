@@ -58,7 +58,6 @@ impl ExprPool {
         finish(self, rebuilt[&expr])
     }
 
-    /// All nodes of the region of `expr`, operands first.
     fn region(&self, expr: ExprId) -> Vec<ExprId> {
         self.walk(&[expr], |_| true, |node| !self.is_atom(node))
     }
@@ -95,7 +94,6 @@ impl ExprPool {
         }
     }
 
-    /// A factor as an integer power of a sum.
     pub(super) fn sum_power(&self, factor: ExprId) -> Option<(ExprId, i64)> {
         let is_sum = |(base, _): &(ExprId, i64)| matches!(self.node(*base), Node::Sum(_));
         self.integer_power(factor).filter(is_sum)

@@ -99,10 +99,7 @@ pub(super) fn is_exact_root(root: f64, square: f64) -> bool {
 }
 
 pub(super) fn widen_down(value: f64) -> f64 {
-    if value == f64::INFINITY {
-        return f64::MAX;
-    }
-    (0..FUNCTION_ULPS).fold(value, |value, _| value.next_down())
+    -widen_up(-value)
 }
 
 pub(super) fn widen_up(value: f64) -> f64 {

@@ -197,15 +197,10 @@ impl ExprPool {
     }
 
     fn merge_exponentials(&mut self, expr: ExprId) -> ExprId {
-        let powers = self.factors_of(expr).iter();
-        let powers = powers.filter_map(|&factor| match self.function_power(factor) {
-            Some((Function::Exp, _, power)) => Some(power),
-            _ => None,
-        });
-        if let [] | [1] = powers.collect::<Vec<_>>()[..] {
+        let (exponents, mut others) = self.split_exponentials(expr);
+        if exponents.is_empty() {
             return expr;
         }
-        let (exponents, mut others) = self.split_exponentials(expr);
         let exponent = self.sum(&exponents);
         others.push(self.apply(Function::Exp, exponent));
         self.product(&others)

@@ -116,7 +116,6 @@ impl Germs<'_> {
         series
     }
 
-    /// `a - b` where that is a number.
     fn difference(&mut self, a: ExprId, b: ExprId) -> Option<f64> {
         match self.number_of(a).zip(self.number_of(b)) {
             Some((a, b)) => Some(a - b),

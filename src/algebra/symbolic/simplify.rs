@@ -53,7 +53,6 @@ impl ExprPool {
         }
     }
 
-    /// The cheapest of the forms of one region; the region itself unless one is cheaper.
     fn cheapest_form(&mut self, region: ExprId, costs: &mut Costs) -> ExprId {
         if self.as_number(region).is_some() || self.as_symbol(region).is_some() {
             return region;
@@ -211,7 +210,6 @@ impl ExprPool {
         }
     }
 
-    /// How many divisors that are sums stand below each other at most.
     fn levels_of_divisors(&self, expr: ExprId) -> usize {
         let levels = self.fold_up(&[expr], |pool, part, levels_of| {
             let (base, exponent) = pool.base_and_exponent(part);
@@ -222,7 +220,6 @@ impl ExprPool {
         levels[0]
     }
 
-    /// Whether sines, cosines or tangents are among the atoms of a region.
     pub(super) fn has_waves(&self, region: ExprId) -> bool {
         self.atoms_of(region).into_iter().any(|atom| {
             matches!(

@@ -31,11 +31,9 @@ const STEP: f64 = 1.0 / 8192.0;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Slope {
     expr: ExprId,
-    /// Whether it is infinite somewhere.
     has_infinity: bool,
 }
 
-/// What is assumed about the points of a case.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Facts {
     first_zero: Option<ExprId>,
@@ -96,7 +94,6 @@ impl Facts {
         Ok(self.is_zero(pool, below)? != content.is_negative())
     }
 
-    /// Whether an expression is zero, as far as that is known.
     pub(crate) fn known(&self, pool: &mut ExprPool, expr: ExprId) -> Option<bool> {
         let core = core(pool, expr);
         if pool.is_constant(core) {

@@ -61,7 +61,6 @@ impl ExprPool {
         })
     }
 
-    /// Adds the angles of the sines and cosines of a region to the units.
     fn note_units(&self, expr: ExprId, units: &mut Units) {
         for atom in self.atoms_of(expr) {
             if let Node::Apply(Function::Sin | Function::Cos, argument) = *self.node(atom) {
@@ -130,7 +129,6 @@ impl ExprPool {
         self.reduce_powers(expr, Function::Cos, Function::Sin, |_| true)
     }
 
-    /// The arguments of which a sine or cosine occurs to another power than the first.
     pub(super) fn squared_angles(&self, expr: ExprId) -> Vec<ExprId> {
         let mut angles = Vec::new();
         for (_, rest) in self.terms_of(expr) {

@@ -17,7 +17,6 @@ const LARGEST_CHANGE: f64 = 0.5;
 type Tensors<'a> = (&'a Assigned<'a>, Option<&'a Assigned<'a>>);
 
 impl<'a> Assembly<'a, '_> {
-    /// Encoder and decoder, as far as the file has their weights.
     pub(super) fn maps(&mut self) -> Result<(Option<StateMap>, Option<StateMap>), ImportError> {
         let maps = (self.map(Part::Encoder)?, self.map(Part::Decoder)?);
         let is_deep = |map: &StateMap| map.layers().len() > 1;

@@ -27,7 +27,6 @@ const KEPT: Refusal = (
 const UNDECIDED: Refusal = (", a macro that is defined under a condition", FOLLOWED);
 
 impl Expander<'_> {
-    /// Follows a conditional, or gives the token back if it is none.
     pub(super) fn condition(&mut self, token: Token) -> Result<Option<Token>, ImportError> {
         let Kind::Command(name) = &token.kind else {
             return Ok(Some(token));
@@ -123,7 +122,6 @@ impl Expander<'_> {
         self.refuse(start, " without its end", "`\\fi`")
     }
 
-    /// Passes what prints under a condition that is not followed.
     fn undecided(
         &mut self,
         token: &Token,

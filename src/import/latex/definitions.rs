@@ -45,7 +45,6 @@ const EXPANDED: Refusal = (
 );
 
 impl Expander<'_> {
-    /// Follows a definition; whether the command is one.
     pub(super) fn follows_definition(&mut self, token: &Token) -> Result<bool, ImportError> {
         let Kind::Command(command) = &token.kind else {
             return Ok(false);

@@ -14,7 +14,6 @@ const SPACED: &str = "operatorname mathop mathbin mathopen mathclose mathinner";
 /// Digits with at most one point, or comma in braces, and an exponent as in `1.2e-3`.
 pub(super) struct Number {
     pub(super) text: String,
-    /// The token of its first digit or point.
     pub(super) first: usize,
     pub(super) behind: usize,
 }
@@ -114,7 +113,6 @@ fn is_operator(kind: &Kind, behind: &[Token]) -> bool {
 }
 
 impl Reader<'_> {
-    /// The number that prints at a place.
     pub(super) fn number_at(&self, at: usize) -> Option<Number> {
         let (_, first) =
             (self.character_at(at)).filter(|(c, _)| c.is_ascii_digit() || *c == '.')?;
@@ -141,7 +139,6 @@ impl Reader<'_> {
         is_number.then_some(number)
     }
 
-    /// The place behind the whole number at a place.
     pub(super) fn behind_integer(&self, at: usize) -> Option<usize> {
         let number = self.number_at(at)?;
         let is_integer = number.text.bytes().all(|byte| byte.is_ascii_digit());

@@ -10,7 +10,6 @@ use super::token::{Kind, Token};
 /// Environments that arrange lines of mathematics, in a display of their own or inside one.
 pub(super) const LAYOUTS: &str = "equation align gather multline eqnarray flalign alignat displaymath dmath \
     dgroup aligned alignedat split gathered IEEEeqnarray";
-/// Environments that are displays of their own as well.
 pub(super) const CASES: &str = "cases dcases";
 /// Environments that begin with an argument: a number of columns, or what each column is.
 pub(super) const WITH_COLUMNS: &str = "alignat alignedat array IEEEeqnarray";
@@ -102,7 +101,6 @@ fn display(expander: &mut Expander, start: &Token) -> Result<Item, ImportError> 
     }
 }
 
-/// Mathematics inside a paragraph, which ends with that at the latest.
 fn inline(expander: &mut Expander) -> Result<Option<Item>, ImportError> {
     let tokens = formula(expander, |token| token.kind == Kind::Paragraph)?;
     Ok(tokens.map(Item::Inline))

@@ -9,7 +9,6 @@ use super::reader::has;
 use super::scopes::{Macro, Meaning, Refusal, Scopes};
 use super::token::{Kind, Lexer, Token};
 
-/// Most tokens that macros may make of one document.
 const MAX_EXPANDED: usize = 500_000;
 const VERBATIM: &str =
     "verbatim Verbatim BVerbatim LVerbatim lstlisting minted comment filecontents";
@@ -81,7 +80,6 @@ impl<'t> Expander<'t> {
         Ok(None)
     }
 
-    /// The next token as it stands in the document or in a macro.
     pub(super) fn raw(&mut self) -> Option<Token> {
         self.pending.pop().or_else(|| {
             self.lexer.has_at_letters = self.scopes.has_at_letters;
@@ -98,7 +96,6 @@ impl<'t> Expander<'t> {
         }
     }
 
-    /// Whether `wanted` comes next, which is passed then.
     pub(super) fn takes(&mut self, wanted: &Kind) -> bool {
         let Some(token) = self.code() else {
             return false;
@@ -235,7 +232,6 @@ impl<'t> Expander<'t> {
         Ok(())
     }
 
-    /// Follows a command with the meaning that LaTeX gives it.
     fn primitive(&mut self, token: Token) -> Result<Option<Token>, ImportError> {
         let Kind::Command(name) = &token.kind else {
             return Ok(Some(token));
@@ -389,7 +385,6 @@ impl<'t> Expander<'t> {
         Ok(Some(token))
     }
 
-    /// The characters up to a command, which is passed.
     pub(super) fn name_to(&mut self, end: &str) -> String {
         let mut name = Vec::new();
         while let Some(token) = self.code() {

@@ -9,7 +9,6 @@ use super::token::{Kind, Token};
 use super::variables::function;
 use crate::model::LatentVariable;
 
-/// What can stand where a factor begins.
 const FACTOR: &str = "a number, a variable, a function or a group";
 const BARS: &[&str] = &["|", "\\rvert", "\\vert", "\\|"];
 /// What opens a sum, and what closes it.
@@ -23,7 +22,6 @@ const DELIMITERS: [(&str, &[&str]); 8] = [
     ("\\vert", BARS),
     ("\\|", BARS),
 ];
-/// Commands whose argument is text.
 pub(super) const WORDS: &str = "text textrm textit mbox intertext shortintertext";
 
 impl Reader<'_> {
@@ -56,7 +54,6 @@ impl Reader<'_> {
         self.character('=') || NAMES.split(' ').any(|name| self.command(name))
     }
 
-    /// Latent coordinate of a left side, from 0.
     pub(super) fn output(&self, symbol: &Symbol) -> Option<usize> {
         match self.names.variable(&symbol.name, self.alone)? {
             LatentVariable::Z(index) => Some(index),
@@ -73,7 +70,6 @@ impl Reader<'_> {
         token
     }
 
-    /// Reads the right side between two places.
     pub(super) fn equation(
         &mut self,
         output: usize,
@@ -94,7 +90,6 @@ impl Reader<'_> {
         })
     }
 
-    /// Passes punctuation and words behind an equation.
     pub(super) fn rest_of_line(&mut self) -> Read<()> {
         loop {
             match self.next_kind() {
@@ -354,7 +349,6 @@ impl Reader<'_> {
         Ok(self.command("right"))
     }
 
-    /// A sum between delimiters of any size.
     pub(super) fn delimited(&mut self, place: (usize, usize)) -> Read<Last> {
         let has_left = self.command("left");
         let mut openers = DELIMITERS.iter();
@@ -389,7 +383,6 @@ impl Reader<'_> {
         self.enclosed(place, open, read).map(|()| Last::Other)
     }
 
-    /// The power behind a factor.
     pub(super) fn powers(&mut self, place: (usize, usize)) -> Read<()> {
         if !self.takes(&Kind::Superscript) {
             return Ok(());

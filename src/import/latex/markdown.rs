@@ -250,7 +250,6 @@ fn inline(text: &str) -> Option<(std::ops::Range<usize>, usize)> {
     }
 }
 
-/// Markdown's backslashes before punctuation taken away.
 fn unescaped(text: &str) -> String {
     let mut plain = String::new();
     let mut characters = text.chars().peekable();

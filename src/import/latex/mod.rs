@@ -6,10 +6,10 @@
 //! in its lines; inside a display that is
 //! read, whatever has no meaning here is an error with line and column, never a guess.
 //!
-//! Read `token.rs` (characters to tokens; `markdown.rs`), `expander.rs` with `definitions.rs`, `conditionals.rs`
-//! and `scopes.rs` (what of them is printed), `document.rs` (displays), `digits.rs` (numbers), `derivatives.rs` (dots for other ways to write a
-//! derivative), `sections.rs` (displays to equations and phases), `reader.rs`, `expression.rs` and `numbers.rs` (one
-//! right side) in this order.
+//! Read `token.rs` (characters to tokens; `markdown.rs`), `expander.rs` with `definitions.rs`, `conditionals.rs` and
+//! `scopes.rs` (what of them is printed), `document.rs` (displays), `derivatives.rs` (dots for other ways to write a
+//! derivative), `sections.rs` (displays to equations and phases), `reader.rs`, `digits.rs`, `expression.rs` and
+//! `numbers.rs` (one right side) in this order.
 
 mod conditionals;
 mod definitions;

@@ -31,7 +31,6 @@ pub(super) enum Digits {
     Significant(usize),
 }
 
-/// A variable with its dots: `\ddot z_1` is `z_1` and 2.
 pub(super) struct Symbol {
     pub(super) name: String,
     pub(super) dots: usize,
@@ -79,7 +78,6 @@ pub(super) const BARE: &str = "parentheses around the argument of the function b
 
 pub(super) type Read<T> = Result<T, ImportError>;
 
-/// Whether `list` has a word.
 pub(super) fn has(list: &str, word: &str) -> bool {
     list.split_whitespace().any(|known| known == word)
 }
@@ -95,9 +93,6 @@ pub(super) fn is_blank(kind: &Kind) -> bool {
 
 impl<'a> Reader<'a> {
     /// A reader of one display's tokens.
-    ///
-    /// # Errors
-    /// [`ImportError`] for braces without partner.
     pub(super) fn new(file: &'a str, names: &'a SymbolNames, tokens: &[Token]) -> Read<Self> {
         let tokens = without_split_delimiters(tokens);
         let end = tokens.len();
@@ -161,7 +156,6 @@ impl<'a> Reader<'a> {
         self.peek().map(|token| token.kind.clone())
     }
 
-    /// Whether `wanted` comes next.
     pub(super) fn is_next(&mut self, wanted: &Kind) -> bool {
         self.peek().is_some_and(|token| token.kind == *wanted)
     }
@@ -196,7 +190,6 @@ impl<'a> Reader<'a> {
         found
     }
 
-    /// Refuses what comes next.
     pub(super) fn unexpected<T>(&mut self, expected: &str) -> Read<T> {
         self.peek();
         let number = self.number_at(self.at);
@@ -281,7 +274,6 @@ impl Reader<'_> {
         takes
     }
 
-    /// Whether a number follows, in braces or without.
     pub(super) fn is_number_next(&self) -> bool {
         let is_passed = |at: &usize| {
             let kind = &self.tokens[*at].kind;
@@ -310,7 +302,6 @@ impl Reader<'_> {
         found.map(|(_, token)| token)
     }
 
-    /// Whether a fraction of two integers follows.
     pub(super) fn is_fraction_of_integers(&self) -> bool {
         let is_fraction = matches!(self.kind(self.at), Some(Kind::Command(name)) if has("frac dfrac tfrac cfrac", name));
         let behind_integer = |at: usize| {

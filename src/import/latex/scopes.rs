@@ -34,7 +34,6 @@ pub(super) enum Meaning {
     Same(Kind),
     /// A definition that is not read, and whether mathematics may be in it.
     Unread(Refusal, bool),
-    /// An environment whose contents are not read.
     Verbatim,
 }
 
@@ -47,7 +46,6 @@ struct Scope {
     earlier: Vec<(String, Option<(Meaning, usize)>)>,
 }
 
-/// The meanings that hold at a place of a document.
 #[derive(Default)]
 pub(super) struct Scopes {
     /// With the number of scopes that were open where each was defined.
@@ -66,7 +64,6 @@ impl Scopes {
         self.open.len()
     }
 
-    /// How many scopes are open around the formula that was just opened.
     pub(super) fn formula_around(&self) -> usize {
         let is_formula = |scope: &Scope| scope.closer.is_some();
         self.open.iter().rposition(is_formula).unwrap_or(0)

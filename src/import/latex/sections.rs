@@ -15,9 +15,6 @@ const DISTINCTIONS: &str = "cases dcases array";
 ///
 /// `known` are names of phases, which labels may end in; the phase of a comment `Phase NAME` (a
 /// heading in Markdown) goes before that of a label.
-///
-/// # Errors
-/// [`ImportError`] with the place, what was found and what was expected.
 pub(in crate::import) fn read(
     file: &str,
     bytes: &[u8],
@@ -199,9 +196,7 @@ struct Document<'d> {
     names: &'d SymbolNames,
     known: &'d [String],
     digits: Option<Digits>,
-    /// The phase that the last comment names.
     phase: Option<String>,
-    /// Whether it was named since the last equation.
     starts_phase: bool,
     /// The first left side of a variable that is not known.
     strange: Option<(Token, String)>,

@@ -3,7 +3,6 @@
 use std::collections::VecDeque;
 use std::str::Lines;
 
-/// The minus of Unicode.
 const MINUS: char = '\u{2212}';
 
 /// One token and where it starts: line and column, from 1.
@@ -21,9 +20,7 @@ pub(super) enum Kind {
     Command(String),
     /// `\begin{...}`; it and the next two are made of tokens that follow each other.
     Begin(String),
-    /// `\end{...}`.
     End(String),
-    /// `\label{...}`.
     Label(String),
     Open,
     Close,
@@ -35,10 +32,8 @@ pub(super) enum Kind {
     Dollar,
     /// `$$`, or a fence of mathematics in Markdown.
     Display,
-    /// `#1`.
     Parameter(usize),
     Comment(String),
-    /// An empty line.
     Paragraph,
     Character(char),
     /// What TeX would follow and romc does not, and what could be there.
@@ -82,7 +77,6 @@ impl Kind {
 }
 
 impl Token {
-    /// Another kind of token at the same place.
     pub(super) fn with(&self, kind: Kind) -> Self {
         let (place, is_spaced) = (self.place, self.is_spaced);
         Self {
@@ -123,7 +117,6 @@ pub(super) struct Lexer<'t> {
     characters: Vec<char>,
     next: usize,
     number: usize,
-    /// Column of the first character.
     start: usize,
     is_spaced: bool,
     /// What one character made besides the last token.
@@ -244,7 +237,6 @@ impl<'t> Lexer<'t> {
         }
     }
 
-    /// Whether nothing but space is left of the line.
     pub(super) fn is_at_line_end(&self) -> bool {
         self.characters[self.next..]
             .iter()

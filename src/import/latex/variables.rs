@@ -128,7 +128,6 @@ impl Reader<'_> {
         Ok(last)
     }
 
-    /// Whether `\left` at the reader's place opens a bar.
     fn is_bar_behind(&self) -> bool {
         match self.kind(self.at + 1) {
             Some(Kind::Character(bar)) => *bar == '|',
@@ -300,7 +299,6 @@ impl Reader<'_> {
     }
 }
 
-/// The grammar's name of a function that LaTeX has a command for.
 pub(super) fn function(command: &str) -> Option<&str> {
     match command {
         "ln" => Some("log"),

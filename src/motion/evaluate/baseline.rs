@@ -61,10 +61,7 @@ impl Baseline {
 /// squared residuals over all samples with a foot down. A spring that pushes away (`a <= 0`) is no
 /// spring: it is left out, and only the mass is fitted. None without contact, or where the forces say
 /// nothing about a mass.
-///
-/// # Errors
-/// [`RecordingFault::Wrench`](crate::recording::RecordingFault::Wrench) if an angle or torque is not finite.
-pub fn fit_aslip(rule: &InputRule, segments: &[&Segment]) -> Result<Option<Aslip>, RecordingError> {
+fn fit_aslip(rule: &InputRule, segments: &[&Segment]) -> Result<Option<Aslip>, RecordingError> {
     let published = Aslip::PUBLISHED;
     let (mut rows, mut right) = (Vec::new(), Vec::new());
     for segment in segments {

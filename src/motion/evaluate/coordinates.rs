@@ -56,7 +56,7 @@ impl CoordinateSums {
 
     /// Adds the residuals of a robot that keeps the recorded velocity at the start of each window, over the samples that
     /// `rollout` predicts.
-    pub fn add_constant_velocity(
+    pub(super) fn add_constant_velocity(
         &mut self,
         segment: &Segment,
         latent: &LatentSegment,

@@ -22,11 +22,7 @@ pub struct LiftSums {
 
 impl LiftSums {
     /// Adds every sample of a segment whose torques can be the robot's.
-    ///
-    /// # Errors
-    /// [`SimError::Model`] for a latent-only model, [`SimError::Recording`] if the body wrench cannot
-    /// be computed.
-    pub fn add(&mut self, model: &ReducedModel, segment: &Segment) -> Result<(), SimError> {
+    pub(super) fn add(&mut self, model: &ReducedModel, segment: &Segment) -> Result<(), SimError> {
         let robot = model.robot()?;
         let rule = model.input_rule()?;
         let input = segment.input(&rule)?;

@@ -6,7 +6,7 @@ use crate::lower::CompiledModel;
 use crate::sim::LatentSegment;
 
 /// Share of the largest singular value below which a direction of the input counts as without effect.
-pub const RANK_THRESHOLD: f64 = 0.01;
+const RANK_THRESHOLD: f64 = 0.01;
 
 /// One phase, linearised at the mean of the recorded `(z, dz, u_lat)` of that phase.
 #[derive(Debug, Clone, PartialEq)]
@@ -92,7 +92,7 @@ fn linearise_phase(
 }
 
 /// `[0 I; J]`, the matrix of the state `(z, dz)` whose `ddz` has the Jacobian `J` (`d x 2d`).
-pub fn state_matrix(jacobian: &DMatrix<f64>) -> DMatrix<f64> {
+pub(crate) fn state_matrix(jacobian: &DMatrix<f64>) -> DMatrix<f64> {
     let d = jacobian.nrows();
     let mut state = DMatrix::zeros(2 * d, 2 * d);
     state.view_mut((0, d), (d, d)).fill_with_identity();

@@ -31,7 +31,7 @@ impl PredictionError {
     ///
     /// These are what the dynamics predict. The robot's coordinates are made of them by the decoder: one for which no
     /// latent coordinate stands, such as pitch in a model of legs, can be off by much where it hardly moves.
-    pub fn share_of(&self, other: &Self) -> f64 {
+    pub(super) fn share_of(&self, other: &Self) -> f64 {
         let shares = self.latent.iter().zip(&other.latent);
         shares.map(|(own, other)| own / other).sum::<f64>() / self.latent.len() as f64
     }
@@ -48,9 +48,6 @@ pub(super) struct RecordedStage {
 }
 
 /// The stages of a recording that lie within one phase, one after the other.
-///
-/// # Errors
-/// As [`LatentSegment::encode`].
 pub(super) fn recorded_stages(
     model: &ReducedModel,
     recording: &Recording,
@@ -88,9 +85,6 @@ pub(super) fn recorded_stages(
 
 /// The error of predictions over all stages, decoded by `maps`; none without stages. A stage's end is predicted from its
 /// beginning by a model's dynamics with the input held at its mean, or, without a model, by a constant velocity.
-///
-/// # Errors
-/// [`EvaluateError::Lower`] if the dynamics do not compile, [`EvaluateError::Model`] for a latent-only model.
 pub(super) fn prediction_error(
     maps: &ReducedModel,
     dynamics: Option<&ReducedModel>,
@@ -134,9 +128,6 @@ pub(super) fn prediction_error(
 /// Encoder, decoder, robot and input statistics stay. The one number `g` of each phase is the least-squares fit to these
 /// very stages, so that the copy has the right scale and nothing else: no gravity, no coupling of coordinates, no
 /// effect of the state. How far its accelerations are off is its own.
-///
-/// # Errors
-/// [`EvaluateError::Model`] if the copy is not a model.
 pub(super) fn uninformed(
     model: &ReducedModel,
     stages: &[RecordedStage],

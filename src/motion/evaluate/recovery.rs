@@ -54,21 +54,18 @@ pub(super) struct Recovery {
 
 impl Recovery {
     /// Root mean square of the body's deviation from the recording after pushes of 0.1 m/s, over times and pushes, m.
-    pub fn rms_m(&self) -> Option<f64> {
+    pub(super) fn rms_m(&self) -> Option<f64> {
         self.deviations.get().map(f64::sqrt)
     }
 
     /// Root mean square of planned minus reference positions, in standard deviations of the reference.
-    pub fn tracking_rms(&self) -> Option<f64> {
+    pub(super) fn tracking_rms(&self) -> Option<f64> {
         self.planned.get().map(f64::sqrt)
     }
 }
 
 /// Pushes the robot at many times of a recording, with every foot that is on the ground staying there for the time of a
 /// window.
-///
-/// # Errors
-/// Those of [`Controller::set_reference`] and [`MpcError::Recording`].
 pub(super) fn recovery(
     controller: &mut Controller,
     recording: &Recording,

@@ -1,5 +1,7 @@
 //! The result: what a robot is by its recordings.
 
+#![allow(missing_docs, reason = "fields are named by quantity and unit")]
+
 use serde::{Deserialize, Serialize};
 
 use crate::robot::joints::LEG_JOINT_DIM;
@@ -9,21 +11,16 @@ use crate::robot::{Actuators, GRAVITY_M_S2, JOINT_DIM};
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PerKind {
-    /// Abduction of the hip.
     pub hx: f64,
-    /// Flexion of the hip.
     pub hy: f64,
-    /// Knee.
     pub kn: f64,
 }
 
 impl PerKind {
-    /// From abduction, flexion, knee.
     pub fn from_array([hx, hy, kn]: [f64; LEG_JOINT_DIM]) -> Self {
         Self { hx, hy, kn }
     }
 
-    /// Abduction, flexion, knee.
     pub fn to_array(self) -> [f64; LEG_JOINT_DIM] {
         [self.hx, self.hy, self.kn]
     }
@@ -57,29 +54,21 @@ pub struct Legs {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StandardError {
-    /// Of gravity.
     pub gravity_m_s2: f64,
-    /// Of the mass.
     pub mass_kg: f64,
     /// Of the delay of the motion behind the torques.
     pub delay_s: f64,
-    /// Of viscous friction.
     pub viscous_nm_s_rad: PerKind,
-    /// Of dry friction.
     pub dry_nm: PerKind,
-    /// Of the armatures.
     pub armature_kg_m2: PerKind,
-    /// Of the legs' moments.
     pub legs: Legs,
 }
 
-/// How well an equation explains the trunk's acceleration in contact: R^2 over windows.
+/// How well an equation explains the trunk's acceleration in contact along the world's axes: R^2 over windows.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Fit {
-    /// Along the world's x axis.
     pub x: f64,
-    /// Along its z axis.
     pub z: f64,
 }
 
@@ -87,21 +76,16 @@ pub struct Fit {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ForceAlone {
-    /// Gravity of that regression, m/s^2.
     pub gravity_m_s2: f64,
-    /// Its mass, kg.
     pub mass_kg: f64,
-    /// Its fit.
     pub r2: Fit,
 }
 
-/// Samples in the windows of the regression.
+/// Samples in the windows of the regression, with a foot on the ground and in flight.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Samples {
-    /// With a foot on the ground.
     pub contact: usize,
-    /// In flight.
     pub flight: usize,
 }
 
@@ -111,23 +95,18 @@ pub struct Samples {
 pub struct Identification {
     /// Name of the robot whose geometry was used.
     pub robot: String,
-    /// Gravity, m/s^2.
     pub gravity_m_s2: f64,
     /// Mass of trunk and legs, kg.
     pub mass_kg: f64,
     /// Time from a recorded torque to its effect on the motion, s.
     pub delay_s: f64,
-    /// Losses of the twelve joints.
     pub actuators: Actuators,
-    /// The legs' own inertia.
     pub legs: Legs,
-    /// Standard errors of all that.
     pub standard_error: StandardError,
     /// Fit of the whole equation.
     pub r2: Fit,
     /// The equation without losses, delay and legs.
     pub force_alone: ForceAlone,
-    /// What entered.
     pub samples: Samples,
     /// What a reader of the values should know of the recordings.
     #[serde(default)]

@@ -59,6 +59,17 @@ pub(crate) struct Findings<'a> {
 }
 
 pub(crate) fn verdict(settings: &PlanSettings, found: &Findings<'_>) -> Verdict {
+    let refused = refusals(settings, found);
+    if !refused.is_empty() {
+        return Verdict::Refused(refused);
+    }
+    match doubts(settings, found) {
+        reasons if reasons.is_empty() => Verdict::Trusted,
+        reasons => Verdict::Extrapolates(reasons),
+    }
+}
+
+fn refusals(settings: &PlanSettings, found: &Findings<'_>) -> Vec<String> {
     let mut refused = Vec::new();
     for (bound, slack) in found.slack {
         if slack > NO_SLACK {
@@ -108,9 +119,10 @@ pub(crate) fn verdict(settings: &PlanSettings, found: &Findings<'_>) -> Verdict 
             found.input_deviation, settings.refuse_deviation
         ));
     }
-    if !refused.is_empty() {
-        return Verdict::Refused(refused);
-    }
+    refused
+}
+
+fn doubts(settings: &PlanSettings, found: &Findings<'_>) -> Vec<String> {
     let mut reasons = Vec::new();
     for (what, outside) in ["distance", "apex"].into_iter().zip(found.outside) {
         if outside > 0.0 {
@@ -126,7 +138,7 @@ pub(crate) fn verdict(settings: &PlanSettings, found: &Findings<'_>) -> Verdict 
             found.input_deviation
         ));
     }
-    let [along, below] = margins.foot_drift_m;
+    let [along, below] = found.margins.foot_drift_m;
     if along > FOOT_DRIFT_M[0] || below > FOOT_DRIFT_M[1] {
         reasons.push(format!(
             "feet on the ground move {:.0} mm along the floor and {:.0} mm below it: the model's latent coordinates \
@@ -141,8 +153,5 @@ pub(crate) fn verdict(settings: &PlanSettings, found: &Findings<'_>) -> Verdict 
             found.start_lost.join(", ")
         ));
     }
-    match reasons.is_empty() {
-        true => Verdict::Trusted,
-        false => Verdict::Extrapolates(reasons),
-    }
+    reasons
 }

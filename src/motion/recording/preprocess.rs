@@ -14,7 +14,7 @@ use super::segment::{Recording, Segment};
 /// Samples of a batch: every phase of a jump is resampled to a multiple (section IV-C4).
 pub(crate) const BATCH_ROWS: usize = 100;
 
-/// The phases of every segment of a recording, each with its samples resampled to a multiple of [`BATCH_ROWS`].
+/// The phases of every segment of a recording, each with its samples resampled to a multiple of 100.
 ///
 /// # Errors
 /// [`RecordingFault::Unexpected`] for a span of one sample, [`RecordingFault::NoPhase`].

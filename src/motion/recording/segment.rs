@@ -268,7 +268,7 @@ impl Segment {
         self.input_of(rule, &self.torque_nm)
     }
 
-    /// [`Segment::input`] of [`Segment::torque_within_limits`].
+    /// [`Segment::input`] of torques that the robot's motors can give: those beyond a limit count as the limit.
     pub fn input_within_limits(&self, rule: &InputRule) -> Result<DMatrix<f64>, RecordingError> {
         self.input_of(rule, &self.torque_within_limits(rule.robot()))
     }

@@ -67,7 +67,7 @@ pub fn sha256(bytes: &[u8]) -> String {
 }
 
 impl Task<'_> {
-    pub fn assemble(
+    pub(super) fn assemble(
         &self,
         fitted: Fitted,
         jumps: Option<JumpPrior>,

@@ -18,7 +18,7 @@ pub const MIN_SAMPLES: usize = 50;
 
 /// Factors from SI to scaled units, one a coordinate.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Scaling {
+pub(super) struct Scaling {
     pub state: DVector<f64>,
     pub input: DVector<f64>,
 }
@@ -58,7 +58,7 @@ impl ScaleOptions {
         }
     }
 
-    pub fn factors(&self) -> Scaling {
+    pub(super) fn factors(&self) -> Scaling {
         let input = DVector::from_fn(STATE_DIM, |i, _| match i {
             0..JOINT_DIM => self.torque,
             i if i < JOINT_DIM + 3 => self.force,
@@ -73,7 +73,7 @@ impl ScaleOptions {
 
 /// One continuous jump (a segment of a recording); samples are columns, all in scaled units.
 #[derive(Clone, Debug)]
-pub struct Jump {
+pub(super) struct Jump {
     pub path: PathBuf,
     pub time_s: Vec<f64>,
     /// States, `18 x n`.
@@ -95,19 +95,19 @@ pub struct Jump {
 }
 
 impl Jump {
-    pub fn samples(&self) -> usize {
+    pub(super) fn samples(&self) -> usize {
         self.time_s.len()
     }
 
     /// Samples whose torques can be the robot's.
-    pub fn torque_samples(&self) -> impl Iterator<Item = usize> {
+    pub(super) fn torque_samples(&self) -> impl Iterator<Item = usize> {
         (0..self.samples()).filter(|sample| !self.implausible.contains(sample))
     }
 }
 
 /// All jumps of a set of recordings, with the phases of the model.
 #[derive(Clone, Debug)]
-pub struct Dataset {
+pub(super) struct Dataset {
     /// Jumps in the order of the files and their segments.
     pub jumps: Vec<Jump>,
     pub phases: PhaseRule,
@@ -122,11 +122,7 @@ impl Dataset {
     /// Takes the samples of recordings, cut into `phases`.
     ///
     /// `smoothing` is the window of the moving average over accelerations, in samples.
-    ///
-    /// # Errors
-    /// [`TrainError::TooFewSamples`] for a segment under 50 samples; [`TrainError::Recording`] where no phase
-    /// matches, a value is not finite, or a file cannot be read.
-    pub fn new(
+    pub(super) fn new(
         recordings: &[Recording],
         rule: &InputRule,
         phases: &PhaseRule,
@@ -147,12 +143,12 @@ impl Dataset {
     }
 
     /// States of one phase or of all side by side, `18 x samples`.
-    pub fn states(&self, phase: Option<usize>) -> DMatrix<f64> {
+    pub(super) fn states(&self, phase: Option<usize>) -> DMatrix<f64> {
         self.gather(phase, |jump| &jump.x)
     }
 
     /// Inputs of one phase or of all side by side, `18 x samples`.
-    pub fn inputs(&self, phase: Option<usize>) -> DMatrix<f64> {
+    pub(super) fn inputs(&self, phase: Option<usize>) -> DMatrix<f64> {
         self.gather(phase, |jump| &jump.u)
     }
 
@@ -168,7 +164,7 @@ impl Dataset {
     }
 
     /// Standard deviation of every state over all samples.
-    pub fn state_std(&self) -> DVector<f64> {
+    pub(super) fn state_std(&self) -> DVector<f64> {
         let states = self.states(None);
         let share = 1.0 / states.ncols() as f64;
         let mut variance = mean(&states).map(|mean| -(mean * mean));
@@ -181,7 +177,7 @@ impl Dataset {
     }
 
     /// Covariance of the states and second moment of the inputs about zero, over all samples.
-    pub fn moments(&self) -> Moments {
+    pub(super) fn moments(&self) -> Moments {
         let (x, u) = (self.states(None), self.inputs(None));
         let (deviations, n) = (centred(&x, &mean(&x)), x.ncols().max(1) as f64);
         Moments {
@@ -191,7 +187,7 @@ impl Dataset {
     }
 
     /// Mean and covariance of the SI inputs of one phase; all zero without a sample.
-    pub fn input_statistics(&self, phase: usize) -> InputStatistics {
+    pub(super) fn input_statistics(&self, phase: usize) -> InputStatistics {
         let mut u = self.inputs(Some(phase));
         for (mut row, factor) in u.row_iter_mut().zip(&self.scaling.input) {
             row /= *factor;
@@ -199,12 +195,15 @@ impl Dataset {
         InputStatistics::of_samples(&u)
     }
 
-    pub fn samples(&self, phase: Option<usize>) -> usize {
+    pub(super) fn samples(&self, phase: Option<usize>) -> usize {
         self.spans(phase).map(|(_, range)| range.len()).sum()
     }
 
     /// Maximal runs of one phase or of all, each with the index of its jump.
-    pub fn spans(&self, phase: Option<usize>) -> impl Iterator<Item = (usize, Range<usize>)> {
+    pub(super) fn spans(
+        &self,
+        phase: Option<usize>,
+    ) -> impl Iterator<Item = (usize, Range<usize>)> {
         let jumps = self.jumps.iter().enumerate();
         let all = jumps.flat_map(|(jump, of)| of.spans.iter().map(move |span| (jump, span)));
         let own = all.filter(move |(_, (of, _))| phase.is_none_or(|wanted| wanted == *of));
@@ -212,10 +211,7 @@ impl Dataset {
     }
 
     /// Complains unless there are jumps and enough samples of every phase.
-    ///
-    /// # Errors
-    /// [`TrainError::NoRecording`] without a jump, [`TrainError::PhaseSamples`] for a phase under 50 samples.
-    pub fn check_for_training(&self) -> Result<(), TrainError> {
+    pub(super) fn check_for_training(&self) -> Result<(), TrainError> {
         if self.jumps.is_empty() {
             return Err(TrainError::NoRecording);
         }
@@ -282,7 +278,7 @@ impl Dataset {
     }
 }
 
-pub fn mean(samples: &DMatrix<f64>) -> DVector<f64> {
+pub(super) fn mean(samples: &DMatrix<f64>) -> DVector<f64> {
     let mut mean = DVector::zeros(samples.nrows());
     for column in samples.column_iter() {
         mean.axpy(1.0 / samples.ncols() as f64, &column, 1.0);
@@ -290,14 +286,14 @@ pub fn mean(samples: &DMatrix<f64>) -> DVector<f64> {
     mean
 }
 
-pub fn scaled(mut rows: DMatrix<f64>, factors: &DVector<f64>) -> DMatrix<f64> {
+pub(super) fn scaled(mut rows: DMatrix<f64>, factors: &DVector<f64>) -> DMatrix<f64> {
     rows.row_iter_mut()
         .zip(factors.iter())
         .for_each(|(mut row, factor)| row *= *factor);
     rows
 }
 
-pub fn centred(samples: &DMatrix<f64>, mean: &DVector<f64>) -> DMatrix<f64> {
+pub(super) fn centred(samples: &DMatrix<f64>, mean: &DVector<f64>) -> DMatrix<f64> {
     let mut centred = samples.clone();
     let columns = centred.column_iter_mut();
     columns.for_each(|mut column| column -= mean);

@@ -11,7 +11,7 @@ use super::latent::{EncodedSet, Latent, input_projection, lift_samples, mean_jac
 use super::metrics::{BODY_X, BODY_Z, SetMetrics, measure};
 use super::progress::Monitor;
 use super::report::{PhaseTerms, SeedReport, TrainReport};
-use super::rollout::Candidate;
+use super::rollout::{Candidate, Xi};
 use super::select::{Choice, select};
 use super::sparse::active_terms;
 use super::task::Task;
@@ -30,12 +30,12 @@ pub(super) struct Maps {
 }
 
 impl Maps {
-    pub fn training_set<'a>(&'a self, task: &'a Task<'_>) -> EncodedSet<'a> {
+    pub(super) fn training_set<'a>(&'a self, task: &'a Task<'_>) -> EncodedSet<'a> {
         EncodedSet::new(&task.training, &self.training)
     }
 
     /// The jumps that candidates are judged by: those of the training where there are no others.
-    pub fn judged_set<'a>(&'a self, task: &'a Task<'_>) -> EncodedSet<'a> {
+    pub(super) fn judged_set<'a>(&'a self, task: &'a Task<'_>) -> EncodedSet<'a> {
         match self.validation.is_empty() {
             true => self.training_set(task),
             false => EncodedSet::new(&task.validation, &self.validation),
@@ -45,7 +45,7 @@ impl Maps {
 
 pub(super) struct Fitted {
     pub maps: Maps,
-    pub xi: Vec<DMatrix<f64>>,
+    pub xi: Vec<Xi>,
     /// The regression, if Xi was chosen among regressions, and how many were tried.
     pub choice: Option<(Choice, usize)>,
     /// What seeds are compared by, see [`SeedReport::score`].
@@ -62,7 +62,7 @@ impl Fitted {
 impl Task<'_> {
     /// The encoder of the rows that the frame holds and, in its canonical basis, of a space with orthonormal `basis`
     /// (`18 x (d - h)`); `b_e = -W_e mean(x)`.
-    pub fn encoder_over(&self, basis: &DMatrix<f64>) -> Result<AffineMap, TrainError> {
+    pub(super) fn encoder_over(&self, basis: &DMatrix<f64>) -> Result<AffineMap, TrainError> {
         let held = self.frame.held.column_iter();
         let learned = self.canonical_basis(basis).0;
         let rows: Vec<_> = held.chain(learned.column_iter()).collect();
@@ -73,7 +73,7 @@ impl Task<'_> {
 
     /// `basis T` (`18 x d`) and the orthogonal `T` (`d x d`) for which its columns are simple in the sense of varimax,
     /// with body x and body z first and positive dominant entries.
-    pub fn canonical_basis(&self, basis: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
+    pub(super) fn canonical_basis(&self, basis: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
         let std = self.training.state_std();
         let loadings = |basis: &DMatrix<f64>| DMatrix::from_diagonal(&std) * basis;
         let mut basis = basis.clone();
@@ -93,7 +93,7 @@ impl Task<'_> {
         (arranged(basis), arranged(turn))
     }
 
-    pub fn encoded(&self, encoder: StateMap, decoder: StateMap) -> Maps {
+    pub(super) fn encoded(&self, encoder: StateMap, decoder: StateMap) -> Maps {
         Maps {
             weights: mean_jacobian(&encoder, &self.training),
             training: Latent::of(&self.training, &encoder),
@@ -104,10 +104,7 @@ impl Task<'_> {
     }
 
     /// Chosen dynamics for an encoder and its decoder.
-    ///
-    /// # Errors
-    /// [`TrainError::TermValue`] for a term without a finite value at a sample, and those of [`select`].
-    pub fn fit_dynamics(
+    pub(super) fn fit_dynamics(
         &self,
         (encoder, decoder): (StateMap, StateMap),
         monitor: &mut Monitor<'_>,
@@ -126,7 +123,12 @@ impl Task<'_> {
         })
     }
 
-    pub fn seed_report(&self, fitted: &Fitted, seed: u64, losses: Option<Losses>) -> SeedReport {
+    pub(super) fn seed_report(
+        &self,
+        fitted: &Fitted,
+        seed: u64,
+        losses: Option<Losses>,
+    ) -> SeedReport {
         let std = self.training.state_std();
         let names = Robot::state_names();
         let rows = fitted.maps.weights.row_iter();
@@ -144,7 +146,7 @@ impl Task<'_> {
 
     /// The report of `fitted`; `judged` are its metrics on the jumps that candidates are judged by, kept only if there
     /// are validation jumps.
-    pub fn report(&self, fitted: &Fitted, judged: &SetMetrics) -> TrainReport {
+    pub(super) fn report(&self, fitted: &Fitted, judged: &SetMetrics) -> TrainReport {
         let names = Robot::state_names();
         let phases = self.training.phases.names().into_iter().zip(&fitted.xi);
         let (choice, candidates) = fitted.choice.clone().unzip();

@@ -1,7 +1,5 @@
 //! What can keep a model from being trained.
 
-#![allow(missing_docs, reason = "each variant's message names its fields")]
-
 use std::path::PathBuf;
 
 use thiserror::Error;
@@ -26,7 +24,6 @@ pub enum TrainError {
         found: usize,
         expected: usize,
     },
-    /// A phase of the model has too few samples over all training recordings.
     #[error(
         "phase `{phase}` has {found} samples in the training recordings, expected at least {expected}: \
          record jumps in which {needed}"
@@ -35,29 +32,25 @@ pub enum TrainError {
         phase: String,
         found: usize,
         expected: usize,
-        /// What the recordings would have to show.
         needed: &'static str,
     },
-    /// More latent coordinates than the encoder may look at, or none.
     #[error(
         "latent dimension {requested}, expected 1 to {active} (the rows that an encoder can have of the coordinates that move or are actuated; `--coordinates free` and `--mask-std 0` allow more)"
     )]
     LatentDim { requested: usize, active: usize },
     #[error("{option} is {found}, expected {expected}")]
     Option {
-        /// Name of the option as on the command line.
+        /// As on the command line.
         option: &'static str,
         found: String,
         expected: &'static str,
     },
     #[error(transparent)]
     Range(#[from] OutOfRange),
-    /// Every candidate model left the range of finite numbers on the validation recordings.
     #[error(
         "all {candidates} candidate models diverge on the validation recordings: try another number of latent coordinates or more recordings"
     )]
     NoStableModel { candidates: usize },
-    /// A candidate term has no usable value at a training sample.
     #[error(
         "{path}: term `{term}` is {found:e} at sample {sample} ({time_s} s) in phase `{phase}`, expected a finite number \
          below {limit:e}: leave it out, or scale or shift what is inside"
@@ -66,19 +59,16 @@ pub enum TrainError {
         path: PathBuf,
         term: String,
         phase: String,
-        /// Sample of the jump, from 0.
+        /// Of the jump, from 0.
         sample: usize,
         time_s: f64,
         found: f64,
-        /// Magnitude above which squares overflow.
         limit: f64,
     },
     #[error("training was cancelled before the first complete model")]
     Cancelled,
-    /// A recording could not be turned into inputs.
     #[error(transparent)]
     Recording(#[from] RecordingError),
-    /// The trained numbers do not form a model.
     #[error("the trained model is refused")]
     Model(#[from] ModelError),
 }

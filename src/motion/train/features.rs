@@ -13,7 +13,7 @@ use crate::train::vectors::vectorised;
 
 /// A library over batches.
 #[derive(Clone, Debug)]
-pub struct Features {
+pub(super) struct Features {
     tape: Tape,
     latent_dim: usize,
     occurring: Vec<Vec<bool>>, // term, variable
@@ -22,13 +22,13 @@ pub struct Features {
 
 /// Values of all steps on one batch, reused between batches.
 #[derive(Clone, Debug, Default)]
-pub struct FeatureValues {
+pub(super) struct FeatureValues {
     values: Vec<Vec<f64>>,
     adjoints: Vec<Vec<f64>>,
 }
 
 impl Features {
-    pub fn new(library: &Library) -> Self {
+    pub(super) fn new(library: &Library) -> Self {
         let latent_dim = library.latent_dim();
         let variables = LatentVariable::all(latent_dim).filter_map(|v| library.symbol(v));
         let variables: Vec<SymbolId> = variables.collect();
@@ -50,32 +50,32 @@ impl Features {
         }
     }
 
-    pub fn library_dim(&self) -> usize {
+    pub(super) fn library_dim(&self) -> usize {
         self.tape.terms.len()
     }
 
-    pub fn latent_dim(&self) -> usize {
+    pub(super) fn latent_dim(&self) -> usize {
         self.latent_dim
     }
 
     /// For every term whether it is affine in `z`, `dz` and `u_lat`: dynamics of such terms do not run away within the
     /// time of a jump.
-    pub fn affine_terms(&self) -> &[bool] {
+    pub(super) fn affine_terms(&self) -> &[bool] {
         &self.affine
     }
 
     /// Whether a variable, counted over `z`, `dz`, `u_lat`, occurs in a term.
-    pub fn depends_on(&self, term: usize, variable: usize) -> bool {
+    pub(super) fn depends_on(&self, term: usize, variable: usize) -> bool {
         self.occurring[term][variable]
     }
 
     /// The term that is 1.
-    pub fn constant_term(&self) -> Option<usize> {
+    pub(super) fn constant_term(&self) -> Option<usize> {
         self.term_of(|step| matches!(step, Step::Number(value) if *value == 1.0))
     }
 
     /// The term that is a variable, counted over `z`, `dz`, `u_lat`.
-    pub fn variable_term(&self, variable: usize) -> Option<usize> {
+    pub(super) fn variable_term(&self, variable: usize) -> Option<usize> {
         self.term_of(|step| matches!(step, Step::Variable(own) if *own == variable))
     }
 
@@ -85,7 +85,11 @@ impl Features {
     }
 
     /// `Theta` (`n x library_dim`) from `variables` (`n x 3 latent_dim`, columns z, dz, u_lat).
-    pub fn evaluate(&self, variables: &DMatrix<f64>, values: &mut FeatureValues) -> DMatrix<f64> {
+    pub(super) fn evaluate(
+        &self,
+        variables: &DMatrix<f64>,
+        values: &mut FeatureValues,
+    ) -> DMatrix<f64> {
         self.forward(variables, values);
         let mut theta = DMatrix::zeros(variables.nrows(), self.tape.terms.len());
         for (mut column, &step) in theta.column_iter_mut().zip(&self.tape.terms) {
@@ -96,14 +100,14 @@ impl Features {
 
     /// Values of one term after [`Self::forward`], one per sample.
     #[inline(always)]
-    pub fn term<'a>(&self, values: &'a FeatureValues, term: usize) -> &'a [f64] {
+    pub(super) fn term<'a>(&self, values: &'a FeatureValues, term: usize) -> &'a [f64] {
         &values.values[self.tape.terms[term]]
     }
 
     /// Adds to `gradient` (`n x 3 latent_dim`) what `theta_gradient` (`n x library_dim`) means for the variables.
     ///
     /// `values` must hold the forward pass of the same batch.
-    pub fn backward(
+    pub(super) fn backward(
         &self,
         theta_gradient: &DMatrix<f64>,
         values: &mut FeatureValues,
@@ -117,7 +121,7 @@ impl Features {
     }
 
     /// Computes every step for all samples; see [`Self::evaluate`] for the shape of `variables`.
-    pub fn forward(&self, variables: &DMatrix<f64>, values: &mut FeatureValues) {
+    pub(super) fn forward(&self, variables: &DMatrix<f64>, values: &mut FeatureValues) {
         compute(&self.tape.steps, variables, &mut values.values);
     }
 }

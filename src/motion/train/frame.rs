@@ -21,7 +21,7 @@ const RIDGE: f64 = 1e-2;
 
 /// Rows of an encoder `W_e` before they are chosen, in scaled units.
 #[derive(Clone, Debug)]
-pub struct Frame {
+pub(super) struct Frame {
     /// Rows that every encoder has, as columns, `18 x h`.
     pub held: DMatrix<f64>,
     /// Orthonormal directions that the other rows combine, `18 x k`.
@@ -30,7 +30,7 @@ pub struct Frame {
 
 impl Frame {
     /// No row held, and the coordinates `active` to combine.
-    pub fn plain(active: &[usize]) -> Self {
+    pub(super) fn plain(active: &[usize]) -> Self {
         Self {
             held: DMatrix::zeros(STATE_DIM, 0),
             free: DMatrix::identity(STATE_DIM, STATE_DIM).select_columns(active),
@@ -42,7 +42,7 @@ impl Frame {
     /// With [`Coordinates::Named`] and two latent coordinates or more, the first two rows are the centre of mass
     /// forwards and upwards (see `centre_of_mass`) and the others combine the sums of `active` coordinates left and
     /// right that a mirror leaves alone: such an encoder knows nothing of `y`, roll and yaw, nor of left and right.
-    pub fn new(
+    pub(super) fn new(
         training: &Dataset,
         active: &[usize],
         latent_dim: usize,
@@ -68,13 +68,13 @@ impl Frame {
         }
     }
 
-    pub fn dim(&self) -> usize {
+    pub(super) fn dim(&self) -> usize {
         self.held.ncols() + self.free.ncols()
     }
 
     /// The held rows and the `latent_dim - h` directions of the free space nearest to the space that the columns of
     /// `basis` span.
-    pub fn nearest(&self, basis: &DMatrix<f64>, latent_dim: usize) -> DMatrix<f64> {
+    pub(super) fn nearest(&self, basis: &DMatrix<f64>, latent_dim: usize) -> DMatrix<f64> {
         let inside = self.free.tr_mul(basis).svd(true, false);
         let left = inside.u.expect("invariant: asked for");
         let count = latent_dim - self.held.ncols();

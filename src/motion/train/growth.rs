@@ -13,6 +13,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 use super::dataset::Dataset;
 use super::features::{FeatureValues, Features};
 use super::latent::EncodedSet;
+use super::rollout::Xi;
 use crate::evaluate::{eigenvalues, state_matrix};
 
 /// Steps of least change before coefficients are scaled down instead.
@@ -28,7 +29,7 @@ const DIFFERENCE: f64 = 1e-6;
 
 /// What the dynamics of a training must keep to.
 #[derive(Clone, Debug)]
-pub struct Growth {
+pub(super) struct Growth {
     bound_per_s: Option<f64>,
     slopes: Vec<DMatrix<f64>>, // a phase: d theta / d (z, dz) at its mean state
     sequence: Vec<(usize, f64)>, // phases and their durations in s
@@ -43,7 +44,11 @@ struct Mode {
 
 impl Growth {
     /// Of these jumps: the mean state of each phase, and the most frequent order of phases with its mean durations.
-    pub fn of_jumps(bound_per_s: Option<f64>, set: EncodedSet<'_>, features: &Features) -> Self {
+    pub(super) fn of_jumps(
+        bound_per_s: Option<f64>,
+        set: EncodedSet<'_>,
+        features: &Features,
+    ) -> Self {
         let phases = 0..set.dataset.phases.patterns.len();
         Self {
             bound_per_s,
@@ -55,7 +60,7 @@ impl Growth {
     }
 
     /// Whether no phase grows faster than the bound, nor the sequence of phases.
-    pub fn admits(&self, xi: &[DMatrix<f64>]) -> bool {
+    pub(super) fn admits(&self, xi: &[Xi]) -> bool {
         self.excess(&self.lower_halves(xi)) == [0.0; 2]
     }
 
@@ -63,11 +68,7 @@ impl Growth {
     ///
     /// `inverse` applies the inverse of the matrix that weighs changes (`library_dim x latent_dim` a phase), and makes
     /// no change where there must not be one. Where such steps do not end, what depends on the state is scaled down.
-    pub fn hold(
-        &self,
-        xi: &mut [DMatrix<f64>],
-        inverse: impl Fn(&[DMatrix<f64>]) -> Vec<DMatrix<f64>>,
-    ) {
+    pub(super) fn hold(&self, xi: &mut [Xi], inverse: impl Fn(&[Xi]) -> Vec<Xi>) {
         for _ in 0..STEPS {
             let lower = self.lower_halves(xi);
             let excess = self.excess(&lower);
@@ -99,7 +100,7 @@ impl Growth {
     }
 
     /// `d ddz / d (z, dz)` of every phase, `latent_dim x 2 latent_dim`.
-    fn lower_halves(&self, xi: &[DMatrix<f64>]) -> Vec<DMatrix<f64>> {
+    fn lower_halves(&self, xi: &[Xi]) -> Vec<DMatrix<f64>> {
         let each = xi.iter().zip(&self.slopes);
         each.map(|(xi, slopes)| xi.tr_mul(slopes)).collect()
     }
@@ -203,7 +204,7 @@ impl Growth {
     fn least_change(
         &self,
         modes: &[Mode],
-        inverse: impl Fn(&[DMatrix<f64>]) -> Vec<DMatrix<f64>>,
+        inverse: impl Fn(&[Xi]) -> Vec<Xi>,
     ) -> Vec<DMatrix<f64>> {
         let of_xi = |mode: &Mode| -> Vec<DMatrix<f64>> {
             let each = self.slopes.iter().zip(&mode.slopes);

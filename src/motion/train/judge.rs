@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::features::Features;
 use super::latent::{EncodedSet, Latent};
-use super::rollout::{Candidate, Change, Window, plain, predict, predict_changed, windows};
+use super::rollout::{Candidate, Change, Window, Xi, plain, predict, predict_changed, windows};
 use crate::sim::Restart;
 
 /// Weight of whole-jump rollouts against predictions of 0.1 s in a score.
@@ -23,7 +23,7 @@ const LONG: usize = 1;
 
 /// A library, and samples to judge its coefficients on (`library_dim x latent_dim` a phase).
 #[derive(Clone)]
-pub struct Judge<'a> {
+pub(super) struct Judge<'a> {
     pub features: &'a Features,
     set: EncodedSet<'a>,
     windows: [Vec<Window>; 2], // short and long
@@ -31,7 +31,7 @@ pub struct Judge<'a> {
 }
 
 impl<'a> Judge<'a> {
-    pub fn new(features: &'a Features, set: EncodedSet<'a>) -> Self {
+    pub(super) fn new(features: &'a Features, set: EncodedSet<'a>) -> Self {
         let inverse_std: Vec<f64> = (0..set.latent_dim())
             .map(|row| 1.0 / row_std(set.latent, row).max(f64::MIN_POSITIVE))
             .collect();
@@ -47,7 +47,7 @@ impl<'a> Judge<'a> {
     ///
     /// In standard deviations a millimetre of a body that jumps half a metre is nothing beside a leg's error, though
     /// both are a tenth of what can be predicted: this way a tenth less counts the same wherever it is.
-    pub fn relative_to(&self, xi: &[DMatrix<f64>]) -> Self {
+    pub(super) fn relative_to(&self, xi: &[Xi]) -> Self {
         let mut relative = self.clone();
         for kind in [SHORT, LONG] {
             let squares = self.mean_squares(xi, kind);
@@ -62,12 +62,12 @@ impl<'a> Judge<'a> {
     }
 
     /// Score of coefficients, see [`Choice::score`](super::select::Choice::score); infinite if a rollout diverges.
-    pub fn score(&self, xi: &[DMatrix<f64>]) -> f64 {
+    pub(super) fn score(&self, xi: &[Xi]) -> f64 {
         self.score_within(xi, f64::MAX)
     }
 
     /// The same, or a number above `limit` if the score is: whole jumps are left out if 0.1 s are enough to know.
-    pub fn score_within(&self, xi: &[DMatrix<f64>], limit: f64) -> f64 {
+    pub(super) fn score_within(&self, xi: &[Xi], limit: f64) -> f64 {
         let short = self.error(xi, SHORT);
         if short > limit {
             return short;
@@ -76,13 +76,13 @@ impl<'a> Judge<'a> {
     }
 
     /// Parts that [`Self::errors`] can be asked for, one by one so that few predictions are held at a time.
-    pub fn parts(&self) -> Range<usize> {
+    pub(super) fn parts(&self) -> Range<usize> {
         0..self.set.dataset.jumps.len().div_ceil(JUMPS)
     }
 
     /// Scaled errors of 0.1 s predictions and of whole jumps of a part, every [`THINNED`]th sample;
     /// none if a rollout diverges.
-    pub fn errors(&self, xi: &[DMatrix<f64>], part: usize) -> Option<[DVector<f64>; 2]> {
+    pub(super) fn errors(&self, xi: &[Xi], part: usize) -> Option<[DVector<f64>; 2]> {
         let errors = [SHORT, LONG].map(|kind| {
             let mut errors = Vec::new();
             for (window, prediction) in self.predictions(xi, part, kind) {
@@ -93,9 +93,9 @@ impl<'a> Judge<'a> {
         are_finite(&errors).then_some(errors)
     }
 
-    pub fn errors_changed(
+    pub(super) fn errors_changed(
         &self,
-        xi: &[DMatrix<f64>],
+        xi: &[Xi],
         changes: &[Change],
         part: usize,
     ) -> Option<Vec<[DVector<f64>; 2]>> {
@@ -118,7 +118,7 @@ impl<'a> Judge<'a> {
 
     fn predictions(
         &self,
-        xi: &[DMatrix<f64>],
+        xi: &[Xi],
         part: usize,
         kind: usize,
     ) -> impl Iterator<Item = (&Window, DMatrix<f64>)> {
@@ -151,7 +151,7 @@ impl<'a> Judge<'a> {
     }
 
     /// Root mean square of the scaled errors; infinite if a rollout diverges.
-    fn error(&self, xi: &[DMatrix<f64>], kind: usize) -> f64 {
+    fn error(&self, xi: &[Xi], kind: usize) -> f64 {
         let squares = self.mean_squares(xi, kind);
         let scaled = squares.iter().zip(&self.scales[kind]);
         let sum: f64 = scaled.map(|(square, scale)| square * scale * scale).sum();
@@ -164,7 +164,7 @@ impl<'a> Judge<'a> {
     }
 
     /// Mean squares of the errors, a coordinate.
-    fn mean_squares(&self, xi: &[DMatrix<f64>], kind: usize) -> Vec<f64> {
+    fn mean_squares(&self, xi: &[Xi], kind: usize) -> Vec<f64> {
         let (mut squares, mut count) = (vec![0.0; self.scales[kind].len()], 0);
         for part in self.parts() {
             for (window, prediction) in self.predictions(xi, part, kind) {

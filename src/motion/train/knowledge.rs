@@ -15,7 +15,7 @@ const HELD: usize = 2;
 
 /// Coefficients of one phase that are known, those that a regression may choose, and those that it must keep.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Knowledge {
+pub(super) struct Knowledge {
     /// `library_dim x latent_dim`, zero where nothing is known.
     pub known: DMatrix<f64>,
     /// Whether a coefficient is free, `library_dim x latent_dim`.
@@ -27,7 +27,7 @@ pub struct Knowledge {
 }
 
 impl Knowledge {
-    pub fn nothing(library_dim: usize, latent_dim: usize) -> Self {
+    pub(super) fn nothing(library_dim: usize, latent_dim: usize) -> Self {
         Self {
             known: DMatrix::zeros(library_dim, latent_dim),
             free: DMatrix::from_element(library_dim, latent_dim, true),
@@ -37,7 +37,7 @@ impl Knowledge {
     }
 
     /// Coefficients that would drive where they may only brake, set to 0.
-    pub fn brake(&self, xi: &mut DMatrix<f64>) {
+    pub(super) fn brake(&self, xi: &mut DMatrix<f64>) {
         for (coefficient, braking) in xi.iter_mut().zip(self.braking.iter()) {
             if *braking && *coefficient > 0.0 {
                 *coefficient = 0.0;
@@ -54,7 +54,7 @@ impl Knowledge {
     /// and velocity alone, and keeps its constant: gravity, less what the ground carries of the legs' weight, which
     /// forces that come from torques leave out. In flight `ddz1 = 0`, `ddz2 = -g`, and there are no forces that any term
     /// could depend on. An input acts on its own coordinate.
-    pub fn of_phases(training: &Dataset, features: &Features, frame: &Frame) -> Vec<Self> {
+    pub(super) fn of_phases(training: &Dataset, features: &Features, frame: &Frame) -> Vec<Self> {
         let (p, d) = (features.library_dim(), features.latent_dim());
         let each = training.phases.patterns.iter();
         if frame.held.ncols() < HELD {
@@ -116,7 +116,7 @@ mod tests {
     use super::*;
     use crate::robot::STATE_DIM;
     use crate::train::oscillator;
-    use crate::train::sparse::Regression;
+    use crate::train::sparse::{Pruning, Regression};
 
     #[test]
     fn centre_of_mass_is_moved_by_forces_alone_and_in_flight_by_none() {
@@ -170,8 +170,14 @@ mod tests {
         knowledge.free[(1, 0)] = false;
         knowledge.kept[(6, 0)] = true; // explains nothing
         let regression = Regression::new(&theta, &(&theta * &truth), knowledge);
-        let xi = regression.fit(1e-6, 0.02);
-        assert_eq!((xi[(0, 1)], xi[(1, 0)]), (-0.981, 0.0));
-        assert!(xi[(6, 0)] != 0.0 && (xi[(6, 1)] - 3.0).abs() < 0.2, "{xi}");
+        for pruning in [Pruning::Threshold(0.05), Pruning::Elimination(0.02)] {
+            let xi = regression.fit(1e-6, pruning);
+            assert_eq!((xi[(0, 1)], xi[(1, 0)]), (-0.981, 0.0));
+            assert!(xi[(6, 0)] != 0.0 && (xi[(6, 1)] - 3.0).abs() < 0.2, "{xi}");
+            let support = xi.map(|value| value != 0.0);
+            assert_eq!(regression.fit_column(1, &support, 1e-6)[0], -0.981);
+            let may_go = regression.losses(0, &support, 1e-6);
+            assert!(may_go.iter().all(|(term, _)| *term != 6 && *term != 1));
+        }
     }
 }

@@ -12,7 +12,7 @@ const FITS: &str = "invariant: a trained or checked map takes the robot's coordi
 
 /// Latent samples of one jump; columns are samples, scaled units.
 #[derive(Clone, Debug)]
-pub struct Latent {
+pub(super) struct Latent {
     /// `z = W_e x + b_e`, of a nonlinear encoder `E(x)`.
     pub z: DMatrix<f64>,
     /// `dz = W_e dx`, or `J dx` with the Jacobian at the sample.
@@ -24,7 +24,7 @@ pub struct Latent {
 }
 
 impl Latent {
-    pub fn of(dataset: &Dataset, encoder: &StateMap) -> Vec<Latent> {
+    pub(super) fn of(dataset: &Dataset, encoder: &StateMap) -> Vec<Latent> {
         let linear = encoder.as_affine().map(AffineMap::weights);
         let linear = linear.map(|weights| (weights, input_projection(weights)));
         let encoded = dataset.jumps.iter().map(|jump| match &linear {
@@ -63,7 +63,7 @@ impl Latent {
     }
 
     /// `[z, dz, u_lat]` of some samples in rows.
-    pub fn variables(&self, range: Range<usize>) -> DMatrix<f64> {
+    pub(super) fn variables(&self, range: Range<usize>) -> DMatrix<f64> {
         let n = range.len();
         let mut variables = DMatrix::zeros(n, 3 * self.z.nrows());
         self.copy_variables(range, &mut variables.rows_mut(0, n));
@@ -81,22 +81,22 @@ impl Latent {
 }
 
 #[derive(Clone, Copy, Debug)]
-pub struct EncodedSet<'a> {
+pub(super) struct EncodedSet<'a> {
     pub dataset: &'a Dataset,
     pub latent: &'a [Latent],
 }
 
 impl<'a> EncodedSet<'a> {
-    pub fn new(dataset: &'a Dataset, latent: &'a [Latent]) -> Self {
+    pub(super) fn new(dataset: &'a Dataset, latent: &'a [Latent]) -> Self {
         Self { dataset, latent }
     }
 
-    pub fn latent_dim(self) -> usize {
+    pub(super) fn latent_dim(self) -> usize {
         self.latent.first().map_or(0, |first| first.z.nrows())
     }
 
     /// The samples of one phase: `[z, dz, u_lat]`, `n x 3 latent_dim`, and `ddz^T`, `n x latent_dim`.
-    pub fn regression_samples(self, phase: usize) -> (DMatrix<f64>, DMatrix<f64>) {
+    pub(super) fn regression_samples(self, phase: usize) -> (DMatrix<f64>, DMatrix<f64>) {
         let (n, d) = (self.dataset.samples(Some(phase)), self.latent_dim());
         let (mut variables, mut target) = (DMatrix::zeros(n, 3 * d), DMatrix::zeros(n, d));
         let mut at = 0;
@@ -112,7 +112,7 @@ impl<'a> EncodedSet<'a> {
 }
 
 /// `pinv(W_e^T) = (W_e W_e^T)^-1 W_e` of an encoder of full row rank, `latent_dim x input_dim`.
-pub fn input_projection(weights: &DMatrix<f64>) -> DMatrix<f64> {
+pub(super) fn input_projection(weights: &DMatrix<f64>) -> DMatrix<f64> {
     let gram = weights * weights.transpose();
     match gram.cholesky() {
         Some(factor) => factor.solve(weights),
@@ -123,7 +123,7 @@ pub fn input_projection(weights: &DMatrix<f64>) -> DMatrix<f64> {
     }
 }
 
-pub fn map_samples(map: &StateMap, samples: &DMatrix<f64>) -> DMatrix<f64> {
+pub(super) fn map_samples(map: &StateMap, samples: &DMatrix<f64>) -> DMatrix<f64> {
     if let Some(linear) = map.as_affine() {
         let mut mapped = linear.weights() * samples;
         let columns = mapped.column_iter_mut();
@@ -138,7 +138,11 @@ pub fn map_samples(map: &StateMap, samples: &DMatrix<f64>) -> DMatrix<f64> {
 }
 
 /// Latent inputs of samples in columns lifted back: `J^T u_lat` with the encoder's Jacobian at the states `x`.
-pub fn lift_samples(encoder: &StateMap, x: &DMatrix<f64>, u_lat: &DMatrix<f64>) -> DMatrix<f64> {
+pub(super) fn lift_samples(
+    encoder: &StateMap,
+    x: &DMatrix<f64>,
+    u_lat: &DMatrix<f64>,
+) -> DMatrix<f64> {
     if let Some(linear) = encoder.as_affine() {
         return linear.weights().tr_mul(u_lat);
     }
@@ -152,7 +156,7 @@ pub fn lift_samples(encoder: &StateMap, x: &DMatrix<f64>, u_lat: &DMatrix<f64>) 
 }
 
 /// `W_e`, of a nonlinear encoder the mean of its Jacobian over the samples of a dataset.
-pub fn mean_jacobian(encoder: &StateMap, dataset: &Dataset) -> DMatrix<f64> {
+pub(super) fn mean_jacobian(encoder: &StateMap, dataset: &Dataset) -> DMatrix<f64> {
     if let Some(linear) = encoder.as_affine() {
         return linear.weights().clone();
     }
@@ -167,10 +171,7 @@ pub fn mean_jacobian(encoder: &StateMap, dataset: &Dataset) -> DMatrix<f64> {
 
 /// Decoder of least mean square error over all phases: `x ~ W_d z + b_d`, with `z` the encoded samples after the
 /// `hidden` layers of the decoder, if it has any.
-///
-/// # Errors
-/// [`TrainError::Model`] if a weight is not finite.
-pub fn least_squares_decoder(
+pub(super) fn least_squares_decoder(
     dataset: &Dataset,
     encoder: &StateMap,
     hidden: Option<&StateMap>,

@@ -1,6 +1,6 @@
 //! How good a model is on a set of jumps.
 
-use nalgebra::{DMatrix, DVector, DVectorView};
+use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
 use super::dataset::{Dataset, Jump, Scaling, mean};
@@ -125,39 +125,22 @@ fn decoder_mse(decoder: &StateMap, set: EncodedSet<'_>) -> f64 {
 fn ddz_r2(candidate: Candidate<'_>, set: EncodedSet<'_>, phase: usize) -> f64 {
     let (variables, target) = set.regression_samples(phase);
     let theta = (candidate.features).evaluate(&variables, &mut FeatureValues::default());
-    let (predicted, target) = (
-        (theta * &candidate.xi[phase]).transpose(),
-        target.transpose(),
-    );
-    let mut sums = Determination::about(mean(&target));
-    for (predicted, target) in predicted.column_iter().zip(target.column_iter()) {
-        sums.add(predicted, target);
-    }
-    sums.r2()
+    let predicted = (theta * &candidate.xi[phase]).transpose();
+    determination(&predicted, &target.transpose())
 }
 
 /// Of the samples whose torques can be the robot's, see [`is_plausible`](crate::evaluate::is_plausible).
 fn torque_r2(encoder: &StateMap, set: EncodedSet<'_>) -> f64 {
-    let jumps = set.dataset.jumps.iter().zip(set.latent);
-    let n: usize = (set.dataset.jumps.iter())
-        .map(|jump| jump.torque_samples().count())
-        .sum();
-    let mut mean = DVector::zeros(JOINT_DIM);
-    for (jump, _) in jumps.clone() {
-        for sample in jump.torque_samples() {
-            let torque = recorded_torque(&jump.u, jump, sample);
-            mean.axpy(1.0 / n as f64, &torque, 1.0);
-        }
-    }
-    let mut sums = Determination::about(mean);
-    for (jump, samples) in jumps {
+    let (mut predicted, mut recorded) = (Vec::new(), Vec::new());
+    for (jump, samples) in set.dataset.jumps.iter().zip(set.latent) {
         let lift = lift_samples(encoder, &jump.x, &samples.u_lat);
         for sample in jump.torque_samples() {
-            let torque = |u| recorded_torque(u, jump, sample);
-            sums.add(torque(&lift).as_view(), torque(&jump.u).as_view());
+            predicted.extend(recorded_torque(&lift, jump, sample).iter());
+            recorded.extend(recorded_torque(&jump.u, jump, sample).iter());
         }
     }
-    sums.r2()
+    let columns = |values: Vec<f64>| DMatrix::from_vec(JOINT_DIM, values.len() / JOINT_DIM, values);
+    determination(&columns(predicted), &columns(recorded))
 }
 
 /// The motors' torques of a sample for inputs `u`: those at the links, joint friction and rotor inertia.
@@ -169,28 +152,13 @@ fn recorded_torque(u: &DMatrix<f64>, jump: &Jump, sample: usize) -> DVector<f64>
     }
 }
 
-/// Sums of a coefficient of determination over all rows together, each about its mean.
-struct Determination {
-    mean: DVector<f64>,
-    residual: f64,
-    spread: f64,
-}
-
-impl Determination {
-    fn about(mean: DVector<f64>) -> Self {
-        Self {
-            mean,
-            residual: 0.0,
-            spread: 0.0,
-        }
+/// Coefficient of determination of samples in columns, over all rows together, each about its mean.
+fn determination(predicted: &DMatrix<f64>, truth: &DMatrix<f64>) -> f64 {
+    let mean = mean(truth);
+    let (mut residual, mut spread) = (0.0, 0.0);
+    for (predicted, truth) in predicted.column_iter().zip(truth.column_iter()) {
+        residual += (predicted - truth).norm_squared();
+        spread += (truth - &mean).norm_squared();
     }
-
-    fn add(&mut self, predicted: DVectorView<'_, f64>, truth: DVectorView<'_, f64>) {
-        self.residual += (predicted - truth).norm_squared();
-        self.spread += (truth - &self.mean).norm_squared();
-    }
-
-    fn r2(&self) -> f64 {
-        1.0 - self.residual / self.spread.max(f64::MIN_POSITIVE)
-    }
+    1.0 - residual / f64::max(spread, f64::MIN_POSITIVE)
 }

@@ -11,7 +11,6 @@ mod closed_form;
 mod dataset;
 mod features;
 mod frame;
-mod grow;
 mod growth;
 mod joint;
 mod jumps;
@@ -34,6 +33,7 @@ mod options;
 #[cfg(test)]
 mod oscillator;
 mod overlap;
+mod prune;
 mod random;
 mod refine;
 mod report;

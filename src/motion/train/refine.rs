@@ -5,17 +5,17 @@
 //! of whole jumps do: coefficients under which a phase, or the sequence of phases, runs away predict badly (the
 //! prediction-error method, Ljung, System Identification, 2nd ed. 1999, section 7.2).
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::growth::Growth;
 use super::judge::Judge;
 use super::knowledge::Knowledge;
 use super::progress::Monitor;
-use super::rollout::Change;
+use super::rollout::{Change, Xi};
 use super::sparse::active_terms;
 
 /// Weight of relative changes of the coefficients, against squared errors that start at 1 for both kinds of windows.
-pub(super) const PRIOR: f64 = 1e-3;
+const PRIOR: f64 = 1e-3;
 /// Relative step of the difference quotients.
 const STEP: f64 = 1e-6;
 const ATTEMPTS: usize = 6;
@@ -29,7 +29,7 @@ pub(super) type CoefficientIndex = (usize, usize, usize);
 /// Coefficients of all phases, `library_dim x latent_dim` each, and the score that judges them.
 #[derive(Clone, Debug)]
 pub(super) struct Coefficients {
-    pub xi: Vec<DMatrix<f64>>,
+    pub xi: Vec<Xi>,
     pub score: f64,
 }
 
@@ -40,18 +40,7 @@ impl Coefficients {
 }
 
 /// Coefficients that may change, and their sizes, which changes are relative to.
-#[derive(Clone)]
-pub(super) struct FreeCoefficients {
-    pub places: Vec<CoefficientIndex>,
-    pub scales: Vec<f64>,
-}
-
-impl FreeCoefficients {
-    pub fn each(&self) -> impl Iterator<Item = (CoefficientIndex, f64)> {
-        let scales = self.scales.iter().copied();
-        self.places.iter().copied().zip(scales)
-    }
-}
+pub(super) type FreeCoefficients = Vec<(CoefficientIndex, f64)>;
 
 pub(super) struct Refiner<'a> {
     pub knowledge: &'a [Knowledge],
@@ -67,18 +56,29 @@ pub(super) struct ErrorModel {
     pub gradient: DVector<f64>,
 }
 
+impl ErrorModel {
+    /// The factor of the form's matrix with the prior, and damped relative to each coefficient's own weight.
+    pub(super) fn damped(&self, damping: f64) -> Option<Cholesky<f64, Dyn>> {
+        let mut system = self.gram.clone();
+        for i in 0..system.nrows() {
+            system[(i, i)] += PRIOR + damping * self.gram[(i, i)];
+        }
+        system.cholesky()
+    }
+}
+
 impl Refiner<'_> {
     /// Lowers the errors that `training` measures in at most `steps` steps, and gives the coefficients that `judge`
     /// scores best on the way. Which terms are active does not change, but for those that would drive where they may
     /// only brake, nor do coefficients that are known.
-    pub fn refine(
+    pub(super) fn refine(
         &self,
         start: Coefficients,
         steps: usize,
         monitor: &mut Monitor<'_>,
     ) -> Coefficients {
         let free = self.free(&start.xi);
-        let Some(weights) = self.weights(&start.xi).filter(|_| !free.places.is_empty()) else {
+        let Some(weights) = self.weights(&start.xi).filter(|_| !free.is_empty()) else {
             return start;
         };
         monitor.stage("refining coefficients by rollouts", steps);
@@ -89,21 +89,19 @@ impl Refiner<'_> {
     fn descend(
         &self,
         start: Coefficients,
-        free: &FreeCoefficients,
+        free: &[(CoefficientIndex, f64)],
         weights: [f64; 2],
         steps: usize,
         monitor: &mut Monitor<'_>,
     ) -> Coefficients {
-        let n = free.places.len();
-        let moved = |xi: &[DMatrix<f64>]| {
+        let n = free.len();
+        let moved = |xi: &[Xi]| {
             let change = |((phase, term, k), scale): (CoefficientIndex, f64)| {
                 (xi[phase][(term, k)] - start.xi[phase][(term, k)]) / scale
             };
-            DVector::from_iterator(n, free.each().map(change))
+            DVector::from_iterator(n, free.iter().copied().map(change))
         };
-        let cost = |squared_error: f64, xi: &[DMatrix<f64>]| {
-            squared_error + PRIOR * moved(xi).norm_squared()
-        };
+        let cost = |squared_error: f64, xi: &[Xi]| squared_error + PRIOR * moved(xi).norm_squared();
         let mut current = start.xi.clone();
         self.admit(&mut current, free, Clone::clone);
         let mut best = Coefficients {
@@ -121,14 +119,10 @@ impl Refiner<'_> {
             let before = cost(model.squared_error, &current);
             let gradient = &model.gradient + moved(&current) * PRIOR;
             let lower = (0..ATTEMPTS).find_map(|_| {
-                let mut system = model.gram.clone();
-                for i in 0..n {
-                    system[(i, i)] += PRIOR + damping * model.gram[(i, i)];
-                }
-                let factor = system.cholesky()?;
+                let factor = model.damped(damping)?;
                 let change = -factor.solve(&gradient);
                 let mut trial = current.clone();
-                for (((phase, term, k), scale), change) in free.each().zip(change.iter()) {
+                for (((phase, term, k), scale), change) in free.iter().copied().zip(change.iter()) {
                     trial[phase][(term, k)] += change * scale;
                 }
                 self.admit(&mut trial, free, |gradient| factor.solve(gradient));
@@ -137,16 +131,12 @@ impl Refiner<'_> {
                 damping *= if after < before { 0.1 } else { 10.0 };
                 (after < before).then_some((trial, after))
             });
-            let Some((trial, after)) = lower else {
-                break;
-            };
+            let Some((trial, after)) = lower else { break };
             let score = self.score(&trial);
             monitor.done(step + 1, format!("score {score:.4}"));
             if score < best.score {
-                best = Coefficients {
-                    xi: trial.clone(),
-                    score,
-                };
+                let xi = trial.clone();
+                best = Coefficients { xi, score };
             }
             current = trial;
             if after > (1.0 - LEAST_GAIN) * before {
@@ -160,17 +150,17 @@ impl Refiner<'_> {
     /// `inverse` applies that of the matrix which weighs relative changes of the `free` coefficients.
     fn admit(
         &self,
-        xi: &mut [DMatrix<f64>],
-        free: &FreeCoefficients,
+        xi: &mut [Xi],
+        free: &[(CoefficientIndex, f64)],
         inverse: impl Fn(&DVector<f64>) -> DVector<f64>,
     ) {
         self.growth.hold(xi, |gradient| {
-            let relative = free.each();
+            let relative = free.iter().copied();
             let relative =
                 relative.map(|((phase, term, k), scale)| gradient[phase][(term, k)] * scale);
-            let change = inverse(&DVector::from_iterator(free.places.len(), relative));
+            let change = inverse(&DVector::from_iterator(free.len(), relative));
             let mut all: Vec<_> = gradient.iter().map(|each| each.map(|_| 0.0)).collect();
-            for (((phase, term, k), scale), change) in free.each().zip(&change) {
+            for (((phase, term, k), scale), change) in free.iter().copied().zip(&change) {
                 all[phase][(term, k)] = change * scale;
             }
             all
@@ -179,19 +169,19 @@ impl Refiner<'_> {
     }
 
     /// Coefficients that would drive where they may only brake, set to 0.
-    pub(super) fn brake(&self, xi: &mut [DMatrix<f64>]) {
+    pub(super) fn brake(&self, xi: &mut [Xi]) {
         for (knowledge, xi) in self.knowledge.iter().zip(xi) {
             knowledge.brake(xi);
         }
     }
 
     /// Score of coefficients, infinite if they grow faster than they may or diverge.
-    pub(super) fn score(&self, xi: &[DMatrix<f64>]) -> f64 {
+    pub(super) fn score(&self, xi: &[Xi]) -> f64 {
         self.score_within(xi, f64::MAX)
     }
 
     /// The same, or a number above `limit` if the score is.
-    pub(super) fn score_within(&self, xi: &[DMatrix<f64>], limit: f64) -> f64 {
+    pub(super) fn score_within(&self, xi: &[Xi], limit: f64) -> f64 {
         match self.growth.admits(xi) {
             true => self.judge.score_within(xi, limit),
             false => f64::INFINITY,
@@ -199,23 +189,18 @@ impl Refiner<'_> {
     }
 
     /// Errors of a part, weighted and stacked; none if a rollout diverges.
-    fn residual(
-        &self,
-        xi: &[DMatrix<f64>],
-        weights: [f64; 2],
-        part: usize,
-    ) -> Option<DVector<f64>> {
+    fn residual(&self, xi: &[Xi], weights: [f64; 2], part: usize) -> Option<DVector<f64>> {
         Some(stacked(&self.training.errors(xi, part)?, weights))
     }
 
     /// Squared errors of all parts; none if a rollout diverges.
-    fn squared_error(&self, xi: &[DMatrix<f64>], weights: [f64; 2]) -> Option<f64> {
+    fn squared_error(&self, xi: &[Xi], weights: [f64; 2]) -> Option<f64> {
         let of_part = |part| Some(self.residual(xi, weights, part)?.norm_squared());
         self.training.parts().map(of_part).sum()
     }
 
     /// Weights under which the squared errors of both kinds of windows are 1; none if a rollout diverges.
-    pub(super) fn weights(&self, xi: &[DMatrix<f64>]) -> Option<[f64; 2]> {
+    pub(super) fn weights(&self, xi: &[Xi]) -> Option<[f64; 2]> {
         let mut squares = [0.0; 2];
         for part in self.training.parts() {
             let errors = self.training.errors(xi, part)?;
@@ -229,11 +214,11 @@ impl Refiner<'_> {
     /// The squared errors about `xi`; none if a rollout diverges.
     pub(super) fn model(
         &self,
-        xi: &[DMatrix<f64>],
-        free: &FreeCoefficients,
+        xi: &[Xi],
+        free: &[(CoefficientIndex, f64)],
         weights: [f64; 2],
     ) -> Option<ErrorModel> {
-        let n = free.places.len();
+        let n = free.len();
         let mut model = ErrorModel {
             squared_error: 0.0,
             gram: DMatrix::zeros(n, n),
@@ -247,7 +232,7 @@ impl Refiner<'_> {
             let residual = self.residual(xi, weights, part)?;
             let mut sensitivity = DMatrix::zeros(residual.len(), n);
             for first in (0..n).step_by(TOGETHER) {
-                let each = free.each().skip(first).take(TOGETHER);
+                let each = free.iter().copied().skip(first).take(TOGETHER);
                 let changes: Vec<_> = each.map(change).collect();
                 let moved = self.training.errors_changed(xi, &changes, part)?;
                 for (column, moved) in (first..).zip(&moved) {
@@ -262,18 +247,17 @@ impl Refiner<'_> {
         Some(model)
     }
 
-    pub(super) fn free(&self, xi: &[DMatrix<f64>]) -> FreeCoefficients {
-        let (mut places, mut scales) = (Vec::new(), Vec::new());
+    pub(super) fn free(&self, xi: &[Xi]) -> FreeCoefficients {
+        let mut all = Vec::new();
         for (phase, (xi, knowledge)) in xi.iter().zip(self.knowledge).enumerate() {
             for (index, (value, free)) in xi.iter().zip(knowledge.free.iter()).enumerate() {
                 if *value != 0.0 && *free {
                     let (term, column) = xi.vector_to_matrix_index(index);
-                    places.push((phase, term, column));
-                    scales.push(value.abs());
+                    all.push(((phase, term, column), value.abs()));
                 }
             }
         }
-        FreeCoefficients { places, scales }
+        all
     }
 }
 

@@ -18,23 +18,25 @@ const DIVERGED: f64 = 1e6;
 /// Input of the step (start, middle, end) that each stage has, and its share of the step.
 const STAGES: [(usize, f64); 4] = [(0, 0.0), (1, 0.5), (1, 0.5), (2, 1.0)];
 
+/// Coefficients of one phase, `library_dim x latent_dim`.
+pub(super) type Xi = DMatrix<f64>;
+
 /// Latent dynamics under trial: `ddz = Xi_phase^T theta(z, dz, u_lat)`.
 #[derive(Clone, Copy, Debug)]
-pub struct Candidate<'a> {
+pub(super) struct Candidate<'a> {
     pub features: &'a Features,
-    /// Coefficients a phase, `library_dim x latent_dim`.
-    pub xi: &'a [DMatrix<f64>],
+    pub xi: &'a [Xi],
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Change {
+pub(super) struct Change {
     /// Phase, term and latent coordinate of the coefficient.
     pub place: (usize, usize, usize),
     pub by: f64,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Window {
+pub(super) struct Window {
     pub jump: usize,
     /// First sample; the rollout starts at its true latent state.
     pub start: usize,
@@ -43,12 +45,12 @@ pub struct Window {
 }
 
 #[derive(Clone, Copy, Debug)]
-pub struct Row {
+pub(super) struct Row {
     pub window: Window,
     pub change: Option<Change>,
 }
 
-pub fn plain(windows: &[Window]) -> Vec<Row> {
+pub(super) fn plain(windows: &[Window]) -> Vec<Row> {
     let change = None;
     let rows = windows.iter().map(|&window| Row { window, change });
     rows.collect()
@@ -56,7 +58,7 @@ pub fn plain(windows: &[Window]) -> Vec<Row> {
 
 /// The windows between restarts of every jump ([`restart_windows`]), each up to the sample that the next one starts
 /// from.
-pub fn windows(dataset: &Dataset, restart: Restart) -> Vec<Window> {
+pub(super) fn windows(dataset: &Dataset, restart: Restart) -> Vec<Window> {
     let mut windows = Vec::new();
     for (jump, samples) in dataset.jumps.iter().enumerate() {
         for window in restart_windows(&samples.time_s, restart) {
@@ -75,7 +77,11 @@ pub fn windows(dataset: &Dataset, restart: Restart) -> Vec<Window> {
 /// RK4 with the recorded sampling; the latent input is interpolated linearly between samples, the phase is the
 /// recorded one of the sample a step starts from. Values beyond 1e6 are set to infinity and stay there. What is
 /// computed for a row does not depend on the others.
-pub fn predict(candidate: Candidate<'_>, set: EncodedSet<'_>, rows: &[Row]) -> Vec<DMatrix<f64>> {
+pub(super) fn predict(
+    candidate: Candidate<'_>,
+    set: EncodedSet<'_>,
+    rows: &[Row],
+) -> Vec<DMatrix<f64>> {
     let d = candidate.features.latent_dim();
     let empty = rows.iter().map(|row| DMatrix::zeros(d, row.window.steps));
     let mut predictions: Vec<_> = empty.collect();
@@ -99,7 +105,7 @@ pub fn predict(candidate: Candidate<'_>, set: EncodedSet<'_>, rows: &[Row]) -> V
 
 /// As [`predict`] for one window, once with each of the changes; one of a phase that the window does not have changes
 /// nothing.
-pub fn predict_changed(
+pub(super) fn predict_changed(
     candidate: Candidate<'_>,
     changes: &[Change],
     set: EncodedSet<'_>,

@@ -22,11 +22,8 @@ pub(super) struct Seeds {
 }
 
 impl Seeds {
-    /// Keeps the outcome of a seed.
-    ///
-    /// # Errors
-    /// Those that other seeds would have as well.
-    pub fn add(
+    /// Keeps the outcome of a seed; returns an error that other seeds would have as well.
+    pub(super) fn add(
         &mut self,
         seed: u64,
         outcome: Outcome,
@@ -45,10 +42,7 @@ impl Seeds {
     }
 
     /// The model of the best seed of `task`.
-    ///
-    /// # Errors
-    /// The first seed's if none has a model, [`TrainError::Cancelled`] if none was begun.
-    pub fn into_model(
+    pub(super) fn into_model(
         self,
         task: Task<'_>,
         method: &str,
@@ -71,9 +65,6 @@ impl Seeds {
 
     /// The seed of least score, the reports of all that have a model, best first, and the overlap of their supports;
     /// `state_covariance` (18 x 18) is that of the training states in scaled units.
-    ///
-    /// # Errors
-    /// The first seed's if none has a model, [`TrainError::Cancelled`] if none was begun.
     fn best(
         mut self,
         library: &Library,

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeSet;
 
-use nalgebra::DMatrix;
 use serde::Serialize;
 
 use super::error::TrainError;
@@ -13,53 +12,55 @@ use super::latent::EncodedSet;
 use super::options::RegressionOptions;
 use super::progress::Monitor;
 use super::refine::{Coefficients, Refiner};
-use super::sparse::Regression;
+use super::rollout::Xi;
+use super::sparse::{Pruning, Regression};
 use super::weak_form::windowed_samples;
 
 /// Windows (samples) over which the dynamics are integrated before regression; 0 means the accelerations.
 const WINDOWS: [usize; 3] = [0, 25, 50];
 /// Ridges on the normalised columns.
 const RIDGES: [f64; 3] = [1e-4, 1e-3, 1e-2];
-/// Shares of the accelerations' energy that eliminations may lose; they share the walk that drops terms one by one.
-const ELIMINATIONS: [f64; 7] = [1e-3, 3e-3, 1e-2, 2e-2, 3e-2, 5e-2, 0.0];
-/// How many candidates are refined.
-const REFINED: usize = 3;
-
-/// Backward elimination of terms.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Elimination {
-    /// Share of the accelerations' energy that may be lost.
-    pub elimination: f64,
-}
+/// Prunings; eliminations share the walk that drops terms one by one.
+const PRUNINGS: [Pruning; 10] = [
+    Pruning::Elimination(1e-3),
+    Pruning::Elimination(3e-3),
+    Pruning::Elimination(1e-2),
+    Pruning::Elimination(2e-2),
+    Pruning::Elimination(3e-2),
+    Pruning::Elimination(5e-2),
+    Pruning::Threshold(0.0),
+    Pruning::Threshold(0.03),
+    Pruning::Threshold(0.1),
+    Pruning::Threshold(0.2),
+];
+/// How many candidates are pruned further, a term at a time, while their score stays within the slack.
+const SWEEPS: usize = 3;
 
 /// How a candidate was fitted, and how it did.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Choice {
     pub window: usize,
     pub ridge: f64,
-    pub pruning: Elimination,
+    pub pruning: Pruning,
     /// Validation score: root mean square error of the latent state in standard deviations, of 0.1 s predictions
     /// plus 0.2 times that of whole jumps.
     pub score: f64,
     pub active: usize,
 }
 
-/// Fits all combinations of windows, ridges and eliminations and takes, among those within the slack of the best, the
+/// Fits all combinations of windows, ridges and prunings and takes, among those within the slack of the best, the
 /// sparsest: Xi of every phase (`library_dim x latent_dim`), what it was fitted with, and how many candidates there
 /// were.
 ///
 /// Fits the jumps of `set` with what is known of each phase, for the library of `judge`. The best by `judge` sets the
-/// scale: from there on errors are relative to its own.
-///
-/// # Errors
-/// [`TrainError::NoStableModel`] if every candidate diverges. If cancelled, the search ends as soon as one does not.
-pub fn select(
+/// scale: from there on errors are relative to its own. If cancelled, the search ends as soon as a candidate is stable.
+pub(super) fn select(
     set: EncodedSet<'_>,
     knowledge: &[Knowledge],
     judge: &Judge<'_>,
     options: &RegressionOptions,
     monitor: &mut Monitor<'_>,
-) -> Result<(Vec<DMatrix<f64>>, Choice, usize), TrainError> {
+) -> Result<(Vec<Xi>, Choice, usize), TrainError> {
     let features = judge.features;
     let regressions = &WINDOWS.map(|window| {
         let of_phase = |(phase, knowledge): (usize, &Knowledge)| {
@@ -83,6 +84,10 @@ pub fn select(
         trial.score_by(relative);
     }
     let limit = (1.0 + options.slack) * best_of(&tried)?.now.score;
+    let search = Search {
+        judge: relative,
+        ..search
+    };
     let refiner = Refiner {
         knowledge,
         growth,
@@ -93,9 +98,31 @@ pub fn select(
     for mut trial in starts(tried, limit) {
         trial.hold(growth);
         trial.score_by(relative);
+        search.sweep(&mut trial, limit, monitor);
         trial.now = refiner.refine(trial.now, options.refinements, monitor);
         refined.push(trial);
     }
+    let mut chosen = sparsest(refined, &refiner, options, monitor)?;
+    chosen.score_by(judge);
+    let choice = Choice {
+        window: chosen.window,
+        ridge: chosen.ridge,
+        pruning: chosen.pruning,
+        score: chosen.now.score,
+        active: chosen.now.active(),
+    };
+    Ok((chosen.now.xi, choice, candidates))
+}
+
+/// Of the best refined candidate without the terms that rollouts do not miss, and of all others within the slack of the
+/// best, the one with fewest terms.
+fn sparsest<'a>(
+    mut refined: Vec<Trial<'a>>,
+    refiner: &Refiner<'_>,
+    options: &RegressionOptions,
+    monitor: &mut Monitor<'_>,
+) -> Result<Trial<'a>, TrainError> {
+    let candidates = refined.len();
     let best = best_of(&refined)?;
     let limit = (1.0 + options.slack) * best.now.score;
     if options.refinements > 0 {
@@ -106,18 +133,7 @@ pub fn select(
     let all = refined.into_iter();
     let within = all.filter(|trial| trial.now.score <= limit);
     let sparsest = within.min_by_key(|trial| trial.now.active());
-    let mut chosen = sparsest.ok_or(TrainError::NoStableModel { candidates })?;
-    chosen.score_by(judge);
-    let choice = Choice {
-        window: chosen.window,
-        ridge: chosen.ridge,
-        pruning: Elimination {
-            elimination: chosen.elimination,
-        },
-        score: chosen.now.score,
-        active: chosen.now.active(),
-    };
-    Ok((chosen.now.xi, choice, candidates))
+    sparsest.ok_or(TrainError::NoStableModel { candidates })
 }
 
 #[derive(Clone)]
@@ -126,7 +142,7 @@ pub(super) struct Trial<'a> {
     pub regressions: &'a [Regression],
     pub ridge: f64,
     window: usize,
-    elimination: f64,
+    pruning: Pruning,
 }
 
 impl Trial<'_> {
@@ -157,7 +173,7 @@ pub(super) struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    /// Every combination of windows, ridges and eliminations; where the library has terms that are not affine, also those
+    /// Every combination of windows, ridges and prunings; where the library has terms that are not affine, also those
     /// without them, and the best of these grown by such terms: rollouts of full libraries diverge more often than not.
     fn all(&self, monitor: &mut Monitor<'_>) -> Vec<Trial<'a>> {
         let affine = self.judge.features.affine_terms();
@@ -178,7 +194,7 @@ impl<'a> Search<'a> {
         tried
     }
 
-    /// Every combination of windows, ridges and eliminations with the terms that are `allowed`; if cancelled, those until
+    /// Every combination of windows, ridges and prunings with the terms that are `allowed`; if cancelled, those until
     /// there are `enough`.
     fn fit_all(
         &self,
@@ -187,7 +203,7 @@ impl<'a> Search<'a> {
         monitor: &mut Monitor<'_>,
     ) -> Vec<Trial<'a>> {
         let mut tried = Vec::new();
-        let steps = WINDOWS.len() * RIDGES.len() * ELIMINATIONS.len();
+        let steps = WINDOWS.len() * RIDGES.len() * PRUNINGS.len();
         monitor.stage("fitting the dynamics", steps);
         for (window, regressions) in WINDOWS.into_iter().zip(self.regressions) {
             for ridge in RIDGES {
@@ -195,10 +211,9 @@ impl<'a> Search<'a> {
                     return tried;
                 }
                 let each = regressions.iter();
-                let fits =
-                    each.map(|regression| regression.fit_each(ridge, &ELIMINATIONS, allowed));
-                let fits: Vec<Vec<DMatrix<f64>>> = fits.collect();
-                for (number, elimination) in ELIMINATIONS.into_iter().enumerate() {
+                let fits = each.map(|regression| regression.fit_each(ridge, &PRUNINGS, allowed));
+                let fits: Vec<Vec<Xi>> = fits.collect();
+                for (number, pruning) in PRUNINGS.into_iter().enumerate() {
                     let xi: Vec<_> = fits.iter().map(|phase| phase[number].clone()).collect();
                     let score = self.judge.score(&xi);
                     let mut trial = Trial {
@@ -206,7 +221,7 @@ impl<'a> Search<'a> {
                         regressions,
                         ridge,
                         window,
-                        elimination,
+                        pruning,
                     };
                     if !trial.is_stable() {
                         trial.hold(self.growth);
@@ -234,7 +249,7 @@ fn best_of<'t, 'a>(tried: &'t [Trial<'a>]) -> Result<&'t Trial<'a>, TrainError> 
     })
 }
 
-/// Candidates to refine, at most [`REFINED`]: of every window the one with the best score, then all others
+/// Candidates to prune and refine, at most [`SWEEPS`]: of every window the one with the best score, then all others
 /// within the limit, best first.
 fn starts<'a>(mut tried: Vec<Trial<'a>>, limit: f64) -> impl Iterator<Item = Trial<'a>> {
     tried.retain(|trial| trial.now.score <= limit);
@@ -242,5 +257,5 @@ fn starts<'a>(mut tried: Vec<Trial<'a>>, limit: f64) -> impl Iterator<Item = Tri
     let mut seen = BTreeSet::new();
     let (first, later): (Vec<_>, Vec<_>) =
         (tried.into_iter()).partition(|trial| seen.insert(trial.window));
-    first.into_iter().chain(later).take(REFINED)
+    first.into_iter().chain(later).take(SWEEPS)
 }

@@ -1,6 +1,7 @@
 //! Sparse regression of the latent accelerations: which terms of the library stay, with which coefficients.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use serde::Serialize;
 
 use super::knowledge::Knowledge;
 
@@ -9,11 +10,14 @@ const LEAST_RIDGE: f64 = 1e-10;
 /// Supports up to this size are solved anew after every elimination, larger ones by an update.
 const RECOMPUTED: usize = 64;
 
+/// Which terms are active, `library_dim x latent_dim`.
+type Support = DMatrix<bool>;
+
 /// Normal equations of `ddz = theta Xi` for one phase, columns normalised to unit root mean square.
 ///
 /// Building it reads the samples once; every solve afterwards works on `library_dim x library_dim` matrices.
 #[derive(Clone, Debug)]
-pub struct Regression {
+pub(super) struct Regression {
     gram: DMatrix<f64>,        // p x p, normalised theta^T theta / n
     correlation: DMatrix<f64>, // p x d, normalised theta^T ddz / n
     theta_rms: DVector<f64>,
@@ -21,10 +25,22 @@ pub struct Regression {
     knowledge: Knowledge,
 }
 
+/// When a term of the library is dropped.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Pruning {
+    /// Sequential thresholding: drop every term whose contribution `|xi| rms(term) / rms(ddz)` is below this, solve
+    /// again, until none is.
+    Threshold(f64),
+    /// Backward elimination: drop the term that explains least, one at a time, while the share of the acceleration's
+    /// energy left unexplained stays within this of the full library's.
+    Elimination(f64),
+}
+
 impl Regression {
     /// Normal equations from samples: `theta` is `n x library_dim`, `target` is `n x latent_dim`; what is known is
     /// taken off the target.
-    pub fn new(theta: &DMatrix<f64>, target: &DMatrix<f64>, knowledge: Knowledge) -> Self {
+    pub(super) fn new(theta: &DMatrix<f64>, target: &DMatrix<f64>, knowledge: Knowledge) -> Self {
         let n = theta.nrows().max(1) as f64;
         let unknown = target - theta * &knowledge.known;
         let theta_rms = column_rms(theta);
@@ -47,24 +63,62 @@ impl Regression {
     }
 
     /// Coefficients `Xi` (`library_dim x latent_dim`) of the terms that are `allowed`, by ridge regression on the
-    /// normalised columns, with backward elimination: the term that explains least is dropped, one at a time, while the
-    /// share of the acceleration's energy left unexplained stays within each of the `losses` of the full library's.
+    /// normalised columns, with each of the `prunings`.
     ///
-    /// What terms explain, not bare coefficients, decides, so that the units of a term do not matter. All eliminations
-    /// drop terms in one and the same order, which is walked once.
-    pub fn fit_each(&self, ridge: f64, losses: &[f64], allowed: &[bool]) -> Vec<DMatrix<f64>> {
-        let mut fits = vec![self.knowledge.known.clone(); losses.len()];
+    /// Contributions, not bare coefficients, decide (STLSQ of Brunton et al. 2016 otherwise), so that the units of a
+    /// term do not matter. Eliminations drop terms in one and the same order, which is walked once for all of them.
+    pub(super) fn fit_each(
+        &self,
+        ridge: f64,
+        prunings: &[Pruning],
+        allowed: &[bool],
+    ) -> Vec<DMatrix<f64>> {
+        let mut fits = vec![self.knowledge.known.clone(); prunings.len()];
         for column in (0..self.target_rms.len()).filter(|&column| self.target_rms[column] > 0.0) {
             let informative: Vec<usize> = (self.free_terms(column))
                 .filter(|&i| self.theta_rms[i] > 0.0 && allowed[i])
                 .collect();
-            let supports = self.eliminate(column, informative, ridge, losses);
-            for (support, xi) in supports.iter().zip(&mut fits) {
-                let solution = self.solve(column, support, ridge);
-                self.store(xi, column, support, &solution);
+            let losses: Vec<f64> = (prunings.iter())
+                .filter_map(|pruning| match pruning {
+                    Pruning::Elimination(loss) => Some(*loss),
+                    Pruning::Threshold(_) => None,
+                })
+                .collect();
+            let eliminated = self.eliminate(column, informative.clone(), ridge, &losses);
+            let mut eliminated = eliminated.into_iter();
+            let mut next = || eliminated.next().expect("invariant: one for every loss");
+            for (pruning, xi) in prunings.iter().zip(&mut fits) {
+                let support = match pruning {
+                    Pruning::Threshold(least) => {
+                        self.threshold(column, informative.clone(), ridge, *least)
+                    }
+                    Pruning::Elimination(_) => next(),
+                };
+                let solution = self.solve(column, &support, ridge);
+                self.store(xi, column, &support, &solution);
             }
         }
         fits
+    }
+
+    fn threshold(
+        &self,
+        column: usize,
+        mut support: Vec<usize>,
+        ridge: f64,
+        least: f64,
+    ) -> Vec<usize> {
+        loop {
+            let (solution, before) = (self.solve(column, &support, ridge), support.len());
+            let mut values = solution.iter();
+            support.retain(|&i| {
+                let weighs = |value: &f64| value.abs() >= least * self.target_rms[column];
+                values.next().is_some_and(weighs) || self.knowledge.kept[(i, column)]
+            });
+            if support.len() == before {
+                return support;
+            }
+        }
     }
 
     fn eliminate(
@@ -112,7 +166,7 @@ impl Regression {
 
     /// For every term that is not active in a column: its row, and the share of the acceleration's energy that is
     /// explained with it and not without.
-    pub fn gains(&self, column: usize, support: &DMatrix<bool>, ridge: f64) -> Vec<(usize, f64)> {
+    pub(super) fn gains(&self, column: usize, support: &Support, ridge: f64) -> Vec<(usize, f64)> {
         let energy = self.energy(column);
         let (inside, outside): (Vec<usize>, Vec<usize>) =
             (self.free_terms(column)).partition(|&i| support[(i, column)]);
@@ -131,11 +185,8 @@ impl Regression {
     }
 
     /// One column of Xi on a given support (`library_dim x latent_dim`, true where a term is active).
-    pub fn fit_column(&self, column: usize, support: &DMatrix<bool>, ridge: f64) -> DVector<f64> {
-        let rows = self
-            .free_terms(column)
-            .filter(|&i| support[(i, column)])
-            .collect::<Vec<_>>();
+    pub(super) fn fit_column(&self, column: usize, support: &Support, ridge: f64) -> DVector<f64> {
+        let rows = self.active_terms(column, support);
         let solution = self.solve(column, &rows, ridge);
         let mut xi = self.knowledge.known.clone();
         self.store(&mut xi, column, &rows, &solution);
@@ -144,7 +195,12 @@ impl Regression {
 
     /// What the active terms of `xi` would change by for this gradient: the inverse of the normal equations applied to
     /// it, column by column, each relative to the energy of its accelerations.
-    pub fn change(&self, xi: &DMatrix<f64>, gradient: &DMatrix<f64>, ridge: f64) -> DMatrix<f64> {
+    pub(super) fn change(
+        &self,
+        xi: &DMatrix<f64>,
+        gradient: &DMatrix<f64>,
+        ridge: f64,
+    ) -> DMatrix<f64> {
         let mut change = DMatrix::zeros(xi.nrows(), xi.ncols());
         for column in 0..xi.ncols() {
             let active = (self.free_terms(column))
@@ -163,9 +219,26 @@ impl Regression {
         change
     }
 
+    /// For every active term of a column that may go: its row, and the share of the acceleration's energy lost
+    /// without it.
+    pub(super) fn losses(&self, column: usize, support: &Support, ridge: f64) -> Vec<(usize, f64)> {
+        let energy = self.energy(column);
+        let fit = self.support_fit(column, self.active_terms(column, support), ridge);
+        let losses = (0..fit.support.len()).map(|j| fit.rise(j) / energy);
+        (fit.support.iter().copied().zip(losses))
+            .filter(|&(term, _)| !self.knowledge.kept[(term, column)])
+            .collect()
+    }
+
     /// Terms whose coefficient in a column is not known.
     fn free_terms(&self, column: usize) -> impl Iterator<Item = usize> {
         (0..self.theta_rms.len()).filter(move |&i| self.knowledge.free[(i, column)])
+    }
+
+    /// Those of them that are active in a support.
+    fn active_terms(&self, column: usize, support: &Support) -> Vec<usize> {
+        let free = self.free_terms(column);
+        free.filter(|&i| support[(i, column)]).collect()
     }
 
     fn energy(&self, column: usize) -> f64 {
@@ -230,7 +303,7 @@ impl SupportFit {
     }
 }
 
-pub fn active_terms(xi: &DMatrix<f64>) -> usize {
+pub(super) fn active_terms(xi: &DMatrix<f64>) -> usize {
     xi.iter().filter(|value| **value != 0.0).count()
 }
 
@@ -247,9 +320,9 @@ mod tests {
     use crate::train::random::Random;
 
     impl Regression {
-        pub fn fit(&self, ridge: f64, loss: f64) -> DMatrix<f64> {
+        pub(in crate::train) fn fit(&self, ridge: f64, pruning: Pruning) -> DMatrix<f64> {
             let all = vec![true; self.theta_rms.len()];
-            self.fit_each(ridge, &[loss], &all).remove(0)
+            self.fit_each(ridge, &[pruning], &all).remove(0)
         }
     }
 
@@ -277,10 +350,12 @@ mod tests {
     #[test]
     fn fit_finds_the_terms_that_made_the_data_whatever_their_size() {
         let (theta, target) = samples();
-        let xi = unconstrained(&theta, &target).fit(0.0, 1e-6);
-        assert_eq!(active_terms(&xi), 2);
-        let close = (xi[(0, 0)] - 2.0).abs() < 1e-3 && (xi[(1, 0)] - 30.0).abs() < 0.05;
-        assert!(close, "{xi}");
+        for pruning in [Pruning::Threshold(0.03), Pruning::Elimination(1e-6)] {
+            let xi = unconstrained(&theta, &target).fit(0.0, pruning);
+            assert_eq!(active_terms(&xi), 2, "{pruning:?}");
+            let close = (xi[(0, 0)] - 2.0).abs() < 1e-3 && (xi[(1, 0)] - 30.0).abs() < 0.05;
+            assert!(close, "{pruning:?} {xi}");
+        }
     }
 
     #[test]
@@ -315,22 +390,25 @@ mod tests {
     }
 
     #[test]
-    fn gains_of_terms_are_what_a_fit_with_them_loses_without() {
+    fn gains_of_terms_are_what_a_fit_with_them_explains_more() {
         let mut random = Random::new(6);
         let (theta, target) = (random.matrix(100, 5, 1.0), random.matrix(100, 1, 1.0));
         let regression = unconstrained(&theta, &target);
-        let support = DMatrix::from_column_slice(5, 1, &[true, false, true, false, false]);
+        let mut support = DMatrix::from_column_slice(5, 1, &[true, false, true, false, false]);
         let gains = regression.gains(0, &support, 1e-2);
         assert!(gains.iter().map(|(row, _)| *row).eq([1, 3, 4]));
-        let with = regression.support_fit(0, vec![0, 2, 3], 1e-2);
-        assert!((gains[1].1 - with.rise(2) / regression.energy(0)).abs() < 1e-12);
+        // Taking a term out again loses what it gave.
+        support[(3, 0)] = true;
+        let losses = regression.losses(0, &support, 1e-2);
+        let (_, loss) = losses[2]; // of rows 0, 2 and 3
+        assert!((gains[1].1 - loss).abs() < 1e-12);
     }
 
     #[test]
     fn no_term_is_left_of_an_elimination_of_everything_or_without_accelerations() {
         let (theta, target) = samples();
-        let all = unconstrained(&theta, &target).fit(1e-3, 2.0);
-        let still = unconstrained(&theta, &(target * 0.0)).fit(1e-3, 0.0);
+        let all = unconstrained(&theta, &target).fit(1e-3, Pruning::Elimination(2.0));
+        let still = unconstrained(&theta, &(target * 0.0)).fit(1e-3, Pruning::Threshold(0.03));
         assert_eq!((active_terms(&all), active_terms(&still)), (0, 0));
     }
 }

@@ -12,7 +12,7 @@ use super::options::EncoderOptions;
 use super::random::Random;
 
 #[derive(Clone, Debug)]
-pub struct Moments {
+pub(super) struct Moments {
     /// Covariance of the state, `state_dim x state_dim`.
     pub state: DMatrix<f64>,
     /// Second moment of the input about zero, `state_dim x state_dim`.
@@ -25,7 +25,7 @@ impl Moments {
     ///
     /// A coordinate that neither moves nor is actuated would only bring noise into the latent space. One that rests
     /// because a torque holds it (hip abduction) must stay, else the lift cannot return that torque.
-    pub fn active_coordinates(&self, least_std: f64, least_share: f64) -> Vec<usize> {
+    pub(super) fn active_coordinates(&self, least_std: f64, least_share: f64) -> Vec<usize> {
         let energy = self.input.trace();
         (0..self.state.nrows())
             .filter(|&i| {

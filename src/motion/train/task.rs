@@ -46,10 +46,7 @@ pub(super) struct Task<'a> {
 
 impl<'a> Task<'a> {
     /// Checks the options, reads the data sets and cuts them into phases, and checks them against the options.
-    ///
-    /// # Errors
-    /// [`TrainError`]: options out of range, too few samples, too many latent coordinates.
-    pub fn new(
+    pub(super) fn new(
         recordings: Recordings<'_>,
         robot: &'static Robot,
         options: &'a TrainOptions,

@@ -7,7 +7,8 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::progress::Monitor;
-use super::refine::{CoefficientIndex, Coefficients, ErrorModel, FreeCoefficients, PRIOR, Refiner};
+use super::refine::{CoefficientIndex, Coefficients, ErrorModel, FreeCoefficients, Refiner};
+use super::rollout::Xi;
 
 /// Damping of the changes, relative to each coefficient's own weight.
 const DAMPING: f64 = 1e-3;
@@ -20,7 +21,7 @@ impl Refiner<'_> {
     /// Drops terms one at a time, those first that training misses least, while `judge` scores at most `limit`. What is
     /// known and what must be kept stay, and so do inputs: a controller needs what they do, whether or not the recorded
     /// ones differ enough for a prediction to miss them.
-    pub fn thin(
+    pub(super) fn thin(
         &self,
         refined: Coefficients,
         limit: f64,
@@ -30,11 +31,11 @@ impl Refiner<'_> {
             return refined;
         };
         let mut thinned = refined;
-        let total = self.free(&thinned.xi).places.len();
+        let total = self.free(&thinned.xi).len();
         monitor.stage("dropping terms that rollouts do not miss", total);
         while !monitor.cancelled() {
             let free = self.free(&thinned.xi);
-            let before = free.places.len();
+            let before = free.len();
             let model = self.model(&thinned.xi, &free, weights);
             let form = model.and_then(|model| QuadraticForm::new(&thinned, free, &model));
             let Some(mut form) = form else { break };
@@ -82,7 +83,7 @@ impl Refiner<'_> {
             !inputs.contains(&term) && !self.knowledge[phase].kept[(term, column)]
         };
         let mut order: Vec<usize> = (0..form.gone.len())
-            .filter(|&i| !form.gone[i] && may_go(form.free.places[i]))
+            .filter(|&i| !form.gone[i] && may_go(form.free[i].0))
             .collect();
         order.sort_by(|&a, &b| form.loss(a).total_cmp(&form.loss(b)));
         order
@@ -104,18 +105,14 @@ struct QuadraticForm {
 
 impl QuadraticForm {
     fn new(from: &Coefficients, free: FreeCoefficients, model: &ErrorModel) -> Option<Self> {
-        let (mut system, n) = (model.gram.clone(), free.places.len());
-        for i in 0..n {
-            system[(i, i)] += PRIOR + DAMPING * model.gram[(i, i)];
-        }
-        let factor = system.cholesky()?;
+        let factor = model.damped(DAMPING)?;
         let to_zero =
             |((phase, term, k), scale): (CoefficientIndex, f64)| -from.xi[phase][(term, k)] / scale;
         Some(Self {
-            to_zero: free.each().map(to_zero).collect(),
+            to_zero: free.iter().copied().map(to_zero).collect(),
             lowest: -factor.solve(&model.gradient),
             inverse: factor.inverse(),
-            gone: vec![false; n],
+            gone: vec![false; free.len()],
             free,
         })
     }
@@ -134,9 +131,9 @@ impl QuadraticForm {
         next
     }
 
-    fn xi(&self, from: &Coefficients) -> Vec<DMatrix<f64>> {
+    fn xi(&self, from: &Coefficients) -> Vec<Xi> {
         let mut xi = from.xi.clone();
-        for (i, ((phase, term, column), scale)) in self.free.each().enumerate() {
+        for (i, ((phase, term, column), scale)) in self.free.iter().copied().enumerate() {
             let change = self.lowest[i] * scale;
             let coefficient = &mut xi[phase][(term, column)];
             *coefficient = match self.gone[i] {

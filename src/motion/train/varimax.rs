@@ -7,7 +7,7 @@ use nalgebra::DMatrix;
 /// `loadings` is `state_dim x latent_dim` (here `diag(std) Q`); the sum over columns of the variance of the squared
 /// entries is increased by planar rotations until none moves a pair by more than `1e-12` rad
 /// (Kaiser 1958, The varimax criterion for analytic rotation in factor analysis, without row normalisation).
-pub fn varimax(loadings: &DMatrix<f64>) -> DMatrix<f64> {
+pub(super) fn varimax(loadings: &DMatrix<f64>) -> DMatrix<f64> {
     let n_columns = loadings.ncols();
     let n_rows = loadings.nrows() as f64;
     let mut rotated = loadings.clone();
@@ -35,7 +35,10 @@ pub fn varimax(loadings: &DMatrix<f64>) -> DMatrix<f64> {
 ///
 /// The first coordinate of `order_by` takes the column that weighs it most, then the next one, so that a reader
 /// meets body x as z1 and body z as z2 whenever the space holds them.
-pub fn order_and_sign(loadings: &DMatrix<f64>, order_by: &[usize]) -> (Vec<usize>, Vec<f64>) {
+pub(super) fn order_and_sign(
+    loadings: &DMatrix<f64>,
+    order_by: &[usize],
+) -> (Vec<usize>, Vec<f64>) {
     let weight = |column: usize| loadings.column(column).norm_squared();
     let mut left: Vec<usize> = (0..loadings.ncols()).collect();
     let mut order = Vec::with_capacity(left.len());

@@ -14,10 +14,7 @@ const STRIDE: usize = 5;
 const LARGEST: f64 = 1e150;
 
 /// Complains about the first term of `library` without a finite value at a sample, or with one whose square overflows.
-///
-/// # Errors
-/// [`TrainError::TermValue`].
-pub fn check_terms(
+pub(super) fn check_terms(
     set: EncodedSet<'_>,
     features: &Features,
     library: &Library,
@@ -59,7 +56,7 @@ pub fn check_terms(
 /// `(dz(T) - dz(0)) / T = mean of theta Xi` and `2 (z(T) - z(0) - T dz(0)) / T^2 = weighted mean of theta Xi`
 /// (the integral form of Schaeffer and McCalla 2017, here of second order). They need no accelerations and weigh
 /// coefficients by what they do to a prediction. A `window` of 0 gives the smoothed accelerations themselves.
-pub fn windowed_samples(
+pub(super) fn windowed_samples(
     set: EncodedSet<'_>,
     features: &Features,
     phase: usize,
@@ -151,7 +148,7 @@ mod tests {
     use super::*;
     use crate::train::knowledge::Knowledge;
     use crate::train::oscillator;
-    use crate::train::sparse::Regression;
+    use crate::train::sparse::{Pruning, Regression};
 
     #[test]
     fn windows_and_accelerations_recover_the_same_known_coefficients() {
@@ -160,7 +157,8 @@ mod tests {
         for window in [0, 20, 60] {
             let set = EncodedSet::new(&dataset, &latent);
             let (theta, target) = windowed_samples(set, &features, 0, window);
-            let xi = Regression::new(&theta, &target, Knowledge::nothing(7, 2)).fit(1e-9, 1e-6);
+            let xi = Regression::new(&theta, &target, Knowledge::nothing(7, 2))
+                .fit(1e-9, Pruning::Threshold(1e-3));
             let active = xi
                 .iter()
                 .zip(truth[0].iter())

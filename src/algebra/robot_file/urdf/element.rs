@@ -18,7 +18,6 @@ const UNREAD: [&str; 5] = [
 /// Elements of xacro without its prefix, none of which a URDF has.
 const UNPREFIXED: [&str; 4] = ["macro", "include", "property", "insert_block"];
 
-/// An element of a file.
 #[derive(Clone, Copy)]
 pub(super) struct Element<'x> {
     pub file: &'x str,
@@ -26,9 +25,6 @@ pub(super) struct Element<'x> {
 }
 
 /// The document of a text.
-///
-/// # Errors
-/// [`RobotFileError`] with the character that breaks XML, or the first sign of a xacro, which is no URDF yet.
 pub(super) fn document<'x>(file: &str, text: &'x str) -> Result<Document<'x>, RobotFileError> {
     let document = Document::parse(text).map_err(|error| {
         // A prefix that nothing declares; macros of included files have none.
@@ -74,7 +70,6 @@ pub(super) fn document<'x>(file: &str, text: &'x str) -> Result<Document<'x>, Ro
     Ok(document)
 }
 
-/// The refusal of a xacro, with the line that makes a URDF of it.
 fn unexpanded(file: &str, row: u32, found: &str) -> RobotFileError {
     let stem = file.strip_suffix(".xacro");
     let urdf = match (stem, file.strip_suffix(".urdf")) {

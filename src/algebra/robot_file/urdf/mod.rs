@@ -11,8 +11,9 @@ mod tree;
 use nalgebra::{Rotation3, Vector3};
 
 use super::entry::{Axis, JointEntry, LegEntry, RobotEntry};
+use super::identity::{RobotReading, identified};
 use super::legs::{LegPlaces, Places};
-use super::read::RobotFileError;
+use super::read::{RobotFileError, RobotOptions};
 use element::{Element, document};
 use limbs::{Legs, Limb};
 use tree::{Joint, Tree};
@@ -23,24 +24,12 @@ const ROUNDING: f64 = 1e-12;
 const ENDLESS_RAD: f64 = 2.0 * std::f64::consts::PI;
 const AXIS: std::ops::Range<f64> = 1e-6..1e6;
 
-/// The entry of a URDF, the places of its parts in the file, and what a user should know of it.
-pub(super) struct Reading {
-    pub entry: RobotEntry,
-    pub places: Places,
-    pub notes: Vec<String>,
-}
-
-/// Reads a URDF; `name` is the robot's, if not the file's, `feet` are links, empty to find them.
-///
-/// # Errors
-/// [`RobotFileError`] with the element that is wrong or missing.
 pub(super) fn read(
     file: &str,
     text: &str,
-    feet: &[String],
-    name: Option<&str>,
-) -> Result<Reading, RobotFileError> {
-    let feet = limbs::feet(feet)?;
+    options: &RobotOptions<'_>,
+) -> Result<RobotReading, RobotFileError> {
+    let feet = limbs::feet(options.feet)?;
     let document = document(file, text)?;
     let robot = Element::root(file, &document);
     if robot.tag() != "robot" {
@@ -51,26 +40,21 @@ pub(super) fn read(
     let legs = Legs::find(&tree, &feet)?;
     let leg = legs.legs.iter().map(|leg| entry(&tree, legs.trunk, leg));
     let leg = leg.collect::<Result<_, _>>()?;
-    let name = match name.or_else(|| robot.attribute("name")) {
+    let name = match options.name.or_else(|| robot.attribute("name")) {
         Some(name) => name.to_owned(),
         None => return Err(robot.fault("", "no name", "name=\"...\", or --name (romc robot)")),
     };
     let notes = notes(&tree, &legs)?;
-    Ok(Reading {
-        entry: RobotEntry {
-            name,
-            mass_kg: tree.mass_below(legs.top),
-            leg,
-        },
-        places: places(robot, &tree, &legs),
-        notes,
-    })
+    let entry = RobotEntry {
+        name,
+        mass_kg: tree.mass_below(legs.top),
+        leg,
+    };
+    let places = places(robot, &tree, &legs);
+    identified(file, entry, &places, options.name, notes)
 }
 
 /// Where the body's frame is if not at the root, and which parts have no mass.
-///
-/// # Errors
-/// [`RobotFileError`] if the trunk has none.
 fn notes(tree: &Tree<'_>, legs: &Legs) -> Result<Vec<String>, RobotFileError> {
     let (trunk, body) = (&tree.links[legs.trunk], tree.body(legs.top));
     if tree.mass(&body.links) == 0.0 {
@@ -135,7 +119,6 @@ fn places(robot: Element<'_>, tree: &Tree<'_>, legs: &Legs) -> Places {
     }
 }
 
-/// A leg along the axes of the trunk.
 fn entry(tree: &Tree<'_>, trunk: usize, leg: &Limb) -> Result<LegEntry, RobotFileError> {
     let (origin, frame) = tree.frame(trunk);
     let seen = |link: usize| {
@@ -159,7 +142,6 @@ fn entry(tree: &Tree<'_>, trunk: usize, leg: &Limb) -> Result<LegEntry, RobotFil
     })
 }
 
-/// The axis of a joint whose frame is turned so.
 fn axis(joint: &Joint<'_>, turn: Rotation3<f64>) -> Result<[f64; 3], RobotFileError> {
     let Some(element) = joint.element.child("axis")? else {
         return Ok(rounded(turn * Vector3::x()));

@@ -77,7 +77,7 @@ impl Coefficient {
         Rational::from(BigInt::from(value)).into()
     }
 
-    pub(super) fn complex(re: Rational, im: Rational) -> Self {
+    fn complex(re: Rational, im: Rational) -> Self {
         Self { re, im, radius: 0 }
     }
 
@@ -113,10 +113,7 @@ impl Coefficient {
     }
 
     pub(super) fn exact(&self) -> Self {
-        Self {
-            radius: 0,
-            ..self.clone()
-        }
+        Self::complex(self.re.clone(), self.im.clone())
     }
 
     pub(super) fn as_real(&self) -> Option<&Rational> {

@@ -34,7 +34,6 @@ pub struct CanonicalForms<'p> {
     pub(super) positive_sums: Vec<CanonicalForm>,
     pub(super) negative: HashSet<u32>,
     rounding: f64,
-    /// Whether any argument has radii.
     is_rounded: bool,
     is_contradictory: bool,
     n_fraction_tries: usize,
@@ -278,7 +277,6 @@ impl<'p> CanonicalForms<'p> {
         }
     }
 
-    /// An odd function of an argument whose leading coefficient is positive.
     pub(super) fn odd(
         &mut self,
         argument: &CanonicalForm,

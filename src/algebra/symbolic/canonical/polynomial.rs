@@ -161,7 +161,6 @@ impl CanonicalForm {
         Some((self.scaled(&factor), size, sign))
     }
 
-    /// The coefficient of the last monomial.
     pub(super) fn leading(&self) -> Option<&Coefficient> {
         self.terms.values().next_back()
     }
@@ -203,7 +202,6 @@ impl CanonicalForm {
         self.plus(&other.scaled(&Coefficient::integer(-1)))
     }
 
-    /// Pairs of terms of a product, if they are not too many.
     pub(super) fn products(&self, other: &Self) -> Option<Vec<(Coefficient, Monomial)>> {
         let count = self.terms.len().checked_mul(other.terms.len())?;
         if count > MAX_PRODUCTS {

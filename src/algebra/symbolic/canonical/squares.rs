@@ -89,7 +89,6 @@ impl CanonicalForms<'_> {
     }
 }
 
-/// The monomial whose square this is, if powers are even.
 fn halved(monomial: &Monomial) -> Option<Monomial> {
     let powers = monomial.powers.iter();
     let powers: Option<Vec<_>> = powers

@@ -299,11 +299,13 @@ fn by_code(
             power_by(value, exponent, |a, b| round(a * b))
         })
     };
+    let product = |a: Column, b: Column| both(a, b, |a, b| a * b);
+    // A base and its exponent without the minus.
     let divisor = |expr: ExprId| match *pool.node(expr) {
-        Node::Power(base, exponent) => {
-            let exponent = pool.as_integer(exponent).filter(|exponent| *exponent < 0)?;
-            Some(chain(child(base), exponent.unsigned_abs()))
-        }
+        Node::Power(base, exponent) => match pool.as_integer(exponent)? {
+            exponent @ ..0 => Some((base, exponent.unsigned_abs())),
+            _ => None,
+        },
         _ => None,
     };
     match *pool.node(expr) {
@@ -315,24 +317,21 @@ fn by_code(
             sum.unwrap_or_else(|| constant(0.0))
         }
         Node::Product(ref factors) => {
-            let (mut over, mut under) = (constant(1.0), None);
-            for &factor in factors {
-                match (divisor(factor), under.take()) {
-                    (Some(column), None) => under = Some(column),
-                    (Some(column), Some(known)) => under = Some(both(known, column, |a, b| a * b)),
-                    (None, known) => {
-                        over = both(over, child(factor), |a, b| a * b);
-                        under = known;
-                    }
-                }
-            }
+            let above = factors.iter().filter(|factor| divisor(**factor).is_none());
+            let over = above
+                .map(|factor| child(*factor))
+                .fold(constant(1.0), product);
+            let below = factors.iter().filter_map(|factor| divisor(*factor));
+            let under = below
+                .map(|(base, exponent)| chain(child(base), exponent))
+                .reduce(product);
             match under {
                 Some(under) => both(over, under, |a, b| a / b),
                 None => over,
             }
         }
         Node::Power(base, exponent) => match (divisor(expr), pool.as_integer(exponent)) {
-            (Some(under), _) => map(under, &|value| 1.0 / value),
+            (Some((base, exponent)), _) => map(chain(child(base), exponent), &|value| 1.0 / value),
             (None, Some(integer)) => chain(child(base), integer.unsigned_abs()),
             (None, None) => {
                 let logarithm = map(child(base), &f64::ln);

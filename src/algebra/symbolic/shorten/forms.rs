@@ -103,7 +103,6 @@ impl Shortener<'_> {
         count
     }
 
-    /// Coefficients that are written, with those of sums that are terms.
     fn n_numbers(&self, unit: Number, summands: &Scaled) -> usize {
         let is_written =
             |(number, rest): &(Number, ExprId)| *rest == ExprId::ONE || !number.abs().is_one();
@@ -118,7 +117,6 @@ impl Shortener<'_> {
         summands.iter().map(of_term).sum()
     }
 
-    /// Functions that are written, each as often as it is.
     fn calls(&self, summands: &Scaled) -> usize {
         let roots: Vec<ExprId> = summands.iter().map(|&(_, expr)| expr).collect();
         let calls = self.pool.fold_up(&roots, |pool, expr, calls_of| {

@@ -206,7 +206,6 @@ impl Shortener<'_> {
         links
     }
 
-    /// The sums in the denominator of a term.
     pub(super) fn denominators(&self, expr: ExprId) -> Vec<ExprId> {
         let base = |factor: &ExprId| match *self.pool.node(*factor) {
             Node::Power(base, exponent) if matches!(self.pool.node(base), Node::Sum(_)) => {

@@ -134,7 +134,6 @@ impl<'a> Shortener<'a> {
         found
     }
 
-    /// Shortens all blocks in one view; whether anything changed.
     fn pass(&mut self, blocks: &mut Vec<Block>, view: View<'a>) -> bool {
         let flat: Vec<(usize, (f64, ExprId))> = (blocks.iter().enumerate())
             .flat_map(|(place, block)| block.summands.iter().map(move |&summand| (place, summand)))
@@ -285,16 +284,12 @@ impl<'a> Shortener<'a> {
                     _ if n_terms[factor] < 2 => continue,
                     _ => (*factor, Number::ONE),
                 };
-                let known = parts.iter().find(|(_, known)| *known == part);
-                let variable = match known {
-                    Some(&(variable, _)) => variable,
-                    None => {
-                        let variable = self.pool.placeholder("factor", parts.len());
-                        parts.push((variable, part));
-                        variable
-                    }
-                };
-                let symbol = self.pool.symbol_expr(variable);
+                let known = parts.iter().position(|(_, known)| *known == part);
+                let place = known.unwrap_or_else(|| {
+                    parts.push((self.pool.placeholder("factor", parts.len()), part));
+                    parts.len() - 1
+                });
+                let symbol = self.pool.symbol_expr(parts[place].0);
                 *factor = self.pool.pow_number(symbol, exponent);
             }
             whole.push((coefficient, self.pool.product(&factors)));
@@ -306,7 +301,6 @@ impl<'a> Shortener<'a> {
         Some((summands.to_vec(), Vec::new()))
     }
 
-    /// Whether the terms are distinct monomials that cannot interact.
     fn is_plain_sum(&mut self, summands: &[(f64, ExprId)]) -> bool {
         let mut seen = IdSet::default();
         (summands.iter()).all(|&(_, expr)| seen.insert(expr) && self.is_plain(expr))
@@ -339,7 +333,6 @@ impl<'a> Shortener<'a> {
         })
     }
 
-    /// The term alone in its shortest form.
     pub(super) fn single(&mut self, expr: ExprId) -> ExprId {
         if self.is_plain(expr) {
             return expr;
@@ -361,7 +354,6 @@ impl<'a> Shortener<'a> {
         single
     }
 
-    /// Replaces the blocks of a group by one, if that is shorter.
     fn shorten_group(
         &mut self,
         blocks: &mut [Block],

@@ -262,7 +262,7 @@ impl ControlModel {
     }
 
     /// The joint positions within the robot's limits that are nearest to these; the lower limit for NaN.
-    pub fn clamp_joints(&self, joints_rad: [f64; JOINT_DIM]) -> [f64; JOINT_DIM] {
+    pub(super) fn clamp_joints(&self, joints_rad: [f64; JOINT_DIM]) -> [f64; JOINT_DIM] {
         std::array::from_fn(|joint| {
             let (lower, upper) = self.robot().joint_limit_rad()[joint];
             joints_rad[joint].max(lower).min(upper)

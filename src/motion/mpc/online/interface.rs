@@ -96,23 +96,17 @@ pub fn status_text(code: i32) -> &'static CStr {
     found.map_or(c"unknown status", |(_, text)| text)
 }
 
-/// What a robot's low-level interface takes, as C has it; `D` latent coordinates.
+/// The [`Command`] as C has it; `D` latent coordinates.
 #[repr(C)]
+#[allow(missing_docs, reason = "as in `Command`")]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RawCommand<const D: usize> {
-    /// Feed-forward torques, N m.
     pub torque: [f64; JOINT_DIM],
-    /// Desired joint positions, rad.
     pub joint_position: [f64; JOINT_DIM],
-    /// Desired joint velocities, rad/s.
     pub joint_velocity: [f64; JOINT_DIM],
-    /// Latent input behind the torques.
     pub u_lat: [f64; D],
-    /// How the step ended.
     pub status: i32,
-    /// Interior-point iterations.
     pub iterations: i32,
-    /// Wall time of the step, µs.
     pub solve_us: f64,
 }
 
@@ -133,31 +127,25 @@ impl<const D: usize> RawCommand<D> {
     }
 }
 
-/// A trajectory as it comes through the interface; see [`ReferenceSamples`].
+/// [`ReferenceSamples`] as they come through the interface. Feet are four values per sample, zero in the air; of `u` the
+/// inner `None` is a bad pointer.
 #[derive(Debug, Clone, Copy)]
+#[allow(missing_docs, reason = "as in `ReferenceSamples`")]
 pub struct RawReference<'a> {
-    /// Time of each sample, s.
     pub time_s: Option<&'a [f64]>,
-    /// States, 18 values per sample.
     pub x: Option<&'a [f64]>,
-    /// Velocities, 18 values per sample.
     pub dx: Option<&'a [f64]>,
-    /// Inputs, 18 values per sample, unless there are none; the inner `None` is a bad pointer.
     pub u: Option<Option<&'a [f64]>>,
-    /// Feet in contact, 4 values per sample, zero in the air.
     pub feet: Option<&'a [u8]>,
 }
 
-/// A measurement as it comes through the interface.
+/// A [`Measurement`] as it comes through the interface; feet are four values, zero in the air.
+#[allow(missing_docs, reason = "as in `Measurement`")]
 #[derive(Debug, Clone, Copy)]
 pub struct RawMeasurement<'a> {
-    /// Time, s.
     pub time_s: f64,
-    /// State, 18 values.
     pub x: Option<&'a [f64]>,
-    /// Velocity, 18 values.
     pub dx: Option<&'a [f64]>,
-    /// Feet in contact, 4 values, zero in the air.
     pub feet: Option<&'a [u8]>,
 }
 

@@ -155,7 +155,7 @@ impl ConsistentLift {
     }
 
     /// Takes the projection of another plant: that at the measured state, where it depends on it.
-    pub fn take_projection(&mut self, plant: &ControlModel) {
+    pub(super) fn take_projection(&mut self, plant: &ControlModel) {
         for (latent, row) in plant.parts().projection.row_iter().enumerate() {
             self.by_torque[latent] = std::array::from_fn(|joint| row[joint]);
             self.by_wrench[latent] = std::array::from_fn(|axis| row[JOINT_DIM + axis]);

@@ -90,7 +90,7 @@ impl Plan {
 
     /// Largest deviation of a state from the one that the plan predicts for a time, in multiples
     /// of `deviation`; none if the plan does not reach that far.
-    pub fn normalised_innovation(
+    pub(super) fn normalised_innovation(
         &self,
         time_s: f64,
         state: &[f64],

@@ -223,7 +223,11 @@ pub(super) fn row_selection(plant: &ControlModel, settings: &MpcSettings) -> Row
 impl StageRows {
     /// The same rows with the maps of `plant`, those at a stage's reference; none if a row vanishes
     /// there, so that the rows are not the same.
-    pub fn with_maps_of(&self, plant: &ControlModel, settings: &MpcSettings) -> Option<Self> {
+    pub(super) fn with_maps_of(
+        &self,
+        plant: &ControlModel,
+        settings: &MpcSettings,
+    ) -> Option<Self> {
         let rows = Self::selected(plant, settings, RowSelection::All);
         let shape = |rows: &Self| (rows.torque.len(), rows.rate.len(), rows.joint.len());
         (shape(&rows) == shape(self)).then_some(rows)

@@ -99,7 +99,7 @@ impl Reference {
     }
 
     /// First and last time, s.
-    pub fn time_range_s(&self) -> (f64, f64) {
+    pub(super) fn time_range_s(&self) -> (f64, f64) {
         (self.time_s[0], self.time_s[self.time_s.len() - 1])
     }
 
@@ -137,7 +137,7 @@ impl Reference {
     }
 
     /// The robot's state at a time, between samples on the line from one to the next.
-    pub fn robot_state_at(&self, time_s: f64) -> [f64; STATE_DIM] {
+    pub(super) fn robot_state_at(&self, time_s: f64) -> [f64; STATE_DIM] {
         let (before, share) = self.locate(time_s);
         let earlier = row(&self.x, before);
         let later = row(&self.x, (before + 1).min(self.time_s.len() - 1));
@@ -180,12 +180,12 @@ impl Reference {
     }
 
     /// Feet in contact: those of the last sample at or before the time.
-    pub fn feet_at(&self, time_s: f64) -> ContactFlags {
+    pub(super) fn feet_at(&self, time_s: f64) -> ContactFlags {
         self.feet[self.locate(time_s).0]
     }
 
     /// Roll and pitch, rad, of the last sample at or before the time.
-    pub fn attitude_at(&self, time_s: f64) -> [f64; 2] {
+    pub(super) fn attitude_at(&self, time_s: f64) -> [f64; 2] {
         let x = row(&self.x, self.locate(time_s).0);
         [x[15], x[16]]
     }

@@ -19,7 +19,11 @@ pub const MOST_TURN_RAD: f64 = 0.3;
 impl ControlModel {
     /// Joint angles, rad, with every foot turned about the body's origin by `-turn_rad` of pitch. A leg whose foot
     /// cannot be moved stays as it is.
-    pub fn turned_legs(&self, joints_rad: &[f64; JOINT_DIM], turn_rad: f64) -> [f64; JOINT_DIM] {
+    pub(super) fn turned_legs(
+        &self,
+        joints_rad: &[f64; JOINT_DIM],
+        turn_rad: f64,
+    ) -> [f64; JOINT_DIM] {
         let mut turned = *joints_rad;
         let (sine, cosine) = turn_rad.clamp(-MOST_TURN_RAD, MOST_TURN_RAD).sin_cos();
         let robot = self.robot();

@@ -10,7 +10,7 @@ use crate::train::error::TrainError;
 
 /// Consecutive samples of one phase, rows are samples, scaled units.
 #[derive(Clone, Debug)]
-pub struct Batch {
+pub(super) struct Batch {
     pub phase: usize,
     /// States, `n x 18`.
     pub x: DMatrix<f64>,
@@ -30,7 +30,7 @@ pub struct Batch {
 }
 
 impl Batch {
-    pub fn new(phase: usize, [x, dx, ddx, u]: [DMatrix<f64>; 4], step_s: f64) -> Self {
+    pub(super) fn new(phase: usize, [x, dx, ddx, u]: [DMatrix<f64>; 4], step_s: f64) -> Self {
         let n = x.nrows();
         let extended = x.clone().insert_column(x.ncols(), 1.0);
         Self {
@@ -46,16 +46,16 @@ impl Batch {
         }
     }
 
-    pub fn samples(&self) -> usize {
+    pub(super) fn samples(&self) -> usize {
         self.x.nrows()
     }
 }
 
 /// Batches of all phases of all recordings, in their order, with the phases, inputs, units and smoothing of `dataset`.
-///
-/// # Errors
-/// [`TrainError::Recording`] for what cannot be resampled or turned into inputs.
-pub fn batches(recordings: &[Recording], dataset: &Dataset) -> Result<Vec<Batch>, TrainError> {
+pub(super) fn batches(
+    recordings: &[Recording],
+    dataset: &Dataset,
+) -> Result<Vec<Batch>, TrainError> {
     let mut out = Vec::new();
     let state = |columns| scaled(columns, &dataset.scaling.state).transpose();
     for recording in recordings {

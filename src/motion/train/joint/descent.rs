@@ -59,7 +59,7 @@ pub(super) struct MaskedAdam {
 }
 
 impl MaskedAdam {
-    pub fn new(xi: &DMatrix<f64>, schedule: &Schedule) -> Self {
+    pub(super) fn new(xi: &DMatrix<f64>, schedule: &Schedule) -> Self {
         Self {
             optimiser: Adam::new(xi.len(), schedule.learning_rate),
             support: xi.map(|_| true),
@@ -67,7 +67,7 @@ impl MaskedAdam {
     }
 
     /// Masks what has become small, in epochs that the schedule has for it.
-    pub fn start_epoch(&mut self, epoch: usize, schedule: &Schedule, xi: &mut DMatrix<f64>) {
+    pub(super) fn start_epoch(&mut self, epoch: usize, schedule: &Schedule, xi: &mut DMatrix<f64>) {
         if schedule.thresholds_at(epoch) {
             for (value, kept) in xi.iter().zip(self.support.iter_mut()) {
                 *kept &= value.abs() >= schedule.threshold;
@@ -76,12 +76,12 @@ impl MaskedAdam {
         }
     }
 
-    pub fn step(&mut self, xi: &mut DMatrix<f64>, gradient: &DMatrix<f64>) {
+    pub(super) fn step(&mut self, xi: &mut DMatrix<f64>, gradient: &DMatrix<f64>) {
         self.optimiser.step(xi.as_mut_slice(), gradient.as_slice());
         self.apply(xi);
     }
 
-    pub fn active(&self) -> usize {
+    pub(super) fn active(&self) -> usize {
         self.support.iter().filter(|kept| **kept).count()
     }
 
@@ -95,7 +95,7 @@ impl MaskedAdam {
 
 /// The Adam optimiser (Kingma and Ba 2015) on one block of numbers.
 #[derive(Clone, Debug)]
-pub struct Adam {
+pub(super) struct Adam {
     learning_rate: f64,
     mean: Vec<f64>,
     square: Vec<f64>,
@@ -108,7 +108,7 @@ const BETA_SQUARE: f64 = 0.999;
 const EPSILON: f64 = 1e-7;
 
 impl Adam {
-    pub fn new(len: usize, learning_rate: f64) -> Self {
+    pub(super) fn new(len: usize, learning_rate: f64) -> Self {
         Self {
             learning_rate,
             mean: vec![0.0; len],
@@ -117,7 +117,7 @@ impl Adam {
         }
     }
 
-    pub fn step(&mut self, values: &mut [f64], gradient: &[f64]) {
+    pub(super) fn step(&mut self, values: &mut [f64], gradient: &[f64]) {
         self.steps = self.steps.saturating_add(1);
         let mean_correction = 1.0 - BETA_MEAN.powi(self.steps);
         let square_correction = 1.0 - BETA_SQUARE.powi(self.steps);

@@ -8,7 +8,7 @@ use crate::model::{AffineMap, Layer, ModelError, StateMap};
 
 /// Another basis of the latent space: `z_new = turn z + shift`.
 #[derive(Clone, Debug, PartialEq)]
-pub struct LatentBasis {
+pub(super) struct LatentBasis {
     /// Invertible, `d x d`.
     pub turn: DMatrix<f64>,
     pub back: DMatrix<f64>,
@@ -16,7 +16,7 @@ pub struct LatentBasis {
 }
 
 impl LatentBasis {
-    pub fn unchanged(latent_dim: usize) -> Self {
+    pub(super) fn unchanged(latent_dim: usize) -> Self {
         Self {
             turn: DMatrix::identity(latent_dim, latent_dim),
             back: DMatrix::identity(latent_dim, latent_dim),
@@ -26,10 +26,7 @@ impl LatentBasis {
 }
 
 /// Encoder and decoder between scaled states and latent coordinates in `basis`.
-///
-/// # Errors
-/// [`ModelError`] for numbers that are not finite, as a training that diverged leaves them.
-pub fn folded(
+pub(super) fn folded(
     parameters: &Parameters,
     frame: &Frame,
     basis: &LatentBasis,

@@ -11,7 +11,7 @@ use super::projection::InputProjection;
 use crate::train::features::{FeatureValues, Features};
 
 /// `z = x W_e^T + b_e^T` and `x = z W_d^T + b_d^T` for samples in rows.
-pub struct LinearMaps {
+pub(super) struct LinearMaps {
     coordinate_weights: DVector<f64>,
     mask: Vec<bool>,
     projection: InputProjection, // of the last encoder
@@ -20,7 +20,7 @@ pub struct LinearMaps {
 impl LinearMaps {
     /// `coordinate_weights` (18) weigh the coordinates in (16), `mask` (18) is true for those that the encoder may
     /// use; the weights of the others get no gradient.
-    pub fn new(coordinate_weights: DVector<f64>, mask: Vec<bool>) -> Self {
+    pub(super) fn new(coordinate_weights: DVector<f64>, mask: Vec<bool>) -> Self {
         Self {
             coordinate_weights,
             mask,
@@ -207,7 +207,7 @@ impl Maps for LinearMaps {
 }
 
 /// Sets the rows of `encoder` (18 x d) for which `mask` is false to zero.
-pub fn mask_rows(encoder: &mut DMatrix<f64>, mask: &[bool]) {
+pub(super) fn mask_rows(encoder: &mut DMatrix<f64>, mask: &[bool]) {
     for (mut row, _) in encoder.row_iter_mut().zip(mask).filter(|(_, used)| !**used) {
         row.fill(0.0);
     }

@@ -80,21 +80,21 @@ impl Losses {
 }
 
 #[derive(Clone, Copy, Debug)]
-pub struct LossPoint<'a> {
+pub(super) struct LossPoint<'a> {
     pub parameters: &'a Parameters,
     pub batch: &'a Batch,
     pub weights: LossWeights,
 }
 
 /// (16) of one batch as a function of the decoder; overwrites its gradient.
-pub type DecoderLoss = Box<dyn Fn(&Network, &mut Network) -> f64>;
+pub(super) type DecoderLoss = Box<dyn Fn(&Network, &mut Network) -> f64>;
 /// (17) to (19) of one batch as functions of Xi, with their weighted gradient.
-pub type XiLoss = Box<dyn Fn(&DMatrix<f64>, LossWeights) -> (Losses, DMatrix<f64>)>;
+pub(super) type XiLoss = Box<dyn Fn(&DMatrix<f64>, LossWeights) -> (Losses, DMatrix<f64>)>;
 
 /// Encoder and decoder inside the loss, with the adjoints of both.
 ///
 /// One evaluation calls `encode`, `residual`, `decode` and `encode_adjoint` in this order on the same batch.
-pub trait Maps {
+pub(super) trait Maps {
     /// `z`, `dz` and `u_lat` of all samples (9, 11, 13), `n x 3d`.
     fn encode(&mut self, at: LossPoint<'_>) -> DMatrix<f64>;
 
@@ -132,7 +132,7 @@ pub trait Maps {
 }
 
 /// The loss over one library, with its scratch space.
-pub struct JointLoss<'a> {
+pub(super) struct JointLoss<'a> {
     pub(super) features: &'a Features,
     pub(super) maps: Box<dyn Maps>,
     pub(super) weights: LossWeights,
@@ -144,7 +144,7 @@ pub struct JointLoss<'a> {
 
 impl<'a> JointLoss<'a> {
     /// The loss of parameters of the shape of `parameters`; the window of (41) counts only with a weight.
-    pub fn new(
+    pub(super) fn new(
         features: &'a Features,
         maps: Box<dyn Maps>,
         (weights, unroll): (LossWeights, Unroll),
@@ -178,12 +178,12 @@ impl<'a> JointLoss<'a> {
     }
 
     /// Gradient of the last [`Self::evaluate`]; of Xi only the phase of that batch has one.
-    pub fn gradient(&self) -> &Parameters {
+    pub(super) fn gradient(&self) -> &Parameters {
         &self.gradient
     }
 
     /// The losses on a batch; the gradient of their weighted sum is kept in [`Self::gradient`].
-    pub fn evaluate(&mut self, parameters: &Parameters, batch: &Batch) -> Losses {
+    pub(super) fn evaluate(&mut self, parameters: &Parameters, batch: &Batch) -> Losses {
         self.gradient.clear();
         let weights = self.current;
         let at = LossPoint {

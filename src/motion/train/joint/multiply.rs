@@ -10,20 +10,20 @@ use crate::train::vectors::vectorised;
 const LANES: usize = 16;
 
 #[derive(Clone, Copy)]
-pub struct Columns<'a> {
+pub(super) struct Columns<'a> {
     values: &'a [f64],
     rows: usize,
 }
 
 impl<'a> Columns<'a> {
-    pub fn all(matrix: &'a DMatrix<f64>) -> Self {
+    pub(super) fn all(matrix: &'a DMatrix<f64>) -> Self {
         Self {
             values: matrix.as_slice(),
             rows: matrix.nrows(),
         }
     }
 
-    pub fn some(matrix: &'a DMatrix<f64>, start: usize, count: usize) -> Self {
+    pub(super) fn some(matrix: &'a DMatrix<f64>, start: usize, count: usize) -> Self {
         let rows = matrix.nrows();
         Self {
             values: &matrix.as_slice()[rows * start..rows * (start + count)],
@@ -37,7 +37,7 @@ impl<'a> Columns<'a> {
 }
 
 /// Columns `start..` of `out`, as many as `b` has, become `a b`.
-pub fn product_into(out: &mut DMatrix<f64>, start: usize, a: Columns<'_>, b: &DMatrix<f64>) {
+pub(super) fn product_into(out: &mut DMatrix<f64>, start: usize, a: Columns<'_>, b: &DMatrix<f64>) {
     let rows = a.rows;
     let out = &mut out.as_mut_slice()[rows * start..rows * (start + b.ncols())];
     out.fill(0.0);
@@ -45,19 +45,19 @@ pub fn product_into(out: &mut DMatrix<f64>, start: usize, a: Columns<'_>, b: &DM
 }
 
 /// `a b`.
-pub fn product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
+pub(super) fn product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     let mut product = DMatrix::zeros(a.nrows(), b.ncols());
     add_product(&mut product, 1.0, a, b);
     product
 }
 
 /// `out += scale a b`.
-pub fn add_product(out: &mut DMatrix<f64>, scale: f64, a: &DMatrix<f64>, b: &DMatrix<f64>) {
+pub(super) fn add_product(out: &mut DMatrix<f64>, scale: f64, a: &DMatrix<f64>, b: &DMatrix<f64>) {
     add_columns(out.as_mut_slice(), scale, Columns::all(a), b);
 }
 
 /// `out += scale a^T b`.
-pub fn add_transposed(out: &mut DMatrix<f64>, scale: f64, a: Columns<'_>, b: Columns<'_>) {
+pub(super) fn add_transposed(out: &mut DMatrix<f64>, scale: f64, a: Columns<'_>, b: Columns<'_>) {
     add_dots(out.as_mut_slice(), scale, a, b);
 }
 

@@ -14,7 +14,7 @@ use crate::train::random::Random;
 
 /// One layer: `y -> phi(y W + b)`.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Dense {
+pub(super) struct Dense {
     /// `W`, inputs x outputs.
     pub weights: DMatrix<f64>,
     /// `b`, one per output.
@@ -23,13 +23,13 @@ pub struct Dense {
 }
 
 #[derive(Clone, Debug, PartialEq)]
-pub struct Network {
+pub(super) struct Network {
     pub layers: Vec<Dense>,
 }
 
 /// Record of a forward pass for the reverse sweeps.
 #[derive(Clone, Debug, Default)]
-pub struct Tape {
+pub(super) struct Tape {
     samples: usize,
     layers: Vec<Recorded>,
 }
@@ -43,7 +43,7 @@ struct Recorded {
 
 /// Jacobians of all samples, with the records for the reverse sweep.
 #[derive(Clone, Debug, Default)]
-pub struct Jacobians {
+pub(super) struct Jacobians {
     /// Row `i n + s` is the gradient of output `i` at sample `s`: `(outputs n) x inputs`.
     pub rows: DMatrix<f64>,
     at_affine: Vec<DMatrix<f64>>, // per layer: derivative of every output with respect to a
@@ -53,7 +53,7 @@ pub struct Jacobians {
 impl Network {
     /// Layers between `widths`, all but the last with `activation`: weights uniform within
     /// `sqrt(6 / (fan in + fan out))` (Glorot and Bengio 2010), biases 0.
-    pub fn random(widths: &[usize], activation: Activation, random: &mut Random) -> Self {
+    pub(super) fn random(widths: &[usize], activation: Activation, random: &mut Random) -> Self {
         let last = widths.len().saturating_sub(2);
         let layers = widths.windows(2).enumerate().map(|(index, pair)| {
             let bound = (6.0 / (pair[0] + pair[1]) as f64).sqrt();
@@ -74,13 +74,13 @@ impl Network {
     }
 
     /// Weights and bias of every layer as slices, in a fixed order.
-    pub fn blocks(&self) -> impl Iterator<Item = &[f64]> {
+    pub(super) fn blocks(&self) -> impl Iterator<Item = &[f64]> {
         self.layers
             .iter()
             .flat_map(|layer| [layer.weights.as_slice(), layer.bias.as_slice()])
     }
 
-    pub fn blocks_mut(&mut self) -> impl Iterator<Item = &mut [f64]> {
+    pub(super) fn blocks_mut(&mut self) -> impl Iterator<Item = &mut [f64]> {
         self.layers
             .iter_mut()
             .flat_map(|layer| [layer.weights.as_mut_slice(), layer.bias.as_mut_slice()])
@@ -90,7 +90,12 @@ impl Network {
     ///
     /// `entering` has `samples` rows (values) or 3 times as many (values, first, second derivatives); the result has
     /// as many rows.
-    pub fn forward(&self, entering: DMatrix<f64>, samples: usize, tape: &mut Tape) -> DMatrix<f64> {
+    pub(super) fn forward(
+        &self,
+        entering: DMatrix<f64>,
+        samples: usize,
+        tape: &mut Tape,
+    ) -> DMatrix<f64> {
         tape.samples = samples;
         tape.layers.clear();
         let mut y = entering;
@@ -114,7 +119,7 @@ impl Network {
     ///
     /// `at_affine` (one matrix per layer, or none) is added to the adjoint of `a`; it comes from
     /// [`Self::jacobian_adjoint`].
-    pub fn backward(
+    pub(super) fn backward(
         &self,
         tape: &Tape,
         adjoint: DMatrix<f64>,
@@ -141,7 +146,7 @@ impl Network {
         adjoint
     }
 
-    pub fn jacobian(&self, tape: &Tape) -> Jacobians {
+    pub(super) fn jacobian(&self, tape: &Tape) -> Jacobians {
         let n = tape.samples;
         let outputs = self.layers.last().map_or(0, |layer| layer.bias.len());
         let mut at_affine = vec![DMatrix::zeros(0, 0); self.layers.len()];
@@ -169,7 +174,7 @@ impl Network {
     /// Adds to `gradient` the share of the layers, given the adjoint of [`Jacobians::rows`].
     ///
     /// Returns the adjoint of `a` of every layer, to be given to [`Self::backward`].
-    pub fn jacobian_adjoint(
+    pub(super) fn jacobian_adjoint(
         &self,
         tape: &Tape,
         jacobians: &Jacobians,

@@ -12,7 +12,7 @@ use super::parameters::{Frame, Parameters};
 use super::projection::InputProjections;
 
 /// Networks in their frame, with the forward pass of the last batch.
-pub struct NonlinearMaps {
+pub(super) struct NonlinearMaps {
     frame: Frame,
     coordinate_weights: DVector<f64>,
     encoder_tape: Tape,
@@ -60,7 +60,7 @@ impl Encoded {
 
 impl NonlinearMaps {
     /// Networks between the units of `frame`; `coordinate_weights` (18) weigh the coordinates in (16).
-    pub fn new(coordinate_weights: DVector<f64>, frame: Frame) -> Self {
+    pub(super) fn new(coordinate_weights: DVector<f64>, frame: Frame) -> Self {
         Self {
             frame,
             coordinate_weights,

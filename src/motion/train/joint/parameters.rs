@@ -9,7 +9,7 @@ use crate::train::random::Random;
 
 /// Parameters, or gradients with respect to them; linear maps are networks of one layer.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Parameters {
+pub(super) struct Parameters {
     /// From framed states to latent coordinates.
     pub encoder: Network,
     /// From latent coordinates to framed states.
@@ -20,7 +20,7 @@ pub struct Parameters {
 
 impl Parameters {
     /// A random start: see [`Network::random`]; Xi everywhere `xi`.
-    pub fn random(
+    pub(super) fn random(
         (encoder, decoder): (&[usize], &[usize]),
         activation: Activation,
         (library_dim, phases, xi): (usize, usize, f64),
@@ -33,24 +33,24 @@ impl Parameters {
         }
     }
 
-    pub fn clear(&mut self) {
+    pub(super) fn clear(&mut self) {
         self.maps_mut().for_each(|block| block.fill(0.0));
         self.xi.iter_mut().for_each(|xi| xi.fill(0.0));
     }
 
     /// Weights and biases of encoder and decoder as slices, in a fixed order.
-    pub fn maps(&self) -> impl Iterator<Item = &[f64]> {
+    pub(super) fn maps(&self) -> impl Iterator<Item = &[f64]> {
         self.encoder.blocks().chain(self.decoder.blocks())
     }
 
-    pub fn maps_mut(&mut self) -> impl Iterator<Item = &mut [f64]> {
+    pub(super) fn maps_mut(&mut self) -> impl Iterator<Item = &mut [f64]> {
         self.encoder.blocks_mut().chain(self.decoder.blocks_mut())
     }
 }
 
 /// Fixed affine maps around encoder and decoder, so that networks see and give numbers of order one.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Frame {
+pub(super) struct Frame {
     /// State that enters the encoder and leaves the decoder as 0, 18.
     pub mean: DVector<f64>,
     /// State for one unit of the decoder's output, 18.
@@ -63,7 +63,7 @@ pub struct Frame {
 
 impl Frame {
     /// No change of units; `mask` (18) is true for coordinates that the encoder may use.
-    pub fn plain(mask: &[bool]) -> Self {
+    pub(super) fn plain(mask: &[bool]) -> Self {
         let n = mask.len();
         Self {
             mean: DVector::zeros(n),
@@ -74,7 +74,7 @@ impl Frame {
     }
 
     /// `x`, `dx` and `ddx` of a batch, stacked, as the encoder takes them.
-    pub fn enter(&self, batch: &Batch) -> DMatrix<f64> {
+    pub(super) fn enter(&self, batch: &Batch) -> DMatrix<f64> {
         let n = batch.samples();
         let mut stack = DMatrix::zeros(3 * n, batch.x.ncols());
         for (index, block) in [&batch.x, &batch.dx, &batch.ddx].into_iter().enumerate() {
@@ -88,7 +88,7 @@ impl Frame {
     }
 
     /// The stacked Jacobians of the network as those of the map between `x` and `z`, or a gradient the other way.
-    pub fn scale_jacobian(&self, rows: &mut DMatrix<f64>) {
+    pub(super) fn scale_jacobian(&self, rows: &mut DMatrix<f64>) {
         for (mut column, factor) in rows.column_iter_mut().zip(self.factors.iter()) {
             column *= self.latent * factor;
         }

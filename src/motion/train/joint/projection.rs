@@ -11,7 +11,7 @@ const DAMPING: f64 = 1e-12;
 
 /// `pinv(W_e^T)^T = V (V^T V)^-1` for `V = W_e^T`: latent inputs of samples in rows are `u` times this.
 #[derive(Clone, Debug, Default)]
-pub struct InputProjection {
+pub(super) struct InputProjection {
     /// `V (V^T V)^-1`, `18 x d`.
     pub weights: DMatrix<f64>,
     inverse_gram: DMatrix<f64>, // d x d
@@ -19,7 +19,7 @@ pub struct InputProjection {
 
 impl InputProjection {
     /// The projection of an encoder `V`, `18 x d`.
-    pub fn new(encoder: &DMatrix<f64>) -> Self {
+    pub(super) fn new(encoder: &DMatrix<f64>) -> Self {
         let d = encoder.ncols();
         let gram = encoder.tr_mul(encoder) + DMatrix::identity(d, d) * DAMPING;
         let inverse_gram = match gram.clone().cholesky() {
@@ -35,7 +35,7 @@ impl InputProjection {
     /// Adjoint of `V`, given the one of the projection.
     ///
     /// From `dQ = dV A^-1 - Q (dV^T V + V^T dV) A^-1`: with `K = G A^-1`, it is `K - V (Q^T K) - V (K^T Q)`.
-    pub fn adjoint(&self, encoder: &DMatrix<f64>, gradient: &DMatrix<f64>) -> DMatrix<f64> {
+    pub(super) fn adjoint(&self, encoder: &DMatrix<f64>, gradient: &DMatrix<f64>) -> DMatrix<f64> {
         let k = gradient * &self.inverse_gram;
         let crossed = self.weights.tr_mul(&k);
         &k - encoder * (&crossed + crossed.transpose())
@@ -44,7 +44,7 @@ impl InputProjection {
 
 /// Latent inputs of a batch under a Jacobian at every sample.
 #[derive(Clone, Debug, Default)]
-pub struct InputProjections {
+pub(super) struct InputProjections {
     /// `n x d`.
     pub u_lat: DMatrix<f64>,
     /// Sum over samples of `(J u) . u_lat`: the energy of the inputs that the latent inputs carry.
@@ -54,7 +54,7 @@ pub struct InputProjections {
 
 impl InputProjections {
     /// Projects `u` (`n x 18`) by the Jacobians whose rows are stacked in `rows` (`(d n) x 18`).
-    pub fn new(rows: &DMatrix<f64>, u: &DMatrix<f64>) -> Self {
+    pub(super) fn new(rows: &DMatrix<f64>, u: &DMatrix<f64>) -> Self {
         let n = u.nrows();
         let d = rows.nrows() / n.max(1);
         let mut u_lat = DMatrix::zeros(n, d);
@@ -99,7 +99,7 @@ impl InputProjections {
     ///
     /// With `w = (J J^T)^-1 adjoint`, `v = u_lat` and the rest `r = u - J^T v` it is
     /// `w r^T - v (J^T w)^T - 2 lift v r^T`.
-    pub fn adjoint(
+    pub(super) fn adjoint(
         &self,
         rows: &DMatrix<f64>,
         u: &DMatrix<f64>,

@@ -13,8 +13,11 @@ use crate::train::features::{FeatureValues, Features};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Integrator {
+    /// Explicit Euler
     Euler,
+    /// Midpoint rule
     Rk2,
+    /// Classical Runge-Kutta
     Rk4,
 }
 
@@ -57,7 +60,7 @@ impl Integrator {
 }
 
 #[derive(Clone, Copy, Debug)]
-pub struct Window<'a> {
+pub(super) struct Window<'a> {
     pub features: &'a Features,
     /// `n x 3d`: z, dz, u_lat.
     pub variables: &'a DMatrix<f64>,
@@ -67,7 +70,7 @@ pub struct Window<'a> {
 }
 
 #[derive(Debug)]
-pub struct Adjoints<'a> {
+pub(super) struct Adjoints<'a> {
     /// With respect to the variables, `n x 3d`.
     pub variables: &'a mut DMatrix<f64>,
     pub xi: &'a mut DMatrix<f64>,
@@ -85,7 +88,12 @@ impl Unroll {
     ///
     /// Adds `weight` times its gradient to `adjoints`. Inputs are those recorded at the time of each stage, or the sample
     /// before it.
-    pub fn evaluate(&self, samples: Window<'_>, weight: f64, adjoints: &mut Adjoints<'_>) -> f64 {
+    pub(super) fn evaluate(
+        &self,
+        samples: Window<'_>,
+        weight: f64,
+        adjoints: &mut Adjoints<'_>,
+    ) -> f64 {
         let d = samples.features.latent_dim();
         let reach = self.window * self.stride;
         let starts = samples.variables.nrows().saturating_sub(reach);

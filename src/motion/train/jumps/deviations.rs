@@ -14,7 +14,7 @@ use crate::model::{FEATURE_DIM, GOAL_DIM, GoalRange, complement};
 /// Ridge relative to the variance of each column.
 const RIDGE: f64 = 1e-2;
 
-pub struct Deviations {
+pub(super) struct Deviations {
     /// `(3 d) x d`.
     pub xi: DMatrix<f64>,
     /// Standard deviation over the jumps of the mean residual, each jump left out of the fit.
@@ -25,7 +25,7 @@ pub struct Deviations {
 }
 
 /// Fits the deviations of one part; `translation` is the change of `z` by a shift forwards.
-pub fn fit_deviations(
+pub(super) fn fit_deviations(
     sampled: &[Sampled],
     goal: &[GoalRange; GOAL_DIM],
     part: usize,

@@ -15,14 +15,14 @@ const LEAST_SAMPLES: usize = 8;
 
 /// A part of every jump of a kind.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Landmark {
+pub(super) struct Landmark {
     pub name: String,
     pub phase: usize,
     /// Feet on the ground: those that select the phase, as many as it allows.
     pub feet: ContactFlags,
 }
 
-pub struct Cut {
+pub(super) struct Cut {
     pub kind: Vec<Landmark>,
     /// First sample of each part, and the last sample of the last.
     borders: Vec<usize>,
@@ -31,27 +31,27 @@ pub struct Cut {
 
 impl Cut {
     /// Samples from the first to the last of a part, both borders included.
-    pub fn samples(&self, part: usize) -> Range<usize> {
+    pub(super) fn samples(&self, part: usize) -> Range<usize> {
         self.borders[part]..self.borders[part + 1] + 1
     }
 
-    pub fn duration_s(&self, part: usize) -> f64 {
+    pub(super) fn duration_s(&self, part: usize) -> f64 {
         self.times_s[part + 1] - self.times_s[part]
     }
 
     /// First sample after touch-down; none for a jump that ends with its flight.
-    pub fn landing(&self) -> Option<usize> {
+    pub(super) fn landing(&self) -> Option<usize> {
         let lands = self.kind.last()?.feet.contains(&true);
         lands.then(|| self.borders[self.kind.len() - 1])
     }
 
-    pub fn end(&self) -> usize {
+    pub(super) fn end(&self) -> usize {
         self.borders[self.kind.len()]
     }
 }
 
 /// The cut of every jump; none where a jump has no flight with contact before it.
-pub fn cuts(training: &Dataset) -> Vec<Option<Cut>> {
+pub(super) fn cuts(training: &Dataset) -> Vec<Option<Cut>> {
     let jumps = training.jumps.iter();
     jumps.map(|jump| cut(training, jump)).collect()
 }
@@ -131,7 +131,7 @@ fn feet_of(training: &Dataset, phase: usize) -> Option<ContactFlags> {
 }
 
 /// The jumps with the parts that most jumps have, and their cuts.
-pub fn of_commonest_kind(cuts: &[Option<Cut>]) -> Vec<(usize, &Cut)> {
+pub(super) fn of_commonest_kind(cuts: &[Option<Cut>]) -> Vec<(usize, &Cut)> {
     let all = cuts.iter().enumerate();
     let mut all: Vec<_> = all
         .filter_map(|(jump, cut)| Some((jump, cut.as_ref()?)))

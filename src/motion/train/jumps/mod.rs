@@ -10,9 +10,9 @@ mod landmarks;
 mod nodes;
 mod regression;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, RowDVector};
 
-use super::dataset::Dataset;
+use super::dataset::{Dataset, centred, mean};
 use super::latent::{EncodedSet, Latent};
 use super::metrics::{BODY_X, BODY_Z};
 use super::report::PartScore;
@@ -23,7 +23,7 @@ use nodes::{PartNodes, intervals, sample};
 use regression::GoalRegression;
 
 /// Fewest jumps of one kind that say how jumps depend on their goal.
-pub const LEAST_JUMPS: usize = 6;
+pub(super) const LEAST_JUMPS: usize = 6;
 /// Significant digits of what is kept: beyond those of any recording.
 const DIGITS: usize = 6;
 
@@ -34,7 +34,10 @@ struct Sampled {
 
 /// Landmarks and prior of the training jumps, and how well its deviations are explained in each of its parts; none for
 /// a nonlinear encoder or too few jumps of one kind.
-pub fn learn_jumps(set: EncodedSet<'_>, encoder: &StateMap) -> (Option<JumpPrior>, Vec<PartScore>) {
+pub(super) fn learn_jumps(
+    set: EncodedSet<'_>,
+    encoder: &StateMap,
+) -> (Option<JumpPrior>, Vec<PartScore>) {
     let (training, latent) = (set.dataset, set.latent);
     let nothing = (None, Vec::new());
     let Some(affine) = encoder.as_affine() else {
@@ -144,17 +147,12 @@ fn part_of(
 fn input_covariance(all: &[&PartNodes]) -> DMatrix<f64> {
     /// Share of the mean variance that is added to every variance.
     const FLOOR: f64 = 1e-4;
-    let d = all[0].u_lat.ncols();
-    let n: usize = all.iter().map(|nodes| nodes.u_lat.nrows()).sum();
-    let sum = all.iter().map(|nodes| nodes.u_lat.row_sum());
-    let mean = sum.fold(nalgebra::RowDVector::zeros(d), |a, b| a + b) / n as f64;
-    let mut covariance = DMatrix::zeros(d, d);
-    for nodes in all {
-        for row in nodes.u_lat.row_iter() {
-            let deviation = row - &mean;
-            covariance += deviation.transpose() * deviation / n as f64;
-        }
-    }
+    let inputs = all.iter().flat_map(|nodes| nodes.u_lat.row_iter());
+    let inputs: Vec<_> = inputs.map(|row| row.transpose()).collect();
+    let inputs = DMatrix::from_columns(&inputs);
+    let (d, n) = inputs.shape();
+    let deviations = centred(&inputs, &mean(&inputs));
+    let covariance = &deviations * deviations.transpose() / n as f64;
     let floor = FLOOR * (covariance.trace() / d as f64).max(f64::MIN_POSITIVE.sqrt());
     covariance + DMatrix::identity(d, d) * floor
 }
@@ -167,25 +165,16 @@ fn range_of(values: impl Iterator<Item = f64>) -> [f64; 2] {
 
 /// Standard deviations of `z` and `dz` over the samples of the jumps.
 fn state_std(latent: &[Latent], chosen: &[(usize, &Cut)]) -> DVector<f64> {
-    let stacked = |jump: usize| {
-        let (z, dz) = (&latent[jump].z, &latent[jump].dz);
-        let d = z.nrows();
-        DMatrix::from_fn(2 * d, z.ncols(), |i, j| match i.checked_sub(d) {
-            None => z[(i, j)],
-            Some(i) => dz[(i, j)],
-        })
-    };
-    let all: Vec<DMatrix<f64>> = chosen.iter().map(|&(jump, _)| stacked(jump)).collect();
-    let n = all.iter().map(DMatrix::ncols).sum::<usize>() as f64;
-    let sum = all.iter().map(|part| part.column_sum());
-    let zero = DVector::zeros(all[0].nrows());
-    let mean: DVector<f64> = sum.fold(zero.clone(), |a, b| a + b) / n;
-    let squares = all.iter().flat_map(|part| {
-        let columns = part.column_iter();
-        columns.map(|column| (column - &mean).map(|v| v * v))
+    let states = chosen.iter().flat_map(|&(jump, _)| {
+        let Latent { z, dz, .. } = &latent[jump];
+        let pairs = z.column_iter().zip(dz.column_iter());
+        pairs.map(|(z, dz)| DVector::from_iterator(2 * z.len(), z.iter().chain(&dz).copied()))
     });
-    let variance: DVector<f64> = squares.fold(zero, |a, b| a + b) / n;
-    variance.map(|v| v.sqrt().max(f64::EPSILON))
+    let states = DMatrix::from_columns(&states.collect::<Vec<_>>());
+    let deviations = centred(&states, &mean(&states));
+    let std = |row: RowDVector<f64>| (row.norm_squared() / row.len() as f64).sqrt();
+    let rows = deviations.row_iter().map(|row| std(row.into_owned()));
+    DVector::from_iterator(deviations.nrows(), rows).map(|std| std.max(f64::EPSILON))
 }
 
 /// The value at [`DIGITS`] significant digits.

@@ -12,7 +12,7 @@ const NODE_STEP_S: f64 = 0.014;
 const INTERVALS: [usize; 2] = [10, 60];
 
 /// Nodes of one part of one jump; one row per node, scaled units.
-pub struct PartNodes {
+pub(super) struct PartNodes {
     pub duration_s: f64,
     pub z: DMatrix<f64>,
     pub dz: DMatrix<f64>,
@@ -22,18 +22,24 @@ pub struct PartNodes {
 
 impl PartNodes {
     /// Time between two nodes, s.
-    pub fn step_s(&self) -> f64 {
+    pub(super) fn step_s(&self) -> f64 {
         self.duration_s / (self.z.nrows() - 1) as f64
     }
 }
 
 /// How many intervals a part of this mean duration has.
-pub fn intervals(mean_duration_s: f64) -> usize {
+pub(super) fn intervals(mean_duration_s: f64) -> usize {
     let [least, most] = INTERVALS;
     ((mean_duration_s / NODE_STEP_S).round() as usize).clamp(least, most)
 }
 
-pub fn sample(jump: &Jump, latent: &Latent, cut: &Cut, part: usize, count: usize) -> PartNodes {
+pub(super) fn sample(
+    jump: &Jump,
+    latent: &Latent,
+    cut: &Cut,
+    part: usize,
+    count: usize,
+) -> PartNodes {
     let samples = cut.samples(part);
     let times = &jump.time_s[samples.clone()];
     let (first, duration_s) = (times[0], cut.duration_s(part));

@@ -9,13 +9,13 @@ use crate::model::{FEATURE_DIM, GOAL_DIM, GoalRange};
 const RIDGE: f64 = 3.0;
 
 /// The linear map from the values of all jumps to the coefficients of the features.
-pub struct GoalRegression {
+pub(super) struct GoalRegression {
     /// `FEATURE_DIM x jumps`.
     solution: DMatrix<f64>,
 }
 
 impl GoalRegression {
-    pub fn of<'a>(
+    pub(super) fn of<'a>(
         jumps: impl IntoIterator<Item = &'a Sampled>,
         goal: &[GoalRange; GOAL_DIM],
     ) -> Self {
@@ -30,13 +30,16 @@ impl GoalRegression {
         }
     }
 
-    pub fn numbers(&self, values: &[f64]) -> [f64; FEATURE_DIM] {
+    pub(super) fn numbers(&self, values: &[f64]) -> [f64; FEATURE_DIM] {
         let fitted = &self.solution * DVector::from_column_slice(values);
         std::array::from_fn(|k| fitted[k])
     }
 
     /// Coefficients of one table per jump, `n x d` each: `n x (FEATURE_DIM d)`.
-    pub fn table<'a>(&self, values: impl IntoIterator<Item = &'a DMatrix<f64>>) -> DMatrix<f64> {
+    pub(super) fn table<'a>(
+        &self,
+        values: impl IntoIterator<Item = &'a DMatrix<f64>>,
+    ) -> DMatrix<f64> {
         let values: Vec<_> = values.into_iter().collect();
         let (n, d) = values[0].shape();
         let mut table = DMatrix::zeros(n, FEATURE_DIM * d);
