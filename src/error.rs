@@ -113,7 +113,13 @@ impl Error {
             // Exit code 1 of `check` means that two files differ.
             Self::Check(_) | Self::Rename(_) | Self::Name(_) => true,
             Self::Output { .. } | Self::NotOne { .. } | Self::Idle { .. } => true,
-            _ => false, // faults of files and runs
+            Self::Recording(_) | Self::Model(_) | Self::Identify(_) | Self::Emit(_) => false,
+            Self::Typeset(_) | Self::Codegen(_) | Self::Folder(_) | Self::Lower(_) => false,
+            Self::Sim(_) | Self::Evaluate(_) | Self::Study(_) | Self::Mpc(_) | Self::Plan(_) => {
+                false
+            }
+            Self::Distrusted(_) | Self::Config { .. } | Self::Mismatch { .. } => false,
+            Self::Exists(_) | Self::Read { .. } | Self::Write { .. } => false,
         }
     }
 }

@@ -25,6 +25,7 @@ mod definitions;
 mod expression;
 mod function;
 mod items;
+mod statement;
 mod text;
 mod types;
 
