@@ -245,7 +245,7 @@ fn compare<T: Real, const NX: usize, const NU: usize, const LINKED: bool>(real: 
         .map(|number| random_program(&mut random, NX, NU, number, links))
         .collect();
     let folder = tempfile::tempdir().expect("a folder");
-    let files = solver(&root()).expect("the solver is in the subset");
+    let files = solver(root()).expect("the solver is in the subset");
     let found = solved_in_c(folder.path(), &files, (NX, NU, real, LINKED), &programs);
     let mut rest = found.as_slice();
     let mut iterated = 0;
@@ -264,7 +264,7 @@ fn compare<T: Real, const NX: usize, const NU: usize, const LINKED: bool>(real: 
 
 #[test]
 fn solver_in_c_is_what_its_rust_says() {
-    for (path, text) in solver(&root()).expect("the solver is in the subset") {
+    for (path, text) in solver(root()).expect("the solver is in the subset") {
         let committed = fs::read_to_string(root().join(path)).expect("committed");
         assert!(
             committed == text,

@@ -8,7 +8,7 @@ use romc::recording::{
 };
 use romc::robot::{JOINT_DIM, Robot, STATE_DIM};
 
-mod checks {
+mod implausible {
     use super::*;
 
     use nalgebra::DMatrix;

@@ -20,7 +20,7 @@ struct Package {
 static PACKAGES: LazyLock<Vec<Package>> = LazyLock::new(|| {
     let own = include_str!("../../../Cargo.lock");
     let package = |text: &'static str| {
-        let field = |key| Some(text.lines().find_map(|line| line.strip_prefix(key))?);
+        let field = |key| text.lines().find_map(|line| line.strip_prefix(key));
         let listed = text.lines().filter_map(|line| line.strip_prefix(" \""));
         Some(Package {
             name: field("name = ")?.trim_matches('"'),

@@ -171,7 +171,7 @@ fn facts<'a>(
         ..Shape::default()
     };
     Facts {
-        solver_stage: solver::stage(&controller.name, &controller.upper, real),
+        solver_stage: solver::stage(controller.name, &controller.upper, real),
         row_numbers: one_row.memory(),
         controller,
         banner: format!("/* {provenance} */"),

@@ -128,7 +128,7 @@ impl<'a> Source<'a> {
             has_actuators: plant.input_rule().actuators().is_some(),
             is_body_frame: plant.input_rule().wrench_frame() == WrenchFrame::Body,
             solver: SolverNumbers::new(precision, mpc.qp.accepted_residual),
-            functions: solver::of_horizon(&facts.name),
+            functions: solver::of_horizon(facts.name),
             lift_functions: solver::of_lift(),
             legs: Legs::of(robot, numbers),
             torque_mean: numbers

@@ -58,6 +58,10 @@ mod links;
 mod lower;
 mod point;
 mod problem;
+#[allow(
+    clippy::manual_memcpy,
+    reason = "loops over indices, which C is made of"
+)]
 mod riccati;
 mod rows;
 mod scalar;

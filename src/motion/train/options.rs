@@ -15,8 +15,7 @@ use super::report::Trained;
 use super::task::Recordings;
 use crate::limits::table;
 use crate::model::{
-    Activation, Library, LibraryChoice, MAX_LAYER_WIDTH, MAX_LAYERS, ModelError, StandardLibrary,
-    check_name,
+    Activation, Library, LibraryChoice, MAX_LAYER_WIDTH, MAX_LAYERS, StandardLibrary, check_name,
 };
 use crate::recording::PhaseRule;
 use crate::recording::phases::CHATTER_SAMPLES;
@@ -230,9 +229,8 @@ impl TrainOptions {
     /// # Errors
     /// [`TrainError::Model`] for a term that does not parse or a latent dimension out of range.
     pub fn library(&self) -> Result<Library, TrainError> {
-        let library = Library::of(self.latent_dim, self.library.clone());
-        let library = library.map_err(ModelError::from)?;
-        library.check_distinct().map_err(ModelError::from)?;
+        let library = Library::of(self.latent_dim, self.library.clone())?;
+        library.check_distinct()?;
         Ok(library)
     }
 

@@ -320,7 +320,7 @@ impl<'a> Items<'a> {
                     syn::GenericArgument::Lifetime(_) => true,
                     syn::GenericArgument::Type(syn::Type::Path(path)) => {
                         let is = |name: &&str| path.path.is_ident(name);
-                        path.path.is_ident("T") || SIZES.iter().any(|name| is(&name))
+                        path.path.is_ident("T") || SIZES.iter().any(is)
                     }
                     _ => false,
                 };
