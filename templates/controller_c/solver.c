@@ -1971,8 +1971,8 @@ static inline solver_report solver_program_solve(solver_program *restrict self, 
             if (solver_point_is_optimal(&point, settings)) {
                 break;
             }
-            is_capped = iterations == settings->max_iterations;
-            if (is_capped) {
+            if (iterations >= settings->max_iterations) {
+                is_capped = true;
                 break;
             }
             iterations += 1;

@@ -37,6 +37,8 @@ pub(super) struct Source<'a> {
     facts: &'a Facts<'a>,
     numbers: Numbers,
     parts: &'a ControlModelParts,
+    /// Of the stage problem: twice the latent dimension, as one number, which Eva wants of the length of an array.
+    n_states: usize,
     n_torque_pairs: usize,
     max_nnz: usize,
     has_actuators: bool,
@@ -118,6 +120,7 @@ impl<'a> Source<'a> {
             facts,
             numbers,
             parts,
+            n_states: 2 * facts.latent_dim,
             n_torque_pairs: pairs(&rows.torque),
             max_nnz: (entries.phases.iter())
                 .map(|phase| phase.pattern.len())

@@ -72,8 +72,8 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
                 if point.is_optimal(settings) {
                     break;
                 }
-                is_capped = iterations == settings.max_iterations;
-                if is_capped {
+                if iterations >= settings.max_iterations {
+                    is_capped = true;
                     break;
                 }
                 iterations += 1;
