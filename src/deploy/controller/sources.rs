@@ -1,7 +1,7 @@
 //! The sources of romc that every generated controller holds.
 
 /// The tests at the end of a file, and the text of the sources themselves, which stay here.
-const ENDS: [&str; 2] = ["\n#[cfg(test)]\nmod tests", "\npub mod sources;"];
+const ENDS: [&str; 2] = ["\n#[cfg(test)]\nmod tests", "\n#[cfg(feature = \"serde\")]"];
 
 pub(crate) const LICENCES: [(&str, &str); 2] = [
     ("LICENSE-APACHE", include_str!("../../../LICENSE-APACHE")),
