@@ -11,7 +11,6 @@ const MAX_CHANGES: usize = 600;
 const REACHES: [f64; 6] = [1.0, 3.0, 0.3, 10.0, 0.1, 0.01];
 
 /// Inputs of a function and what it computes from them.
-#[derive(Clone, Debug)]
 pub(crate) struct TestPoint {
     pub inputs: Vec<Vec<f64>>,
     pub outputs: Vec<Vec<f64>>,
@@ -138,7 +137,6 @@ pub(crate) const N_BATCH: usize = 21;
 
 /// The inputs of that batch: element `i` of its arrays is `z + 0.01 (i mod 97)`, `dz - 0.01 (i mod 89)` and `u_lat +
 /// 0.01 (i mod 83)`, except for `far_angle` in point 3 of `z1` and in the last but one of `dz1`.
-#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct BatchPoints {
     pub z: f64,
     pub dz: f64,

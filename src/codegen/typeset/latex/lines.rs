@@ -14,7 +14,6 @@ const BRACE: f64 = 1.8;
 /// Lines from which [`Form::Automatic`] prefers an environment that breaks across pages: no page holds many more.
 pub(super) const CASES_LINES: usize = 30;
 
-#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Block {
     pub label: String,
     pub count: usize,
