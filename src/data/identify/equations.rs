@@ -48,8 +48,7 @@ pub fn joint_unknowns(kind: usize) -> [usize; JOINT_ROWS - 1] {
 pub struct SampleEquations {
     /// Axes x, y, z one below the other, [`BODY_ROWS`] each: the trunk's acceleration, m/s^2.
     pub body: DMatrix<f64>,
-    /// The twelve joints one below the other, [`JOINT_ROWS`] each: torque, N m. They hold in the
-    /// air.
+    /// The twelve joints one below the other, [`JOINT_ROWS`] each: torque, N m. They hold in the air.
     pub joints: DMatrix<f64>,
     /// Samples at which a leg on the ground is too close to a singular posture.
     pub singular: Vec<bool>,
@@ -113,16 +112,13 @@ impl SampleEquations {
                 }
                 for kind in 0..LEG_JOINT_DIM {
                     let row = (first + kind) * JOINT_ROWS;
-                    let mut joint = equations
-                        .joints
-                        .fixed_view_mut::<JOINT_ROWS, 1>(row, sample);
-                    joint.copy_from_slice(&state.joint(kind));
+                    let joints = &mut equations.joints;
+                    (joints.fixed_view_mut::<JOINT_ROWS, 1>(row, sample))
+                        .copy_from_slice(&state.joint(kind));
                 }
             }
-            equations
-                .body
-                .column_mut(sample)
-                .copy_from_slice(body.0.as_flattened());
+            let mut column = equations.body.column_mut(sample);
+            column.copy_from_slice(body.0.as_flattened());
         }
         equations
     }

@@ -60,10 +60,9 @@ impl Motion {
         };
         let mut rates = DMatrix::zeros(TRUNK_ROWS + 4 * LEG_ROWS, n);
         for sample in 0..n {
-            let [roll, pitch, yaw] =
-                std::array::from_fn(|i| segment.x[(JOINT_DIM + 3 + i, sample)]);
-            let [droll, dpitch, dyaw] =
-                std::array::from_fn(|i| segment.dx[(JOINT_DIM + 3 + i, sample)]);
+            let of = |m: &DMatrix<f64>| std::array::from_fn(|i| m[(JOINT_DIM + 3 + i, sample)]);
+            let [roll, pitch, yaw] = of(&segment.x);
+            let [droll, dpitch, dyaw] = of(&segment.dx);
             let heading = Rotation3::from_axis_angle(&Vector3::z_axis(), yaw);
             let inclined = heading * Rotation3::from_axis_angle(&Vector3::y_axis(), pitch);
             let trunk = inclined * Rotation3::from_axis_angle(&Vector3::x_axis(), roll);
@@ -99,9 +98,8 @@ impl Motion {
 
     /// Acceleration of the trunk's origin, m/s^2.
     pub fn body(&self, sample: usize) -> Vector3<f64> {
-        self.coordinates
-            .fixed_view::<3, 1>(JOINT_DIM, sample)
-            .into_owned()
+        let rows = self.coordinates.fixed_view::<3, 1>(JOINT_DIM, sample);
+        rows.into_owned()
     }
 
     /// Second derivative of a trunk axis (0 x, 1 y, 2 z), 1/s^2.

@@ -46,7 +46,6 @@ pub(crate) enum Group {
 }
 
 impl Group {
-    /// Number of groups.
     pub(crate) const COUNT: usize = 9;
 
     pub(crate) fn index(self) -> usize {
@@ -75,9 +74,7 @@ pub(crate) struct Windows {
     pub rows: Vec<Row>,
     /// The segment that each block lies in, counted from zero.
     pub blocks: Vec<usize>,
-    /// Samples with a foot on the ground in windows.
     pub contact_samples: usize,
-    /// Samples in flight in windows.
     pub flight_samples: usize,
     /// Samples left out because a leg on the ground was close to a singular posture.
     pub singular_samples: usize,
@@ -100,7 +97,6 @@ impl Windows {
         let window = (samples(WINDOW_S) | 1).max(3);
         let filter = SavitzkyGolay::new(window, 1)?;
         let per_block = samples(BLOCK_S).max(1);
-        let number = self.segments;
         self.segments += 1;
         let feet = &segment.feet;
         for stance in stretches(0..segment.len(), |a, b| feet[a] == feet[b]) {
@@ -112,13 +108,13 @@ impl Windows {
                 if !kept(span.start) || span.len() < window {
                     continue;
                 }
+                let half = window / 2;
                 let first_block = self.blocks.len();
-                let blocks = (window / 2..span.len() - window / 2)
-                    .step_by((window / OVERLAP).max(1))
-                    .map(|centre| (centre, first_block + (centre - window / 2) / per_block))
-                    .collect::<Vec<_>>();
+                let centres = (half..span.len() - half).step_by((window / OVERLAP).max(1));
+                let block = |centre| (centre, first_block + (centre - half) / per_block);
+                let blocks: Vec<(usize, usize)> = centres.map(block).collect();
                 let last = blocks.last().map_or(first_block, |(_, block)| *block);
-                self.blocks.resize(last + 1, number);
+                self.blocks.resize(last + 1, self.segments - 1);
                 let averaged = Averaged {
                     segment,
                     equations,
@@ -161,14 +157,11 @@ impl Windows {
         };
         *count += averaged.span.len();
         let mean_speed = |is_meant: fn(usize) -> bool| {
-            let bearing: Vec<usize> = (0..JOINT_DIM)
-                .filter(|joint| is_meant(*joint) && feet[joint / 3])
-                .collect();
+            let bearing = || (0..JOINT_DIM).filter(|joint| is_meant(*joint) && feet[joint / 3]);
+            let count = bearing().count().max(1) as f64;
             let speed = DMatrix::from_fn(1, segment.len(), |_, sample| {
-                let speeds = bearing
-                    .iter()
-                    .map(|joint| segment.dx[(*joint, sample)].abs());
-                speeds.sum::<f64>() / bearing.len().max(1) as f64
+                let speeds = bearing().map(|joint| segment.dx[(joint, sample)].abs());
+                speeds.sum::<f64>() / count
             });
             averaged.of(&speed)
         };
@@ -197,15 +190,11 @@ impl Windows {
         let half = averaged.filter.window() / 2;
         for joint in (0..JOINT_DIM).filter(|joint| !feet[joint / 3]) {
             let unknowns = joint_unknowns(joint % 3);
-            let rows = averaged
-                .equations
-                .joints
-                .rows(joint * JOINT_ROWS, JOINT_ROWS);
-            let means = averaged.of(&rows.into_owned());
+            let joints = &averaged.equations.joints;
+            let means = averaged.of(&joints.rows(joint * JOINT_ROWS, JOINT_ROWS).into_owned());
             for &(centre, block) in &averaged.blocks {
                 let at = averaged.span.start + centre;
-                let turning = (at - half..=at + half)
-                    .all(|sample| segment.dx[(joint, sample)].abs() > TURNING_RAD_S);
+                let turns = |sample| segment.dx[(joint, sample)].abs() > TURNING_RAD_S;
                 let mut coefficients = [0.0; PARAMETER_DIM];
                 for (row, unknown) in unknowns.into_iter().enumerate() {
                     coefficients[unknown] = means[(row, centre)];
@@ -215,7 +204,7 @@ impl Windows {
                     left: means[(JOINT_ROWS - 1, centre)],
                     group: Group::Joint(joint % 3),
                     block,
-                    moving: turning,
+                    moving: (at - half..=at + half).all(turns),
                 });
             }
         }

@@ -31,7 +31,7 @@ pub fn read(path: &Path) -> Result<Recording, RecordingError> {
 /// As [`read`]. No bytes make it panic.
 pub fn read_from_bytes(name: &str, bytes: &[u8]) -> Result<Recording, RecordingError> {
     let path = Path::new(name);
-    read_noted(path, Lines::of(path, bytes)?).map(|reading| reading.recording)
+    read_noted(path, Lines::of(path, bytes, u64::MAX)?).map(|reading| reading.recording)
 }
 
 /// [`read`], with a note of what the file leaves to be derived.
@@ -42,23 +42,20 @@ pub(super) fn read_noted(path: &Path, lines: Lines<'_>) -> Result<Reading, Recor
     };
     let log = read_lines(path, lines, &format)?;
     let columns = Column::arranged(path, &log.names())?;
-    let mut time_s = Vec::new();
-    let mut ignored_columns = Vec::new();
-    for (column, channel) in columns.iter().zip(&log.columns) {
-        match column {
-            Some(Column::Time) => time_s = channel.times(),
-            None if !channel.name.is_empty() => ignored_columns.push(channel.name.clone()),
-            Some(_) | None => {}
-        }
-    }
+    let time = columns.iter().position(|c| *c == Some(Column::Time));
+    let time = time.expect("invariant: an arranged header has the time");
     let mut whole = Segment {
         first_row: log.first_row,
-        ..Segment::still(path, time_s)
+        ..Segment::still(path, log.columns[time].times())
     };
     let has_acceleration = columns.contains(&Some(Column::Acceleration(0)));
+    let mut ignored_columns = Vec::new();
     for (column, channel) in columns.into_iter().zip(log.columns) {
-        if let Some(column) = column {
-            whole.set(column, channel.values.into_iter());
+        match column {
+            Some(Column::Time) => {}
+            Some(column) => whole.set(column, channel.values.into_iter()),
+            None if channel.name.is_empty() => {}
+            None => ignored_columns.push(channel.name),
         }
     }
     let recording = Recording {

@@ -3,7 +3,7 @@
 use super::lines::count;
 
 /// A time as whole units and the rest, so that nanoseconds since 1970 lose nothing in differences.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Instant {
     pub whole: i64,
     pub rest: f64,

@@ -35,16 +35,12 @@ impl<'a> Lines<'a> {
         let file = File::open(path)
             .map_err(|source| RecordingFault::unreadable("open", source).of(path))?;
         let size = file.metadata().ok().filter(fs::Metadata::is_file);
-        Self::packed(path, file, size.map_or(u64::MAX, |size| size.len()))
+        Self::of(path, file, size.map_or(u64::MAX, |size| size.len()))
     }
 
-    /// Of any source, plain or gzip, found from the first two bytes; `path` stands for it in messages.
-    pub(crate) fn of(path: &'a Path, source: impl Read + 'a) -> Result<Self, RecordingError> {
-        Self::packed(path, source, u64::MAX)
-    }
-
-    /// A source of so many bytes, which bound what they may unpack to.
-    fn packed(
+    /// Of a source of so many bytes, which bound what they may unpack to: plain or gzip, found from the first two bytes;
+    /// `path` stands for it in messages.
+    pub(crate) fn of(
         path: &'a Path,
         mut source: impl Read + 'a,
         size: u64,
@@ -133,14 +129,12 @@ impl<'a> Lines<'a> {
             false => (0, *all),
         };
         let filled = self.row - *all;
-        match *since > MAX_BLANK_ROWS || *all > filled.saturating_add(MAX_BLANK_ROWS) {
-            true => {
-                let found = format!("more than {MAX_BLANK_ROWS} empty lines");
-                let fault = RecordingFault::unexpected(found, "samples or the end");
-                Err(fault.at(self.path, self.row))
-            }
-            false => Ok(()),
+        if *since > MAX_BLANK_ROWS || *all > filled.saturating_add(MAX_BLANK_ROWS) {
+            let found = format!("more than {MAX_BLANK_ROWS} empty lines");
+            let fault = RecordingFault::unexpected(found, "samples or the end");
+            return Err(fault.at(self.path, self.row));
         }
+        Ok(())
     }
 
     fn read_error(&self, source: io::Error) -> RecordingError {
@@ -228,36 +222,17 @@ impl NumberReader {
         if self.mark.is_some_and(|mark| mark != found) {
             return None;
         }
-        let pointed = match found {
+        let value = match found {
+            Mark::Point => cell.parse().ok()?,
             Mark::Comma => {
                 // A second mark of either kind fails to parse.
+                let (whole, rest) = (&cell[..place], &cell[place + 1..]);
                 self.pointed.clear();
-                self.pointed
-                    .extend([&cell[..place], ".", &cell[place + 1..]]);
-                &self.pointed
+                self.pointed.extend([whole, ".", rest]);
+                self.pointed.parse().ok()?
             }
-            Mark::Point => cell,
         };
-        let value = pointed.parse().ok()?;
         self.mark = Some(found);
         Some(value)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn next_row_longest_line_is_read_and_one_byte_more_is_not() {
-        let read = |ones: usize| {
-            let text = [vec![b'1'; ones], b"\n".to_vec()].concat();
-            let mut lines = Lines::of(Path::new("t"), &text[..]).unwrap();
-            lines.next_row().map(|row| row.is_some())
-        };
-        assert!(read(MAX_LINE_BYTES).unwrap());
-        let error = read(MAX_LINE_BYTES + 1).unwrap_err();
-        assert!(error.to_string().contains("found a line of more than"));
-        assert_eq!(error.place.row(), Some(1));
     }
 }

@@ -125,6 +125,7 @@ pub fn arrays_by_neighbours(path: &Path) -> Option<OtherFormat> {
 impl Row {
     fn holds(&self, bytes: &[u8]) -> bool {
         let latin_1 = |text: &str| -> Vec<u8> { text.chars().map(|c| c as u8).collect() };
+        // A file that ends before the place of the sign does not have it.
         let from = bytes.get(self.at..).unwrap_or_default();
         let is_signed = |sign: &Vec<String>| {
             let mut inside = sign.iter().skip(1);

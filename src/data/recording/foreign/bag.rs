@@ -26,25 +26,18 @@ pub(super) fn files(path: &Path) -> Result<(Vec<PathBuf>, Vec<String>), Recordin
         return Err(RecordingFault::Missing.of(absent));
     }
     let is_listed = !listed.is_empty();
-    let (mut files, unlisted) = match is_listed {
-        false => (parts(path), Vec::new()),
-        true => {
-            let others = parts(path)
-                .into_iter()
-                .filter(|file| !listed.contains(file));
-            let note =
-                |file: PathBuf| format!("{}: not in {METADATA}, and left out", file.display());
-            let notes = others.map(note).collect();
-            (listed, notes)
-        }
-    };
+    let mut files = parts(path);
+    let mut unlisted = Vec::new();
+    if is_listed {
+        let others = files.iter().filter(|file| !listed.contains(file));
+        let note = |file: &PathBuf| format!("{}: not in {METADATA}, and left out", file.display());
+        unlisted.extend(others.map(note));
+        files = listed;
+    }
     // rosbag2 calls the parts of a bag NAME_0.mcap, NAME_1.mcap and so on.
     let part = |file: &Path| -> Option<(String, usize)> {
-        let name = file.file_stem()?.to_str()?;
-        let (name, number) = name
-            .split_once('.')
-            .map_or(name, |(name, _)| name)
-            .rsplit_once('_')?;
+        let stem = file.file_stem()?.to_str()?;
+        let (name, number) = stem.split('.').next()?.rsplit_once('_')?;
         Some((name.to_owned(), number.parse().ok()?))
     };
     files.sort_by_cached_key(|file| (part(file), file.clone()));
@@ -87,9 +80,8 @@ fn listed(folder: &Path) -> Result<Vec<PathBuf>, RecordingError> {
     };
     let in_line = first.trim().trim_matches(['[', ']']).split(',');
     let below = lines.map_while(|line| line.strip_prefix('-'));
-    let names = in_line
-        .chain(below)
-        .map(|name| name.trim().trim_matches(['"', '\'']));
+    let names = in_line.chain(below);
+    let names = names.map(|name| name.trim().trim_matches(['"', '\'']));
     // A list may name the folder too; files elsewhere are not the bag's.
     let names = names.filter_map(|name| Path::new(name).file_name());
     Ok(names.map(|name| folder.join(name)).collect())

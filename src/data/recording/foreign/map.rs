@@ -32,8 +32,8 @@ pub struct ColumnMap {
     /// The clock of all tables that have none of their own.
     pub(super) time: TimeMap,
     pub(super) names: Names,
-    joint: JointTables,
-    body: BodyTables,
+    joint: BTreeMap<String, Table>,
+    body: BTreeMap<String, Table>,
     feet: Option<Table>,
     /// The file that the map was read from, for messages.
     #[serde(skip)]
@@ -101,26 +101,6 @@ impl Default for Names {
             axes: ["x", "y", "z"].map(str::to_owned),
         }
     }
-}
-
-#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-struct JointTables {
-    position: Option<Table>,
-    velocity: Option<Table>,
-    acceleration: Option<Table>,
-    torque: Option<Table>,
-}
-
-#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-struct BodyTables {
-    position: Option<Table>,
-    orientation: Option<Table>,
-    velocity: Option<Table>,
-    angular_velocity: Option<Table>,
-    acceleration: Option<Table>,
-    angular_acceleration: Option<Table>,
 }
 
 /// Where one quantity stands: `value = sign x unit x raw + offset`.
@@ -237,21 +217,11 @@ impl ColumnMap {
 
     /// Where a quantity stands.
     pub(super) fn table(&self, quantity: Quantity) -> Option<&Table> {
-        let (joint, body) = (&self.joint, &self.body);
-        match quantity {
-            Quantity::JointPosition => &joint.position,
-            Quantity::JointVelocity => &joint.velocity,
-            Quantity::JointAcceleration => &joint.acceleration,
-            Quantity::JointTorque => &joint.torque,
-            Quantity::BodyPosition => &body.position,
-            Quantity::Orientation => &body.orientation,
-            Quantity::BodyVelocity => &body.velocity,
-            Quantity::AngularVelocity => &body.angular_velocity,
-            Quantity::BodyAcceleration => &body.acceleration,
-            Quantity::AngularAcceleration => &body.angular_acceleration,
-            Quantity::Feet => &self.feet,
+        match quantity.key().split_once('.') {
+            Some(("joint", name)) => self.joint.get(name),
+            Some((_, name)) => self.body.get(name),
+            None => self.feet.as_ref(),
         }
-        .as_ref()
     }
 
     /// The files or topics that the map names, each once, in its order.
@@ -273,12 +243,8 @@ impl ColumnMap {
         found: impl Into<String>,
         expected: impl Into<String>,
     ) -> RecordingError {
-        let place = crate::files::Place::Entry(format!("`{key}`").into());
-        RecordingError::new(
-            &self.file,
-            place,
-            RecordingFault::unexpected(found, expected),
-        )
+        let fault = RecordingFault::unexpected(found, expected);
+        RecordingError::new(&self.file, format!("`{key}`").into(), fault)
     }
 }
 
@@ -293,20 +259,40 @@ impl Table {
 
     /// Its columns, patterns and ranges written out.
     pub(super) fn columns(&self, names: &Names, quantity: Quantity) -> Vec<Name> {
-        let mut out = Vec::new();
-        for entry in self.entries() {
-            match entry {
-                Name::Number(number) => out.push(Name::Number(*number)),
-                Name::Text(text) => match range(text) {
-                    Some(numbers) => out.extend(numbers.map(Name::Number)),
-                    None => {
-                        let texts = pattern(text, names, quantity);
-                        out.extend(texts.into_iter().map(Name::Text));
-                    }
-                },
+        let written_out = |entry: &Name| -> Vec<Name> {
+            let Name::Text(text) = entry else {
+                return vec![entry.clone()];
+            };
+            let of_pattern = || pattern(text, names, quantity).into_iter().map(Name::Text);
+            let numbers = range(text).map(|all| all.map(Name::Number).collect());
+            numbers.unwrap_or_else(|| of_pattern().collect())
+        };
+        self.entries().iter().flat_map(written_out).collect()
+    }
+
+    /// A key that does not apply to the table of this quantity, and what may be there.
+    fn misplaced(&self, quantity: Quantity) -> Option<(&'static str, &'static str)> {
+        let angular = quantity == Quantity::AngularVelocity;
+        let is_velocity = angular || quantity == Quantity::BodyVelocity;
+        match self {
+            _ if self.frame.is_some() && !is_velocity => {
+                Some(("frame", "none: only velocities of the body have one"))
             }
+            _ if self.frame == Some(Frame::Angles) && !angular => {
+                Some(("frame", "`world` or `body`"))
+            }
+            _ if self.origin.is_some() && quantity != Quantity::BodyPosition => {
+                Some(("origin", "none: only `body.position` has one"))
+            }
+            _ if self.release.is_some() && self.threshold.is_none() => {
+                Some(("release", "a `threshold` beside it"))
+            }
+            _ if self.threshold.is_some() && quantity != Quantity::Feet => {
+                Some(("threshold", "none: only `feet` has one"))
+            }
+            _ if self.release > self.threshold => Some(("release", "at most the `threshold`")),
+            _ => None,
         }
-        out
     }
 }
 
@@ -347,6 +333,13 @@ fn pattern(text: &str, names: &Names, quantity: Quantity) -> Vec<String> {
 /// What a map may not state, whatever the log.
 impl ColumnMap {
     pub(super) fn require_applicable(&self) -> Result<(), RecordingError> {
+        for (group, tables) in [("joint", &self.joint), ("body", &self.body)] {
+            let known = Quantity::ALL.map(Quantity::key);
+            let mut keys = tables.keys().map(|name| format!("{group}.{name}"));
+            if let Some(key) = keys.find(|key| !known.contains(&&key[..])) {
+                return Err(self.fault(&key, "a table", format!("one of {}", known.join(", "))));
+            }
+        }
         for quantity in Quantity::ALL {
             let Some(table) = self.table(quantity) else {
                 if quantity.is_required() {
@@ -355,28 +348,8 @@ impl ColumnMap {
                 }
                 continue;
             };
-            let refuse =
-                |key: &str, expected: &str| Err(self.fault(&quantity.at(key), "a value", expected));
-            let angular = quantity == Quantity::AngularVelocity;
-            let velocity = quantity == Quantity::BodyVelocity;
-            match table.frame {
-                Some(_) if !angular && !velocity => {
-                    return refuse("frame", "none: only velocities of the body have one");
-                }
-                Some(Frame::Angles) if !angular => return refuse("frame", "`world` or `body`"),
-                Some(_) | None => {}
-            }
-            if table.origin.is_some() && quantity != Quantity::BodyPosition {
-                return refuse("origin", "none: only `body.position` has one");
-            }
-            if table.release.is_some() && table.threshold.is_none() {
-                return refuse("release", "a `threshold` beside it");
-            }
-            if table.threshold.is_some() && quantity != Quantity::Feet {
-                return refuse("threshold", "none: only `feet` has one");
-            }
-            if table.release > table.threshold {
-                return refuse("release", "at most the `threshold`");
+            if let Some((key, expected)) = table.misplaced(quantity) {
+                return Err(self.fault(&quantity.at(key), "a value", expected));
             }
             self.require_finite(quantity, table)?;
             self.require_distinct(quantity, table)?;
@@ -399,25 +372,28 @@ impl ColumnMap {
     }
 
     fn require_finite(&self, quantity: Quantity, table: &Table) -> Result<(), RecordingError> {
-        let factors = |factors: &Option<Factors>| match factors {
-            None => Vec::new(),
-            Some(Factors::All(value)) => vec![*value],
-            Some(Factors::Each(values)) => values.clone(),
-            Some(Factors::Named(values)) => values.values().copied().collect(),
+        let wrong = |factors: &Option<Factors>| match factors.as_ref()? {
+            Factors::All(value) => Some(*value).filter(|value| !value.is_finite()),
+            Factors::Each(values) => values.iter().find(|value| !value.is_finite()).copied(),
+            Factors::Named(values) => values.values().find(|value| !value.is_finite()).copied(),
         };
-        for (key, values) in [
-            ("time_offset_s", vec![table.time_offset_s]),
-            ("threshold", table.threshold.into_iter().collect()),
-            ("release", table.release.into_iter().collect()),
-            ("sign", factors(&table.sign)),
-            ("offset", factors(&table.offset)),
-        ] {
-            if let Some(value) = values.into_iter().find(|value| !value.is_finite()) {
-                let expected = "a finite number";
-                return Err(self.fault(&quantity.at(key), value.to_string(), expected));
+        let one = |value: Option<f64>| wrong(&value.map(Factors::All));
+        let found = [
+            ("time_offset_s", one(Some(table.time_offset_s))),
+            ("threshold", one(table.threshold)),
+            ("release", one(table.release)),
+            ("sign", wrong(&table.sign)),
+            ("offset", wrong(&table.offset)),
+        ];
+        match found
+            .into_iter()
+            .find_map(|(key, value)| Some((key, value?)))
+        {
+            None => Ok(()),
+            Some((key, value)) => {
+                Err(self.fault(&quantity.at(key), value.to_string(), "a finite number"))
             }
         }
-        Ok(())
     }
 
     /// No column of a table twice, and no range that no log could have.

@@ -28,9 +28,9 @@ const LEAST_WINDOW: u64 = 1 << 23;
 /// Whether a file is an MCAP log, by its name or its first bytes, or a folder with those of a bag. Pipes are not read
 /// from to find out.
 pub(in crate::recording) fn is_mcap(path: &Path) -> bool {
-    let has_ending = |ending: &str| {
-        let found = path.extension();
-        found.is_some_and(|found| found.eq_ignore_ascii_case(ending))
+    let has_ending = || {
+        path.extension()
+            .is_some_and(|e| e.eq_ignore_ascii_case("mcap"))
     };
     let begins = || {
         let mut start = Vec::new();
@@ -38,7 +38,7 @@ pub(in crate::recording) fn is_mcap(path: &Path) -> bool {
         let read = file.and_then(|mut file| file.read_to_end(&mut start));
         read.is_ok() && start == MCAP
     };
-    bag::is_bag(path) || has_ending("mcap") || (path.is_file() && begins())
+    bag::is_bag(path) || has_ending() || (path.is_file() && begins())
 }
 
 /// Reads every topic whose messages are numbers; others have their fault.
@@ -49,7 +49,15 @@ pub(in crate::recording) fn read_mcap(path: &Path) -> Result<Vec<Log>, Recording
         let open = File::open(&file);
         let open = open.map_err(|source| RecordingFault::unreadable("read", source).of(&file))?;
         topics.begin_file();
-        let mut scan = Scan::new(BufReader::new(open), &mut topics);
+        let mut scan = Scan {
+            source: BufReader::new(open),
+            topics: &mut topics,
+            offset: 0,
+            section: Crc::new(),
+            chunks: 0,
+            packed: 0,
+            unpacked: 0,
+        };
         let Some(early) = scan.whole(&file).map_err(|fault| fault.of(&file))? else {
             continue;
         };
@@ -81,19 +89,7 @@ struct Scan<'a, R> {
     unpacked: u64,
 }
 
-impl<'a, R: Read> Scan<'a, R> {
-    fn new(source: R, topics: &'a mut Topics) -> Self {
-        Self {
-            source,
-            topics,
-            offset: 0,
-            section: Crc::new(),
-            chunks: 0,
-            packed: 0,
-            unpacked: 0,
-        }
-    }
-
+impl<R: Read> Scan<'_, R> {
     /// Reads all records; words for a file that ends before its end.
     fn whole(&mut self, path: &Path) -> Result<Option<String>, RecordingFault> {
         let before = self.topics.messages;
@@ -232,19 +228,16 @@ impl<'a, R: Read> Scan<'a, R> {
             crc.update(&bytes);
             same_checksum(header.uncompressed_crc, crc.sum()).map_err(damaged)?;
         }
+        let split = |rest: &'_ [u8]| -> Option<(u8, usize)> {
+            let (header, rest) = rest.split_first_chunk::<RECORD_HEADER>()?;
+            let length = usize::try_from(u64::from_le_bytes(*header.last_chunk()?)).ok()?;
+            (length <= rest.len()).then_some((header[0], length))
+        };
         let mut rest = &bytes[..];
         while !rest.is_empty() {
-            let split = rest
-                .split_first_chunk::<RECORD_HEADER>()
-                .and_then(|(header, rest)| {
-                    let length = u64::from_le_bytes(*header.last_chunk()?);
-                    Some((
-                        header[0],
-                        rest.split_at_checked(usize::try_from(length).ok()?)?,
-                    ))
-                });
-            let (kind, (body, behind)) =
-                split.ok_or_else(|| damaged("it ends within a record".to_owned()))?;
+            let cut = || damaged("it ends within a record".to_owned());
+            let (kind, length) = split(rest).ok_or_else(cut)?;
+            let (body, behind) = rest[RECORD_HEADER..].split_at(length);
             match parsed(kind, body).map_err(damaged)? {
                 Some(Record::Chunk { .. }) => {
                     return Err(damaged("a chunk within a chunk".to_owned()));
@@ -261,9 +254,8 @@ impl<'a, R: Read> Scan<'a, R> {
 /// A record; none for an attachment, whose checksum is compared.
 fn parsed(kind: u8, body: &[u8]) -> Result<Option<Record<'_>>, String> {
     if kind != op::ATTACHMENT {
-        return parse_record(kind, body)
-            .map(Some)
-            .map_err(|error| error.to_string());
+        let record = parse_record(kind, body);
+        return record.map(Some).map_err(|error| error.to_string());
     }
     let ends = "an attachment without checksum";
     let (contents, stated) = body.split_last_chunk::<4>().ok_or(ends)?;
@@ -308,10 +300,8 @@ fn unpacked<'a>(
 ) -> Result<Cow<'a, [u8]>, String> {
     let size = header.uncompressed_size;
     if size > left {
-        let packed = data.len();
-        return Err(format!(
-            "{packed} bytes that unpack to {size}, expected at most {left}"
-        ));
+        let packed = format!("{} bytes that unpack to {size}", data.len());
+        return Err(format!("{packed}, expected at most {left}"));
     }
     let mut out = Vec::new();
     let mut read =

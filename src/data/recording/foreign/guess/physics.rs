@@ -7,7 +7,6 @@ use nalgebra::Vector3;
 
 use super::super::elements::Dimension;
 use crate::recording::mismatch::{foot_place, hip_torque, median_place, stances};
-use crate::recording::segment::stretches;
 use crate::recording::{Recording, Segment};
 use crate::robot::input_rule::rotation;
 use crate::robot::{GRAVITY_M_S2, JOINT_DIM, Leg, Robot, STATE_DIM};
@@ -313,12 +312,15 @@ impl<'a> View<'a> {
         let mut out = Vec::new();
         let forwards_and_up = |v: Vector3<f64>| Vector3::new(v.x, 0.0, v.z);
         for segment in &self.recording.segments {
-            let grounded = |sample: usize| segment.feet[sample].contains(&true);
             let step_s = segment.mean_step_s();
             let length = ((BLOCK_S / step_s).round() as usize).max(2);
-            for run in stretches(0..segment.len(), |a, b| grounded(a) == grounded(b)) {
+            let contacts = segment
+                .contacts()
+                .into_iter()
+                .filter(|(_, grounded)| *grounded);
+            for (run, _) in contacts {
                 let starts = run.clone().step_by(length);
-                for start in starts.filter(|start| grounded(*start) && start + length < run.end) {
+                for start in starts.filter(|start| start + length < run.end) {
                     let mut forces = [Vector3::zeros(); 2];
                     for sample in start..start + length {
                         let x = state(segment, sample, reading);
