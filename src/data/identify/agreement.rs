@@ -16,17 +16,13 @@ use crate::robot::Robot;
 
 /// Share by which the mass of a jump may differ from that of all, and the same in standard errors of that jump.
 const MASS: (f64, f64) = (0.05, 4.0);
-/// Fewest blocks of a jump whose mass is compared.
-const LEAST_BLOCKS: usize = 3;
+const LEAST_BLOCKS: usize = 3; // fewest blocks of a jump whose mass is compared
 
-/// Refuses recordings that contradict physics, or each other by what their torques carry.
 pub(super) fn require_physics(
     recordings: &[Recording],
     robot: &Robot,
 ) -> Result<(), IdentifyError> {
-    let balances = recordings
-        .iter()
-        .map(|recording| Balance::of(recording, robot));
+    let balances = (recordings.iter()).map(|recording| Balance::of(recording, robot));
     let balances: Vec<Balance> = balances.collect();
     match contradiction(&balances) {
         None => Ok(()),

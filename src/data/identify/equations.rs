@@ -128,14 +128,12 @@ impl SampleEquations {
 struct BodyEquation([[f64; BODY_ROWS]; 3]);
 
 impl BodyEquation {
-    /// Adds a vector to the coefficients of an unknown, or to the left side.
     fn add(&mut self, unknown: usize, vector: Vector3<f64>) {
         for axis in 0..3 {
             self.0[axis][unknown] += vector[axis];
         }
     }
 
-    /// Takes a vector from the coefficients of an unknown.
     fn subtract(&mut self, unknown: usize, vector: &Vector3<f64>) {
         for axis in 0..3 {
             self.0[axis][unknown] -= vector[axis];
@@ -185,7 +183,6 @@ const OWN: [usize; 7] = [
 /// One leg at one sample; vectors over joints unless they are directions.
 struct LegSample {
     frame: LegFrame,
-    /// Angular velocity of the trunk in the world, rad/s.
     trunk_rate: Vector3<f64>,
     rate: Vector3<f64>,
     acceleration: Vector3<f64>,
@@ -202,7 +199,6 @@ impl LegSample {
         Vector3::new(self.frame.abduction.dot(moment), flexion, flexion)
     }
 
-    /// Angular velocity of the calf in the world, rad/s.
     fn calf_rate(&self) -> Vector3<f64> {
         self.trunk_rate
             + self.frame.abduction * self.rate[0]

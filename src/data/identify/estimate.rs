@@ -21,16 +21,11 @@ use crate::recording::check::check;
 use crate::recording::clock::{Timed, timed};
 use crate::robot::{Actuators, GRAVITY_M_S2, JOINT_DIM, Leg, Robot};
 
-/// Fewest samples with feet on the ground.
-const LEAST_CONTACT_SAMPLES: usize = 100;
-/// Fewest windows with moving legs; there are 23 unknowns.
-const LEAST_WINDOWS: usize = 30;
-/// Most rounds; a clean recording needs about eight.
-const MOST_ROUNDS: usize = 30;
-/// Largest change of the delay in a round, s.
-const LARGEST_DELAY_CHANGE_S: f64 = 0.004;
-/// Largest delay either way, s.
-const LARGEST_DELAY_S: f64 = 0.06;
+const LEAST_CONTACT_SAMPLES: usize = 100; // fewest samples with feet on the ground
+const LEAST_WINDOWS: usize = 30; // fewest windows with moving legs; there are 23 unknowns
+const MOST_ROUNDS: usize = 30; // most rounds; a clean recording needs about eight
+const LARGEST_DELAY_CHANGE_S: f64 = 0.004; // largest change of the delay in a round, s
+const LARGEST_DELAY_S: f64 = 0.06; // largest delay either way, s
 /// Changes in a round below which the rounds end: of the delay (s), of the mass (relative).
 const SETTLED: [f64; 2] = [2e-5, 1e-4];
 
@@ -111,7 +106,6 @@ fn require_enough(windows: &Windows, recordings: usize) -> Result<(), IdentifyEr
     }
 }
 
-/// What is clipped, left out or lacking in the windows.
 fn exclusions(windows: &Windows) -> Vec<String> {
     let (clipped, singular) = (windows.clipped_torques, windows.singular_samples);
     let notes = [
@@ -161,7 +155,6 @@ impl State {
         Ok(windows)
     }
 
-    /// One fit; whether it changed nothing that matters.
     fn improve(&mut self, windows: &Windows, robot: &Robot) -> Result<bool, IdentifyError> {
         const LEAST_ROUNDS: usize = 6;
         let priors = priors(robot.geometry(Leg::FrontLeft), self.mass_kg, &self.losses);
@@ -268,9 +261,7 @@ fn implausible(recording: &Recording, robot: &Robot) -> Option<String> {
     for finding in check(recording, robot) {
         *counts.entry(finding.kind.description()).or_default() += finding.samples.len();
     }
-    let listed = counts
-        .iter()
-        .map(|(kind, count)| format!("{kind} ({count})"));
+    let listed = (counts.iter()).map(|(kind, count)| format!("{kind} ({count})"));
     let listed = listed.collect::<Vec<_>>().join(", ");
     let path = recording.path.display();
     (!listed.is_empty()).then(|| {

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use super::error::IdentifyError;
-use super::identification::{Fit, Identification, Legs, PerKind, Samples};
+use super::identification::{Fit, Identification, Legs, Samples};
 use crate::files::{Fault, Located, Place, read_toml};
 use crate::robot::JOINT_NAMES;
 
@@ -32,12 +32,12 @@ impl Identification {
             &gravity_and_mass(error.gravity_m_s2, error.mass_kg),
         );
         numbers(&mut out, &[("delay_s", error.delay_s)]);
-        for (name, PerKind { hx, hy, kn }) in [
+        for (name, kinds) in [
             ("viscous_nm_s_rad", error.viscous_nm_s_rad),
             ("dry_nm", error.dry_nm),
             ("armature_kg_m2", error.armature_kg_m2),
         ] {
-            let [hx, hy, kn] = [hx, hy, kn].map(number);
+            let [hx, hy, kn] = kinds.to_array().map(number);
             let _ = writeln!(out, "{name} = {{ hx = {hx}, hy = {hy}, kn = {kn} }}");
         }
         table(&mut out, "standard_error.legs", &legs(&error.legs));

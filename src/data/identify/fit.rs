@@ -13,8 +13,7 @@ use super::windows::{Group, OVERLAP, Row};
 pub(crate) type Estimate = SVector<f64, PARAMETER_DIM>;
 type Square = SMatrix<f64, PARAMETER_DIM, PARAMETER_DIM>;
 
-/// Deviations of a residual from which it counts less.
-const HUBER: f64 = 3.0;
+const HUBER: f64 = 3.0; // deviations of a residual from which it counts less
 /// Smallest deviation of a group, m/s^2: what the model leaves out of the best recordings.
 const LEAST_DEVIATION: f64 = 0.005;
 /// Weights of body and joint rows before the deviations are known.
@@ -111,10 +110,8 @@ impl Normal {
 /// What a row's equation leaves unexplained, m/s^2.
 pub(crate) fn residual(row: &Row, estimate: &Estimate, mass_kg: f64) -> f64 {
     let pairs = row.coefficients.iter().zip(estimate.iter());
-    left(row, mass_kg)
-        - pairs
-            .map(|(coefficient, value)| coefficient * value)
-            .sum::<f64>()
+    let products = pairs.map(|(coefficient, value)| coefficient * value);
+    left(row, mass_kg) - products.sum::<f64>()
 }
 
 fn left(row: &Row, mass_kg: f64) -> f64 {
@@ -165,8 +162,11 @@ impl Iteration {
     ) -> Option<Estimate> {
         let whole = self.normal(rows, priors, mass_kg);
         let (_, bounded) = whole.solve_not_negative()?;
-        let everything: Vec<usize> = (0..PARAMETER_DIM).collect();
-        let parts = |grouping: &Vec<usize>| self.parts(rows, grouping, mass_kg);
+        let parts = |grouping: &Vec<usize>| {
+            let count = grouping.iter().max().map_or(0, |last| last + 1);
+            let all = self.normals(rows, mass_kg, |row| grouping[row.block], count);
+            all.filter(|part| part.matrix.trace() > 0.0).collect()
+        };
         let parts: Vec<Vec<Normal>> = groupings.iter().map(parts).collect();
         let over = |free: &[usize]| {
             let mut largest = Estimate::zeros();
@@ -178,7 +178,7 @@ impl Iteration {
         };
         let mut variances = over(&bounded)?;
         if bounded.len() < PARAMETER_DIM {
-            let free = over(&everything)?;
+            let free = over(&Vec::from_iter(0..PARAMETER_DIM))?;
             for at_zero in (0..PARAMETER_DIM).filter(|i| !bounded.contains(i)) {
                 variances[at_zero] = free[at_zero];
             }
@@ -186,23 +186,26 @@ impl Iteration {
         Some(variances)
     }
 
-    /// The normal equations of every group that has rows.
-    fn parts(&self, rows: &[Row], grouping: &[usize], mass_kg: f64) -> Vec<Normal> {
-        let count = grouping.iter().max().map_or(0, |last| last + 1);
-        let mut parts = vec![Normal::default(); count];
+    /// The normal equations of the rows of each group.
+    fn normals(
+        &self,
+        rows: &[Row],
+        mass_kg: f64,
+        group: impl Fn(&Row) -> usize,
+        count: usize,
+    ) -> impl Iterator<Item = Normal> {
+        let mut normals = vec![Normal::default(); count];
         for row in rows.iter().filter(|row| row.moving) {
-            parts[grouping[row.block]].add(row, left(row, mass_kg), self.weight(row, mass_kg));
+            normals[group(row)].add(row, left(row, mass_kg), self.weight(row, mass_kg));
         }
-        let used = (parts.into_iter()).filter(|part| part.matrix.trace() > 0.0);
-        used.map(Normal::symmetric).collect()
+        normals.into_iter().map(Normal::symmetric)
     }
 
     fn normal(&self, rows: &[Row], priors: &[Prior], mass_kg: f64) -> Normal {
-        let mut normal = Normal::default();
-        for row in rows.iter().filter(|row| row.moving) {
-            normal.add(row, left(row, mass_kg), self.weight(row, mass_kg));
-        }
-        let mut normal = normal.symmetric();
+        let mut normal = self
+            .normals(rows, mass_kg, |_| 0, 1)
+            .next()
+            .unwrap_or_default();
         for prior in priors {
             let weight = (mass_kg / prior.deviation).powi(2);
             for (i, a) in &prior.terms {
@@ -252,7 +255,6 @@ fn spread(whole: &Normal, parts: &[Normal], free: &[usize]) -> Option<Estimate> 
     Some(sum * ((count - 1.0) / count))
 }
 
-/// Gravity and inverse mass by the feet's forces alone, over rows in contact; `None` without any.
 pub(crate) fn force_alone(rows: &[Row]) -> Option<Estimate> {
     let mut normal = Normal::default();
     let is_contact = |row: &&Row| matches!(row.group, Group::Contact(_));

@@ -43,8 +43,7 @@ pub struct Motion {
 
 /// Rows of the trunk's axes in [`Motion::directions`].
 const TRUNK_ROWS: usize = 9;
-/// Rows of a leg there.
-const LEG_ROWS: usize = 15;
+const LEG_ROWS: usize = 15; // rows of a leg there
 
 impl Motion {
     /// The motion of a robot's segment of at least two samples.
@@ -71,9 +70,7 @@ impl Motion {
                 + heading * Vector3::y() * dpitch
                 + Vector3::z() * dyaw;
             let mut put = |row: usize, velocity: Vector3<f64>| {
-                rates
-                    .fixed_view_mut::<3, 1>(row, sample)
-                    .copy_from(&velocity);
+                (rates.fixed_view_mut::<3, 1>(row, sample)).copy_from(&velocity);
             };
             for axis in 0..3 {
                 put(3 * axis, rate.cross(&attitude.column(axis)));
@@ -102,7 +99,6 @@ impl Motion {
         rows.into_owned()
     }
 
-    /// Second derivative of a trunk axis (0 x, 1 y, 2 z), 1/s^2.
     pub(crate) fn trunk_axis(&self, axis: usize, sample: usize) -> Vector3<f64> {
         self.direction(3 * axis, sample)
     }
@@ -120,7 +116,6 @@ impl Motion {
     }
 }
 
-/// A leg's axes and directions, and the velocities of the directions.
 fn leg_frame(
     attitude: &Matrix3<f64>,
     rate: &Vector3<f64>,

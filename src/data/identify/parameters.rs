@@ -44,8 +44,7 @@ pub(crate) struct Prior {
 const LEG_SHARE: f64 = 0.13;
 /// Least distance of a leg from its axis of abduction that counts, over the thigh's length.
 const LEAST_SIDE: f64 = 0.1;
-/// Second moment of a uniform rod over length times first moment.
-const ROD: f64 = 2.0 / 3.0;
+const ROD: f64 = 2.0 / 3.0; // second moment of a uniform rod over length times first moment
 /// Deviation of a hip's loss from that of the thigh joint of the same leg, relative, and the smallest loss that it
 /// counts from.
 const HIP_LIKE_THIGH: [(usize, f64, f64); 3] = [

@@ -16,22 +16,17 @@ use crate::recording::segment::stretches;
 use crate::recording::smoothing::SavitzkyGolay;
 use crate::robot::JOINT_DIM;
 
-/// Length of a window, s.
-const WINDOW_S: f64 = 0.03;
-/// Distance of windows from a change of the feet on the ground, s.
-const MARGIN_S: f64 = 0.02;
-/// Windows a window's length: neighbours overlap.
-pub(crate) const OVERLAP: usize = 4;
-/// Length of the blocks that are left out in turn for standard errors, s.
-const BLOCK_S: f64 = 0.1;
+const WINDOW_S: f64 = 0.03; // length of a window, s
+const MARGIN_S: f64 = 0.02; // distance of windows from a change of the feet on the ground, s
+pub(crate) const OVERLAP: usize = 4; // windows a window's length: neighbours overlap
+const BLOCK_S: f64 = 0.1; // length of the blocks that are left out in turn for standard errors, s
 /// Fewest jumps that are left out in turn, too, and the largest share of all equations that one of them may have.
 const LEAST_JUMPS: usize = 6;
 const LARGEST_SHARE: f64 = 1.0 / 3.0;
 /// Mean speed of the bearing joints from which their dry friction has a direction, rad/s: of hips and knees, and for
 /// accelerations sideways of the abductions, too, for a joint at rest holds any torque up to that friction.
 const MOVING_RAD_S: f64 = 0.1;
-/// Axis along which abductions push.
-const SIDEWAYS: usize = 1;
+const SIDEWAYS: usize = 1; // axis along which abductions push
 /// Speed that a joint in the air keeps over a window for the same reason, rad/s.
 const TURNING_RAD_S: f64 = 0.15;
 
@@ -39,7 +34,6 @@ const TURNING_RAD_S: f64 = 0.15;
 pub(crate) enum Group {
     /// Trunk's acceleration along an axis (x, y, z) with feet on the ground.
     Contact(usize),
-    /// The same in flight.
     Flight(usize),
     /// Torque of a joint (hx, hy, kn) of a leg in the air.
     Joint(usize),

@@ -17,28 +17,23 @@ use crate::robot::joints::LEG_JOINT_DIM;
 use crate::robot::kinematics::{LEAST_HEIGHT, LEAST_SPAN};
 use crate::robot::{JOINT_DIM, Leg, Robot, STATE_DIM};
 
-/// Torque and speed over a joint's limit that are still accepted.
-const TORQUE_FACTOR: f64 = 1.1;
+const TORQUE_FACTOR: f64 = 1.1; // torque and speed over a joint's limit that are still accepted
 const SPEED_FACTOR: f64 = 1.1;
 /// Angle beyond a joint's limits that is still accepted, in rad.
 pub const JOINT_MARGIN_RAD: f64 = 0.05;
 /// Largest speed of the body along an axis, in m/s.
 pub const BODY_SPEED_M_S: f64 = 10.0;
-/// Largest rate of a body angle, in rad/s.
-const BODY_RATE_RAD_S: f64 = 30.0;
+const BODY_RATE_RAD_S: f64 = 30.0; // largest rate of a body angle, in rad/s
 /// Disagreement of a rate with differences, as a share of the 95th percentile of that rate, that is still accepted on
 /// top of the floor and of what the noise of the differentiated column explains.
 const CONSISTENCY_SHARE: f64 = 0.3;
 /// Floor of that disagreement for velocities: joints, body linear, body angular.
 const VELOCITY_FLOOR: [f64; 3] = [1.0, 0.2, 0.5];
-/// The same for accelerations.
-const ACCELERATION_FLOOR: [f64; 3] = [100.0, 10.0, 50.0];
-/// Coordinates of the body along the floor.
-const BODY_XY: Range<usize> = JOINT_DIM..JOINT_DIM + 2;
+const ACCELERATION_FLOOR: [f64; 3] = [100.0, 10.0, 50.0]; // the same for accelerations
+const BODY_XY: Range<usize> = JOINT_DIM..JOINT_DIM + 2; // coordinates of the body along the floor
 /// Equal consecutive velocities at an extreme that count as clipped.
 const CLIPPED_SAMPLES: usize = 5;
-/// Departure of a time step from the median, as a share of it.
-const STEP_SHARE: f64 = 0.5;
+const STEP_SHARE: f64 = 0.5; // departure of a time step from the median, as a share of it
 
 /// What is wrong with a run of samples; a finding's `bound` is what its `value` breaks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -10,6 +10,8 @@ use super::error::{RecordingError, RecordingFault};
 use crate::files::magic::{MAGIC_BYTES, recognised};
 use crate::files::size::{Capped, Format};
 
+/// Most samples read from a file: half an hour at 2 ms.
+pub(super) const MAX_ROWS: usize = 1_000_000;
 /// Longest line accepted, in bytes: some thirty times a row of 71 columns.
 pub(super) const MAX_LINE_BYTES: usize = 1 << 16;
 
@@ -30,7 +32,6 @@ pub(super) struct Lines<'a> {
 }
 
 impl<'a> Lines<'a> {
-    /// Of a file, plain or gzip.
     pub(crate) fn open(path: &'a Path) -> Result<Self, RecordingError> {
         let file = File::open(path)
             .map_err(|source| RecordingFault::unreadable("open", source).of(path))?;
@@ -117,7 +118,6 @@ impl<'a> Lines<'a> {
         }
     }
 
-    /// Refuses to read on after too many empty lines.
     fn count_blank(&mut self) -> Result<(), RecordingError> {
         let is_blank = match self.buffer.first() {
             Some(first) if first.is_ascii_graphic() => false,
@@ -169,7 +169,6 @@ pub(super) fn count(line: &str, character: char) -> usize {
     line.bytes().filter(|byte| *byte == wanted).count()
 }
 
-/// A cell without white space around it; most have none.
 fn trimmed(cell: &str) -> &str {
     match cell.as_bytes() {
         [first, .., last] if first.is_ascii_graphic() && last.is_ascii_graphic() => cell,
@@ -188,7 +187,6 @@ enum Mark {
 pub(super) struct NumberReader {
     /// The first one met holds for the rest.
     mark: Option<Mark>,
-    /// A cell with its comma replaced, kept to spare an allocation a cell.
     pointed: String,
 }
 

@@ -27,22 +27,18 @@ pub(super) use stance::{foot_place, median_place, stances};
 const SLIP_M: f64 = 0.025;
 /// How many times better feet have to stay in place under another reading of the columns.
 const READING_FACTOR: f64 = 1.4;
-/// By how much they have to stay better in place, m.
-const READING_LEAST_M: f64 = 3e-4;
+const READING_LEAST_M: f64 = 3e-4; // by how much they have to stay better in place, m
 /// How many times, and by how much, m, feet stay better where they are with the body's place read otherwise.
 const PLACE: (f64, f64) = (2.0, 0.004);
-/// Vertical acceleration of the body in flight, m/s^2.
-const FALL_M_S2: (f64, f64) = (-16.0, -6.5);
+const FALL_M_S2: (f64, f64) = (-16.0, -6.5); // vertical acceleration of the body in flight, m/s^2
 /// Force of the feet over what weight and acceleration need.
 const WEIGHT_SHARE: (f64, f64) = (0.45, 1.7);
 /// Least share of the hips' torques that hold the feet on their own side: 1 for vertical forces.
 const HIP_SHARE: f64 = -0.3;
-/// The same where both legs of one end alone are below that.
-const HIP_SHARE_OF_PAIR: f64 = -0.5;
+const HIP_SHARE_OF_PAIR: f64 = -0.5; // the same where both legs of one end alone are below that
 /// Largest median difference of the body's acceleration and the slope of its velocity, m/s^2.
 const ACCELERATION_M_S2: f64 = 2.0;
-/// Share of the weight below which torques carry nothing.
-const NOTHING_CARRIED: f64 = 0.02;
+const NOTHING_CARRIED: f64 = 0.02; // share of the weight below which torques carry nothing
 /// How many times more or less of the weight the torques of one recording may carry than those of most.
 const OTHER_SHARE: f64 = 2.0;
 /// Logarithm of the share of the weight from which another robot may explain it, and up to which it does.
@@ -305,8 +301,7 @@ const FACTORS: [(f64, &str, &str); 6] = [
     ),
     (-1.0, "the other sign", ""),
 ];
-/// Distance from such a factor, as a share of it.
-const FACTOR_SHARE: f64 = 0.1;
+const FACTOR_SHARE: f64 = 0.1; // distance from such a factor, as a share of it
 
 /// Velocities that are a multiple of the changes of their positions.
 fn rates(recording: &Recording) -> Option<Mismatch> {

@@ -19,10 +19,8 @@ use crate::robot::FOOT_DIM;
 
 /// Largest distance between samples of a topic that is interpolated, in s.
 const MAX_GAP_S: f64 = 0.05;
-/// How far the length of a quaternion may be from one.
-const QUATERNION_TOLERANCE: f64 = 0.05;
-/// Most samples of a recording that is resampled.
-const MAX_RESAMPLED: usize = 10_000_000;
+const QUATERNION_TOLERANCE: f64 = 0.05; // how far the length of a quaternion may be from one
+const MAX_RESAMPLED: usize = 10_000_000; // most samples of a recording that is resampled
 
 /// Makes a recording of the logs as the map says, with notes of what was derived, resampled, turned or cut.
 pub(in crate::recording) fn assemble(
@@ -70,7 +68,6 @@ pub(in crate::recording) fn assemble(
     rows.recording()
 }
 
-/// The quantities that the log has, and the rows that they become.
 struct Rows<'a> {
     path: &'a Path,
     logs: &'a [Log],
@@ -78,7 +75,6 @@ struct Rows<'a> {
     first_row: usize,
     /// Times of the recording: those of the joints' positions unless all are brought to others.
     times_s: Vec<f64>,
-    /// Stretches of increasing time.
     ranges: Vec<Range<usize>>,
     signals: BTreeMap<Quantity, Signal>,
     notes: Vec<String>,
@@ -218,7 +214,6 @@ impl Rows<'_> {
         Ok(times)
     }
 
-    /// Brings every quantity to the times of the recording.
     fn resample(&mut self) -> Result<(), RecordingError> {
         let mut values = Vec::new();
         for (quantity, signal) in &self.signals {
@@ -233,9 +228,7 @@ impl Rows<'_> {
                 _ => Between::Smooth,
             };
             let rates = self.known_rates(*quantity);
-            let slopes = rates
-                .filter(|rates| rates.times_s == *own_s)
-                .map(|rates| &rates.values);
+            let slopes = (rates.filter(|rates| rates.times_s == *own_s)).map(|rates| &rates.values);
             values.push(at_times(
                 own_s,
                 &signal.values,
@@ -287,7 +280,6 @@ impl Rows<'_> {
         Ok(())
     }
 
-    /// Velocities that the log does not have are differences of positions.
     fn derive_velocities(&mut self) {
         for (velocity, of) in [
             (Quantity::JointVelocity, Quantity::JointPosition),

@@ -3,7 +3,6 @@
 use crate::recording::columns::Column;
 use crate::robot::{JOINT_DIM, JOINT_NAMES, STATE_DIM};
 
-/// A quantity that a map places.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Quantity {
     JointPosition,
@@ -19,7 +18,6 @@ pub(super) enum Quantity {
     BodyAcceleration,
     /// Second derivatives of roll, pitch and yaw.
     AngularAcceleration,
-    /// Contact, or forces at the feet.
     Feet,
 }
 
@@ -81,14 +79,12 @@ impl Quantity {
         self.facts().1
     }
 
-    /// The recording's column of an element.
     pub(crate) fn column(self, element: usize) -> Column {
         let (_, _, column, first) = self.facts();
         debug_assert!(first + element < STATE_DIM, "w of a quaternion");
         column(first + element)
     }
 
-    /// Whether a recording cannot be without it.
     pub(crate) fn is_required(self) -> bool {
         use Quantity::{BodyPosition, Feet, JointPosition, JointTorque, Orientation};
         [JointPosition, JointTorque, BodyPosition, Orientation, Feet].contains(&self)
@@ -102,7 +98,6 @@ impl Quantity {
         self.is_of_joints() || self == Self::Feet
     }
 
-    /// Names of its elements in romc's order; a quaternion has [`QUATERNION`] instead.
     pub(crate) fn elements(self) -> &'static [&'static str] {
         match self {
             _ if self.is_of_joints() => &JOINT_NAMES,
@@ -211,30 +206,5 @@ impl Dimension {
     pub(crate) fn names(self) -> String {
         let names: Vec<&str> = self.units().iter().map(|(name, _)| *name).collect();
         names.join(", ")
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn ordered_wildcards_and_letters_stand_for_elements() {
-        for (quantity, words, expected) in [
-            (
-                Quantity::JointTorque,
-                "*.hx *.hy *.kn",
-                &[0, 3, 6, 9, 1, 4, 7, 10, 2, 5, 8, 11][..],
-            ),
-            (Quantity::Feet, "fl fr rl rr", &[1, 0, 3, 2]),
-            (Quantity::Orientation, "ypr", &[2, 1, 0]),
-            (Quantity::BodyPosition, "zxy", &[2, 0, 1]),
-        ] {
-            let words: Vec<String> = words.split_whitespace().map(str::to_owned).collect();
-            let found = ordered(&words, quantity.elements());
-            assert_eq!(found.as_deref(), Ok(expected), "{words:?}");
-        }
-        let unknown = ordered(&["FR.hz".to_owned()], Quantity::JointPosition.elements());
-        assert!(unknown.is_err_and(|found| found.starts_with("`FR.hz`")));
     }
 }

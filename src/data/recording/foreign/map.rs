@@ -21,8 +21,7 @@ use super::elements::Quantity;
 use crate::files::read_toml;
 use crate::recording::error::{RecordingError, RecordingFault};
 
-/// Most columns that a range stands for.
-const MAX_COLUMNS: usize = 10_000;
+const MAX_COLUMNS: usize = 10_000; // most columns that a range stands for
 
 /// A map as its file states it.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
@@ -45,9 +44,7 @@ pub struct ColumnMap {
 #[serde(deny_unknown_fields, default)]
 pub(in crate::recording) struct TextFormat {
     pub delimiter: Option<Delimiter>,
-    /// Whether the first line has names.
     pub header: Option<bool>,
-    /// Lines before the first that counts.
     pub skip: usize,
     /// Empty cells and NaN are samples that a quantity does not have, where topics share one table.
     pub blank: bool,
@@ -58,12 +55,10 @@ pub(in crate::recording) struct TextFormat {
     pub own: bool,
 }
 
-/// Separator of cells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(in crate::recording) enum Delimiter {
     Tab,
-    /// Any number of blanks or tabs.
     Blank,
     Comma,
     Semicolon,
@@ -72,15 +67,10 @@ pub(in crate::recording) enum Delimiter {
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct TimeMap {
-    /// Absent with `sample_time_s`.
     pub column: Option<Name>,
-    /// [default: s]; dates and times of day are found by themselves.
     pub unit: Option<String>,
-    /// Distance of samples without a clock.
     pub sample_time_s: Option<f64>,
-    /// Even steps to bring the recording to.
     pub resample_s: Option<f64>,
-    /// Largest distance between samples of a topic that is interpolated [default: 0.05].
     pub max_gap_s: Option<f64>,
 }
 
@@ -107,26 +97,19 @@ impl Default for Names {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Table {
-    /// Names, numbers from 1, ranges such as `"4..6"`, or one pattern.
-    pub columns: Columns,
-    /// The file or topic that they are in [default: the only one].
+    pub columns: List<Name>,
     #[serde(alias = "topic")]
     pub file: Option<String>,
-    /// Column of a clock of their own.
     pub time: Option<Name>,
     pub time_unit: Option<String>,
-    /// Added to the clock.
     #[serde(default)]
     pub time_offset_s: f64,
     /// [default: SI]
     pub unit: Option<String>,
-    /// 1 or -1.
     pub sign: Option<Factors>,
     /// Added after sign and unit, in SI units.
     pub offset: Option<Factors>,
-    /// What each column is [default: romc's order].
-    pub order: Option<Words>,
-    /// Axes of velocities [default: `world`]; of angular velocities [default: `angles`].
+    pub order: Option<List<String>>,
     pub frame: Option<Frame>,
     pub origin: Option<Origin>,
     /// Force from which a foot is on the ground, in the table's unit; absent for flags.
@@ -143,20 +126,21 @@ pub(super) enum Name {
     Text(String),
 }
 
+/// One or several of a kind; several words also in one text with blanks between them.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 #[serde(untagged)]
-pub(super) enum Columns {
-    /// One name, range or pattern.
-    One(Name),
-    Many(Vec<Name>),
+pub(super) enum List<T> {
+    One(T),
+    Many(Vec<T>),
 }
 
-/// Words, also in one text with blanks between them.
-#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
-#[serde(untagged)]
-pub(super) enum Words {
-    One(String),
-    Many(Vec<String>),
+impl<T> List<T> {
+    pub(super) fn entries(&self) -> &[T] {
+        match self {
+            List::One(one) => std::slice::from_ref(one),
+            List::Many(all) => all,
+        }
+    }
 }
 
 /// A number for all columns, for each in their order, or by the names of elements (`*.kn`).
@@ -168,24 +152,18 @@ pub(super) enum Factors {
     Named(BTreeMap<String, f64>),
 }
 
-/// Axes of a velocity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Frame {
     World,
-    /// The trunk's own.
-    Body,
-    /// Rates of roll, pitch and yaw.
-    Angles,
+    Body,   // the trunk's own axes
+    Angles, // rates of roll, pitch and yaw
 }
 
-/// Where positions count from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Origin {
-    /// The first sample, for x and y.
     Start,
-    /// As logged.
     Log,
 }
 
@@ -193,7 +171,7 @@ impl ColumnMap {
     /// Reads a map.
     ///
     /// # Errors
-    /// [`RecordingFault::MapSyntax`] with line, key and what was expected; [`RecordingFault::Unexpected`] for
+    /// [`RecordingFault::Text`] with line, key and what was expected; [`RecordingFault::Unexpected`] for
     /// a key that does not apply to its table.
     pub fn read(path: &Path) -> Result<Self, RecordingError> {
         let text = read_toml(path)
@@ -207,8 +185,9 @@ impl ColumnMap {
     /// As [`Self::read`].
     pub fn parse(file: &str, text: &str) -> Result<Self, RecordingError> {
         let mut map: Self = toml::from_str(text).map_err(|error| {
-            let message = error.to_string().trim_end().to_owned();
-            RecordingFault::MapSyntax(message).of(Path::new(file))
+            let message = error.to_string();
+            let message = message.trim_end();
+            RecordingFault::Text(format!("no map of columns: {message}")).of(Path::new(file))
         })?;
         map.file = file.to_owned();
         map.require_applicable()?;
@@ -236,7 +215,6 @@ impl ColumnMap {
         out
     }
 
-    /// The fault of a key.
     pub(super) fn fault(
         &self,
         key: &str,
@@ -249,14 +227,6 @@ impl ColumnMap {
 }
 
 impl Table {
-    /// Its columns as the file has them.
-    pub(super) fn entries(&self) -> &[Name] {
-        match &self.columns {
-            Columns::One(name) => std::slice::from_ref(name),
-            Columns::Many(names) => names,
-        }
-    }
-
     /// Its columns, patterns and ranges written out.
     pub(super) fn columns(&self, names: &Names, quantity: Quantity) -> Vec<Name> {
         let written_out = |entry: &Name| -> Vec<Name> {
@@ -267,7 +237,9 @@ impl Table {
             let numbers = range(text).map(|all| all.map(Name::Number).collect());
             numbers.unwrap_or_else(|| of_pattern().collect())
         };
-        self.entries().iter().flat_map(written_out).collect()
+        (self.columns.entries().iter())
+            .flat_map(written_out)
+            .collect()
     }
 
     /// A key that does not apply to the table of this quantity, and what may be there.
@@ -401,7 +373,7 @@ impl ColumnMap {
         let refuse = |found: String, expected: &str| {
             Err(self.fault(&quantity.at("columns"), found, expected))
         };
-        for entry in table.entries() {
+        for entry in table.columns.entries() {
             let Name::Text(text) = entry else { continue };
             if range(text).is_some_and(|all| all.end().saturating_sub(*all.start()) >= MAX_COLUMNS)
             {

@@ -3,20 +3,15 @@
 
 use std::collections::BTreeMap;
 
-/// Longest array whose entries become columns: an image is no column.
-const MOST_ENTRIES: usize = 64;
-/// Most numbers of a message.
-const MOST_NUMBERS: usize = 4096;
+const MOST_ENTRIES: usize = 64; // longest array whose entries become columns: an image is no column
+const MOST_NUMBERS: usize = 4096; // most numbers of a message
 /// Most fields of a message without bytes of their own: empty messages.
 const MOST_EMPTY: usize = 100_000;
-/// Deepest nesting of messages.
-const MOST_LEVELS: usize = 16;
+const MOST_LEVELS: usize = 16; // deepest nesting of messages
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Layout {
-    /// Packed, little endian.
     Ros1,
-    /// CDR with its header.
     Ros2,
 }
 
@@ -27,7 +22,6 @@ enum Kind {
     Signed(usize),
     Float(usize),
     Text,
-    /// Seconds and nanoseconds.
     Time,
     Message(usize),
 }
@@ -55,13 +49,11 @@ pub(super) struct Definition {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Value {
     Number(f64),
-    /// Seconds and nanoseconds.
     Time(i64, u32),
 }
 
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Numbers {
-    /// Their names, if these are asked for.
     pub names: Vec<String>,
     pub values: Vec<Value>,
     /// Lengths and names of its lists: messages of one type that agree in them have the same numbers in the same order.
@@ -283,9 +275,7 @@ impl<'a> Cursor<'a> {
                     Kind::Message(part) => self.message(of, part, kept)?,
                     kind => {
                         let value = self.value(kind)?;
-                        value
-                            .filter(|_| kept)
-                            .map_or(Ok(()), |value| self.keep(value))?;
+                        (value.filter(|_| kept)).map_or(Ok(()), |value| self.keep(value))?;
                     }
                 }
             }

@@ -4,11 +4,10 @@ use nalgebra::DMatrix;
 
 use super::elements::{Dimension, QUATERNION, Quantity, named, ordered};
 use super::log::{Channel, Log};
-use super::map::{ColumnMap, Factors, Name, Table, Words};
+use super::map::{ColumnMap, Factors, List, Name, Table};
 use crate::recording::error::{RecordingError, RecordingFault};
 use crate::recording::instant::Instant;
 
-/// A quantity with the clock that it was logged by.
 #[derive(Debug, Clone)]
 pub(super) struct Signal {
     /// One row an element in romc's order, one column a sample; a quaternion has four rows, w first.
@@ -107,7 +106,6 @@ impl<'a> Source<'a> {
         Ok(first.map(|instant| instant.whole.div_euclid(times.per_second)))
     }
 
-    /// The fault of a key of the quantity's table.
     fn fault(
         &self,
         key: &str,
@@ -137,7 +135,6 @@ impl<'a> Source<'a> {
         Err(self.fault("columns", format!("{} columns", columns.len()), expected))
     }
 
-    /// The column of a name that stands under this key.
     fn column(&self, key: &str, name: &Name) -> Result<usize, RecordingError> {
         let log = self.log;
         log.column(name).ok_or_else(|| {
@@ -161,8 +158,8 @@ impl<'a> Source<'a> {
                 return Err(self.fault("order", found, "`wxyz` or `xyzw`"));
             }
             None => return Ok((0..columns).collect()),
-            Some(Words::One(text)) => text.split_whitespace().map(str::to_owned).collect(),
-            Some(Words::Many(words)) => words.clone(),
+            Some(List::One(text)) => text.split_whitespace().map(str::to_owned).collect(),
+            Some(List::Many(words)) => words.clone(),
         };
         let order = ordered(&words, elements).and_then(|order| match order.len() == columns {
             true => Ok(order),

@@ -6,10 +6,9 @@ use std::path::Path;
 use super::log::{Channel, Log};
 use super::map::{ColumnMap, Delimiter, TextFormat};
 use crate::recording::columns::Column;
-use crate::recording::csv::MAX_ROWS;
 use crate::recording::error::{RecordingError, RecordingFault, shortened};
 use crate::recording::instant::Instant;
-use crate::recording::lines::{self, Lines, NumberReader};
+use crate::recording::lines::{self, Lines, MAX_ROWS, NumberReader};
 
 /// Numbers from which a column is kept as times: beyond, one number does not hold a microsecond.
 const LARGE: f64 = 1e8;
@@ -44,7 +43,6 @@ pub(in crate::recording) fn read_texts(
     Ok(logs)
 }
 
-/// Reads one text file, plain or gzip, as a log without name.
 pub(in crate::recording) fn read_text(
     path: &Path,
     format: &TextFormat,
@@ -88,7 +86,6 @@ struct Sheet {
     numbers: NumberReader,
     log: Log,
     count: usize,
-    /// Meaning of each column in romc's own format.
     own: Option<Vec<Option<Column>>>,
 }
 

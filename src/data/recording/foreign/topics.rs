@@ -10,14 +10,12 @@ use mcap::records::{Channel as Declared, SchemaHeader};
 
 use super::log::{Channel, Log};
 use super::message::{Definition, Layout, Value, undefined, unknown_encoding};
-use crate::recording::csv::MAX_ROWS;
 use crate::recording::error::RecordingFault;
 use crate::recording::instant::Instant;
+use crate::recording::lines::MAX_ROWS;
 
-/// Most tables of a topic.
-const MOST_TABLES: usize = 16;
-/// Most arrangements of lists that are kept in mind.
-const MOST_ARRANGEMENTS: usize = 64;
+const MOST_TABLES: usize = 16; // most tables of a topic
+const MOST_ARRANGEMENTS: usize = 64; // most arrangements of lists that are kept in mind
 /// Most messages in a row with earlier stamps than one before them, for which they count as late; more are another run
 /// of a simulator.
 const MOST_LATE: usize = 20;
@@ -45,10 +43,8 @@ struct Topic {
     fault: Option<String>,
 }
 
-/// Messages with the same names.
 struct Table {
     log: Log,
-    /// Numbers of the messages within their topic.
     arrivals: Vec<usize>,
     /// Whether a narrower table has its rows.
     is_part: bool,
@@ -66,7 +62,6 @@ impl Topics {
         self.schemas.insert(header.id, schema);
     }
 
-    /// A declared channel.
     pub(crate) fn channel(&mut self, channel: &Declared) -> Result<(), String> {
         let (id, other) = (channel.id, &channel.topic);
         let schema = self.schemas.get(&channel.schema_id).cloned();
@@ -93,7 +88,6 @@ impl Topics {
         }
     }
 
-    /// A message.
     pub(crate) fn message(
         &mut self,
         channel: u16,
@@ -145,7 +139,8 @@ impl Topics {
         if logs.iter().all(|log| log.fault.is_some()) {
             let refused = (logs.iter()).find_map(|log| Some((&log.name, log.fault.as_ref()?)));
             let why = refused.map(|(topic, fault)| format!(" (`{topic}`: {fault})"));
-            return Err(RecordingFault::NoTopic(why.unwrap_or_default()));
+            let text = "found no topic of ROS messages with numbers".to_owned();
+            return Err(RecordingFault::Text(text + &why.unwrap_or_default()));
         }
         Ok(logs)
     }
@@ -325,11 +320,7 @@ fn distinct(log: &Log, clock: usize) -> Vec<usize> {
     let times = log.columns[clock].times();
     let others = &log.columns[1..];
     let bits = |column: &Channel, row: usize| column.values[row].to_bits();
-    let same = |a, b| {
-        others
-            .iter()
-            .all(|column| bits(column, a) == bits(column, b))
-    };
+    let same = |a, b| (others.iter()).all(|column| bits(column, a) == bits(column, b));
     let mut kept: Vec<usize> = Vec::new();
     for row in 0..times.len() {
         let before = kept.iter().rev().take(MOST_LATE);

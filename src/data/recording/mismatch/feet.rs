@@ -12,8 +12,7 @@ use crate::robot::{ContactFlags, FOOT_DIM, JOINT_DIM, Leg, Robot};
 ///
 /// In right recordings single samples of a foot that rolls off or touches down can favour another order by 8 mm in sum.
 const LEAST_GAIN: (f64, f64) = (9e-3, 0.3);
-/// Height of the feet that are on the ground, m.
-const FLOOR_M: f64 = 0.1;
+const FLOOR_M: f64 = 0.1; // height of the feet that are on the ground, m
 
 /// Another order of the columns, if it fits the heights of the feet clearly better than the recorded one.
 pub(super) fn columns(recording: &Recording, robot: &Robot) -> Option<Mismatch> {
@@ -54,7 +53,6 @@ fn higher_m(feet: &ContactFlags, height: &[f64; FOOT_DIM], legs: &[Leg; FOOT_DIM
     mean(false) - mean(true)
 }
 
-/// The median height of the feet that are on the ground, if that is not the floor's.
 pub(super) fn floor(value: f64) -> Option<Mismatch> {
     // The bound has no sign.
     let breach = outside(value, -FLOOR_M, FLOOR_M).map(|(value, _)| (value, FLOOR_M));
@@ -81,8 +79,7 @@ pub(super) fn floor_m(recording: &Recording, robot: &Robot) -> f64 {
 /// Lowest height of the trunk's origin over the floor, m, and largest angle of its z axis to the vertical while feet are
 /// on the ground, rad.
 const TRUNK: (f64, f64) = (0.05, 1.6);
-/// Shortest time that it lies, s.
-const LIES_S: f64 = 0.1;
+const LIES_S: f64 = 0.1; // shortest time that it lies, s
 
 /// Time, s, that the trunk lies on the ground, or under it, or on its back, if that is long enough.
 pub(super) fn fallen(recording: &Recording, floor_m: f64) -> Option<Mismatch> {
@@ -108,7 +105,6 @@ pub(super) fn fallen(recording: &Recording, floor_m: f64) -> Option<Mismatch> {
     mismatch("fallen", outside(lies_s, 0.0, LIES_S), words)
 }
 
-/// Height of each foot over where it stands, m.
 fn heights(segment: &Segment, robot: &Robot) -> Vec<[f64; FOOT_DIM]> {
     let of_sample = |sample| {
         let x = segment.state(sample);

@@ -10,14 +10,12 @@ use crate::recording::segment::stretches;
 use crate::recording::{Recording, Segment};
 use crate::robot::{FOOT_DIM, JOINT_DIM, Leg, Robot, STATE_DIM};
 
-/// Shortest stance that counts, s.
-const LEAST_STANCE_S: f64 = 0.05;
+const LEAST_STANCE_S: f64 = 0.05; // shortest stance that counts, s
 /// Time at both ends of a stance that does not count, s: touchdown and lift-off; at most an eighth of the stance.
 const EDGE_S: f64 = 0.02;
 /// Radius of the sphere that a foot rolls on, m: 0.02 to 0.023 on the robots that romc knows.
 const FOOT_RADIUS_M: f64 = 0.022;
-/// Fewest samples of feet on the ground that say anything.
-const LEAST_SAMPLES: usize = 50;
+const LEAST_SAMPLES: usize = 50; // fewest samples of feet on the ground that say anything
 
 /// A way in which columns of joints and body are easily recorded, in words, and what it makes of a state.
 type Reading = (&'static str, fn(&mut [f64; STATE_DIM]));
@@ -114,7 +112,6 @@ pub(super) fn best_other_reading(recording: &Recording, robot: &Robot) -> Option
     best(of_orders.chain(of_signs))
 }
 
-/// The one with the least of these figures.
 fn best<T>(judged: impl Iterator<Item = (Option<f64>, T)>) -> Option<(f64, T)> {
     let known = judged.filter_map(|(rms_m, reading)| Some((rms_m?, reading)));
     let finite = known.filter(|(rms_m, _)| rms_m.is_finite());
@@ -205,15 +202,12 @@ impl Stances {
         Self(moved)
     }
 
-    /// Adds the places with the legs read from the columns of `order`.
     fn add_to(&self, slip: &mut Slip, order: &[Leg; FOOT_DIM]) {
         let of_sample = self.0.chunk_by(|one, other| one.0 == other.0);
         let mut standing = Vec::with_capacity(FOOT_DIM);
         for feet in of_sample {
             standing.clear();
-            let chosen = feet
-                .iter()
-                .filter(|(_, leg, from, _)| order[leg.index()] == *from);
+            let chosen = (feet.iter()).filter(|(_, leg, from, _)| order[leg.index()] == *from);
             standing.extend(chosen.map(|(.., place)| *place));
             let common = standing.iter().sum::<Vector3<f64>>() / standing.len() as f64;
             for place in &standing {
