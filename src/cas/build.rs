@@ -243,7 +243,6 @@ impl ExprPool {
         self.assemble_product(numbers, factors)
     }
 
-    /// Puts the numbers of `expr` and its other factors, as base and exponent, into their lists.
     fn push_factors(
         &mut self,
         expr: ExprId,

@@ -6,14 +6,12 @@
 
 use super::canonical::CanonicalForms;
 use super::function::Function;
-use super::id_map::IdMap;
 use super::interval::Interval;
-use super::node::{ExprId, SymbolId};
+use super::node::{ExprId, IdMap, SymbolId};
 use super::pool::ExprPool;
 
 /// Largest constant, in nodes, of which it is proven that it is zero.
 const MAX_PROOF: usize = 300;
-/// Magnitude below which a constant may be zero.
 const SMALL: f64 = 1e-6;
 
 /// An expression that was read.
@@ -25,7 +23,6 @@ pub struct Reading {
     pub guards: Vec<ExprId>,
 }
 
-/// What is known of the parts of a text.
 #[derive(Debug, Default)]
 pub(super) struct Guards {
     pub(super) found: Vec<ExprId>,

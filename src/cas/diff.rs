@@ -1,8 +1,7 @@
 //! Derivatives, memoised per expression and symbol.
 
 use super::function::Function;
-use super::id_map::IdSet;
-use super::node::{ExprId, Node, SymbolId};
+use super::node::{ExprId, IdSet, Node, SymbolId};
 use super::number::Number;
 use super::pool::ExprPool;
 

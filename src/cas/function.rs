@@ -16,9 +16,7 @@ pub enum Function {
     Tan,
     Tanh,
     Exp,
-    /// Natural logarithm.
     Log,
-    /// Non-negative square root.
     Sqrt,
     Abs,
     /// `-1`, `0` or `1`: the derivative of [`Function::Abs`].
@@ -34,7 +32,6 @@ pub(super) enum Parity {
     Neither,
 }
 
-/// What the algebra uses of a function.
 pub(super) struct Row {
     function: Function,
     /// Names in the term grammar; the first is printed.

@@ -8,8 +8,7 @@
 use std::cmp::Ordering;
 
 use super::function::Function;
-use super::id_map::IdMap;
-use super::node::{ExprId, Node, SymbolId};
+use super::node::{ExprId, IdMap, Node, SymbolId};
 use super::number::Number;
 use super::pool::ExprPool;
 use super::series::Series;
@@ -67,7 +66,7 @@ impl Germs<'_> {
             Node::Sum(_) | Node::Product(_) if is_smooth => Ok(None),
             Node::Sum(terms) => {
                 let mut sum = Series::default();
-                for term in terms {
+                for &term in terms.iter() {
                     let series = self.series(term);
                     sum = self.plus(sum, series);
                 }
@@ -158,7 +157,6 @@ impl Germs<'_> {
         series
     }
 
-    /// A function that is smooth wherever it has values.
     fn smooth_of(&mut self, function: Function, argument: Series) -> Result<Series, Stop> {
         let (value, inner) = match self.split(argument)? {
             Ok(parts) => parts,

@@ -8,9 +8,7 @@
 use std::fmt;
 
 use super::function::Function;
-use super::rounding::{
-    is_exact_root, mul_up, power_down, power_up, recip_down, recip_up, sub_up, widen_down, widen_up,
-};
+use super::number::power;
 
 /// Arguments beyond this are not reduced: sines of them are only known to lie in `[-1, 1]`.
 const LARGEST_ANGLE: f64 = 1e9;
@@ -172,7 +170,6 @@ impl Interval {
         power.hull(magnitude).hull(-magnitude)
     }
 
-    /// `exp(exponent log(x))` where `x` is positive, and the limits at zero.
     fn pow_non_negative(self, exponent: Interval) -> Interval {
         let mut power = (exponent * self.log()).exp();
         if self.contains(0.0) && exponent.hi > 0.0 {
@@ -184,7 +181,6 @@ impl Interval {
         power
     }
 
-    /// Square roots of the points that are not negative.
     pub(crate) fn sqrt(self) -> Interval {
         let inside = self.intersection(Interval::NON_NEGATIVE);
         if inside.is_empty() {
@@ -205,7 +201,6 @@ impl Interval {
             .intersection(Interval::NON_NEGATIVE)
     }
 
-    /// Natural logarithms of the positive points.
     pub(crate) fn log(self) -> Interval {
         let inside = self.intersection(Interval::NON_NEGATIVE);
         if inside.hi == 0.0 {
@@ -328,4 +323,104 @@ impl std::ops::Div for Interval {
     fn div(self, other: Interval) -> Interval {
         self * other.recip()
     }
+}
+
+/// Steps by which the value of an elementary function is widened.
+const FUNCTION_ULPS: usize = 4;
+
+/// `a - b` rounded up; infinite for infinities of the same sign, of which nothing is known.
+pub(super) fn sub_up(a: f64, b: f64) -> f64 {
+    let difference = a - b;
+    if difference.is_nan() {
+        return f64::INFINITY;
+    }
+    if !difference.is_finite() {
+        // A finite difference that overflows downward is still above the largest negative float.
+        return if difference == f64::NEG_INFINITY && a.is_finite() && b.is_finite() {
+            f64::MIN
+        } else {
+            difference
+        };
+    }
+    // The rounding error of a difference, exactly (Knuth's two-sum).
+    let b_rounded = a - difference;
+    let error = (a - (difference + b_rounded)) + (b_rounded - b);
+    if error > 0.0 || error.is_nan() {
+        difference.next_up()
+    } else {
+        difference
+    }
+}
+
+/// `a * b` rounded up, with `0 * inf = 0` as bounds of intervals need it.
+pub(super) fn mul_up(a: f64, b: f64) -> f64 {
+    if a == 0.0 || b == 0.0 {
+        return 0.0;
+    }
+    let product = a * b;
+    if !product.is_finite() {
+        let overflowed = a.is_finite() && b.is_finite();
+        return if product < 0.0 && overflowed {
+            f64::MIN
+        } else {
+            product
+        };
+    }
+    // The error of a product is exact in one fused operation, except near underflow.
+    if product.abs() < 1e-290 || a.mul_add(b, -product) > 0.0 {
+        product.next_up()
+    } else {
+        product
+    }
+}
+
+pub(super) fn recip_up(x: f64) -> f64 {
+    let quotient = 1.0 / x;
+    if quotient.is_finite() && quotient * x == 1.0 && quotient.mul_add(x, -1.0) == 0.0 {
+        quotient
+    } else {
+        quotient.next_up()
+    }
+}
+
+pub(super) fn recip_down(x: f64) -> f64 {
+    let quotient = 1.0 / x;
+    if quotient.is_infinite() {
+        f64::MAX
+    } else if quotient.mul_add(x, -1.0) == 0.0 {
+        quotient
+    } else {
+        quotient.next_down().max(0.0)
+    }
+}
+
+pub(super) fn power_up(x: f64, exponent: u64) -> f64 {
+    power_by(x, exponent, mul_up)
+}
+
+pub(super) fn power_down(x: f64, exponent: u64) -> f64 {
+    power_by(x, exponent, |a, b| (-mul_up(-a, b)).max(0.0))
+}
+
+/// A power by squaring; a bound if `product` is monotone and all factors are non-negative.
+pub(super) fn power_by(x: f64, exponent: u64, product: impl Fn(f64, f64) -> f64) -> f64 {
+    let power = power(1.0, x, exponent, |a, b| Some(product(*a, *b)));
+    power.expect("no product fails")
+}
+
+pub(super) fn is_exact_root(root: f64, square: f64) -> bool {
+    root == f64::INFINITY
+        || (square > 1e-290 && root.mul_add(root, -square) == 0.0)
+        || square == 0.0
+}
+
+pub(super) fn widen_down(value: f64) -> f64 {
+    -widen_up(-value)
+}
+
+pub(super) fn widen_up(value: f64) -> f64 {
+    if value == f64::NEG_INFINITY {
+        return f64::MIN;
+    }
+    (0..FUNCTION_ULPS).fold(value, |value, _| value.next_up())
 }

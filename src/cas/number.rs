@@ -186,7 +186,6 @@ impl Number {
         of_decimals().or_else(|| rounded(self.to_f64(), other.to_f64()))
     }
 
-    /// An exact number of short parts as the nearest float.
     fn rounded(self) -> Option<Number> {
         let (numerator, denominator) = self.as_rational()?;
         let is_short = |part: i64| part.unsigned_abs() <= EXACT_INTEGER as u64;
@@ -203,7 +202,6 @@ impl Number {
         self.combined(other, product, |a, b| normal(a * b))
     }
 
-    /// `self / other`; `None` for a zero divisor, overflow or underflow.
     pub(crate) fn checked_div(self, other: Number) -> Option<Number> {
         if self.is_zero() && !other.is_zero() {
             return Some(Number::ZERO);
@@ -284,7 +282,6 @@ pub fn sum_of_floats(values: &[f64]) -> f64 {
     parts.iter().sum()
 }
 
-/// The number of a float that is zero or has all its digits; `None` for anything else.
 fn normal(value: f64) -> Option<Number> {
     Number::from_f64(value).filter(|_| value.is_normal())
 }

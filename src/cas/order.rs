@@ -104,7 +104,6 @@ impl ExprPool {
         Step::Break(a.len().cmp(&b.len()))
     }
 
-    /// Numbers, then symbols, then functions, then sums.
     fn compare_atoms(&self, a: ExprId, b: ExprId) -> Step {
         let rank = |node: &Node| match node {
             Node::Number(_) => 0,
@@ -119,7 +118,7 @@ impl ExprPool {
             }
             (Node::Apply(f, x), Node::Apply(g, y)) if f == g => Step::Continue((*x, *y)),
             (Node::Apply(f, _), Node::Apply(g, _)) => Step::Break(f.cmp(g)),
-            (Node::Sum(x), Node::Sum(y)) => match x.iter().zip(y).find(|(x, y)| x != y) {
+            (Node::Sum(x), Node::Sum(y)) => match x.iter().zip(y.iter()).find(|(x, y)| x != y) {
                 Some((x, y)) => Step::Continue((*x, *y)),
                 None => Step::Break(x.len().cmp(&y.len())),
             },

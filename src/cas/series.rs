@@ -11,7 +11,6 @@ use super::pool::ExprPool;
 const SAME_EXPONENT: f64 = 1e-12;
 /// Coefficients from this exponent on are taken not to vanish by chance with all before them.
 const RARE: f64 = 3.0;
-/// Most terms of a composition; the rest is left open.
 const MOST_TERMS: i64 = 24;
 
 /// `sum coefficient t^exponent`, and what is left out: terms from the exponents of `rest` on.
@@ -230,7 +229,6 @@ impl Germs<'_> {
         }
     }
 
-    /// The coefficient of `t`, if no smaller exponent is left.
     pub(super) fn linear(&mut self, series: &Series) -> Result<Option<ExprId>, Stop> {
         if !series.terms.iter().all(|term| term.0 == ExprId::ONE) {
             return Ok(None);

@@ -14,11 +14,11 @@ use std::collections::BTreeMap;
 
 use num_integer::Integer;
 
-use super::expand::NARROW;
 use super::function::Function;
 use super::node::{ExprId, Node};
 use super::number::Number;
 use super::pool::ExprPool;
+use super::region::NARROW;
 
 /// Largest multiple of an angle, and most angles in one argument, that are expanded.
 const MAX_MULTIPLE: i64 = 6;

@@ -30,9 +30,5 @@ pub enum CheckError {
         source: ParseError,
     },
     #[error("{}: {message}", path.display())]
-    Domain {
-        path: PathBuf,
-        /// Table, key, what was found and expected.
-        message: String,
-    },
+    Domain { path: PathBuf, message: String },
 }

@@ -39,7 +39,6 @@ pub(super) struct SidePhase {
 #[derive(Clone, Debug)]
 pub(super) enum RightSide {
     Summands(Vec<(f64, String)>),
-    /// One expression, and the line of its left side.
     Text(usize, String),
 }
 
@@ -147,7 +146,6 @@ impl Side {
         names.flatten().collect()
     }
 
-    /// Builds every right side once, so that later ones are known to build.
     fn check(&self) -> Result<(), CheckError> {
         let mut pool = ExprPool::exact();
         for right_side in self.phases.iter().flat_map(|phase| &phase.ddz) {

@@ -5,11 +5,9 @@ use std::collections::BTreeSet;
 use nalgebra::DMatrix;
 use serde_json::{Value, json};
 
-use super::certificate::{
-    BeforeAfter, Certificate, Change, Effect, EquationCertificate, PhaseCertificate,
-};
+use super::certificate::{BeforeAfter, Certificate, EquationCertificate, PhaseCertificate};
 use super::domain::{Domain, Samples, check_count};
-use super::equation::{Equation, Step, Terms, is_same_decimal};
+use super::equation::{Equation, Terms, is_same_decimal};
 use super::error::SimplifyError;
 use super::measure::Differences;
 use super::tolerance::Tolerance;
@@ -193,7 +191,7 @@ impl<'a> PhaseProblem<'a> {
                 Some(_) | None => (self.equation(output), Interval::point(0.0)),
             };
             xi.set_column(output, &nalgebra::DVector::from_column_slice(&equation.xi));
-            equations.push(self.certified(output, &equation, bound, allowed, rms)?);
+            equations.push(self.certified(output, equation, bound, allowed, rms)?);
         }
         let certificate = PhaseCertificate {
             name: self.name.to_owned(),
@@ -241,7 +239,7 @@ impl<'a> PhaseProblem<'a> {
     fn certified(
         &self,
         output: usize,
-        equation: &Equation,
+        mut equation: Equation,
         bound: Interval,
         allowed: f64,
         rms: Option<f64>,
@@ -263,6 +261,10 @@ impl<'a> PhaseProblem<'a> {
                 });
             }
         }
+        for change in &mut equation.changes {
+            let effects = change.coefficients().map(|e| (e.row, e.before, e.after));
+            change.measured = Differences(effects.collect()).measured(&self.theta);
+        }
         let active = |xi: &[f64]| xi.iter().filter(|&&coefficient| coefficient != 0.0).count();
         let counts = |of: &dyn Fn(&[f64]) -> usize| BeforeAfter {
             before: of(&before),
@@ -277,28 +279,8 @@ impl<'a> PhaseProblem<'a> {
             measured,
             terms: counts(&active),
             digits: counts(&digits),
-            changes: equation.steps.iter().map(|s| self.change(s)).collect(),
+            changes: equation.changes,
         })
-    }
-
-    fn change(&self, step: &Step) -> Change {
-        let own = (step.row, step.before, step.after);
-        let differences = std::iter::once(own).chain(step.effects.iter().copied());
-        let differences = Differences(differences.collect());
-        let effect = |&(row, before, after): &(usize, f64, f64)| Effect {
-            term: self.workspace.text(row).to_owned(),
-            before,
-            after,
-        };
-        Change {
-            kind: step.kind,
-            term: self.workspace.text(step.row).to_owned(),
-            before: step.before,
-            after: step.after,
-            effects: step.effects.iter().map(effect).collect(),
-            bound: step.bound,
-            measured: differences.measured(&self.theta),
-        }
     }
 }
 
@@ -313,7 +295,6 @@ fn digits(xi: &[f64]) -> usize {
     active.map(of).sum()
 }
 
-/// Operations of the straight-line code of `ddz`.
 fn operations(system: &Equations<'_>, phase: usize) -> Result<usize, SimplifyError> {
     let program: Program = lower::dynamics(system, phase, Form::StraightLine)?;
     let counted = program.statements().iter().enumerate();

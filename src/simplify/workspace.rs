@@ -10,7 +10,6 @@ use crate::equations::Equations;
 use crate::model::{LatentVariable, Library, ModelError, ReducedModel};
 use crate::symbolic::{ExprId, ExprPool, Interval, Node, SymbolId};
 
-/// A library of terms, counted by rows, and the rows of `1` and of variables.
 #[derive(Clone, Debug)]
 pub(super) struct Workspace {
     library: Library,
@@ -127,7 +126,6 @@ fn rows(library: &Library) -> BTreeMap<Option<SymbolId>, usize> {
     exprs.into_iter().filter_map(row).collect()
 }
 
-/// Texts of the terms that rewriting may need.
 fn wanted(equations: &Equations<'_>) -> Vec<String> {
     let pool = equations.pool();
     let summands = equations

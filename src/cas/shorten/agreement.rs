@@ -13,9 +13,9 @@ use std::rc::Rc;
 use super::Summands;
 use crate::function::Function;
 use crate::interval::Interval;
+use crate::interval::power_by;
 use crate::node::{ExprId, Node, SymbolId};
 use crate::pool::ExprPool;
-use crate::rounding::power_by;
 
 /// Ranges from which the variables of the points near the origin are taken.
 const NEAR: [(f64, f64); 6] = [
@@ -26,15 +26,12 @@ const NEAR: [(f64, f64); 6] = [
     (-0.3, 0.1),
     (2.13, 5.9),
 ];
-/// Relative error that evaluation near the origin may have.
 const EVALUATION: f64 = 1e-11;
-/// Multiples of the golden ratio fill an interval evenly.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 type Column = Rc<[f64]>;
 type Points = BTreeMap<SymbolId, Column>;
 
-/// Floating-point numbers of generated code.
 struct Precision {
     round: fn(f64) -> f64,
     /// Relative distance of the inputs that are enclosed around a point.
@@ -73,14 +70,12 @@ const PRECISIONS: [Precision; 2] = [
     },
 ];
 
-/// A sum at many points, with which its shorter forms are compared.
 pub(super) struct Agreement {
     sum: Summands,
     symbols: Vec<SymbolId>,
     far: Option<[Far; 2]>,
 }
 
-/// A sum far out in one precision.
 struct Far {
     points: Points,
     /// Where its values lie, and how large its summands are; nothing where it is not accurate itself.
@@ -199,7 +194,6 @@ fn is_tame(pool: &ExprPool, summands: &Summands) -> bool {
     })
 }
 
-/// Magnitudes of the variables of a sum.
 fn scales(pool: &ExprPool, sum: &Summands, precision: &Precision) -> Vec<f64> {
     let roots: Vec<ExprId> = sum.iter().map(|&(_, expr)| expr).collect();
     let has_exponents = (pool.reachable(&roots).into_iter()).any(|expr| {

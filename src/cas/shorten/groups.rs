@@ -5,23 +5,19 @@ use std::collections::{BTreeMap, HashMap};
 use super::Summands;
 use super::search::{Block, Distance, Shortener};
 use crate::function::Function;
-use crate::id_map::IdMap;
-use crate::node::{ExprId, Node};
+use crate::node::{ExprId, IdMap, Node};
 use crate::number::Number;
 use crate::polynomial::MAX_POWER;
 use crate::pool::ExprPool;
 use crate::simplify::MAX_WORK;
 
-/// Most terms that can be powers of the parts of a sum.
 const MAX_PARTS: usize = 64;
-/// Relative error of coefficients that fit a power.
 const ROUNDING: f64 = 1e-13;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum Link {
     /// A monomial of their normal forms.
     Monomial(ExprId),
-    /// Logarithms, with this cofactor.
     Logarithm(ExprId),
     /// Denominators that have the variables of this product.
     Variables(ExprId),
@@ -37,7 +33,6 @@ impl Link {
 }
 
 impl Shortener<'_> {
-    /// Positions of blocks that can interact, or that are worth a look alone.
     pub(super) fn groups(&mut self, blocks: &[Block], distance: Distance) -> Vec<Vec<usize>> {
         let (places, summands): (Vec<usize>, Summands) = (blocks.iter().enumerate())
             .flat_map(|(place, block)| block.summands.iter().map(move |&summand| (place, summand)))
