@@ -12,11 +12,7 @@
 //!
 //! A shared part counts as often as it is written.
 
-use super::function::Function;
-use super::node::{ExprId, IdMap, Node};
-use super::number::Number;
-use super::order::Exponent;
-use super::pool::ExprPool;
+use crate::{Exponent, ExprId, ExprPool, Function, IdMap, Node, Number};
 
 /// Of an added term, and of one inside a function's argument.
 const TERM: u64 = 4;

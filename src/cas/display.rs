@@ -2,10 +2,7 @@
 
 use std::fmt;
 
-use super::node::{ExprId, Node};
-use super::number::Number;
-use super::order::Exponent;
-use super::pool::ExprPool;
+use crate::{Exponent, ExprId, ExprPool, Node, Number};
 
 /// The text of an expression; made by [`ExprPool::display`].
 pub struct Display<'p> {

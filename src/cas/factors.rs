@@ -2,10 +2,7 @@
 
 use std::sync::Arc;
 
-use super::function::Function;
-use super::node::{ExprId, Node, SymbolId};
-use super::number::Number;
-use super::pool::ExprPool;
+use crate::{ExprId, ExprPool, Function, Node, Number, SymbolId};
 
 /// Where an identity is applied.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

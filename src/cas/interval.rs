@@ -1,14 +1,13 @@
 //! Intervals of reals with outward rounding.
 //!
-//! Every operation returns an interval that contains the exact results for all points of its
-//! operands. Sums, products, quotients and square roots are rounded to the nearest float that
-//! errs outward; elementary functions are widened by a few steps, more than the error of
-//! any current mathematical library.
+//! Every operation returns an interval that contains the exact results for all points of its operands. Sums, products,
+//! quotients and square roots err outward by a unit in the last place at most; elementary functions by a few, more than
+//! the error of any current mathematical library.
 
 use std::fmt;
 
-use super::function::Function;
 use super::number::power;
+use crate::Function;
 
 /// Arguments beyond this are not reduced: sines of them are only known to lie in `[-1, 1]`.
 const LARGEST_ANGLE: f64 = 1e9;
@@ -148,10 +147,9 @@ impl Interval {
             true => -power_down(-x, exponent),
             false => power_up(x, exponent),
         };
-        let base = if exponent.is_multiple_of(2) {
-            self.abs()
-        } else {
-            self
+        let base = match exponent.is_multiple_of(2) {
+            true => self.abs(),
+            false => self,
         };
         Interval::between(down(base.lo), up(base.hi))
     }
@@ -328,62 +326,49 @@ impl std::ops::Div for Interval {
 /// Steps by which the value of an elementary function is widened.
 const FUNCTION_ULPS: usize = 4;
 
+/// A float that was rounded to the nearest, or the next one if the exact result is above it. A finite result that
+/// overflows downward is still above the largest negative float.
+fn up(nearest: f64, is_above: bool, operands: [f64; 2]) -> f64 {
+    match nearest.is_finite() {
+        true if is_above => nearest.next_up(),
+        false if nearest < 0.0 && operands.iter().all(|x| x.is_finite()) => f64::MIN,
+        _ => nearest,
+    }
+}
+
 /// `a - b` rounded up; infinite for infinities of the same sign, of which nothing is known.
-pub(super) fn sub_up(a: f64, b: f64) -> f64 {
+fn sub_up(a: f64, b: f64) -> f64 {
     let difference = a - b;
     if difference.is_nan() {
         return f64::INFINITY;
     }
-    if !difference.is_finite() {
-        // A finite difference that overflows downward is still above the largest negative float.
-        return if difference == f64::NEG_INFINITY && a.is_finite() && b.is_finite() {
-            f64::MIN
-        } else {
-            difference
-        };
-    }
     // The rounding error of a difference, exactly (Knuth's two-sum).
     let b_rounded = a - difference;
     let error = (a - (difference + b_rounded)) + (b_rounded - b);
-    if error > 0.0 || error.is_nan() {
-        difference.next_up()
-    } else {
-        difference
-    }
+    up(difference, error > 0.0 || error.is_nan(), [a, b])
 }
 
 /// `a * b` rounded up, with `0 * inf = 0` as bounds of intervals need it.
-pub(super) fn mul_up(a: f64, b: f64) -> f64 {
+fn mul_up(a: f64, b: f64) -> f64 {
     if a == 0.0 || b == 0.0 {
         return 0.0;
     }
-    let product = a * b;
-    if !product.is_finite() {
-        let overflowed = a.is_finite() && b.is_finite();
-        return if product < 0.0 && overflowed {
-            f64::MIN
-        } else {
-            product
-        };
-    }
     // The error of a product is exact in one fused operation, except near underflow.
-    if product.abs() < 1e-290 || a.mul_add(b, -product) > 0.0 {
-        product.next_up()
-    } else {
-        product
-    }
+    let product = a * b;
+    let is_above = product.abs() < 1e-290 || a.mul_add(b, -product) > 0.0;
+    up(product, is_above, [a, b])
 }
 
-pub(super) fn recip_up(x: f64) -> f64 {
+/// `1/x` of a positive `x`.
+fn recip_up(x: f64) -> f64 {
     let quotient = 1.0 / x;
-    if quotient.is_finite() && quotient * x == 1.0 && quotient.mul_add(x, -1.0) == 0.0 {
-        quotient
-    } else {
-        quotient.next_up()
+    match quotient.mul_add(x, -1.0) == 0.0 {
+        true => quotient,
+        false => quotient.next_up(),
     }
 }
 
-pub(super) fn recip_down(x: f64) -> f64 {
+fn recip_down(x: f64) -> f64 {
     let quotient = 1.0 / x;
     if quotient.is_infinite() {
         f64::MAX
@@ -394,11 +379,12 @@ pub(super) fn recip_down(x: f64) -> f64 {
     }
 }
 
-pub(super) fn power_up(x: f64, exponent: u64) -> f64 {
+/// `x^exponent` of an `x` that is not negative.
+fn power_up(x: f64, exponent: u64) -> f64 {
     power_by(x, exponent, mul_up)
 }
 
-pub(super) fn power_down(x: f64, exponent: u64) -> f64 {
+fn power_down(x: f64, exponent: u64) -> f64 {
     power_by(x, exponent, |a, b| (-mul_up(-a, b)).max(0.0))
 }
 
@@ -408,17 +394,17 @@ pub(super) fn power_by(x: f64, exponent: u64, product: impl Fn(f64, f64) -> f64)
     power.expect("no product fails")
 }
 
-pub(super) fn is_exact_root(root: f64, square: f64) -> bool {
+fn is_exact_root(root: f64, square: f64) -> bool {
     root == f64::INFINITY
         || (square > 1e-290 && root.mul_add(root, -square) == 0.0)
         || square == 0.0
 }
 
-pub(super) fn widen_down(value: f64) -> f64 {
+fn widen_down(value: f64) -> f64 {
     -widen_up(-value)
 }
 
-pub(super) fn widen_up(value: f64) -> f64 {
+fn widen_up(value: f64) -> f64 {
     if value == f64::NEG_INFINITY {
         return f64::MIN;
     }

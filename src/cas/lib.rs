@@ -75,3 +75,8 @@ pub use parse::{ParseError, ParseErrorKind, ParseLimits};
 pub use pool::ExprPool;
 pub use shorten::{Shortened, Shortener};
 pub use values::integer_power;
+
+// Names that most files use.
+use node::{IdMap, IdSet};
+use order::Exponent;
+use pool::Sign;

@@ -4,8 +4,7 @@ use std::collections::{HashMap, HashSet};
 use std::hash::{BuildHasherDefault, Hasher};
 use std::sync::Arc;
 
-use super::function::Function;
-use super::number::Number;
+use crate::{Function, Number};
 
 /// A canonical expression of one [`ExprPool`](super::ExprPool).
 ///

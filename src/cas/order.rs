@@ -7,10 +7,7 @@
 use std::cmp::Ordering;
 use std::ops::ControlFlow;
 
-use super::function::Function;
-use super::node::{ExprId, Node};
-use super::number::Number;
-use super::pool::ExprPool;
+use crate::{ExprId, ExprPool, Function, Node, Number};
 
 /// Grades from here on are not polynomial.
 const NOT_POLYNOMIAL: u32 = 1 << 31;

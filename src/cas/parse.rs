@@ -13,11 +13,7 @@
 //! the length of the text.
 
 use super::defined::{Guards, Reading};
-use super::function::Function;
-use super::node::ExprId;
-use super::number::Number;
-use super::order::Exponent;
-use super::pool::ExprPool;
+use crate::{Exponent, ExprId, ExprPool, Function, Number};
 
 /// How large a text may be and become.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -4,13 +4,9 @@ use std::collections::BTreeMap;
 
 use num_integer::Integer;
 
-use super::function::Function;
-use super::node::{ExprId, Node};
-use super::number::Number;
-use super::order::Exponent;
-use super::pool::ExprPool;
 use super::region::{Terms, WIDE};
 use super::rules::common_unit;
+use crate::{Exponent, ExprId, ExprPool, Function, Node, Number};
 
 const MAX_STEPS: usize = 500;
 /// Largest exponent of a monomial, in units of its base.
@@ -348,11 +344,8 @@ fn divided(dividend: Monomials, divisor: &Monomials) -> Option<(Monomials, Monom
 /// Each next term of the root is what is left over, divided by the derivative of the power.
 fn root_of(polynomial: &Monomials, power: i64) -> Option<(Number, Monomials)> {
     let (highest, leading) = polynomial.last_key_value()?;
-    let divisible = highest.iter().all(|exponent| exponent % power == 0);
-    let first: Vec<i64> = highest.iter().map(|exponent| exponent / power).collect();
-    if !divisible {
-        return None;
-    }
+    let halved = |exponent: &i64| (exponent % power == 0).then_some(exponent / power);
+    let first: Vec<i64> = highest.iter().map(halved).collect::<Option<_>>()?;
     // A power of k terms has at least n (k - 1) + 1.
     let most = (polynomial.len() - 1) / usize::try_from(power).ok()?;
     let slope = leading.checked_mul(Number::integer(power))?;

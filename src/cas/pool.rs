@@ -3,13 +3,11 @@
 use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
 
-use super::canonical::Coefficient;
 use super::factors::Identity;
-use super::function::Function;
-use super::node::{BuildIdHasher, ExprId, IdSet, Node, SymbolId};
-use super::number::Number;
+use super::node::BuildIdHasher;
 use super::order::SymbolKey;
 use super::slope::Slope;
+use crate::{Coefficient, ExprId, Function, IdSet, Node, Number, SymbolId};
 
 /// Owner of hash-consed, canonical expressions.
 ///

@@ -2,11 +2,8 @@
 
 use num_integer::Integer;
 
-use super::function::{Function, Parity};
-use super::node::{ExprId, Node};
-use super::number::Number;
-use super::order::Exponent;
-use super::pool::{ExprPool, Sign};
+use super::function::Parity;
+use crate::{Exponent, ExprId, ExprPool, Function, Node, Number, Sign};
 
 /// Trial divisors for square factors under a root: `sqrt(8) = 2*sqrt(2)`.
 const SQUARE_FACTOR_LIMIT: i64 = 1_000;

@@ -4,11 +4,7 @@
 //! A *region* is what can be reached from an expression through sums, products and integer powers.
 //! Function calls and other powers are its atoms; their arguments are regions of their own.
 
-use super::function::Function;
-use super::node::{ExprId, IdMap, Node, SymbolId};
-use super::number::Number;
-use super::order::Exponent;
-use super::pool::ExprPool;
+use crate::{Exponent, ExprId, ExprPool, Function, IdMap, Node, Number, SymbolId};
 
 #[derive(Clone, Copy)]
 pub(super) struct Limits {

@@ -19,11 +19,7 @@
 //! | `(exp(a) - exp(b))/(exp(a) + exp(b))` | `tanh((a - b)/2)` |
 
 use super::factors::Stage;
-use super::function::Function;
-use super::node::{ExprId, Node};
-use super::number::Number;
-use super::order::Exponent;
-use super::pool::ExprPool;
+use crate::{Exponent, ExprId, ExprPool, Function, Node, Number};
 
 /// Largest power that merging logarithms may create, and most parts of a number that are tried as unit.
 const MAX_LOG_POWER: i64 = 4;
@@ -121,22 +117,21 @@ impl ExprPool {
         };
         let exponent = Number::integer(power);
         let terms = self.summands_of(base).to_vec();
-        let mut shared: Vec<(ExprId, Number)> = Vec::new();
         let powers: Vec<Vec<(ExprId, Number)>> = (terms.iter())
             .map(|term| self.powers_with_exponentials(*term))
             .collect();
+        let mut shared: Vec<(ExprId, Number)> = Vec::new();
         for &(factor, _) in powers.iter().flatten() {
-            let of_term = |powers: &Vec<(ExprId, Number)>| {
+            let exponents = powers.iter().map(|powers| {
                 let found = powers.iter().find(|(base, _)| *base == factor);
                 found.map_or(Number::ZERO, |(_, exponent)| *exponent)
-            };
-            let least =
-                (powers.iter().map(of_term)).min_by(|a, b| a.to_f64().total_cmp(&b.to_f64()));
-            match least.filter(|least| !least.is_zero() && least.as_integer().is_some()) {
-                Some(least) if !shared.contains(&(factor, least)) => shared.push((factor, least)),
-                _ => {}
-            }
+            });
+            let least = exponents.min_by(|a, b| a.to_f64().total_cmp(&b.to_f64()));
+            let least = least.filter(|least| !least.is_zero() && least.as_integer().is_some());
+            shared.extend(least.map(|least| (factor, least)));
         }
+        shared.sort_unstable_by_key(|(factor, _)| *factor);
+        shared.dedup();
         if shared.is_empty() {
             return expr;
         }
@@ -204,36 +199,28 @@ impl ExprPool {
     }
 
     fn merge_roots(&mut self, expr: ExprId) -> ExprId {
-        let (mut inside, mut outside, mut numbers) = (Vec::new(), Vec::new(), Vec::new());
-        for factor in self.factors_of(expr).to_vec() {
-            match self.base_and_exponent(factor) {
-                (base, Exponent::Number(exponent))
-                    if matches!(exponent.as_rational(), Some((_, 2))) =>
-                {
-                    let whole = exponent.checked_add(-Number::HALF).unwrap_or(Number::ZERO);
-                    let parts = (base, self.pow_number(base, whole));
-                    match self.as_number(base) {
-                        Some(_) => numbers.push((factor, parts)),
-                        None => {
-                            inside.push(parts.0);
-                            outside.push(parts.1);
-                        }
-                    }
-                }
-                _ => outside.push(factor),
-            }
-        }
+        // Each as its base and what is left beside one root of it.
+        let (roots, mut outside) = self.partition_factors(expr, |pool, factor| {
+            let (base, Exponent::Number(exponent)) = pool.base_and_exponent(factor) else {
+                return None;
+            };
+            let halves = exponent.as_rational().filter(|parts| parts.1 == 2)?.0;
+            let whole = pool.pow_number(base, Number::integer((halves - 1) / 2));
+            Some((factor, base, whole))
+        });
+        let (numbers, others): (Vec<_>, Vec<_>) =
+            (roots.into_iter()).partition(|root| self.as_number(root.1).is_some());
+        let mut inside: Vec<ExprId> = others.iter().map(|root| root.1).collect();
+        outside.extend(others.iter().map(|root| root.2));
         // Roots of numbers stay outside unless they meet another root that makes them rational.
-        for (factor, (base, whole)) in numbers {
-            inside.push(base);
-            let radicand = self.product(&inside);
-            let (content, _) = self.split(radicand);
-            let content = self.scale(content, ExprId::ONE);
+        for (factor, base, whole) in numbers {
+            let radicand = self.product(&[inside.as_slice(), &[base]].concat());
+            let content = self.constant(self.split(radicand).0);
             let root = self.pow_number(content, Number::HALF);
-            if inside.len() > 1 && self.as_number(root).is_some() {
+            if !inside.is_empty() && self.as_number(root).is_some() {
+                inside.push(base);
                 outside.push(whole);
             } else {
-                inside.pop();
                 outside.push(factor);
             }
         }

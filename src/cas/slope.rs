@@ -1,24 +1,17 @@
 //! Derivatives that have values wherever the function has slopes.
 //!
-//! The rules of differentiation give `g'/(2 sqrt(g))` for a root, which is `0/0` where `g` and `g'` vanish, and
-//! `0*inf` behind a factor that vanishes with `g`. The slope of an expression is what its values have:
+//! The rules of differentiation give `g'/(2 sqrt(g))` for a root, which is `0/0` where `g` and `g'` vanish. The slope of
+//! an expression is the derivative, where it exists; otherwise the limit of slopes from above, or from below where there
+//! are no values above, which may be infinite. A jump itself adds nothing.
 //!
-//! - the derivative, where it exists;
-//! - otherwise the limit of slopes from above, or from below where there are no values above;
-//! - an infinity of the right sign where that limit is infinite;
-//! - where the function jumps, the limit of the slopes beside the jump: a jump itself adds nothing.
-//!
-//! Which of them applies is decided at run time by selections: the derivative by the rules where no argument of a root,
-//! magnitude, sign or power is zero, a slope from series (see `germ.rs`) where one is. Where that takes too many cases, a
-//! difference of values replaces a derivative that is not a number.
+//! Selections decide at run time which applies: the derivative by the rules where no argument of a root, magnitude, sign
+//! or power is zero, a slope from series (see `germ.rs`) where one is. Where that takes too many cases, a difference of
+//! values replaces a derivative that is not a number.
 
 use std::cmp::Ordering;
 
-use super::function::Function;
 use super::germ::{Germs, LAST_ORDER, Stop};
-use super::node::{ExprId, IdMap, Node, SymbolId};
-use super::number::Number;
-use super::pool::{ExprPool, Sign};
+use crate::{ExprId, ExprPool, Function, IdMap, Node, Number, Sign, SymbolId};
 
 /// Most cases of one slope; those that are not decided have the derivative by the rules, or a difference.
 const MOST_CASES: usize = 256;

@@ -2,10 +2,8 @@
 
 use std::ops::Neg;
 
-use super::interval::{Interval, power_by};
-use super::node::{ExprId, Node, SymbolId};
-use super::number::Number;
-use super::pool::ExprPool;
+use super::interval::power_by;
+use crate::{ExprId, ExprPool, Interval, Node, Number, SymbolId};
 
 impl ExprPool {
     /// The value of `expr` where variables have the values that `value_of` gives.

@@ -3,8 +3,7 @@
 use nalgebra::DMatrix;
 use serde::Serialize;
 
-use super::domain::{Domain, Samples};
-use super::error::SimplifyError;
+use super::domain::{Domain, Samples, SimplifyError};
 use super::ranges::Ranges;
 use super::workspace::Workspace;
 use crate::equations::Equations;

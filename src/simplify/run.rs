@@ -6,9 +6,8 @@ use nalgebra::DMatrix;
 use serde_json::{Value, json};
 
 use super::certificate::{BeforeAfter, Certificate, EquationCertificate, PhaseCertificate};
-use super::domain::{Domain, Samples, check_count};
+use super::domain::{Domain, Samples, SimplifyError, check_count};
 use super::equation::{Equation, Terms, is_same_decimal};
-use super::error::SimplifyError;
 use super::measure::Differences;
 use super::tolerance::Tolerance;
 use super::workspace::Workspace;
@@ -121,12 +120,6 @@ fn provenance_of(model: &ReducedModel, certificate: &Certificate) -> Value {
     entry
 }
 
-/// `-g` in the scaled units of a model with a robot's coordinates: what is known of free fall before any learning.
-fn gravity(model: &ReducedModel) -> Option<f64> {
-    let factors = model.state_factors().ok()?;
-    Some(-GRAVITY_M_S2 * factors[BODY_Z])
-}
-
 struct PhaseProblem<'a> {
     name: &'a str,
     workspace: &'a Workspace,
@@ -134,7 +127,7 @@ struct PhaseProblem<'a> {
     domain: Option<&'a [Interval]>,
     /// A row a sample in the box, a column a term.
     theta: DMatrix<f64>,
-    /// `-g` in the model's units, where it goes between these and those of the robot.
+    /// `-g` in the scaled units of a model with a robot's coordinates: known before any learning.
     gravity: Option<f64>,
     samples_outside: usize,
 }
@@ -148,6 +141,7 @@ impl<'a> PhaseProblem<'a> {
         phase: usize,
     ) -> Result<Self, SimplifyError> {
         let theta = domain.theta(phase, samples, workspace.library())?;
+        let factors = equations.model().state_factors();
         let recorded = samples.map_or(0, |samples| samples.phases[phase].ncols());
         Ok(Self {
             name: &equations.phases()[phase].name,
@@ -156,21 +150,17 @@ impl<'a> PhaseProblem<'a> {
             domain: domain.phase(phase),
             samples_outside: recorded - theta.nrows(),
             theta,
-            gravity: gravity(equations.model()),
+            gravity: factors.ok().map(|factors| -GRAVITY_M_S2 * factors[BODY_Z]),
         })
     }
 
     /// The equation as it is; known is the constant that is gravity.
     fn equation(&self, output: usize) -> Equation {
         let is_gravity = |row: &usize| {
-            let coefficient = self.xi[(*row, output)];
-            self.gravity
-                .is_some_and(|gravity| is_same_decimal(gravity, coefficient))
+            (self.gravity).is_some_and(|gravity| is_same_decimal(gravity, self.xi[(*row, output)]))
         };
-        Equation::new(
-            self.coefficients(output),
-            self.workspace.constant().filter(is_gravity),
-        )
+        let known = self.workspace.constant().filter(is_gravity);
+        Equation::new(self.coefficients(output), known)
     }
 
     fn solve(

@@ -6,10 +6,7 @@ use num_traits::ToPrimitive;
 
 use super::coefficient::{Coefficient, nearest, ratio};
 use super::polynomial::{Atom, CanonicalForm, Monomial};
-use crate::function::Function;
-use crate::node::{ExprId, Node};
-use crate::number::Number;
-use crate::pool::ExprPool;
+use crate::{ExprId, ExprPool, Function, Node, Number};
 
 /// Most fractions of two arguments that are compared by multiplying out, and most such comparisons.
 const MAX_FRACTIONS: usize = 4;

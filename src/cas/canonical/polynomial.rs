@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::coefficient::Coefficient;
-use crate::node::{ExprId, SymbolId};
+use crate::{ExprId, SymbolId};
 
 /// Most terms of a form, and most products of terms that one multiplication makes.
 const MAX_TERMS: usize = 2_000;

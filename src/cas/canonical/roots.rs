@@ -272,13 +272,8 @@ impl CanonicalForms<'_> {
 
     pub(super) fn sign(&mut self, form: &CanonicalForm) -> Option<CanonicalForm> {
         let form = self.argument(form.clone());
-        let Some(leading) = form.leading() else {
+        if form.is_zero() {
             return Some(form);
-        };
-        if let Some(constant) = form.as_constant()
-            && constant.as_real().is_some()
-        {
-            return Some(CanonicalForm::constant(leading.sign()));
         }
         if form.terms.len() > 1
             && let Some((_, rest)) = self.without_exponential(&form)

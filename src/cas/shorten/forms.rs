@@ -3,10 +3,7 @@
 use super::agreement::Agreement;
 use super::search::Shortener;
 use super::{Scaled, Summands};
-use crate::function::Function;
-use crate::node::{ExprId, IdMap, Node};
-use crate::number::Number;
-use crate::pool::ExprPool;
+use crate::{ExprId, ExprPool, Function, IdMap, Node, Number};
 
 const MAX_GROUP: usize = 64;
 const MAX_CHOSEN: usize = 16;

@@ -7,12 +7,8 @@ use super::forms::{NestedSums, collected};
 use super::groups::Link;
 use super::{Scaled, Summands};
 use crate::cost::Costs;
-use crate::function::Function;
-use crate::node::{ExprId, IdMap, IdSet, Node, SymbolId};
-use crate::number::Number;
-use crate::order::Exponent;
-use crate::pool::ExprPool;
 use crate::simplify::MAX_WORK;
+use crate::{Exponent, ExprId, ExprPool, Function, IdMap, IdSet, Node, Number, SymbolId};
 
 const MAX_ROUNDS: usize = 4;
 
