@@ -1,46 +1,12 @@
 //! Latent inputs of batches, forwards and backwards: `u_lat = pinv(J^T) u = (J J^T)^-1 J u`.
 //!
-//! A linear encoder has one `J = W_e` for all samples, so that the projection is one matrix; a nonlinear one has a
-//! Jacobian at every sample, whose Gram matrices are as small as the latent space and factored one by one. Both damp
-//! directions that are nearly dependent.
+//! The Gram matrices of the Jacobians, one per sample, are as small as the latent space and factored one by one;
+//! directions that are nearly dependent are damped.
 
 use nalgebra::DMatrix;
 
 /// Added to the diagonal of `J J^T`.
 const DAMPING: f64 = 1e-12;
-
-/// `pinv(W_e^T)^T = V (V^T V)^-1` for `V = W_e^T`: latent inputs of samples in rows are `u` times this.
-#[derive(Clone, Debug, Default)]
-pub(super) struct InputProjection {
-    /// `V (V^T V)^-1`, `18 x d`.
-    pub weights: DMatrix<f64>,
-    inverse_gram: DMatrix<f64>, // d x d
-}
-
-impl InputProjection {
-    /// The projection of an encoder `V`, `18 x d`.
-    pub(super) fn new(encoder: &DMatrix<f64>) -> Self {
-        let d = encoder.ncols();
-        let gram = encoder.tr_mul(encoder) + DMatrix::identity(d, d) * DAMPING;
-        let inverse_gram = match gram.clone().cholesky() {
-            Some(factor) => factor.inverse(),
-            None => gram.pseudo_inverse(1e-12).expect("a positive tolerance"),
-        };
-        Self {
-            weights: encoder * &inverse_gram,
-            inverse_gram,
-        }
-    }
-
-    /// Adjoint of `V`, given the one of the projection.
-    ///
-    /// From `dQ = dV A^-1 - Q (dV^T V + V^T dV) A^-1`: with `K = G A^-1`, it is `K - V (Q^T K) - V (K^T Q)`.
-    pub(super) fn adjoint(&self, encoder: &DMatrix<f64>, gradient: &DMatrix<f64>) -> DMatrix<f64> {
-        let k = gradient * &self.inverse_gram;
-        let crossed = self.weights.tr_mul(&k);
-        &k - encoder * (&crossed + crossed.transpose())
-    }
-}
 
 /// Latent inputs of a batch under a Jacobian at every sample.
 #[derive(Clone, Debug, Default)]
