@@ -9,8 +9,8 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::model::Activation;
+use crate::train::features::vectorised;
 use crate::train::random::Random;
-use crate::train::vectors::vectorised;
 
 const LANES: usize = 16;
 

@@ -11,16 +11,15 @@ use super::loss::{JointLoss, LossWeights, Losses};
 use super::parameters::{Frame, LatentBasis, Parameters, folded};
 use crate::model::{Layer, ModelError, StateMap};
 use crate::robot::{Robot, STATE_DIM};
-use crate::train::assemble::Origin;
 use crate::train::dynamics_fit::Fitted;
 use crate::train::error::TrainError;
 use crate::train::latent::{EncodedSet, Latent, least_squares_decoder, map_samples, mean_jacobian};
+use crate::train::metrics::Trained;
 use crate::train::options::{TrainOptions, Transfer};
 use crate::train::progress::Monitor;
 use crate::train::random::Random;
-use crate::train::report::Trained;
 use crate::train::seeds::{Outcome, Seeds};
-use crate::train::task::{Recordings, Task};
+use crate::train::task::{Origin, Recordings, Task};
 use crate::train::weak_form::check_terms;
 
 /// Learns a model by Adam over encoder, decoder and Xi together (equations 9 to 20, steps of section IV-D).
