@@ -264,7 +264,7 @@ pub(crate) fn check_pairs(settings: &TrainSettings) -> Result<(), Error> {
         .is_some_and(|weight| f64::from(weight) != 0.0);
     let is_named = settings.coordinates == Some(Coordinates::Named);
     let is_published = settings.paper && method == Method::Joint;
-    let activation = settings.activation.unwrap_or_default();
+    let activation = settings.activation.unwrap_or(Activation::Elu);
     let of_choice = ["slack", "refinements", "growth", "no-rotation"];
     let faults = [
         (
