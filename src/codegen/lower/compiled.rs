@@ -12,7 +12,8 @@ use crate::model::ReducedModel;
 /// the interpreter with the very arithmetic of the generated code. Evaluation
 /// allocates nothing; clone it for another thread.
 ///
-/// All vectors have `latent_dim` elements, in scaled units.
+/// All vectors have `latent_dim` elements, in scaled units. Methods panic where a phase does not exist or a length does
+/// not fit.
 #[derive(Clone, Debug)]
 pub struct CompiledModel {
     latent_dim: usize,
@@ -68,18 +69,12 @@ impl CompiledModel {
     }
 
     /// `ddz = Xi^T Theta(z, dz, u_lat)`.
-    ///
-    /// # Panics
-    /// If `phase` does not exist or a slice is not `latent_dim` long.
     pub fn ddz(&mut self, phase: usize, z: &[f64], dz: &[f64], u_lat: &[f64], ddz: &mut [f64]) {
         let dynamics = &mut self.phases[phase].dynamics;
         dynamics.run(&[z, dz, u_lat], &mut [ddz]);
     }
 
     /// `ddz` and the full `latent_dim x 3 latent_dim` Jacobian by `(z, dz, u_lat)`.
-    ///
-    /// # Panics
-    /// If `phase` does not exist or a length does not fit.
     pub fn jacobian(
         &mut self,
         phase: usize,
@@ -92,12 +87,9 @@ impl CompiledModel {
         let d = self.latent_dim;
         assert_eq!(jacobian.shape(), (d, 3 * d), "shape of the Jacobian");
         let phase = &mut self.phases[phase];
-        if phase.pattern.is_empty() {
-            phase.jacobian.run(&[z, dz, u_lat], &mut [ddz]);
-        } else {
-            let outputs = &mut [ddz, phase.entries.as_mut_slice()];
-            phase.jacobian.run(&[z, dz, u_lat], outputs);
-        }
+        let outputs = &mut [ddz, phase.entries.as_mut_slice()];
+        let n_outputs = if phase.pattern.is_empty() { 1 } else { 2 };
+        (phase.jacobian).run(&[z, dz, u_lat], &mut outputs[..n_outputs]);
         jacobian.fill(0.0);
         for (place, &entry) in phase.pattern.places().zip(&phase.entries) {
             jacobian[place] = entry;
@@ -106,15 +98,11 @@ impl CompiledModel {
 
     /// Advances `(z, dz)` by `h` seconds with the classical Runge-Kutta method under
     /// constant `u_lat`.
-    ///
-    /// # Panics
-    /// If `phase` does not exist or a slice is not `latent_dim` long.
     pub fn rk4_step(&mut self, phase: usize, z: &mut [f64], dz: &mut [f64], u_lat: &[f64], h: f64) {
         let phase = &mut self.phases[phase];
         let (z_next, dz_next) = phase.next.split_at_mut(self.latent_dim);
-        phase
-            .step
-            .run(&[z, dz, u_lat, &[h]], &mut [&mut *z_next, &mut *dz_next]);
+        let outputs = &mut [&mut *z_next, &mut *dz_next];
+        phase.step.run(&[z, dz, u_lat, &[h]], outputs);
         z.copy_from_slice(z_next);
         dz.copy_from_slice(dz_next);
     }
