@@ -21,7 +21,7 @@ impl Format {
 
     /// Refuses a name whose ending says another format. What is there and no file of a disk is refused elsewhere.
     fn check(self, path: &Path) -> Result<(), Error> {
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let name = path.file_name().expect("refused before").to_string_lossy();
         let name = name.to_lowercase();
         let is_device = path.exists() && !path.is_file();
         if is_device || self.0.iter().any(|ending| name.ends_with(ending)) {

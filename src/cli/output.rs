@@ -228,8 +228,8 @@ pub(crate) fn extend(object: &mut Value, more: Value) {
 
 /// The name of a model: as given, or that of its file without folder and ending.
 pub(crate) fn named(given: Option<&str>, output: &Path) -> String {
-    let stem = output.file_stem().unwrap_or_default().to_string_lossy();
-    given.map_or_else(|| stem.into_owned(), str::to_owned)
+    let stem = output.file_stem().expect("an output without a name is refused");
+    given.map_or_else(|| stem.to_string_lossy().into_owned(), str::to_owned)
 }
 
 /// A spinner on stderr, shown only when stderr is a terminal.

@@ -254,7 +254,7 @@ pub(crate) fn failed_runs(runs: &[NamedRun]) -> Vec<String> {
 }
 
 pub(super) fn file_name(path: &Path) -> String {
-    let name = path.file_name().unwrap_or_default();
+    let name = path.file_name().unwrap_or(path.as_os_str());
     name.to_string_lossy().into_owned()
 }
 

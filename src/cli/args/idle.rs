@@ -75,7 +75,7 @@ fn reading(arguments: &ReadingArguments) -> [(&'static str, bool); 2] {
 }
 
 fn ending(path: &Path) -> String {
-    let ending = path.extension().unwrap_or_default();
+    let ending = path.extension().unwrap_or_default(); // no ending is one that no table has
     ending.to_string_lossy().to_lowercase()
 }
 
@@ -160,6 +160,7 @@ fn of_check(arguments: &CheckArguments) -> Result<(), Error> {
 }
 
 fn of_import(arguments: &ImportArguments) -> Result<(), Error> {
+    // A name that says no format: the import tells it by the content, and every flag may be used.
     let of_path = || Format::of_path(&arguments.file).ok();
     let format = arguments.format.or_else(of_path);
     let is = |wanted: &[Format]| format.is_none_or(|format| wanted.contains(&format));

@@ -43,7 +43,7 @@ fn file_beside(path: &Path, name: &str) -> PathBuf {
     if path.is_dir() {
         return path.join(name);
     }
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy(); // what has no name cannot be opened
     let folder = path.parent().unwrap_or(Path::new(""));
     folder.join(name.replace("{}", stem.trim_end_matches(".csv")))
 }

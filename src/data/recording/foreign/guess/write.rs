@@ -31,7 +31,7 @@ pub(super) fn guessed(path: &Path, logs: &[Log], robot: &Robot) -> Guess {
     let time = source.time();
     let mut text = format!(
         "# Guessed from {}: check every line, then `romc inspect LOG --columns THIS.toml`.\n\n[time]\n{time}\n",
-        path.file_name().unwrap_or_default().to_string_lossy(),
+        path.file_name().unwrap_or(path.as_os_str()).to_string_lossy(),
     );
     let Scales {
         lines: mut scales,
