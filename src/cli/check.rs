@@ -1,24 +1,16 @@
 //! `romc check`: two files in, equal or a point of difference out.
 
-use std::fmt::Write as _;
-
-use serde_json::{Value, json};
-
-use super::Answer;
 use super::args::CheckArguments;
-use super::output::extend;
-use crate::Error;
+use super::*;
 use crate::check::{
     CheckDomain, CheckError, CheckOptions, Comparison, EquationComparison, Gap, Side,
     TermDifference, Verdict, compare, read_sides,
 };
 use crate::files::read_toml;
 use crate::import::SymbolNames;
-use crate::typeset::significant;
-use crate::typeset::words::counted;
 
 /// Compares two files. The exit code is 0 if they are proven equal and 1 otherwise.
-pub(crate) fn run(arguments: &CheckArguments) -> Result<Answer, Error> {
+pub(super) fn run(arguments: &CheckArguments) -> Result<Answer, Error> {
     let options = CheckOptions {
         exact: arguments.exact,
         symbols: SymbolNames::parse(&arguments.symbols)?,
@@ -27,21 +19,21 @@ pub(crate) fn run(arguments: &CheckArguments) -> Result<Answer, Error> {
     let [left, right] = read_sides([&arguments.left, &arguments.right], &options)?;
     let comparison = compare(&left, &right, &options);
     let phases: Vec<&str> = (comparison.phases.iter().map(|phase| phase.name.as_str())).collect();
-    let latent_dim = left.latent_dim.max(right.latent_dim);
-    let foreign = options.domain.foreign(&phases, latent_dim);
+    let foreign = (options.domain).foreign(&phases, left.latent_dim.max(right.latent_dim));
     if let (Some(path), Some(message)) = (&arguments.domain, foreign) {
         let path = path.clone();
         return Err(CheckError::Domain { path, message }.into());
     }
     let is_equal = comparison.says_the_same();
+    let phases = comparison.phases.iter().map(|phase| {
+        let equations: Vec<Value> = phase.equations.iter().map(equation_json).collect();
+        json!({ "phase": phase.name, "equations": equations })
+    });
     let json = json!({
         "files": [&left.file, &right.file],
         "equal": is_equal,
         "exact": comparison.verdicts().all(|verdict| *verdict == Verdict::Equal),
-        "phases": comparison.phases.iter().map(|phase| json!({
-            "phase": phase.name,
-            "equations": phase.equations.iter().map(equation_json).collect::<Vec<_>>(),
-        })).collect::<Vec<_>>(),
+        "phases": phases.collect::<Vec<_>>(),
     });
     Ok(Answer::new(text(&left, &right, &comparison), json).failed_if(!is_equal))
 }
@@ -65,35 +57,28 @@ fn text(left: &Side, right: &Side, comparison: &Comparison) -> String {
             let verdict = verdict_text(&equation.verdict);
             let _ = writeln!(text, "  {}: {verdict}", equation.output);
             text += &dropping(&equation.verdict, [left, right]);
-            if let Some(gap) = &equation.one_sided {
-                let is_of_second = gap.left.is_nan();
-                let (has, lacks, at) = (side(is_of_second), side(!is_of_second), place(gap));
-                let _ = writeln!(
-                    text,
-                    "    note: {has} has a value at {at}, {lacks} has none"
-                );
-            }
+            text += &lines(
+                "    note: ",
+                equation.one_sided.as_ref().map(|gap| {
+                    let is_of_second = gap.left.is_nan();
+                    let (has, lacks, at) = (side(is_of_second), side(!is_of_second), place(gap));
+                    format!("{has} has a value at {at}, {lacks} has none")
+                }),
+            );
         }
     }
     let count = |wanted: fn(&Verdict) -> bool| comparison.verdicts().filter(|v| wanted(v)).count();
     let (all, exact) = (count(|_| true), count(|verdict| *verdict == Verdict::Equal));
-    let equal = count(Verdict::is_equal);
+    let (all, equal) = (counted(all, "equation"), count(Verdict::is_equal));
     let rounded = match equal - exact {
         0 => String::new(),
         n => format!(", {n} of them up to the printed digits"),
     };
     let (say, of_all) = match comparison.says_the_same() {
-        true => ("say", counted(all, "equation")),
-        false => (
-            "do not say",
-            format!("{equal} of {}", counted(all, "equation")),
-        ),
+        true => ("say", all),
+        false => ("do not say", format!("{equal} of {all}")),
     };
-    let _ = writeln!(
-        text,
-        "\nA and B {say} the same: {of_all} proven equal{rounded}"
-    );
-    text
+    text + &format!("\nA and B {say} the same: {of_all} proven equal{rounded}\n")
 }
 
 /// Notes on the files in print that lack a term of the other: rounding may have dropped it.
@@ -109,13 +94,13 @@ fn dropping(verdict: &Verdict, [left, right]: [&Side; 2]) -> String {
         ("B", right, lacks(|term| term.right)),
     ];
     let dropping = (files.into_iter()).filter(|(_, file, lacks)| file.is_rounded && *lacks);
-    let rounded = dropping.map(|(letter, side, _)| format!("{letter} ({})", side.file));
-    let notes = rounded.map(|file| {
+    let notes = dropping.map(|(letter, side, _)| {
         format!(
-            "    note: {file} has rounded decimals, and terms that round to zero are not printed\n"
+            "{letter} ({}) has rounded decimals, and terms that round to zero are not printed",
+            side.file
         )
     });
-    notes.collect()
+    lines("    note: ", notes)
 }
 
 fn side(is_second: bool) -> &'static str {
@@ -139,11 +124,11 @@ fn verdict_text(verdict: &Verdict) -> String {
         }
         Verdict::Undecided(largest, terms) => {
             let seen = match largest {
-                Some(gap) => format!("; the largest difference seen is{}", gap_text(gap)),
-                None => "; no difference was seen at any point".to_owned(),
+                Some(gap) => format!("the largest difference seen is{}", gap_text(gap)),
+                None => "no difference was seen at any point".to_owned(),
             };
             format!(
-                "not decided: no proof, and no point where the difference is beyond rounding{seen}{}",
+                "not decided: no proof, and no point where the difference is beyond rounding; {seen}{}",
                 terms_text(terms)
             )
         }

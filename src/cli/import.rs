@@ -1,27 +1,17 @@
 //! `romc import`: a model trained elsewhere in, a model file out.
 
-use std::fmt::Write as _;
-
-use serde_json::{Map, Value, json};
-
-use super::Answer;
 use super::args::{ImportArguments, LibraryArgument};
-use super::destination::{Format, Inputs};
-use super::output::{lines, named, read_recordings};
-use super::robot;
+use super::*;
 use crate::evaluate::RoundTrip;
 use crate::import::{
     Chosen, Format as FileKind, ImportError, ImportOptions, ImportReport, Imported, SymbolNames,
     import, read_terms,
 };
-use crate::model::{LibraryChoice, LibraryOrder, ReducedModel};
-use crate::recording::Segment;
+use crate::model::{LibraryChoice, LibraryOrder};
 use crate::robot_file::read_actuators;
 use crate::sim::with_input_statistics;
-use crate::typeset::Table;
-use crate::{Error, artifact};
 
-pub fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
+pub(super) fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
     let library = match &arguments.library {
         Some(LibraryArgument::File(path)) => Some(path),
         Some(LibraryArgument::Shorthand(_) | LibraryArgument::Terms(_)) | None => None,
@@ -37,8 +27,8 @@ pub fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
     let options = options(arguments)?;
     let kind = options
         .format
-        .map_or_else(|| FileKind::of_path(&arguments.file), Ok);
-    let is_text = matches!(kind, Ok(FileKind::Equations | FileKind::Latex));
+        .or_else(|| FileKind::of_path(&arguments.file).ok());
+    let is_text = matches!(kind, Some(FileKind::Equations | FileKind::Latex));
     if is_text && !arguments.inputs_from.is_empty() {
         let (found, expected) = ("a file of equations", "a file with encoder and decoder");
         return Err(ImportError::option("--inputs-from", found, expected).into());
@@ -52,14 +42,17 @@ pub fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
         fault,
     } = import_compared(read, options, &segments, arguments.unchecked)?;
     artifact::write(&arguments.output, &model, arguments.force)?;
-    let mut text = describe(&report);
-    let axes = axes(&model).filter(|_| arguments.wrench_frame.is_none());
-    text += &lines("note: ", &axes);
-    text.extend(
-        check
-            .as_ref()
-            .map(|check| describe_check(check, fault.as_deref())),
-    );
+    let has_axes = model.robot().is_ok() && model.encoder_map().is_ok();
+    let axes = (has_axes && arguments.wrench_frame.is_none()).then(|| {
+        format!(
+            "force and moment of the inputs are along the {}'s axes, as published \
+             (--wrench-frame says otherwise)",
+            model.wrench_frame().name()
+        )
+    });
+    let fault = fault.as_deref();
+    let mut text = describe(&report) + &lines("note: ", &axes);
+    text.extend((check.iter()).map(|check| describe_check(check, fault)));
     let (output, name) = (arguments.output.display().to_string(), model.name());
     let _ = writeln!(text, "{output}: model `{name}`");
     let lacking = lacking(&model);
@@ -71,20 +64,9 @@ pub fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
         "report": report,
         "wrench_axes": axes,
         "lacking": lacking,
-        "check": check.as_ref().map(|check| check_json(check, fault.as_deref())),
+        "check": check.as_ref().map(|check| check_json(check, fault)),
     });
     Ok(Answer::new(text, json))
-}
-
-fn axes(model: &ReducedModel) -> Option<String> {
-    let has_axes = model.robot().is_ok() && model.encoder_map().is_ok();
-    let frame = model.wrench_frame().name();
-    has_axes.then(|| {
-        format!(
-            "force and moment of the inputs are along the {frame}'s axes, as published \
-             (--wrench-frame says otherwise)"
-        )
-    })
 }
 
 /// An imported model, compared with recordings if there are any.
@@ -110,12 +92,10 @@ pub fn import_compared(
     unchecked: bool,
 ) -> Result<Compared, Error> {
     if segments.is_empty() {
-        let imported = read(&options)?;
-        let (check, fault) = (None, None);
         return Ok(Compared {
-            imported,
-            check,
-            fault,
+            imported: read(&options)?,
+            check: None,
+            fault: None,
         });
     }
     let compared = |options: &ImportOptions| -> Result<(Imported, RoundTrip), Error> {
@@ -159,14 +139,10 @@ pub fn import_compared(
 }
 
 fn needs_maps(report: &ImportReport) -> Error {
-    let unused = report
-        .unused
-        .iter()
-        .map(|unused| format!("`{}`", unused.tensor));
-    let unused: Vec<String> = unused.collect();
-    let left = match unused.is_empty() {
-        true => "no tensor is left".to_owned(),
-        false => format!("left are {}", unused.join(", ")),
+    let unused = report.unused.iter().map(|of| format!("`{}`", of.tensor));
+    let left = match unused.collect::<Vec<_>>().join(", ").as_str() {
+        "" => "no tensor is left".to_owned(),
+        unused => format!("left are {unused}"),
     };
     let found = format!("a model without encoder or decoder to compare; {left}");
     let expected = "both (--map encoder.weight=TENSOR, --map decoder.weight=TENSOR)";
@@ -247,11 +223,11 @@ fn describe(report: &ImportReport) -> String {
         let _ = writeln!(text, "{table}");
     }
     if !report.terms.is_empty() {
-        let order = report
-            .library_order
-            .map(|order| format!(" (--library-order {order})"));
-        let (order, terms) = (order.unwrap_or_default(), report.terms.join("; "));
-        let _ = writeln!(text, "rows of xi{order}: {terms}\n");
+        let order = report.library_order.iter();
+        let order: String = order
+            .map(|order| format!(" (--library-order {order})"))
+            .collect();
+        let _ = writeln!(text, "rows of xi{order}: {}\n", report.terms.join("; "));
     }
     if !report.equations.is_empty() {
         let table = Table::of(&report.equations)
@@ -262,11 +238,9 @@ fn describe(report: &ImportReport) -> String {
             .table();
         let _ = writeln!(text, "{table}");
     }
-    for unused in &report.unused {
-        let shape = shape(&unused.shape);
-        let _ = writeln!(text, "not used: {} ({shape})", unused.tensor);
-    }
-    text + &lines("note: ", &report.notes)
+    let unused = report.unused.iter();
+    let unused = unused.map(|of| format!("{} ({})", of.tensor, shape(&of.shape)));
+    text + &lines("not used: ", unused) + &lines("note: ", &report.notes)
 }
 
 fn shape(dims: &[usize]) -> String {
@@ -283,36 +257,30 @@ fn describe_check(check: &RoundTrip, fault: Option<&str>) -> String {
         "\nOn the recordings: decode(encode(x)) misses {:.3} of the variance",
         check.error
     );
-    for (phase, r2) in &check.acceleration_r2 {
-        if let Some(r2) = r2 {
-            let _ = write!(text, "; R^2 of ddz in {phase} {r2:.3}");
-        }
+    let phases = check.acceleration_r2.iter();
+    for (phase, r2) in phases.filter_map(|(phase, r2)| Some((phase, (*r2)?))) {
+        let _ = write!(text, "; R^2 of ddz in {phase} {r2:.3}");
     }
     if check.trials.by_order.len() > 1 {
-        let orders = check.trials.by_order.iter().map(|(order, r2)| {
-            let name = order.name().unwrap_or_default();
-            format!("{r2:.3} in the order {name}")
-        });
-        let _ = write!(
-            text,
-            "; of all phases {}",
-            orders.collect::<Vec<_>>().join(", ")
-        );
+        let orders: Vec<String> = orders(check)
+            .map(|(name, r2)| format!("{r2:.3} in the order {name}"))
+            .collect();
+        let _ = write!(text, "; of all phases {}", orders.join(", "));
     }
     text + "\n" + &lines("warning: ", fault) + "\n"
 }
 
+fn orders(check: &RoundTrip) -> impl Iterator<Item = (&'static str, f64)> {
+    let orders = check.trials.by_order.iter();
+    orders.map(|(order, r2)| (order.name().unwrap_or_default(), *r2))
+}
+
 fn check_json(check: &RoundTrip, fault: Option<&str>) -> Value {
-    let orders: Map<String, Value> = (check.trials.by_order.iter())
-        .map(|(order, r2)| (order.name().unwrap_or_default().to_owned(), json!(r2)))
-        .collect();
-    let phases: Map<String, Value> = (check.acceleration_r2.iter())
-        .map(|(phase, r2)| (phase.clone(), json!(r2)))
-        .collect();
+    let phases = check.acceleration_r2.iter();
     json!({
         "reconstruction_error": check.error,
-        "acceleration_r2": phases,
-        "library_order_r2": orders,
+        "acceleration_r2": phases.map(|(phase, r2)| (phase.clone(), json!(r2))).collect::<Map<_, _>>(),
+        "library_order_r2": orders(check).map(|(name, r2)| (name.to_owned(), json!(r2))).collect::<Map<_, _>>(),
         "fault": fault,
     })
 }

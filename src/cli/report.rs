@@ -1,22 +1,9 @@
 //! `romc report`: a one-page assessment of a model, and its figures as files.
 
-use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
-
-use serde_json::json;
-
 use super::args::ReportArguments;
-use super::destination::{Format, Inputs};
 use super::mpc::{judged, run_with_both_lifts};
-use super::output::{
-    lines, names, note, note_late_restarts, quoted, quoted_all, read_for, read_jump, spinner,
-    write_file,
-};
-use super::{Answer, simplification};
+use super::*;
 use crate::evaluate::{Assessment, LAMBDA, Verdict, verdict};
-use crate::files::EmittedFile;
-use crate::model::ReducedModel;
-use crate::recording::{Recording, Segment};
 use crate::report::{
     Content, Introduction, PageOptions, all_figures, figure_files, introduction, page,
     verdict_lines, without_statistics,
@@ -24,10 +11,9 @@ use crate::report::{
 use crate::simplify::Tolerance;
 use crate::study::{Store, Summary};
 use crate::train::sha256;
-use crate::{Error, artifact};
 
 /// Writes the page, and the figures if a folder for them is given. The exit code is 1 if the model is fit for nothing.
-pub(crate) fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
+pub(super) fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
     let inputs = Inputs::default()
         .and([&arguments.model])
         .and(&arguments.recordings)
@@ -39,40 +25,41 @@ pub(crate) fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
     let recordings = read_for(&model, &arguments.recordings, &arguments.reading)?;
     note_late_restarts(&recordings, arguments.restart_every);
     let study = (arguments.study.as_deref()).map(summary).transpose()?;
-    let plan = arguments.plan.as_ref();
-    let plan = plan.map(|path| read_jump(&model, path, &arguments.reading));
+    let plan = (arguments.plan.as_ref()).map(|path| read_jump(&model, path, &arguments.reading));
     let plan = plan.transpose()?;
-    let beside = (study.as_ref(), plan.as_ref());
-    let made = make(&model, &recordings, beside, arguments)?;
+    let made = make(&model, &recordings, (&study, &plan), arguments)?;
     // The figures come first: files that romc did not make are refused with nothing written.
     let written = match &arguments.figures {
         Some(folder) => inputs.write_folder(folder, &made.files, arguments.force)?,
         None => Vec::new(),
     };
     write_file(&arguments.output, made.page.as_bytes(), arguments.force)?;
+    let output = arguments.output.display().to_string();
+    let Introduction {
+        headline,
+        sentences,
+        ..
+    } = &made.introduction;
     let mut text = format!(
-        "{}\n{}\n\n{}\n{}: {} kB, {} figures\n",
-        made.introduction.headline,
-        made.introduction.sentences.join("\n"),
+        "{headline}\n{}\n\n{}\n{output}: {} kB, {} figures\n",
+        sentences.join("\n"),
         verdict_lines(&made.verdict),
-        arguments.output.display(),
         made.page.len() / 1000,
         made.n_figures
     );
     text += &lines("note: ", &made.remarks);
-    if let Some(folder) = &arguments.figures {
-        let (folder, files) = (folder.display(), written.len());
-        let _ = writeln!(
-            text,
-            "{folder}: {files} files, each figure as .svg, .pdf and .csv"
-        );
-    }
+    let files = format!(
+        "{} files, each figure as .svg, .pdf and .csv",
+        written.len()
+    );
+    let folder = shown(&arguments.figures);
+    text += &lines("", folder.map(|folder| format!("{folder}: {files}")));
     let json = json!({
         "model": arguments.model.display().to_string(),
-        "output": arguments.output.display().to_string(),
+        "output": output,
         "bytes": made.page.len(),
-        "headline": made.introduction.headline,
-        "reasons": made.introduction.sentences,
+        "headline": headline,
+        "reasons": sentences,
         "verdict": made.verdict,
         "figures": names(&written),
         "remarks": made.remarks,
@@ -91,7 +78,7 @@ fn summary(folder: &Path) -> Result<Summary, Error> {
     Ok(summary)
 }
 
-pub(crate) struct Made {
+pub(super) struct Made {
     pub page: String,
     pub introduction: Introduction,
     pub verdict: Verdict,
@@ -104,17 +91,15 @@ pub(crate) struct Made {
 fn make(
     model: &ReducedModel,
     recordings: &[Recording],
-    (study, plan): (Option<&Summary>, Option<&Segment>),
+    (study, plan): (&Option<Summary>, &Option<Segment>),
     arguments: &ReportArguments,
 ) -> Result<Made, Error> {
     let progress = spinner("rolling the model out");
     let assessment = Assessment::over(model, recordings, arguments.restart_every)?;
     progress.set_message("running the controller");
     let can_control = without_statistics(model).is_none();
-    let [plain, consistent] = match can_control {
-        true => run_with_both_lifts(model, recordings)?,
-        false => [Vec::new(), Vec::new()],
-    };
+    let runs = can_control.then(|| run_with_both_lifts(model, recordings));
+    let [plain, consistent] = runs.transpose()?.unwrap_or_default();
     let verdict = verdict(model, &assessment, &judged(&plain));
     progress.set_message("drawing");
     let paths = recordings.iter().map(|recording| &recording.path);
@@ -127,8 +112,8 @@ fn make(
         verdict: &verdict,
         plain: &plain,
         consistent: &consistent,
-        study,
-        plan,
+        study: study.as_ref(),
+        plan: plan.as_ref(),
         digests: &digests,
     };
     let commands = commands(arguments, can_control);
@@ -137,7 +122,7 @@ fn make(
     made
 }
 
-pub(crate) fn page_of(
+pub(super) fn page_of(
     content: &Content<'_>,
     tolerance: Tolerance,
     commands: Vec<String>,
@@ -169,33 +154,34 @@ pub(crate) fn page_of(
 const LADDER_CAPTION: &str = "Size of the equations within each tolerance: active terms, digits of all coefficients, operations; errors as shares of the root mean square of their ddz, the largest of all equations; errors of rollouts over whole jumps and restarted";
 
 fn commands(arguments: &ReportArguments, has_control: bool) -> Vec<String> {
-    let model = quoted(&arguments.model);
+    let (model, output) = (quoted(&arguments.model), quoted(&arguments.output));
     let recordings = quoted_all(&arguments.recordings) + &arguments.reading.as_flags();
-    let every = arguments.restart_every;
-    let flag = |name: &str, path: &Option<PathBuf>| -> String {
-        let flag = |path: &PathBuf| format!(" --{name} {}", quoted(path));
-        path.iter().map(flag).collect()
-    };
-    let study = flag("study", &arguments.study);
-    let plan = flag("plan", &arguments.plan);
-    let tolerance = arguments.tolerance;
+    let along = format!("{model} {recordings}");
+    let (every, tolerance) = (arguments.restart_every, arguments.tolerance);
+    let study = arguments
+        .study
+        .iter()
+        .map(|path| format!(" --study {}", quoted(path)));
+    let plan = arguments
+        .plan
+        .iter()
+        .map(|path| format!(" --plan {}", quoted(path)));
+    let beside: String = study.chain(plan).collect();
     let mut commands = vec![
         format!(
-            "romc report {model} {recordings} --restart-every {every} --tolerance {tolerance}{study}{plan} --output {}",
-            quoted(&arguments.output)
+            "report {along} --restart-every {every} --tolerance {tolerance}{beside} --output {output}"
         ),
-        format!("romc simulate {model} {recordings} --restart-every {every}"),
-    ];
-    if has_control {
-        for lift in ["transpose", "consistent"] {
-            commands.push(format!("romc mpc {model} {recordings} --lift {lift}"));
-        }
-    }
-    commands.extend([
-        format!("romc compile {model} --emit latex --out-dir out"),
+        format!("simulate {along} --restart-every {every}"),
+        format!("mpc {along} --lift transpose"),
+        format!("mpc {along} --lift consistent"),
+        format!("compile {model} --emit latex --out-dir out"),
         format!(
-            "romc compile {model} --emit latex,c --tolerance {tolerance} --domain {recordings} --out-dir out"
+            "compile {model} --emit latex,c --tolerance {tolerance} --domain {recordings} --out-dir out"
         ),
-    ]);
+    ];
+    commands.retain(|command| has_control || !command.starts_with("mpc"));
     commands
+        .iter()
+        .map(|command| format!("romc {command}"))
+        .collect()
 }

@@ -159,7 +159,6 @@ pub struct IdentifyArguments {
                   romc robot go1.urdf --name my-go1 --output my-go1.toml")]
 pub struct RobotArguments {
     /// Robot: go1, go2, a1, or a .toml or .urdf file
-    #[arg(value_name = "ROBOT")]
     pub robot: String,
     /// Links of the four feet of a URDF, where they are not found by themselves: LINK,LINK,..., or with the foot's
     /// place in the frame of each, in m, where no link is: LINK:x,y,z,LINK:x,y,z,...
@@ -212,7 +211,6 @@ pub struct CheckArguments {
 )]
 pub struct SimulateArguments {
     /// Model file
-    #[arg(value_name = "MODEL")]
     pub model: PathBuf,
     /// Recordings to follow
     #[arg(required = true, value_name = "RECORDING")]
@@ -236,7 +234,6 @@ pub struct SimulateArguments {
 )]
 pub struct MpcArguments {
     /// Model file
-    #[arg(value_name = "MODEL")]
     pub model: PathBuf,
     /// Recordings to follow
     #[arg(required = true, value_name = "RECORDING")]
@@ -281,7 +278,6 @@ pub struct MpcArguments {
 )]
 pub struct PlanArguments {
     /// Model file with `landmarks` and `prior`, as `romc train` writes them
-    #[arg(value_name = "MODEL")]
     pub model: PathBuf,
     /// Distance of the body from start to end, in metres
     #[arg(
@@ -329,7 +325,6 @@ pub struct PlanArguments {
 )]
 pub struct ReportArguments {
     /// Model file
-    #[arg(value_name = "MODEL")]
     pub model: PathBuf,
     /// Recordings that the model is compared with
     #[arg(required = true, value_name = "RECORDING")]

@@ -18,7 +18,6 @@ use crate::typeset::Form;
 )]
 pub struct CompileArguments {
     /// Model file
-    #[arg(value_name = "MODEL")]
     pub model: PathBuf,
     /// Targets, separated by commas
     #[arg(
@@ -116,9 +115,8 @@ pub struct EquationArguments {
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Simplification")]
 pub struct SimplifyArguments {
-    /// Drop and round terms as long as no ddz is off by more than this anywhere in the domain: 1%
-    /// (of its root mean square over the recordings) or 0.05 (scaled units per s^2); nothing
-    /// changes at 0
+    /// Drop and round terms as long as no ddz is off by more than this anywhere in the domain: 1% (of its root mean
+    /// square over the recordings) or 0.05 (scaled units per s^2); nothing changes at 0
     #[arg(
         long,
         value_name = "ERROR",
@@ -129,8 +127,7 @@ pub struct SimplifyArguments {
     /// Recordings whose bounding box in each phase is the domain; or one .toml file of ranges
     #[arg(long, value_name = "RECORDING", num_args = 1..)]
     pub domain: Vec<PathBuf>,
-    /// How far the domain reaches beyond the recordings, as a share of each variable's range (0.1
-    /// unless given)
+    /// How far the domain reaches beyond the recordings, as a share of each variable's range (0.1 unless given)
     #[arg(
         long,
         value_name = "SHARE",
