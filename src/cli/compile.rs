@@ -154,7 +154,6 @@ fn planned(
     }))
 }
 
-/// The files of the targets, in memory, with the model's digest in their headers.
 fn emit(
     equations: &Equations<'_>,
     arguments: &CompileArguments,
@@ -187,7 +186,6 @@ fn emit(
     Ok(deploy::emit(equations, &arguments.emit, &options)?)
 }
 
-/// A note on files of the folder that this run did not write.
 fn earlier_in_words(earlier: &[PathBuf]) -> String {
     match names(earlier).as_slice() {
         [] => String::new(),

@@ -30,7 +30,6 @@ impl<'a> Inputs<'a> {
         self
     }
 
-    /// The same for a command that writes into this folder.
     pub(super) fn into_folder(mut self, folder: Option<&Path>) -> Result<Self, Error> {
         self.1 = folder.map(Begun::of).transpose()?;
         Ok(self)
@@ -130,7 +129,6 @@ impl<'a> Inputs<'a> {
         Ok(write_files_since(begun, folder, files, overwrite)?)
     }
 
-    /// Writes figures into a folder, and says so in the answer.
     pub(super) fn write_figures(
         &self,
         folder: &Path,

@@ -52,7 +52,9 @@ pub(super) fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
     });
     let fault = fault.as_deref();
     let mut text = describe(&report) + &lines("note: ", &axes);
-    text.extend((check.iter()).map(|check| describe_check(check, fault)));
+    let check = check.map(|check| describe_check(&check, fault));
+    let (words, check) = check.unwrap_or_default();
+    text += &words;
     let (output, name) = (arguments.output.display().to_string(), model.name());
     let _ = writeln!(text, "{output}: model `{name}`");
     let lacking = lacking(&model);
@@ -64,7 +66,7 @@ pub(super) fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
         "report": report,
         "wrench_axes": axes,
         "lacking": lacking,
-        "check": check.as_ref().map(|check| check_json(check, fault)),
+        "check": check,
     });
     Ok(Answer::new(text, json))
 }
@@ -151,21 +153,18 @@ fn needs_maps(report: &ImportReport) -> Error {
 
 /// Commands that cannot use a model, and the option that mends it.
 fn lacking(model: &ReducedModel) -> Option<&'static str> {
-    if model.encoder_map().is_err() || model.decoder_map().is_err() {
-        return Some(
-            "Equations only: `romc compile` takes this model; everything else needs an encoder and a decoder.",
-        );
-    }
-    if model.robot().is_err() {
-        return Some(
-            "No robot: `romc compile` takes this model; `--robot go1` lets `simulate`, `report` and `mpc` do so too.",
-        );
-    }
-    let n_phases = model.phases().len();
-    (0..n_phases).any(|phase| model.input_statistics(phase).is_err()).then_some(
+    let has_maps = model.encoder_map().is_ok() && model.decoder_map().is_ok();
+    let mut phases = 0..model.phases().len();
+    Some(if !has_maps {
+        "Equations only: `romc compile` takes this model; everything else needs an encoder and a decoder."
+    } else if model.robot().is_err() {
+        "No robot: `romc compile` takes this model; `--robot go1` lets `simulate`, `report` and `mpc` do so too."
+    } else if phases.any(|phase| model.input_statistics(phase).is_err()) {
         "No input statistics in some phase: the controller (`mpc`, `compile --emit controller`) cannot weigh inputs; \
-         `--inputs-from jumps/*.csv` takes them from recordings.",
-    )
+         `--inputs-from jumps/*.csv` takes them from recordings."
+    } else {
+        return None;
+    })
 }
 
 fn options(arguments: &ImportArguments) -> Result<ImportOptions, Error> {
@@ -200,47 +199,44 @@ fn options(arguments: &ImportArguments) -> Result<ImportOptions, Error> {
 }
 
 fn describe(report: &ImportReport) -> String {
-    let mut text = format!(
-        "{} ({}): {} latent coordinates, ",
-        report.file, report.format, report.latent_dim
-    );
-    if let Some(state_dim) = report.state_dim {
-        let _ = write!(text, "{state_dim} robot coordinates, ");
-    }
-    let _ = writeln!(text, "{} candidate terms\n", report.library_dim);
-    if !report.used.is_empty() {
-        let table = Table::of(&report.used)
-            .column("part", "", |used| &used.role)
-            .column("tensor", "", |used| &used.tensor)
-            .column("shape", "", |used| shape(&used.shape))
-            .column("type", "", |used| &used.element)
-            .column("chosen", "", |used| match used.chosen {
-                Chosen::Mapped => "by --map",
-                Chosen::Named => "by name",
-            })
-            .column("stored as", "", |used| used.layout.to_string())
-            .table();
-        let _ = writeln!(text, "{table}");
-    }
-    if !report.terms.is_empty() {
-        let order = report.library_order.iter();
-        let order: String = order
-            .map(|order| format!(" (--library-order {order})"))
-            .collect();
-        let _ = writeln!(text, "rows of xi{order}: {}\n", report.terms.join("; "));
-    }
-    if !report.equations.is_empty() {
-        let table = Table::of(&report.equations)
-            .column("equation", "", |equation| &equation.output)
-            .column("phase", "", |equation| &equation.phase)
-            .column("line", "", |equation| equation.line)
-            .column("terms", "", |equation| equation.terms)
-            .table();
-        let _ = writeln!(text, "{table}");
-    }
+    let used = Table::of(&report.used)
+        .column("part", "", |used| &used.role)
+        .column("tensor", "", |used| &used.tensor)
+        .column("shape", "", |used| shape(&used.shape))
+        .column("type", "", |used| &used.element)
+        .column("chosen", "", |used| match used.chosen {
+            Chosen::Mapped => "by --map",
+            Chosen::Named => "by name",
+        })
+        .column("stored as", "", |used| used.layout.to_string())
+        .table();
+    let order = (report.library_order.as_ref()).map(|of| format!(" (--library-order {of})"));
+    let (order, terms) = (order.unwrap_or_default(), report.terms.join("; "));
+    let terms = (!terms.is_empty()).then(|| format!("rows of xi{order}: {terms}\n"));
+    let equations = Table::of(&report.equations)
+        .column("equation", "", |equation| &equation.output)
+        .column("phase", "", |equation| &equation.phase)
+        .column("line", "", |equation| equation.line)
+        .column("terms", "", |equation| equation.terms)
+        .table();
+    let filled = |table: Table| lines("", Some(table).filter(|table| !table.is_empty()));
     let unused = report.unused.iter();
     let unused = unused.map(|of| format!("{} ({})", of.tensor, shape(&of.shape)));
-    text + &lines("not used: ", unused) + &lines("note: ", &report.notes)
+    let state = report
+        .state_dim
+        .map(|dim| format!("{dim} robot coordinates, "));
+    format!(
+        "{} ({}): {} latent coordinates, {}{} candidate terms\n\n",
+        report.file,
+        report.format,
+        report.latent_dim,
+        state.unwrap_or_default(),
+        report.library_dim
+    ) + &filled(used)
+        + &lines("", terms)
+        + &filled(equations)
+        + &lines("not used: ", unused)
+        + &lines("note: ", &report.notes)
 }
 
 fn shape(dims: &[usize]) -> String {
@@ -251,36 +247,30 @@ fn shape(dims: &[usize]) -> String {
     }
 }
 
-/// What the recordings of `--inputs-from` say of the imported model, as text.
-fn describe_check(check: &RoundTrip, fault: Option<&str>) -> String {
+/// What the recordings of `--inputs-from` say of the imported model, in words and as JSON.
+fn describe_check(check: &RoundTrip, fault: Option<&str>) -> (String, Value) {
     let mut text = format!(
         "\nOn the recordings: decode(encode(x)) misses {:.3} of the variance",
         check.error
     );
-    let phases = check.acceleration_r2.iter();
-    for (phase, r2) in phases.filter_map(|(phase, r2)| Some((phase, (*r2)?))) {
-        let _ = write!(text, "; R^2 of ddz in {phase} {r2:.3}");
+    let (mut phases, mut orders, mut words) = (Map::new(), Map::new(), Vec::new());
+    for (phase, r2) in &check.acceleration_r2 {
+        text.extend(r2.map(|r2| format!("; R^2 of ddz in {phase} {r2:.3}")));
+        phases.insert(phase.clone(), json!(r2));
     }
-    if check.trials.by_order.len() > 1 {
-        let orders: Vec<String> = orders(check)
-            .map(|(name, r2)| format!("{r2:.3} in the order {name}"))
-            .collect();
-        let _ = write!(text, "; of all phases {}", orders.join(", "));
+    for (order, r2) in &check.trials.by_order {
+        let name = order.name().unwrap_or_default();
+        words.push(format!("{r2:.3} in the order {name}"));
+        orders.insert(name.to_owned(), json!(r2));
     }
-    text + "\n" + &lines("warning: ", fault) + "\n"
-}
-
-fn orders(check: &RoundTrip) -> impl Iterator<Item = (&'static str, f64)> {
-    let orders = check.trials.by_order.iter();
-    orders.map(|(order, r2)| (order.name().unwrap_or_default(), *r2))
-}
-
-fn check_json(check: &RoundTrip, fault: Option<&str>) -> Value {
-    let phases = check.acceleration_r2.iter();
-    json!({
+    if words.len() > 1 {
+        let _ = write!(text, "; of all phases {}", words.join(", "));
+    }
+    let json = json!({
         "reconstruction_error": check.error,
-        "acceleration_r2": phases.map(|(phase, r2)| (phase.clone(), json!(r2))).collect::<Map<_, _>>(),
-        "library_order_r2": orders(check).map(|(name, r2)| (name.to_owned(), json!(r2))).collect::<Map<_, _>>(),
+        "acceleration_r2": phases,
+        "library_order_r2": orders,
         "fault": fault,
-    })
+    });
+    (text + "\n" + &lines("warning: ", fault) + "\n", json)
 }

@@ -20,17 +20,7 @@ use crate::report::{invariance_table, range};
 use crate::robot::{JOINT_DIM, JOINT_NAMES, Robot, WrenchFrame};
 
 /// Endings of models; those of other tools are refused with the lines that convert them.
-const OF_MODELS: [&str; 9] = [
-    "json",
-    "safetensors",
-    "pt",
-    "pth",
-    "ckpt",
-    "keras",
-    "onnx",
-    "tflite",
-    "msgpack",
-];
+const OF_MODELS: &str = "json safetensors pt pth ckpt keras onnx tflite msgpack";
 
 /// Inspects each file: those with an ending of models as such, all others as recordings.
 pub(super) fn run(arguments: &InspectArguments) -> Result<Answer, Error> {
@@ -42,7 +32,7 @@ pub(super) fn run(arguments: &InspectArguments) -> Result<Answer, Error> {
     let (mut texts, mut files) = (Vec::new(), Vec::new());
     for path in &arguments.files {
         let ending = path.extension().and_then(|ending| ending.to_str());
-        let has_ending = ending.is_some_and(|ending| OF_MODELS.contains(&ending));
+        let has_ending = ending.is_some_and(|end| OF_MODELS.split(' ').any(|of| of == end));
         let Answer { text, json, .. } = match has_ending || artifact::is_standard_input(path) {
             true => describe_model(path, &artifact::read(path)?),
             false => describe_recording(&reader.read(path)?, robot)?,
@@ -164,7 +154,6 @@ fn describe_model(path: &Path, model: &ReducedModel) -> Answer {
     Answer::new(text, json)
 }
 
-/// A name and its weight, of the largest weights of each latent coordinate.
 type Dominant = Vec<Vec<(String, f64)>>;
 
 fn composition(dominant: &Dominant) -> String {
@@ -239,10 +228,8 @@ const FINDINGS_SHOWN: usize = 12;
 
 fn describe_recording(reading: &Reading, robot: &Robot) -> Result<Answer, Error> {
     let recording = &reading.recording;
-    let (file, samples) = (
-        recording.path.display().to_string(),
-        recording.sample_count(),
-    );
+    let file = recording.path.display().to_string();
+    let samples = recording.sample_count();
     let mut notes = ReadingNotes::default();
     notes.add(reading);
     let notes = notes.lines();

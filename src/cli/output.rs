@@ -95,7 +95,6 @@ pub(super) fn read_recordings(
     read_with(&reader(arguments, Clocks::Repaired, robot)?, paths)
 }
 
-/// [`read_recordings`] by a reader.
 pub(super) fn read_with(reader: &Reader, paths: &[PathBuf]) -> Result<Vec<Recording>, Error> {
     let progress = spinner("reading recordings");
     let mut notes = ReadingNotes::default();
@@ -120,7 +119,6 @@ pub(super) fn warn(text: &str) {
     eprintln!("warning: {}", printable(text));
 }
 
-/// Prints on stderr what cannot be true of a recording of this robot.
 pub(super) fn note_mismatches(recording: &Recording, robot: &Robot) {
     (mismatch::notes(recording, robot).iter()).for_each(|found| note(found));
 }
@@ -166,7 +164,6 @@ pub(super) fn printable(text: &str) -> Cow<'_, str> {
     escaped(text, |c| c.escape_unicode().to_string())
 }
 
-/// As [`printable`], for one JSON object.
 pub(super) fn printable_json(text: &str) -> Cow<'_, str> {
     // Those of JSON itself have been escaped, so that all of them are in strings.
     escaped(text, |c| {
@@ -199,7 +196,6 @@ pub(super) fn names(paths: &[PathBuf]) -> Vec<String> {
     names.collect()
 }
 
-/// `name_1`, `name_2` and so on.
 pub(super) fn numbered(name: &str, count: usize) -> impl Iterator<Item = String> {
     (1..=count).map(move |index| format!("{name}_{index}"))
 }

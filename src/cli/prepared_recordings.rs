@@ -15,7 +15,6 @@ type DividedJump = (PathBuf, usize, usize);
 
 const SETS: [&str; 3] = ["training", "validation", "test"];
 
-/// The recordings of a training.
 pub(super) struct RecordedSets {
     /// Jumps that the model is fitted to, those that choose between candidates, and those used only for the final
     /// metrics; empty before [`Self::read`].
@@ -23,7 +22,6 @@ pub(super) struct RecordedSets {
     files: [Vec<RecordingFile>; 3],
     robot: &'static Robot,
     reader: Reader,
-    /// The jumps of each set, if they were divided.
     pub divided: Option<[Vec<DividedJump>; 3]>,
     options: ConditionOptions,
 }
@@ -77,13 +75,11 @@ impl RecordedSets {
         })
     }
 
-    /// The first training recordings as recorded.
     pub(super) fn first(&self, count: usize) -> Result<Vec<Recording>, RecordingError> {
         let files = &self.files[0];
         as_recorded(&files[..count.min(files.len())], self.robot, &self.reader)
     }
 
-    /// Reads all sets, those of the test first.
     pub(super) fn read(&mut self) -> Result<(), RecordingError> {
         for set in [2, 0, 1] {
             let files = &self.files[set];
@@ -178,7 +174,6 @@ impl RecordedSets {
         self.sets.iter().map(|set| set.left_out).sum()
     }
 
-    /// Every finding with its place, and how many samples were left out.
     pub(super) fn findings_json(&self) -> Value {
         let of_file = |file: &Path, mut value: Value| {
             value["file"] = json!(file.display().to_string());

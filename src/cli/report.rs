@@ -3,7 +3,7 @@
 use super::args::ReportArguments;
 use super::mpc::{judged, run_with_both_lifts};
 use super::*;
-use crate::evaluate::{Assessment, LAMBDA, Verdict, verdict};
+use crate::evaluate::{Assessment, LAMBDA, verdict};
 use crate::report::{
     Content, Introduction, PageOptions, all_figures, figure_files, introduction, page,
     verdict_lines, without_statistics,
@@ -27,44 +27,69 @@ pub(super) fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
     let study = (arguments.study.as_deref()).map(summary).transpose()?;
     let plan = (arguments.plan.as_ref()).map(|path| read_jump(&model, path, &arguments.reading));
     let plan = plan.transpose()?;
-    let made = make(&model, &recordings, (&study, &plan), arguments)?;
+    let progress = spinner("rolling the model out");
+    let assessment = Assessment::over(&model, &recordings, arguments.restart_every)?;
+    progress.set_message("running the controller");
+    let can_control = without_statistics(&model).is_none();
+    let runs = can_control.then(|| run_with_both_lifts(&model, &recordings));
+    let [plain, consistent] = runs.transpose()?.unwrap_or_default();
+    progress.set_message("drawing");
+    let paths = recordings.iter().map(|recording| &recording.path);
+    // A file that is gone by now has no digest, and counts as one that the model does not name.
+    let digest = |path: &PathBuf| Some((path.clone(), sha256(&std::fs::read(path).ok()?)));
+    let content = Content {
+        model: &model,
+        assessment: &assessment,
+        verdict: &verdict(&model, &assessment, &judged(&plain)),
+        plain: &plain,
+        consistent: &consistent,
+        study: study.as_ref(),
+        plan: plan.as_ref(),
+        digests: &paths.filter_map(digest).collect::<Vec<_>>(),
+    };
+    let commands = commands(arguments, can_control);
+    let made = page_of(&content, arguments.tolerance, commands)?;
+    progress.finish_and_clear();
     // The figures come first: files that romc did not make are refused with nothing written.
     let written = match &arguments.figures {
         Some(folder) => inputs.write_folder(folder, &made.files, arguments.force)?,
         None => Vec::new(),
     };
     write_file(&arguments.output, made.page.as_bytes(), arguments.force)?;
-    let output = arguments.output.display().to_string();
-    let Introduction {
-        headline,
-        sentences,
-        ..
-    } = &made.introduction;
+    Ok(answer(arguments, &content, &made, &written))
+}
+
+fn answer(
+    arguments: &ReportArguments,
+    content: &Content<'_>,
+    made: &Made,
+    written: &[PathBuf],
+) -> Answer {
+    let (output, verdict) = (arguments.output.display().to_string(), content.verdict);
+    let (headline, reasons) = (&made.introduction.headline, &made.introduction.sentences);
     let mut text = format!(
         "{headline}\n{}\n\n{}\n{output}: {} kB, {} figures\n",
-        sentences.join("\n"),
-        verdict_lines(&made.verdict),
+        reasons.join("\n"),
+        verdict_lines(verdict),
         made.page.len() / 1000,
         made.n_figures
     );
-    text += &lines("note: ", &made.remarks);
-    let files = format!(
-        "{} files, each figure as .svg, .pdf and .csv",
-        written.len()
-    );
-    let folder = shown(&arguments.figures);
-    text += &lines("", folder.map(|folder| format!("{folder}: {files}")));
+    text += &lines("note: ", &content.assessment.remarks);
+    if let Some(folder) = shown(&arguments.figures) {
+        let files = written.len();
+        text += &format!("{folder}: {files} files, each figure as .svg, .pdf and .csv\n");
+    }
     let json = json!({
         "model": arguments.model.display().to_string(),
         "output": output,
         "bytes": made.page.len(),
         "headline": headline,
-        "reasons": sentences,
-        "verdict": made.verdict,
-        "figures": names(&written),
-        "remarks": made.remarks,
+        "reasons": reasons,
+        "verdict": verdict,
+        "figures": names(written),
+        "remarks": content.assessment.remarks,
     });
-    Ok(Answer::new(text, json).failed_if(made.verdict.fit_for.is_empty()))
+    Answer::new(text, json).failed_if(verdict.fit_for.is_empty())
 }
 
 fn summary(folder: &Path) -> Result<Summary, Error> {
@@ -80,46 +105,9 @@ fn summary(folder: &Path) -> Result<Summary, Error> {
 
 pub(super) struct Made {
     pub page: String,
-    pub introduction: Introduction,
-    pub verdict: Verdict,
-    pub files: Vec<EmittedFile>,
-    pub n_figures: usize,
-    /// What speaks against using the model on these recordings.
-    pub remarks: Vec<String>,
-}
-
-fn make(
-    model: &ReducedModel,
-    recordings: &[Recording],
-    (study, plan): (&Option<Summary>, &Option<Segment>),
-    arguments: &ReportArguments,
-) -> Result<Made, Error> {
-    let progress = spinner("rolling the model out");
-    let assessment = Assessment::over(model, recordings, arguments.restart_every)?;
-    progress.set_message("running the controller");
-    let can_control = without_statistics(model).is_none();
-    let runs = can_control.then(|| run_with_both_lifts(model, recordings));
-    let [plain, consistent] = runs.transpose()?.unwrap_or_default();
-    let verdict = verdict(model, &assessment, &judged(&plain));
-    progress.set_message("drawing");
-    let paths = recordings.iter().map(|recording| &recording.path);
-    let digests: Vec<(PathBuf, String)> = paths
-        .filter_map(|path| Some((path.clone(), sha256(&std::fs::read(path).ok()?))))
-        .collect();
-    let content = Content {
-        model,
-        assessment: &assessment,
-        verdict: &verdict,
-        plain: &plain,
-        consistent: &consistent,
-        study: study.as_ref(),
-        plan: plan.as_ref(),
-        digests: &digests,
-    };
-    let commands = commands(arguments, can_control);
-    let made = page_of(&content, arguments.tolerance, commands);
-    progress.finish_and_clear();
-    made
+    introduction: Introduction,
+    files: Vec<EmittedFile>,
+    n_figures: usize,
 }
 
 pub(super) fn page_of(
@@ -144,10 +132,8 @@ pub(super) fn page_of(
     Ok(Made {
         page: page(content, &introduction, &figures, &options)?,
         introduction,
-        verdict: content.verdict.clone(),
         files: figures.iter().flat_map(figure_files).collect(),
         n_figures: figures.iter().count(),
-        remarks: content.assessment.remarks.clone(),
     })
 }
 
@@ -156,32 +142,25 @@ const LADDER_CAPTION: &str = "Size of the equations within each tolerance: activ
 fn commands(arguments: &ReportArguments, has_control: bool) -> Vec<String> {
     let (model, output) = (quoted(&arguments.model), quoted(&arguments.output));
     let recordings = quoted_all(&arguments.recordings) + &arguments.reading.as_flags();
-    let along = format!("{model} {recordings}");
     let (every, tolerance) = (arguments.restart_every, arguments.tolerance);
-    let study = arguments
-        .study
-        .iter()
-        .map(|path| format!(" --study {}", quoted(path)));
-    let plan = arguments
-        .plan
-        .iter()
-        .map(|path| format!(" --plan {}", quoted(path)));
-    let beside: String = study.chain(plan).collect();
+    let within = format!("--tolerance {tolerance}");
+    let flags = [("study", &arguments.study), ("plan", &arguments.plan)].into_iter();
+    let flags =
+        flags.filter_map(|(name, path)| Some(format!(" --{name} {}", quoted(path.as_ref()?))));
+    let flags: String = flags.collect();
+    let along = format!("{model} {recordings}");
     let mut commands = vec![
-        format!(
-            "report {along} --restart-every {every} --tolerance {tolerance}{beside} --output {output}"
-        ),
-        format!("simulate {along} --restart-every {every}"),
-        format!("mpc {along} --lift transpose"),
-        format!("mpc {along} --lift consistent"),
-        format!("compile {model} --emit latex --out-dir out"),
-        format!(
-            "compile {model} --emit latex,c --tolerance {tolerance} --domain {recordings} --out-dir out"
-        ),
+        format!("romc report {along} --restart-every {every} {within}{flags} --output {output}"),
+        format!("romc simulate {along} --restart-every {every}"),
     ];
-    commands.retain(|command| has_control || !command.starts_with("mpc"));
+    if has_control {
+        let mpc = ["transpose", "consistent"].map(|lift| format!("romc mpc {along} --lift {lift}"));
+        commands.extend(mpc);
+    }
+    let domain = format!("--domain {recordings} --out-dir out");
+    commands.extend([
+        format!("romc compile {model} --emit latex --out-dir out"),
+        format!("romc compile {model} --emit latex,c {within} {domain}"),
+    ]);
     commands
-        .iter()
-        .map(|command| format!("romc {command}"))
-        .collect()
 }

@@ -13,7 +13,6 @@ use crate::simplify::{
 };
 use crate::typeset::Rounding;
 
-/// Time between restarts of the short rollouts, as in the paper's second test.
 pub(super) const RESTART_S: f64 = 0.1;
 
 pub(super) struct Outcome {
@@ -88,7 +87,6 @@ pub(super) fn run(
     Ok(Some(outcome))
 }
 
-/// The ranges of the TOML file of the arguments, if the domain is one.
 fn ranges(model: &ReducedModel, arguments: &SimplifyArguments) -> Result<Option<Domain>, Error> {
     let is_table = |path: &&PathBuf| path.extension().is_some_and(|end| end == "toml");
     let Some(path) = arguments.domain.iter().find(is_table) else {
@@ -106,7 +104,6 @@ fn ranges(model: &ReducedModel, arguments: &SimplifyArguments) -> Result<Option<
 }
 
 impl Outcome {
-    /// Adds to the provenance of a changed model where the domain comes from.
     fn record_domain(&mut self) -> Result<(), Error> {
         let mut provenance = self.model.provenance().clone();
         if let Some(Value::Object(entry)) = provenance.get_mut("simplification")

@@ -87,7 +87,7 @@ fn settings(arguments: &StudyArguments) -> Result<TrainSettings, Error> {
     let mut settings = TrainSettings::default();
     if let Some(path) = &arguments.config {
         settings = TrainSettings::read(path)?;
-        if let Some(name) = settings.first(&["latent-dim", "seed", "seeds"]) {
+        if let Some(name) = settings.first("latent-dim seed seeds") {
             let message = format!("`{name}` is not a setting of a study, which runs over them");
             return Err(Error::refused(path, message));
         }

@@ -17,18 +17,11 @@ use crate::train::{
 
 /// The word for actuators that stands for no file.
 const NONE: &str = "none";
-/// The word that stands for what the training recordings tell.
 const IDENTIFIED: &str = "identify";
-/// Files of recordings that tell it, at most.
 const IDENTIFIED_FROM: usize = 20;
 
 /// The settings of the window of predictions beside its weight.
-const WINDOW: [&str; 4] = [
-    "bptt-window",
-    "bptt-stride",
-    "bptt-decay",
-    "bptt-integrator",
-];
+const WINDOW: &str = "bptt-window bptt-stride bptt-decay bptt-integrator";
 
 fn set<T>(option: &mut T, given: Option<impl Into<T>>) {
     if let Some(value) = given {
@@ -187,16 +180,15 @@ impl TrainSettings {
             Some(_) => "encoder-layers",
             None => "decoder-layers",
         };
-        self.first(&["paper", "epochs"])
+        self.first("paper epochs")
             .or((!self.maps().is_linear()).then_some(layers))
-            .or_else(|| self.first(&["bptt-weight"]))
-            .or_else(|| self.first(&WINDOW))
+            .or_else(|| self.first("bptt-weight").or(self.first(WINDOW)))
     }
 
-    /// The first of these settings that is given.
-    pub(super) fn first(&self, names: &[&'static str]) -> Option<&'static str> {
+    /// The first of some settings, by their names, that is given.
+    pub(super) fn first(&self, names: &'static str) -> Option<&'static str> {
         let given = self.given();
-        names.iter().copied().find(|name| given.contains_key(*name))
+        names.split(' ').find(|name| given.contains_key(*name))
     }
 
     fn library(&self, default: LibraryChoice) -> LibraryChoice {
@@ -243,14 +235,14 @@ impl TrainSettings {
     /// and named coordinates where a method learns others.
     pub(super) fn check_pairs(&self) -> Result<(), Error> {
         let (method, is_linear) = (self.method(), self.maps().is_linear());
-        let given = |names: &[&'static str], when: bool| self.first(names).filter(|_| when);
+        let given = |names, when: bool| self.first(names).filter(|_| when);
         let has_weight = self
             .bptt_weight
             .is_some_and(|weight| f64::from(weight) != 0.0);
         let is_named = self.coordinates == Some(Coordinates::Named);
         let is_published = self.paper && method == Method::Joint;
         let activation = self.activation.unwrap_or_default();
-        let of_choice = ["slack", "refinements", "growth", "no-rotation"];
+        let of_choice = "slack refinements growth no-rotation";
         let faults = [
             (
                 (self.of_the_joint_method()).filter(|_| method == Method::ClosedForm),
@@ -258,32 +250,32 @@ impl TrainSettings {
                 "`--method joint`, or no method",
             ),
             (
-                given(&WINDOW, !has_weight),
+                given(WINDOW, !has_weight),
                 "set for a loss without weight",
                 "`--bptt-weight` above 0 beside it",
             ),
             (
-                given(&["activation"], is_linear),
+                given("activation", is_linear),
                 &format!("{activation} without hidden layers"),
                 "`--encoder-layers` or `--decoder-layers` beside it",
             ),
             (
-                given(&["coordinates"], is_named && !is_linear),
+                given("coordinates", is_named && !is_linear),
                 "named with hidden layers",
                 "free, or maps without hidden layers",
             ),
             (
-                given(&["coordinates"], is_named && is_published),
+                given("coordinates", is_named && is_published),
                 "named with the published joint training",
                 "free, or a training without `--paper`",
             ),
             (
-                given(&of_choice, self.paper),
+                given(of_choice, self.paper),
                 "set for the published training, which neither chooses terms nor turns the basis",
                 "a training without `--paper`",
             ),
             (
-                given(&["smooth-rows"], self.smooth.is_none()),
+                given("smooth-rows", self.smooth.is_none()),
                 "set without a filter",
                 "`--smooth` beside it",
             ),
@@ -303,9 +295,9 @@ impl TrainSettings {
     /// centre of mass, which nothing searches, and the search of the closed form ends in one model from every start.
     pub(super) fn without_effect(&self, options: &TrainOptions) -> Option<String> {
         let is_held = options.coordinates() == Coordinates::Named && options.latent_dim == 2;
-        let searched = ["lift-weight", "body-weight", "no-rotation"];
-        let searched = self.first(&searched).filter(|_| is_held);
-        let words = match (searched, self.first(&["seed", "seeds"])) {
+        let searched = self.first("lift-weight body-weight no-rotation");
+        let searched = searched.filter(|_| is_held);
+        let words = match (searched, self.first("seed seeds")) {
             _ if self.method() != Method::ClosedForm => return None,
             (Some(name), _) => format!(
                 "--{name}: without effect, as both named coordinates are those of the centre of mass"
@@ -332,7 +324,7 @@ impl TrainSettings {
                 }
             }
         }
-        let has_parts = self.first(&["degree", "trigonometric"]).is_some();
+        let has_parts = self.first("degree trigonometric").is_some();
         let fault = if self.terms.is_some() && has_parts {
             "`terms` stands beside `degree` or `trigonometric`, expected one or the other"
         } else if self.activation == Some(Activation::Linear) {

@@ -2,11 +2,8 @@
 
 use super::figure::{Drawing, Figure, HeatMap, Panel, Role, Series, StickPlot};
 
-/// Space left of the axes, for their numbers.
 const LEFT: f64 = 38.0;
-/// Space above, for the title.
 const TOP: f64 = 17.0;
-/// Space below, for numbers and label.
 const BOTTOM: f64 = 26.0;
 const RIGHT: f64 = 8.0;
 /// Points of a line that are drawn; CSV has them all.
@@ -24,7 +21,6 @@ pub(crate) enum Anchor {
 pub(crate) enum Paint {
     Axis,
     Grid,
-    /// The ground of a flight.
     Shade,
     /// A magnitude from 0 to 1.
     Heat(f64),
@@ -34,7 +30,6 @@ pub(crate) enum Paint {
 pub(crate) enum Mark {
     /// A filled rectangle: corner, width, height.
     Rectangle([f64; 4], Paint),
-    /// A straight line between two points.
     Rule([f64; 4], Paint),
     Line(Vec<(f64, f64)>, Role),
     /// A text at the left end of its baseline, or as anchored.
@@ -61,7 +56,6 @@ impl Mark {
     }
 }
 
-/// Height of the legend's line.
 const LEGEND: f64 = 18.0;
 
 pub(super) fn figure_size(figure: &Figure) -> (f64, f64) {
@@ -120,7 +114,6 @@ pub(crate) fn draw_panel(panel: &Panel, size: (f64, f64), x_label: &str) -> Vec<
     }
 }
 
-/// Data coordinates to those of the panel.
 struct Axes {
     x: (f64, f64),
     y: (f64, f64),
@@ -336,7 +329,6 @@ pub(crate) fn range(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
     values.fold(none, |(low, high), value| (low.min(value), high.max(value)))
 }
 
-/// The range of values with a margin; a range around a constant.
 fn padded(values: impl Iterator<Item = f64>) -> (f64, f64) {
     let (low, high) = range(values.filter(|value| value.is_finite()));
     if low > high {

@@ -4,7 +4,7 @@ use super::sticks::{Extent, Sticks};
 
 /// The meaning of a line, which selects its colour and dashes in every figure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Role {
+pub(crate) enum Role {
     /// Measured, or encoded from what was measured.
     Recorded,
     /// Predicted over the whole recording.
@@ -43,7 +43,6 @@ pub(crate) struct Series {
 }
 
 impl Series {
-    /// A value of every sample over its time.
     pub(crate) fn over(role: Role, time_s: &[f64], value: impl Fn(usize) -> Option<f64>) -> Self {
         let times = time_s.iter().enumerate();
         Self::through(role, times.map(|(sample, &time)| (time, value(sample))))
@@ -98,7 +97,6 @@ impl Panel {
         Self::shaded(title, series, Vec::new())
     }
 
-    /// Lines over one axis, some ranges of which are shaded.
     pub(crate) fn shaded(
         title: impl Into<String>,
         series: Vec<Series>,
@@ -113,7 +111,6 @@ impl Panel {
 
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Figure {
-    /// Stem of its files.
     pub id: String,
     pub caption: String,
     /// The common axis below, such as `time, s`.
@@ -146,7 +143,6 @@ impl Figure {
         }
     }
 
-    /// The same with panels of another size, so many side by side.
     pub(crate) fn in_columns(self, columns: usize, panel_size: (f64, f64)) -> Self {
         Self {
             columns,
@@ -155,7 +151,6 @@ impl Figure {
         }
     }
 
-    /// The same over another axis than time.
     pub(crate) fn over(self, x_label: &str) -> Self {
         let x_label = x_label.to_owned();
         Self { x_label, ..self }

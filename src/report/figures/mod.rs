@@ -11,8 +11,7 @@ mod sticks;
 mod svg;
 
 pub(crate) use draw::{range, subscript};
-pub use figure::Role;
-pub(crate) use figure::{Drawing, Figure, HeatMap, Panel, Series};
+pub(crate) use figure::{Drawing, Figure, HeatMap, Panel, Role, Series};
 pub(crate) use sticks::{Film, Motion, film, film_strip, floor_m};
 pub(crate) use svg::panel_svg;
 
@@ -40,7 +39,9 @@ fn csv(figure: &Figure) -> String {
         let words = figure.legend.iter().find(|entry| entry.0 == role);
         words.map_or(role.class(), |entry| &entry.1)
     };
-    let mut row = |cells: [&str; 4]| drop(table.row(cells));
+    let mut row = |cells: [&str; 4]| {
+        table.row(cells);
+    };
     for panel in &figure.panels {
         let title = panel.title.as_str();
         match &panel.drawing {

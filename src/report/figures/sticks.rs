@@ -12,7 +12,6 @@ use crate::robot::input_rule::rotation;
 use crate::robot::{FOOT_DIM, JOINT_DIM, Leg, Robot, STATE_DIM};
 use crate::typeset::mathml::HtmlText;
 
-/// Half the height of the box that stands for a trunk, in m.
 const TRUNK_HALF_HEIGHT_M: f64 = 0.05;
 
 const MARGIN_M: f64 = 0.04;
@@ -66,7 +65,6 @@ pub(crate) struct Extent {
 }
 
 impl Extent {
-    /// The smallest part with a margin that shows all `sticks` and the floor.
     pub(crate) fn around<'a>(sticks: impl IntoIterator<Item = &'a Sticks>, floor_m: f64) -> Self {
         let lines = sticks.into_iter().flat_map(|sticks| &sticks.lines);
         let (forward, mut up): (Vec<f64>, Vec<f64>) = lines.flatten().copied().unzip();
@@ -223,7 +221,6 @@ fn points(line: impl IntoIterator<Item = (f64, f64)>) -> String {
     points.collect::<Vec<_>>().join(" ")
 }
 
-/// The lines of a robot, by semicolons; empty where there is no robot.
 fn joined(sticks: &Option<Sticks>) -> String {
     let lines = sticks.iter().flat_map(|sticks| &sticks.lines);
     let lines = lines.map(|line| points(line.iter().copied()));
@@ -274,25 +271,16 @@ pub(crate) fn film(
         left + width
     );
     for (motion, sticks) in motions.iter().zip(&sticks) {
-        let (class, path) = (
-            motion.role.class(),
-            points(sticks.iter().flatten().map(middle)),
-        );
+        let class = motion.role.class();
+        let path = points(sticks.iter().flatten().map(middle));
         let _ = write!(svg, "<polyline class=\"{class} path\" points=\"{path}\"/>");
     }
     for (motion, lines) in motions.iter().zip(&lines) {
         let now = lines.get(shown).map_or("", String::as_str);
-        let now = now
-            .split(';')
-            .chain(std::iter::repeat(""))
-            .take(Sticks::NAMES.len());
+        let now = now.split(';').chain(std::iter::repeat(""));
         let lines = now.map(|points| format!("<polyline points=\"{points}\"/>"));
-        let _ = write!(
-            svg,
-            "<g class=\"{}\">{}</g>",
-            motion.role.class(),
-            lines.collect::<String>()
-        );
+        let lines: String = lines.take(Sticks::NAMES.len()).collect();
+        let _ = write!(svg, "<g class=\"{}\">{lines}</g>", motion.role.class());
     }
     Film {
         svg: svg + "</svg>",

@@ -16,7 +16,6 @@ pub(crate) fn panel_svg(figure: &Figure, panel: &Panel) -> String {
     )
 }
 
-/// A figure as a file of its own, with legend and colours for paper.
 pub(crate) fn standalone_svg(figure: &Figure) -> String {
     let (width, height) = figure_size(figure);
     let mut text = format!(
