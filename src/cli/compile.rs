@@ -69,11 +69,10 @@ pub(super) fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
 /// The files that are read, after a check of the one that the model is saved to.
 fn inputs(arguments: &CompileArguments) -> Result<Inputs<'_>, Error> {
     let simplification = &arguments.simplification;
-    let inputs = Inputs::default()
+    let inputs = Inputs::reading(&simplification.reading)
         .and([&arguments.model])
         .and(&arguments.plan)
         .and(&simplification.domain)
-        .and(&simplification.reading.columns)
         .into_folder(Some(&arguments.out_dir))?;
     // What would be the same file again may stay; it is compared once there is a model.
     match simplification.save_model.as_deref() {

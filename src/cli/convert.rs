@@ -7,10 +7,9 @@ use super::*;
 use crate::recording::{RecordingFault, WriteOptions, write_as, write_mcap};
 
 pub(super) fn run(arguments: &ConvertArguments) -> Result<Answer, Error> {
-    Inputs::default()
+    Inputs::reading(&arguments.reading)
         .and(&arguments.recordings)
         .and(&arguments.inputs_of)
-        .and(&arguments.reading.columns)
         .check_output(Some(&arguments.output), Format::RECORDING, arguments.force)?;
     let rule = match &arguments.inputs_of {
         None => None,

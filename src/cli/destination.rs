@@ -1,5 +1,6 @@
 //! Where a command may write: its output says its format by its ending, and is none of the files that the command reads.
 
+use super::args::ReadingArguments;
 use super::*;
 use crate::files::{Begun, write_files_since};
 use crate::report::{Figure, figure_files};
@@ -22,6 +23,10 @@ impl Format {
 pub(super) struct Inputs<'a>(Vec<&'a Path>, Option<Begun>);
 
 impl<'a> Inputs<'a> {
+    pub(super) fn reading(arguments: &'a ReadingArguments) -> Self {
+        Self::default().and(&arguments.columns)
+    }
+
     pub(super) fn and<P: AsRef<Path> + ?Sized + 'a>(
         mut self,
         more: impl IntoIterator<Item = &'a P>,

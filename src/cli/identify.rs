@@ -6,9 +6,8 @@ use crate::identify::{Identification, Legs, identify};
 use crate::robot::Robot;
 
 pub(super) fn run(arguments: &IdentifyArguments) -> Result<Answer, Error> {
-    Inputs::default()
+    Inputs::reading(&arguments.reading)
         .and(&arguments.recordings)
-        .and(&arguments.reading.columns)
         .and_robot(Some(&arguments.robot))
         .check_output(arguments.output.as_deref(), Format::TOML, arguments.force)?;
     let robot = robot::chosen(&arguments.robot)?;

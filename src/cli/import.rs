@@ -16,12 +16,11 @@ pub(super) fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
         Some(LibraryArgument::File(path)) => Some(path),
         Some(LibraryArgument::Shorthand(_) | LibraryArgument::Terms(_)) | None => None,
     };
-    Inputs::default()
+    Inputs::reading(&arguments.reading)
         .and([&arguments.file])
         .and(library)
         .and(&arguments.actuators)
         .and(&arguments.inputs_from)
-        .and(&arguments.reading.columns)
         .and_robot(arguments.robot.as_deref())
         .check_output(Some(&arguments.output), Format::MODEL, arguments.force)?;
     let options = options(arguments)?;

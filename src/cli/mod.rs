@@ -51,7 +51,7 @@ use output::*;
 
 /// The result of a command, for people and for programs.
 #[derive(Debug, Clone)]
-pub struct Answer {
+pub(crate) struct Answer {
     /// Human text, complete with its last newline.
     pub text: String,
     /// The same as one JSON object; that of a command gets the command's name before these entries.
@@ -97,7 +97,7 @@ pub fn run_with(arguments: impl IntoIterator<Item = OsString>) -> u8 {
             return u8::try_from(refusal.exit_code()).unwrap_or(WRONG_USAGE);
         }
     };
-    match execute(arguments.command) {
+    match execute(&arguments) {
         Ok(Answer { text, json, code }) => {
             let text = match arguments.json {
                 true => format!("{}\n", printable_json(&json.to_string())),
@@ -124,9 +124,9 @@ const DONE: u8 = 0;
 const FAILED: u8 = 1;
 const WRONG_USAGE: u8 = 2;
 
-fn execute(command: Command) -> Result<Answer, Error> {
-    args::refuse_idle(&command)?;
-    let (name, mut answer) = match &command {
+fn execute(arguments: &Arguments) -> Result<Answer, Error> {
+    arguments.refuse_idle()?;
+    let (name, mut answer) = match &arguments.command {
         Command::Check(arguments) => ("check", check::run(arguments)?),
         Command::Demo(arguments) => ("demo", demo::run(arguments)?),
         Command::Inspect(arguments) => ("inspect", inspect::run(arguments)?),

@@ -16,10 +16,9 @@ use crate::robot::{JOINT_DIM, Robot};
 /// Runs the controller along each recording. The exit code is 1 if the model is not fit for torques or control there, or
 /// if most steps along one of them have no plan.
 pub(super) fn run(arguments: &MpcArguments) -> Result<Answer, Error> {
-    let inputs = Inputs::default()
+    let inputs = Inputs::reading(&arguments.reading)
         .and([&arguments.model])
         .and(&arguments.recordings)
-        .and(&arguments.reading.columns)
         .into_folder(arguments.figures.as_deref())?;
     inputs.check_output(arguments.output.as_deref(), Format::TABLE, arguments.force)?;
     let model = artifact::read(&arguments.model)?;

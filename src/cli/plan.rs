@@ -9,11 +9,10 @@ use crate::robot::Robot;
 
 /// Plans a jump and writes it unless it is not to be trusted and not forced, or maps what can be planned.
 pub(super) fn run(arguments: &PlanArguments) -> Result<Answer, Error> {
-    let inputs = Inputs::default()
+    let inputs = Inputs::reading(&arguments.reading)
         .and([&arguments.model])
         .and(&arguments.start)
         .and(&arguments.settings)
-        .and(&arguments.reading.columns)
         .into_folder(arguments.figures.as_deref())?;
     let output = arguments.output.as_deref();
     inputs.check_output(output, Format::RECORDING, arguments.force)?;

@@ -14,11 +14,10 @@ use crate::train::sha256;
 
 /// Writes the page, and the figures if a folder for them is given. The exit code is 1 if the model is fit for nothing.
 pub(super) fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
-    let inputs = Inputs::default()
+    let inputs = Inputs::reading(&arguments.reading)
         .and([&arguments.model])
         .and(&arguments.recordings)
         .and(&arguments.plan)
-        .and(&arguments.reading.columns)
         .into_folder(arguments.figures.as_deref())?;
     inputs.check_output(Some(&arguments.output), Format::PAGE, arguments.force)?;
     let model = artifact::read(&arguments.model)?;

@@ -11,10 +11,9 @@ use crate::report::{
 
 /// Rolls the model out over every segment of every recording. The exit code is 1 if predictions of body x or z fail.
 pub(super) fn run(arguments: &SimulateArguments) -> Result<Answer, Error> {
-    Inputs::default()
+    Inputs::reading(&arguments.reading)
         .and([&arguments.model])
         .and(&arguments.recordings)
-        .and(&arguments.reading.columns)
         .check_output(arguments.output.as_deref(), Format::TABLE, arguments.force)?;
     let model = artifact::read(&arguments.model)?;
     let recordings = read_for(&model, &arguments.recordings, &arguments.reading)?;

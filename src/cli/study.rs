@@ -24,11 +24,10 @@ pub(super) fn run(arguments: &StudyArguments) -> Result<Answer, Error> {
         EmittedFile::new(of_summary, summary.table().csv()),
     ];
     files.extend(study_figures(&summary).iter().flat_map(figure_files));
-    Inputs::default()
+    Inputs::reading(&arguments.reading)
         .and(&arguments.recordings)
         .and(&arguments.validation)
         .and(&arguments.config)
-        .and(&arguments.reading.columns)
         .and_robot(arguments.robot.as_deref())
         .write_folder(&arguments.out_dir, &files, arguments.force)?;
     Ok(answer(&arguments.out_dir, &store, &cells, &summary))

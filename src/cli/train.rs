@@ -14,12 +14,11 @@ use crate::train::{
 
 pub(super) fn run(arguments: &TrainArguments) -> Result<Answer, Error> {
     let settings = TrainSettings::effective(arguments)?;
-    Inputs::default()
+    Inputs::reading(&arguments.reading)
         .and(&arguments.recordings)
         .and(&arguments.validation)
         .and(&arguments.test)
         .and(&arguments.config)
-        .and(&arguments.reading.columns)
         .and_robot(settings.robot.as_deref())
         .and(&settings.actuators)
         .check_output(Some(&arguments.output), Format::MODEL, arguments.force)?;

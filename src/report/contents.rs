@@ -24,14 +24,13 @@ pub(crate) struct Content<'a> {
     pub digests: &'a [(PathBuf, String)],
 }
 
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Default)]
 pub(crate) struct AllFigures {
     pub encoder: Vec<Figure>,
     pub jumps: Vec<JumpFigures>,
     pub study: Vec<Figure>,
 }
 
-#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct JumpFigures {
     pub title: String,
     /// Root mean square errors of body x and z over the whole jump, in m.

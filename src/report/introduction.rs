@@ -6,7 +6,6 @@ use super::jump::{Jump, modelled};
 use super::tables::template_rms;
 use super::*;
 
-#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Introduction {
     /// One line: fit for what, and for what not.
     pub headline: String,

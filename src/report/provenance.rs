@@ -6,7 +6,7 @@ const LONGEST_LIST: usize = 24;
 
 const DIGEST: usize = 12;
 
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Default)]
 pub(crate) struct Origin {
     /// Name and value of each entry that fits a cell.
     pub facts: Vec<(String, String)>,

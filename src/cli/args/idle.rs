@@ -4,8 +4,10 @@
 
 use std::path::Path;
 
+use super::{
+    Arguments, Command, CompileArguments, ImportArguments, InspectArguments, ReadingArguments,
+};
 use super::{CheckArguments, UnitsChoice};
-use super::{Command, CompileArguments, ImportArguments, InspectArguments, ReadingArguments};
 use crate::Error;
 use crate::artifact::is_standard_input;
 use crate::codegen::{Precision, SineCosine};
@@ -13,37 +15,41 @@ use crate::deploy::Target;
 use crate::import::Format;
 use crate::mpc::Lift;
 
-/// Refuses the first flag that has no effect.
-///
-/// # Errors
-/// [`Error::Idle`].
-pub fn refuse_idle(command: &Command) -> Result<(), Error> {
-    match command {
-        Command::Compile(arguments) => of_compile(arguments),
-        Command::Inspect(arguments) => of_inspect(arguments),
-        Command::Check(arguments) => of_check(arguments),
-        Command::Import(arguments) => of_import(arguments),
-        Command::Mpc(arguments) => Needed("--lift transpose", arguments.lift == Lift::Transpose)
-            .by("--torque-rate", arguments.torque_rate.is_some()),
-        Command::Plan(arguments) => {
-            Needed("--start", arguments.start.is_some()).by_reading(&arguments.reading)
+impl Arguments {
+    /// Refuses the first flag that has no effect.
+    ///
+    /// # Errors
+    /// [`Error::Idle`].
+    pub fn refuse_idle(&self) -> Result<(), Error> {
+        match &self.command {
+            Command::Compile(arguments) => of_compile(arguments),
+            Command::Inspect(arguments) => of_inspect(arguments),
+            Command::Check(arguments) => of_check(arguments),
+            Command::Import(arguments) => of_import(arguments),
+            Command::Mpc(arguments) => {
+                Needed("--lift transpose", arguments.lift == Lift::Transpose)
+                    .by("--torque-rate", arguments.torque_rate.is_some())
+            }
+            Command::Plan(arguments) => {
+                Needed("--start", arguments.start.is_some()).by_reading(&arguments.reading)
+            }
+            Command::Robot(arguments) => {
+                let is_file = !crate::robot_file::known_names().contains(&arguments.robot.as_str());
+                Needed("a URDF file", is_file).by("--feet", !arguments.feet.is_empty())
+            }
+            Command::Study(arguments) => {
+                let needs = "recordings, which --merge does not read";
+                Needed(needs, arguments.merge.is_empty()).by_reading(&arguments.reading)
+            }
+            Command::Demo(_)
+            | Command::Train(_)
+            | Command::Convert(_)
+            | Command::Identify(_)
+            | Command::Simulate(_)
+            | Command::Report(_)
+            | Command::Manual(_)
+            | Command::Completions(_) => Ok(()),
         }
-        Command::Robot(arguments) => {
-            let is_file = !crate::robot_file::known_names().contains(&arguments.robot.as_str());
-            Needed("a URDF file", is_file).by("--feet", !arguments.feet.is_empty())
-        }
-        Command::Study(arguments) => {
-            let needs = "recordings, which --merge does not read";
-            Needed(needs, arguments.merge.is_empty()).by_reading(&arguments.reading)
-        }
-        Command::Demo(_)
-        | Command::Train(_)
-        | Command::Convert(_)
-        | Command::Identify(_)
-        | Command::Simulate(_)
-        | Command::Report(_)
-        | Command::Manual(_)
-        | Command::Completions(_) => Ok(()),
     }
 }
 

@@ -15,7 +15,7 @@ use crate::robot::WrenchFrame;
 
 /// The candidate terms of an imported model.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum LibraryArgument {
+pub(crate) enum LibraryArgument {
     /// `degree=1,trigonometric,inputs`
     Shorthand(StandardLibrary),
     /// A file with the list of terms
@@ -50,7 +50,7 @@ fn library_argument(text: &str) -> Result<LibraryArgument, ImportError> {
                   romc import equations.txt --phase contact=any --phase flight=none --output hopper.json\n  \
                   romc import paper.tex --symbols z1=x --symbols z2=theta --output paper.json"
 )]
-pub struct ImportArguments {
+pub(crate) struct ImportArguments {
     /// File to import: .safetensors, .npz, or equations as .txt, .tex or .md
     pub file: PathBuf,
     /// The model file to write

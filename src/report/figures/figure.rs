@@ -36,7 +36,6 @@ impl Role {
 }
 
 /// One line: points in the order of x; a point without y breaks the line.
-#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Series {
     pub role: Role,
     pub points: Vec<(f64, Option<f64>)>,
@@ -57,14 +56,12 @@ impl Series {
     }
 }
 
-#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Panel {
     /// The quantity with its unit, such as `body.x, m`, or the instant, such as `0.12 s`.
     pub title: String,
     pub drawing: Drawing,
 }
 
-#[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Drawing {
     /// Lines over one axis; shaded are ranges of x with a grey ground, such as flight.
     Lines {
@@ -75,7 +72,6 @@ pub(crate) enum Drawing {
     Sticks(StickPlot),
 }
 
-#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct HeatMap {
     pub rows: Vec<String>,
     pub columns: Vec<String>,
@@ -84,7 +80,6 @@ pub(crate) struct HeatMap {
 }
 
 /// Robots as sticks in a vertical plane, one length for a metre in both directions.
-#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct StickPlot {
     /// The robots, the first below the others.
     pub sticks: Vec<(Role, Sticks)>,
@@ -109,7 +104,6 @@ impl Panel {
     }
 }
 
-#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Figure {
     pub id: String,
     pub caption: String,

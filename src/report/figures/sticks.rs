@@ -16,7 +16,6 @@ const TRUNK_HALF_HEIGHT_M: f64 = 0.05;
 
 const MARGIN_M: f64 = 0.04;
 
-#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Sticks {
     /// The trunk as a closed box, then hip, knee and foot of each leg, as named in [`Sticks::NAMES`].
     pub lines: Vec<Vec<(f64, f64)>>,
@@ -80,7 +79,6 @@ impl Extent {
     }
 }
 
-#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Motion {
     pub role: Role,
     pub words: String,
@@ -199,7 +197,6 @@ pub(crate) fn film_strip(
 const MOST_FRAMES: usize = 72;
 
 /// An animation: the drawing at its first instant in sight, and the lines of every instant.
-#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Film {
     /// An `svg` element with a `g` for each motion, which holds a polyline for each of [`Sticks::NAMES`].
     pub svg: String,
