@@ -68,10 +68,10 @@ impl ReducedModel {
         self.require(projection, "encoder", "projecting inputs")
     }
 
-    /// The linear model whose maps have the same value and the same Jacobian at the state `x` and, for the decoder, at
-    /// `z = E(s_x x)`; the dynamics are the same. A linear map stays as it is.
+    /// The model with encoder and decoder linearised: the encoder about the state `x`, the decoder about
+    /// `z = E(s_x x)`. The dynamics and linear maps stay the same.
     ///
-    /// Positions, velocities and inputs of the two models agree at `x` and drift apart away from it.
+    /// Positions, velocities and inputs of the two models agree at `x` and differ elsewhere.
     pub fn linearised_at(&self, x: &DVector<f64>) -> Result<ReducedModel, ModelError> {
         let scaled = self.scaled_state(x)?;
         let encoder = self.encoder_map()?;
@@ -215,8 +215,8 @@ pub(super) fn pinv_of_transpose(
     Ok(projection)
 }
 
-/// Removes what the iteration of the singular values left over, which can be 1e-10 even for well
-/// conditioned matrices: a Newton step on `P W_e^T = I` squares the residual.
+/// Reduces the error of the iterative SVD, which can be 1e-10 even for well-conditioned matrices, by
+/// one Newton step on `P W_e^T = I`, which squares the residual.
 fn refined(projection: DMatrix<f64>, weights: &DMatrix<f64>) -> DMatrix<f64> {
     const NEGLIGIBLE: f64 = 1e-13;
     let dim = projection.nrows();

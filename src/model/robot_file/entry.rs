@@ -108,13 +108,13 @@ impl Axis {
 }
 
 impl JointEntry {
-    /// Keys and values of a joint whose angles count along its axis from zero, as TOML spells them.
+    /// Keys and values as TOML spells them, of a joint made by [`RobotEntry::of`].
     pub(super) fn fields(&self) -> [(&'static str, String); 6] {
         let axis = match &self.axis {
             Axis::Name(name) => format!("{name:?}"),
             Axis::Vector(vector) => format!("{vector:?}"),
         };
-        let limits = self.limits_rad.unwrap_or_default();
+        let limits = self.limits_rad.expect("a robot's limits are in rad");
         [
             ("name", format!("{:?}", self.name)),
             ("at", format!("{:?}", self.at)),

@@ -76,7 +76,6 @@ pub(super) fn identified(
         entry.name = other;
         robot = build(file, &entry, places)?;
     }
-    refuse_degrees(file, &entry, places)?;
     notes.extend(doubts(&robot));
     Ok(RobotReading {
         robot: keep(robot),
@@ -110,35 +109,6 @@ fn differences(robot: &Robot, other: &Robot) -> String {
         0 => found.join(", "),
         more => format!("{}, and {more} more", found.join(", ")),
     }
-}
-
-/// Refuses limits of more than two turns, which are degrees, or bounds of a joint that has none.
-fn refuse_degrees(file: &str, entry: &RobotEntry, places: &Places) -> Result<(), RobotFileError> {
-    for (leg, limbs) in entry.leg.iter().enumerate() {
-        for (index, joint) in limbs.joint.iter().enumerate() {
-            let (key, [low, high], unit) = match (joint.limits_rad, joint.limits_deg) {
-                (Some(limits), _) => ("limits_rad", limits, "rad"),
-                (None, limits) => ("limits_deg", limits.unwrap_or_default(), "degrees"),
-            };
-            let radians = if unit == "rad" {
-                1.0
-            } else {
-                1_f64.to_radians()
-            };
-            if low.abs().max(high.abs()) * radians > LARGEST_ANGLE_RAD {
-                let found = format!("{low} to {high} {unit}");
-                let expected = match places {
-                    Places::Keys => "at most two turns either way; limits_deg takes degrees",
-                    Places::Elements { .. } => {
-                        "at most two turns either way: rad, not degrees; type=\"continuous\" for a joint without bounds"
-                    }
-                };
-                let place = places.of_joint(leg, index, key);
-                return Err(RobotFileError::at(file, place, found, expected));
-            }
-        }
-    }
-    Ok(())
 }
 
 fn doubts(robot: &Robot) -> Vec<String> {

@@ -3,7 +3,7 @@
 use nalgebra::{Rotation3, Unit, Vector3};
 
 use super::entry::{JointEntry, LegEntry, RobotEntry};
-use super::identity::namesake;
+use super::identity::{LARGEST_ANGLE_RAD, namesake};
 use super::read::RobotFileError;
 use super::registry::{keep, word};
 use crate::files::is_invisible;
@@ -199,9 +199,12 @@ impl Reader<'_> {
         place: impl Fn(&str) -> String,
         joint: &JointEntry,
     ) -> Result<(f64, f64), RobotFileError> {
-        let (key, [low, high]) = match (joint.limits_rad, joint.limits_deg) {
-            (Some(limits), None) => ("limits_rad", limits),
-            (None, Some(limits)) => ("limits_deg", limits.map(f64::to_radians)),
+        let (key, unit, given, [low, high]) = match (joint.limits_rad, joint.limits_deg) {
+            (Some(limits), None) => ("limits_rad", "rad", limits, limits),
+            (None, Some(limits)) => {
+                let radians = limits.map(f64::to_radians);
+                ("limits_deg", "degrees", limits, radians)
+            }
             (found, _) => {
                 let found = if found.is_some() { "both" } else { "neither" };
                 let expected = "one of limits_rad and limits_deg";
@@ -211,6 +214,16 @@ impl Reader<'_> {
         let is_fine = low.is_finite() && high.is_finite() && low < high;
         let (place, found) = (place(key), format!("{low} to {high}"));
         self.check(is_fine, &place, found, "the lower limit first")?;
+        // Beyond two turns limits are degrees, or bounds of a joint that has none.
+        let is_fine = low.abs().max(high.abs()) <= LARGEST_ANGLE_RAD;
+        let found = format!("{} to {} {unit}", given[0], given[1]);
+        let expected = match self.places {
+            Places::Keys => "at most two turns either way; limits_deg takes degrees",
+            Places::Elements { .. } => {
+                "at most two turns either way: rad, not degrees; type=\"continuous\" for a joint without bounds"
+            }
+        };
+        self.check(is_fine, &place, found, expected)?;
         Ok((low, high))
     }
 
