@@ -38,14 +38,10 @@ fn activations_of_large_arguments_stay_finite_and_those_of_nan_are_nan() {
 #[test]
 fn names_are_read_back_and_others_refused() {
     for phi in Activation::ALL {
-        assert_eq!(phi.to_string().parse(), Ok(phi));
+        let name = serde_json::Value::from(phi.to_string());
+        assert_eq!(serde_json::from_value::<Activation>(name).ok(), Some(phi));
     }
-    let refused = "selu".parse::<Activation>().unwrap_err();
-    assert!(
-        refused
-            .to_string()
-            .contains("linear, elu, tanh, sigmoid, relu")
-    );
+    assert!(serde_json::from_str::<Activation>("\"selu\"").is_err());
 }
 
 #[test]

@@ -76,8 +76,8 @@ fn add_feet(task: &Task<'_>, y: &[f64], part: usize, out: &mut Vec<(Affine, f64)
     let (settings, of) = (task.settings, &task.seed.parts[part]);
     let anchor_part = task.anchor_part(part);
     let time = of.duration_s / of.intervals() as f64 / TIME_UNIT_S;
-    let count = Leg::down(of.part.feet).count();
-    for leg in Leg::down(of.part.feet) {
+    let count = Leg::down(of.landmark.feet).count();
+    for leg in Leg::down(of.landmark.feet) {
         let anchor = moved_foot(task, y, leg, (anchor_part, 0));
         for node in 0..of.z.len() {
             if (part, node) == (anchor_part, 0) {

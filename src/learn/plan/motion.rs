@@ -63,7 +63,7 @@ pub(crate) fn motion(
         motion.dx.set_column(sample, &(&task.seed.decode * at.dz));
         motion.ddx.set_column(sample, &(&task.seed.decode * ddz));
         input.set_column(sample, &(&task.seed.lift * at.u_lat));
-        motion.feet[sample] = task.seed.parts[part].part.feet;
+        motion.feet[sample] = task.seed.parts[part].landmark.feet;
     }
     motion.torque_nm = input.rows(0, JOINT_DIM) + motion.losses(&task.seed.rule);
     let margins = margins(task, y, (&motion, &input));
@@ -127,7 +127,7 @@ fn foot_slip(task: &Task<'_>, y: &[f64]) -> [f64; 2] {
     let mut farthest = [0.0_f64; 2];
     for (part, of) in task.seed.parts.iter().enumerate() {
         let anchor = (task.anchor_part(part), 0);
-        for leg in Leg::down(of.part.feet) {
+        for leg in Leg::down(of.landmark.feet) {
             let from = moved_foot(task, y, leg, anchor).map(|moved| moved.at(y));
             for node in 0..of.z.len() {
                 let moved = moved_foot(task, y, leg, (part, node)).map(|moved| moved.at(y));

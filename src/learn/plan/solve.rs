@@ -79,8 +79,8 @@ pub fn plan(model: &ReducedModel, goal: &Goal, settings: &PlanSettings) -> Resul
     let (motion, margins) = motion(&task, &y, model.sample_time_s().unwrap_or(0.002))?;
     let parts = (seed.parts.iter().enumerate())
         .map(|(part, of)| PlannedPart {
-            name: of.part.name.clone(),
-            phase: of.part.phase,
+            name: of.landmark.name.clone(),
+            phase: of.phase,
             duration_s: task.duration_s(part, &y),
         })
         .collect();

@@ -301,7 +301,7 @@ impl<'a> Task<'a> {
         if self.seed.parts[part].is_grounded() {
             self.rest(builder);
         }
-        let [least, most] = self.seed.prior.end_height_m;
+        let [least, most] = self.seed.prior.landmarks.end_height_m;
         let slack = self.settings.height_slack_m;
         let height = self.slack(Bound::Height);
         let range = [least - slack, most + slack];
@@ -354,7 +354,8 @@ impl<'a> Task<'a> {
                 self.friction(part, node, friction, builder);
             }
             if landing {
-                let least = self.seed.prior.landing_height_m - self.settings.height_slack_m;
+                let least =
+                    self.seed.prior.landmarks.landing_height_m - self.settings.height_slack_m;
                 let mut low = Affine::of(least);
                 low.add_scaled(&self.x(part, node, BODY_Z), -1.0);
                 low.add(height, -1.0);

@@ -33,8 +33,6 @@
 //! [`ReducedModel`]: crate::model::ReducedModel
 
 mod bounded;
-mod export;
-mod jump_prior;
 mod manifest;
 mod print;
 mod read;

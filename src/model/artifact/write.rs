@@ -6,7 +6,7 @@ use std::{fmt, fs, io};
 
 use sha2::{Digest as _, Sha256};
 
-use super::export::manifest_of;
+use super::manifest::Manifest;
 use super::print::print;
 use super::read::ArtifactError;
 use crate::files::{Overwrite, Place, hex, write_whole};
@@ -15,7 +15,7 @@ use crate::model::ReducedModel;
 /// The model file as text: equal for equal models, numbers in the shortest form that reads back to
 /// the same bits.
 pub fn to_text(model: &ReducedModel) -> String {
-    let value = serde_json::to_value(manifest_of(model))
+    let value = serde_json::to_value(Manifest::of(model))
         .expect("a manifest is strings, finite numbers and string-keyed maps");
     print(&value)
 }

@@ -1,11 +1,8 @@
 //! Activations of layers, with their exact derivatives.
 
 use std::fmt;
-use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
-
-use super::error::ModelError;
 
 /// What a layer applies to each of its units.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, clap::ValueEnum, Serialize, Deserialize)]
@@ -39,7 +36,7 @@ pub const GELU_RATE: f64 = 0.797_884_560_802_865_4;
 pub const GELU_CUBIC: f64 = 0.044_715;
 
 impl Activation {
-    /// All activations, in the order in which they are listed.
+    /// All activations.
     pub const ALL: [Activation; 9] = [
         Self::Linear,
         Self::Elu,
@@ -195,19 +192,6 @@ fn gelu_tanh(a: f64) -> [f64; 4] {
 impl fmt::Display for Activation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.name())
-    }
-}
-
-impl FromStr for Activation {
-    type Err = ModelError;
-
-    fn from_str(name: &str) -> Result<Self, ModelError> {
-        let known = Self::ALL.into_iter().find(|known| known.name() == name);
-        known.ok_or_else(|| {
-            let name: String = name.chars().take(40).collect();
-            let expected = format!("one of {}", Self::ALL.map(Self::name).join(", "));
-            ModelError::invalid("activation", format!("{name:?}"), expected)
-        })
     }
 }
 

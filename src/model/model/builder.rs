@@ -34,22 +34,22 @@ macro_rules! setters {
 /// Collects the parts of a model; [`ModelBuilder::build`] checks them against each other.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModelBuilder {
-    pub(super) name: String,
-    pub(super) description: String,
-    pub(super) library: Library,
-    pub(super) phases: Vec<Phase>,
-    pub(super) statistics: Vec<(String, InputStatistics)>,
-    pub(super) state: Option<CoordinateNames>,
-    pub(super) input: Option<CoordinateNames>,
-    pub(super) scaling: Option<Scaling>,
-    pub(super) encoder: Option<StateMap>,
-    pub(super) decoder: Option<StateMap>,
-    pub(super) robot: Option<&'static Robot>,
-    pub(super) actuators: Option<Actuators>,
-    pub(super) wrench_frame: WrenchFrame,
-    pub(super) jump_prior: Option<JumpPrior>,
-    pub(super) sample_time_s: Option<f64>,
-    pub(super) provenance: Map<String, Value>,
+    pub(crate) name: String,
+    pub(crate) description: String,
+    pub(crate) library: Library,
+    pub(crate) phases: Vec<Phase>,
+    pub(crate) statistics: Vec<(String, InputStatistics)>,
+    pub(crate) state: Option<CoordinateNames>,
+    pub(crate) input: Option<CoordinateNames>,
+    pub(crate) scaling: Option<Scaling>,
+    pub(crate) encoder: Option<StateMap>,
+    pub(crate) decoder: Option<StateMap>,
+    pub(crate) robot: Option<&'static Robot>,
+    pub(crate) actuators: Option<Actuators>,
+    pub(crate) wrench_frame: WrenchFrame,
+    pub(crate) jump_prior: Option<JumpPrior>,
+    pub(crate) sample_time_s: Option<f64>,
+    pub(crate) provenance: Map<String, Value>,
 }
 
 impl ModelBuilder {
@@ -240,6 +240,9 @@ impl ModelBuilder {
 
     /// Checks shapes of encoder and decoder; returns the number of robot coordinates if known.
     fn check_maps(&self) -> Result<Option<usize>, ModelError> {
+        for (name, map) in [("encoder", &self.encoder), ("decoder", &self.decoder)] {
+            map.as_ref().map_or(Ok(()), |map| map.check_chain(name))?;
+        }
         let latent_dim = self.library.latent_dim();
         let of_robot = self.robot.map(|_| crate::robot::STATE_DIM);
         let state_dim = of_robot.or(self.state_dim());

@@ -1,8 +1,10 @@
 //! What the latent state says of the latent input.
 
 use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
 
 use super::error::{ModelError, check_tensor};
+use super::listed;
 use super::maps::complement;
 use super::statistics::{check_covariance, symmetric};
 
@@ -13,13 +15,17 @@ const RIDGE: f64 = 1e-2;
 
 /// The latent input of one phase given the latent state, `u_lat | z, dz ~ (mean [1; z; dz], covariance)`, and how far
 /// the model's accelerations are off. Scaled units.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct InputGivenState {
     /// `latent_dim x (1 + 2 latent_dim)`.
+    #[serde(with = "listed")]
     pub mean: DMatrix<f64>,
     /// `latent_dim x latent_dim`, symmetric positive semidefinite.
+    #[serde(with = "listed")]
     pub covariance: DMatrix<f64>,
     /// Of `ddz - Xi^T Theta(z, dz, u_lat)` about zero, `latent_dim x latent_dim`.
+    #[serde(with = "listed")]
     pub acceleration_error: DMatrix<f64>,
 }
 

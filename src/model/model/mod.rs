@@ -41,6 +41,7 @@ mod given_state;
 mod identifier;
 mod jump_prior;
 mod library;
+mod listed;
 mod maps;
 mod order;
 mod rom;
@@ -56,7 +57,9 @@ pub use error::ModelError;
 pub use evaluation::{Step, Tape};
 pub use given_state::InputGivenState;
 pub use identifier::{Identifier, IdentifierError, check_name};
-pub use jump_prior::{FEATURE_DIM, GOAL_DIM, GoalFeatures, GoalRange, JumpPart, JumpPrior};
+pub use jump_prior::{
+    FEATURE_DIM, GOAL_DIM, GoalFeatures, GoalRange, JumpPart, JumpPrior, Landmark, Landmarks,
+};
 pub use library::{
     CandidateTerm, LatentVariable, Library, LibraryChoice, MAX_LATENT_DIM, MAX_TERM_LEN,
 };

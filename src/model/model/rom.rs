@@ -17,6 +17,7 @@
 //! wrong length, [`ModelError::Invalid`].
 
 use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
 use super::builder::ModelBuilder;
@@ -25,17 +26,20 @@ use super::error::{ModelError, check};
 use super::identifier::Identifier;
 use super::jump_prior::JumpPrior;
 use super::library::{CandidateTerm, Library};
+use super::listed;
 use super::statistics::InputStatistics;
 use crate::robot::{Actuators, ContactFlags, FeetRule, InputRule, Robot, WrenchFrame};
 
 /// One dynamics regime: `ddz = Xi^T Theta(z, dz, u_lat)`.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Phase {
     /// Name, such as `contact`.
     pub name: String,
     /// Foot patterns that select it; the first phase that matches wins.
     pub feet: FeetRule,
     /// Coefficients, `library_dim x latent_dim`, in scaled units.
+    #[serde(with = "listed")]
     pub xi: DMatrix<f64>,
 }
 
@@ -61,7 +65,7 @@ pub(super) fn selected(phases: &[Phase], feet: ContactFlags) -> Option<usize> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReducedModel {
     /// As given, statistics in the order of the phases.
-    pub(super) parts: ModelBuilder,
+    pub(crate) parts: ModelBuilder,
     pub(super) identifier: Identifier,
     pub(super) phase_identifiers: Vec<Identifier>,
     /// `pinv(W_e^T)`, `latent_dim x input_dim`; there when the encoder is, and is linear.
