@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::Answer;
 use super::output::names;
 use crate::Error;
-use crate::files::{Begun, EmittedFile, Overwrite, write_files_since};
+use crate::files::{Emitted, EmittedFile, Overwrite, write_files_since};
 use crate::report::{Figure, figure_files};
 
 /// What an output file holds: the endings that it may have.
@@ -45,7 +45,7 @@ impl Format {
 /// The files that a command reads, none of which it may replace, forced or not; and the folder that it writes into, as it
 /// is when the command begins.
 #[derive(Debug, Default)]
-pub(crate) struct Inputs<'a>(Vec<&'a Path>, Option<Begun>);
+pub(crate) struct Inputs<'a>(Vec<&'a Path>, Option<Emitted>);
 
 impl<'a> Inputs<'a> {
     pub(crate) fn and<P: AsRef<Path> + ?Sized + 'a>(
@@ -58,7 +58,7 @@ impl<'a> Inputs<'a> {
 
     /// The same for a command that writes into this folder.
     pub(crate) fn into_folder(mut self, folder: Option<&Path>) -> Result<Self, Error> {
-        self.1 = folder.map(Begun::of).transpose()?;
+        self.1 = folder.map(Emitted::of).transpose()?;
         Ok(self)
     }
 
@@ -137,7 +137,7 @@ impl<'a> Inputs<'a> {
         for file in files {
             self.check(&folder.join(&file.path))?;
         }
-        let now = Begun::of(folder)?;
+        let now = Emitted::of(folder)?;
         let begun = self.1.as_ref().unwrap_or(&now);
         Ok(write_files_since(begun, folder, files, overwrite)?)
     }

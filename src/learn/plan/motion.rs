@@ -34,9 +34,6 @@ pub struct Margins {
 
 /// The motion of a point and its margins: samples at equal distances from the start to the planned end, as close to
 /// `sample_time_s` apart as a whole number of steps allows.
-///
-/// # Errors
-/// [`PlanError::Recording`] if a sample makes no input.
 pub(crate) fn motion(
     task: &Task<'_>,
     y: &[f64],

@@ -34,9 +34,6 @@ pub struct GoalMap {
 }
 
 /// Plans a grid of goals around the training jumps; `done` is told how many of how many.
-///
-/// # Errors
-/// [`PlanError::Model`] for a model without a prior, [`PlanError::Lower`].
 pub fn reach(
     model: &ReducedModel,
     settings: &PlanSettings,

@@ -65,10 +65,6 @@ impl SeedPart<'_> {
 
 impl<'a> Seed<'a> {
     /// The prior of a model at a goal.
-    ///
-    /// # Errors
-    /// [`PlanError::Model`] if the model lacks a prior, [`PlanError::Goal`] for goals out of all
-    /// proportion, [`PlanError::Lower`].
     pub(crate) fn new(
         model: &'a ReducedModel,
         goal: &Goal,

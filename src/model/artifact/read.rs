@@ -36,9 +36,6 @@ pub fn is_standard_input(path: &Path) -> bool {
 }
 
 /// Reads and checks a model file, or standard input for the path `-`.
-///
-/// # Errors
-/// [`ArtifactError`] with what was found and expected.
 pub fn read(path: &Path) -> Result<ReducedModel, ArtifactError> {
     let mut bytes = Vec::new();
     let (name, source): (String, io::Result<Box<dyn Read>>) = match is_standard_input(path) {

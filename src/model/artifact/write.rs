@@ -21,9 +21,6 @@ pub fn to_text(model: &ReducedModel) -> String {
 }
 
 /// Checks whether [`write()`] would refuse.
-///
-/// # Errors
-/// [`Fault::Text`](crate::files::Fault::Text) if a different file is there and `overwrite` refuses.
 pub fn check_place(
     path: &Path,
     model: &ReducedModel,
@@ -45,9 +42,6 @@ fn check_text(path: &Path, text: &str, overwrite: Overwrite) -> Result<(), Artif
 }
 
 /// Writes a model file: into a new file beside `path`, which is then moved there.
-///
-/// # Errors
-/// As [`check_place`], and those of the file system.
 pub fn write(path: &Path, model: &ReducedModel, overwrite: Overwrite) -> Result<(), ArtifactError> {
     let text = to_text(model);
     let written = write_whole(path, overwrite, |out| out.write_all(text.as_bytes()));

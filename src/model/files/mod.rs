@@ -16,7 +16,7 @@ mod text;
 mod whole;
 
 pub use folder::{
-    Begun, FolderError, check_folder, earlier_files, hex, write_files, write_files_since,
+    Emitted, FolderError, check_folder, earlier_files, hex, write_files, write_files_since,
 };
 pub use located::{Fault, Located, Place};
 pub use size::read_toml;

@@ -96,9 +96,6 @@ impl<R: Read> Read for Capped<R> {
 }
 
 /// The bytes of a file, or of a device or pipe, up to the most of its format.
-///
-/// # Errors
-/// Those of the file system, and [`io::ErrorKind::FileTooLarge`].
 pub fn read_capped(path: &Path, format: Format) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let file = File::open(path)?;
@@ -107,9 +104,6 @@ pub fn read_capped(path: &Path, format: Format) -> io::Result<Vec<u8>> {
 }
 
 /// [`read_capped`] of a text.
-///
-/// # Errors
-/// As [`read_capped`], and [`io::ErrorKind::InvalidData`] for another format or bytes that are not UTF-8.
 pub fn read_text_capped(path: &Path, format: Format) -> io::Result<String> {
     let bytes = read_capped(path, format)?;
     let invalid = |text: String| io::Error::new(io::ErrorKind::InvalidData, text);
@@ -126,9 +120,6 @@ pub fn read_text_capped(path: &Path, format: Format) -> io::Result<String> {
 const MOST_TABLES: usize = 20_000;
 
 /// The text of a TOML file.
-///
-/// # Errors
-/// As [`read_text_capped`], and [`io::ErrorKind::InvalidData`] for a file of more tables than any settings have.
 pub fn read_toml(path: &Path) -> io::Result<String> {
     let text = read_text_capped(path, Format::Settings)?;
     match text.bytes().filter(|byte| b".[{".contains(byte)).count() {

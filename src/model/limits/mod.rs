@@ -83,25 +83,16 @@ impl Range {
     }
 
     /// The number, if it is in the range.
-    ///
-    /// # Errors
-    /// [`OutOfRange`] with the name, the number and the range.
     pub fn check(&self, value: f64) -> Result<f64, OutOfRange> {
         (self.contains(value).then_some(value)).ok_or_else(|| self.refusal(short(value)))
     }
 
     /// The count, if it is in the range.
-    ///
-    /// # Errors
-    /// As [`Range::check`].
     pub fn check_count(&self, value: usize) -> Result<usize, OutOfRange> {
         (self.contains(value as f64).then_some(value)).ok_or_else(|| self.refusal(value))
     }
 
     /// The number that a text spells.
-    ///
-    /// # Errors
-    /// The range in words, for a text that is no number in it.
     pub fn parse<T: FromStr + Copy + fmt::Display>(&self, text: &str) -> Result<T, String> {
         let in_range = |number: &T| {
             // A whole number beyond 2^53 is far beyond every range, so that its rounding does not matter.

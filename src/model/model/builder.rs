@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use serde_json::{Map, Value};
 
 use super::coordinates::{CoordinateNames, Scaling};
-use super::error::{ModelError, check, check_tensor};
+use super::error::{ModelError, check, check_count, check_tensor};
 use super::identifier::{Identifier, identifier_of};
 use super::jump_prior::JumpPrior;
 use super::library::Library;
@@ -20,10 +20,10 @@ const MAX_STATE_DIM: usize = 256;
 const MAX_DESCRIPTION_LEN: usize = 10_000;
 const MAX_SAMPLE_TIME_S: f64 = 1.0;
 
-/// A method for each part that replaces it.
+/// A method for each part that replaces it; the model's method of that name says what it is.
 macro_rules! setters {
-    ($($(#[$doc:meta])* $part:ident: $value:ty;)*) => {
-        $($(#[$doc])*
+    ($($part:ident: $value:ty;)*) => {
+        $(#[allow(missing_docs, reason = "see above")]
         pub fn $part(mut self, $part: $value) -> Self {
             self.$part = $part.into();
             self
@@ -75,31 +75,18 @@ impl ModelBuilder {
     }
 
     setters! {
-        /// The name.
         name: impl Into<String>;
-        /// Free text about the model.
         description: impl Into<String>;
-        /// The library; the phases' Xi must then have a row for each of its terms.
         library: Library;
-        /// All phases; rules are tried in their order.
         phases: Vec<Phase>;
-        /// Names and units of the state.
         state: impl Into<Option<CoordinateNames>>;
-        /// Names and units of the input.
         input: impl Into<Option<CoordinateNames>>;
-        /// The scale factors.
         scaling: impl Into<Option<Scaling>>;
-        /// The robot.
         robot: impl Into<Option<&'static Robot>>;
-        /// Losses of the joints, subtracted from the motors' torques; without them torques count as they are.
         actuators: Option<Actuators>;
-        /// The axes of force and moment in the inputs [default: the body's].
         wrench_frame: WrenchFrame;
-        /// Landmarks and prior of the training jumps.
         jump_prior: Option<JumpPrior>;
-        /// The sampling period of the recordings, s.
         sample_time_s: impl Into<Option<f64>>;
-        /// The model's origin: free JSON.
         provenance: Map<String, Value>;
     }
 
@@ -138,10 +125,6 @@ impl ModelBuilder {
     }
 
     /// Checks all parts and makes the model.
-    ///
-    /// # Errors
-    /// The first of the [`ModelError`]s that applies: names, shapes, finite values, scale factors,
-    /// rank of the encoder (singular values, `RANK_TOLERANCE`), reachable phases, covariances.
     pub fn build(mut self) -> Result<ReducedModel, ModelError> {
         let identifier = identifier_of("model name", &self.name)?;
         let phase_identifiers = self.check_phase_names()?;
@@ -170,14 +153,9 @@ impl ModelBuilder {
     }
 
     fn check_phase_names(&self) -> Result<Vec<Identifier>, ModelError> {
-        let n_phases = self.phases.len();
-        let (fits, expected) = (
-            (1..=MAX_PHASES).contains(&n_phases),
-            format!("1 to {MAX_PHASES}"),
-        );
-        check(fits, "`phases`", || format!("{n_phases} phases"), expected)?;
+        check_count("`phases`", self.phases.len(), "phases", 1..=MAX_PHASES)?;
         let mut first_use = HashMap::new();
-        let mut identifiers = Vec::with_capacity(self.phases.len());
+        let mut identifiers = Vec::new();
         for (second, phase) in self.phases.iter().enumerate() {
             let place = format!("phases[{second}].name");
             let identifier = identifier_of(&place, &phase.name)?;
@@ -195,14 +173,14 @@ impl ModelBuilder {
     fn check_phases(&self) -> Result<(), ModelError> {
         let expected = (self.library.len(), self.library.latent_dim());
         for (index, phase) in self.phases.iter().enumerate() {
-            let tensor = format!("phases[{index}].xi");
-            check_tensor(&tensor, &phase.xi, expected)?;
+            check_tensor(&format!("phases[{index}].xi"), &phase.xi, expected)?;
             if let FeetRule::Patterns(patterns) = &phase.feet {
-                let repeated = (1..patterns.len())
-                    .find(|&second| patterns[..second].contains(&patterns[second]));
-                let place = format!("phases[{index}].feet[{}]", repeated.unwrap_or(0));
-                let found = || "a pattern that is in the list already";
-                check(repeated.is_none(), &place, found, "each pattern once")?;
+                let mut places = 1..patterns.len();
+                if let Some(again) = places.find(|&k| patterns[..k].contains(&patterns[k])) {
+                    let place = format!("phases[{index}].feet[{again}]");
+                    let found = "a pattern that is in the list already";
+                    return Err(ModelError::invalid(place, found, "each pattern once"));
+                }
             }
         }
         for (index, phase) in self.phases.iter().enumerate() {
@@ -255,13 +233,9 @@ impl ModelBuilder {
             return Ok(None);
         };
         let fits = (latent_dim..=MAX_STATE_DIM).contains(&dim);
+        let found = || format!("{dim} robot coordinates");
         let expected = format!("{latent_dim} (one per latent coordinate) to {MAX_STATE_DIM}");
-        check(
-            fits,
-            "`state`",
-            || format!("{dim} robot coordinates"),
-            expected,
-        )?;
+        check(fits, "`state`", found, expected)?;
         if let Some(encoder) = &self.encoder {
             encoder.check("encoder", (latent_dim, dim))?;
             encoder.check_widths(latent_dim)?;
@@ -279,12 +253,9 @@ impl ModelBuilder {
                 names.check(signals, state_dim)?;
             }
         }
-        let Some(robot) = self.robot else {
-            return Ok(());
-        };
         let of_robot = [Robot::state_names(), Robot::input_names()];
         for ((signals, names), of_robot) in named.into_iter().zip(of_robot) {
-            if let Some(names) = names {
+            if let (Some(names), Some(robot)) = (names, self.robot) {
                 names.check_robot(signals, &of_robot, robot)?;
             }
         }
@@ -298,8 +269,8 @@ impl ModelBuilder {
             (None, WrenchFrame::World) => "wrench_frame",
             (None, WrenchFrame::Body) => return Ok(()),
         };
+        let needs = "robot";
         if self.robot.is_none() {
-            let needs = "robot";
             return Err(ModelError::Incomplete { part, needs });
         }
         match self.actuators.as_ref().and_then(Actuators::unusable) {

@@ -2,6 +2,8 @@
 
 #![allow(missing_docs, reason = "each variant's message names its fields")]
 
+use std::ops::RangeInclusive;
+
 use nalgebra::{Dim, Matrix, RawStorage};
 use thiserror::Error;
 
@@ -117,6 +119,18 @@ pub(super) fn check<F: ToString>(
         true => Ok(()),
         false => Err(ModelError::invalid(place, found(), expected.to_string())),
     }
+}
+
+/// Refuses a number of things outside a range.
+pub(super) fn check_count(
+    place: &str,
+    found: usize,
+    things: &str,
+    range: RangeInclusive<usize>,
+) -> Result<(), ModelError> {
+    let expected = format!("{} to {}", range.start(), range.end());
+    let text = || format!("{found} {things}").trim_end().to_owned();
+    check(range.contains(&found), place, text, expected)
 }
 
 /// Refuses a tensor of another shape than expected.

@@ -20,9 +20,6 @@ pub struct IdentifierError(String);
 
 impl Identifier {
     /// The identifier that a name of the model file stands for: `-`, `.` and space become `_`.
-    ///
-    /// # Errors
-    /// [`IdentifierError`]; keywords and taken names are compared without case.
     pub fn from_name(name: &str) -> Result<Self, IdentifierError> {
         let refused = |words: String| Err(IdentifierError(words));
         let Some(first) = name.chars().next() else {

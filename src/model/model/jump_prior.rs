@@ -9,7 +9,7 @@
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-use super::error::{ModelError, check, check_tensor};
+use super::error::{ModelError, check, check_count, check_tensor};
 use super::listed::{self, Listed};
 use super::rom::{Phase, selected};
 use crate::robot::{ContactFlags, FOOT_DIM, STATE_DIM};
@@ -171,9 +171,7 @@ impl JumpPart {
     fn check(&self, name: &str, d: usize, range_s: &[f64; 2]) -> Result<(), ModelError> {
         let place = |key: &str| format!("`{name}{key}`");
         let nodes = self.nodes();
-        let fits = (3..=MAX_NODES).contains(&nodes);
-        let expected = format!("3 to {MAX_NODES}");
-        check(fits, &place(".z"), || format!("{nodes} nodes"), expected)?;
+        check_count(&place(".z"), nodes, "nodes", 3..=MAX_NODES)?;
         let of_nodes = (nodes, FEATURE_DIM * d);
         let xi = self.xi.as_ref().map(|xi| ("xi", xi, (3 * d, d)));
         let tables = [

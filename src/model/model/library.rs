@@ -6,7 +6,7 @@ use std::fmt;
 use nalgebra::{DMatrix, DVector};
 use serde::{Serialize, Serializer};
 
-use super::error::{ModelError, check, check_shape};
+use super::error::{ModelError, check, check_count, check_shape};
 use super::evaluation::Tape;
 use super::standard_library::StandardLibrary;
 use crate::symbolic::{ExprId, ExprPool, ParseLimits, SymbolId};
@@ -145,9 +145,7 @@ impl Library {
     /// [`ModelError::Invalid`] for a number of coordinates, a degree or a number of terms beyond its bound, and for a
     /// term that is zero everywhere or has a constant part beyond the range of floats; [`ModelError::Term`].
     pub fn of(latent_dim: usize, choice: LibraryChoice) -> Result<Self, ModelError> {
-        let fits = (1..=MAX_LATENT_DIM).contains(&latent_dim);
-        let expected = format!("1 to {MAX_LATENT_DIM}");
-        check(fits, "`latent_dim`", || latent_dim, expected)?;
+        check_count("`latent_dim`", latent_dim, "", 1..=MAX_LATENT_DIM)?;
         let (texts, standard) = match choice {
             LibraryChoice::Terms(texts) => (texts, None),
             LibraryChoice::Standard(standard) => (standard.texts(latent_dim)?, Some(standard)),
@@ -177,9 +175,6 @@ impl Library {
 
     /// Refuses a library in which a term equals an earlier one under another spelling: its
     /// coefficients cannot be learned.
-    ///
-    /// # Errors
-    /// [`ModelError::Invalid`] for the first such term.
     pub fn check_distinct(&self) -> Result<(), ModelError> {
         let mut first_use = HashMap::new();
         for (second, term) in self.terms.iter().enumerate() {
@@ -261,9 +256,6 @@ impl Library {
     }
 
     /// Theta at one point: the value of each term, in order.
-    ///
-    /// # Errors
-    /// [`ModelError::Invalid`] if an argument is not `latent_dim` long.
     pub fn evaluate(
         &self,
         z: &DVector<f64>,
@@ -284,9 +276,6 @@ impl Library {
     /// Theta at many points: one row a point, one column a term.
     ///
     /// `variables` holds one point a column (`3 latent_dim x n`): `z`, then `dz`, then `u_lat`.
-    ///
-    /// # Errors
-    /// [`ModelError::Invalid`] if it has another number of rows.
     pub fn evaluate_points(&self, variables: &DMatrix<f64>) -> Result<DMatrix<f64>, ModelError> {
         let expected = (3 * self.latent_dim, variables.ncols());
         check_shape("z, dz, u_lat", variables.shape(), expected)?;

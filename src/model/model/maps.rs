@@ -46,17 +46,11 @@ impl ReducedModel {
     }
 
     /// The encoder of a linear model, in scaled units: `W_e` is `latent_dim x state_dim`.
-    ///
-    /// # Errors
-    /// [`ModelError::Missing`] for a latent-only model, [`ModelError::Nonlinear`].
     pub fn encoder(&self) -> Result<&AffineMap, ModelError> {
         self.affine("encoder", self.encoder_map()?)
     }
 
     /// The decoder of a linear model, in scaled units: `W_d` is `state_dim x latent_dim`.
-    ///
-    /// # Errors
-    /// [`ModelError::Missing`] if the model has none, [`ModelError::Nonlinear`].
     pub fn decoder(&self) -> Result<&AffineMap, ModelError> {
         self.affine("decoder", self.decoder_map()?)
     }
@@ -176,10 +170,6 @@ pub(crate) const RANK_TOLERANCE: f64 = 1e-10;
 
 /// `pinv(W_e^T)`, `latent_dim x state_dim`, from the singular values of `W_e = U S V^T`:
 /// `pinv(W_e^T) = U S^-1 V^T`.
-///
-/// # Errors
-/// [`ModelError::Invalid`] with the name of the matrix, if its rows are (nearly) linearly dependent, so that latent
-/// inputs have no unique lift.
 pub(super) fn pinv_of_transpose(
     weights: &DMatrix<f64>,
     matrix: &str,

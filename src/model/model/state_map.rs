@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
 use super::activation::Activation;
-use super::error::{ModelError, check, check_finite, check_shape};
+use super::error::{ModelError, check, check_count, check_finite, check_shape};
 use super::listed;
 
 /// Most layers of a map.
@@ -28,10 +28,6 @@ pub struct AffineMap {
 
 impl AffineMap {
     /// The map with these weights and this bias; `tensor` names it in errors.
-    ///
-    /// # Errors
-    /// [`ModelError::Invalid`] unless `bias` has one entry per row of `weights`,
-    /// [`ModelError::NonFinite`] if an entry is infinite or not a number.
     pub fn new(
         tensor: &str,
         weights: DMatrix<f64>,
@@ -189,10 +185,6 @@ impl From<AffineMap> for StateMap {
 
 impl StateMap {
     /// The chain of these layers, the first applied first; `tensor` names it in errors.
-    ///
-    /// # Errors
-    /// [`ModelError::Invalid`] unless there are 1 to [`MAX_LAYERS`], each of at most
-    /// [`MAX_LAYER_WIDTH`] units, and each takes the outputs of the layer before it.
     pub fn new(tensor: &str, layers: Vec<Layer>) -> Result<Self, ModelError> {
         let map = Self { layers };
         map.check_chain(tensor)?;
@@ -202,9 +194,7 @@ impl StateMap {
     /// Refuses what [`StateMap::new`] does.
     pub(super) fn check_chain(&self, tensor: &str) -> Result<(), ModelError> {
         let n_layers = self.layers.len();
-        let fits = (1..=MAX_LAYERS).contains(&n_layers);
-        let (place, expected) = (format!("`{tensor}.layers`"), format!("1 to {MAX_LAYERS}"));
-        check(fits, &place, || format!("{n_layers} layers"), expected)?;
+        check_count(&format!("`{tensor}.layers`"), n_layers, "layers", 1..=MAX_LAYERS)?;
         if let Some(affine) = self.as_affine() {
             return affine.check(tensor);
         }
@@ -253,10 +243,10 @@ impl StateMap {
 
     /// How positions map.
     pub fn apply(&self, x: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
-        let (first, rest) = self.layers.split_first().expect("a map has a layer");
-        let y = first.activated(first.map.apply(x)?);
-        rest.iter()
-            .try_fold(y, |y, layer| Ok(layer.activated(layer.map.apply(&y)?)))
+        let mut layers = self.layers.iter();
+        layers.try_fold(x.clone(), |y, layer| {
+            Ok((layer.map.apply(&y)?).map(|a| layer.activation.value(a)))
+        })
     }
 
     /// How positions, velocities and accelerations map: `y`, `J(x) dx` and `J(x) ddx + dJ/dt dx`.
@@ -323,14 +313,9 @@ impl StateMap {
     pub(super) fn check_widths(&self, latent_dim: usize) -> Result<(), ModelError> {
         let widths = self.layers.iter().map(|layer| layer.map.output_dim());
         for (layer, width) in widths.enumerate() {
-            let place = format!("`encoder.layers[{layer}]`");
+            let (place, found) = (format!("`encoder.layers[{layer}]`"), || format!("{width} units"));
             let expected = format!("at least {latent_dim}, one per latent coordinate");
-            check(
-                width >= latent_dim,
-                &place,
-                || format!("{width} units"),
-                expected,
-            )?;
+            check(width >= latent_dim, &place, found, expected)?;
         }
         Ok(())
     }
@@ -345,14 +330,5 @@ impl StateMap {
             }
         }
         text
-    }
-}
-
-impl Layer {
-    fn activated(&self, mut a: DVector<f64>) -> DVector<f64> {
-        if self.activation != Activation::Linear {
-            a.apply(|a| *a = self.activation.value(*a));
-        }
-        a
     }
 }

@@ -90,9 +90,6 @@ struct Reader<'f> {
 
 impl RobotEntry {
     /// The robot of the entry, which is `entry` of `file` in errors; equal robots are one.
-    ///
-    /// # Errors
-    /// [`RobotFileError`] with the entry that is wrong, or a name that is another robot's.
     pub fn robot(&self, file: &str) -> Result<&'static Robot, RobotFileError> {
         let robot = build(file, self, &Places::Keys)?;
         match namesake(&robot) {

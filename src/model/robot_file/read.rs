@@ -26,17 +26,11 @@ pub struct RobotOptions<'a> {
 }
 
 /// The robot of a name, or of a file that ends in `.toml` or `.urdf`.
-///
-/// # Errors
-/// [`RobotFileError`] without a file for what is neither, else as [`from_text`].
 pub fn find(name_or_file: &str) -> Result<&'static Robot, RobotFileError> {
     Ok(open(name_or_file, &RobotOptions::default())?.robot)
 }
 
 /// [`find`] with options and notes.
-///
-/// # Errors
-/// As [`find`], and for options of a robot that has no file.
 pub fn open(
     name_or_file: &str,
     options: &RobotOptions<'_>,
@@ -84,9 +78,6 @@ pub(super) fn text_of(path: &Path) -> Result<String, RobotFileError> {
 }
 
 /// Reads a robot from TOML or, by the ending of `file`, which names it in errors, URDF.
-///
-/// # Errors
-/// [`RobotFileError`] with the entry that is wrong or missing.
 pub fn from_text(
     file: &str,
     text: &str,

@@ -16,9 +16,6 @@ const KNOWN: [(&str, &str); 3] = [
 ];
 
 /// The robot of romc's own that is named so, such as `go1`.
-///
-/// # Errors
-/// [`RobotError::UnknownRobot`], which lists the known names.
 pub fn by_name(name: &str) -> Result<&'static Robot, RobotError> {
     static ROBOTS: [OnceLock<&Robot>; KNOWN.len()] = [const { OnceLock::new() }; KNOWN.len()];
     let known = KNOWN.iter().position(|(known, _)| *known == name);
