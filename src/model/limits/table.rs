@@ -78,14 +78,3 @@ ranges! {
 pub fn of_training(name: &str) -> Option<&'static Range> {
     ALL.iter().find(|range| range.name == name)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn ranges_are_those_that_the_rooms_keep_themselves() {
-        assert_eq!(LATENT_DIM.most as usize, crate::robot::STATE_DIM);
-        assert_eq!(LAYER_WIDTH.most as usize, crate::model::MAX_LAYER_WIDTH);
-    }
-}

@@ -194,7 +194,12 @@ impl StateMap {
     /// Refuses what [`StateMap::new`] does.
     pub(super) fn check_chain(&self, tensor: &str) -> Result<(), ModelError> {
         let n_layers = self.layers.len();
-        check_count(&format!("`{tensor}.layers`"), n_layers, "layers", 1..=MAX_LAYERS)?;
+        check_count(
+            &format!("`{tensor}.layers`"),
+            n_layers,
+            "layers",
+            1..=MAX_LAYERS,
+        )?;
         if let Some(affine) = self.as_affine() {
             return affine.check(tensor);
         }
@@ -313,7 +318,9 @@ impl StateMap {
     pub(super) fn check_widths(&self, latent_dim: usize) -> Result<(), ModelError> {
         let widths = self.layers.iter().map(|layer| layer.map.output_dim());
         for (layer, width) in widths.enumerate() {
-            let (place, found) = (format!("`encoder.layers[{layer}]`"), || format!("{width} units"));
+            let (place, found) = (format!("`encoder.layers[{layer}]`"), || {
+                format!("{width} units")
+            });
             let expected = format!("at least {latent_dim}, one per latent coordinate");
             check(width >= latent_dim, &place, found, expected)?;
         }
