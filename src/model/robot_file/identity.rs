@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::entry::RobotEntry;
-use super::legs::{Places, build};
+use super::legs::{Part, Places, build};
 use super::read::RobotFileError;
 use super::registry::keep;
 use crate::files::{Located, Place};
@@ -39,42 +39,33 @@ pub(super) fn namesake(robot: &Robot) -> Option<String> {
 /// The robot of an entry from a file. Numbers other than those of romc's robot of that name make it another robot,
 /// with the kind of the file in its name.
 pub(super) fn identified(
-    file: &str,
     mut entry: RobotEntry,
-    places: &Places,
+    places: &Places<'_>,
     chosen: Option<&str>,
     mut notes: Vec<String>,
 ) -> Result<RobotReading, RobotFileError> {
     if let Some(name) = chosen {
         entry.name = name.to_owned();
     }
-    let name_place = Place::Entry(places.of_robot("name").into());
-    let built = build(file, &entry, places);
-    let mut robot = built.map_err(
-        |error| match chosen.is_some() && error.place == name_place {
-            true => Located::new("", Place::Option("--name"), error.kind),
-            false => error,
-        },
-    )?;
+    let name_place = Place::from((places.of)(Part::Name));
+    let of_option = |error: RobotFileError| match chosen.is_some() && error.place == name_place {
+        true => Located::new("", Place::Option("--name"), error.kind),
+        false => error,
+    };
+    let mut robot = build(&entry, places).map_err(of_option)?;
     if let Some(differences) = namesake(&robot) {
+        let own = &entry.name;
         if chosen.is_some() {
-            let found = format!(
-                "{:?}, romc's own robot with other numbers ({differences})",
-                entry.name
-            );
+            let found = format!("{own:?}, romc's own robot with other numbers ({differences})");
             return Err(RobotFileError::option("--name", found, "another name"));
         }
-        let kind = match places {
-            Places::Keys => "toml",
-            Places::Elements { .. } => "urdf",
-        };
-        let (own, other) = (&entry.name, format!("{}-{kind}", entry.name));
+        let other = format!("{own}-{}", places.kind);
         notes.push(format!(
             "its numbers are not those of romc's own {own:?} ({differences}): it is called {other:?}; --name (romc \
              robot) gives it another name"
         ));
         entry.name = other;
-        robot = build(file, &entry, places)?;
+        robot = build(&entry, places)?;
     }
     notes.extend(doubts(&robot));
     Ok(RobotReading {

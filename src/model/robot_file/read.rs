@@ -91,7 +91,7 @@ pub fn from_text(
         return Err(RobotFileError::option("--feet", found, "a URDF"));
     }
     let entry = from_toml_text::<RobotEntry>(file, text)?;
-    identified(file, entry, &Places::Keys, options.name, Vec::new())
+    identified(entry, &Places::keys(file), options.name, Vec::new())
 }
 
 pub(super) fn from_toml_text<T: DeserializeOwned>(

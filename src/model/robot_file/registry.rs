@@ -26,7 +26,7 @@ pub fn by_name(name: &str) -> Result<&'static Robot, RobotError> {
     Ok(ROBOTS[at].get_or_init(|| {
         let (file, text) = KNOWN[at];
         let entry = read::from_toml_text::<RobotEntry>(file, text);
-        let robot = entry.and_then(|entry| legs::build(file, &entry, &Places::Keys));
+        let robot = entry.and_then(|entry| legs::build(&entry, &Places::keys(file)));
         keep(robot.expect("a file of romc's own, read by a test"))
     }))
 }

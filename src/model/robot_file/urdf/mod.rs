@@ -12,7 +12,7 @@ use nalgebra::{Rotation3, Vector3};
 
 use super::entry::{Axis, JointEntry, LegEntry, RobotEntry};
 use super::identity::{RobotReading, identified};
-use super::legs::{LegPlaces, Places};
+use super::legs::{Part, Places};
 use super::read::{RobotFileError, RobotOptions};
 use element::{Element, document};
 use limbs::{Legs, Limb};
@@ -50,8 +50,9 @@ pub(super) fn read(
         mass_kg: tree.mass_below(legs.top),
         leg,
     };
-    let places = places(robot, &tree, &legs);
-    identified(file, entry, &places, options.name, notes)
+    let of = &|part: Part<'_>| place(robot, &tree, &legs.legs, part);
+    let kind = "urdf";
+    identified(entry, &Places { file, kind, of }, options.name, notes)
 }
 
 /// Where the body's frame is if not at the root, and which parts have no mass.
@@ -102,20 +103,30 @@ fn notes(tree: &Tree<'_>, legs: &Legs) -> Result<Vec<String>, RobotFileError> {
     Ok(notes)
 }
 
-fn places(robot: Element<'_>, tree: &Tree<'_>, legs: &Legs) -> Places {
-    let of = |leg: &Limb| {
-        let joints = leg
-            .joints
-            .iter()
-            .map(|joint| tree.joints[*joint].element.place());
-        LegPlaces {
-            joints: joints.collect(),
-            foot: tree.links[leg.foot].element.place(),
+/// Keys of a joint as a URDF spells them.
+const SPELLINGS: [(&str, &str); 5] = [
+    ("at", "<origin>, xyz"),
+    ("axis", "<axis>, xyz"),
+    ("limits_rad", "<limit>, lower and upper"),
+    ("torque_nm", "<limit>, effort"),
+    ("speed_rad_s", "<limit>, velocity"),
+];
+
+/// The element of a part, such as ``line 24: joint `knee`, <axis>, xyz``.
+fn place(robot: Element<'_>, tree: &Tree<'_>, legs: &[Limb], part: Part<'_>) -> String {
+    let joint = |leg: usize, joint: usize| tree.joints[legs[leg].joints[joint]].element.place();
+    match part {
+        Part::Name => format!("{}, name", robot.place()),
+        Part::Mass => "the masses of the links".to_owned(),
+        Part::Legs => "the tree".to_owned(),
+        Part::Leg(leg) => format!("{}, its leg", joint(leg, 0)),
+        Part::Foot(leg) => tree.links[legs[leg].foot].element.place(),
+        Part::Joint(leg, index, "") => joint(leg, index),
+        Part::Joint(leg, index, key) => {
+            let known = SPELLINGS.iter().find(|(name, _)| *name == key);
+            let spelling = known.map_or(key, |(_, spelling)| spelling);
+            format!("{}, {spelling}", joint(leg, index))
         }
-    };
-    Places::Elements {
-        robot: robot.place(),
-        legs: legs.legs.iter().map(of).collect(),
     }
 }
 
