@@ -9,25 +9,17 @@ use crate::model::ReducedModel;
 /// Steps of a map across the recorded range of distances and of apexes; it goes on as far at either side.
 const STEPS: [i32; 2] = [4, 3];
 
-/// A goal of the map.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MappedGoal {
-    /// Distance and apex, m.
     pub goal_m: [f64; 2],
-    /// Word of the verdict, or `no plan`.
     pub status: &'static str,
-    /// Input deviation, if there is a plan.
     pub input_deviation: Option<f64>,
-    /// Time for it, ms.
     pub solve_ms: f64,
 }
 
-/// The map of a model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GoalMap {
-    /// Distances, m, ascending.
     pub distances_m: Vec<f64>,
-    /// Apexes, m, ascending.
     pub apexes_m: Vec<f64>,
     /// One point per distance and apex, distances of one apex together.
     pub points: Vec<MappedGoal>,

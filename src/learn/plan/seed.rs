@@ -37,7 +37,6 @@ pub(crate) struct Seed<'a> {
 pub(crate) struct SeedPart<'a> {
     pub part: &'a JumpPart,
     pub landmark: &'a Landmark,
-    /// Index of the model's phase.
     pub phase: usize,
     pub duration_s: f64,
     pub z: Vec<DVector<f64>>,

@@ -26,27 +26,20 @@ const APEX_PROGRAMS: usize = 3;
 /// Largest violation of an equation with which a plan may be used at all.
 const USABLE_DEFECT: f64 = 1e-3;
 
-/// A part of a planned jump.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlannedPart {
-    /// Its name.
     pub name: String,
-    /// Index of the model's phase.
     pub phase: usize,
-    /// Its duration, s.
     pub duration_s: f64,
 }
 
-/// A planned jump.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
-    /// The goal: distance and rise of the body, m.
     pub goal_m: [f64; 2],
     /// What the planned motion reaches, m.
     pub reached_m: [f64; 2],
     /// The motion, sampled as the training's recordings.
     pub motion: Segment,
-    /// The parts in order.
     pub parts: Vec<PlannedPart>,
     /// The cost: weighted squares of the deviations from the prior.
     pub cost: f64,
@@ -58,11 +51,8 @@ pub struct Plan {
     pub error_m: [f64; 2],
     /// How close the motion comes to its bounds, between the nodes too.
     pub margins: Margins,
-    /// Whether to trust it.
     pub verdict: Verdict,
-    /// Convex programs solved.
     pub programs: usize,
-    /// Time that took, ms.
     pub solve_ms: f64,
 }
 

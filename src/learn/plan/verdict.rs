@@ -37,7 +37,6 @@ impl Verdict {
         }
     }
 
-    /// The reasons; none for a trusted plan.
     pub fn reasons(&self) -> &[String] {
         match self {
             Self::Trusted => &[],

@@ -32,6 +32,8 @@
 //!
 //! [`ReducedModel`]: crate::model::ReducedModel
 
+#![allow(missing_docs, reason = "names say it all where there is no comment")]
+
 mod bounded;
 mod manifest;
 mod print;

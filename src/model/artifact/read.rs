@@ -12,7 +12,6 @@ use crate::files::size::Format;
 use crate::files::{Fault, Located, Place, magic};
 use crate::model::{ModelError, ReducedModel};
 
-/// A fault and its place in a model file.
 pub type ArtifactError = Located<Fault<ModelError>>;
 
 /// An error and all its causes in one line.

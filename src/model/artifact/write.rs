@@ -77,7 +77,6 @@ impl fmt::Display for Digest {
     }
 }
 
-/// The digest of a model.
 pub fn digest(model: &ReducedModel) -> Digest {
     Digest(Sha256::digest(to_text(model)).into())
 }

@@ -13,9 +13,7 @@ use super::whole::{EmittedFile, Overwrite};
 
 const LIST: &str = ".romc-emitted";
 
-/// Why files could not be written.
 #[derive(Debug, thiserror::Error)]
-#[allow(missing_docs, reason = "each variant's message names its fields")]
 pub enum FolderError {
     #[error("{path}: not made by romc; move it away or use --force to replace it")]
     Foreign { path: PathBuf },

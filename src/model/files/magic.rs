@@ -13,7 +13,6 @@ use super::shell_path;
 /// Bytes that [`recognised`] needs of a file.
 pub const MAGIC_BYTES: usize = 512;
 
-/// First bytes of an MCAP file.
 pub const MCAP: &[u8] = b"\x89MCAP0\r\n";
 
 /// Bytes at either end of a file in which names are looked for.

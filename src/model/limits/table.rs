@@ -1,7 +1,5 @@
 //! The ranges; the command line's help says what each setting is.
 
-#![allow(missing_docs, reason = "the name of a range is that of its flag")]
-
 use super::Range;
 
 /// Constants and the list of them.

@@ -36,7 +36,6 @@ pub const GELU_RATE: f64 = 0.797_884_560_802_865_4;
 pub const GELU_CUBIC: f64 = 0.044_715;
 
 impl Activation {
-    /// All activations.
     pub const ALL: [Activation; 9] = [
         Self::Linear,
         Self::Elu,
@@ -49,7 +48,6 @@ impl Activation {
         Self::Softplus,
     ];
 
-    /// The name in model files and on the command line.
     pub(crate) fn name(self) -> &'static str {
         const NAMES: [&str; 9] = [
             "linear",
@@ -65,12 +63,10 @@ impl Activation {
         NAMES[self as usize]
     }
 
-    /// `phi(a)`.
     pub(crate) fn value(self, a: f64) -> f64 {
         self.jet(a)[0]
     }
 
-    /// `phi'(a)`.
     pub fn slope(self, a: f64) -> f64 {
         self.derivative(a, 1)
     }
@@ -157,7 +153,6 @@ fn sigmoid(a: f64) -> f64 {
     1.0 / (1.0 + (-a).exp())
 }
 
-/// Value and three derivatives of [`Activation::GeluTanh`].
 fn gelu_tanh(a: f64) -> [f64; 4] {
     // Where tanh is one to the last bit; further out its argument's powers would only overflow.
     if a.abs() > 10.0 {

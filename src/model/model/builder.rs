@@ -23,8 +23,7 @@ const MAX_SAMPLE_TIME_S: f64 = 1.0;
 /// A method for each part that replaces it; the model's method of that name says what it is.
 macro_rules! setters {
     ($($part:ident: $value:ty;)*) => {
-        $(#[allow(missing_docs, reason = "see above")]
-        pub fn $part(mut self, $part: $value) -> Self {
+        $(pub fn $part(mut self, $part: $value) -> Self {
             self.$part = $part.into();
             self
         })*
@@ -124,7 +123,6 @@ impl ModelBuilder {
         self
     }
 
-    /// Checks all parts and makes the model.
     pub fn build(mut self) -> Result<ReducedModel, ModelError> {
         let identifier = identifier_of("model name", &self.name)?;
         let phase_identifiers = self.check_phase_names()?;
@@ -207,7 +205,6 @@ impl ModelBuilder {
         check(fits, "`sample_time_s`", || time_s, expected)
     }
 
-    /// Number of robot coordinates, by the first of the parts that has it.
     pub(super) fn state_dim(&self) -> Option<usize> {
         let named = |signals: &Option<CoordinateNames>| signals.as_ref().map(CoordinateNames::dim);
         named(&self.state)
@@ -262,7 +259,6 @@ impl ModelBuilder {
         Ok(())
     }
 
-    /// Actuators and a frame are those of a robot.
     fn check_input_rule(&self) -> Result<(), ModelError> {
         let part = match (&self.actuators, self.wrench_frame) {
             (Some(_), _) => "actuators",

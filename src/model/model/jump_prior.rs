@@ -23,16 +23,11 @@ const MAX_NODES: usize = 200;
 /// The features of a goal that the prior multiplies.
 pub type GoalFeatures = [f64; FEATURE_DIM];
 
-/// Range of one number over the training jumps, in m.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GoalRange {
-    /// Mean.
     pub mean: f64,
-    /// Standard deviation, positive.
     pub std: f64,
-    /// Smallest value.
     pub least: f64,
-    /// Largest value.
     pub most: f64,
 }
 
@@ -40,7 +35,6 @@ pub struct GoalRange {
 const LEAST_STD_M: f64 = 1e-3;
 
 impl GoalRange {
-    /// Ranges over jumps.
     pub fn of(jumps: &[[f64; GOAL_DIM]]) -> [Self; GOAL_DIM] {
         std::array::from_fn(|i| {
             let values = || jumps.iter().map(|jump| jump[i]);
@@ -78,7 +72,6 @@ pub struct Landmarks {
     pub end_height_m: [f64; 2],
     /// Lowest body height after touch-down; for jumps without a landing that at their end, m.
     pub landing_height_m: f64,
-    /// Parts in the order of time.
     pub parts: Vec<Landmark>,
 }
 
@@ -88,7 +81,6 @@ pub struct Landmarks {
 pub struct Landmark {
     /// Name: crouch, thrust, flight, landing, or the phase's.
     pub name: String,
-    /// Name of the model's phase.
     pub phase: String,
     /// Feet on the ground, which select that phase.
     #[serde(with = "listed")]
@@ -129,10 +121,8 @@ pub struct JumpPart {
     /// Latent positions, `n x (FEATURE_DIM latent_dim)`: the columns of one feature after the other.
     #[serde(with = "listed")]
     pub z: DMatrix<f64>,
-    /// Latent velocities, as `z`.
     #[serde(with = "listed")]
     pub dz: DMatrix<f64>,
-    /// Latent inputs, as `z`.
     #[serde(with = "listed")]
     pub u_lat: DMatrix<f64>,
     /// Xi of deviations, `(3 latent_dim) x latent_dim`; none: the phase's own equations are used.
@@ -148,7 +138,6 @@ pub struct JumpPart {
 }
 
 impl JumpPart {
-    /// Number of nodes.
     pub fn nodes(&self) -> usize {
         self.z.nrows()
     }
@@ -162,7 +151,6 @@ impl JumpPart {
         })
     }
 
-    /// Duration for a goal, s.
     pub fn duration(&self, features: &GoalFeatures) -> f64 {
         let terms = self.duration_s.iter().zip(features);
         terms.map(|(c, f)| c * f).sum()
@@ -207,7 +195,6 @@ pub struct JumpPrior {
     /// Standard deviations of `z`, then of `dz`, over all samples, `2 latent_dim`.
     #[serde(with = "listed")]
     pub state_std: DVector<f64>,
-    /// One entry per landmark.
     pub parts: Vec<JumpPart>,
 }
 
@@ -217,7 +204,6 @@ impl JumpPrior {
         GoalRange::of(&self.landmarks.jumps)
     }
 
-    /// Features of a goal in m.
     pub fn features(&self, goal: [f64; GOAL_DIM]) -> GoalFeatures {
         GoalRange::features(&self.ranges(), &goal)
     }

@@ -33,13 +33,11 @@ impl ReducedModel {
         maps.all(|map| map.as_affine().is_some())
     }
 
-    /// The encoder, linear or not, in scaled units.
     pub fn encoder_map(&self) -> Result<&StateMap, ModelError> {
         let purpose = "going from robot to latent coordinates";
         self.require(self.parts.encoder.as_ref(), "encoder", purpose)
     }
 
-    /// The decoder, linear or not, in scaled units.
     pub fn decoder_map(&self) -> Result<&StateMap, ModelError> {
         let purpose = "going from latent to robot coordinates";
         self.require(self.parts.decoder.as_ref(), "decoder", purpose)

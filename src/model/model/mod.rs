@@ -32,6 +32,8 @@
 //! # }
 //! ```
 
+#![allow(missing_docs, reason = "names say it all where there is no comment")]
+
 mod activation;
 mod builder;
 mod coordinates;

@@ -83,7 +83,6 @@ impl ReducedModel {
         self.parts
     }
 
-    /// Name as in the model file.
     pub fn name(&self) -> &str {
         &self.parts.name
     }
@@ -103,7 +102,6 @@ impl ReducedModel {
         &self.parts.provenance
     }
 
-    /// Number of latent coordinates, `d`.
     pub fn latent_dim(&self) -> usize {
         self.parts.library.latent_dim()
     }
@@ -113,12 +111,10 @@ impl ReducedModel {
         self.parts.state_dim()
     }
 
-    /// The candidate terms.
     pub fn library(&self) -> &Library {
         &self.parts.library
     }
 
-    /// The phases in the order in which their foot rules are tried.
     pub fn phases(&self) -> &[Phase] {
         &self.parts.phases
     }
@@ -133,22 +129,18 @@ impl ReducedModel {
         selected(&self.parts.phases, feet)
     }
 
-    /// Index of the phase with this name.
     pub fn phase_named(&self, name: &str) -> Option<usize> {
         self.phases().iter().position(|phase| phase.name == name)
     }
 
-    /// Names and units of the state, if the file has them.
     pub fn state(&self) -> Option<&CoordinateNames> {
         self.parts.state.as_ref()
     }
 
-    /// Names and units of the input, if the file has them.
     pub fn input(&self) -> Option<&CoordinateNames> {
         self.parts.input.as_ref()
     }
 
-    /// The scale factors.
     pub fn scaling(&self) -> Result<&Scaling, ModelError> {
         let purpose = "going between SI and scaled units";
         self.require(self.parts.scaling.as_ref(), "scaling", purpose)

@@ -50,17 +50,14 @@ impl AffineMap {
         &self.weights
     }
 
-    /// `b`, `output_dim`.
     pub fn bias(&self) -> &DVector<f64> {
         &self.bias
     }
 
-    /// Columns of `W`.
     pub fn input_dim(&self) -> usize {
         self.weights.ncols()
     }
 
-    /// Number of rows of the output.
     pub fn output_dim(&self) -> usize {
         self.weights.nrows()
     }
@@ -81,9 +78,7 @@ impl AffineMap {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(from = "LayerKeys", into = "LayerKeys")]
 pub struct Layer {
-    /// `W` and `b`.
     pub map: AffineMap,
-    /// `phi`.
     pub activation: Activation,
 }
 
@@ -218,7 +213,6 @@ impl StateMap {
         Ok(())
     }
 
-    /// The layers, the first applied first.
     pub fn layers(&self) -> &[Layer] {
         &self.layers
     }
@@ -231,22 +225,18 @@ impl StateMap {
         }
     }
 
-    /// Number of coordinates that enter.
     pub fn input_dim(&self) -> usize {
         self.layers[0].map.input_dim()
     }
 
-    /// Number of coordinates that leave.
     pub fn output_dim(&self) -> usize {
         self.layers[self.layers.len() - 1].map.output_dim()
     }
 
-    /// Shape of the Jacobian, `output_dim x input_dim`.
     pub fn shape(&self) -> (usize, usize) {
         (self.output_dim(), self.input_dim())
     }
 
-    /// How positions map.
     pub fn apply(&self, x: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
         let mut layers = self.layers.iter();
         layers.try_fold(x.clone(), |y, layer| {

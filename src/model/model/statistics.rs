@@ -15,7 +15,6 @@ const ROUNDING: f64 = 1e-9;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct InputStatistics {
-    /// `input_dim`.
     #[serde(with = "listed")]
     pub mean: DVector<f64>,
     /// `input_dim x input_dim`, symmetric positive semidefinite.
@@ -66,7 +65,6 @@ impl InputStatistics {
     }
 }
 
-/// The matrix without the asymmetry of rounding.
 pub(super) fn symmetric(matrix: DMatrix<f64>) -> DMatrix<f64> {
     (&matrix + matrix.transpose()) * 0.5
 }

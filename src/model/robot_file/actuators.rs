@@ -27,11 +27,8 @@ const GRAVITY_SHARE: f64 = 0.25;
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ActuatorsEntry {
-    /// Viscous friction, N m s/rad.
     pub viscous: Vec<f64>,
-    /// Dry friction, N m.
     pub dry: Vec<f64>,
-    /// Armature, kg m^2.
     pub armature: Vec<f64>,
 }
 

@@ -10,15 +10,11 @@ use crate::robot::{Leg, Robot};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RobotEntry {
-    /// Its name.
     pub name: String,
-    /// Mass of body and legs, kg.
     pub mass_kg: f64,
-    /// The four legs.
     pub leg: Vec<LegEntry>,
 }
 
-/// A leg.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LegEntry {
@@ -28,7 +24,6 @@ pub struct LegEntry {
     pub foot: [f64; 3],
 }
 
-/// A joint.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct JointEntry {
@@ -50,9 +45,7 @@ pub struct JointEntry {
     /// The same in degrees.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub limits_deg: Option<[f64; 2]>,
-    /// Largest torque, N m.
     pub torque_nm: f64,
-    /// Largest speed, rad/s.
     pub speed_rad_s: f64,
 }
 
@@ -72,9 +65,7 @@ fn is_zero(value: &f64) -> bool {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Axis {
-    /// By name.
     Name(String),
-    /// By its components.
     Vector([f64; 3]),
 }
 

@@ -17,14 +17,12 @@ const USUAL_ANGLE_RAD: f64 = 9.5;
 /// Range of a leg's largest torque as a part of the robot's weight times the length of thigh and calf; robots that are
 /// built have 0.2 to 1.
 const TORQUE_SHARE: std::ops::RangeInclusive<f64> = 0.02..=3.0;
-/// Largest speed of a joint, rad/s.
 const LARGEST_SPEED_RAD_S: f64 = 100.0;
 const N_LISTED: usize = 4;
 
 /// A robot of a file, and notes for the user.
 #[derive(Clone, Debug)]
 pub struct RobotReading {
-    /// The robot.
     pub robot: &'static Robot,
     /// One sentence each: the frame of the body, numbers that can hardly be true, another name.
     pub notes: Vec<String>,

@@ -11,9 +11,7 @@ use crate::robot::joints::LEG_JOINT_DIM;
 use crate::robot::{ChainLeg, FOOT_DIM, JOINT_DIM, Leg, LegGeometry, Robot};
 
 const MAX_NAME_LEN: usize = 80;
-/// Largest length of a link, m.
 const MAX_LINK_M: f64 = 10.0;
-/// Smallest length of thigh and calf, m.
 const MIN_LINK_M: f64 = 1e-3;
 /// Largest sine of the angle between the axes of a leg's last two joints.
 const MAX_TILT: f64 = 1e-3;

@@ -21,7 +21,6 @@ pub struct RobotOptions<'a> {
     /// Links of the four feet of a URDF, each with a point in its frame where that is not the foot
     /// (`LINK:x,y,z`); empty to find them.
     pub feet: &'a [String],
-    /// The robot's name instead of the file's.
     pub name: Option<&'a str>,
 }
 

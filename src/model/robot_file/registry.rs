@@ -31,7 +31,6 @@ pub fn by_name(name: &str) -> Result<&'static Robot, RobotError> {
     }))
 }
 
-/// Names that [`by_name`] accepts.
 pub fn known_names() -> Vec<&'static str> {
     KNOWN.iter().map(|(name, _)| *name).collect()
 }

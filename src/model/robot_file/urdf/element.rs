@@ -24,7 +24,6 @@ pub(super) struct Element<'x> {
     node: Node<'x, 'x>,
 }
 
-/// The document of a text.
 pub(super) fn document<'x>(file: &str, text: &'x str) -> Result<Document<'x>, RobotFileError> {
     let document = Document::parse(text).map_err(|error| {
         // A prefix that nothing declares; macros of included files have none.

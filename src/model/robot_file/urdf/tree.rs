@@ -23,7 +23,6 @@ pub(super) struct Link<'x> {
     pub name: &'x str,
     /// kg; 0 without an `<inertial>`.
     pub mass_kg: f64,
-    /// The joint above.
     pub above: Option<usize>,
     /// Joints below, in the file's order.
     pub below: Vec<usize>,
