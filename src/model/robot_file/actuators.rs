@@ -27,9 +27,9 @@ const GRAVITY_SHARE: f64 = 0.25;
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ActuatorsEntry {
-    pub viscous: Vec<f64>,
-    pub dry: Vec<f64>,
-    pub armature: Vec<f64>,
+    viscous: Vec<f64>,
+    dry: Vec<f64>,
+    armature: Vec<f64>,
 }
 
 impl ActuatorsEntry {

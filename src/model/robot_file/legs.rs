@@ -239,8 +239,9 @@ impl Places<'_> {
         let norm = vector.norm();
         let is_fine = norm.is_finite() && norm > 1e-6;
         self.check(is_fine, part, format!("{given:?}"), "a direction")?;
-        let is_fine = joint.sign.abs() == 1.0 && joint.offset_rad.is_finite();
-        let found = format!("sign {} and offset_rad {}", joint.sign, joint.offset_rad);
+        let (sign, offset_rad) = (joint.sign.unwrap_or(1.0), joint.offset_rad.unwrap_or(0.0));
+        let is_fine = sign.abs() == 1.0 && offset_rad.is_finite();
+        let found = format!("sign {sign} and offset_rad {offset_rad}");
         self.check(is_fine, part, found, "sign 1 or -1, offset_rad finite")?;
         // What is a unit vector already stays as it is, to the last bit.
         let unit = match (norm - 1.0).abs() < 1e-12 {
@@ -248,7 +249,7 @@ impl Places<'_> {
             false => vector / norm,
         };
         // No -0.0, so that the usual axes are recognised.
-        Ok((unit * joint.sign).map(|v| v + 0.0))
+        Ok((unit * sign).map(|v| v + 0.0))
     }
 
     fn chain(&self, index: usize, leg: &LegEntry) -> Result<ChainLeg, RobotFileError> {
@@ -261,7 +262,7 @@ impl Places<'_> {
         let mut links = [leg.joint[1].at, leg.joint[2].at, leg.foot].map(Vector3::from);
         // At the recorded zero each joint is turned back by its offset.
         for joint in (0..LEG_JOINT_DIM).rev() {
-            let offset = leg.joint[joint].offset_rad;
+            let offset = leg.joint[joint].offset_rad.unwrap_or(0.0);
             if offset != 0.0 {
                 let turn = Rotation3::from_axis_angle(&Unit::new_unchecked(axes[joint]), -offset);
                 for later in joint..LEG_JOINT_DIM {

@@ -70,19 +70,14 @@ fn notes(tree: &Tree<'_>, legs: &Legs) -> Result<Vec<String>, RobotFileError> {
     };
     let mut notes = Vec::new();
     if legs.trunk != tree.root {
-        let place = apart(legs.trunk, tree.root);
+        let (name, place) = (trunk.name, apart(legs.trunk, tree.root));
         notes.push(format!(
-            "the body's frame is that of link `{}`, {place}",
-            trunk.name
+            "the body's frame is that of link `{name}`, {place}"
         ));
     }
     let by_mass = |a: &usize, b: &usize| tree.links[*a].mass_kg.total_cmp(&tree.links[*b].mass_kg);
-    let heaviest = body
-        .links
-        .iter()
-        .copied()
-        .max_by(by_mass)
-        .unwrap_or(legs.trunk);
+    let heaviest = body.links.iter().copied().max_by(by_mass);
+    let heaviest = heaviest.unwrap_or(legs.trunk);
     let distance = (tree.frame(heaviest).0 - tree.frame(legs.trunk).0).norm();
     if trunk.mass_kg == 0.0 && distance > ROUNDING {
         let (name, place) = (tree.links[heaviest].name, apart(heaviest, legs.trunk));
@@ -137,20 +132,17 @@ fn entry(tree: &Tree<'_>, trunk: usize, leg: &Limb) -> Result<LegEntry, RobotFil
         let back = frame.inverse();
         (back * (position - origin), back * turn)
     };
-    let mut entries = Vec::with_capacity(leg.joints.len());
     let mut before = Vector3::zeros();
-    for &joint in &leg.joints {
-        let joint = &tree.joints[joint];
+    let joints = leg.joints.iter().map(|joint| {
+        let joint = &tree.joints[*joint];
         let (position, turn) = seen(joint.child);
-        let (at, axis) = (rounded(position - before), axis(joint, turn)?);
-        entries.push(joint_entry(joint, at, axis)?);
-        before = position;
-    }
+        let at = position - std::mem::replace(&mut before, position);
+        joint_entry(joint, rounded(at), axis(joint, turn)?)
+    });
+    let joint = joints.collect::<Result<_, _>>()?;
     let (position, turn) = seen(leg.foot);
-    Ok(LegEntry {
-        joint: entries,
-        foot: rounded(position + turn * leg.point - before),
-    })
+    let foot = rounded(position + turn * leg.point - before);
+    Ok(LegEntry { joint, foot })
 }
 
 fn axis(joint: &Joint<'_>, turn: Rotation3<f64>) -> Result<[f64; 3], RobotFileError> {
@@ -181,10 +173,8 @@ fn joint_entry(
         }
     };
     if let Some(mimic) = element.child("mimic")? {
-        let found = format!(
-            "a copy of joint `{}`",
-            mimic.attribute("joint").unwrap_or("")
-        );
+        let original = mimic.attribute("joint").unwrap_or("");
+        let found = format!("a copy of joint `{original}`");
         let expected = "joints of legs that move by themselves: without <mimic>, or type=\"fixed\"";
         return Err(mimic.fault("", found, expected));
     }
@@ -199,8 +189,8 @@ fn joint_entry(
         name: joint.name.to_owned(),
         at,
         axis: Axis::of(axis),
-        sign: 1.0,
-        offset_rad: 0.0,
+        sign: None,
+        offset_rad: None,
         limits_rad: Some(limits),
         limits_deg: None,
         torque_nm: limit.number("effort")?,
