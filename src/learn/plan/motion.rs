@@ -40,10 +40,11 @@ pub(crate) fn motion(
     sample_time_s: f64,
 ) -> Result<(Segment, Margins), PlanError> {
     let durations = (0..task.seed.parts.len()).map(|part| task.duration_s(part, y));
-    let mut ends: Vec<f64> = Vec::new();
-    for duration in durations {
-        ends.push(ends.last().unwrap_or(&0.0) + duration);
-    }
+    let ends = durations.scan(0.0, |end, duration| {
+        *end += duration;
+        Some(*end)
+    });
+    let ends: Vec<f64> = ends.collect();
     let total = ends[ends.len() - 1];
     let steps = (total / sample_time_s).round().max(1.0) as usize;
     let count = steps + 1;
@@ -125,12 +126,10 @@ fn foot_slip(task: &Task<'_>, y: &[f64]) -> [f64; 2] {
     for (part, of) in task.seed.parts.iter().enumerate() {
         let anchor = (task.anchor_part(part), 0);
         for leg in Leg::down(of.landmark.feet) {
-            let from = moved_foot(task, y, leg, anchor).map(|moved| moved.at(y));
-            for node in 0..of.z.len() {
-                let moved = moved_foot(task, y, leg, (part, node)).map(|moved| moved.at(y));
-                for axis in 0..2 {
-                    farthest[axis] = farthest[axis].max((moved[axis] - from[axis]).abs());
-                }
+            let moved = |at| moved_foot(task, y, leg, at).map(|moved| moved.at(y));
+            let from = moved(anchor);
+            for now in (0..of.z.len()).map(|node| moved((part, node))) {
+                farthest = std::array::from_fn(|k| farthest[k].max((now[k] - from[k]).abs()));
             }
         }
     }

@@ -44,11 +44,13 @@ pub fn reach(
     let (distances_m, apexes_m) = (axis(0), axis(1));
     let total = distances_m.len() * apexes_m.len();
     let mut points = Vec::with_capacity(total);
-    for &apex in &apexes_m {
-        for &distance in &distances_m {
-            points.push(point(model, [distance, apex], settings)?);
-            done(points.len(), total);
-        }
+    for k in 0..total {
+        let goal_m = [
+            distances_m[k % distances_m.len()],
+            apexes_m[k / distances_m.len()],
+        ];
+        points.push(point(model, goal_m, settings)?);
+        done(points.len(), total);
     }
     Ok(GoalMap {
         distances_m,

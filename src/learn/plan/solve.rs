@@ -147,15 +147,12 @@ fn solve(task: &mut Task<'_>) -> Result<(Vec<f64>, usize), PlanError> {
 /// Largest `|mu| / sqrt(latent_dim)` of a node.
 fn input_deviation(task: &Task<'_>, y: &[f64]) -> f64 {
     let d = task.seed.latent_dim;
-    let mut most = 0.0_f64;
-    for (part, of) in task.seed.parts.iter().enumerate() {
-        for node in 0..of.z.len() {
-            let at = task.node(part, node) + 2 * d;
-            let square: f64 = y[at..at + d].iter().map(|mu| mu * mu).sum();
-            most = most.max((square / d as f64).sqrt());
-        }
-    }
-    most
+    let nodes = y[..task.duration(0)].chunks(3 * d);
+    let deviations = nodes.map(|node| {
+        let square: f64 = node[2 * d..].iter().map(|mu| mu * mu).sum();
+        (square / d as f64).sqrt()
+    });
+    deviations.fold(0.0, f64::max)
 }
 
 /// How far a goal is beyond the training jumps, in widths of their range; zero inside.
