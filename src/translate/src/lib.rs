@@ -67,7 +67,7 @@ impl fmt::Display for Fault {
 impl std::error::Error for Fault {}
 
 /// The names of the C.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub struct Unit<'a> {
     /// Before every name: `solver` for `solver_solve` and `SOLVER_WIDE`.
     pub prefix: &'a str,
@@ -75,6 +75,17 @@ pub struct Unit<'a> {
     pub roots: &'a [&'a str],
     /// Structs whose text stands apart, for a header.
     pub header: &'a [&'a str],
+    /// Constants and functions of the Rust that whoever includes the C defines, with their names there.
+    pub elsewhere: &'a [(&'a str, &'a str)],
+    /// What stands before the type of every function, with a space.
+    pub attribute: &'a str,
+}
+
+impl<'a> Unit<'a> {
+    pub(crate) fn elsewhere(&self, word: &str) -> Option<&'a str> {
+        let found = self.elsewhere.iter().find(|(name, _)| *name == word);
+        found.map(|(_, name)| *name)
+    }
 }
 
 /// The text of a unit.
