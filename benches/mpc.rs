@@ -68,7 +68,8 @@ fn controller(
     segment: &Segment,
     settings: MpcSettings,
 ) -> Controller {
-    let mut controller = Controller::new(model, settings).expect("the shipped model is complete");
+    let mut controller =
+        romc::mpc::controller(model, settings).expect("the shipped model is complete");
     let input = segment
         .input(controller.plant().input_rule())
         .expect("no leg is stretched");

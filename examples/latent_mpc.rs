@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use romc::mpc::{Controller, Measurement, MpcSettings, ReferenceSamples};
+use romc::mpc::{Measurement, MpcSettings, ReferenceSamples};
 use romc::robot::STATE_DIM;
 use romc::{artifact, recording};
 
@@ -17,7 +17,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let segment = jump.segments.first().ok_or("the recording is empty")?;
     let input = segment.input(&model.input_rule()?)?;
 
-    let mut controller = Controller::new(&model, MpcSettings::default())?;
+    let mut controller = romc::mpc::controller(&model, MpcSettings::default())?;
     controller.set_reference(ReferenceSamples {
         time_s: &segment.time_s,
         x: segment.x.as_slice(),

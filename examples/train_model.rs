@@ -5,7 +5,6 @@
 use std::sync::atomic::AtomicBool;
 
 use romc::recording::{self, Recording};
-use romc::robot::Robot;
 use romc::train::{self, Monitor, Origin, Recordings, TrainOptions};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -19,7 +18,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     };
     let (training, validation, test) =
         (read("train", 14)?, read("validation", 3)?, read("test", 3)?);
-    let robot = Robot::by_name("go1")?;
+    let robot = romc::robot_file::by_name("go1")?;
     let name = format!("go1-d{latent_dim}");
     let options = match method.as_str() {
         "paper" => TrainOptions::paper(name, latent_dim),

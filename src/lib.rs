@@ -54,11 +54,18 @@ pub mod simplify;
 pub mod study;
 
 #[doc(inline)]
-pub use romc_algebra::{
-    artifact, codegen, equations, files, ir, limits, lower, model, robot, robot_file, symbolic,
-    typeset,
-};
+pub use romc_cas as symbolic;
 #[doc(inline)]
-pub use romc_motion::{evaluate, identify, mpc, plan, recording, sim, solver, train};
+pub use romc_codegen::{codegen, equations, ir, lower, typeset};
+#[doc(inline)]
+pub use romc_control::solver;
+#[doc(inline)]
+pub use romc_data::{identify, recording};
+#[doc(inline)]
+pub use romc_learn::{evaluate, mpc, plan, sim, train};
+#[doc(inline)]
+pub use romc_model::{artifact, files, limits, model, robot_file};
+#[doc(inline)]
+pub use romc_robot as robot;
 
 pub use error::Error;

@@ -1011,7 +1011,7 @@ fn mpc_commands_stay_inside_the_torque_limits() {
                 .iter()
                 .position(|column| *column == format!("{name} torque"))
         };
-        let robot = romc::robot::Robot::by_name("go1").expect("known");
+        let robot = romc::robot_file::by_name("go1").expect("known");
         let columns: Vec<usize> = romc::robot::Robot::input_names()[..12]
             .iter()
             .map(|name| torque(name).expect("a column a joint"))

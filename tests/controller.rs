@@ -8,7 +8,7 @@ use romc::deploy::{EmitError, EmitOptions, Target, emit};
 use romc::equations::Equations;
 use romc::files::EmittedFile;
 use romc::model::ReducedModel;
-use romc::mpc::{Controller, Lift, Measurement, MpcSettings, ReferenceSamples};
+use romc::mpc::{Lift, Measurement, MpcSettings, ReferenceSamples};
 use romc::recording::Segment;
 
 #[path = "controller/programs.rs"]
@@ -177,7 +177,7 @@ fn commanded(model: &ReducedModel, case: &Case, segment: &Segment, input: &[f64]
         lift: case.lift,
         ..MpcSettings::default()
     };
-    let mut controller = Controller::new(model, settings).expect("a complete model");
+    let mut controller = romc::mpc::controller(model, settings).expect("a complete model");
     let input = case.has_input.then_some(input);
     controller
         .set_reference(samples(segment, input))

@@ -10,8 +10,8 @@ use romc::deploy::{EmitError, EmitOptions, Target, emit};
 use romc::equations::Equations;
 use romc::model::ReducedModel;
 use romc::mpc::{
-    ConsistentLift, ControlModel, Controller, Effectiveness, Lift, Linearisation, Measurement,
-    MissingInput, MpcSettings, ReferenceSamples, Solver, StanceState, Status,
+    ConsistentLift, Controller, Effectiveness, Lift, Linearisation, Measurement, MissingInput,
+    MpcSettings, ReferenceSamples, Solver, StanceState, Status,
 };
 
 #[path = "controller_c/analysers.rs"]
@@ -137,7 +137,7 @@ fn replay_file(
     let mut bytes = Vec::new();
     let (mut done, mut changed, mut lifts) = (0, 0, [0; 2]);
     let rule = model.input_rule().expect("a robot");
-    let plant = ControlModel::new(model).expect("a complete model");
+    let plant = romc::mpc::control_model(model).expect("a complete model");
     let knows_inputs = plant
         .phases()
         .iter()
@@ -191,8 +191,8 @@ fn replay_file(
             effectiveness: None,
             ..settings
         };
-        let [mut controller, mut trusting] =
-            [settings, trusting].map(|s| Controller::new(model, s).expect("a complete model"));
+        let [mut controller, mut trusting] = [settings, trusting]
+            .map(|s| romc::mpc::controller(model, s).expect("a complete model"));
         // A measurement for each stage, or more: some are then within the first stage of the last plan
         // although a step without a plan lies between.
         let is_dense = run % 2 == 1 && seed.is_multiple_of(2);

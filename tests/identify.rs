@@ -11,7 +11,6 @@ use std::process::Command;
 
 use romc::identify::{Identification, IdentifyError, identify};
 use romc::recording::{self, Recording};
-use romc::robot::Robot;
 use serde_json::Value;
 
 fn path(name: &str) -> PathBuf {
@@ -23,7 +22,7 @@ fn path(name: &str) -> PathBuf {
 fn found(robot: &str, names: &[&str]) -> Identification {
     let read = |name: &&str| recording::read(&path(name)).expect("a shipped recording");
     let recordings: Vec<Recording> = names.iter().map(read).collect();
-    let robot = Robot::by_name(robot).expect("a known robot");
+    let robot = romc::robot_file::by_name(robot).expect("a known robot");
     identify(&recordings, robot).expect("recordings of jumps")
 }
 
@@ -221,7 +220,7 @@ fn values_that_the_motion_contradicts_are_told() {
         "go1/test_03.csv.gz",
     ];
     let right: Vec<Recording> = names.map(read).into();
-    let go1 = Robot::by_name("go1").expect("a known robot");
+    let go1 = romc::robot_file::by_name("go1").expect("a known robot");
     let spoiled = |spoil: &dyn Fn(&mut recording::Segment)| {
         let mut wrong = right.clone();
         wrong
@@ -272,7 +271,7 @@ fn read_all(names: &[&str]) -> Vec<Recording> {
 
 /// The refusal of recordings that are not of one robot.
 fn contradiction(recordings: &[Recording]) -> String {
-    let go1 = Robot::by_name("go1").expect("a known robot");
+    let go1 = romc::robot_file::by_name("go1").expect("a known robot");
     match identify(recordings, go1) {
         Err(error @ IdentifyError::Contradiction { .. }) => error.to_string(),
         Err(error) => panic!("{error}"),
@@ -338,7 +337,7 @@ fn recordings_that_contradict_each_other_or_physics_are_refused_by_name() {
         .iter_mut()
         .flat_map(|recording| &mut recording.segments);
     segments.for_each(|segment| segment.torque_nm *= 1.3);
-    let go1 = Robot::by_name("go1").expect("a known robot");
+    let go1 = romc::robot_file::by_name("go1").expect("a known robot");
     let found = identify(&heavier, go1).expect("one robot");
     assert!(found.mass_kg > 15.5, "{}", found.mass_kg);
 }
@@ -410,7 +409,7 @@ fn right_recordings_are_not_refused() {
         let recordings: Vec<Recording> = files
             .map(|path| recording::read(&path).expect("a recording"))
             .collect();
-        let robot = Robot::by_name(robot).expect("a known robot");
+        let robot = romc::robot_file::by_name(robot).expect("a known robot");
         assert!(recordings.len() >= 4);
         if let Err(error) = identify(&recordings, robot) {
             panic!("{}: {error}", folder.display());

@@ -5,7 +5,6 @@ use std::process::Command;
 
 use romc::evaluate::is_plausible;
 use romc::recording::{self, Recording, write};
-use romc::robot::Robot;
 use serde_json::Value;
 
 fn recording_path(name: &str) -> PathBuf {
@@ -47,7 +46,7 @@ fn jump_with_a_spike(folder: &Path) -> PathBuf {
     let jump = recording::read(&recording_path("test_01")).expect("shipped");
     let mut segment = jump.segments[0].clone();
     segment.torque_nm[(4, 60)] = 900.0;
-    let go1 = Robot::by_name("go1").expect("known");
+    let go1 = romc::robot_file::by_name("go1").expect("known");
     assert!(!is_plausible(go1, &segment.torque(60)));
     let path = folder.join("spike.csv");
     let recording = Recording {

@@ -9,9 +9,13 @@ mod command_line;
 mod formulas;
 #[path = "robots/made.rs"]
 mod made;
+#[path = "robots/registry.rs"]
+mod registry;
 mod tools;
 #[path = "robots/urdf.rs"]
 mod urdf;
+#[path = "robots/wrench.rs"]
+mod wrench;
 
 use std::fs;
 use std::path::PathBuf;
@@ -174,7 +178,7 @@ fn model_file_carries_its_robot() {
             "{error}"
         );
     }
-    let text = artifact::to_text(&model_on(Robot::by_name("go2").expect("known")));
+    let text = artifact::to_text(&model_on(romc::robot_file::by_name("go2").expect("known")));
     assert!(
         text.contains("\"robot\": \"go2\"") && text.contains("romc-model/1"),
         "{text}"
@@ -220,8 +224,8 @@ fn generalised_input_of_robots_of_files_is_that_of_the_rule_also_where_it_is_dam
 fn rules() -> Vec<InputRule> {
     let actuators = Actuators::of_leg([1.0, 0.6, 0.5], [0.2, 0.0, 0.3], [0.01; 3]);
     let mut rules = Vec::new();
-    for name in Robot::known_names() {
-        let robot = Robot::by_name(name).expect("a known robot");
+    for name in romc::robot_file::known_names() {
+        let robot = romc::robot_file::by_name(name).expect("a known robot");
         for frame in WrenchFrame::ALL {
             rules.push(InputRule::new(robot, None, frame));
             rules.push(InputRule::new(robot, Some(actuators.clone()), frame));
@@ -312,7 +316,7 @@ fn actuator_torque_undoes_the_friction_of_generalised_input_and_adds_the_inertia
 
 #[test]
 fn generalised_input_weighs_a_foot_with_its_number() {
-    let go1 = InputRule::published(Robot::by_name("go1").expect("a known robot"));
+    let go1 = InputRule::published(romc::robot_file::by_name("go1").expect("a known robot"));
     let mut input = Input::of(&go1);
     let x: [f64; 18] = std::array::from_fn(|k| match (k < 12, k % 3) {
         (true, joint) => [0.1, 0.7, -1.4][joint],
@@ -547,8 +551,8 @@ fn names_that_act_on_the_text_around_them_are_refused() {
 
 #[test]
 fn known_robots_are_planar_and_come_back_from_their_own_text_as_themselves() {
-    for name in Robot::known_names() {
-        let robot = Robot::by_name(name).expect("read");
+    for name in romc::robot_file::known_names() {
+        let robot = romc::robot_file::by_name(name).expect("read");
         for leg in Leg::ALL {
             assert!(
                 matches!(robot.geometry(leg), LegGeometry::Planar(_)),
@@ -564,7 +568,8 @@ fn known_robots_are_planar_and_come_back_from_their_own_text_as_themselves() {
 
 #[test]
 fn faults_name_the_entry() {
-    let good = robot_file::to_toml(Robot::by_name("go1").unwrap()).replace("\"go1\"", "\"mine\"");
+    let good = robot_file::to_toml(romc::robot_file::by_name("go1").unwrap())
+        .replace("\"go1\"", "\"mine\"");
     for (from, to, said) in [
         (
             "FR_calf_joint",
@@ -604,7 +609,8 @@ fn faults_name_the_entry() {
 
 #[test]
 fn another_robot_of_a_known_name_is_one_of_its_own_and_says_what_differs() {
-    let a1 = robot_file::to_toml(Robot::by_name("a1").unwrap()).replace("12.78", "12.79");
+    let a1 =
+        robot_file::to_toml(romc::robot_file::by_name("a1").unwrap()).replace("12.78", "12.79");
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("r.toml").display().to_string();
     fs::write(&path, &a1).expect("written");
@@ -633,7 +639,7 @@ fn another_robot_of_a_known_name_is_one_of_its_own_and_says_what_differs() {
 
 #[test]
 fn signs_and_offsets_turn_the_same_leg_at_other_angles() {
-    let own = Robot::by_name("go1").unwrap();
+    let own = romc::robot_file::by_name("go1").unwrap();
     let text = robot_file::to_toml(own).replace("\"go1\"", "\"mine\"");
     // Knees that count the other way, and read 0.4 where the leg is straight.
     let text = text.replace(

@@ -12,7 +12,7 @@ use romc::evaluate::{Assessment, ReferenceInput, along_recording};
 use romc::files::Overwrite;
 use romc::lower::CompiledModel;
 use romc::model::{Activation, LibraryChoice, StandardLibrary};
-use romc::mpc::{Controller, MpcSettings};
+use romc::mpc::MpcSettings;
 use romc::recording::{self, Recording};
 use romc::robot::{Actuators, Robot, WrenchFrame};
 use romc::sim::{LatentSegment, Restart, rollout};
@@ -47,7 +47,7 @@ fn assert_predictions(test: &SetMetrics, most_mm: [f64; 4]) {
 }
 
 fn go1() -> &'static Robot {
-    Robot::by_name("go1").expect("known robot")
+    romc::robot_file::by_name("go1").expect("known robot")
 }
 
 fn paths(recordings: &[Recording]) -> impl Iterator<Item = &Path> {
@@ -171,7 +171,8 @@ fn net_torques_predict_better_and_command_what_was_recorded() {
             "{r2} {}",
             after.torque_r2
         );
-        let mut controller = Controller::new(&net.model, MpcSettings::default()).expect("complete");
+        let mut controller =
+            romc::mpc::controller(&net.model, MpcSettings::default()).expect("complete");
         let along = ReferenceInput::Recorded;
         let run = along_recording(&mut controller, &test[0], along, |_, _| {}).expect("runs");
         let found = run.summary.torque_r2.contact.expect("contact");
@@ -186,7 +187,8 @@ fn net_torques_predict_better_and_command_what_was_recorded() {
             .actuators(None)
             .build()
             .expect("sound");
-        let mut ignorant = Controller::new(&ignorant, MpcSettings::default()).expect("complete");
+        let mut ignorant =
+            romc::mpc::controller(&ignorant, MpcSettings::default()).expect("complete");
         let run = along_recording(&mut ignorant, &test[0], along, |_, _| {}).expect("runs");
         assert!(run.summary.torque_r2.contact.expect("contact") != found);
     }
@@ -243,7 +245,8 @@ fn model_with_quadratic_drag_is_controlled_at_rest() {
     let model = model.expect("sound");
     let jump = jumps("test", 1).remove(0);
     for jump in [jump.clone(), with_rest(jump)] {
-        let mut controller = Controller::new(&model, MpcSettings::default()).expect("complete");
+        let mut controller =
+            romc::mpc::controller(&model, MpcSettings::default()).expect("complete");
         let along = ReferenceInput::Recorded;
         let run = along_recording(&mut controller, &jump, along, |_, _| {}).expect("runs");
         assert_eq!(run.summary.failed, 0, "{:?}", run.summary);

@@ -8,11 +8,11 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use romc::evaluate::{ReferenceInput, StepRow, along_recording};
 use romc::limits::table;
-use romc::mpc::{Command, Lift, Measurement, MpcError, MpcSettings, ReferenceSamples};
+use romc::mpc::{Command, Measurement, MpcError, MpcSettings, ReferenceSamples};
 use romc::robot::{ContactFlags, FOOT_DIM};
 
 use crate::arrays::into_rows;
-use crate::errors::{bad_reference, choice, count_within, python_error, within};
+use crate::errors::{bad_reference, choice, count_within, lift, python_error, within};
 use crate::model::Model;
 use crate::recording::{Recording, Segment};
 
@@ -30,7 +30,7 @@ pub struct Settings {
 
 impl Settings {
     fn settings(&self, py: Python<'_>) -> PyResult<MpcSettings> {
-        let lift: Lift = choice(py, "lift", &self.lift)?;
+        let lift = lift(py, &self.lift)?;
         let mut settings = MpcSettings {
             horizon: count_within(py, table::HORIZON, self.horizon)?,
             step_s: within(py, table::STEP, self.step)?,
@@ -79,7 +79,7 @@ impl Controller {
     #[new]
     fn new(py: Python<'_>, model: &Model, settings: Settings) -> PyResult<Self> {
         let settings = settings.settings(py)?;
-        let made = py.detach(|| romc::mpc::Controller::new(&model.data, settings));
+        let made = py.detach(|| romc::mpc::controller(&model.data, settings));
         let phases = model.data.phases().iter();
         Ok(Controller {
             controller: Mutex::new(made.map_err(|error| python_error(py, error))?),

@@ -15,7 +15,7 @@ use romc::files::{Fault as FileFault, Place};
 use romc::limits::{OutOfRange, Range};
 use romc::lower::LowerError;
 use romc::model::ModelError;
-use romc::mpc::{ControlError, MpcError};
+use romc::mpc::{ControlError, LIFTS, Lift, MpcError};
 use romc::plan::PlanError;
 use romc::recording::RecordingError;
 use romc::robot::WrenchFrame;
@@ -319,12 +319,26 @@ pub fn choice<T: clap::ValueEnum>(py: Python<'_>, option: &str, name: &str) -> P
     T::from_str(name, true).map_err(|_| {
         let values = T::value_variants().iter().filter_map(T::to_possible_value);
         let values: Vec<String> = values.map(|value| value.get_name().to_owned()).collect();
-        let expected = values.join(", ");
-        usage(
-            py,
-            &format!("{option}: found {name:?}, expected one of {expected}"),
-        )
+        unknown(py, option, name, &values.join(", "))
     })
+}
+
+/// The controller's lift, by its name on the command line.
+pub fn lift(py: Python<'_>, name: &str) -> PyResult<Lift> {
+    let found = LIFTS
+        .iter()
+        .find(|(known, ..)| known.eq_ignore_ascii_case(name));
+    found.map(|(_, _, lift)| *lift).ok_or_else(|| {
+        let names = LIFTS.map(|(known, ..)| known).join(", ");
+        unknown(py, "lift", name, &names)
+    })
+}
+
+fn unknown(py: Python<'_>, option: &str, name: &str, expected: &str) -> PyErr {
+    usage(
+        py,
+        &format!("{option}: found {name:?}, expected one of {expected}"),
+    )
 }
 
 /// The axes of force and moment, by their name on the command line.

@@ -141,7 +141,7 @@ impl ExprPool {
     }
 
     /// `coefficient * expr`; a factor of `1` or `-1` goes into the terms of a sum.
-    pub(crate) fn scale(&mut self, coefficient: Number, expr: ExprId) -> ExprId {
+    pub fn scale(&mut self, coefficient: Number, expr: ExprId) -> ExprId {
         if coefficient.is_zero() {
             return ExprId::ZERO;
         }

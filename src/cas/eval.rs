@@ -59,8 +59,9 @@ impl ExprPool {
     }
 }
 
+/// `base^exponent` by squaring, in the order of multiplications of the interpreter and of generated code.
 #[inline]
-pub(crate) fn integer_power(base: f64, exponent: i64) -> f64 {
+pub fn integer_power(base: f64, exponent: i64) -> f64 {
     let power = power_by(base, exponent.unsigned_abs(), |a, b| a * b);
     if exponent < 0 { 1.0 / power } else { power }
 }

@@ -165,7 +165,8 @@ impl Function {
         &ROWS[self as usize]
     }
 
-    pub(crate) fn name(self) -> &'static str {
+    /// The name in the term grammar.
+    pub fn name(self) -> &'static str {
         self.row().names[0]
     }
 

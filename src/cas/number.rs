@@ -105,7 +105,8 @@ impl Number {
         self == Number::ONE
     }
 
-    pub(crate) fn is_negative(self) -> bool {
+    /// Whether the value is below zero.
+    pub fn is_negative(self) -> bool {
         match self.0 {
             Repr::Rational(numerator, _) => numerator < 0,
             Repr::Float(bits) => f64::from_bits(bits) < 0.0,
@@ -113,7 +114,7 @@ impl Number {
     }
 
     /// The exact fraction in lowest terms, `(numerator, denominator)`.
-    pub(crate) fn as_rational(self) -> Option<(i64, i64)> {
+    pub fn as_rational(self) -> Option<(i64, i64)> {
         match self.0 {
             Repr::Rational(numerator, denominator) => Some((numerator, denominator)),
             Repr::Float(_) => None,
@@ -137,7 +138,8 @@ impl Number {
         self.as_integer().is_some_and(|value| value % 2 == 0)
     }
 
-    pub(crate) fn abs(self) -> Number {
+    /// The magnitude.
+    pub fn abs(self) -> Number {
         if self.is_negative() { -self } else { self }
     }
 
@@ -259,7 +261,7 @@ pub(super) fn exact_sum(numbers: &[Number]) -> Option<Number> {
 
 /// The sum of floats, rounded once (Shewchuk, Adaptive precision floating-point arithmetic, 1997): what is lost by
 /// each addition is kept.
-pub(crate) fn sum_of_floats(values: &[f64]) -> f64 {
+pub fn sum_of_floats(values: &[f64]) -> f64 {
     let plain = values.iter().fold(0.0, |sum, value| sum + value);
     if values.len() < 3 || !plain.is_finite() {
         return plain;

@@ -202,7 +202,7 @@ impl ExprPool {
 
     /// The parts of a symbol that stands for a selection of [`ExprPool::slope`]: test, value where the
     /// test is zero, value elsewhere.
-    pub(crate) fn selection(&self, symbol: SymbolId) -> Option<[ExprId; 3]> {
+    pub fn selection(&self, symbol: SymbolId) -> Option<[ExprId; 3]> {
         match self.symbols[symbol.index()].meaning {
             Meaning::Selection(parts) => Some(parts),
             Meaning::Variable | Meaning::Decimal(..) => None,

@@ -208,12 +208,12 @@ enum Outcome {
 impl ExprPool {
     /// The slope of `expr` by `symbol`: its derivative, with selections where that has no value although
     /// `expr` has; see the module. To be evaluated, not to be differentiated or rewritten.
-    pub(crate) fn slope(&mut self, expr: ExprId, symbol: SymbolId) -> ExprId {
+    pub fn slope(&mut self, expr: ExprId, symbol: SymbolId) -> ExprId {
         self.full_slope(expr, symbol).expr
     }
 
     /// Whether the slope of `expr` may be infinite where `expr` has a value, by an argument that is zero.
-    pub(crate) fn may_be_steep(&mut self, expr: ExprId, symbol: SymbolId) -> bool {
+    pub fn may_be_steep(&mut self, expr: ExprId, symbol: SymbolId) -> bool {
         self.full_slope(expr, symbol).has_infinity
     }
 

@@ -13,7 +13,7 @@ impl ExprPool {
     }
 
     /// As [`substitute`](ExprPool::substitute) for several expressions with common parts.
-    pub(crate) fn substitute_all(
+    pub fn substitute_all(
         &mut self,
         exprs: &[ExprId],
         replacements: &[(SymbolId, ExprId)],
@@ -32,7 +32,7 @@ impl ExprPool {
 
     /// The expressions with every part that has no variable but a finite value as a number: `exp(3)*x` is
     /// `20.085536923187668*x`.
-    pub(crate) fn fold_constants(&mut self, exprs: &[ExprId]) -> Vec<ExprId> {
+    pub fn fold_constants(&mut self, exprs: &[ExprId]) -> Vec<ExprId> {
         let order = self.reachable(exprs);
         let mut folded: IdMap<ExprId> = IdMap::default();
         for &expr in &order {

@@ -7,7 +7,6 @@ use super::output::names;
 use crate::Error;
 use crate::files::{Begun, EmittedFile, Overwrite, write_files_since};
 use crate::report::{Figure, figure_files};
-use crate::robot::Robot;
 
 /// What an output file holds: the endings that it may have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -65,7 +64,7 @@ impl<'a> Inputs<'a> {
 
     /// These and the file of a robot, unless the name is that of one of romc's own.
     pub(crate) fn and_robot(self, name: Option<&'a str>) -> Self {
-        let is_file = |name: &&str| !Robot::known_names().contains(name);
+        let is_file = |name: &&str| !crate::robot_file::known_names().contains(name);
         self.and(name.filter(is_file))
     }
 

@@ -48,7 +48,7 @@ pub(crate) fn completions(arguments: &CompletionsArguments) -> Answer {
     let mut command = Arguments::command();
     clap_complete::generate(arguments.shell, &mut command, "romc", &mut script);
     // Where names are offered that may also be files, bash offers both.
-    let robots = crate::robot::Robot::known_names().join(" ");
+    let robots = crate::robot_file::known_names().join(" ");
     let names = format!("compgen -W \"{robots}\"");
     let text =
         String::from_utf8_lossy(&script).replace(&names, &format!("compgen -f -W \"{robots}\""));

@@ -16,7 +16,7 @@ use crate::evaluate::{
     usual_settings, verdict,
 };
 use crate::model::ReducedModel;
-use crate::mpc::{Controller, Lift, MpcSettings};
+use crate::mpc::{Lift, MpcSettings};
 use crate::recording::Recording;
 use crate::report::{
     NamedRun, control_figures, control_table, failed_runs, failures, run_table, verdict_lines,
@@ -72,7 +72,7 @@ pub(crate) fn run_all(
     settings: MpcSettings,
     reference_input: ReferenceInput,
 ) -> Result<Vec<NamedRun>, Error> {
-    let mut controller = Controller::new(model, settings)?;
+    let mut controller = crate::mpc::controller(model, settings)?;
     let mut runs = Vec::with_capacity(recordings.len());
     for recording in recordings {
         let path = recording.path.display();

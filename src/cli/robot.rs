@@ -17,7 +17,7 @@ use crate::typeset::Table;
 pub(crate) fn chosen(name_or_file: &str) -> Result<&'static Robot, Error> {
     let read = robot_file::open(name_or_file, &RobotOptions::default())?;
     let robot = read.robot;
-    if Robot::by_name(name_or_file).is_err() {
+    if crate::robot_file::by_name(name_or_file).is_err() {
         let joints = Leg::ALL.into_iter().zip(robot.joint_names().chunks(3));
         let matched: Vec<String> = joints
             .map(|(leg, joints)| format!("{leg} = {}", joints.join(" ")))

@@ -153,7 +153,7 @@ impl ChainLeg {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::robot::{LegGeometry, PlanarLeg};
+    use crate::{LegGeometry, PlanarLeg};
 
     const PLANAR: PlanarLeg = PlanarLeg {
         hip_m: -0.08,

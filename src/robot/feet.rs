@@ -38,7 +38,7 @@ impl FeetRule {
     }
 
     /// From no foot to four feet.
-    pub(crate) fn all_patterns() -> impl Iterator<Item = ContactFlags> {
+    pub fn all_patterns() -> impl Iterator<Item = ContactFlags> {
         (0..N_PATTERNS).map(|code| std::array::from_fn(|foot| (code >> foot) & 1 == 1))
     }
 

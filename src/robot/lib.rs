@@ -5,12 +5,12 @@
 //! body (equations 4 to 8, 22 and 23), and the limits a command has to keep.
 //! Read [`joints`] for names and order first, then [`kinematics`] and [`chain`] for one leg,
 //! [`wrench`] for all four and [`input_rule`] for the inputs of a model;
-//! `crate::robot_file` reads robots from files; generated controllers hold these sources.
+//! `romc_model::robot_file` reads robots from files; generated controllers hold these sources.
 //!
 //! ```
 //! use romc::robot::{Leg, Robot};
 //!
-//! let go1 = Robot::by_name("go1")?;
+//! let go1 = romc::robot_file::by_name("go1")?;
 //! let q = [0.0, 0.7, -1.4];
 //! let foot = go1.foot_position(Leg::FrontRight, &q);
 //! assert!((foot.x).abs() < 1e-12 && foot.y == -0.08 && foot.z < -0.3);
@@ -45,3 +45,7 @@ pub use joints::{
 };
 pub use kinematics::{PlanarLeg, SINGULAR_BOUND};
 pub use registry::Robot;
+
+#[cfg(feature = "serde")]
+mod serialised;
+pub mod sources;

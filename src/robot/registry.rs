@@ -10,18 +10,25 @@ use super::joints::{
 
 /// A quadruped with three joints per leg: abduction, flexion, knee.
 ///
-/// `crate::robot_file` reads and checks robots; arrays are in the order of the state.
+/// `romc_model::robot_file` reads and checks robots; arrays are in the order of the state.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Robot {
-    pub(crate) name: &'static str,
-    pub(crate) mass_kg: f64,
-    pub(crate) legs: [LegGeometry; FOOT_DIM],
-    pub(crate) hip_position_m: [[f64; 3]; FOOT_DIM],
+    /// Name in model files and on the command line.
+    pub name: &'static str,
+    /// Mass of body and legs.
+    pub mass_kg: f64,
+    /// Shapes of the legs.
+    pub legs: [LegGeometry; FOOT_DIM],
+    /// Hips in the body's frame.
+    pub hip_position_m: [[f64; 3]; FOOT_DIM],
     /// Its maker's names.
-    pub(crate) joint_names: [&'static str; JOINT_DIM],
-    pub(crate) torque_limit_nm: [f64; JOINT_DIM],
-    pub(crate) joint_limit_rad: [(f64, f64); JOINT_DIM],
-    pub(crate) joint_speed_limit_rad_s: [f64; JOINT_DIM],
+    pub joint_names: [&'static str; JOINT_DIM],
+    /// Largest torques.
+    pub torque_limit_nm: [f64; JOINT_DIM],
+    /// Lowest and highest angles.
+    pub joint_limit_rad: [(f64, f64); JOINT_DIM],
+    /// Largest speeds.
+    pub joint_speed_limit_rad_s: [f64; JOINT_DIM],
 }
 
 impl Robot {

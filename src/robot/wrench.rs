@@ -109,7 +109,7 @@ impl Robot {
 
     /// The 6 x 12 matrix `G` of `[F_lin; F_ang] = G tau` at a posture and contact, by the arms of a frame, in axes
     /// parallel to the body's; columns of legs in the air are zero.
-    pub(super) fn map_by_arms(
+    pub fn map_by_arms(
         &self,
         frame: WrenchFrame,
         joints: &[f64; JOINT_DIM],

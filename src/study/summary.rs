@@ -70,7 +70,7 @@ impl Summary {
     }
 
     /// One row per latent dimension: means and standard deviations.
-    pub(crate) fn table(&self) -> Table {
+    pub fn table(&self) -> Table {
         let mut table = Table::of(&self.dimensions)
             .column("latent_dim", "", |row| row.latent_dim)
             .column("trained", "", |row| row.trained)

@@ -3,7 +3,7 @@
 
 use romc::codegen::Precision;
 use romc::model::ReducedModel;
-use romc::mpc::{ConsistentLift, ControlModel, Lift, MpcSettings, Solver, StanceState};
+use romc::mpc::{ConsistentLift, Lift, MpcSettings, Solver, StanceState};
 use romc::robot::WrenchFrame;
 
 use crate::emitted::Emitted;
@@ -77,7 +77,7 @@ fn consistent_lift_has_the_librarys_bits_for_planar_legs_and_chains_in_both_fram
             lift: Lift::Consistent,
             ..MpcSettings::default()
         };
-        let plant = ControlModel::new(&model).expect("a complete model");
+        let plant = romc::mpc::control_model(&model).expect("a complete model");
         let mut lift = ConsistentLift::new(&plant, &settings).expect("a sound program");
         let (mut bytes, mut limited, mut failed) = (Vec::new(), 0, 0);
         for sample in 0..2000 {

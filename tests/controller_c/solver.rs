@@ -287,7 +287,7 @@ fn solver_in_c_has_the_bits_of_its_rust_on_random_programs_of_two_sizes_in_both_
 
 /// The sources of the solver with one piece of text changed.
 fn changed(from: &str, to: &str) -> Vec<Source> {
-    let folder = root().join("src/motion/solver");
+    let folder = root().join("src/control/solver");
     let mut sources = Vec::new();
     for entry in fs::read_dir(folder).expect("sources") {
         let path = entry.expect("a file").path();

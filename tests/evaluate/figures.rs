@@ -10,7 +10,7 @@ use romc::evaluate::{
 use romc::lower::CompiledModel;
 use romc::model::{FeetRule, Library, Phase, ReducedModel};
 use romc::recording::{Recording, Segment};
-use romc::robot::{BODY_Z, InputRule, JOINT_DIM, Leg, Robot};
+use romc::robot::{BODY_Z, InputRule, JOINT_DIM, Leg};
 use romc::sim::{LatentSegment, Restart};
 use romc::{artifact, recording};
 
@@ -66,7 +66,7 @@ fn r2_is_one_for_equal_torques_and_zero_for_the_mean() {
 
 #[test]
 fn torques_beyond_twice_the_limit_are_not_the_robots() {
-    let go1 = Robot::by_name("go1").expect("known");
+    let go1 = romc::robot_file::by_name("go1").expect("known");
     let mut torque = *go1.torque_limit_nm();
     torque[3] *= 1.9;
     assert!(is_plausible(go1, &torque));
@@ -88,7 +88,7 @@ fn at_rest(height: f64, feet: [bool; 4], count: usize) -> Segment {
 }
 
 fn rms_z(segment: &Segment) -> f64 {
-    let robot = Robot::by_name("go1").expect("known");
+    let robot = romc::robot_file::by_name("go1").expect("known");
     let mut sums = AslipSums::default();
     let rollout = Aslip::PUBLISHED
         .rollout(&InputRule::published(robot), segment, Restart::Never)
@@ -112,7 +112,7 @@ fn pendulum_in_flight_falls_freely() {
 fn pendulum_in_contact_swings_about_the_springs_equilibrium() {
     // feet hang below the hips at f; the spring's rest is f + l0, its equilibrium g m / k below
     let segment = at_rest(0.3, [true; 4], 201);
-    let robot = Robot::by_name("go1").expect("known");
+    let robot = romc::robot_file::by_name("go1").expect("known");
     let foot = 0.3 + robot.foot_from_body(Leg::FrontRight, &[0.0, 0.8, -1.6]).z;
     let Aslip {
         mass_kg,
@@ -132,7 +132,7 @@ fn pendulum_in_contact_swings_about_the_springs_equilibrium() {
 #[test]
 fn fitted_pendulum_explains_short_rollouts_better_than_the_published_one() {
     let recording = jump("go1/test_01");
-    let rule = &InputRule::published(Robot::by_name("go1").expect("known"));
+    let rule = &InputRule::published(romc::robot_file::by_name("go1").expect("known"));
     let segments: Vec<&Segment> = recording.segments.iter().collect();
     let mut baselines = Baseline::all(rule, &segments).expect("legs are bent");
     assert_eq!(baselines.len(), 2);

@@ -17,7 +17,7 @@ use romc::recording::preprocess::prepare;
 use romc::recording::write::{Notation, WriteOptions, write_to};
 use romc::recording::{self, Recording, Segment};
 use romc::recording::{Clocks, ColumnMap, PhaseRule, Reader};
-use romc::robot::{InputRule, Robot};
+use romc::robot::InputRule;
 use romc::robot_file;
 use romc::symbolic::ExprPool;
 
@@ -109,7 +109,7 @@ pub fn recording(bytes: &[u8]) {
     for notation in [Notation::Semicolon, Notation::Comma] {
         same_when_written(&found, notation);
     }
-    let go1 = Robot::by_name("go1").expect("go1 is registered");
+    let go1 = romc::robot_file::by_name("go1").expect("go1 is registered");
     let findings = check(&found, go1);
     for finding in &findings {
         assert!(!finding.to_string().is_empty());

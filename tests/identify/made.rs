@@ -21,7 +21,7 @@ const MASS_KG: f64 = 11.0;
 const GRAVITY_M_S2: f64 = 9.7;
 
 fn go1() -> &'static Robot {
-    Robot::by_name("go1").unwrap()
+    romc::robot_file::by_name("go1").unwrap()
 }
 
 /// The unknowns of the made robot, per mass except gravity.

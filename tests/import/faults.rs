@@ -97,7 +97,7 @@ fn import_tells_wrong_shapes_with_both_layouts() {
         "m.safetensors: `encoder.weight` as encoder.weight: found 2 x 2 x 2, expected d x n (column \
          vectors) or n x d (row vectors), with d at most n"
     );
-    let go1 = romc::robot::Robot::by_name("go1").expect("registered");
+    let go1 = romc::robot_file::by_name("go1").expect("registered");
     assert_eq!(
         option_message(|options| options.robot = Some(go1)),
         "m.safetensors: `encoder.weight` as encoder.weight: found 2 x 5, expected d x 18 (column \

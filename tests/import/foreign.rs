@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 use nalgebra::{DMatrix, DVector};
 use romc::import::*;
 use romc::model::{LibraryChoice, LibraryOrder, Scaling, StandardLibrary};
-use romc::robot::Robot;
 use serde_json::Value;
 
 fn fixture(name: &str) -> PathBuf {
@@ -41,7 +40,7 @@ fn options() -> ImportOptions {
         library: Some(LibraryChoice::Standard(StandardLibrary::default())),
         library_order: Some(LibraryOrder::ROMC),
         scaling: Some(Scaling::uniform(0.1)),
-        robot: Some(Robot::by_name("go1").expect("registered")),
+        robot: Some(romc::robot_file::by_name("go1").expect("registered")),
         ..ImportOptions::default()
     }
 }

@@ -3,7 +3,6 @@
 use nalgebra::{DMatrix, DVector};
 use romc::import::*;
 use romc::model::{Activation, LibraryChoice, Scaling};
-use romc::robot::Robot;
 use zip::CompressionMethod;
 
 use crate::store::{Stored, list, npz, plain};
@@ -149,7 +148,7 @@ fn options_of_maps_are_refused_without_one_and_the_tensors_left_are_named() {
         list("enc.b", &[0.0; 2]),
         plain("xi_contact", &wave(4, 2, 0.2)),
     ];
-    let go1 = Robot::by_name("go1").expect("registered");
+    let go1 = romc::robot_file::by_name("go1").expect("registered");
     let with_robot = ImportOptions {
         robot: Some(go1),
         ..latent(TERMS)

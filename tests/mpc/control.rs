@@ -16,7 +16,7 @@ fn controller(
     settings: MpcSettings,
     reference: ReferenceSamples<'_>,
 ) -> Controller {
-    let mut controller = Controller::new(model, settings).expect("the model is complete");
+    let mut controller = romc::mpc::controller(model, settings).expect("the model is complete");
     controller
         .set_reference(reference)
         .expect("the reference is sound");
@@ -35,7 +35,7 @@ pub fn measure(trajectory: &Trajectory, sample: usize, controller: &mut Controll
 }
 
 pub fn assert_within_limits(command: &Command) {
-    let robot = romc::robot::Robot::by_name("go1").expect("known robot");
+    let robot = romc::robot_file::by_name("go1").expect("known robot");
     for joint in 0..12 {
         assert!(
             command.torque_nm[joint].abs() <= robot.torque_limit_nm()[joint],
@@ -460,7 +460,7 @@ fn same_measurements_give_the_same_bits() {
 #[test]
 fn stage_rows_keep_only_what_can_be_active() {
     let controller =
-        Controller::new(&model(Equations::Linear), MpcSettings::default()).expect("complete");
+        romc::mpc::controller(&model(Equations::Linear), MpcSettings::default()).expect("complete");
     let rows = controller.stage_rows();
     assert!(
         !rows.torque.is_empty() && rows.torque.len() < 16,
@@ -480,7 +480,7 @@ fn stage_rows_keep_only_what_can_be_active() {
 #[test]
 fn settings_out_of_range_are_refused_by_name() {
     let model = model(Equations::Linear);
-    let refused = |settings| match Controller::new(&model, settings) {
+    let refused = |settings| match romc::mpc::controller(&model, settings) {
         Err(MpcError::Control(ControlError::Setting { name, .. })) => name,
         other => panic!("{other:?}"),
     };

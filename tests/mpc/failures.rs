@@ -19,7 +19,8 @@ impl Bench {
     fn new(settings: MpcSettings) -> Self {
         let model = model(Equations::Nonlinear);
         let reference = trajectory(&model);
-        let mut controller = Controller::new(&model, settings).expect("the model is complete");
+        let mut controller =
+            romc::mpc::controller(&model, settings).expect("the model is complete");
         controller
             .set_reference(reference.samples())
             .expect("the reference is sound");
@@ -189,7 +190,7 @@ fn wrong_dimension_is_refused_and_the_next_step_is_solved() {
 #[test]
 fn without_a_reference_the_joints_are_damped_and_nothing_else() {
     let mut controller =
-        Controller::new(&model(Equations::Linear), MpcSettings::default()).expect("complete");
+        romc::mpc::controller(&model(Equations::Linear), MpcSettings::default()).expect("complete");
     let mut dx = [0.0; 18];
     dx[4] = 3.0;
     let command = controller.step(Measurement {
@@ -209,7 +210,7 @@ fn without_a_reference_the_joints_are_damped_and_nothing_else() {
 #[test]
 fn without_a_reference_the_posture_measured_first_is_held() {
     let mut controller =
-        Controller::new(&model(Equations::Linear), MpcSettings::default()).expect("complete");
+        romc::mpc::controller(&model(Equations::Linear), MpcSettings::default()).expect("complete");
     let standing: [f64; 18] = std::array::from_fn(|i| match i {
         0..12 => [0.1, 0.92, -1.75][i % 3],
         _ => 0.0,

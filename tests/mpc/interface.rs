@@ -8,7 +8,6 @@ use romc::mpc::interface::{
     status_text,
 };
 use romc::mpc::{Controller, LatentDynamics, Lift, Linearisation, MpcSettings, Solver, Status};
-use romc::robot::Robot;
 
 /// Equations that panic.
 #[derive(Debug)]
@@ -33,7 +32,7 @@ fn panic_inside_a_step_becomes_a_code_with_the_last_posture_and_no_torque() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/models/go1-d4.json");
     let model = romc::artifact::read(std::path::Path::new(path)).expect("shipped");
     let handle = Handle::<4>::create(None, |settings| {
-        let controller = Controller::new(&model, settings).expect("a complete model");
+        let controller = romc::mpc::controller(&model, settings).expect("a complete model");
         Controller::with_plant(controller.plant().clone(), Box::new(Broken), settings)
     });
     let mut handle = handle.expect("default settings");
@@ -63,7 +62,7 @@ fn panic_inside_a_step_becomes_a_code_with_the_last_posture_and_no_torque() {
         dx: Some(&zeros[..18]),
         feet: Some(&feet[..4]),
     };
-    let mut command = RawCommand::at_rest(Robot::by_name("go1").expect("known"), 99);
+    let mut command = RawCommand::at_rest(romc::robot_file::by_name("go1").expect("known"), 99);
     let rest = command.joint_position;
     for _ in 0..2 {
         assert_eq!(handle.step(&measurement, &mut command), INTERNAL);

@@ -14,7 +14,7 @@ const PRIOR_WEIGHT: f64 = 1e-3;
 fn plant(name: &str) -> ControlModel {
     let path = format!("{}/models/{name}.json", env!("CARGO_MANIFEST_DIR"));
     let model = romc::artifact::read(std::path::Path::new(&path)).expect("shipped");
-    ControlModel::new(&model).expect("complete")
+    romc::mpc::control_model(&model).expect("complete")
 }
 
 fn lift_by(plant: &ControlModel, solver: Solver) -> ConsistentLift {

@@ -19,7 +19,7 @@ const FOOTING: StanceState = StanceState {
 };
 
 fn go1() -> &'static Robot {
-    Robot::by_name("go1").expect("known robot")
+    romc::robot_file::by_name("go1").expect("known robot")
 }
 
 /// Torques with which the standing legs push the body with these forces, N.
@@ -88,7 +88,7 @@ fn projected(plant: &ControlModel, torque: &[f64; 12]) -> [f64; D] {
 
 #[test]
 fn projecting_a_lifted_input_returns_it() {
-    let plant = ControlModel::new(&model(Equations::Linear)).expect("complete");
+    let plant = romc::mpc::control_model(&model(Equations::Linear)).expect("complete");
     let mut random = Random::new(9);
     for _ in 0..50 {
         let u_lat: [f64; D] = std::array::from_fn(|_| random.normal());
@@ -102,7 +102,7 @@ fn projecting_a_lifted_input_returns_it() {
 
 #[test]
 fn consistent_lift_recovers_torques_that_obey_the_ground() {
-    let plant = ControlModel::new(&informed_model()).expect("complete");
+    let plant = romc::mpc::control_model(&informed_model()).expect("complete");
     let settings = MpcSettings {
         lift_prior_weight: 1e-6,
         ..MpcSettings::default()
@@ -152,7 +152,7 @@ fn cost(plant: &ControlModel, torque: &[f64; 12], u_lat: &[f64; D], weight: f64)
 
 #[test]
 fn consistent_lift_of_a_slipping_push_stays_in_the_cones_and_nothing_near_is_better() {
-    let plant = ControlModel::new(&informed_model()).expect("complete");
+    let plant = romc::mpc::control_model(&informed_model()).expect("complete");
     let settings = MpcSettings {
         foot_friction: 0.5,
         ..MpcSettings::default()
@@ -192,7 +192,7 @@ fn consistent_lift_of_a_slipping_push_stays_in_the_cones_and_nothing_near_is_bet
 
 #[test]
 fn consistent_lift_of_a_giant_input_stays_within_the_torque_limits() {
-    let plant = ControlModel::new(&informed_model()).expect("complete");
+    let plant = romc::mpc::control_model(&informed_model()).expect("complete");
     let mut lift = ConsistentLift::new(&plant, &MpcSettings::default()).expect("a sound program");
     let wanted = projected(&plant, &torque_for([Vector3::new(0.0, 0.0, 900.0); 4]));
     let found = lift.lift(&plant, &wanted, &FOOTING).expect("bent legs");
@@ -210,7 +210,7 @@ fn consistent_lift_of_a_giant_input_stays_within_the_torque_limits() {
 
 #[test]
 fn feet_in_the_air_have_no_cone() {
-    let plant = ControlModel::new(&informed_model()).expect("complete");
+    let plant = romc::mpc::control_model(&informed_model()).expect("complete");
     let mut lift = ConsistentLift::new(&plant, &MpcSettings::default()).expect("a sound program");
     let wanted = projected(&plant, &torque_for([Vector3::new(8.0, 0.0, -6.0); 4]));
     let flying = StanceState {
@@ -227,7 +227,7 @@ fn feet_in_the_air_have_no_cone() {
 
 #[test]
 fn stretched_leg_is_a_failure_in_contact_only() {
-    let plant = ControlModel::new(&informed_model()).expect("complete");
+    let plant = romc::mpc::control_model(&informed_model()).expect("complete");
     let mut lift = ConsistentLift::new(&plant, &MpcSettings::default()).expect("a sound program");
     let mut stretched = FOOTING;
     stretched.joints_rad[5] = 0.0;
@@ -251,7 +251,7 @@ fn losses() -> Actuators {
 #[test]
 fn consistent_lift_keeps_the_command_with_its_losses_within_the_limits() {
     let model = informed_model().into_builder().actuators(Some(losses()));
-    let plant = ControlModel::new(&model.build().expect("sound")).expect("complete");
+    let plant = romc::mpc::control_model(&model.build().expect("sound")).expect("complete");
     let mut lift = ConsistentLift::new(&plant, &MpcSettings::default()).expect("a sound program");
     let wanted = projected(&plant, &torque_for([Vector3::new(0.0, 0.0, 900.0); 4]));
     let limits = go1().torque_limit_nm();
@@ -298,7 +298,7 @@ fn consistent_lift_in_world_axes_recovers_the_torques_of_a_pitched_robot() {
     let model = informed_model()
         .into_builder()
         .wrench_frame(WrenchFrame::World);
-    let plant = ControlModel::new(&model.build().expect("sound")).expect("complete");
+    let plant = romc::mpc::control_model(&model.build().expect("sound")).expect("complete");
     let settings = MpcSettings {
         lift_prior_weight: 1e-6,
         ..MpcSettings::default()
@@ -323,7 +323,7 @@ fn consistent_lift_in_world_axes_recovers_the_torques_of_a_pitched_robot() {
 #[test]
 fn losses_of_a_plan_are_those_at_its_mean_velocity_and_its_acceleration() {
     let model = informed_model().into_builder().actuators(Some(losses()));
-    let plant = ControlModel::new(&model.build().expect("sound")).expect("complete");
+    let plant = romc::mpc::control_model(&model.build().expect("sound")).expect("complete");
     let start = [0.1, -0.05, 0.02, 0.4, -0.3, 0.2];
     let end = [0.104, -0.052, 0.021, 0.43, -0.28, 0.15];
     let found = plant.planned_losses(&start, &end, 0.01);
@@ -337,6 +337,6 @@ fn losses_of_a_plan_are_those_at_its_mean_velocity_and_its_acceleration() {
         assert!((found[joint] - expected).abs() < 1e-12, "{joint}");
     }
     assert!(found.iter().any(|loss| loss.abs() > 0.5), "{found:?}");
-    let ideal = ControlModel::new(&informed_model()).expect("complete");
+    let ideal = romc::mpc::control_model(&informed_model()).expect("complete");
     assert_eq!(ideal.planned_losses(&start, &end, 0.01), [0.0; 12]);
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 use romc::model::{Activation, AffineMap, Layer, ReducedModel, StateMap};
-use romc::mpc::{Controller, Lift, Measurement, MpcSettings, RowSelection};
+use romc::mpc::{Lift, Measurement, MpcSettings, RowSelection};
 
 use crate::random::Random;
 use crate::synthetic::{D, Equations, STAND, Trajectory, model, trajectory};
@@ -98,7 +98,7 @@ fn maps_that_are_linear_in_disguise_give_the_commands_of_the_linear_model() {
             ..MpcSettings::default()
         };
         let mut controllers = [&linear, &hidden].map(|model| {
-            let mut controller = Controller::new(model, settings).expect("complete");
+            let mut controller = romc::mpc::controller(model, settings).expect("complete");
             let samples = trajectory.samples();
             controller
                 .set_reference(samples)
@@ -140,7 +140,7 @@ fn torques_are_lifted_at_the_measured_state_and_limited_at_the_reference_of_each
     let mut trajectory = trajectory(&crate::synthetic::model(Equations::Nonlinear));
     // Inputs that no motor gives: the limits have something to do.
     trajectory.u.iter_mut().for_each(|u| *u *= 40.0);
-    let mut controller = Controller::new(&model, MpcSettings::default()).expect("complete");
+    let mut controller = romc::mpc::controller(&model, MpcSettings::default()).expect("complete");
     controller
         .set_reference(trajectory.samples())
         .expect("a sound reference");

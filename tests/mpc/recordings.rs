@@ -4,7 +4,7 @@ use std::path::Path;
 
 use nalgebra::DMatrix;
 use romc::evaluate::{ReferenceInput, along_recording, lift_comparison};
-use romc::mpc::{Controller, Lift, MpcSettings, Source};
+use romc::mpc::{Lift, MpcSettings, Source};
 use romc::recording::{Recording, Segment};
 
 use crate::outside;
@@ -37,7 +37,7 @@ fn recording(trajectory: &Trajectory) -> Recording {
 fn run_along_a_recording_that_the_model_follows_finds_its_torques() {
     let model = model(Equations::Nonlinear);
     let recording = recording(&trajectory(&model));
-    let mut controller = Controller::new(&model, MpcSettings::default()).expect("complete");
+    let mut controller = romc::mpc::controller(&model, MpcSettings::default()).expect("complete");
     let mut told = Vec::new();
     let run = along_recording(
         &mut controller,
@@ -91,7 +91,7 @@ fn torques_of_no_robot_are_left_out_and_counted() {
     let model = model(Equations::Nonlinear);
     let mut recording = recording(&trajectory(&model));
     recording.segments.remove(0);
-    let mut controller = Controller::new(&model, MpcSettings::default()).expect("complete");
+    let mut controller = romc::mpc::controller(&model, MpcSettings::default()).expect("complete");
     recording.segments[0].torque_nm[(2, 203)] = -2.7e5;
     let run = along_recording(
         &mut controller,
@@ -115,7 +115,7 @@ fn torques_of_no_robot_are_left_out_and_counted() {
 fn lift_comparison_of_inputs_in_the_encoders_range_is_exact() {
     let model = model(Equations::Nonlinear);
     let recording = recording(&trajectory(&model));
-    let mut controller = Controller::new(&model, MpcSettings::default()).expect("complete");
+    let mut controller = romc::mpc::controller(&model, MpcSettings::default()).expect("complete");
     let r2 = lift_comparison(&mut controller, &recording)
         .expect("a sound recording")
         .r2();
@@ -135,7 +135,7 @@ fn hardware_jump_gets_torques_within_the_limits_with_either_lift() {
             ..MpcSettings::default()
         };
         let mut controller =
-            Controller::new(&model(Equations::Nonlinear), settings).expect("complete");
+            romc::mpc::controller(&model(Equations::Nonlinear), settings).expect("complete");
         let run = along_recording(&mut controller, &recording, ReferenceInput::None, |_, _| {})
             .expect("a sound recording");
         assert!(run.summary.steps > 100);
@@ -183,7 +183,7 @@ fn shipped_models_stay_within_limits_and_friction_at_every_step_of_every_recordi
                 lift,
                 ..MpcSettings::default()
             };
-            let mut controller = Controller::new(&model, settings).expect("complete");
+            let mut controller = romc::mpc::controller(&model, settings).expect("complete");
             let mut steps = 0;
             for &recording in &taken {
                 let run = along_recording(

@@ -2,7 +2,7 @@
 
 use romc::evaluate::{ReferenceInput, along_recording};
 use romc::mpc::{
-    Cone, ConeProgram, Controller, Lift, MpcSettings, Outcome, QpSettings, QpSolver, Solver, sparse,
+    Cone, ConeProgram, Lift, MpcSettings, Outcome, QpSettings, QpSolver, Solver, sparse,
 };
 use romc::solver::{self, Cost, Links, Pairs, Program, Real, RowMatrices, Settings, Shape, Stage};
 
@@ -379,7 +379,7 @@ fn riccati_commands_clarabels_torques_along_recordings_and_prepares_ahead() {
                 ..MpcSettings::default()
             };
             settings.qp.tolerance = 1e-9;
-            let mut controller = Controller::new(&model, settings).expect("complete");
+            let mut controller = romc::mpc::controller(&model, settings).expect("complete");
             let input = ReferenceInput::Recorded;
             along_recording(&mut controller, &recording, input, |_, _| {}).expect("sound")
         });
@@ -425,7 +425,7 @@ fn riccati_commands_clarabels_torques_under_limits_on_their_rates() {
                     ..MpcSettings::default()
                 };
                 settings.qp.tolerance = 1e-12;
-                let mut controller = Controller::new(&model, settings).expect("complete");
+                let mut controller = romc::mpc::controller(&model, settings).expect("complete");
                 let input = ReferenceInput::Recorded;
                 along_recording(&mut controller, &recording, input, |_, _| {}).expect("sound")
             });

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use nalgebra::{Rotation3, Vector3};
 use romc::artifact;
 use romc::model::ReducedModel;
-use romc::mpc::{Command, Controller, Measurement, MpcSettings, ReferenceSamples};
+use romc::mpc::{Command, Measurement, MpcSettings, ReferenceSamples};
 use romc::recording::Segment;
 use romc::robot::Leg;
 
@@ -30,7 +30,7 @@ fn command(swing_turn: f64, sample: usize, error_rad: f64) -> Command {
         swing_turn,
         ..MpcSettings::default()
     };
-    let mut controller = Controller::new(&model, settings).expect("a complete model");
+    let mut controller = romc::mpc::controller(&model, settings).expect("a complete model");
     let reference = ReferenceSamples {
         time_s: &segment.time_s,
         x: segment.x.as_slice(),
@@ -59,7 +59,7 @@ fn in_flight(segment: &Segment) -> usize {
 
 /// Feet from the body's origin, in axes that have turned by a pitch.
 fn feet(command: &Command, pitch_rad: f64) -> Vec<Vector3<f64>> {
-    let robot = romc::robot::Robot::by_name("go1").expect("known robot");
+    let robot = romc::robot_file::by_name("go1").expect("known robot");
     let turned = Rotation3::from_euler_angles(0.0, pitch_rad, 0.0);
     let foot = |leg: Leg| {
         let q = leg.of_joints(&command.joint_position_rad);

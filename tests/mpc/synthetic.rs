@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 use romc::lower::CompiledModel;
 use romc::model::{AffineMap, FeetRule, InputStatistics, Library, Phase, ReducedModel, Scaling};
 use romc::mpc::ReferenceSamples;
-use romc::robot::{ContactFlags, Robot};
+use romc::robot::ContactFlags;
 
 use crate::random::Random;
 
@@ -92,7 +92,7 @@ pub fn model_with(equations: Equations, contact_inputs: InputStatistics) -> Redu
         .decoder(AffineMap::new("decoder", pseudo_inverse, stand).expect("shapes fit"))
         .input_statistics("contact", contact_inputs)
         .input_statistics("flight", statistics(2.0, 0.0))
-        .robot(Robot::by_name("go1").expect("known robot"))
+        .robot(romc::robot_file::by_name("go1").expect("known robot"))
         .sample_time_s(0.002)
         .build()
         .expect("a valid model")

@@ -9,7 +9,7 @@ use romc::artifact;
 use romc::model::ReducedModel;
 use romc::plan::{Goal, Plan, PlanError, PlanSettings, Verdict, plan};
 use romc::recording::{self, Recording};
-use romc::robot::{BODY_Z, GRAVITY_M_S2, Robot};
+use romc::robot::{BODY_Z, GRAVITY_M_S2};
 use romc::train::{Method, Monitor, Origin, Progress, Recordings, TrainOptions};
 
 fn shipped_model(name: &str) -> ReducedModel {
@@ -32,7 +32,7 @@ fn model() -> &'static ReducedModel {
 
 fn learned(training: &[Recording], validation: &[Recording], latent_dim: usize) -> ReducedModel {
     let sets = Recordings::new(training, validation);
-    let robot = Robot::by_name("go1").unwrap();
+    let robot = romc::robot_file::by_name("go1").unwrap();
     let options = TrainOptions::new("planner", latent_dim);
     let (cancel, mut listener) = (AtomicBool::new(false), |_: Progress| ());
     let mut monitor = Monitor::new(&mut listener, &cancel);
@@ -97,7 +97,7 @@ fn plan_read_as_a_recording_has_the_planned_torques_inside_their_limits() {
     recording::write::write_to(&mut bytes, &recording, None, &options).unwrap();
     let read = recording::read_from_bytes("plan.csv", &bytes).unwrap();
     assert_eq!(read.segments[0].torque_nm, plan.motion.torque_nm);
-    let limits = Robot::by_name("go1").unwrap().torque_limit_nm();
+    let limits = romc::robot_file::by_name("go1").unwrap().torque_limit_nm();
     for column in read.segments[0].torque_nm.column_iter() {
         let mut each = column.iter().zip(limits);
         assert!(each.all(|(t, limit)| t.abs() <= *limit), "{column}");

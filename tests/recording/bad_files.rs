@@ -4,7 +4,7 @@ use std::path::Path;
 
 use romc::recording::check::{Finding, Implausible, check, without};
 use romc::recording::{self, RecordingError, RecordingFault, read_from_bytes};
-use romc::robot::{InputRule, Robot, RobotError};
+use romc::robot::{InputRule, RobotError};
 
 use crate::sheet::{Sheet, gzip};
 
@@ -417,7 +417,7 @@ fn time_that_stands_still_or_steps_back_is_told() {
 
 #[test]
 fn unknown_robot_lists_the_known_ones() {
-    let error = Robot::by_name("spot").unwrap_err();
+    let error = romc::robot_file::by_name("spot").unwrap_err();
     assert!(matches!(&error, RobotError::UnknownRobot { found, .. } if found == "spot"));
     assert!(
         error
@@ -428,7 +428,7 @@ fn unknown_robot_lists_the_known_ones() {
 
 #[test]
 fn stretched_knee_in_contact_is_damped_and_found() {
-    let go1 = Robot::by_name("go1").unwrap();
+    let go1 = romc::robot_file::by_name("go1").unwrap();
     let rule = InputRule::published(go1);
     let input = |sheet: &Sheet| sheet.read().unwrap().segments[0].input(&rule).unwrap();
     let bent = input(&Sheet::landing());

@@ -14,7 +14,7 @@ mod implausible {
     use nalgebra::DMatrix;
 
     fn go1() -> &'static Robot {
-        Robot::by_name("go1").unwrap()
+        romc::robot_file::by_name("go1").unwrap()
     }
 
     /// A smooth motion whose rates are exact.
@@ -236,7 +236,7 @@ mod conditioning {
         recording: &Recording,
         options: &ConditionOptions,
     ) -> Result<(Recording, usize), RecordingError> {
-        let go1 = Robot::by_name("go1").expect("a known robot");
+        let go1 = romc::robot_file::by_name("go1").expect("a known robot");
         condition(recording.clone(), &check(recording, go1), options)
     }
 
@@ -429,7 +429,7 @@ mod sets {
             segments: segments.clone(),
         };
         let files: Vec<_> = names.iter().map(file).collect();
-        let go1 = Robot::by_name("go1").expect("known");
+        let go1 = romc::robot_file::by_name("go1").expect("known");
         let mut set = RecordingSet::default();
         let read = set.read(
             &files,

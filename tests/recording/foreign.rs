@@ -7,8 +7,8 @@ use nalgebra::{DMatrix, Vector3};
 use romc::files::Overwrite;
 use romc::recording::foreign::guess::guess;
 use romc::recording::{self, Clocks, ColumnMap, Reader, Recording, RecordingFault, Segment};
+use romc::robot::JOINT_NAMES;
 use romc::robot::input_rule::rotation;
-use romc::robot::{JOINT_NAMES, Robot};
 
 /// Columns of numbers with names.
 #[derive(Default)]
@@ -454,7 +454,7 @@ fn logs_of_one_jump_by_their_maps_are_the_same_recording() {
 fn guessed_maps_of_seven_logs_give_the_recording() {
     let folder = tempfile::tempdir().unwrap();
     let jump = jump();
-    let go1 = Robot::by_name("go1").unwrap();
+    let go1 = romc::robot_file::by_name("go1").unwrap();
     let mut found = Vec::new();
     for case in cases(folder.path(), &jump) {
         if case.path.is_dir() {
@@ -687,7 +687,7 @@ fn files_with_late_samples_are_smoothed_unless_told_otherwise() {
             path: path.clone(),
             segments: None,
         };
-        let go1 = Robot::by_name("go1").unwrap();
+        let go1 = romc::robot_file::by_name("go1").unwrap();
         let (options, reader) = (ConditionOptions::default(), Reader::new(None, clocks));
         let mut set = RecordingSet::default();
         set.read(&[file], go1, &options, &reader).unwrap();

@@ -8,14 +8,13 @@ use nalgebra::DMatrix;
 use romc::files::Overwrite;
 use romc::recording::foreign::guess::{Guess, guess};
 use romc::recording::{self, Clocks, ColumnMap, Reader, Recording, Segment};
-use romc::robot::Robot;
 
 use super::foreign::{Log, difference, gyro, jump, quaternion};
 use super::mcap::Dice;
 use super::tools::is_thorough;
 
 fn guessed(path: &Path) -> (Guess, Recording) {
-    let guess = guess(path, Robot::by_name("go1").unwrap()).unwrap();
+    let guess = guess(path, romc::robot_file::by_name("go1").unwrap()).unwrap();
     assert_eq!(guess.missing, Vec::<&str>::new(), "{}", guess.text);
     let map = ColumnMap::parse("guessed.toml", &guess.text).unwrap();
     let read = Reader::new(Some(map), Clocks::Recorded).read(path);

@@ -763,7 +763,7 @@ fn logs_of_other_formats_are_named_with_the_line_that_converts_them() {
                 "{name}: {error}"
             );
         }
-        let robot = romc::robot::Robot::by_name("go1").unwrap();
+        let robot = romc::robot_file::by_name("go1").unwrap();
         let error = romc::recording::foreign::guess::guess(&path, robot)
             .unwrap_err()
             .to_string();

@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 use romc::recording::mismatch::{mismatches, notes};
 use romc::recording::{self, Recording, Segment};
-use romc::robot::{Leg, Robot};
+use romc::robot::Leg;
 
 use crate::outside;
 use crate::real_jumps::jumps_in;
@@ -137,7 +137,7 @@ const RIGHT: [(&str, &str, usize); 4] = [
 #[test]
 fn no_right_recording_has_a_note() {
     for (folder, robot, least) in RIGHT {
-        let robot = Robot::by_name(robot).unwrap();
+        let robot = romc::robot_file::by_name(robot).unwrap();
         for path in jumps_in(folder, least) {
             let right = recording::read(&path).unwrap();
             assert_eq!(notes(&right, robot), [""; 0], "{}", path.display());
@@ -149,7 +149,7 @@ fn no_right_recording_has_a_note() {
 fn wrong_readings_of_every_jump_are_noticed() {
     let (mut missed, mut made) = (Vec::new(), 0);
     for (folder, robot, least) in RIGHT {
-        let robot = Robot::by_name(robot).unwrap();
+        let robot = romc::robot_file::by_name(robot).unwrap();
         for path in jumps_in(folder, least)
             .into_iter()
             .step_by(thorough_or(1, 3))
@@ -165,7 +165,10 @@ fn wrong_readings_of_every_jump_are_noticed() {
                 require(name, notes(&spoiled(&right, spoil), robot));
             }
             let other = if robot.name() == "go1" { "go2" } else { "go1" };
-            require(other, notes(&right, Robot::by_name(other).unwrap()));
+            require(
+                other,
+                notes(&right, romc::robot_file::by_name(other).unwrap()),
+            );
         }
     }
     println!("{} of {made} missed:\n{}", missed.len(), missed.join("\n"));
@@ -187,7 +190,7 @@ fn real_jumps_have_no_mismatch() {
     }
     for (path, robot) in jumps {
         let jump = recording::read(&path).unwrap();
-        let found = mismatches(&jump, Robot::by_name(robot).unwrap());
+        let found = mismatches(&jump, romc::robot_file::by_name(robot).unwrap());
         assert!(found.is_empty(), "{}: {found:?}", path.display());
     }
 }
@@ -197,7 +200,7 @@ fn note_of(spoil: impl Fn(&mut Segment)) -> String {
     let right = recording::read(&jumps_in("go1", 20)[0]).unwrap();
     let mut wrong = right;
     wrong.segments.iter_mut().for_each(spoil);
-    notes(&wrong, Robot::by_name("go1").unwrap()).join("\n")
+    notes(&wrong, romc::robot_file::by_name("go1").unwrap()).join("\n")
 }
 
 #[test]

@@ -6,7 +6,7 @@ use romc::recording::PhaseRule;
 use romc::recording::check::{check, without};
 use romc::recording::preprocess::prepare;
 use romc::recording::{Recording, read_from_bytes};
-use romc::robot::{InputRule, Robot};
+use romc::robot::InputRule;
 
 use crate::sheet::{Sheet, gzip};
 
@@ -16,7 +16,7 @@ fn exercise(bytes: &[u8]) {
         return;
     };
     require_finite(&recording);
-    let go1 = Robot::by_name("go1").expect("go1 is registered");
+    let go1 = romc::robot_file::by_name("go1").expect("go1 is registered");
     let findings = check(&recording, go1);
     for finding in &findings {
         assert!(!finding.to_string().is_empty());

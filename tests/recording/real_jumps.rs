@@ -12,7 +12,7 @@ use romc::robot::{InputRule, Robot};
 use crate::outside;
 
 fn go1() -> &'static Robot {
-    Robot::by_name("go1").unwrap()
+    romc::robot_file::by_name("go1").unwrap()
 }
 
 fn own_jumps() -> Vec<PathBuf> {
@@ -100,7 +100,7 @@ fn require_plausible(path: &Path, robot: &Robot) {
 
 #[test]
 fn asynchronous_jumps_leave_the_ground_front_feet_first() {
-    let go2 = Robot::by_name("go2").unwrap();
+    let go2 = romc::robot_file::by_name("go2").unwrap();
     let rule = PhaseRule::three_phase().with_min_samples(5);
     assert_eq!(rule.names(), ["contact", "rear", "flight"]);
     for path in jumps_in("go2-asynchronous", 4) {

@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 use romc::files::Overwrite;
 use romc::recording::{Recording, RecordingFault, Segment};
-use romc::robot::{JOINT_DIM, Robot, STATE_DIM};
+use romc::robot::{JOINT_DIM, STATE_DIM};
 
 /// A segment whose entries all differ, of a robot that stands.
 pub fn sample_segment(n: usize) -> Segment {
@@ -31,12 +31,16 @@ mod inputs {
     use super::*;
 
     fn published() -> InputRule {
-        InputRule::published(Robot::by_name("go1").unwrap())
+        InputRule::published(romc::robot_file::by_name("go1").unwrap())
     }
 
     fn with_losses(frame: WrenchFrame) -> InputRule {
         let actuators = Actuators::of_leg([1.0, 0.6, 0.6], [0.2; 3], [0.01; 3]);
-        InputRule::new(Robot::by_name("go1").unwrap(), Some(actuators), frame)
+        InputRule::new(
+            romc::robot_file::by_name("go1").unwrap(),
+            Some(actuators),
+            frame,
+        )
     }
 
     #[test]

@@ -88,8 +88,8 @@ fn manipulability_is_the_normalised_determinant() {
 
 #[test]
 fn mirrored_joints_of_known_robots_are_abductions_against_and_flexions_alike() {
-    for name in Robot::known_names() {
-        let robot = Robot::by_name(name).unwrap();
+    for name in romc::robot_file::known_names() {
+        let robot = romc::robot_file::by_name(name).unwrap();
         let signs = (0..JOINT_DIM).map(|joint| robot.mirror_sign(joint));
         assert!(signs.eq([-1.0, 1.0, 1.0].repeat(4)), "{name}");
     }
@@ -97,12 +97,12 @@ fn mirrored_joints_of_known_robots_are_abductions_against_and_flexions_alike() {
 
 #[test]
 fn by_name_unknown_robot_lists_the_known_ones() {
-    let error = Robot::by_name("spot").unwrap_err();
+    let error = romc::robot_file::by_name("spot").unwrap_err();
     let RobotError::UnknownRobot { found, known } = &error else {
         panic!("{error:?}");
     };
     assert_eq!(found, "spot");
-    assert_eq!(known, &Robot::known_names().join(", "));
+    assert_eq!(known, &romc::robot_file::known_names().join(", "));
     assert!(error.to_string().contains("`spot`; known: go1"));
 }
 
@@ -119,8 +119,8 @@ fn state_and_input_names_are_in_the_order_of_the_contract() {
 
 #[test]
 fn registered_robots_stand_inside_their_limits_with_an_invertible_jacobian() {
-    for name in Robot::known_names() {
-        let robot = Robot::by_name(name).unwrap();
+    for name in romc::robot_file::known_names() {
+        let robot = romc::robot_file::by_name(name).unwrap();
         for (joint, (low, high)) in robot.joint_limit_rad().iter().enumerate() {
             let stand = [0.0, 0.8, -1.5][joint % 3];
             assert!(*low < stand && stand < *high, "{name} joint {joint}");
@@ -146,7 +146,9 @@ fn foot_positions_agree_with_a_physics_engine() {
     ];
     let legs = ["go1", "go2"].map(|name| postures.map(|(leg, q)| (name, leg, q)));
     for ((name, leg, q), expected) in legs.into_iter().flatten().zip(expected) {
-        let foot = Robot::by_name(name).unwrap().foot_position(leg, &q);
+        let foot = romc::robot_file::by_name(name)
+            .unwrap()
+            .foot_position(leg, &q);
         let error = (foot - Vector3::from(expected)).norm();
         assert!(error < 2e-9, "{name} {leg}: {error:e}");
     }
@@ -154,7 +156,7 @@ fn foot_positions_agree_with_a_physics_engine() {
 
 #[test]
 fn hip_positions_lie_on_the_side_of_their_leg() {
-    let go1 = Robot::by_name("go1").unwrap();
+    let go1 = romc::robot_file::by_name("go1").unwrap();
     for leg in Leg::ALL {
         let hip = go1.hip_position(leg);
         assert!(hip.y * leg.side() > 0.0);
@@ -163,7 +165,7 @@ fn hip_positions_lie_on_the_side_of_their_leg() {
 }
 
 fn go1() -> &'static Robot {
-    Robot::by_name("go1").unwrap()
+    romc::robot_file::by_name("go1").unwrap()
 }
 
 fn stand() -> [f64; JOINT_DIM] {
@@ -269,7 +271,11 @@ const CONTACTS: [ContactFlags; 3] = [
 ];
 
 fn rule(name: &str) -> InputRule {
-    InputRule::new(Robot::by_name(name).unwrap(), None, WrenchFrame::World)
+    InputRule::new(
+        romc::robot_file::by_name(name).unwrap(),
+        None,
+        WrenchFrame::World,
+    )
 }
 
 fn state() -> [f64; STATE_DIM] {
@@ -286,7 +292,7 @@ fn state() -> [f64; STATE_DIM] {
 fn world_wrench_does_the_work_of_the_feet_on_the_bodys_coordinates() {
     // Virtual work: F_k . d(foot k)/dx_i over the feet in contact is -tau_i for a joint of a leg
     // in contact, and the generalised force for a coordinate of the body.
-    for name in Robot::known_names() {
+    for name in romc::robot_file::known_names() {
         let rule = rule(name);
         let (x, tau) = (state(), torques());
         for contact in CONTACTS {
@@ -329,7 +335,7 @@ fn world_wrench_does_the_work_of_the_feet_on_the_bodys_coordinates() {
 fn wrench_is_the_wrench_map_times_torques_in_both_frames() {
     let (x, tau) = (state(), torques());
     for frame in WrenchFrame::ALL {
-        let rule = InputRule::new(Robot::by_name("go2").unwrap(), None, frame);
+        let rule = InputRule::new(romc::robot_file::by_name("go2").unwrap(), None, frame);
         for contact in CONTACTS {
             let joints = std::array::from_fn(|i| x[i]);
             let map = rule.wrench_map(&joints, [x[15], x[16], x[17]], contact);
@@ -348,7 +354,7 @@ fn world_and_body_force_agree_for_a_level_robot_that_looks_along_x() {
     let mut x = state();
     x[15..].fill(0.0);
     let world = rule("go1").wrench(&x, &torques(), [true; 4]).unwrap();
-    let body = InputRule::published(Robot::by_name("go1").unwrap());
+    let body = InputRule::published(romc::robot_file::by_name("go1").unwrap());
     let body = body.wrench(&x, &torques(), [true; 4]).unwrap();
     assert!((world - body).rows(0, 3).norm() < 1e-12 * body.norm());
     // The arms differ: about the body's origin a front foot that pushes up pitches it back.

@@ -6,7 +6,7 @@ use num_traits::ToPrimitive;
 
 use super::coefficient::Rational;
 use super::polynomial::CanonicalForm;
-use crate::symbolic::node::{ExprId, SymbolId};
+use crate::node::{ExprId, SymbolId};
 
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(super) enum Atom {

@@ -4,7 +4,7 @@ use num_bigint::BigInt;
 pub(super) use num_rational::BigRational as Rational;
 use num_traits::{One, Signed, ToPrimitive, Zero};
 
-use crate::symbolic::number::Number;
+use crate::number::Number;
 
 /// Widens a radius by more than the rounding errors of the operations on it.
 const OUTWARD: f64 = 1.0 + 1e-12;

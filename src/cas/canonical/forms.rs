@@ -7,10 +7,10 @@ use num_traits::ToPrimitive;
 use super::atoms::Atom;
 use super::coefficient::{Coefficient, nearest, ratio};
 use super::polynomial::{CanonicalForm, Monomial};
-use crate::symbolic::function::Function;
-use crate::symbolic::node::{ExprId, Node};
-use crate::symbolic::number::Number;
-use crate::symbolic::pool::ExprPool;
+use crate::function::Function;
+use crate::node::{ExprId, Node};
+use crate::number::Number;
+use crate::pool::ExprPool;
 
 /// Most fractions of two arguments that are compared by multiplying out, and most such comparisons.
 const MAX_FRACTIONS: usize = 4;

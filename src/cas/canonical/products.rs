@@ -4,7 +4,7 @@ use super::atoms::Atom;
 use super::coefficient::Coefficient;
 use super::forms::CanonicalForms;
 use super::polynomial::{CanonicalForm, Monomial};
-use crate::symbolic::number::power;
+use crate::number::power;
 
 /// Largest power of a sum that is multiplied out, and of a single term.
 const MAX_SUM_POWER: u32 = 40;

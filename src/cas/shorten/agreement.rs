@@ -11,11 +11,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
 use super::Summands;
-use crate::symbolic::function::Function;
-use crate::symbolic::interval::Interval;
-use crate::symbolic::node::{ExprId, Node, SymbolId};
-use crate::symbolic::pool::ExprPool;
-use crate::symbolic::rounding::power_by;
+use crate::function::Function;
+use crate::interval::Interval;
+use crate::node::{ExprId, Node, SymbolId};
+use crate::pool::ExprPool;
+use crate::rounding::power_by;
 
 /// Ranges from which the variables of the points near the origin are taken.
 const NEAR: [(f64, f64); 6] = [

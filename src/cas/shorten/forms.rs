@@ -3,11 +3,11 @@
 use super::agreement::Agreement;
 use super::search::Shortener;
 use super::{Scaled, Summands};
-use crate::symbolic::function::Function;
-use crate::symbolic::id_map::IdMap;
-use crate::symbolic::node::{ExprId, Node};
-use crate::symbolic::number::Number;
-use crate::symbolic::pool::ExprPool;
+use crate::function::Function;
+use crate::id_map::IdMap;
+use crate::node::{ExprId, Node};
+use crate::number::Number;
+use crate::pool::ExprPool;
 
 /// Largest group whose forms are searched, and largest whose terms are chosen one by one.
 const MAX_GROUP: usize = 64;

@@ -4,13 +4,13 @@ use std::collections::{BTreeMap, HashMap};
 
 use super::Summands;
 use super::search::{Block, Distance, Shortener};
-use crate::symbolic::function::Function;
-use crate::symbolic::id_map::IdMap;
-use crate::symbolic::node::{ExprId, Node};
-use crate::symbolic::number::Number;
-use crate::symbolic::polynomial::MAX_POWER;
-use crate::symbolic::pool::ExprPool;
-use crate::symbolic::simplify::MAX_WORK;
+use crate::function::Function;
+use crate::id_map::IdMap;
+use crate::node::{ExprId, Node};
+use crate::number::Number;
+use crate::polynomial::MAX_POWER;
+use crate::pool::ExprPool;
+use crate::simplify::MAX_WORK;
 
 /// Most terms that can be powers of the parts of a sum.
 const MAX_PARTS: usize = 64;

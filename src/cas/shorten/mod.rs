@@ -22,7 +22,7 @@ mod forms;
 mod groups;
 mod search;
 
-pub(crate) use search::{Shortened, Shortener};
+pub use search::{Shortened, Shortener};
 
 use super::node::ExprId;
 use super::number::Number;

@@ -6,20 +6,20 @@ use super::agreement::Agreement;
 use super::forms::{NestedSums, collected};
 use super::groups::Link;
 use super::{Scaled, Summands};
-use crate::symbolic::cost::Costs;
-use crate::symbolic::function::Function;
-use crate::symbolic::id_map::{IdMap, IdSet};
-use crate::symbolic::node::{ExprId, Node, SymbolId};
-use crate::symbolic::number::Number;
-use crate::symbolic::order::Exponent;
-use crate::symbolic::pool::ExprPool;
-use crate::symbolic::simplify::MAX_WORK;
+use crate::cost::Costs;
+use crate::function::Function;
+use crate::id_map::{IdMap, IdSet};
+use crate::node::{ExprId, Node, SymbolId};
+use crate::number::Number;
+use crate::order::Exponent;
+use crate::pool::ExprPool;
+use crate::simplify::MAX_WORK;
 
 const MAX_ROUNDS: usize = 4;
 
 /// Summands that a shorter form takes the place of.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Shortened {
+pub struct Shortened {
     /// Positions of the replaced summands, ascending.
     pub replaced: Vec<usize>,
     /// What they are together; nothing if they cancel.
@@ -28,7 +28,7 @@ pub(crate) struct Shortened {
 
 /// Shortens sums over one pool, and remembers what it found about their terms.
 #[derive(Debug)]
-pub(crate) struct Shortener<'a> {
+pub struct Shortener<'a> {
     pub(super) pool: &'a mut ExprPool,
     pub(super) costs: Costs,
     singles: IdMap<ExprId>,
@@ -84,7 +84,8 @@ fn merge(blocks: &mut [Block], places: &[usize], summands: Summands) {
 }
 
 impl<'a> Shortener<'a> {
-    pub(crate) fn new(pool: &'a mut ExprPool) -> Self {
+    /// A shortener of sums over `pool`.
+    pub fn new(pool: &'a mut ExprPool) -> Self {
         Self {
             pool,
             costs: Costs::default(),
@@ -94,13 +95,14 @@ impl<'a> Shortener<'a> {
         }
     }
 
-    pub(crate) fn pool(&self) -> &ExprPool {
+    /// The pool, with the expressions that were made.
+    pub fn pool(&self) -> &ExprPool {
         self.pool
     }
 
     /// The replacements that make `sum coefficient * expr` shortest, in the order of the first
     /// positions they replace; none if it is short already.
-    pub(crate) fn shorten(&mut self, summands: &[(f64, ExprId)]) -> Vec<Shortened> {
+    pub fn shorten(&mut self, summands: &[(f64, ExprId)]) -> Vec<Shortened> {
         if self.is_plain_sum(summands) && self.parts_of_powers(summands).is_empty() {
             return Vec::new();
         }

@@ -8,11 +8,11 @@ use clap::{ArgAction, Args, Parser, Subcommand};
 use super::compile::CompileArguments;
 use super::import::ImportArguments;
 use super::train::{StudyArguments, TrainArguments};
-use super::value::{ReadingArguments, RobotParser, count, overwrite, real};
+use super::value::{ReadingArguments, RobotParser, choice, count, overwrite, real};
 use crate::evaluate::ReferenceInput;
 use crate::files::Overwrite;
 use crate::limits::table::{APEX, DISTANCE, HORIZON, RESTART_EVERY, STEP, TORQUE_RATE};
-use crate::mpc::{Lift, MpcSettings, Solver};
+use crate::mpc::{LIFTS, Lift, MpcSettings, SOLVERS, Solver};
 use crate::simplify::Tolerance;
 
 /// The reduced-order model compiler: from recorded jumps to equations, code and torques.
@@ -248,13 +248,13 @@ pub struct MpcArguments {
     #[arg(long, value_name = "SECONDS", default_value_t = MpcSettings::default().step_s, value_parser = real(&STEP))]
     pub step: f64,
     /// How latent inputs become joint torques
-    #[arg(long, value_enum, default_value_t = MpcSettings::default().lift)]
+    #[arg(long, value_parser = choice(&LIFTS), default_value = "transpose")]
     pub lift: Lift,
     /// Where the input reference comes from
     #[arg(long, value_enum, default_value = "recorded")]
     pub reference_input: ReferenceInput,
     /// What solves the quadratic program of a step
-    #[arg(long, value_enum, default_value_t = MpcSettings::default().solver)]
+    #[arg(long, value_parser = choice(&SOLVERS), default_value = "clarabel")]
     pub solver: Solver,
     /// Largest change of a torque that the transpose lift gives, in N m/s [default: none]
     #[arg(long, value_name = "N_M_PER_S", value_parser = real(&TORQUE_RATE))]

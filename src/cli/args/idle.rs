@@ -14,7 +14,6 @@ use crate::codegen::{Precision, SineCosine};
 use crate::deploy::Target;
 use crate::import::Format;
 use crate::mpc::Lift;
-use crate::robot::Robot;
 
 /// Refuses the first flag that has no effect.
 ///
@@ -36,7 +35,7 @@ pub fn refuse_idle(command: &Command) -> Result<(), Error> {
             refuse(has_start, "--start", &reading(&arguments.reading))
         }
         Command::Robot(arguments) => {
-            let is_file = !Robot::known_names().contains(&arguments.robot.as_str());
+            let is_file = !crate::robot_file::known_names().contains(&arguments.robot.as_str());
             let flags = [("--feet", !arguments.feet.is_empty())];
             refuse(is_file, "a URDF file", &flags)
         }

@@ -2,7 +2,9 @@
 
 use std::path::PathBuf;
 
-use clap::builder::{BoolValueParser, PossibleValue, StringValueParser, TypedValueParser};
+use clap::builder::{
+    BoolValueParser, PossibleValue, PossibleValuesParser, StringValueParser, TypedValueParser,
+};
 use clap::{Args, ValueEnum as _};
 
 use super::train::Finite;
@@ -10,7 +12,7 @@ use crate::cli::output::quoted;
 use crate::files::Overwrite;
 use crate::limits::Range;
 use crate::recording::Clocks;
-use crate::robot::{Robot, WrenchFrame};
+use crate::robot::WrenchFrame;
 
 /// A whole number in a range.
 pub(super) fn count(range: &'static Range) -> impl Fn(&str) -> Result<usize, String> + Clone {
@@ -25,6 +27,19 @@ pub(super) fn real(range: &'static Range) -> impl Fn(&str) -> Result<f64, String
 /// As [`real`], as settings hold it.
 pub(super) fn finite(range: &'static Range) -> impl Fn(&str) -> Result<Finite, String> + Clone {
     |text| range.parse::<f64>(text)?.try_into()
+}
+
+/// One of a table of names, each with its help.
+pub(super) fn choice<T: Copy + Send + Sync>(
+    table: &'static [(&'static str, &'static str, T)],
+) -> impl TypedValueParser<Value = T> {
+    let names = table
+        .iter()
+        .map(|(name, help, _)| PossibleValue::new(*name).help(*help));
+    PossibleValuesParser::new(names).map(|found| {
+        let row = table.iter().find(|(name, ..)| *name == found);
+        row.expect("clap accepts names of the table alone").2
+    })
 }
 
 /// `--force`, as those who write files take it.
@@ -49,7 +64,7 @@ impl TypedValueParser for RobotParser {
     }
 
     fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
-        let names = Robot::known_names();
+        let names = crate::robot_file::known_names();
         Some(Box::new(names.into_iter().map(PossibleValue::new)))
     }
 }

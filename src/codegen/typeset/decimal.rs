@@ -27,7 +27,7 @@ pub struct Decimal {
 }
 
 /// Most digits that are ever printed of a fixed number of them.
-pub(crate) const MOST_DIGITS: usize = 40;
+const MOST_DIGITS: usize = 40;
 /// Fewest places after the point of [`Rounding::Adaptive`].
 pub(super) const LEAST_DECIMALS: usize = 2;
 /// Places after the point beyond which it turns to powers of ten.

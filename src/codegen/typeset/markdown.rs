@@ -27,7 +27,7 @@ pub fn emit(
 }
 
 #[derive(Template)]
-#[template(path = "markdown/page.askama", config = "../../templates/askama.toml")]
+#[template(path = "markdown/page.askama", config = "templates/askama.toml")]
 struct Document {
     page: Page,
 }

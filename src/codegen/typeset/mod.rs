@@ -22,8 +22,6 @@ pub(crate) mod tree;
 mod width;
 pub mod words;
 
-#[cfg(test)]
-pub(crate) use decimal::MOST_DIGITS;
 pub use decimal::{Decimal, Rounding};
 pub(crate) use equations::{CoefficientRow, CoefficientTable};
 pub use equations::{Equation, EquationSystem, Typeset};

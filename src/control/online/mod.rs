@@ -17,7 +17,7 @@ pub mod estimate;
 mod fallback;
 mod horizon;
 pub mod interface;
-pub(super) mod lift;
+mod lift;
 pub mod linearise;
 mod plan;
 pub mod problem;
@@ -32,20 +32,22 @@ mod swing;
 
 /// Numbers that the controller in C shares, which are no settings.
 pub mod shared {
-    pub use super::controller::SOFTENED_FROM;
-    pub use super::effectiveness::{LARGEST_WEIGHT, PRIOR_WEIGHT, RANGE as EFFECTIVENESS_RANGE};
-    pub use super::estimate::HALF_WINDOW_S;
-    pub use super::lift::{CURVATURE as LIFT_CURVATURE, LIFT_ITERATIONS, torque_deviation};
-    pub use super::plan::POSTURE_SHARE;
-    pub use super::problem::{SLACK_PRICE, STATE_REACH};
-    pub use super::reference::{DEVIATION_FLOOR, STILL_SHARE, STILL_TIME_S};
-    pub use super::structured::{GAP, RATE_SOFTNESS, RATE_TOLERANCE, TOLERANCE};
-    pub use super::swing::MOST_TURN_RAD;
+    pub use crate::online::controller::SOFTENED_FROM;
+    pub use crate::online::effectiveness::{
+        LARGEST_WEIGHT, PRIOR_WEIGHT, RANGE as EFFECTIVENESS_RANGE,
+    };
+    pub use crate::online::estimate::HALF_WINDOW_S;
+    pub use crate::online::lift::{CURVATURE as LIFT_CURVATURE, LIFT_ITERATIONS, torque_deviation};
+    pub use crate::online::plan::POSTURE_SHARE;
+    pub use crate::online::problem::{SLACK_PRICE, STATE_REACH};
+    pub use crate::online::reference::{DEVIATION_FLOOR, STILL_SHARE, STILL_TIME_S};
+    pub use crate::online::structured::{GAP, RATE_SOFTNESS, RATE_TOLERANCE, TOLERANCE};
+    pub use crate::online::swing::MOST_TURN_RAD;
 }
 
 /// The structured solver with the widest vectors that the processor has.
 pub mod widest {
-    pub use super::structured::{prepare, solve};
+    pub use crate::online::structured::{prepare, solve};
 }
 
 pub use command::{Command, Source, Status};

@@ -15,7 +15,7 @@
 //! use romc::robot::Robot;
 //!
 //! let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/recordings/go1/test_01.csv.gz");
-//! let found = identify(&[romc::recording::read(&path)?], Robot::by_name("go1")?)?;
+//! let found = identify(&[romc::recording::read(&path)?], romc::robot_file::by_name("go1")?)?;
 //! assert!((found.gravity_m_s2 - 9.81).abs() < 0.2);
 //! assert!((found.mass_kg - 12.74).abs() < 0.6);
 //! # Ok::<(), Box<dyn std::error::Error>>(())

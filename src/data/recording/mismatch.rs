@@ -20,7 +20,7 @@ use super::check::{check, outside};
 use super::preprocess::{differences, median};
 use super::segment::Recording;
 use crate::robot::{GRAVITY_M_S2, JOINT_DIM, Leg, Robot, STATE_DIM};
-pub(crate) use balance::Balance;
+pub use balance::Balance;
 pub(super) use balance::hip_torque;
 use stance::{Slip, best_other_place, best_other_reading};
 pub(super) use stance::{foot_place, median_place, stances};
@@ -378,8 +378,8 @@ fn other_robot(
     if own <= OTHER_WEIGHT.0 {
         return None;
     }
-    let others = Robot::known_names().into_iter();
-    let others = others.filter_map(|name| Robot::by_name(name).ok());
+    let others = crate::robot_file::known_names().into_iter();
+    let others = others.filter_map(|name| crate::robot_file::by_name(name).ok());
     let explains = others.filter_map(|other| {
         let share = Balance::of(recording, other).weight_share?;
         let fits = share > 0.0 && share.ln().abs() < OTHER_WEIGHT.1;

@@ -20,7 +20,7 @@
 //! # recording::write(&path, &hop.into())?;
 //! let jump = recording::read(&path)?;
 //! let segment = &jump.segments[0];
-//! let rule = InputRule::published(Robot::by_name("go1")?);
+//! let rule = InputRule::published(romc::robot_file::by_name("go1")?);
 //! let u = segment.input(&rule)?; // 18 x samples: [tau; F; M]
 //! assert_eq!(u.shape(), (18, segment.len()));
 //! let spans = PhaseRule::two_phase().spans(segment)?;
@@ -59,10 +59,3 @@ pub use foreign::ColumnMap;
 pub use phases::{PhaseRule, PhaseSpan, Stance};
 pub use reader::{Clocks, Reader, Reading, ReadingNotes};
 pub use segment::{Recording, Segment, stretches};
-
-/// A recording below `examples/recordings`, such as `go1/test_01`.
-#[cfg(test)]
-pub(crate) fn shipped(name: &str) -> Recording {
-    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/recordings");
-    read(format!("{folder}/{name}.csv.gz").as_ref()).expect("a shipped recording")
-}

@@ -14,7 +14,7 @@ use super::segment::{Segment, stretches};
 use crate::robot::{ContactFlags, FeetRule};
 
 /// Fewest samples of a span: fewer are chatter of contact and join the span before them.
-pub(crate) const CHATTER_SAMPLES: usize = 5;
+pub const CHATTER_SAMPLES: usize = 5;
 
 /// A phase and its feet.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -100,7 +100,7 @@ impl PhaseRule {
     }
 
     /// Index of the first pattern that matches, if any does.
-    pub(crate) fn phase_of(&self, feet: ContactFlags) -> Option<usize> {
+    pub fn phase_of(&self, feet: ContactFlags) -> Option<usize> {
         self.patterns.iter().position(|p| p.feet.matches(feet))
     }
 

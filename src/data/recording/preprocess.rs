@@ -12,7 +12,7 @@ use super::phases::{PhaseRule, PhaseSpan};
 use super::segment::{Recording, Segment};
 
 /// Samples of a batch: every phase of a jump is resampled to a multiple (section IV-C4).
-pub(crate) const BATCH_ROWS: usize = 100;
+pub const BATCH_ROWS: usize = 100;
 
 /// The phases of every segment of a recording, each with its samples resampled to a multiple of 100.
 ///

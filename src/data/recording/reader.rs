@@ -84,7 +84,7 @@ impl Reader {
             Some(map) if is_mcap(path) => assemble(path, &read_mcap(path)?, map)?,
             Some(map) => assemble(path, &read_texts(path, map)?, map)?,
             None if is_mcap(path) => {
-                let go1 = || Robot::by_name("go1").expect("a known robot");
+                let go1 = || crate::robot_file::by_name("go1").expect("a known robot");
                 by_guess(path, self.robot.unwrap_or_else(go1))?
             }
             None if path.is_dir() => {

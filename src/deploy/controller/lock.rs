@@ -45,7 +45,7 @@ fn package(spelled: &str) -> &'static Package {
 
 /// A direct dependency of the crate with the controller, as its own entry spells it.
 fn direct(name: &str) -> &'static str {
-    let mut dependencies = package("romc-motion").dependencies.iter();
+    let mut dependencies = package("romc-control").dependencies.iter();
     let found = dependencies.find(|spelled| spelled.split(' ').next() == Some(name));
     found.expect("the controller depends on it")
 }

@@ -137,7 +137,7 @@ pub fn emit(
 /// [`EmitError::Nonlinear`] and [`EmitError::Control`].
 pub(super) fn plant(model: &ReducedModel) -> Result<ControlModel, EmitError> {
     match model.is_linear() {
-        true => Ok(ControlModel::new(model)?),
+        true => Ok(crate::mpc::control_model(model)?),
         false => Err(EmitError::Nonlinear {
             model: model.name().to_owned(),
         }),

@@ -11,7 +11,7 @@ use crate::codegen::Precision;
 use crate::deploy::EmitError;
 use crate::model::ReducedModel;
 use crate::mpc::{
-    Command, Controller, Lift, Linearisation, Measurement, MissingInput, MpcError, MpcSettings,
+    Command, Lift, Linearisation, Measurement, MissingInput, MpcError, MpcSettings,
     ReferenceSamples, Solver,
 };
 use crate::robot::{InputRule, JOINT_DIM, STATE_DIM};
@@ -119,7 +119,7 @@ fn commands(
     settings: MpcSettings,
     torques: Torques,
 ) -> Result<Vec<Command>, EmitError> {
-    let mut controller = Controller::new(model, settings)?;
+    let mut controller = crate::mpc::controller(model, settings)?;
     let u = inputs(controller.plant().input_rule(), jump)?;
     let reference = ReferenceSamples {
         time_s: &jump.time_s,

@@ -12,7 +12,7 @@
 //! let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
 //! let model = romc::artifact::read(&root.join("models/go1-d4.json"))?;
 //! let jump = romc::recording::read(&root.join("examples/recordings/go1/test_01.csv.gz"))?;
-//! let mut controller = Controller::new(&model, MpcSettings::default())?;
+//! let mut controller = romc::mpc::controller(&model, MpcSettings::default())?;
 //! let run = along_recording(&mut controller, &jump, ReferenceInput::Recorded, |_, _| {})?;
 //! assert_eq!(run.summary.limit_violations, 0);
 //! assert!(run.summary.torque_r2.contact > Some(0.85));

@@ -84,8 +84,8 @@ pub fn control_metrics(
     let stages = recorded_stages(model, recording, settings.step_s)?;
     let predicted = |dynamics: Option<&ReducedModel>| prediction_error(model, dynamics, &stages);
     let blind = uninformed(model, &stages)?;
-    let mut controller = Controller::new(model, settings)?;
-    let mut blind_controller = Controller::new(&blind, settings)?;
+    let mut controller = crate::mpc::controller(model, settings)?;
+    let mut blind_controller = crate::mpc::controller(&blind, settings)?;
     let own_input = |controller: &mut Controller| {
         along_recording(controller, recording, ReferenceInput::None, |_, _| {})
     };

@@ -52,3 +52,10 @@ pub(crate) fn shipped_model(name: &str) -> crate::model::ReducedModel {
     let path = format!("{}/../../models/{name}.json", env!("CARGO_MANIFEST_DIR"));
     crate::artifact::read(path.as_ref()).expect("a shipped model")
 }
+
+/// A recording below `examples/recordings`, such as `go1/test_01`.
+#[cfg(test)]
+pub(crate) fn shipped(name: &str) -> crate::recording::Recording {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/recordings");
+    crate::recording::read(format!("{folder}/{name}.csv.gz").as_ref()).expect("a shipped recording")
+}

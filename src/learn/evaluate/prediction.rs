@@ -181,12 +181,12 @@ fn error_covariance(samples: &[(DVector<f64>, &DVector<f64>)], gain: f64) -> DMa
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{evaluate::shipped_model, recording};
+    use crate::evaluate::shipped_model;
 
     #[test]
     fn pitch_without_a_latent_coordinate_does_not_make_right_predictions_fail() {
         let model = shipped_model("go1-d6");
-        let jump = recording::shipped("go1-other/jump_04");
+        let jump = crate::evaluate::shipped("go1-other/jump_04");
         let stages = recorded_stages(&model, &jump, 0.01).expect("of its robot");
         let error = |dynamics| {
             let error = prediction_error(&model, dynamics, &stages);

@@ -206,14 +206,15 @@ impl Deviation {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::evaluate::shipped_model;
     use crate::mpc::MpcSettings;
-    use crate::{evaluate::shipped_model, recording};
 
     #[test]
     fn replay_moves_on_at_the_speed_of_the_push_and_feedback_does_not() {
         let model = shipped_model("go1-d6");
-        let jump = recording::shipped("go1/test_01");
-        let mut controller = Controller::new(&model, MpcSettings::default()).expect("complete");
+        let jump = crate::evaluate::shipped("go1/test_01");
+        let mut controller =
+            crate::mpc::controller(&model, MpcSettings::default()).expect("complete");
         // after k of 100 samples of 2 ms the body is 0.1 m/s k 2 ms away, whatever the control step
         let mean_square = (1..=100).map(|k| f64::from(k * k)).sum::<f64>() / 100.0;
         for step_s in [0.002, 0.02] {
@@ -221,7 +222,7 @@ mod tests {
                 step_s,
                 ..MpcSettings::default()
             };
-            let mut controller = Controller::new(&model, settings).expect("complete");
+            let mut controller = crate::mpc::controller(&model, settings).expect("complete");
             let replay = recovery(&mut controller, &jump, Driver::Replay).expect("a sound jump");
             let replay = replay.rms_m().expect("the robot stands");
             let expected = 0.1 * 0.002 * mean_square.sqrt();

@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
-use super::online::ControlError;
 use crate::lower::LowerError;
 use crate::model::ModelError;
+use crate::online::ControlError;
 use crate::recording::RecordingError;
 
 /// Why a controller could not be built or given a reference.

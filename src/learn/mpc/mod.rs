@@ -4,7 +4,7 @@
 //! statistics; a reference trajectory; measurements. Out: a [`Command`] a control step, whose torques
 //! are within the robot's limits whatever happened, and a [`Status`] that says what did.
 //!
-//! `of_model` takes from the model what the controller needs; `online` is the controller itself,
+//! `of_model` takes from the model what the controller needs; `romc_control::online` is the controller itself,
 //! the folder that is emitted for a robot. Read `online/problem` first, which states the optimal
 //! control problem. From there one torque is made by `reference` (the trajectory, encoded), `horizon` (phases and
 //! linearised dynamics, with `linearise`), `stage` (one stage, scaled), the solvers behind `engine` (`conic` and `qp`
@@ -15,8 +15,8 @@
 mod error;
 mod named;
 mod of_model;
-mod online;
 
+pub use crate::online::*;
 pub use error::MpcError;
-pub use of_model::STEP_SLACK;
-pub use online::*;
+pub use named::{LIFTS, SOLVERS};
+pub use of_model::{STEP_SLACK, control_model, controller};

@@ -7,12 +7,12 @@ use std::sync::Arc;
 use nalgebra::{Cholesky, DMatrix, DVector, SMatrix, SVector};
 
 use super::error::MpcError;
-use super::online::{
+use crate::lower::CompiledModel;
+use crate::model::ReducedModel;
+use crate::online::{
     ControlModel, ControlModelParts, ControlPhase, Controller, InputGivenState, LatentDynamics,
     MpcSettings, NonlinearMaps,
 };
-use crate::lower::CompiledModel;
-use crate::model::ReducedModel;
 use crate::robot::{ContactFlags, JOINT_DIM, STATE_DIM};
 
 /// Share of the time between a recording's samples below which the controller's step is too short for it: a step may be
@@ -23,7 +23,11 @@ pub const STEP_SLACK: f64 = 0.99;
 /// training inputs never moved has a finite weight.
 const VARIANCE_FLOOR: f64 = 1e-6;
 
-impl LatentDynamics for CompiledModel {
+/// The accelerations of a model's phases, run by the interpreter.
+#[derive(Debug)]
+struct ModelDynamics(CompiledModel);
+
+impl LatentDynamics for ModelDynamics {
     fn jacobian(
         &mut self,
         phase: usize,
@@ -33,62 +37,58 @@ impl LatentDynamics for CompiledModel {
         ddz: &mut [f64],
         jacobian: &mut DMatrix<f64>,
     ) {
-        CompiledModel::jacobian(self, phase, z, dz, u_lat, ddz, jacobian);
+        self.0.jacobian(phase, z, dz, u_lat, ddz, jacobian);
     }
 }
 
-impl Controller {
-    /// A controller of a model.
-    ///
-    /// # Errors
-    /// [`MpcError::Control`] for settings out of range or a problem that the solver refuses, those
-    /// of [`ControlModel::new`] if the model lacks something and [`MpcError::Lower`] if its dynamics do
-    /// not compile.
-    pub fn new(model: &ReducedModel, settings: MpcSettings) -> Result<Self, MpcError> {
-        let plant = ControlModel::new(model)?;
-        let dynamics = Box::new(CompiledModel::new(model)?);
-        Ok(Self::with_plant(plant, dynamics, settings)?)
-    }
+/// A controller of a model.
+///
+/// # Errors
+/// [`MpcError::Control`] for settings out of range or a problem that the solver refuses, those
+/// of [`control_model`] if the model lacks something and [`MpcError::Lower`] if its dynamics do
+/// not compile.
+pub fn controller(model: &ReducedModel, settings: MpcSettings) -> Result<Controller, MpcError> {
+    let plant = control_model(model)?;
+    let dynamics = Box::new(ModelDynamics(CompiledModel::new(model)?));
+    Ok(Controller::with_plant(plant, dynamics, settings)?)
 }
 
-impl ControlModel {
-    /// Reads off a model what the controller needs.
-    ///
-    /// Of a nonlinear model the matrices are those at the state that the decoder gives for `z = 0`,
-    /// and the statistics of the inputs are projected there, until a reference comes.
-    ///
-    /// # Errors
-    /// [`MpcError::Model`] if the model has no encoder, decoder, scaling, robot or input
-    /// statistics, [`MpcError::StateDim`] if it is not over the robot's 18 coordinates, and
-    /// [`MpcError::Statistics`] if a covariance cannot be factorised.
-    pub fn new(model: &ReducedModel) -> Result<Self, MpcError> {
-        if !model.is_linear() {
-            let stand = model.decode(&DVector::zeros(model.latent_dim()))?;
-            let base = Self::new(&model.linearised_at(&stand)?)?;
-            return Ok(base.with_nonlinear(Arc::new(ModelMaps(model.clone()))));
-        }
-        let input_rule = model.input_rule()?;
-        let (encoder, decoder) = (model.encoder()?, model.decoder()?);
-        if encoder.input_dim() != STATE_DIM {
-            return Err(MpcError::StateDim {
-                found: encoder.input_dim(),
-                expected: STATE_DIM,
-            });
-        }
-        let tangent = model.tangent(&DVector::zeros(STATE_DIM))?;
-        let state_factors = model.state_factors()?;
-        Ok(Self::from_parts(ControlModelParts {
-            input_rule,
-            encoder_bias: encoder.bias().clone(),
-            decoder: model.decoder_jacobian(&DVector::zeros(model.latent_dim()))?,
-            decoder_bias: decoder.bias().component_div(&state_factors),
-            phases: phases_under(model, &tangent.project)?,
-            encoder: tangent.encode,
-            lift: tangent.lift,
-            projection: tangent.project,
-            phase_of_feet: std::array::from_fn(|bits| model.phase_for(pattern(bits))),
-        })?)
+/// Reads off a model what the controller needs.
+///
+/// Of a nonlinear model the matrices are those at the state that the decoder gives for `z = 0`,
+/// and the statistics of the inputs are projected there, until a reference comes.
+///
+/// # Errors
+/// [`MpcError::Model`] if the model has no encoder, decoder, scaling, robot or input
+/// statistics, [`MpcError::StateDim`] if it is not over the robot's 18 coordinates, and
+/// [`MpcError::Statistics`] if a covariance cannot be factorised.
+pub fn control_model(model: &ReducedModel) -> Result<ControlModel, MpcError> {
+    if !model.is_linear() {
+        let stand = model.decode(&DVector::zeros(model.latent_dim()))?;
+        let base = control_model(&model.linearised_at(&stand)?)?;
+        return Ok(base.with_nonlinear(Arc::new(ModelMaps(model.clone()))));
     }
+    let input_rule = model.input_rule()?;
+    let (encoder, decoder) = (model.encoder()?, model.decoder()?);
+    if encoder.input_dim() != STATE_DIM {
+        return Err(MpcError::StateDim {
+            found: encoder.input_dim(),
+            expected: STATE_DIM,
+        });
+    }
+    let tangent = model.tangent(&DVector::zeros(STATE_DIM))?;
+    let state_factors = model.state_factors()?;
+    Ok(ControlModel::from_parts(ControlModelParts {
+        input_rule,
+        encoder_bias: encoder.bias().clone(),
+        decoder: model.decoder_jacobian(&DVector::zeros(model.latent_dim()))?,
+        decoder_bias: decoder.bias().component_div(&state_factors),
+        phases: phases_under(model, &tangent.project)?,
+        encoder: tangent.encode,
+        lift: tangent.lift,
+        projection: tangent.project,
+        phase_of_feet: std::array::from_fn(|bits| model.phase_for(pattern(bits))),
+    })?)
 }
 
 /// The nonlinear maps of a model over the robot's coordinates with full maps: checked when the

@@ -174,7 +174,7 @@ mod tests {
     use crate::train::oscillator::go1;
 
     fn robot() -> &'static Robot {
-        Robot::by_name("go1").expect("a known robot")
+        crate::robot_file::by_name("go1").expect("a known robot")
     }
 
     /// Mean and standard deviation of the acceleration along a row over the windows in flight, m/s^2.

@@ -17,9 +17,10 @@ use super::latent::{EncodedSet, Latent};
 use super::options::TrainOptions;
 use super::progress::{Monitor, Progress};
 use super::refine::Refiner;
+use crate::evaluate::shipped;
 use crate::model::{AffineMap, Library, StandardLibrary};
-use crate::recording::{PhaseRule, shipped};
-use crate::robot::{InputRule, Robot, STATE_DIM, WrenchFrame};
+use crate::recording::PhaseRule;
+use crate::robot::{InputRule, STATE_DIM, WrenchFrame};
 
 /// Samples between contact and flight.
 const LIFT_OFF: usize = 120;
@@ -40,7 +41,7 @@ pub(super) fn go1(names: impl IntoIterator<Item = impl Display>) -> Dataset {
     let names = names.into_iter().map(|name| format!("go1/{name}"));
     let jumps: Vec<_> = names.map(|name| shipped(&name)).collect();
     let options = TrainOptions::new("test", 4);
-    let rule = InputRule::published(Robot::by_name("go1").expect("known"));
+    let rule = InputRule::published(crate::robot_file::by_name("go1").expect("known"));
     let scaling = options.scaling.factors();
     Dataset::new(&jumps[..], &rule, &options.phases, &scaling, 11).expect("jumps")
 }
@@ -89,7 +90,7 @@ pub(super) fn jumps(n_jumps: usize) -> (Dataset, Vec<Latent>) {
             implausible: Vec::new(),
         }
     });
-    let robot = Robot::by_name("go1").expect("known");
+    let robot = crate::robot_file::by_name("go1").expect("known");
     let dataset = Dataset {
         jumps: jumps.collect(),
         phases: PhaseRule::two_phase(),

@@ -51,7 +51,7 @@ pub(super) fn manifest_of(model: &ReducedModel) -> Manifest {
 }
 
 fn robot_value(robot: &Robot) -> RobotValue {
-    match Robot::by_name(robot.name()) {
+    match crate::robot_file::by_name(robot.name()) {
         Ok(_) => RobotValue::Name(robot.name().to_owned()),
         Err(_) => RobotValue::Entry(RobotEntry::of(robot)),
     }

@@ -17,7 +17,7 @@ use super::read::ArtifactError;
 use crate::model::{
     Activation, CoordinateNames, FeetRule, LibraryChoice, ScaleFactors, Scaling, StandardLibrary,
 };
-use crate::robot::{Actuators, JOINT_DIM, WrenchFrame};
+use crate::robot::{Actuators, WrenchFrame};
 use crate::robot_file::RobotEntry;
 
 /// Name and version of the format of a model without the keys of [`SCHEMA_2`].
@@ -286,99 +286,6 @@ impl<'de> Deserialize<'de> for LibraryChoice {
             }
         }
         deserializer.deserialize_any(Terms)
-    }
-}
-
-/// `"any"`, `"none"`, or a list of patterns of four flags (0 or 1) in the order fr, fl, rr, rl.
-impl Serialize for FeetRule {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        match self {
-            FeetRule::Any => "any".serialize(serializer),
-            FeetRule::None => "none".serialize(serializer),
-            FeetRule::Patterns(patterns) => {
-                serializer.collect_seq(patterns.iter().map(|feet| feet.map(u8::from)))
-            }
-        }
-    }
-}
-
-impl<'de> Deserialize<'de> for FeetRule {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Feet;
-        impl<'de> Visitor<'de> for Feet {
-            type Value = FeetRule;
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("\"any\", \"none\" or a list of patterns such as [1, 1, 0, 0]")
-            }
-            fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<FeetRule, E> {
-                match text {
-                    "any" => Ok(FeetRule::Any),
-                    "none" => Ok(FeetRule::None),
-                    _ => Err(E::invalid_value(serde::de::Unexpected::Str(text), &self)),
-                }
-            }
-            fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<FeetRule, A::Error> {
-                let rows: Vec<[Flag; 4]> = Vec::deserialize(SeqAccessDeserializer::new(seq))?;
-                let patterns = rows.into_iter().map(|row| row.map(|flag| flag.0));
-                Ok(FeetRule::Patterns(patterns.collect()))
-            }
-        }
-        deserializer.deserialize_any(Feet)
-    }
-}
-
-/// Three arrays of twelve numbers, as [`Actuators`] has them.
-#[derive(Serialize, Deserialize)]
-#[serde(remote = "Actuators", deny_unknown_fields)]
-struct ActuatorsEntry {
-    viscous: [f64; JOINT_DIM],
-    dry: [f64; JOINT_DIM],
-    armature: [f64; JOINT_DIM],
-}
-
-impl Serialize for Actuators {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        ActuatorsEntry::serialize(self, serializer)
-    }
-}
-
-impl<'de> Deserialize<'de> for Actuators {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        ActuatorsEntry::deserialize(deserializer)
-    }
-}
-
-/// `"body"` or `"world"`.
-impl Serialize for WrenchFrame {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        self.name().serialize(serializer)
-    }
-}
-
-impl<'de> Deserialize<'de> for WrenchFrame {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let name = String::deserialize(deserializer)?;
-        let unknown = || {
-            let found = serde::de::Unexpected::Str(&name);
-            D::Error::invalid_value(found, &"\"body\" or \"world\"")
-        };
-        WrenchFrame::by_name(&name).ok_or_else(unknown)
-    }
-}
-
-/// 0 or 1, as recordings write the contact of a foot.
-struct Flag(bool);
-
-impl<'de> Deserialize<'de> for Flag {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        match u8::deserialize(deserializer)? {
-            0 => Ok(Flag(false)),
-            1 => Ok(Flag(true)),
-            other => Err(D::Error::invalid_value(
-                serde::de::Unexpected::Unsigned(other.into()),
-                &"0 or 1",
-            )),
-        }
     }
 }
 

@@ -19,7 +19,7 @@ use crate::model::{
     Activation, AffineMap, InputGivenState, InputStatistics, Layer, Library, ModelError, Phase,
     ReducedModel, StateMap,
 };
-use crate::robot::{Robot, STATE_DIM};
+use crate::robot::STATE_DIM;
 
 /// A fault and its place in a model file.
 pub type ArtifactError = Located<Fault<ModelError>>;
@@ -153,9 +153,8 @@ fn to_model(file: &str, manifest: Manifest) -> Result<ReducedModel, ArtifactErro
         .description(manifest.description)
         .provenance(manifest.provenance);
     let robot = manifest.robot.map(|robot| match robot {
-        RobotValue::Name(name) => {
-            Robot::by_name(&name).map_err(|source| ArtifactError::unusable(file, source))
-        }
+        RobotValue::Name(name) => crate::robot_file::by_name(&name)
+            .map_err(|source| ArtifactError::unusable(file, source)),
         RobotValue::Entry(entry) => {
             let robot = entry.robot("robot");
             robot.map_err(|error| ArtifactError::text(file, Place::Whole, error.to_string()))

@@ -86,8 +86,6 @@ mod tests {
     #[test]
     fn ranges_are_those_that_the_rooms_keep_themselves() {
         assert_eq!(LATENT_DIM.most as usize, crate::robot::STATE_DIM);
-        assert_eq!(DIGITS.most as usize, crate::typeset::MOST_DIGITS);
-        assert_eq!(SIGNIFICANT.most as usize, crate::typeset::MOST_DIGITS);
         assert_eq!(LAYER_WIDTH.most as usize, crate::model::MAX_LAYER_WIDTH);
     }
 }

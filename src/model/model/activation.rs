@@ -34,9 +34,9 @@ pub enum Activation {
 }
 
 /// sqrt(2/pi), of [`Activation::GeluTanh`].
-pub(crate) const GELU_RATE: f64 = 0.797_884_560_802_865_4;
+pub const GELU_RATE: f64 = 0.797_884_560_802_865_4;
 /// Of [`Activation::GeluTanh`].
-pub(crate) const GELU_CUBIC: f64 = 0.044_715;
+pub const GELU_CUBIC: f64 = 0.044_715;
 
 impl Activation {
     /// All activations, in the order in which they are listed.
@@ -74,7 +74,7 @@ impl Activation {
     }
 
     /// `phi'(a)`.
-    pub(crate) fn slope(self, a: f64) -> f64 {
+    pub fn slope(self, a: f64) -> f64 {
         self.derivative(a, 1)
     }
 
@@ -212,7 +212,7 @@ impl FromStr for Activation {
 }
 
 /// Chebyshev coefficients of `q`: those of its interpolation at 22 nodes.
-pub(crate) const TAIL: [f64; 22] = [
+pub const TAIL: [f64; 22] = [
     0.577_033_738_616_469_7,
     0.355_436_921_270_498_5,
     0.065_095_158_828_786_53,
@@ -238,7 +238,7 @@ pub(crate) const TAIL: [f64; 22] = [
 ];
 
 /// `1/sqrt(2 pi)`.
-pub(crate) const DENSITY_AT_ZERO: f64 = 0.398_942_280_401_432_7;
+pub const DENSITY_AT_ZERO: f64 = 0.398_942_280_401_432_7;
 
 /// Probability that a normal number is below `a`.
 ///

@@ -16,7 +16,7 @@ pub const MAX_LATENT_DIM: usize = 64;
 /// Largest number of candidate terms.
 pub(crate) const MAX_LIBRARY_DIM: usize = 20_000;
 /// Longest candidate term in bytes.
-pub(crate) const MAX_TERM_LEN: usize = 1_000;
+pub const MAX_TERM_LEN: usize = 1_000;
 
 /// A variable of candidate terms; indices count from 0, names in files from 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -91,7 +91,7 @@ pub struct CandidateTerm {
 
 impl CandidateTerm {
     /// A term of a pool with its text in the syntax of the model file.
-    pub(crate) fn new(text: String, expr: ExprId) -> Self {
+    pub fn new(text: String, expr: ExprId) -> Self {
         Self { text, expr }
     }
 

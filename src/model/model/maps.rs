@@ -62,7 +62,7 @@ impl ReducedModel {
     }
 
     /// `pinv(W_e^T)` of a linear model, `latent_dim x state_dim`, in scaled units.
-    pub(crate) fn input_projection(&self) -> Result<&DMatrix<f64>, ModelError> {
+    pub fn input_projection(&self) -> Result<&DMatrix<f64>, ModelError> {
         self.encoder()?;
         let projection = self.input_projection.as_ref();
         self.require(projection, "encoder", "projecting inputs")

@@ -49,8 +49,7 @@ mod state_map;
 mod statistics;
 
 pub use crate::robot::FeetRule;
-pub use activation::Activation;
-pub(crate) use activation::{DENSITY_AT_ZERO, GELU_CUBIC, GELU_RATE, TAIL};
+pub use activation::{Activation, DENSITY_AT_ZERO, GELU_CUBIC, GELU_RATE, TAIL};
 pub use builder::ModelBuilder;
 pub use coordinates::{CoordinateNames, ScaleFactors, Scaling};
 pub use error::ModelError;
@@ -58,8 +57,9 @@ pub use evaluation::{Step, Tape};
 pub use given_state::InputGivenState;
 pub use identifier::{Identifier, IdentifierError, check_name};
 pub use jump_prior::{FEATURE_DIM, GOAL_DIM, GoalFeatures, GoalRange, JumpPart, JumpPrior};
-pub(crate) use library::MAX_TERM_LEN;
-pub use library::{CandidateTerm, LatentVariable, Library, LibraryChoice, MAX_LATENT_DIM};
+pub use library::{
+    CandidateTerm, LatentVariable, Library, LibraryChoice, MAX_LATENT_DIM, MAX_TERM_LEN,
+};
 pub use maps::{Tangent, complement};
 pub use order::CoordinateOrder;
 pub use rom::{Phase, ReducedModel};

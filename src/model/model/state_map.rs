@@ -57,7 +57,8 @@ impl AffineMap {
         self.weights.ncols()
     }
 
-    pub(crate) fn output_dim(&self) -> usize {
+    /// Number of rows of the output.
+    pub fn output_dim(&self) -> usize {
         self.weights.nrows()
     }
 

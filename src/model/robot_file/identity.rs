@@ -32,7 +32,7 @@ pub struct RobotReading {
 
 /// How a robot that has the name of one of romc's own differs from it; nothing, if it does not.
 pub(super) fn namesake(robot: &Robot) -> Option<String> {
-    let known = Robot::by_name(robot.name()).ok()?;
+    let known = super::by_name(robot.name()).ok()?;
     (known != robot).then(|| differences(robot, known))
 }
 

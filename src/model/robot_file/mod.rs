@@ -33,3 +33,4 @@ pub use actuators::{ActuatorsEntry, read_actuators};
 pub use entry::{RobotEntry, to_toml};
 pub use identity::RobotReading;
 pub use read::{RobotFileError, RobotOptions, find, from_text, open};
+pub use registry::{by_name, known_names};

@@ -42,7 +42,10 @@ pub fn open(
     options: &RobotOptions<'_>,
 ) -> Result<RobotReading, RobotFileError> {
     let path = Path::new(name_or_file);
-    match (Robot::by_name(name_or_file), ending(path).as_str()) {
+    match (
+        crate::robot_file::by_name(name_or_file),
+        ending(path).as_str(),
+    ) {
         (Ok(robot), _) if options.feet.is_empty() && options.name.is_none() => Ok(RobotReading {
             robot,
             notes: Vec::new(),

@@ -15,30 +15,28 @@ const KNOWN: [(&str, &str); 3] = [
     ("a1", include_str!("known/a1.toml")),
 ];
 
-impl Robot {
-    /// The robot of romc's own that is named so, such as `go1`.
-    ///
-    /// # Errors
-    /// [`RobotError::UnknownRobot`], which lists the known names.
-    pub fn by_name(name: &str) -> Result<&'static Robot, RobotError> {
-        static ROBOTS: [OnceLock<&Robot>; KNOWN.len()] = [const { OnceLock::new() }; KNOWN.len()];
-        let known = KNOWN.iter().position(|(known, _)| *known == name);
-        let at = known.ok_or_else(|| RobotError::UnknownRobot {
-            found: name.to_owned(),
-            known: Self::known_names().join(", "),
-        })?;
-        Ok(ROBOTS[at].get_or_init(|| {
-            let (file, text) = KNOWN[at];
-            let entry = read::from_toml_text::<RobotEntry>(file, text);
-            let robot = entry.and_then(|entry| legs::build(file, &entry, &Places::Keys));
-            keep(robot.expect("a file of romc's own, read by a test"))
-        }))
-    }
+/// The robot of romc's own that is named so, such as `go1`.
+///
+/// # Errors
+/// [`RobotError::UnknownRobot`], which lists the known names.
+pub fn by_name(name: &str) -> Result<&'static Robot, RobotError> {
+    static ROBOTS: [OnceLock<&Robot>; KNOWN.len()] = [const { OnceLock::new() }; KNOWN.len()];
+    let known = KNOWN.iter().position(|(known, _)| *known == name);
+    let at = known.ok_or_else(|| RobotError::UnknownRobot {
+        found: name.to_owned(),
+        known: known_names().join(", "),
+    })?;
+    Ok(ROBOTS[at].get_or_init(|| {
+        let (file, text) = KNOWN[at];
+        let entry = read::from_toml_text::<RobotEntry>(file, text);
+        let robot = entry.and_then(|entry| legs::build(file, &entry, &Places::Keys));
+        keep(robot.expect("a file of romc's own, read by a test"))
+    }))
+}
 
-    /// Names that [`Robot::by_name`] accepts.
-    pub fn known_names() -> Vec<&'static str> {
-        KNOWN.iter().map(|(name, _)| *name).collect()
-    }
+/// Names that [`by_name`] accepts.
+pub fn known_names() -> Vec<&'static str> {
+    KNOWN.iter().map(|(name, _)| *name).collect()
 }
 
 /// The one robot that is equal to this one: robots live as long as the process, each once.

@@ -208,7 +208,7 @@ mod tests {
     }
 
     fn go1() -> &'static Robot {
-        Robot::by_name("go1").unwrap()
+        crate::robot_file::by_name("go1").unwrap()
     }
 
     #[test]

@@ -129,7 +129,7 @@ const SOLVER: [&str; 9] = [
 /// [`Fault`] for the first construct that is outside the subset, or a source that cannot be read.
 pub fn solver(root: &Path) -> Result<[(&'static str, String); 2], Fault> {
     let read = |name: &&str| {
-        let path = format!("src/motion/solver/{name}");
+        let path = format!("src/control/solver/{name}");
         let text = fs::read_to_string(root.join(&path)).map_err(|error| Fault {
             path: path.clone(),
             line: 0,
@@ -159,7 +159,7 @@ pub fn solver_of(sources: &[Source]) -> Result<[(&'static str, String); 2], Faul
     let Translated { header, source } = translate(sources, &unit)?;
     let head = |what: &str| {
         format!(
-            "/* @generated from src/motion/solver by `cargo run -p romc-translate`: {what} Names that are defined\n \
+            "/* @generated from src/control/solver by `cargo run -p romc-translate`: {what} Names that are defined\n \
              * elsewhere: real, the type of numbers; NX and NU, how many states and inputs there are. */\n\n"
         )
     };

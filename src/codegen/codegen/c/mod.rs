@@ -22,7 +22,7 @@ use dialect::CDialect;
 type Text<'a> = ModelText<'a, (String, String)>;
 
 #[derive(Template)]
-#[template(path = "c/header.askama", config = "../../templates/askama.toml")]
+#[template(path = "c/header.askama", config = "templates/askama.toml")]
 struct Header<'a> {
     banner: &'a str,
     d: &'a CDialect,
@@ -30,7 +30,7 @@ struct Header<'a> {
 }
 
 #[derive(Template)]
-#[template(path = "c/source.askama", config = "../../templates/askama.toml")]
+#[template(path = "c/source.askama", config = "templates/askama.toml")]
 struct Source<'a> {
     banner: &'a str,
     d: &'a CDialect,
@@ -43,7 +43,7 @@ struct Source<'a> {
 }
 
 #[derive(Template)]
-#[template(path = "c/cmake.askama", config = "../../templates/askama.toml")]
+#[template(path = "c/cmake.askama", config = "templates/askama.toml")]
 struct CMake<'a> {
     banner: String,
     name: &'a str,
@@ -125,7 +125,7 @@ fn batch_prototype(dialect: &CDialect, phase: &str) -> String {
 }
 
 #[derive(Template)]
-#[template(path = "c/selftest.askama", config = "../../templates/askama.toml")]
+#[template(path = "c/selftest.askama", config = "templates/askama.toml")]
 struct SelfTest<'a> {
     banner: &'a str,
     d: &'a CDialect,

@@ -18,14 +18,14 @@ use crate::files::EmittedFile;
 use dialect::RustDialect;
 
 #[derive(Template)]
-#[template(path = "rust/cargo.askama", config = "../../templates/askama.toml")]
+#[template(path = "rust/cargo.askama", config = "templates/askama.toml")]
 struct Cargo<'a> {
     banner: String,
     name: &'a str,
 }
 
 #[derive(Template)]
-#[template(path = "rust/lib.askama", config = "../../templates/askama.toml")]
+#[template(path = "rust/lib.askama", config = "templates/askama.toml")]
 struct Lib<'a> {
     banner: &'a str,
     d: RustDialect,
@@ -81,7 +81,7 @@ fn numbers(values: &[usize]) -> String {
 }
 
 #[derive(Template)]
-#[template(path = "rust/selftest.askama", config = "../../templates/askama.toml")]
+#[template(path = "rust/selftest.askama", config = "templates/askama.toml")]
 struct SelfTest<'a> {
     banner: &'a str,
     name: &'a str,

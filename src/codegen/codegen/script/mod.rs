@@ -252,14 +252,14 @@ fn from_one(index: &Index) -> String {
 }
 
 #[derive(Template)]
-#[template(path = "script/numpy.askama", config = "../../templates/askama.toml")]
+#[template(path = "script/numpy.askama", config = "templates/askama.toml")]
 struct NumPyModule<'a> {
     banner: String,
     m: ModelText<'a, FunctionText>,
 }
 
 #[derive(Template)]
-#[template(path = "script/casadi.askama", config = "../../templates/askama.toml")]
+#[template(path = "script/casadi.askama", config = "templates/askama.toml")]
 struct CasadiModule<'a> {
     banner: String,
     module: String,
@@ -267,7 +267,7 @@ struct CasadiModule<'a> {
 }
 
 #[derive(Template)]
-#[template(path = "script/matlab.askama", config = "../../templates/askama.toml")]
+#[template(path = "script/matlab.askama", config = "templates/askama.toml")]
 struct MatlabFile<'a> {
     banner: String,
     file: String,

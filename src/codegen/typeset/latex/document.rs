@@ -112,7 +112,7 @@ fn equations(
 
 /// What the templates show below the comments at the top.
 #[derive(Template)]
-#[template(config = "../../templates/askama.toml", syntax = "latex")]
+#[template(config = "templates/askama.toml", syntax = "latex")]
 enum Document<'a> {
     #[template(path = "latex/equations.askama")]
     Equations {

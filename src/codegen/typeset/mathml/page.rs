@@ -73,7 +73,7 @@ pub fn emit(
 }
 
 #[derive(Template)]
-#[template(path = "mathml/page.askama", config = "../../templates/askama.toml")]
+#[template(path = "mathml/page.askama", config = "templates/askama.toml")]
 struct Document {
     page: Page,
 }

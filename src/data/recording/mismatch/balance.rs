@@ -18,7 +18,7 @@ const LEAST_FORCE: f64 = 0.02;
 
 /// What forces and accelerations of a recording come to.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct Balance {
+pub struct Balance {
     /// Mean vertical acceleration in flight, upwards, m/s^2.
     pub fall_m_s2: Option<f64>,
     /// The same by the heights alone, the median over the flights.

@@ -1,0 +1,14 @@
+//! The equations of a model, and what is printed of them: programs, code and text.
+//!
+//! [`equations`] are the accelerations over the expressions of `romc-cas`, [`lower`] makes an [`ir::Program`] of them;
+//! [`typeset`] and [`codegen`] print both. `romc` re-exports every module; depend on that.
+
+use romc_cas as symbolic;
+use romc_model::{files, model};
+use romc_robot as robot;
+
+pub mod codegen;
+pub mod equations;
+pub mod ir;
+pub mod lower;
+pub mod typeset;

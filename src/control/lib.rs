@@ -1,0 +1,9 @@
+//! Latent-space model-predictive control: the stage problem, its solvers, and the controller from a measured state to torques.
+//!
+//! Generated controllers hold these very sources and those of `romc-robot`. `romc` re-exports every module; depend on that.
+
+use romc_robot as robot;
+
+pub mod online;
+pub mod solver;
+pub mod sources;
