@@ -3,6 +3,12 @@
 /// A stage of the solver, and all else.
 const STAGE: &str = include_str!("../../../templates/controller_c/solver_stage.h");
 const FUNCTIONS: &str = include_str!("../../../templates/controller_c/solver.c");
+const ONLINE: &str = include_str!("../../../templates/controller_c/online.c");
+
+/// The controller's own steps.
+pub(super) fn online() -> &'static str {
+    ONLINE.split_once("\n\n").map_or(ONLINE, |(_, rest)| rest)
+}
 
 /// A stage of the horizon's solver, for the header of a controller.
 pub(super) fn stage(name: &str, upper: &str, real: &str) -> String {

@@ -36,7 +36,11 @@ impl Writer<'_> {
         }
         let value = crate::expression::constant(self.items, constant.source, &constant.value)?;
         let docs = comment(&constant.docs, "");
-        let cast = if constant.ty == Type::Real { "(real)" } else { "" };
+        let cast = if constant.ty == Type::Real {
+            "(real)"
+        } else {
+            ""
+        };
         Ok(format!(
             "{docs}#define {} {cast}{value}\n\n",
             self.items.constant_name(name)

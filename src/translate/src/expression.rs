@@ -88,7 +88,7 @@ fn number(literal: &Lit) -> Option<(String, Type)> {
     }
 }
 
-/// The value of a constant: a number, or numbers in sums, products, arrays and structs.
+/// The value of a constant: a number, or numbers in sums, products, arrays of reals and structs.
 pub(crate) fn constant(items: &Items<'_>, source: usize, value: &Expr) -> Result<String, Fault> {
     match value {
         Expr::Lit(literal) => match number(&literal.lit) {
@@ -109,9 +109,8 @@ pub(crate) fn constant(items: &Items<'_>, source: usize, value: &Expr) -> Result
             Ok(format!("{{{}}}", fields?.join(", ")))
         }
         Expr::Array(array) => {
-            let elements = array.elems.iter();
-            let elements: Result<Vec<_>, _> =
-                elements.map(|value| constant(items, source, value)).collect();
+            let element = |value| Ok(format!("(real){}", constant(items, source, value)?));
+            let elements: Result<Vec<_>, _> = array.elems.iter().map(element).collect();
             Ok(format!("{{{}}}", elements?.join(", ")))
         }
         Expr::Binary(binary) if operator(&binary.op).is_some_and(|(_, rank, _)| rank > 11) => {
@@ -466,7 +465,11 @@ impl Writer<'_> {
         let mut text = "{\n".to_owned();
         for field in &literal.fields {
             let of = self.items.structs.get(&name);
-            let ty = of.and_then(|of| of.fields.iter().find(|f| field.member == *f.name));
+            let ty = of.and_then(|of| {
+                of.fields
+                    .iter()
+                    .find(|f| matches!(&field.member, syn::Member::Named(of) if *of == f.name))
+            });
             let ty = ty.map(|field| field.ty.clone());
             let value = self.value_as(instance, &field.expr, ty.as_ref())?;
             let is_copy = matches!(value.ty, Type::Array(..)) && value.repeated.is_none();

@@ -71,13 +71,11 @@ impl<'a> Writer<'a> {
     }
 
     fn resolve_length(&mut self, length: &str, sizes: &BTreeMap<String, String>) -> String {
-        let word = |word: &str| {
-            match (self.items.unit.elsewhere(word), sizes.get(word)) {
-                (Some(name), _) => name.to_owned(),
-                (None, Some(size)) => size.clone(),
-                (None, None) if self.items.constants.contains_key(word) => self.constant(word),
-                (None, None) => word.to_owned(),
-            }
+        let word = |word: &str| match (self.items.unit.elsewhere(word), sizes.get(word)) {
+            (Some(name), _) => name.to_owned(),
+            (None, Some(size)) => size.clone(),
+            (None, None) if self.items.constants.contains_key(word) => self.constant(word),
+            (None, None) => word.to_owned(),
         };
         let words: Vec<String> = length.split(' ').map(word).collect();
         words.join(" ")
@@ -176,7 +174,10 @@ impl<'a> Writer<'a> {
         let signature = format!("{c_name}({})", declared.join(", "));
         let signature = output.declare(&signature, &|of| self.spelling(of));
         let mut lines = Lines::default();
-        lines.add(&format!("static inline {}{signature}", self.items.unit.attribute));
+        lines.add(&format!(
+            "static inline {}{signature}",
+            self.items.unit.attribute
+        ));
         lines.open("{");
         self.block(&mut instance, &mut lines, body, true)?;
         lines.close("}");

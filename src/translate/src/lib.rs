@@ -110,26 +110,30 @@ pub fn translate(sources: &[Source], unit: &Unit<'_>) -> Result<Translated, Faul
     writer.finish(unit)
 }
 
-/// Files of the solver, below the workspace's folder.
+/// Files of the solver and, of the controller, those with functions that C has too, below `src/control`.
 const SOLVER: [&str; 9] = [
-    "interior.rs",
-    "links.rs",
-    "lower.rs",
-    "point.rs",
-    "problem.rs",
-    "riccati.rs",
-    "rows.rs",
-    "scalar.rs",
-    "solve.rs",
+    "solver/interior.rs",
+    "solver/links.rs",
+    "solver/lower.rs",
+    "solver/point.rs",
+    "solver/problem.rs",
+    "solver/riccati.rs",
+    "solver/rows.rs",
+    "solver/scalar.rs",
+    "solver/solve.rs",
+];
+const ONLINE: [&str; 6] = [
+    "online/dense.rs",
+    "online/estimate.rs",
+    "online/linearise.rs",
+    "online/problem.rs",
+    "online/stage.rs",
+    "online/trajectory.rs",
 ];
 
-/// The C of the structured solver, as paths below the workspace's folder and texts.
-///
-/// # Errors
-/// [`Fault`] for the first construct that is outside the subset, or a source that cannot be read.
-pub fn solver(root: &Path) -> Result<[(&'static str, String); 2], Fault> {
+fn read(root: &Path, names: &[&str]) -> Result<Vec<Source>, Fault> {
     let read = |name: &&str| {
-        let path = format!("src/control/solver/{name}");
+        let path = format!("src/control/{name}");
         let text = fs::read_to_string(root.join(&path)).map_err(|error| Fault {
             path: path.clone(),
             line: 0,
@@ -137,11 +141,57 @@ pub fn solver(root: &Path) -> Result<[(&'static str, String); 2], Fault> {
         })?;
         Ok(Source { path, text })
     };
-    let sources = SOLVER.iter().map(read).collect::<Result<Vec<_>, Fault>>()?;
-    solver_of(&sources)
+    names.iter().map(read).collect()
 }
 
-/// The same from sources of the solver.
+fn head(what: &str) -> String {
+    format!(
+        "/* @generated from src/control by `cargo run -p romc-translate`: {what} Names that are defined\n \
+         * elsewhere: real, the type of numbers; NX and NU, how many states and inputs there are. */\n\n"
+    )
+}
+
+/// The C of the structured solver and of the controller, as paths below the workspace's folder and texts.
+///
+/// # Errors
+/// [`Fault`] for the first construct that is outside the subset, or a source that cannot be read.
+pub fn controller(root: &Path) -> Result<Vec<(&'static str, String)>, Fault> {
+    let mut texts = solver_of(&read(root, &SOLVER)?)?.to_vec();
+    let unit = Unit {
+        prefix: "online",
+        roots: &[
+            "Trajectory::state_at",
+            "Trajectory::mean_input",
+            "Trajectory::write_deviations",
+            "Trajectory::comes_near",
+            "Trajectory::schedule",
+            "Trajectory::write_acceleration",
+            "Accelerations::step",
+            "write_still",
+            "write_expected",
+            "add_correction",
+            "turn_force",
+            "scale_dynamics",
+            "write_pyramid",
+            "unscale",
+            "write_defect",
+        ],
+        header: &[],
+        elsewhere: &[
+            ("MOST_LATENT", "D"),
+            ("MOST_STATE", "X"),
+            ("MOST_SQUARE", "D * D"),
+            ("SQRT_HALF", "SQRT_HALF"),
+        ],
+        attribute: "MAYBE_UNUSED ",
+    };
+    let online = translate(&read(root, &ONLINE)?, &unit)?.source;
+    let text = head("the controller's own steps.") + &online;
+    texts.push(("templates/controller_c/online.c", text));
+    Ok(texts)
+}
+
+/// The C of sources of the solver.
 ///
 /// # Errors
 /// [`Fault`] for the first construct that is outside the subset.
@@ -155,14 +205,9 @@ pub fn solver_of(sources: &[Source]) -> Result<[(&'static str, String); 2], Faul
             "Program::solve",
         ],
         header: &["Stage"],
+        ..Unit::default()
     };
     let Translated { header, source } = translate(sources, &unit)?;
-    let head = |what: &str| {
-        format!(
-            "/* @generated from src/control/solver by `cargo run -p romc-translate`: {what} Names that are defined\n \
-             * elsewhere: real, the type of numbers; NX and NU, how many states and inputs there are. */\n\n"
-        )
-    };
     let types = head("a stage of the structured solver.") + &header;
     let functions = head("the structured solver.") + &source;
     Ok([
