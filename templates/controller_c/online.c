@@ -184,13 +184,13 @@ static inline MAYBE_UNUSED void online_trajectory_write_deviations(online_trajec
         is_still = is_still && (i >= d || deviation[i] < still[i]);
     }
     for (int half = 0; half < 2; ++half) {
-        real floor = 0;
+        real least = 0;
         for (int i = half * d; i < (half + 1) * d; ++i) {
-            floor = deviation[i] > floor ? deviation[i] : floor;
+            least = deviation[i] > least ? deviation[i] : least;
         }
-        floor = floor > 0 ? ONLINE_DEVIATION_FLOOR * floor : 1;
+        least = least > 0 ? ONLINE_DEVIATION_FLOOR * least : 1;
         for (int i = half * d; i < (half + 1) * d; ++i) {
-            const real own = deviation[i] > floor ? deviation[i] : floor;
+            const real own = deviation[i] > least ? deviation[i] : least;
             deviation[i] = is_still ? still[i] : own;
         }
     }
@@ -309,7 +309,7 @@ static inline MAYBE_UNUSED void online_trajectory_write_acceleration(online_traj
 
 /* Writes F(x, u) and (A B), row by row, for a stage of step_s. All else is memory: two states, two matrices
  * of the size of (A B), the entries of a Jacobian. */
-static inline MAYBE_UNUSED void online_accelerations_step(online_accelerations *restrict self, int phase,
+static inline MAYBE_UNUSED void online_latent_dynamics_step(online_latent_dynamics *restrict self, int phase,
         const real *x, const real *u, int d, real step_s, real *restrict next, real *restrict by,
         real *restrict state, real *restrict slope, real *restrict sensitivity, real *restrict slope_sensitivity,
         real *restrict entries)
@@ -337,14 +337,14 @@ static inline MAYBE_UNUSED void online_accelerations_step(online_accelerations *
         for (int i = 0; i < d; ++i) {
             slope[i] = state[d + i];
         }
-        const int count = online_accelerations_accelerate(self, phase, state, state + d, u, slope + d, entries);
+        const int count = online_latent_dynamics_accelerate(self, phase, state, state + d, u, slope + d, entries);
         for (int i = 0; i < d * width; ++i) {
             slope_sensitivity[i] = sensitivity[d * width + i];
             slope_sensitivity[d * width + i] = 0;
         }
         for (int entry = 0; entry < count; ++entry) {
-            const int row = (d + online_accelerations_row(self, phase, entry)) * width;
-            const int column = online_accelerations_column(self, phase, entry);
+            const int row = (d + online_latent_dynamics_row(self, phase, entry)) * width;
+            const int column = online_latent_dynamics_column(self, phase, entry);
             if (column < 2 * d) {
                 const real *by_column = sensitivity + column * width;
                 online_add_scaled(entries[entry], by_column, width, slope_sensitivity + row);
@@ -366,8 +366,23 @@ static inline MAYBE_UNUSED void online_accelerations_step(online_accelerations *
     }
 }
 
+/* Writes ∂ddz/∂u, row by row, of so many entries. */
+static inline MAYBE_UNUSED void online_latent_dynamics_write_gain(online_latent_dynamics *self, int phase, int count,
+        const real *entries, int d, real *restrict gain)
+{
+    for (int i = 0; i < d * d; ++i) {
+        gain[i] = 0;
+    }
+    for (int entry = 0; entry < count; ++entry) {
+        const int column = online_latent_dynamics_column(self, phase, entry);
+        if (column >= 2 * d) {
+            gain[online_latent_dynamics_row(self, phase, entry) * d + column - 2 * d] = entries[entry];
+        }
+    }
+}
+
 /* Scale of (z, dz) for a trajectory that stands still: the change of each latent alone that moves some joint by
- * STILL_SHARE of half its range, and that change within STILL_TIME_S; decoder is 12 × d. */
+ * STILL_SHARE of half its range, and that change within STILL_TIME_S; decoder has d columns. */
 static inline MAYBE_UNUSED void online_write_still(const real *decoder, const real *lower, const real *upper, int d,
         real *restrict still)
 {
@@ -477,7 +492,7 @@ static inline MAYBE_UNUSED void online_add_correction(const real *gain, const re
     }
 }
 
-/* Writes the rows (μ F_z, F_x, F_y) of a force 3 × d turned by a rotation; both row-major. */
+/* Writes the rows (mu F_z, F_x, F_y) of a force 3 x d turned by a rotation; both row-major. */
 static inline MAYBE_UNUSED void online_turn_force(const real *rotation, const real *force, real coefficient, int d,
         real *restrict out)
 {
@@ -492,7 +507,7 @@ static inline MAYBE_UNUSED void online_turn_force(const real *rotation, const re
     }
 }
 
-/* Writes σ^-1 A σ and σ^-1 B C_p of derivatives (A B), 2d × 3d; all row-major but C_p, lower triangular, column by column. */
+/* Writes sigma^-1 A sigma and sigma^-1 B C_p of derivatives (A B), 2d x 3d; all row-major but C_p, lower triangular, column by column. */
 static inline MAYBE_UNUSED void online_scale_dynamics(const real *by, const real *root, const real *deviation, int d,
         real *restrict a, real *restrict b)
 {
@@ -528,7 +543,7 @@ static inline MAYBE_UNUSED real online_scale_row(const real *row, const real *ro
     return at_reference;
 }
 
-/* Writes the friction pyramid of a force with rows (μ F_z, F_x, F_y), all zero without contact, where slacks are strictly
+/* Writes the friction pyramid of a force with rows (mu F_z, F_x, F_y), all zero without contact, where slacks are strictly
  * inside. */
 static inline MAYBE_UNUSED void online_write_pyramid(const real *force, const real *root, const real *input, int d,
         real *restrict rows, real *restrict bounds)
@@ -547,7 +562,7 @@ static inline MAYBE_UNUSED void online_write_pyramid(const real *force, const re
     }
 }
 
-/* Writes a stage's latent input u_r + C_p v and the latent state at its end x_r + σ x of a solution. */
+/* Writes a stage's latent input u_r + C_p v and the latent state at its end x_r + sigma x of a solution. */
 static inline MAYBE_UNUSED void online_unscale(const real *root, const real *deviation, int d, const real *v,
         const real *x, real *restrict input, real *restrict end)
 {
@@ -578,6 +593,142 @@ static inline MAYBE_UNUSED void online_write_defect(const real *next, const real
             sum += row[2 * d + j] * (input[j] - u[j]);
         }
         defect[i] = sum;
+    }
+}
+
+/* Writes m + C y. */
+static inline MAYBE_UNUSED void online_write_torque(const real *mean, const real *deviation, const real *y,
+        real *restrict torque)
+{
+    for (int i = 0; i < 12; ++i) {
+        torque[i] = mean[i];
+        for (int j = i; j < 12; ++j) {
+            torque[i] += deviation[12 * i + j] * y[j];
+        }
+    }
+}
+
+/* Writes row C. */
+static inline MAYBE_UNUSED void online_by_deviation(const real *row, const real *deviation, real *restrict out)
+{
+    for (int j = 0; j < 12; ++j) {
+        out[j] = 0;
+        for (int k = 0; k <= j; ++k) {
+            out[j] += row[k] * deviation[12 * k + j];
+        }
+    }
+}
+
+/* Writes A and y_0; false if a number is not finite. wrench is G; matrices are row-major. */
+static inline MAYBE_UNUSED bool online_free_optimum(const real *projection, const real *wrench, const real *mean,
+        const real *deviation, const real *u_lat, real prior_weight, int d, real *restrict scaled_map,
+        real *restrict y)
+{
+    const real scale = 1 / SQRT(prior_weight);
+    real row[12] = {0};
+    real residual[D] = {0};
+    real square[D * D] = {0};
+    for (int i = 0; i < d; ++i) {
+        const real *own = projection + 18 * i;
+        real left = u_lat[i];
+        for (int j = 0; j < 12; ++j) {
+            real by_wrench = 0;
+            for (int axis = 0; axis < 6; ++axis) {
+                by_wrench += wrench[12 * axis + j] * own[12 + axis];
+            }
+            row[j] = own[j] + by_wrench;
+            left -= row[j] * mean[j];
+        }
+        online_by_deviation(row, deviation, scaled_map + 12 * i);
+        for (int j = 0; j < 12; ++j) {
+            scaled_map[12 * i + j] *= scale;
+        }
+        residual[i] = scale * left;
+    }
+    for (int i = 0; i < d; ++i) {
+        for (int j = 0; j <= i; ++j) {
+            real sum = i == j ? 1 : 0;
+            for (int k = 0; k < 12; ++k) {
+                sum += scaled_map[12 * i + k] * scaled_map[12 * j + k];
+            }
+            square[i * d + j] = sum;
+        }
+    }
+    if (!online_factorise(square, d)) {
+        return false;
+    }
+    online_solve_lower(square, d, residual);
+    online_solve_upper(square, d, residual);
+    for (int j = 0; j < 12; ++j) {
+        y[j] = 0;
+    }
+    for (int i = 0; i < d; ++i) {
+        online_add_scaled(residual[i], scaled_map + 12 * i, 12, y);
+    }
+    return true;
+}
+
+/* Writes both sides of the torque limits as rows on the torques, and the room that torque leaves. */
+static inline MAYBE_UNUSED void online_write_limits(const real *limit_nm, const real *losses_nm, const real *torque,
+        real *restrict rows, real *restrict bounds)
+{
+    for (int number = 0; number < 24; ++number) {
+        const int joint = number % 12;
+        const real sign = number < 12 ? 1 : -1;
+        for (int j = 0; j < 12; ++j) {
+            rows[12 * number + j] = 0;
+        }
+        rows[12 * number + joint] = sign / limit_nm[joint];
+        bounds[number] = 1 - sign * ((torque[joint] + losses_nm[joint]) / limit_nm[joint]);
+    }
+}
+
+/* Writes the pyramid |F_x|, |F_y| <= mu F_z / √2 of a foot with its force by the leg's torques, 3 x 3 row-major. */
+static inline MAYBE_UNUSED void online_write_foot(const real *force, real friction, real weight_n,
+        const real *torque, int leg, real *restrict rows, real *restrict bounds)
+{
+    for (int side = 0; side < 4; ++side) {
+        const real sign = side % 2 == 0 ? 1 : -1;
+        real room = 0;
+        for (int j = 0; j < 12; ++j) {
+            rows[12 * side + j] = 0;
+        }
+        for (int k = 0; k < 3; ++k) {
+            const real within = friction * force[6 + k] * SQRT_HALF;
+            const real entry = (sign * force[3 * (side / 2) + k] - within) / weight_n;
+            rows[12 * side + 3 * leg + k] = entry;
+            room -= entry * torque[3 * leg + k];
+        }
+        bounds[side] = room;
+    }
+}
+
+/* Writes L; false if a number is not finite. */
+static inline MAYBE_UNUSED bool online_write_hessian(const real *scaled_map, int d, real *restrict hessian)
+{
+    for (int i = 0; i < 12; ++i) {
+        for (int j = 0; j <= i; ++j) {
+            real sum = i == j ? 1 : 0;
+            for (int k = 0; k < d; ++k) {
+                sum += scaled_map[12 * k + i] * scaled_map[12 * k + j];
+            }
+            hessian[12 * i + j] = sum;
+        }
+    }
+    return online_factorise(hessian, 12);
+}
+
+/* Rows on the torques become rows on v. */
+static inline MAYBE_UNUSED void online_change_rows(const real *hessian, const real *deviation, int count,
+        real *restrict rows)
+{
+    real changed[12] = {0};
+    for (int row = 0; row < count; ++row) {
+        online_by_deviation(rows + 12 * row, deviation, changed);
+        online_solve_lower(hessian, 12, changed);
+        for (int j = 0; j < 12; ++j) {
+            rows[12 * row + j] = changed[j];
+        }
     }
 }
 

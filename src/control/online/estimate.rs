@@ -45,9 +45,9 @@ pub struct InputGivenState {
 struct Evidence {
     sample: usize,
     /// `y`.
-    unexplained: DVector<f64>,
-    /// `B`.
-    gain: DMatrix<f64>,
+    unexplained: Vec<f64>,
+    /// `B`, row by row.
+    gain: Vec<f64>,
 }
 
 /// Latent inputs, `latent_dim` a sample.
@@ -61,8 +61,8 @@ pub(super) fn estimate_input(
     let mut evidence: Vec<Vec<Evidence>> = plant.phases().iter().map(|_| Vec::new()).collect();
     let known = |phase: &ControlPhase| phase.given_state.as_ref().map(|g| g.mean.transpose());
     let given: Vec<_> = plant.phases().iter().map(known).collect();
-    let (mut ddz, mut jacobian) = (vec![0.0; d], DMatrix::zeros(d, 3 * d));
-    let (mut state, mut unexplained) = (vec![0.0; 2 * d], DVector::zeros(d));
+    let (mut ddz, mut entries) = (vec![0.0; d], vec![0.0; 3 * d * d]);
+    let mut state = vec![0.0; 2 * d];
     for (sample, mean) in input.chunks_exact_mut(d).enumerate() {
         let phase = motion.phase(sample);
         motion.write_state(sample, &mut state);
@@ -71,12 +71,15 @@ pub(super) fn estimate_input(
             None => mean.copy_from_slice(plant.phases()[phase].latent_mean.as_slice()),
         }
         let (z, dz) = state.split_at(d);
-        dynamics.jacobian(phase, z, dz, mean, &mut ddz, &mut jacobian);
-        motion.write_acceleration(sample, unexplained.as_mut_slice());
+        let count = dynamics.accelerate(phase, z, dz, mean, &mut ddz, &mut entries);
+        let (mut unexplained, mut gain) = (vec![0.0; d], vec![0.0; d * d]);
+        dynamics.write_gain(phase, count, &entries, d, &mut gain);
+        motion.write_acceleration(sample, &mut unexplained);
+        add_scaled(-1.0, &ddz, d, &mut unexplained);
         evidence[phase].push(Evidence {
             sample,
-            unexplained: &unexplained - DVector::from_column_slice(&ddz),
-            gain: jacobian.columns(2 * d, d).into_owned(),
+            unexplained,
+            gain,
         });
     }
     for (phase, evidence) in plant.phases().iter().zip(evidence) {
@@ -111,9 +114,8 @@ fn add_estimates(phase: &ControlPhase, evidence: Vec<Evidence>, input: &mut [f64
     let rows = [covariance, residual].map(|matrix| matrix.transpose());
     let [covariance, residual] = rows.each_ref().map(|matrix| matrix.as_slice());
     for mut item in evidence {
-        let (gain, left) = (item.gain.transpose(), item.unexplained.as_mut_slice());
-        let input = &mut input[item.sample * d..];
-        add_correction(gain.as_slice(), covariance, residual, d, left, input);
+        let (left, input) = (&mut item.unexplained, &mut input[item.sample * d..]);
+        add_correction(&item.gain, covariance, residual, d, left, input);
     }
 }
 
@@ -175,15 +177,13 @@ fn add_correction(
 fn residual_covariance(evidence: &[Evidence], input: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let d = input.nrows();
     let count = evidence.len() as f64;
-    let unexplained = evidence.iter().map(|item| &item.unexplained);
-    let mean = unexplained.sum::<DVector<f64>>() / count;
+    let unexplained = |item: &Evidence| DVector::from_column_slice(&item.unexplained);
+    let mean = evidence.iter().map(unexplained).sum::<DVector<f64>>() / count;
     let mut covariance = DMatrix::zeros(d, d);
     let mut explained = DMatrix::zeros(d, d);
-    for Evidence {
-        unexplained, gain, ..
-    } in evidence
-    {
-        let off = unexplained - &mean;
+    for item in evidence {
+        let gain = &DMatrix::from_row_slice(d, d, &item.gain);
+        let off = unexplained(item) - &mean;
         covariance += &off * off.transpose() / count;
         explained += gain * input * gain.transpose() / count;
     }
@@ -234,8 +234,8 @@ mod tests {
         // y = 6 with B = 2: S B / (B S B + R) y = 0.5 * 2 / (2 + 2) * 6.
         let evidence = vec![Evidence {
             sample: 0,
-            unexplained: DVector::from_element(1, 6.0),
-            gain: number(2.0),
+            unexplained: vec![6.0],
+            gain: vec![2.0],
         }];
         add_estimates(&phase, evidence, &mut input);
         assert!((input[0] - 3.0).abs() < 1e-12, "{input:?}");
@@ -247,8 +247,8 @@ mod tests {
         let evidence =
             [[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]].map(|[u, r]| Evidence {
                 sample: 0,
-                unexplained: DVector::from_element(1, 2.0 * u + 0.5 * r),
-                gain: DMatrix::from_element(1, 1, 2.0),
+                unexplained: vec![2.0 * u + 0.5 * r],
+                gain: vec![2.0],
             });
         let residual = residual_covariance(&evidence, &DMatrix::identity(1, 1)).expect("finite");
         assert!((residual[(0, 0)] - 0.25).abs() < 1e-12, "{residual}");

@@ -266,11 +266,11 @@ impl Horizon {
             phase,
             ..
         } = &mut self.stages[index];
-        let mut evaluate = |z: &[f64], dz: &[f64], u: &[f64], ddz: &mut [f64], jacobian: &mut _| {
-            dynamics.jacobian(*phase, z, dz, u, ddz, jacobian);
-        };
         let (x, u) = point.unwrap_or((state, input));
-        (self.lineariser).stage(x, u, step_s, &mut evaluate, model);
+        let mut stage = |x: &[f64], u: &[f64], model: &mut StageModel| {
+            (self.lineariser).stage((dynamics, *phase), x, u, step_s, model);
+        };
+        stage(x, u, model);
         let (next, by, d) = (&model.next, &model.by, input.len());
         write_defect(next, by, x, u, state, input, end, d, defect);
         match (trusts_reference, point) {
@@ -278,7 +278,7 @@ impl Horizon {
             (true, None) => defect.fill(0.0),
             (true, Some(_)) => {
                 let nominal = &mut self.nominal;
-                (self.lineariser).stage(state, input, step_s, &mut evaluate, nominal);
+                stage(state, input, nominal);
                 for (row, defect) in defect.iter_mut().enumerate() {
                     *defect += end[row] - nominal.next[row];
                 }

@@ -21,67 +21,20 @@
 
 use std::fmt::Debug;
 
-use nalgebra::DMatrix;
-
 use super::dense::{Real, add_scaled};
-
-/// The latent accelerations of every phase with their derivatives.
-///
-/// The interpreter's programs and the generated code of a controller both are.
-pub trait LatentDynamics: Debug + Send {
-    /// Writes `ddz = Xiᵀ Θ(z, dz, u_lat)` of a phase and its dense Jacobian by `(z, dz, u_lat)`,
-    /// `latent_dim × 3 latent_dim`.
-    ///
-    /// # Panics
-    /// May panic if the phase does not exist or a length does not fit.
-    fn jacobian(
-        &mut self,
-        phase: usize,
-        z: &[f64],
-        dz: &[f64],
-        u_lat: &[f64],
-        ddz: &mut [f64],
-        jacobian: &mut DMatrix<f64>,
-    );
-}
-
-/// Runge-Kutta step of one stage and its derivatives.
-#[derive(Debug, Clone, PartialEq)]
-pub struct StageModel {
-    /// `F(x̄, ū)`, `2 latent_dim`: positions first.
-    pub next: Vec<f64>,
-    /// `(∂F/∂x ∂F/∂u)`, `2 latent_dim × 3 latent_dim`, row-major.
-    pub(super) by: Vec<f64>,
-}
-
-impl StageModel {
-    /// A stage of zeros.
-    pub fn zeros(latent_dim: usize) -> Self {
-        Self {
-            next: vec![0.0; 2 * latent_dim],
-            by: vec![0.0; 6 * latent_dim * latent_dim],
-        }
-    }
-
-    /// Entry of `∂F/∂x`.
-    pub fn a(&self, row: usize, col: usize) -> f64 {
-        self.by[row * 3 * (self.next.len() / 2) + col]
-    }
-
-    /// Entry of `∂F/∂u`.
-    pub fn b(&self, row: usize, col: usize) -> f64 {
-        self.a(row, self.next.len() + col)
-    }
-}
 
 /// Nodes of the classical Runge-Kutta method: the internal state is `x + node · h · previous slope`.
 const NODES: [Real; 4] = [0.0, 0.5, 0.5, 1.0];
 /// Weights of its slopes.
 const WEIGHTS: [Real; 4] = [1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0];
 
-/// The latent accelerations with the entries of their Jacobian that are not zero.
-pub(super) trait Accelerations {
-    /// Writes `ddz` and the entries of its Jacobian by `(z, dz, u)`; how many there are.
+/// The latent accelerations of every phase with their derivatives. Methods may panic if the phase does not exist or a
+/// length does not fit.
+///
+/// The interpreter's programs and the generated code of a controller both are.
+pub trait LatentDynamics: Debug + Send {
+    /// Writes `ddz = Xiᵀ Θ(z, dz, u)` of a phase and the entries of its Jacobian by `(z, dz, u)` that need not be zero; how
+    /// many there are, at most `3 latent_dim²`.
     fn accelerate(
         &mut self,
         phase: usize,
@@ -91,8 +44,9 @@ pub(super) trait Accelerations {
         ddz: &mut [Real],
         entries: &mut [Real],
     ) -> usize;
-    /// Row and column of an entry of the last Jacobian.
+    /// Row of an entry: the component of `ddz`.
     fn row(&self, phase: usize, entry: usize) -> usize;
+    /// Column of an entry: `z` in the first `latent_dim`, then `dz`, then `u`.
     fn column(&self, phase: usize, entry: usize) -> usize;
 
     /// Writes `F(x, u)` and `(A B)`, row by row, for a stage of `step_s`. All else is memory: two states, two matrices
@@ -169,6 +123,55 @@ pub(super) trait Accelerations {
             by[i * width + i] += 1.0;
         }
     }
+
+    /// Writes `∂ddz/∂u`, row by row, of so many entries.
+    fn write_gain(
+        &self,
+        phase: usize,
+        count: usize,
+        entries: &[Real],
+        d: usize,
+        gain: &mut [Real],
+    ) {
+        for i in 0..d * d {
+            gain[i] = 0.0;
+        }
+        for entry in 0..count {
+            let column = self.column(phase, entry);
+            if column >= 2 * d {
+                gain[self.row(phase, entry) * d + column - 2 * d] = entries[entry];
+            }
+        }
+    }
+}
+
+/// Runge-Kutta step of one stage and its derivatives.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StageModel {
+    /// `F(x̄, ū)`, `2 latent_dim`: positions first.
+    pub next: Vec<f64>,
+    /// `(∂F/∂x ∂F/∂u)`, `2 latent_dim × 3 latent_dim`, row-major.
+    pub(super) by: Vec<f64>,
+}
+
+impl StageModel {
+    /// A stage of zeros.
+    pub fn zeros(latent_dim: usize) -> Self {
+        Self {
+            next: vec![0.0; 2 * latent_dim],
+            by: vec![0.0; 6 * latent_dim * latent_dim],
+        }
+    }
+
+    /// Entry of `∂F/∂x`.
+    pub fn a(&self, row: usize, col: usize) -> f64 {
+        self.by[row * 3 * (self.next.len() / 2) + col]
+    }
+
+    /// Entry of `∂F/∂u`.
+    pub fn b(&self, row: usize, col: usize) -> f64 {
+        self.a(row, self.next.len() + col)
+    }
 }
 
 /// Working memory of [`Lineariser::stage`].
@@ -176,48 +179,35 @@ pub(super) trait Accelerations {
 pub struct Lineariser {
     state: Vec<f64>,
     slope: Vec<f64>,
-    jacobian: DMatrix<f64>,
-    entries: Vec<f64>,
-    pattern: Vec<(usize, usize)>,
     /// `S_i` and `K_i`, `2d × 3d`, row-major.
     sensitivity: Vec<f64>,
     slope_sensitivity: Vec<f64>,
+    entries: Vec<f64>,
 }
 
 impl Lineariser {
     /// Memory for a latent dimension.
     pub fn new(latent_dim: usize) -> Self {
-        let (state_dim, point_dim) = (2 * latent_dim, 3 * latent_dim);
         Self {
-            state: vec![0.0; state_dim],
-            slope: vec![0.0; state_dim],
-            jacobian: DMatrix::zeros(latent_dim, point_dim),
-            entries: vec![0.0; latent_dim * point_dim],
-            pattern: Vec::with_capacity(latent_dim * point_dim),
-            sensitivity: vec![0.0; state_dim * point_dim],
-            slope_sensitivity: vec![0.0; state_dim * point_dim],
+            state: vec![0.0; 2 * latent_dim],
+            slope: vec![0.0; 2 * latent_dim],
+            sensitivity: vec![0.0; 6 * latent_dim * latent_dim],
+            slope_sensitivity: vec![0.0; 6 * latent_dim * latent_dim],
+            entries: vec![0.0; 3 * latent_dim * latent_dim],
         }
     }
 
-    /// Writes `F(x, u)`, `A` and `B` at `x = (z, dz)` and `u` for a stage of `step_s` into `stage`.
-    ///
-    /// `dynamics(z, dz, u, ddz, jacobian)` writes `ddz = f(z, dz, u)` and its dense Jacobian by
-    /// `(z, dz, u)`, `latent_dim × 3 latent_dim`.
+    /// Writes `F(x, u)`, `A` and `B` at `x = (z, dz)` and `u` for a stage of `step_s` in a phase into `stage`.
     pub fn stage(
         &mut self,
+        (dynamics, phase): (&mut dyn LatentDynamics, usize),
         x: &[f64],
         u: &[f64],
         step_s: f64,
-        dynamics: impl FnMut(&[f64], &[f64], &[f64], &mut [f64], &mut DMatrix<f64>),
         stage: &mut StageModel,
     ) {
-        let mut dense = Dense {
-            dynamics,
-            jacobian: &mut self.jacobian,
-            pattern: &mut self.pattern,
-        };
-        dense.step(
-            0,
+        dynamics.step(
+            phase,
             x,
             u,
             u.len(),
@@ -230,48 +220,5 @@ impl Lineariser {
             &mut self.slope_sensitivity,
             &mut self.entries,
         );
-    }
-}
-
-/// Dynamics with a dense Jacobian.
-struct Dense<'a, F> {
-    dynamics: F,
-    jacobian: &'a mut DMatrix<f64>,
-    pattern: &'a mut Vec<(usize, usize)>,
-}
-
-impl<F: FnMut(&[f64], &[f64], &[f64], &mut [f64], &mut DMatrix<f64>)> Accelerations
-    for Dense<'_, F>
-{
-    fn accelerate(
-        &mut self,
-        _phase: usize,
-        z: &[f64],
-        dz: &[f64],
-        u: &[f64],
-        ddz: &mut [f64],
-        entries: &mut [f64],
-    ) -> usize {
-        (self.dynamics)(z, dz, u, ddz, self.jacobian);
-        self.pattern.clear();
-        let (rows, columns) = self.jacobian.shape();
-        for row in 0..rows {
-            for column in 0..columns {
-                let entry = self.jacobian[(row, column)];
-                if entry != 0.0 {
-                    entries[self.pattern.len()] = entry;
-                    self.pattern.push((row, column));
-                }
-            }
-        }
-        self.pattern.len()
-    }
-
-    fn row(&self, _phase: usize, entry: usize) -> usize {
-        self.pattern[entry].0
-    }
-
-    fn column(&self, _phase: usize, entry: usize) -> usize {
-        self.pattern[entry].1
     }
 }

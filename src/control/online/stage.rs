@@ -44,14 +44,9 @@ impl Rows {
         }
     }
 
-    pub(super) fn clear(&mut self) {
-        self.entries.clear();
-        self.bounds.clear();
-    }
-
-    pub(super) fn push(&mut self, row: &[f64], bound: f64) {
-        self.entries.extend_from_slice(row);
-        self.bounds.push(bound);
+    pub(super) fn resize(&mut self, count: usize, width: usize) {
+        self.entries.resize(count * width, 0.0);
+        self.bounds.resize(count, 0.0);
     }
 }
 

@@ -122,9 +122,10 @@ const SOLVER: [&str; 9] = [
     "solver/scalar.rs",
     "solver/solve.rs",
 ];
-const ONLINE: [&str; 6] = [
+const ONLINE: [&str; 7] = [
     "online/dense.rs",
     "online/estimate.rs",
+    "online/lift.rs",
     "online/linearise.rs",
     "online/problem.rs",
     "online/stage.rs",
@@ -166,7 +167,8 @@ pub fn controller(root: &Path) -> Result<Vec<(&'static str, String)>, Fault> {
             "Trajectory::comes_near",
             "Trajectory::schedule",
             "Trajectory::write_acceleration",
-            "Accelerations::step",
+            "LatentDynamics::step",
+            "LatentDynamics::write_gain",
             "write_still",
             "write_expected",
             "add_correction",
@@ -175,6 +177,12 @@ pub fn controller(root: &Path) -> Result<Vec<(&'static str, String)>, Fault> {
             "write_pyramid",
             "unscale",
             "write_defect",
+            "write_torque",
+            "free_optimum",
+            "write_limits",
+            "write_foot",
+            "write_hessian",
+            "change_rows",
         ],
         header: &[],
         elsewhere: &[
