@@ -7,8 +7,19 @@
 /* Half width of the window in which velocities are fitted by a straight line, s. */
 #define ONLINE_HALF_WINDOW_S (0.016 + 1e-9)
 
+#define ONLINE_LARGEST (real)1.3
+
+/* Largest weight of a step, in first steps. */
+#define ONLINE_LARGEST_WEIGHT (real)2.0
+
+/* Smallest and largest estimate. */
+#define ONLINE_LEAST (real)0.7
+
 /* Phase of feet that select none. */
 #define ONLINE_NO_PHASE 255
+
+/* Weight of the one from before the motion, in first steps. */
+#define ONLINE_PRIOR_WEIGHT (real)10.0
 
 /* Distance from the reference, in its standard deviations, within which joint limits matter. */
 #define ONLINE_STATE_REACH (real)4.0
@@ -594,6 +605,53 @@ static inline MAYBE_UNUSED void online_write_defect(const real *next, const real
         }
         defect[i] = sum;
     }
+}
+
+/* As known before a motion. */
+static inline MAYBE_UNUSED online_share online_share_unknown(void)
+{
+    return (online_share){
+        .estimate = 1,
+        .weight = 0,
+        .weighted = 0,
+        .unit = 0,
+    };
+}
+
+/* Takes what a measurement of latent velocities says after a part of the plan's first stage, with the velocities at the
+ * stage's start and end, its input, and the latent input of the drives at the command and now. */
+static inline MAYBE_UNUSED void online_share_update(online_share *restrict self, real part, real kept,
+        const real *by_input, const real *input, const real *start, const real *end, const real *velocity,
+        const real *deviation, const real *at_command, const real *drives, int d)
+{
+    real size = 0;
+    real agreement = 0;
+    for (int i = 0; i < d; ++i) {
+        real by_plan = 0;
+        real by_drives = 0;
+        for (int k = 0; k < d; ++k) {
+            const real effect = part * by_input[i * d + k] / deviation[i];
+            by_plan += effect * input[k];
+            by_drives += effect * ((real)0.5 * (at_command[k] + drives[k]));
+        }
+        const real planned = start[i] + part * (end[i] - start[i]);
+        const real missed = (velocity[i] - planned) / deviation[i] - by_drives;
+        const real change = by_plan + by_drives;
+        size += change * change;
+        agreement += change * missed;
+    }
+    if (!(size > 0 && solver_is_finite_number(size) && solver_is_finite_number(agreement))) {
+        return;
+    }
+    if (self->unit == 0) {
+        self->unit = size;
+    }
+    const real ratio = size / self->unit;
+    const real weight = ratio < ONLINE_LARGEST_WEIGHT ? ratio : ONLINE_LARGEST_WEIGHT;
+    self->weight = kept * self->weight + weight;
+    self->weighted = kept * self->weighted + weight * self->estimate * (1 + agreement / size);
+    const real mean = (ONLINE_PRIOR_WEIGHT + self->weighted) / (ONLINE_PRIOR_WEIGHT + self->weight);
+    self->estimate = mean < ONLINE_LEAST ? ONLINE_LEAST : mean > ONLINE_LARGEST ? ONLINE_LARGEST : mean;
 }
 
 /* Writes m + C y. */

@@ -43,9 +43,6 @@ mod trajectory;
 /// Numbers that the controller in C shares, which are no settings.
 pub mod shared {
     pub use crate::online::controller::SOFTENED_FROM;
-    pub use crate::online::effectiveness::{
-        LARGEST_WEIGHT, PRIOR_WEIGHT, RANGE as EFFECTIVENESS_RANGE,
-    };
     pub use crate::online::lift::{CURVATURE as LIFT_CURVATURE, LIFT_ITERATIONS, torque_deviation};
     pub use crate::online::plan::POSTURE_SHARE;
     pub use crate::online::problem::SLACK_PRICE;

@@ -14,9 +14,8 @@ use crate::codegen::interface::{ModelInterface, PhaseInterface};
 use crate::mpc::interface::Accepts;
 use crate::mpc::problem::{Row, pairs};
 use crate::mpc::shared::{
-    EFFECTIVENESS_RANGE, GAP, LARGEST_WEIGHT, LIFT_CURVATURE, LIFT_ITERATIONS, MOST_TURN_RAD,
-    NO_PHASE, POSTURE_SHARE, PRIOR_WEIGHT, RATE_SOFTNESS, RATE_TOLERANCE, SLACK_PRICE,
-    SOFTENED_FROM, TOLERANCE,
+    GAP, LIFT_CURVATURE, LIFT_ITERATIONS, MOST_TURN_RAD, NO_PHASE, POSTURE_SHARE, RATE_SOFTNESS,
+    RATE_TOLERANCE, SLACK_PRICE, SOFTENED_FROM, TOLERANCE,
 };
 use crate::mpc::{ControlModel, ControlModelParts, FallbackSettings, InputGivenState, MpcSettings};
 use crate::robot::{DRY_SPEED_RAD_S, GRAVITY_M_S2, JOINT_DIM, SINGULAR_BOUND, WrenchFrame};
@@ -49,7 +48,7 @@ pub(super) struct Source<'a> {
     solver: SolverNumbers,
     functions: String,
     lift_functions: String,
-    online: &'static str,
+    online: String,
     legs: Legs,
     torque_mean: String,
     torque_deviation: String,
@@ -134,7 +133,7 @@ impl<'a> Source<'a> {
             solver: SolverNumbers::new(precision, mpc.qp.accepted_residual),
             functions: solver::of_horizon(facts.name),
             lift_functions: solver::of_lift(),
-            online: solver::online(),
+            online: solver::online(facts.name),
             legs: Legs::of(robot, numbers),
             torque_mean: numbers
                 .matrix(phases.iter().map(|phase| phase.torque_mean.iter().copied())),

@@ -122,8 +122,9 @@ const SOLVER: [&str; 9] = [
     "solver/scalar.rs",
     "solver/solve.rs",
 ];
-const ONLINE: [&str; 7] = [
+const ONLINE: [&str; 8] = [
     "online/dense.rs",
+    "online/effectiveness.rs",
     "online/estimate.rs",
     "online/lift.rs",
     "online/linearise.rs",
@@ -177,6 +178,8 @@ pub fn controller(root: &Path) -> Result<Vec<(&'static str, String)>, Fault> {
             "write_pyramid",
             "unscale",
             "write_defect",
+            "Share::unknown",
+            "Share::update",
             "write_torque",
             "free_optimum",
             "write_limits",
@@ -184,7 +187,7 @@ pub fn controller(root: &Path) -> Result<Vec<(&'static str, String)>, Fault> {
             "write_hessian",
             "change_rows",
         ],
-        header: &[],
+        header: &["Share"],
         elsewhere: &[
             ("MOST_LATENT", "D"),
             ("MOST_STATE", "X"),
@@ -193,9 +196,11 @@ pub fn controller(root: &Path) -> Result<Vec<(&'static str, String)>, Fault> {
         ],
         attribute: "MAYBE_UNUSED ",
     };
-    let online = translate(&read(root, &ONLINE)?, &unit)?.source;
-    let text = head("the controller's own steps.") + &online;
-    texts.push(("templates/controller_c/online.c", text));
+    let Translated { header, source } = translate(&read(root, &ONLINE)?, &unit)?;
+    let state = head("state of the controller's own steps.") + &header;
+    let steps = head("the controller's own steps.") + &source;
+    texts.push(("templates/controller_c/online_state.h", state));
+    texts.push(("templates/controller_c/online.c", steps));
     Ok(texts)
 }
 

@@ -161,8 +161,8 @@ impl Writer<'_> {
                 }
                 return Ok(());
             }
-            Some(_) => return Err(self.outside(instance, pattern, "a second variable of a name")),
-            None => {}
+            None if instance.variable(&name).is_none() => {}
+            _ => return Err(self.outside(instance, pattern, "a second variable of a name")),
         }
         let ty = match &value.ty {
             Type::Unit => return Err(self.outside(instance, pattern, "a variable of no value")),
