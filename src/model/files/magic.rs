@@ -218,7 +218,10 @@ fn to_table(code: &str, path: &Path) -> String {
         true => "",
         false => TO_COLUMNS,
     };
-    let stem = path.file_stem().unwrap_or(path.as_os_str()).to_string_lossy();
+    let stem = path
+        .file_stem()
+        .unwrap_or(path.as_os_str())
+        .to_string_lossy();
     let with_ending = |end: &str| path.with_file_name(format!("{stem}{end}"));
     let table = match with_ending(".csv") {
         same if same == path => with_ending("-table.csv"),

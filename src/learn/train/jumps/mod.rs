@@ -15,7 +15,7 @@ use super::latent::{EncodedSet, Latent};
 use super::metrics::{BODY_X, BODY_Z, PartScore};
 use crate::model::{self, GOAL_DIM, GoalRange, JumpPart, JumpPrior, Landmarks, StateMap};
 use deviations::{GoalRegression, fit_deviations};
-use landmarks::{Cut, Landmark, PartNodes, intervals, of_commonest_kind, sample};
+use landmarks::{Cut, PartNodes, intervals, of_commonest_kind, sample};
 
 /// Fewest jumps of one kind that say how jumps depend on their goal.
 pub(super) const LEAST_JUMPS: usize = 6;
