@@ -73,6 +73,36 @@ impl CompiledModel {
         dynamics.run(&[z, dz, u_lat], &mut [ddz]);
     }
 
+    /// `ddz` and the entries of its Jacobian by `(z, dz, u_lat)` that [`CompiledModel::pattern`] names; how many there are.
+    ///
+    /// # Panics
+    /// If `phase` does not exist, a vector does not fit or there is no room for the entries.
+    pub fn accelerate(
+        &mut self,
+        phase: usize,
+        z: &[f64],
+        dz: &[f64],
+        u_lat: &[f64],
+        ddz: &mut [f64],
+        entries: &mut [f64],
+    ) -> usize {
+        let CompiledPhase {
+            jacobian, pattern, ..
+        } = &mut self.phases[phase];
+        if pattern.is_empty() {
+            jacobian.run(&[z, dz, u_lat], &mut [ddz]);
+        } else {
+            let outputs = &mut [ddz, &mut entries[..pattern.len()]];
+            jacobian.run(&[z, dz, u_lat], outputs);
+        }
+        pattern.len()
+    }
+
+    /// Rows and columns of the entries of a phase's Jacobian.
+    pub fn pattern(&self, phase: usize) -> &JacobianPattern {
+        &self.phases[phase].pattern
+    }
+
     /// `ddz` and the full `latent_dim x 3 latent_dim` Jacobian by `(z, dz, u_lat)`.
     pub fn jacobian(
         &mut self,
@@ -85,14 +115,13 @@ impl CompiledModel {
     ) {
         let d = self.latent_dim;
         assert_eq!(jacobian.shape(), (d, 3 * d), "shape of the Jacobian");
-        let phase = &mut self.phases[phase];
-        let outputs = &mut [ddz, phase.entries.as_mut_slice()];
-        let n_outputs = if phase.pattern.is_empty() { 1 } else { 2 };
-        (phase.jacobian).run(&[z, dz, u_lat], &mut outputs[..n_outputs]);
+        let mut entries = std::mem::take(&mut self.phases[phase].entries);
+        self.accelerate(phase, z, dz, u_lat, ddz, &mut entries);
         jacobian.fill(0.0);
-        for (place, &entry) in phase.pattern.places().zip(&phase.entries) {
+        for (place, &entry) in self.pattern(phase).places().zip(&entries) {
             jacobian[place] = entry;
         }
+        self.phases[phase].entries = entries;
     }
 
     /// Advances `(z, dz)` by `h` seconds with the classical Runge-Kutta method under constant `u_lat`.
