@@ -100,14 +100,19 @@ impl Transcript {
     }
 
     /// All lines but the texts of self-tests, which are compared by running them, and the names of a controller's own
-    /// sources, which are romc's; files of the controller in C without their sizes.
+    /// sources, which are romc's; emitted code and files of the controller in C without their sizes.
     fn compared(&self) -> impl Iterator<Item = &str> {
         let lines = self.lines.iter().map(String::as_str);
         let lines =
             lines.filter(|line| !line.starts_with("> ") && !line.contains("-controller/src/"));
-        lines.map(|line| match line.contains("-controller-c/") {
-            true => line.trim_end_matches(|digit: char| digit.is_ascii_digit()),
-            false => line,
+        lines.map(|line| {
+            let name = line.trim_end_matches(|digit: char| digit.is_ascii_digit());
+            let ending = name.trim_end().rsplit_once('.').map(|(_, ending)| ending);
+            let is_code = ending.is_some_and(|ending| CODE.contains(&ending));
+            match is_code || line.contains("-controller-c/") {
+                true => name,
+                false => line,
+            }
         })
     }
 
