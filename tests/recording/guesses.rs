@@ -154,7 +154,9 @@ impl Convention {
                 None => f64::from(u8::from(down)),
                 Some((rest, load)) => {
                     let ripple = 1.0 + 0.4 * ((k * 37 + foot * 5) % 23) as f64 / 23.0;
-                    rest + self.zero * foot as f64 + 0.02 * load * ripple + if down { load * ripple } else { 0.0 }
+                    rest + self.zero * foot as f64
+                        + 0.02 * load * ripple
+                        + if down { load * ripple } else { 0.0 }
                 }
             });
             let name = if self.force.is_some() {
