@@ -29,7 +29,7 @@ pub(in crate::recording) fn read_texts(
     if !path.is_dir() {
         logs.push(read_text(path, &map.text)?);
     }
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy(); // what has no name cannot be opened
     for name in named {
         let file = match path.is_dir() {
             true => path.join(name),

@@ -28,7 +28,10 @@ pub(super) fn guessed(path: &Path, logs: &[Log], robot: &Robot) -> Guess {
         clock: clock.as_ref(),
     };
     let time = source.time();
-    let file = path.file_name().unwrap_or_default().to_string_lossy();
+    let file = path
+        .file_name()
+        .unwrap_or(path.as_os_str())
+        .to_string_lossy();
     let mut text = format!(
         "# Guessed from {file}: check every line, then `romc inspect LOG --columns THIS.toml`.\n\n[time]\n{time}\n"
     );
