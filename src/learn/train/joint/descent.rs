@@ -237,20 +237,8 @@ mod tests {
         };
         let features = Features::new(&standard_library(2, 1, true));
         let mut random = Random::new(21);
-        let batches: Vec<Batch> = (0..4)
-            .map(|i| {
-                let [x, dx, ddx, u] = std::array::from_fn(|_| random.matrix(40, 6, 0.5));
-                let (phase, step_s) = (i % 2, 0.002);
-                Batch {
-                    phase,
-                    x,
-                    dx,
-                    ddx,
-                    u,
-                    step_s,
-                }
-            })
-            .collect();
+        let batch = |i: usize| Batch::random(i % 2, (40, 6), 0.5, &mut random);
+        let batches: Vec<Batch> = (0..4).map(batch).collect();
         let all: Vec<&Batch> = batches.iter().collect();
         let kinds = [Activation::Linear, Activation::Elu].into_iter();
         let moves = [Moved::All, Moved::Decoder, Moved::Xi];
