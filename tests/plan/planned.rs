@@ -210,7 +210,12 @@ fn jumps_recorded_up_to_touch_down_are_planned_up_to_it() {
     }
     let model = learned(&training, &[], 4);
     let prior = model.jump_prior().expect("a prior without landings");
-    let names: Vec<&str> = prior.parts.iter().map(|part| part.name.as_str()).collect();
+    let names: Vec<&str> = prior
+        .landmarks
+        .parts
+        .iter()
+        .map(|part| part.name.as_str())
+        .collect();
     assert_eq!(names, ["crouch", "thrust", "flight"]);
     let [distance, apex, _] = prior.ranges();
     let goal = Goal::new(distance.mean, apex.mean).unwrap();
@@ -227,11 +232,15 @@ fn prior_cuts_jumps_by_contacts_and_is_nearer_to_a_jump_at_its_goal_than_the_mea
     let training = recordings("train", 8);
     let model = learned(&training, &[], 4);
     let prior = model.jump_prior().expect("jumps of one kind");
-    let names: Vec<&str> = prior.parts.iter().map(|part| part.name.as_str()).collect();
+    let landmarks = &prior.landmarks.parts;
+    let names: Vec<&str> = landmarks.iter().map(|part| part.name.as_str()).collect();
     assert_eq!(names, ["crouch", "thrust", "flight", "landing"]);
-    assert_eq!((prior.jumps.len(), prior.parts[2].feet), (8, [false; 4]));
-    for part in &prior.parts {
-        let [least, most] = part.duration_range_s;
+    assert_eq!(
+        (prior.landmarks.jumps.len(), landmarks[2].feet),
+        (8, [false; 4])
+    );
+    for (part, landmark) in prior.parts.iter().zip(landmarks) {
+        let [least, most] = landmark.duration_range_s;
         assert!(least <= part.duration_s[0] && part.duration_s[0] <= most);
     }
     // Where the flight begins the body rises, where it ends it falls.
@@ -248,7 +257,7 @@ fn prior_cuts_jumps_by_contacts_and_is_nearer_to_a_jump_at_its_goal_than_the_mea
         });
         ends.sum()
     };
-    let at_goal = error(&|jump| prior.features(prior.jumps[jump]));
+    let at_goal = error(&|jump| prior.features(prior.landmarks.jumps[jump]));
     let at_mean = error(&|_| [1.0, 0.0, 0.0, 0.0]);
     assert!(at_goal < 0.2 * at_mean, "{at_goal} {at_mean}");
 }
