@@ -189,9 +189,9 @@ fn earlier_in_words(earlier: &[PathBuf]) -> String {
     match names(earlier).as_slice() {
         [] => String::new(),
         [file] => format!("\nof an earlier run, not written now: {file}\n"),
-        [file, others @ ..] => format!(
-            "\nof earlier runs, not written now: {file} and {} more\n",
-            others.len()
-        ),
+        [file, others @ ..] => {
+            let n = others.len();
+            format!("\nof earlier runs, not written now: {file} and {n} more\n")
+        }
     }
 }

@@ -51,11 +51,9 @@ pub(super) fn run(arguments: &SimulateArguments) -> Result<Answer, Error> {
 
 fn metrics_text(model: &ReducedModel, assessment: &Assessment<'_>) -> String {
     let mut text = format!("{}\n", coordinate_table(model, assessment));
-    let kinds = [
-        ("full", &assessment.full),
-        ("restarted", &assessment.restarted),
-    ];
-    for (kind, sums) in kinds.into_iter().filter(|(_, sums)| sums.diverged > 0) {
+    let sums = [&assessment.full, &assessment.restarted].into_iter();
+    let kinds = ["full", "restarted"].into_iter().zip(sums);
+    for (kind, sums) in kinds.filter(|(_, sums)| sums.diverged > 0) {
         let _ = writeln!(
             text,
             "{} of {} {kind} rollouts diverged; the table covers them up to there\n",
@@ -115,10 +113,8 @@ fn trajectory_table(model: &ReducedModel, assessment: &Assessment<'_>) -> Result
             [&run.full, &run.restarted].map(|rollout| rollout.states(latent.len()));
         for (sample, states) in full.iter().zip(&restarted).enumerate() {
             let states = [states.0.as_ref(), states.1.as_ref()];
-            let [z, dz] = [
-                states.map(|state| state.map(|(z, _)| z)),
-                states.map(|state| state.map(|(_, dz)| dz)),
-            ];
+            let z = states.map(|state| state.map(|(z, _)| z));
+            let dz = states.map(|state| state.map(|(_, dz)| dz));
             let [full, restarted] = z.map(|z| z.map(|z| model.decode(z)).transpose());
             let (full, restarted) = (full?, restarted?);
             let phase = &model.phases()[latent.phase[sample]].name;
