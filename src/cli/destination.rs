@@ -2,7 +2,7 @@
 
 use super::args::ReadingArguments;
 use super::*;
-use crate::files::{Begun, write_files_since};
+use crate::files::{Emitted, write_files_since};
 use crate::report::{Figure, figure_files};
 
 /// What an output file holds: the endings that it may have.
@@ -20,7 +20,7 @@ impl Format {
 /// The files that a command reads, none of which it may replace, forced or not; and the folder that it writes into, as it
 /// is when the command begins.
 #[derive(Debug, Default)]
-pub(super) struct Inputs<'a>(Vec<&'a Path>, Option<Begun>);
+pub(super) struct Inputs<'a>(Vec<&'a Path>, Option<Emitted>);
 
 impl<'a> Inputs<'a> {
     pub(super) fn reading(arguments: &'a ReadingArguments) -> Self {
@@ -36,7 +36,7 @@ impl<'a> Inputs<'a> {
     }
 
     pub(super) fn into_folder(mut self, folder: Option<&Path>) -> Result<Self, Error> {
-        self.1 = folder.map(Begun::of).transpose()?;
+        self.1 = folder.map(Emitted::of).transpose()?;
         Ok(self)
     }
 
@@ -127,7 +127,7 @@ impl<'a> Inputs<'a> {
         for file in files {
             self.check(&folder.join(&file.path))?;
         }
-        let now = Begun::of(folder)?;
+        let now = Emitted::of(folder)?;
         let begun = self.1.as_ref().unwrap_or(&now);
         Ok(write_files_since(begun, folder, files, overwrite)?)
     }

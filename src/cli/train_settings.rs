@@ -241,7 +241,7 @@ impl TrainSettings {
             .is_some_and(|weight| f64::from(weight) != 0.0);
         let is_named = self.coordinates == Some(Coordinates::Named);
         let is_published = self.paper && method == Method::Joint;
-        let activation = self.activation.unwrap_or_default();
+        let activation = self.activation.unwrap_or(Activation::Elu);
         let of_choice = "slack refinements growth no-rotation";
         let faults = [
             (

@@ -104,13 +104,17 @@ fn torques(plan: &Plan, robot: &Robot, goal: &str) -> Figure {
 }
 
 pub(crate) fn reach_figure(reach: &GoalMap, prior: &JumpPrior) -> Figure {
-    let crosses = prior.jumps.iter().flat_map(|&[distance, apex, _]| {
-        let at = |x: f64, y: f64| (distance + x * CROSS_M, Some(apex + 0.25 * y * CROSS_M));
-        let gap = (distance, None);
-        [[-1.0, 1.0], [1.0, -1.0]]
-            .map(|[from, to]| [at(-1.0, from), at(1.0, to), gap])
-            .concat()
-    });
+    let crosses = prior
+        .landmarks
+        .jumps
+        .iter()
+        .flat_map(|&[distance, apex, _]| {
+            let at = |x: f64, y: f64| (distance + x * CROSS_M, Some(apex + 0.25 * y * CROSS_M));
+            let gap = (distance, None);
+            [[-1.0, 1.0], [1.0, -1.0]]
+                .map(|[from, to]| [at(-1.0, from), at(1.0, to), gap])
+                .concat()
+        });
     let series = vec![
         Series::through(Role::Recorded, crosses),
         border(reach, Role::Full, &["trusted"]),
