@@ -120,9 +120,8 @@ fn text(
         let test = of_model("_selftest.c");
         // Without a folder before it, a shell would look for the program elsewhere.
         let here = if program.contains('/') { "" } else { "./" };
-        let _ = writeln!(
-            text,
-            "\ncheck the C code on this machine:\n  cc -O2 -o {program} {source} {test} -lm && {here}{program}"
+        text += &format!(
+            "\ncheck the C code on this machine:\n  cc -O2 -o {program} {source} {test} -lm && {here}{program}\n"
         );
     }
     text
