@@ -124,6 +124,7 @@ pub fn arrays_by_neighbours(path: &Path) -> Option<OtherFormat> {
 impl Row {
     fn holds(&self, bytes: &[u8]) -> bool {
         let latin_1 = |text: &str| -> Vec<u8> { text.chars().map(|c| c as u8).collect() };
+        // A file that ends before the place of the sign does not have it.
         let from = bytes.get(self.at..).unwrap_or_default();
         let is_signed = |sign: &Vec<String>| {
             let mut inside = sign.iter().skip(1);
@@ -217,7 +218,10 @@ fn to_table(code: &str, path: &Path) -> String {
         true => "",
         false => TO_COLUMNS,
     };
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let stem = path
+        .file_stem()
+        .unwrap_or(path.as_os_str())
+        .to_string_lossy();
     let with_ending = |end: &str| path.with_file_name(format!("{stem}{end}"));
     let table = match with_ending(".csv") {
         same if same == path => with_ending("-table.csv"),

@@ -63,7 +63,7 @@ pub fn open(
 }
 
 fn ending(path: &Path) -> String {
-    let ending = path.extension().unwrap_or_default();
+    let ending = path.extension().unwrap_or_default(); // no ending is none of a robot's
     ending.to_string_lossy().to_lowercase()
 }
 

@@ -1,26 +1,21 @@
 //! What the training jumps say of jumps that were not recorded: landmarks, prior, deviations.
 //!
 //! In: the training jumps and an encoder. Out: a [`JumpPrior`], or none if fewer than
-//! [`LEAST_JUMPS`] of them are of one kind. `landmarks` cuts each jump into parts, `nodes`
-//! samples the parts at equal shares of their durations, `regression` fits nodes and durations over
-//! the goals, and `deviations` fits how accelerations change about such a trajectory.
+//! [`LEAST_JUMPS`] of them are of one kind. `landmarks` cuts each jump into parts and
+//! samples these at equal shares of their durations; `deviations` fits nodes and durations over the goals, and
+//! how accelerations change about such a trajectory.
 
 mod deviations;
 mod landmarks;
-mod nodes;
-mod regression;
 
 use nalgebra::{DMatrix, DVector, RowDVector};
 
 use super::dataset::{Dataset, centred, mean};
 use super::latent::{EncodedSet, Latent};
-use super::metrics::{BODY_X, BODY_Z};
-use super::report::PartScore;
+use super::metrics::{BODY_X, BODY_Z, PartScore};
 use crate::model::{self, GOAL_DIM, GoalRange, JumpPart, JumpPrior, Landmarks, StateMap};
-use deviations::fit_deviations;
-use landmarks::{Cut, of_commonest_kind};
-use nodes::{PartNodes, intervals, sample};
-use regression::GoalRegression;
+use deviations::{GoalRegression, fit_deviations};
+use landmarks::{Cut, PartNodes, intervals, of_commonest_kind, sample};
 
 /// Fewest jumps of one kind that say how jumps depend on their goal.
 pub(super) const LEAST_JUMPS: usize = 6;

@@ -61,7 +61,7 @@ fn prior_at_the_goal_of_a_jump_is_nearer_to_it_than_the_mean_jump() {
         });
         ends.sum()
     };
-    let at_goal = error(&|jump| prior.features(prior.jumps[jump]));
+    let at_goal = error(&|jump| prior.features(prior.landmarks.jumps[jump]));
     let at_mean = error(&|_| [1.0, 0.0, 0.0, 0.0]);
     assert!(at_goal < 0.2 * at_mean, "{at_goal} {at_mean}");
 }
