@@ -14,7 +14,8 @@ macro_rules! sources {
 pub const SOURCES: &[(&str, &str)] = sources! {
     "online":
         command conic control_model controller dense effectiveness engine error estimate fallback horizon
-        interface lift linearise mod plan problem prune qp reference settings stage step structured swing;
+        interface lift linearise mod plan problem prune qp reference settings stage step structured swing
+        trajectory;
     "solver":
         interior links lower mod point problem riccati rows scalar solve;
 };

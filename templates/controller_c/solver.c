@@ -1,4 +1,4 @@
-/* @generated from src/control/solver by `cargo run -p romc-translate`: the structured solver. Names that are defined
+/* @generated from src/control by `cargo run -p romc-translate`: the structured solver. Names that are defined
  * elsewhere: real, the type of numbers; NX and NU, how many states and inputs there are. */
 
 /* A guess is of quite another program if the optimum without rows moved further than this, in units of
@@ -359,63 +359,68 @@ static inline void solver_add_wide(real factor, const real *row, real out[restri
     }
 }
 
-/* P A and P B. */
-static inline void solver_products_multiply_end(solver_products *restrict self, real a[NX][NX], real p[NX][NX])
+/* out_x += left^T x and out_v += left^T v of the first M columns of left. */
+static inline void solver_add_products_nx_nx(real left[NX][NX], real x[NX][NX], real v[NX][SOLVER_WIDE],
+        real out_x[restrict NX][NX], real out_v[restrict NX][SOLVER_WIDE])
 {
-    /* Two rows at a time: what is read of A and B serves both. */
+    /* Two rows at a time: what is read of x and v serves both. */
     for (int i = 0; i < NX - NX % 2; i += 2) {
-        real first_a[NX] = {0};
-        real second_a[NX] = {0};
-        real first_b[SOLVER_WIDE] = {0};
-        real second_b[SOLVER_WIDE] = {0};
+        real first_x[NX];
+        memcpy(first_x, out_x[i], sizeof first_x);
+        real second_x[NX];
+        memcpy(second_x, out_x[i + 1], sizeof second_x);
+        real first_v[SOLVER_WIDE];
+        memcpy(first_v, out_v[i], sizeof first_v);
+        real second_v[SOLVER_WIDE];
+        memcpy(second_v, out_v[i + 1], sizeof second_v);
         for (int k = 0; k < NX; ++k) {
-            solver_add_multiple_nx(p[i][k], a[k], first_a);
-            solver_add_multiple_nx(p[i + 1][k], a[k], second_a);
-            solver_add_wide(p[i][k], self->b[k], first_b);
-            solver_add_wide(p[i + 1][k], self->b[k], second_b);
+            solver_add_multiple_nx(left[k][i], x[k], first_x);
+            solver_add_multiple_nx(left[k][i + 1], x[k], second_x);
+            solver_add_wide(left[k][i], v[k], first_v);
+            solver_add_wide(left[k][i + 1], v[k], second_v);
         }
-        memcpy(self->pa[i], first_a, sizeof(real[NX]));
-        memcpy(self->pa[i + 1], second_a, sizeof(real[NX]));
-        memcpy(self->pb[i], first_b, sizeof(real[SOLVER_WIDE]));
-        memcpy(self->pb[i + 1], second_b, sizeof(real[SOLVER_WIDE]));
+        memcpy(out_x[i], first_x, sizeof(real[NX]));
+        memcpy(out_x[i + 1], second_x, sizeof(real[NX]));
+        memcpy(out_v[i], first_v, sizeof(real[SOLVER_WIDE]));
+        memcpy(out_v[i + 1], second_v, sizeof(real[SOLVER_WIDE]));
     }
     for (int i = NX - NX % 2; i < NX; ++i) {
-        memset(self->pa[i], 0, sizeof(real[NX]));
-        memset(self->pb[i], 0, sizeof(real[SOLVER_WIDE]));
         for (int k = 0; k < NX; ++k) {
-            solver_add_multiple_nx(p[i][k], a[k], self->pa[i]);
-            solver_add_wide(p[i][k], self->b[k], self->pb[i]);
+            solver_add_multiple_nx(left[k][i], x[k], out_x[i]);
+            solver_add_wide(left[k][i], v[k], out_v[i]);
         }
     }
 }
 
-/* H_vx += B^T P A and H_vv += B^T P B. */
-static inline void solver_products_add_hessian(solver_products *self)
+/* out_x += left^T x and out_v += left^T v of the first M columns of left. */
+static inline void solver_add_products_wide_nu(real left[NX][SOLVER_WIDE], real x[NX][NX], real v[NX][SOLVER_WIDE],
+        real out_x[restrict NU][NX], real out_v[restrict NU][SOLVER_WIDE])
 {
+    /* Two rows at a time: what is read of x and v serves both. */
     for (int i = 0; i < NU - NU % 2; i += 2) {
         real first_x[NX];
-        memcpy(first_x, self->hvx[i], sizeof first_x);
+        memcpy(first_x, out_x[i], sizeof first_x);
         real second_x[NX];
-        memcpy(second_x, self->hvx[i + 1], sizeof second_x);
+        memcpy(second_x, out_x[i + 1], sizeof second_x);
         real first_v[SOLVER_WIDE];
-        memcpy(first_v, self->hvv[i], sizeof first_v);
+        memcpy(first_v, out_v[i], sizeof first_v);
         real second_v[SOLVER_WIDE];
-        memcpy(second_v, self->hvv[i + 1], sizeof second_v);
+        memcpy(second_v, out_v[i + 1], sizeof second_v);
         for (int k = 0; k < NX; ++k) {
-            solver_add_multiple_nx(self->b[k][i], self->pa[k], first_x);
-            solver_add_multiple_nx(self->b[k][i + 1], self->pa[k], second_x);
-            solver_add_wide(self->b[k][i], self->pb[k], first_v);
-            solver_add_wide(self->b[k][i + 1], self->pb[k], second_v);
+            solver_add_multiple_nx(left[k][i], x[k], first_x);
+            solver_add_multiple_nx(left[k][i + 1], x[k], second_x);
+            solver_add_wide(left[k][i], v[k], first_v);
+            solver_add_wide(left[k][i + 1], v[k], second_v);
         }
-        memcpy(self->hvx[i], first_x, sizeof(real[NX]));
-        memcpy(self->hvx[i + 1], second_x, sizeof(real[NX]));
-        memcpy(self->hvv[i], first_v, sizeof(real[SOLVER_WIDE]));
-        memcpy(self->hvv[i + 1], second_v, sizeof(real[SOLVER_WIDE]));
+        memcpy(out_x[i], first_x, sizeof(real[NX]));
+        memcpy(out_x[i + 1], second_x, sizeof(real[NX]));
+        memcpy(out_v[i], first_v, sizeof(real[SOLVER_WIDE]));
+        memcpy(out_v[i + 1], second_v, sizeof(real[SOLVER_WIDE]));
     }
     for (int i = NU - NU % 2; i < NU; ++i) {
         for (int k = 0; k < NX; ++k) {
-            solver_add_multiple_nx(self->b[k][i], self->pa[k], self->hvx[i]);
-            solver_add_wide(self->b[k][i], self->pb[k], self->hvv[i]);
+            solver_add_multiple_nx(left[k][i], x[k], out_x[i]);
+            solver_add_wide(left[k][i], v[k], out_v[i]);
         }
     }
 }
@@ -620,8 +625,11 @@ static inline bool solver_eliminate(solver_stage *restrict stage, real p[restric
             products->b[k][j] = stage->b[k][j];
         }
     }
-    solver_products_multiply_end(products, stage->a, p);
-    solver_products_add_hessian(products);
+    /* P A and P B, as P is symmetric; H_vx += B^T P A and H_vv += B^T P B. */
+    memset(products->pa, 0, sizeof(real[NX][NX]));
+    memset(products->pb, 0, sizeof(real[NX][SOLVER_WIDE]));
+    solver_add_products_nx_nx(p, stage->a, products->b, products->pa, products->pb);
+    solver_add_products_wide_nu(products->b, products->pa, products->pb, products->hvx, products->hvv);
     if (!solver_factorise(products->hvv, stage->factor)) {
         return false;
     }

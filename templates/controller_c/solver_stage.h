@@ -1,4 +1,4 @@
-/* @generated from src/control/solver by `cargo run -p romc-translate`: a stage of the structured solver. Names that are defined
+/* @generated from src/control by `cargo run -p romc-translate`: a stage of the structured solver. Names that are defined
  * elsewhere: real, the type of numbers; NX and NU, how many states and inputs there are. */
 
 /* One stage: its dynamics, where its rows stand, and the memory of the solver.

@@ -9,7 +9,7 @@ use std::process::{Command, Stdio};
 use romc::solver::{
     Cost, Links, Outcome, Pairs, Program, Real, RowMatrices, Settings, Shape, Stage,
 };
-use romc_translate::{Source, Unit, solver, solver_of, translate};
+use romc_translate::{Source, Unit, controller, solver_of, translate};
 
 use crate::emitted::STRICT;
 use crate::programs::{root, succeed};
@@ -245,7 +245,7 @@ fn compare<T: Real, const NX: usize, const NU: usize, const LINKED: bool>(real: 
         .map(|number| random_program(&mut random, NX, NU, number, links))
         .collect();
     let folder = tempfile::tempdir().expect("a folder");
-    let files = solver(root()).expect("the solver is in the subset");
+    let files = controller(root()).expect("the solver is in the subset");
     let found = solved_in_c(folder.path(), &files, (NX, NU, real, LINKED), &programs);
     let mut rest = found.as_slice();
     let mut iterated = 0;
@@ -264,7 +264,7 @@ fn compare<T: Real, const NX: usize, const NU: usize, const LINKED: bool>(real: 
 
 #[test]
 fn solver_in_c_is_what_its_rust_says() {
-    for (path, text) in solver(root()).expect("the solver is in the subset") {
+    for (path, text) in controller(root()).expect("the controller is in the subset") {
         let committed = fs::read_to_string(root().join(path)).expect("committed");
         assert!(
             committed == text,
@@ -357,7 +357,7 @@ fn constructs_outside_the_subset_are_named_with_their_place() {
         let unit = Unit {
             prefix: "test",
             roots: &["count"],
-            header: &[],
+            ..Unit::default()
         };
         let fault = translate(&[source], &unit).expect_err(body);
         assert_eq!(

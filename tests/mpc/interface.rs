@@ -2,7 +2,6 @@
 
 use std::ffi::CStr;
 
-use nalgebra::DMatrix;
 use romc::mpc::interface::{
     Handle, INTERNAL, RawCommand, RawMeasurement, RawReference, Settings, all_codes, last_error,
     status_text,
@@ -14,16 +13,24 @@ use romc::mpc::{Controller, LatentDynamics, Lift, Linearisation, MpcSettings, So
 struct Broken;
 
 impl LatentDynamics for Broken {
-    fn jacobian(
+    fn accelerate(
         &mut self,
         _: usize,
         _: &[f64],
         _: &[f64],
         _: &[f64],
         _: &mut [f64],
-        _: &mut DMatrix<f64>,
-    ) {
+        _: &mut [f64],
+    ) -> usize {
         panic!("equations that panic");
+    }
+
+    fn row(&self, _: usize, _: usize) -> usize {
+        0
+    }
+
+    fn column(&self, _: usize, _: usize) -> usize {
+        0
     }
 }
 

@@ -1,10 +1,38 @@
 //! The step of a stage and its derivatives.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
+use romc::mpc::LatentDynamics;
 use romc::mpc::linearise::{Lineariser, StageModel};
 
+/// Accelerations with all entries of their Jacobian, row by row.
+#[derive(Debug)]
+struct Dense(usize, fn(&[f64], &[f64], &[f64], &mut [f64], &mut [f64]));
+
+impl LatentDynamics for Dense {
+    fn accelerate(
+        &mut self,
+        _: usize,
+        z: &[f64],
+        dz: &[f64],
+        u: &[f64],
+        ddz: &mut [f64],
+        entries: &mut [f64],
+    ) -> usize {
+        self.1(z, dz, u, ddz, entries);
+        entries.len()
+    }
+
+    fn row(&self, _: usize, entry: usize) -> usize {
+        entry / (3 * self.0)
+    }
+
+    fn column(&self, _: usize, entry: usize) -> usize {
+        entry % (3 * self.0)
+    }
+}
+
 /// A stiff, nonlinear pair of oscillators with inputs inside and outside the sine.
-fn sample(z: &[f64], dz: &[f64], u: &[f64], ddz: &mut [f64], jacobian: &mut DMatrix<f64>) {
+fn sample(z: &[f64], dz: &[f64], u: &[f64], ddz: &mut [f64], jacobian: &mut [f64]) {
     ddz[0] = -40.0 * z[0].sin() + z[1] * dz[0] + u[0];
     ddz[1] = -3.0 * dz[1] + (z[0] * u[1]).cos() + 2.0 * u[0];
     let slope = -(z[0] * u[1]).sin();
@@ -12,12 +40,13 @@ fn sample(z: &[f64], dz: &[f64], u: &[f64], ddz: &mut [f64], jacobian: &mut DMat
         [-40.0 * z[0].cos(), dz[0], z[1], 0.0, 1.0, 0.0],
         [slope * u[1], 0.0, 0.0, -3.0, 2.0, slope * z[0]],
     ];
-    jacobian.copy_from(&DMatrix::from_row_slice(2, 6, &rows.concat()));
+    jacobian.copy_from_slice(&rows.concat());
 }
 
 fn stage_at(x: &[f64], u: &[f64]) -> StageModel {
     let mut stage = StageModel::zeros(2);
-    Lineariser::new(2).stage(x, u, 0.02, sample, &mut stage);
+    let mut dynamics = Dense(2, sample);
+    Lineariser::new(2).stage((&mut dynamics, 0), x, u, 0.02, &mut stage);
     stage
 }
 
@@ -52,13 +81,12 @@ fn sensitivities_match_central_differences_of_the_step() {
 #[test]
 fn step_of_a_linear_oscillator_is_the_taylor_polynomial_of_order_four() {
     let mut stage = StageModel::zeros(1);
-    let oscillator =
-        |z: &[f64], _: &[f64], u: &[f64], ddz: &mut [f64], jacobian: &mut DMatrix<f64>| {
-            ddz[0] = -z[0] + u[0];
-            jacobian.copy_from_slice(&[-1.0, 0.0, 1.0]);
-        };
+    let mut oscillator = Dense(1, |z, _, u, ddz, jacobian| {
+        ddz[0] = -z[0] + u[0];
+        jacobian.copy_from_slice(&[-1.0, 0.0, 1.0]);
+    });
     let h: f64 = 0.5;
-    Lineariser::new(1).stage(&[2.0, 0.0], &[0.0], h, oscillator, &mut stage);
+    Lineariser::new(1).stage((&mut oscillator, 0), &[2.0, 0.0], &[0.0], h, &mut stage);
     let (cosine, sine) = (
         1.0 - h.powi(2) / 2.0 + h.powi(4) / 24.0,
         h - h.powi(3) / 6.0,

@@ -12,7 +12,8 @@ use crate::model::ReducedModel;
 /// the interpreter with the very arithmetic of the generated code. Evaluation
 /// allocates nothing; clone it for another thread.
 ///
-/// All vectors have `latent_dim` elements, in scaled units.
+/// All vectors have `latent_dim` elements, in scaled units. Methods panic where a phase does not exist or a length does
+/// not fit.
 #[derive(Clone, Debug)]
 pub struct CompiledModel {
     latent_dim: usize,
@@ -68,18 +69,42 @@ impl CompiledModel {
     }
 
     /// `ddz = Xi^T Theta(z, dz, u_lat)`.
-    ///
-    /// # Panics
-    /// If `phase` does not exist or a slice is not `latent_dim` long.
     pub fn ddz(&mut self, phase: usize, z: &[f64], dz: &[f64], u_lat: &[f64], ddz: &mut [f64]) {
         let dynamics = &mut self.phases[phase].dynamics;
         dynamics.run(&[z, dz, u_lat], &mut [ddz]);
     }
 
-    /// `ddz` and the full `latent_dim x 3 latent_dim` Jacobian by `(z, dz, u_lat)`.
+    /// `ddz` and the entries of its Jacobian by `(z, dz, u_lat)` that [`CompiledModel::pattern`] names; how many there are.
     ///
     /// # Panics
-    /// If `phase` does not exist or a length does not fit.
+    /// If `phase` does not exist, a vector does not fit or there is no room for the entries.
+    pub fn accelerate(
+        &mut self,
+        phase: usize,
+        z: &[f64],
+        dz: &[f64],
+        u_lat: &[f64],
+        ddz: &mut [f64],
+        entries: &mut [f64],
+    ) -> usize {
+        let CompiledPhase {
+            jacobian, pattern, ..
+        } = &mut self.phases[phase];
+        if pattern.is_empty() {
+            jacobian.run(&[z, dz, u_lat], &mut [ddz]);
+        } else {
+            let outputs = &mut [ddz, &mut entries[..pattern.len()]];
+            jacobian.run(&[z, dz, u_lat], outputs);
+        }
+        pattern.len()
+    }
+
+    /// Rows and columns of the entries of a phase's Jacobian.
+    pub fn pattern(&self, phase: usize) -> &JacobianPattern {
+        &self.phases[phase].pattern
+    }
+
+    /// `ddz` and the full `latent_dim x 3 latent_dim` Jacobian by `(z, dz, u_lat)`.
     pub fn jacobian(
         &mut self,
         phase: usize,
@@ -91,30 +116,22 @@ impl CompiledModel {
     ) {
         let d = self.latent_dim;
         assert_eq!(jacobian.shape(), (d, 3 * d), "shape of the Jacobian");
-        let phase = &mut self.phases[phase];
-        if phase.pattern.is_empty() {
-            phase.jacobian.run(&[z, dz, u_lat], &mut [ddz]);
-        } else {
-            let outputs = &mut [ddz, phase.entries.as_mut_slice()];
-            phase.jacobian.run(&[z, dz, u_lat], outputs);
-        }
+        let mut entries = std::mem::take(&mut self.phases[phase].entries);
+        self.accelerate(phase, z, dz, u_lat, ddz, &mut entries);
         jacobian.fill(0.0);
-        for (place, &entry) in phase.pattern.places().zip(&phase.entries) {
+        for (place, &entry) in self.pattern(phase).places().zip(&entries) {
             jacobian[place] = entry;
         }
+        self.phases[phase].entries = entries;
     }
 
     /// Advances `(z, dz)` by `h` seconds with the classical Runge-Kutta method under
     /// constant `u_lat`.
-    ///
-    /// # Panics
-    /// If `phase` does not exist or a slice is not `latent_dim` long.
     pub fn rk4_step(&mut self, phase: usize, z: &mut [f64], dz: &mut [f64], u_lat: &[f64], h: f64) {
         let phase = &mut self.phases[phase];
         let (z_next, dz_next) = phase.next.split_at_mut(self.latent_dim);
-        phase
-            .step
-            .run(&[z, dz, u_lat, &[h]], &mut [&mut *z_next, &mut *dz_next]);
+        let outputs = &mut [&mut *z_next, &mut *dz_next];
+        phase.step.run(&[z, dz, u_lat, &[h]], outputs);
         z.copy_from_slice(z_next);
         dz.copy_from_slice(dz_next);
     }

@@ -261,6 +261,12 @@ impl ControlModel {
         })
     }
 
+    /// Lower and upper limits of the joints, rad.
+    pub(super) fn joint_limits(&self) -> [[f64; JOINT_DIM]; 2] {
+        let limits = self.robot().joint_limit_rad();
+        [limits.map(|limit| limit.0), limits.map(|limit| limit.1)]
+    }
+
     /// The joint positions within the robot's limits that are nearest to these; the lower limit for NaN.
     pub(super) fn clamp_joints(&self, joints_rad: [f64; JOINT_DIM]) -> [f64; JOINT_DIM] {
         std::array::from_fn(|joint| {

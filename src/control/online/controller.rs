@@ -17,6 +17,7 @@ use super::qp::QpSolver;
 use super::reference::{Reference, ReferenceSamples};
 use super::settings::{Lift, Linearisation, MissingInput, MpcSettings, RowSelection};
 use super::stage::StageShape;
+use super::trajectory::Trajectory;
 use crate::robot::{ContactFlags, JOINT_DIM, STATE_DIM};
 
 /// Violation of a joint limit, in half ranges, from which a plan counts as softened: beyond what the
@@ -246,12 +247,12 @@ impl Controller {
             return;
         }
         let middle_s = time_s + 0.5 * self.settings.step_s;
-        let feet = reference.feet_at(middle_s);
-        self.prepare_stages(time_s, feet);
+        let phase = reference.phase_at(middle_s);
+        self.prepare_stages(time_s, phase);
     }
 
     /// Writes the horizon from a time on and its gains; none without a reference.
-    pub(super) fn prepare_stages(&mut self, time_s: f64, feet: ContactFlags) -> Option<Status> {
+    pub(super) fn prepare_stages(&mut self, time_s: f64, phase: usize) -> Option<Status> {
         let inputs = StageInputs {
             plant: &self.plant,
             settings: &self.settings,
@@ -260,7 +261,7 @@ impl Controller {
             rows: &self.near_rows,
         };
         let dynamics = self.dynamics.as_mut();
-        let contact = self.horizon.prepare(&inputs, dynamics, time_s, feet);
+        let contact = self.horizon.prepare(&inputs, dynamics, time_s, phase);
         let (stages, shift, is_new) = self.horizon.prepared();
         self.engine.prepare(stages, shift, is_new);
         Some(contact)

@@ -18,27 +18,104 @@
 
 use super::control_model::ControlModel;
 use super::controller::Measurement;
+use super::dense::Real;
 use super::linearise::StageModel;
 use super::plan::Plan;
 use super::settings::Effectiveness as Settings;
 use crate::robot::{JOINT_DIM, STATE_DIM};
 
 /// Weight of the one from before the motion, in first steps.
-pub const PRIOR_WEIGHT: f64 = 10.0;
+const PRIOR_WEIGHT: Real = 10.0;
 /// Largest weight of a step, in first steps.
-pub const LARGEST_WEIGHT: f64 = 2.0;
+const LARGEST_WEIGHT: Real = 2.0;
 /// Smallest and largest estimate.
-pub const RANGE: (f64, f64) = (0.7, 1.3);
+const LEAST: Real = 0.7;
+const LARGEST: Real = 1.3;
 
 /// The estimate and the sums behind it.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
+pub(super) struct Share {
+    /// `γ̂`.
+    pub estimate: Real,
+    /// Weights of the steps so far, and weights times what the steps say.
+    weight: Real,
+    weighted: Real,
+    /// `φᵀ φ` of the first step, zero before.
+    unit: Real,
+}
+
+impl Share {
+    /// As known before a motion.
+    fn unknown() -> Self {
+        Self {
+            estimate: 1.0,
+            weight: 0.0,
+            weighted: 0.0,
+            unit: 0.0,
+        }
+    }
+
+    /// Takes what a measurement of latent velocities says after a part of the plan's first stage, with the velocities at the
+    /// stage's `start` and `end`, its `input`, and the latent input of the drives at the command and now.
+    fn update(
+        &mut self,
+        part: Real,
+        kept: Real,
+        by_input: &[Real],
+        input: &[Real],
+        start: &[Real],
+        end: &[Real],
+        velocity: &[Real],
+        deviation: &[Real],
+        at_command: &[Real],
+        drives: &[Real],
+        d: usize,
+    ) {
+        let mut size: Real = 0.0;
+        let mut agreement: Real = 0.0;
+        for i in 0..d {
+            let mut by_plan: Real = 0.0;
+            let mut by_drives: Real = 0.0;
+            for k in 0..d {
+                let effect = part * by_input[i * d + k] / deviation[i];
+                by_plan += effect * input[k];
+                by_drives += effect * (0.5 * (at_command[k] + drives[k]));
+            }
+            let planned = start[i] + part * (end[i] - start[i]);
+            let missed = (velocity[i] - planned) / deviation[i] - by_drives;
+            let change = by_plan + by_drives;
+            size += change * change;
+            agreement += change * missed;
+        }
+        if !(size > 0.0 && size.is_finite() && agreement.is_finite()) {
+            return;
+        }
+        if self.unit == 0.0 {
+            self.unit = size;
+        }
+        let ratio = size / self.unit;
+        let weight = if ratio < LARGEST_WEIGHT {
+            ratio
+        } else {
+            LARGEST_WEIGHT
+        };
+        self.weight = kept * self.weight + weight;
+        self.weighted = kept * self.weighted + weight * self.estimate * (1.0 + agreement / size);
+        let mean = (PRIOR_WEIGHT + self.weighted) / (PRIOR_WEIGHT + self.weight);
+        self.estimate = if mean < LEAST {
+            LEAST
+        } else if mean > LARGEST {
+            LARGEST
+        } else {
+            mean
+        };
+    }
+}
+
+/// The estimate with what the motors hold.
+#[derive(Debug, Clone)]
 pub(super) struct Effectiveness {
-    estimate: f64,
-    /// Weights, and weights times what they say, of the steps so far.
-    weight: f64,
-    weighted: f64,
-    /// `φᵀ φ` of the first step.
-    unit: Option<f64>,
+    share: Share,
     /// Whether the plan's first stage has feet on the ground, and the change of the velocities at its
     /// end by its input.
     is_grounded: bool,
@@ -54,17 +131,17 @@ impl Effectiveness {
     /// All of it, as known before a motion.
     pub(super) fn full(latent_dim: usize) -> Self {
         Self {
-            estimate: 1.0,
+            share: Share::unknown(),
+            is_grounded: false,
             by_input: vec![0.0; latent_dim * latent_dim],
+            held: None,
             at_command: vec![0.0; latent_dim],
             drives: vec![0.0; latent_dim],
-            ..Self::default()
         }
     }
 
-    /// `γ̂`.
     pub(super) fn estimate(&self) -> f64 {
-        self.estimate
+        self.share.estimate
     }
 
     pub(super) fn begin(&mut self, model: &StageModel, is_grounded: bool) {
@@ -114,30 +191,21 @@ impl Effectiveness {
             return;
         }
         let d = self.drives.len();
-        let (start, end, input) = (&plan.start(0)[d..], &plan.end(0)[d..], plan.input(0));
-        let (mut size, mut agreement) = (0.0, 0.0);
-        for i in 0..d {
-            let (mut by_plan, mut by_drives) = (0.0, 0.0);
-            for k in 0..d {
-                let by_input = share * self.by_input[i * d + k] / deviation[i];
-                by_plan += by_input * input[k];
-                by_drives += by_input * (0.5 * (self.at_command[k] + self.drives[k]));
-            }
-            let planned = start[i] + share * (end[i] - start[i]);
-            let missed = (velocity[i] - planned) / deviation[i] - by_drives;
-            let change = by_plan + by_drives;
-            size += change * change;
-            agreement += change * missed;
-        }
-        if !(size > 0.0 && size.is_finite() && agreement.is_finite()) {
-            return;
-        }
-        let weight = (size / *self.unit.get_or_insert(size)).min(LARGEST_WEIGHT);
+        let (start, end) = (&plan.start(0)[d..], &plan.end(0)[d..]);
         let kept = (-share * plan.step_s() / settings.time_constant_s).exp();
-        self.weight = kept * self.weight + weight;
-        self.weighted = kept * self.weighted + weight * self.estimate * (1.0 + agreement / size);
-        let mean = (PRIOR_WEIGHT + self.weighted) / (PRIOR_WEIGHT + self.weight);
-        self.estimate = mean.clamp(RANGE.0, RANGE.1);
+        self.share.update(
+            share,
+            kept,
+            &self.by_input,
+            plan.input(0),
+            start,
+            end,
+            velocity,
+            deviation,
+            &self.at_command,
+            &self.drives,
+            d,
+        );
     }
 
     /// The latent input of the motors' PD at a measurement; false if there is none to tell.

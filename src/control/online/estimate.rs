@@ -22,11 +22,12 @@
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use super::control_model::{ControlModel, ControlPhase};
-use super::dense::{factorise, solve_lower, solve_upper};
+use super::dense::{
+    MOST_LATENT, MOST_SQUARE, Real, add_scaled, factorise, solve_lower, solve_upper,
+};
 use super::linearise::LatentDynamics;
+use super::trajectory::Trajectory;
 
-/// Half width of the window in which velocities are fitted by a straight line, s.
-pub const HALF_WINDOW_S: f64 = 0.016 + 1e-9;
 /// Smallest eigenvalue of the residual's covariance in units of the deviations of `y`.
 const RESIDUAL_FLOOR: f64 = 0.03;
 
@@ -41,65 +42,50 @@ pub struct InputGivenState {
     pub acceleration_error: DMatrix<f64>,
 }
 
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Motion<'a> {
-    /// Time of each sample, s.
-    pub time_s: &'a [f64],
-    /// `(z, dz)` a sample.
-    pub state: &'a [f64],
-    /// Phase of each sample.
-    pub phase: &'a [usize],
-}
-
 struct Evidence {
     sample: usize,
     /// `y`.
-    unexplained: DVector<f64>,
-    /// `B`.
-    gain: DMatrix<f64>,
+    unexplained: Vec<f64>,
+    /// `B`, row by row.
+    gain: Vec<f64>,
 }
 
 /// Latent inputs, `latent_dim` a sample.
 pub(super) fn estimate_input(
     plant: &ControlModel,
     dynamics: &mut dyn LatentDynamics,
-    motion: &Motion<'_>,
+    motion: &impl Trajectory,
 ) -> Vec<f64> {
     let d = plant.latent_dim();
-    let mut input = vec![0.0; motion.time_s.len() * d];
+    let mut input = vec![0.0; motion.count() * d];
     let mut evidence: Vec<Vec<Evidence>> = plant.phases().iter().map(|_| Vec::new()).collect();
-    let (mut ddz, mut jacobian) = (vec![0.0; d], DMatrix::zeros(d, 3 * d));
-    for (sample, &phase) in motion.phase.iter().enumerate() {
-        let state = &motion.state[sample * 2 * d..(sample + 1) * 2 * d];
-        let mean = expected_input(&plant.phases()[phase], state);
-        input[sample * d..(sample + 1) * d].copy_from_slice(mean.as_slice());
+    let known = |phase: &ControlPhase| phase.given_state.as_ref().map(|g| g.mean.transpose());
+    let given: Vec<_> = plant.phases().iter().map(known).collect();
+    let (mut ddz, mut entries) = (vec![0.0; d], vec![0.0; 3 * d * d]);
+    let mut state = vec![0.0; 2 * d];
+    for (sample, mean) in input.chunks_exact_mut(d).enumerate() {
+        let phase = motion.phase(sample);
+        motion.write_state(sample, &mut state);
+        match &given[phase] {
+            Some(given) => write_expected(given.as_slice(), &state, d, mean),
+            None => mean.copy_from_slice(plant.phases()[phase].latent_mean.as_slice()),
+        }
         let (z, dz) = state.split_at(d);
-        dynamics.jacobian(phase, z, dz, mean.as_slice(), &mut ddz, &mut jacobian);
-        let acceleration = acceleration(motion, d, sample);
+        let count = dynamics.accelerate(phase, z, dz, mean, &mut ddz, &mut entries);
+        let (mut unexplained, mut gain) = (vec![0.0; d], vec![0.0; d * d]);
+        dynamics.write_gain(phase, count, &entries, d, &mut gain);
+        motion.write_acceleration(sample, &mut unexplained);
+        add_scaled(-1.0, &ddz, d, &mut unexplained);
         evidence[phase].push(Evidence {
             sample,
-            unexplained: acceleration - DVector::from_column_slice(&ddz),
-            gain: jacobian.columns(2 * d, d).into_owned(),
+            unexplained,
+            gain,
         });
     }
-    for (phase, evidence) in plant.phases().iter().zip(&evidence) {
+    for (phase, evidence) in plant.phases().iter().zip(evidence) {
         add_estimates(phase, evidence, &mut input);
     }
     input
-}
-
-/// `m` at a state `(z, dz)`.
-fn expected_input(phase: &ControlPhase, state: &[f64]) -> DVector<f64> {
-    match &phase.given_state {
-        None => phase.latent_mean.clone(),
-        Some(given) => DVector::from_fn(given.mean.nrows(), |row, _| {
-            let mut sum = given.mean[(row, 0)];
-            for (col, value) in state.iter().enumerate() {
-                sum += given.mean[(row, 1 + col)] * value;
-            }
-            sum
-        }),
-    }
 }
 
 /// `S` and `R` of a phase; none if there are too few samples to tell.
@@ -120,74 +106,84 @@ fn covariances(
 }
 
 /// Adds `S Bᵀ (B S Bᵀ + R)⁻¹ y` to the inputs of one phase's samples.
-fn add_estimates(phase: &ControlPhase, evidence: &[Evidence], input: &mut [f64]) {
+fn add_estimates(phase: &ControlPhase, evidence: Vec<Evidence>, input: &mut [f64]) {
     let d = phase.latent_mean.len();
-    let Some((covariance, residual)) = covariances(phase, evidence) else {
+    let Some((covariance, residual)) = covariances(phase, &evidence) else {
         return;
     };
-    for item in evidence {
-        let found = correction(&item.gain, &covariance, &residual, &item.unexplained);
-        let finite = |estimate: &Vec<f64>| estimate.iter().all(|value| value.is_finite());
-        if let Some(estimate) = found.filter(finite) {
-            for (input, estimate) in input[item.sample * d..].iter_mut().zip(&estimate) {
-                *input += estimate;
-            }
+    let rows = [covariance, residual].map(|matrix| matrix.transpose());
+    let [covariance, residual] = rows.each_ref().map(|matrix| matrix.as_slice());
+    for mut item in evidence {
+        let (left, input) = (&mut item.unexplained, &mut input[item.sample * d..]);
+        add_correction(&item.gain, covariance, residual, d, left, input);
+    }
+}
+
+/// Writes `m = M [1; z; dz]`.
+fn write_expected(given: &[Real], state: &[Real], d: usize, input: &mut [Real]) {
+    for i in 0..d {
+        let row = &given[i * (1 + 2 * d)..];
+        input[i] = row[0];
+        for k in 0..2 * d {
+            input[i] += row[1 + k] * state[k];
         }
     }
 }
 
-/// `S Bᵀ (B S Bᵀ + R)⁻¹ y`, or none if the sum in brackets is not positive definite. The order of operations is that of
-/// the controller in C.
-fn correction(
-    gain: &DMatrix<f64>,
-    covariance: &DMatrix<f64>,
-    residual: &DMatrix<f64>,
-    unexplained: &DVector<f64>,
-) -> Option<Vec<f64>> {
-    let d = unexplained.len();
-    let mut spread = vec![0.0; d * d];
-    let mut square = vec![0.0; d * d];
+/// Adds `S Bᵀ (B S Bᵀ + R)⁻¹ y` to an input, unless the sum in brackets is not positive definite. Matrices are row-major; `y` is
+/// overwritten.
+fn add_correction(
+    gain: &[Real],
+    covariance: &[Real],
+    residual: &[Real],
+    d: usize,
+    unexplained: &mut [Real],
+    input: &mut [Real],
+) {
+    let mut spread: [Real; MOST_SQUARE] = [0.0; MOST_SQUARE];
+    let mut square: [Real; MOST_SQUARE] = [0.0; MOST_SQUARE];
+    let mut estimate: [Real; MOST_LATENT] = [0.0; MOST_LATENT];
     for i in 0..d {
         for j in 0..d {
             for k in 0..d {
-                spread[i * d + j] += gain[(i, k)] * covariance[(k, j)];
+                spread[i * d + j] += gain[i * d + k] * covariance[k * d + j];
             }
         }
         for j in 0..=i {
-            square[i * d + j] = residual[(i, j)];
+            square[i * d + j] = residual[i * d + j];
             for k in 0..d {
-                square[i * d + j] += spread[i * d + k] * gain[(j, k)];
+                square[i * d + j] += spread[i * d + k] * gain[j * d + k];
             }
         }
     }
     if !factorise(&mut square, d) {
-        return None;
+        return;
     }
-    let mut solved = unexplained.as_slice().to_vec();
-    solve_lower(&square, d, &mut solved);
-    solve_upper(&square, d, &mut solved);
-    let mut estimate = vec![0.0; d];
-    for i in 0..d {
-        for j in 0..d {
-            estimate[j] += spread[i * d + j] * solved[i];
+    solve_lower(&square, d, unexplained);
+    solve_upper(&square, d, unexplained);
+    let mut is_finite = true;
+    for j in 0..d {
+        for i in 0..d {
+            estimate[j] += spread[i * d + j] * unexplained[i];
         }
+        is_finite = is_finite && estimate[j].is_finite();
     }
-    Some(estimate)
+    if is_finite {
+        add_scaled(1.0, &estimate, d, input);
+    }
 }
 
 /// `R = Cov(y) − mean(B S Bᵀ)`, made positive definite; none if `y` is not finite.
 fn residual_covariance(evidence: &[Evidence], input: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let d = input.nrows();
     let count = evidence.len() as f64;
-    let unexplained = evidence.iter().map(|item| &item.unexplained);
-    let mean = unexplained.sum::<DVector<f64>>() / count;
+    let unexplained = |item: &Evidence| DVector::from_column_slice(&item.unexplained);
+    let mean = evidence.iter().map(unexplained).sum::<DVector<f64>>() / count;
     let mut covariance = DMatrix::zeros(d, d);
     let mut explained = DMatrix::zeros(d, d);
-    for Evidence {
-        unexplained, gain, ..
-    } in evidence
-    {
-        let off = unexplained - &mean;
+    for item in evidence {
+        let gain = &DMatrix::from_row_slice(d, d, &item.gain);
+        let off = unexplained(item) - &mean;
         covariance += &off * off.transpose() / count;
         explained += gain * input * gain.transpose() / count;
     }
@@ -211,61 +207,9 @@ fn residual_covariance(evidence: &[Evidence], input: &DMatrix<f64>) -> Option<DM
     }))
 }
 
-/// Slope of the straight line through the velocities around a sample, within its phase.
-fn acceleration(motion: &Motion<'_>, latent_dim: usize, sample: usize) -> DVector<f64> {
-    let time_s = motion.time_s;
-    let belongs = |other: usize| {
-        motion.phase[other] == motion.phase[sample]
-            && (time_s[other] - time_s[sample]).abs() <= HALF_WINDOW_S
-    };
-    let before = (0..sample).rev().take_while(|&other| belongs(other));
-    let after = (sample + 1..time_s.len()).take_while(|&other| belongs(other));
-    let mut first = before.last().unwrap_or(sample);
-    let mut last = after.last().unwrap_or(sample);
-    if first == last {
-        // A lone sample of its phase: its neighbours are all there is.
-        first = first.saturating_sub(1);
-        last = (last + 1).min(time_s.len() - 1);
-    }
-    // Sums in the order in which the controller in C has them.
-    let mut mean_s = 0.0;
-    for other in first..=last {
-        mean_s += time_s[other];
-    }
-    mean_s /= (last - first + 1) as f64;
-    let (mut spread, mut slope) = (0.0, DVector::zeros(latent_dim));
-    for other in first..=last {
-        let off_s = time_s[other] - mean_s;
-        spread += off_s * off_s;
-        for latent in 0..latent_dim {
-            slope[latent] += off_s * motion.state[(2 * other + 1) * latent_dim + latent];
-        }
-    }
-    slope / spread
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn slope_of_a_parabola_is_its_derivative_inside_and_stops_at_the_phases_edge() {
-        let time_s: Vec<f64> = (0..40).map(|sample| 0.002 * sample as f64).collect();
-        let phase: Vec<usize> = (0..40).map(|sample| usize::from(sample >= 20)).collect();
-        // dz = t² before the edge, 5 after it.
-        let state: Vec<f64> = (0..40)
-            .flat_map(|k| [0.0, if k < 20 { time_s[k] * time_s[k] } else { 5.0 }])
-            .collect();
-        let motion = Motion {
-            time_s: &time_s,
-            state: &state,
-            phase: &phase,
-        };
-        assert!((acceleration(&motion, 1, 10)[0] - 0.04).abs() < 1e-12);
-        // One-sided at the edge: the slope at the middle of the eight samples before it.
-        assert!((acceleration(&motion, 1, 19)[0] - (time_s[19] + time_s[11])).abs() < 1e-12);
-        assert!(acceleration(&motion, 1, 20)[0].abs() < 1e-9);
-    }
 
     #[test]
     fn states_set_what_is_expected_and_accelerations_correct_it() {
@@ -284,15 +228,16 @@ mod tests {
             torque_precision: nalgebra::one(),
         };
         // M [1; z; dz] = 0.5 + 3 - 2 at z = 3, dz = 1.
-        let mut input = expected_input(&phase, &[3.0, 1.0]).as_slice().to_vec();
+        let mut input = [0.0];
+        write_expected(&[0.5, 1.0, -2.0], &[3.0, 1.0], 1, &mut input);
         assert_eq!(input, [1.5]);
         // y = 6 with B = 2: S B / (B S B + R) y = 0.5 * 2 / (2 + 2) * 6.
-        let evidence = [Evidence {
+        let evidence = vec![Evidence {
             sample: 0,
-            unexplained: DVector::from_element(1, 6.0),
-            gain: number(2.0),
+            unexplained: vec![6.0],
+            gain: vec![2.0],
         }];
-        add_estimates(&phase, &evidence, &mut input);
+        add_estimates(&phase, evidence, &mut input);
         assert!((input[0] - 3.0).abs() < 1e-12, "{input:?}");
     }
 
@@ -302,8 +247,8 @@ mod tests {
         let evidence =
             [[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]].map(|[u, r]| Evidence {
                 sample: 0,
-                unexplained: DVector::from_element(1, 2.0 * u + 0.5 * r),
-                gain: DMatrix::from_element(1, 1, 2.0),
+                unexplained: vec![2.0 * u + 0.5 * r],
+                gain: vec![2.0],
             });
         let residual = residual_covariance(&evidence, &DMatrix::identity(1, 1)).expect("finite");
         assert!((residual[(0, 0)] - 0.25).abs() < 1e-12, "{residual}");

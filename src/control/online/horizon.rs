@@ -8,8 +8,8 @@ use super::plan::Plan;
 use super::problem::StageRows;
 use super::reference::Reference;
 use super::settings::{Drift, Linearisation, MpcSettings};
-use super::stage::{StageQp, StageScale, StageShape};
-use crate::robot::ContactFlags;
+use super::stage::{StageQp, StageScale, StageShape, unscale, write_defect};
+use super::trajectory::{Contact, TIME_TOLERANCE_S, Trajectory};
 
 #[derive(Debug, Clone)]
 pub(super) struct Stage {
@@ -54,9 +54,6 @@ pub(super) struct StageInputs<'a> {
     /// The rows of every stage, as far as the maps are the same at all of them.
     pub rows: &'a StageRows,
 }
-
-/// Times closer than this are the same control instant, s.
-const TIME_TOLERANCE_S: f64 = 1e-9;
 
 impl Horizon {
     pub(super) fn new(length: usize, shape: &StageShape) -> Self {
@@ -135,17 +132,18 @@ impl Horizon {
         (input, end): (&mut [f64], &mut [f64]),
     ) {
         let stage = &self.stages[index];
-        let root = &plant.phases()[stage.phase].latent_root;
-        for row in 0..input.len() {
-            let mut sum = 0.0;
-            for col in 0..=row {
-                sum += root[(row, col)] * scaled_input[col];
-            }
-            input[row] = stage.input[row] + sum;
-        }
-        for row in 0..end.len() {
-            end[row] = stage.end[row] + deviation[row] * scaled_end[row];
-        }
+        let root = plant.phases()[stage.phase].latent_root.as_slice();
+        input.copy_from_slice(&stage.input);
+        end.copy_from_slice(&stage.end);
+        unscale(
+            root,
+            deviation,
+            plant.latent_dim(),
+            scaled_input,
+            scaled_end,
+            input,
+            end,
+        );
     }
 
     /// Prepares all stages from a time on with the feet as measured then; the status of a plan for them.
@@ -154,9 +152,11 @@ impl Horizon {
         inputs: &StageInputs<'_>,
         dynamics: &mut dyn LatentDynamics,
         time_s: f64,
-        feet: ContactFlags,
+        measured: usize,
     ) -> Status {
-        let contact = self.schedule(inputs, time_s, feet);
+        let (step_s, phases) = (inputs.settings.step_s, &mut self.phases);
+        let (reference, horizon) = (inputs.reference, phases.len());
+        let contact = reference.schedule(time_s, step_s, measured, horizon, phases);
         self.reuse(inputs.settings, time_s);
         for index in 0..self.stages.len() {
             let start_s = time_s + index as f64 * inputs.settings.step_s;
@@ -174,41 +174,11 @@ impl Horizon {
                 };
             }
         }
-        contact
-    }
-
-    /// Phases of all stages: the reference's, changed where the feet disagree.
-    fn schedule(&mut self, inputs: &StageInputs<'_>, time_s: f64, feet: ContactFlags) -> Status {
-        let (plant, step_s) = (inputs.plant, inputs.settings.step_s);
-        let scheduled = |time_s: f64| {
-            let phase = plant.phase_for(inputs.reference.feet_at(time_s));
-            phase.expect("reference was checked for its phases")
-        };
-        for (index, phase) in self.phases.iter_mut().enumerate() {
-            *phase = scheduled(time_s + (index as f64 + 0.5) * step_s);
-        }
-        let Some(measured) = plant.phase_for(feet) else {
-            return Status::ContactUnknown;
-        };
-        if measured == scheduled(time_s) || measured == self.phases[0] {
-            return Status::Solved;
-        }
-        let length = self.phases.len();
-        let next = self.phases.iter().position(|&phase| phase == measured);
-        let last = (1..=length).find(|&back| scheduled(time_s - back as f64 * step_s) == measured);
-        match (next, last) {
-            (None, None) => {
-                self.phases[0] = measured;
-                Status::ContactUnknown
-            }
-            (Some(next), last) if last.is_none_or(|last| next <= last) => {
-                self.phases[..next].fill(measured);
-                Status::ContactEarly
-            }
-            (_, _) => {
-                self.phases[0] = measured;
-                Status::ContactLate
-            }
+        match contact {
+            Contact::AsScheduled => Status::Solved,
+            Contact::Early => Status::ContactEarly,
+            Contact::Late => Status::ContactLate,
+            Contact::Unknown => Status::ContactUnknown,
         }
     }
 
@@ -235,7 +205,9 @@ impl Horizon {
         stage.phase = self.phases[index];
         reference.state_at(start_s, &mut stage.state);
         reference.state_at(start_s + settings.step_s, &mut stage.end);
-        if !reference.mean_input(start_s, settings.step_s, &mut stage.input) {
+        if reference.has_input() {
+            reference.mean_input(start_s, settings.step_s, &mut stage.input);
+        } else {
             let mean = &plant.phases()[stage.phase].latent_mean;
             stage.input.copy_from_slice(mean.as_slice());
         }
@@ -249,7 +221,7 @@ impl Horizon {
         let (stage, program) = (&self.stages[index], &mut self.programs[index]);
         let phase = &plant.phases()[stage.phase];
         let scale = StageScale {
-            root: &phase.latent_root,
+            root: phase.latent_root.as_slice(),
             input: &stage.input,
             deviation: inputs.reference.deviation(),
         };
@@ -294,26 +266,19 @@ impl Horizon {
             phase,
             ..
         } = &mut self.stages[index];
-        let mut evaluate = |z: &[f64], dz: &[f64], u: &[f64], ddz: &mut [f64], jacobian: &mut _| {
-            dynamics.jacobian(*phase, z, dz, u, ddz, jacobian);
-        };
         let (x, u) = point.unwrap_or((state, input));
-        (self.lineariser).stage(x, u, step_s, &mut evaluate, model);
-        for (row, defect) in defect.iter_mut().enumerate() {
-            *defect = model.next[row] - end[row];
-            for (col, value) in x.iter().enumerate() {
-                *defect += model.a(row, col) * (state[col] - value);
-            }
-            for (col, value) in u.iter().enumerate() {
-                *defect += model.b(row, col) * (input[col] - value);
-            }
-        }
+        let mut stage = |x: &[f64], u: &[f64], model: &mut StageModel| {
+            (self.lineariser).stage((dynamics, *phase), x, u, step_s, model);
+        };
+        stage(x, u, model);
+        let (next, by, d) = (&model.next, &model.by, input.len());
+        write_defect(next, by, x, u, state, input, end, d, defect);
         match (trusts_reference, point) {
             (false, _) => {}
             (true, None) => defect.fill(0.0),
             (true, Some(_)) => {
                 let nominal = &mut self.nominal;
-                (self.lineariser).stage(state, input, step_s, &mut evaluate, nominal);
+                stage(state, input, nominal);
                 for (row, defect) in defect.iter_mut().enumerate() {
                     *defect += end[row] - nominal.next[row];
                 }

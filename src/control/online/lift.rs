@@ -32,15 +32,19 @@ use nalgebra::{Cholesky, Matrix3};
 
 use super::conic::Conic;
 use super::control_model::{ControlModel, ControlPhase};
-use super::dense::{factorise, solve_lower, solve_upper};
+use super::dense::{
+    MOST_LATENT, MOST_SQUARE, Real, add_scaled, factorise, solve_lower, solve_upper,
+};
 use super::engine::{StageSolver, Start};
 use super::error::ControlError;
 use super::problem::upright;
 use super::qp::{Outcome, QpSettings};
 use super::settings::{MpcSettings, Solver};
-use super::stage::{CONE_ROWS, FrictionShape, PYRAMID_ROWS, StageCost, StageQp, StageShape};
+use super::stage::{
+    CONE_ROWS, FrictionShape, PYRAMID_ROWS, SQRT_HALF, StageCost, StageQp, StageShape,
+};
 use super::structured::{Structured, TOLERANCE};
-use crate::robot::{ContactFlags, FOOT_DIM, GRAVITY_M_S2, JOINT_DIM, Leg};
+use crate::robot::{ContactFlags, FOOT_DIM, GRAVITY_M_S2, JOINT_DIM, Leg, STATE_DIM};
 use crate::solver::Settings;
 
 /// Cap on the interior-point iterations of a lift.
@@ -98,14 +102,9 @@ pub struct ConsistentLift {
     solver: Box<dyn StageSolver>,
     friction: FrictionShape,
     qp: StageQp,
-    /// `pinv(W_eᵀ) s_u`, split into its columns for torques and for force and moment.
-    by_torque: Vec<Torque>,
-    by_wrench: Vec<[f64; 6]>,
-    /// `M`, `A`, the factor of `I + A Aᵀ` row by row, and `r`.
-    map: Vec<Torque>,
-    scaled_map: Vec<Torque>,
-    square: Vec<f64>,
-    residual: Vec<f64>,
+    /// `pinv(W_eᵀ) s_u` and `A`, row by row.
+    projection: Vec<f64>,
+    scaled_map: Vec<f64>,
     /// `C` of each phase.
     deviation: Vec<Option<[Torque; JOINT_DIM]>>,
     limit_nm: Torque,
@@ -137,12 +136,8 @@ impl ConsistentLift {
             solver: solver(shape, settings)?,
             friction,
             qp: StageQp::zeros(&shape),
-            by_torque: vec![[0.0; JOINT_DIM]; d],
-            by_wrench: vec![[0.0; 6]; d],
-            map: vec![[0.0; JOINT_DIM]; d],
-            scaled_map: vec![[0.0; JOINT_DIM]; d],
-            square: vec![0.0; d * d],
-            residual: vec![0.0; d],
+            projection: vec![0.0; d * STATE_DIM],
+            scaled_map: vec![0.0; d * JOINT_DIM],
             deviation: plant.phases().iter().map(torque_deviation).collect(),
             limit_nm: *plant.robot().torque_limit_nm(),
             weight_n: plant.robot().mass_kg() * GRAVITY_M_S2,
@@ -156,9 +151,11 @@ impl ConsistentLift {
 
     /// Takes the projection of another plant: that at the measured state, where it depends on it.
     pub(super) fn take_projection(&mut self, plant: &ControlModel) {
-        for (latent, row) in plant.parts().projection.row_iter().enumerate() {
-            self.by_torque[latent] = std::array::from_fn(|joint| row[joint]);
-            self.by_wrench[latent] = std::array::from_fn(|axis| row[JOINT_DIM + axis]);
+        let rows = plant.parts().projection.row_iter();
+        for (own, row) in self.projection.chunks_exact_mut(STATE_DIM).zip(rows) {
+            own.iter_mut()
+                .zip(row.iter())
+                .for_each(|(own, entry)| *own = *entry);
         }
     }
 
@@ -175,20 +172,29 @@ impl ConsistentLift {
     ) -> Result<[f64; JOINT_DIM], LiftFailure> {
         self.iterations = 0;
         let forces = foot_forces(plant, stance).ok_or(LiftFailure::SingularLeg)?;
-        self.write_map(plant, stance)?;
+        let wrench = plant
+            .input_rule()
+            .wrench_map(&stance.joints_rad, stance.attitude_rad, stance.feet)
+            .map_err(|_| LiftFailure::SingularLeg)?
+            .transpose();
         let deviation = self.deviation[stance.phase].ok_or(BROKEN)?;
-        let mean: Torque = plant.phases()[stance.phase].torque_mean.into();
-        let mut y = self.free_optimum(&deviation, &mean, u_lat).ok_or(BROKEN)?;
-        let torque = torque_of(&deviation, &mean, &y);
-        self.write_limits(&torque, &stance.losses_nm);
-        match self.friction {
-            FrictionShape::Cone => self.write_cones(&torque, &forces),
-            FrictionShape::Pyramid => self.write_pyramids(&torque, &forces),
+        let deviation = deviation.as_flattened();
+        let mean = plant.phases()[stance.phase].torque_mean.as_slice();
+        let (d, weight) = (u_lat.len(), self.prior_weight);
+        let (projection, scaled_map) = (&self.projection, &mut self.scaled_map);
+        let (wrench, mut y) = (wrench.as_slice(), [0.0; JOINT_DIM]);
+        if !free_optimum(
+            projection, wrench, mean, deviation, u_lat, weight, d, scaled_map, &mut y,
+        ) {
+            return Err(BROKEN);
         }
+        let mut torque = [0.0; JOINT_DIM];
+        write_torque(mean, deviation, &y, &mut torque);
+        self.write_rows(&torque, &stance.losses_nm, &forces);
         if !self.is_kept() {
-            self.constrain(&deviation, &mut y)?;
+            self.constrain(deviation, &mut y)?;
+            write_torque(mean, deviation, &y, &mut torque);
         }
-        let torque = torque_of(&deviation, &mean, &y);
         Ok(std::array::from_fn(|joint| {
             let (loss, limit) = (stance.losses_nm[joint], self.limit_nm[joint]);
             torque[joint].clamp(-limit - loss, limit - loss)
@@ -200,123 +206,54 @@ impl ConsistentLift {
         self.iterations
     }
 
-    /// Writes `M`.
-    fn write_map(&mut self, plant: &ControlModel, stance: &StanceState) -> Result<(), LiftFailure> {
-        let wrench = plant
-            .input_rule()
-            .wrench_map(&stance.joints_rad, stance.attitude_rad, stance.feet)
-            .map_err(|_| LiftFailure::SingularLeg)?;
-        for latent in 0..self.map.len() {
-            for joint in 0..JOINT_DIM {
-                let mut by_wrench = 0.0;
-                for axis in 0..6 {
-                    by_wrench += wrench[(axis, joint)] * self.by_wrench[latent][axis];
-                }
-                self.map[latent][joint] = self.by_torque[latent][joint] + by_wrench;
-            }
-        }
-        Ok(())
-    }
-
-    /// Writes `A` and returns `y₀`; none if a number is not finite.
-    fn free_optimum(
-        &mut self,
-        deviation: &[Torque; JOINT_DIM],
-        mean: &Torque,
-        u_lat: &[f64],
-    ) -> Option<Torque> {
-        let d = self.map.len();
-        let scale = 1.0 / self.prior_weight.sqrt();
-        for i in 0..d {
-            let row = &self.map[i];
-            let mut left = u_lat[i];
-            for j in 0..JOINT_DIM {
-                left -= row[j] * mean[j];
-                let mut sum = 0.0;
-                for k in 0..=j {
-                    sum += row[k] * deviation[k][j];
-                }
-                self.scaled_map[i][j] = scale * sum;
-            }
-            self.residual[i] = scale * left;
-        }
-        for i in 0..d {
-            for j in 0..=i {
-                let mut sum = if i == j { 1.0 } else { 0.0 };
-                for k in 0..JOINT_DIM {
-                    sum += self.scaled_map[i][k] * self.scaled_map[j][k];
-                }
-                self.square[i * d + j] = sum;
-            }
-        }
-        if !factorise(&mut self.square, d) {
-            return None;
-        }
-        solve_lower(&self.square, d, &mut self.residual);
-        solve_upper(&self.square, d, &mut self.residual);
-        let mut y = [0.0; JOINT_DIM];
-        for i in 0..d {
-            for j in 0..JOINT_DIM {
-                y[j] += self.scaled_map[i][j] * self.residual[i];
-            }
-        }
-        Some(y)
-    }
-
-    /// Both sides of the torque limits as rows on the torques, and the room that `torque` leaves.
-    fn write_limits(&mut self, torque: &Torque, losses_nm: &Torque) {
+    /// The rows on the torques, and the room that `torque` leaves: limits, and of each foot in contact the pyramid. A foot in the
+    /// air has a cone of which the axis is the slack, strictly inside.
+    fn write_rows(&mut self, torque: &Torque, losses_nm: &Torque, forces: &FootForces) {
+        let (friction, weight_n) = (self.foot_friction, self.weight_n);
+        let down = forces.iter().flatten().count();
+        let pyramids = match self.friction {
+            FrictionShape::Cone => 0,
+            FrictionShape::Pyramid => down,
+        };
         let rows = &mut self.qp.input;
-        rows.clear();
-        for sign in [1.0, -1.0] {
-            for joint in 0..JOINT_DIM {
-                let limit = self.limit_nm[joint];
-                let mut row = [0.0; JOINT_DIM];
-                row[joint] = sign / limit;
-                let room = 1.0 - sign * ((torque[joint] + losses_nm[joint]) / limit);
-                rows.push(&row, room);
+        rows.resize(2 * JOINT_DIM + PYRAMID_ROWS * pyramids, JOINT_DIM);
+        let (limit_nm, bounds) = (&self.limit_nm, &mut rows.bounds);
+        write_limits(limit_nm, losses_nm, torque, &mut rows.entries, bounds);
+        let mut first = 2 * JOINT_DIM;
+        for leg in 0..FOOT_DIM {
+            let force = forces[leg].map(|force| force.transpose());
+            match (self.friction, &force) {
+                (FrictionShape::Cone, _) => self.write_cone(leg, torque, force.as_ref()),
+                (FrictionShape::Pyramid, None) => {}
+                (FrictionShape::Pyramid, Some(force)) => {
+                    let rows = &mut self.qp.input;
+                    let entries = &mut rows.entries[first * JOINT_DIM..];
+                    let (force, bounds) = (force.as_slice(), &mut rows.bounds[first..]);
+                    write_foot(force, friction, weight_n, torque, leg, entries, bounds);
+                    first += PYRAMID_ROWS;
+                }
             }
         }
     }
 
-    /// The pyramid `|F_x|, |F_y| <= μ F_z / √2` of each foot in contact.
-    fn write_pyramids(&mut self, torque: &Torque, forces: &FootForces) {
-        for leg in 0..FOOT_DIM {
-            let Some(force) = &forces[leg] else {
-                continue;
+    /// The cone of a foot with the transpose of its force by the torques.
+    fn write_cone(&mut self, leg: usize, torque: &Torque, force: Option<&Matrix3<f64>>) {
+        let axes = [(2, self.foot_friction), (0, 1.0), (1, 1.0)];
+        for (number, (axis, factor)) in axes.into_iter().enumerate() {
+            let place = CONE_ROWS * leg + number;
+            let row = &mut self.qp.cones.entries[place * JOINT_DIM..][..JOINT_DIM];
+            row.fill(0.0);
+            let mut room = if force.is_none() && axis == 2 {
+                1.0
+            } else {
+                0.0
             };
-            for side in 0..PYRAMID_ROWS {
-                let sign = if side % 2 == 0 { 1.0 } else { -1.0 };
-                let mut row = [0.0; JOINT_DIM];
-                let mut room = 0.0;
-                for k in 0..3 {
-                    let within =
-                        self.foot_friction * force[(2, k)] * std::f64::consts::FRAC_1_SQRT_2;
-                    let entry = (sign * force[(side / 2, k)] - within) / self.weight_n;
-                    row[3 * leg + k] = entry;
-                    room -= entry * torque[3 * leg + k];
-                }
-                self.qp.input.push(&row, room);
+            for k in 0..3 {
+                let entry = force.map_or(0.0, |force| factor * force[(k, axis)] / self.weight_n);
+                row[3 * leg + k] = -entry;
+                room += entry * torque[3 * leg + k];
             }
-        }
-    }
-
-    /// The cone of each foot; one in the air has the axis as its slack, strictly inside.
-    fn write_cones(&mut self, torque: &Torque, forces: &FootForces) {
-        self.qp.cones.clear();
-        for leg in 0..FOOT_DIM {
-            for (axis, factor) in [(2, self.foot_friction), (0, 1.0), (1, 1.0)] {
-                let mut row = [0.0; JOINT_DIM];
-                let mut room = if axis == 2 { 1.0 } else { 0.0 };
-                if let Some(force) = &forces[leg] {
-                    room = 0.0;
-                    for k in 0..3 {
-                        let entry = factor * force[(axis, k)] / self.weight_n;
-                        row[3 * leg + k] = -entry;
-                        room += entry * torque[3 * leg + k];
-                    }
-                }
-                self.qp.cones.push(&row, room);
-            }
+            self.qp.cones.bounds[place] = room;
         }
     }
 
@@ -328,35 +265,15 @@ impl ConsistentLift {
     }
 
     /// Moves `y` from the optimum without rows to the one under them.
-    fn constrain(
-        &mut self,
-        deviation: &[Torque; JOINT_DIM],
-        y: &mut Torque,
-    ) -> Result<(), LiftFailure> {
+    fn constrain(&mut self, deviation: &[f64], y: &mut Torque) -> Result<(), LiftFailure> {
         let mut hessian = [0.0; JOINT_DIM * JOINT_DIM];
-        for i in 0..JOINT_DIM {
-            for j in 0..=i {
-                let mut sum = if i == j { 1.0 } else { 0.0 };
-                for row in &self.scaled_map {
-                    sum += row[i] * row[j];
-                }
-                hessian[i * JOINT_DIM + j] = sum;
-            }
-        }
-        if !factorise(&mut hessian, JOINT_DIM) {
+        let d = self.scaled_map.len() / JOINT_DIM;
+        if !write_hessian(&self.scaled_map, d, &mut hessian) {
             return Err(BROKEN);
         }
         for rows in [&mut self.qp.input, &mut self.qp.cones] {
-            for row in rows.entries.as_chunks_mut::<JOINT_DIM>().0 {
-                let mut by_deviation = [0.0; JOINT_DIM];
-                for j in 0..JOINT_DIM {
-                    for k in 0..=j {
-                        by_deviation[j] += row[k] * deviation[k][j];
-                    }
-                }
-                solve_lower(&hessian, JOINT_DIM, &mut by_deviation);
-                *row = by_deviation;
-            }
+            let count = rows.bounds.len();
+            change_rows(&hessian, deviation, count, &mut rows.entries);
         }
         let stages = std::slice::from_ref(&self.qp);
         self.solver.forget();
@@ -418,15 +335,151 @@ pub fn torque_deviation(phase: &ControlPhase) -> Option<[[f64; JOINT_DIM]; JOINT
     }))
 }
 
-/// `m + C y`.
-fn torque_of(deviation: &[Torque; JOINT_DIM], mean: &Torque, y: &Torque) -> Torque {
-    let mut torque = *mean;
-    for i in 0..JOINT_DIM {
-        for j in i..JOINT_DIM {
-            torque[i] += deviation[i][j] * y[j];
+/// Writes `m + C y`.
+fn write_torque(mean: &[Real], deviation: &[Real], y: &[Real], torque: &mut [Real]) {
+    for i in 0..12 {
+        torque[i] = mean[i];
+        for j in i..12 {
+            torque[i] += deviation[12 * i + j] * y[j];
         }
     }
-    torque
+}
+
+/// Writes `row C`.
+fn by_deviation(row: &[Real], deviation: &[Real], out: &mut [Real]) {
+    for j in 0..12 {
+        out[j] = 0.0;
+        for k in 0..=j {
+            out[j] += row[k] * deviation[12 * k + j];
+        }
+    }
+}
+
+/// Writes `A` and `y₀`; false if a number is not finite. `wrench` is `G`; matrices are row-major.
+fn free_optimum(
+    projection: &[Real],
+    wrench: &[Real],
+    mean: &[Real],
+    deviation: &[Real],
+    u_lat: &[Real],
+    prior_weight: Real,
+    d: usize,
+    scaled_map: &mut [Real],
+    y: &mut [Real],
+) -> bool {
+    let scale = 1.0 / prior_weight.sqrt();
+    let mut row: [Real; 12] = [0.0; 12];
+    let mut residual: [Real; MOST_LATENT] = [0.0; MOST_LATENT];
+    let mut square: [Real; MOST_SQUARE] = [0.0; MOST_SQUARE];
+    for i in 0..d {
+        let own = &projection[18 * i..];
+        let mut left: Real = u_lat[i];
+        for j in 0..12 {
+            let mut by_wrench: Real = 0.0;
+            for axis in 0..6 {
+                by_wrench += wrench[12 * axis + j] * own[12 + axis];
+            }
+            row[j] = own[j] + by_wrench;
+            left -= row[j] * mean[j];
+        }
+        by_deviation(&row, deviation, &mut scaled_map[12 * i..]);
+        for j in 0..12 {
+            scaled_map[12 * i + j] *= scale;
+        }
+        residual[i] = scale * left;
+    }
+    for i in 0..d {
+        for j in 0..=i {
+            let mut sum: Real = if i == j { 1.0 } else { 0.0 };
+            for k in 0..12 {
+                sum += scaled_map[12 * i + k] * scaled_map[12 * j + k];
+            }
+            square[i * d + j] = sum;
+        }
+    }
+    if !factorise(&mut square, d) {
+        return false;
+    }
+    solve_lower(&square, d, &mut residual);
+    solve_upper(&square, d, &mut residual);
+    for j in 0..12 {
+        y[j] = 0.0;
+    }
+    for i in 0..d {
+        add_scaled(residual[i], &scaled_map[12 * i..], 12, y);
+    }
+    true
+}
+
+/// Writes both sides of the torque limits as rows on the torques, and the room that `torque` leaves.
+fn write_limits(
+    limit_nm: &[Real],
+    losses_nm: &[Real],
+    torque: &[Real],
+    rows: &mut [Real],
+    bounds: &mut [Real],
+) {
+    for number in 0..24 {
+        let joint = number % 12;
+        let sign: Real = if number < 12 { 1.0 } else { -1.0 };
+        for j in 0..12 {
+            rows[12 * number + j] = 0.0;
+        }
+        rows[12 * number + joint] = sign / limit_nm[joint];
+        bounds[number] = 1.0 - sign * ((torque[joint] + losses_nm[joint]) / limit_nm[joint]);
+    }
+}
+
+/// Writes the pyramid `|F_x|, |F_y| <= μ F_z / √2` of a foot with its force by the leg's torques, `3 × 3` row-major.
+fn write_foot(
+    force: &[Real],
+    friction: Real,
+    weight_n: Real,
+    torque: &[Real],
+    leg: usize,
+    rows: &mut [Real],
+    bounds: &mut [Real],
+) {
+    for side in 0..4 {
+        let sign: Real = if side % 2 == 0 { 1.0 } else { -1.0 };
+        let mut room: Real = 0.0;
+        for j in 0..12 {
+            rows[12 * side + j] = 0.0;
+        }
+        for k in 0..3 {
+            let within = friction * force[6 + k] * SQRT_HALF;
+            let entry = (sign * force[3 * (side / 2) + k] - within) / weight_n;
+            rows[12 * side + 3 * leg + k] = entry;
+            room -= entry * torque[3 * leg + k];
+        }
+        bounds[side] = room;
+    }
+}
+
+/// Writes `L`; false if a number is not finite.
+fn write_hessian(scaled_map: &[Real], d: usize, hessian: &mut [Real]) -> bool {
+    for i in 0..12 {
+        for j in 0..=i {
+            let mut sum: Real = if i == j { 1.0 } else { 0.0 };
+            for k in 0..d {
+                sum += scaled_map[12 * k + i] * scaled_map[12 * k + j];
+            }
+            hessian[12 * i + j] = sum;
+        }
+    }
+    factorise(hessian, 12)
+}
+
+/// Rows on the torques become rows on `v`.
+fn change_rows(hessian: &[Real], deviation: &[Real], count: usize, rows: &mut [Real]) {
+    let mut changed: [Real; 12] = [0.0; 12];
+    for row in 0..count {
+        by_deviation(&rows[12 * row..], deviation, &mut changed);
+        solve_lower(hessian, 12, &mut changed);
+        for j in 0..12 {
+            rows[12 * row + j] = changed[j];
+        }
+    }
 }
 
 /// The upright force of each foot in contact by its leg's torques, or none if a leg is singular.

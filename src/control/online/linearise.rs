@@ -21,26 +21,128 @@
 
 use std::fmt::Debug;
 
-use nalgebra::DMatrix;
+use super::dense::{Real, add_scaled};
 
-/// The latent accelerations of every phase with their derivatives.
+/// Nodes of the classical Runge-Kutta method: the internal state is `x + node · h · previous slope`.
+const NODES: [Real; 4] = [0.0, 0.5, 0.5, 1.0];
+/// Weights of its slopes.
+const WEIGHTS: [Real; 4] = [1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0];
+
+/// The latent accelerations of every phase with their derivatives. Methods may panic if the phase does not exist or a
+/// length does not fit.
 ///
 /// The interpreter's programs and the generated code of a controller both are.
 pub trait LatentDynamics: Debug + Send {
-    /// Writes `ddz = Xiᵀ Θ(z, dz, u_lat)` of a phase and its dense Jacobian by `(z, dz, u_lat)`,
-    /// `latent_dim × 3 latent_dim`.
-    ///
-    /// # Panics
-    /// May panic if the phase does not exist or a length does not fit.
-    fn jacobian(
+    /// Writes `ddz = Xiᵀ Θ(z, dz, u)` of a phase and the entries of its Jacobian by `(z, dz, u)` that need not be zero; how
+    /// many there are, at most `3 latent_dim²`.
+    fn accelerate(
         &mut self,
         phase: usize,
-        z: &[f64],
-        dz: &[f64],
-        u_lat: &[f64],
-        ddz: &mut [f64],
-        jacobian: &mut DMatrix<f64>,
-    );
+        z: &[Real],
+        dz: &[Real],
+        u: &[Real],
+        ddz: &mut [Real],
+        entries: &mut [Real],
+    ) -> usize;
+    /// Row of an entry: the component of `ddz`.
+    fn row(&self, phase: usize, entry: usize) -> usize;
+    /// Column of an entry: `z` in the first `latent_dim`, then `dz`, then `u`.
+    fn column(&self, phase: usize, entry: usize) -> usize;
+
+    /// Writes `F(x, u)` and `(A B)`, row by row, for a stage of `step_s`. All else is memory: two states, two matrices
+    /// of the size of `(A B)`, the entries of a Jacobian.
+    fn step(
+        &mut self,
+        phase: usize,
+        x: &[Real],
+        u: &[Real],
+        d: usize,
+        step_s: Real,
+        next: &mut [Real],
+        by: &mut [Real],
+        state: &mut [Real],
+        slope: &mut [Real],
+        sensitivity: &mut [Real],
+        slope_sensitivity: &mut [Real],
+        entries: &mut [Real],
+    ) {
+        let width = 3 * d;
+        for i in 0..2 * d {
+            slope[i] = 0.0;
+            next[i] = 0.0;
+        }
+        for i in 0..2 * d * width {
+            slope_sensitivity[i] = 0.0;
+            by[i] = 0.0;
+        }
+        for node in 0..4 {
+            let scale = NODES[node] * step_s;
+            for i in 0..2 * d {
+                state[i] = x[i] + scale * slope[i];
+            }
+            for i in 0..2 * d * width {
+                sensitivity[i] = scale * slope_sensitivity[i];
+            }
+            for i in 0..2 * d {
+                sensitivity[i * width + i] += 1.0;
+            }
+            for i in 0..d {
+                slope[i] = state[d + i];
+            }
+            let count =
+                self.accelerate(phase, &state[..d], &state[d..], u, &mut slope[d..], entries);
+            for i in 0..d * width {
+                slope_sensitivity[i] = sensitivity[d * width + i];
+                slope_sensitivity[d * width + i] = 0.0;
+            }
+            for entry in 0..count {
+                let row = (d + self.row(phase, entry)) * width;
+                let column = self.column(phase, entry);
+                if column < 2 * d {
+                    let by_column = &sensitivity[column * width..];
+                    add_scaled(
+                        entries[entry],
+                        by_column,
+                        width,
+                        &mut slope_sensitivity[row..],
+                    );
+                } else {
+                    slope_sensitivity[row + column] += entries[entry];
+                }
+            }
+            add_scaled(WEIGHTS[node], slope, 2 * d, next);
+            add_scaled(WEIGHTS[node], slope_sensitivity, 2 * d * width, by);
+        }
+        for i in 0..2 * d {
+            next[i] = x[i] + step_s * next[i];
+        }
+        for i in 0..2 * d * width {
+            by[i] *= step_s;
+        }
+        for i in 0..2 * d {
+            by[i * width + i] += 1.0;
+        }
+    }
+
+    /// Writes `∂ddz/∂u`, row by row, of so many entries.
+    fn write_gain(
+        &self,
+        phase: usize,
+        count: usize,
+        entries: &[Real],
+        d: usize,
+        gain: &mut [Real],
+    ) {
+        for i in 0..d * d {
+            gain[i] = 0.0;
+        }
+        for entry in 0..count {
+            let column = self.column(phase, entry);
+            if column >= 2 * d {
+                gain[self.row(phase, entry) * d + column - 2 * d] = entries[entry];
+            }
+        }
+    }
 }
 
 /// Runge-Kutta step of one stage and its derivatives.
@@ -49,7 +151,7 @@ pub struct StageModel {
     /// `F(x̄, ū)`, `2 latent_dim`: positions first.
     pub next: Vec<f64>,
     /// `(∂F/∂x ∂F/∂u)`, `2 latent_dim × 3 latent_dim`, row-major.
-    by: Vec<f64>,
+    pub(super) by: Vec<f64>,
 }
 
 impl StageModel {
@@ -77,97 +179,46 @@ impl StageModel {
 pub struct Lineariser {
     state: Vec<f64>,
     slope: Vec<f64>,
-    jacobian: DMatrix<f64>,
     /// `S_i` and `K_i`, `2d × 3d`, row-major.
     sensitivity: Vec<f64>,
     slope_sensitivity: Vec<f64>,
+    entries: Vec<f64>,
 }
-
-/// Nodes of the classical Runge-Kutta method: the internal state is `x + node · h · previous slope`.
-const NODES: [f64; 4] = [0.0, 0.5, 0.5, 1.0];
-/// Weights of its slopes.
-const WEIGHTS: [f64; 4] = [1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0];
 
 impl Lineariser {
     /// Memory for a latent dimension.
     pub fn new(latent_dim: usize) -> Self {
-        let (state_dim, point_dim) = (2 * latent_dim, 3 * latent_dim);
         Self {
-            state: vec![0.0; state_dim],
-            slope: vec![0.0; state_dim],
-            jacobian: DMatrix::zeros(latent_dim, point_dim),
-            sensitivity: vec![0.0; state_dim * point_dim],
-            slope_sensitivity: vec![0.0; state_dim * point_dim],
+            state: vec![0.0; 2 * latent_dim],
+            slope: vec![0.0; 2 * latent_dim],
+            sensitivity: vec![0.0; 6 * latent_dim * latent_dim],
+            slope_sensitivity: vec![0.0; 6 * latent_dim * latent_dim],
+            entries: vec![0.0; 3 * latent_dim * latent_dim],
         }
     }
 
-    /// Writes `F(x, u)`, `A` and `B` at `x = (z, dz)` and `u` for a stage of `step_s` into `stage`.
-    ///
-    /// `dynamics(z, dz, u, ddz, jacobian)` writes `ddz = f(z, dz, u)` and its dense Jacobian by
-    /// `(z, dz, u)`, `latent_dim × 3 latent_dim`.
+    /// Writes `F(x, u)`, `A` and `B` at `x = (z, dz)` and `u` for a stage of `step_s` in a phase into `stage`.
     pub fn stage(
         &mut self,
+        (dynamics, phase): (&mut dyn LatentDynamics, usize),
         x: &[f64],
         u: &[f64],
         step_s: f64,
-        mut dynamics: impl FnMut(&[f64], &[f64], &[f64], &mut [f64], &mut DMatrix<f64>),
         stage: &mut StageModel,
     ) {
-        let (d, point_dim) = (u.len(), 3 * u.len());
-        self.slope.fill(0.0);
-        self.slope_sensitivity.fill(0.0);
-        stage.next.fill(0.0);
-        stage.by.fill(0.0);
-        for (node, weight) in NODES.into_iter().zip(WEIGHTS) {
-            let scale = node * step_s;
-            for i in 0..2 * d {
-                self.state[i] = x[i] + scale * self.slope[i];
-            }
-            for (sensitivity, slope) in self.sensitivity.iter_mut().zip(&self.slope_sensitivity) {
-                *sensitivity = scale * slope;
-            }
-            for row in 0..2 * d {
-                self.sensitivity[row * point_dim + row] += 1.0;
-            }
-            let (z, dz) = self.state.split_at(d);
-            let (velocity, acceleration) = self.slope.split_at_mut(d);
-            velocity.copy_from_slice(dz);
-            dynamics(z, dz, u, acceleration, &mut self.jacobian);
-            self.differentiate_slope();
-            for (sum, slope) in stage.next.iter_mut().zip(&self.slope) {
-                *sum += weight * slope;
-            }
-            for (sum, slope) in stage.by.iter_mut().zip(&self.slope_sensitivity) {
-                *sum += weight * slope;
-            }
-        }
-        for row in 0..2 * d {
-            stage.next[row] = x[row] + step_s * stage.next[row];
-            for entry in &mut stage.by[row * point_dim..][..point_dim] {
-                *entry *= step_s;
-            }
-            stage.by[row * point_dim + row] += 1.0;
-        }
-    }
-
-    /// `K` from `S` and the Jacobian of `f`.
-    fn differentiate_slope(&mut self) {
-        let (d, point_dim) = self.jacobian.shape();
-        let (velocity, acceleration) = self.slope_sensitivity.split_at_mut(d * point_dim);
-        velocity.copy_from_slice(&self.sensitivity[d * point_dim..]);
-        for (row, out) in acceleration.chunks_exact_mut(point_dim).enumerate() {
-            out.fill(0.0);
-            for (col, sensitivity) in self.sensitivity.chunks_exact(point_dim).enumerate() {
-                let factor = self.jacobian[(row, col)];
-                if factor != 0.0 {
-                    for (out, sensitivity) in out.iter_mut().zip(sensitivity) {
-                        *out += factor * sensitivity;
-                    }
-                }
-            }
-            for col in 2 * d..point_dim {
-                out[col] += self.jacobian[(row, col)];
-            }
-        }
+        dynamics.step(
+            phase,
+            x,
+            u,
+            u.len(),
+            step_s,
+            &mut stage.next,
+            &mut stage.by,
+            &mut self.state,
+            &mut self.slope,
+            &mut self.sensitivity,
+            &mut self.slope_sensitivity,
+            &mut self.entries,
+        );
     }
 }

@@ -5,6 +5,15 @@
 //! import [`robot`](crate::robot) and [`solver`](crate::solver) alone, because `romc compile --emit controller` emits this very
 //! folder. Read `problem` first.
 
+// Loops over indices are what C is made of.
+#![allow(
+    clippy::assign_op_pattern,
+    clippy::manual_memcpy,
+    clippy::needless_range_loop,
+    clippy::too_many_arguments,
+    clippy::unnecessary_cast
+)]
+
 mod command;
 mod conic;
 mod control_model;
@@ -29,20 +38,17 @@ mod stage;
 mod step;
 mod structured;
 mod swing;
+mod trajectory;
 
 /// Numbers that the controller in C shares, which are no settings.
 pub mod shared {
     pub use crate::online::controller::SOFTENED_FROM;
-    pub use crate::online::effectiveness::{
-        LARGEST_WEIGHT, PRIOR_WEIGHT, RANGE as EFFECTIVENESS_RANGE,
-    };
-    pub use crate::online::estimate::HALF_WINDOW_S;
     pub use crate::online::lift::{CURVATURE as LIFT_CURVATURE, LIFT_ITERATIONS, torque_deviation};
     pub use crate::online::plan::POSTURE_SHARE;
-    pub use crate::online::problem::{SLACK_PRICE, STATE_REACH};
-    pub use crate::online::reference::{DEVIATION_FLOOR, STILL_SHARE, STILL_TIME_S};
+    pub use crate::online::problem::SLACK_PRICE;
     pub use crate::online::structured::{GAP, RATE_SOFTNESS, RATE_TOLERANCE, TOLERANCE};
     pub use crate::online::swing::MOST_TURN_RAD;
+    pub use crate::online::trajectory::NO_PHASE;
 }
 
 /// The structured solver with the widest vectors that the processor has.

@@ -42,18 +42,17 @@
 use nalgebra::DVector;
 
 use super::control_model::ControlModel;
+use super::dense::Real;
 use super::prune::needed_rows;
 use super::reference::Reference;
 use super::settings::{Lift, MpcSettings, RowSelection};
 use super::stage::StageCost;
+use super::trajectory::Trajectory;
 use crate::robot::{GRAVITY_M_S2, JOINT_DIM, WrenchFrame};
 
 /// Price of a slack in the program; the whole cost is scaled to it. clarabel starts with all
 /// multipliers near one and needs two iterations more if it has to bring them to 100.
 pub const SLACK_PRICE: f64 = 10.0;
-
-/// Distance from the reference, in its standard deviations, within which joint limits matter.
-pub const STATE_REACH: f64 = 4.0;
 
 /// Distance from the mean training input, in standard deviations, within which limits matter.
 const INPUT_REACH: f64 = 10.0;
@@ -116,14 +115,27 @@ impl BodyFriction {
 
     /// Writes the cone's rows `(μ F_z, F_x, F_y)` of the force turned upright into `out`.
     pub fn turned(&self, attitude_rad: [f64; 2], out: &mut [f64]) {
-        let d = self.force.len() / 3;
         let rotation = to_upright(self.frame, attitude_rad);
-        let axes = [(2, self.coefficient), (0, 1.0), (1, 1.0)].into_iter();
-        for (row, (axis, factor)) in axes.enumerate() {
-            for col in 0..d {
-                let terms = (0..3).map(|k| rotation[axis][k] * self.force[k * d + col]);
-                out[row * d + col] = factor * terms.sum::<f64>();
-            }
+        let d = self.force.len() / 3;
+        turn_force(
+            rotation.as_flattened(),
+            &self.force,
+            self.coefficient,
+            d,
+            out,
+        );
+    }
+}
+
+/// Writes the rows `(μ F_z, F_x, F_y)` of a force `3 × d` turned by a rotation; both row-major.
+fn turn_force(rotation: &[Real], force: &[Real], coefficient: Real, d: usize, out: &mut [Real]) {
+    for row in 0..3 {
+        let turned = &rotation[3 * ((row + 2) % 3)..];
+        for j in 0..d {
+            let mut sum: Real = turned[0] * force[j];
+            sum += turned[1] * force[d + j];
+            sum += turned[2] * force[2 * d + j];
+            out[row * d + j] = if row == 0 { coefficient * sum } else { sum };
         }
     }
 }
@@ -240,11 +252,8 @@ impl StageRows {
     /// a plan from far away bends around limits that its reference is nowhere near.
     pub fn near(mut self, reference: &Reference) -> Self {
         let deviation = reference.deviation();
-        self.joint.retain(|Row { row, bound, .. }| {
-            let squares = row.iter().zip(deviation).map(|(r, d)| (r * d).powi(2));
-            let spread = squares.sum::<f64>().sqrt();
-            reference.farthest(row) + STATE_REACH * spread >= *bound
-        });
+        let matters = |row: &Row| reference.comes_near(&row.row, row.bound, deviation);
+        self.joint.retain(matters);
         self
     }
 }

@@ -8,8 +8,7 @@
 //! they are: [`conic`](super::conic) makes clarabel's sparse matrices of them, [`structured`](super::structured)
 //! solves them one after the other.
 
-use nalgebra::DMatrix;
-
+use super::dense::{MOST_LATENT, Real};
 use super::linearise::StageModel;
 use super::problem::{Row, StageRows, pairs};
 
@@ -17,6 +16,8 @@ use super::problem::{Row, StageRows, pairs};
 pub(super) const PYRAMID_ROWS: usize = 4;
 /// Rows of a friction cone.
 pub(super) const CONE_ROWS: usize = 3;
+/// Share of a friction cone's radius that the pyramid inside it has along an axis.
+pub(super) const SQRT_HALF: Real = std::f64::consts::FRAC_1_SQRT_2;
 
 /// How the friction cone `‖(F_x, F_y)‖ <= μ F_z` is stated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -43,14 +44,9 @@ impl Rows {
         }
     }
 
-    pub(super) fn clear(&mut self) {
-        self.entries.clear();
-        self.bounds.clear();
-    }
-
-    pub(super) fn push(&mut self, row: &[f64], bound: f64) {
-        self.entries.extend_from_slice(row);
-        self.bounds.push(bound);
+    pub(super) fn resize(&mut self, count: usize, width: usize) {
+        self.entries.resize(count * width, 0.0);
+        self.bounds.resize(count, 0.0);
     }
 }
 
@@ -122,7 +118,8 @@ pub(super) struct StageQp {
 /// deviations.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct StageScale<'a> {
-    pub root: &'a DMatrix<f64>,
+    /// Column by column.
+    pub root: &'a [f64],
     pub input: &'a [f64],
     pub deviation: &'a [f64],
 }
@@ -149,20 +146,10 @@ impl StageQp {
         defect: &[f64],
         scale: &StageScale<'_>,
     ) {
-        let dim = scale.input.len();
-        for row in 0..2 * dim {
-            let factor = 1.0 / scale.deviation[row];
-            for col in 0..dim {
-                let mut sum = 0.0;
-                for k in col..dim {
-                    sum += model.b(row, k) * scale.root[(k, col)];
-                }
-                self.b[row * dim + col] = factor * sum;
-            }
-            for col in 0..2 * dim {
-                self.a[row * 2 * dim + col] = factor * model.a(row, col) * scale.deviation[col];
-            }
-            self.c[row] = factor * defect[row];
+        let (root, deviation, d) = (scale.root, scale.deviation, scale.input.len());
+        scale_dynamics(&model.by, root, deviation, d, &mut self.a, &mut self.b);
+        for row in 0..2 * d {
+            self.c[row] = 1.0 / deviation[row] * defect[row];
         }
     }
 
@@ -177,15 +164,13 @@ impl StageQp {
         let dim = scale.input.len();
         for (number, row) in rows.torque.iter().enumerate() {
             let entries = &mut self.input.entries[number * dim..][..dim];
-            entries.copy_from_slice(&row.row);
-            let at_reference = scale_row(entries, scale);
+            let at_reference = scale.row(&row.row, entries);
             let bound = row.bound - row.per_loss * losses_nm[row.joint];
             self.input.bounds[number] = bound - at_reference;
         }
         for (number, row) in rows.rate.iter().enumerate() {
             let entries = &mut self.rate.entries[number * dim..][..dim];
-            entries.copy_from_slice(&row.row);
-            self.rate_at_reference[number] = scale_row(entries, scale);
+            self.rate_at_reference[number] = scale.row(&row.row, entries);
             self.rate.bounds[number] = row.bound;
         }
         for (number, Row { row, bound, .. }) in rows.joint.iter().enumerate() {
@@ -204,41 +189,135 @@ impl StageQp {
         let dim = scale.input.len();
         for (number, bound) in self.cones.bounds.iter_mut().enumerate() {
             let row = &mut self.cones.entries[number * dim..][..dim];
-            for col in 0..dim {
-                row[col] = -force[number * dim + col];
-            }
+            let force_row = &force[number * dim..][..dim];
             let is_free = number == 0 && force.iter().all(|entry| *entry == 0.0);
-            let at_reference = -scale_row(row, scale);
+            let at_reference = scale.row(force_row, row);
+            row.iter_mut().for_each(|entry| *entry = -*entry);
             *bound = if is_free { 1.0 } else { at_reference };
         }
-        if !self.cones.bounds.is_empty() {
-            return;
-        }
-        let share = std::f64::consts::FRAC_1_SQRT_2;
-        let first = self.input.bounds.len() - PYRAMID_ROWS;
-        for side in 0..PYRAMID_ROWS {
-            let (axis, sign) = (1 + side / 2, if side % 2 == 0 { 1.0 } else { -1.0 });
-            let row = &mut self.input.entries[(first + side) * dim..][..dim];
-            for col in 0..dim {
-                row[col] = sign * force[axis * dim + col] - share * force[col];
-            }
-            let is_free = row.iter().all(|entry| *entry == 0.0);
-            let at_reference = scale_row(row, scale);
-            self.input.bounds[first + side] = if is_free { 1.0 } else { -at_reference };
+        if self.cones.bounds.is_empty() {
+            let first = self.input.bounds.len() - PYRAMID_ROWS;
+            let rows = &mut self.input.entries[first * dim..];
+            let bounds = &mut self.input.bounds[first..];
+            write_pyramid(force, scale.root, scale.input, dim, rows, bounds);
         }
     }
 }
 
-/// `row C_p` in place of the row; returns `row · input`.
-fn scale_row(row: &mut [f64], scale: &StageScale<'_>) -> f64 {
-    let mut at_reference = 0.0;
-    for col in 0..row.len() {
-        at_reference += row[col] * scale.input[col];
-        let mut sum = 0.0;
-        for k in col..row.len() {
-            sum += row[k] * scale.root[(k, col)];
+impl StageScale<'_> {
+    /// Writes `row C_p`; returns `row · input`.
+    fn row(&self, row: &[f64], out: &mut [f64]) -> f64 {
+        scale_row(row, self.root, self.input, self.input.len(), out)
+    }
+}
+
+/// Writes `σ⁻¹ A σ` and `σ⁻¹ B C_p` of derivatives `(A B)`, `2d × 3d`; all row-major but `C_p`, lower triangular, column by column.
+fn scale_dynamics(
+    by: &[Real],
+    root: &[Real],
+    deviation: &[Real],
+    d: usize,
+    a: &mut [Real],
+    b: &mut [Real],
+) {
+    for i in 0..2 * d {
+        let factor = 1.0 / deviation[i];
+        let row = &by[3 * i * d..];
+        for j in 0..d {
+            let mut sum: Real = 0.0;
+            for k in j..d {
+                sum += row[2 * d + k] * root[j * d + k];
+            }
+            b[i * d + j] = factor * sum;
         }
-        row[col] = sum;
+        for j in 0..2 * d {
+            a[2 * i * d + j] = factor * row[j] * deviation[j];
+        }
+    }
+}
+
+/// Writes `row C_p`; returns `row · input`.
+fn scale_row(row: &[Real], root: &[Real], input: &[Real], d: usize, out: &mut [Real]) -> Real {
+    let mut at_reference: Real = 0.0;
+    for j in 0..d {
+        let mut sum: Real = 0.0;
+        for k in j..d {
+            sum += row[k] * root[j * d + k];
+        }
+        out[j] = sum;
+        at_reference += row[j] * input[j];
     }
     at_reference
+}
+
+/// Writes the friction pyramid of a force with rows `(μ F_z, F_x, F_y)`, all zero without contact, where slacks are strictly
+/// inside.
+fn write_pyramid(
+    force: &[Real],
+    root: &[Real],
+    input: &[Real],
+    d: usize,
+    rows: &mut [Real],
+    bounds: &mut [Real],
+) {
+    let mut row: [Real; MOST_LATENT] = [0.0; MOST_LATENT];
+    for side in 0..4 {
+        let axis = (1 + side / 2) * d;
+        let sign: Real = if side % 2 == 0 { 1.0 } else { -1.0 };
+        let mut is_free = true;
+        for j in 0..d {
+            row[j] = sign * force[axis + j] - SQRT_HALF * force[j];
+            is_free = is_free && row[j] == 0.0;
+        }
+        let at_reference = scale_row(&row, root, input, d, &mut rows[side * d..]);
+        bounds[side] = if is_free { 1.0 } else { -at_reference };
+    }
+}
+
+/// Writes a stage's latent input `u_r + C_p v` and the latent state at its end `x_r + σ x` of a solution.
+pub(super) fn unscale(
+    root: &[Real],
+    deviation: &[Real],
+    d: usize,
+    v: &[Real],
+    x: &[Real],
+    input: &mut [Real],
+    end: &mut [Real],
+) {
+    for i in 0..d {
+        let mut sum: Real = 0.0;
+        for j in 0..=i {
+            sum += root[j * d + i] * v[j];
+        }
+        input[i] += sum;
+    }
+    for i in 0..2 * d {
+        end[i] += deviation[i] * x[i];
+    }
+}
+
+/// What a step `next` with derivatives `(A B)` at `(x, u)` leaves of the dynamics at a reference `(state, input)` that goes to
+/// `end`: `next + A (state − x) + B (input − u) − end`.
+pub(super) fn write_defect(
+    next: &[Real],
+    by: &[Real],
+    x: &[Real],
+    u: &[Real],
+    state: &[Real],
+    input: &[Real],
+    end: &[Real],
+    d: usize,
+    defect: &mut [Real],
+) {
+    for i in 0..2 * d {
+        let row = &by[3 * i * d..];
+        let mut sum: Real = next[i] - end[i];
+        for j in 0..2 * d {
+            sum += row[j] * (state[j] - x[j]);
+        }
+        for j in 0..d {
+            sum += row[2 * d + j] * (input[j] - u[j]);
+        }
+        defect[i] = sum;
+    }
 }

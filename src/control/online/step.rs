@@ -6,6 +6,7 @@ use super::command::{Command, Source, Status};
 use super::controller::{Controller, Measurement, SOFTENED_FROM};
 use super::lift::StanceState;
 use super::qp::Outcome;
+use super::trajectory::NO_PHASE;
 use crate::robot::{JOINT_DIM, STATE_DIM};
 
 /// Lifted force, N, below which its inconsistency means nothing.
@@ -64,7 +65,8 @@ impl Controller {
         measurement: &Measurement<'_>,
         command: &mut Command,
     ) -> Status {
-        let prepared = self.prepare_stages(measurement.time_s, measurement.feet);
+        let phase = self.plant.phase_for(measurement.feet).unwrap_or(NO_PHASE);
+        let prepared = self.prepare_stages(measurement.time_s, phase);
         let (Some(contact), Some(reference)) = (prepared, &self.reference) else {
             return Status::NoReference;
         };

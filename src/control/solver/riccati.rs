@@ -48,63 +48,6 @@ impl<T: Real, const NX: usize, const NU: usize> Products<T, NX, NU> {
         }
     }
 
-    /// `P A` and `P B`.
-    #[inline(always)]
-    fn multiply_end(&mut self, a: &[[T; NX]; NX], p: &[[T; NX]; NX]) {
-        // Two rows at a time: what is read of A and B serves both.
-        for i in (0..NX - NX % 2).step_by(2) {
-            let mut first_a = [T::ZERO; NX];
-            let mut second_a = [T::ZERO; NX];
-            let mut first_b = [T::ZERO; WIDE];
-            let mut second_b = [T::ZERO; WIDE];
-            for k in 0..NX {
-                add_multiple(p[i][k], &a[k], &mut first_a);
-                add_multiple(p[i + 1][k], &a[k], &mut second_a);
-                add_wide::<T, NU>(p[i][k], &self.b[k], &mut first_b);
-                add_wide::<T, NU>(p[i + 1][k], &self.b[k], &mut second_b);
-            }
-            self.pa[i] = first_a;
-            self.pa[i + 1] = second_a;
-            self.pb[i] = first_b;
-            self.pb[i + 1] = second_b;
-        }
-        for i in NX - NX % 2..NX {
-            self.pa[i] = [T::ZERO; NX];
-            self.pb[i] = [T::ZERO; WIDE];
-            for k in 0..NX {
-                add_multiple(p[i][k], &a[k], &mut self.pa[i]);
-                add_wide::<T, NU>(p[i][k], &self.b[k], &mut self.pb[i]);
-            }
-        }
-    }
-
-    /// `H_vx += Bᵀ P A` and `H_vv += Bᵀ P B`.
-    #[inline(always)]
-    fn add_hessian(&mut self) {
-        for i in (0..NU - NU % 2).step_by(2) {
-            let mut first_x = self.hvx[i];
-            let mut second_x = self.hvx[i + 1];
-            let mut first_v = self.hvv[i];
-            let mut second_v = self.hvv[i + 1];
-            for k in 0..NX {
-                add_multiple(self.b[k][i], &self.pa[k], &mut first_x);
-                add_multiple(self.b[k][i + 1], &self.pa[k], &mut second_x);
-                add_wide::<T, NU>(self.b[k][i], &self.pb[k], &mut first_v);
-                add_wide::<T, NU>(self.b[k][i + 1], &self.pb[k], &mut second_v);
-            }
-            self.hvx[i] = first_x;
-            self.hvx[i + 1] = second_x;
-            self.hvv[i] = first_v;
-            self.hvv[i + 1] = second_v;
-        }
-        for i in NU - NU % 2..NU {
-            for k in 0..NX {
-                add_multiple(self.b[k][i], &self.pa[k], &mut self.hvx[i]);
-                add_wide::<T, NU>(self.b[k][i], &self.pb[k], &mut self.hvv[i]);
-            }
-        }
-    }
-
     /// `P = Aᵀ P A − Yᵀ Z` by its lower triangle, with `Y` in the place of `H_vx`.
     #[inline(always)]
     fn write_beginning(&self, a: &[[T; NX]; NX], p: &mut [[T; NX]; NX]) {
@@ -178,8 +121,17 @@ pub(super) fn eliminate<T: Real, const NX: usize, const NU: usize>(
             products.b[k][j] = stage.b[k][j];
         }
     }
-    products.multiply_end(&stage.a, p);
-    products.add_hessian();
+    // P A and P B, as P is symmetric; H_vx += Bᵀ P A and H_vv += Bᵀ P B.
+    products.pa = [[T::ZERO; NX]; NX];
+    products.pb = [[T::ZERO; WIDE]; NX];
+    add_products::<T, NX, NU, NX, NX>(p, &stage.a, &products.b, &mut products.pa, &mut products.pb);
+    add_products::<T, NX, NU, WIDE, NU>(
+        &products.b,
+        &products.pa,
+        &products.pb,
+        &mut products.hvx,
+        &mut products.hvv,
+    );
     if !factorise(&products.hvv, &mut stage.factor) {
         return false;
     }
@@ -190,6 +142,40 @@ pub(super) fn eliminate<T: Real, const NX: usize, const NU: usize>(
     solve_upper_rows(&stage.factor, &mut products.z);
     stage.gain = products.z;
     true
+}
+
+/// `out_x += leftᵀ x` and `out_v += leftᵀ v` of the first `M` columns of `left`.
+#[inline(always)]
+fn add_products<T: Real, const NX: usize, const NU: usize, const N: usize, const M: usize>(
+    left: &[[T; N]; NX],
+    x: &[[T; NX]; NX],
+    v: &[[T; WIDE]; NX],
+    out_x: &mut [[T; NX]; M],
+    out_v: &mut [[T; WIDE]; M],
+) {
+    // Two rows at a time: what is read of x and v serves both.
+    for i in (0..M - M % 2).step_by(2) {
+        let mut first_x = out_x[i];
+        let mut second_x = out_x[i + 1];
+        let mut first_v = out_v[i];
+        let mut second_v = out_v[i + 1];
+        for k in 0..NX {
+            add_multiple(left[k][i], &x[k], &mut first_x);
+            add_multiple(left[k][i + 1], &x[k], &mut second_x);
+            add_wide::<T, NU>(left[k][i], &v[k], &mut first_v);
+            add_wide::<T, NU>(left[k][i + 1], &v[k], &mut second_v);
+        }
+        out_x[i] = first_x;
+        out_x[i + 1] = second_x;
+        out_v[i] = first_v;
+        out_v[i + 1] = second_v;
+    }
+    for i in M - M % 2..M {
+        for k in 0..NX {
+            add_multiple(left[k][i], &x[k], &mut out_x[i]);
+            add_wide::<T, NU>(left[k][i], &v[k], &mut out_v[i]);
+        }
+    }
 }
 
 /// `L D Lᵀ` of a symmetric matrix, of which the lower triangle is read; false if it is not positive

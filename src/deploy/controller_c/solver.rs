@@ -3,17 +3,33 @@
 /// A stage of the solver, and all else.
 const STAGE: &str = include_str!("../../../templates/controller_c/solver_stage.h");
 const FUNCTIONS: &str = include_str!("../../../templates/controller_c/solver.c");
+const STATE: &str = include_str!("../../../templates/controller_c/online_state.h");
+const ONLINE: &str = include_str!("../../../templates/controller_c/online.c");
 
-/// A stage of the horizon's solver, for the header of a controller.
-pub(super) fn stage(name: &str, upper: &str, real: &str) -> String {
-    renamed(STAGE, |word| match word {
-        "real" => Some(real.to_owned()),
-        "NX" => Some(format!("2 * {upper}_LATENT_DIM")),
-        "NU" => Some(format!("{upper}_LATENT_DIM")),
-        _ => word
-            .starts_with("solver_")
-            .then(|| format!("{name}_{word}")),
+/// The controller's own steps.
+pub(super) fn online(name: &str) -> String {
+    renamed(ONLINE, |word| {
+        (word == "online_share").then(|| format!("{name}_{word}"))
     })
+}
+
+/// A stage of the horizon's solver and the controller's own state, for the header of a controller.
+pub(super) fn stage(name: &str, upper: &str, real: &str) -> String {
+    renamed(
+        &format!(
+            "{STAGE}{}",
+            STATE.split_once("\n\n").map_or("", |(_, rest)| rest)
+        ),
+        |word| match word {
+            "real" => Some(real.to_owned()),
+            "NX" => Some(format!("2 * {upper}_LATENT_DIM")),
+            "NU" => Some(format!("{upper}_LATENT_DIM")),
+            "online_share" => Some(format!("{name}_{word}")),
+            _ => word
+                .starts_with("solver_")
+                .then(|| format!("{name}_{word}")),
+        },
+    )
 }
 
 /// The solver of the horizon.

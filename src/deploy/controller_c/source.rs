@@ -14,9 +14,8 @@ use crate::codegen::interface::{ModelInterface, PhaseInterface};
 use crate::mpc::interface::Accepts;
 use crate::mpc::problem::{Row, pairs};
 use crate::mpc::shared::{
-    DEVIATION_FLOOR, EFFECTIVENESS_RANGE, GAP, HALF_WINDOW_S, LARGEST_WEIGHT, LIFT_CURVATURE,
-    LIFT_ITERATIONS, MOST_TURN_RAD, POSTURE_SHARE, PRIOR_WEIGHT, RATE_SOFTNESS, RATE_TOLERANCE,
-    SLACK_PRICE, SOFTENED_FROM, STATE_REACH, STILL_SHARE, STILL_TIME_S, TOLERANCE,
+    GAP, LIFT_CURVATURE, LIFT_ITERATIONS, MOST_TURN_RAD, NO_PHASE, POSTURE_SHARE, RATE_SOFTNESS,
+    RATE_TOLERANCE, SLACK_PRICE, SOFTENED_FROM, TOLERANCE,
 };
 use crate::mpc::{ControlModel, ControlModelParts, FallbackSettings, InputGivenState, MpcSettings};
 use crate::robot::{DRY_SPEED_RAD_S, GRAVITY_M_S2, JOINT_DIM, SINGULAR_BOUND, WrenchFrame};
@@ -49,6 +48,7 @@ pub(super) struct Source<'a> {
     solver: SolverNumbers,
     functions: String,
     lift_functions: String,
+    online: String,
     legs: Legs,
     torque_mean: String,
     torque_deviation: String,
@@ -133,6 +133,7 @@ impl<'a> Source<'a> {
             solver: SolverNumbers::new(precision, mpc.qp.accepted_residual),
             functions: solver::of_horizon(facts.name),
             lift_functions: solver::of_lift(),
+            online: solver::online(facts.name),
             legs: Legs::of(robot, numbers),
             torque_mean: numbers
                 .matrix(phases.iter().map(|phase| phase.torque_mean.iter().copied())),
@@ -144,12 +145,17 @@ impl<'a> Source<'a> {
                 row.iter().map(|entry| entry / weight_n).collect::<Vec<_>>()
             })),
             phase_of_feet: integers(
-                (parts.phase_of_feet.iter()).map(|phase| phase.map_or(-1, |phase| phase as i64)),
+                (parts.phase_of_feet.iter())
+                    .map(|phase| phase.map_or(NO_PHASE, |phase| phase) as i64),
             ),
             is_grounded: integers(phases.iter().map(|phase| i64::from(phase.is_grounded))),
             input_mean: numbers
                 .matrix(phases.iter().map(|phase| phase.latent_mean.iter().copied())),
-            input_root: nested(phases.iter().map(|phase| matrix(&phase.latent_root))),
+            input_root: nested(
+                phases
+                    .iter()
+                    .map(|phase| matrix(&phase.latent_root.transpose())),
+            ),
             torque_rows: row_matrix(&rows.torque),
             torque_bound: numbers.vector(rows.torque.iter().map(|row| row.bound)),
             torque_per_loss: numbers.vector(rows.torque.iter().map(|row| row.per_loss)),

@@ -28,16 +28,24 @@ const VARIANCE_FLOOR: f64 = 1e-6;
 struct ModelDynamics(CompiledModel);
 
 impl LatentDynamics for ModelDynamics {
-    fn jacobian(
+    fn accelerate(
         &mut self,
         phase: usize,
         z: &[f64],
         dz: &[f64],
-        u_lat: &[f64],
+        u: &[f64],
         ddz: &mut [f64],
-        jacobian: &mut DMatrix<f64>,
-    ) {
-        self.0.jacobian(phase, z, dz, u_lat, ddz, jacobian);
+        entries: &mut [f64],
+    ) -> usize {
+        self.0.accelerate(phase, z, dz, u, ddz, entries)
+    }
+
+    fn row(&self, phase: usize, entry: usize) -> usize {
+        self.0.pattern(phase).rows[entry]
+    }
+
+    fn column(&self, phase: usize, entry: usize) -> usize {
+        self.0.pattern(phase).cols[entry]
     }
 }
 

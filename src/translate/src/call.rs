@@ -88,6 +88,9 @@ impl Writer<'_> {
             let text = format!("({} + {}) / {by}", receiver.at_least(12), by - 1);
             return Ok(Value::new(text, Type::Int, 13));
         }
+        if let Some(value) = of_libm(&receiver, &method) {
+            return Ok(value);
+        }
         let owner = match receiver.ty.referent() {
             Type::Real => "Real",
             Type::Named(name) => name,
@@ -182,6 +185,21 @@ impl Writer<'_> {
     }
 }
 
+/// A method of the standard library's numbers as whoever includes the C has it.
+fn of_libm(receiver: &Value, method: &str) -> Option<Value> {
+    let (function, ty) = match (&receiver.ty, method) {
+        (Type::Real, "sqrt" | "exp" | "sin" | "cos" | "tanh") => {
+            (method.to_ascii_uppercase(), Type::Real)
+        }
+        (Type::Double, "floor") => (method.to_ascii_uppercase(), Type::Double),
+        (Type::Real, "abs") => ("solver_magnitude".to_owned(), Type::Real),
+        (Type::Real, "is_finite") => ("solver_is_finite_number".to_owned(), Type::Bool),
+        (Type::Double, "is_finite") => ("is_finite_double".to_owned(), Type::Bool),
+        _ => return None,
+    };
+    Some(Value::new(format!("{function}({})", receiver.text), ty, 16))
+}
+
 /// Whether an argument fits a parameter; lengths that are const parameters become known.
 fn infer(
     parameter: &Type,
@@ -206,7 +224,10 @@ fn infer(
             };
             fits && infer(of, given, names, sizes)
         }
-        (Type::Real, Type::Real) | (Type::Int, Type::Int) | (Type::Bool, Type::Bool) => true,
+        (Type::Real, Type::Real)
+        | (Type::Double, Type::Double)
+        | (Type::Int, Type::Int)
+        | (Type::Bool, Type::Bool) => true,
         (Type::Named(of), Type::Named(given)) => of == given,
         _ => false,
     }

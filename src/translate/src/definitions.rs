@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use crate::function::Writer;
 use crate::text::comment;
+use crate::types::Type;
 use crate::{Fault, Translated, Unit};
 
 impl Writer<'_> {
@@ -35,8 +36,13 @@ impl Writer<'_> {
         }
         let value = crate::expression::constant(self.items, constant.source, &constant.value)?;
         let docs = comment(&constant.docs, "");
+        let cast = if constant.ty == Type::Real {
+            "(real)"
+        } else {
+            ""
+        };
         Ok(format!(
-            "{docs}#define {} {value}\n\n",
+            "{docs}#define {} {cast}{value}\n\n",
             self.items.constant_name(name)
         ))
     }
@@ -80,9 +86,12 @@ impl Writer<'_> {
         let mut text = format!("{}typedef struct {{\n", comment(&found.docs, ""));
         for field in &found.fields {
             let ty = field.ty.with_lengths(&mut |length| {
-                let word = |word: &str| match self.items.constants.contains_key(word) {
-                    true => self.items.constant_name(word),
-                    false => word.to_owned(),
+                let word = |word: &str| match self.items.unit.elsewhere(word) {
+                    Some(name) => name.to_owned(),
+                    None if self.items.constants.contains_key(word) => {
+                        self.items.constant_name(word)
+                    }
+                    None => word.to_owned(),
                 };
                 length.split(' ').map(word).collect::<Vec<_>>().join(" ")
             });

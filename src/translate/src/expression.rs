@@ -41,6 +41,17 @@ impl Value {
     fn is_literal(&self) -> bool {
         self.text.parse::<f64>().is_ok()
     }
+
+    /// The same in the place of a real: a whole number for a literal that is one, else its nearest real.
+    fn as_real(self) -> Self {
+        if self.ty != Type::Double || !self.is_literal() {
+            return self;
+        }
+        match self.text.strip_suffix(".0") {
+            Some(whole) => Value::new(whole, Type::Real, self.rank),
+            None => Value::new(format!("(real){}", self.text), Type::Real, 15),
+        }
+    }
 }
 
 /// A binary operator of C, its rank, and whether its result is a condition.
@@ -62,6 +73,7 @@ fn operator(op: &BinOp) -> Option<(&'static str, u8, bool)> {
         BinOp::AddAssign(_) => ("+=", 2, false),
         BinOp::SubAssign(_) => ("-=", 2, false),
         BinOp::MulAssign(_) => ("*=", 2, false),
+        BinOp::DivAssign(_) => ("/=", 2, false),
         _ => return None,
     })
 }
@@ -76,7 +88,7 @@ fn number(literal: &Lit) -> Option<(String, Type)> {
     }
 }
 
-/// The value of a constant: a number, or a struct of numbers.
+/// The value of a constant: a number, or numbers in sums, products, arrays of reals and structs.
 pub(crate) fn constant(items: &Items<'_>, source: usize, value: &Expr) -> Result<String, Fault> {
     match value {
         Expr::Lit(literal) => match number(&literal.lit) {
@@ -96,6 +108,23 @@ pub(crate) fn constant(items: &Items<'_>, source: usize, value: &Expr) -> Result
             let fields: Result<Vec<_>, _> = fields.fields.iter().map(field).collect();
             Ok(format!("{{{}}}", fields?.join(", ")))
         }
+        Expr::Array(array) => {
+            let element = |value| Ok(format!("(real){}", constant(items, source, value)?));
+            let elements: Result<Vec<_>, _> = array.elems.iter().map(element).collect();
+            Ok(format!("{{{}}}", elements?.join(", ")))
+        }
+        Expr::Binary(binary) if operator(&binary.op).is_some_and(|(_, rank, _)| rank > 11) => {
+            let (sign, ..) = operator(&binary.op).expect("it is one");
+            let sides = [&binary.left, &binary.right];
+            let [left, right] = sides.map(|side| constant(items, source, side));
+            Ok(format!("({} {sign} {})", left?, right?))
+        }
+        Expr::Path(path) => match path.path.get_ident().map(ToString::to_string) {
+            Some(name) if items.constants.contains_key(&name) => {
+                constant(items, source, &items.constants[&name].value)
+            }
+            _ => Err(items.fault(source, value, "a constant that is no number")),
+        },
         other => Err(items.fault(source, other, "a constant that is no number")),
     }
 }
@@ -111,6 +140,19 @@ impl Writer<'_> {
 
     /// The value of an expression, where a type is expected or not.
     pub fn value_as(
+        &mut self,
+        instance: &mut Instance<'_>,
+        expression: &Expr,
+        expected: Option<&Type>,
+    ) -> Result<Value, Fault> {
+        let value = self.value_of(instance, expression, expected)?;
+        Ok(match expected {
+            Some(Type::Real) => value.as_real(),
+            _ => value,
+        })
+    }
+
+    fn value_of(
         &mut self,
         instance: &mut Instance<'_>,
         expression: &Expr,
@@ -137,7 +179,8 @@ impl Writer<'_> {
                 Ok(Value::new(text, ty, 15))
             }
             Expr::If(branch) => self.choice(instance, branch, expected),
-            Expr::Repeat(repeat) => self.repeat(instance, repeat),
+            Expr::Repeat(repeat) => self.repeat(instance, repeat, expected),
+            Expr::Array(array) => self.array(instance, array, expected),
             Expr::Struct(literal) => self.struct_literal(instance, literal),
             Expr::Call(call) => self.call(instance, call, expected),
             Expr::MethodCall(call) => self.method(instance, call),
@@ -160,6 +203,11 @@ impl Writer<'_> {
             [name] => {
                 if let Some(ty) = instance.variable(name) {
                     return Ok(Value::new(*name, ty.clone(), 16));
+                }
+                if let Some(elsewhere) = self.items.unit.elsewhere(name) {
+                    let constant = self.items.constants.get(*name);
+                    let ty = constant.map_or(Type::Int, |constant| constant.ty.clone());
+                    return Ok(Value::new(elsewhere, ty, 16));
                 }
                 if let Some(size) = instance.sizes.get(*name) {
                     let rank = if size.contains(' ') { 3 } else { 16 };
@@ -270,8 +318,15 @@ impl Writer<'_> {
         instance: &mut Instance<'_>,
         binary: &syn::ExprBinary,
     ) -> Result<Value, Fault> {
-        let left = self.value(instance, &binary.left)?;
-        let right = self.value(instance, &binary.right)?;
+        let (mut left, mut right) = (
+            self.value(instance, &binary.left)?,
+            self.value(instance, &binary.right)?,
+        );
+        if left.ty == Type::Real {
+            right = right.as_real();
+        } else if right.ty == Type::Real {
+            left = left.as_real();
+        }
         let Some((sign, rank, is_condition)) = operator(&binary.op) else {
             return Err(self.outside(instance, binary, "this operator"));
         };
@@ -361,8 +416,10 @@ impl Writer<'_> {
         &mut self,
         instance: &mut Instance<'_>,
         repeat: &syn::ExprRepeat,
+        expected: Option<&Type>,
     ) -> Result<Value, Fault> {
-        let element = self.value(instance, &repeat.expr)?;
+        let expected = expected.and_then(Type::element);
+        let element = self.value_as(instance, &repeat.expr, expected)?;
         let length = self.items.length(instance.function.source, &repeat.len)?;
         let ty = Type::Array(Box::new(element.ty.clone()), length);
         let ty = self.resolve(&ty, &instance.sizes);
@@ -371,6 +428,24 @@ impl Writer<'_> {
             repeated: Some(innermost),
             ..Value::new(format!("{{{}}}", element.text), ty, 16)
         })
+    }
+
+    /// The elements of an array in braces.
+    fn array(
+        &mut self,
+        instance: &mut Instance<'_>,
+        array: &syn::ExprArray,
+        expected: Option<&Type>,
+    ) -> Result<Value, Fault> {
+        let Some(Type::Array(element, length)) = expected else {
+            return Err(self.outside(instance, array, "an array without a type in its `let`"));
+        };
+        let mut texts = Vec::new();
+        for value in &array.elems {
+            texts.push(self.value_as(instance, value, Some(element))?.text);
+        }
+        let ty = Type::Array(element.clone(), length.clone());
+        Ok(Value::new(format!("{{{}}}", texts.join(", ")), ty, 16))
     }
 
     /// The fields of a struct on a line each, in braces.
@@ -389,7 +464,14 @@ impl Writer<'_> {
         };
         let mut text = "{\n".to_owned();
         for field in &literal.fields {
-            let value = self.value(instance, &field.expr)?;
+            let of = self.items.structs.get(&name);
+            let ty = of.and_then(|of| {
+                of.fields
+                    .iter()
+                    .find(|f| matches!(&field.member, syn::Member::Named(of) if *of == f.name))
+            });
+            let ty = ty.map(|field| field.ty.clone());
+            let value = self.value_as(instance, &field.expr, ty.as_ref())?;
             let is_copy = matches!(value.ty, Type::Array(..)) && value.repeated.is_none();
             let (syn::Member::Named(name), false) = (&field.member, is_copy) else {
                 return Err(self.outside(instance, field, "a field that is a copied array"));

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::Fault;
-use crate::items::{Function, Items, SIZES};
+use crate::items::{Function, Items};
 use crate::statement::Lines;
 use crate::text::{comment, wrapped};
 use crate::types::Type;
@@ -71,14 +71,11 @@ impl<'a> Writer<'a> {
     }
 
     fn resolve_length(&mut self, length: &str, sizes: &BTreeMap<String, String>) -> String {
-        let word = |word: &str| {
-            let is_name = word.starts_with(|letter: char| letter.is_ascii_alphabetic());
-            match sizes.get(word) {
-                Some(size) => size.clone(),
-                None if self.items.constants.contains_key(word) => self.constant(word),
-                None if !is_name || SIZES.contains(&word) => word.to_owned(),
-                None => word.to_owned(),
-            }
+        let word = |word: &str| match (self.items.unit.elsewhere(word), sizes.get(word)) {
+            (Some(name), _) => name.to_owned(),
+            (None, Some(size)) => size.clone(),
+            (None, None) if self.items.constants.contains_key(word) => self.constant(word),
+            (None, None) => word.to_owned(),
         };
         let words: Vec<String> = length.split(' ').map(word).collect();
         words.join(" ")
@@ -120,7 +117,7 @@ impl<'a> Writer<'a> {
         function: &Function,
         sizes: BTreeMap<String, String>,
     ) -> Result<String, Fault> {
-        let prefix = self.items.prefix.to_ascii_uppercase() + "_";
+        let prefix = self.items.unit.prefix.to_ascii_uppercase() + "_";
         let size = |size: &String| sizes[size].replace(&prefix, "").replace(' ', "");
         let suffixes: Vec<String> = function.sizes.iter().map(size).collect();
         let of = if owner == "Real" { "" } else { owner };
@@ -136,8 +133,11 @@ impl<'a> Writer<'a> {
             }
             None => {}
         }
+        let Some(body) = &function.body else {
+            return Ok(c_name);
+        };
         self.done.insert(c_name.clone(), false);
-        let text = self.definition(&c_name, owner, function, sizes)?;
+        let text = self.definition(&c_name, owner, (function, body), sizes)?;
         self.functions += &text;
         self.done.insert(c_name.clone(), true);
         Ok(c_name)
@@ -147,7 +147,7 @@ impl<'a> Writer<'a> {
         &mut self,
         c_name: &str,
         owner: &str,
-        function: &Function,
+        (function, body): (&Function, &syn::Block),
         sizes: BTreeMap<String, String>,
     ) -> Result<String, Fault> {
         let mut scope = BTreeMap::new();
@@ -174,9 +174,12 @@ impl<'a> Writer<'a> {
         let signature = format!("{c_name}({})", declared.join(", "));
         let signature = output.declare(&signature, &|of| self.spelling(of));
         let mut lines = Lines::default();
-        lines.add(&format!("static inline {signature}"));
+        lines.add(&format!(
+            "static inline {}{signature}",
+            self.items.unit.attribute
+        ));
         lines.open("{");
-        self.block(&mut instance, &mut lines, &function.body, true)?;
+        self.block(&mut instance, &mut lines, body, true)?;
         lines.close("}");
         let docs = comment(&function.docs, "");
         Ok(format!("{docs}{}\n", wrapped(&lines.text)))

@@ -14,12 +14,13 @@ pub(crate) const SIZES: [&str; 3] = ["NX", "NU", "LINKED"];
 
 /// A struct or enum, a constant or a function belongs to a source, of which faults name the path.
 pub(crate) struct Items<'a> {
-    pub prefix: &'a str,
+    pub unit: Unit<'a>,
     sources: &'a [Source],
     pub structs: BTreeMap<String, Struct>,
     pub enums: BTreeMap<String, (Vec<String>, Vec<String>)>,
     pub constants: BTreeMap<String, Constant>,
-    /// By owner and name; functions without one have an empty owner, the scalar's have `Real`.
+    /// By owner and name; functions without one have an empty owner. The trait `Real` is the scalar; any other is a struct of
+    /// C, its required methods are functions that whoever includes the C defines.
     pub functions: BTreeMap<(String, String), Function>,
 }
 
@@ -51,7 +52,8 @@ pub(crate) struct Function {
     /// Name, type, and whether the function changes its copy.
     pub parameters: Vec<(String, Type, bool)>,
     pub output: Type,
-    pub body: syn::Block,
+    /// None of a function that is defined elsewhere.
+    pub body: Option<syn::Block>,
 }
 
 /// The lines of documentation among attributes.
@@ -77,7 +79,7 @@ fn is_conditional(attributes: &[syn::Attribute]) -> bool {
 impl<'a> Items<'a> {
     pub fn read(sources: &'a [Source], unit: &Unit<'a>) -> Result<Self, Fault> {
         let mut items = Self {
-            prefix: unit.prefix,
+            unit: *unit,
             sources,
             structs: BTreeMap::new(),
             enums: BTreeMap::new(),
@@ -122,49 +124,48 @@ impl<'a> Items<'a> {
     pub fn name(&self, parts: &[&str]) -> String {
         let words = parts.iter().filter(|part| !part.is_empty());
         let words: Vec<String> = words.map(|part| snake(part)).collect();
-        format!("{}_{}", self.prefix, words.join("_"))
+        format!("{}_{}", self.unit.prefix, words.join("_"))
     }
 
     /// A name of C for a constant or the value of an enum.
     pub fn constant_name(&self, name: &str) -> String {
         match name.chars().any(|letter| letter.is_ascii_lowercase()) {
             true => self.name(&[name]).to_ascii_uppercase(),
-            false => format!("{}_{name}", self.prefix.to_ascii_uppercase()),
+            false => format!("{}_{name}", self.unit.prefix.to_ascii_uppercase()),
         }
     }
 
     fn add(&mut self, source: usize, item: &Item) -> Result<(), Fault> {
         match item {
             Item::Struct(item) if !is_conditional(&item.attrs) => self.add_struct(source, item),
-            Item::Enum(item) => {
-                let variants = item.variants.iter();
-                if let Some(variant) = variants.clone().find(|v| !v.fields.is_empty()) {
-                    return Err(self.fault(source, variant, "an enum with data"));
-                }
-                let names = variants.map(|variant| variant.ident.to_string());
+            Item::Enum(item) if item.variants.iter().all(|v| v.fields.is_empty()) => {
+                let names = item.variants.iter().map(|v| v.ident.to_string());
                 let plain = (docs(&item.attrs), names.collect());
                 self.enums.insert(item.ident.to_string(), plain);
                 Ok(())
             }
             Item::Const(item) => {
-                let constant = Constant {
-                    docs: docs(&item.attrs),
-                    source,
-                    ty: self.ty(source, &item.ty, "")?,
-                    value: (*item.expr).clone(),
-                };
-                self.constants.insert(item.ident.to_string(), constant);
+                if let Ok(ty) = self.ty(source, &item.ty, "") {
+                    let (docs, value) = (docs(&item.attrs), (*item.expr).clone());
+                    let constant = Constant {
+                        docs,
+                        source,
+                        ty,
+                        value,
+                    };
+                    self.constants.insert(item.ident.to_string(), constant);
+                }
                 Ok(())
             }
             Item::Fn(item) if !is_conditional(&item.attrs) => {
-                self.add_function(source, "", &item.attrs, &item.sig, &item.block)
+                self.add_function(source, "", &item.attrs, &item.sig, Some(&item.block))
             }
-            Item::Trait(item) if item.ident == "Real" => {
+            Item::Trait(item) => {
+                let owner = item.ident.to_string();
                 for method in &item.items {
-                    if let TraitItem::Fn(method) = method
-                        && let Some(body) = &method.default
-                    {
-                        self.add_function(source, "Real", &method.attrs, &method.sig, body)?;
+                    if let TraitItem::Fn(method) = method {
+                        let (attributes, body) = (&method.attrs, method.default.as_ref());
+                        self.add_function(source, &owner, attributes, &method.sig, body)?;
                     }
                 }
                 Ok(())
@@ -181,7 +182,7 @@ impl<'a> Items<'a> {
                 let owner = owner.ident.to_string();
                 for method in &item.items {
                     if let ImplItem::Fn(method) = method {
-                        let (attributes, body) = (&method.attrs, &method.block);
+                        let (attributes, body) = (&method.attrs, Some(&method.block));
                         self.add_function(source, &owner, attributes, &method.sig, body)?;
                     }
                 }
@@ -203,10 +204,12 @@ impl<'a> Items<'a> {
                 ty: self.ty(source, &field.ty, "")?,
             })
         };
-        let fields = item.fields.iter().map(field).collect::<Result<_, _>>()?;
-        let docs = docs(&item.attrs);
-        let found = Struct { docs, fields };
-        self.structs.insert(item.ident.to_string(), found);
+        // Structs that the C does not need may have any fields.
+        if let Ok(fields) = item.fields.iter().map(field).collect() {
+            let docs = docs(&item.attrs);
+            let found = Struct { docs, fields };
+            self.structs.insert(item.ident.to_string(), found);
+        }
         Ok(())
     }
 
@@ -216,7 +219,7 @@ impl<'a> Items<'a> {
         owner: &str,
         attributes: &[syn::Attribute],
         signature: &syn::Signature,
-        body: &syn::Block,
+        body: Option<&syn::Block>,
     ) -> Result<(), Fault> {
         let const_parameters: Vec<String> = (signature.generics.params.iter())
             .filter_map(|parameter| match parameter {
@@ -270,7 +273,7 @@ impl<'a> Items<'a> {
             const_parameters,
             parameters,
             output,
-            body: body.clone(),
+            body: body.cloned(),
         };
         let key = (owner.to_owned(), signature.ident.to_string());
         self.functions.insert(key, function);
@@ -294,7 +297,7 @@ impl<'a> Items<'a> {
             syn::Type::Path(path) => {
                 let last = path.path.segments.last().expect("a path has segments");
                 match last.ident.to_string().as_str() {
-                    "T" => Type::Real,
+                    "T" | "Real" => Type::Real,
                     "Self" if owner == "Real" => Type::Real,
                     "Self" => Type::Named(owner.to_owned()),
                     "f64" => Type::Double,
@@ -303,6 +306,13 @@ impl<'a> Items<'a> {
                     name => Type::Named(self.with_sizes(source, name, last)?),
                 }
             }
+            syn::Type::ImplTrait(of) => match of.bounds.first() {
+                Some(syn::TypeParamBound::Trait(bound)) => {
+                    let name = bound.path.segments.last().expect("a path has segments");
+                    Type::Named(name.ident.to_string())
+                }
+                _ => return Err(self.fault(source, of, "a type outside the subset")),
+            },
             other => return Err(self.fault(source, other, "a type outside the subset")),
         })
     }

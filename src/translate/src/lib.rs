@@ -67,7 +67,7 @@ impl fmt::Display for Fault {
 impl std::error::Error for Fault {}
 
 /// The names of the C.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub struct Unit<'a> {
     /// Before every name: `solver` for `solver_solve` and `SOLVER_WIDE`.
     pub prefix: &'a str,
@@ -75,6 +75,17 @@ pub struct Unit<'a> {
     pub roots: &'a [&'a str],
     /// Structs whose text stands apart, for a header.
     pub header: &'a [&'a str],
+    /// Constants and functions of the Rust that whoever includes the C defines, with their names there.
+    pub elsewhere: &'a [(&'a str, &'a str)],
+    /// What stands before the type of every function, with a space.
+    pub attribute: &'a str,
+}
+
+impl<'a> Unit<'a> {
+    pub(crate) fn elsewhere(&self, word: &str) -> Option<&'a str> {
+        let found = self.elsewhere.iter().find(|(name, _)| *name == word);
+        found.map(|(_, name)| *name)
+    }
 }
 
 /// The text of a unit.
@@ -99,26 +110,32 @@ pub fn translate(sources: &[Source], unit: &Unit<'_>) -> Result<Translated, Faul
     writer.finish(unit)
 }
 
-/// Files of the solver, below the workspace's folder.
+/// Files of the solver and, of the controller, those with functions that C has too, below `src/control`.
 const SOLVER: [&str; 9] = [
-    "interior.rs",
-    "links.rs",
-    "lower.rs",
-    "point.rs",
-    "problem.rs",
-    "riccati.rs",
-    "rows.rs",
-    "scalar.rs",
-    "solve.rs",
+    "solver/interior.rs",
+    "solver/links.rs",
+    "solver/lower.rs",
+    "solver/point.rs",
+    "solver/problem.rs",
+    "solver/riccati.rs",
+    "solver/rows.rs",
+    "solver/scalar.rs",
+    "solver/solve.rs",
+];
+const ONLINE: [&str; 8] = [
+    "online/dense.rs",
+    "online/effectiveness.rs",
+    "online/estimate.rs",
+    "online/lift.rs",
+    "online/linearise.rs",
+    "online/problem.rs",
+    "online/stage.rs",
+    "online/trajectory.rs",
 ];
 
-/// The C of the structured solver, as paths below the workspace's folder and texts.
-///
-/// # Errors
-/// [`Fault`] for the first construct that is outside the subset, or a source that cannot be read.
-pub fn solver(root: &Path) -> Result<[(&'static str, String); 2], Fault> {
+fn read(root: &Path, names: &[&str]) -> Result<Vec<Source>, Fault> {
     let read = |name: &&str| {
-        let path = format!("src/control/solver/{name}");
+        let path = format!("src/control/{name}");
         let text = fs::read_to_string(root.join(&path)).map_err(|error| Fault {
             path: path.clone(),
             line: 0,
@@ -126,11 +143,68 @@ pub fn solver(root: &Path) -> Result<[(&'static str, String); 2], Fault> {
         })?;
         Ok(Source { path, text })
     };
-    let sources = SOLVER.iter().map(read).collect::<Result<Vec<_>, Fault>>()?;
-    solver_of(&sources)
+    names.iter().map(read).collect()
 }
 
-/// The same from sources of the solver.
+fn head(what: &str) -> String {
+    format!(
+        "/* @generated from src/control by `cargo run -p romc-translate`: {what} Names that are defined\n \
+         * elsewhere: real, the type of numbers; NX and NU, how many states and inputs there are. */\n\n"
+    )
+}
+
+/// The C of the structured solver and of the controller, as paths below the workspace's folder and texts.
+///
+/// # Errors
+/// [`Fault`] for the first construct that is outside the subset, or a source that cannot be read.
+pub fn controller(root: &Path) -> Result<Vec<(&'static str, String)>, Fault> {
+    let mut texts = solver_of(&read(root, &SOLVER)?)?.to_vec();
+    let unit = Unit {
+        prefix: "online",
+        roots: &[
+            "Trajectory::state_at",
+            "Trajectory::mean_input",
+            "Trajectory::write_deviations",
+            "Trajectory::comes_near",
+            "Trajectory::schedule",
+            "Trajectory::write_acceleration",
+            "LatentDynamics::step",
+            "LatentDynamics::write_gain",
+            "write_still",
+            "write_expected",
+            "add_correction",
+            "turn_force",
+            "scale_dynamics",
+            "write_pyramid",
+            "unscale",
+            "write_defect",
+            "Share::unknown",
+            "Share::update",
+            "write_torque",
+            "free_optimum",
+            "write_limits",
+            "write_foot",
+            "write_hessian",
+            "change_rows",
+        ],
+        header: &["Share"],
+        elsewhere: &[
+            ("MOST_LATENT", "D"),
+            ("MOST_STATE", "X"),
+            ("MOST_SQUARE", "D * D"),
+            ("SQRT_HALF", "SQRT_HALF"),
+        ],
+        attribute: "MAYBE_UNUSED ",
+    };
+    let Translated { header, source } = translate(&read(root, &ONLINE)?, &unit)?;
+    let state = head("state of the controller's own steps.") + &header;
+    let steps = head("the controller's own steps.") + &source;
+    texts.push(("templates/controller_c/online_state.h", state));
+    texts.push(("templates/controller_c/online.c", steps));
+    Ok(texts)
+}
+
+/// The C of sources of the solver.
 ///
 /// # Errors
 /// [`Fault`] for the first construct that is outside the subset.
@@ -144,14 +218,9 @@ pub fn solver_of(sources: &[Source]) -> Result<[(&'static str, String); 2], Faul
             "Program::solve",
         ],
         header: &["Stage"],
+        ..Unit::default()
     };
     let Translated { header, source } = translate(sources, &unit)?;
-    let head = |what: &str| {
-        format!(
-            "/* @generated from src/control/solver by `cargo run -p romc-translate`: {what} Names that are defined\n \
-             * elsewhere: real, the type of numbers; NX and NU, how many states and inputs there are. */\n\n"
-        )
-    };
     let types = head("a stage of the structured solver.") + &header;
     let functions = head("the structured solver.") + &source;
     Ok([

@@ -78,7 +78,8 @@ impl Writer<'_> {
         if instance.output == Type::Unit {
             return self.statement(instance, lines, expression);
         }
-        let value = self.value(instance, expression)?;
+        let output = instance.output.clone();
+        let value = self.value_as(instance, expression, Some(&output))?;
         self.return_value(lines, value);
         Ok(())
     }
@@ -160,8 +161,8 @@ impl Writer<'_> {
                 }
                 return Ok(());
             }
-            Some(_) => return Err(self.outside(instance, pattern, "a second variable of a name")),
-            None => {}
+            None if instance.variable(&name).is_none() => {}
+            _ => return Err(self.outside(instance, pattern, "a second variable of a name")),
         }
         let ty = match &value.ty {
             Type::Unit => return Err(self.outside(instance, pattern, "a variable of no value")),
@@ -199,6 +200,9 @@ impl Writer<'_> {
     ) {
         match &value.repeated {
             Some(element) if element == "0" => lines.add(&format!("{declared} = {};", value.text)),
+            None if value.text.starts_with('{') => {
+                lines.add(&format!("{declared} = {};", value.text))
+            }
             Some(element) => {
                 lines.add(&format!("{declared};"));
                 lines.open(&format!("for (int i = 0; i < {length}; ++i) {{"));
@@ -249,7 +253,8 @@ impl Writer<'_> {
             Expr::Return(returned) => {
                 match &returned.expr {
                     Some(expression) => {
-                        let value = self.value(instance, expression)?;
+                        let output = instance.output.clone();
+                        let value = self.value_as(instance, expression, Some(&output))?;
                         self.return_value(lines, value);
                     }
                     None => lines.add("return;"),

@@ -17,7 +17,7 @@ pub(crate) fn snake(name: &str) -> String {
 
 /// The signs of comments in ASCII; links of rustdoc become plain words.
 pub(crate) fn ascii(comment: &str) -> String {
-    const SIGNS: [(&str, &str); 15] = [
+    const SIGNS: [(&str, &str); 20] = [
         ("⁻¹", "^-1"),
         ("⁻ᵀ", "^-T"),
         ("ᵀ", "^T"),
@@ -29,6 +29,11 @@ pub(crate) fn ascii(comment: &str) -> String {
         ("…", "..."),
         ("₀", "_0"),
         ("≤", "<="),
+        ("×", "x"),
+        ("σ", "sigma"),
+        ("μ", "mu"),
+        ("γ̂", "gamma"),
+        ("φ", "phi"),
         ("[`", ""),
         ("`]", ""),
         ("`", ""),
