@@ -202,8 +202,7 @@ impl Translator<'_> {
         home
     }
 
-    /// Reserves `rows x cols` elements for values, row by row in an output where they belong
-    /// if possible.
+    /// Reserves `rows x cols` elements for values, row by row in an output where they belong if possible.
     fn matrix_storage(
         &mut self,
         first: usize,
@@ -227,8 +226,8 @@ impl Translator<'_> {
         matrix
     }
 
-    /// The output array in which each row is a run of elements, all equally far apart, if nothing in it is still
-    /// to be read.
+    /// The output array in which each row is a run of elements, all equally far apart, if nothing in it is still to be
+    /// read.
     fn output_matrix(&self, first: usize, rows: usize, cols: usize) -> Option<MatrixStorage> {
         let results = self.program.results();
         let find = |value: usize| results.iter().position(|e| e.value.index() == value);

@@ -77,7 +77,6 @@ pub struct Parameter<N = Ident> {
     pub role: Role,
 }
 
-#[derive(Clone, Debug, PartialEq)]
 pub struct Function {
     pub name: Ident,
     pub docs: Vec<String>,

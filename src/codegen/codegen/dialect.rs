@@ -31,8 +31,8 @@ pub(crate) struct Spelling {
     pub continuation: &'static str,
     /// Sum, difference, product and quotient, with the spaces around them.
     pub operators: [&'static str; 4],
-    /// Function `f(a, b, c) = a*b + c` for loops, in a language whose compilers never fuse the two
-    /// operations by themselves.
+    /// Function `f(a, b, c) = a*b + c` for loops, in a language whose compilers never fuse the two operations by
+    /// themselves.
     pub multiply_add: Option<&'static str>,
     /// A function `$name` of `$a`, and the functions that are spelled otherwise.
     pub function: &'static str,
@@ -51,8 +51,8 @@ pub(crate) struct Spelling {
     /// Calls of the sine-and-cosine kernel for `$n` angles and of a generated function.
     pub sin_cos: &'static str,
     pub call: &'static str,
-    /// The kernel's core on the argument `$a` of a lane: defines `$sine` and `$cosine`, and notes an argument beyond its
-    /// limit. Blocks of lanes are for compilers: scripts run many points as columns.
+    /// The kernel's core on the argument `$a` of a lane: defines `$sine` and `$cosine`, and notes an argument beyond
+    /// its limit. Blocks of lanes are for compilers: scripts run many points as columns.
     pub sin_cos_lane: &'static [&'static str],
     /// What stands for a result of the core that is not used, if it may be left out.
     pub unused_lane: Option<&'static str>,
@@ -62,8 +62,8 @@ pub(crate) struct Spelling {
     pub table_base: &'static str,
     pub table: &'static str,
     pub rows: [&'static str; 3],
-    /// Head of a function with its parameters: arrays that are read, arrays that are written, scalars; and the mention of
-    /// a parameter that nothing reads.
+    /// Head of a function with its parameters: arrays that are read, arrays that are written, scalars; and the mention
+    /// of a parameter that nothing reads.
     pub head: &'static str,
     pub parameters: [&'static str; 3],
     pub mention: &'static str,
@@ -207,8 +207,8 @@ impl Dialect {
         self.fill(self.spelling.head, &words)
     }
 
-    /// The function without its documentation, with a mention of each parameter that nothing reads; ends without
-    /// a newline.
+    /// The function without its documentation, with a mention of each parameter that nothing reads; ends without a
+    /// newline.
     pub(crate) fn definition(&self, function: &Function) -> String {
         let mention = |name: &Ident| self.fill(self.spelling.mention, &[("name", name.as_str())]);
         let unused = function.unused.iter();

@@ -22,7 +22,6 @@ impl fmt::Display for Ident {
 }
 
 /// Mints the names of one scope: identifiers, no keyword, none twice.
-#[derive(Clone, Debug)]
 pub(crate) struct Namer {
     used: BTreeSet<String>,
 }
@@ -56,7 +55,6 @@ impl Namer {
 }
 
 /// The constant tables of a file in the order of their first use; equal tables are stored once.
-#[derive(Debug)]
 pub(crate) struct Tables {
     namer: Namer,
     base: String,

@@ -4,7 +4,7 @@ use super::code::{Parameter, Role};
 use super::documentation::{equations, of_inputs, of_maps};
 use super::options::Units;
 use crate::equations::{Equations, LatentUnits};
-use crate::ir::{Program, Slot, Statement};
+use crate::ir::{Program, Statement};
 use crate::lower::{self, Form, JacobianPattern, LowerError, Map};
 use crate::model::{ModelError, ReducedModel};
 
@@ -98,8 +98,8 @@ pub(super) fn computes_angles(statement: &Statement) -> bool {
     matches!(statement, Statement::SinCos { .. })
 }
 
-/// What computes the input of the maps, and torques of the motors from it, if the model is over a
-/// known robot's coordinates.
+/// What computes the input of the maps, and torques of the motors from it, if the model is over a known robot's
+/// coordinates.
 fn input_entries(model: &ReducedModel) -> Result<Vec<FunctionSpec>, LowerError> {
     let (Some(input), Some(torque)) = (
         lower::generalised_input(model)?,
@@ -184,28 +184,20 @@ fn phase_entries(
     })
 }
 
-/// An entry whose outputs of the same name as an input are updated in place; its documentation ends
-/// with the lengths of all arrays.
+/// An entry whose outputs of the same name as an input are updated in place; its documentation ends with the lengths of
+/// all arrays.
 fn entry(name: &str, program: Program, mut docs: Vec<String>) -> FunctionSpec {
     let mut parameters: Vec<Parameter<String>> = Vec::new();
-    let slots = |slots: &[Slot], role| {
-        slots
-            .iter()
-            .cloned()
-            .map(move |slot| (slot, role))
-            .collect()
-    };
-    let all: [Vec<(Slot, Role)>; 2] = [
-        slots(program.inputs(), Role::Input),
-        slots(program.outputs(), Role::Output),
-    ];
-    for (Slot { name, len }, role) in all.concat() {
-        match parameters.iter_mut().find(|known| known.name == name) {
+    let inputs = program.inputs().iter().map(|slot| (slot, Role::Input));
+    let outputs = program.outputs().iter().map(|slot| (slot, Role::Output));
+    for (slot, role) in inputs.chain(outputs) {
+        match parameters.iter_mut().find(|known| known.name == slot.name) {
             Some(known) => known.role = Role::InOut,
-            None => {
-                let role = if name == "h" { Role::Scalar } else { role };
-                parameters.push(Parameter { name, len, role });
-            }
+            None => parameters.push(Parameter {
+                name: slot.name.clone(),
+                len: slot.len,
+                role: if slot.name == "h" { Role::Scalar } else { role },
+            }),
         }
     }
     let lengths = parameters.iter().filter(|p| p.role != Role::Scalar);

@@ -1,7 +1,7 @@
 //! Breaking lists and comments into lines.
 
-/// `{a, b, c}`, broken with `indent` after every eight elements of a long list; an `indent`
-/// without a newline leaves breaking to the printer.
+/// `{a, b, c}`, broken with `indent` after every eight elements of a long list; an `indent` without a newline leaves
+/// breaking to the printer.
 pub(crate) fn braced(elements: &[String], indent: &str) -> String {
     let lines: Vec<String> = elements.chunks(8).map(|line| line.join(", ")).collect();
     format!("{{{}}}", lines.join(&format!(",{indent}")))
@@ -15,8 +15,8 @@ pub(crate) fn comment_lines(paragraphs: &[String], width: usize) -> Vec<String> 
         .collect()
 }
 
-/// A paragraph broken at spaces into lines of at most `width` bytes where possible; continued lines
-/// begin with `indent`, which a space follows if it is not empty.
+/// A paragraph broken at spaces into lines of at most `width` bytes where possible; continued lines begin with
+/// `indent`, which a space follows if it is not empty.
 pub fn wrapped(paragraph: &str, width: usize, indent: &str) -> Vec<String> {
     let mut lines = Vec::new();
     let mut line = String::new();

@@ -25,8 +25,8 @@ impl Precision {
         }
     }
 
-    /// A finite number with the fewest digits that read back to the nearest number of this precision, always with
-    /// a point or an exponent, so that it is no integer in any target.
+    /// A finite number with the fewest digits that read back to the nearest number of this precision, always with a
+    /// point or an exponent, so that it is no integer in any target.
     pub(crate) fn digits(self, value: f64) -> String {
         assert!(value.is_finite(), "numbers of programs are finite");
         match self {
@@ -104,8 +104,8 @@ pub enum Units {
     /// SI units; the model's scaling factors are folded into the maps.
     #[default]
     Si,
-    /// Scaled values as the model was learned with: `s_x x`, `s_x dx`, `s_u u`; the maps are the
-    /// encoder's and the decoder's very weights.
+    /// Scaled values as the model was learned with: `s_x x`, `s_x dx`, `s_u u`; the maps are the encoder's and the
+    /// decoder's very weights.
     Scaled,
 }
 

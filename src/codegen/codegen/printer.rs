@@ -123,7 +123,8 @@ impl Dialect {
         Text::new(text, Precedence::Atom, depth.unwrap_or(0) + 1)
     }
 
-    /// An operation on two operands; `in_loop`, a sum with a product is printed with a function, if the language has one.
+    /// An operation on two operands; `in_loop`, a sum with a product is printed with a function, if the language has
+    /// one.
     pub(crate) fn binary(&self, op: Binary, a: &Text, b: &Text, in_loop: bool) -> Text {
         let depth = a.depth.max(b.depth) + 1;
         let multiply_add = self.spelling.multiply_add.filter(|_| in_loop);
@@ -131,8 +132,8 @@ impl Dialect {
             return Text::new(format!("{name}({x}, {y}, {rest})"), Precedence::Atom, depth);
         }
         let [add, sub, mul, div] = self.spelling.operators;
-        // Sums and products group to the left; a right operand of the same kind keeps
-        // its parentheses, because floating-point sums do not associate.
+        // Sums and products group to the left; a right operand of the same kind keeps its parentheses, because
+        // floating-point sums do not associate.
         let (operator, own, right) = match op {
             Binary::Add => (add, Precedence::Sum, Precedence::Product),
             Binary::Sub => (sub, Precedence::Sum, Precedence::Product),

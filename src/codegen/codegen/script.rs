@@ -1,9 +1,9 @@
 //! Languages that run scripts: `NAME.py` on NumPy, `NAME_casadi.py` with functions of CasADi, `NAME.m` for MATLAB and
 //! Octave, a function that returns a struct of function handles.
 //!
-//! Arrays are matrices with a column per point, or a vector for one point, and every operation is
-//! element by element, so that the statements of a program serve one state and many alike. What a
-//! generated function writes into its parameters elsewhere is returned here.
+//! Arrays are matrices with a column per point, or a vector for one point, and every operation is element by element,
+//! so that the statements of a program serve one state and many alike. What a generated function writes into its
+//! parameters elsewhere is returned here.
 
 use askama::Template;
 

@@ -11,7 +11,6 @@ const MAX_CHANGES: usize = 600;
 const REACHES: [f64; 6] = [1.0, 3.0, 0.3, 10.0, 0.1, 0.01];
 
 /// Inputs of a function and what it computes from them.
-#[derive(Clone, Debug)]
 pub(crate) struct TestPoint {
     pub inputs: Vec<Vec<f64>>,
     pub outputs: Vec<Vec<f64>>,
@@ -29,9 +28,9 @@ impl TestPoint {
         }
     }
 
-    /// The point with some arrays at zero, as a robot that stands still has them, if the function of the state
-    /// has kinks and finite results there. A slope that is not a number there although the accelerations are counts as zero, so that the
-    /// test fails.
+    /// The point with some arrays at zero, as a robot that stands still has them, if the function of the state has
+    /// kinks and finite results there. A slope that is not a number there although the accelerations are counts as
+    /// zero, so that the test fails.
     pub(crate) fn at_rest(self, entry: &FunctionSpec, precision: Precision, zero: &[&str]) -> Self {
         let is_of_state = entry.program.inputs().iter().any(|slot| slot.name == "dz");
         if !is_of_state || !entry.program.has(has_kink) {
@@ -72,8 +71,8 @@ fn has_kink(statement: &Statement) -> bool {
     )
 }
 
-/// A point between -1 and 1. Where the function is not finite there, points around it are tried: all elements
-/// positive, all drawn again, a few of the best point changed; the best is returned.
+/// A point between -1 and 1. Where the function is not finite there, points around it are tried: all elements positive,
+/// all drawn again, a few of the best point changed; the best is returned.
 pub(crate) fn point(entry: &FunctionSpec, precision: Precision, random: &mut Random) -> TestPoint {
     let slots = entry.program.inputs().iter();
     let drawn = slots.map(|slot| match slot.name.as_str() {
@@ -119,8 +118,8 @@ fn free_elements(entry: &FunctionSpec) -> Vec<(usize, usize)> {
         .collect()
 }
 
-/// Element `k` of an input from a number between -1 and 1: that number, except that the function of the
-/// feet's forces gets knees that are bent and feet on the ground or in the air.
+/// Element `k` of an input from a number between -1 and 1: that number, except that the function of the feet's forces
+/// gets knees that are bent and feet on the ground or in the air.
 fn element(entry: &FunctionSpec, slot: &str, k: usize, random: f64) -> f64 {
     let has_feet = entry.parameters.iter().any(|p| p.name == "feet");
     match (slot, k % LEG_JOINT_DIM) {
@@ -136,9 +135,8 @@ fn element(entry: &FunctionSpec, slot: &str, k: usize, random: f64) -> f64 {
 /// Points of the batch that self-tests run.
 pub(crate) const N_BATCH: usize = 21;
 
-/// The inputs of that batch: element `i` of its arrays is `z + 0.01 (i mod 97)`, `dz - 0.01 (i mod 89)` and
-/// `u_lat + 0.01 (i mod 83)`, except for `far_angle` in point 3 of `z1` and in the last but one of `dz1`.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// The inputs of that batch: element `i` of its arrays is `z + 0.01 (i mod 97)`, `dz - 0.01 (i mod 89)` and `u_lat +
+/// 0.01 (i mod 83)`, except for `far_angle` in point 3 of `z1` and in the last but one of `dz1`.
 pub(crate) struct BatchPoints {
     pub z: f64,
     pub dz: f64,

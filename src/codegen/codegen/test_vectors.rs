@@ -9,9 +9,8 @@ use crate::typeset::rounded_up;
 
 pub(crate) const N_POINTS: usize = 6;
 
-/// Largest accepted difference, relative to one plus the largest magnitude of the
-/// expected vector: room for another mathematics library and for fused operations,
-/// none for a wrong coefficient.
+/// Largest accepted difference, relative to one plus the largest magnitude of the expected vector: room for another
+/// mathematics library and for fused operations, none for a wrong coefficient.
 pub(crate) const TOLERANCE_F64: f64 = 1e-11;
 
 /// Accepted share of one plus the largest value of an output in single precision.
@@ -104,8 +103,8 @@ fn spelled(bound: f64, precision: Precision) -> String {
     }
 }
 
-/// The vectors of all parameters of an entry, at points where its results are finite if such points are found;
-/// inputs are numbers of the precision.
+/// The vectors of all parameters of an entry, at points where its results are finite if such points are found; inputs
+/// are numbers of the precision.
 fn vectors(entry: &FunctionSpec, precision: Precision) -> FunctionVectors<'_> {
     let mut random = Random::new();
     let points = (0..N_POINTS).map(|position| {

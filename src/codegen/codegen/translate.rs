@@ -19,8 +19,8 @@ pub(super) struct Translator<'a> {
     pub tables: &'a mut Tables,
     pub callees: &'a [Ident],
     inputs: Vec<Parameter>,
-    /// Parameter of each output slot; one that is also an input (role `InOut`) is assigned
-    /// only after everything has been read.
+    /// Parameter of each output slot; one that is also an input (role `InOut`) is assigned only after everything has
+    /// been read.
     pub outputs: Vec<Parameter>,
     pub locals: Namer,
     pub n_uses: Vec<usize>,
@@ -70,8 +70,8 @@ pub(crate) fn function(
 }
 
 /// The body of the loop over the lanes of a block of points; arrays are called `z_lanes` and so on, with elements
-/// `array[element][lane]`, the loop variable `lane`. Nothing if the program is better run point by point: it loops
-/// over tables itself, or calls functions that no compiler vectorises.
+/// `array[element][lane]`, the loop variable `lane`. Nothing if the program is better run point by point: it loops over
+/// tables itself, or calls functions that no compiler vectorises.
 pub(crate) fn lanes(program: &Program, dialect: &Dialect, sines: SineCosine) -> Option<String> {
     let is_by_library = sines == SineCosine::Library && program.has(computes_angles);
     if is_by_library || !program.statements().iter().all(vectorises) {

@@ -1,7 +1,7 @@
 //! Exact simplification: each acceleration in its shortest form, equal as a real function.
 //!
-//! The algebra finds the form ([`Shortener`]); here the new terms get their places among the old:
-//! each stands where the first term that it replaces stood.
+//! The algebra finds the form ([`Shortener`]); here the new terms get their places among the old: each stands where the
+//! first term that it replaces stood.
 
 use std::collections::HashMap;
 use std::fmt;
@@ -74,76 +74,72 @@ impl Serialize for ExactStep {
     }
 }
 
-/// Place of a term: the term as learned that it follows or is, then its number among new ones.
-type Place = (usize, usize);
-
 impl Equations<'_> {
     /// The equations in their shortest form; what is shortest already keeps its bits.
     #[must_use]
     pub(crate) fn simplified(mut self) -> Self {
-        let mut new = NewTerms::default();
         let mut pool = std::mem::take(&mut self.pool);
         let mut shortener = Shortener::new(&mut pool);
+        let mut new = NewTerms {
+            places: (0..self.terms.len()).map(|term| (term, 0)).collect(),
+            known: HashMap::new(),
+        };
         let mut steps = Vec::new();
-        let mut equations = Vec::new();
-        for phase in &self.phases {
-            for (output, equation) in phase.ddz.iter().enumerate() {
-                let summands: Vec<(f64, ExprId)> = (equation.iter())
-                    .map(|summand| (summand.coefficient, self.terms[summand.term].expr()))
-                    .collect();
-                let mut kept: Vec<Option<(Place, f64)>> = (equation.iter())
-                    .map(|summand| Some(((summand.term, 0), summand.coefficient)))
-                    .collect();
-                let mut placed = Vec::new();
+        for phase in &mut self.phases {
+            for (output, equation) in phase.ddz.iter_mut().enumerate() {
+                let summands = equation.iter();
+                let summands = summands.map(|s| (s.coefficient, self.terms[s.term].expr()));
+                let summands: Vec<(f64, ExprId)> = summands.collect();
+                let mut is_kept = vec![true; equation.len()];
+                let mut all: Vec<Summand> = Vec::new();
                 for Shortened { replaced, by } in shortener.shorten(&summands) {
                     let first = equation[replaced[0]].term;
-                    let Some(after) = new.placed(shortener.pool(), &self.terms, first, &by) else {
+                    let after = new.placed(shortener.pool(), &mut self.terms, first, &by);
+                    let Some((placed, texts)) = after else {
                         continue;
                     };
-                    let named = |&position: &usize| {
+                    let before = replaced.iter().map(|&position| {
                         let Summand { coefficient, term } = equation[position];
                         (coefficient, self.terms[term].text().to_owned())
-                    };
+                    });
+                    let after = placed.iter().map(|summand| summand.coefficient).zip(texts);
                     steps.push(ExactStep {
                         phase: phase.name.clone(),
                         output,
-                        before: replaced.iter().map(named).collect(),
-                        after: (after.iter())
-                            .map(|(_, c, text)| (*c, text.clone()))
-                            .collect(),
+                        before: before.collect(),
+                        after: after.collect(),
                     });
-                    replaced.iter().for_each(|&position| kept[position] = None);
-                    placed.extend(after.into_iter().map(|(place, c, _)| (place, c)));
+                    replaced
+                        .iter()
+                        .for_each(|&position| is_kept[position] = false);
+                    all.extend(placed);
                 }
-                placed.extend(kept.into_iter().flatten());
-                equations.push(placed);
+                let kept = equation.iter().zip(is_kept).filter(|(_, is_kept)| *is_kept);
+                all.extend(kept.map(|(summand, _)| *summand));
+                *equation = all;
             }
         }
         self.pool = pool;
         if !steps.is_empty() {
-            self.replace(equations, new);
+            self.sort_terms(&new.places);
         }
         self.steps.extend(steps);
         self
     }
 
-    /// Puts the new terms among the old, and in all equations the summands that they have by place.
-    fn replace(&mut self, equations: Vec<Vec<(Place, f64)>>, new: NewTerms) {
-        let old = self.terms.drain(..).enumerate();
-        let old = old.map(|(index, term)| ((index, 0), term));
-        let mut all: Vec<(Place, CandidateTerm)> = old.chain(new.terms).collect();
-        all.sort_by_key(|(place, _)| *place);
-        let index: HashMap<Place, usize> = (all.iter().enumerate())
-            .map(|(index, (place, _))| (*place, index))
-            .collect();
-        self.terms = all.into_iter().map(|(_, term)| term).collect();
-        let old = self.phases.iter_mut().flat_map(|phase| &mut phase.ddz);
-        for (equation, summands) in old.zip(equations) {
-            let summand = |(place, coefficient)| Summand {
-                coefficient,
-                term: index[&place],
-            };
-            *equation = summands.into_iter().map(summand).collect();
+    /// Puts the terms in the order of their places; equal ones of an equation become one.
+    fn sort_terms(&mut self, places: &[(usize, usize)]) {
+        let mut order: Vec<usize> = (0..places.len()).collect();
+        order.sort_by_key(|&term| places[term]);
+        let mut index = vec![0; order.len()];
+        for (new, &old) in order.iter().enumerate() {
+            index[old] = new;
+        }
+        self.terms = order.iter().map(|&term| self.terms[term].clone()).collect();
+        for equation in self.phases.iter_mut().flat_map(|phase| &mut phase.ddz) {
+            for summand in equation.iter_mut() {
+                summand.term = index[summand.term];
+            }
             equation.sort_by_key(|summand| summand.term);
             equation.dedup_by(|later, first| {
                 let is_same = later.term == first.term;
@@ -155,48 +151,44 @@ impl Equations<'_> {
     }
 }
 
-/// Terms that simplification brought in.
-#[derive(Default)]
 struct NewTerms {
-    terms: Vec<(Place, CandidateTerm)>,
-    /// Places of all terms by expression, made at the first need.
-    known: HashMap<ExprId, Place>,
+    /// Of each term: the term as learned that it is or follows, then its number among new ones.
+    places: Vec<(usize, usize)>,
+    /// All terms by expression, made at the first need.
+    known: HashMap<ExprId, usize>,
 }
 
 impl NewTerms {
-    /// Places, coefficients and texts of new summands, after the term `first`; nothing if one has no
-    /// text that a model file could hold.
+    /// New summands and their texts, after the term `first`; nothing if one has no text that a model file could hold.
     fn placed(
         &mut self,
         pool: &ExprPool,
-        old: &[CandidateTerm],
+        terms: &mut Vec<CandidateTerm>,
         first: usize,
         summands: &[(f64, ExprId)],
-    ) -> Option<Vec<(Place, f64, String)>> {
+    ) -> Option<(Vec<Summand>, Vec<String>)> {
+        let text = |expr: ExprId| pool.display(expr).to_string();
         if self.known.is_empty() {
-            for (index, term) in old.iter().enumerate() {
-                let place = self.known.entry(term.expr()).or_insert((index, 0));
+            for (index, term) in terms.iter().enumerate() {
+                let known = self.known.entry(term.expr()).or_insert(index);
                 // Of several spellings the canonical one is printed.
-                if term.text() == pool.display(term.expr()).to_string() {
-                    *place = (index, 0);
+                if term.text() == text(term.expr()) {
+                    *known = index;
                 }
             }
         }
-        let texts: Vec<String> = (summands.iter())
-            .map(|&(_, expr)| pool.display(expr).to_string())
-            .collect();
+        let texts: Vec<String> = summands.iter().map(|&(_, expr)| text(expr)).collect();
         if texts.iter().any(|text| text.len() > MAX_TERM_LEN) {
             return None;
         }
-        let placed = |(&(coefficient, expr), text): (&(f64, ExprId), String)| {
-            let next = (first, self.terms.len() + 1);
-            let place = *self.known.entry(expr).or_insert(next);
-            if place == next {
-                let term = CandidateTerm::new(text.clone(), expr);
-                self.terms.push((place, term));
+        let placed = |(&(coefficient, expr), text): (&(f64, ExprId), &String)| {
+            let term = *self.known.entry(expr).or_insert(terms.len());
+            if term == terms.len() {
+                self.places.push((first, term));
+                terms.push(CandidateTerm::new(text.clone(), expr));
             }
-            (place, coefficient, text)
+            Summand { coefficient, term }
         };
-        Some(summands.iter().zip(texts).map(placed).collect())
+        Some((summands.iter().zip(&texts).map(placed).collect(), texts))
     }
 }

@@ -1,8 +1,8 @@
 //! The latent dynamics as equations, between a model and everything that prints or emits it.
 //!
-//! For each phase the accelerations are sums of coefficients times expressions over named variables, in library
-//! order, in one pool, in their shortest form unless asked otherwise; nothing else reads Xi to print or emit. Read
-//! `system.rs` first, then `exact.rs`.
+//! For each phase the accelerations are sums of coefficients times expressions over named variables, in library order,
+//! in one pool, in their shortest form unless asked otherwise; nothing else reads Xi to print or emit. Read `system.rs`
+//! first, then `exact.rs`.
 //!
 //! ```
 //! use nalgebra::DMatrix;
@@ -35,6 +35,7 @@ mod unit;
 
 pub use exact::ExactStep;
 pub(crate) use exact::summand_words;
-pub use physical::{LatentUnits, PhysicalError};
-pub use system::{Equations, PhaseEquations, Summand};
-pub use unit::Unit;
+pub(crate) use physical::LatentUnits;
+pub use physical::PhysicalError;
+pub use system::{Equations, PhaseEquations};
+pub(crate) use unit::Unit;

@@ -1,12 +1,12 @@
 //! Equations in metres, radians and newtons.
 //!
-//! A latent coordinate is `z_i = W_e,i (s_x x) + b_e,i`. Where one unit rules its row, that is where the
-//! weights in SI units `w_ij = W_e,ij s_x,j` of that unit have more than half of the row's sum of squares, it
-//! becomes a length or an angle `Z_i = z_i / sigma_i` with `sigma_i = +- sum_j |w_ij|` over the coordinates of
-//! the ruling unit: a weighted mean of these, the weights adding up to one, the largest positive. Its input
-//! becomes a force or a moment, `U_i = u_i / upsilon_i` with `1 / upsilon_i = +- sum_j |W_e,ij| / s_u,j` over the
-//! inputs of the unit that does work along it, so that the shares of `u = W_e^T u_lat / s_u` in that unit add up to one.
-//! Rows that no unit rules keep pure numbers: `sigma_i = sqrt(sum_j w_ij^2)`, and inputs alike.
+//! A latent coordinate is `z_i = W_e,i (s_x x) + b_e,i`. Where one unit rules its row, that is where the weights in SI
+//! units `w_ij = W_e,ij s_x,j` of that unit have more than half of the row's sum of squares, it becomes a length or an
+//! angle `Z_i = z_i / sigma_i` with `sigma_i = +- sum_j |w_ij|` over the coordinates of the ruling unit: a weighted
+//! mean of these, the weights adding up to one, the largest positive. Its input becomes a force or a moment, `U_i = u_i
+//! / upsilon_i` with `1 / upsilon_i = +- sum_j |W_e,ij| / s_u,j` over the inputs of the unit that does work along it,
+//! so that the shares of `u = W_e^T u_lat / s_u` in that unit add up to one. Rows that no unit rules keep pure numbers:
+//! `sigma_i = sqrt(sum_j w_ij^2)`, and inputs alike.
 //!
 //! Substituted, `dd Z_i = 1/sigma_i sum_k xi_ki theta_k(sigma Z, sigma dZ, upsilon U)`, numeric factors taken out of
 //! every term and into its coefficient.
@@ -80,8 +80,8 @@ impl LatentUnits {
         self.position[output].per_second().per_second()
     }
 
-    /// The unit of a term: that of a product of powers of variables; anything else counts as a pure number,
-    /// whose inner numbers carry the units.
+    /// The unit of a term: that of a product of powers of variables; anything else counts as a pure number, whose inner
+    /// numbers carry the units.
     pub(crate) fn of_term(&self, pool: &ExprPool, term: ExprId) -> Unit {
         let factors = pool.factors_of(term).iter().map(|&factor| {
             let (base, exponent) = match pool.node(factor) {
@@ -107,7 +107,8 @@ impl Equations<'_> {
     /// The same equations in metres, radians, seconds, newtons and newton metres, with the model's maps.
     ///
     /// # Errors
-    /// [`PhysicalError`] for equations without robot coordinates, nonlinear maps, missing units, or values beyond floats.
+    /// [`PhysicalError`] for equations without robot coordinates, nonlinear maps, missing units, or values beyond
+    /// floats.
     pub fn in_physical_units(&self) -> Result<Equations<'static>, PhysicalError> {
         let model = self.model();
         if model.encoder_map().is_err() && model.decoder_map().is_err() {
@@ -230,8 +231,8 @@ fn ruling_unit(weights: &DVector<f64>, names: &CoordinateNames) -> Option<Unit> 
     shares.into_iter().find(rules).map(|(unit, _)| unit)
 }
 
-/// Sum of the absolute weights of a unit, with the sign of the largest; without a unit, or where it has no
-/// weight, the norm of all.
+/// Sum of the absolute weights of a unit, with the sign of the largest; without a unit, or where it has no weight, the
+/// norm of all.
 fn scale_of(weights: &DVector<f64>, names: &CoordinateNames, unit: Option<Unit>) -> f64 {
     let of_unit = (weights.iter().zip(&names.units))
         .filter(|(_, name)| unit.is_some() && Unit::from_name(name) == unit)

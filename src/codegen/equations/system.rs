@@ -14,7 +14,7 @@ use crate::symbolic::{ExprId, ExprPool, SymbolId};
 /// One summand of an equation: `coefficient * terms[term]`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Summand {
-    /// The factor, finite and not zero; scaled units.
+    /// Finite and not zero.
     pub coefficient: f64,
     /// Index into [`Equations::terms`].
     pub term: usize,
@@ -31,8 +31,8 @@ pub struct PhaseEquations {
     pub ddz: Vec<Vec<Summand>>,
 }
 
-/// `ddz = Xi^T Theta(z, dz, u_lat)` of all phases of a model, with the model whose maps, names and
-/// scale factors belong to it.
+/// `ddz = Xi^T Theta(z, dz, u_lat)` of all phases of a model, with the model whose maps, names and scale factors belong
+/// to it.
 #[derive(Clone)]
 pub struct Equations<'a> {
     pub(super) model: Cow<'a, ReducedModel>,
@@ -45,8 +45,8 @@ pub struct Equations<'a> {
 }
 
 impl<'a> Equations<'a> {
-    /// The equations of a model as they are printed and emitted unless asked otherwise: in the shortest equal
-    /// form that is found.
+    /// The equations of a model as they are printed and emitted unless asked otherwise: in the shortest equal form that
+    /// is found.
     pub fn of(model: &'a ReducedModel) -> Self {
         Self::as_learned(model).simplified()
     }
@@ -80,8 +80,7 @@ impl<'a> Equations<'a> {
         &self.steps
     }
 
-    /// A model whose Xi and library are these equations: the one they were made from if nothing
-    /// was simplified.
+    /// A model whose Xi and library are these equations: the one they were made from if nothing was simplified.
     ///
     /// # Errors
     /// [`ModelError::Invalid`] if new terms make the library too large.

@@ -17,8 +17,7 @@ const NEWTON: Unit = Unit([1, 0, 1, -2]);
 const NEWTON_METRE: Unit = Unit([2, 0, 1, -2]);
 
 impl Unit {
-    /// The unit of a position or generalised force that a model file names, if it is one of
-    /// `m`, `rad`, `N`, `N m`.
+    /// The unit of a position or generalised force that a model file names, if it is one of `m`, `rad`, `N`, `N m`.
     pub(crate) fn from_name(name: &str) -> Option<Self> {
         match name {
             "m" => Some(METRE),

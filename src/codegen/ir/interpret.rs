@@ -1,5 +1,4 @@
-//! Runs programs: the reference for generated code, and what simulation and
-//! control run.
+//! Runs programs: the reference for generated code, and what simulation and control run.
 
 use std::fmt::Debug;
 use std::ops::{Add, Div, Mul, Neg, Sub};
@@ -7,15 +6,15 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 use super::program::{Binary, Program, Slot, Statement, Table, Unary, ValueId};
 use super::sin_cos::{double, single};
 
-/// Runs one program as often as asked; owns the memory of all its values, so that
-/// a run allocates nothing.
+/// Runs one program as often as asked; owns the memory of all its values, so that a run allocates nothing.
 ///
-/// Numbers are `f64` unless another `Real` is named: `Interpreter::<f32>::new(&program)` is the
-/// reference for generated code in single precision.
+/// Numbers are `f64` unless another `Real` is named: `Interpreter::<f32>::new(&program)` is the reference for generated
+/// code in single precision.
 #[derive(Clone, Debug)]
 pub struct Interpreter<T = f64> {
-    inputs: Vec<Slot>,
-    outputs: Vec<Slot>,
+    /// Lengths of the slots.
+    inputs: Vec<usize>,
+    outputs: Vec<usize>,
     /// Positions among the values of the elements of all inputs.
     loads: Vec<usize>,
     steps: Vec<Step>,
@@ -26,8 +25,8 @@ pub struct Interpreter<T = f64> {
     values: Vec<T>,
 }
 
-/// A statement that computes something, and the position of its first value. Those of one operation are small,
-/// as most steps are.
+/// A statement that computes something, and the position of its first value. Those of one operation are small, as most
+/// steps are.
 #[derive(Clone, Debug)]
 enum Step {
     Unary(Unary, ValueId, usize),
@@ -56,17 +55,14 @@ impl<T: Real> Interpreter<T> {
                 array => steps.push(Step::Array(Box::new(array.clone()), first)),
             }
         }
-        let len = |slots: &[Slot]| slots.iter().map(|slot| slot.len).sum::<usize>();
-        assert_eq!(loads.len(), len(program.inputs()), "one load an element");
-        let n_results = program.results().len();
-        assert_eq!(n_results, len(program.outputs()), "one result an element");
+        let lengths = |slots: &[Slot]| slots.iter().map(|slot| slot.len).collect();
         let table = |table: &Table| {
             let entries = table.entries.iter().map(|&x| T::constant(x));
             Table::new(table.rows, table.cols, entries.collect())
         };
         Self {
-            inputs: program.inputs().to_vec(),
-            outputs: program.outputs().to_vec(),
+            inputs: lengths(program.inputs()),
+            outputs: lengths(program.outputs()),
             loads,
             steps,
             tables: program.tables().iter().map(table).collect(),
@@ -81,18 +77,13 @@ impl<T: Real> Interpreter<T> {
     /// # Panics
     /// If the number or a length of the slices differs from the program's slots.
     pub fn run(&mut self, inputs: &[&[T]], outputs: &mut [&mut [T]]) {
-        assert_eq!(inputs.len(), self.inputs.len(), "one slice an input slot");
-        assert_eq!(
-            outputs.len(),
-            self.outputs.len(),
-            "one slice an output slot"
+        let lengths = inputs.iter().map(|slice| slice.len());
+        assert!(lengths.eq(self.inputs.iter().copied()), "lengths of inputs");
+        let lengths = outputs.iter().map(|slice| slice.len());
+        assert!(
+            lengths.eq(self.outputs.iter().copied()),
+            "lengths of outputs"
         );
-        for (slice, slot) in inputs.iter().zip(&self.inputs) {
-            assert_eq!(slice.len(), slot.len, "length of input `{}`", slot.name);
-        }
-        for (slice, slot) in outputs.iter().zip(&self.outputs) {
-            assert_eq!(slice.len(), slot.len, "length of output `{}`", slot.name);
-        }
         for (&load, &x) in self.loads.iter().zip(inputs.iter().copied().flatten()) {
             self.values[load] = x;
         }
@@ -105,8 +96,8 @@ impl<T: Real> Interpreter<T> {
 
     /// The same for arrays, one an input slot; returns one an output slot.
     pub fn results(&mut self, inputs: &[Vec<T>]) -> Vec<Vec<T>> {
-        let slots = self.outputs.iter();
-        let mut outputs: Vec<_> = slots.map(|slot| vec![T::constant(0.0); slot.len]).collect();
+        let lengths = self.outputs.iter();
+        let mut outputs: Vec<_> = lengths.map(|&len| vec![T::constant(0.0); len]).collect();
         let read: Vec<&[T]> = inputs.iter().map(Vec::as_slice).collect();
         let mut written: Vec<&mut [T]> = outputs.iter_mut().map(Vec::as_mut_slice).collect();
         self.run(&read, &mut written);

@@ -1,9 +1,8 @@
 //! Programs: what is computed, in which order.
 //!
-//! A [`Program`] enters from `lower` (through [`ProgramBuilder`]) and leaves to
-//! the interpreter and to all code generators: C, Rust and the interpreter run the
-//! same statements in the same order with the same association, so that their
-//! results agree bit for bit. Read `program` first, then `interpret`.
+//! A [`Program`] enters from `lower` (through [`ProgramBuilder`]) and leaves to the interpreter and to all code
+//! generators: C, Rust and the interpreter run the same statements in the same order with the same association, so that
+//! their results agree bit for bit. Read `program` first, then `interpret`.
 //!
 //! ```
 //! use romc::ir::{Binary, Interpreter, ProgramBuilder};
@@ -24,7 +23,8 @@ mod interpret;
 mod program;
 pub mod sin_cos;
 
-pub use build::{IrError, ProgramBuilder};
+pub(crate) use build::IrError;
+pub use build::ProgramBuilder;
 pub use interpret::Interpreter;
 pub(crate) use program::Table;
 pub use program::{Binary, Program, Slot, Statement, Unary, ValueId};

@@ -132,21 +132,19 @@ pub enum Statement {
     Unary(Unary, ValueId),
     /// A scalar operation on two values.
     Binary(Binary, ValueId, ValueId),
-    /// The second value where the first one is zero, of either sign; the third elsewhere, also where the first is
-    /// NaN. Both are computed.
+    /// The second value where the first one is zero, of either sign; the third elsewhere, also where the first is NaN.
+    /// Both are computed.
     Select([ValueId; 3]),
-    /// Sine and cosine of all arguments by [`super::sin_cos::sin_cos`]:
-    /// defines the n sines, then the n cosines.
+    /// Sine and cosine of all arguments by [`super::sin_cos::sin_cos`]: defines the n sines, then the n cosines.
     SinCos {
         /// The n arguments, in rad.
         arguments: Vec<ValueId>,
     },
-    /// Matrix-vector product with an offset, `y_j = t_0j + sum_i t_(i+1)j w_i`: the first row
-    /// of the table is the offset, each later row is scaled by one weight.
+    /// Matrix-vector product with an offset, `y_j = t_0j + sum_i t_(i+1)j w_i`: the first row of the table is the
+    /// offset, each later row is scaled by one weight.
     ///
-    /// Association: the accumulator starts at the offset and takes four rows at a time,
-    /// `y += (t_1 w_1 + t_2 w_2) + (t_3 w_3 + t_4 w_4)`; the rows that remain are added one by one.
-    /// Defines `cols` values.
+    /// Association: the accumulator starts at the offset and takes four rows at a time, `y += (t_1 w_1 + t_2 w_2) +
+    /// (t_3 w_3 + t_4 w_4)`; the rows that remain are added one by one. Defines `cols` values.
     Accumulate {
         /// Position of a table with one row more than there are weights.
         table: usize,
@@ -162,8 +160,8 @@ pub enum Statement {
         /// entries are added as they are.
         groups: Vec<(usize, Option<Vec<ValueId>>)>,
     },
-    /// Evaluation of another program; the arguments fill its input slots in order.
-    /// Defines the values of its output slots in order.
+    /// Evaluation of another program; the arguments fill its input slots in order. Defines the values of its output
+    /// slots in order.
     Call {
         /// Position in [`Program::callees`].
         callee: usize,
@@ -198,8 +196,8 @@ pub(crate) struct ResultEntry {
     pub value: ValueId,
 }
 
-/// A validated, scheduled computation of named output arrays from named input
-/// arrays; made by [`super::ProgramBuilder`].
+/// A validated, scheduled computation of named output arrays from named input arrays; made by
+/// [`super::ProgramBuilder`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Program {
     pub(super) name: String,

@@ -1,17 +1,16 @@
 //! Sine and cosine together, without branches; the arithmetic of the emitted kernels.
 //!
-//! The argument is reduced by the nearest multiple of pi/2, held as three parts
-//! (Cody and Waite); two minimax polynomials give sine and cosine of the
-//! remainder, and the low two bits of the multiple exchange and negate them.
-//! The polynomials minimise the relative error over +-pi/4 and were found by a
-//! Remez exchange with coefficients rounded one after the other; their error is
-//! 2^-57.9 (sine) and 2^-63.9 (cosine), in single precision 2^-27.9 and 2^-33. Arguments beyond `LIMIT`, infinities and
-//! NaN go to the standard library.
+//! The argument is reduced by the nearest multiple of pi/2, held as three parts (Cody and Waite); two minimax
+//! polynomials give sine and cosine of the remainder, and the low two bits of the multiple exchange and negate them.
+//! The polynomials minimise the relative error over +-pi/4 and were found by a Remez exchange with coefficients rounded
+//! one after the other; their error is 2^-57.9 (sine) and 2^-63.9 (cosine), in single precision 2^-27.9 and 2^-33.
+//! Arguments beyond `LIMIT`, infinities and NaN go to the standard library.
 //!
-//! C and Rust emit these very operations in this very order, from these constants. The parts of pi/2 (40, 40 and 53 bits;
-//! in single precision 17, 17 and 24) are cut off rather than rounded: the first two times a multiple up to 2^13, 2^7 are
-//! exact, and a positive tail keeps the sign of zero. Adding `ROUND`, 1.5 times 2^52 or 2^23, rounds to an integer, which
-//! the low bits then hold. `SIN` is (r - sin r) / r^3 in powers of r^2, `COS` is (cos r - 1 + r^2/2) / r^4.
+//! C and Rust emit these very operations in this very order, from these constants. The parts of pi/2 (40, 40 and 53
+//! bits; in single precision 17, 17 and 24) are cut off rather than rounded: the first two times a multiple up to 2^13,
+//! 2^7 are exact, and a positive tail keeps the sign of zero. Adding `ROUND`, 1.5 times 2^52 or 2^23, rounds to an
+//! integer, which the low bits then hold. `SIN` is (r - sin r) / r^3 in powers of r^2, `COS` is (cos r - 1 + r^2/2) /
+//! r^4.
 
 pub use double::{LIMIT, reduced_sin_cos, sin_cos};
 

@@ -1,16 +1,15 @@
 //! Linear combinations of expressions with floating-point coefficients, and in which order sums are added.
 //!
-//! Generated code keeps the association of the program, so it is chosen here: terms that
-//! are known early are added in up to four partial sums, which run side by side; terms
-//! that wait for a sine or an exponential come last, so that they delay as little as possible.
+//! Generated code keeps the association of the program, so it is chosen here: terms that are known early are added in
+//! up to four partial sums, which run side by side; terms that wait for a sine or an exponential come last, so that
+//! they delay as little as possible.
 
 use std::collections::HashMap;
 
 use crate::ir::{Binary, ProgramBuilder, Unary, ValueId};
 use crate::symbolic::{ExprId, ExprPool, Number, SymbolId, sum_of_floats};
 
-/// `constant + sum_i coefficient_i expr_i`; the expressions are distinct, not sums and
-/// without numeric factor.
+/// `constant + sum_i coefficient_i expr_i`; the expressions are distinct, not sums and without numeric factor.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Combination {
     pub constant: f64,
@@ -18,8 +17,8 @@ pub(super) struct Combination {
 }
 
 impl Combination {
-    /// Collects `sum_i coefficient_i expr_i`; sums are taken apart, equal expressions
-    /// merged in order of first appearance, and what cancels exactly is left out.
+    /// Collects `sum_i coefficient_i expr_i`; sums are taken apart, equal expressions merged in order of first
+    /// appearance, and what cancels exactly is left out.
     pub(crate) fn collect(
         pool: &ExprPool,
         summands: impl IntoIterator<Item = (f64, ExprId)>,
@@ -50,8 +49,8 @@ impl Combination {
         }
     }
 
-    /// The slope by one variable. Terms whose slopes may be infinite count as one: infinities of both signs
-    /// can have a finite sum.
+    /// The slope by one variable. Terms whose slopes may be infinite count as one: infinities of both signs can have a
+    /// finite sum.
     pub(crate) fn derivative(&self, pool: &mut ExprPool, by: SymbolId) -> Self {
         let mut items = self.items.clone();
         let mut is_steep = |item: &(f64, ExprId)| pool.may_be_steep(item.1, by);

@@ -8,9 +8,8 @@ use crate::ir::Interpreter;
 use crate::lower;
 use crate::model::ReducedModel;
 
-/// The accelerations, Jacobians and Runge-Kutta steps of all phases of a model, run by
-/// the interpreter with the very arithmetic of the generated code. Evaluation
-/// allocates nothing; clone it for another thread.
+/// The accelerations, Jacobians and Runge-Kutta steps of all phases of a model, run by the interpreter with the very
+/// arithmetic of the generated code. Evaluation allocates nothing; clone it for another thread.
 ///
 /// All vectors have `latent_dim` elements, in scaled units. Methods panic where a phase does not exist or a length does
 /// not fit.
@@ -125,8 +124,7 @@ impl CompiledModel {
         self.phases[phase].entries = entries;
     }
 
-    /// Advances `(z, dz)` by `h` seconds with the classical Runge-Kutta method under
-    /// constant `u_lat`.
+    /// Advances `(z, dz)` by `h` seconds with the classical Runge-Kutta method under constant `u_lat`.
     pub fn rk4_step(&mut self, phase: usize, z: &mut [f64], dz: &mut [f64], u_lat: &[f64], h: f64) {
         let phase = &mut self.phases[phase];
         let (z_next, dz_next) = phase.next.split_at_mut(self.latent_dim);

@@ -199,8 +199,7 @@ pub enum Form {
     Automatic,
     /// One operation after the other: best for small and for sparse models.
     StraightLine,
-    /// Tables of coefficients and loops over them, which compilers vectorise: best for
-    /// dense models.
+    /// Tables of coefficients and loops over them, which compilers vectorise: best for dense models.
     Tables,
 }
 

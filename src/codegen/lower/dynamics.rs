@@ -1,14 +1,12 @@
-//! The accelerations `ddz = Xi^T Theta(z, dz, u_lat)` of a phase, their Jacobian, and one step of the classical Runge-Kutta
-//! method, with the input held.
-
-use std::collections::HashMap;
+//! The accelerations `ddz = Xi^T Theta(z, dz, u_lat)` of a phase, their Jacobian, and one step of the classical
+//! Runge-Kutta method, with the input held.
 
 use super::combination::Combination;
 use super::dense::{DenseJacobian, Form, distinct, matrix_vector};
 use super::expression::ExpressionLowering;
 use super::nested::{Demand, Nested};
 use super::number::{Number, Sheet, ids, numbers};
-use crate::equations::Equations;
+use crate::equations::{Equations, PhaseEquations};
 use crate::ir::{IrError, Program, ProgramBuilder, ValueId};
 use crate::model::{LatentVariable, ModelError};
 use crate::symbolic::{ExprId, ExprPool, SymbolId};
@@ -35,7 +33,7 @@ pub enum LowerError {
 }
 
 /// Where the structural nonzeros of `d ddz / d (z, dz, u_lat)` stand, row-major.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct JacobianPattern {
     /// Row of each entry: the component of ddz.
     pub rows: Vec<usize>,
@@ -59,20 +57,17 @@ impl JacobianPattern {
     }
 }
 
-/// The program of the accelerations: inputs `z`, `dz`, `u_lat`, output `ddz`, each
-/// `latent_dim` long, in scaled units.
+/// The program of the accelerations: inputs `z`, `dz`, `u_lat`, output `ddz`, each `latent_dim` long, in scaled units.
 ///
 /// # Errors
-/// [`LowerError::Model`] if there is no such phase, [`LowerError::NonFinite`] if a
-/// coefficient overflows when folded.
+/// [`LowerError::Model`] if there is no such phase, [`LowerError::NonFinite`] if a coefficient overflows when folded.
 pub fn dynamics(system: &Equations<'_>, phase: usize, form: Form) -> Result<Program, LowerError> {
     let (program, _) = with_derivatives(system, phase, form, "dynamics", &[])?;
     Ok(program)
 }
 
-/// The program of the accelerations and the structural nonzeros of their exact Jacobian
-/// by `(z, dz, u_lat)`: outputs `ddz` and `jacobian`, the latter absent if the
-/// accelerations are constant.
+/// The program of the accelerations and the structural nonzeros of their exact Jacobian by `(z, dz, u_lat)`: outputs
+/// `ddz` and `jacobian`, the latter absent if the accelerations are constant.
 ///
 /// # Errors
 /// As [`dynamics`].
@@ -96,14 +91,11 @@ fn with_derivatives(
     let equations = accelerations(system, phase)?;
     let mut pool = system.pool().clone();
     let mut entries = Vec::new();
-    let mut pattern = JacobianPattern {
-        rows: Vec::new(),
-        cols: Vec::new(),
-    };
+    let mut pattern = JacobianPattern::default();
     for (row, equation) in equations.iter().enumerate() {
         for (col, &variable) in columns.iter().enumerate() {
             let derivative = equation.derivative(&mut pool, variable);
-            check_finite(system, phase, row, &derivative)?;
+            let derivative = finite(system.phase(phase)?, row, derivative)?;
             if !derivative.is_zero() {
                 pattern.rows.push(row);
                 pattern.cols.push(col);
@@ -137,8 +129,8 @@ fn with_derivatives(
     Ok((builder.finish()?, pattern))
 }
 
-/// Accelerations, then the entries of the pattern, in nested form: what a variable was taken
-/// out of in an acceleration is a part of its derivative by that variable.
+/// Accelerations, then the entries of the pattern, in nested form: what a variable was taken out of in an acceleration
+/// is a part of its derivative by that variable.
 fn nested(
     pool: &mut ExprPool,
     equations: &[Combination],
@@ -165,29 +157,20 @@ fn nested(
 
 /// The right-hand sides with folded coefficients, one a latent coordinate.
 fn accelerations(system: &Equations<'_>, phase: usize) -> Result<Vec<Combination>, LowerError> {
-    let phase_equations = system.phase(phase)?;
-    (0..system.latent_dim())
-        .map(|row| {
-            let summands = phase_equations
-                .summands(system, row)
-                .map(|(coefficient, term)| (coefficient, term.expr()));
-            let equation = Combination::collect(system.pool(), summands);
-            check_finite(system, phase, row, &equation)?;
-            Ok(equation)
-        })
-        .collect()
+    let phase = system.phase(phase)?;
+    let equation = |row| {
+        let summands = phase.summands(system, row);
+        let summands = summands.map(|(coefficient, term)| (coefficient, term.expr()));
+        finite(phase, row, Combination::collect(system.pool(), summands))
+    };
+    (0..system.latent_dim()).map(equation).collect()
 }
 
-fn check_finite(
-    system: &Equations<'_>,
-    phase: usize,
-    row: usize,
-    combination: &Combination,
-) -> Result<(), LowerError> {
-    match combination.non_finite() {
-        None => Ok(()),
+fn finite(phase: &PhaseEquations, row: usize, sum: Combination) -> Result<Combination, LowerError> {
+    match sum.non_finite() {
+        None => Ok(sum),
         Some(value) => Err(LowerError::NonFinite {
-            phase: system.phase(phase)?.name.clone(),
+            phase: phase.name.clone(),
             output: row + 1,
             value,
         }),
@@ -198,16 +181,9 @@ fn check_finite(
 fn start<'a>(system: &Equations<'_>, pool: &'a ExprPool, name: &str) -> ExpressionLowering<'a> {
     let d = system.latent_dim();
     let mut builder = ProgramBuilder::new(name);
-    let inputs = [
-        builder.input("z", d),
-        builder.input("dz", d),
-        builder.input("u_lat", d),
-    ];
-    let variables: HashMap<SymbolId, ValueId> = LatentVariable::all(d)
-        .zip(inputs.into_iter().flatten())
-        .map(|(variable, value)| (system.symbol(variable), value))
-        .collect();
-    ExpressionLowering::new(pool, builder, variables)
+    let inputs = ["z", "dz", "u_lat"].map(|name| builder.input(name, d));
+    let symbols = LatentVariable::all(d).map(|variable| system.symbol(variable));
+    ExpressionLowering::new(pool, builder, symbols.zip(inputs.concat()).collect())
 }
 
 /// The values of nested sums; each may share a part of one before it.
@@ -225,9 +201,9 @@ fn values(lowering: &mut ExpressionLowering, sums: &[Nested]) -> Vec<ValueId> {
     values
 }
 
-/// The program of one fourth-order Runge-Kutta step of `d/dt (z, dz) = (dz, ddz)` over
-/// `h` seconds with constant `u_lat`: inputs `z`, `dz`, `u_lat`, `h`; outputs `z`, `dz`
-/// after the step. It calls the program of the accelerations four times.
+/// The program of one fourth-order Runge-Kutta step of `d/dt (z, dz) = (dz, ddz)` over `h` seconds with constant
+/// `u_lat`: inputs `z`, `dz`, `u_lat`, `h`; outputs `z`, `dz` after the step. It calls the program of the accelerations
+/// four times.
 ///
 /// # Errors
 /// As [`dynamics`].
@@ -247,11 +223,8 @@ pub fn rk4_step(system: &Equations<'_>, phase: usize, form: Form) -> Result<Prog
     let mut at = z.clone();
     for stage in 0..4 {
         let arguments = ids(&[at.as_slice(), &velocities[stage], &u_lat].concat());
-        let ddz = sheet
-            .borrow_mut()
-            .call(&accelerations, &arguments)
-            .remove(0);
-        slopes.push(numbers(sheet, &ddz));
+        let outputs = sheet.borrow_mut().call(&accelerations, &arguments);
+        slopes.push(numbers(sheet, &outputs[0]));
         if stage < 3 {
             let length = if stage == 2 { h } else { half_step };
             at = advance(&z, length, &velocities[stage]);
@@ -279,12 +252,9 @@ fn weighted<'b>(
     sixth_step: Number<'b>,
     stages: &[Vec<Number<'b>>],
 ) -> Vec<Number<'b>> {
-    let sum = |a: &[Number<'b>], b: &[Number<'b>]| -> Vec<Number<'b>> {
-        a.iter().zip(b).map(|(&a, &b)| a + b).collect()
-    };
-    let outer = sum(&stages[0], &stages[3]);
-    let inner = sum(&stages[1], &stages[2]);
-    let pairs = outer.into_iter().zip(inner);
-    let mean: Vec<Number> = pairs.map(|(outer, inner)| outer + 2.0 * inner).collect();
-    advance(start, sixth_step, &mean)
+    let mean = (0..start.len()).map(|k| {
+        let [first, second, third, last] = [0, 1, 2, 3].map(|stage| stages[stage][k]);
+        (first + last) + 2.0 * (second + third)
+    });
+    advance(start, sixth_step, &mean.collect::<Vec<_>>())
 }

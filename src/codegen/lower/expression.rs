@@ -7,8 +7,7 @@ use super::nested::Nested;
 use crate::ir::{Binary, ProgramBuilder, Unary, ValueId};
 use crate::symbolic::{ExprId, ExprPool, Function, Node, SymbolId};
 
-/// Turns expressions of one pool into values of one program; an expression that occurs
-/// again is the same value.
+/// Turns expressions of one pool into values of one program; an expression that occurs again is the same value.
 pub(super) struct ExpressionLowering<'a> {
     pub pool: &'a ExprPool,
     pub builder: ProgramBuilder,
@@ -35,8 +34,7 @@ impl<'a> ExpressionLowering<'a> {
         }
     }
 
-    /// Computes all sines and cosines that occur in the expressions, as few array
-    /// statements as their nesting allows.
+    /// Computes all sines and cosines that occur in the expressions, as few array statements as their nesting allows.
     pub fn prepare(&mut self, roots: &[ExprId]) {
         let mut levels: BTreeMap<usize, Vec<ExprId>> = BTreeMap::new();
         let mut nesting: HashMap<ExprId, usize> = HashMap::new();
@@ -129,8 +127,8 @@ impl<'a> ExpressionLowering<'a> {
         combination.items.iter().map(term).collect()
     }
 
-    /// The value of a nested sum and of the `single` part of each of its groups; `shared` is
-    /// the part that is known already.
+    /// The value of a nested sum and of the `single` part of each of its groups; `shared` is the part that is known
+    /// already.
     pub(crate) fn nested(
         &mut self,
         nested: &Nested,
@@ -168,8 +166,8 @@ impl<'a> ExpressionLowering<'a> {
         (sum, singles)
     }
 
-    /// Factors with negative exponents form one divisor; the others multiply in
-    /// canonical order, so that monomials share their beginnings.
+    /// Factors with negative exponents form one divisor; the others multiply in canonical order, so that monomials
+    /// share their beginnings.
     fn product(&mut self, expr: ExprId) -> ValueId {
         let pool = self.pool;
         let (number, rest) = pool.split(expr);

@@ -1,8 +1,7 @@
 //! The maps between robot and latent coordinates, with the scaling folded in.
 //!
-//! Each says what it is for a linear model. With a nonlinear encoder or decoder the weights are the
-//! Jacobian at a state, which is then the first input: `x` of the encoder's maps, `z` of the
-//! decoder's.
+//! Each says what it is for a linear model. With a nonlinear encoder or decoder the weights are the Jacobian at a
+//! state, which is then the first input: `x` of the encoder's maps, `z` of the decoder's.
 
 use nalgebra::{DMatrix, DVector};
 

@@ -1,10 +1,9 @@
 //! Sums of products in nested form: `a x y + b x z^2` becomes `x (a y + b z^2)`.
 //!
-//! A product that only one sum uses costs a multiplication of its own beside the one with its
-//! coefficient. Taking a common factor out of several such products saves theirs and costs one
-//! for the group (Horner's rule for several variables). A product that many sums use is
-//! computed once for all of them and stays. What is left after a factor has been taken out
-//! is often needed again: it is the derivative of the sum by that factor.
+//! A product that only one sum uses costs a multiplication of its own beside the one with its coefficient. Taking a
+//! common factor out of several such products saves theirs and costs one for the group (Horner's rule for several
+//! variables). A product that many sums use is computed once for all of them and stays. What is left after a factor has
+//! been taken out is often needed again: it is the derivative of the sum by that factor.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -173,8 +172,8 @@ fn n_factors(pool: &ExprPool, expr: ExprId) -> usize {
     counts.fold(0, usize::saturating_add)
 }
 
-/// What remains of a product without one of its factors, for each distinct factor; nothing if
-/// it is no product of factors with positive integer exponents.
+/// What remains of a product without one of its factors, for each distinct factor; nothing if it is no product of
+/// factors with positive integer exponents.
 fn quotients(pool: &mut ExprPool, expr: ExprId) -> Vec<Quotient> {
     let factors = pool.factors_of(expr).to_vec();
     let bases: Option<Vec<(ExprId, i64)>> = factors.iter().map(|&f| base_of(pool, f)).collect();

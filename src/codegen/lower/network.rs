@@ -1,9 +1,8 @@
 //! The maps of nonlinear encoders and decoders.
 //!
-//! A layer's products with its weights go through a table, [`crate::ir::Statement::Accumulate`];
-//! activations and their slopes are scalar operations without branches.
-//! Velocities run forwards through the layers, lifted inputs backwards; the projection takes the
-//! Jacobian row by row and solves with it.
+//! A layer's products with its weights go through a table, [`crate::ir::Statement::Accumulate`]; activations and their
+//! slopes are scalar operations without branches. Velocities run forwards through the layers, lifted inputs backwards;
+//! the projection takes the Jacobian row by row and solves with it.
 
 use nalgebra::DVector;
 
@@ -66,9 +65,7 @@ pub(super) fn lower(map: Map, model: &ReducedModel) -> Result<Program, LowerErro
         }
         // u = (J_E(s_x x)^T u_lat) / s_u
         Map::LiftInput => {
-            let last = layers.layers().len() - 1;
-            let seed = times_slopes(&given, &slopes[last]);
-            let scaled = network.backward(last, &seed, &slopes);
+            let scaled = network.backward(given, &slopes);
             divided(&scaled, &model.input_factors()?)
         }
     };
@@ -77,8 +74,8 @@ pub(super) fn lower(map: Map, model: &ReducedModel) -> Result<Program, LowerErro
     Ok(builder.finish()?)
 }
 
-/// Slopes of one layer's activation; `None` where it is linear.
-type Slopes<'b> = Option<Vec<Number<'b>>>;
+/// One number per unit of a layer.
+type Layer<'b> = Vec<Number<'b>>;
 
 struct Network<'b> {
     sheet: &'b Sheet<'b>,
@@ -88,54 +85,45 @@ struct Network<'b> {
 }
 
 impl<'b> Network<'b> {
-    /// The map of `factors * input`, and the slopes of each layer.
-    fn forward(&self, input: &[Number<'b>]) -> (Vec<Number<'b>>, Vec<Slopes<'b>>) {
+    /// The map of `factors * input`, and the slopes of each layer's activation.
+    fn forward(&self, input: &[Number<'b>]) -> (Layer<'b>, Vec<Layer<'b>>) {
         let mut y = input.to_vec();
         let mut slopes = Vec::new();
         for (index, layer) in self.map.layers().iter().enumerate() {
             let a = self.product(index, &y, true).into_iter();
-            let activated: Vec<_> = a.map(|a| activation(layer.activation, a)).collect();
-            y = activated.iter().map(|pair| pair.0).collect();
-            slopes.push(activated.into_iter().map(|pair| pair.1).collect());
+            let (values, of_layer) = a.map(|a| activation(layer.activation, a)).unzip();
+            y = values;
+            slopes.push(of_layer);
         }
         (y, slopes)
     }
 
     /// `J (factors * direction)`, from the first layer to the last.
-    fn tangent(&self, direction: &[Number<'b>], slopes: &[Slopes<'b>]) -> Vec<Number<'b>> {
+    fn tangent(&self, direction: &[Number<'b>], slopes: &[Layer<'b>]) -> Layer<'b> {
         let mut v = direction.to_vec();
         for (index, slopes) in slopes.iter().enumerate() {
-            v = times_slopes(&self.product(index, &v, false), slopes);
+            v = times(&self.product(index, &v, false), slopes);
         }
         v
     }
 
-    /// `g^T J` for the part of `J` up to layer `last`, whose slopes `g` has already.
-    fn backward(&self, last: usize, g: &[Number<'b>], slopes: &[Slopes<'b>]) -> Vec<Number<'b>> {
-        let mut g = self.transposed_product(last, g);
-        for index in (0..last).rev() {
-            g = self.transposed_product(index, &times_slopes(&g, &slopes[index]));
+    /// `g^T J` of the first layers, those whose slopes are given.
+    fn backward(&self, mut g: Layer<'b>, slopes: &[Layer<'b>]) -> Layer<'b> {
+        for (index, slopes) in slopes.iter().enumerate().rev() {
+            g = self.transposed_product(index, &times(&g, slopes));
         }
         g
     }
 
-    fn jacobian_row(&self, row: usize, slopes: &[Slopes<'b>]) -> Vec<Number<'b>> {
-        let last = self.map.layers().len() - 1;
+    fn jacobian_row(&self, row: usize, slopes: &[Layer<'b>]) -> Layer<'b> {
+        let last = slopes.len() - 1;
         let weights = self.map.layers()[last].map.weights().row(row);
-        let slope = slopes[last].as_ref().map(|slopes| slopes[row]);
-        let entry = |&weight: &f64| match slope {
-            Some(slope) => weight * slope,
-            None => Number::known(self.sheet, weight),
-        };
-        let g: Vec<Number> = weights.iter().map(entry).collect();
-        if last == 0 {
-            return g;
-        }
-        self.backward(last - 1, &times_slopes(&g, &slopes[last - 1]), slopes)
+        let g = weights.iter().map(|&weight| weight * slopes[last][row]);
+        self.backward(g.collect(), &slopes[..last])
     }
 
     /// `W y` of a layer, of the first `W (factors * y)`; plus its bias if asked.
-    fn product(&self, index: usize, y: &[Number<'b>], is_biased: bool) -> Vec<Number<'b>> {
+    fn product(&self, index: usize, y: &[Number<'b>], is_biased: bool) -> Layer<'b> {
         let map = &self.map.layers()[index].map;
         let (rows, cols) = map.weights().shape();
         let mut entries = match is_biased {
@@ -150,7 +138,7 @@ impl<'b> Network<'b> {
     }
 
     /// `W^T g` of a layer.
-    fn transposed_product(&self, index: usize, g: &[Number<'b>]) -> Vec<Number<'b>> {
+    fn transposed_product(&self, index: usize, g: &[Number<'b>]) -> Layer<'b> {
         let weights = self.map.layers()[index].map.weights();
         let (rows, cols) = weights.shape();
         let mut entries = vec![0.0; cols];
@@ -160,32 +148,29 @@ impl<'b> Network<'b> {
         self.accumulated(Table::new(rows + 1, cols, entries), g)
     }
 
-    fn accumulated(&self, table: Table, weights: &[Number<'b>]) -> Vec<Number<'b>> {
+    fn accumulated(&self, table: Table, weights: &[Number<'b>]) -> Layer<'b> {
         let sums = self.sheet.borrow_mut().accumulate(&table, ids(weights));
         numbers(self.sheet, &sums)
     }
 }
 
-fn times_slopes<'b>(values: &[Number<'b>], slopes: &Slopes<'b>) -> Vec<Number<'b>> {
-    let Some(slopes) = slopes else {
-        return values.to_vec();
-    };
+fn times<'b>(values: &[Number<'b>], slopes: &[Number<'b>]) -> Layer<'b> {
     let pairs = values.iter().zip(slopes);
     pairs.map(|(&value, &slope)| value * slope).collect()
 }
 
-fn divided<'b>(values: &[Number<'b>], factors: &DVector<f64>) -> Vec<Number<'b>> {
+fn divided<'b>(values: &[Number<'b>], factors: &DVector<f64>) -> Layer<'b> {
     let pairs = values.iter().zip(factors);
     pairs.map(|(&value, &factor)| value / factor).collect()
 }
 
-/// `phi(a)` and, unless it is one everywhere, `phi'(a)`.
+/// `phi(a)` and `phi'(a)`.
 ///
-/// Without branches: `min(a, 0) = (a - |a|)/2` and `max(a, 0) = (a + |a|)/2` are exact in floating
-/// point, so that elu has the slope `e = exp(min(a, 0))` and the value `max(a, 0) + (e - 1)`.
-fn activation<'b>(activation: Activation, a: Number<'b>) -> (Number<'b>, Option<Number<'b>>) {
-    let (value, slope) = match activation {
-        Activation::Linear => return (a, None),
+/// Without branches: `min(a, 0) = (a - |a|)/2` and `max(a, 0) = (a + |a|)/2` are exact in floating point, so that elu
+/// has the slope `e = exp(min(a, 0))` and the value `max(a, 0) + (e - 1)`.
+fn activation(activation: Activation, a: Number) -> (Number, Number) {
+    match activation {
+        Activation::Linear => (a, a.constant(1.0)),
         Activation::Elu => {
             let below = 0.5 * (a - a.abs());
             let above = positive_part(a);
@@ -214,8 +199,7 @@ fn activation<'b>(activation: Activation, a: Number<'b>) -> (Number<'b>, Option<
             let (s, _) = sigmoid(a);
             (above + log, s)
         }
-    };
-    (value, Some(slope))
+    }
 }
 
 fn positive_part(a: Number) -> Number {
@@ -262,14 +246,14 @@ fn gelu_tanh(a: Number) -> (Number, Number) {
 
 /// `pinv(J^T) w = (J J^T)^-1 J w` for the `d x n` matrix with these rows, `d <= n`.
 ///
-/// The normal equations by Cholesky, `J J^T = L L^T`; d is small, so all is unrolled. The error
-/// grows with the square of J's condition number. If J has not full row rank a pivot is zero or
-/// negative, and the result infinite or not a number.
+/// The normal equations by Cholesky, `J J^T = L L^T`; d is small, so all is unrolled. The error grows with the square
+/// of J's condition number. If J has not full row rank a pivot is zero or negative, and the result infinite or not a
+/// number.
 pub(super) fn pinv_times<'b>(
     sheet: &'b Sheet<'b>,
     rows: &[Vec<Number<'b>>],
     w: &[Number<'b>],
-) -> Vec<Number<'b>> {
+) -> Layer<'b> {
     // Two chains, so that one does not wait for every sum of the other.
     let dot = |a: &[Number<'b>], b: &[Number<'b>]| {
         let mut sums = [Number::known(sheet, 0.0); 2];

@@ -1,12 +1,11 @@
-//! Generalised inputs from what a robot measures: its state, joint torques and contacts; and back,
-//! from torques at the links to those of the motors.
+//! Generalised inputs from what a robot measures: its state, joint torques and contacts; and back, from torques at the
+//! links to those of the motors.
 //!
-//! The same forces and moments as [`InputRule::wrench`](crate::robot::InputRule::wrench), in closed
-//! form. With `fwd` and `up` the foot in the plane of the leg, `c_fwd` and `c_up` the calf's share of
-//! them, `h` the signed hip offset, and the right-handed axes `x`, `e = (0, sin hx, -cos hx)`,
-//! `n = (0, cos hx, sin hx)`, the leg's Jacobian has the columns `-h e - up n`, `up x + fwd e` and
-//! `c_up x + c_fwd e`, and the foot is at `p = fwd x - up e + h n`. From `J^T F = -tau` (equation 4)
-//! follow the force and its moment about the hip
+//! The same forces and moments as [`InputRule::wrench`](crate::robot::InputRule::wrench), in closed form. With `fwd`
+//! and `up` the foot in the plane of the leg, `c_fwd` and `c_up` the calf's share of them, `h` the signed hip offset,
+//! and the right-handed axes `x`, `e = (0, sin hx, -cos hx)`, `n = (0, cos hx, sin hx)`, the leg's Jacobian has the
+//! columns `-h e - up n`, `up x + fwd e` and `c_up x + c_fwd e`, and the foot is at `p = fwd x - up e + h n`. From `J^T
+//! F = -tau` (equation 4) follow the force and its moment about the hip
 //!
 //! ```text
 //! F_x = (fwd tau_2 - c_fwd tau_1) / det        (p x F)_x = -up F_n - h F_e
@@ -15,9 +14,8 @@
 //! det = up c_fwd - fwd c_up
 //! ```
 //!
-//! for a leg of the usual shape; other legs move as [`Moved`] says. `1 / d` of both divisors is
-//! `d / max(d^2, least^2)`, see
-//! [`LegGeometry::least_levers`](crate::robot::LegGeometry::least_levers).
+//! for a leg of the usual shape; other legs move as [`Moved`] says. `1 / d` of both divisors is `d / max(d^2,
+//! least^2)`, see [`LegGeometry::least_levers`](crate::robot::LegGeometry::least_levers).
 
 use super::dynamics::LowerError;
 use super::number::{Number, Sheet};
@@ -35,15 +33,14 @@ use crate::robot::{
 /// Sine and cosine of each joint's angle.
 type JointAngles<'b> = [(Number<'b>, Number<'b>); 3];
 
-/// `u = [net; F; M]` with the torques at the links `net` and the force and moment of the feet on the
-/// ground, by the model's rule (equations 4 to 7, 22 and 23): inputs `x` and `dx` (18 robot coordinates
-/// and their velocities), `tau` (torques of the motors, 12, N m), `feet` (4, order of [`Leg::ALL`]: 1
-/// on the ground, 0 in the air); output `u` (18, N m and N). `None` for a model that is not over the
-/// 18 coordinates of a robot that romc knows.
+/// `u = [net; F; M]` with the torques at the links `net` and the force and moment of the feet on the ground, by the
+/// model's rule (equations 4 to 7, 22 and 23): inputs `x` and `dx` (18 robot coordinates and their velocities), `tau`
+/// (torques of the motors, 12, N m), `feet` (4, order of [`Leg::ALL`]: 1 on the ground, 0 in the air); output `u` (18,
+/// N m and N). `None` for a model that is not over the 18 coordinates of a robot that romc knows.
 ///
-/// `net` is `tau` less viscous and dry friction; the inertia of the motors needs accelerations, which
-/// are not measured, and is left out. A foot's force and moment are multiplied with its element of
-/// `feet`; at 0 they are zero in every posture.
+/// `net` is `tau` less viscous and dry friction; the inertia of the motors needs accelerations, which are not measured,
+/// and is left out. A foot's force and moment are multiplied with its element of `feet`; at 0 they are zero in every
+/// posture.
 ///
 /// # Errors
 /// [`LowerError::Program`] if the program breaks one of its promises.
@@ -51,10 +48,9 @@ pub fn generalised_input(model: &ReducedModel) -> Result<Option<Program>, LowerE
     rule_of(model).map(|rule| input_of(&rule)).transpose()
 }
 
-/// Torques of the motors behind torques at the links, `tau = net + b dq + c tanh(dq / v) + I ddq`:
-/// inputs `dx` and `ddx` (velocities and accelerations of the 18 robot coordinates, of which the
-/// joints count), `net` (12, N m); output `tau` (12, N m). `None` as for [`generalised_input`], of
-/// which it is the inverse at the joints for `ddx = 0`.
+/// Torques of the motors behind torques at the links, `tau = net + b dq + c tanh(dq / v) + I ddq`: inputs `dx` and
+/// `ddx` (velocities and accelerations of the 18 robot coordinates, of which the joints count), `net` (12, N m); output
+/// `tau` (12, N m). `None` as for [`generalised_input`], of which it is the inverse at the joints for `ddx = 0`.
 ///
 /// # Errors
 /// As [`generalised_input`].
@@ -95,8 +91,8 @@ fn input_of(rule: &InputRule) -> Result<Program, LowerError> {
     let net: [Number; JOINT_DIM] =
         std::array::from_fn(|joint| number(tau[joint]) - friction(rule, joint, number(dx[joint])));
     let joint = |kind: usize| (0..FOOT_DIM).map(move |leg| LEG_JOINT_DIM * leg + kind);
-    // Abductions, then flexions, then of planar legs the angles of the calves, flexion plus knee, of
-    // others those of the knees.
+    // Abductions, then flexions, then of planar legs the angles of the calves, flexion plus knee, of others those of
+    // the knees.
     let mut angles: Vec<ValueId> = joint(0).chain(joint(1)).map(|k| x[k]).collect();
     for leg in Leg::ALL {
         let k = LEG_JOINT_DIM * leg.index() + 1;
@@ -167,8 +163,8 @@ fn about_body<'b>(hip: [f64; 3], wrench: [Number<'b>; BODY_DIM]) -> [Number<'b>;
     moved
 }
 
-/// Force and moment in the body's axes as the generalised forces of the body's coordinates, with
-/// sine and cosine of roll, pitch and yaw.
+/// Force and moment in the body's axes as the generalised forces of the body's coordinates, with sine and cosine of
+/// roll, pitch and yaw.
 fn in_world<'b>(
     [(s_r, c_r), (s_p, c_p), (s_y, c_y)]: JointAngles<'b>,
     [f_x, f_y, f_z, m_x, m_y, m_z]: [Number<'b>; BODY_DIM],
@@ -185,8 +181,8 @@ fn in_world<'b>(
     [force_x, force_y, up, m_x, pitch, yaw]
 }
 
-/// Force and moment of one leg about its hip, in axes parallel to the body's; the third angle is that
-/// of the calf, flexion plus knee.
+/// Force and moment of one leg about its hip, in axes parallel to the body's; the third angle is that of the calf,
+/// flexion plus knee.
 fn leg_wrench<'b>(
     geometry: &PlanarLeg,
     [abduction, (thigh_sin, thigh_cos), (calf_sin, calf_cos)]: JointAngles<'b>,

@@ -5,12 +5,11 @@ use std::fmt;
 /// How coefficients are rounded for print.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Rounding {
-    /// The paper's two decimals, with more for coefficients that would be off by over 5 %: every coefficient
-    /// of 0.1 and above has exactly two. Never rounds a term away.
+    /// The paper's two decimals, with more for coefficients that would be off by over 5 %: every coefficient of 0.1 and
+    /// above has exactly two. Never rounds a term away.
     #[default]
     Adaptive,
-    /// Exactly this many places after the point, as the paper prints; small
-    /// coefficients can vanish.
+    /// Exactly this many places after the point, as the paper prints; small coefficients can vanish.
     Decimals(usize),
     /// This many significant digits (at least one).
     Significant(usize),
@@ -53,9 +52,8 @@ impl Decimal {
         Self::plain(value as f64, value.unsigned_abs().to_string())
     }
 
-    /// `value` rounded for print; the exact binary value is rounded, ties to even.
-    /// More than 40 digits are taken as 40, and more digits than asked where fewer would round to a number
-    /// beyond the range of floats.
+    /// `value` rounded for print; the exact binary value is rounded, ties to even. More than 40 digits are taken as 40,
+    /// and more digits than asked where fewer would round to a number beyond the range of floats.
     pub fn rounded(value: f64, rounding: Rounding) -> Self {
         match rounding {
             Rounding::Exact => Self::exact(value),

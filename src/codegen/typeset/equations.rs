@@ -35,14 +35,13 @@ pub struct Equation {
 pub struct CoefficientTable {
     /// Column heads: the acceleration, with the phase it belongs to, and its unit where that is physical.
     pub columns: Vec<(String, Symbol, Option<Unit>)>,
-    /// One row a candidate term, in library order.
+    /// In library order.
     pub rows: Vec<CoefficientRow>,
 }
 
 /// One candidate term and its coefficient in each column.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CoefficientRow {
-    /// The term.
     pub term: Math,
     /// Unit of the term, for equations in physical units; that of a coefficient is the column's over this.
     pub unit: Option<Unit>,
@@ -62,8 +61,7 @@ pub struct Typeset {
 }
 
 impl Typeset {
-    /// Lays out the equations of each phase, terms in their order, coefficients rounded by
-    /// `rounding`.
+    /// Lays out the equations of each phase, terms in their order, coefficients rounded by `rounding`.
     pub fn new(system: &Equations<'_>, symbols: &SymbolTable, rounding: Rounding) -> Self {
         let terms = terms(system, symbols);
         let output = |output| (symbols.acceleration(output), format!("ddz{}", output + 1));

@@ -1,5 +1,5 @@
-//! From canonical expressions to the typeset tree: fractions, roots, parentheses
-//! and the order in which readers expect factors and terms.
+//! From canonical expressions to the typeset tree: fractions, roots, parentheses and the order in which readers expect
+//! factors and terms.
 
 use crate::equations::Equations;
 use crate::model::{LatentVariable, MAX_LATENT_DIM};
@@ -29,9 +29,8 @@ pub(super) fn terms<'e>(
         .collect()
 }
 
-/// Puts a coefficient before a term: `0.36` and `sin(dz1)` to `0.36 sin(dz1)`.
-/// The coefficient takes the place of a term or numerator that is one; one that `is_omitted` prints its
-/// sign alone.
+/// Puts a coefficient before a term: `0.36` and `sin(dz1)` to `0.36 sin(dz1)`. The coefficient takes the place of a
+/// term or numerator that is one; one that `is_omitted` prints its sign alone.
 pub(super) fn with_coefficient(coefficient: &Decimal, is_omitted: bool, term: Signed) -> Signed {
     let number = Math::Number(coefficient.magnitude());
     let math = match term.math {
@@ -175,8 +174,7 @@ impl Layout<'_> {
         Signed { negative, math }
     }
 
-    /// `base ^ exponent` for a positive number: a root, a power on the function's
-    /// name, or a plain power.
+    /// `base ^ exponent` for a positive number: a root, a power on the function's name, or a plain power.
     fn numeric_power(&self, base: ExprId, exponent: Number) -> Factor {
         if exponent.is_one() {
             return self.factor(base);
@@ -306,8 +304,8 @@ fn bare(math: Math) -> Math {
     }
 }
 
-/// Factors side by side, with a dot where digits or words would run together; dots among the factors, as a
-/// product that is extended has them, are set anew.
+/// Factors side by side, with a dot where digits or words would run together; dots among the factors, as a product that
+/// is extended has them, are set anew.
 fn product(factors: Vec<Math>) -> Math {
     let mut laid_out: Vec<Math> = Vec::with_capacity(factors.len());
     for factor in factors {

@@ -1,19 +1,18 @@
-//! Equations for READMEs and lab notebooks: a
-//! [`ReducedModel`](crate::model::ReducedModel) enters, `NAME.md` leaves, with its
-//! mathematics as GitHub and GitLab draw it. The formulas are those of the
-//! [`latex`](crate::typeset::latex) backend.
+//! Equations for READMEs and lab notebooks: a [`ReducedModel`](crate::model::ReducedModel) enters, `NAME.md` leaves,
+//! with its mathematics as GitHub and GitLab draw it. The formulas are those of the [`latex`](crate::typeset::latex)
+//! backend.
 
 use askama::Template;
 
 use crate::equations::{Equations, Unit};
 use crate::files::{EmittedFile, is_invisible};
 use crate::typeset::latex::{tex, tex_cases, tex_symbol, tex_unit};
-use crate::typeset::page::{Markup, Page, rendered};
+use crate::typeset::page::{Page, rendered};
 use crate::typeset::words::{Spelling, code_point, ends_line};
-use crate::typeset::{EquationSystem, Math, NumberStyle, PrintOptions, Symbol, TypesetError};
+use crate::typeset::{Math, NumberStyle, PrintOptions, TypesetError};
 
-/// The file `NAME.md`: each phase's equations in `math` fences, and the table of
-/// coefficients, as GitHub and GitLab show them.
+/// The file `NAME.md`: each phase's equations in `math` fences, and the table of coefficients, as GitHub and GitLab
+/// show them.
 ///
 /// # Errors
 /// [`TypesetError::Template`].
@@ -28,8 +27,8 @@ pub fn emit(
 
 #[derive(Template)]
 #[template(path = "markdown/page.askama", config = "templates/askama.toml")]
-struct Document {
-    page: Page,
+struct Document<'a> {
+    page: Page<'a>,
 }
 
 struct Markdown;
@@ -44,27 +43,12 @@ impl Spelling for Markdown {
     }
 }
 
-impl Markup for Markdown {
-    fn system(system: &EquationSystem, width_em: f64) -> String {
-        tex_cases(system, width_em)
-    }
-
-    fn head(symbol: &Symbol, phase: &str, unit: Option<Unit>) -> String {
-        let (symbol, phase) = (tex_symbol(symbol), markdown_text(phase));
-        format!("$`{symbol}`$ {phase}{}", after_comma(unit))
-    }
-
-    fn row_head(math: &Math, unit: Option<Unit>) -> String {
-        format!("{}{}", Self::math(math, ""), after_comma(unit))
-    }
-}
-
-fn after_comma(unit: Option<Unit>) -> String {
+fn after_comma(unit: &Option<Unit>) -> String {
     unit.map_or(String::new(), |unit| format!(", $`{}`$", tex_unit(unit)))
 }
 
-/// Text from outside that Markdown shows as it is: punctuation is escaped, and
-/// control characters become spaces, so that a text cannot start a new line.
+/// Text from outside that Markdown shows as it is: punctuation is escaped, and control characters become spaces, so
+/// that a text cannot start a new line.
 ///
 /// ```
 /// use romc::typeset::markdown::markdown_text;

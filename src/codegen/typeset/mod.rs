@@ -1,20 +1,19 @@
 //! Equations laid out for print, before they have a spelling.
 //!
-//! A [`ReducedModel`](crate::model::ReducedModel) enters; a [`Typeset`] leaves: one
-//! [`EquationSystem`] a phase, made of [`Math`] trees in which fractions, roots,
-//! parentheses, signs and rounded coefficients have their final place. [`latex`],
-//! [`markdown`] and [`mathml`] spell the same trees. Read `tree` first, then
-//! [`expression()`] (from the algebra to the tree) and [`equations`].
+//! A [`ReducedModel`](crate::model::ReducedModel) enters; a [`Typeset`] leaves: one [`EquationSystem`] a phase, made of
+//! [`Math`] trees in which fractions, roots, parentheses, signs and rounded coefficients have their final place.
+//! [`latex`], [`markdown`] and [`mathml`] spell the same trees. Read `tree` first, then `expression` (from the algebra
+//! to the tree) and `equations`.
 
 mod decimal;
-pub mod equations;
-pub mod expression;
+mod equations;
+mod expression;
 pub mod latex;
 pub mod markdown;
 pub mod mathml;
 mod options;
 mod page;
-pub mod robot;
+mod robot;
 mod rounder;
 mod symbols;
 mod table;
@@ -29,9 +28,8 @@ pub use expression::expression;
 pub use options::{Form, NumberStyle, PrintOptions, TypesetError};
 pub use page::rendered;
 pub use robot::RobotTypeset;
-pub use rounder::{Place, RoundingReport};
 pub use symbols::{RenameError, SymbolTable};
-pub use table::{Cell, Rows, Table, rounded, rounded_up, significant};
+pub use table::{Cell, Table, rounded, rounded_up, significant};
 pub(crate) use tree::Glyph;
 pub use tree::{Math, Signed, Symbol};
 pub(crate) use width::{EQUALS, break_lines, symbol_width, width};

@@ -33,8 +33,8 @@ pub enum NumberStyle {
 pub struct PrintOptions {
     /// How coefficients are rounded.
     pub rounding: Rounding,
-    /// Longest line in em of the text around (1 em is 10 pt in a 10 pt document): 32 suits one
-    /// column, 22 a column of a two-column paper. `None` is 32 for LaTeX and 44 for other pages.
+    /// Longest line in em of the text around (1 em is 10 pt in a 10 pt document): 32 suits one column, 22 a column of a
+    /// two-column paper. `None` is 32 for LaTeX and 44 for other pages.
     pub width_em: Option<f64>,
     /// New names for variables.
     pub symbols: SymbolTable,

@@ -1,69 +1,59 @@
-//! Pages of Markdown and HTML: what stands on them, in a markup that the page chooses.
+//! What pages of Markdown and HTML are made of.
 
 use askama::Template;
 
-use super::decimal::Decimal;
 use super::equations::{EquationSystem, Typeset};
 use super::options::PrintOptions;
-use super::tree::{Math, Symbol};
 use super::words::{self, Spelling};
-use crate::equations::{Equations, Unit};
+use crate::equations::Equations;
 
 /// Longest line of an equation unless chosen, in em.
 const WIDTH_EM: f64 = 44.0;
 
-/// How a page spells text and mathematics.
-pub(super) trait Markup: Spelling {
-    fn system(system: &EquationSystem, width_em: f64) -> String;
-    /// The head of a column: an acceleration of a phase, with its unit where that is physical.
-    fn head(symbol: &Symbol, phase: &str, unit: Option<Unit>) -> String;
-    /// The head of a row: a candidate term, with its unit where that is physical.
-    fn row_head(term: &Math, unit: Option<Unit>) -> String;
-}
-
-pub(super) struct Page {
-    pub name: String,
-    pub description: String,
-    pub version: &'static str,
-    pub digest: Option<String>,
-    /// Name, feet and equations of each phase.
-    pub phases: Vec<[String; 3]>,
+pub(super) struct Page<'a> {
+    equations: &'a Equations<'a>,
+    pub typeset: Typeset,
     pub rounding: String,
-    pub heads: Vec<String>,
-    /// Each candidate term with a cell for each column.
-    pub rows: Vec<(String, Vec<String>)>,
+    width_em: f64,
+    pub digest: Option<&'a str>,
+    pub version: &'static str,
 }
 
-impl Page {
-    pub(crate) fn new<M: Markup>(equations: &Equations<'_>, options: &PrintOptions) -> Self {
-        let model = equations.model();
-        let width_em = options.width_em.unwrap_or(WIDTH_EM);
+impl<'a> Page<'a> {
+    pub(super) fn new<S: Spelling>(
+        equations: &'a Equations<'a>,
+        options: &'a PrintOptions,
+    ) -> Self {
         let typeset = Typeset::new(equations, &options.symbols, options.rounding);
-        let phases = typeset.systems.iter().zip(equations.phases());
-        let table = &typeset.table;
-        let cell = |number: &Option<Decimal>| number.as_ref().map_or(String::new(), M::number);
         Self {
-            name: M::text(model.name()),
-            description: M::text(model.description()),
+            equations,
+            rounding: words::rounding::<S>(options.rounding, &typeset.rounding),
+            typeset,
+            width_em: options.width_em.unwrap_or(WIDTH_EM),
+            digest: options.digest.as_deref(),
             version: env!("CARGO_PKG_VERSION"),
-            digest: options.digest.as_deref().map(M::text),
-            phases: phases
-                .map(|(system, phase)| {
-                    let feet = M::text(&words::feet(&phase.feet));
-                    [M::text(&phase.name), feet, M::system(system, width_em)]
-                })
-                .collect(),
-            rounding: words::rounding::<M>(options.rounding, &typeset.rounding),
-            heads: (table.columns.iter())
-                .map(|(phase, symbol, unit)| M::head(symbol, phase, *unit))
-                .collect(),
-            rows: (table.rows.iter())
-                .map(|row| {
-                    let cells = row.coefficients.iter().map(cell).collect();
-                    (M::row_head(&row.term, row.unit), cells)
-                })
-                .collect(),
         }
+    }
+
+    pub(super) fn name(&self) -> &str {
+        self.equations.model().name()
+    }
+
+    pub(super) fn description(&self) -> &str {
+        self.equations.model().description()
+    }
+
+    /// Name, feet and equations of each phase.
+    pub(super) fn phases(
+        &self,
+        math: impl Fn(&EquationSystem, f64) -> String,
+    ) -> Vec<(&str, String, String)> {
+        let phases = self.typeset.systems.iter().zip(self.equations.phases());
+        let phases = phases.map(|(system, phase)| {
+            let feet = words::feet(&phase.feet);
+            (phase.name.as_str(), feet, math(system, self.width_em))
+        });
+        phases.collect()
     }
 }
 

@@ -1,5 +1,5 @@
-//! The model in robot coordinates: what the latent coordinates are made of, and the
-//! accelerations of the robot that the latent dynamics mean.
+//! The model in robot coordinates: what the latent coordinates are made of, and the accelerations of the robot that the
+//! latent dynamics mean.
 
 use std::collections::BTreeSet;
 
@@ -24,8 +24,7 @@ const NEGLIGIBLE: f64 = 0.02;
 pub struct RobotTypeset {
     /// `z = W_e (s_x q) + b_e`, one equation a latent coordinate.
     pub encoder: EquationSystem,
-    /// How many weights of the encoder are too small to be printed: each below 2 % of the
-    /// largest of its row.
+    /// How many weights of the encoder are too small to be printed: each below 2 % of the largest of its row.
     pub negligible_weights: usize,
     /// `ddq = (W_d ddz) / s_x` a phase, as sums of candidate terms.
     pub systems: Vec<EquationSystem>,
@@ -34,8 +33,8 @@ pub struct RobotTypeset {
 }
 
 impl RobotTypeset {
-    /// Lays out a model in robot coordinates; `None` for a model without encoder, decoder,
-    /// scaling or names of its state.
+    /// Lays out a model in robot coordinates; `None` for a model without encoder, decoder, scaling or names of its
+    /// state.
     ///
     /// # Errors
     /// [`TypesetError::NotFinite`] if a coefficient is too large for a float in SI units.

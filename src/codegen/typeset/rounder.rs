@@ -7,20 +7,15 @@ use super::equations::{Equation, EquationSystem};
 use super::expression::with_coefficient;
 use super::tree::{Signed, Symbol};
 
-/// A coefficient's place in the model.
+/// A coefficient in full, the phase, output (`ddz1`) and left side of its equation, and its candidate term as the
+/// library spells it and laid out.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Place {
-    /// The phase's name.
+pub struct Occurrence {
     pub phase: String,
-    /// `ddz1` and so on.
     pub output: String,
-    /// The candidate term in the library's syntax.
     pub term: String,
-    /// The coefficient in full.
     pub coefficient: f64,
-    /// The left side of its equation.
     pub left: Symbol,
-    /// The term, laid out.
     pub math: Signed,
 }
 
@@ -28,12 +23,11 @@ pub struct Place {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RoundingReport {
     /// Largest |printed - coefficient|, where it is not zero, and where it occurs.
-    pub largest: Option<(f64, Place)>,
+    pub largest: Option<(f64, Occurrence)>,
     /// Largest |printed - coefficient| / |coefficient| of the terms that are printed.
     pub largest_relative: f64,
     /// Active terms whose coefficient prints as zero, so that they are left out.
-    pub dropped: Vec<Place>,
-    /// How many coefficients are active in all.
+    pub dropped: Vec<Occurrence>,
     pub active: usize,
 }
 
@@ -48,8 +42,8 @@ pub(super) struct Rounder {
 /// Share of the coefficients that need every decimal from which a model counts as rounded to them.
 const ROUNDED_SHARE: f64 = 0.6;
 
-/// Whether a whole number among `coefficients` is one exactly: not where it could as well be a
-/// rounded one, because digits were asked for or because the model itself was rounded.
+/// Whether a whole number among `coefficients` is one exactly: not where it could as well be a rounded one, because
+/// digits were asked for or because the model itself was rounded.
 fn are_whole_exact(rounding: Rounding, coefficients: impl Iterator<Item = f64>) -> bool {
     match rounding {
         Rounding::Significant(_) | Rounding::Exact => return true,
@@ -84,8 +78,8 @@ impl Rounder {
         }
     }
 
-    /// The equations of one phase out of `xi`, a row a term, a column an output, which has a symbol and
-    /// a name for the record.
+    /// The equations of one phase out of `xi`, a row a term, a column an output, which has a symbol and a name for the
+    /// record.
     pub(super) fn system(
         &mut self,
         phase: &str,
@@ -114,7 +108,7 @@ impl Rounder {
     ) -> Equation {
         let mut terms = Vec::new();
         for (&coefficient, (text, term)) in entries {
-            let place = || Place {
+            let place = || Occurrence {
                 phase: phase.to_owned(),
                 output: output.to_owned(),
                 term: (*text).to_owned(),

@@ -26,8 +26,8 @@ impl SymbolTable {
     /// Reads entries `VARIABLE=NAME` for a model of `latent_dim` coordinates.
     ///
     /// # Errors
-    /// [`RenameError`] for an entry that is malformed, names no variable of the
-    /// model, or makes two variables look alike.
+    /// [`RenameError`] for an entry that is malformed, names no variable of the model, or makes two variables look
+    /// alike.
     pub fn parse<S: AsRef<str>>(entries: &[S], latent_dim: usize) -> Result<Self, RenameError> {
         let mut table = Self::default();
         for entry in entries {

@@ -5,9 +5,8 @@ use crate::symbolic::Function;
 
 /// One piece of laid-out mathematics.
 ///
-/// Parentheses ([`Math::Group`]) and multiplication dots ([`Math::Dot`]) are
-/// already in place, and signs sit only in [`Signed`], so that a printer
-/// chooses spelling and nothing else.
+/// Parentheses ([`Math::Group`]) and multiplication dots ([`Math::Dot`]) are already in place, and signs sit only in
+/// [`Signed`], so that a printer chooses spelling and nothing else.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Math {
     /// A number without sign.
@@ -28,8 +27,8 @@ pub enum Math {
     Power(Box<Math>, Box<Math>),
     /// A root; no index means the square root.
     Root(Box<Math>, Option<u32>),
-    /// A function of one argument by its name, with an optional power on that; square roots and
-    /// magnitudes have forms of their own.
+    /// A function of one argument by its name, with an optional power on that; square roots and magnitudes have forms
+    /// of their own.
     Function(Function, Option<Box<Math>>, Box<Math>),
     /// The absolute value.
     Absolute(Box<Math>),

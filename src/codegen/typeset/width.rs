@@ -1,7 +1,7 @@
 //! Estimated widths, and where a long equation is broken.
 //!
-//! Widths are in em of the surrounding text, from the metrics of Computer
-//! Modern: good to a few percent, which is all that line breaking needs.
+//! Widths are in em of the surrounding text, from the metrics of Computer Modern: good to a few percent, which is all
+//! that line breaking needs.
 
 use super::tree::{Glyph, Math, Signed, Symbol, function_name};
 
@@ -77,9 +77,8 @@ fn glyph_width(glyph: &Glyph) -> f64 {
     }
 }
 
-/// Splits `terms` into lines no wider than `available` em where that is
-/// possible: greedily, and only before a sign. `first` em of the first line and
-/// `indent` em of each further line are taken by what stands before the terms.
+/// Splits `terms` into lines no wider than `available` em where that is possible: greedily, and only before a sign.
+/// `first` em of the first line and `indent` em of each further line are taken by what stands before the terms.
 pub(crate) fn break_lines(
     terms: &[Signed],
     available: f64,

@@ -4,7 +4,7 @@ use crate::model::FeetRule;
 use crate::robot::{ContactFlags, Leg};
 
 use super::decimal::{Decimal, LEAST_DECIMALS, RELATIVE_ERROR, Rounding};
-use super::rounder::{Place, RoundingReport};
+use super::rounder::{Occurrence, RoundingReport};
 use super::table::{rounded, rounded_up};
 use super::tree::{Math, Signed};
 
@@ -52,8 +52,8 @@ pub fn counted(count: usize, noun: &str) -> String {
     }
 }
 
-/// A front or rear pair of feet: the words for how many of it are on the ground, none where it does
-/// not matter, and whether they hold of no foot, of one, of both.
+/// A front or rear pair of feet: the words for how many of it are on the ground, none where it does not matter, and
+/// whether they hold of no foot, of one, of both.
 const PAIRS: [(&str, [bool; 3]); 5] = [
     ("", [true, true, true]),
     ("no {} foot", [true, false, false]),
@@ -146,7 +146,7 @@ pub fn rounding<S: Spelling>(rule: Rounding, report: &RoundingReport) -> String 
 }
 
 /// A coefficient with more digits than are printed, before its term.
-fn summand<S: Spelling>(place: &Place) -> String {
+fn summand<S: Spelling>(place: &Occurrence) -> String {
     let coefficient = Decimal::exact(rounded(place.coefficient, 6));
     let number = S::number(&coefficient);
     match &place.math {

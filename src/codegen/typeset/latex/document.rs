@@ -8,10 +8,10 @@ use crate::equations::Equations;
 use crate::files::EmittedFile;
 use crate::model::{Identifier, ReducedModel};
 use crate::typeset::TypesetError;
+use crate::typeset::rounder::RoundingReport;
 use crate::typeset::words::{self, Plain, Spelling};
 use crate::typeset::{
-    EquationSystem, Form, Math, NumberStyle, PrintOptions, RobotTypeset, RoundingReport, Typeset,
-    rendered,
+    EquationSystem, Form, Math, NumberStyle, PrintOptions, RobotTypeset, Typeset, rendered,
 };
 
 use super::escape::{comment_text, label, tex_text};
@@ -31,8 +31,8 @@ use super::table::{self, TableBlock};
 /// - `NAME-preview.tex`: a document that shows them all, in two columns where the width asked for is
 ///   at most `TWO_COLUMNS_EM`.
 ///
-/// The first lines of `NAME.tex` say how coefficients were rounded, the largest
-/// error that this made, and which terms vanished by it. Files with labels list them.
+/// The first lines of `NAME.tex` say how coefficients were rounded, the largest error that this made, and which terms
+/// vanished by it. Files with labels list them.
 ///
 /// # Errors
 /// [`TypesetError`] if a coefficient is too large for a float in robot coordinates.
@@ -235,9 +235,10 @@ impl Header<'_> {
     fn short(&self, note: &str) -> String {
         let version = env!("CARGO_PKG_VERSION");
         let name = comment_text(self.model.name());
-        let digest = self.options.digest.as_ref();
-        let digest = digest.map(|digest| format!(", digest {}", comment_text(digest)));
-        let digest = digest.unwrap_or_default();
+        let digest = match &self.options.digest {
+            Some(digest) => format!(", digest {}", comment_text(digest)),
+            None => String::new(),
+        };
         format!("% romc {version}, model {name}{digest}.\n% {note}")
     }
 
@@ -246,18 +247,15 @@ impl Header<'_> {
             NumberStyle::Plain => "amsmath",
             NumberStyle::Siunitx => "amsmath and siunitx",
         };
-        let mut header = self.short(&format!("For \\input; needs {packages}."));
+        let short = self.short(&format!("For \\input; needs {packages}."));
         let rounding = words::rounding::<Plain>(self.options.rounding, report);
-        header.push_str(&format!("\n% {}", comment_text(&rounding)));
-        for place in &report.dropped {
-            let names = [&place.phase, &place.output, &place.term];
-            let [phase, output, term] = names.map(|name| comment_text(name));
-            let coefficient = place.coefficient;
-            header.push_str(&format!(
-                "\n%   left out: {phase}, {output}: {coefficient:e} * {term}"
-            ));
-        }
-        header
+        let dropped = report.dropped.iter().map(|term| {
+            let names = [&term.phase, &term.output, &term.term].map(|name| comment_text(name));
+            let ([phase, output, text], xi) = (names, term.coefficient);
+            format!("\n%   left out: {phase}, {output}: {xi:e} * {text}")
+        });
+        let dropped: String = dropped.collect();
+        format!("{short}\n% {}{dropped}", comment_text(&rounding))
     }
 
     fn robot(&self, robot: &RobotTypeset, is_physical: bool) -> String {

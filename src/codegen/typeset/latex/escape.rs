@@ -3,11 +3,10 @@
 use crate::files::is_invisible;
 use crate::typeset::words::code_point;
 
-/// Text from outside, printed so that TeX shows its characters and runs none of
-/// them: every special character becomes a command, control characters and line
-/// ends become a space, and characters that pdfTeX does not know by default their code
-/// point in brackets. The result never contains a line break, so it is as safe
-/// inside a comment as in the running text.
+/// Text from outside, printed so that TeX shows its characters and runs none of them: every special character becomes a
+/// command, control characters and line ends become a space, and characters that pdfTeX does not know by default their
+/// code point in brackets. The result never contains a line break, so it is as safe inside a comment as in the running
+/// text.
 ///
 /// ```
 /// use romc::typeset::latex::tex_text;
@@ -31,9 +30,8 @@ pub fn tex_text(text: &str) -> String {
     tex
 }
 
-/// Text from outside for a `%` comment: as it is, but on one line and without what changes how its
-/// reader sees the line. TeX skips the rest of a comment's line without looking at it, so only a
-/// line end could let something out.
+/// Text from outside for a `%` comment: as it is, but on one line and without what changes how its reader sees the
+/// line. TeX skips the rest of a comment's line without looking at it, so only a line end could let something out.
 pub(crate) fn comment_text(text: &str) -> String {
     text.replace(is_invisible, " ")
 }
@@ -57,8 +55,7 @@ fn escaped(character: char) -> Option<&'static str> {
     known.map(|(_, command)| command)
 }
 
-/// ASCII letters, digits and harmless marks, and the Latin letters that the
-/// default fonts of pdfTeX carry.
+/// ASCII letters, digits and harmless marks, and the Latin letters that the default fonts of pdfTeX carry.
 fn is_plain(character: char) -> bool {
     character.is_ascii_alphanumeric()
         || "!()*+,-./:;=?@[] ".contains(character)
@@ -66,8 +63,7 @@ fn is_plain(character: char) -> bool {
             .contains(character)
 }
 
-/// A name reduced to what a `\label` and a file name can hold: ASCII letters and
-/// digits, everything else a hyphen.
+/// A name reduced to what a `\label` and a file name can hold: ASCII letters and digits, everything else a hyphen.
 ///
 /// ```
 /// use romc::typeset::latex::label;

@@ -7,15 +7,13 @@ use crate::typeset::{
 use super::math::{tex, tex_symbol, tex_terms};
 
 pub(super) const WIDTH_EM: f64 = 30.5;
-/// What a continued line is set in by, in em: `\qquad` and the empty group
-/// before its sign.
+/// What a continued line is set in by, in em: `\qquad` and the empty group before its sign.
 const INDENT: f64 = 2.3;
 /// What the brace of `cases` takes of the line, in em.
 const BRACE: f64 = 1.8;
 /// Lines from which [`Form::Automatic`] prefers an environment that breaks across pages: no page holds many more.
 pub(super) const CASES_LINES: usize = 30;
 
-#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Block {
     pub label: String,
     pub count: usize,
@@ -111,8 +109,8 @@ pub fn tex_cases(system: &EquationSystem, width_em: f64) -> String {
     format!("\\begin{{cases}}\n  {lines}\n\\end{{cases}}")
 }
 
-/// The right side of an equation, one entry per line. Lines are aligned behind the widest left side, in em,
-/// or stand behind a brace, at the equation's own left side.
+/// The right side of an equation, one entry per line. Lines are aligned behind the widest left side, in em, or stand
+/// behind a brace, at the equation's own left side.
 fn right_sides(equation: &Equation, aligned: Option<f64>, options: &PrintOptions) -> Vec<String> {
     let numbers = options.numbers;
     if equation.terms.is_empty() {

@@ -9,8 +9,7 @@ pub(crate) fn tex(math: &Math, numbers: NumberStyle) -> String {
     let inner = |math: &Math| tex(math, numbers);
     // Exponents are structure, not measured values: no siunitx.
     let exponent_of = |math| script(tex(math, NumberStyle::Plain));
-    // Delimiters grow only around something tall: `\left` and `\right` would put a space after
-    // the function's name.
+    // Delimiters grow only around something tall: `\left` and `\right` would put a space after the function's name.
     let delimited = |open: &str, close: &str, math: &Math| match math.is_tall() {
         true => format!(r"\left{open}{}\right{}", inner(math), close.trim_start()),
         false => format!("{open}{}{close}", inner(math)),
@@ -41,8 +40,8 @@ pub(crate) fn tex(math: &Math, numbers: NumberStyle) -> String {
     }
 }
 
-/// Signed terms one after the other: `0.36 - 0.16\dot{z}_1`; the first sign may be a binary operator that
-/// continues a line above.
+/// Signed terms one after the other: `0.36 - 0.16\dot{z}_1`; the first sign may be a binary operator that continues a
+/// line above.
 pub(crate) fn tex_terms(terms: &[Signed], numbers: NumberStyle, continues: bool) -> String {
     let mut text = String::new();
     for (place, term) in terms.iter().enumerate() {

@@ -1,8 +1,7 @@
-//! Equations for papers: [`Equations`](crate::equations::Equations) enter,
-//! LaTeX files leave.
+//! Equations for papers: [`Equations`](crate::equations::Equations) enter, LaTeX files leave.
 //!
-//! Read [`document`](self::emit) first: it names the files. Names from a model file pass through [`tex_text`] and nothing
-//! else.
+//! Read [`document`](self::emit) first: it names the files. Names from a model file pass through [`tex_text`] and
+//! nothing else.
 //!
 //! ```
 //! use nalgebra::DMatrix;
@@ -27,9 +26,8 @@
 //! # }
 //! ```
 //!
-//! In a paper: `\usepackage{amsmath}` in the preamble, then `\input{flight_only}` for all
-//! phases, or `\input{flight_only_flight}` for one, and `\eqref{eq:flight-only:flight}` to
-//! refer to it.
+//! In a paper: `\usepackage{amsmath}` in the preamble, then `\input{flight_only}` for all phases, or
+//! `\input{flight_only_flight}` for one, and `\eqref{eq:flight-only:flight}` to refer to it.
 
 mod document;
 mod escape;

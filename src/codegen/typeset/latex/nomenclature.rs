@@ -1,6 +1,6 @@
 //! What each symbol of the equations means.
 
-use crate::equations::{Equations, LatentUnits};
+use crate::equations::Equations;
 use crate::model::{Activation, LatentVariable, ReducedModel, ScaleFactors, StateMap};
 use crate::typeset::{Decimal, NumberStyle, Rounding, SymbolTable};
 
@@ -26,31 +26,38 @@ pub(super) fn entries(
     symbols: &SymbolTable,
     numbers: NumberStyle,
 ) -> Vec<Entry> {
-    let model = system.model();
-    if let Some(units) = system.latent_units() {
-        return physical_entries(model, units, symbols, numbers);
-    }
+    let (model, units) = (system.model(), system.latent_units());
     let dim = model.latent_dim();
     let position = |index| {
-        let symbol = symbol(symbols, LatentVariable::Z(index));
-        entry(symbol, coordinate(model, index, numbers))
+        let unit = units.map(|units| format!("${}$; ", tex_unit(units.position[index])));
+        let meaning = unit.unwrap_or_default() + &coordinate(model, index, numbers);
+        entry(symbol(symbols, LatentVariable::Z(index)), meaning)
     };
     let mut list: Vec<Entry> = (0..dim).map(position).collect();
-    // the map of velocities: the weights of an affine encoder, the Jacobian of another
-    let map = match (model.encoder(), model.encoder_map()) {
-        (Ok(_), _) => Some(r"\mathbf{W}_e"),
-        (Err(_), Ok(_)) => Some(r"\mathbf{J}"),
-        (Err(_), Err(_)) => None,
-    };
-    let [mut velocities, mut inputs] = ["latent velocities", "latent inputs"].map(str::to_owned);
-    if let Some(map) = map {
-        velocities +=
-            &format!(r", $\dot{{\mathbf{{z}}}} = {map} (\mathbf{{s}}_x \dot{{\mathbf{{x}}}})$");
-        inputs += &format!(
-            r", $\mathbf{{u}}_{{\mathrm{{lat}}}} = ({map}^{{\mathsf{{T}}}})^{{+}} (\mathbf{{s}}_u \mathbf{{u}})$, lifted by $\mathbf{{s}}_u \mathbf{{u}} = {map}^{{\mathsf{{T}}}} \mathbf{{u}}_{{\mathrm{{lat}}}}$"
-        );
+    let velocity_range = range(symbols, LatentVariable::Dz, dim);
+    if let Some(units) = units {
+        list.push(entry(
+            velocity_range,
+            r"their derivatives by time, $\dot{\mathbf{z}} = \mathbf{W}_e \dot{\mathbf{x}}$, per second",
+        ));
+        list.extend((0..dim).map(|index| {
+            let (unit, number) = (tex_unit(units.input[index]), index + 1);
+            let meaning =
+                format!("${unit}$; the input that does work along latent coordinate {number}");
+            entry(symbol(symbols, LatentVariable::U(index)), meaning)
+        }));
+        list.push(entry(
+            ROBOT_STATE,
+            r"robot state and generalised input in SI units; $\mathbf{u} = \mathbf{L}\,\mathbf{u}_{\mathrm{lat}}$ with the constant matrix $\mathbf{L}$ of the generated code",
+        ));
+        list.push(entry(
+            ENCODER,
+            r"encoder in these units, $\mathbf{z} = \mathbf{W}_e \mathbf{x} + \mathbf{b}_e$",
+        ));
+        return list;
     }
-    list.push(entry(range(symbols, LatentVariable::Dz, dim), velocities));
+    let [velocities, inputs] = velocities_and_inputs(model);
+    list.push(entry(velocity_range, velocities));
     list.push(entry(range(symbols, LatentVariable::U, dim), inputs));
     if let Ok(encoder) = model.encoder_map() {
         let state = "robot state and generalised input in SI units";
@@ -67,40 +74,22 @@ pub(super) fn entries(
     list
 }
 
-fn physical_entries(
-    model: &ReducedModel,
-    units: &LatentUnits,
-    symbols: &SymbolTable,
-    numbers: NumberStyle,
-) -> Vec<Entry> {
-    let indices = || 0..model.latent_dim();
-    let positions = indices().map(|index| {
-        let unit = tex_unit(units.position[index]);
-        let meaning = format!("${unit}$; {}", coordinate(model, index, numbers));
-        entry(symbol(symbols, LatentVariable::Z(index)), meaning)
-    });
-    let inputs = indices().map(|index| {
-        let (unit, number) = (tex_unit(units.input[index]), index + 1);
-        let meaning =
-            format!("${unit}$; the input that does work along latent coordinate {number}");
-        entry(symbol(symbols, LatentVariable::U(index)), meaning)
-    });
-    let velocities = entry(
-        range(symbols, LatentVariable::Dz, model.latent_dim()),
-        r"their derivatives by time, $\dot{\mathbf{z}} = \mathbf{W}_e \dot{\mathbf{x}}$, per second",
-    );
-    let robot = [
-        entry(
-            ROBOT_STATE,
-            r"robot state and generalised input in SI units; $\mathbf{u} = \mathbf{L}\,\mathbf{u}_{\mathrm{lat}}$ with the constant matrix $\mathbf{L}$ of the generated code",
-        ),
-        entry(
-            ENCODER,
-            r"encoder in these units, $\mathbf{z} = \mathbf{W}_e \mathbf{x} + \mathbf{b}_e$",
-        ),
-    ];
-    let latent = positions.chain([velocities]).chain(inputs);
-    latent.chain(robot).collect()
+fn velocities_and_inputs(model: &ReducedModel) -> [String; 2] {
+    // the map of velocities: the weights of an affine encoder, the Jacobian of another
+    let map = match (model.encoder(), model.encoder_map()) {
+        (Ok(_), _) => Some(r"\mathbf{W}_e"),
+        (Err(_), Ok(_)) => Some(r"\mathbf{J}"),
+        (Err(_), Err(_)) => None,
+    };
+    let [mut velocities, mut inputs] = ["latent velocities", "latent inputs"].map(str::to_owned);
+    if let Some(map) = map {
+        velocities +=
+            &format!(r", $\dot{{\mathbf{{z}}}} = {map} (\mathbf{{s}}_x \dot{{\mathbf{{x}}}})$");
+        inputs += &format!(
+            r", $\mathbf{{u}}_{{\mathrm{{lat}}}} = ({map}^{{\mathsf{{T}}}})^{{+}} (\mathbf{{s}}_u \mathbf{{u}})$, lifted by $\mathbf{{s}}_u \mathbf{{u}} = {map}^{{\mathsf{{T}}}} \mathbf{{u}}_{{\mathrm{{lat}}}}$"
+        );
+    }
+    [velocities, inputs]
 }
 
 fn symbol(symbols: &SymbolTable, variable: LatentVariable) -> String {

@@ -5,10 +5,10 @@ use askama::Template;
 use crate::equations::{Equations, Unit};
 use crate::files::EmittedFile;
 use crate::typeset::latex::tex_cases;
-use crate::typeset::page::{Markup, Page, rendered};
+use crate::typeset::page::{Page, rendered};
 use crate::typeset::words::Spelling;
 use crate::typeset::{
-    EQUALS, EquationSystem, Math, PrintOptions, Symbol, TypesetError, break_lines, symbol_width,
+    EQUALS, EquationSystem, Math, PrintOptions, TypesetError, break_lines, symbol_width,
 };
 
 use super::math::{mathml, mathml_symbol, mathml_terms};
@@ -17,9 +17,8 @@ use super::prose::HtmlText;
 /// What a continued line is set in by, in em.
 const INDENT: f64 = 2.0;
 
-/// One phase as a `math` element: a brace before its equations, each broken into
-/// lines of `width_em`. The LaTeX of the same equations stands in an annotation,
-/// where tools for copying find it.
+/// One phase as a `math` element: a brace before its equations, each broken into lines of `width_em`. The LaTeX of the
+/// same equations stands in an annotation, where tools for copying find it.
 pub fn system(system: &EquationSystem, width_em: f64) -> String {
     let mut rows = String::new();
     for equation in &system.equations {
@@ -58,8 +57,8 @@ fn row(left: &str, right: &str, indent: f64) -> String {
     )
 }
 
-/// The page `NAME.html`: each phase's equations and the table of coefficients,
-/// without scripts or anything from elsewhere.
+/// The page `NAME.html`: each phase's equations and the table of coefficients, without scripts or anything from
+/// elsewhere.
 ///
 /// # Errors
 /// [`TypesetError::Template`].
@@ -74,8 +73,8 @@ pub fn emit(
 
 #[derive(Template)]
 #[template(path = "mathml/page.askama", config = "templates/askama.toml")]
-struct Document {
-    page: Page,
+struct Document<'a> {
+    page: Page<'a>,
 }
 
 /// Text and mathematics for the content of an element.
@@ -92,19 +91,6 @@ impl Spelling for Html {
     }
 }
 
-impl Markup for Html {
-    fn system(equations: &EquationSystem, width_em: f64) -> String {
-        system(equations, width_em)
-    }
-
-    fn head(symbol: &Symbol, phase: &str, unit: Option<Unit>) -> String {
-        let (symbol, phase) = (mathml_symbol(symbol), HtmlText(phase));
-        let unit = unit.map_or(String::new(), |unit| format!(", {unit}"));
-        format!("<math>{symbol}</math><br><small>{phase}{unit}</small>")
-    }
-
-    fn row_head(term: &Math, unit: Option<Unit>) -> String {
-        let unit = unit.map(|unit| format!("<small>, {unit}</small>"));
-        format!("<math>{}</math>{}", mathml(term), unit.unwrap_or_default())
-    }
+fn after_comma(unit: &Option<Unit>) -> String {
+    unit.map_or(String::new(), |unit| format!(", {unit}"))
 }

@@ -55,8 +55,8 @@ const SYMBOLS: [(&str, &str); 14] = [
     ("lambda", "<mi>λ</mi>"),
 ];
 
-/// Text for the content of an element: known symbols become `math` elements, a hyphen before a digit a minus, `s^2` a raised
-/// digit, `us` microseconds, a lone hyphen a dash.
+/// Text for the content of an element: known symbols become `math` elements, a hyphen before a digit a minus, `s^2` a
+/// raised digit, `us` microseconds, a lone hyphen a dash.
 ///
 /// ```
 /// use romc::typeset::mathml::HtmlProse;
