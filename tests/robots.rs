@@ -9,13 +9,9 @@ mod command_line;
 mod formulas;
 #[path = "robots/made.rs"]
 mod made;
-#[path = "robots/registry.rs"]
-mod registry;
 mod tools;
 #[path = "robots/urdf.rs"]
 mod urdf;
-#[path = "robots/wrench.rs"]
-mod wrench;
 
 use std::fs;
 use std::path::PathBuf;

@@ -11,13 +11,22 @@ mod parsing;
 #[path = "symbolic_identities/simplify.rs"]
 mod simplify;
 
-use romc::symbolic::{CanonicalForms, ExprId, ExprPool};
+use romc::symbolic::{CanonicalForms, ExprId, ExprPool, Function};
 
 const TABLE: &str = include_str!("fixtures/identities.txt");
 
 fn parse(pool: &mut ExprPool, text: &str) -> ExprId {
     pool.parse(text, &|_| true)
         .unwrap_or_else(|error| panic!("{text}: {error}"))
+}
+
+/// `function` of its own value plus `x`, or of that alone, so many levels deep.
+fn nested(pool: &mut ExprPool, function: Function, levels: usize, plus_x: bool) -> ExprId {
+    let x = pool.symbol("x");
+    (0..levels).fold(x, |deep, _| {
+        let value = pool.apply(function, deep);
+        if plus_x { pool.add(value, x) } else { value }
+    })
 }
 
 /// The text of what `rewrite` makes of the expression of a text.

@@ -74,7 +74,6 @@ impl ImportArguments {
             }
             (None, None) => None,
         };
-        let activation = self.activation.as_deref().map(str::parse).transpose();
         let robot = self.robot.as_deref().map(find).transpose();
         let robot = robot.map_err(|error| python_error(py, error))?;
         let actuators = self.actuators.as_ref();
@@ -97,7 +96,9 @@ impl ImportArguments {
             xi_layout: (self.xi_layout.as_deref())
                 .map(|name| choice(py, "xi_layout", name))
                 .transpose()?,
-            activation: activation.map_err(|error| python_error(py, Error::Model(error)))?,
+            activation: (self.activation.as_deref())
+                .map(|name| choice(py, "activation", name))
+                .transpose()?,
             robot,
             order: order.map_err(|error| python_error(py, Error::Model(error)))?,
             wrench_frame: wrench_frame(py, &self.wrench_frame)?,

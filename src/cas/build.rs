@@ -1,10 +1,8 @@
 //! Canonical constructors of numbers, sums and products.
 
-use super::node::{ExprId, Node};
-use super::number::{Number, exact_sum};
-use super::order::Exponent;
-use super::pool::ExprPool;
+use super::number::exact_sum;
 use super::power::half_integer;
+use crate::{Exponent, ExprId, ExprPool, Node, Number};
 
 /// Passes over operands that become flat only after collecting (each pass removes a level, so
 /// two or three suffice in practice; the bound keeps termination obvious).
@@ -243,7 +241,6 @@ impl ExprPool {
         self.assemble_product(numbers, factors)
     }
 
-    /// Puts the numbers of `expr` and its other factors, as base and exponent, into their lists.
     fn push_factors(
         &mut self,
         expr: ExprId,
@@ -365,28 +362,23 @@ fn fold(
     }
     numbers.sort_by_key(|number| (!number.is_exact(), *number));
     let n_exact = numbers.iter().filter(|number| number.is_exact()).count();
-    let floats = numbers.split_off(n_exact);
-    let mut queue = std::collections::VecDeque::from(floats);
-    let mut left_over = Vec::new();
+    let mut floats = std::collections::VecDeque::from(numbers.split_off(n_exact));
     let mut exact = numbers.into_iter();
-    let mut result = exact.next().or_else(|| queue.pop_front());
-    while let Some(current) = result {
-        let next = exact.next().or_else(|| {
-            if is_low(current) {
-                queue.pop_back()
-            } else {
-                queue.pop_front()
-            }
-        });
-        let Some(next) = next else {
+    let mut next = |is_low: bool| {
+        exact.next().or_else(|| match is_low {
+            true => floats.pop_back(),
+            false => floats.pop_front(),
+        })
+    };
+    let mut left_over = Vec::new();
+    let mut current = next(false).expect("there are two numbers or more");
+    while let Some(number) = next(is_low(current)) {
+        current = combine(current, number).unwrap_or_else(|| {
             left_over.push(current);
-            break;
-        };
-        result = combine(current, next).or_else(|| {
-            left_over.push(current);
-            Some(next)
+            number
         });
     }
+    left_over.push(current);
     left_over.sort_unstable();
     left_over
 }

@@ -12,21 +12,14 @@
 //!
 //! A shared part counts as often as it is written.
 
-use super::function::Function;
-use super::id_map::IdMap;
-use super::node::{ExprId, Node};
-use super::number::Number;
-use super::order::Exponent;
-use super::pool::ExprPool;
+use crate::{Exponent, ExprId, ExprPool, Function, IdMap, Node, Number};
 
 /// Of an added term, and of one inside a function's argument.
 const TERM: u64 = 4;
 const INNER_TERM: u64 = 2;
 const FUNCTION: u64 = 3;
 const PARENTHESES: u64 = 2;
-/// Of a fraction in a divisor.
 const NESTED: u64 = 2;
-/// Digits that a reader sees of a coefficient.
 const MOST_DIGITS: usize = 3;
 
 #[derive(Clone, Debug, Default)]

@@ -4,16 +4,10 @@
 //! canonical forms would forget them, as `0*log(z)` is 0 wherever it has a value. So each is looked at when it is read.
 //! `0^0` is 1, as in floating point; powers that are not integers have values for bases from zero on only.
 
-use super::canonical::CanonicalForms;
-use super::function::Function;
-use super::id_map::IdMap;
-use super::interval::Interval;
-use super::node::{ExprId, SymbolId};
-use super::pool::ExprPool;
+use crate::{CanonicalForms, ExprId, ExprPool, Function, IdMap, Interval, SymbolId};
 
 /// Largest constant, in nodes, of which it is proven that it is zero.
 const MAX_PROOF: usize = 300;
-/// Magnitude below which a constant may be zero.
 const SMALL: f64 = 1e-6;
 
 /// An expression that was read.
@@ -25,7 +19,6 @@ pub struct Reading {
     pub guards: Vec<ExprId>,
 }
 
-/// What is known of the parts of a text.
 #[derive(Debug, Default)]
 pub(super) struct Guards {
     pub(super) found: Vec<ExprId>,

@@ -1,10 +1,6 @@
 //! Derivatives, memoised per expression and symbol.
 
-use super::function::Function;
-use super::id_map::IdSet;
-use super::node::{ExprId, Node, SymbolId};
-use super::number::Number;
-use super::pool::ExprPool;
+use crate::{ExprId, ExprPool, Function, IdSet, Node, Number, SymbolId};
 
 impl ExprPool {
     /// The derivative of `expr` by `symbol`.

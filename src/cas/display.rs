@@ -2,10 +2,7 @@
 
 use std::fmt;
 
-use super::node::{ExprId, Node};
-use super::number::Number;
-use super::order::Exponent;
-use super::pool::ExprPool;
+use crate::{Exponent, ExprId, ExprPool, Node, Number};
 
 /// The text of an expression; made by [`ExprPool::display`].
 pub struct Display<'p> {
@@ -27,11 +24,9 @@ enum Piece<'p> {
     Text(&'p str),
     Number(Number),
     Expr(ExprId),
-    /// A base raised to a positive power, or a constant raised to any.
     Power(ExprId, Exponent),
     /// An expression in parentheses unless it is a single word.
     Operand(ExprId),
-    /// `coefficient * rest`, with the sign written in front.
     Term(Number, ExprId),
 }
 
@@ -154,7 +149,6 @@ impl<'p> Display<'p> {
         pieces
     }
 
-    /// Whether the square root of `expr` would be read as a number.
     fn has_exact_root(&self, expr: ExprId) -> bool {
         let number = self.pool.as_number(expr);
         number.is_some_and(|number| number.checked_root(2).is_some())

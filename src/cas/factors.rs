@@ -1,96 +1,143 @@
-//! Identities of the factors of a product: sines and cosines that are a tangent, tangents of doubles
-//! and halves of an angle, magnitudes and signs.
+//! Identities of the factors of a product: a table of those of two factors, and what magnitudes and signs share.
 
-use super::function::Function;
-use super::node::{ExprId, Node};
-use super::number::Number;
-use super::order::Exponent;
-use super::pool::ExprPool;
+use std::sync::Arc;
+
+use crate::{ExprId, ExprPool, Function, Node, Number, SymbolId};
+
+/// Where an identity is applied.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Stage {
+    /// On the way to the normal form.
+    Normal,
+    /// Towards fewer calls, before and after magnitudes are put together.
+    Angles,
+    Signs,
+}
+
+/// Left and right sides for all `a`. A factor matches to any power of the same sign, a sum to that power alone.
+const IDENTITIES: [(Stage, &str, &str); 14] = [
+    (Stage::Normal, "sign(a)*abs(a)", "a"),
+    (Stage::Normal, "sign(a)*a", "abs(a)"),
+    (Stage::Normal, "sign(a)^3", "sign(a)"),
+    (Stage::Normal, "abs(a)^3", "abs(a)*a^2"),
+    (Stage::Normal, "1/abs(a)", "abs(a)/a^2"),
+    (Stage::Angles, "sin(a)/cos(a)", "tan(a)"),
+    (Stage::Angles, "cos(a)/sin(a)", "1/tan(a)"),
+    (Stage::Angles, "tan(a)/(1 - tan(a)^2)", "tan(2*a)/2"),
+    (Stage::Angles, "tanh(a)/(1 + tanh(a)^2)", "tanh(2*a)/2"),
+    (Stage::Angles, "sin(a)/(1 + cos(a))", "tan(a/2)"),
+    (Stage::Angles, "sin(a)/(1 - cos(a))", "1/tan(a/2)"),
+    (Stage::Angles, "(1 + cos(a))/sin(a)", "1/tan(a/2)"),
+    (Stage::Angles, "(1 - cos(a))/sin(a)", "tan(a/2)"),
+    (Stage::Signs, "abs(a)/a", "sign(a)"),
+];
+
+/// A line of the table in the expressions of a pool.
+#[derive(Debug)]
+pub(super) struct Identity {
+    stage: Stage,
+    variable: SymbolId,
+    left: ExprId,
+    factors: Vec<Power>,
+    right: ExprId,
+}
+
+/// Base and exponent.
+type Power = (ExprId, i64);
+
+impl Identity {
+    /// What the variable is for a product of these factors, and how often the left side is part of it.
+    fn find(
+        &self,
+        pool: &ExprPool,
+        wanted: &[Power],
+        factors: &[Power],
+        bound: Option<ExprId>,
+    ) -> Option<(ExprId, i64)> {
+        let Some((&(pattern, power), rest)) = wanted.split_first() else {
+            return Some((bound?, i64::MAX));
+        };
+        factors.iter().find_map(|&(base, found)| {
+            let mut bound = bound;
+            let (count, is_whole) = match pool.node(pattern) {
+                Node::Sum(_) => (1, found == power),
+                _ => (found / power, found / power > 0),
+            };
+            if !is_whole || !pool.binds(pattern, base, self.variable, &mut bound) {
+                return None;
+            }
+            let (value, others) = self.find(pool, rest, factors, bound)?;
+            // Even powers of magnitudes are no magnitudes.
+            let count = if power.abs() == 1 { count } else { 1 };
+            Some((value, count.min(others)))
+        })
+    }
+}
 
 impl ExprPool {
-    /// What `merge` makes of a product, given its factors and the first place for which it finds
-    /// something; else `expr`.
-    pub(super) fn merge_first(
-        &mut self,
+    fn identities(&mut self) -> Arc<[Identity]> {
+        if let Some(known) = &self.identities {
+            return known.clone();
+        }
+        let variable = self.symbol_id("a");
+        let identities = IDENTITIES.map(|(stage, left, right)| {
+            let [left, right] = [left, right].map(|text| {
+                self.parse(text, &|name| name == "a")
+                    .expect("the table's expressions parse")
+            });
+            let factors = self.factors_of(left).iter();
+            Identity {
+                stage,
+                variable,
+                left,
+                factors: factors.filter_map(|f| self.integer_power(*f)).collect(),
+                right,
+            }
+        });
+        let identities: Arc<[Identity]> = identities.into();
+        self.identities = Some(identities.clone());
+        identities
+    }
+
+    /// A product with the left sides of all identities of a stage replaced by the right ones.
+    pub(super) fn merge_factors(&mut self, stage: Stage, expr: ExprId) -> ExprId {
+        let mut product = expr;
+        for identity in self.identities().iter().filter(|i| i.stage == stage) {
+            loop {
+                let factors = self.factors_of(product).iter();
+                let factors: Vec<Power> = factors.filter_map(|f| self.integer_power(*f)).collect();
+                let found = identity.find(self, &identity.factors, &factors, None);
+                let Some((value, count)) = found else { break };
+                let sides = [(identity.left, -count), (identity.right, count)];
+                let [before, after] = sides.map(|(side, power)| {
+                    let side = self.substitute(side, &[(identity.variable, value)]);
+                    self.pow_number(side, Number::integer(power))
+                });
+                product = self.product(&[product, before, after]);
+            }
+        }
+        product
+    }
+
+    /// Whether an expression is a pattern with some value of its variable.
+    fn binds(
+        &self,
+        pattern: ExprId,
         expr: ExprId,
-        merge: impl Fn(&mut ExprPool, &[ExprId], usize) -> Option<ExprId>,
-    ) -> ExprId {
-        let factors = self.factors_of(expr).to_vec();
-        let merged = (0..factors.len()).find_map(|place| merge(self, &factors, place));
-        merged.unwrap_or(expr)
-    }
-
-    /// `sin(a)/cos(a) = tan(a)`, also with powers.
-    pub(super) fn merge_tangents(&mut self, expr: ExprId) -> ExprId {
-        self.merge_first(expr, |pool, factors, place| {
-            let Some((Function::Cos, argument, cosines)) = pool.function_power(factors[place])
-            else {
-                return None;
-            };
-            let sines = factors
-                .iter()
-                .filter_map(|factor| pool.function_power(*factor))
-                .find(|(function, angle, _)| (*function, *angle) == (Function::Sin, argument))
-                .map_or(0, |(_, _, power)| power);
-            if sines.signum() * cosines.signum() >= 0 {
-                return None;
-            }
-            let tangents = sines.signum() * sines.abs().min(cosines.abs());
-            let mut merged = factors.to_vec();
-            merged.push(pool.apply_power(Function::Tan, argument, tangents));
-            merged.push(pool.apply_power(Function::Sin, argument, -tangents));
-            merged.push(pool.apply_power(Function::Cos, argument, tangents));
-            Some(pool.product(&merged))
-        })
-    }
-
-    /// `tan(a)/(1 - tan(a)^2) = tan(2*a)/2`, `tanh(a)/(1 + tanh(a)^2) = tanh(2*a)/2`,
-    /// `sin(a)/(1 + cos(a)) = (1 - cos(a))/sin(a) = tan(a/2)` and `sin(a)/(1 - cos(a)) = 1/tan(a/2)`.
-    pub(super) fn merge_double_angles(&mut self, expr: ExprId) -> ExprId {
-        self.merge_first(expr, |pool, factors, place| {
-            let (base, Exponent::Number(side)) = pool.base_and_exponent(factors[place]) else {
-                return None;
-            };
-            let terms = pool.terms_of(base);
-            let [(Number::ONE, ExprId::ONE), (sign, rest)] = terms[..] else {
-                return None;
-            };
-            let (inner, angle, power) = pool.function_power(rest)?;
-            let (is_below, is_above) = (side == Number::MINUS_ONE, side.is_one());
-            let (two, half) = (Number::integer(2), Number::HALF);
-            // The other factor with its power, the new function, what its angle and the product are multiplied by.
-            let (partner, wanted, new, multiple, scale) = match (inner, power, sign) {
-                (Function::Tan, 2, Number::MINUS_ONE) | (Function::Tanh, 2, Number::ONE)
-                    if is_below =>
-                {
-                    (inner, 1, (inner, 1), two, half)
-                }
-                (Function::Cos, 1, Number::ONE | Number::MINUS_ONE) if is_below || is_above => {
-                    let wanted = if is_below { 1 } else { -1 };
-                    let new = if sign.is_one() { wanted } else { -wanted };
-                    (
-                        Function::Sin,
-                        wanted,
-                        (Function::Tan, new),
-                        half,
-                        Number::ONE,
-                    )
-                }
-                _ => return None,
-            };
-            let mut powers = factors
-                .iter()
-                .filter_map(|other| pool.function_power(*other));
-            if !powers.any(|(f, of, n)| (f, of) == (partner, angle) && n * wanted > 0) {
-                return None;
-            }
-            let angle_of_new = pool.scale(multiple, angle);
-            let mut merged = factors.to_vec();
-            merged[place] = pool.apply_power(new.0, angle_of_new, new.1);
-            merged.push(pool.apply_power(partner, angle, -wanted));
-            let product = pool.product(&merged);
-            Some(pool.scale(scale, product))
-        })
+        variable: SymbolId,
+        bound: &mut Option<ExprId>,
+    ) -> bool {
+        let mut all = |patterns: &[ExprId], exprs: &[ExprId]| {
+            let mut pairs = patterns.iter().zip(exprs);
+            patterns.len() == exprs.len() && pairs.all(|(p, e)| self.binds(*p, *e, variable, bound))
+        };
+        match (self.node(pattern), self.node(expr)) {
+            (Node::Symbol(symbol), _) if *symbol == variable => *bound.get_or_insert(expr) == expr,
+            (Node::Apply(f, x), Node::Apply(g, y)) => f == g && all(&[*x], &[*y]),
+            (Node::Power(x, m), Node::Power(y, n)) => m == n && all(&[*x], &[*y]),
+            (Node::Sum(x), Node::Sum(y)) | (Node::Product(x), Node::Product(y)) => all(x, y),
+            _ => pattern == expr,
+        }
     }
 
     /// `abs(a*b) = abs(a)*abs(b)`.
@@ -111,39 +158,8 @@ impl ExprPool {
         (product != whole).then_some(product)
     }
 
-    /// `abs(a)*sign(a) = a`, `sign(a)*a = abs(a)`, and even powers of both.
-    pub(super) fn merge_signs(&mut self, expr: ExprId) -> ExprId {
-        let factors = self.factors_of(expr).to_vec();
-        for (place, &factor) in factors.iter().enumerate() {
-            let mut rest = factors.clone();
-            match self.function_power(factor) {
-                Some((Function::Abs, argument, power)) if !(0..2).contains(&power) => {
-                    let even = power - power.rem_euclid(2);
-                    rest[place] = self.apply_power(Function::Abs, argument, power - even);
-                    rest.push(self.pow_number(argument, Number::integer(even)));
-                }
-                Some((Function::Sign, argument, power)) if power > 0 => {
-                    if power > 2 {
-                        let lower = 2 - power % 2;
-                        rest[place] = self.apply_power(Function::Sign, argument, lower);
-                    } else if let Some(partner) = self.partner_of_sign(&factors, argument) {
-                        let (base, with_sign) = partner;
-                        let lower = self.powi(base, -1);
-                        rest[place] = self.apply_power(Function::Sign, argument, power - 1);
-                        rest.extend([lower, with_sign]);
-                    } else {
-                        continue;
-                    }
-                }
-                _ => continue,
-            }
-            return self.product(&rest);
-        }
-        self.merge_factors(Function::Sign, expr)
-    }
-
     /// `f(a)*f(b) = f(a*b)`, for magnitudes and signs.
-    pub(super) fn merge_factors(&mut self, function: Function, expr: ExprId) -> ExprId {
+    pub(super) fn merge_calls(&mut self, function: Function, expr: ExprId) -> ExprId {
         let (inside, mut outside) =
             self.partition_factors(expr, |pool, factor| match pool.function_power(factor) {
                 Some((of_factor, argument, 1)) if of_factor == function => Some(argument),
@@ -155,39 +171,5 @@ impl ExprPool {
         let product = self.product(&inside);
         outside.push(self.apply(function, product));
         self.product(&outside)
-    }
-
-    /// What loses a factor and what takes its place when `sign(argument)` is multiplied in:
-    /// `x` becomes `abs(x)`, `abs(x)` becomes `x`.
-    fn partner_of_sign(
-        &mut self,
-        factors: &[ExprId],
-        argument: ExprId,
-    ) -> Option<(ExprId, ExprId)> {
-        let magnitude = self.apply(Function::Abs, argument);
-        for (base, other) in [(magnitude, argument), (argument, magnitude)] {
-            let mut powers = (factors.iter()).filter_map(|factor| self.integer_power(*factor));
-            if powers.any(|(found, power)| found == base && power > 0) {
-                return Some((base, other));
-            }
-        }
-        None
-    }
-
-    /// `abs(a)/a = sign(a)`.
-    pub(super) fn abs_to_sign(&mut self, expr: ExprId) -> ExprId {
-        self.merge_first(expr, |pool, factors, place| {
-            let Some((Function::Abs, argument, 1)) = pool.function_power(factors[place]) else {
-                return None;
-            };
-            let mut powers = (factors.iter()).filter_map(|factor| pool.integer_power(*factor));
-            if !powers.any(|(base, power)| base == argument && power < 0) {
-                return None;
-            }
-            let mut merged = factors.to_vec();
-            merged[place] = pool.apply(Function::Sign, argument);
-            merged.push(argument);
-            Some(pool.product(&merged))
-        })
     }
 }

@@ -2,10 +2,7 @@
 
 use std::fmt;
 
-use super::interval::Interval;
-use super::node::ExprId;
-use super::number::Number;
-use super::pool::ExprPool;
+use crate::{ExprId, ExprPool, Interval, Number};
 
 /// The elementary functions. Arguments are real, in radians where they are angles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -16,9 +13,7 @@ pub enum Function {
     Tan,
     Tanh,
     Exp,
-    /// Natural logarithm.
     Log,
-    /// Non-negative square root.
     Sqrt,
     Abs,
     /// `-1`, `0` or `1`: the derivative of [`Function::Abs`].
@@ -34,9 +29,7 @@ pub(super) enum Parity {
     Neither,
 }
 
-/// What the algebra uses of a function.
 pub(super) struct Row {
-    function: Function,
     /// Names in the term grammar; the first is printed.
     names: &'static [&'static str],
     pub(super) parity: Parity,
@@ -48,9 +41,9 @@ pub(super) struct Row {
     pub(super) derivative: fn(&mut ExprPool, ExprId, ExprId) -> ExprId,
 }
 
+/// In the order of the enum.
 const ROWS: [Row; 9] = [
     Row {
-        function: Function::Sin,
         names: &["sin"],
         parity: Parity::Odd,
         value: f64::sin,
@@ -59,7 +52,6 @@ const ROWS: [Row; 9] = [
         derivative: |pool, x, _| pool.apply(Function::Cos, x),
     },
     Row {
-        function: Function::Cos,
         names: &["cos"],
         parity: Parity::Even,
         value: f64::cos,
@@ -71,7 +63,6 @@ const ROWS: [Row; 9] = [
         },
     },
     Row {
-        function: Function::Tan,
         names: &["tan"],
         parity: Parity::Odd,
         value: f64::tan,
@@ -83,7 +74,6 @@ const ROWS: [Row; 9] = [
         },
     },
     Row {
-        function: Function::Tanh,
         names: &["tanh"],
         parity: Parity::Odd,
         value: f64::tanh,
@@ -98,7 +88,6 @@ const ROWS: [Row; 9] = [
         },
     },
     Row {
-        function: Function::Exp,
         names: &["exp"],
         parity: Parity::Neither,
         value: f64::exp,
@@ -107,7 +96,6 @@ const ROWS: [Row; 9] = [
         derivative: |_, _, value| value,
     },
     Row {
-        function: Function::Log,
         names: &["log", "ln"],
         parity: Parity::Neither,
         value: f64::ln,
@@ -116,7 +104,6 @@ const ROWS: [Row; 9] = [
         derivative: |pool, x, _| pool.powi(x, -1),
     },
     Row {
-        function: Function::Sqrt,
         names: &["sqrt"],
         parity: Parity::Neither,
         value: f64::sqrt,
@@ -128,7 +115,6 @@ const ROWS: [Row; 9] = [
         },
     },
     Row {
-        function: Function::Abs,
         names: &["abs"],
         parity: Parity::Even,
         value: f64::abs,
@@ -137,7 +123,6 @@ const ROWS: [Row; 9] = [
         derivative: |pool, x, _| pool.apply(Function::Sign, x),
     },
     Row {
-        function: Function::Sign,
         names: &["sign", "sgn"],
         parity: Parity::Odd,
         // f64::signum gives 1 for zero.
@@ -151,14 +136,8 @@ const ROWS: [Row; 9] = [
 impl Function {
     /// All functions, in the order in which sums list them.
     pub const ALL: [Function; ROWS.len()] = {
-        let mut all = [Function::Sin; ROWS.len()];
-        let mut place = 0;
-        while place < ROWS.len() {
-            all[place] = ROWS[place].function;
-            assert!(all[place] as usize == place);
-            place += 1;
-        }
-        all
+        use Function::*;
+        [Sin, Cos, Tan, Tanh, Exp, Log, Sqrt, Abs, Sign]
     };
 
     pub(super) fn row(self) -> &'static Row {
@@ -172,8 +151,8 @@ impl Function {
 
     /// The function of that name; `ln` and `sgn` are names of the logarithm and the sign too.
     pub fn by_name(name: &str) -> Option<Function> {
-        let row = ROWS.iter().find(|row| row.names.contains(&name))?;
-        Some(row.function)
+        let mut all = Function::ALL.into_iter();
+        all.find(|function| function.row().names.contains(&name))
     }
 
     /// The value at `argument`; NaN or infinite where the function has none.

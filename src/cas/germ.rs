@@ -1,19 +1,14 @@
 //! Series of expressions beside a point, where roots, magnitudes and signs may have kinks.
 //!
 //! With one variable at `p + t` or `p - t`, an expression is a sum of terms `c t^r` for small positive `t`, with
-//! coefficients that are expressions at the point and real exponents: `sqrt(abs(x))*sin(x)` at `x = 0` is
-//! `t^(3/2) - ...`. Arithmetic with such series (Puiseux's, with any exponents) gives the slope where the rules
-//! of differentiation end in `0/0` or `0*inf`. Expressions that are smooth at the point have Taylor series.
+//! coefficients that are expressions at the point and real exponents (a Puiseux series): `sqrt(abs(x))*sin(x)` at
+//! `x = 0` is `t^(3/2) - ...`. Expressions that are smooth at the point have Taylor series.
 
 use std::cmp::Ordering;
 
-use super::function::Function;
-use super::id_map::IdMap;
-use super::node::{ExprId, Node, SymbolId};
-use super::number::Number;
-use super::pool::ExprPool;
 use super::series::Series;
 use super::slope::Facts;
+use crate::{ExprId, ExprPool, Function, IdMap, Node, Number, SymbolId};
 
 pub(super) const LAST_ORDER: i64 = 8;
 
@@ -67,7 +62,7 @@ impl Germs<'_> {
             Node::Sum(_) | Node::Product(_) if is_smooth => Ok(None),
             Node::Sum(terms) => {
                 let mut sum = Series::default();
-                for term in terms {
+                for &term in terms.iter() {
                     let series = self.series(term);
                     sum = self.plus(sum, series);
                 }
@@ -158,7 +153,6 @@ impl Germs<'_> {
         series
     }
 
-    /// A function that is smooth wherever it has values.
     fn smooth_of(&mut self, function: Function, argument: Series) -> Result<Series, Stop> {
         let (value, inner) = match self.split(argument)? {
             Ok(parts) => parts,

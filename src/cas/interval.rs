@@ -1,16 +1,13 @@
 //! Intervals of reals with outward rounding.
 //!
-//! Every operation returns an interval that contains the exact results for all points of its
-//! operands. Sums, products, quotients and square roots are rounded to the nearest float that
-//! errs outward; elementary functions are widened by a few steps, more than the error of
-//! any current mathematical library.
+//! Every operation returns an interval that contains the exact results for all points of its operands. Sums, products,
+//! quotients and square roots err outward by a unit in the last place at most; elementary functions by a few, more than
+//! the error of any current mathematical library.
 
 use std::fmt;
 
-use super::function::Function;
-use super::rounding::{
-    is_exact_root, mul_up, power_down, power_up, recip_down, recip_up, sub_up, widen_down, widen_up,
-};
+use super::number::power;
+use crate::Function;
 
 /// Arguments beyond this are not reduced: sines of them are only known to lie in `[-1, 1]`.
 const LARGEST_ANGLE: f64 = 1e9;
@@ -150,10 +147,9 @@ impl Interval {
             true => -power_down(-x, exponent),
             false => power_up(x, exponent),
         };
-        let base = if exponent.is_multiple_of(2) {
-            self.abs()
-        } else {
-            self
+        let base = match exponent.is_multiple_of(2) {
+            true => self.abs(),
+            false => self,
         };
         Interval::between(down(base.lo), up(base.hi))
     }
@@ -172,7 +168,6 @@ impl Interval {
         power.hull(magnitude).hull(-magnitude)
     }
 
-    /// `exp(exponent log(x))` where `x` is positive, and the limits at zero.
     fn pow_non_negative(self, exponent: Interval) -> Interval {
         let mut power = (exponent * self.log()).exp();
         if self.contains(0.0) && exponent.hi > 0.0 {
@@ -184,7 +179,6 @@ impl Interval {
         power
     }
 
-    /// Square roots of the points that are not negative.
     pub(crate) fn sqrt(self) -> Interval {
         let inside = self.intersection(Interval::NON_NEGATIVE);
         if inside.is_empty() {
@@ -205,7 +199,6 @@ impl Interval {
             .intersection(Interval::NON_NEGATIVE)
     }
 
-    /// Natural logarithms of the positive points.
     pub(crate) fn log(self) -> Interval {
         let inside = self.intersection(Interval::NON_NEGATIVE);
         if inside.hi == 0.0 {
@@ -328,4 +321,92 @@ impl std::ops::Div for Interval {
     fn div(self, other: Interval) -> Interval {
         self * other.recip()
     }
+}
+
+/// Steps by which the value of an elementary function is widened.
+const FUNCTION_ULPS: usize = 4;
+
+/// A float that was rounded to the nearest, or the next one if the exact result is above it. A finite result that
+/// overflows downward is still above the largest negative float.
+fn up(nearest: f64, is_above: bool, operands: [f64; 2]) -> f64 {
+    match nearest.is_finite() {
+        true if is_above => nearest.next_up(),
+        false if nearest < 0.0 && operands.iter().all(|x| x.is_finite()) => f64::MIN,
+        _ => nearest,
+    }
+}
+
+/// `a - b` rounded up; infinite for infinities of the same sign, of which nothing is known.
+fn sub_up(a: f64, b: f64) -> f64 {
+    let difference = a - b;
+    if difference.is_nan() {
+        return f64::INFINITY;
+    }
+    // The rounding error of a difference, exactly (Knuth's two-sum).
+    let b_rounded = a - difference;
+    let error = (a - (difference + b_rounded)) + (b_rounded - b);
+    up(difference, error > 0.0 || error.is_nan(), [a, b])
+}
+
+/// `a * b` rounded up, with `0 * inf = 0` as bounds of intervals need it.
+fn mul_up(a: f64, b: f64) -> f64 {
+    if a == 0.0 || b == 0.0 {
+        return 0.0;
+    }
+    // The error of a product is exact in one fused operation, except near underflow.
+    let product = a * b;
+    let is_above = product.abs() < 1e-290 || a.mul_add(b, -product) > 0.0;
+    up(product, is_above, [a, b])
+}
+
+/// `1/x` of a positive `x`.
+fn recip_up(x: f64) -> f64 {
+    let quotient = 1.0 / x;
+    match quotient.mul_add(x, -1.0) == 0.0 {
+        true => quotient,
+        false => quotient.next_up(),
+    }
+}
+
+fn recip_down(x: f64) -> f64 {
+    let quotient = 1.0 / x;
+    if quotient.is_infinite() {
+        f64::MAX
+    } else if quotient.mul_add(x, -1.0) == 0.0 {
+        quotient
+    } else {
+        quotient.next_down().max(0.0)
+    }
+}
+
+/// `x^exponent` of an `x` that is not negative.
+fn power_up(x: f64, exponent: u64) -> f64 {
+    power_by(x, exponent, mul_up)
+}
+
+fn power_down(x: f64, exponent: u64) -> f64 {
+    power_by(x, exponent, |a, b| (-mul_up(-a, b)).max(0.0))
+}
+
+/// A power by squaring; a bound if `product` is monotone and all factors are non-negative.
+pub(super) fn power_by(x: f64, exponent: u64, product: impl Fn(f64, f64) -> f64) -> f64 {
+    let power = power(1.0, x, exponent, |a, b| Some(product(*a, *b)));
+    power.expect("no product fails")
+}
+
+fn is_exact_root(root: f64, square: f64) -> bool {
+    root == f64::INFINITY
+        || (square > 1e-290 && root.mul_add(root, -square) == 0.0)
+        || square == 0.0
+}
+
+fn widen_down(value: f64) -> f64 {
+    -widen_up(-value)
+}
+
+fn widen_up(value: f64) -> f64 {
+    if value == f64::NEG_INFINITY {
+        return f64::MIN;
+    }
+    (0..FUNCTION_ULPS).fold(value, |value, _| value.next_up())
 }

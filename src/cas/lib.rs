@@ -7,14 +7,14 @@
 //!
 //! | files | |
 //! |---|---|
-//! | `node`, `function`, `number`, `pool`, `id_map`, `order` | what an expression is and how it is stored |
+//! | `node`, `function`, `number`, `pool`, `order` | what an expression is and how it is stored |
 //! | `build`, `power` | canonical constructors |
-//! | `lexer`, `parse`, `defined`, `display` | the grammar of candidate terms, both ways; constants without a value |
-//! | `eval`, `interval`, `rounding`, `bounds` | values, and bounds over boxes |
-//! | `diff`, `substitute` | derivatives and substitution |
+//! | `parse`, `defined`, `display` | the grammar of candidate terms, both ways; constants without a value |
+//! | `interval`, `values` | values, and bounds over boxes |
+//! | `diff` | derivatives |
 //! | `slope`, `germ`, `series` | derivatives with values where roots, magnitudes and signs have kinks |
-//! | `expand`, `polynomial`, `trig`, `rules`, `factors` | rewriting, each way when asked |
-//! | `simplify`, `shorten`, `cost`, `region` | choosing the shortest of equal forms |
+//! | `region`, `polynomial`, `trig`, `rules`, `factors` | substitution and rewriting, each way when asked |
+//! | `simplify`, `shorten`, `cost` | choosing the shortest of equal forms |
 //! | `canonical/` | a normal form with exact coefficients, to decide equality |
 //!
 //! No algorithm but the parser, whose depth is limited, recurses on the machine's stack, and none iterates a hash map
@@ -37,21 +37,16 @@
 //! # Ok::<(), romc::symbolic::ParseError>(())
 //! ```
 
-mod bounds;
 mod build;
 mod canonical;
 mod cost;
 mod defined;
 mod diff;
 mod display;
-mod eval;
-mod expand;
 mod factors;
 mod function;
 mod germ;
-mod id_map;
 mod interval;
-mod lexer;
 mod node;
 mod number;
 mod order;
@@ -60,19 +55,18 @@ mod polynomial;
 mod pool;
 mod power;
 mod region;
-mod rounding;
 mod rules;
 mod series;
 mod shorten;
 mod simplify;
 mod slope;
-mod substitute;
 mod trig;
+mod values;
 
 pub use canonical::{CanonicalForm, CanonicalForms, Coefficient};
 pub use defined::Reading;
 pub use display::Display;
-pub use eval::integer_power;
+
 pub use function::Function;
 pub use interval::Interval;
 pub use node::{ExprId, Node, SymbolId};
@@ -80,3 +74,9 @@ pub use number::{Number, sum_of_floats};
 pub use parse::{ParseError, ParseErrorKind, ParseLimits};
 pub use pool::ExprPool;
 pub use shorten::{Shortened, Shortener};
+pub use values::integer_power;
+
+// Names that most files use.
+use node::{IdMap, IdSet};
+use order::Exponent;
+use pool::Sign;

@@ -1,13 +1,12 @@
 //! Numbers of the algebra: exact rationals, and floats where exactness has ended.
 //!
-//! A learned coefficient is a float and keeps its bits; an integer exponent or the `1/2` of a
-//! derivative is exact. Sums and products of both follow the usual rule: one float makes the
-//! result a float, and a rational that outgrows `i64` becomes the nearest float. A float of at most
-//! 15 digits stands for the decimal fraction that is written for it, so that `0.1 + 0.2` is `0.3`.
+//! A learned coefficient is a float and keeps its bits; an integer exponent or the `1/2` of a derivative is exact. One
+//! float makes a sum or product a float, and so does a rational that outgrows `i64`. A float of at most 15 digits stands
+//! for the decimal fraction that is written for it, so that `0.1 + 0.2` is `0.3`.
 //!
-//! Only correctly rounded operations are folded (`+ - * /`, square roots, integer powers as
-//! multiplication chains), so that folding gives the same bits on every machine. An operation
-//! whose result would be infinite, undefined or denormal is refused ([`None`]) and stays symbolic.
+//! Only correctly rounded operations are folded (`+ - * /`, square roots, integer powers as multiplication chains), so
+//! that results are the same on every machine. An operation whose result would be infinite, undefined or denormal is
+//! refused ([`None`]) and stays symbolic.
 
 use std::cmp::Ordering;
 use std::fmt;
@@ -186,7 +185,6 @@ impl Number {
         of_decimals().or_else(|| rounded(self.to_f64(), other.to_f64()))
     }
 
-    /// An exact number of short parts as the nearest float.
     fn rounded(self) -> Option<Number> {
         let (numerator, denominator) = self.as_rational()?;
         let is_short = |part: i64| part.unsigned_abs() <= EXACT_INTEGER as u64;
@@ -203,7 +201,6 @@ impl Number {
         self.combined(other, product, |a, b| normal(a * b))
     }
 
-    /// `self / other`; `None` for a zero divisor, overflow or underflow.
     pub(crate) fn checked_div(self, other: Number) -> Option<Number> {
         if self.is_zero() && !other.is_zero() {
             return Some(Number::ZERO);
@@ -284,7 +281,6 @@ pub fn sum_of_floats(values: &[f64]) -> f64 {
     parts.iter().sum()
 }
 
-/// The number of a float that is zero or has all its digits; `None` for anything else.
 fn normal(value: f64) -> Option<Number> {
     Number::from_f64(value).filter(|_| value.is_normal())
 }

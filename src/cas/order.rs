@@ -7,10 +7,7 @@
 use std::cmp::Ordering;
 use std::ops::ControlFlow;
 
-use super::function::Function;
-use super::node::{ExprId, Node};
-use super::number::Number;
-use super::pool::ExprPool;
+use crate::{ExprId, ExprPool, Function, Node, Number};
 
 /// Grades from here on are not polynomial.
 const NOT_POLYNOMIAL: u32 = 1 << 31;
@@ -104,7 +101,6 @@ impl ExprPool {
         Step::Break(a.len().cmp(&b.len()))
     }
 
-    /// Numbers, then symbols, then functions, then sums.
     fn compare_atoms(&self, a: ExprId, b: ExprId) -> Step {
         let rank = |node: &Node| match node {
             Node::Number(_) => 0,
@@ -119,7 +115,7 @@ impl ExprPool {
             }
             (Node::Apply(f, x), Node::Apply(g, y)) if f == g => Step::Continue((*x, *y)),
             (Node::Apply(f, _), Node::Apply(g, _)) => Step::Break(f.cmp(g)),
-            (Node::Sum(x), Node::Sum(y)) => match x.iter().zip(y).find(|(x, y)| x != y) {
+            (Node::Sum(x), Node::Sum(y)) => match x.iter().zip(y.iter()).find(|(x, y)| x != y) {
                 Some((x, y)) => Step::Continue((*x, *y)),
                 None => Step::Break(x.len().cmp(&y.len())),
             },

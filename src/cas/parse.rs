@@ -13,11 +13,7 @@
 //! the length of the text.
 
 use super::defined::{Guards, Reading};
-use super::function::Function;
-use super::lexer::{Token, TokenKind, tokenize};
-use super::node::ExprId;
-use super::order::Exponent;
-use super::pool::ExprPool;
+use crate::{Exponent, ExprId, ExprPool, Function, Number};
 
 /// How large a text may be and become.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -78,7 +74,7 @@ pub enum ParseErrorKind {
 }
 
 impl ParseErrorKind {
-    pub(super) fn at(self, text: &str, start: usize) -> ParseError {
+    fn at(self, text: &str, start: usize) -> ParseError {
         ParseError {
             position: text[..start].chars().count() + 1,
             kind: self,
@@ -102,7 +98,7 @@ fn function_names() -> String {
     format!("{} or {last}", names.join(", "))
 }
 
-pub(super) fn short(token: &str) -> String {
+fn short(token: &str) -> String {
     token.chars().take(40).collect()
 }
 
@@ -134,8 +130,8 @@ impl ExprPool {
         literal: &dyn Fn(&mut ExprPool, &str) -> Option<ExprId>,
         limits: ParseLimits,
     ) -> Result<ExprId, ParseError> {
-        let reading = self.read_within(text, allowed, literal, limits, None)?;
-        Ok(reading.expr)
+        let mut parser = Parser::of(self, text, allowed, literal, limits)?;
+        parser.expression(TokenKind::End)
     }
 
     /// As [`parse_within`](ExprPool::parse_within), for texts that users write: constant parts that have no value, such
@@ -150,37 +146,11 @@ impl ExprPool {
         literal: &dyn Fn(&mut ExprPool, &str) -> Option<ExprId>,
         limits: ParseLimits,
     ) -> Result<Reading, ParseError> {
-        self.read_within(text, allowed, literal, limits, Some(Guards::default()))
-    }
-
-    fn read_within(
-        &mut self,
-        text: &str,
-        allowed: &dyn Fn(&str) -> bool,
-        literal: &dyn Fn(&mut ExprPool, &str) -> Option<ExprId>,
-        limits: ParseLimits,
-        guards: Option<Guards>,
-    ) -> Result<Reading, ParseError> {
-        if text.len() > limits.length {
-            let (found, limit) = (text.len(), limits.length);
-            return Err(ParseErrorKind::TooLong { found, limit }.at(text, 0));
-        }
-        let mut parser = Parser {
-            pool: self,
-            allowed,
-            literal,
-            limits,
-            text,
-            tokens: tokenize(text)?,
-            next: 0,
-            depth: 0,
-            guards,
-        };
-        let expr = parser.expression(TokenKind::End)?;
-        let guards = parser.guards.map(|guards| guards.found);
+        let mut parser = Parser::of(self, text, allowed, literal, limits)?;
+        parser.needs_values = true;
         Ok(Reading {
-            expr,
-            guards: guards.unwrap_or_default(),
+            expr: parser.expression(TokenKind::End)?,
+            guards: parser.guards.found,
         })
     }
 }
@@ -195,11 +165,37 @@ struct Parser<'p> {
     tokens: Vec<Token<'p>>,
     next: usize,
     depth: usize,
-    /// What has to have a value, where that is asked.
-    guards: Option<Guards>,
+    /// Whether constant parts without a value are refused, and what has to have one.
+    needs_values: bool,
+    guards: Guards,
 }
 
 impl<'p> Parser<'p> {
+    fn of(
+        pool: &'p mut ExprPool,
+        text: &'p str,
+        allowed: &'p dyn Fn(&str) -> bool,
+        literal: &'p dyn Fn(&mut ExprPool, &str) -> Option<ExprId>,
+        limits: ParseLimits,
+    ) -> Result<Self, ParseError> {
+        if text.len() > limits.length {
+            let (found, limit) = (text.len(), limits.length);
+            return Err(ParseErrorKind::TooLong { found, limit }.at(text, 0));
+        }
+        Ok(Parser {
+            tokens: tokenize(text)?,
+            pool,
+            allowed,
+            literal,
+            limits,
+            text,
+            next: 0,
+            depth: 0,
+            needs_values: false,
+            guards: Guards::default(),
+        })
+    }
+
     fn peek(&self) -> Token<'p> {
         self.tokens[self.next]
     }
@@ -217,8 +213,8 @@ impl<'p> Parser<'p> {
             terms.push(self.pool.negated_if(is_subtracted, term));
             let token = self.token();
             is_subtracted = match token.kind {
-                TokenKind::Plus => false,
-                TokenKind::Minus => true,
+                TokenKind::Sign('+') => false,
+                TokenKind::Sign('-') => true,
                 kind if kind == end => return Ok(self.pool.sum(&terms)),
                 _ if end == TokenKind::End => {
                     return Err(self.unexpected(token, "an operator or the end"));
@@ -233,8 +229,8 @@ impl<'p> Parser<'p> {
         let mut factors = vec![self.signed(start)?];
         loop {
             let is_divisor = match self.peek().kind {
-                TokenKind::Times => false,
-                TokenKind::Divide => true,
+                TokenKind::Sign('*') => false,
+                TokenKind::Sign('/') => true,
                 _ => return Ok(self.pool.product(&factors)),
             };
             self.next += 1;
@@ -251,12 +247,13 @@ impl<'p> Parser<'p> {
 
     fn signed(&mut self, start: usize) -> Result<ExprId, ParseError> {
         let mut is_negative = false;
-        while let TokenKind::Plus | TokenKind::Minus = self.peek().kind {
-            is_negative ^= self.token().kind == TokenKind::Minus;
+        while let TokenKind::Sign(sign @ ('+' | '-')) = self.peek().kind {
+            self.next += 1;
+            is_negative ^= sign == '-';
         }
         let mut value = self.atom()?;
         let caret = self.peek();
-        if caret.kind == TokenKind::Caret {
+        if caret.kind == TokenKind::Sign('^') {
             self.next += 1;
             self.deepen(caret)?;
             let exponent = self.signed(start)?;
@@ -273,7 +270,7 @@ impl<'p> Parser<'p> {
                 let literal = (self.literal)(self.pool, token.text);
                 Ok(literal.unwrap_or_else(|| self.pool.constant(number)))
             }
-            TokenKind::Open => self.parenthesis(token),
+            TokenKind::Sign('(') => self.parenthesis(token),
             TokenKind::Name => self.name(token),
             _ => Err(self.unexpected(token, "a number, a name, `(` or a sign")),
         }
@@ -281,7 +278,7 @@ impl<'p> Parser<'p> {
 
     fn name(&mut self, token: Token<'p>) -> Result<ExprId, ParseError> {
         let (name, after) = (token.text, self.peek());
-        let is_called = after.kind == TokenKind::Open;
+        let is_called = after.kind == TokenKind::Sign('(');
         let refused = match Function::by_name(name) {
             Some(function) if is_called => {
                 self.next += 1;
@@ -302,7 +299,7 @@ impl<'p> Parser<'p> {
     /// What stands between parentheses; the first is read, and is reported with `opener` if it is one too many.
     fn parenthesis(&mut self, opener: Token<'p>) -> Result<ExprId, ParseError> {
         self.deepen(opener)?;
-        let expr = self.expression(TokenKind::Close)?;
+        let expr = self.expression(TokenKind::Sign(')'))?;
         self.depth -= 1;
         Ok(expr)
     }
@@ -322,7 +319,7 @@ impl<'p> Parser<'p> {
         has_value: impl FnOnce(&mut Guards, &mut ExprPool) -> bool,
     ) -> Result<(), ParseError> {
         let end = self.peek().start;
-        if (self.guards.as_mut()).is_none_or(|guards| has_value(guards, self.pool)) {
+        if !self.needs_values || has_value(&mut self.guards, self.pool) {
             return Ok(());
         }
         let found = self.text[start..end].trim_end();
@@ -336,7 +333,7 @@ impl<'p> Parser<'p> {
         start: usize,
     ) -> Result<ExprId, ParseError> {
         let (text, limit, after) = (self.text, self.limits.exponent, self.peek().start);
-        let too_large = |found: super::Number| {
+        let too_large = |found: Number| {
             if found.to_f64().abs() > f64::from(limit) {
                 let found = found.to_string();
                 return Err(ParseErrorKind::Exponent { found, limit }.at(text, after));
@@ -365,10 +362,107 @@ impl<'p> Parser<'p> {
     }
 }
 
-#[cfg(test)]
-impl ExprPool {
-    pub(crate) fn parsed(&mut self, text: &str) -> ExprId {
-        self.parse(text, &|_| true)
-            .unwrap_or_else(|error| panic!("{text}: {error}"))
+/// A token and the byte at which it starts.
+#[derive(Clone, Copy)]
+struct Token<'a> {
+    kind: TokenKind,
+    start: usize,
+    text: &'a str,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum TokenKind {
+    Number(Number),
+    Name,
+    /// An operator or parenthesis in its plain spelling: one of `+-*/^()`.
+    Sign(char),
+    End,
+}
+
+/// All tokens of `text`, with [`TokenKind::End`] last. Characters outside the grammar are found
+/// here, before anything is built.
+fn tokenize(text: &str) -> Result<Vec<Token<'_>>, ParseError> {
+    let mut tokens = Vec::new();
+    let mut start = 0;
+    while let Some(first) = text[start..].chars().next() {
+        let rest = &text[start..];
+        let mut length = first.len_utf8();
+        let kind = match first {
+            ' ' | '\t' | '\n' | '\r' => {
+                start += 1;
+                continue;
+            }
+            '0'..='9' | '.' => {
+                length = number_length(rest);
+                let number = &rest[..length];
+                let refused = || ParseErrorKind::Number(short(number)).at(text, start);
+                TokenKind::Number(read_number(number).ok_or_else(refused)?)
+            }
+            'a'..='z' | 'A'..='Z' | '_' => {
+                length = name_length(rest);
+                TokenKind::Name
+            }
+            '*' if rest.starts_with("**") => {
+                length = 2;
+                TokenKind::Sign('^')
+            }
+            '-' | '\u{2212}' => TokenKind::Sign('-'),
+            '*' | '·' | '⋅' | '×' => TokenKind::Sign('*'),
+            '+' | '/' | '^' | '(' | ')' => TokenKind::Sign(first),
+            _ => return Err(ParseErrorKind::Character(first).at(text, start)),
+        };
+        let text = &rest[..length];
+        tokens.push(Token { kind, start, text });
+        start += length;
     }
+    tokens.push(Token {
+        kind: TokenKind::End,
+        start,
+        text: "",
+    });
+    Ok(tokens)
+}
+
+fn number_length(text: &str) -> usize {
+    let n_digits = |text: &str| text.bytes().take_while(u8::is_ascii_digit).count();
+    let mut end = n_digits(text);
+    if let Some(fraction) = text[end..].strip_prefix('.') {
+        end += 1 + n_digits(fraction);
+    }
+    if let Some(exponent) = text[end..].strip_prefix(['e', 'E']) {
+        let sign = usize::from(exponent.starts_with(['+', '-']));
+        match n_digits(&exponent[sign..]) {
+            0 => {}
+            n => end += 1 + sign + n,
+        }
+    }
+    end
+}
+
+/// Letters, digits and underscores; parts may be joined by points, as in `body.x`.
+fn name_length(text: &str) -> usize {
+    let is_word = |byte: &u8| byte.is_ascii_alphanumeric() || *byte == b'_';
+    let is_start = |c: char| c.is_ascii_alphabetic() || c == '_';
+    let word = |text: &str| text.bytes().take_while(is_word).count();
+    let mut end = word(text);
+    while let Some(part) = text[end..].strip_prefix('.')
+        && part.starts_with(is_start)
+    {
+        end += 1 + word(part);
+    }
+    end
+}
+
+/// The value of a number token: exact if it is written as an integer that fits; nothing for what floats hold as
+/// infinity, or as zero although it is none.
+fn read_number(token: &str) -> Option<Number> {
+    if token.bytes().all(|byte| byte.is_ascii_digit())
+        && let Ok(integer) = token.parse::<i64>()
+    {
+        return Some(Number::integer(integer));
+    }
+    let value: f64 = token.parse().ok()?;
+    let mantissa = token.split(['e', 'E']).next()?;
+    let is_lost = value == 0.0 && mantissa.contains(|digit| ('1'..='9').contains(&digit));
+    Number::from_f64(value).filter(|_| !is_lost)
 }

@@ -4,22 +4,15 @@ use std::collections::BTreeMap;
 
 use num_integer::Integer;
 
-use super::expand::{Terms, WIDE};
-use super::function::Function;
-use super::node::{ExprId, Node};
-use super::number::Number;
-use super::order::Exponent;
-use super::pool::ExprPool;
+use super::region::{Terms, WIDE};
 use super::rules::common_unit;
+use crate::{Exponent, ExprId, ExprPool, Function, Node, Number};
 
-/// Most steps of one polynomial division.
 const MAX_STEPS: usize = 500;
 /// Largest exponent of a monomial, in units of its base.
 const MAX_EXPONENT: i64 = 1 << 32;
-/// Most different denominators that are brought together: the numerator grows with all of them.
 const MAX_DENOMINATORS: usize = 12;
 
-/// Largest power that is looked for, and longest sum.
 pub(super) const MAX_POWER: i64 = 4;
 const MAX_POWER_TERMS: usize = 35;
 
@@ -351,11 +344,8 @@ fn divided(dividend: Monomials, divisor: &Monomials) -> Option<(Monomials, Monom
 /// Each next term of the root is what is left over, divided by the derivative of the power.
 fn root_of(polynomial: &Monomials, power: i64) -> Option<(Number, Monomials)> {
     let (highest, leading) = polynomial.last_key_value()?;
-    let divisible = highest.iter().all(|exponent| exponent % power == 0);
-    let first: Vec<i64> = highest.iter().map(|exponent| exponent / power).collect();
-    if !divisible {
-        return None;
-    }
+    let halved = |exponent: &i64| (exponent % power == 0).then_some(exponent / power);
+    let first: Vec<i64> = highest.iter().map(halved).collect::<Option<_>>()?;
     // A power of k terms has at least n (k - 1) + 1.
     let most = (polynomial.len() - 1) / usize::try_from(power).ok()?;
     let slope = leading.checked_mul(Number::integer(power))?;
@@ -408,7 +398,7 @@ fn product(a: &Monomials, b: &Monomials) -> Option<Monomials> {
 /// Adds a term to a polynomial; nothing if a coefficient is no longer exact.
 fn add(to: &mut Monomials, exponents: Vec<i64>, coefficient: Number) -> Option<()> {
     let entry = to.entry(exponents.clone()).or_insert(Number::ZERO);
-    // Floats may cancel to an exact zero where what they stand for does not.
+    // Rounded coefficients may add up to zero although the numbers that were rounded do not.
     let sum = (entry.checked_add(coefficient)).filter(|sum| sum.is_exact());
     *entry = sum.filter(|_| coefficient.is_exact())?;
     if entry.is_zero() {

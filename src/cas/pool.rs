@@ -1,15 +1,13 @@
 //! The pool that owns all expressions: storage, symbols and traversal.
 
 use std::collections::{BTreeSet, HashMap};
-use std::hash::BuildHasher;
+use std::sync::Arc;
 
-use super::canonical::Coefficient;
-use super::function::Function;
-use super::id_map::{BuildIdHasher, IdSet};
-use super::node::{ExprId, Node, SymbolId};
-use super::number::Number;
+use super::factors::Identity;
+use super::node::BuildIdHasher;
 use super::order::SymbolKey;
 use super::slope::Slope;
+use crate::{Coefficient, ExprId, Function, IdSet, Node, Number, SymbolId};
 
 /// Owner of hash-consed, canonical expressions.
 ///
@@ -35,16 +33,15 @@ use super::slope::Slope;
 pub struct ExprPool {
     nodes: Vec<Node>,
     facts: Vec<Facts>,
-    /// The node of every hash; those of equal hashes stand at the next ones that are free.
-    places: HashMap<u64, ExprId, BuildIdHasher>,
+    ids: HashMap<Node, ExprId, BuildIdHasher>,
     symbols: Vec<Symbol>,
     symbol_ids: HashMap<String, SymbolId>,
     is_exact: bool,
     /// Constructors that were called and steps of about that effort, and how many of them there may be.
     work_done: u64,
     work_limit: u64,
-    /// Derivatives found so far; expressions never change, so entries stay valid.
     pub(super) derivatives: HashMap<(ExprId, SymbolId), ExprId, BuildIdHasher>,
+    pub(super) identities: Option<Arc<[Identity]>>,
     pub(super) slopes: HashMap<(ExprId, SymbolId), Slope, BuildIdHasher>,
 }
 
@@ -63,7 +60,6 @@ enum Meaning {
     Decimal(Coefficient, f64),
 }
 
-/// What is known about a node without looking at its children.
 #[derive(Clone, Copy, Debug)]
 struct Facts {
     /// The node's own id, to lend it as a list of one.
@@ -96,7 +92,7 @@ impl ExprPool {
         let mut pool = ExprPool {
             nodes: Vec::new(),
             facts: Vec::new(),
-            places: HashMap::default(),
+            ids: HashMap::default(),
             symbols: Vec::new(),
             symbol_ids: HashMap::new(),
             is_exact: false,
@@ -104,6 +100,7 @@ impl ExprPool {
             work_limit: u64::MAX,
             derivatives: HashMap::default(),
             slopes: HashMap::default(),
+            identities: None,
         };
         let zero = pool.intern(Node::Number(Number::ZERO));
         let one = pool.intern(Node::Number(Number::ONE));
@@ -144,7 +141,6 @@ impl ExprPool {
         self.work_limit = limit;
     }
 
-    /// Counts some steps; whether they are within the limit.
     pub(super) fn spend(&mut self, steps: usize) -> bool {
         self.work_done = self.work_done.saturating_add(steps as u64);
         self.work_done <= self.work_limit
@@ -154,7 +150,6 @@ impl ExprPool {
         self.work_done.saturating_add(steps as u64) <= self.work_limit
     }
 
-    /// A folded number, if this pool takes it.
     pub(super) fn folded(&self, number: Option<Number>) -> Option<Number> {
         number.filter(|number| number.is_exact() || !self.is_exact)
     }
@@ -386,18 +381,13 @@ impl ExprPool {
         self.facts[expr.index()].sign
     }
 
-    /// The id of a node that is canonical already.
     pub(super) fn intern(&mut self, node: Node) -> ExprId {
         self.work_done += 1;
-        let mut place = match self.place_of(&node) {
-            Ok(id) => return id,
-            Err(free) => free,
-        };
-        // Interning the rest first keeps operands at smaller ids; it may take the free place.
-        let rest = self.rest_of(&node);
-        while self.places.contains_key(&place) {
-            place = place.wrapping_add(1);
+        if let Some(&id) = self.ids.get(&node) {
+            return id;
         }
+        // Interning the rest first keeps operands at smaller ids.
+        let rest = self.rest_of(&node);
         let id = ExprId(
             u32::try_from(self.nodes.len()).expect("a pool holds fewer than 2^32 expressions"),
         );
@@ -408,24 +398,10 @@ impl ExprPool {
             symbols: self.symbols_in(&node),
             sign: self.sign_of(&node),
         };
-        self.nodes.push(node);
+        self.nodes.push(node.clone());
         self.facts.push(facts);
-        self.places.insert(place, id);
+        self.ids.insert(node, id);
         id
-    }
-
-    /// The id of a node equal to `node`, or the free place where it belongs.
-    fn place_of(&self, node: &Node) -> Result<ExprId, u64> {
-        // Of its hash only eight bits count in unit tests, so that places are often taken.
-        let unused = if cfg!(test) { 56 } else { 0 };
-        let mut place = BuildIdHasher::default().hash_one(node) << unused;
-        while let Some(&id) = self.places.get(&place) {
-            if self.nodes[id.index()] == *node {
-                return Ok(id);
-            }
-            place = place.wrapping_add(1);
-        }
-        Err(place)
     }
 
     fn rest_of(&mut self, node: &Node) -> Option<ExprId> {

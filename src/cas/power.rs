@@ -2,11 +2,8 @@
 
 use num_integer::Integer;
 
-use super::function::{Function, Parity};
-use super::node::{ExprId, Node};
-use super::number::Number;
-use super::order::Exponent;
-use super::pool::{ExprPool, Sign};
+use super::function::Parity;
+use crate::{Exponent, ExprId, ExprPool, Function, Node, Number, Sign};
 
 /// Trial divisors for square factors under a root: `sqrt(8) = 2*sqrt(2)`.
 const SQUARE_FACTOR_LIMIT: i64 = 1_000;
@@ -73,7 +70,6 @@ impl ExprPool {
         self.raw_power(base, exponent)
     }
 
-    /// A power that no rule applies to: `x^(k/2)` becomes `sqrt(x)^k`.
     fn raw_power(&mut self, base: ExprId, exponent: Number) -> ExprId {
         if let Some((halves, 2)) = exponent.as_rational() {
             let root = self.intern(Node::Apply(Function::Sqrt, base));
@@ -259,7 +255,6 @@ impl ExprPool {
     }
 }
 
-/// Floats that are multiples of a half become exact, so that `x^0.5` is `sqrt(x)`.
 pub(super) fn half_integer(exponent: Number) -> Number {
     let twice = exponent.to_f64() * 2.0;
     match Number::from_f64(twice).and_then(Number::as_integer) {
@@ -268,7 +263,6 @@ pub(super) fn half_integer(exponent: Number) -> Number {
     }
 }
 
-/// `base ^ exponent` if that is a number which can be folded, for an exponent that is a fraction.
 fn exact_power(base: Number, exponent: Number) -> Option<Number> {
     let (numerator, denominator) = exponent.as_rational()?;
     let root = base.checked_root(u32::try_from(denominator).ok()?)?;

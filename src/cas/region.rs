@@ -1,15 +1,28 @@
-//! Rewriting level by level: sums, products and integer powers on one side, what is inside
+//! Substitution, multiplying out within limits, and rewriting level by level: sums, products and integer powers on one side, what is inside
 //! functions and other powers on the other.
 //!
 //! A *region* is what can be reached from an expression through sums, products and integer powers.
 //! Function calls and other powers are its atoms; their arguments are regions of their own.
 
-use super::function::Function;
-use super::id_map::IdMap;
-use super::node::{ExprId, Node};
-use super::number::Number;
-use super::order::Exponent;
-use super::pool::ExprPool;
+use crate::{Exponent, ExprId, ExprPool, Function, IdMap, Node, Number, SymbolId};
+
+#[derive(Clone, Copy)]
+pub(super) struct Limits {
+    terms: usize,
+    products: usize,
+}
+
+pub(super) const WIDE: Limits = Limits {
+    terms: 2_000,
+    products: 100_000,
+};
+/// Of intermediate results.
+pub(super) const NARROW: Limits = Limits {
+    terms: 500,
+    products: 500,
+};
+
+pub(super) type Terms = Vec<(Number, ExprId)>;
 
 impl ExprPool {
     /// Rebuilds `expr` bottom-up within its region, passing every new node through `rule`.
@@ -69,7 +82,6 @@ impl ExprPool {
         atoms
     }
 
-    /// Whether the operands of a node are regions of their own.
     fn is_atom(&self, expr: ExprId) -> bool {
         match *self.node(expr) {
             Node::Apply(..) => true,
@@ -85,7 +97,6 @@ impl ExprPool {
         }
     }
 
-    /// A factor as an integer power of a function call: `sin(x)^2` is `(Sin, x, 2)`.
     pub(super) fn function_power(&self, factor: ExprId) -> Option<(Function, ExprId, i64)> {
         let (base, power) = self.integer_power(factor)?;
         match self.node(base) {
@@ -123,5 +134,153 @@ impl ExprPool {
     ) -> ExprId {
         let value = self.apply(function, argument);
         self.pow_number(value, Number::integer(exponent))
+    }
+
+    /// `expr` with every symbol of `replacements` replaced, all at once: replacements are not
+    /// searched for symbols again, so `x` and `y` can be exchanged. The first entry of a symbol
+    /// counts.
+    pub fn substitute(&mut self, expr: ExprId, replacements: &[(SymbolId, ExprId)]) -> ExprId {
+        self.substitute_all(&[expr], replacements)[0]
+    }
+
+    /// As [`substitute`](ExprPool::substitute) for several expressions with common parts.
+    pub fn substitute_all(
+        &mut self,
+        exprs: &[ExprId],
+        replacements: &[(SymbolId, ExprId)],
+    ) -> Vec<ExprId> {
+        let affected = |expr| {
+            let mut symbols = replacements.iter().map(|(symbol, _)| *symbol);
+            symbols.any(|symbol| self.may_contain(expr, symbol))
+        };
+        let order = self.walk(exprs, affected, |_| true);
+        // The first entry of a symbol is inserted last.
+        let new = replacements.iter().rev();
+        let new = new.map(|&(symbol, new)| (self.symbol_expr(symbol), new));
+        let replaced = new.collect();
+        self.replace(exprs, order, replaced)
+    }
+
+    /// The expressions with every part that has no variable but a finite value as a number: `exp(3)*x` is
+    /// `20.085536923187668*x`.
+    pub fn fold_constants(&mut self, exprs: &[ExprId]) -> Vec<ExprId> {
+        let order = self.reachable(exprs);
+        let mut folded: IdMap<ExprId> = IdMap::default();
+        for &expr in &order {
+            if self.is_constant(expr) && self.as_number(expr).is_none() {
+                let value = self.evaluate(expr, &|_| f64::NAN);
+                if value.is_finite() {
+                    folded.insert(expr, self.number(value));
+                }
+            }
+        }
+        self.replace(exprs, order, folded)
+    }
+
+    /// The expressions with the parts that `replaced` has, and what is made of these, built again; `order` lists their
+    /// parts, operands first.
+    pub(super) fn replace(
+        &mut self,
+        exprs: &[ExprId],
+        order: Vec<ExprId>,
+        mut replaced: IdMap<ExprId>,
+    ) -> Vec<ExprId> {
+        let of = |replaced: &IdMap<ExprId>, expr| replaced.get(&expr).copied().unwrap_or(expr);
+        for expr in order {
+            if !replaced.contains_key(&expr) {
+                let new = self.rebuild(expr, |operand| of(&replaced, operand));
+                replaced.insert(expr, new);
+            }
+        }
+        exprs.iter().map(|expr| of(&replaced, *expr)).collect()
+    }
+
+    pub(super) fn rebuild(
+        &mut self,
+        expr: ExprId,
+        mut operand: impl FnMut(ExprId) -> ExprId,
+    ) -> ExprId {
+        match self.node(expr).clone() {
+            Node::Number(_) | Node::Symbol(_) => expr,
+            Node::Sum(terms) => {
+                let terms: Vec<ExprId> = terms.iter().map(|term| operand(*term)).collect();
+                self.sum(&terms)
+            }
+            Node::Product(factors) => {
+                let factors: Vec<ExprId> = factors.iter().map(|factor| operand(*factor)).collect();
+                self.product(&factors)
+            }
+            Node::Power(base, exponent) => {
+                let (base, exponent) = (operand(base), operand(exponent));
+                self.pow(base, exponent)
+            }
+            Node::Apply(function, argument) => {
+                let argument = operand(argument);
+                self.apply(function, argument)
+            }
+        }
+    }
+
+    pub(super) fn expand_region(&mut self, region: ExprId) -> ExprId {
+        self.rewrite_region(region, |pool, node| pool.expand_node(node, WIDE))
+    }
+
+    pub(super) fn expand_node(&mut self, expr: ExprId, limits: Limits) -> ExprId {
+        if !matches!(self.node(expr), Node::Product(_) | Node::Power(..)) {
+            return expr;
+        }
+        let factors = self.factors_of(expr).to_vec();
+        let mut plain = Vec::new();
+        let mut sums: Vec<(ExprId, i64)> = Vec::new();
+        for factor in factors {
+            match self.sum_power(factor) {
+                Some((sum, exponent @ 0..)) => sums.push((sum, exponent)),
+                _ => plain.push(factor),
+            }
+        }
+        if sums.is_empty() {
+            return expr;
+        }
+        let plain = self.product(&plain);
+        let (mut terms, mut products_left) = (vec![self.split(plain)], limits.products);
+        for (sum, exponent) in sums {
+            let factor = self.terms_of(sum);
+            for _ in 0..exponent {
+                let n_products = terms.len().saturating_mul(factor.len());
+                if n_products > products_left || !self.affords(n_products) {
+                    return expr;
+                }
+                products_left -= n_products;
+                terms = self.multiply(&terms, &factor);
+                if terms.len() > limits.terms {
+                    return expr;
+                }
+            }
+        }
+        self.sum_of_terms(terms)
+    }
+
+    fn multiply(&mut self, a: &Terms, b: &Terms) -> Terms {
+        let mut products = Vec::with_capacity(a.len() * b.len());
+        for &(coefficient_a, rest_a) in a {
+            for &(coefficient_b, rest_b) in b {
+                let rest = self.product(&[rest_a, rest_b]);
+                let (extra, rest) = self.split(rest);
+                let folded = coefficient_a
+                    .checked_mul(coefficient_b)
+                    .and_then(|coefficient| coefficient.checked_mul(extra));
+                match folded {
+                    Some(coefficient) => products.push((coefficient, rest)),
+                    None => {
+                        let numbers = [coefficient_a, coefficient_b, extra];
+                        let numbers = numbers.map(|number| self.constant(number));
+                        let whole = self.product(&[numbers[0], numbers[1], numbers[2], rest]);
+                        products.push((Number::ONE, whole));
+                    }
+                }
+            }
+        }
+        let sum = self.sum_of_terms(products);
+        self.terms_of(sum)
     }
 }

@@ -9,23 +9,17 @@
 //! | `exp(a)*exp(b)`, `exp(a)^n`, `exp(n*log(a))` | `exp(a + b)`, `exp(n*a)`, `a^n` |
 //! | `log(a^n)`, `log(exp(a)*b)` | `n*log(a)` (`n*log(abs(a))` for even `n`), `a + log(b)` |
 //! | `n*log(a) + m*log(b)` | `log(a^n*b^m)` for small integers `n`, `m` up to a common factor |
-//! | `abs(a*b)`, `abs(a)^2`, `abs(a)*sign(a)` | `abs(a)*abs(b)`, `a^2`, `a` |
-//! | `sign(a)*a`, `sign(a)^3` | `abs(a)`, `sign(a)` |
 //! | `sqrt(a)*sqrt(b)`, `sqrt(exp(a))` | `sqrt(a*b)`, `exp(a/2)` |
 //! | `1/(a^2 + a*b)`, `1/(1 + exp(-a))` | `1/(a*(a + b))`, `exp(a)/(exp(a) + 1)` |
-//! | `sign(a)*sign(b)` | `sign(a*b)` |
+//! | `abs(a*b)`, `sign(a)*sign(b)` | `abs(a)*abs(b)`, `sign(a*b)` |
 //!
 //! | fewer calls | |
 //! |---|---|
-//! | `sin(a)/cos(a)`, `tan(a)/(1 - tan(a)^2)`, `sin(a)/(1 + cos(a))` | `tan(a)`, `tan(2*a)/2`, `tan(a/2)` |
-//! | `abs(a)*abs(b)`, `abs(a)/a` | `abs(a*b)`, `sign(a)` |
+//! | `abs(a)*abs(b)` | `abs(a*b)` |
 //! | `(exp(a) - exp(b))/(exp(a) + exp(b))` | `tanh((a - b)/2)` |
 
-use super::function::Function;
-use super::node::{ExprId, Node};
-use super::number::Number;
-use super::order::Exponent;
-use super::pool::ExprPool;
+use super::factors::Stage;
+use crate::{Exponent, ExprId, ExprPool, Function, Node, Number};
 
 /// Largest power that merging logarithms may create, and most parts of a number that are tried as unit.
 const MAX_LOG_POWER: i64 = 4;
@@ -46,7 +40,8 @@ impl ExprPool {
             Node::Product(_) | Node::Power(..) => {
                 let expr = self.split_divisor(expr);
                 let expr = self.merge_exponentials(expr);
-                let expr = self.merge_signs(expr);
+                let expr = self.merge_factors(Stage::Normal, expr);
+                let expr = self.merge_calls(Function::Sign, expr);
                 self.merge_roots(expr)
             }
             Node::Sum(_) => self.merge_logs(expr),
@@ -58,14 +53,12 @@ impl ExprPool {
         if !matches!(self.node(expr), Node::Product(_)) {
             return expr;
         }
-        let expr = self.merge_tangents(expr);
-        let expr = self.merge_double_angles(expr);
-        let expr = self.merge_hyperbolic_tangent(expr);
-        let expr = self.merge_factors(Function::Abs, expr);
-        self.abs_to_sign(expr)
+        let expr = self.merge_factors(Stage::Angles, expr);
+        let expr = self.merge_hyperbolic_tangent(expr).unwrap_or(expr);
+        let expr = self.merge_calls(Function::Abs, expr);
+        self.merge_factors(Stage::Signs, expr)
     }
 
-    /// `exp(n*log(a) + b) = a^n*exp(b)`.
     fn split_exp(&mut self, argument: ExprId) -> Option<ExprId> {
         let mut powers = Vec::new();
         let mut left = Vec::new();
@@ -124,22 +117,21 @@ impl ExprPool {
         };
         let exponent = Number::integer(power);
         let terms = self.summands_of(base).to_vec();
-        let mut shared: Vec<(ExprId, Number)> = Vec::new();
         let powers: Vec<Vec<(ExprId, Number)>> = (terms.iter())
             .map(|term| self.powers_with_exponentials(*term))
             .collect();
+        let mut shared: Vec<(ExprId, Number)> = Vec::new();
         for &(factor, _) in powers.iter().flatten() {
-            let of_term = |powers: &Vec<(ExprId, Number)>| {
+            let exponents = powers.iter().map(|powers| {
                 let found = powers.iter().find(|(base, _)| *base == factor);
                 found.map_or(Number::ZERO, |(_, exponent)| *exponent)
-            };
-            let least =
-                (powers.iter().map(of_term)).min_by(|a, b| a.to_f64().total_cmp(&b.to_f64()));
-            match least.filter(|least| !least.is_zero() && least.as_integer().is_some()) {
-                Some(least) if !shared.contains(&(factor, least)) => shared.push((factor, least)),
-                _ => {}
-            }
+            });
+            let least = exponents.min_by(|a, b| a.to_f64().total_cmp(&b.to_f64()));
+            let least = least.filter(|least| !least.is_zero() && least.as_integer().is_some());
+            shared.extend(least.map(|least| (factor, least)));
         }
+        shared.sort_unstable_by_key(|(factor, _)| *factor);
+        shared.dedup();
         if shared.is_empty() {
             return expr;
         }
@@ -207,36 +199,28 @@ impl ExprPool {
     }
 
     fn merge_roots(&mut self, expr: ExprId) -> ExprId {
-        let (mut inside, mut outside, mut numbers) = (Vec::new(), Vec::new(), Vec::new());
-        for factor in self.factors_of(expr).to_vec() {
-            match self.base_and_exponent(factor) {
-                (base, Exponent::Number(exponent))
-                    if matches!(exponent.as_rational(), Some((_, 2))) =>
-                {
-                    let whole = exponent.checked_add(-Number::HALF).unwrap_or(Number::ZERO);
-                    let parts = (base, self.pow_number(base, whole));
-                    match self.as_number(base) {
-                        Some(_) => numbers.push((factor, parts)),
-                        None => {
-                            inside.push(parts.0);
-                            outside.push(parts.1);
-                        }
-                    }
-                }
-                _ => outside.push(factor),
-            }
-        }
+        // Each as its base and what is left beside one root of it.
+        let (roots, mut outside) = self.partition_factors(expr, |pool, factor| {
+            let (base, Exponent::Number(exponent)) = pool.base_and_exponent(factor) else {
+                return None;
+            };
+            let halves = exponent.as_rational().filter(|parts| parts.1 == 2)?.0;
+            let whole = pool.pow_number(base, Number::integer((halves - 1) / 2));
+            Some((factor, base, whole))
+        });
+        let (numbers, others): (Vec<_>, Vec<_>) =
+            (roots.into_iter()).partition(|root| self.as_number(root.1).is_some());
+        let mut inside: Vec<ExprId> = others.iter().map(|root| root.1).collect();
+        outside.extend(others.iter().map(|root| root.2));
         // Roots of numbers stay outside unless they meet another root that makes them rational.
-        for (factor, (base, whole)) in numbers {
-            inside.push(base);
-            let radicand = self.product(&inside);
-            let (content, _) = self.split(radicand);
-            let content = self.scale(content, ExprId::ONE);
+        for (factor, base, whole) in numbers {
+            let radicand = self.product(&[inside.as_slice(), &[base]].concat());
+            let content = self.constant(self.split(radicand).0);
             let root = self.pow_number(content, Number::HALF);
-            if inside.len() > 1 && self.as_number(root).is_some() {
+            if !inside.is_empty() && self.as_number(root).is_some() {
+                inside.push(base);
                 outside.push(whole);
             } else {
-                inside.pop();
                 outside.push(factor);
             }
         }
@@ -249,25 +233,27 @@ impl ExprPool {
     }
 
     /// `(exp(a) - exp(b))/(exp(a) + exp(b)) = tanh((a - b)/2)`, where `1` is `exp(0)`.
-    fn merge_hyperbolic_tangent(&mut self, expr: ExprId) -> ExprId {
-        self.merge_first(expr, |pool, factors, above| {
-            let [(first, a), (second, b)] = pool.two_exponentials(factors[above])?;
-            let (below, unit) = factors.iter().enumerate().find_map(|(below, factor)| {
-                let (base, -1) = pool.integer_power(*factor)? else {
-                    return None;
-                };
-                let [(unit, c), (other, d)] = pool.two_exponentials(base)?;
-                (unit == other && [a, b] == [c, d]).then_some((below, unit))
+    fn merge_hyperbolic_tangent(&mut self, expr: ExprId) -> Option<ExprId> {
+        let mut factors = self.factors_of(expr).to_vec();
+        let (above, below, scale, [a, b]) =
+            factors.iter().enumerate().find_map(|(above, top)| {
+                let [(first, a), (second, b)] = self.two_exponentials(*top)?;
+                let (below, unit) = factors.iter().enumerate().find_map(|(below, factor)| {
+                    let (base, -1) = self.integer_power(*factor)? else {
+                        return None;
+                    };
+                    let [(unit, c), (other, d)] = self.two_exponentials(base)?;
+                    (unit == other && [a, b] == [c, d]).then_some((below, unit))
+                })?;
+                let scale = first.checked_div(unit).filter(|_| first == -second)?;
+                Some((above, below, scale, [a, b]))
             })?;
-            let scale = first.checked_div(unit).filter(|_| first == -second)?;
-            let difference = pool.sub(a, b);
-            let half = pool.scale(Number::HALF, difference);
-            let tangent = pool.apply(Function::Tanh, half);
-            let mut merged = factors.to_vec();
-            merged[above] = pool.scale(scale, tangent);
-            merged[below] = ExprId::ONE;
-            Some(pool.product(&merged))
-        })
+        let difference = self.sub(a, b);
+        let half = self.scale(Number::HALF, difference);
+        let tangent = self.apply(Function::Tanh, half);
+        factors[above] = self.scale(scale, tangent);
+        factors[below] = ExprId::ONE;
+        Some(self.product(&factors))
     }
 
     /// Coefficients and exponents of a sum of two exponentials, of which one may be a number.
@@ -328,7 +314,6 @@ impl ExprPool {
         self.sum(&parts)
     }
 
-    /// A term with exactly one logarithm, as cofactor and argument.
     pub(super) fn as_log_term(&mut self, rest: ExprId) -> Option<(ExprId, ExprId)> {
         let (logs, cofactors) =
             self.partition_factors(rest, |pool, factor| match *pool.node(factor) {

@@ -3,15 +3,12 @@
 use std::cmp::Ordering;
 
 use super::germ::{Germs, LAST_ORDER, Stop};
-use super::node::ExprId;
-use super::number::Number;
-use super::pool::ExprPool;
+use crate::{ExprId, ExprPool, Number};
 
 /// Differences of exponents that count as zero: 0.1 + 0.9 and 1 are the same.
 const SAME_EXPONENT: f64 = 1e-12;
 /// Coefficients from this exponent on are taken not to vanish by chance with all before them.
 const RARE: f64 = 3.0;
-/// Most terms of a composition; the rest is left open.
 const MOST_TERMS: i64 = 24;
 
 /// `sum coefficient t^exponent`, and what is left out: terms from the exponents of `rest` on.
@@ -24,11 +21,15 @@ pub(super) struct Series {
 }
 
 impl Series {
-    pub(super) fn constant(value: ExprId) -> Series {
+    fn term(exponent: ExprId, coefficient: ExprId) -> Series {
         Series {
-            terms: vec![(ExprId::ZERO, value)],
+            terms: vec![(exponent, coefficient)],
             rest: Vec::new(),
         }
+    }
+
+    pub(super) fn constant(value: ExprId) -> Series {
+        Series::term(ExprId::ZERO, value)
     }
 
     pub(super) fn is_zero(&self) -> bool {
@@ -160,12 +161,8 @@ impl Germs<'_> {
         exponent: ExprId,
         coefficient: ExprId,
     ) -> Series {
-        let factor = Series {
-            terms: vec![(exponent, coefficient)],
-            rest: Vec::new(),
-        };
         let order = std::mem::replace(&mut self.order, i64::MAX);
-        let shifted = self.times(series, &factor);
+        let shifted = self.times(series, &Series::term(exponent, coefficient));
         self.order = order;
         shifted
     }
@@ -230,7 +227,6 @@ impl Germs<'_> {
         }
     }
 
-    /// The coefficient of `t`, if no smaller exponent is left.
     pub(super) fn linear(&mut self, series: &Series) -> Result<Option<ExprId>, Stop> {
         if !series.terms.iter().all(|term| term.0 == ExprId::ONE) {
             return Ok(None);
@@ -250,10 +246,8 @@ impl Germs<'_> {
         &mut self,
         mut series: Series,
     ) -> Result<Result<(ExprId, Series), ExprId>, Stop> {
-        let numbers: Option<Vec<f64>> = (series.terms.iter())
-            .map(|&(e, _)| self.number_of(e))
-            .collect();
-        if numbers.is_some_and(|numbers| numbers.iter().all(|&number| number >= 0.0)) {
+        let mut exponents = series.terms.iter().map(|term| self.number_of(term.0));
+        if exponents.all(|number| number.is_some_and(|number| number >= 0.0)) {
             let is_constant = |&(e, _): &(ExprId, ExprId)| e == ExprId::ZERO;
             let at = series.terms.iter().position(is_constant);
             let value = at.map_or(ExprId::ZERO, |at| series.terms.remove(at).1);
@@ -279,10 +273,11 @@ impl Germs<'_> {
         mut coefficient: impl FnMut(&mut Self, i64) -> ExprId,
     ) -> Series {
         let mut result = Series::constant(coefficient(self, 0));
-        let numbers: Option<Vec<f64>> = (inner.terms.iter())
-            .map(|&(e, _)| self.number_of(e))
-            .collect();
-        let most = if numbers.is_some() { MOST_TERMS } else { 1 };
+        let mut exponents = inner.terms.iter().map(|term| self.number_of(term.0));
+        let most = match exponents.all(|number| number.is_some()) {
+            true => MOST_TERMS,
+            false => 1,
+        };
         let mut power = Series::constant(ExprId::ONE);
         for k in 1.. {
             power = self.times(&power, inner);

@@ -1,27 +1,15 @@
 //! Simplification: the shortest of several equal forms.
 //!
-//! A region (see `region.rs`) is brought to a normal form, in which equal expressions tend to
-//! coincide: multiplied out, angles expanded, sines reduced to cosines, exponentials and
-//! logarithms merged, over a common denominator. From it a few shorter forms are derived: with
-//! sines for cosines angle by angle, with angles combined, with sums as powers. The one with the least
-//! [`cost`](ExprPool::cost) replaces the region, if it is shorter than what was there.
+//! A region (see `region.rs`) is brought to a normal form, in which equal expressions tend to coincide: multiplied out,
+//! angles expanded, sines reduced to cosines, exponentials and logarithms merged, over a common denominator. From it a
+//! few shorter forms are derived. The one with the least [`cost`](ExprPool::cost) replaces the region if it is shorter.
 //!
-//! **Termination.** Every accepted step lowers the cost, a natural number. The work on one expression
-//! is bounded, counted in constructors; what exceeds that is left as it is.
-//!
-//! **Idempotence.** A result is returned once no further step lowers its cost, so simplifying it
-//! again returns it.
-//!
-//! **Values.** All rewritings keep the value wherever the expression has one, up to rounding (see
-//! [`ExprPool`]). Floats are added and multiplied when terms are collected; exact numbers stay
-//! exact. Nothing is rounded to fewer digits, and no term is dropped for being small.
+//! Every accepted step lowers the cost, a natural number, until none does: simplifying a result returns it. The work on
+//! one expression is bounded, counted in constructors; what exceeds that is left as it is. All rewritings keep the
+//! value wherever the expression has one, up to rounding (see [`ExprPool`]); no term is dropped for being small.
 
-use super::canonical::CanonicalForms;
 use super::cost::Costs;
-use super::function::Function;
-use super::node::{ExprId, Node};
-use super::order::Exponent;
-use super::pool::ExprPool;
+use crate::{CanonicalForms, Exponent, ExprId, ExprPool, Function, Node};
 
 /// Most angles whose squares are tried both as sines and as cosines.
 const MAX_CHOICES: usize = 4;

@@ -1,25 +1,17 @@
 //! Derivatives that have values wherever the function has slopes.
 //!
-//! The rules of differentiation give `g'/(2 sqrt(g))` for a root, which is `0/0` where `g` and `g'` vanish, and
-//! `0*inf` behind a factor that vanishes with `g`. The slope of an expression is what its values have:
+//! The rules of differentiation give `g'/(2 sqrt(g))` for a root, which is `0/0` where `g` and `g'` vanish. The slope of
+//! an expression is the derivative, where it exists; otherwise the limit of slopes from above, or from below where there
+//! are no values above, which may be infinite. A jump itself adds nothing.
 //!
-//! - the derivative, where it exists;
-//! - otherwise the limit of slopes from above, or from below where there are no values above;
-//! - an infinity of the right sign where that limit is infinite;
-//! - where the function jumps, the limit of the slopes beside the jump: a jump itself adds nothing.
-//!
-//! Which of them applies is decided at run time by selections: the derivative by the rules where no argument of a root,
-//! magnitude, sign or power is zero, a slope from series (see `germ.rs`) where one is. Where that takes too many cases, a
-//! difference of values replaces a derivative that is not a number.
+//! Selections decide at run time which applies: the derivative by the rules where no argument of a root, magnitude, sign
+//! or power is zero, a slope from series (see `germ.rs`) where one is. Where that takes too many cases, a difference of
+//! values replaces a derivative that is not a number.
 
 use std::cmp::Ordering;
 
-use super::function::Function;
 use super::germ::{Germs, LAST_ORDER, Stop};
-use super::id_map::IdMap;
-use super::node::{ExprId, Node, SymbolId};
-use super::number::Number;
-use super::pool::{ExprPool, Sign};
+use crate::{ExprId, ExprPool, Function, IdMap, Node, Number, Sign, SymbolId};
 
 /// Most cases of one slope; those that are not decided have the derivative by the rules, or a difference.
 const MOST_CASES: usize = 256;
@@ -424,64 +416,5 @@ impl Germs<'_> {
             }
         }
         Ok(Outcome::Finite(ExprId::ZERO))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn slope_of_what_has_none_of_these_points_is_the_derivative() {
-        let mut pool = ExprPool::new();
-        let x = pool.symbol_id("x");
-        for text in [
-            "x^2*y",
-            "y/(1 + x)",
-            "sin(x)/x",
-            "x*abs(x)",
-            "x^1.5",
-            "exp(x)/(exp(x) - y)",
-            "log(x)*y",
-        ] {
-            let expr = pool.parsed(text);
-            assert_eq!(pool.slope(expr, x), pool.derivative(expr, x), "{text}");
-        }
-    }
-
-    #[test]
-    fn slope_of_what_has_no_value_in_a_case_has_no_divisor_zero() {
-        let mut pool = ExprPool::new();
-        let x = pool.symbol_id("x");
-        for text in [
-            "sqrt(x^2 + y^2)/y",
-            "sqrt(x^2 + y^2)/x",
-            "sqrt(abs(x*y))*log(y)",
-            "abs(exp(y) - 1)^(-0.5)*sqrt(abs(y*x))",
-            "abs(y)^x/(y*(1 - y))",
-        ] {
-            let expr = pool.parsed(text);
-            let slope = pool.slope(expr, x);
-            for part in pool.reachable(&[slope]) {
-                let value = pool.evaluate(part, &|_| f64::NAN);
-                assert!(
-                    !pool.is_constant(part) || value.is_finite(),
-                    "{text}: {value}"
-                );
-            }
-        }
-    }
-
-    #[test]
-    fn slope_of_many_kinks_takes_bounded_work() {
-        let factors: Vec<String> = (1..12)
-            .map(|k| format!("sqrt(1 + sin(x + {k}*y))"))
-            .collect();
-        let mut pool = ExprPool::new();
-        let expr = pool.parsed(&factors.join("*"));
-        let x = pool.symbol_id("x");
-        pool.slope(expr, x);
-        let n_parts = pool.n_nodes();
-        assert!(n_parts < 50_000, "{n_parts} expressions were made");
     }
 }

@@ -1,24 +1,12 @@
-//! Trigonometric identities, each in the direction it is asked for.
-//!
-//! | method | rewrites |
-//! |---|---|
-//! | [`expand_angles`](ExprPool::expand_angles) | `sin(x + y)`, `cos(2*x)`, `tan(x)` into sines and cosines of single angles |
-//! | [`sines_to_cosines`](ExprPool::sines_to_cosines) | `sin(x)^2` into `1 - cos(x)^2` |
-//! | [`cosines_to_sines`](ExprPool::cosines_to_sines) | `cos(x)^2` into `1 - sin(x)^2` |
-//! | [`combine_angles`](ExprPool::combine_angles) | products into sums: `2*sin(x)*cos(x)` into `sin(2*x)` |
-//! | [`without_sine_below`](ExprPool::without_sine_below) | `1/(1 + sin(x))` into `(1 - sin(x))/cos(x)^2` |
-//!
-//! All work on the outermost level (sums, products and integer powers), not inside arguments.
+//! Trigonometric identities, each in the direction it is asked for, on the outermost level (sums, products and integer
+//! powers), not inside arguments.
 
 use std::collections::BTreeMap;
 
 use num_integer::Integer;
 
-use super::expand::NARROW;
-use super::function::Function;
-use super::node::{ExprId, Node};
-use super::number::Number;
-use super::pool::ExprPool;
+use super::region::NARROW;
+use crate::{ExprId, ExprPool, Function, Node, Number};
 
 /// Largest multiple of an angle, and most angles in one argument, that are expanded.
 const MAX_MULTIPLE: i64 = 6;
@@ -243,22 +231,16 @@ impl ExprPool {
         let divisor = self.sum_of_waves(&below);
         match divisor.filter(|divisor| !matches!(self.node(*divisor), Node::Sum(_))) {
             Some(divisor) => others.push(self.powi(divisor, -1)),
-            None => others.extend(
-                below
-                    .iter()
-                    .map(|&(function, argument)| self.apply_power(function, argument, -1)),
-            ),
+            None => others.extend((below.iter()).map(|&(f, x)| self.apply_power(f, x, -1))),
+        }
+        let sum = self.sum_of_waves(&above);
+        if sum.is_none() {
+            others.extend(above.iter().map(|&(f, x)| self.apply(f, x)));
         }
         let others = self.product(&others);
-        match self.sum_of_waves(&above) {
+        match sum {
             Some(sum) => self.expanded_product(others, sum),
-            None => {
-                let waves: Vec<ExprId> = (above.iter())
-                    .map(|&(function, argument)| self.apply(function, argument))
-                    .collect();
-                let waves = self.product(&waves);
-                self.mul(others, waves)
-            }
+            None => others,
         }
     }
 

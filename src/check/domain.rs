@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::error::CheckError;
+use super::side::CheckError;
 use crate::model::{LatentVariable, MAX_LATENT_DIM};
 
 /// A range per variable and phase; -1 to 1 where there is none.

@@ -23,17 +23,15 @@
 
 mod compare;
 mod domain;
-mod error;
 mod point;
 mod side;
 
 pub(crate) use compare::TermDifference;
 pub use compare::{Comparison, Difference, EquationComparison, PhaseComparison, Verdict, compare};
 pub(crate) use domain::CheckDomain;
-pub use error::CheckError;
 pub use point::Gap;
-pub use side::Side;
 pub(crate) use side::read_sides;
+pub use side::{CheckError, Side};
 
 use crate::import::SymbolNames;
 

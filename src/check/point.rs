@@ -12,9 +12,7 @@ use crate::symbolic::{ExprId, ExprPool, Interval, SymbolId};
 /// both sides have values.
 const POINTS: usize = 3_000;
 const POINTS_OF_EQUALS: usize = 64;
-/// Points after which the first difference found is taken.
 const ENOUGH: usize = 200;
-/// How far points reach without a domain, each in its turn.
 const SCALES: [f64; 8] = [1.0, 1.0, 1.0, 0.3, 3.0, 0.03, 10.0, 100.0];
 
 pub(crate) type Point = BTreeMap<String, f64>;
@@ -184,14 +182,12 @@ impl Sides<'_> {
         }
     }
 
-    /// Bounds with the rounding of decimals.
     fn bounds_of(&self, exprs: &[ExprId], values: &BTreeMap<SymbolId, f64>) -> Vec<Interval> {
         let range_of =
             |symbol: SymbolId| Interval::point(values.get(&symbol).copied().unwrap_or(0.0));
         self.pool.evaluate_intervals(exprs, &range_of)
     }
 
-    /// Whether the bounds of both sides have no number in common.
     fn are_apart(&self, values: &BTreeMap<SymbolId, f64>) -> bool {
         let bounds = self.bounds_of(&self.rest, values);
         let [left, right] = [bounds[0], bounds[1]];

@@ -1,13 +1,13 @@
 //! One of two files that are compared, with its numbers as they are written.
 
-use std::path::Path;
+use std::io;
+use std::path::{Path, PathBuf};
 
 use super::CheckOptions;
-use super::error::CheckError;
 use crate::artifact;
 use crate::equations::Equations;
 use crate::files::size;
-use crate::import::{Format, read_equations};
+use crate::import::{Format, ImportError, read_equations};
 use crate::model::{LatentVariable, ReducedModel};
 use crate::symbolic::{Coefficient, ExprId, ExprPool, Number, ParseError, ParseLimits, Reading};
 
@@ -15,6 +15,30 @@ use crate::symbolic::{Coefficient, ExprId, ExprPool, Number, ParseError, ParseLi
 const FLOAT_DIGITS: usize = 16;
 /// Below this floats hold every multiple of 1/2.
 const LARGEST_HALF: f64 = 4e15;
+
+/// What is wrong with a file that is to be compared.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "each variant's message names its fields")]
+pub enum CheckError {
+    #[error("{}: cannot read the file", path.display())]
+    Io { path: PathBuf, source: io::Error },
+    #[error(
+        "{file}: found {found}, expected a model (.json), equations as text (.txt), or LaTeX (.tex, .md)"
+    )]
+    Kind { file: String, found: String },
+    #[error(transparent)]
+    File(#[from] ImportError),
+    /// An equation that is too large once its numbers are kept as they are written.
+    #[error("{file}:{line}: not a usable equation")]
+    Expression {
+        file: String,
+        /// Line of its left side; 0 in a model.
+        line: usize,
+        source: ParseError,
+    },
+    #[error("{}: {message}", path.display())]
+    Domain { path: PathBuf, message: String },
+}
 
 /// The equations of one file.
 #[derive(Clone, Debug)]
@@ -39,7 +63,6 @@ pub(super) struct SidePhase {
 #[derive(Clone, Debug)]
 pub(super) enum RightSide {
     Summands(Vec<(f64, String)>),
-    /// One expression, and the line of its left side.
     Text(usize, String),
 }
 
@@ -147,7 +170,6 @@ impl Side {
         names.flatten().collect()
     }
 
-    /// Builds every right side once, so that later ones are known to build.
     fn check(&self) -> Result<(), CheckError> {
         let mut pool = ExprPool::exact();
         for right_side in self.phases.iter().flat_map(|phase| &phase.ddz) {
@@ -203,30 +225,25 @@ impl Side {
                 .parse(text, pool)
                 .expect("the text was parsed when the file was read"),
             RightSide::Summands(summands) => {
-                let mut guards = Vec::new();
-                let products: Vec<ExprId> = (summands.iter())
-                    .map(|(coefficient, term)| {
-                        let term = self.parse(term, pool).expect("terms of a model parse");
-                        guards.extend(term.guards);
-                        let size = coefficient.abs();
-                        let whole = Number::from_f64(size).filter(|number| number.is_exact());
-                        let text = format!("{size:?}");
-                        let is_rounded =
-                            floats == Floats::Rounded && n_digits(&text) >= FLOAT_DIGITS;
-                        let factor = match (whole, is_rounded) {
-                            (Some(number), _) => Some(pool.constant(number)),
-                            (None, true) => pool.decimal(&format!("{size:.14e}"), true),
-                            (None, false) => pool.decimal(&text, false),
-                        };
-                        let factor = factor.expect("a float reads as a decimal");
-                        let product = pool.mul(factor, term.expr);
-                        if *coefficient < 0.0 {
-                            pool.neg(product)
-                        } else {
-                            product
-                        }
-                    })
-                    .collect();
+                let (mut products, mut guards) = (Vec::new(), Vec::new());
+                for (coefficient, term) in summands {
+                    let term = self.parse(term, pool).expect("terms of a model parse");
+                    guards.extend(term.guards);
+                    let size = coefficient.abs();
+                    let whole = Number::from_f64(size).filter(|number| number.is_exact());
+                    let text = format!("{size:?}");
+                    let is_rounded = floats == Floats::Rounded && n_digits(&text) >= FLOAT_DIGITS;
+                    let factor = match (whole, is_rounded) {
+                        (Some(number), _) => Some(pool.constant(number)),
+                        (None, true) => pool.decimal(&format!("{size:.14e}"), true),
+                        (None, false) => pool.decimal(&text, false),
+                    };
+                    let product = pool.mul(factor.expect("a float reads as a decimal"), term.expr);
+                    products.push(match *coefficient < 0.0 {
+                        true => pool.neg(product),
+                        false => product,
+                    });
+                }
                 let expr = pool.sum(&products);
                 Reading { expr, guards }
             }

@@ -1,24 +1,16 @@
 //! `romc check`: two files in, equal or a point of difference out.
 
-use std::fmt::Write as _;
-
-use serde_json::{Value, json};
-
-use super::Answer;
 use super::args::CheckArguments;
-use super::output::extend;
-use crate::Error;
+use super::*;
 use crate::check::{
-    CheckDomain, CheckError, CheckOptions, Comparison, EquationComparison, Gap, Side,
-    TermDifference, Verdict, compare, read_sides,
+    CheckDomain, CheckError, CheckOptions, Comparison, Gap, Side, TermDifference, Verdict, compare,
+    read_sides,
 };
 use crate::files::read_toml;
 use crate::import::SymbolNames;
-use crate::typeset::significant;
-use crate::typeset::words::counted;
 
 /// Compares two files. The exit code is 0 if they are proven equal and 1 otherwise.
-pub(crate) fn run(arguments: &CheckArguments) -> Result<Answer, Error> {
+pub(super) fn run(arguments: &CheckArguments) -> Result<Answer, Error> {
     let options = CheckOptions {
         exact: arguments.exact,
         symbols: SymbolNames::parse(&arguments.symbols)?,
@@ -27,23 +19,12 @@ pub(crate) fn run(arguments: &CheckArguments) -> Result<Answer, Error> {
     let [left, right] = read_sides([&arguments.left, &arguments.right], &options)?;
     let comparison = compare(&left, &right, &options);
     let phases: Vec<&str> = (comparison.phases.iter().map(|phase| phase.name.as_str())).collect();
-    let latent_dim = left.latent_dim.max(right.latent_dim);
-    let foreign = options.domain.foreign(&phases, latent_dim);
+    let foreign = (options.domain).foreign(&phases, left.latent_dim.max(right.latent_dim));
     if let (Some(path), Some(message)) = (&arguments.domain, foreign) {
         let path = path.clone();
         return Err(CheckError::Domain { path, message }.into());
     }
-    let is_equal = comparison.says_the_same();
-    let json = json!({
-        "files": [&left.file, &right.file],
-        "equal": is_equal,
-        "exact": comparison.verdicts().all(|verdict| *verdict == Verdict::Equal),
-        "phases": comparison.phases.iter().map(|phase| json!({
-            "phase": phase.name,
-            "equations": phase.equations.iter().map(equation_json).collect::<Vec<_>>(),
-        })).collect::<Vec<_>>(),
-    });
-    Ok(Answer::new(text(&left, &right, &comparison), json).failed_if(!is_equal))
+    Ok(answer(&left, &right, &comparison))
 }
 
 fn domain(arguments: &CheckArguments) -> Result<CheckDomain, CheckError> {
@@ -57,43 +38,48 @@ fn domain(arguments: &CheckArguments) -> Result<CheckDomain, CheckError> {
     CheckDomain::from_toml(path, &text)
 }
 
-fn text(left: &Side, right: &Side, comparison: &Comparison) -> String {
+fn answer(left: &Side, right: &Side, comparison: &Comparison) -> Answer {
     let mut text = format!("A: {}\nB: {}\n", left.file, right.file);
+    let mut phases = Vec::new();
     for phase in &comparison.phases {
         let _ = writeln!(text, "\nphase {}", phase.name);
+        let mut equations = Vec::new();
         for equation in &phase.equations {
-            let verdict = verdict_text(&equation.verdict);
-            let _ = writeln!(text, "  {}: {verdict}", equation.output);
+            let (words, verdict) = described(&equation.verdict);
+            let _ = writeln!(text, "  {}: {words}", equation.output);
             text += &dropping(&equation.verdict, [left, right]);
+            let mut entry = json!({ "equation": equation.output });
+            extend(&mut entry, verdict);
             if let Some(gap) = &equation.one_sided {
                 let is_of_second = gap.left.is_nan();
                 let (has, lacks, at) = (side(is_of_second), side(!is_of_second), place(gap));
-                let _ = writeln!(
-                    text,
-                    "    note: {has} has a value at {at}, {lacks} has none"
-                );
+                text += &format!("    note: {has} has a value at {at}, {lacks} has none\n");
+                entry["one_sided"] = gap_json(gap);
             }
+            equations.push(entry);
         }
+        phases.push(json!({ "phase": phase.name, "equations": equations }));
     }
     let count = |wanted: fn(&Verdict) -> bool| comparison.verdicts().filter(|v| wanted(v)).count();
-    let (all, exact) = (count(|_| true), count(|verdict| *verdict == Verdict::Equal));
-    let equal = count(Verdict::is_equal);
+    let (n, exact) = (count(|_| true), count(|verdict| *verdict == Verdict::Equal));
+    let (all, equal) = (counted(n, "equation"), count(Verdict::is_equal));
     let rounded = match equal - exact {
         0 => String::new(),
         n => format!(", {n} of them up to the printed digits"),
     };
-    let (say, of_all) = match comparison.says_the_same() {
-        true => ("say", counted(all, "equation")),
-        false => (
-            "do not say",
-            format!("{equal} of {}", counted(all, "equation")),
-        ),
+    let is_equal = comparison.says_the_same();
+    let (say, of_all) = match is_equal {
+        true => ("say", all),
+        false => ("do not say", format!("{equal} of {all}")),
     };
-    let _ = writeln!(
-        text,
-        "\nA and B {say} the same: {of_all} proven equal{rounded}"
-    );
-    text
+    text += &format!("\nA and B {say} the same: {of_all} proven equal{rounded}\n");
+    let json = json!({
+        "files": [&left.file, &right.file],
+        "equal": is_equal,
+        "exact": exact == n,
+        "phases": phases,
+    });
+    Answer::new(text, json).failed_if(!is_equal)
 }
 
 /// Notes on the files in print that lack a term of the other: rounding may have dropped it.
@@ -109,45 +95,59 @@ fn dropping(verdict: &Verdict, [left, right]: [&Side; 2]) -> String {
         ("B", right, lacks(|term| term.right)),
     ];
     let dropping = (files.into_iter()).filter(|(_, file, lacks)| file.is_rounded && *lacks);
-    let rounded = dropping.map(|(letter, side, _)| format!("{letter} ({})", side.file));
-    let notes = rounded.map(|file| {
-        format!(
-            "    note: {file} has rounded decimals, and terms that round to zero are not printed\n"
-        )
-    });
-    notes.collect()
+    let words = "has rounded decimals, and terms that round to zero are not printed";
+    let notes = dropping.map(|(letter, side, _)| format!("{letter} ({}) {words}", side.file));
+    lines("    note: ", notes)
 }
 
 fn side(is_second: bool) -> &'static str {
     if is_second { "B" } else { "A" }
 }
 
-fn verdict_text(verdict: &Verdict) -> String {
+/// A verdict in words, and as entries of a JSON object.
+fn described(verdict: &Verdict) -> (String, Value) {
     match verdict {
-        Verdict::Equal => "proven equal".to_owned(),
-        Verdict::EqualAsPrinted(rounding) => format!(
-            "proven equal up to the printed digits (coefficients differ by at most {})",
-            significant(*rounding)
-        ),
+        Verdict::Equal => ("proven equal".to_owned(), json!({ "verdict": "equal" })),
+        Verdict::EqualAsPrinted(rounding) => {
+            let most = significant(*rounding);
+            let text = format!(
+                "proven equal up to the printed digits (coefficients differ by at most {most})"
+            );
+            let json = json!({ "verdict": "equal as printed", "rounding": rounding });
+            (text, json)
+        }
         Verdict::Different(difference) => {
             let how = match difference.beside_rounding {
                 true => "different in terms beside those that rounding explains,",
                 false => "different",
             };
             let (gap, terms) = (gap_text(&difference.gap), terms_text(&difference.terms));
-            format!("{how}{gap}{terms}")
+            let json = json!({
+                "verdict": "different",
+                "point": gap_json(&difference.gap),
+                "terms": difference.terms,
+                "beside_rounding": difference.beside_rounding,
+            });
+            (format!("{how}{gap}{terms}"), json)
         }
         Verdict::Undecided(largest, terms) => {
             let seen = match largest {
-                Some(gap) => format!("; the largest difference seen is{}", gap_text(gap)),
-                None => "; no difference was seen at any point".to_owned(),
+                Some(gap) => format!("the largest difference seen is{}", gap_text(gap)),
+                None => "no difference was seen at any point".to_owned(),
             };
-            format!(
-                "not decided: no proof, and no point where the difference is beyond rounding{seen}{}",
+            let text = format!(
+                "not decided: no proof, and no point where the difference is beyond rounding; {seen}{}",
                 terms_text(terms)
-            )
+            );
+            let point = largest.as_ref().map(gap_json);
+            let json = json!({ "verdict": "not decided", "point": point, "terms": terms });
+            (text, json)
         }
-        Verdict::Missing(in_second) => format!("missing in {}", side(*in_second)),
+        Verdict::Missing(second) => {
+            let file = side(*second);
+            let json = json!({ "verdict": "missing", "missing_in": file });
+            (format!("missing in {file}"), json)
+        }
     }
 }
 
@@ -158,7 +158,6 @@ fn gap_text(gap: &Gap) -> String {
     format!(" at {at}\n    A = {left}, B = {right}, A - B = {difference}")
 }
 
-/// A number with all its digits, but not with hundreds of zeros.
 fn number(value: f64) -> String {
     match value.abs() {
         0.0 | 1e-5..1e16 => value.to_string(),
@@ -189,34 +188,6 @@ fn terms_text(terms: &[TermDifference]) -> String {
     lines.collect()
 }
 
-fn equation_json(equation: &EquationComparison) -> Value {
-    let verdict = match &equation.verdict {
-        Verdict::Equal => json!({ "verdict": "equal" }),
-        Verdict::EqualAsPrinted(rounding) => {
-            json!({ "verdict": "equal as printed", "rounding": rounding })
-        }
-        Verdict::Different(difference) => json!({
-            "verdict": "different",
-            "point": gap_json(&difference.gap),
-            "terms": difference.terms,
-            "beside_rounding": difference.beside_rounding,
-        }),
-        Verdict::Undecided(largest, terms) => json!({
-            "verdict": "not decided",
-            "point": largest.as_ref().map(gap_json),
-            "terms": terms,
-        }),
-        Verdict::Missing(second) => json!({ "verdict": "missing", "missing_in": side(*second) }),
-    };
-    let mut entry = json!({ "equation": equation.output });
-    extend(&mut entry, verdict);
-    if let Some(gap) = &equation.one_sided {
-        entry["one_sided"] = gap_json(gap);
-    }
-    entry
-}
-
-/// Both values at a point; a side without a value is null.
 fn gap_json(gap: &Gap) -> Value {
     json!({ "at": gap.point, "a": gap.left, "b": gap.right, "difference": gap.left - gap.right })
 }

@@ -1,23 +1,14 @@
 //! `romc compile`: a model file to equations and code.
 
-use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
-
-use serde_json::{Value, json};
-
-use super::Answer;
 use super::args::{CompileArguments, UnitsChoice};
-use super::destination::{Format, Inputs};
-use super::output::{lines, names, quoted, read_jump, shown};
 use super::simplification::{self, Outcome, exact_words};
+use super::*;
 use crate::deploy::{self, EmitOptions, PlannedJump, Target};
 use crate::equations::Equations;
-use crate::files::{EmittedFile, Overwrite, earlier_files};
-use crate::model::ReducedModel;
-use crate::typeset::{NumberStyle, PrintOptions, Rounding, SymbolTable, Table};
-use crate::{Error, artifact};
+use crate::files::earlier_files;
+use crate::typeset::{NumberStyle, PrintOptions, Rounding, SymbolTable};
 
-pub(crate) fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
+pub(super) fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
     let (inputs, simplification) = (inputs(arguments)?, &arguments.simplification);
     let save_model = simplification.save_model.as_deref();
     let read = artifact::read(&arguments.model)?;
@@ -49,7 +40,7 @@ pub(crate) fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
     }
     let paths = inputs.write_folder(&arguments.out_dir, &files, arguments.force)?;
     let sizes = files.iter().map(|file| file.contents.len());
-    let written: Vec<(PathBuf, usize)> = paths.into_iter().zip(sizes).collect();
+    let written: Vec<(String, usize)> = names(&paths).into_iter().zip(sizes).collect();
     let earlier = earlier_files(&arguments.out_dir, &files)?;
     if let Some(path) = save_model {
         artifact::write(path, model, arguments.force)?;
@@ -59,10 +50,8 @@ pub(crate) fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
         + &summary
         + &text(arguments, equations, &written)
         + &earlier_in_words(&earlier);
-    let files = written.iter().map(|(path, bytes)| {
-        let path = path.display().to_string();
-        json!({ "path": path, "bytes": bytes })
-    });
+    let files = written.iter();
+    let files = files.map(|(path, bytes)| json!({ "path": path, "bytes": bytes }));
     let json = json!({
         "model": arguments.model.display().to_string(),
         "name": model.name(),
@@ -80,11 +69,10 @@ pub(crate) fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
 /// The files that are read, after a check of the one that the model is saved to.
 fn inputs(arguments: &CompileArguments) -> Result<Inputs<'_>, Error> {
     let simplification = &arguments.simplification;
-    let inputs = Inputs::default()
+    let inputs = Inputs::reading(&simplification.reading)
         .and([&arguments.model])
         .and(&arguments.plan)
         .and(&simplification.domain)
-        .and(&simplification.reading.columns)
         .into_folder(Some(&arguments.out_dir))?;
     // What would be the same file again may stay; it is compared once there is a model.
     match simplification.save_model.as_deref() {
@@ -107,11 +95,11 @@ fn twice(targets: &[Target]) -> String {
 fn text(
     arguments: &CompileArguments,
     equations: &Equations<'_>,
-    written: &[(PathBuf, usize)],
+    written: &[(String, usize)],
 ) -> String {
     let model = equations.model();
     let table = Table::of(written)
-        .column("file", "", |(path, _)| path.display().to_string())
+        .column("file", "", |(path, _)| path)
         .column("bytes", "", |(_, bytes)| *bytes)
         .table();
     let phases: Vec<String> = (equations.phases().iter())
@@ -126,21 +114,15 @@ fn text(
     let saved = arguments.simplification.save_model.as_deref();
     text += &lines("simplified model: ", saved.map(Path::display));
     if arguments.emit.contains(&Target::C) {
-        let name = model.identifier().as_str();
-        let file = |ending: &str| quoted(&arguments.out_dir.join(ending));
-        let program = file("selftest");
+        let file = |name: &str| quoted(&arguments.out_dir.join(name));
+        let of_model = |end: &str| file(&format!("{}{end}", model.identifier()));
+        let (program, source) = (file("selftest"), of_model(".c"));
+        let test = of_model("_selftest.c");
         // Without a folder before it, a shell would look for the program elsewhere.
-        let run = match program.contains('/') {
-            true => program.clone(),
-            false => format!("./{program}"),
-        };
-        let (source, test) = (
-            file(&format!("{name}.c")),
-            file(&format!("{name}_selftest.c")),
-        );
+        let here = if program.contains('/') { "" } else { "./" };
         let _ = writeln!(
             text,
-            "\ncheck the C code on this machine:\n  cc -O2 -o {program} {source} {test} -lm && {run}"
+            "\ncheck the C code on this machine:\n  cc -O2 -o {program} {source} {test} -lm && {here}{program}"
         );
     }
     text
@@ -171,7 +153,6 @@ fn planned(
     }))
 }
 
-/// The files of the targets, in memory, with the model's digest in their headers.
 fn emit(
     equations: &Equations<'_>,
     arguments: &CompileArguments,
@@ -197,22 +178,19 @@ fn emit(
         },
         ..EmitOptions::default()
     };
-    let physical = match code.units {
-        UnitsChoice::Si | UnitsChoice::Scaled => None,
-        UnitsChoice::Physical => Some(equations.in_physical_units()?),
-    };
+    let is_physical = code.units == UnitsChoice::Physical;
+    let physical = is_physical.then(|| equations.in_physical_units());
+    let physical = physical.transpose()?;
     let equations = physical.as_ref().unwrap_or(equations);
     Ok(deploy::emit(equations, &arguments.emit, &options)?)
 }
 
-/// A note on files of the folder that this run did not write.
 fn earlier_in_words(earlier: &[PathBuf]) -> String {
-    match earlier {
+    match names(earlier).as_slice() {
         [] => String::new(),
-        [file] => format!("\nof an earlier run, not written now: {}\n", file.display()),
+        [file] => format!("\nof an earlier run, not written now: {file}\n"),
         [file, others @ ..] => format!(
-            "\nof earlier runs, not written now: {} and {} more\n",
-            file.display(),
+            "\nof earlier runs, not written now: {file} and {} more\n",
             others.len()
         ),
     }

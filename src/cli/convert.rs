@@ -1,38 +1,23 @@
 //! `romc convert`: recordings and logs of other programs into one format.
 
-use std::io::ErrorKind;
-use std::path::Path;
-
 use nalgebra::DMatrix;
-use serde_json::json;
 
-use super::Answer;
 use super::args::ConvertArguments;
-use super::destination::{Format, Inputs};
-use super::output::{names, read_with, reader};
-use crate::files::Overwrite;
-use crate::recording::{
-    Clocks, Recording, RecordingFault, Segment, WriteOptions, write_as, write_mcap,
-};
-use crate::{Error, artifact};
+use super::*;
+use crate::recording::{RecordingFault, WriteOptions, write_as, write_mcap};
 
-pub(crate) fn run(arguments: &ConvertArguments) -> Result<Answer, Error> {
-    Inputs::default()
+pub(super) fn run(arguments: &ConvertArguments) -> Result<Answer, Error> {
+    Inputs::reading(&arguments.reading)
         .and(&arguments.recordings)
         .and(&arguments.inputs_of)
-        .and(&arguments.reading.columns)
         .check_output(Some(&arguments.output), Format::RECORDING, arguments.force)?;
     let rule = match &arguments.inputs_of {
         None => None,
         Some(path) => Some(artifact::read(path)?.input_rule()?),
     };
-    let reader = reader(&arguments.reading, Clocks::Recorded)?;
-    let reader = match &rule {
-        Some(rule) => reader.for_robot(rule.robot()),
-        None => reader,
-    };
-    let recordings = read_with(&reader, &arguments.recordings)?;
-    let segments = chained(recordings);
+    let robot = rule.as_ref().map(|rule| rule.robot());
+    let reader = reader(&arguments.reading, Clocks::Recorded, robot)?;
+    let segments = chained(read_with(&reader, &arguments.recordings)?);
     let inputs = rule.as_ref().map(|rule| {
         let inputs = segments.iter().map(|segment| segment.input(rule));
         inputs.collect::<Result<Vec<DMatrix<f64>>, _>>()
@@ -56,9 +41,7 @@ pub(crate) fn run(arguments: &ConvertArguments) -> Result<Answer, Error> {
 
 /// The segments one after the other; where there are several, each begins at 0 s.
 fn chained(recordings: Vec<Recording>) -> Vec<Segment> {
-    let segments = recordings
-        .into_iter()
-        .flat_map(|recording| recording.segments);
+    let segments = recordings.into_iter().flat_map(|of| of.segments);
     let mut segments: Vec<Segment> = segments.collect();
     if segments.len() > 1 {
         for segment in &mut segments {
@@ -73,36 +56,35 @@ fn chained(recordings: Vec<Recording>) -> Vec<Segment> {
 ///
 /// # Errors
 /// [`Error::NotOne`] for an MCAP file of several, [`Error::Exists`], [`Error::Recording`] if the file system refuses.
-pub(crate) fn write_recording(
+pub(super) fn write_recording(
     path: &Path,
     segments: Vec<Segment>,
     inputs: Option<&[DMatrix<f64>]>,
     overwrite: Overwrite,
 ) -> Result<(), Error> {
-    let written = if (path.extension()).is_some_and(|ending| ending.eq_ignore_ascii_case("mcap")) {
-        let [segment] = &segments[..] else {
+    let is_mcap = (path.extension()).is_some_and(|ending| ending.eq_ignore_ascii_case("mcap"));
+    let written = match &segments[..] {
+        [segment] if is_mcap => {
+            write_mcap(path, segment, inputs.map(|inputs| &inputs[0]), overwrite)
+        }
+        several if is_mcap => {
             return Err(Error::NotOne {
-                found: format!("{} segments", segments.len()),
+                found: format!("{} segments", several.len()),
                 expected: "for an MCAP file",
             });
-        };
-        write_mcap(path, segment, inputs.map(|inputs| &inputs[0]), overwrite)
-    } else {
-        let recording = Recording {
-            path: path.to_owned(),
-            segments,
-            ignored_columns: Vec::new(),
-        };
-        write_as(
-            path,
-            &recording,
-            inputs,
-            &WriteOptions::default(),
-            overwrite,
-        )
+        }
+        _ => {
+            let recording = Recording {
+                path: path.to_owned(),
+                segments,
+                ignored_columns: Vec::new(),
+            };
+            let options = WriteOptions::default();
+            write_as(path, &recording, inputs, &options, overwrite)
+        }
     };
     written.map_err(|error| match &error.kind {
-        RecordingFault::Io { source, .. } if source.kind() == ErrorKind::AlreadyExists => {
+        RecordingFault::Io { source, .. } if source.kind() == io::ErrorKind::AlreadyExists => {
             Error::Exists(path.to_owned())
         }
         _ => error.into(),

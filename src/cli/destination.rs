@@ -1,54 +1,33 @@
 //! Where a command may write: its output says its format by its ending, and is none of the files that the command reads.
 
-use std::path::{Path, PathBuf};
-
-use super::Answer;
-use super::output::names;
-use crate::Error;
-use crate::files::{Begun, EmittedFile, Overwrite, write_files_since};
+use super::args::ReadingArguments;
+use super::*;
+use crate::files::{Emitted, write_files_since};
 use crate::report::{Figure, figure_files};
 
 /// What an output file holds: the endings that it may have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Format(&'static [&'static str]);
+pub(super) struct Format(&'static [&'static str]);
 
 impl Format {
-    pub(crate) const TABLE: Self = Self(&[".csv"]);
-    pub(crate) const RECORDING: Self = Self(&[".csv", ".csv.gz", ".mcap"]);
-    pub(crate) const MODEL: Self = Self(&[".json"]);
-    pub(crate) const TOML: Self = Self(&[".toml"]);
-    pub(crate) const PAGE: Self = Self(&[".html", ".htm"]);
-
-    /// Refuses a name whose ending says another format. What is there and no file of a disk is refused elsewhere.
-    fn check(self, path: &Path) -> Result<(), Error> {
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
-        let name = name.to_lowercase();
-        let is_device = path.exists() && !path.is_file();
-        if is_device || self.0.iter().any(|ending| name.ends_with(ending)) {
-            return Ok(());
-        }
-        let found = match path.extension() {
-            Some(ending) => format!(".{}", ending.to_string_lossy()),
-            None => "no ending".to_owned(),
-        };
-        let expected = match self.0 {
-            [all @ .., last] if !all.is_empty() => format!("{} or {last}", all.join(", ")),
-            all => all.concat(),
-        };
-        Err(Error::Output {
-            path: path.to_owned(),
-            message: format!("found {found}, expected a name that ends in {expected}"),
-        })
-    }
+    pub(super) const TABLE: Self = Self(&[".csv"]);
+    pub(super) const RECORDING: Self = Self(&[".csv", ".csv.gz", ".mcap"]);
+    pub(super) const MODEL: Self = Self(&[".json"]);
+    pub(super) const TOML: Self = Self(&[".toml"]);
+    pub(super) const PAGE: Self = Self(&[".html", ".htm"]);
 }
 
 /// The files that a command reads, none of which it may replace, forced or not; and the folder that it writes into, as it
 /// is when the command begins.
 #[derive(Debug, Default)]
-pub(crate) struct Inputs<'a>(Vec<&'a Path>, Option<Begun>);
+pub(super) struct Inputs<'a>(Vec<&'a Path>, Option<Emitted>);
 
 impl<'a> Inputs<'a> {
-    pub(crate) fn and<P: AsRef<Path> + ?Sized + 'a>(
+    pub(super) fn reading(arguments: &'a ReadingArguments) -> Self {
+        Self::default().and(&arguments.columns)
+    }
+
+    pub(super) fn and<P: AsRef<Path> + ?Sized + 'a>(
         mut self,
         more: impl IntoIterator<Item = &'a P>,
     ) -> Self {
@@ -56,14 +35,13 @@ impl<'a> Inputs<'a> {
         self
     }
 
-    /// The same for a command that writes into this folder.
-    pub(crate) fn into_folder(mut self, folder: Option<&Path>) -> Result<Self, Error> {
-        self.1 = folder.map(Begun::of).transpose()?;
+    pub(super) fn into_folder(mut self, folder: Option<&Path>) -> Result<Self, Error> {
+        self.1 = folder.map(Emitted::of).transpose()?;
         Ok(self)
     }
 
     /// These and the file of a robot, unless the name is that of one of romc's own.
-    pub(crate) fn and_robot(self, name: Option<&'a str>) -> Self {
+    pub(super) fn and_robot(self, name: Option<&'a str>) -> Self {
         let is_file = |name: &&str| !crate::robot_file::known_names().contains(name);
         self.and(name.filter(is_file))
     }
@@ -92,21 +70,35 @@ impl<'a> Inputs<'a> {
         })
     }
 
-    /// Refuses an output by its name alone: a folder, a name that says another format, one of the inputs.
-    pub(crate) fn check_name(&self, path: &Path, format: Format) -> Result<(), Error> {
-        if path.is_dir() || path.file_name().is_none() {
-            return Err(Error::refused(
-                path,
-                "is a folder; expected the name of a file",
-            ));
+    /// Refuses an output by its name alone: a folder, a name that says another format, one of the inputs. What is there
+    /// and no file of a disk may have any name.
+    pub(super) fn check_name(&self, path: &Path, format: Format) -> Result<(), Error> {
+        let Some(name) = path.file_name().filter(|_| !path.is_dir()) else {
+            let message = "is a folder; expected the name of a file";
+            return Err(Error::refused(path, message));
+        };
+        let name = name.to_string_lossy().to_lowercase();
+        let is_device = path.exists() && !path.is_file();
+        if is_device || format.0.iter().any(|ending| name.ends_with(ending)) {
+            return self.check(path);
         }
-        format.check(path)?;
-        self.check(path)
+        let found = match path.extension() {
+            Some(ending) => format!(".{}", ending.to_string_lossy()),
+            None => "no ending".to_owned(),
+        };
+        let expected = match format.0 {
+            [all @ .., last] if !all.is_empty() => format!("{} or {last}", all.join(", ")),
+            all => all.concat(),
+        };
+        Err(Error::Output {
+            path: path.to_owned(),
+            message: format!("found {found}, expected a name that ends in {expected}"),
+        })
     }
 
     /// Refuses an output that could not be written, before long work begins: by its name, as it is there and may not be
     /// replaced, or as its folder is not.
-    pub(crate) fn check_output(
+    pub(super) fn check_output(
         &self,
         path: Option<&Path>,
         format: Format,
@@ -128,7 +120,7 @@ impl<'a> Inputs<'a> {
     }
 
     /// Writes files into a folder, none of them one of these, nor one of that name that romc did not make.
-    pub(crate) fn write_folder(
+    pub(super) fn write_folder(
         &self,
         folder: &Path,
         files: &[EmittedFile],
@@ -137,13 +129,12 @@ impl<'a> Inputs<'a> {
         for file in files {
             self.check(&folder.join(&file.path))?;
         }
-        let now = Begun::of(folder)?;
+        let now = Emitted::of(folder)?;
         let begun = self.1.as_ref().unwrap_or(&now);
         Ok(write_files_since(begun, folder, files, overwrite)?)
     }
 
-    /// Writes figures into a folder, and says so in the answer.
-    pub(crate) fn write_figures(
+    pub(super) fn write_figures(
         &self,
         folder: &Path,
         figures: &[Figure],

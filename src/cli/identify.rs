@@ -1,29 +1,17 @@
 //! `romc identify`: gravity, mass and the joints' losses from recordings.
 
-use std::fmt::Write as _;
-use std::path::PathBuf;
-
-use serde_json::{Value, json};
-
-use super::Answer;
 use super::args::IdentifyArguments;
-use super::destination::{Format, Inputs};
-use super::output::{lines, names, note_repeated, read_with, reader, shown, spinner, write_file};
-use super::robot;
-use crate::Error;
+use super::*;
 use crate::identify::{Identification, Legs, identify};
-use crate::recording::Clocks;
 use crate::robot::Robot;
-use crate::typeset::{Table, significant};
 
-pub(crate) fn run(arguments: &IdentifyArguments) -> Result<Answer, Error> {
-    Inputs::default()
+pub(super) fn run(arguments: &IdentifyArguments) -> Result<Answer, Error> {
+    Inputs::reading(&arguments.reading)
         .and(&arguments.recordings)
-        .and(&arguments.reading.columns)
         .and_robot(Some(&arguments.robot))
         .check_output(arguments.output.as_deref(), Format::TOML, arguments.force)?;
     let robot = robot::chosen(&arguments.robot)?;
-    let reader = reader(&arguments.reading, Clocks::Recorded)?.for_robot(robot);
+    let reader = reader(&arguments.reading, Clocks::Recorded, Some(robot))?;
     let recordings = read_with(&reader, &arguments.recordings)?;
     let paths = arguments.recordings.iter().map(PathBuf::as_path);
     note_repeated(&[("recordings", paths.collect())]);

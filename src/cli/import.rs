@@ -1,44 +1,33 @@
 //! `romc import`: a model trained elsewhere in, a model file out.
 
-use std::fmt::Write as _;
-
-use serde_json::{Map, Value, json};
-
-use super::Answer;
 use super::args::{ImportArguments, LibraryArgument};
-use super::destination::{Format, Inputs};
-use super::output::{lines, named, read_recordings};
-use super::robot;
+use super::*;
 use crate::evaluate::RoundTrip;
 use crate::import::{
     Chosen, Format as FileKind, ImportError, ImportOptions, ImportReport, Imported, SymbolNames,
     import, read_terms,
 };
-use crate::model::{LibraryChoice, LibraryOrder, ReducedModel};
-use crate::recording::Segment;
+use crate::model::{LibraryChoice, LibraryOrder};
 use crate::robot_file::read_actuators;
 use crate::sim::with_input_statistics;
-use crate::typeset::Table;
-use crate::{Error, artifact};
 
-pub fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
+pub(super) fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
     let library = match &arguments.library {
         Some(LibraryArgument::File(path)) => Some(path),
         Some(LibraryArgument::Shorthand(_) | LibraryArgument::Terms(_)) | None => None,
     };
-    Inputs::default()
+    Inputs::reading(&arguments.reading)
         .and([&arguments.file])
         .and(library)
         .and(&arguments.actuators)
         .and(&arguments.inputs_from)
-        .and(&arguments.reading.columns)
         .and_robot(arguments.robot.as_deref())
         .check_output(Some(&arguments.output), Format::MODEL, arguments.force)?;
     let options = options(arguments)?;
     let kind = options
         .format
-        .map_or_else(|| FileKind::of_path(&arguments.file), Ok);
-    let is_text = matches!(kind, Ok(FileKind::Equations | FileKind::Latex));
+        .or_else(|| FileKind::of_path(&arguments.file).ok());
+    let is_text = matches!(kind, Some(FileKind::Equations | FileKind::Latex));
     if is_text && !arguments.inputs_from.is_empty() {
         let (found, expected) = ("a file of equations", "a file with encoder and decoder");
         return Err(ImportError::option("--inputs-from", found, expected).into());
@@ -52,14 +41,19 @@ pub fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
         fault,
     } = import_compared(read, options, &segments, arguments.unchecked)?;
     artifact::write(&arguments.output, &model, arguments.force)?;
-    let mut text = describe(&report);
-    let axes = axes(&model).filter(|_| arguments.wrench_frame.is_none());
-    text += &lines("note: ", &axes);
-    text.extend(
-        check
-            .as_ref()
-            .map(|check| describe_check(check, fault.as_deref())),
-    );
+    let has_axes = model.robot().is_ok() && model.encoder_map().is_ok();
+    let axes = (has_axes && arguments.wrench_frame.is_none()).then(|| {
+        format!(
+            "force and moment of the inputs are along the {}'s axes, as published \
+             (--wrench-frame says otherwise)",
+            model.wrench_frame().name()
+        )
+    });
+    let fault = fault.as_deref();
+    let mut text = describe(&report) + &lines("note: ", &axes);
+    let check = check.map(|check| describe_check(&check, fault));
+    let (words, check) = check.unwrap_or_default();
+    text += &words;
     let (output, name) = (arguments.output.display().to_string(), model.name());
     let _ = writeln!(text, "{output}: model `{name}`");
     let lacking = lacking(&model);
@@ -71,20 +65,9 @@ pub fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
         "report": report,
         "wrench_axes": axes,
         "lacking": lacking,
-        "check": check.as_ref().map(|check| check_json(check, fault.as_deref())),
+        "check": check,
     });
     Ok(Answer::new(text, json))
-}
-
-fn axes(model: &ReducedModel) -> Option<String> {
-    let has_axes = model.robot().is_ok() && model.encoder_map().is_ok();
-    let frame = model.wrench_frame().name();
-    has_axes.then(|| {
-        format!(
-            "force and moment of the inputs are along the {frame}'s axes, as published \
-             (--wrench-frame says otherwise)"
-        )
-    })
 }
 
 /// An imported model, compared with recordings if there are any.
@@ -110,12 +93,10 @@ pub fn import_compared(
     unchecked: bool,
 ) -> Result<Compared, Error> {
     if segments.is_empty() {
-        let imported = read(&options)?;
-        let (check, fault) = (None, None);
         return Ok(Compared {
-            imported,
-            check,
-            fault,
+            imported: read(&options)?,
+            check: None,
+            fault: None,
         });
     }
     let compared = |options: &ImportOptions| -> Result<(Imported, RoundTrip), Error> {
@@ -159,14 +140,10 @@ pub fn import_compared(
 }
 
 fn needs_maps(report: &ImportReport) -> Error {
-    let unused = report
-        .unused
-        .iter()
-        .map(|unused| format!("`{}`", unused.tensor));
-    let unused: Vec<String> = unused.collect();
-    let left = match unused.is_empty() {
-        true => "no tensor is left".to_owned(),
-        false => format!("left are {}", unused.join(", ")),
+    let unused = report.unused.iter().map(|of| format!("`{}`", of.tensor));
+    let left = match unused.collect::<Vec<_>>().join(", ").as_str() {
+        "" => "no tensor is left".to_owned(),
+        unused => format!("left are {unused}"),
     };
     let found = format!("a model without encoder or decoder to compare; {left}");
     let expected = "both (--map encoder.weight=TENSOR, --map decoder.weight=TENSOR)";
@@ -175,21 +152,18 @@ fn needs_maps(report: &ImportReport) -> Error {
 
 /// Commands that cannot use a model, and the option that mends it.
 fn lacking(model: &ReducedModel) -> Option<&'static str> {
-    if model.encoder_map().is_err() || model.decoder_map().is_err() {
-        return Some(
-            "Equations only: `romc compile` takes this model; everything else needs an encoder and a decoder.",
-        );
-    }
-    if model.robot().is_err() {
-        return Some(
-            "No robot: `romc compile` takes this model; `--robot go1` lets `simulate`, `report` and `mpc` do so too.",
-        );
-    }
-    let n_phases = model.phases().len();
-    (0..n_phases).any(|phase| model.input_statistics(phase).is_err()).then_some(
+    let has_maps = model.encoder_map().is_ok() && model.decoder_map().is_ok();
+    let mut phases = 0..model.phases().len();
+    Some(if !has_maps {
+        "Equations only: `romc compile` takes this model; everything else needs an encoder and a decoder."
+    } else if model.robot().is_err() {
+        "No robot: `romc compile` takes this model; `--robot go1` lets `simulate`, `report` and `mpc` do so too."
+    } else if phases.any(|phase| model.input_statistics(phase).is_err()) {
         "No input statistics in some phase: the controller (`mpc`, `compile --emit controller`) cannot weigh inputs; \
-         `--inputs-from jumps/*.csv` takes them from recordings.",
-    )
+         `--inputs-from jumps/*.csv` takes them from recordings."
+    } else {
+        return None;
+    })
 }
 
 fn options(arguments: &ImportArguments) -> Result<ImportOptions, Error> {
@@ -224,49 +198,44 @@ fn options(arguments: &ImportArguments) -> Result<ImportOptions, Error> {
 }
 
 fn describe(report: &ImportReport) -> String {
-    let mut text = format!(
-        "{} ({}): {} latent coordinates, ",
-        report.file, report.format, report.latent_dim
-    );
-    if let Some(state_dim) = report.state_dim {
-        let _ = write!(text, "{state_dim} robot coordinates, ");
-    }
-    let _ = writeln!(text, "{} candidate terms\n", report.library_dim);
-    if !report.used.is_empty() {
-        let table = Table::of(&report.used)
-            .column("part", "", |used| &used.role)
-            .column("tensor", "", |used| &used.tensor)
-            .column("shape", "", |used| shape(&used.shape))
-            .column("type", "", |used| &used.element)
-            .column("chosen", "", |used| match used.chosen {
-                Chosen::Mapped => "by --map",
-                Chosen::Named => "by name",
-            })
-            .column("stored as", "", |used| used.layout.to_string())
-            .table();
-        let _ = writeln!(text, "{table}");
-    }
-    if !report.terms.is_empty() {
-        let order = report
-            .library_order
-            .map(|order| format!(" (--library-order {order})"));
-        let (order, terms) = (order.unwrap_or_default(), report.terms.join("; "));
-        let _ = writeln!(text, "rows of xi{order}: {terms}\n");
-    }
-    if !report.equations.is_empty() {
-        let table = Table::of(&report.equations)
-            .column("equation", "", |equation| &equation.output)
-            .column("phase", "", |equation| &equation.phase)
-            .column("line", "", |equation| equation.line)
-            .column("terms", "", |equation| equation.terms)
-            .table();
-        let _ = writeln!(text, "{table}");
-    }
-    for unused in &report.unused {
-        let shape = shape(&unused.shape);
-        let _ = writeln!(text, "not used: {} ({shape})", unused.tensor);
-    }
-    text + &lines("note: ", &report.notes)
+    let used = Table::of(&report.used)
+        .column("part", "", |used| &used.role)
+        .column("tensor", "", |used| &used.tensor)
+        .column("shape", "", |used| shape(&used.shape))
+        .column("type", "", |used| &used.element)
+        .column("chosen", "", |used| match used.chosen {
+            Chosen::Mapped => "by --map",
+            Chosen::Named => "by name",
+        })
+        .column("stored as", "", |used| used.layout.to_string())
+        .table();
+    let order = (report.library_order.as_ref()).map(|of| format!(" (--library-order {of})"));
+    let (order, terms) = (order.unwrap_or_default(), report.terms.join("; "));
+    let terms = (!terms.is_empty()).then(|| format!("rows of xi{order}: {terms}\n"));
+    let equations = Table::of(&report.equations)
+        .column("equation", "", |equation| &equation.output)
+        .column("phase", "", |equation| &equation.phase)
+        .column("line", "", |equation| equation.line)
+        .column("terms", "", |equation| equation.terms)
+        .table();
+    let filled = |table: Table| lines("", Some(table).filter(|table| !table.is_empty()));
+    let unused = report.unused.iter();
+    let unused = unused.map(|of| format!("{} ({})", of.tensor, shape(&of.shape)));
+    let state = report
+        .state_dim
+        .map(|dim| format!("{dim} robot coordinates, "));
+    format!(
+        "{} ({}): {} latent coordinates, {}{} candidate terms\n\n",
+        report.file,
+        report.format,
+        report.latent_dim,
+        state.unwrap_or_default(),
+        report.library_dim
+    ) + &filled(used)
+        + &lines("", terms)
+        + &filled(equations)
+        + &lines("not used: ", unused)
+        + &lines("note: ", &report.notes)
 }
 
 fn shape(dims: &[usize]) -> String {
@@ -277,42 +246,30 @@ fn shape(dims: &[usize]) -> String {
     }
 }
 
-/// What the recordings of `--inputs-from` say of the imported model, as text.
-fn describe_check(check: &RoundTrip, fault: Option<&str>) -> String {
+/// What the recordings of `--inputs-from` say of the imported model, in words and as JSON.
+fn describe_check(check: &RoundTrip, fault: Option<&str>) -> (String, Value) {
     let mut text = format!(
         "\nOn the recordings: decode(encode(x)) misses {:.3} of the variance",
         check.error
     );
+    let (mut phases, mut orders, mut words) = (Map::new(), Map::new(), Vec::new());
     for (phase, r2) in &check.acceleration_r2 {
-        if let Some(r2) = r2 {
-            let _ = write!(text, "; R^2 of ddz in {phase} {r2:.3}");
-        }
+        text.extend(r2.map(|r2| format!("; R^2 of ddz in {phase} {r2:.3}")));
+        phases.insert(phase.clone(), json!(r2));
     }
-    if check.trials.by_order.len() > 1 {
-        let orders = check.trials.by_order.iter().map(|(order, r2)| {
-            let name = order.name().unwrap_or_default();
-            format!("{r2:.3} in the order {name}")
-        });
-        let _ = write!(
-            text,
-            "; of all phases {}",
-            orders.collect::<Vec<_>>().join(", ")
-        );
+    for (order, r2) in &check.trials.by_order {
+        let name = order.name().unwrap_or_default();
+        words.push(format!("{r2:.3} in the order {name}"));
+        orders.insert(name.to_owned(), json!(r2));
     }
-    text + "\n" + &lines("warning: ", fault) + "\n"
-}
-
-fn check_json(check: &RoundTrip, fault: Option<&str>) -> Value {
-    let orders: Map<String, Value> = (check.trials.by_order.iter())
-        .map(|(order, r2)| (order.name().unwrap_or_default().to_owned(), json!(r2)))
-        .collect();
-    let phases: Map<String, Value> = (check.acceleration_r2.iter())
-        .map(|(phase, r2)| (phase.clone(), json!(r2)))
-        .collect();
-    json!({
+    if words.len() > 1 {
+        let _ = write!(text, "; of all phases {}", words.join(", "));
+    }
+    let json = json!({
         "reconstruction_error": check.error,
         "acceleration_r2": phases,
         "library_order_r2": orders,
         "fault": fault,
-    })
+    });
+    (text + "\n" + &lines("warning: ", fault) + "\n", json)
 }

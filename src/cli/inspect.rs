@@ -3,59 +3,38 @@
 //! Of a model its parts, its phases, the pattern of Xi and the composition of each latent coordinate; of a recording
 //! ranges, phases on a time bar, implausible samples.
 
-use std::fmt::Write as _;
-use std::path::Path;
-
 use nalgebra::DMatrix;
 use serde::Serialize;
-use serde_json::{Value, json};
 
 use super::args::InspectArguments;
-use super::destination::{Format, Inputs};
-use super::output::{lines, note, reader, shown, write_file};
 use super::simplification::exact_words;
-use super::{Answer, robot};
+use super::*;
 use crate::equations::Equations;
 use crate::evaluate::Invariance;
-use crate::model::{ReducedModel, StateMap};
+use crate::model::StateMap;
 use crate::recording::check::{Finding, check};
 use crate::recording::foreign::guess::guess;
-use crate::recording::mismatch::{Figures, mismatches};
-use crate::recording::{Clocks, PhaseRule, PhaseSpan, Reading, ReadingNotes, Recording, Segment};
-use crate::report::invariance_table;
+use crate::recording::mismatch::{Figures, notes as mismatches};
+use crate::recording::{PhaseRule, Reading, ReadingNotes};
+use crate::report::{invariance_table, range};
 use crate::robot::{JOINT_DIM, JOINT_NAMES, Robot, WrenchFrame};
-use crate::typeset::words::counted;
-use crate::typeset::{Cell, Table, significant};
-use crate::{Error, artifact};
 
 /// Endings of models; those of other tools are refused with the lines that convert them.
-const OF_MODELS: [&str; 9] = [
-    "json",
-    "safetensors",
-    "pt",
-    "pth",
-    "ckpt",
-    "keras",
-    "onnx",
-    "tflite",
-    "msgpack",
-];
+const OF_MODELS: &str = "json safetensors pt pth ckpt keras onnx tflite msgpack";
 
 /// Inspects each file: those with an ending of models as such, all others as recordings.
-pub(crate) fn run(arguments: &InspectArguments) -> Result<Answer, Error> {
+pub(super) fn run(arguments: &InspectArguments) -> Result<Answer, Error> {
     let robot = robot::chosen(&arguments.robot)?;
     if arguments.guess {
         return guessed(arguments, robot);
     }
-    let reader = reader(&arguments.reading, Clocks::Recorded)?.for_robot(robot);
+    let reader = reader(&arguments.reading, Clocks::Recorded, Some(robot))?;
     let (mut texts, mut files) = (Vec::new(), Vec::new());
     for path in &arguments.files {
-        let is_model = artifact::is_standard_input(path)
-            || OF_MODELS
-                .iter()
-                .any(|of| path.extension().is_some_and(|e| e == *of));
-        let Answer { text, json, .. } = match is_model {
-            true => describe_model(path, &artifact::read(path)?)?,
+        let ending = path.extension().and_then(|ending| ending.to_str());
+        let has_ending = ending.is_some_and(|end| OF_MODELS.split(' ').any(|of| of == end));
+        let Answer { text, json, .. } = match has_ending || artifact::is_standard_input(path) {
+            true => describe_model(path, &artifact::read(path)?),
             false => describe_recording(&reader.read(path)?, robot)?,
         };
         texts.push(text);
@@ -105,20 +84,17 @@ fn guessed(arguments: &InspectArguments, robot: &Robot) -> Result<Answer, Error>
 const PATTERN_WIDTH: usize = 120;
 const DOMINANT: usize = 4;
 
-fn describe_model(path: &Path, model: &ReducedModel) -> Result<Answer, Error> {
-    let dominant = dominant_coordinates(model);
-    let equations = Equations::of(model);
+fn describe_model(path: &Path, model: &ReducedModel) -> Answer {
+    let (equations, file) = (Equations::of(model), path.display().to_string());
     let mut text = format!(
-        "{}: model `{}`, {} latent coordinates, {} candidate terms\n",
-        path.display(),
+        "{file}: model `{}`, {} latent coordinates, {} candidate terms\n",
         model.name(),
         model.latent_dim(),
         model.library().len()
     );
-    if !model.description().is_empty() {
-        let _ = writeln!(text, "  {}", model.description());
-    }
-    text.push_str(&input_rule(model));
+    let description = Some(model.description()).filter(|text| !text.is_empty());
+    text += &lines("  ", description);
+    text += &input_rule(model);
     let coefficients = equations.terms().len() * equations.latent_dim();
     let table = Table::of(equations.phases())
         .column("phase", "", |phase| &phase.name)
@@ -134,24 +110,26 @@ fn describe_model(path: &Path, model: &ReducedModel) -> Result<Answer, Error> {
             "coefficients": coefficients,
         })
     });
-    let _ = writeln!(text, "\n{table}");
-    text.push_str(&exact_words(&equations));
-    for phase in 0..equations.phases().len() {
-        text.push_str(&pattern(&equations, phase));
+    let phases: Vec<Value> = phases.collect();
+    text += &format!("\n{table}\n{}", exact_words(&equations));
+    if equations.terms().len() <= PATTERN_WIDTH {
+        text.extend((0..phases.len()).map(|phase| pattern(&equations, phase)));
     }
+    let dominant = dominant_coordinates(model);
     let [encoder, decoder] =
         [model.encoder_map(), model.decoder_map()].map(|map| map.ok().map(StateMap::summary));
-    text += &composition(
-        dominant.as_deref(),
-        [encoder.as_deref(), decoder.as_deref()],
-    );
-    let file = path.display().to_string();
+    text += &match (&dominant, &encoder) {
+        (Some(dominant), _) => composition(dominant),
+        (None, Some(_)) => lines("  encoder ", &encoder) + &lines("  decoder ", &decoder),
+        (None, None) => {
+            "latent-only: no encoder, so it says nothing about a robot's coordinates\n".to_owned()
+        }
+    };
     let invariance = Invariance::of(model).unwrap_or_else(|error| {
         note(&format!("{file}: invariance is not told: {error}"));
         None
     });
-    if let Some(invariance) = &invariance {
-        let table = invariance_table(invariance);
+    if let Some(table) = invariance.as_ref().map(invariance_table) {
         let _ = write!(text, "\n{}\n\n{table}", table.caption());
     }
     let json = json!({
@@ -163,7 +141,7 @@ fn describe_model(path: &Path, model: &ReducedModel) -> Result<Answer, Error> {
         "latent_dim": model.latent_dim(),
         "library_dim": model.library().len(),
         "library": model.library().terms().iter().map(|term| term.text()).collect::<Vec<_>>(),
-        "phases": phases.collect::<Vec<_>>(),
+        "phases": phases,
         "exact": equations.steps(),
         "dominant_coordinates": dominant,
         "encoder": encoder,
@@ -173,28 +151,18 @@ fn describe_model(path: &Path, model: &ReducedModel) -> Result<Answer, Error> {
         "invariance": invariance,
         "provenance": model.provenance(),
     });
-    Ok(Answer::new(text, json))
+    Answer::new(text, json)
 }
 
-/// The largest weights of a linear encoder, or the layers of the maps.
-fn composition(
-    dominant: Option<&[Vec<(String, f64)>]>,
-    [encoder, decoder]: [Option<&str>; 2],
-) -> String {
-    let Some(latents) = dominant else {
-        return match encoder {
-            Some(_) => lines("  encoder ", encoder) + &lines("  decoder ", decoder),
-            None => {
-                "latent-only: no encoder, so it says nothing about a robot's coordinates\n".into()
-            }
-        };
+type Dominant = Vec<Vec<(String, f64)>>;
+
+fn composition(dominant: &Dominant) -> String {
+    let line = |(weights, latent): (&Vec<(String, f64)>, i32)| {
+        let part = |(name, weight): &(String, f64)| format!("{} {name}", significant(*weight));
+        let parts: Vec<String> = weights.iter().map(part).collect();
+        format!("  z{latent} = {} ...\n", parts.join(", "))
     };
-    let weight = |(name, weight): &(String, f64)| format!("{} {name}", significant(*weight));
-    let line = |(latent, weights): (usize, &Vec<(String, f64)>)| {
-        let parts: Vec<String> = weights.iter().map(weight).collect();
-        format!("  z{} = {} ...\n", latent + 1, parts.join(", "))
-    };
-    latents.iter().enumerate().map(line).collect()
+    dominant.iter().zip(1..).map(line).collect()
 }
 
 fn input_rule(model: &ReducedModel) -> String {
@@ -205,25 +173,21 @@ fn input_rule(model: &ReducedModel) -> String {
         WrenchFrame::Body => "the body's axes, as published",
         WrenchFrame::World => "the world's axes, moments of roll, pitch and yaw",
     };
-    let mut text = format!("  inputs of robot {}: forces in {axes};", robot.name());
+    let rule = format!("  inputs of robot {}: forces in {axes};", robot.name());
     let Some(actuators) = model.actuators() else {
-        return text + " torques of the motors\n";
+        return rule + " torques of the motors\n";
     };
-    text.push_str(" torques of the motors less what the joints take\n\n");
     let mut table = Table::default();
     table
         .column("joint", "", JOINT_NAMES)
         .column("viscous", "N m s/rad", actuators.viscous)
         .column("dry", "N m", actuators.dry)
         .column("armature", "kg m^2", actuators.armature);
-    text + &table.to_string()
+    format!("{rule} torques of the motors less what the joints take\n\n{table}")
 }
 
 /// Rows are outputs, columns terms; a dot is an inactive one.
 fn pattern(equations: &Equations<'_>, phase: usize) -> String {
-    if equations.terms().len() > PATTERN_WIDTH {
-        return String::new();
-    }
     let mut text = format!(
         "Xi of {} (one column per term, + positive, - negative)\n",
         equations.phases()[phase].name
@@ -236,11 +200,10 @@ fn pattern(equations: &Equations<'_>, phase: usize) -> String {
         });
         let _ = writeln!(text, "  ddz{}  {}", output + 1, cells.collect::<String>());
     }
-    text.push('\n');
-    text
+    text + "\n"
 }
 
-fn dominant_coordinates(model: &ReducedModel) -> Option<Vec<Vec<(String, f64)>>> {
+fn dominant_coordinates(model: &ReducedModel) -> Option<Dominant> {
     let weights = model.encoder().ok()?.weights();
     let names = match model.state() {
         Some(state) => state.names.clone(),
@@ -248,11 +211,8 @@ fn dominant_coordinates(model: &ReducedModel) -> Option<Vec<Vec<(String, f64)>>>
         None => (1..=weights.ncols()).map(|i| format!("x{i}")).collect(),
     };
     let of_latent = |row: usize| {
-        let pairs = names
-            .iter()
-            .cloned()
-            .zip(weights.row(row).into_iter().copied());
-        let mut pairs: Vec<(String, f64)> = pairs.collect();
+        let weights = weights.row(row).into_iter().copied();
+        let mut pairs: Vec<(String, f64)> = names.iter().cloned().zip(weights).collect();
         pairs.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
         pairs.truncate(DOMINANT);
         pairs
@@ -268,60 +228,60 @@ const FINDINGS_SHOWN: usize = 12;
 
 fn describe_recording(reading: &Reading, robot: &Robot) -> Result<Answer, Error> {
     let recording = &reading.recording;
+    let file = recording.path.display().to_string();
+    let samples = recording.sample_count();
     let mut notes = ReadingNotes::default();
     notes.add(reading);
     let notes = notes.lines();
-    let findings = check(recording, robot);
-    let rule = PhaseRule::three_phase().with_min_samples(CHATTER);
-    let mut text = format!(
-        "{}: {} samples in {}\n",
-        recording.path.display(),
-        recording.sample_count(),
-        counted(recording.segments.len(), "segment")
-    );
+    let count = counted(recording.segments.len(), "segment");
+    let mut text = format!("{file}: {samples} samples in {count}\n");
     let mut segments = Vec::new();
     for (index, segment) in recording.segments.iter().enumerate() {
-        let spans = rule.spans(segment)?;
         let _ = writeln!(
             text,
-            "  segment {index}: {:.3} s, {} samples every {:.3} ms",
+            "  segment {index}: {:.3} s, {} samples every {:.3} ms\n  |{}|",
             segment.duration_s(),
             segment.len(),
-            1e3 * segment.mean_step_s()
+            1e3 * segment.mean_step_s(),
+            time_bar(segment)
         );
-        let _ = writeln!(text, "  |{}|", time_bar(segment));
-        segments.push(segment_json(segment, &spans, &rule));
+        segments.push(segment_json(segment)?);
     }
     if !recording.ignored_columns.is_empty() {
         let names = recording.ignored_columns.join("`, `");
         let _ = writeln!(text, "  columns not read: `{names}`");
     }
-    text += &lines("  ", &notes);
-    text.push_str("  # a front foot is down, = only rear feet are, blank: flight\n\n");
     let ranges = ranges(recording);
-    let _ = writeln!(text, "{}", range_table(&ranges));
-    let mismatches = mismatches(recording, robot);
-    if findings.is_empty() && mismatches.is_empty() {
-        text.push_str("nothing implausible\n");
-    } else if !findings.is_empty() {
-        text.push_str(&findings_text(&findings));
+    let (findings, mismatches) = (check(recording, robot), mismatches(recording, robot));
+    text += &lines("  ", &notes);
+    text += "  # a front foot is down, = only rear feet are, blank: flight\n\n";
+    text += &format!("{}\n", range_table(&ranges));
+    if !findings.is_empty() {
+        let _ = writeln!(text, "{} implausible runs of samples", findings.len());
+        text += &lines("  ", findings.iter().take(FINDINGS_SHOWN));
+    } else if mismatches.is_empty() {
+        text += "nothing implausible\n";
+    }
+    if let more @ 1.. = findings.len().saturating_sub(FINDINGS_SHOWN) {
+        let _ = writeln!(text, "  and {more} more, all of them with --json");
     }
     text += &lines("note: ", &mismatches);
+    let findings = findings.iter().map(|finding| {
+        let mut value = finding_json(finding);
+        value["segment"] = json!(finding.segment);
+        value
+    });
     let json = json!({
         "kind": "recording",
-        "file": recording.path.display().to_string(),
-        "samples": recording.sample_count(),
+        "file": file,
+        "samples": samples,
         "segments": segments,
         "notes": notes,
         "ranges": ranges,
         "ignored_columns": recording.ignored_columns,
         "figures": Figures::of(recording, robot),
         "mismatches": mismatches,
-        "implausible": findings.iter().map(|finding| {
-            let mut value = finding_json(finding);
-            value["segment"] = json!(finding.segment);
-            value
-        }).collect::<Vec<_>>(),
+        "implausible": findings.collect::<Vec<_>>(),
     });
     Ok(Answer::new(text, json))
 }
@@ -337,85 +297,67 @@ fn time_bar(segment: &Segment) -> String {
     feet.map(character).collect()
 }
 
-fn segment_json(segment: &Segment, spans: &[PhaseSpan], rule: &PhaseRule) -> Value {
-    let names = rule.names();
-    let phases: Vec<Value> = (spans.iter())
-        .map(|span| {
-            json!({
-                "phase": names[span.phase],
-                "stance": span.kind,
-                "samples": span.range.len(),
-                "start_s": segment.time_s[span.range.start],
-            })
+fn segment_json(segment: &Segment) -> Result<Value, Error> {
+    let rule = PhaseRule::three_phase().with_min_samples(CHATTER);
+    let (names, spans) = (rule.names(), rule.spans(segment)?);
+    let phases = spans.iter().map(|span| {
+        json!({
+            "phase": names[span.phase],
+            "stance": span.kind,
+            "samples": span.range.len(),
+            "start_s": segment.time_s[span.range.start],
         })
-        .collect();
-    json!({
+    });
+    Ok(json!({
         "samples": segment.len(),
         "duration_s": segment.duration_s(),
         "mean_step_s": segment.mean_step_s(),
         "first_row": segment.first_row,
-        "phases": phases,
-    })
+        "phases": phases.collect::<Vec<_>>(),
+    }))
 }
+
+type Extremes = (f64, f64);
 
 #[derive(Serialize)]
-struct Extremes {
+struct Ranges {
     coordinate: String,
     unit: String,
-    position: (f64, f64),
-    velocity: (f64, f64),
-    torque_nm: Option<(f64, f64)>,
+    position: Extremes,
+    velocity: Extremes,
+    torque_nm: Option<Extremes>,
 }
 
-fn ranges(recording: &Recording) -> Vec<Extremes> {
-    let extremes = |row: usize, matrix: &dyn Fn(&Segment) -> &DMatrix<f64>| {
+fn ranges(recording: &Recording) -> Vec<Ranges> {
+    let extremes = |row: usize, matrix: fn(&Segment) -> &DMatrix<f64>| {
         let segments = recording.segments.iter();
-        let values = segments
-            .flat_map(|segment| matrix(segment).row(row).iter().copied().collect::<Vec<_>>());
-        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
-            (low.min(value), high.max(value))
-        })
+        range(segments.flat_map(|s| matrix(s).row(row).iter().copied().collect::<Vec<_>>()))
     };
     let names = Robot::state_names().into_iter().zip(Robot::state_units());
-    names
-        .enumerate()
-        .map(|(row, (name, unit))| Extremes {
-            coordinate: name,
-            unit,
-            position: extremes(row, &|segment| &segment.x),
-            velocity: extremes(row, &|segment| &segment.dx),
-            torque_nm: (row < JOINT_DIM).then(|| extremes(row, &|segment| &segment.torque_nm)),
-        })
-        .collect()
+    let ranges = names.enumerate().map(|(row, (coordinate, unit))| Ranges {
+        coordinate,
+        unit,
+        position: extremes(row, |segment| &segment.x),
+        velocity: extremes(row, |segment| &segment.dx),
+        torque_nm: (row < JOINT_DIM).then(|| extremes(row, |segment| &segment.torque_nm)),
+    });
+    ranges.collect()
 }
 
-fn range_table(ranges: &[Extremes]) -> Table {
-    let pair = |(low, high): (f64, f64)| -> Cell {
-        format!("{} .. {}", significant(low), significant(high)).into()
-    };
+fn range_table(ranges: &[Ranges]) -> Table {
+    let pair = |(low, high)| format!("{} .. {}", significant(low), significant(high));
+    let torque = |range: &Ranges| range.torque_nm.map_or_else(String::new, pair);
     Table::of(ranges)
         .column("coordinate", "", |range| &range.coordinate)
         .column("unit", "", |range| &range.unit)
         .column("position", "", |range| pair(range.position))
         .column("velocity", "per s", |range| pair(range.velocity))
-        .column("torque", "N m", |range| {
-            range.torque_nm.map_or("".into(), pair)
-        })
+        .column("torque", "N m", |range| torque(range))
         .table()
 }
 
-fn findings_text(findings: &[Finding]) -> String {
-    let mut text = format!("{} implausible runs of samples\n", findings.len());
-    text += &lines("  ", findings.iter().take(FINDINGS_SHOWN));
-    if findings.len() > FINDINGS_SHOWN {
-        let more = findings.len() - FINDINGS_SHOWN;
-        let _ = writeln!(text, "  and {more} more, all of them with --json");
-    }
-    text
-}
-
 /// A finding without the place of its recording.
-pub(crate) fn finding_json(finding: &Finding) -> Value {
+pub(super) fn finding_json(finding: &Finding) -> Value {
     json!({
         "what": finding.kind.description(),
         "samples": finding.samples.len(),

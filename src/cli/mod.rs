@@ -2,7 +2,8 @@
 //!
 //! Each command is a file with one function from its arguments to an [`Answer`]; [`run`] prints the
 //! answer and picks the exit code (0 done, 1 the run failed, 2 wrong usage). Human text and JSON go
-//! to stdout; progress, warnings and errors go to stderr. Start with [`args`].
+//! to stdout; progress, warnings and errors go to stderr. Start with [`args`]. What this file
+//! imports is what every command imports with `use super::*`.
 
 pub mod args;
 mod check;
@@ -30,23 +31,31 @@ pub use import::{Compared, import_compared};
 
 use std::borrow::Cow;
 use std::ffi::OsString;
+use std::fmt::Write as _;
 use std::io::{self, Write};
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Parser;
-use serde_json::json;
+use serde_json::{Map, Value, json};
 
-use crate::Error;
+use crate::files::{EmittedFile, Overwrite};
+use crate::model::ReducedModel;
+use crate::recording::{Clocks, Recording, Segment};
+use crate::typeset::words::counted;
+use crate::typeset::{Cell, Table, significant};
+use crate::{Error, artifact};
 use args::{Arguments, Command};
-use output::{extend, printable, printable_json};
+use destination::{Format, Inputs};
+use output::*;
 
 /// The result of a command, for people and for programs.
 #[derive(Debug, Clone)]
-pub struct Answer {
+pub(crate) struct Answer {
     /// Human text, complete with its last newline.
     pub text: String,
     /// The same as one JSON object; that of a command gets the command's name before these entries.
-    pub json: serde_json::Value,
+    pub json: Value,
     /// The exit code of a command that ran: 0, 130 for a training that Ctrl-C cut short, or 1 where its own purpose
     /// fails: files that `check` finds different; torques or control for `mpc`, predictions of body x or z for
     /// `simulate` and `demo`, every use for `report`.
@@ -54,7 +63,7 @@ pub struct Answer {
 }
 
 impl Answer {
-    fn new(text: String, json: serde_json::Value) -> Self {
+    fn new(text: String, json: Value) -> Self {
         let code = DONE;
         Self { text, json, code }
     }
@@ -88,22 +97,24 @@ pub fn run_with(arguments: impl IntoIterator<Item = OsString>) -> u8 {
             return u8::try_from(refusal.exit_code()).unwrap_or(WRONG_USAGE);
         }
     };
-    match execute(arguments.command) {
+    match execute(&arguments) {
         Ok(Answer { text, json, code }) => {
             let text = match arguments.json {
                 true => format!("{}\n", printable_json(&json.to_string())),
                 false => printable(&text).into_owned(),
             };
-            match print(&text) {
-                DONE => code,
-                failed => failed,
-            }
+            if print(&text) { code } else { FAILED }
         }
         Err(error) => {
-            print_error(&error);
-            match error.is_usage() {
-                true => WRONG_USAGE,
-                false => FAILED,
+            eprintln!("error: {}", printable(&error.to_string()));
+            let first = std::error::Error::source(&error);
+            for cause in std::iter::successors(first, |cause| cause.source()) {
+                eprintln!("  because: {}", printable(&cause.to_string()));
+            }
+            if error.is_usage() {
+                WRONG_USAGE
+            } else {
+                FAILED
             }
         }
     }
@@ -113,9 +124,9 @@ const DONE: u8 = 0;
 const FAILED: u8 = 1;
 const WRONG_USAGE: u8 = 2;
 
-fn execute(command: Command) -> Result<Answer, Error> {
-    args::refuse_idle(&command)?;
-    let (name, mut answer) = match &command {
+fn execute(arguments: &Arguments) -> Result<Answer, Error> {
+    arguments.refuse_idle()?;
+    let (name, mut answer) = match &arguments.command {
         Command::Check(arguments) => ("check", check::run(arguments)?),
         Command::Demo(arguments) => ("demo", demo::run(arguments)?),
         Command::Inspect(arguments) => ("inspect", inspect::run(arguments)?),
@@ -138,24 +149,14 @@ fn execute(command: Command) -> Result<Answer, Error> {
     Ok(answer)
 }
 
-/// Prints to stdout; a reader that has gone away (`| head`) is no failure.
-fn print(text: &str) -> u8 {
+/// Prints to stdout, and says whether that worked; a reader that has gone away (`| head`) is no failure.
+fn print(text: &str) -> bool {
     let mut stdout = io::stdout().lock();
     let written = stdout.write_all(text.as_bytes());
-    match written.and_then(|()| stdout.flush()) {
-        Ok(()) => DONE,
-        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => DONE,
-        Err(error) => {
-            eprintln!("error: cannot write to stdout: {error}");
-            FAILED
-        }
+    let error = written.and_then(|()| stdout.flush()).err();
+    let error = error.filter(|error| error.kind() != io::ErrorKind::BrokenPipe);
+    if let Some(error) = &error {
+        eprintln!("error: cannot write to stdout: {error}");
     }
-}
-
-fn print_error(error: &Error) {
-    eprintln!("error: {}", printable(&error.to_string()));
-    let first = std::error::Error::source(error);
-    for cause in std::iter::successors(first, |cause| cause.source()) {
-        eprintln!("  because: {}", printable(&cause.to_string()));
-    }
+    error.is_none()
 }

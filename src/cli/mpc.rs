@@ -1,37 +1,24 @@
 //! `romc mpc`: the latent-space controller along recordings.
 
-use std::fmt::Write as _;
-
-use serde_json::{Value, json};
-
-use super::Answer;
 use super::args::MpcArguments;
-use super::destination::{Format, Inputs};
-use super::output::{
-    extend, lines, note, numbered, progress_bar, read_for, show_progress, shown, write_file,
-};
 use super::simplification::RESTART_S;
+use super::*;
 use crate::evaluate::{
     Assessment, ControlMetrics, ReferenceInput, Verdict, along_recording, control_metrics,
     usual_settings, verdict,
 };
-use crate::model::ReducedModel;
-use crate::mpc::{Lift, MpcSettings};
-use crate::recording::Recording;
+use crate::mpc::{Lift, MpcSettings, controller};
 use crate::report::{
     NamedRun, control_figures, control_table, failed_runs, failures, run_table, verdict_lines,
 };
 use crate::robot::{JOINT_DIM, Robot};
-use crate::typeset::Table;
-use crate::{Error, artifact};
 
 /// Runs the controller along each recording. The exit code is 1 if the model is not fit for torques or control there, or
 /// if most steps along one of them have no plan.
-pub(crate) fn run(arguments: &MpcArguments) -> Result<Answer, Error> {
-    let inputs = Inputs::default()
+pub(super) fn run(arguments: &MpcArguments) -> Result<Answer, Error> {
+    let inputs = Inputs::reading(&arguments.reading)
         .and([&arguments.model])
         .and(&arguments.recordings)
-        .and(&arguments.reading.columns)
         .into_folder(arguments.figures.as_deref())?;
     inputs.check_output(arguments.output.as_deref(), Format::TABLE, arguments.force)?;
     let model = artifact::read(&arguments.model)?;
@@ -61,18 +48,18 @@ pub(crate) fn run(arguments: &MpcArguments) -> Result<Answer, Error> {
     Ok(answer.failed_if(is_failed))
 }
 
-pub(crate) fn judged(runs: &[NamedRun]) -> Vec<&ControlMetrics> {
+pub(super) fn judged(runs: &[NamedRun]) -> Vec<&ControlMetrics> {
     let metrics = runs.iter().filter_map(|(_, run)| run.metrics.as_ref());
     metrics.collect()
 }
 
-pub(crate) fn run_all(
+pub(super) fn run_all(
     model: &ReducedModel,
     recordings: &[Recording],
     settings: MpcSettings,
     reference_input: ReferenceInput,
 ) -> Result<Vec<NamedRun>, Error> {
-    let mut controller = crate::mpc::controller(model, settings)?;
+    let mut controller = controller(model, settings)?;
     let mut runs = Vec::with_capacity(recordings.len());
     for recording in recordings {
         let path = recording.path.display();
@@ -90,7 +77,7 @@ pub(crate) fn run_all(
 
 /// Runs with default settings: with the plain lift, then with the consistent one. Recordings of fewer samples than a
 /// default stage has are followed at the rate of the slowest, which a note says.
-pub(crate) fn run_with_both_lifts(
+pub(super) fn run_with_both_lifts(
     model: &ReducedModel,
     recordings: &[Recording],
 ) -> Result<[Vec<NamedRun>; 2], Error> {
@@ -128,11 +115,9 @@ fn answer(
     text += &verdict_lines(verdict);
     text += &lines("note: ", remarks);
     let mut rows = runs.iter().flat_map(|(_, run)| &run.rows);
-    if let Some(row) = rows.find(|row| row.command.status.has_plan()) {
-        let torques = row.command.torque_nm.map(|torque| format!("{torque:.2}"));
-        let torques = torques.join(" ");
-        let _ = writeln!(text, "first torque command (N m): {torques}");
-    }
+    let first = rows.find(|row| row.command.status.has_plan());
+    let torques = first.map(|row| row.command.torque_nm.map(|torque| format!("{torque:.2}")));
+    text += &lines("first torque command (N m): ", torques.map(|t| t.join(" ")));
     let output = shown(&arguments.output);
     text += &lines("every step: ", &output);
     let json = json!({
@@ -148,7 +133,7 @@ fn answer(
     Answer::new(text, json)
 }
 
-pub(crate) fn runs_json(runs: &[NamedRun]) -> Vec<Value> {
+pub(super) fn runs_json(runs: &[NamedRun]) -> Vec<Value> {
     runs.iter().map(run_json).collect()
 }
 
@@ -180,27 +165,24 @@ fn run_json((path, run): &NamedRun) -> Value {
     value
 }
 
-pub(crate) fn command_table(model: &ReducedModel, runs: &[NamedRun]) -> Table {
+pub(super) fn command_table(model: &ReducedModel, runs: &[NamedRun]) -> Table {
     let latent = |name| numbered(name, model.latent_dim());
     let inputs = match model.input() {
         Some(input) => input.names.clone(),
         None => Robot::input_names().to_vec(),
     };
-    let torques: Vec<String> = (inputs.iter().take(JOINT_DIM))
-        .map(|name| format!("{name} torque"))
-        .collect();
+    let torques = inputs.iter().take(JOINT_DIM);
+    let torques: Vec<String> = torques.map(|name| format!("{name} torque")).collect();
     let first = "recording,segment,time,phase,status,solve_us,iterations".split(',');
-    let columns = first
-        .map(str::to_owned)
+    let columns = (first.map(str::to_owned))
         .chain(latent("u_lat"))
         .chain(inputs)
         .chain(torques)
         .chain(latent("z_ref"))
         .chain(latent("z"));
     let mut table = Table::new(columns);
-    let steps = runs
-        .iter()
-        .flat_map(|(path, run)| run.rows.iter().map(move |row| (path, row)));
+    let steps = runs.iter();
+    let steps = steps.flat_map(|(path, run)| run.rows.iter().map(move |row| (path, row)));
     for (path, row) in steps {
         let command = &row.command;
         let phase = command

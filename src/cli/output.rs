@@ -1,8 +1,7 @@
-//! Files and progress of every command.
+//! What every command reads, and its words and progress.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
-use std::collections::btree_map::Entry;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -14,7 +13,7 @@ use serde_json::Value;
 use super::args::ReadingArguments;
 use crate::Error;
 use crate::files::{Overwrite, is_invisible, read_toml, write_whole};
-pub(crate) use crate::files::{
+pub(super) use crate::files::{
     shell_path as quoted, shell_paths as quoted_all, shell_word as quoted_text,
 };
 use crate::model::ReducedModel;
@@ -23,25 +22,23 @@ use crate::robot::Robot;
 use crate::train::sha256;
 
 /// Writes a whole file, unless it is there, also since a moment ago, and may not be replaced.
-pub(crate) fn write_file(path: &Path, contents: &[u8], overwrite: Overwrite) -> Result<(), Error> {
+pub(super) fn write_file(path: &Path, contents: &[u8], overwrite: Overwrite) -> Result<(), Error> {
     let written = write_whole(path, overwrite, |out| out.write_all(contents));
+    let path = path.to_owned();
     written.map_err(|source| match source.kind() {
-        std::io::ErrorKind::AlreadyExists => Error::Exists(path.to_owned()),
-        _ => Error::Write {
-            path: path.to_owned(),
-            source,
-        },
+        std::io::ErrorKind::AlreadyExists => Error::Exists(path),
+        _ => Error::Write { path, source },
     })
 }
 
-pub(crate) fn read_text(path: &Path) -> Result<String, Error> {
+pub(super) fn read_text(path: &Path) -> Result<String, Error> {
     read_toml(path).map_err(|source| Error::Read {
         path: path.to_owned(),
         source,
     })
 }
 
-pub(crate) fn read_settings<T: DeserializeOwned>(
+pub(super) fn read_settings<T: DeserializeOwned>(
     path: &Path,
     check: impl Fn(&T) -> Result<(), String>,
 ) -> Result<T, Error> {
@@ -52,15 +49,20 @@ pub(crate) fn read_settings<T: DeserializeOwned>(
 }
 
 /// The reader that the arguments ask for, with this treatment of clocks unless they name another.
-pub(crate) fn reader(arguments: &ReadingArguments, clocks: Clocks) -> Result<Reader, Error> {
+pub(super) fn reader(
+    arguments: &ReadingArguments,
+    clocks: Clocks,
+    robot: Option<&'static Robot>,
+) -> Result<Reader, Error> {
     let map = arguments.columns.as_deref().map(ColumnMap::read);
-    Ok(Reader::new(
-        map.transpose()?,
-        arguments.clock.unwrap_or(clocks),
-    ))
+    let reader = Reader::new(map.transpose()?, arguments.clock.unwrap_or(clocks));
+    Ok(match robot {
+        Some(robot) => reader.for_robot(robot),
+        None => reader,
+    })
 }
 
-pub(crate) fn read_for(
+pub(super) fn read_for(
     model: &ReducedModel,
     paths: &[PathBuf],
     arguments: &ReadingArguments,
@@ -69,7 +71,7 @@ pub(crate) fn read_for(
 }
 
 /// The one jump of the recording after `--plan`, of a model's robot.
-pub(crate) fn read_jump(
+pub(super) fn read_jump(
     model: &ReducedModel,
     path: &PathBuf,
     arguments: &ReadingArguments,
@@ -84,22 +86,16 @@ pub(crate) fn read_jump(
 }
 
 /// Reads recordings of a robot, if it is known, showing which; what reading did besides goes to stderr.
-pub(crate) fn read_recordings(
+pub(super) fn read_recordings(
     paths: &[PathBuf],
     arguments: &ReadingArguments,
     robot: Option<&'static Robot>,
 ) -> Result<Vec<Recording>, Error> {
     note_repeated(&[("recordings", paths.iter().map(PathBuf::as_path).collect())]);
-    let reader = reader(arguments, Clocks::Repaired)?;
-    let reader = match robot {
-        Some(robot) => reader.for_robot(robot),
-        None => reader,
-    };
-    read_with(&reader, paths)
+    read_with(&reader(arguments, Clocks::Repaired, robot)?, paths)
 }
 
-/// [`read_recordings`] by a reader.
-pub(crate) fn read_with(reader: &Reader, paths: &[PathBuf]) -> Result<Vec<Recording>, Error> {
+pub(super) fn read_with(reader: &Reader, paths: &[PathBuf]) -> Result<Vec<Recording>, Error> {
     let progress = spinner("reading recordings");
     let mut notes = ReadingNotes::default();
     let read = (paths.iter())
@@ -111,54 +107,48 @@ pub(crate) fn read_with(reader: &Reader, paths: &[PathBuf]) -> Result<Vec<Record
         })
         .collect();
     progress.finish_and_clear();
-    report_reading(&notes);
+    notes.lines().iter().for_each(|line| note(line));
     read
 }
 
-/// A text for a terminal: characters that act instead of being shown, as a file's name or cell may have them, are
-/// written out. Line ends and tabs stay.
-pub(crate) fn printable(text: &str) -> Cow<'_, str> {
-    escaped(text, |c| c.escape_unicode().to_string())
-}
-
-pub(crate) fn note(text: &str) {
+pub(super) fn note(text: &str) {
     eprintln!("note: {}", printable(text));
 }
 
-/// Prints on stderr what cannot be true of a recording of this robot.
-pub(crate) fn note_mismatches(recording: &Recording, robot: &Robot) {
-    for found in mismatch::notes(recording, robot) {
-        note(&found);
-    }
+pub(super) fn warn(text: &str) {
+    eprintln!("warning: {}", printable(text));
+}
+
+pub(super) fn note_mismatches(recording: &Recording, robot: &Robot) {
+    (mismatch::notes(recording, robot).iter()).for_each(|found| note(found));
 }
 
 /// Prints on stderr which recordings are given twice, under whatever name: a jump in two sets judges nothing, and one that
 /// counts twice says less than two.
-pub(crate) fn note_repeated(sets: &[(&str, Vec<&Path>)]) {
+pub(super) fn note_repeated(sets: &[(&str, Vec<&Path>)]) {
     let mut first: BTreeMap<String, (&str, &Path)> = BTreeMap::new();
-    let sets = sets.iter();
-    let all = sets.flat_map(|(set, paths)| paths.iter().map(move |path| (*set, *path)));
-    for (set, path) in all.filter(|(_, path)| path.is_file()) {
+    let of_set = |(set, paths): &(_, Vec<_>)| paths.iter().map(|path| (*set, *path)).collect();
+    let files: Vec<(&str, &Path)> = sets.iter().flat_map::<Vec<_>, _>(of_set).collect();
+    for (set, path) in files.into_iter().filter(|(_, path)| path.is_file()) {
         let Ok(bytes) = std::fs::read(path) else {
             continue; // reading it as a recording says why
         };
-        match first.entry(sha256(&bytes)) {
-            Entry::Vacant(place) => drop(place.insert((set, path))),
-            Entry::Occupied(place) => {
-                let (other, earlier) = *place.get();
-                let what = match other == set {
-                    true => "and counts twice".to_owned(),
-                    false => format!("which is in the {other} set: its {set} figures say too much"),
-                };
-                let (path, earlier) = (path.display(), earlier.display());
-                note(&format!("{path}: the same recording as {earlier}, {what}"));
-            }
-        }
+        let digest = sha256(&bytes);
+        let Some((other, earlier)) = first.get(&digest) else {
+            first.insert(digest, (set, path));
+            continue;
+        };
+        let what = match *other == set {
+            true => "and counts twice".to_owned(),
+            false => format!("which is in the {other} set: its {set} figures say too much"),
+        };
+        let (path, earlier) = (path.display(), earlier.display());
+        note(&format!("{path}: the same recording as {earlier}, {what}"));
     }
 }
 
 /// Prints a note where restarts come later than every recording ends, so that restarted rollouts are whole ones.
-pub(crate) fn note_late_restarts(recordings: &[Recording], restart_every_s: f64) {
+pub(super) fn note_late_restarts(recordings: &[Recording], restart_every_s: f64) {
     let segments = recordings.iter().flat_map(|recording| &recording.segments);
     let longest_s = segments.map(Segment::duration_s).fold(0.0, f64::max);
     if restart_every_s >= longest_s {
@@ -168,12 +158,13 @@ pub(crate) fn note_late_restarts(recordings: &[Recording], restart_every_s: f64)
     }
 }
 
-pub(crate) fn warn(text: &str) {
-    eprintln!("warning: {}", printable(text));
+/// A text for a terminal: characters that act instead of being shown, as a file's name or cell may have them, are
+/// written out. Line ends and tabs stay.
+pub(super) fn printable(text: &str) -> Cow<'_, str> {
+    escaped(text, |c| c.escape_unicode().to_string())
 }
 
-/// As [`printable`], for one JSON object.
-pub(crate) fn printable_json(text: &str) -> Cow<'_, str> {
+pub(super) fn printable_json(text: &str) -> Cow<'_, str> {
     // Those of JSON itself have been escaped, so that all of them are in strings.
     escaped(text, |c| {
         let units = c.encode_utf16(&mut [0; 2]).to_vec();
@@ -186,76 +177,58 @@ fn escaped(text: &str, written: impl Fn(char) -> String) -> Cow<'_, str> {
     if !text.contains(acts) {
         return Cow::Borrowed(text);
     }
-    let mut out = String::with_capacity(text.len());
-    for c in text.chars() {
-        match acts(c) {
-            true => out += &written(c),
-            false => out.push(c),
-        }
-    }
-    Cow::Owned(out)
-}
-
-pub(crate) fn report_reading(notes: &ReadingNotes) {
-    notes.lines().iter().for_each(|line| note(line));
+    let shown = |c| if acts(c) { written(c) } else { c.into() };
+    text.chars().map(shown).collect()
 }
 
 /// Each of these on a line of its own, behind the same words.
-pub(crate) fn lines<T: Display>(words: &str, items: impl IntoIterator<Item = T>) -> String {
+pub(super) fn lines<T: Display>(words: &str, items: impl IntoIterator<Item = T>) -> String {
     let lines = items.into_iter().map(|item| format!("{words}{item}\n"));
     lines.collect()
 }
 
-pub(crate) fn shown(path: &Option<PathBuf>) -> Option<String> {
+pub(super) fn shown(path: &Option<PathBuf>) -> Option<String> {
     path.as_ref().map(|path| path.display().to_string())
 }
 
-pub(crate) fn names(paths: &[PathBuf]) -> Vec<String> {
+pub(super) fn names(paths: &[PathBuf]) -> Vec<String> {
     let names = paths.iter().map(|path| path.display().to_string());
     names.collect()
 }
 
-/// `name_1`, `name_2` and so on.
-pub(crate) fn numbered(name: &str, count: usize) -> impl Iterator<Item = String> {
+pub(super) fn numbered(name: &str, count: usize) -> impl Iterator<Item = String> {
     (1..=count).map(move |index| format!("{name}_{index}"))
 }
 
-pub(crate) fn extend(object: &mut Value, more: Value) {
+pub(super) fn extend(object: &mut Value, more: Value) {
     if let (Value::Object(object), Value::Object(more)) = (object, more) {
         object.extend(more);
     }
 }
 
 /// The name of a model: as given, or that of its file without folder and ending.
-pub(crate) fn named(given: Option<&str>, output: &Path) -> String {
-    let stem = output.file_stem().unwrap_or_default().to_string_lossy();
-    given.map_or_else(|| stem.into_owned(), str::to_owned)
+pub(super) fn named(given: Option<&str>, output: &Path) -> String {
+    let stem = (output.file_stem()).expect("an output without a name is refused");
+    given.map_or_else(|| stem.to_string_lossy().into_owned(), str::to_owned)
 }
 
 /// A spinner on stderr, shown only when stderr is a terminal.
-pub(crate) fn spinner(message: impl Into<String>) -> ProgressBar {
-    let bar = styled(
-        ProgressBar::new_spinner(),
-        "{spinner} {msg} [{elapsed}]",
-        message,
-    );
+pub(super) fn spinner(message: &'static str) -> ProgressBar {
+    let bar = styled(ProgressBar::new_spinner(), "{spinner} {msg} [{elapsed}]");
     bar.enable_steady_tick(Duration::from_millis(120));
-    bar
+    bar.with_message(message)
 }
 
 /// A bar on stderr for a known number of steps, shown only when stderr is a terminal.
-pub(crate) fn progress_bar(message: impl Into<String>) -> ProgressBar {
-    styled(ProgressBar::new(0), "{msg} {wide_bar} {pos}/{len}", message)
+pub(super) fn progress_bar(message: impl Into<String>) -> ProgressBar {
+    styled(ProgressBar::new(0), "{msg} {wide_bar} {pos}/{len}").with_message(message.into())
 }
 
-fn styled(bar: ProgressBar, template: &str, message: impl Into<String>) -> ProgressBar {
-    let style = ProgressStyle::with_template(template).expect("templates are constants");
-    bar.set_style(style);
-    bar.set_message(message.into());
-    bar
+fn styled(bar: ProgressBar, template: &str) -> ProgressBar {
+    bar.with_style(ProgressStyle::with_template(template).expect("templates are constants"))
 }
 
-pub(crate) fn show_progress(bar: &ProgressBar, done: usize, total: usize) {
+pub(super) fn show_progress(bar: &ProgressBar, done: usize, total: usize) {
     bar.set_length(total as u64);
     bar.set_position(done as u64);
 }

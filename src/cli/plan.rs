@@ -1,40 +1,25 @@
 //! `romc plan`: a jump that nobody recorded, as a recording.
 
-use std::fmt::Write as _;
-
-use serde_json::json;
-
-use super::Answer;
 use super::args::PlanArguments;
 use super::convert::write_recording;
-use super::destination::{Format, Inputs};
-use super::output::{
-    extend, lines, note_mismatches, progress_bar, read_settings, read_with, reader, show_progress,
-    shown, spinner, warn,
-};
-use crate::files::Overwrite;
+use super::*;
 use crate::plan::{self, Goal, GoalMap, Plan, PlanSettings, Verdict};
-use crate::recording::Clocks;
 use crate::report::{plan_figures, plan_json, reach_figure};
 use crate::robot::Robot;
-use crate::typeset::{Cell, Table};
-use crate::{Error, artifact};
 
 /// Plans a jump and writes it unless it is not to be trusted and not forced, or maps what can be planned.
-pub(crate) fn run(arguments: &PlanArguments) -> Result<Answer, Error> {
-    let inputs = Inputs::default()
+pub(super) fn run(arguments: &PlanArguments) -> Result<Answer, Error> {
+    let inputs = Inputs::reading(&arguments.reading)
         .and([&arguments.model])
         .and(&arguments.start)
         .and(&arguments.settings)
-        .and(&arguments.reading.columns)
         .into_folder(arguments.figures.as_deref())?;
     let output = arguments.output.as_deref();
     inputs.check_output(output, Format::RECORDING, arguments.force)?;
     let model = artifact::read(&arguments.model)?;
-    let settings = match &arguments.settings {
-        None => PlanSettings::default(),
-        Some(path) => read_settings(path, PlanSettings::check)?,
-    };
+    let settings = arguments.settings.as_deref();
+    let settings = settings.map(|path| read_settings(path, PlanSettings::check));
+    let settings = settings.transpose()?.unwrap_or_default();
     let figures = arguments.figures.as_deref();
     if arguments.reach {
         let bar = progress_bar("planning a grid of goals");
@@ -83,11 +68,10 @@ fn goal(arguments: &PlanArguments, robot: &'static Robot) -> Result<Goal, Error>
     let Some(path) = &arguments.start else {
         return Ok(goal);
     };
-    let reader = reader(&arguments.reading, Clocks::Recorded)?.for_robot(robot);
+    let reader = reader(&arguments.reading, Clocks::Recorded, Some(robot))?;
     let recordings = read_with(&reader, std::slice::from_ref(path))?;
-    let recording = &recordings[0];
-    note_mismatches(recording, robot);
-    let first = &recording.segments[0];
+    note_mismatches(&recordings[0], robot);
+    let first = &recordings[0].segments[0];
     let column = |rows: &nalgebra::DMatrix<f64>| rows.column(0).into_owned();
     Ok(goal.from_start(column(&first.x), column(&first.dx)))
 }
@@ -96,48 +80,45 @@ fn answer(arguments: &PlanArguments, planned: &Plan) -> Answer {
     let mut table = Table::new(["", "unit", "planned", "expected error"]);
     for (i, name) in ["distance", "apex"].into_iter().enumerate() {
         let values = [planned.reached_m[i], planned.error_m[i]].map(Cell::from);
-        table.row([name, "m"].map(Cell::from).into_iter().chain(values));
+        table.row([name.into(), "m".into()].into_iter().chain(values));
     }
     for part in &planned.parts {
         let name = format!("duration of {}", part.name);
         table.row([name.into(), "s".into(), Cell::from(part.duration_s)]);
     }
+    let (model, verdict) = (arguments.model.display().to_string(), &planned.verdict);
     let margins = &planned.margins;
+    let [slip, drift] = [margins.foot_slip_m, margins.foot_drift_m].map(|of| of.map(|m| 1e3 * m));
     let mut text = format!(
-        "{}: a jump of {} m with an apex of {} m: {}\n\n{table}\n",
-        arguments.model.display(),
-        planned.goal_m[0],
-        planned.goal_m[1],
-        planned.verdict.word()
-    );
-    let _ = writeln!(
-        text,
-        "cost {:.3}; largest deviation of the input from the recorded ones: {:.2} standard deviations\n\
+        "{model}: a jump of {} m with an apex of {} m: {}\n\n{table}\n\
+         cost {:.3}; largest deviation of the input from the recorded ones: {:.2} standard deviations\n\
          largest torque {:.0} % of its limit; feet on the ground move {:.1} mm along the floor and \
          {:.1} mm above it beyond those of the training's mean jump to this goal, {:.1} mm along it and {:.1} mm \
-         below it in all\n{} convex programs, {:.0} ms",
+         below it in all\n{} convex programs, {:.0} ms\n",
+        planned.goal_m[0],
+        planned.goal_m[1],
+        verdict.word(),
         planned.cost,
         planned.input_deviation,
         100.0 * margins.torque_share,
-        1e3 * margins.foot_slip_m[0],
-        1e3 * margins.foot_slip_m[1],
-        1e3 * margins.foot_drift_m[0],
-        1e3 * margins.foot_drift_m[1],
+        slip[0],
+        slip[1],
+        drift[0],
+        drift[1],
         planned.programs,
         planned.solve_ms,
     );
-    let word = format!("{}: ", planned.verdict.word());
-    text += &lines(&word, planned.verdict.reasons());
-    let mut json = json!({ "model": arguments.model.display().to_string() });
+    text += &lines(&format!("{}: ", verdict.word()), verdict.reasons());
+    let mut json = json!({ "model": model });
     extend(&mut json, plan_json(planned));
     json["output"] = json!(shown(&arguments.output));
     Answer::new(text, json)
 }
 
 fn reach_answer(arguments: &PlanArguments, reach: &GoalMap) -> Answer {
-    let first = std::iter::once("apex, m \\ distance, m".to_owned());
-    let heads = first.chain(reach.distances_m.iter().map(|d| format!("{d:.2}")));
-    let mut table = Table::new(heads);
+    let distances = reach.distances_m.iter().map(|d| format!("{d:.2}"));
+    let corner = "apex, m \\ distance, m".to_owned();
+    let mut table = Table::new(std::iter::once(corner).chain(distances));
     let rows = reach.points.chunks_exact(reach.distances_m.len());
     for (apex, row) in reach.apexes_m.iter().zip(rows).rev() {
         let cells = row.iter().map(|point| match point.input_deviation {

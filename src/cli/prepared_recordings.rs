@@ -1,37 +1,27 @@
 //! Recordings on their way into a training: divided into sets, checked, conditioned.
 
-use std::path::{Path, PathBuf};
-
-use serde_json::{Map, Value, json};
-
 use super::args::{ReadingArguments, TrainArguments, TrainSettings};
 use super::inspect::finding_json;
-use super::output::{note, reader, report_reading};
-use super::train_settings;
-use crate::Error;
+use super::*;
 use crate::recording::check::Finding;
 use crate::recording::files::as_recorded;
 use crate::recording::{
-    Clocks, ConditionOptions, ImplausibleSamples, Reader, Recording, RecordingError, RecordingFile,
-    RecordingSet,
+    ConditionOptions, ImplausibleSamples, Reader, RecordingError, RecordingFile, RecordingSet,
 };
 use crate::robot::Robot;
-use crate::typeset::words::counted;
 
 /// A jump of a divided set: its file, its segment there, and the first row.
 type DividedJump = (PathBuf, usize, usize);
 
 const SETS: [&str; 3] = ["training", "validation", "test"];
 
-/// The recordings of a training.
-pub(crate) struct RecordedSets {
+pub(super) struct RecordedSets {
     /// Jumps that the model is fitted to, those that choose between candidates, and those used only for the final
     /// metrics; empty before [`Self::read`].
     pub sets: [RecordingSet; 3],
     files: [Vec<RecordingFile>; 3],
     robot: &'static Robot,
     reader: Reader,
-    /// The jumps of each set, if they were divided.
     pub divided: Option<[Vec<DividedJump>; 3]>,
     options: ConditionOptions,
 }
@@ -39,7 +29,7 @@ pub(crate) struct RecordedSets {
 impl RecordedSets {
     /// The recordings that the arguments name, divided by their shares if they have any, to be conditioned as the
     /// settings say.
-    pub(crate) fn new(
+    pub(super) fn new(
         arguments: &TrainArguments,
         settings: &TrainSettings,
         robot: &'static Robot,
@@ -50,10 +40,9 @@ impl RecordedSets {
         let mut recorded = Self::whole(paths, &arguments.reading, settings, robot)?;
         if let Some(split) = arguments.split {
             let jumps = jumps_of(training, &recorded.reader)?;
+            let jump = |jump: usize| jumps[jump].clone();
             let sets = split.of(jumps.len(), seed)?;
-            let sets = sets.map(|set| -> Vec<DividedJump> {
-                set.into_iter().map(|jump| jumps[jump].clone()).collect()
-            });
+            let sets = sets.map(|set| set.into_iter().map(jump).collect::<Vec<_>>());
             recorded.files = sets.each_ref().map(|set| chosen_segments(set));
             recorded.divided = Some(sets);
         }
@@ -61,15 +50,16 @@ impl RecordedSets {
     }
 
     /// Whole files; clocks are repaired unless told otherwise, or to train as published.
-    pub(crate) fn whole(
+    pub(super) fn whole(
         paths: [&[PathBuf]; 3],
         reading: &ReadingArguments,
         settings: &TrainSettings,
         robot: &'static Robot,
     ) -> Result<Self, Error> {
-        let clocks = match settings.paper {
-            true => Clocks::Recorded,
-            false => Clocks::Repaired,
+        let clocks = if settings.paper {
+            Clocks::Recorded
+        } else {
+            Clocks::Repaired
         };
         let whole = |path: &PathBuf| RecordingFile {
             path: path.clone(),
@@ -79,20 +69,18 @@ impl RecordedSets {
             sets: Default::default(),
             files: paths.map(|paths| paths.iter().map(whole).collect()),
             robot,
-            reader: reader(reading, clocks)?,
+            reader: reader(reading, clocks, None)?,
             divided: None,
-            options: train_settings::conditioning(settings),
+            options: settings.conditioning(),
         })
     }
 
-    /// The first training recordings as recorded.
-    pub(crate) fn first(&self, count: usize) -> Result<Vec<Recording>, RecordingError> {
+    pub(super) fn first(&self, count: usize) -> Result<Vec<Recording>, RecordingError> {
         let files = &self.files[0];
         as_recorded(&files[..count.min(files.len())], self.robot, &self.reader)
     }
 
-    /// Reads all sets, those of the test first.
-    pub(crate) fn read(&mut self) -> Result<(), RecordingError> {
+    pub(super) fn read(&mut self) -> Result<(), RecordingError> {
         for set in [2, 0, 1] {
             let files = &self.files[set];
             self.sets[set].read(files, self.robot, &self.options, &self.reader)?;
@@ -101,23 +89,24 @@ impl RecordedSets {
     }
 
     /// Which jumps came into which set, file and first row of each, if they were divided: in words and as JSON.
-    pub(crate) fn division(&self) -> Option<(String, Value)> {
+    pub(super) fn division(&self) -> Option<(String, Value)> {
         let (mut text, mut json) = (String::new(), Map::new());
         for (name, places) in SETS.into_iter().zip(self.divided.as_ref()?) {
-            let places = || (places.iter()).map(|(path, _, row)| (path.display().to_string(), row));
-            let jumps: Vec<String> = places()
-                .map(|(file, row)| format!("{file} (row {row})"))
-                .collect();
+            let (mut jumps, mut rows) = (Vec::new(), Vec::new());
+            for (path, _, row) in places {
+                let file = path.display().to_string();
+                jumps.push(format!("{file} (row {row})"));
+                rows.push(json!({ "file": file, "row": row }));
+            }
             let count = counted(jumps.len(), "jump");
             text += &format!("{name}, {count}: {}\n", jumps.join(", "));
-            let place = |(file, row)| json!({ "file": file, "row": row });
-            json.insert(name.to_owned(), places().map(place).collect());
+            json.insert(name.to_owned(), rows.into());
         }
         Some((text, Value::Object(json)))
     }
 
     /// The sets that the jumps of a file came into, if they were divided.
-    pub(crate) fn sets_of(&self, path: &str) -> Vec<&'static str> {
+    pub(super) fn sets_of(&self, path: &str) -> Vec<&'static str> {
         let sets = SETS.into_iter().zip(self.divided.iter().flatten());
         let is_of = |(file, ..): &DividedJump| file.display().to_string() == path;
         let with = sets.filter(|(_, places)| places.iter().any(is_of));
@@ -125,11 +114,10 @@ impl RecordedSets {
     }
 
     /// The files of each set, those with jumps in several in the first.
-    pub(crate) fn files(&self) -> [(&'static str, Vec<&Path>); 3] {
+    pub(super) fn files(&self) -> [(&'static str, Vec<&Path>); 3] {
         let mut seen: Vec<&Path> = Vec::new();
         std::array::from_fn(|set| {
-            let files = self.files[set].iter();
-            let files = files.map(|file| file.path.as_path());
+            let files = self.files[set].iter().map(|file| file.path.as_path());
             let new = files.filter(|path| self.divided.is_none() || !seen.contains(path));
             let new: Vec<&Path> = new.collect();
             seen.extend(&new);
@@ -137,19 +125,29 @@ impl RecordedSets {
         })
     }
 
-    /// Reports on stderr which files have implausible samples, and what became of them.
-    pub(crate) fn report_findings(&self) {
-        report_reading(&self.sets[0].reading);
+    /// Reports on stderr which files have implausible samples, or legs on the ground near a singularity, and what became
+    /// of them.
+    pub(super) fn report_findings(&self) {
+        self.sets[0]
+            .reading
+            .lines()
+            .iter()
+            .for_each(|line| note(line));
         for (file, mismatch) in self.sets.iter().flat_map(|set| &set.mismatches) {
             note(&format!("{}: {mismatch}", file.display()));
         }
         let findings = self.sets.iter().flat_map(|set| &set.findings);
         let (findings, singular): (Vec<_>, Vec<_>) =
             findings.partition(|(_, finding)| finding.kind.can_be_left_out());
-        let left_out = self.left_out();
-        report_singular(&singular);
+        for runs in singular.chunk_by(|(one, _), (other, _)| one == other) {
+            let samples: usize = runs.iter().map(|(_, finding)| finding.samples.len()).sum();
+            let (file, first) = (runs[0].0.display(), &runs[0].1);
+            note(&format!(
+                "{file}: {samples} samples of legs on the ground near a singularity, where forces are damped, from {first}"
+            ));
+        }
         let mut files: Vec<(&Path, usize, &Finding)> = Vec::new();
-        for (file, finding) in findings.iter().copied() {
+        for (file, finding) in &findings {
             match files.iter_mut().find(|(known, ..)| known == file) {
                 Some((_, runs, _)) => *runs += 1,
                 None => files.push((file, 1, finding)),
@@ -161,14 +159,14 @@ impl RecordedSets {
                 "{file}: {runs} implausible runs of samples, such as {first}"
             ));
         }
-        match self.options.implausible {
-            ImplausibleSamples::LeaveOut if left_out > 0 => {
+        match (self.options.implausible, self.left_out()) {
+            (ImplausibleSamples::LeaveOut, left_out @ 1..) => {
                 note(&format!("{left_out} samples are left out"));
             }
-            ImplausibleSamples::Keep if !findings.is_empty() => note(
+            (ImplausibleSamples::Keep, _) if !findings.is_empty() => note(
                 "they are used; `romc inspect` lists them, --leave-out-implausible leaves them out",
             ),
-            ImplausibleSamples::LeaveOut | ImplausibleSamples::Keep => {}
+            (ImplausibleSamples::LeaveOut | ImplausibleSamples::Keep, _) => {}
         }
     }
 
@@ -176,8 +174,7 @@ impl RecordedSets {
         self.sets.iter().map(|set| set.left_out).sum()
     }
 
-    /// Every finding with its place, and how many samples were left out.
-    pub(crate) fn findings_json(&self) -> Value {
+    pub(super) fn findings_json(&self) -> Value {
         let of_file = |file: &Path, mut value: Value| {
             value["file"] = json!(file.display().to_string());
             value
@@ -191,20 +188,6 @@ impl RecordedSets {
             "mismatches": unlike.collect::<Vec<_>>(),
             "left_out": self.left_out(),
         })
-    }
-}
-
-/// Reports on stderr which files have legs near a singularity while they are on the ground.
-fn report_singular(findings: &[&(PathBuf, Finding)]) {
-    let of_file = findings.chunk_by(|(one, _), (other, _)| one == other);
-    for runs in of_file {
-        let samples: usize = runs.iter().map(|(_, finding)| finding.samples.len()).sum();
-        note(&format!(
-            "{}: {samples} samples of legs on the ground near a singularity, where forces are \
-             damped, from {}",
-            runs[0].0.display(),
-            runs[0].1
-        ));
     }
 }
 

@@ -1,22 +1,9 @@
 //! `romc report`: a one-page assessment of a model, and its figures as files.
 
-use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
-
-use serde_json::json;
-
 use super::args::ReportArguments;
-use super::destination::{Format, Inputs};
 use super::mpc::{judged, run_with_both_lifts};
-use super::output::{
-    lines, names, note, note_late_restarts, quoted, quoted_all, read_for, read_jump, spinner,
-    write_file,
-};
-use super::{Answer, simplification};
-use crate::evaluate::{Assessment, LAMBDA, Verdict, verdict};
-use crate::files::EmittedFile;
-use crate::model::ReducedModel;
-use crate::recording::{Recording, Segment};
+use super::*;
+use crate::evaluate::{Assessment, LAMBDA, verdict};
 use crate::report::{
     Content, Introduction, PageOptions, all_figures, figure_files, introduction, page,
     verdict_lines, without_statistics,
@@ -24,60 +11,84 @@ use crate::report::{
 use crate::simplify::Tolerance;
 use crate::study::{Store, Summary};
 use crate::train::sha256;
-use crate::{Error, artifact};
 
 /// Writes the page, and the figures if a folder for them is given. The exit code is 1 if the model is fit for nothing.
-pub(crate) fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
-    let inputs = Inputs::default()
+pub(super) fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
+    let inputs = Inputs::reading(&arguments.reading)
         .and([&arguments.model])
         .and(&arguments.recordings)
         .and(&arguments.plan)
-        .and(&arguments.reading.columns)
         .into_folder(arguments.figures.as_deref())?;
     inputs.check_output(Some(&arguments.output), Format::PAGE, arguments.force)?;
     let model = artifact::read(&arguments.model)?;
     let recordings = read_for(&model, &arguments.recordings, &arguments.reading)?;
     note_late_restarts(&recordings, arguments.restart_every);
     let study = (arguments.study.as_deref()).map(summary).transpose()?;
-    let plan = arguments.plan.as_ref();
-    let plan = plan.map(|path| read_jump(&model, path, &arguments.reading));
+    let plan = (arguments.plan.as_ref()).map(|path| read_jump(&model, path, &arguments.reading));
     let plan = plan.transpose()?;
-    let beside = (study.as_ref(), plan.as_ref());
-    let made = make(&model, &recordings, beside, arguments)?;
+    let progress = spinner("rolling the model out");
+    let assessment = Assessment::over(&model, &recordings, arguments.restart_every)?;
+    progress.set_message("running the controller");
+    let can_control = without_statistics(&model).is_none();
+    let runs = can_control.then(|| run_with_both_lifts(&model, &recordings));
+    let [plain, consistent] = runs.transpose()?.unwrap_or_default();
+    progress.set_message("drawing");
+    let paths = recordings.iter().map(|recording| &recording.path);
+    // A file that is gone by now has no digest, and counts as one that the model does not name.
+    let digest = |path: &PathBuf| Some((path.clone(), sha256(&std::fs::read(path).ok()?)));
+    let content = Content {
+        model: &model,
+        assessment: &assessment,
+        verdict: &verdict(&model, &assessment, &judged(&plain)),
+        plain: &plain,
+        consistent: &consistent,
+        study: study.as_ref(),
+        plan: plan.as_ref(),
+        digests: &paths.filter_map(digest).collect::<Vec<_>>(),
+    };
+    let commands = commands(arguments, can_control);
+    let made = page_of(&content, arguments.tolerance, commands)?;
+    progress.finish_and_clear();
     // The figures come first: files that romc did not make are refused with nothing written.
     let written = match &arguments.figures {
         Some(folder) => inputs.write_folder(folder, &made.files, arguments.force)?,
         None => Vec::new(),
     };
     write_file(&arguments.output, made.page.as_bytes(), arguments.force)?;
+    Ok(answer(arguments, &content, &made, &written))
+}
+
+fn answer(
+    arguments: &ReportArguments,
+    content: &Content<'_>,
+    made: &Made,
+    written: &[PathBuf],
+) -> Answer {
+    let (output, verdict) = (arguments.output.display().to_string(), content.verdict);
+    let (headline, reasons) = (&made.introduction.headline, &made.introduction.sentences);
     let mut text = format!(
-        "{}\n{}\n\n{}\n{}: {} kB, {} figures\n",
-        made.introduction.headline,
-        made.introduction.sentences.join("\n"),
-        verdict_lines(&made.verdict),
-        arguments.output.display(),
+        "{headline}\n{}\n\n{}\n{output}: {} kB, {} figures\n",
+        reasons.join("\n"),
+        verdict_lines(verdict),
         made.page.len() / 1000,
         made.n_figures
     );
-    text += &lines("note: ", &made.remarks);
-    if let Some(folder) = &arguments.figures {
-        let (folder, files) = (folder.display(), written.len());
-        let _ = writeln!(
-            text,
-            "{folder}: {files} files, each figure as .svg, .pdf and .csv"
-        );
+    text += &lines("note: ", &content.assessment.remarks);
+    if let Some(folder) = shown(&arguments.figures) {
+        let files = written.len();
+        text += &format!("{folder}: {files} files, each figure as .svg, .pdf and .csv\n");
     }
     let json = json!({
         "model": arguments.model.display().to_string(),
-        "output": arguments.output.display().to_string(),
+        "output": output,
         "bytes": made.page.len(),
-        "headline": made.introduction.headline,
-        "reasons": made.introduction.sentences,
-        "verdict": made.verdict,
-        "figures": names(&written),
-        "remarks": made.remarks,
+        "headline": headline,
+        "reasons": reasons,
+        "verdict": verdict,
+        "figures": names(written),
+        "remarks": content.assessment.remarks,
     });
-    Ok(Answer::new(text, json).failed_if(made.verdict.fit_for.is_empty()))
+    Answer::new(text, json).failed_if(verdict.fit_for.is_empty())
 }
 
 fn summary(folder: &Path) -> Result<Summary, Error> {
@@ -91,53 +102,14 @@ fn summary(folder: &Path) -> Result<Summary, Error> {
     Ok(summary)
 }
 
-pub(crate) struct Made {
+pub(super) struct Made {
     pub page: String,
-    pub introduction: Introduction,
-    pub verdict: Verdict,
-    pub files: Vec<EmittedFile>,
-    pub n_figures: usize,
-    /// What speaks against using the model on these recordings.
-    pub remarks: Vec<String>,
+    introduction: Introduction,
+    files: Vec<EmittedFile>,
+    n_figures: usize,
 }
 
-fn make(
-    model: &ReducedModel,
-    recordings: &[Recording],
-    (study, plan): (Option<&Summary>, Option<&Segment>),
-    arguments: &ReportArguments,
-) -> Result<Made, Error> {
-    let progress = spinner("rolling the model out");
-    let assessment = Assessment::over(model, recordings, arguments.restart_every)?;
-    progress.set_message("running the controller");
-    let can_control = without_statistics(model).is_none();
-    let [plain, consistent] = match can_control {
-        true => run_with_both_lifts(model, recordings)?,
-        false => [Vec::new(), Vec::new()],
-    };
-    let verdict = verdict(model, &assessment, &judged(&plain));
-    progress.set_message("drawing");
-    let paths = recordings.iter().map(|recording| &recording.path);
-    let digests: Vec<(PathBuf, String)> = paths
-        .filter_map(|path| Some((path.clone(), sha256(&std::fs::read(path).ok()?))))
-        .collect();
-    let content = Content {
-        model,
-        assessment: &assessment,
-        verdict: &verdict,
-        plain: &plain,
-        consistent: &consistent,
-        study,
-        plan,
-        digests: &digests,
-    };
-    let commands = commands(arguments, can_control);
-    let made = page_of(&content, arguments.tolerance, commands);
-    progress.finish_and_clear();
-    made
-}
-
-pub(crate) fn page_of(
+pub(super) fn page_of(
     content: &Content<'_>,
     tolerance: Tolerance,
     commands: Vec<String>,
@@ -159,43 +131,35 @@ pub(crate) fn page_of(
     Ok(Made {
         page: page(content, &introduction, &figures, &options)?,
         introduction,
-        verdict: content.verdict.clone(),
         files: figures.iter().flat_map(figure_files).collect(),
         n_figures: figures.iter().count(),
-        remarks: content.assessment.remarks.clone(),
     })
 }
 
 const LADDER_CAPTION: &str = "Size of the equations within each tolerance: active terms, digits of all coefficients, operations; errors as shares of the root mean square of their ddz, the largest of all equations; errors of rollouts over whole jumps and restarted";
 
 fn commands(arguments: &ReportArguments, has_control: bool) -> Vec<String> {
-    let model = quoted(&arguments.model);
+    let (model, output) = (quoted(&arguments.model), quoted(&arguments.output));
     let recordings = quoted_all(&arguments.recordings) + &arguments.reading.as_flags();
-    let every = arguments.restart_every;
-    let flag = |name: &str, path: &Option<PathBuf>| -> String {
-        let flag = |path: &PathBuf| format!(" --{name} {}", quoted(path));
-        path.iter().map(flag).collect()
-    };
-    let study = flag("study", &arguments.study);
-    let plan = flag("plan", &arguments.plan);
-    let tolerance = arguments.tolerance;
+    let (every, tolerance) = (arguments.restart_every, arguments.tolerance);
+    let within = format!("--tolerance {tolerance}");
+    let flags = [("study", &arguments.study), ("plan", &arguments.plan)].into_iter();
+    let flags =
+        flags.filter_map(|(name, path)| Some(format!(" --{name} {}", quoted(path.as_ref()?))));
+    let flags: String = flags.collect();
+    let along = format!("{model} {recordings}");
     let mut commands = vec![
-        format!(
-            "romc report {model} {recordings} --restart-every {every} --tolerance {tolerance}{study}{plan} --output {}",
-            quoted(&arguments.output)
-        ),
-        format!("romc simulate {model} {recordings} --restart-every {every}"),
+        format!("romc report {along} --restart-every {every} {within}{flags} --output {output}"),
+        format!("romc simulate {along} --restart-every {every}"),
     ];
     if has_control {
-        for lift in ["transpose", "consistent"] {
-            commands.push(format!("romc mpc {model} {recordings} --lift {lift}"));
-        }
+        let mpc = ["transpose", "consistent"].map(|lift| format!("romc mpc {along} --lift {lift}"));
+        commands.extend(mpc);
     }
+    let domain = format!("--domain {recordings} --out-dir out");
     commands.extend([
         format!("romc compile {model} --emit latex --out-dir out"),
-        format!(
-            "romc compile {model} --emit latex,c --tolerance {tolerance} --domain {recordings} --out-dir out"
-        ),
+        format!("romc compile {model} --emit latex,c {within} {domain}"),
     ]);
     commands
 }

@@ -1,41 +1,33 @@
 //! `--robot` of every command, and `romc robot`: what a robot's file says.
 
-use std::fmt::Write as _;
-
-use serde_json::json;
-
-use super::Answer;
 use super::args::RobotArguments;
-use super::destination::{Format, Inputs};
-use super::output::{note, shown, write_file};
-use crate::Error;
+use super::*;
 use crate::robot::{JOINT_NAMES, Leg, Robot};
 use crate::robot_file::{self, RobotEntry, RobotOptions};
-use crate::typeset::Table;
 
 /// The robot of `--robot`; of a file, how its joints were matched goes to stderr.
-pub(crate) fn chosen(name_or_file: &str) -> Result<&'static Robot, Error> {
+pub(super) fn chosen(name_or_file: &str) -> Result<&'static Robot, Error> {
     let read = robot_file::open(name_or_file, &RobotOptions::default())?;
     let robot = read.robot;
-    if crate::robot_file::by_name(name_or_file).is_err() {
+    if robot_file::by_name(name_or_file).is_err() {
         let joints = Leg::ALL.into_iter().zip(robot.joint_names().chunks(3));
-        let matched: Vec<String> = joints
-            .map(|(leg, joints)| format!("{leg} = {}", joints.join(" ")))
-            .collect();
-        let (name, matched) = (robot.name(), matched.join(", "));
-        note(&format!("{name_or_file}: robot {name}, {matched}"));
+        let matched = joints.map(|(leg, joints)| format!("{leg} = {}", joints.join(" ")));
+        let matched = matched.collect::<Vec<_>>().join(", ");
+        note(&format!(
+            "{name_or_file}: robot {}, {matched}",
+            robot.name()
+        ));
     }
     note_all(name_or_file, &read.notes);
     Ok(robot)
 }
 
 fn note_all(file: &str, notes: &[String]) {
-    notes
-        .iter()
-        .for_each(|text| note(&format!("{file}: {text}")));
+    let notes = notes.iter();
+    notes.for_each(|text| note(&format!("{file}: {text}")));
 }
 
-pub(crate) fn run(arguments: &RobotArguments) -> Result<Answer, Error> {
+pub(super) fn run(arguments: &RobotArguments) -> Result<Answer, Error> {
     Inputs::default()
         .and_robot(Some(&arguments.robot))
         .check_output(arguments.output.as_deref(), Format::TOML, arguments.force)?;
@@ -46,7 +38,6 @@ pub(crate) fn run(arguments: &RobotArguments) -> Result<Answer, Error> {
     let read = robot_file::open(&arguments.robot, &options)?;
     let robot = read.robot;
     note_all(&arguments.robot, &read.notes);
-    let mut text = format!("{}: {} kg\n\n", robot.name(), number(robot.mass_kg()));
     let geometry = |joint: usize| robot.geometry(Leg::ALL[joint / 3]).chain();
     let limits = robot.joint_limit_rad();
     let (torques, speeds) = (robot.torque_limit_nm(), robot.joint_speed_limit_rad_s());
@@ -63,7 +54,8 @@ pub(crate) fn run(arguments: &RobotArguments) -> Result<Answer, Error> {
         .column("torque", "N m", |&i| number(torques[i]))
         .column("speed", "rad/s", |&i| number(speeds[i]))
         .table();
-    let _ = writeln!(text, "{table}");
+    let (name, mass) = (robot.name(), number(robot.mass_kg()));
+    let mut text = format!("{name}: {mass} kg\n\n{table}\n");
     for leg in Leg::ALL {
         let foot = vector(robot.geometry(leg).chain().links[2]);
         let _ = writeln!(text, "foot {leg}: {foot} m from its last joint");

@@ -1,146 +1,116 @@
 //! Simplification for the commands that offer it: the domain from files, the effect on rollouts.
 
-use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
-
-use serde_json::{Value, json};
-
 use super::args::SimplifyArguments;
-use super::output::{lines, names, read_for, read_text, spinner};
+use super::*;
 use crate::equations::Equations;
 use crate::evaluate::Assessment;
-use crate::files::EmittedFile;
-use crate::model::ReducedModel;
-use crate::recording::Recording;
+use crate::report::body_rms;
 use crate::sim::LatentSegment;
 use crate::simplify::{
-    Certificate, Domain, MARGIN, PrintedEquation, RolloutBasis, RolloutEffect, Samples,
-    SimplifyError, Tolerance, bound_words, certificate_json, change_table, equation_table,
-    lost_words, markdown, printed, rollout_table, rollouts_json, simplify,
+    Certificate, Domain, MARGIN, RolloutBasis, RolloutEffect, Samples, SimplifyError, Tolerance,
+    bound_words, certificate_json, change_table, equation_table, lost_words, markdown, printed,
+    rollout_table, rollouts_json, simplify,
 };
-use crate::typeset::{Cell, Rounding, Table, significant};
-use crate::{Error, artifact};
+use crate::typeset::Rounding;
 
-/// Time between restarts of the short rollouts, as in the paper's second test.
-pub(crate) const RESTART_S: f64 = 0.1;
+pub(super) const RESTART_S: f64 = 0.1;
 
-struct Basis {
-    domain: Domain,
-    samples: Option<Samples>,
-    recordings: Vec<Recording>,
-    latent: Vec<LatentSegment>,
-    /// `None` if the ranges were given.
-    margin: Option<f64>,
-}
-
-impl Basis {
-    /// The domain that the files of the arguments give: one TOML file of ranges, or the box around all samples of
-    /// recordings.
-    fn read(model: &ReducedModel, arguments: &SimplifyArguments) -> Result<Self, Error> {
-        let files = &arguments.domain;
-        let is_table = |path: &&PathBuf| path.extension().is_some_and(|end| end == "toml");
-        if let Some(path) = files.iter().find(is_table) {
-            if files.len() > 1 {
-                let message = "one .toml file of ranges, or recordings, but not both".to_owned();
-                let path = path.clone();
-                return Err(SimplifyError::DomainFile { path, message }.into());
-            }
-            if arguments.margin.is_some() {
-                return Err(SimplifyError::Margin.into());
-            }
-            return Ok(Self {
-                domain: Domain::from_toml(model, path, &read_text(path)?)?,
-                samples: None,
-                recordings: Vec::new(),
-                latent: Vec::new(),
-                margin: None,
-            });
-        }
-        let recordings = read_for(model, files, &arguments.reading)?;
-        if model.encoder_map().is_err() {
-            let model = model.name().to_owned();
-            return Err(SimplifyError::NoEncoder { model }.into());
-        }
-        let segments = recordings.iter().flat_map(|recording| &recording.segments);
-        let latent = segments.map(|segment| LatentSegment::encode(model, segment));
-        let latent = latent.collect::<Result<Vec<_>, _>>()?;
-        let samples = Samples::of(model, &latent.iter().collect::<Vec<_>>());
-        let margin = arguments.margin.unwrap_or(MARGIN);
-        Ok(Self {
-            domain: Domain::around(model, &samples, margin)?,
-            samples: Some(samples),
-            recordings,
-            latent,
-            margin: Some(margin),
-        })
-    }
-
-    /// The effect of simplification on rollouts; none without recordings or decoder.
-    fn rollouts(
-        &self,
-        model: &ReducedModel,
-        simplified: &ReducedModel,
-    ) -> Result<Option<RolloutEffect>, Error> {
-        if self.recordings.is_empty() || model.decoder_map().is_err() {
-            return Ok(None);
-        }
-        let recordings = self.recordings.iter();
-        let basis = RolloutBasis {
-            domain: &self.domain,
-            segments: recordings.flat_map(|r| &r.segments).collect(),
-            latent: self.latent.iter().collect(),
-            restart_every_s: RESTART_S,
-        };
-        Ok(Some(basis.effect(model, simplified)?))
-    }
-}
-
-pub(crate) struct Outcome {
+pub(super) struct Outcome {
     pub model: ReducedModel,
     original: ReducedModel,
     certificate: Certificate,
     rollouts: Option<RolloutEffect>,
-    basis: Basis,
+    domain: Domain,
+    samples: Option<Samples>,
+    /// `None` if the ranges were given.
+    margin: Option<f64>,
     domain_files: Vec<String>,
 }
 
-/// Simplifies a model as typed; nothing if no domain was given.
-pub(crate) fn run(
+/// Simplifies a model as typed, over the ranges of one TOML file or the box around all samples of recordings; nothing if
+/// no domain was given.
+pub(super) fn run(
     equations: &Equations<'_>,
     arguments: &SimplifyArguments,
 ) -> Result<Option<Outcome>, Error> {
-    let model = equations.model();
-    if arguments.domain.is_empty() {
+    let (original, files) = (equations.model(), &arguments.domain);
+    if files.is_empty() {
         return Ok(None);
     }
     let progress = spinner("simplifying");
-    let basis = Basis::read(model, arguments)?;
+    let mut recordings = Vec::new();
+    let ranges = ranges(original, arguments)?;
+    if ranges.is_none() {
+        recordings = read_for(original, files, &arguments.reading)?;
+        if original.encoder_map().is_err() {
+            let model = original.name().to_owned();
+            return Err(SimplifyError::NoEncoder { model }.into());
+        }
+    }
+    let segments: Vec<&Segment> = recordings.iter().flat_map(|r| &r.segments).collect();
+    let latent = segments.iter().map(|s| LatentSegment::encode(original, s));
+    let latent = latent.collect::<Result<Vec<_>, _>>()?;
+    let latent: Vec<&LatentSegment> = latent.iter().collect();
+    let (domain, samples, margin) = match ranges {
+        Some(domain) => (domain, None, None),
+        None => {
+            let samples = Samples::of(original, &latent);
+            let margin = arguments.margin.unwrap_or(MARGIN);
+            let domain = Domain::around(original, &samples, margin)?;
+            (domain, Some(samples), Some(margin))
+        }
+    };
     let tolerance = arguments.tolerance.unwrap_or(Tolerance::Absolute(0.0));
-    let simplified = simplify(equations, &basis.domain, basis.samples.as_ref(), tolerance)?;
+    let made = simplify(equations, &domain, samples.as_ref(), tolerance)?;
     progress.set_message("rolling out");
-    let rollouts = basis.rollouts(model, &simplified.model)?;
+    let basis = RolloutBasis {
+        domain: &domain,
+        segments,
+        latent,
+        restart_every_s: RESTART_S,
+    };
+    let can_roll_out = !recordings.is_empty() && original.decoder_map().is_ok();
+    let rollouts = can_roll_out.then(|| basis.effect(original, &made.model));
+    let rollouts = rollouts.transpose()?;
     progress.finish_and_clear();
     let mut outcome = Outcome {
-        model: simplified.model,
-        original: model.clone(),
-        certificate: simplified.certificate,
+        model: made.model,
+        original: original.clone(),
+        certificate: made.certificate,
         rollouts,
-        basis,
-        domain_files: names(&arguments.domain),
+        domain,
+        samples,
+        margin,
+        domain_files: names(files),
     };
     outcome.record_domain()?;
     Ok(Some(outcome))
 }
 
+fn ranges(model: &ReducedModel, arguments: &SimplifyArguments) -> Result<Option<Domain>, Error> {
+    let is_table = |path: &&PathBuf| path.extension().is_some_and(|end| end == "toml");
+    let Some(path) = arguments.domain.iter().find(is_table) else {
+        return Ok(None);
+    };
+    if arguments.domain.len() > 1 {
+        let message = "one .toml file of ranges, or recordings, but not both".to_owned();
+        let path = path.clone();
+        return Err(SimplifyError::DomainFile { path, message }.into());
+    }
+    if arguments.margin.is_some() {
+        return Err(SimplifyError::Margin.into());
+    }
+    Ok(Some(Domain::from_toml(model, path, &read_text(path)?)?))
+}
+
 impl Outcome {
-    /// Adds to the provenance of a changed model where the domain comes from.
     fn record_domain(&mut self) -> Result<(), Error> {
         let mut provenance = self.model.provenance().clone();
         if let Some(Value::Object(entry)) = provenance.get_mut("simplification")
             && self.certificate.n_changes() > 0
         {
             entry.insert("domain".to_owned(), json!(self.domain_files));
-            entry.insert("margin".to_owned(), json!(self.basis.margin));
+            entry.insert("margin".to_owned(), json!(self.margin));
             let builder = self.model.clone().into_builder();
             self.model = builder.provenance(provenance).build()?;
         }
@@ -149,7 +119,7 @@ impl Outcome {
 
     /// How coefficients are printed unless digits are given: in full if simplification has already
     /// chosen their digits.
-    pub(crate) fn rounding(&self) -> Rounding {
+    pub(super) fn rounding(&self) -> Rounding {
         match self.certificate.n_changes() {
             0 => Rounding::default(),
             _ => Rounding::Exact,
@@ -158,26 +128,36 @@ impl Outcome {
 
     /// Adds the certificate to the emitted files and, if anything changed, a comment to those that can hold one; its
     /// summary, and the same as JSON. `equations` are those of the model as they are printed, `rounding` is how.
-    pub(crate) fn add_to(
+    pub(super) fn add_to(
         &self,
         files: &mut Vec<EmittedFile>,
         equations: &Equations<'_>,
         rounding: Rounding,
     ) -> Result<(String, Value), Error> {
-        let basis = &self.basis;
         let printed = match rounding {
             Rounding::Exact => Vec::new(),
-            _ => printed(equations, &basis.domain, basis.samples.as_ref(), rounding)?,
+            _ => printed(equations, &self.domain, self.samples.as_ref(), rounding)?,
         };
         let name = format!("{}-simplification.md", self.model.identifier());
         let (models, rollouts) = ([&self.original, &self.model], self.rollouts.as_ref());
         let page = markdown(models, &self.certificate, rollouts, &printed);
         let mut value = certificate_json(&self.certificate);
-        value["file"] = json!(name);
-        value["domain_files"] = json!(self.domain_files);
-        value["margin"] = json!(basis.margin);
-        value["rollouts"] = json!(rollouts.map(rollouts_json));
-        value["printed"] = printed.iter().map(printed_json).collect();
+        let printed = printed.iter().map(|equation| {
+            json!({
+                "phase": equation.phase,
+                "equation": format!("ddz{}", equation.output + 1),
+                "bound": equation.bound.map(|bound| [bound.lo(), bound.hi()]),
+                "measured_max": equation.measured.map(|measured| measured.max),
+            })
+        });
+        let more = json!({
+            "file": name,
+            "domain_files": self.domain_files,
+            "margin": self.margin,
+            "rollouts": rollouts.map(rollouts_json),
+            "printed": printed.collect::<Vec<_>>(),
+        });
+        extend(&mut value, more);
         if self.certificate.n_changes() > 0 {
             self.comment(files, &name);
         }
@@ -187,23 +167,23 @@ impl Outcome {
 
     /// Adds a comment to each file of equations or code that names the model it was simplified from.
     fn comment(&self, files: &mut [EmittedFile], certificate_file: &str) {
-        let lines = [
-            format!("Simplified within {}", self.certificate.tolerance.words()),
-            format!(
-                "from the model with digest {}; {certificate_file} bounds each change.",
-                artifact::digest(&self.original).short()
-            ),
-        ];
+        let within = self.certificate.tolerance.words();
+        let digest = artifact::digest(&self.original).short();
         for file in files {
-            let Some([before, after]) = comment_marks(Path::new(&file.path)) else {
-                continue;
+            let [before, after] = match Path::new(&file.path).extension().and_then(|e| e.to_str()) {
+                Some("tex" | "m") => ["% ", ""],
+                Some("c" | "h") => ["/* ", " */"],
+                Some("rs") => ["// ", ""],
+                Some("py") => ["# ", ""],
+                Some("md" | "html") => ["<!-- ", " -->"],
+                _ => continue, // holds none of the model's equations
             };
-            let comment = lines
-                .each_ref()
-                .map(|line| format!("{before}{line}{after}\n"));
+            let comment = format!(
+                "{before}Simplified within {within}{after}\n\
+                 {before}from the model with digest {digest}; {certificate_file} bounds each change.{after}\n"
+            );
             let after_first_line = file.contents.find('\n').map_or(0, |end| end + 1);
-            file.contents
-                .insert_str(after_first_line, &comment.concat());
+            file.contents.insert_str(after_first_line, &comment);
         }
     }
 
@@ -225,33 +205,12 @@ impl Outcome {
     }
 }
 
-/// Delimiters of a comment in a file of this kind; `None` for files without the model's equations.
-fn comment_marks(path: &Path) -> Option<[&'static str; 2]> {
-    match path.extension()?.to_str()? {
-        "tex" | "m" => Some(["% ", ""]),
-        "c" | "h" => Some(["/* ", " */"]),
-        "rs" => Some(["// ", ""]),
-        "py" => Some(["# ", ""]),
-        "md" | "html" => Some(["<!-- ", " -->"]),
-        _ => None,
-    }
-}
-
 /// What exact simplification did, one line for each step; nothing if it did nothing.
-pub(crate) fn exact_words(equations: &Equations<'_>) -> String {
+pub(super) fn exact_words(equations: &Equations<'_>) -> String {
     match equations.steps() {
         [] => String::new(),
         steps => format!("simplified exactly:\n{}\n", lines("  ", steps)),
     }
-}
-
-fn printed_json(equation: &PrintedEquation) -> Value {
-    json!({
-        "phase": equation.phase,
-        "equation": format!("ddz{}", equation.output + 1),
-        "bound": equation.bound.map(|bound| [bound.lo(), bound.hi()]),
-        "measured_max": equation.measured.map(|measured| measured.max),
-    })
 }
 
 const LADDER: [f64; 4] = [0.001, 0.01, 0.05, 0.1];
@@ -259,7 +218,7 @@ const LADDER: [f64; 4] = [0.001, 0.01, 0.05, 0.1];
 /// Simplifies a model within several tolerances over the recordings of an assessment: a table with a row per tolerance
 /// (size, error and rollouts of the simplified equations), one of the errors of each equation within `chosen`, and one
 /// of every change within it.
-pub(crate) fn ladder(
+pub(super) fn ladder(
     model: &ReducedModel,
     assessment: &Assessment<'_>,
     chosen: Tolerance,
@@ -273,24 +232,24 @@ pub(crate) fn ladder(
         latent,
         restart_every_s: assessment.restart_every_s,
     };
-    let rms = |sums, name| assessment.fit(sums, name).map(|fit| fit.rms);
-    let (whole, short) = (&assessment.full, &assessment.restarted);
-    let [x, z] = ["body.x", "body.z"].map(|name| [rms(whole, name), rms(short, name)]);
     let equations = &Equations::of(model);
-    let none = simplify(equations, &domain, Some(&samples), Tolerance::Absolute(0.0))?;
-    let mut steps = vec![("none".to_owned(), none.certificate, [x, z])];
+    let within = |tolerance| simplify(equations, &domain, Some(&samples), tolerance);
+    let [whole, short] =
+        [&assessment.full, &assessment.restarted].map(|sums| body_rms(assessment, sums));
+    let unchanged = [0, 1].map(|axis| [whole[axis], short[axis]]);
+    let none = within(Tolerance::Absolute(0.0))?.certificate;
+    let mut steps = vec![("none".to_owned(), none, unchanged)];
     let names = assessment.names.iter();
     let body = names.filter(|name| name.starts_with("body."));
     let places = ["body.x", "body.z"].map(|name| body.clone().position(|known| known == name));
-    for share in LADDER {
-        let tolerance = Tolerance::ShareOfRms(share);
-        let made = simplify(equations, &domain, Some(&samples), tolerance)?;
-        let errors = basis.errors(&made.model)?;
-        let of = |place: Option<usize>| errors.rms.get(place?).copied();
-        let body = places.map(|place| of(place).unwrap_or_default());
+    for tolerance in LADDER.map(Tolerance::ShareOfRms) {
+        let made = within(tolerance)?;
+        let rms = basis.errors(&made.model)?.rms;
+        let body = places.map(|place| place.and_then(|place| rms.get(place).copied()));
+        let body = body.map(Option::unwrap_or_default);
         steps.push((tolerance.to_string(), made.certificate, body));
     }
-    let certificate = simplify(equations, &domain, Some(&samples), chosen)?.certificate;
+    let certificate = within(chosen)?.certificate;
     Ok([
         ladder_table(&steps, assessment.restart_every_s),
         equation_table(&certificate),

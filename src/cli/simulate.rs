@@ -1,29 +1,19 @@
 //! `romc simulate`: rollouts over recordings, in full and restarted.
 
-use std::fmt::Write as _;
-
 use nalgebra::DVector;
-use serde_json::json;
 
-use super::Answer;
 use super::args::SimulateArguments;
-use super::destination::{Format, Inputs};
-use super::output::{lines, note_late_restarts, numbered, read_for, shown, spinner, write_file};
+use super::*;
 use crate::evaluate::{Assessment, verdict_by_default};
-use crate::model::ReducedModel;
 use crate::report::{
     assessment_json, baseline_table, coordinate_table, dynamics_table, phase_table, verdict_lines,
 };
-use crate::typeset::words::counted;
-use crate::typeset::{Table, significant};
-use crate::{Error, artifact};
 
 /// Rolls the model out over every segment of every recording. The exit code is 1 if predictions of body x or z fail.
-pub(crate) fn run(arguments: &SimulateArguments) -> Result<Answer, Error> {
-    Inputs::default()
+pub(super) fn run(arguments: &SimulateArguments) -> Result<Answer, Error> {
+    Inputs::reading(&arguments.reading)
         .and([&arguments.model])
         .and(&arguments.recordings)
-        .and(&arguments.reading.columns)
         .check_output(arguments.output.as_deref(), Format::TABLE, arguments.force)?;
     let model = artifact::read(&arguments.model)?;
     let recordings = read_for(&model, &arguments.recordings, &arguments.reading)?;
@@ -36,13 +26,13 @@ pub(crate) fn run(arguments: &SimulateArguments) -> Result<Answer, Error> {
     let unmeasured =
         unmeasured.map(|reason| format!("torques and control are not judged: {reason}"));
     let mut text = format!(
-        "{} over {} of {}\n\n{}",
+        "{} over {} of {}\n\n{}\n{}",
         arguments.model.display(),
         counted(assessment.runs.len(), "segment"),
         counted(recordings.len(), "recording"),
-        metrics_text(&model, &assessment)
+        metrics_text(&model, &assessment),
+        verdict_lines(&verdict)
     );
-    text += &format!("\n{}", verdict_lines(&verdict));
     text += &lines("note: ", &unmeasured);
     if let Some(path) = &arguments.output {
         let table = trajectory_table(&model, &assessment)?;
@@ -61,17 +51,16 @@ pub(crate) fn run(arguments: &SimulateArguments) -> Result<Answer, Error> {
 
 fn metrics_text(model: &ReducedModel, assessment: &Assessment<'_>) -> String {
     let mut text = format!("{}\n", coordinate_table(model, assessment));
-    for (kind, sums) in [
+    let kinds = [
         ("full", &assessment.full),
         ("restarted", &assessment.restarted),
-    ] {
-        if sums.diverged > 0 {
-            let _ = writeln!(
-                text,
-                "{} of {} {kind} rollouts diverged; the table covers them up to there\n",
-                sums.diverged, sums.windows
-            );
-        }
+    ];
+    for (kind, sums) in kinds.into_iter().filter(|(_, sums)| sums.diverged > 0) {
+        let _ = writeln!(
+            text,
+            "{} of {} {kind} rollouts diverged; the table covers them up to there\n",
+            sums.diverged, sums.windows
+        );
     }
     let _ = writeln!(
         text,
@@ -85,20 +74,19 @@ fn metrics_text(model: &ReducedModel, assessment: &Assessment<'_>) -> String {
         let _ = writeln!(text, "  {}: {constants}", baseline.name);
     }
     let _ = writeln!(text, "\n{}", dynamics_table(model, assessment));
-    if let Some(mean_square) = assessment.decoder_mean_square() {
-        let mean_square = significant(mean_square);
+    if let Some(mean_square) = assessment.decoder_mean_square().map(significant) {
         let _ = writeln!(text, "decoder mean square: {mean_square} (scaled units)");
     }
     let shown = |value: Option<f64>| value.map_or("-".to_owned(), significant);
-    let lift = &assessment.lift;
+    let (lift, r2) = (&assessment.lift, assessment.lift.torque.r2());
     let _ = writeln!(
         text,
         "active terms: {}, combined loss L_mod: {}\n\
          plain lift of exactly projected inputs: torque R^2 {} in contact, {} in flight, {} over all samples; inconsistency {}",
         assessment.active_terms,
         shown(assessment.combined_loss()),
-        shown(lift.torque.r2().contact),
-        shown(lift.torque.r2().flight),
+        shown(r2.contact),
+        shown(r2.flight),
         shown(lift.torque.r2_all()),
         shown(lift.inconsistency())
     );
@@ -111,44 +99,40 @@ fn metrics_text(model: &ReducedModel, assessment: &Assessment<'_>) -> String {
 /// three of its velocity `dz_i`, the latent input `u_lat_i`, then the three of every robot coordinate
 /// in SI units. A prediction that diverged leaves its cell empty.
 fn trajectory_table(model: &ReducedModel, assessment: &Assessment<'_>) -> Result<Table, Error> {
-    let mut table = Table::new(columns(model.latent_dim(), &assessment.names));
+    let thrice = |name: String| ["", "_full", "_restarted"].map(|kind| format!("{name}{kind}"));
+    let latent = |name: &'static str| numbered(name, model.latent_dim());
+    let first = ["segment", "time", "phase"].map(str::to_owned).into_iter();
+    let mut table = Table::new(
+        first
+            .chain(latent("z").flat_map(thrice))
+            .chain(latent("dz").flat_map(thrice))
+            .chain(latent("u_lat"))
+            .chain(assessment.names.iter().cloned().flat_map(thrice)),
+    );
     for (index, run) in assessment.runs.iter().enumerate() {
+        let (segment, latent) = (run.segment, &run.latent);
         let [full, restarted] =
-            [&run.full, &run.restarted].map(|rollout| rollout.states(run.latent.len()));
-        for (sample, predictions) in full.iter().zip(&restarted).enumerate() {
-            let (segment, latent) = (run.segment, &run.latent);
-            let phase = &model.phases()[latent.phase[sample]].name;
-            let mut row = vec![
-                index.to_string(),
-                segment.time_s[sample].to_string(),
-                phase.clone(),
+            [&run.full, &run.restarted].map(|rollout| rollout.states(latent.len()));
+        for (sample, states) in full.iter().zip(&restarted).enumerate() {
+            let states = [states.0.as_ref(), states.1.as_ref()];
+            let [z, dz] = [
+                states.map(|state| state.map(|(z, _)| z)),
+                states.map(|state| state.map(|(_, dz)| dz)),
             ];
-            let states = [predictions.0.as_ref(), predictions.1.as_ref()];
-            let z = states.map(|state| state.map(|(z, _)| z));
+            let [full, restarted] = z.map(|z| z.map(|z| model.decode(z)).transpose());
+            let (full, restarted) = (full?, restarted?);
+            let phase = &model.phases()[latent.phase[sample]].name;
+            let time = segment.time_s[sample].to_string();
+            let mut row = vec![index.to_string(), time, phase.clone()];
             add(&mut row, latent.z.column(sample).iter(), z);
-            let dz = states.map(|state| state.map(|(_, dz)| dz));
             add(&mut row, latent.dz.column(sample).iter(), dz);
             row.extend(latent.u_lat.column(sample).iter().map(f64::to_string));
-            let [full, restarted] = z.map(|z| z.map(|z| model.decode(z)).transpose());
-            let decoded = [full?, restarted?];
-            let decoded = decoded.each_ref().map(Option::as_ref);
+            let decoded = [full.as_ref(), restarted.as_ref()];
             add(&mut row, segment.x.column(sample).iter(), decoded);
             table.row(row);
         }
     }
     Ok(table)
-}
-
-fn columns(latent_dim: usize, names: &[String]) -> Vec<String> {
-    const KINDS: [&str; 3] = ["", "_full", "_restarted"];
-    let thrice = |name: String| KINDS.map(|kind| format!("{name}{kind}"));
-    let first = ["segment", "time", "phase"].map(str::to_owned).into_iter();
-    first
-        .chain(numbered("z", latent_dim).flat_map(thrice))
-        .chain(numbered("dz", latent_dim).flat_map(thrice))
-        .chain(numbered("u_lat", latent_dim))
-        .chain(names.iter().cloned().flat_map(thrice))
-        .collect()
 }
 
 fn add<'a>(
@@ -157,10 +141,8 @@ fn add<'a>(
     predicted: [Option<&DVector<f64>>; 2],
 ) {
     for (index, value) in recorded.enumerate() {
+        let cell = |values: Option<&DVector<f64>>| values.map(|values| values[index].to_string());
         row.push(value.to_string());
-        let cell = |values: Option<&DVector<f64>>| {
-            values.map_or(String::new(), |values| values[index].to_string())
-        };
-        row.extend(predicted.map(cell));
+        row.extend(predicted.map(|values| cell(values).unwrap_or_default()));
     }
 }

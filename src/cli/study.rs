@@ -1,26 +1,16 @@
 //! `romc study`: trainings over latent dimensions and seeds, joined and summarised.
 
-use std::path::Path;
-
-use serde_json::{Value, json};
-
-use super::Answer;
 use super::args::{StudyArguments, TrainSettings};
-use super::destination::Inputs;
-use super::output::{note, spinner};
 use super::prepared_recordings::RecordedSets;
-use super::train_settings;
-use crate::Error;
-use crate::files::{EmittedFile, check_folder};
-use crate::recording::Recording;
+use super::*;
+use crate::files::check_folder;
 use crate::report::{figure_files, study_figures};
 use crate::study::{self, CellId, FOLDS, Outcome, Plan, Shard, Spread, Store, Summary, cell_table};
 use crate::train::{Method, Origin};
-use crate::typeset::{Cell, Table, significant};
 
 const TABLES: [&str; 2] = ["cells.csv", "summary.csv"];
 
-pub(crate) fn run(arguments: &StudyArguments) -> Result<Answer, Error> {
+pub(super) fn run(arguments: &StudyArguments) -> Result<Answer, Error> {
     check_folder(&arguments.out_dir, &TABLES, arguments.force)?;
     let store = match arguments.merge.is_empty() {
         true => trained(arguments)?,
@@ -28,16 +18,16 @@ pub(crate) fn run(arguments: &StudyArguments) -> Result<Answer, Error> {
     };
     let cells = store.cells()?;
     let summary = Summary::of(&cells, arguments.lambda);
-    let tables = [cell_table(&cells, arguments.lambda), summary.table()];
-    let tables = TABLES.iter().zip(tables);
-    let tables = tables.map(|(name, table)| EmittedFile::new(*name, table.csv()));
-    let mut files: Vec<EmittedFile> = tables.collect();
+    let [of_cells, of_summary] = TABLES;
+    let mut files = vec![
+        EmittedFile::new(of_cells, cell_table(&cells, arguments.lambda).csv()),
+        EmittedFile::new(of_summary, summary.table().csv()),
+    ];
     files.extend(study_figures(&summary).iter().flat_map(figure_files));
-    Inputs::default()
+    Inputs::reading(&arguments.reading)
         .and(&arguments.recordings)
         .and(&arguments.validation)
         .and(&arguments.config)
-        .and(&arguments.reading.columns)
         .and_robot(arguments.robot.as_deref())
         .write_folder(&arguments.out_dir, &files, arguments.force)?;
     Ok(answer(&arguments.out_dir, &store, &cells, &summary))
@@ -56,7 +46,7 @@ fn merged(arguments: &StudyArguments) -> Result<Store, Error> {
 
 fn trained(arguments: &StudyArguments) -> Result<Store, Error> {
     let mut settings = settings(arguments)?;
-    let robot = train_settings::robot(&settings)?;
+    let robot = settings.robot()?;
     let mut recorded = RecordedSets::whole(
         [&arguments.recordings, &arguments.validation, &[]],
         &arguments.reading,
@@ -67,16 +57,15 @@ fn trained(arguments: &StudyArguments) -> Result<Store, Error> {
     recorded.report_findings();
     let [training, validation, _] = &recorded.sets;
     let [training, validation] = [training, validation].map(|set| &set.recordings[..]);
-    let mut base = train_settings::options(&settings, 1, String::new(), robot)?;
-    train_settings::identified(&mut base, &settings, &recorded, robot)?;
+    let mut base = settings.options(1, String::new(), robot)?;
+    settings.identify(&mut base, &recorded, robot)?;
     settings.wrench_frame = Some(base.wrench_frame);
-    settings.actuators = Some(train_settings::actuators(&settings).to_owned());
+    settings.actuators = Some(settings.actuators().to_owned());
     let plan = plan(arguments, &settings, training, validation);
     if plan.method == Method::ClosedForm && plan.seeds > FOLDS {
-        let message = "has seeds from 6 on leave out the jumps of seeds 1 to 5 again";
+        let seeds = plan.seeds;
         note(&format!(
-            "--seeds {}: the closed form {message}",
-            plan.seeds
+            "--seeds {seeds}: the closed form has seeds from 6 on leave out the jumps of seeds 1 to 5 again"
         ));
     }
     let store = Store::create(&arguments.out_dir, plan)?;
@@ -96,8 +85,8 @@ fn trained(arguments: &StudyArguments) -> Result<Store, Error> {
 fn settings(arguments: &StudyArguments) -> Result<TrainSettings, Error> {
     let mut settings = TrainSettings::default();
     if let Some(path) = &arguments.config {
-        settings = train_settings::read(path)?;
-        if let Some(name) = train_settings::first(&settings, &["latent-dim", "seed", "seeds"]) {
+        settings = TrainSettings::read(path)?;
+        if let Some(name) = settings.first("latent-dim seed seeds") {
             let message = format!("`{name}` is not a setting of a study, which runs over them");
             return Err(Error::refused(path, message));
         }
@@ -105,8 +94,8 @@ fn settings(arguments: &StudyArguments) -> Result<TrainSettings, Error> {
     settings.paper |= arguments.paper;
     settings.method = arguments.method.or(settings.method);
     settings.robot = arguments.robot.clone().or(settings.robot);
-    train_settings::check_pairs(&settings)?;
-    settings.method = Some(train_settings::method(&settings));
+    settings.check_pairs()?;
+    settings.method = Some(settings.method());
     Ok(settings)
 }
 
@@ -116,16 +105,13 @@ fn plan(
     training: &[Recording],
     validation: &[Recording],
 ) -> Plan {
-    let files = training
-        .iter()
-        .chain(validation)
-        .map(|recording| &recording.path);
+    let files = training.iter().chain(validation).map(|of| &of.path);
     let recordings = Origin::new("", files).recordings.into_iter();
     Plan {
         latent_dims: arguments.latent_dims.0.clone(),
         seeds: arguments.seeds,
-        method: train_settings::method(settings),
-        settings: train_settings::as_flags(settings),
+        method: settings.method(),
+        settings: settings.as_flags(),
         recordings: recordings.map(|file| file.digest).collect(),
         training: training.len(),
         romc: env!("CARGO_PKG_VERSION").to_owned(),
@@ -147,40 +133,28 @@ fn answer(folder: &Path, store: &Store, cells: &[study::Cell], summary: &Summary
         .column("torque R^2", "", |row| spread(row.torque_r2))
         .table();
     let (missing, total) = (store.missing(), store.plan().cells().len());
-    let best = summary.best();
-    let mut text = format!(
-        "{}: {} of {total} trainings finished\n\n{table}",
-        folder.display(),
-        total - missing.len()
-    );
+    let (best, folder) = (summary.best(), folder.display().to_string());
+    let id = |id: &CellId| format!("d = {} seed {}", id.latent_dim, id.seed);
+    let finished = total - missing.len();
+    let mut text = format!("{folder}: {finished} of {total} trainings finished\n\n{table}");
     if let Some(best) = best {
-        text += &format!(
-            "\nleast L_mod = 2 E_dec + 2 * {} * log |Xi| at d = {best}\n",
-            summary.lambda
-        );
+        let lambda = summary.lambda;
+        text += &format!("\nleast L_mod = 2 E_dec + 2 * {lambda} * log |Xi| at d = {best}\n");
     }
-    let names: Vec<String> = (missing.iter())
-        .map(|id| format!("d = {} seed {}", id.latent_dim, id.seed))
-        .collect();
-    if !names.is_empty() {
-        text += &format!("\nnot trained yet: {}\n", names.join("; "));
+    if !missing.is_empty() {
+        let missing: Vec<String> = missing.iter().map(id).collect();
+        text += &format!("\nnot trained yet: {}\n", missing.join("; "));
     }
-    let refused = cells.iter().filter_map(|cell| match &cell.outcome {
-        Outcome::Refused(reason) => Some((cell.id, reason)),
-        Outcome::Trained(_) => None,
-    });
-    let refused: Vec<(CellId, &String)> = refused.collect();
-    for (id, reason) in &refused {
-        text += &format!(
-            "no model: d = {} seed {}: {reason}\n",
-            id.latent_dim, id.seed
-        );
+    let mut refused = Vec::new();
+    for cell in cells {
+        if let Outcome::Refused(reason) = &cell.outcome {
+            text += &format!("no model: {}: {reason}\n", id(&cell.id));
+            let CellId { latent_dim, seed } = cell.id;
+            refused.push(json!({ "latent_dim": latent_dim, "seed": seed, "reason": reason }));
+        }
     }
-    let refused: Vec<Value> = (refused.iter())
-        .map(|(id, reason)| json!({ "latent_dim": id.latent_dim, "seed": id.seed, "reason": reason }))
-        .collect();
     let json = json!({
-        "folder": folder.display().to_string(),
+        "folder": folder,
         "plan": store.plan(),
         "summary": summary,
         "least_combined_loss_at": best,

@@ -1,42 +1,33 @@
 //! `romc train`: recordings in, a model file out.
 
-use std::fmt::Write as _;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use serde_json::json;
-
-use super::Answer;
 use super::args::{TrainArguments, TrainSettings};
-use super::destination::{Format, Inputs};
-use super::output::{named, note, note_repeated, quoted, quoted_all, quoted_text, spinner};
 use super::prepared_recordings::RecordedSets;
-use super::train_settings;
-use crate::recording::{Recording, RecordingSet};
+use super::*;
+use crate::recording::RecordingSet;
 use crate::robot::{BODY_X, BODY_Z};
 use crate::train::{
     Method, Monitor, Origin, Progress, Recordings, SetMetrics, TrainOptions, TrainReport, Trained,
+    assess,
 };
-use crate::typeset::{Cell, Table, significant};
-use crate::{Error, artifact, train};
 
-pub(crate) fn run(arguments: &TrainArguments) -> Result<Answer, Error> {
-    let settings = train_settings::effective(arguments)?;
-    Inputs::default()
+pub(super) fn run(arguments: &TrainArguments) -> Result<Answer, Error> {
+    let settings = TrainSettings::effective(arguments)?;
+    Inputs::reading(&arguments.reading)
         .and(&arguments.recordings)
         .and(&arguments.validation)
         .and(&arguments.test)
         .and(&arguments.config)
-        .and(&arguments.reading.columns)
         .and_robot(settings.robot.as_deref())
         .and(&settings.actuators)
         .check_output(Some(&arguments.output), Format::MODEL, arguments.force)?;
     let latent_dim = settings.latent_dim.expect("clap or the file's check asks");
-    let method = train_settings::method(&settings);
-    let robot = train_settings::robot(&settings)?;
+    let (method, robot) = (settings.method(), settings.robot()?);
     let name = named(arguments.name.as_deref(), &arguments.output);
-    let mut options = train_settings::options(&settings, latent_dim, name, robot)?;
+    let mut options = settings.options(latent_dim, name, robot)?;
     let mut recorded = RecordedSets::new(arguments, &settings, robot, options.seed)?;
-    train_settings::identified(&mut options, &settings, &recorded, robot)?;
+    settings.identify(&mut options, &recorded, robot)?;
     options.check()?;
     note_repeated(&recorded.files());
     let read = recorded.read();
@@ -64,16 +55,14 @@ pub(crate) fn run(arguments: &TrainArguments) -> Result<Answer, Error> {
         trained = marked_as_interrupted(trained);
     }
     artifact::write(&arguments.output, &trained.model, arguments.force)?;
-    let tested = (!test.is_empty()).then(|| train::assess(&trained.model, test));
+    let tested = (!test.is_empty()).then(|| assess(&trained.model, test));
     let tested = tested.transpose()?;
     let mut answer = answer(arguments, &trained, tested.as_ref());
     let notes = notes(&trained.report, tested.as_ref(), &recorded.sets);
     notes.iter().for_each(|text| note(text));
-    if arguments.split.is_none()
-        && let Some(words) = train_settings::without_effect(&settings, &options)
-    {
-        note(&words);
-    }
+    let without_effect = settings.without_effect(&options);
+    let without_effect = without_effect.filter(|_| arguments.split.is_none());
+    without_effect.iter().for_each(|text| note(text));
     answer.json["notes"] = notes.into();
     answer.json["interrupted"] = is_interrupted.into();
     answer.json["recordings"] = recorded.findings_json();
@@ -97,11 +86,12 @@ fn notes(
     [training, validation, test]: &[RecordingSet; 3],
 ) -> Vec<String> {
     let judged = match &report.validation {
-        Some(metrics) => ("validation", Some(metrics), validation),
-        None => ("training", Some(&report.training), training),
+        Some(metrics) => ("validation", metrics, validation),
+        None => ("training", &report.training, training),
     };
-    let sets = [judged, ("test", tested, test)].into_iter();
-    sets.filter_map(|(name, metrics, set)| whole_jump_note(metrics?, name, &set.recordings))
+    let tested = tested.map(|metrics| ("test", metrics, test));
+    let sets = std::iter::once(judged).chain(tested);
+    sets.filter_map(|(name, metrics, set)| whole_jump_note(metrics, name, &set.recordings))
         .collect()
 }
 
@@ -149,11 +139,10 @@ fn command_line(
         method: Some(method),
         wrench_frame: Some(options.wrench_frame),
         coordinates: Some(options.coordinates()),
-        actuators: Some(train_settings::actuators(settings).to_owned()),
+        actuators: Some(settings.actuators().to_owned()),
         ..settings.clone()
     };
-    line += &train_settings::as_flags(&settings);
-    line += &arguments.reading.as_flags();
+    line += &(settings.as_flags() + &arguments.reading.as_flags());
     if let Some(name) = &arguments.name {
         let _ = write!(line, " --name {}", quoted_text(name));
     }
@@ -162,17 +151,16 @@ fn command_line(
 }
 
 fn answer(arguments: &TrainArguments, trained: &Trained, tested: Option<&SetMetrics>) -> Answer {
-    let report = &trained.report;
-    let latent_dim = trained.model.latent_dim();
+    let (report, latent_dim) = (&trained.report, trained.model.latent_dim());
+    let output = arguments.output.display().to_string();
     let text = format!(
-        "{}: {latent_dim} latent coordinates from {} recordings\n\n{}{}",
-        arguments.output.display(),
+        "{output}: {latent_dim} latent coordinates from {} recordings\n\n{}{}",
         arguments.recordings.len(),
         metrics_table(report, tested),
         seed_table(report)
     );
     let json = json!({
-        "model": arguments.output.display().to_string(),
+        "model": output,
         "name": trained.model.name(),
         "latent_dim": latent_dim,
         "report": report,
@@ -194,11 +182,10 @@ fn metrics_table(report: &TrainReport, tested: Option<&SetMetrics>) -> Table {
         let cells = (sets.iter()).map(|(_, set)| set.map(cell).unwrap_or_default());
         table.row([name.into(), unit.into()].into_iter().chain(cells));
     };
-    row("decoder mean square", "scaled", &|m| Some(m.decoder_mse));
-    row("torque R^2 of the plain lift, all samples", "", &|m| {
-        Some(m.torque_r2)
-    });
+    let lift = "torque R^2 of the plain lift, all samples";
     let (short, whole) = ("fixed steps over 0.1 s", "fixed steps, whole jump");
+    row("decoder mean square", "scaled", &|m| Some(m.decoder_mse));
+    row(lift, "", &|m| Some(m.torque_r2));
     row(&format!("body x, {short}"), "m", &|m| {
         Some(m.prediction_x_m)
     });
@@ -212,13 +199,16 @@ fn metrics_table(report: &TrainReport, tested: Option<&SetMetrics>) -> Table {
         let name = format!("smoothed ddz R^2 in {name} ({active} terms)");
         row(&name, "", &|m| m.ddz_r2.get(phase).copied());
     }
+    let mut of_all = |name: String, value: f64| {
+        table.row([name.into(), "".into(), Cell::from(value)]);
+    };
     for score in &report.deviations {
         let name = format!("ddz R^2 of deviations in {}, jump left out", score.part);
-        table.row([name.into(), "".into(), Cell::from(score.ddz_r2)]);
+        of_all(name, score.ddz_r2);
     }
     if let Some(overlap) = report.support_overlap {
         let name = format!("overlap of supports, {} seeds", report.seeds.len());
-        table.row([name.into(), "".into(), Cell::from(overlap)]);
+        of_all(name, overlap);
     }
     table
 }
@@ -240,18 +230,14 @@ fn seed_table(report: &TrainReport) -> String {
     format!("\n{table}")
 }
 
-const BODY: [usize; 2] = [BODY_X, BODY_Z];
-
 /// A note if rollouts of whole jumps end up further off than a body would be that stays where each jump starts: root mean
 /// squares over all samples of the body's error forwards and upwards, and of its way from the start.
 fn whole_jump_note(metrics: &SetMetrics, set: &str, recordings: &[Recording]) -> Option<String> {
     let (mut squares, mut samples) = (0.0, 0);
     for segment in recordings.iter().flat_map(|recording| &recording.segments) {
-        for row in BODY {
-            let start = segment.x[(row, 0)];
-            squares += (segment.x.row(row).iter())
-                .map(|value| (value - start).powi(2))
-                .sum::<f64>();
+        for row in [BODY_X, BODY_Z].map(|row| segment.x.row(row)) {
+            let off = row.iter().map(|value| (value - row[0]).powi(2));
+            squares += off.sum::<f64>();
         }
         samples += segment.len();
     }
@@ -266,39 +252,4 @@ fn whole_jump_note(metrics: &SetMetrics, set: &str, recordings: &[Recording]) ->
          of 0.1 s only, try another number of latent coordinates, or record more jumps",
         significant(moved_m)
     ))
-}
-
-#[cfg(test)]
-mod tests {
-    use std::path::Path;
-
-    use super::*;
-    use crate::recording;
-
-    #[test]
-    fn whole_jump_note_appears_where_standing_still_is_better() {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/recordings/go1");
-        // moves by 0.140 m forwards and 0.065 m upwards, root mean squares
-        let jumps = [recording::read(&folder.join("test_01.csv.gz")).expect("shipped")];
-        let note = |x: Option<f64>, z: f64| {
-            let metrics = SetMetrics {
-                decoder_mse: 0.0,
-                ddz_r2: Vec::new(),
-                torque_r2: 1.0,
-                prediction_x_m: 0.0,
-                prediction_z_m: 0.0,
-                rollout_x_m: x,
-                rollout_z_m: Some(z),
-            };
-            whole_jump_note(&metrics, "validation", &jumps)
-        };
-        assert_eq!(note(Some(0.13), 0.06), None);
-        let found = note(Some(0.15), 0.07).expect("a note");
-        assert!(
-            found.contains("validation jumps are 0.1655 m off"),
-            "{found}"
-        );
-        assert!(note(Some(3.0), 4.0).expect("a note").contains("5.000 m"));
-        assert!(note(None, 0.0).expect("a note").contains("diverge"));
-    }
 }

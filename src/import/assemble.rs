@@ -11,7 +11,7 @@ use super::library;
 use super::options::{ImportOptions, PhaseRule, XiLayout, standard_text};
 use super::report::{ImportReport, Layout, UnusedTensor, UsedTensor};
 use super::role::{Part, Role, is_of_optimiser};
-use super::tensors::{Element, TensorFile, TensorInfo};
+use super::tensors::{TensorFile, TensorInfo};
 use crate::files::Place;
 use crate::model::{InputStatistics, Library, LibraryChoice, ModelError, Phase, Scaling, StateMap};
 use crate::robot::STATE_DIM;
@@ -64,16 +64,17 @@ pub(super) fn parts(
         assembly.check_options_of_maps()?;
     }
     let (library, phases) = assembly.coefficients()?;
-    assembly.check_left_over([&encoder, &decoder], &phases)?;
-    let statistics = assembly.statistics()?;
     let mut parts = Parts {
         library,
         phases,
         encoder,
         decoder,
-        scaling: assembly.scaling()?,
-        statistics,
+        scaling: None,
+        statistics: Vec::new(),
     };
+    assembly.check_left_over(&parts)?;
+    parts.statistics = assembly.statistics()?;
+    parts.scaling = assembly.scaling()?;
     assembly.fold_mean(&mut parts)?;
     assembly.sort(&mut parts)?;
     let mut report = assembly.report;
@@ -109,7 +110,7 @@ impl<'a> Assembly<'a, '_> {
     }
 
     fn unusable(&self, source: impl Into<ModelError>) -> ImportError {
-        ImportError::unusable(self.tensors.file(), source)
+        ImportError::unusable(&self.tensors.file, source)
     }
 
     fn wrong_shape(&self, assigned: &Assigned<'_>, expected: String) -> ImportError {
@@ -144,7 +145,7 @@ impl<'a> Assembly<'a, '_> {
         layout: Layout,
     ) -> Result<DMatrix<f64>, ImportError> {
         let info = assigned.info;
-        if info.element == Element::Bool && !matches!(assigned.role, Role::Mask(_)) {
+        if info.element.0 == "bool" && !matches!(assigned.role, Role::Mask(_)) {
             return Err(self.refused(assigned, "numbers of type bool", "f32 or f64"));
         }
         let stored = (self.tensors).read(info, shape, |index| assigned.place(index))?;
@@ -152,7 +153,7 @@ impl<'a> Assembly<'a, '_> {
             role: assigned.role.to_string(),
             tensor: info.name.clone(),
             shape: info.shape.clone(),
-            element: info.element.name().to_owned(),
+            element: info.element.0.clone(),
             chosen: assigned.chosen,
             layout,
         });
@@ -193,7 +194,7 @@ impl<'a> Assembly<'a, '_> {
             phases.push(Phase { name, feet, xi });
         }
         let latent_dim = phases[0].xi.ncols();
-        let library = library::build(self.tensors.file(), choice, latent_dim)?;
+        let library = library::build(&self.tensors.file, choice, latent_dim)?;
         self.report.terms = self.sort_terms(&library, &mut phases)?;
         Ok((library, phases))
     }
@@ -211,8 +212,9 @@ impl<'a> Assembly<'a, '_> {
         };
         let latent_dim = library.latent_dim();
         let order = library::order(standard, latent_dim, self.options.library_order)?;
-        let rows = standard.rows_in(order, latent_dim);
-        let rows = rows.map_err(|source| self.unusable(source))?;
+        let sorted = (standard.rows_in(order, latent_dim))
+            .and_then(|rows| Ok((rows, standard.texts_in(order, latent_dim)?)));
+        let (rows, terms) = sorted.map_err(|source| self.unusable(source))?;
         for phase in phases {
             let stored = phase.xi.clone();
             for (place, &row) in rows.iter().enumerate() {
@@ -220,8 +222,7 @@ impl<'a> Assembly<'a, '_> {
             }
         }
         self.report.library_order = order.name();
-        let terms = standard.texts_in(order, latent_dim);
-        terms.map_err(|source| self.unusable(source))
+        Ok(terms)
     }
 
     /// Refuses options that are of use with an encoder or decoder alone.
@@ -229,8 +230,8 @@ impl<'a> Assembly<'a, '_> {
         let Some(option) = self.options.of_maps() else {
             return Ok(());
         };
-        let unused = &self.assignment.unused;
-        let unused: Vec<String> = unused.iter().take(24).map(|info| info.describe()).collect();
+        let unused = self.assignment.unused.iter().take(24);
+        let unused: Vec<String> = unused.map(|info| info.describe()).collect();
         let left = match unused.is_empty() {
             true => "no tensor is left".to_owned(),
             false => format!("left are {}", unused.join(", ")),
@@ -241,59 +242,54 @@ impl<'a> Assembly<'a, '_> {
     }
 
     /// Refuses unused tensors that by shape are a missing encoder or decoder, or by their numbers a mask.
-    fn check_left_over(
-        &self,
-        maps: [&Option<StateMap>; 2],
-        phases: &[Phase],
-    ) -> Result<(), ImportError> {
-        let is_of_model = |info: &&&TensorInfo| !is_of_optimiser(&info.name);
-        let mut unused = self.assignment.unused.iter().filter(is_of_model);
-        let other = maps.iter().find_map(|map| map.as_ref());
-        for (part, map) in Part::ALL.into_iter().zip(maps) {
-            let (None, Some(other)) = (map, other) else {
-                continue;
-            };
+    fn check_left_over(&self, parts: &Parts) -> Result<(), ImportError> {
+        let unused = self.assignment.unused.iter();
+        let unused: Vec<_> = unused.filter(|info| !is_of_optimiser(&info.name)).collect();
+        let refused = |found: String, expected: String| {
+            Err(self.tensors.refused(Place::Whole, found, expected))
+        };
+        let missing = match (&parts.encoder, &parts.decoder) {
+            (None, Some(other)) => Some((Part::Encoder, other)),
+            (Some(other), None) => Some((Part::Decoder, other)),
+            _ => None,
+        };
+        if let Some((part, other)) = missing {
             let (a, b) = (other.input_dim(), other.output_dim());
-            let mut fitting = unused
-                .clone()
-                .filter(|info| info.shape == [a, b] || info.shape == [b, a]);
-            if let Some(info) = fitting.next() {
-                let name = part.name();
-                let found = format!(
-                    "no {name}, and {} unused, which has its shape",
-                    info.describe()
+            let fits = |info: &&&&TensorInfo| info.shape == [a, b] || info.shape == [b, a];
+            if let Some(info) = unused.iter().find(fits) {
+                let (name, described) = (part.name(), info.describe());
+                return refused(
+                    format!("no {name}, and {described} unused, which has its shape"),
+                    format!("--map {name}.weight={}, or a file without it", info.name),
                 );
-                let expected = format!("--map {name}.weight={}, or a file without it", info.name);
-                return Err(self.tensors.refused(Place::Whole, found, expected));
             }
         }
-        let Some(mask) = unused.find(|info| self.is_mask(info, &phases[0].xi)) else {
+        let first = &parts.phases[0];
+        let Some(mask) = unused.iter().find(|info| self.is_mask(info, &first.xi)) else {
             return Ok(());
         };
-        let (phase, described) = (&phases[0].name, mask.describe());
-        let found = format!("{described} unused, zeros and ones in the shape of xi.{phase}");
-        let expected = format!(
-            "--map mask.{phase}={} (0 switches a coefficient off), or a file without it",
-            mask.name
-        );
-        Err(self.tensors.refused(Place::Whole, found, expected))
+        let (phase, described, mask) = (&first.name, mask.describe(), &mask.name);
+        refused(
+            format!("{described} unused, zeros and ones in the shape of xi.{phase}"),
+            format!(
+                "--map mask.{phase}={mask} (0 switches a coefficient off), or a file without it"
+            ),
+        )
     }
 
     /// Whether a tensor has the shape of coefficients and holds zeros and ones, both of them.
     fn is_mask(&self, info: &TensorInfo, xi: &DMatrix<f64>) -> bool {
         let (terms, latent) = xi.shape();
-        let shape = match info.shape[..] {
-            [rows, columns] if [(terms, latent), (latent, terms)].contains(&(rows, columns)) => {
-                (rows, columns)
-            }
-            _ => return false,
+        let &[rows, columns] = info.shape.as_slice() else {
+            return false;
         };
-        let place = |_: &[usize]| Place::Whole;
-        (self.tensors.read(info, shape, place)).is_ok_and(|values| {
-            [0.0, 1.0]
-                .iter()
-                .all(|flag| values.iter().any(|v| v == flag))
-                && values.iter().all(|&value| value == 0.0 || value == 1.0)
+        if ![(terms, latent), (latent, terms)].contains(&(rows, columns)) {
+            return false;
+        }
+        let read = self.tensors.read(info, (rows, columns), |_| Place::Whole);
+        read.is_ok_and(|values| {
+            let has = |flag: f64| values.iter().any(|&value| value == flag);
+            has(0.0) && has(1.0) && values.iter().all(|&value| value == 0.0 || value == 1.0)
         })
     }
 
@@ -329,28 +325,26 @@ impl<'a> Assembly<'a, '_> {
         choice: &LibraryChoice,
     ) -> Result<(DMatrix<f64>, Layout), ImportError> {
         let (by_terms, by_latent) = (Layout::TermsByLatent, Layout::LatentByTerms);
+        // Each way with the numbers of terms and of latent coordinates.
         let mut ways = match assigned.info.shape[..] {
             [length] => vec![(Layout::Plain, (length, 1))],
             [rows, columns] => vec![(by_terms, (rows, columns)), (by_latent, (columns, rows))],
             _ => Vec::new(),
         };
-        ways.retain(|(way, _)| match self.options.xi_layout {
-            Some(XiLayout::TermsByLatent) => *way != by_latent,
-            Some(XiLayout::LatentByTerms) => *way != by_terms,
-            None => true,
-        });
-        ways.retain(|&(_, (terms, latent))| {
-            latent > 0
+        let excluded = match self.options.xi_layout {
+            Some(XiLayout::TermsByLatent) => Some(by_latent),
+            Some(XiLayout::LatentByTerms) => Some(by_terms),
+            None => None,
+        };
+        ways.retain(|&(way, (terms, latent))| {
+            Some(way) != excluded
+                && latent > 0
                 && self.known.latent.is_none_or(|known| known == latent)
                 && library::dim(choice, latent) == Some(terms)
         });
         let option = "--xi-layout terms-by-latent (one row per term) or --xi-layout latent-by-terms \
                       (one row per latent coordinate)";
-        let expected = || match assigned.info.shape.len() {
-            3 => "one tensor per phase: in Python, {\"xi.contact\": Xi[0], \"xi.flight\": Xi[1]}"
-                .to_owned(),
-            _ => self.expected_xi(choice),
-        };
+        let expected = || self.expected_xi(assigned.info.shape.len(), choice);
         let (layout, (terms, latent)) = self.only_way(assigned, &ways, expected, option)?;
         let stored = match layout {
             Layout::LatentByTerms => (latent, terms),
@@ -359,38 +353,45 @@ impl<'a> Assembly<'a, '_> {
         Ok((self.read(assigned, stored, layout)?, layout))
     }
 
-    fn expected_xi(&self, choice: &LibraryChoice) -> String {
+    fn expected_xi(&self, rank: usize, choice: &LibraryChoice) -> String {
+        if rank == 3 {
+            return "one tensor per phase: in Python, {\"xi.contact\": Xi[0], \"xi.flight\": Xi[1]}"
+                .to_owned();
+        }
         let latent = self.known.latent;
         let (terms, source) = match choice {
-            LibraryChoice::Terms(terms) => {
-                let count = terms.len();
-                (Some(count), format!("a list of {count} terms"))
-            }
+            LibraryChoice::Terms(terms) => (
+                Some(terms.len()),
+                format!("a list of {} terms", terms.len()),
+            ),
             LibraryChoice::Standard(standard) => {
                 let count = latent.and_then(|d| standard.term_count(d));
                 (count, standard_text(*standard))
             }
         };
-        let latent = latent.map_or("d".to_owned(), |d| d.to_string());
-        let terms = terms.map_or("terms".to_owned(), |count| count.to_string());
+        let latent = text_or(latent, "d");
+        let terms = text_or(terms, "terms");
         format!("{terms} x {latent} or {latent} x {terms} (library: {source})")
     }
 
     fn no_library(&self, first: &Assigned<'_>) -> ImportError {
         let shape = &first.info.shape;
         let latent = self.known.latent.or(shape.iter().copied().min());
-        let suggestions = match (latent, shape.as_slice()) {
-            (Some(d), &[terms, columns]) if d == columns => library::standards_with(terms, d),
-            (Some(d), &[rows, terms]) if d == rows => library::standards_with(terms, d),
-            _ => Vec::new(),
+        let terms = match (latent, shape.as_slice()) {
+            (Some(d), &[terms, columns]) if d == columns => Some(terms),
+            (Some(d), &[rows, terms]) if d == rows => Some(terms),
+            _ => None,
         };
-        let mut expected =
-            "--library degree=N[,trigonometric][,inputs] or --library FILE with the list of terms"
-                .to_owned();
-        if !suggestions.is_empty() {
-            expected += "; for this shape perhaps --library ";
-            expected += &suggestions.join(" or ");
-        }
+        let suggestions = terms
+            .zip(latent)
+            .map(|(terms, d)| library::standards_with(terms, d));
+        let suggested = match suggestions.filter(|texts| !texts.is_empty()) {
+            Some(texts) => format!("; for this shape perhaps --library {}", texts.join(" or ")),
+            None => String::new(),
+        };
+        let expected = format!(
+            "--library degree=N[,trigonometric][,inputs] or --library FILE with the list of terms{suggested}"
+        );
         let found = format!("no candidate terms for {}", first.info.describe());
         self.tensors.refused(Place::Whole, found, expected)
     }
@@ -398,13 +399,11 @@ impl<'a> Assembly<'a, '_> {
     fn statistics(&mut self) -> Result<Vec<(String, InputStatistics)>, ImportError> {
         let mut all = Vec::new();
         for rule in &self.assignment.phases {
-            let mean = Role::InputMean(rule.name.clone());
-            let covariance = Role::InputCovariance(rule.name.clone());
-            let (mean, covariance) = match (self.find(&mean), self.find(&covariance)) {
-                (None, None) => continue,
-                (Some(mean), Some(covariance)) => (mean, covariance),
-                (Some(_), None) => return Err(self.tensors.missing(&covariance)),
-                (None, Some(_)) => return Err(self.tensors.missing(&mean)),
+            let roles = [Role::InputMean, Role::InputCovariance].map(|of| of(rule.name.clone()));
+            let (mean, covariance) = match roles.each_ref().map(|role| self.find(role)) {
+                [None, None] => continue,
+                [Some(mean), Some(covariance)] => (mean, covariance),
+                [mean, _] => return Err(self.tensors.missing(&roles[usize::from(mean.is_some())])),
             };
             let length = mean.info.shape.first().copied();
             let dim = self.known.state.or(length).unwrap_or(0);
@@ -421,4 +420,9 @@ impl<'a> Assembly<'a, '_> {
         }
         Ok(all)
     }
+}
+
+/// A dimension, or a letter for one that is not known.
+fn text_or(dim: Option<usize>, letter: &str) -> String {
+    dim.map_or(letter.to_owned(), |dim| dim.to_string())
 }

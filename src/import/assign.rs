@@ -39,20 +39,11 @@ pub(super) fn assign<'f>(
     used.extend(named(tensors, options, &used)?);
     used.sort_by(|a, b| a.role.cmp(&b.role));
     let phases = phases(tensors, options, &used)?;
-    check_mapped_phases(options, &phases)?;
-    for phase in &phases {
-        let role = Role::Xi(phase.name.clone());
-        if used.iter().all(|assigned| assigned.role != role) {
-            return Err(tensors.missing(&role));
-        }
-    }
     let is_unused = |info: &&TensorInfo| used.iter().all(|a| a.info.name != info.name);
-    let unused: Vec<&TensorInfo> = tensors.infos().iter().filter(is_unused).collect();
+    let unused: Vec<&TensorInfo> = tensors.infos.iter().filter(is_unused).collect();
     check_layers(tensors, options, &unused)?;
-    if let Some(mean) = unused
-        .iter()
-        .find(|info| mentions(&info.name, "mean.input"))
-    {
+    let mut means = unused.iter();
+    if let Some(mean) = means.find(|info| mentions(&info.name, "mean.input")) {
         let expected = "inputs divided by std.input alone, or a file without it: u_lat has no mean";
         return Err(tensors.refused(Place::Whole, mean.describe(), expected));
     }
@@ -76,17 +67,14 @@ fn named<'f>(
             (a, b) => a == b,
         })
     };
-    let free = (tensors.infos().iter()).filter(|i| mapped.iter().all(|a| a.info.name != i.name));
-    let found = free.filter_map(|info| Some((info, Role::of_name(&info.name)?)));
-    let found = found.map(|(info, role)| (info, renamed(role, &info.name, options)));
+    let free = (tensors.infos.iter()).filter(|i| mapped.iter().all(|a| a.info.name != i.name));
+    let found =
+        free.filter_map(|info| Some((info, renamed(Role::of_name(&info.name)?, info, options))));
     let found: Vec<(&TensorInfo, Role)> = found.collect();
-    let of_xi = |role: &Role| match role {
-        Role::Xi(phase) => Some(phase.clone()),
-        _ => None,
-    };
-    let known = found.iter().map(|(_, role)| role);
-    let known = known.chain(mapped.iter().map(|assigned| &assigned.role));
-    let known: Vec<String> = known.filter_map(of_xi).collect();
+    let roles = found.iter().map(|(_, role)| role);
+    let roles = roles.chain(mapped.iter().map(|assigned| &assigned.role));
+    let known = roles.filter(|role| matches!(role, Role::Xi(_)));
+    let known: Vec<String> = known.filter_map(Role::phase).map(str::to_owned).collect();
     let mut named: Vec<Assigned<'f>> = Vec::new();
     for (info, role) in found {
         let role = in_phase(tensors, info, role, &known)?;
@@ -106,16 +94,14 @@ fn named<'f>(
 }
 
 /// Coefficients without a phase belong to the one whose name their module has, or to the only one there is.
-fn renamed(role: Role, name: &str, options: &ImportOptions) -> Role {
+fn renamed(role: Role, info: &TensorInfo, options: &ImportOptions) -> Role {
     if role != Role::Xi(ONLY_PHASE.to_owned()) {
         return role;
     }
     let given = options.phases.iter().map(|rule| rule.name.as_str());
     let mut usual = given.chain(["contact", "flight"]);
-    match (
-        usual.find(|phase| mentions(name, phase)),
-        options.phases.as_slice(),
-    ) {
+    let mentioned = usual.find(|phase| mentions(&info.name, phase));
+    match (mentioned, options.phases.as_slice()) {
         (Some(phase), _) => role.of_phase(phase),
         (None, [only]) => role.of_phase(&only.name),
         (None, _) => role,
@@ -138,12 +124,8 @@ fn in_phase(
         (Some(phase), _) => Ok(role.of_phase(phase)),
         (None, [only]) if role.phase() == Some(ONLY_PHASE) => Ok(role.of_phase(only)),
         (None, _) => {
-            let part = role.of_phase("PHASE");
-            let found = format!(
-                "{} for none of the phases {}",
-                info.describe(),
-                known.join(", ")
-            );
+            let (part, known) = (role.of_phase("PHASE"), known.join(", "));
+            let found = format!("{} for none of the phases {known}", info.describe());
             let expected = format!("--map {part}={}, or a file without it", info.name);
             Err(tensors.refused(Place::Whole, found, expected))
         }
@@ -187,7 +169,7 @@ fn mapped<'f>(
             let found = format!("both `{}` and `{tensor}` for {role}", earlier.info.name);
             return Err(ImportError::option("--map", found, "one tensor"));
         }
-        let Some(info) = tensors.infos().iter().find(|info| info.name == *tensor) else {
+        let Some(info) = tensors.infos.iter().find(|info| info.name == *tensor) else {
             let found = format!("no tensor `{tensor}` for {role}");
             let expected = format!("one of {}", tensors.listing());
             return Err(tensors.refused(Place::Whole, found, expected));
@@ -198,6 +180,7 @@ fn mapped<'f>(
     Ok(used)
 }
 
+/// The phases as given, then others that have coefficients; all have some.
 fn phases(
     tensors: &TensorFile<'_>,
     options: &ImportOptions,
@@ -211,29 +194,26 @@ fn phases(
             && options.given(name).is_none()
         {
             let found = format!("the coefficients {}", assigned.info.describe());
-            let feet = options.feet_of(tensors.file(), name, &found)?;
+            let feet = options.feet_of(&tensors.file, name, &found)?;
             let name = name.clone();
             rules.push(PhaseRule { name, feet });
         }
     }
-    match rules.is_empty() {
-        true => Err(tensors.missing(&Role::Xi("PHASE".to_owned()))),
-        false => Ok(rules),
+    let xi = |phase: &str| Role::Xi(phase.to_owned());
+    if rules.is_empty() {
+        return Err(tensors.missing(&xi("PHASE")));
     }
-}
-
-fn check_mapped_phases(options: &ImportOptions, phases: &[PhaseRule]) -> Result<(), ImportError> {
-    let is_strange = |role: &&Role| {
-        (role.phase()).is_some_and(|phase| phases.iter().all(|rule| rule.name != phase))
-    };
-    let mut roles = options.mapping.iter().map(|mapping| &mapping.role);
-    match roles.find(is_strange) {
-        None => Ok(()),
-        Some(role) => {
-            let names: Vec<&str> = phases.iter().map(|rule| rule.name.as_str()).collect();
-            let found = format!("{role} for a phase that no --phase names");
-            let expected = format!("one of the phases {}", names.join(", "));
-            Err(ImportError::option("--map", found, expected))
-        }
+    let is_known = |phase: &str| rules.iter().any(|rule| rule.name == phase);
+    let mut mapped = options.mapping.iter().map(|mapping| &mapping.role);
+    if let Some(role) = mapped.find(|role| !role.phase().is_none_or(is_known)) {
+        let names: Vec<&str> = rules.iter().map(|rule| rule.name.as_str()).collect();
+        let found = format!("{role} for a phase that no --phase names");
+        let expected = format!("one of the phases {}", names.join(", "));
+        return Err(ImportError::option("--map", found, expected));
+    }
+    let mut roles = rules.iter().map(|rule| xi(&rule.name));
+    match roles.find(|role| used.iter().all(|assigned| assigned.role != *role)) {
+        None => Ok(rules),
+        Some(role) => Err(tensors.missing(&role)),
     }
 }

@@ -55,7 +55,13 @@ pub(super) fn parts(
                 terms: coefficients.len(),
             });
         }
-        let xi = xi(&library, columns, &rows);
+        let mut xi = DMatrix::zeros(library.len(), latent_dim);
+        for (column, coefficients) in columns.iter().enumerate() {
+            for (term, coefficient) in coefficients {
+                let row = &rows[term];
+                xi[(row.index, column)] = coefficient.to_f64() / row.factor;
+            }
+        }
         phases.push(Phase { name, feet, xi });
     }
     let parts = Parts {
@@ -69,17 +75,6 @@ pub(super) fn parts(
     Ok((parts, report))
 }
 
-fn xi(library: &Library, columns: &[Coefficients], rows: &HashMap<ExprId, Row>) -> DMatrix<f64> {
-    let mut xi = DMatrix::zeros(library.len(), library.latent_dim());
-    for (column, coefficients) in columns.iter().enumerate() {
-        for (term, coefficient) in coefficients {
-            let row = &rows[term];
-            xi[(row.index, column)] = coefficient.to_f64() / row.factor;
-        }
-    }
-    xi
-}
-
 /// A row of Xi, and the number in front of its term in the library (`2` for `2*z1`).
 #[derive(Clone, Copy, Debug)]
 struct Row {
@@ -90,11 +85,8 @@ struct Row {
 fn check_options(latent_dim: usize, options: &ImportOptions) -> Result<(), ImportError> {
     if let Some(given) = options.latent_dim.filter(|given| *given != latent_dim) {
         let expected = format!("{latent_dim}, as the equations have");
-        return Err(ImportError::option(
-            "--latent-dim",
-            given.to_string(),
-            expected,
-        ));
+        let found = given.to_string();
+        return Err(ImportError::option("--latent-dim", found, expected));
     }
     let given = [
         ("--map", !options.mapping.is_empty()),
@@ -175,20 +167,20 @@ impl Separation<'_> {
             let found = format!("a coefficient of ddz{output} beyond the range of numbers");
             ImportError::at(self.file, place, found, "finite coefficients")
         })?;
-        let mut strange: Vec<ExprId> = (coefficients.keys().copied())
-            .filter(|&term| !self.given.is_empty() && !is_term(term))
-            .collect();
-        terms::sort(&self.pool, self.latent_dim, &mut strange);
-        match strange.first() {
-            None => Ok(coefficients),
-            Some(&term) => {
-                let term = self.pool.display(term).to_string();
-                let short: String = term.chars().take(80).collect();
-                let found = format!("the term `{short}` in ddz{output}");
-                let expected = "the terms of --library only";
-                Err(ImportError::at(self.file, place, found, expected))
-            }
+        if self.given.is_empty() {
+            return Ok(coefficients);
         }
+        let strange = coefficients.keys().copied().filter(|&term| !is_term(term));
+        let mut strange: Vec<ExprId> = strange.collect();
+        terms::sort(&self.pool, self.latent_dim, &mut strange);
+        let Some(&term) = strange.first() else {
+            return Ok(coefficients);
+        };
+        let term = self.pool.display(term).to_string();
+        let short: String = term.chars().take(80).collect();
+        let found = format!("the term `{short}` in ddz{output}");
+        let expected = "the terms of --library only";
+        Err(ImportError::at(self.file, place, found, expected))
     }
 }
 
@@ -198,15 +190,13 @@ fn union(
     pool: &ExprPool,
     separated: &[Vec<Coefficients>],
 ) -> Result<(Library, HashMap<ExprId, Row>), ImportError> {
-    let mut found: Vec<ExprId> = (separated.iter().flatten())
-        .flat_map(|coefficients| coefficients.keys().copied())
-        .collect();
+    let found = separated.iter().flatten().flat_map(Coefficients::keys);
+    let mut found: Vec<ExprId> = found.copied().collect();
     found.sort_unstable();
     found.dedup();
     terms::sort(pool, latent_dim, &mut found);
-    let mut texts: Vec<String> = (found.iter())
-        .map(|&term| pool.display(term).to_string())
-        .collect();
+    let texts = found.iter().map(|&term| pool.display(term).to_string());
+    let mut texts: Vec<String> = texts.collect();
     if texts.is_empty() {
         // Equations whose right sides are all zero need some term to have zero times of.
         texts.push("1".to_owned());

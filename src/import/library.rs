@@ -52,10 +52,8 @@ pub(super) fn order(
         let mut rows = orders[a].iter().zip(&orders[b]);
         rows.position(|(a, b)| a != b)
     };
-    let rows: BTreeSet<usize> = [(0, 1), (0, 2), (1, 2)]
-        .into_iter()
-        .filter_map(differs)
-        .collect();
+    let pairs = [(0, 1), (0, 2), (1, 2)].into_iter();
+    let rows: BTreeSet<usize> = pairs.filter_map(differs).collect();
     if rows.is_empty() {
         return Ok(LibraryOrder::ROMC);
     }
@@ -63,13 +61,17 @@ pub(super) fn order(
         let terms = rows
             .iter()
             .map(|&row| format!("{} in row {}", texts[row], row + 1));
-        let (name, terms) = (order.name().unwrap_or_default(), terms.collect::<Vec<_>>());
-        format!("--library-order {name} ({})", terms.join(", "))
+        let terms: Vec<String> = terms.collect();
+        Some(format!(
+            "--library-order {} ({})",
+            order.name()?,
+            terms.join(", ")
+        ))
     };
     let choices: Vec<String> = LibraryOrder::NAMED
         .iter()
         .zip(&orders)
-        .map(choice)
+        .filter_map(choice)
         .collect();
     let choices = choices.join(", ");
     let expected = format!("one of {choices}: the order of the rows of Xi, counted from 1");
@@ -80,10 +82,8 @@ pub(super) fn order(
 /// The shorthands that have this many terms.
 pub(super) fn standards_with(term_count: usize, latent_dim: usize) -> Vec<String> {
     let fits = |standard: &StandardLibrary| standard.term_count(latent_dim) == Some(term_count);
-    StandardLibrary::small()
-        .filter(fits)
-        .map(standard_text)
-        .collect()
+    let fitting = StandardLibrary::small().filter(fits);
+    fitting.map(standard_text).collect()
 }
 
 /// Reads a list of terms: a JSON list of texts, a JSON object with such a list under `library`, or
@@ -99,30 +99,29 @@ pub fn read_terms(path: &Path) -> Result<Vec<String>, ImportError> {
 
 fn parse_terms(file: &str, text: &str) -> Result<Vec<String>, ImportError> {
     let text = text.trim_start_matches('\u{feff}');
-    let refused = |line, column, found: &str, expected: &str| {
-        ImportError::at(file, (line, column), found, expected)
+    let refused = |place: (usize, usize), found: &str, expected: &str| {
+        ImportError::at(file, place, found, expected)
     };
     if !text.trim_start().starts_with(['[', '{']) {
         let lines = (text.lines()).map(|line| line.split('#').next().unwrap_or("").trim());
-        let terms: Vec<String> = (lines.filter(|line| !line.is_empty()))
-            .map(str::to_owned)
-            .collect();
+        let lines = lines.filter(|line| !line.is_empty());
+        let terms: Vec<String> = lines.map(str::to_owned).collect();
         return match terms.is_empty() {
-            true => Err(refused(1, 1, "no term", "one term per line")),
+            true => Err(refused((1, 1), "no term", "one term per line")),
             false => Ok(terms),
         };
     }
     let value: Value = serde_json::from_str(text).map_err(|error| {
         let expected = "a list of terms such as [\"1\", \"z1\", \"sin(z1)\"]";
-        refused(error.line(), error.column(), "no JSON", expected)
+        refused((error.line(), error.column()), "no JSON", expected)
     })?;
     let list = value.get("library").unwrap_or(&value);
     let expected = "a list of terms, or an object with such a list under `library`";
-    let list = (list.as_array()).ok_or_else(|| refused(1, 1, kind_of(list), expected))?;
+    let list = (list.as_array()).ok_or_else(|| refused((1, 1), kind_of(list), expected))?;
     let texts = list.iter().enumerate().map(|(index, term)| {
         let found = || format!("{} at [{index}]", kind_of(term));
         let text = term.as_str().map(str::to_owned);
-        text.ok_or_else(|| refused(1, 1, &found(), "a term as text"))
+        text.ok_or_else(|| refused((1, 1), &found(), "a term as text"))
     });
     texts.collect()
 }

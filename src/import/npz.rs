@@ -5,13 +5,14 @@
 //! version (1 to 3), the length of the rest (2 or 4 bytes, little endian), and a Python dictionary:
 //! `{'descr': '<f8', 'fortran_order': False, 'shape': (18, 4), }`.
 
+use std::borrow::Cow;
 use std::fmt::Display;
 use std::io::{self, Cursor, Read};
 
 use zip::ZipArchive;
 
 use super::error::{self, ImportError, too_large};
-use super::tensors::{Container, Element, TensorFile, TensorInfo};
+use super::tensors::{TensorFile, TensorInfo};
 use crate::files::Place;
 
 const MAX_MEMBERS: usize = 10_000;
@@ -34,7 +35,9 @@ pub(super) fn open<'b>(file: &str, bytes: &'b [u8]) -> Result<TensorFile<'b>, Im
     for member in 0..archive.len() {
         infos.extend(describe(file, &mut archive, member)?);
     }
-    TensorFile::new(file, infos, Container::Npz(bytes))
+    let file_name = file.to_owned();
+    let numbers = move |info: &TensorInfo, length| numbers(&file_name, bytes, info, length);
+    TensorFile::new(file, infos, Box::new(numbers))
 }
 
 fn damaged(file: &str, error: impl Display) -> ImportError {
@@ -61,12 +64,12 @@ fn describe(
     }
 }
 
-pub(super) fn numbers(
+fn numbers(
     file: &str,
     bytes: &[u8],
     info: &TensorInfo,
     length: usize,
-) -> Result<Vec<u8>, ImportError> {
+) -> Result<Cow<'static, [u8]>, ImportError> {
     let refused = |found: String| {
         let place = format!("`{}`", info.name);
         let expected = "as many bytes as its shape and type need";
@@ -81,7 +84,7 @@ pub(super) fn numbers(
         .read_to_end(&mut unpacked)
         .map_err(|error| refused(error.to_string()))?;
     match unpacked.len().checked_sub(info.start) {
-        Some(found) if found == length => Ok(unpacked.split_off(info.start)),
+        Some(found) if found == length => Ok(unpacked.split_off(info.start).into()),
         Some(found) if found < length => Err(refused(format!("{found} bytes"))),
         Some(_) => Err(refused(format!("more than {length} bytes"))),
         None => Err(refused("no bytes".to_owned())),
@@ -118,18 +121,14 @@ fn read_header(reader: &mut impl Read) -> Result<TensorInfo, (String, &'static s
 
 fn parse_header(text: &str, start: usize) -> Option<TensorInfo> {
     let value = |key: &str| {
-        let after = ["'", "\""].iter().find_map(|quote| {
-            let (_, after) = text.split_once(&format!("{quote}{key}{quote}"))?;
-            Some(after)
-        })?;
+        let quoted = ["'", "\""].map(|quote| format!("{quote}{key}{quote}"));
+        let (_, after) = quoted.iter().find_map(|key| text.split_once(key))?;
         Some(after.trim_start().strip_prefix(':')?.trim_start())
     };
     let (element, is_big_endian) = parse_element(value("descr")?)?;
-    let is_column_major = match value("fortran_order")? {
-        order if order.starts_with("True") => true,
-        order if order.starts_with("False") => false,
-        _ => return None,
-    };
+    let order = value("fortran_order")?;
+    let is_column_major = order.starts_with("True");
+    (is_column_major || order.starts_with("False")).then_some(())?;
     Some(TensorInfo {
         shape: parse_shape(value("shape")?)?,
         element,
@@ -141,17 +140,20 @@ fn parse_header(text: &str, start: usize) -> Option<TensorInfo> {
 }
 
 /// `'<f8'` and its relatives, with the flag of big-endian numbers.
-fn parse_element(text: &str) -> Option<(Element, bool)> {
+fn parse_element(text: &str) -> Option<((String, usize), bool)> {
     if text.starts_with('[') {
-        return Some((Element::Other("a structure".to_owned()), false));
+        return Some((("a structure".to_owned(), 0), false));
     }
     let quote = text.chars().next().filter(|c| matches!(c, '\'' | '"'))?;
     let (descr, _) = text[1..].split_once(quote)?;
     let element = match descr.trim_start_matches(['<', '>', '|', '=']) {
-        "f4" => Element::F32,
-        "f8" => Element::F64,
-        "b1" | "?" => Element::Bool,
-        _ => Element::Other(format!("{:?}", descr.chars().take(40).collect::<String>())),
+        "f4" => ("f32".to_owned(), 4),
+        "f8" => ("f64".to_owned(), 8),
+        "b1" | "?" => ("bool".to_owned(), 1),
+        _ => {
+            let short: String = descr.chars().take(40).collect();
+            (format!("{short:?}"), 0)
+        }
     };
     Some((element, descr.starts_with('>')))
 }
@@ -164,9 +166,9 @@ fn parse_shape(text: &str) -> Option<Vec<usize>> {
         return Some(Vec::new());
     }
     let dims = inside.split(',').map(|dim| {
-        let dim = dim.trim().trim_end_matches('L');
-        let is_number = dim.starts_with(|c: char| c.is_ascii_digit());
-        is_number.then(|| dim.parse().ok()).flatten()
+        let digits = dim.trim().trim_end_matches('L');
+        let is_number = digits.starts_with(|c: char| c.is_ascii_digit());
+        digits.parse().ok().filter(|_| is_number)
     });
     let dims: Vec<usize> = dims.collect::<Option<_>>()?;
     (dims.len() <= MAX_RANK).then_some(dims)

@@ -137,14 +137,14 @@ pub fn parse_standard(text: &str) -> Result<StandardLibrary, ImportError> {
 }
 
 pub(super) fn standard_text(standard: StandardLibrary) -> String {
-    let mut text = format!("degree={}", standard.degree);
-    if standard.trigonometric {
-        text.push_str(",trigonometric");
-    }
-    if standard.inputs {
-        text.push_str(",inputs");
-    }
-    text
+    let words = [
+        (standard.trigonometric, ",trigonometric"),
+        (standard.inputs, ",inputs"),
+    ];
+    let words = words
+        .into_iter()
+        .filter_map(|(has, word)| has.then_some(word));
+    format!("degree={}{}", standard.degree, words.collect::<String>())
 }
 
 /// `--phase NAME=FEET`: a phase and the foot patterns that select it.
@@ -166,32 +166,29 @@ impl FromStr for PhaseRule {
             ImportError::option("--phase", format!("{text:?}"), expected)
         };
         let (name, feet) = text.split_once('=').ok_or_else(refused)?;
+        let pattern = |text: &str| parse_pattern(text.trim()).ok_or_else(refused);
         let feet = match feet.trim() {
             "any" => FeetRule::Any,
             "none" => FeetRule::None,
             "always" => FeetRule::always(),
-            patterns => FeetRule::Patterns(
-                (patterns.split(','))
-                    .map(|pattern| parse_pattern(pattern.trim()).ok_or_else(refused))
-                    .collect::<Result<_, _>>()?,
-            ),
+            patterns => {
+                FeetRule::Patterns(patterns.split(',').map(pattern).collect::<Result<_, _>>()?)
+            }
         };
         let name = name.trim().to_owned();
-        if name.is_empty() {
-            return Err(refused());
+        match name.is_empty() {
+            true => Err(refused()),
+            false => Ok(PhaseRule { name, feet }),
         }
-        Ok(PhaseRule { name, feet })
     }
 }
 
 fn parse_pattern(text: &str) -> Option<ContactFlags> {
     let flags = text.chars().map(|c| match c {
-        '0' => Some(false),
-        '1' => Some(true),
+        '0' | '1' => Some(c == '1'),
         _ => None,
     });
-    let flags: Vec<bool> = flags.collect::<Option<_>>()?;
-    flags.try_into().ok()
+    flags.collect::<Option<Vec<bool>>>()?.try_into().ok()
 }
 
 /// Options of an import; only the name is always needed.

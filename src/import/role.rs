@@ -75,31 +75,29 @@ const OF_PHASES: [(&str, fn(String) -> Role); 5] = [
     ("input_mean", Role::InputMean),
     ("input_covariance", Role::InputCovariance),
 ];
-const SINGLE: [Role; 5] = [
-    Role::StateScaling,
-    Role::InputScaling,
-    Role::StateMean,
-    Role::StateStd,
-    Role::InputStd,
+const SINGLE: [(&str, Role); 5] = [
+    ("scaling.state", Role::StateScaling),
+    ("scaling.input", Role::InputScaling),
+    ("mean.state", Role::StateMean),
+    ("std.state", Role::StateStd),
+    ("std.input", Role::InputStd),
 ];
 
 impl fmt::Display for Role {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Role::Weights(part, None) => write!(f, "{}.weight", part.name()),
-            Role::Bias(part, None) => write!(f, "{}.bias", part.name()),
-            Role::Weights(part, Some(layer)) => write!(f, "{}.{layer}.weight", part.name()),
-            Role::Bias(part, Some(layer)) => write!(f, "{}.{layer}.bias", part.name()),
-            Role::Xi(phase) => write!(f, "xi.{phase}"),
-            Role::Mask(phase) => write!(f, "mask.{phase}"),
-            Role::InputMean(phase) => write!(f, "input_mean.{phase}"),
-            Role::InputCovariance(phase) => write!(f, "input_covariance.{phase}"),
-            Role::StateScaling => f.write_str("scaling.state"),
-            Role::InputScaling => f.write_str("scaling.input"),
-            Role::StateMean => f.write_str("mean.state"),
-            Role::StateStd => f.write_str("std.state"),
-            Role::InputStd => f.write_str("std.input"),
+        if let Role::Weights(part, layer) | Role::Bias(part, layer) = self {
+            let layer = layer.map_or(String::new(), |layer| format!(".{layer}"));
+            let is_bias = matches!(self, Role::Bias(..));
+            let tensor = if is_bias { "bias" } else { "weight" };
+            return write!(f, "{}{layer}.{tensor}", part.name());
         }
+        if let Some(phase) = self.phase() {
+            let is_own = |(_, role): &&(&str, fn(String) -> Role)| role(phase.to_owned()) == *self;
+            let head = OF_PHASES.iter().find(is_own).map_or("", |(head, _)| head);
+            return write!(f, "{head}.{phase}");
+        }
+        let single = SINGLE.iter().find(|(_, role)| role == self);
+        f.write_str(single.map_or("", |(name, _)| name))
     }
 }
 
@@ -115,14 +113,7 @@ impl FromStr for Role {
 
 const SEPARATORS: [char; 3] = ['.', '_', '/'];
 /// Words of the names of what an optimiser keeps beside the tensors that it changes.
-const OF_OPTIMISERS: [&str; 6] = [
-    "adam",
-    "optimizer",
-    "momentum",
-    "momentums",
-    "rmsprop",
-    "adagrad",
-];
+const OF_OPTIMISERS: &str = "adam optimizer momentum momentums rmsprop adagrad";
 
 /// What follows the first word of a name, whatever its case, and a separator.
 fn after<'t>(head: &str, text: &'t str) -> Option<&'t str> {
@@ -137,22 +128,16 @@ fn read_role(text: &str) -> Option<Role> {
             return Some(of_phase(phase.to_owned()));
         }
     }
-    if ["xi", "sindy_coefficients"]
-        .iter()
-        .any(|name| text.eq_ignore_ascii_case(name))
-    {
+    let mut without_phase = ["xi", "sindy_coefficients"].iter();
+    if without_phase.any(|name| text.eq_ignore_ascii_case(name)) {
         return Some(Role::Xi(ONLY_PHASE.to_owned()));
     }
-    let is_named = |role: &Role| {
-        let name = role.to_string();
-        text == name || text == name.replace('.', "_")
-    };
-    if let Some(single) = SINGLE.into_iter().find(is_named) {
+    let is_named = |(name, _): &(&str, Role)| text == *name || text == name.replace('.', "_");
+    if let Some((_, single)) = SINGLE.into_iter().find(is_named) {
         return Some(single);
     }
-    let (part, tail) = Part::ALL
-        .into_iter()
-        .find_map(|part| Some((part, after(part.name(), text)?)))?;
+    let mut parts = Part::ALL.into_iter();
+    let (part, tail) = parts.find_map(|part| Some((part, after(part.name(), text)?)))?;
     let (module, tensor) = tail.rsplit_once(SEPARATORS).unwrap_or(("", tail));
     // A layer's number may end the name, as in `encoder_W0`.
     let stem = tensor.trim_end_matches(|c: char| c.is_ascii_digit());
@@ -179,59 +164,47 @@ impl Role {
     /// names of the modules that hold it, as in `autoencoder.encoder.0.weight`. A mask has the
     /// phase `always` where its phase is at most a word of its name.
     pub fn of_name(name: &str) -> Option<Self> {
-        // TensorFlow's ends of names.
-        let name = name
-            .strip_suffix("/.ATTRIBUTES/VARIABLE_VALUE")
-            .unwrap_or(name);
-        let name = name.strip_suffix(":0").unwrap_or(name);
+        let name = without_tensorflow_end(name);
         if is_of_optimiser(name) {
             return None;
         }
-        let ends = name
-            .match_indices(['.', '/'])
-            .map(|(dot, _)| &name[dot + 1..]);
+        let ends = name.match_indices(['.', '/']);
+        let ends = ends.map(|(dot, _)| &name[dot + 1..]);
         let role = std::iter::once(name).chain(ends).find_map(read_role);
         // An array named after the map alone is its weights.
         let last = name.rsplit(['.', '/']).next().unwrap_or(name);
-        let map = Part::ALL
-            .into_iter()
-            .find(|part| last.eq_ignore_ascii_case(part.name()));
+        let mut parts = Part::ALL.into_iter();
+        let map = parts.find(|part| last.eq_ignore_ascii_case(part.name()));
         let role = role.or(map.map(|part| Role::Weights(part, None)));
+        let is_mask = words(name).any(|word| matches!(word.as_str(), "mask" | "masks"));
         match role {
             Some(Role::Mask(_)) => role,
-            _ if words(name).any(|word| matches!(word.as_str(), "mask" | "masks")) => {
-                Some(Role::Mask(ONLY_PHASE.to_owned()))
-            }
+            _ if is_mask => Some(Role::Mask(ONLY_PHASE.to_owned())),
             _ => role,
         }
     }
 
-    pub(super) fn of_phase(&self, phase: &str) -> Self {
-        let phase = phase.to_owned();
-        match self {
-            Role::Xi(_) => Role::Xi(phase),
-            Role::Mask(_) => Role::Mask(phase),
-            Role::InputMean(_) => Role::InputMean(phase),
-            Role::InputCovariance(_) => Role::InputCovariance(phase),
-            other => other.clone(),
+    pub(super) fn of_phase(mut self, phase: &str) -> Self {
+        use Role::{InputCovariance, InputMean, Mask, Xi};
+        if let Xi(own) | Mask(own) | InputMean(own) | InputCovariance(own) = &mut self {
+            phase.clone_into(own);
         }
+        self
     }
 
     pub(crate) fn phase(&self) -> Option<&str> {
+        use Role::{InputCovariance, InputMean, Mask, Xi};
         match self {
-            Role::Xi(phase)
-            | Role::Mask(phase)
-            | Role::InputMean(phase)
-            | Role::InputCovariance(phase) => Some(phase),
-            Role::Weights(..)
-            | Role::Bias(..)
-            | Role::StateScaling
-            | Role::InputScaling
-            | Role::StateMean
-            | Role::StateStd
-            | Role::InputStd => None,
+            Xi(phase) | Mask(phase) | InputMean(phase) | InputCovariance(phase) => Some(phase),
+            _ => None,
         }
     }
+}
+
+/// A name without the ends that TensorFlow gives it.
+pub(super) fn without_tensorflow_end(name: &str) -> &str {
+    let name = name.trim_end_matches("/.ATTRIBUTES/VARIABLE_VALUE");
+    name.trim_end_matches(":0")
 }
 
 fn words(name: &str) -> impl Iterator<Item = String> {
@@ -246,7 +219,7 @@ pub(super) fn mentions(name: &str, other: &str) -> bool {
 }
 
 pub(super) fn is_of_optimiser(name: &str) -> bool {
-    words(name).any(|word| OF_OPTIMISERS.contains(&word.as_str()))
+    words(name).any(|word| OF_OPTIMISERS.split(' ').any(|known| known == word))
 }
 
 /// `--map ROLE=TENSOR`.

@@ -12,11 +12,10 @@ use super::equations::{self, Sections};
 use super::error::{ImportError, too_large};
 use super::latent;
 use super::latex::{self, SymbolNames};
-use super::memory::{self, Tensor};
 use super::npz;
 use super::options::{Format, ImportOptions, refusal};
 use super::report::ImportReport;
-use super::tensors::open_safetensors;
+use super::tensors::{self, Tensor};
 use crate::files::{Place, hex, magic};
 use crate::model::{CoordinateNames, ReducedModel};
 use crate::symbolic::ExprPool;
@@ -69,7 +68,7 @@ pub fn import_from_bytes(
     let (parts, mut report) = match format {
         Format::Safetensors => {
             check_size(file, bytes, MAX_FILE_BYTES)?;
-            assemble::parts(&open_safetensors(file, bytes)?, options)?
+            assemble::parts(&tensors::open_safetensors(file, bytes)?, options)?
         }
         Format::Npz => {
             check_size(file, bytes, MAX_FILE_BYTES)?;
@@ -93,12 +92,12 @@ pub fn import_from_bytes(
 /// As [`import`].
 pub fn import_tensors(
     source: &str,
-    tensors: &[Tensor<'_>],
+    arrays: &[Tensor<'_>],
     options: &ImportOptions,
 ) -> Result<Imported, ImportError> {
-    let (parts, mut report) = assemble::parts(&memory::open(source, tensors)?, options)?;
+    let (parts, mut report) = assemble::parts(&tensors::open_arrays(source, arrays)?, options)?;
     (report.file, report.format) = (source.to_owned(), "arrays");
-    finish(parts, report, &memory::digest(tensors), options)
+    finish(parts, report, &tensors::digest(arrays), options)
 }
 
 pub(super) fn check_size(file: &str, bytes: &[u8], max: u64) -> Result<(), ImportError> {

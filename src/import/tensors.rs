@@ -1,45 +1,38 @@
-//! Named arrays of numbers in a foreign file, whatever its container.
+//! Named arrays of numbers: in a foreign file, whatever its container, or in memory.
 
 use std::borrow::Cow;
+use std::fmt::Display;
 
 use nalgebra::DMatrix;
 use safetensors::{Dtype, SafeTensors};
+use sha2::digest::Output;
+use sha2::{Digest as _, Sha256};
 
 use super::error::{ImportError, damaged, shape_text, too_large};
-use super::memory::{self, Tensor};
-use super::npz;
 use crate::files::Place;
 
 /// Largest tensor that is read: the coefficients of the largest library fit twice.
 const MAX_ELEMENTS: usize = 4 << 20;
+/// Bytes before the header of a safetensors file: its length.
+const LENGTH_BYTES: usize = 8;
 
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(super) enum Element {
-    F32,
-    #[default]
-    F64,
-    Bool,
-    Other(String),
+/// A named array of numbers.
+#[derive(Clone, Debug)]
+pub struct Tensor<'t> {
+    /// Its name, by which its use is found.
+    pub name: String,
+    /// Dimensions.
+    pub shape: Vec<usize>,
+    /// As many numbers as the dimensions say.
+    pub values: &'t [f64],
+    /// The first index runs fastest (Fortran), not the last (C).
+    pub is_column_major: bool,
 }
 
-impl Element {
-    pub(super) fn name(&self) -> &str {
-        match self {
-            Element::F32 => "f32",
-            Element::F64 => "f64",
-            Element::Bool => "bool",
-            Element::Other(name) => name,
-        }
-    }
-
-    /// Bytes of one number, if it is of a type that can be read.
-    fn size(&self) -> Option<usize> {
-        match self {
-            Element::F32 => Some(4),
-            Element::F64 => Some(8),
-            Element::Bool => Some(1),
-            Element::Other(_) => None,
-        }
+impl Tensor<'_> {
+    fn little_endian(&self) -> Vec<u8> {
+        let values = self.values.iter();
+        values.flat_map(|value| value.to_le_bytes()).collect()
     }
 }
 
@@ -47,11 +40,12 @@ impl Element {
 pub(super) struct TensorInfo {
     pub(super) name: String,
     pub(super) shape: Vec<usize>,
-    pub(super) element: Element,
+    /// The type of its numbers, and the bytes of one: 8, 4 (floats) or 1 (truth values), 0 for types that are not read.
+    pub(super) element: (String, usize),
     /// The first index runs fastest (Fortran), not the last (C).
     pub(super) is_column_major: bool,
     pub(super) is_big_endian: bool,
-    /// Member of a zip file; 0 in other containers.
+    /// Member of a zip file, or place among the arrays in memory.
     pub(super) member: usize,
     /// First byte of the numbers in the member or file.
     pub(super) start: usize,
@@ -62,78 +56,56 @@ impl TensorInfo {
         format!("`{}` ({})", self.name, shape_text(&self.shape))
     }
 
-    /// Its numbers as a matrix of `rows x columns`, laid out as their indices say.
-    fn matrix(&self, (rows, columns): (usize, usize), values: &[f64]) -> DMatrix<f64> {
-        match self.is_column_major {
-            false => DMatrix::from_row_slice(rows, columns, values),
-            true => DMatrix::from_column_slice(rows, columns, values),
-        }
-    }
-
-    fn index_of(&self, position: usize) -> Vec<usize> {
-        let mut rest = position;
+    fn index_of(&self, mut position: usize) -> Vec<usize> {
         let mut index = vec![0; self.shape.len()];
         for step in 0..index.len() {
             let axis = match self.is_column_major {
                 true => step,
                 false => index.len() - 1 - step,
             };
-            index[axis] = rest % self.shape[axis];
-            rest /= self.shape[axis];
+            index[axis] = position % self.shape[axis];
+            position /= self.shape[axis];
         }
         index
     }
+
+    fn decode(&self, number: &[u8]) -> f64 {
+        let mut little = number.to_vec();
+        if self.is_big_endian {
+            little.reverse();
+        }
+        match *little.as_slice() {
+            [a, b, c, d, e, f, g, h] => f64::from_le_bytes([a, b, c, d, e, f, g, h]),
+            [a, b, c, d] => f64::from(f32::from_le_bytes([a, b, c, d])),
+            _ => f64::from(u8::from(little != [0])),
+        }
+    }
 }
 
-/// What the numbers of tensors are in.
-pub(super) enum Container<'b> {
-    Safetensors(&'b [u8]),
-    Npz(&'b [u8]),
-    Memory(&'b [Tensor<'b>]),
-}
+/// The bytes of a tensor's numbers, so many.
+type Bytes<'b> = dyn Fn(&TensorInfo, usize) -> Result<Cow<'b, [u8]>, ImportError> + 'b;
 
 /// A file of tensors: their descriptions, and their numbers, which are read one tensor at a time.
 pub(super) struct TensorFile<'b> {
-    file: String,
-    infos: Vec<TensorInfo>,
-    container: Container<'b>,
+    pub(super) file: String,
+    /// By their names.
+    pub(super) infos: Vec<TensorInfo>,
+    bytes: Box<Bytes<'b>>,
 }
 
 impl<'b> TensorFile<'b> {
     pub(super) fn new(
         file: &str,
         mut infos: Vec<TensorInfo>,
-        container: Container<'b>,
+        bytes: Box<Bytes<'b>>,
     ) -> Result<TensorFile<'b>, ImportError> {
         infos.sort_by(|a, b| a.name.cmp(&b.name));
         if let Some(pair) = infos.windows(2).find(|pair| pair[0].name == pair[1].name) {
-            let place = format!("`{}`", pair[0].name);
-            let found = "two tensors of this name";
+            let (place, found) = (format!("`{}`", pair[0].name), "two tensors of this name");
             return Err(ImportError::at(file, place, found, "different names"));
         }
         let file = file.to_owned();
-        Ok(TensorFile {
-            file,
-            infos,
-            container,
-        })
-    }
-
-    /// The bytes of a tensor's numbers, as many as its shape and type need.
-    fn bytes(&self, info: &TensorInfo, length: usize) -> Result<Cow<'b, [u8]>, ImportError> {
-        Ok(match self.container {
-            Container::Safetensors(bytes) => Cow::from(&bytes[info.start..info.start + length]),
-            Container::Npz(bytes) => npz::numbers(&self.file, bytes, info, length)?.into(),
-            Container::Memory(tensors) => memory::little_endian(&tensors[info.member]).into(),
-        })
-    }
-
-    pub(super) fn file(&self) -> &str {
-        &self.file
-    }
-
-    pub(super) fn infos(&self) -> &[TensorInfo] {
-        &self.infos
+        Ok(TensorFile { file, infos, bytes })
     }
 
     pub(super) fn listing(&self) -> String {
@@ -157,7 +129,7 @@ impl<'b> TensorFile<'b> {
         ImportError::at(&self.file, place, found, expected)
     }
 
-    pub(super) fn missing(&self, role: &dyn std::fmt::Display) -> ImportError {
+    pub(super) fn missing(&self, role: &dyn Display) -> ImportError {
         let found = format!("no tensor for {role} among {}", self.listing());
         let expected = format!("a tensor of that name, or --map {role}=TENSOR");
         self.refused(Place::Whole, found, expected)
@@ -168,23 +140,25 @@ impl<'b> TensorFile<'b> {
     pub(super) fn read(
         &self,
         info: &TensorInfo,
-        matrix: (usize, usize),
+        (rows, columns): (usize, usize),
         place: impl Fn(&[usize]) -> Place,
     ) -> Result<DMatrix<f64>, ImportError> {
-        let Some(size) = info.element.size() else {
-            let found = format!("numbers of type {}", info.element.name());
+        let (element, size) = (&info.element.0, info.element.1);
+        if size == 0 {
+            let found = format!("numbers of type {element}");
             return Err(self.refused(place(&[]), found, "f32 or f64"));
-        };
+        }
         let count = (info.shape.iter()).try_fold(1usize, |count, &dim| count.checked_mul(dim));
         let Some(count) = count.filter(|&count| count <= MAX_ELEMENTS) else {
             let (max, unit) = (MAX_ELEMENTS as u64, "numbers");
             return Err(too_large(&self.file, place(&[]), max, unit));
         };
-        let bytes = self.bytes(info, size * count)?;
+        let bytes = (self.bytes)(info, size * count)?;
         let numbers = bytes.chunks_exact(size);
-        let values: Vec<f64> = numbers.map(|number| decode(info, number)).collect();
+        let values: Vec<f64> = numbers.map(|number| info.decode(number)).collect();
         match values.iter().position(|value| !value.is_finite()) {
-            None => Ok(info.matrix(matrix, &values)),
+            None if info.is_column_major => Ok(DMatrix::from_column_slice(rows, columns, &values)),
+            None => Ok(DMatrix::from_row_slice(rows, columns, &values)),
             Some(position) => {
                 let place = place(&info.index_of(position));
                 Err(self.refused(place, values[position].to_string(), "a finite number"))
@@ -192,9 +166,6 @@ impl<'b> TensorFile<'b> {
         }
     }
 }
-
-/// Bytes before the header: its length.
-const LENGTH_BYTES: usize = 8;
 
 /// Opens a file; offsets and lengths of its tensors are checked against the file.
 pub(super) fn open_safetensors<'b>(
@@ -208,27 +179,52 @@ pub(super) fn open_safetensors<'b>(
         name,
         shape: info.shape.clone(),
         element: match info.dtype {
-            Dtype::F32 => Element::F32,
-            Dtype::F64 => Element::F64,
-            Dtype::BOOL => Element::Bool,
-            other => Element::Other(other.to_string()),
+            Dtype::F32 => ("f32".to_owned(), 4),
+            Dtype::F64 => ("f64".to_owned(), 8),
+            Dtype::BOOL => ("bool".to_owned(), 1),
+            other => (other.to_string(), 0),
         },
         start: LENGTH_BYTES + header + info.data_offsets.0,
         ..TensorInfo::default()
     });
-    TensorFile::new(file, infos.collect(), Container::Safetensors(bytes))
+    let numbers = |info: &TensorInfo, length| Ok(bytes[info.start..info.start + length].into());
+    TensorFile::new(file, infos.collect(), Box::new(numbers))
 }
 
-fn decode(info: &TensorInfo, number: &[u8]) -> f64 {
-    let mut little = [0; 8];
-    let little = &mut little[..number.len()];
-    little.copy_from_slice(number);
-    if info.is_big_endian {
-        little.reverse();
+/// Opens arrays as a file of tensors; `source` names them in errors.
+pub(super) fn open_arrays<'t>(
+    source: &str,
+    tensors: &'t [Tensor<'t>],
+) -> Result<TensorFile<'t>, ImportError> {
+    let info = |(member, tensor): (usize, &Tensor<'_>)| {
+        let expected = tensor.shape.iter().product::<usize>();
+        if tensor.values.len() != expected {
+            let place = format!("`{}`", tensor.name);
+            let found = format!("{} numbers", tensor.values.len());
+            let expected = format!("{expected} ({})", shape_text(&tensor.shape));
+            return Err(ImportError::at(source, place, found, expected));
+        }
+        Ok(TensorInfo {
+            name: tensor.name.clone(),
+            shape: tensor.shape.clone(),
+            element: ("f64".to_owned(), 8),
+            is_column_major: tensor.is_column_major,
+            member,
+            ..TensorInfo::default()
+        })
+    };
+    let infos = tensors.iter().enumerate().map(info);
+    let numbers = |info: &TensorInfo, _| Ok(tensors[info.member].little_endian().into());
+    TensorFile::new(source, infos.collect::<Result<_, _>>()?, Box::new(numbers))
+}
+
+pub(super) fn digest(tensors: &[Tensor<'_>]) -> Output<Sha256> {
+    let mut digest = Sha256::new();
+    for tensor in tensors {
+        let (name, shape) = (&tensor.name, &tensor.shape);
+        let order = if tensor.is_column_major { "F" } else { "C" };
+        digest.update(format!("{name} {shape:?} {order}\n"));
+        digest.update(tensor.little_endian());
     }
-    match *little {
-        [a, b, c, d, e, f, g, h] => f64::from_le_bytes([a, b, c, d, e, f, g, h]),
-        [a, b, c, d] => f64::from(f32::from_le_bytes([a, b, c, d])),
-        _ => f64::from(u8::from(little != [0])),
-    }
+    digest.finalize()
 }

@@ -1,17 +1,11 @@
 //! The figures of a report, from an assessment and the controller's runs.
 
-use std::path::PathBuf;
-
-use super::complexity::study_figures;
 use super::control::{latent_inputs, torques};
-use super::figures::{Drawing, Figure, Film, HeatMap, Panel, subscript};
-use super::jump::{Jump, JumpName};
-use super::tables::NamedRun;
-use crate::evaluate::{Assessment, SegmentRun, Verdict};
-use crate::model::{ModelError, ReducedModel};
+use super::figures::{Drawing, HeatMap, subscript};
+use super::jump::Jump;
+use super::*;
 use crate::mpc::Lift;
-use crate::recording::Segment;
-use crate::study::Summary;
+use crate::study::{DimensionSummary, Spread, Summary};
 
 const MAX_JUMPS: usize = 3;
 
@@ -25,20 +19,18 @@ pub(crate) struct Content<'a> {
     /// The same with the lift that keeps torques and forces consistent.
     pub consistent: &'a [NamedRun],
     pub study: Option<&'a Summary>,
-    /// The plan that the first jump follows, if there is one.
     pub plan: Option<&'a Segment>,
     /// Digests of the recordings' files, by path, as a model's provenance has them.
     pub digests: &'a [(PathBuf, String)],
 }
 
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Default)]
 pub(crate) struct AllFigures {
     pub encoder: Vec<Figure>,
     pub jumps: Vec<JumpFigures>,
     pub study: Vec<Figure>,
 }
 
-#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct JumpFigures {
     pub title: String,
     /// Root mean square errors of body x and z over the whole jump, in m.
@@ -69,7 +61,7 @@ pub(crate) fn all_figures(content: &Content<'_>) -> Result<AllFigures, ModelErro
     if let Some(run) = assessment.runs.first() {
         figures.encoder.push(encoder(model, assessment, run)?);
     }
-    for (index, jump) in jumps(content)?.into_iter().take(MAX_JUMPS).enumerate() {
+    for (index, jump) in Jump::all(content)?.into_iter().take(MAX_JUMPS).enumerate() {
         let [joints, body] = jump.coordinates();
         let mut folded = vec![
             ("Latent accelerations", jump.accelerations()?),
@@ -96,24 +88,8 @@ pub(crate) fn all_figures(content: &Content<'_>) -> Result<AllFigures, ModelErro
             folded,
         });
     }
-    if let Some(summary) = content.study {
-        figures.study = study_figures(summary);
-    }
+    figures.study = content.study.map(study_figures).unwrap_or_default();
     Ok(figures)
-}
-
-pub(super) fn jumps<'a>(content: &Content<'a>) -> Result<Vec<Jump<'a>>, ModelError> {
-    let (model, assessment) = (content.model, content.assessment);
-    let jump = |(index, run): (usize, &'a SegmentRun<'a>)| {
-        let path = &run.segment.path;
-        let mut place = JumpName::of_recording(index, path);
-        let same = assessment.runs.iter().map(|run| &run.segment.path);
-        if same.filter(|other| *other == path).count() > 1 {
-            place.words += &format!(", from row {}", run.segment.first_row);
-        }
-        Jump::new(model, assessment, run, place)
-    };
-    assessment.runs.iter().enumerate().map(jump).collect()
 }
 
 /// Figures 6, 9 and 15 of the paper.
@@ -126,10 +102,10 @@ fn encoder(
     // d z / d x in SI units; without the scaling it is W_e of a linear encoder
     let weights = model.encoder_jacobian(&x)?;
     let factors = model.state_factors()?;
-    let rows = assessment.names.len();
     let d = model.latent_dim();
-    let at = |row: usize, column: usize| weights[(column, row)] / factors[row];
-    let values = (0..rows * d).map(|k| at(k / d, k % d)).collect();
+    let rows = 0..assessment.names.len();
+    let values = rows.flat_map(|row| (0..d).map(move |column| (row, column)));
+    let values = values.map(|(row, column)| weights[(column, row)] / factors[row]);
     let what = match model.is_linear() {
         true => "Magnitudes of the encoder's weights",
         false => "Magnitudes of the encoder's Jacobian at the first sample",
@@ -141,9 +117,65 @@ fn encoder(
         drawing: Drawing::Heat(HeatMap {
             rows: assessment.names.clone(),
             columns: columns.collect(),
-            values,
+            values: values.collect(),
         }),
     };
     let figure = Figure::over_time("encoder", caption, vec![map], &[]).over("");
     Ok(figure.in_columns(1, (120.0 + 40.0 * d.min(18) as f64, 330.0)))
+}
+
+/// Figures 10 (decoder error and active coefficients) and 11 (combined loss) of a study; bars are one standard deviation
+/// over the seeds to either side.
+pub(crate) fn study_figures(summary: &Summary) -> Vec<Figure> {
+    let legend = [
+        (Role::Recorded, "mean over seeds"),
+        (Role::SecondBaseline, "standard deviation"),
+    ];
+    let figure = |id: &str, caption: &str, panels: Vec<Panel>| {
+        let figure = Figure::over_time(id, caption, panels, &legend);
+        figure
+            .over("latent coordinates")
+            .in_columns(2, (360.0, 210.0))
+    };
+    let panel = |title: &str, bar: fn(&DimensionSummary) -> [f64; 3]| {
+        let (mut means, mut bars) = (Vec::new(), Vec::new());
+        for row in &summary.dimensions {
+            let (x, [low, mean, high]) = (row.latent_dim as f64, bar(row));
+            means.push((x, Some(mean)));
+            bars.extend([(x, Some(low)), (x, Some(high)), (x, None)]);
+        }
+        let bars = Series::through(Role::SecondBaseline, bars);
+        Panel::lines(title, vec![bars, Series::through(Role::Recorded, means)])
+    };
+    let decoder = "log10 of decoder mean square, scaled units";
+    let over_dimensions = vec![
+        panel(decoder, |row| logarithm(row.decoder_mse)),
+        panel("active coefficients in contact", |row| range(row.active)),
+        panel("x after 0.1 s, mm", |row| millimetres(row.prediction_x_m)),
+        panel("z after 0.1 s, mm", |row| millimetres(row.prediction_z_m)),
+    ];
+    let combined = panel("combined loss", |row| range(row.combined_loss));
+    let accuracy = "Accuracy against complexity over the latent dimension (figure 10 of the paper)";
+    let loss = format!(
+        "Combined loss 2 E_dec + 2 lambda log |Xi| with lambda = {} (figure 11 of the paper)",
+        summary.lambda
+    );
+    vec![
+        figure("complexity", accuracy, over_dimensions),
+        figure("combined-loss", &loss, vec![combined]),
+    ]
+}
+
+fn range(Spread { mean, std }: Spread) -> [f64; 3] {
+    [mean - std, mean, mean + std]
+}
+
+fn millimetres(spread: Spread) -> [f64; 3] {
+    range(spread).map(|metres| 1000.0 * metres)
+}
+
+/// Logarithms of a bar; one that reaches below zero ends at a tenth of its middle.
+fn logarithm(spread: Spread) -> [f64; 3] {
+    let [low, mean, high] = range(spread);
+    [low.max(0.1 * mean), mean, high].map(f64::log10)
 }

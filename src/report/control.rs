@@ -1,16 +1,11 @@
 //! Figures of the controller's runs: torques beside the recorded ones and the limits, latent inputs,
 //! latent tracking, solve times.
 
-use super::figures::{Figure, Panel, Role, Series};
 use super::jump::JumpName;
-use super::tables::NamedRun;
+use super::*;
 use crate::evaluate::{Run, StepRow};
-use crate::model::ReducedModel;
 use crate::mpc::{Lift, MpcSettings};
-use crate::robot::{JOINT_DIM, Robot};
 
-/// The figures of each run, numbered in their names: torques, latent inputs, latent tracking and
-/// solve times.
 pub(crate) fn control_figures(
     model: &ReducedModel,
     settings: &MpcSettings,
@@ -41,7 +36,6 @@ fn line(run: &Run, role: Role, value: impl Fn(&StepRow) -> Option<f64>) -> Serie
 }
 
 pub(super) fn torques(model: &ReducedModel, lift: Lift, run: &Run, place: &JumpName) -> Figure {
-    let JumpName { suffix, words } = place;
     let limits = model.robot().ok().map(Robot::torque_limit_nm);
     let panel = |joint: usize| {
         let limit = |sign: f64| limits.map(|limits| sign * limits[joint]);
@@ -58,42 +52,37 @@ pub(super) fn torques(model: &ReducedModel, lift: Lift, run: &Run, place: &JumpN
         Lift::Transpose => "plain",
         Lift::Consistent => "consistent",
     };
-    Figure::over_time(
-        format!("torques_{suffix}"),
-        format!(
-            "Joint torques along {words}: recorded, and commanded by the latent controller ({lift} lift), within the robot's limits."
-        ),
-        (0..JOINT_DIM).map(panel).collect(),
-        &[
-            (Role::Recorded, "recorded"),
-            (Role::Full, "commanded"),
-            (Role::Limit, "limits"),
-        ],
-    )
+    let caption = format!(
+        "Joint torques along {}: recorded, and commanded by the latent controller ({lift} lift), within the robot's limits.",
+        place.words
+    );
+    let legend = [
+        (Role::Recorded, "recorded"),
+        (Role::Full, "commanded"),
+        (Role::Limit, "limits"),
+    ];
+    let panels = (0..JOINT_DIM).map(panel).collect();
+    Figure::over_time(place.id("torques"), caption, panels, &legend)
 }
 
 pub(super) fn latent_inputs(model: &ReducedModel, run: &Run, place: &JumpName) -> Figure {
-    let JumpName { suffix, words } = place;
     let panel = |latent: usize| {
-        let chosen = line(run, Role::Full, |row| {
-            row.command.u_lat.get(latent).copied()
-        });
-        Panel::lines(format!("u{}", latent + 1), vec![chosen])
+        let chosen = |row: &StepRow| row.command.u_lat.get(latent).copied();
+        let title = format!("u{}", latent + 1);
+        Panel::lines(title, vec![line(run, Role::Full, chosen)])
     };
-    Figure::over_time(
-        format!("latent_inputs_{suffix}"),
-        format!("Latent inputs that the controller chose along {words} (scaled units)."),
-        (0..model.latent_dim()).map(panel).collect(),
-        &[(Role::Full, "commanded")],
-    )
+    let words = &place.words;
+    let caption = format!("Latent inputs that the controller chose along {words} (scaled units).");
+    let panels = (0..model.latent_dim()).map(panel).collect();
+    let legend = [(Role::Full, "commanded")];
+    Figure::over_time(place.id("latent_inputs"), caption, panels, &legend)
 }
 
-/// The latent positions that plans expect at the end of their horizon, beside the reference there.
 fn latent_tracking(
     model: &ReducedModel,
     settings: &MpcSettings,
     run: &Run,
-    JumpName { suffix, words }: &JumpName,
+    place: &JumpName,
 ) -> Figure {
     let horizon_s = settings.horizon as f64 * settings.step_s;
     let panel = |latent: usize| {
@@ -105,37 +94,33 @@ fn latent_tracking(
         let reference = line(run, Role::Recorded, |row| Some(row.z_reference[latent]));
         Panel::lines(format!("z{}", latent + 1), vec![reference, planned])
     };
-    Figure::over_time(
-        format!("latent_tracking_{suffix}"),
-        format!(
-            "Latent positions along {words} (scaled units): the reference, and what each plan expects \
-             {horizon_s} s ahead, drawn where it expects it."
-        ),
-        (0..model.latent_dim()).map(panel).collect(),
-        &[
-            (Role::Recorded, "reference"),
-            (Role::Full, "end of the plan"),
-        ],
-    )
+    let caption = format!(
+        "Latent positions along {} (scaled units): the reference, and what each plan expects \
+         {horizon_s} s ahead, drawn where it expects it.",
+        place.words
+    );
+    let panels = (0..model.latent_dim()).map(panel).collect();
+    let legend = [
+        (Role::Recorded, "reference"),
+        (Role::Full, "end of the plan"),
+    ];
+    Figure::over_time(place.id("latent_tracking"), caption, panels, &legend)
 }
 
 fn solve_times(settings: &MpcSettings, run: &Run, place: &JumpName) -> Figure {
-    let milliseconds = line(run, Role::Recorded, |row| Some(1e-3 * row.command.solve_us));
-    let iterations = line(run, Role::Recorded, |row| {
-        Some(f64::from(row.command.iterations))
-    });
+    let line = |value: fn(&StepRow) -> f64| line(run, Role::Recorded, |row| Some(value(row)));
+    let milliseconds = line(|row| 1e-3 * row.command.solve_us);
+    let iterations = line(|row| f64::from(row.command.iterations));
+    let panels = vec![
+        Panel::lines("time of a step, ms", vec![milliseconds]),
+        Panel::lines("iterations", vec![iterations]),
+    ];
     let caption = format!(
         "Steps along {}: wall time from measurement to command, {} stages of {} s each, and \
          interior-point iterations.",
         place.words, settings.horizon, settings.step_s
     );
-    let panels = vec![
-        Panel::lines("time of a step, ms", vec![milliseconds]),
-        Panel::lines("iterations", vec![iterations]),
-    ];
-    let (id, legend) = (
-        format!("solve_times_{}", place.suffix),
-        [(Role::Recorded, "one step")],
-    );
-    Figure::over_time(id, caption, panels, &legend).in_columns(2, (360.0, 170.0))
+    let legend = [(Role::Recorded, "one step")];
+    let figure = Figure::over_time(place.id("solve_times"), caption, panels, &legend);
+    figure.in_columns(2, (360.0, 170.0))
 }

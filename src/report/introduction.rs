@@ -1,34 +1,17 @@
 //! A report's first words: what the model is fit for, which robot and recordings, whether its training saw them, errors.
 
 use std::collections::BTreeSet;
-use std::path::Path;
 
-use serde_json::{Value, json};
+use super::jump::{Jump, modelled};
+use super::tables::template_rms;
+use super::*;
 
-use super::contents::{Content, jumps};
-use super::jump::modelled;
-use super::tables::{body_rms, template_rms};
-use crate::evaluate::Verdict;
-use crate::model::{ModelError, ReducedModel};
-use crate::recording::Segment;
-use crate::typeset::words::counted;
-use crate::typeset::{Table, rounded};
-
-#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Introduction {
     /// One line: fit for what, and for what not.
     pub headline: String,
     pub sentences: Vec<String>,
     /// The jumps: where from, how long, seen in training or not, errors.
     pub recordings: Table,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Seen {
-    Yes,
-    No,
-    /// The model file does not name its recordings.
-    Unknown,
 }
 
 pub(crate) fn introduction(content: &Content<'_>) -> Result<Introduction, ModelError> {
@@ -49,11 +32,8 @@ pub(crate) fn headline(verdict: &Verdict, is_doubtful: bool) -> String {
         "torques" | "control" => of.clone(),
         short => format!("predictions over {short}"),
     };
-    let listed = |uses: &[String]| {
-        let words: Vec<String> = uses.iter().map(words).collect();
-        listed(&words)
-    };
-    let (fit, failed) = (listed(&verdict.fit_for), listed(&verdict.failed));
+    let [fit, failed] = [&verdict.fit_for, &verdict.failed]
+        .map(|uses| listed(&uses.iter().map(words).collect::<Vec<_>>()));
     let judged = match (fit.as_str(), failed.as_str()) {
         ("", "") => "Not judged: these recordings show nothing that it predicts.".to_owned(),
         (fit, "") => format!("Fit for {fit}."),
@@ -75,9 +55,8 @@ fn cause(content: &Content<'_>) -> Option<String> {
             "Torques fail because encoder and decoder lose them: R^2 of recorded inputs projected and lifted is {r2:.2}."
         ));
     }
-    let known = known_digests(content.model);
     let mut paths = content.assessment.runs.iter().map(|run| &run.segment.path);
-    let are_known = paths.all(|path| seen(content, &known, path) == Seen::Yes);
+    let are_known = paths.all(|path| seen(content, path) == Some(true));
     (are_known && !failed.is_empty()).then(|| {
         "The model is at fault, not the recordings: its training had these very files.".to_owned()
     })
@@ -86,15 +65,12 @@ fn cause(content: &Content<'_>) -> Option<String> {
 fn subject(content: &Content<'_>) -> Result<String, ModelError> {
     let (model, assessment) = (content.model, content.assessment);
     let robot = model.robot().map_or("a robot", |robot| robot.name());
-    let n = assessment.names.len();
     let phases: Vec<&str> = model.phases().iter().map(|p| p.name.as_str()).collect();
-    let modelled = match assessment.runs.first() {
-        Some(run) => modelled(model, run)?,
-        None => vec![true; n],
-    };
-    let names = assessment.names.iter().zip(modelled);
-    let absent = names.filter(|(_, is)| !is).map(|(name, _)| name.as_str());
-    let absent: Vec<String> = absent.map(str::to_owned).collect();
+    let first = assessment.runs.first();
+    let modelled = first.map(|run| modelled(model, run)).transpose()?;
+    let names = assessment.names.iter().zip(modelled.into_iter().flatten());
+    let absent = names.filter(|(_, is_modelled)| !is_modelled);
+    let absent: Vec<String> = absent.map(|(name, _)| name.clone()).collect();
     let are = if absent.len() == 1 { "is" } else { "are" };
     let absent = match listed(&absent).as_str() {
         "" => String::new(),
@@ -103,10 +79,12 @@ fn subject(content: &Content<'_>) -> Result<String, ModelError> {
         ),
     };
     Ok(format!(
-        "The model reduces the {n} coordinates of {robot} to {} latent ones, with {} active terms in {}.{absent}",
+        "The model reduces the {} coordinates of {robot} to {} latent ones, with {} active terms in {} ({}).{absent}",
+        assessment.names.len(),
         model.latent_dim(),
         assessment.active_terms,
-        counted(phases.len(), "phase") + &format!(" ({})", phases.join(", ")),
+        counted(phases.len(), "phase"),
+        phases.join(", ")
     ))
 }
 
@@ -118,23 +96,16 @@ fn listed(names: &[String]) -> String {
     }
 }
 
-fn known_digests(model: &ReducedModel) -> BTreeSet<&str> {
-    let recordings = model.provenance().get("recordings");
-    let entries = recordings.and_then(Value::as_array).into_iter().flatten();
-    entries
-        .filter(|entry| entry.get("sets") != Some(&json!(["test"])))
-        .filter_map(|entry| entry.get("digest")?.as_str())
-        .filter(|text| !text.is_empty())
-        .collect()
-}
-
-fn seen(content: &Content<'_>, known: &BTreeSet<&str>, path: &Path) -> Seen {
-    let digest = content.digests.iter().find(|(of, _)| of == path);
-    match digest {
-        Some((_, digest)) if known.contains(digest.as_str()) => Seen::Yes,
-        Some(_) if !known.is_empty() => Seen::No,
-        Some(_) | None => Seen::Unknown,
-    }
+/// Whether the training had a recording; `None` if the model file does not name its recordings.
+fn seen(content: &Content<'_>, path: &Path) -> Option<bool> {
+    let recordings = content.model.provenance().get("recordings");
+    let entries = recordings.and_then(Value::as_array)?.iter();
+    let trained = entries.filter(|entry| entry.get("sets") != Some(&json!(["test"])));
+    let digests = trained.filter_map(|entry| entry.get("digest")?.as_str());
+    let mut known = digests.filter(|digest| !digest.is_empty()).peekable();
+    known.peek()?;
+    let (_, digest) = content.digests.iter().find(|(of, _)| of == path)?;
+    Some(known.any(|known| known == digest))
 }
 
 const FLATTERS: &str = "which flatters the figures below";
@@ -142,41 +113,33 @@ const FLATTERS: &str = "which flatters the figures below";
 fn compared(content: &Content<'_>) -> String {
     let runs = &content.assessment.runs;
     let seconds: f64 = runs.iter().map(|run| run.segment.duration_s()).sum();
-    let known = known_digests(content.model);
     let paths: BTreeSet<&Path> = runs.iter().map(|run| run.segment.path.as_path()).collect();
-    let all_seen: Vec<Seen> = (paths.iter().map(|path| seen(content, &known, path))).collect();
-    let is = |what: Seen| all_seen.iter().filter(|seen| **seen == what).count();
-    let training = match (is(Seen::Yes), is(Seen::No)) {
+    let all_seen: Vec<_> = paths.iter().map(|path| seen(content, path)).collect();
+    let count = |what: bool| all_seen.iter().filter(|seen| **seen == Some(what)).count();
+    let of_recordings = counted(paths.len(), "recording");
+    let training = match (count(true), count(false)) {
         (0, 0) => "The model file does not say which recordings it was made with.".to_owned(),
         (0, 1) if paths.len() == 1 => "Its training did not see it.".to_owned(),
         (0, _) => "Its training saw none of them.".to_owned(),
         (1, 0) if paths.len() == 1 => format!("Its training saw it, {FLATTERS}."),
         (yes, 0) if yes == paths.len() => format!("Its training saw all of them, {FLATTERS}."),
-        (yes, _) => format!(
-            "Its training saw {yes} of the {}, {FLATTERS}.",
-            counted(paths.len(), "recording")
-        ),
+        (yes, _) => format!("Its training saw {yes} of the {of_recordings}, {FLATTERS}."),
     };
-    format!(
-        "It is compared with {} of {}, {seconds:.1} s in all. {training}",
-        counted(runs.len(), "jump"),
-        counted(paths.len(), "recording"),
-    )
+    let jumps = counted(runs.len(), "jump");
+    format!("It is compared with {jumps} of {of_recordings}, {seconds:.1} s in all. {training}")
 }
 
 fn millimetres(metres: f64) -> String {
     format!("{} mm", rounded(1e3 * metres, 2))
 }
 
-fn pair([x, z]: [Option<f64>; 2]) -> String {
-    let shown = |value: Option<f64>| value.map_or("nowhere predicted".to_owned(), millimetres);
-    format!("{} in body.x and {} in body.z", shown(x), shown(z))
-}
-
 fn errors(content: &Content<'_>) -> String {
     let assessment = content.assessment;
-    let [whole, short] =
-        [&assessment.full, &assessment.restarted].map(|sums| pair(body_rms(assessment, sums)));
+    let shown = |value: Option<f64>| value.map_or("nowhere predicted".to_owned(), millimetres);
+    let [whole, short] = [&assessment.full, &assessment.restarted].map(|sums| {
+        let [x, z] = body_rms(assessment, sums).map(shown);
+        format!("{x} in body.x and {z} in body.z")
+    });
     let runs = assessment.runs.iter();
     let diverged = runs.filter(|run| run.full.diverged_at_s().is_some());
     let diverged = match diverged.count() {
@@ -193,7 +156,7 @@ fn errors(content: &Content<'_>) -> String {
 fn beside_pendulum(content: &Content<'_>) -> Option<String> {
     let assessment = content.assessment;
     let own = body_rms(assessment, &assessment.full);
-    let words = |axis: usize, name: &str| -> Option<String> {
+    let words = |(axis, name): (usize, &str)| -> Option<String> {
         let templates = assessment.baselines.iter();
         let errors = templates.filter_map(|template| template_rms(&template.full)[axis]);
         let ratio = errors.reduce(f64::min)? / own[axis]?;
@@ -204,8 +167,8 @@ fn beside_pendulum(content: &Content<'_>) -> Option<String> {
         };
         (ratio.is_finite() && ratio > 0.0).then_some(words)
     };
-    let words = [words(0, "body.x"), words(1, "body.z")].into_iter();
-    let words = words.flatten().reduce(|x, z| format!("{x} and {z}"))?;
+    let words = [(0, "body.x"), (1, "body.z")].into_iter().filter_map(words);
+    let words = words.reduce(|x, z| format!("{x} and {z}"))?;
     Some(format!(
         "Beside the better of two spring-loaded pendulums under the same forces it is {words}."
     ))
@@ -214,35 +177,35 @@ fn beside_pendulum(content: &Content<'_>) -> Option<String> {
 /// The controller's recovery from a push, compared with the same controller without feedback, and what became of its
 /// steps.
 fn commands(content: &Content<'_>) -> Option<String> {
-    let [mut steps, mut solved, mut violations] = [0; 3];
-    let mut recoveries = Vec::new();
-    for (_, run) in content.consistent {
-        steps += run.summary.steps;
-        solved += run.summary.solved;
-        violations += run.summary.limit_violations;
-        let metrics = run.metrics.as_ref();
-        recoveries.extend(metrics.and_then(|metrics| {
-            let off = metrics.baseline.feedback_off.recovery_rms_m?;
-            Some([metrics.recovery_rms_m?, off])
-        }));
-    }
+    let runs = || content.consistent.iter().map(|(_, run)| run);
+    let steps: usize = runs().map(|run| run.summary.steps).sum();
+    let solved: usize = runs().map(|run| run.summary.solved).sum();
+    let limits = match runs().map(|run| run.summary.limit_violations).sum() {
+        0 => "none of its commands leaves the torque limits".to_owned(),
+        violations => format!(
+            "{} beyond the torque limits",
+            counted(violations, "command")
+        ),
+    };
+    let recoveries = runs().filter_map(|run| {
+        let metrics = run.metrics.as_ref()?;
+        let off = metrics.baseline.feedback_off.recovery_rms_m?;
+        Some([metrics.recovery_rms_m?, off])
+    });
+    let recoveries: Vec<[f64; 2]> = recoveries.collect();
     let mean = |which: usize| {
-        let sum: f64 = recoveries.iter().map(|pair: &[f64; 2]| pair[which]).sum();
-        sum / recoveries.len() as f64
+        let sum: f64 = recoveries.iter().map(|pair| pair[which]).sum();
+        millimetres(sum / recoveries.len() as f64)
     };
     let recovery = match recoveries.is_empty() {
         true => String::new(),
         false => format!(
             " After a push of 0.1 m/s the body stays off by {} on average, and by {} with feedback off.",
-            millimetres(mean(0)),
-            millimetres(mean(1))
+            mean(0),
+            mean(1)
         ),
     };
     (steps > 0).then(|| {
-        let limits = match violations {
-            0 => "none of its commands leaves the torque limits".to_owned(),
-            _ => format!("{} beyond the torque limits", counted(violations, "command")),
-        };
         format!(
             "Along these recordings the latent controller solves {solved} of {steps} steps, and {limits}.{recovery}"
         )
@@ -250,14 +213,12 @@ fn commands(content: &Content<'_>) -> Option<String> {
 }
 
 fn recordings(content: &Content<'_>) -> Result<Table, ModelError> {
-    let known = known_digests(content.model);
-    let mut rows = Vec::new();
-    for jump in jumps(content)? {
+    let rows = Jump::all(content)?.into_iter().map(|jump| {
         let rms = jump.body_rms_m();
-        rows.push((jump.place.words, jump.run.segment, rms));
-    }
-    let names = content.assessment.names.iter();
-    let [x, z] = ["body.x", "body.z"].map(|body| names.clone().position(|name| name == body));
+        (jump.place.words, jump.run.segment, rms)
+    });
+    let names = &content.assessment.names;
+    let [x, z] = ["body.x", "body.z"].map(|body| names.iter().position(|name| name == body));
     let moved = |row: Option<usize>, of: fn(&[f64]) -> f64, segment: &Segment| {
         row.map(|row| {
             let values: Vec<f64> = segment.x.row(row).iter().copied().collect();
@@ -269,11 +230,11 @@ fn recordings(content: &Content<'_>) -> Result<Table, ModelError> {
     let shown = |rms: Option<f64>| rms.map(|rms| rounded(1e3 * rms, 2).to_string());
     let table = Table::of(rows)
         .column("recording", "", |(words, ..)| words.clone())
-        .column("seen in training", "", |(_, segment, _)| {
-            match seen(content, &known, &segment.path) {
-                Seen::Yes => "yes",
-                Seen::No => "no",
-                Seen::Unknown => "unknown",
+        .column("seen in training", "", |(_, s, _)| {
+            match seen(content, &s.path) {
+                Some(true) => "yes",
+                Some(false) => "no",
+                None => "unknown",
             }
         })
         .column("duration", "s", |(_, s, _)| {
@@ -286,32 +247,4 @@ fn recordings(content: &Content<'_>) -> Result<Table, ModelError> {
         .table();
     let count = counted(table.len(), "jump");
     Ok(table.captioned(format!("{count} of the recordings")))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn headline_lists_what_a_model_is_fit_for_and_what_not() {
-        let uses = |names: &[&str]| names.iter().map(|&name| name.to_owned()).collect();
-        let of = |fit: &[&str], failed: &[&str]| {
-            let verdict = Verdict {
-                fit_for: uses(fit),
-                failed: uses(failed),
-                rows: Vec::new(),
-            };
-            headline(&verdict, false)
-        };
-        let predictions = ["0.1 s", "whole motion"];
-        assert_eq!(
-            of(&predictions, &["torques", "control"]),
-            "Fit for predictions over 0.1 s and predictions of the whole motion; not fit for torques and control."
-        );
-        assert_eq!(of(&["control"], &[]), "Fit for control.");
-        assert_eq!(of(&[], &["torques"]), "Not fit for torques.");
-        assert!(of(&[], &[]).starts_with("Not judged"));
-        let doubtful = headline(&Verdict::default(), true);
-        assert!(doubtful.starts_with("Do not rely on it here"), "{doubtful}");
-    }
 }

@@ -1,15 +1,13 @@
 //! An assessment as JSON.
 
-use serde_json::{Map, Value, json};
-
 use super::tables::template_rms;
-use crate::evaluate::{Assessment, Baseline, CoordinateSums, Fit, LinearisedPhase};
-use crate::model::ReducedModel;
-use crate::plan::{Plan, Verdict};
+use super::*;
+use crate::evaluate::{Baseline, LinearisedPhase};
+use crate::plan::{self, Plan};
 
 /// Every metric of an assessment, under the names of the documentation; rms in the units of each coordinate.
 pub fn assessment_json(model: &ReducedModel, assessment: &Assessment<'_>) -> Value {
-    let lift = &assessment.lift;
+    let (lift, lift_r2) = (&assessment.lift, assessment.lift.torque.r2());
     json!({
         "segments": assessment.runs.len(),
         "restart_every_s": assessment.restart_every_s,
@@ -27,8 +25,8 @@ pub fn assessment_json(model: &ReducedModel, assessment: &Assessment<'_>) -> Val
         "combined_loss": assessment.combined_loss(),
         "lift": {
             "torque_r2": {
-                "contact": lift.torque.r2().contact,
-                "flight": lift.torque.r2().flight,
+                "contact": lift_r2.contact,
+                "flight": lift_r2.flight,
                 "all": lift.torque.r2_all(),
             },
             "inconsistency": lift.inconsistency(),
@@ -54,9 +52,8 @@ fn linearised_json(phase: &LinearisedPhase) -> Value {
 }
 
 fn baseline_json(baseline: &Baseline) -> Value {
-    let [full, restarted] = [&baseline.full, &baseline.restarted]
-        .map(template_rms)
-        .map(|[x, z]| json!({ "body.x": x, "body.z": z }));
+    let sums = [&baseline.full, &baseline.restarted].map(template_rms);
+    let [full, restarted] = sums.map(|[x, z]| json!({ "body.x": x, "body.z": z }));
     json!({
         "name": baseline.name,
         "constants": baseline.template.constants(),
@@ -87,8 +84,7 @@ fn rollouts_json(
 
 /// A planned jump: goal and what is reached, durations, how far it is from what was recorded.
 pub fn plan_json(planned: &Plan) -> Value {
-    let parts = planned.parts.iter();
-    let durations = parts.map(|part| (part.name.clone(), json!(part.duration_s)));
+    let durations = (planned.parts.iter()).map(|part| (part.name.clone(), json!(part.duration_s)));
     json!({
         "distance_m": planned.reached_m[0],
         "apex_m": planned.reached_m[1],
@@ -97,7 +93,7 @@ pub fn plan_json(planned: &Plan) -> Value {
         "durations_s": durations.collect::<Map<_, _>>(),
         "cost": planned.cost,
         "input_deviation": planned.input_deviation,
-        "extrapolates": planned.verdict != Verdict::Trusted,
+        "extrapolates": planned.verdict != plan::Verdict::Trusted,
         "reasons": planned.verdict.reasons(),
         "margins": planned.margins,
         "programs": planned.programs,

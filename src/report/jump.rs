@@ -1,24 +1,16 @@
 //! The figures of one jump: recorded beside predicted, pendulums, robots as sticks.
 
-use std::path::Path;
-
 use nalgebra::DVector;
 
-use super::figures::{
-    Figure, Film, Motion, Panel, Role, Series, film, film_strip, floor_m, subscript,
-};
+use super::figures::{film, subscript};
 use super::tables::file_name;
-use crate::evaluate::{Assessment, FitSums, SegmentRun};
-use crate::model::{ModelError, ReducedModel};
-use crate::recording::{Segment, stretches};
-use crate::robot::{BODY_X, BODY_Z, JOINT_DIM, STATE_DIM};
+use super::*;
+use crate::evaluate::FitSums;
+use crate::recording::stretches;
+use crate::robot::STATE_DIM;
 use crate::sim::Rollout;
 
 const FRAMES: usize = 10;
-
-pub(super) fn heading_rad(segment: &Segment) -> f64 {
-    segment.x[(STATE_DIM - 1, 0)]
-}
 
 /// Whether each coordinate of the robot enters a latent one at the beginning of a run.
 pub(crate) fn modelled(
@@ -26,12 +18,10 @@ pub(crate) fn modelled(
     run: &SegmentRun<'_>,
 ) -> Result<Vec<bool>, ModelError> {
     let weights = model.encoder_jacobian(&run.segment.x.column(0).into_owned())?;
-    let columns = weights.column_iter();
-    Ok(columns.map(|column| column.amax() != 0.0).collect())
+    Ok((weights.column_iter().map(|column| column.amax() != 0.0)).collect())
 }
 
 pub(super) struct JumpName {
-    /// Number from 1, which ends the figure's name.
     pub suffix: String,
     /// Name of the recording, with the row where the jump begins if there may be several.
     pub words: String,
@@ -45,6 +35,10 @@ impl JumpName {
             suffix: (index + 1).to_string(),
             words: stem.to_owned(),
         }
+    }
+
+    pub(super) fn id(&self, what: &str) -> String {
+        format!("{what}_{}", self.suffix)
     }
 }
 
@@ -77,12 +71,17 @@ pub(super) struct Jump<'a> {
 impl<'a> Jump<'a> {
     /// # Errors
     /// [`ModelError`] for a model without encoder or decoder.
-    pub(crate) fn new(
-        model: &'a ReducedModel,
-        assessment: &'a Assessment<'a>,
+    fn new(
+        content: &Content<'a>,
+        index: usize,
         run: &'a SegmentRun<'a>,
-        place: JumpName,
     ) -> Result<Self, ModelError> {
+        let (model, assessment, path) = (content.model, content.assessment, &run.segment.path);
+        let mut place = JumpName::of_recording(index, path);
+        let same = assessment.runs.iter().filter(|of| of.segment.path == *path);
+        if same.count() > 1 {
+            place.words += &format!(", from row {}", run.segment.first_row);
+        }
         let decoded = |rollout| predicted(run, rollout, |_, z, _| model.decode(z));
         Ok(Self {
             full: decoded(&run.full)?,
@@ -93,6 +92,13 @@ impl<'a> Jump<'a> {
             run,
             place,
         })
+    }
+
+    /// The jumps of an assessment.
+    pub(super) fn all(content: &Content<'a>) -> Result<Vec<Self>, ModelError> {
+        let runs = content.assessment.runs.iter().enumerate();
+        runs.map(|(index, run)| Self::new(content, index, run))
+            .collect()
     }
 
     /// The robot as it moved and as the model predicts it over the whole jump, as a strip and as an animation; none for a
@@ -111,11 +117,9 @@ impl<'a> Jump<'a> {
             Some(_) => "planned, recorded, and predicted over the whole jump",
             None => "recorded, and predicted over the whole jump",
         };
-        let names = (
-            format!("motion_{}", self.place.suffix),
-            format!("{}: {caption}.", self.place.words),
-        );
-        let from = (heading_rad(segment), floor_m(robot, segment));
+        let caption = format!("{}: {caption}.", self.place.words);
+        let names = (self.place.id("motion"), caption);
+        let from = (segment.x[(STATE_DIM - 1, 0)], floor_m(robot, segment));
         let motions = (segment.time_s.as_slice(), motions.as_slice());
         Some((
             film_strip(robot, names, motions, from, FRAMES),
@@ -149,8 +153,7 @@ impl<'a> Jump<'a> {
         let in_air = |sample: usize| !feet[sample].contains(&true);
         let spans = stretches(0..feet.len(), |a, b| in_air(a) == in_air(b)).into_iter();
         let flights = spans.filter(|span| in_air(span.start));
-        let times = flights.map(|span| (time_s[span.start], time_s[span.end - 1]));
-        times.collect()
+        (flights.map(|span| (time_s[span.start], time_s[span.end - 1]))).collect()
     }
 
     /// A figure of rollouts beside the recording; `id` gets the number of the jump.
@@ -162,8 +165,7 @@ impl<'a> Jump<'a> {
             (Role::Full, "model, whole jump"),
             (Role::Restarted, &restarted),
         ];
-        let id = format!("{id}_{}", self.place.suffix);
-        Figure::over_time(id, caption, panels, &legend)
+        Figure::over_time(self.place.id(id), caption, panels, &legend)
     }
 
     /// A recorded line with the two of the rollouts.
@@ -190,13 +192,11 @@ impl<'a> Jump<'a> {
         let panel = |row: usize| {
             let recorded = |k| self.run.segment.x[(row, k)];
             let title = format!("{}, {}", names[row], units[row]);
-            match self.modelled[row] {
-                true => self.beside_rollouts(title, recorded, rollouts, row),
-                false => {
-                    let line = self.series(Role::Recorded, |k| Some(recorded(k)));
-                    self.panel(format!("{title} (not modelled)"), vec![line])
-                }
+            if self.modelled[row] {
+                return self.beside_rollouts(title, recorded, rollouts, row);
             }
+            let line = self.series(Role::Recorded, |k| Some(recorded(k)));
+            self.panel(format!("{title} (not modelled)"), vec![line])
         };
         let figure = |id: &str, what: &str, rows: std::ops::Range<usize>| {
             let caption = format!(
@@ -258,12 +258,8 @@ impl<'a> Jump<'a> {
             "Body position of {}: the learned model and the pendulum under the same recorded forces.",
             self.place.words
         );
-        let panels = vec![
-            panel(JOINT_DIM, 0, "body.x, m"),
-            panel(BODY_Z, 1, "body.z, m"),
-        ];
-        let id = format!("aslip_{}", self.place.suffix);
-        let figure = Figure::over_time(id, caption, panels, &legend);
+        let (x, z) = (panel(BODY_X, 0, "body.x, m"), panel(BODY_Z, 1, "body.z, m"));
+        let figure = Figure::over_time(self.place.id("aslip"), caption, vec![x, z], &legend);
         figure.in_columns(2, (360.0, 180.0))
     }
 
@@ -271,10 +267,9 @@ impl<'a> Jump<'a> {
     pub(crate) fn body_rms_m(&self) -> [Option<f64>; 2] {
         let of = |row: usize| {
             let mut sums = FitSums::default();
-            for (sample, state) in self.full.iter().enumerate() {
-                if let Some(state) = state {
-                    sums.add(self.run.segment.x[(row, sample)], state[row]);
-                }
+            let states = self.full.iter().enumerate();
+            for (sample, state) in states.filter_map(|(k, state)| Some((k, state.as_ref()?))) {
+                sums.add(self.run.segment.x[(row, sample)], state[row]);
             }
             sums.fit().map(|fit| fit.rms)
         };

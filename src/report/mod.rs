@@ -2,9 +2,9 @@
 //!
 //! An assessment and controller runs come in; a self-contained HTML page and figures leave.
 //! `introduction.rs` has the first words, `tables.rs` holds the tables, `json.rs` the same numbers for programs, `contents.rs` and
-//! `jump.rs` pick what is drawn, `figures/` draws it, `sections.rs` and `page.rs` place all. Start with `page.rs`.
+//! `jump.rs` pick what is drawn, `figures/` draws it, `sections.rs` and `page.rs` place all. Start with `page.rs`. What this
+//! file imports is what its files import with `use super::*`.
 
-mod complexity;
 mod contents;
 mod control;
 mod figures;
@@ -17,15 +17,26 @@ mod provenance;
 mod sections;
 mod tables;
 
-pub(crate) use complexity::study_figures;
-pub(crate) use contents::{Content, all_figures};
+pub(crate) use contents::{Content, all_figures, study_figures};
 pub(crate) use control::{control_figures, without_statistics};
-pub(crate) use figures::{Figure, figure_files};
+pub(crate) use figures::{Figure, figure_files, range};
 pub(crate) use introduction::{Introduction, introduction};
 pub use json::{assessment_json, plan_json};
 pub(crate) use page::{PageOptions, page};
 pub(crate) use plan::{plan_figures, reach_figure};
 pub(crate) use tables::{
-    NamedRun, baseline_table, control_table, coordinate_table, dynamics_table, failed_runs,
-    failures, invariance_table, phase_table, run_table, verdict_lines,
+    NamedRun, baseline_table, body_rms, control_table, coordinate_table, dynamics_table,
+    failed_runs, failures, invariance_table, phase_table, run_table, verdict_lines,
 };
+
+use std::path::{Path, PathBuf};
+
+use serde_json::{Map, Value, json};
+
+use crate::evaluate::{Assessment, CoordinateSums, Fit, SegmentRun, Verdict};
+use crate::model::{ModelError, ReducedModel};
+use crate::recording::Segment;
+use crate::robot::{BODY_X, BODY_Z, JOINT_DIM, Robot};
+use crate::typeset::words::counted;
+use crate::typeset::{Cell, Table, rounded, significant};
+use figures::{Film, Motion, Panel, Role, Series, film_strip, floor_m};

@@ -2,22 +2,18 @@
 
 use askama::Template;
 
-use super::contents::{AllFigures, Content, JumpFigures};
-use super::figures::{Figure, panel_svg};
-use super::introduction::Introduction;
+use super::contents::{AllFigures, JumpFigures};
+use super::figures::panel_svg;
 use super::provenance::{Origin, origin};
 use super::sections::{Section, sections, tiles};
+use super::*;
 use crate::artifact;
 use crate::equations::{Equations, PhaseEquations};
-use crate::model::ReducedModel;
 use crate::typeset::latex::tex_cases;
 use crate::typeset::mathml::{Html, HtmlProse, HtmlText, system};
 use crate::typeset::words::{feet, rounding};
-use crate::typeset::{
-    EquationSystem, Rounding, SymbolTable, Table, Typeset, TypesetError, rendered, rounded,
-};
+use crate::typeset::{EquationSystem, Rounding, SymbolTable, Typeset, TypesetError, rendered};
 
-/// Longest line of an equation, in em.
 const WIDTH_EM: f64 = 44.0;
 
 #[derive(Debug, Clone, Default)]
@@ -84,7 +80,6 @@ fn prose(text: &str) -> String {
     HtmlProse(text).to_string()
 }
 
-/// How far off the model is over a jump.
 fn errors(jump: &JumpFigures) -> String {
     let [x, z] = jump.body_rms_m.map(|rms| match rms {
         Some(rms) => format!("{} mm", rounded(1e3 * rms, 2)),
@@ -101,7 +96,6 @@ fn math(equations: &EquationSystem) -> String {
     system(equations, WIDTH_EM)
 }
 
-/// LaTeX whose line ends stay.
 fn latex(equations: &EquationSystem) -> String {
     let latex = tex_cases(equations, WIDTH_EM);
     let lines = latex.lines().map(|line| format!("{}\n", HtmlText(line)));

@@ -1,13 +1,11 @@
 //! Figures of a planned jump: posture over time, path of the body, torques within their limits,
 //! phases; and of all the jumps that can be planned.
 
-use super::figures::{Figure, Motion, Panel, Role, Series, film_strip, floor_m};
+use super::*;
 use crate::model::JumpPrior;
 use crate::plan::{GoalMap, Plan};
-use crate::robot::{BODY_X, BODY_Z, JOINT_DIM, Robot};
 
 const FRAMES: usize = 8;
-/// Half the size of the cross of a recorded jump, m.
 const CROSS_M: f64 = 0.004;
 
 pub(crate) fn plan_figures(plan: &Plan, robot: &Robot) -> Vec<Figure> {
@@ -35,19 +33,16 @@ fn over_time(plan: &Plan, role: Role, value: impl Fn(usize) -> f64) -> Series {
 }
 
 fn flights(plan: &Plan) -> Vec<(f64, f64)> {
-    let mut start = 0.0;
-    let mut flights = Vec::new();
     let motion = &plan.motion;
-    for part in &plan.parts {
-        let middle = start + 0.5 * part.duration_s;
+    let mut end = 0.0;
+    let spans = plan.parts.iter().filter_map(|part| {
+        let (start, middle) = (end, end + 0.5 * part.duration_s);
+        end += part.duration_s;
         let sample = motion.time_s.partition_point(|time| *time < middle);
-        let sample = sample.min(motion.len() - 1);
-        if motion.feet[sample] == [false; 4] {
-            flights.push((start, start + part.duration_s));
-        }
-        start += part.duration_s;
-    }
-    flights
+        let feet = motion.feet[sample.min(motion.len() - 1)];
+        (feet == [false; 4]).then_some((start, end))
+    });
+    spans.collect()
 }
 
 fn panel(plan: &Plan, title: String, series: Vec<Series>) -> Panel {
@@ -64,7 +59,6 @@ fn path(plan: &Plan, goal: &str) -> Figure {
     figure.over("body x, m").in_columns(1, (360.0, 220.0))
 }
 
-/// Body and its speeds over time, the flight shaded, with the borders of the parts.
 fn phases(plan: &Plan, goal: &str) -> Figure {
     let motion = &plan.motion;
     let names = Robot::state_names();
@@ -78,18 +72,17 @@ fn phases(plan: &Plan, goal: &str) -> Figure {
             panel(plan, of_rate, vec![rate]),
         ]
     });
-    let mut start = 0.0;
+    let mut end = 0.0;
     let parts = plan.parts.iter().map(|part| {
-        start += part.duration_s;
-        format!("{} to {start:.3} s", part.name)
+        end += part.duration_s;
+        format!("{} to {end:.3} s", part.name)
     });
     let parts = parts.collect::<Vec<_>>().join(", ");
     let caption = format!("The body in {goal}: {parts}; the flight is shaded.");
     let legend = [(Role::Full, "planned")];
-    Figure {
-        columns: 2,
-        ..Figure::over_time("plan_phases", caption, panels.collect(), &legend)
-    }
+    let figure = Figure::over_time("plan_phases", caption, panels.collect(), &legend);
+    let size = figure.panel_size;
+    figure.in_columns(2, size)
 }
 
 fn torques(plan: &Plan, robot: &Robot, goal: &str) -> Figure {
@@ -104,23 +97,24 @@ fn torques(plan: &Plan, robot: &Robot, goal: &str) -> Figure {
         ];
         panel(plan, format!("{}, N m", names[joint]), lines)
     });
-    Figure::over_time(
-        "plan_torques",
-        format!("Torques of the motors in {goal}, within their limits; the flight is shaded."),
-        panels.collect(),
-        &[(Role::Full, "planned"), (Role::Limit, "limit")],
-    )
+    let caption =
+        format!("Torques of the motors in {goal}, within their limits; the flight is shaded.");
+    let legend = [(Role::Full, "planned"), (Role::Limit, "limit")];
+    Figure::over_time("plan_torques", caption, panels.collect(), &legend)
 }
 
-/// Distances and apexes that can be planned, with the recorded jumps.
 pub(crate) fn reach_figure(reach: &GoalMap, prior: &JumpPrior) -> Figure {
-    let crosses = prior.jumps.iter().flat_map(|&[distance, apex, _]| {
-        let at = |x: f64, y: f64| (distance + x * CROSS_M, Some(apex + 0.25 * y * CROSS_M));
-        let gap = (distance, None);
-        [[-1.0, 1.0], [1.0, -1.0]]
-            .map(|[from, to]| [at(-1.0, from), at(1.0, to), gap])
-            .concat()
-    });
+    let crosses = prior
+        .landmarks
+        .jumps
+        .iter()
+        .flat_map(|&[distance, apex, _]| {
+            let at = |x: f64, y: f64| (distance + x * CROSS_M, Some(apex + 0.25 * y * CROSS_M));
+            let gap = (distance, None);
+            [[-1.0, 1.0], [1.0, -1.0]]
+                .map(|[from, to]| [at(-1.0, from), at(1.0, to), gap])
+                .concat()
+        });
     let series = vec![
         Series::through(Role::Recorded, crosses),
         border(reach, Role::Full, &["trusted"]),
@@ -140,16 +134,14 @@ pub(crate) fn reach_figure(reach: &GoalMap, prior: &JumpPrior) -> Figure {
 /// The outline of the goals with one of these verdicts: for each apex, the stretch of distances.
 fn border(reach: &GoalMap, role: Role, words: &[&str]) -> Series {
     let rows = reach.points.chunks_exact(reach.distances_m.len());
-    let stretches: Vec<[f64; 3]> = rows
-        .zip(&reach.apexes_m)
-        .filter_map(|(row, apex)| {
-            let chosen = || row.iter().filter(|point| words.contains(&point.status));
-            let (first, last) = (chosen().next()?, chosen().next_back()?);
-            Some([first.goal_m[0], last.goal_m[0], *apex])
-        })
-        .collect();
-    let upwards = stretches.iter().rev();
-    let left = upwards.map(|[least, _, apex]| (*least, Some(*apex)));
+    let stretches = rows.zip(&reach.apexes_m).filter_map(|(row, apex)| {
+        let mut chosen = row.iter().filter(|point| words.contains(&point.status));
+        let first = chosen.next()?;
+        let last = chosen.next_back().unwrap_or(first);
+        Some([first.goal_m[0], last.goal_m[0], *apex])
+    });
+    let stretches: Vec<[f64; 3]> = stretches.collect();
+    let left = (stretches.iter().rev()).map(|[least, _, apex]| (*least, Some(*apex)));
     let right = stretches.iter().map(|[_, most, apex]| (*most, Some(*apex)));
     let mut points: Vec<_> = right.chain(left).collect();
     points.extend(points.first().copied());

@@ -1,16 +1,12 @@
 //! A model's origin as tables: values by their place, and lists of objects folded away.
 
-use serde_json::{Map, Value};
+use super::*;
 
-use crate::typeset::{Table, significant};
-
-/// Longest list of values in one cell.
 const LONGEST_LIST: usize = 24;
 
-/// Digits of a digest that are shown.
 const DIGEST: usize = 12;
 
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Default)]
 pub(crate) struct Origin {
     /// Name and value of each entry that fits a cell.
     pub facts: Vec<(String, String)>,
@@ -21,19 +17,18 @@ pub(crate) struct Origin {
 pub(crate) fn origin(provenance: &Map<String, Value>) -> Origin {
     let mut origin = Origin::default();
     for (key, value) in provenance {
-        match value {
-            Value::Object(entries) => {
-                let (mut facts, place) = (Vec::new(), origin.lists.len());
-                for (key, value) in entries {
-                    add(&mut facts, &mut origin.lists, key, value);
-                }
-                let table = Table::of(&facts)
-                    .column("entry", "", |(entry, _)| entry)
-                    .column("value", "", |(_, value)| value);
-                (origin.lists).insert(place, table.table().captioned(spaced(key)));
-            }
-            value => add(&mut origin.facts, &mut origin.lists, key, value),
+        let Value::Object(entries) = value else {
+            add(&mut origin.facts, &mut origin.lists, key, value);
+            continue;
+        };
+        let (mut facts, place) = (Vec::new(), origin.lists.len());
+        for (key, value) in entries {
+            add(&mut facts, &mut origin.lists, key, value);
         }
+        let table = Table::of(&facts)
+            .column("entry", "", |(entry, _)| entry)
+            .column("value", "", |(_, value)| value);
+        (origin.lists).insert(place, table.table().captioned(spaced(key)));
     }
     origin
 }
@@ -46,7 +41,16 @@ fn add(facts: &mut Vec<(String, String)>, lists: &mut Vec<Table>, place: &str, v
             }
         }
         Value::Array(items) if items.iter().any(Value::is_object) => {
-            lists.push(list(place, items));
+            let keys = items.iter().find_map(Value::as_object).into_iter();
+            let keys: Vec<&String> = keys.flat_map(Map::keys).collect();
+            let mut table = Table::new(keys.iter().map(|key| spaced(key)));
+            for item in items {
+                table.row(
+                    keys.iter()
+                        .map(|key| item.get(key.as_str()).map_or(String::new(), text)),
+                );
+            }
+            lists.push(table.captioned(format!("{}: {}", spaced(place), items.len())));
         }
         value => facts.push((spaced(place), text(value))),
     }
@@ -54,17 +58,6 @@ fn add(facts: &mut Vec<(String, String)>, lists: &mut Vec<Table>, place: &str, v
 
 fn spaced(key: &str) -> String {
     key.replace('_', " ")
-}
-
-fn list(place: &str, items: &[Value]) -> Table {
-    let keys: Vec<&String> = (items.iter().find_map(Value::as_object))
-        .map(|entries| entries.keys().collect())
-        .unwrap_or_default();
-    let mut table = Table::new(keys.iter().map(|key| spaced(key)));
-    for item in items {
-        table.row((keys.iter()).map(|key| item.get(key.as_str()).map_or(String::new(), text)));
-    }
-    table.captioned(format!("{}: {}", spaced(place), items.len()))
 }
 
 /// A value in one cell: numbers with four digits, digests shortened, lists with commas.
@@ -94,43 +87,5 @@ fn text(value: &Value) -> String {
             let shown = |(key, value): (&String, &Value)| format!("{key}: {}", text(value));
             entries.iter().map(shown).collect::<Vec<_>>().join(", ")
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use serde_json::json;
-
-    use super::*;
-
-    #[test]
-    fn nothing_of_a_provenance_is_lost_or_shown_as_json() {
-        let value = json!({
-            "command": "romc train a.csv", "seed": 3,
-            "encoder_options": { "rotate": true, "restarts": 4, "weights": { "body": 0.0123456 } },
-            "recordings": [
-                { "path": "a.csv", "digest": format!("sha256:{}", "0917caf76347ee1c".repeat(4)) },
-                { "path": "b.csv", "digest": "" },
-            ],
-            "encoded": ["fr.hx", "fr.hy"],
-        });
-        let origin = origin(value.as_object().unwrap());
-        let encoded = ("encoded", "fr.hx, fr.hy");
-        let facts = [("command", "romc train a.csv"), ("seed", "3"), encoded];
-        let facts = facts.map(|(key, value)| (key.to_owned(), value.to_owned()));
-        assert_eq!(origin.facts, facts);
-        let [options, recordings] = origin.lists.as_slice() else {
-            panic!("{:?}", origin.lists);
-        };
-        assert_eq!(options.caption(), "encoder options");
-        assert_eq!(
-            options.csv(),
-            "entry,value\nrotate,yes\nrestarts,4\n\"weights, body\",0.01235\n"
-        );
-        assert_eq!(recordings.caption(), "recordings: 2");
-        assert_eq!(
-            recordings.csv(),
-            "path,digest\na.csv,sha256:0917caf76347…\nb.csv,\n"
-        );
     }
 }

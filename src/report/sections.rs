@@ -1,15 +1,9 @@
 //! Sections below the equations: words, tables and figures about one thing each, and the tiles at the top.
 
-use super::contents::{AllFigures, Content};
-use super::control::without_statistics;
-use super::figures::Figure;
-use super::page::PageOptions;
-use super::tables::{
-    NamedRun, baseline_table, body_rms, control_table, dynamics_table, error_table, failures,
-    invariance_table, run_table, verdict_table,
-};
-use crate::evaluate::{AFTER_A_PUSH, CoordinateSums, Invariance, TORQUES_IN_CONTACT};
-use crate::typeset::{Table, rounded, significant};
+use super::contents::AllFigures;
+use super::tables::{error_table, verdict_table};
+use super::*;
+use crate::evaluate::{AFTER_A_PUSH, Invariance, TORQUES_IN_CONTACT};
 
 pub(super) struct Section<'a> {
     pub id: &'static str,
@@ -22,11 +16,13 @@ pub(super) struct Section<'a> {
 }
 
 impl<'a> Section<'a> {
-    fn new(id: &'static str, title: &'static str, paragraphs: &[&str]) -> Self {
+    fn new(id: &'static str) -> Self {
+        let row = WORDS.iter().find(|row| row[0] == id);
+        let row = row.expect("a row for each section");
         Self {
             id,
-            title,
-            paragraphs: paragraphs.iter().map(|&text| text.to_owned()).collect(),
+            title: row[1],
+            paragraphs: row[2..].iter().map(|&text| text.to_owned()).collect(),
             tables: Vec::new(),
             folded: Vec::new(),
             figures: &[],
@@ -38,18 +34,19 @@ impl<'a> Section<'a> {
         self
     }
 
-    fn with(self, figures: &'a [Figure], tables: impl IntoIterator<Item = Table>) -> Self {
-        Self {
-            tables: tables.into_iter().collect(),
-            figures,
-            ..self
-        }
+    fn with(mut self, tables: impl IntoIterator<Item = Table>) -> Self {
+        self.tables.extend(tables);
+        self
     }
 
     fn folding(mut self, tables: impl IntoIterator<Item = Table>) -> Self {
-        self.folded
-            .extend(tables.into_iter().filter(|table| !table.is_empty()));
+        let tables = tables.into_iter().filter(|table| !table.is_empty());
+        self.folded.extend(tables);
         self
+    }
+
+    fn showing(self, figures: &'a [Figure]) -> Self {
+        Self { figures, ..self }
     }
 }
 
@@ -57,40 +54,48 @@ pub(super) fn tiles(content: &Content<'_>) -> Vec<(String, String)> {
     let (model, assessment) = (content.model, content.assessment);
     let every = assessment.restart_every_s;
     let shown = |value: Option<f64>| value.map_or("-".to_owned(), significant);
+    let with = |value: Option<f64>, unit: f64, digits| {
+        value.map_or("-".to_owned(), |value| {
+            rounded(unit * value, digits).to_string()
+        })
+    };
     let errors = |sums: &CoordinateSums| {
-        let [x, z] = body_rms(assessment, sums)
-            .map(|rms| rms.map_or("-".to_owned(), |rms| rounded(1e3 * rms, 2).to_string()));
+        let [x, z] = body_rms(assessment, sums).map(|rms| with(rms, 1e3, 2));
         format!("{x}, {z} mm")
     };
     let pair = |name: &str, unit: f64| {
-        let Some(row) = content.verdict.rows.iter().find(|row| row.name == name) else {
-            return "-".to_owned();
-        };
-        let shown = |value: f64| rounded(unit * value, 3).to_string();
-        let [value, baseline] =
-            [row.value, row.baseline].map(|value| value.map_or("-".to_owned(), shown));
-        format!("{value}, {baseline}")
+        let row = content.verdict.rows.iter().find(|row| row.name == name);
+        let row = row.map(|row| [row.value, row.baseline].map(|value| with(value, unit, 3)));
+        row.map_or("-".to_owned(), |pair| pair.join(", "))
     };
-    let mut tiles = Vec::new();
-    let mut tile = |name: &str, value: String| tiles.push((name.to_owned(), value));
-    let whole = errors(&assessment.full);
-    tile("body x, z: rms error over whole jumps", whole);
-    let restarted = format!("body x, z: rms error, restarted every {every} s");
-    tile(&restarted, errors(&assessment.restarted));
-    let torques =
-        "torque R² in contact that the controller finds itself: worst recording; no dynamics";
-    tile(torques, pair(TORQUES_IN_CONTACT, 1.0));
-    let push = "deviation after a push, mm: worst recording; feedback off";
-    tile(push, pair(AFTER_A_PUSH, 1e3));
     let (d, terms) = (model.latent_dim(), assessment.active_terms);
-    let size =
-        "size alone: latent coordinates, active terms, combined loss of accuracy and size L_mod";
     let loss = shown(assessment.combined_loss());
-    tile(size, format!("{d}, {terms}, {loss}"));
-    let lift =
-        "encoder and decoder alone, whatever the dynamics: torque R² of the plain lift, contact";
-    tile(lift, shown(assessment.lift.torque.r2().contact));
-    tiles
+    let lift_r2 = assessment.lift.torque.r2().contact;
+    let restarted = format!("body x, z: rms error, restarted every {every} s");
+    let tiles = [
+        (
+            "body x, z: rms error over whole jumps",
+            errors(&assessment.full),
+        ),
+        (&restarted, errors(&assessment.restarted)),
+        (
+            "torque R² in contact that the controller finds itself: worst recording; no dynamics",
+            pair(TORQUES_IN_CONTACT, 1.0),
+        ),
+        (
+            "deviation after a push, mm: worst recording; feedback off",
+            pair(AFTER_A_PUSH, 1e3),
+        ),
+        (
+            "size alone: latent coordinates, active terms, combined loss of accuracy and size L_mod",
+            format!("{d}, {terms}, {loss}"),
+        ),
+        (
+            "encoder and decoder alone, whatever the dynamics: torque R² of the plain lift, contact",
+            shown(lift_r2),
+        ),
+    ];
+    tiles.map(|(name, value)| (name.to_owned(), value)).into()
 }
 
 pub(super) fn sections<'a>(
@@ -106,29 +111,24 @@ pub(super) fn sections<'a>(
         assessment.names.len()
     );
     let invariance = Invariance::of(model);
-    let not_told = invariance.as_ref().err();
-    let not_told = not_told.map(|error| format!("Invariance is not told: {error}."));
-    let invariance = invariance.ok().flatten();
+    let not_told =
+        (invariance.as_ref().err()).map(|error| format!("Invariance is not told: {error}."));
+    let physics = invariance.ok().flatten();
     let dynamics = dynamics_table(model, assessment).captioned("Each phase of the model");
-    let physics = invariance.as_ref().map(invariance_table);
-    let stability = "Phases, stability and inputs";
-    let latent = "Composition of the latent coordinates";
     let every_row = verdict_table(content.verdict);
+    let every_row =
+        every_row.captioned("Every figure with its baseline and the value that it needs");
     let mut sections = vec![
-        Section::new("verdict", "The verdict row by row", &VERDICT_WORDS).folding([
-            every_row.captioned("Every figure with its baseline and the value that it needs")
-        ]),
-        Section::new("coordinates", "Errors of every coordinate", &[])
-            .folding([error_table(model, assessment).captioned(by_phase)]),
-        Section::new("stability", stability, &[DYNAMICS_WORDS])
-            .and(not_told)
-            .with(&[], [dynamics].into_iter().chain(physics)),
+        Section::new("verdict").folding([every_row]),
+        Section::new("coordinates").folding([error_table(model, assessment).captioned(by_phase)]),
+        (Section::new("stability").and(not_told))
+            .with([dynamics])
+            .with(physics.as_ref().map(invariance_table)),
         beside_pendulum(content),
         control(content),
-        Section::new("latent", latent, &[ENCODER_WORDS]).with(&figures.encoder, []),
-        simplification(options),
-        Section::new("study", "How many latent coordinates", &[STUDY_WORDS])
-            .with(&figures.study, []),
+        Section::new("latent").showing(&figures.encoder),
+        Section::new("simplification").folding(options.simplification.iter().cloned()),
+        Section::new("study").showing(&figures.study),
     ];
     sections.retain(|section| match section.id {
         "simplification" => !section.folded.is_empty(),
@@ -141,16 +141,15 @@ pub(super) fn sections<'a>(
 fn beside_pendulum(content: &Content<'_>) -> Section<'static> {
     let assessment = content.assessment;
     let baselines = &assessment.baselines;
-    let constants = baselines
-        .iter()
-        .map(|b| format!("{}: {}.", b.name, b.template.constants()));
+    let constants = baselines.iter();
+    let constants = constants.map(|b| format!("{}: {}.", b.name, b.template.constants()));
     let is_springless = baselines.iter().any(|b| b.template.stiffness_n_m == 0.0);
     let springless = is_springless.then(|| SPRINGLESS.to_owned());
     let table = baseline_table(assessment).captioned("Body position: the model and the pendulum");
-    Section::new("aslip", "Beside the pendulum", &[BASELINE_WORDS])
+    Section::new("aslip")
         .and(constants)
         .and(springless)
-        .with(&[], [table])
+        .with([table])
 }
 
 fn control(content: &Content<'_>) -> Section<'static> {
@@ -176,13 +175,17 @@ fn control(content: &Content<'_>) -> Section<'static> {
     let runs = runs.filter(|(_, runs)| !runs.is_empty());
     let work = runs.map(|(lift, runs)| {
         let words = "the solver's work, and what the lift makes of recorded inputs";
-        upright(run_table(runs)).captioned(format!("{lift}: {words}"))
+        let table = run_table(runs).captioned(format!("{lift}: {words}"));
+        // Few runs with many figures each: a column per run, so that the table is no wider than the page.
+        match table.len() <= MOST_RUNS {
+            true => table.transposed(),
+            false => table,
+        }
     });
-    let title = "The controller along the recordings";
-    Section::new("control", title, &CONTROL_WORDS)
+    Section::new("control")
         .and(without)
         .and(failures(plain))
-        .with(&[], first)
+        .with(first)
         .folding(every)
         .folding([judged(plain, format!("{PLAIN}: {beside}"))])
         .folding(work)
@@ -190,41 +193,49 @@ fn control(content: &Content<'_>) -> Section<'static> {
 
 const PLAIN: &str = "Plain lift, u = W_e^T u_lat";
 const CONSISTENT: &str = "Consistent lift";
-
-/// Most rows for which a table of runs is turned, so that each is a column.
 const MOST_RUNS: usize = 6;
 
-/// Few runs with many figures each: a column per run, so that the table is no wider than the page.
-fn upright(table: Table) -> Table {
-    match table.len() <= MOST_RUNS {
-        true => table.transposed(),
-        false => table,
-    }
-}
-
-fn simplification(options: &PageOptions) -> Section<'static> {
-    let title = "How far the equations can be simplified";
-    Section::new("simplification", title, &SIMPLIFICATION_WORDS)
-        .folding(options.simplification.iter().cloned())
-}
-
-const VERDICT_WORDS: [&str; 1] = [
-    "A model is fit for a use if every counted row of it passes; of the controller's figures those of the recording with the least margin are shown. Where predictions one stage ahead or between restarts fail, other figures of the control that pass are not due to the dynamics and count as not measured.",
+/// Of each section its name in links, its title and what it says of every model.
+const WORDS: [&[&str]; 8] = [
+    &[
+        "verdict",
+        "The verdict row by row",
+        "A model is fit for a use if every counted row of it passes; of the controller's figures those of the recording with the least margin are shown. Where predictions one stage ahead or between restarts fail, other figures of the control that pass are not due to the dynamics and count as not measured.",
+    ],
+    &["coordinates", "Errors of every coordinate"],
+    &[
+        "stability",
+        "Phases, stability and inputs",
+        "Eigenvalues belong to each phase's linearisation at its mean state: a positive real part means that small deviations grow at that rate. The input gain is the matrix by which latent inputs accelerate the latent coordinates; its rank counts singular values above 1 % of the largest.",
+    ],
+    &[
+        "aslip",
+        "Beside the pendulum",
+        "The actuated spring-loaded inverted pendulum under the same forces, with the published constants and with the constants that fit the accelerations of these very recordings best.",
+    ],
+    &[
+        "control",
+        "The controller along the recordings",
+        "At each control step the controller sees the recorded state and plans along the recording. Its commands are not fed back to a robot: these are the commands that it would have given in the states that the robot really had. With the recorded input as reference they are the lifted recorded input whatever the dynamics are, so that the torques in the figures show what the lift is worth.",
+        "What the dynamics are worth is in the tables: predictions one stage ahead with the recorded input; torques where the controller has to find its input itself; and how far the body is off in the 0.2 s after a push of 0.1 m/s, where the commands act on a body with the robot's mass and feet that stay where they stand.",
+        "The no-dynamics baseline has the same encoder and decoder and ddz = g u, with g fitted to this very recording. Feedback off is the same controller, given the recorded state after the push; replay is the recorded torques.",
+    ],
+    &[
+        "latent",
+        "Composition of the latent coordinates",
+        "The darker a cell (the brighter on a dark screen), the more of that coordinate the latent one takes.",
+    ],
+    &[
+        "simplification",
+        "How far the equations can be simplified",
+        "Terms are dropped, coefficients shortened and nearly linear functions made linear, as long as no acceleration ddz of a phase can be off by more than the tolerance anywhere in its domain: the smallest box around the recorded latent states and inputs of the phase, a tenth of each range wider on both sides.",
+        "The certified error is proven by interval arithmetic for every point of that box. The measured errors are those at the recorded samples. Nothing is proven outside the box, so rollouts stand beside.",
+    ],
+    &[
+        "study",
+        "How many latent coordinates",
+        "One model for every latent dimension and seed, judged on recordings that were not trained on. With more coordinates the decoder errs less and the equations grow.",
+    ],
 ];
-const ENCODER_WORDS: &str = "The darker a cell (the brighter on a dark screen), the more of that coordinate the latent one takes.";
-const DYNAMICS_WORDS: &str = "Eigenvalues belong to each phase's linearisation at its mean state: a positive real part means that small deviations grow at that rate. The input gain is the matrix by which latent inputs accelerate the latent coordinates; its rank counts singular values above 1 % of the largest.";
-const BASELINE_WORDS: &str = "The actuated spring-loaded inverted pendulum under the same forces, with the published constants and with the constants that fit the accelerations of these very recordings best.";
-const CONTROL_WORDS: [&str; 3] = [
-    "At each control step the controller sees the recorded state and plans along the recording. Its commands are not fed back to a robot: these are the commands that it would have given in the states that the robot really had. With the recorded input as reference they are the lifted recorded input whatever the dynamics are, so that the torques in the figures show what the lift is worth.",
-    "What the dynamics are worth is in the tables: predictions one stage ahead with the recorded input; torques where the controller has to find its input itself; and how far the body is off in the 0.2 s after a push of 0.1 m/s, where the commands act on a body with the robot's mass and feet that stay where they stand.",
-    "The no-dynamics baseline has the same encoder and decoder and ddz = g u, with g fitted to this very recording. Feedback off is the same controller, given the recorded state after the push; replay is the recorded torques.",
-];
-
-const SIMPLIFICATION_WORDS: [&str; 2] = [
-    "Terms are dropped, coefficients shortened and nearly linear functions made linear, as long as no acceleration ddz of a phase can be off by more than the tolerance anywhere in its domain: the smallest box around the recorded latent states and inputs of the phase, a tenth of each range wider on both sides.",
-    "The certified error is proven by interval arithmetic for every point of that box. The measured errors are those at the recorded samples. Nothing is proven outside the box, so rollouts stand beside.",
-];
-
-const STUDY_WORDS: &str = "One model for every latent dimension and seed, judged on recordings that were not trained on. With more coordinates the decoder errs less and the equations grow.";
 
 const SPRINGLESS: &str = "Where k_s is 0, a spring that pushes away would have fitted best: it is left out, and that pendulum is a mass under the recorded forces alone, which falls where these do not carry it.";

@@ -1,17 +1,13 @@
 //! Tables of an assessment and of the controller's runs, for pages and terminals alike.
 
-use std::path::{Path, PathBuf};
-
 use super::introduction::headline;
 use super::jump::modelled;
+use super::*;
 use crate::evaluate::{
-    AslipSums, Assessment, ByContact, ControlMetrics, CoordinateSums, Fit, FitSums, Invariance,
-    LinearisedPhase, PredictionError, Run, Verdict,
+    AslipSums, ByContact, ControlMetrics, FitSums, Invariance, LinearisedPhase, PredictionError,
+    Run,
 };
-use crate::model::ReducedModel;
-use crate::typeset::{Cell, Table, significant};
 
-/// A recording and the controller's run along it.
 pub(crate) type NamedRun = (PathBuf, Run);
 
 fn rms(fit: Option<Fit>) -> Option<f64> {
@@ -36,19 +32,17 @@ pub(crate) fn coordinate_table(model: &ReducedModel, assessment: &Assessment<'_>
     let mut table = coordinates(assessment);
     let first = assessment.runs.first();
     let modelled = first.and_then(|run| modelled(model, run).ok());
-    let is_modelled = |row: usize| modelled.as_ref().is_none_or(|modelled| modelled[row]);
+    let r2 = |(row, fit): (usize, &Option<Fit>)| match &modelled {
+        Some(modelled) if !modelled[row] => "not modelled".into(),
+        _ => r2(*fit),
+    };
     for (title, coefficient, sums) in [
         ("full rms", "full R^2", &assessment.full),
         (&every, "restarted R^2", &assessment.restarted),
     ] {
         let fits = sums.fits();
         table.column(title, "", fits.iter().copied().map(rms));
-        let cells = fits.into_iter().enumerate();
-        let cells = cells.map(|(row, fit)| match is_modelled(row) {
-            true => r2(fit),
-            false => "not modelled".into(),
-        });
-        table.column(coefficient, "", cells);
+        table.column(coefficient, "", fits.iter().enumerate().map(r2));
     }
     table
 }
@@ -73,37 +67,44 @@ pub(crate) fn body_rms(assessment: &Assessment<'_>, sums: &CoordinateSums) -> [O
     ["body.x", "body.z"].map(|name| rms(assessment.fit(sums, name)))
 }
 
-/// The same of a template model.
 pub(crate) fn template_rms(sums: &AslipSums) -> [Option<f64>; 2] {
     [sums.x, sums.z].map(|sums| rms(sums.fit()))
 }
 
 pub(crate) fn baseline_table(assessment: &Assessment<'_>) -> Table {
     let every = format!("restarted every {} s", assessment.restart_every_s);
-    let titles = ["body.x", "body.z"]
-        .into_iter()
-        .flat_map(|name| ["whole jump", &every].map(|title| format!("{name}, {title}")));
+    let rows = ["body.x", "body.z"].map(|name| ["whole jump", &every].map(|kind| (name, kind)));
+    let rows = rows.concat().into_iter();
     let mut table = Table::default();
-    table.column("rms error", "m", titles);
-    let rows = |[x, z]: [Option<f64>; 2], [restarted_x, restarted_z]: [Option<f64>; 2]| {
-        [x, restarted_x, z, restarted_z]
+    table.column(
+        "rms error",
+        "m",
+        rows.map(|(name, kind)| format!("{name}, {kind}")),
+    );
+    let sums = [&assessment.full, &assessment.restarted];
+    let mut column = |name: &str, [full, restarted]: [[Option<f64>; 2]; 2]| {
+        let cells = [full[0], restarted[0], full[1], restarted[1]];
+        table.column(name, "", cells);
     };
-    let [full, restarted] =
-        [&assessment.full, &assessment.restarted].map(|sums| body_rms(assessment, sums));
-    table.column("model", "", rows(full, restarted));
+    column("model", sums.map(|sums| body_rms(assessment, sums)));
     for baseline in &assessment.baselines {
-        let [full, restarted] = [&baseline.full, &baseline.restarted].map(template_rms);
-        table.column(baseline.name, "", rows(full, restarted));
+        let sums = [&baseline.full, &baseline.restarted];
+        column(baseline.name, sums.map(template_rms));
     }
     table
 }
 
 pub(crate) fn dynamics_table(model: &ReducedModel, assessment: &Assessment<'_>) -> Table {
     let fits = assessment.pointwise.acceleration.iter().map(FitSums::fit);
-    let phases = model.phases().iter();
     let linearised = assessment.linearised.iter().map(Option::as_ref);
-    let growth = "largest Re of eigenvalues";
-    let rows = phases.zip(linearised).zip(fits);
+    let rows = model.phases().iter().zip(linearised).zip(fits);
+    let rank = |linear: &LinearisedPhase| {
+        format!(
+            "{} of {}",
+            linear.input_effective_rank(),
+            model.latent_dim()
+        )
+    };
     Table::of(rows.map(|((phase, linear), fit)| (phase, linear, fit)))
         .column("phase", "", |(phase, ..)| &phase.name)
         .column("samples", "", |(_, linear, _)| {
@@ -111,16 +112,13 @@ pub(crate) fn dynamics_table(model: &ReducedModel, assessment: &Assessment<'_>) 
         })
         .column("active terms", "", |(phase, ..)| phase.active_count())
         .column("latent acceleration R^2", "", |(.., fit)| r2(*fit))
-        .column(growth, "1/s", |(_, linear, _)| {
+        .column("largest Re of eigenvalues", "1/s", |(_, linear, _)| {
             linear.and_then(LinearisedPhase::growth_rate)
         })
         .column("input gain condition", "", |(_, linear, _)| {
             linear.and_then(LinearisedPhase::input_condition)
         })
-        .column("input gain rank", "", |(_, linear, _)| {
-            let rank = linear.map(LinearisedPhase::input_effective_rank);
-            rank.map(|rank| format!("{rank} of {}", model.latent_dim()))
-        })
+        .column("input gain rank", "", |(_, linear, _)| linear.map(rank))
         .table()
 }
 
@@ -157,21 +155,17 @@ pub(crate) fn control_table(runs: &[NamedRun]) -> Table {
     let rows = judged.flat_map(|(path, metrics)| driven(metrics).map(|row| (path, row)));
     let stage =
         |of: fn(&PredictionError) -> f64| move |(_, row): &(&PathBuf, Driven<'_>)| row.1.map(of);
-    let millimetres = |metres: f64| 1e3 * metres;
-    let x = stage(|error| 1e3 * error.body_x_m);
-    let z = stage(|error| 1e3 * error.body_z_m);
-    let joints = stage(|error| error.joints_rad);
     Table::of(rows)
         .column("recording", "", |(path, _)| file_name(path))
         .column("controller", "", |(_, row)| row.0)
-        .column("x one stage ahead", "mm", x)
-        .column("z one stage ahead", "mm", z)
-        .column("joints one stage ahead", "rad", joints)
+        .column("x one stage ahead", "mm", stage(|e| 1e3 * e.body_x_m))
+        .column("z one stage ahead", "mm", stage(|e| 1e3 * e.body_z_m))
+        .column("joints one stage ahead", "rad", stage(|e| e.joints_rad))
         .column("own input: torque R^2 contact", "", |(_, row)| {
             row.2.contact
         })
         .column("torque R^2 flight", "", |(_, row)| row.2.flight)
-        .column("off after a push", "mm", |(_, row)| row.3.map(millimetres))
+        .column("off after a push", "mm", |(_, row)| row.3.map(|m| 1e3 * m))
         .table()
 }
 
@@ -194,12 +188,20 @@ fn driven(metrics: &ControlMetrics) -> [Driven<'_>; 5] {
     ]
 }
 
+fn of_runs(runs: &[NamedRun], fault: impl Fn(&Run) -> Option<String>) -> Vec<String> {
+    let faults = runs
+        .iter()
+        .filter_map(|(path, run)| Some((path, fault(run)?)));
+    let lines = faults.map(|(path, fault)| format!("{}: {fault}", file_name(path)));
+    lines.collect()
+}
+
 pub(crate) fn failures(runs: &[NamedRun]) -> Vec<String> {
-    let failed = runs.iter().filter_map(|(path, run)| {
-        let failure = run.metrics.as_ref()?.failure.as_ref()?;
-        Some(format!("{}: {failure}", file_name(path)))
-    });
-    failed.collect()
+    of_runs(runs, |run| run.metrics.as_ref()?.failure.clone())
+}
+
+pub(crate) fn failed_runs(runs: &[NamedRun]) -> Vec<String> {
+    of_runs(runs, Run::failure)
 }
 
 pub(crate) fn verdict_table(verdict: &Verdict) -> Table {
@@ -233,28 +235,20 @@ pub(crate) fn verdict_table(verdict: &Verdict) -> Table {
 
 /// A verdict as lines of text: fit for what, every counted row that fails, every other that is worse than its baseline.
 pub(crate) fn verdict_lines(verdict: &Verdict) -> String {
-    let mut text = format!("verdict: {}\n", headline(verdict, false));
-    for row in &verdict.rows {
-        match (row.passed, row.counts) {
-            (Some(false), true) => text += &format!("FAILED {}: {}\n", row.of, row.words()),
-            (Some(false), false) => {
-                let name = row.baseline_name;
-                text += &format!("worse than {name}, does not count: {}\n", row.words());
-            }
-            (Some(true) | None, _) => {}
+    let failed = verdict.rows.iter().filter(|row| row.passed == Some(false));
+    let lines = failed.map(|row| match row.counts {
+        true => format!("FAILED {}: {}\n", row.of, row.words()),
+        false => {
+            let (name, words) = (row.baseline_name, row.words());
+            format!("worse than {name}, does not count: {words}\n")
         }
-    }
-    text
-}
-
-pub(crate) fn failed_runs(runs: &[NamedRun]) -> Vec<String> {
-    let failed = (runs.iter())
-        .filter_map(|(path, run)| Some(format!("{}: {}", file_name(path), run.failure()?)));
-    failed.collect()
+    });
+    let headline = format!("verdict: {}\n", headline(verdict, false));
+    std::iter::once(headline).chain(lines).collect()
 }
 
 pub(super) fn file_name(path: &Path) -> String {
-    let name = path.file_name().unwrap_or_default();
+    let name = path.file_name().unwrap_or(path.as_os_str());
     name.to_string_lossy().into_owned()
 }
 

@@ -142,7 +142,8 @@ impl LegGeometry {
         [area.abs() / (thigh * calf), lever.abs() / (thigh + calf)]
     }
 
-    pub(super) fn damped_force_map(&self, q: &[f64; 3]) -> Option<Matrix3<f64>> {
+    /// `-J^-T` with levers that are never shorter than [`Self::least_levers`]; none where neither is that short.
+    pub fn damped_force_map(&self, q: &[f64; 3]) -> Option<Matrix3<f64>> {
         match self {
             LegGeometry::Planar(leg) => leg.damped_force_map(q),
             LegGeometry::Chain(leg) => leg.damped_force_map(q),

@@ -100,9 +100,6 @@ impl InputRule {
     /// at a state `x` (joint angles and attitude count), by the feet in contact.
     ///
     /// Near a singularity of a leg its force is damped, see [`Robot::damped_force_map`].
-    ///
-    /// # Errors
-    /// [`RobotError::NotFinite`] for NaN or infinite arguments of a leg in contact.
     pub fn wrench(
         &self,
         x: &[f64; STATE_DIM],

@@ -62,9 +62,6 @@ impl Robot {
     /// shorter than [`LEAST_SPAN`](super::kinematics::LEAST_SPAN) thigh calf over the distance of the
     /// foot and [`LEAST_HEIGHT`](super::kinematics::LEAST_HEIGHT) (thigh + calf), on a Go1 some 3 and
     /// 5 cm; everywhere else the matrix is the exact one.
-    ///
-    /// # Errors
-    /// [`RobotError::NotFinite`] for NaN or infinite joint angles.
     pub fn damped_force_map(&self, leg: Leg, q: &[f64; 3]) -> Result<Matrix3<f64>, RobotError> {
         self.require_finite(leg, "joint angle", q)?;
         match self.geometry(leg).damped_force_map(q) {
@@ -109,7 +106,7 @@ impl Robot {
 
     /// The 6 x 12 matrix `G` of `[F_lin; F_ang] = G tau` at a posture and contact, by the arms of a frame, in axes
     /// parallel to the body's; columns of legs in the air are zero.
-    pub fn map_by_arms(
+    pub(super) fn map_by_arms(
         &self,
         frame: WrenchFrame,
         joints: &[f64; JOINT_DIM],

@@ -34,19 +34,21 @@ impl std::iter::Sum for BeforeAfter {
     }
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum ChangeKind {
     Dropped,
     Constant,
     /// A straight line took its place: multiples of variables, perhaps with a constant.
     Linear,
-    Rounded {
-        digits: usize,
-    },
+    Rounded,
 }
 
+/// A coefficient before and after a change.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Effect {
+    #[serde(skip)]
+    pub(super) row: usize,
     pub term: String,
     pub before: f64,
     pub after: f64,
@@ -54,12 +56,11 @@ pub struct Effect {
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Change {
-    #[serde(flatten, serialize_with = "kind")]
     pub kind: ChangeKind,
-    pub term: String,
-    pub before: f64,
-    /// And after it; zero unless the change is a rounding.
-    pub after: f64,
+    /// Significant digits of a rounding.
+    pub digits: Option<usize>,
+    #[serde(flatten)]
+    pub own: Effect,
     /// Coefficients that took over.
     #[serde(rename = "others")]
     pub effects: Vec<Effect>,
@@ -68,6 +69,13 @@ pub struct Change {
     pub bound: Interval,
     /// The same at the recorded samples.
     pub measured: Option<Measured>,
+}
+
+impl Change {
+    /// The coefficients that it changes, its own first.
+    pub fn coefficients(&self) -> impl Iterator<Item = &Effect> {
+        std::iter::once(&self.own).chain(&self.effects)
+    }
 }
 
 /// One equation of one phase; all errors in scaled units per second squared.
@@ -133,28 +141,27 @@ pub struct Certificate {
 impl Certificate {
     /// All equations with the names of their phases.
     pub fn equations(&self) -> impl Iterator<Item = (&str, &EquationCertificate)> {
-        (self.phases.iter())
-            .flat_map(|phase| phase.equations.iter().map(|e| (phase.name.as_str(), e)))
+        let phases = self.phases.iter();
+        phases.flat_map(|phase| phase.equations.iter().map(|e| (phase.name.as_str(), e)))
+    }
+
+    fn sum(&self, count: impl Fn(&EquationCertificate) -> BeforeAfter) -> BeforeAfter {
+        self.equations().map(|(_, equation)| count(equation)).sum()
     }
 
     /// Number of changes.
     pub fn n_changes(&self) -> usize {
-        self.equations()
-            .map(|(_, equation)| equation.changes.len())
-            .sum()
+        self.equations().map(|(_, e)| e.changes.len()).sum()
     }
 
-    /// Active terms, all phases together.
     pub(crate) fn terms(&self) -> BeforeAfter {
-        self.equations().map(|(_, equation)| equation.terms).sum()
+        self.sum(|equation| equation.terms)
     }
 
-    /// Significant decimal digits of all coefficients, added up.
     pub(crate) fn digits(&self) -> BeforeAfter {
-        self.equations().map(|(_, equation)| equation.digits).sum()
+        self.sum(|equation| equation.digits)
     }
 
-    /// Operations of the straight-line code of `ddz`, all phases together.
     pub(crate) fn operations(&self) -> BeforeAfter {
         self.phases.iter().map(|phase| phase.operations).sum()
     }
@@ -218,15 +225,4 @@ fn ranges<S: Serializer>(
         return to.serialize_none();
     };
     to.collect_map((ranges.iter()).map(|(name, range)| (name, [range.lo(), range.hi()])))
-}
-
-/// The kind of a change, with the digits of a rounding.
-fn kind<S: Serializer>(kind: &ChangeKind, to: S) -> Result<S::Ok, S::Error> {
-    let (kind, digits) = match kind {
-        ChangeKind::Dropped => ("dropped", None),
-        ChangeKind::Constant => ("constant", None),
-        ChangeKind::Linear => ("linear", None),
-        ChangeKind::Rounded { digits } => ("rounded", Some(digits)),
-    };
-    json!({ "kind": kind, "digits": digits }).serialize(to)
 }

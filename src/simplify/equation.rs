@@ -3,7 +3,7 @@
 //! Each change is made to the equation as the changes before it left it, and its error is enclosed
 //! over the box. The errors add, as intervals, to what all changes together may cost.
 
-use super::certificate::ChangeKind;
+use super::certificate::{Change, ChangeKind, Effect};
 use super::ranges::Ranges;
 use super::workspace::{Workspace, has_function};
 use crate::symbolic::Interval;
@@ -14,7 +14,6 @@ const REMOVAL_SHARE: f64 = 0.75;
 /// A coefficient of this many significant digits reads back as itself.
 const MAX_DIGITS: usize = 17;
 
-/// Terms of more variables than this are not made linear.
 const MAX_LINEAR_SYMBOLS: usize = 4;
 /// A constant or slope that would lower the error by less than this share is left out.
 const WORTHWHILE: f64 = 0.05;
@@ -24,30 +23,15 @@ pub(super) fn is_same_decimal(before: f64, after: f64) -> bool {
     (before - after).abs() <= 2.0 * f64::EPSILON * before.abs()
 }
 
-/// One change, by rows of the extended library.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Step {
-    pub kind: ChangeKind,
-    pub row: usize,
-    pub before: f64,
-    pub after: f64,
-    /// Other coefficients that it changed: row, before, after.
-    pub effects: Vec<(usize, f64, f64)>,
-    /// All values of the equation before minus the equation after.
-    pub bound: Interval,
-}
-
 /// A replacement of a term `theta`: `theta = sum r_k theta_k + error`.
 #[derive(Clone, Debug, PartialEq)]
 struct Rewrite {
     kind: ChangeKind,
     /// Rows and factors `r_k`.
     parts: Vec<(usize, f64)>,
-    /// All values of the error over the box.
     error: Interval,
 }
 
-/// Terms of one phase, and what may replace them over its box.
 #[derive(Debug)]
 pub(super) struct Terms<'a> {
     workspace: &'a Workspace,
@@ -62,6 +46,16 @@ impl<'a> Terms<'a> {
             workspace,
             ranges,
             known,
+        }
+    }
+
+    fn effect(&self, row: usize, before: f64, after: f64) -> Effect {
+        let term = self.workspace.text(row).to_owned();
+        Effect {
+            row,
+            term,
+            before,
+            after,
         }
     }
 
@@ -158,7 +152,7 @@ impl<'a> Terms<'a> {
 #[derive(Clone, Debug)]
 pub(super) struct Equation {
     pub xi: Vec<f64>,
-    pub steps: Vec<Step>,
+    pub changes: Vec<Change>,
     /// Encloses the original equation minus the present one.
     pub spent: Interval,
     /// The row whose coefficient is known, which keeps its value.
@@ -169,13 +163,12 @@ impl Equation {
     pub(crate) fn new(xi: Vec<f64>, known: Option<usize>) -> Self {
         Self {
             xi,
-            steps: Vec::new(),
+            changes: Vec::new(),
             spent: Interval::point(0.0),
             known,
         }
     }
 
-    /// Simplifies an equation so that the sum of its changes' errors stays within `allowed`.
     pub(crate) fn simplified(mut self, terms: &mut Terms<'_>, allowed: f64) -> Self {
         self.remove_terms(terms, REMOVAL_SHARE * allowed);
         self.fold_functions(terms, REMOVAL_SHARE * allowed);
@@ -207,18 +200,18 @@ impl Equation {
             }
             let Some((_, row, choice)) = best else { return };
             let rewrite = terms.rewrites(row)[choice].clone();
-            let step = self.step(terms, row, &rewrite);
-            if !self.fits(&step, allowed) {
+            let change = self.change(terms, row, &rewrite);
+            if !self.fits(&change, allowed) {
                 return;
             }
-            self.make(step);
+            self.make(change);
         }
     }
 
     /// Replaces terms that call functions by the simplest form that fits, the cheapest first.
     fn fold_functions(&mut self, terms: &mut Terms<'_>, allowed: f64) {
         loop {
-            let mut best: Option<Step> = None;
+            let mut best: Option<Change> = None;
             for row in self.active() {
                 let expr = terms.ranges.expr(row);
                 if !has_function(terms.ranges.pool(), expr) {
@@ -226,46 +219,45 @@ impl Equation {
                 }
                 let rewrites = terms.rewrites(row).to_vec();
                 let open = rewrites.iter().filter(|r| self.keeps_known(row, r));
-                let mut steps = open.map(|rewrite| self.step(terms, row, rewrite));
-                let Some(step) = steps.find(|step| self.fits(step, allowed)) else {
+                let mut changes = open.map(|rewrite| self.change(terms, row, rewrite));
+                let Some(change) = changes.find(|change| self.fits(change, allowed)) else {
                     continue;
                 };
-                let is_cheaper = |best: &Step| step.bound.magnitude() < best.bound.magnitude();
-                if best.as_ref().is_none_or(is_cheaper) {
-                    best = Some(step);
+                let size = change.bound.magnitude();
+                if (best.as_ref()).is_none_or(|best| size < best.bound.magnitude()) {
+                    best = Some(change);
                 }
             }
-            let Some(step) = best else { return };
-            self.make(step);
+            let Some(change) = best else { return };
+            self.make(change);
         }
     }
 
     /// Rounds coefficients: what costs least goes first, one digit after another, as long as all
     /// together fit.
     fn round(&mut self, terms: &mut Terms<'_>, allowed: f64) {
-        let mut chosen: Vec<Option<Step>> = vec![None; self.xi.len()];
+        let mut chosen: Vec<Option<Change>> = vec![None; self.xi.len()];
         // sums of floats select candidates; accepted changes are checked with intervals
         let (mut lo, mut hi) = (self.spent.lo(), self.spent.hi());
-        for step in self.roundings(terms) {
-            let place = &mut chosen[step.row];
-            let former = (place.as_ref()).map_or((0.0, 0.0), |s| (s.bound.lo(), s.bound.hi()));
-            let new_lo = lo - former.0 + step.bound.lo();
-            let new_hi = hi - former.1 + step.bound.hi();
+        for change in self.roundings(terms) {
+            let place = &mut chosen[change.own.row];
+            let former = (place.as_ref()).map_or((0.0, 0.0), |c| (c.bound.lo(), c.bound.hi()));
+            let new_lo = lo - former.0 + change.bound.lo();
+            let new_hi = hi - former.1 + change.bound.hi();
             if new_hi.max(-new_lo) <= allowed {
                 (lo, hi) = (new_lo, new_hi);
-                *place = Some(step);
+                *place = Some(change);
             }
         }
-        for step in chosen.into_iter().flatten() {
-            if self.fits(&step, allowed) {
-                self.make(step);
+        for change in chosen.into_iter().flatten() {
+            if self.fits(&change, allowed) {
+                self.make(change);
             }
         }
     }
 
-    /// Every rounding of every coefficient, the smallest error first.
-    fn roundings(&self, terms: &mut Terms<'_>) -> Vec<Step> {
-        let mut steps = Vec::new();
+    fn roundings(&self, terms: &mut Terms<'_>) -> Vec<Change> {
+        let mut changes: Vec<Change> = Vec::new();
         for row in self.active() {
             let range = terms.ranges.term(row);
             if range.is_empty() || !range.magnitude().is_finite() {
@@ -280,30 +272,29 @@ impl Equation {
                 }
                 if after == last {
                     // fewer digits write the same number
-                    if let Some(Step { kind, row: of, .. }) = steps.last_mut()
-                        && *of == row
-                    {
-                        *kind = ChangeKind::Rounded { digits };
+                    let same = changes.last_mut().filter(|change| change.own.row == row);
+                    if let Some(change) = same {
+                        change.digits = Some(digits);
                     }
                     continue;
                 }
                 last = after;
-                steps.push(Step {
-                    kind: ChangeKind::Rounded { digits },
-                    row,
-                    before,
-                    after,
+                changes.push(Change {
+                    kind: ChangeKind::Rounded,
+                    digits: Some(digits),
+                    own: terms.effect(row, before, after),
                     effects: Vec::new(),
+                    measured: None,
                     bound: (Interval::point(before) - Interval::point(after)) * range,
                 });
             }
         }
-        steps.sort_by(|a, b| a.bound.magnitude().total_cmp(&b.bound.magnitude()));
-        steps
+        changes.sort_by(|a, b| a.bound.magnitude().total_cmp(&b.bound.magnitude()));
+        changes
     }
 
     /// The change that `rewrite` makes to the term in `row`.
-    fn step(&self, terms: &mut Terms<'_>, row: usize, rewrite: &Rewrite) -> Step {
+    fn change(&self, terms: &mut Terms<'_>, row: usize, rewrite: &Rewrite) -> Change {
         let before = self.xi[row];
         let mut bound = Interval::point(before) * rewrite.error;
         let mut effects = Vec::new();
@@ -313,36 +304,34 @@ impl Equation {
             let exact = Interval::point(before) * Interval::point(factor);
             let rounding = exact - (Interval::point(new) - Interval::point(old));
             bound = bound + rounding * terms.ranges.term(part);
-            effects.push((part, old, new));
+            effects.push(terms.effect(part, old, new));
         }
-        Step {
+        Change {
             kind: rewrite.kind,
-            row,
-            before,
-            after: 0.0,
+            digits: None,
+            own: terms.effect(row, before, 0.0),
             effects,
             bound,
+            measured: None,
         }
     }
 
-    /// Whether a rewriting of the term in `row` leaves the known coefficient alone.
     fn keeps_known(&self, row: usize, rewrite: &Rewrite) -> bool {
         let mut rows = rewrite.parts.iter().map(|&(part, _)| part);
         self.known
             .is_none_or(|known| known != row && rows.all(|part| part != known))
     }
 
-    fn fits(&self, step: &Step, allowed: f64) -> bool {
-        let is_finite = step.effects.iter().all(|(_, _, after)| after.is_finite());
-        is_finite && (self.spent + step.bound).magnitude() <= allowed
+    fn fits(&self, change: &Change, allowed: f64) -> bool {
+        let is_finite = change.effects.iter().all(|effect| effect.after.is_finite());
+        is_finite && (self.spent + change.bound).magnitude() <= allowed
     }
 
-    fn make(&mut self, step: Step) {
-        self.xi[step.row] = step.after;
-        for &(row, _, after) in &step.effects {
-            self.xi[row] = after;
+    fn make(&mut self, change: Change) {
+        for effect in change.coefficients() {
+            self.xi[effect.row] = effect.after;
         }
-        self.spent = self.spent + step.bound;
-        self.steps.push(step);
+        self.spent = self.spent + change.bound;
+        self.changes.push(change);
     }
 }

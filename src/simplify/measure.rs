@@ -3,8 +3,7 @@
 use nalgebra::DMatrix;
 use serde::Serialize;
 
-use super::domain::{Domain, Samples};
-use super::error::SimplifyError;
+use super::domain::{Domain, Samples, SimplifyError};
 use super::ranges::Ranges;
 use super::workspace::Workspace;
 use crate::equations::Equations;
@@ -19,7 +18,6 @@ pub struct Measured {
 }
 
 impl Measured {
-    /// Of these errors; `None` without any.
     pub(crate) fn of(errors: impl IntoIterator<Item = f64>) -> Option<Self> {
         let (mut count, mut square, mut max) = (0usize, 0.0, 0.0f64);
         for error in errors {
@@ -39,7 +37,6 @@ impl Measured {
 pub(super) struct Differences(pub Vec<(usize, f64, f64)>);
 
 impl Differences {
-    /// The rows in which two equations differ.
     pub(crate) fn between(before: &[f64], after: &[f64]) -> Self {
         let rows = before.iter().zip(after).enumerate();
         let rows = rows.map(|(row, (&before, &after))| (row, before, after));
@@ -55,7 +52,6 @@ impl Differences {
         ranges.combination(&parts.collect::<Vec<_>>())
     }
 
-    /// The same at samples; `theta` has one row per sample and one column per term.
     pub(crate) fn measured(&self, theta: &DMatrix<f64>) -> Option<Measured> {
         let at = |sample: usize| -> f64 {
             let parts = self.0.iter();
@@ -112,29 +108,4 @@ pub(crate) fn printed(
         }
     }
     Ok(all)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::model::{FeetRule, Library, Phase, ReducedModel};
-
-    #[test]
-    fn printing_error_is_bounded_by_what_was_cut_off() {
-        let library = Library::from_terms(1, &["z1", "u1"].map(str::to_owned)).unwrap();
-        let phase = Phase {
-            name: "contact".to_owned(),
-            feet: FeetRule::Any,
-            xi: DMatrix::from_column_slice(2, 1, &[0.126, 1.0]),
-        };
-        let model = ReducedModel::builder("single", library)
-            .phase(phase)
-            .build()
-            .unwrap();
-        let domain = Domain::new(&model, vec![Some(vec![Interval::new(-2.0, 1.0); 3])]).unwrap();
-        let rounding = Rounding::Decimals(2);
-        let printed = printed(&Equations::of(&model), &domain, None, rounding).unwrap();
-        let bound = printed[0].bound.expect("has a box");
-        assert!((bound.magnitude() - 0.008).abs() < 1e-12, "{bound}");
-    }
 }

@@ -38,7 +38,6 @@
 mod certificate;
 mod domain;
 mod equation;
-mod error;
 mod measure;
 mod ranges;
 mod rollouts;
@@ -48,8 +47,7 @@ mod tolerance;
 mod workspace;
 
 pub use certificate::{Certificate, certificate_json};
-pub use domain::{Domain, MARGIN, Samples};
-pub use error::SimplifyError;
+pub use domain::{Domain, MARGIN, Samples, SimplifyError};
 pub use measure::PrintedEquation;
 pub(crate) use measure::printed;
 pub use rollouts::RolloutEffect;

@@ -102,7 +102,6 @@ impl RolloutBasis<'_> {
     }
 }
 
-/// Index, name and unit of the robot's body coordinates.
 fn body(model: &ReducedModel) -> impl Iterator<Item = (usize, String, String)> + '_ {
     let signals = model.state().into_iter();
     signals
@@ -111,7 +110,6 @@ fn body(model: &ReducedModel) -> impl Iterator<Item = (usize, String, String)> +
         .map(|(index, (name, unit))| (index, name.clone(), unit.clone()))
 }
 
-/// The effect on rollouts; keys are the coordinates' names.
 pub(crate) fn rollouts_json(effect: &RolloutEffect) -> Value {
     let of = |errors: &RolloutErrors| -> Map<String, Value> {
         let named = effect.names.iter().zip(&errors.rms);

@@ -5,12 +5,9 @@ use std::collections::BTreeSet;
 use nalgebra::DMatrix;
 use serde_json::{Value, json};
 
-use super::certificate::{
-    BeforeAfter, Certificate, Change, Effect, EquationCertificate, PhaseCertificate,
-};
-use super::domain::{Domain, Samples, check_count};
-use super::equation::{Equation, Step, Terms, is_same_decimal};
-use super::error::SimplifyError;
+use super::certificate::{BeforeAfter, Certificate, EquationCertificate, PhaseCertificate};
+use super::domain::{Domain, Samples, SimplifyError, check_count};
+use super::equation::{Equation, Terms, is_same_decimal};
 use super::measure::Differences;
 use super::tolerance::Tolerance;
 use super::workspace::Workspace;
@@ -123,12 +120,6 @@ fn provenance_of(model: &ReducedModel, certificate: &Certificate) -> Value {
     entry
 }
 
-/// `-g` in the scaled units of a model with a robot's coordinates: what is known of free fall before any learning.
-fn gravity(model: &ReducedModel) -> Option<f64> {
-    let factors = model.state_factors().ok()?;
-    Some(-GRAVITY_M_S2 * factors[BODY_Z])
-}
-
 struct PhaseProblem<'a> {
     name: &'a str,
     workspace: &'a Workspace,
@@ -136,7 +127,7 @@ struct PhaseProblem<'a> {
     domain: Option<&'a [Interval]>,
     /// A row a sample in the box, a column a term.
     theta: DMatrix<f64>,
-    /// `-g` in the model's units, where it goes between these and those of the robot.
+    /// `-g` in the scaled units of a model with a robot's coordinates: known before any learning.
     gravity: Option<f64>,
     samples_outside: usize,
 }
@@ -150,6 +141,7 @@ impl<'a> PhaseProblem<'a> {
         phase: usize,
     ) -> Result<Self, SimplifyError> {
         let theta = domain.theta(phase, samples, workspace.library())?;
+        let factors = equations.model().state_factors();
         let recorded = samples.map_or(0, |samples| samples.phases[phase].ncols());
         Ok(Self {
             name: &equations.phases()[phase].name,
@@ -158,21 +150,17 @@ impl<'a> PhaseProblem<'a> {
             domain: domain.phase(phase),
             samples_outside: recorded - theta.nrows(),
             theta,
-            gravity: gravity(equations.model()),
+            gravity: factors.ok().map(|factors| -GRAVITY_M_S2 * factors[BODY_Z]),
         })
     }
 
     /// The equation as it is; known is the constant that is gravity.
     fn equation(&self, output: usize) -> Equation {
         let is_gravity = |row: &usize| {
-            let coefficient = self.xi[(*row, output)];
-            self.gravity
-                .is_some_and(|gravity| is_same_decimal(gravity, coefficient))
+            (self.gravity).is_some_and(|gravity| is_same_decimal(gravity, self.xi[(*row, output)]))
         };
-        Equation::new(
-            self.coefficients(output),
-            self.workspace.constant().filter(is_gravity),
-        )
+        let known = self.workspace.constant().filter(is_gravity);
+        Equation::new(self.coefficients(output), known)
     }
 
     fn solve(
@@ -193,7 +181,7 @@ impl<'a> PhaseProblem<'a> {
                 Some(_) | None => (self.equation(output), Interval::point(0.0)),
             };
             xi.set_column(output, &nalgebra::DVector::from_column_slice(&equation.xi));
-            equations.push(self.certified(output, &equation, bound, allowed, rms)?);
+            equations.push(self.certified(output, equation, bound, allowed, rms)?);
         }
         let certificate = PhaseCertificate {
             name: self.name.to_owned(),
@@ -241,7 +229,7 @@ impl<'a> PhaseProblem<'a> {
     fn certified(
         &self,
         output: usize,
-        equation: &Equation,
+        mut equation: Equation,
         bound: Interval,
         allowed: f64,
         rms: Option<f64>,
@@ -263,6 +251,10 @@ impl<'a> PhaseProblem<'a> {
                 });
             }
         }
+        for change in &mut equation.changes {
+            let effects = change.coefficients().map(|e| (e.row, e.before, e.after));
+            change.measured = Differences(effects.collect()).measured(&self.theta);
+        }
         let active = |xi: &[f64]| xi.iter().filter(|&&coefficient| coefficient != 0.0).count();
         let counts = |of: &dyn Fn(&[f64]) -> usize| BeforeAfter {
             before: of(&before),
@@ -277,28 +269,8 @@ impl<'a> PhaseProblem<'a> {
             measured,
             terms: counts(&active),
             digits: counts(&digits),
-            changes: equation.steps.iter().map(|s| self.change(s)).collect(),
+            changes: equation.changes,
         })
-    }
-
-    fn change(&self, step: &Step) -> Change {
-        let own = (step.row, step.before, step.after);
-        let differences = std::iter::once(own).chain(step.effects.iter().copied());
-        let differences = Differences(differences.collect());
-        let effect = |&(row, before, after): &(usize, f64, f64)| Effect {
-            term: self.workspace.text(row).to_owned(),
-            before,
-            after,
-        };
-        Change {
-            kind: step.kind,
-            term: self.workspace.text(step.row).to_owned(),
-            before: step.before,
-            after: step.after,
-            effects: step.effects.iter().map(effect).collect(),
-            bound: step.bound,
-            measured: differences.measured(&self.theta),
-        }
     }
 }
 
@@ -313,7 +285,6 @@ fn digits(xi: &[f64]) -> usize {
     active.map(of).sum()
 }
 
-/// Operations of the straight-line code of `ddz`.
 fn operations(system: &Equations<'_>, phase: usize) -> Result<usize, SimplifyError> {
     let program: Program = lower::dynamics(system, phase, Form::StraightLine)?;
     let counted = program.statements().iter().enumerate();

@@ -1,6 +1,6 @@
 //! Tables of a certificate and of its effect on rollouts, and both as a page of Markdown.
 
-use std::fmt::Write as _;
+use askama::Template;
 
 use super::certificate::{Certificate, Change, ChangeKind, PhaseCertificate};
 use super::measure::PrintedEquation;
@@ -11,7 +11,6 @@ use crate::model::ReducedModel;
 use crate::symbolic::Interval;
 use crate::typeset::{Cell, Table, rounded_up, significant};
 
-/// Terms, root mean square, allowed, certified and measured error of each equation.
 pub(crate) fn equation_table(certificate: &Certificate) -> Table {
     Table::of(certificate.equations())
         .column("phase, equation", "", |(phase, e)| name(phase, e.output))
@@ -26,7 +25,6 @@ pub(crate) fn equation_table(certificate: &Certificate) -> Table {
         .table()
 }
 
-/// Every change with its bound and its error at the recorded samples.
 pub(crate) fn change_table(certificate: &Certificate) -> Table {
     let changes = certificate.equations().flat_map(|(phase, equation)| {
         let name = name(phase, equation.output);
@@ -35,10 +33,10 @@ pub(crate) fn change_table(certificate: &Certificate) -> Table {
     });
     Table::of(changes)
         .column("phase, equation", "", |(name, _)| name.clone())
-        .column("term", "", |(_, change)| &change.term)
+        .column("term", "", |(_, change)| &change.own.term)
         .column("change", "", |(_, change)| change_words(change))
-        .column("before", "", |(_, change)| change.before.to_string())
-        .column("after", "", |(_, change)| change.after.to_string())
+        .column("before", "", |(_, change)| change.own.before.to_string())
+        .column("after", "", |(_, change)| change.own.after.to_string())
         .column("bound", "", |(_, change)| interval_words(change.bound))
         .column("measured max", "", |(_, c)| c.measured.map(|m| m.max))
         .column("measured rms", "", |(_, c)| c.measured.map(|m| m.rms))
@@ -85,8 +83,10 @@ fn change_words(change: &Change) -> String {
         ChangeKind::Dropped => "dropped".to_owned(),
         ChangeKind::Constant => format!("into the constant ({})", others()),
         ChangeKind::Linear => format!("made linear ({})", others()),
-        ChangeKind::Rounded { digits: 1 } => "rounded to 1 digit".to_owned(),
-        ChangeKind::Rounded { digits } => format!("rounded to {digits} digits"),
+        ChangeKind::Rounded => match change.digits.unwrap_or_default() {
+            1 => "rounded to 1 digit".to_owned(),
+            digits => format!("rounded to {digits} digits"),
+        },
     }
 }
 
@@ -101,7 +101,6 @@ pub(crate) fn bound_words(bound: f64) -> String {
     significant(rounded_up(bound, 4))
 }
 
-/// What phases no longer depend on, a sentence each without its stop.
 pub(crate) fn lost_words(certificate: &Certificate) -> Vec<String> {
     let phases = (certificate.phases.iter()).filter(|phase| !phase.lost.is_empty());
     let sentence = |phase: &PhaseCertificate| {
@@ -117,163 +116,69 @@ pub(crate) fn lost_words(certificate: &Certificate) -> Vec<String> {
 
 /// The certificate of a model and its simplification as a page: totals, changes, effect on rollouts,
 /// what printing rounds, domain.
+#[derive(Template)]
+#[template(path = "simplify/certificate.askama", config = "templates/askama.toml")]
+struct Page<'a> {
+    name: &'a str,
+    digests: [String; 2],
+    certificate: &'a Certificate,
+    rollouts: Option<&'a RolloutEffect>,
+    printed: &'a [PrintedEquation],
+}
+
+/// The certificate of a model and its simplification as a page of Markdown.
 pub fn markdown(
-    [model, simplified]: [&ReducedModel; 2],
+    models: [&ReducedModel; 2],
     certificate: &Certificate,
     rollouts: Option<&RolloutEffect>,
     printed: &[PrintedEquation],
 ) -> String {
-    let mut page = format!("# Simplification of `{}`\n\n", code(model.name()));
-    let digest = |model| artifact::digest(model).short();
-    let (from, to) = (digest(model), digest(simplified));
-    let _ = writeln!(
-        page,
-        "- from the model with digest {from} to the one with digest {to}"
-    );
-    page += &summary(certificate);
-    page += "\n## Statement\n\n";
-    page += STATEMENT;
-    page += "\n## Each equation\n\n";
-    page += &equations(certificate);
-    for text in lost_words(certificate) {
-        let _ = writeln!(page, "\n{}.", code(&text));
-    }
-    if !certificate.exact.is_empty() {
-        page += "\n## Exact steps\n\n";
-        page += EXACT;
-        page += &exact_steps(&certificate.exact);
-    }
-    page += "\n## Each change\n\n";
-    page += &changes(certificate);
-    if let Some(effect) = rollouts {
-        page += "\n## Rollouts over the recordings\n\n";
-        page += &rollout_text(effect);
-    }
-    if !printed.is_empty() {
-        page += "\n## What printing adds\n\n";
-        page += "Printed equations have rounded coefficients. Their `ddz` differs from that of the emitted code by:\n\n";
-        page += &printing_table(printed).markdown();
-    }
-    page += "\n## The domain\n\n";
-    for phase in &certificate.phases {
-        page += &domain(phase);
-    }
-    page
+    let page = Page {
+        name: models[0].name(),
+        digests: models.map(|model| artifact::digest(model).short()),
+        certificate,
+        rollouts,
+        printed,
+    };
+    page.render().expect("a page of numbers and tables") + "\n"
 }
 
-const STATEMENT: &str = "\
-For every phase, every point `(z, dz, u)` of its domain (the last section) and every latent coordinate, `ddz` of the
-model minus `ddz` of the simplified model lies in the interval under *bound*, in exact arithmetic. Intervals are
-computed with outward rounding, from the two models' coefficients and not from the list of changes; *sum of changes*
-adds the bounds of the list and contains the same difference. *Measured* is the difference at the recorded samples in
-the domain: it can never be larger. Nothing is stated about points outside the domain. All errors are in scaled units
-per second squared. The rounding of emitted code comes on top of both models alike: about 1e-16 of its largest summand
-in double precision; in single precision each function states its bound.
-";
-
-const EXACT: &str = "\
-Terms that are together equal to shorter ones, for all arguments. Their coefficients were added or multiplied and
-rounded once; the bounds below are those of the changes made after these steps.
-
-";
-
-fn exact_steps(steps: &[ExactStep]) -> String {
+fn exact_steps(steps: &[ExactStep]) -> Table {
     Table::of(steps)
         .column("step", "", |step| step.to_string())
         .column("as learned", "", |step| ExactStep::sum_words(&step.before))
         .column("simplified", "", |step| ExactStep::sum_words(&step.after))
         .table()
-        .markdown()
 }
 
-fn summary(certificate: &Certificate) -> String {
-    let share = |share: Option<f64>| {
-        share.map_or("not known without recordings".to_owned(), |share| {
-            format!("{} %", bound_words(100.0 * share))
-        })
-    };
-    format!(
-        "- tolerance: {}\n- active terms: {}\n- significant digits of all coefficients together: {}\n\
-         - operations of `ddz` in straight-line code: {}\n- changes: {}\n\
-         - largest bound, as a share of the root mean square of its `ddz`: {}\n\
-         - largest error at a recorded sample, likewise: {}\n",
-        certificate.tolerance.words(),
-        certificate.terms(),
-        certificate.digits(),
-        certificate.operations(),
-        certificate.n_changes(),
-        share(certificate.largest_bound_share()),
-        share(certificate.largest_measured_share()),
-    )
+fn share(share: Option<f64>) -> String {
+    share.map_or("not known without recordings".to_owned(), |share| {
+        format!("{} %", bound_words(100.0 * share))
+    })
 }
 
-fn equations(certificate: &Certificate) -> String {
+fn equations(certificate: &Certificate) -> Table {
     let equations = || certificate.equations().map(|(_, equation)| equation);
     let mut table = equation_table(certificate);
     table.column("bound", "", equations().map(|e| interval_words(e.bound)));
     let sums = equations().map(|e| interval_words(e.sum_of_bounds));
     table.column("sum of changes", "", sums);
-    table.markdown()
+    table
 }
 
-fn changes(certificate: &Certificate) -> String {
-    match certificate.n_changes() {
-        0 => "None.\n".to_owned(),
-        _ => change_table(certificate).markdown(),
-    }
+fn percent(share: &Option<f64>) -> String {
+    format!("{:.1}", share.map_or(0.0, |share| 100.0 * share))
 }
 
-fn rollout_text(effect: &RolloutEffect) -> String {
-    let percent = |share: Option<f64>| share.map_or(0.0, |share| 100.0 * share);
-    format!(
-        "{}\nThe simplified model's rollouts leave the domain, where no bound holds, in {:.1} % of the samples of whole \
-         jumps and {:.1} % of those of restarted ones; {} and {} of them diverged.\n",
-        rollout_table(effect).markdown(),
-        percent(effect.after.outside[0]),
-        percent(effect.after.outside[1]),
-        effect.after.diverged[0],
-        effect.after.diverged[1]
-    )
-}
-
-fn domain(phase: &PhaseCertificate) -> String {
-    let name = code(&phase.name);
-    let Some(ranges) = &phase.domain else {
-        return format!("Phase {name}: none, so its equations were kept.\n\n");
-    };
-    let mut text = format!(
-        "Phase {name}, with {} recorded samples inside",
-        phase.samples
-    );
-    if phase.samples_outside > 0 {
-        let _ = write!(text, " and {} outside", phase.samples_outside);
-    }
-    let table = Table::of(ranges)
+fn domain(ranges: &[(String, Interval)]) -> Table {
+    Table::of(ranges)
         .column("variable", "", |(variable, _)| variable)
         .column("from", "", |(_, range)| range.lo().to_string())
         .column("to", "", |(_, range)| range.hi().to_string())
-        .table();
-    text + ":\n\n" + &table.markdown() + "\n"
+        .table()
 }
 
 /// Text that cannot end a code span.
 fn code(text: &str) -> String {
     text.replace('`', "'")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn printed_interval_contains_the_interval() {
-        assert_eq!(
-            interval_words(Interval::new(-0.00012345678, 0.0)),
-            "[-1.235e-4, 0]"
-        );
-        assert_eq!(
-            interval_words(Interval::new(1.00009, 1.00009)),
-            "[1.000, 1.001]"
-        );
-    }
 }

@@ -63,7 +63,6 @@ impl FromStr for Tolerance {
 }
 
 impl fmt::Display for Tolerance {
-    /// As it is typed.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             // two roundings, of the division and of this product, may leave 0.30000000000000004

@@ -4,19 +4,17 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::DMatrix;
 
-use super::error::SimplifyError;
+use super::domain::SimplifyError;
 use super::ranges::Ranges;
 use crate::equations::Equations;
 use crate::model::{LatentVariable, Library, ModelError, ReducedModel};
 use crate::symbolic::{ExprId, ExprPool, Interval, Node, SymbolId};
 
-/// A library of terms, counted by rows, and the rows of `1` and of variables.
 #[derive(Clone, Debug)]
 pub(super) struct Workspace {
     library: Library,
     /// Number of the equations' own terms; the others are appended.
     original: usize,
-    /// The rows of variables, and of the constant under none.
     rows: BTreeMap<Option<SymbolId>, usize>,
 }
 
@@ -115,26 +113,22 @@ impl Workspace {
     }
 }
 
+/// The rows of variables, and of the constant under none.
 fn rows(library: &Library) -> BTreeMap<Option<SymbolId>, usize> {
-    let mut pool = library.pool().clone();
-    let mut exprs = vec![(None, pool.number(1.0))];
-    let variables = LatentVariable::all(library.latent_dim());
-    let symbols = variables.filter_map(|variable| library.symbol(variable));
-    exprs.extend(symbols.map(|symbol| (Some(symbol), pool.symbol_expr(symbol))));
+    let of = |expr| match library.pool().as_symbol(expr) {
+        None if expr == ExprId::ONE => Some(None),
+        symbol => symbol.map(Some),
+    };
     let terms = library.terms().iter().enumerate();
-    let rows: BTreeMap<ExprId, usize> = terms.map(|(row, term)| (term.expr(), row)).collect();
-    let row = |(of, expr)| Some((of, *rows.get(&expr)?));
-    exprs.into_iter().filter_map(row).collect()
+    terms
+        .filter_map(|(row, term)| Some((of(term.expr())?, row)))
+        .collect()
 }
 
-/// Texts of the terms that rewriting may need.
 fn wanted(equations: &Equations<'_>) -> Vec<String> {
     let pool = equations.pool();
-    let summands = equations
-        .phases()
-        .iter()
-        .flat_map(|phase| &phase.ddz)
-        .flatten();
+    let phases = equations.phases().iter();
+    let summands = phases.flat_map(|phase| &phase.ddz).flatten();
     let active: BTreeSet<usize> = summands.map(|summand| summand.term).collect();
     let mut texts = vec!["1".to_owned()];
     for term in active.into_iter().map(|term| &equations.terms()[term]) {
@@ -154,10 +148,7 @@ fn wanted(equations: &Equations<'_>) -> Vec<String> {
 pub(super) fn has_function(pool: &ExprPool, expr: ExprId) -> bool {
     (pool.reachable(&[expr]).into_iter()).any(|part| match pool.node(part) {
         Node::Apply(_, _) => true,
-        Node::Power(_, exponent) => pool
-            .as_number(*exponent)
-            .and_then(|n| n.as_integer())
-            .is_none(),
+        Node::Power(_, exponent) => pool.as_integer(*exponent).is_none(),
         Node::Number(_) | Node::Symbol(_) | Node::Sum(_) | Node::Product(_) => false,
     })
 }

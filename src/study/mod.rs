@@ -6,15 +6,11 @@
 
 pub(crate) mod plan;
 
-mod cell;
-mod error;
 mod run;
 mod store;
 mod summary;
 
-pub(crate) use cell::{Cell, Outcome};
-pub(crate) use error::StudyError;
-pub(crate) use plan::{CellId, FOLDS, Plan, Shard};
+pub(crate) use plan::{CellId, FOLDS, Plan, Shard, StudyError};
 pub(crate) use run::run;
 pub(crate) use store::Store;
-pub(crate) use summary::{DimensionSummary, Spread, Summary, cell_table};
+pub(crate) use summary::{Cell, DimensionSummary, Outcome, Spread, Summary, cell_table};

@@ -1,8 +1,10 @@
 //! Which trainings a study consists of.
 
+use std::io;
+use std::path::PathBuf;
+
 use serde::{Deserialize, Serialize};
 
-use super::error::StudyError;
 use crate::limits::table::SEEDS;
 use crate::robot::STATE_DIM;
 use crate::train::Method;
@@ -89,6 +91,34 @@ impl Shard {
         let own = cells.iter().skip(self.index - 1).step_by(self.count);
         own.copied().collect()
     }
+}
+
+#[derive(Debug, thiserror::Error)]
+pub enum StudyError {
+    #[error("{found}, expected {expected}")]
+    Range {
+        found: String,
+        expected: &'static str,
+    },
+    #[error(transparent)]
+    Seeds(#[from] crate::limits::OutOfRange),
+    #[error(
+        "{path}: belongs to another study ({difference} differ); choose another folder, or repeat the command that made it"
+    )]
+    OtherStudy {
+        path: PathBuf,
+        difference: &'static str,
+    },
+    #[error("{path}: {message}")]
+    Broken { path: PathBuf, message: String },
+    #[error("{first} and {second} are the same training with different results")]
+    Contradiction { first: PathBuf, second: PathBuf },
+    #[error("{path}: cannot {action}")]
+    File {
+        path: PathBuf,
+        action: &'static str,
+        source: io::Error,
+    },
 }
 
 #[cfg(test)]

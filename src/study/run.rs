@@ -2,10 +2,9 @@
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-use super::cell::{Cell, Metrics, Outcome};
-use super::error::StudyError;
-use super::plan::{CellId, FOLDS, Shard};
+use super::plan::{CellId, FOLDS, Shard, StudyError};
 use super::store::Store;
+use super::summary::{Cell, Metrics, Outcome};
 use crate::recording::Recording;
 use crate::robot::Robot;
 use crate::train::{Method, Monitor, Origin, Recordings, TrainError, TrainOptions, Trained};

@@ -7,9 +7,8 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use super::cell::Cell;
-use super::error::StudyError;
-use super::plan::{CellId, Plan};
+use super::plan::{CellId, Plan, StudyError};
+use super::summary::Cell;
 use crate::files::size::{Format, read_text_capped};
 use crate::files::{Overwrite, write_whole};
 
@@ -160,8 +159,8 @@ fn refused(path: &Path, action: &'static str) -> impl Fn(io::Error) -> StudyErro
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::study::cell::Outcome;
     use crate::study::plan::tests::plan;
+    use crate::study::summary::Outcome;
 
     fn store(folder: &tempfile::TempDir, name: &str, plan: Plan) -> Result<Store, StudyError> {
         Store::create(&folder.path().join(name), plan)

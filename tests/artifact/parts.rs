@@ -1,12 +1,13 @@
 //! Parts of a model: activations, layers, libraries and their orders, names; ranges of settings.
 
 use nalgebra::{DMatrix, DVector};
-use romc::limits::Range;
+use romc::limits::{Range, table};
 use romc::model::{
-    Activation, AffineMap, CandidateTerm, CoordinateOrder, FeetRule, Identifier, LatentVariable,
-    Layer, Library, LibraryOrder, MAX_LAYER_WIDTH, MAX_LAYERS, ModelError, StandardLibrary,
-    StateMap,
+    Activation, AffineMap, CandidateTerm, CoordinateOrder, FeetRule, Identifier, InputGivenState,
+    LatentVariable, Layer, Library, LibraryOrder, MAX_LAYER_WIDTH, MAX_LAYERS, ModelError,
+    StandardLibrary, StateMap,
 };
+use romc::robot::STATE_DIM;
 use romc::symbolic::{ExprId, ParseErrorKind, SymbolId};
 
 #[test]
@@ -38,14 +39,10 @@ fn activations_of_large_arguments_stay_finite_and_those_of_nan_are_nan() {
 #[test]
 fn names_are_read_back_and_others_refused() {
     for phi in Activation::ALL {
-        assert_eq!(phi.to_string().parse(), Ok(phi));
+        let name = serde_json::Value::from(phi.to_string());
+        assert_eq!(serde_json::from_value::<Activation>(name).ok(), Some(phi));
     }
-    let refused = "selu".parse::<Activation>().unwrap_err();
-    assert!(
-        refused
-            .to_string()
-            .contains("linear, elu, tanh, sigmoid, relu")
-    );
+    assert!(serde_json::from_str::<Activation>("\"selu\"").is_err());
 }
 
 #[test]
@@ -488,6 +485,12 @@ fn variable_names_are_read_and_written_alike() {
 }
 
 #[test]
+fn ranges_are_those_that_the_rooms_keep_themselves() {
+    assert_eq!(table::LATENT_DIM.most as usize, STATE_DIM);
+    assert_eq!(table::LAYER_WIDTH.most as usize, MAX_LAYER_WIDTH);
+}
+
+#[test]
 fn ends_are_inside_and_what_lies_beyond_is_not() {
     const COUNT: Range = Range::whole("count", 1, 500);
     const SHARE: Range = Range::above("share", 0.0, 1.0);
@@ -527,4 +530,48 @@ fn rule_of_all_foot_patterns_matches_each() {
     assert!(always.matches([false; 4]) && always.matches([true, false, false, true]));
     assert!(always.is_always() && always.to_string() == "always");
     assert!(!FeetRule::Patterns(vec![[true; 4]]).matches([false; 4]));
+}
+
+/// Inputs `u = 2 + 3 z2 - dz1 + e`, where `e` is 1 and -1 in turn.
+fn inputs_and_states(n: usize) -> (DMatrix<f64>, DMatrix<f64>) {
+    let wave = |k: usize, rate: f64| (rate * k as f64).sin();
+    let variables = DMatrix::from_fn(n, 6, |k, column| {
+        let state = [wave(k, 0.9), wave(k, 1.7), wave(k, 2.3), wave(k, 2.9)];
+        let sign = if k % 2 == 0 { 1.0 } else { -1.0 };
+        match column {
+            4 => 2.0 + 3.0 * state[1] - state[2] + sign,
+            5 => 0.0,
+            _ => state[column],
+        }
+    });
+    (
+        variables,
+        DMatrix::from_fn(n, 2, |_, column| [0.5, 0.0][column]),
+    )
+}
+
+#[test]
+fn states_explain_the_inputs_that_depend_on_them() {
+    let n = 4000;
+    let (variables, left) = inputs_and_states(n);
+    let shifts = DMatrix::from_row_slice(2, 1, &[1.0, 0.0]);
+    let given = InputGivenState::of_samples(&shifts, variables, &left).expect("enough samples");
+    let expected = [2.0, 0.0, 3.0, -1.0, 0.0];
+    for (found, expected) in given.mean.row(0).iter().zip(expected) {
+        assert!((found - expected).abs() < 0.05, "{}", given.mean);
+    }
+    assert_eq!(given.mean[(0, 1)], 0.0);
+    assert!(given.mean.row(1).amax() < 1e-12);
+    assert!(
+        (given.covariance[(0, 0)] - 1.0).abs() < 0.05,
+        "{}",
+        given.covariance
+    );
+    assert!((given.acceleration_error[(0, 0)] - 0.25).abs() < 1e-12);
+}
+
+#[test]
+fn few_samples_say_nothing() {
+    let (variables, left) = inputs_and_states(19);
+    assert!(InputGivenState::of_samples(&DMatrix::zeros(2, 0), variables, &left).is_none());
 }

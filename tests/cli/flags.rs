@@ -6,7 +6,7 @@ use clap::error::ErrorKind;
 use clap::{CommandFactory as _, Parser as _};
 
 use romc::Error;
-use romc::cli::args::{Arguments, Command, refuse_idle};
+use romc::cli::args::Arguments;
 use romc::limits::{Range, table};
 
 /// Command lines with a flag that does nothing there, and that flag.
@@ -102,18 +102,16 @@ const USED: [&str; 11] = [
     "robot r.urdf --feet a,b,c,d",
 ];
 
-fn parsed(line: &str) -> Command {
+fn parsed(line: &str) -> Arguments {
     let words = ["romc"].into_iter().chain(line.split(' '));
     let parsed = Arguments::try_parse_from(words);
-    parsed
-        .unwrap_or_else(|error| panic!("{line}: {error}"))
-        .command
+    parsed.unwrap_or_else(|error| panic!("{line}: {error}"))
 }
 
 #[test]
 fn a_flag_without_effect_is_refused_by_name_and_one_with_effect_is_not() {
     for (line, idle) in IDLE {
-        match refuse_idle(&parsed(line)) {
+        match parsed(line).refuse_idle() {
             Err(error @ Error::Idle { flag, .. }) => {
                 assert_eq!(flag, idle, "{line}");
                 assert!(error.is_usage());
@@ -122,7 +120,9 @@ fn a_flag_without_effect_is_refused_by_name_and_one_with_effect_is_not() {
         }
     }
     for line in USED {
-        refuse_idle(&parsed(line)).unwrap_or_else(|error| panic!("{line}: {error}"));
+        parsed(line)
+            .refuse_idle()
+            .unwrap_or_else(|error| panic!("{line}: {error}"));
     }
 }
 

@@ -7,7 +7,7 @@ use std::path::Path;
 use romc::files::magic::recognised;
 use romc::files::size::{Capped, Format, read_capped};
 use romc::files::{
-    Begun, EmittedFile, FolderError, Overwrite, Place, check_folder, earlier_files, is_invisible,
+    Emitted, EmittedFile, FolderError, Overwrite, Place, check_folder, earlier_files, is_invisible,
     read_toml, shell_path, write_files, write_files_since, write_whole,
 };
 
@@ -142,8 +142,8 @@ fn a_lock_file_that_cargo_rewrote_is_replaced_and_one_of_the_users_kept() {
 #[test]
 fn of_two_commands_at_a_time_the_second_is_refused_unless_it_writes_the_same() {
     let folder = folder();
-    let begin = || Begun::of(folder.path()).expect("readable");
-    let write = |begun: &Begun, text: &str, overwrite| {
+    let begin = || Emitted::of(folder.path()).expect("readable");
+    let write = |begun: &Emitted, text: &str, overwrite| {
         write_files_since(begun, folder.path(), &files(text), overwrite)
     };
     let before = begin();

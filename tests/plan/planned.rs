@@ -210,7 +210,12 @@ fn jumps_recorded_up_to_touch_down_are_planned_up_to_it() {
     }
     let model = learned(&training, &[], 4);
     let prior = model.jump_prior().expect("a prior without landings");
-    let names: Vec<&str> = prior.parts.iter().map(|part| part.name.as_str()).collect();
+    let names: Vec<&str> = prior
+        .landmarks
+        .parts
+        .iter()
+        .map(|part| part.name.as_str())
+        .collect();
     assert_eq!(names, ["crouch", "thrust", "flight"]);
     let [distance, apex, _] = prior.ranges();
     let goal = Goal::new(distance.mean, apex.mean).unwrap();

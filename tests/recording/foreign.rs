@@ -197,9 +197,9 @@ fn cases(folder: &Path, s: &Segment) -> Vec<Case> {
          [joint.position]\ncolumns = \"{leg}.{joint}.angle\"\nunit = \"deg\"\n\
          [joint.velocity]\ncolumns = \"{leg}.{joint}.speed\"\nunit = \"deg/s\"\n\
          [joint.torque]\ncolumns = \"{leg}.{joint}.torque\"\nunit = \"N mm\"\n\
-         [body.position]\ncolumns = \"com_{axis}\"\nunit = \"mm\"\n\
+         [body.position]\ncolumns = [\"com_z\", \"com_x\", \"com_y\"]\norder = \"zxy\"\nunit = \"mm\"\n\
          [body.velocity]\ncolumns = \"com_v{axis}\"\nunit = \"mm/s\"\n\
-         [body.orientation]\ncolumns = [\"roll_deg\", \"pitch_deg\", \"yaw_deg\"]\nunit = \"deg\"\n\
+         [body.orientation]\ncolumns = [\"yaw_deg\", \"pitch_deg\", \"roll_deg\"]\norder = \"ypr\"\nunit = \"deg\"\n\
          [body.angular_velocity]\ncolumns = [\"roll_speed\", \"pitch_speed\", \"yaw_speed\"]\nunit = \"deg/s\"\n\
          [feet]\ncolumns = [\"contact_FR\", \"contact_FL\", \"contact_RR\", \"contact_RL\"]\n";
     add("units", path, units.to_owned());
@@ -633,6 +633,8 @@ fn wrong_maps_name_the_key_the_column_and_what_there_is() {
     assert!(text.contains("`body.orientation.order`"), "{text}");
     let text = fault("wxyz", "order = \"wxyz\"", "order = \"wxxz\"");
     assert!(text.contains("`x` twice"), "{text}");
+    let text = fault("signs", "fl.* fr.*", "FR.hz fr.*");
+    assert!(text.contains("`FR.hz`, which is none of"), "{text}");
     let text = fault("signs", "\"*.kn\" = -1", "\"*.kn\" = 2");
     assert!(text.contains("`joint.position.sign`: found 2"), "{text}");
     for (columns, found) in [

@@ -45,6 +45,8 @@ struct Convention {
     gyro: Option<f64>,
     /// Forces at the feet: in the air, and on the ground on top of that; none for flags.
     force: Option<(f64, f64)>,
+    /// What each sensor shows in the air more than that of the foot before it.
+    zero: f64,
     milliseconds: bool,
 }
 
@@ -59,6 +61,7 @@ const PLAIN: Convention = Convention {
     attitude: 3,
     gyro: None,
     force: None,
+    zero: 0.0,
     milliseconds: false,
 };
 
@@ -86,6 +89,7 @@ impl Convention {
                 Some((100.0, 60.0)),
                 Some((30.0, 400.0)),
             ][dice.below(4)],
+            zero: 0.0,
             milliseconds: dice.below(2) == 0,
         }
     }
@@ -150,7 +154,9 @@ impl Convention {
                 None => f64::from(u8::from(down)),
                 Some((rest, load)) => {
                     let ripple = 1.0 + 0.4 * ((k * 37 + foot * 5) % 23) as f64 / 23.0;
-                    rest + 0.02 * load * ripple + if down { load * ripple } else { 0.0 }
+                    rest + self.zero * foot as f64
+                        + 0.02 * load * ripple
+                        + if down { load * ripple } else { 0.0 }
                 }
             });
             let name = if self.force.is_some() {
@@ -281,6 +287,35 @@ fn short_parts_of_jumps_keep_their_signs() {
     recording::write_mcap(&path, &noisy, None, Overwrite::Replace).unwrap();
     let read = Reader::new(None, Clocks::Recorded).read(&path).unwrap();
     assert!(difference(&read.recording, &noisy).1 < 1e-9);
+}
+
+#[test]
+fn forces_show_contact_whatever_their_sign_zeros_and_flights() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("log.csv");
+    let jump = jump();
+    let lift_off = jump.feet.iter().position(|feet| *feet != [true; 4]);
+    let standing = jump.slice(0..lift_off.unwrap());
+    let of = |rest: f64, load: f64, zero: f64| Convention {
+        force: Some((rest, load)),
+        zero,
+        ..PLAIN
+    };
+    for (convention, own, line) in [
+        (of(0.0, 30.0, 0.0), &jump, "release = "),
+        (of(1.5, 900.0, 0.0), &jump, "release = "),
+        (of(20.0, 80.0, 0.0), &jump, "release = "),
+        (of(400.0, 80.0, 0.0), &jump, "release = "),
+        (of(-30.0, 30.0, 0.0), &jump, "release = "),
+        (of(0.0, -80.0, 0.0), &jump, "sign = -1 "),
+        (of(0.0, 80.0, 30.0), &jump, "offset = [-"),
+        (of(0.0, 80.0, 0.0), &standing, "no foot is in the air"),
+    ] {
+        convention.write(&path, own, &mut Dice(1));
+        let (guess, found) = guessed(&path);
+        let contact = difference(&found, own).2;
+        assert!(contact && guess.text.contains(line), "{}", guess.text);
+    }
 }
 
 /// In flight nothing stands, so that the joints' limits show the unit.

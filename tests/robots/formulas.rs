@@ -4,8 +4,8 @@ use nalgebra::{SVector, Vector3, Vector6};
 use romc::robot::input_rule::rotation;
 use romc::robot::joints::LEG_JOINT_DIM;
 use romc::robot::{
-    Actuators, ContactFlags, InputRule, JOINT_DIM, JOINT_NAMES, Leg, LegGeometry, PlanarLeg, Robot,
-    RobotError, STATE_DIM, WrenchFrame,
+    Actuators, ChainLeg, ContactFlags, InputRule, JOINT_DIM, JOINT_NAMES, Leg, LegGeometry,
+    PlanarLeg, Robot, RobotError, STATE_DIM, WrenchFrame,
 };
 
 #[test]
@@ -72,6 +72,58 @@ fn postures() -> Vec<[f64; 3]> {
         }
     }
     out
+}
+
+/// Tilted axes, the last two parallel, links in all directions.
+fn odd() -> ChainLeg {
+    let bend = Vector3::new(0.1, -0.9, 0.3).normalize();
+    ChainLeg {
+        axes: [
+            Vector3::new(0.8, 0.1, -0.4).normalize().into(),
+            bend.into(),
+            bend.into(),
+        ],
+        links: [[0.06, 0.09, -0.01], [0.02, 0.1, -0.28], [0.08, 0.01, -0.3]],
+    }
+}
+
+#[test]
+fn chain_of_planar_links_is_the_planar_leg_damping_included() {
+    let chain = LegGeometry::Planar(BENT).chain();
+    // Lengths of a bent foot count as the calf's, a little more than along the calf.
+    let straight = LegGeometry::Planar(LEG);
+    let straight_chain = LegGeometry::Chain(straight.chain());
+    let mut damped = 0;
+    let stretched = [-0.05, 0.4].map(|knee| [0.6, 0.3, knee]);
+    for q in postures().into_iter().chain(stretched) {
+        assert!((chain.foot_position(&q) - BENT.foot_position(&q)).norm() < 1e-15);
+        assert!((chain.foot_jacobian(&q) - BENT.foot_jacobian(&q)).norm() < 1e-15);
+        match [&straight_chain, &straight].map(|leg| leg.damped_force_map(&q)) {
+            [None, None] => {}
+            [Some(a), Some(b)] => {
+                assert!((a - b).norm() < 1e-11 * b.norm(), "{q:?}: {a} {b}");
+                damped += 1;
+            }
+            [a, b] => panic!("{q:?}: {a:?} {b:?}"),
+        }
+    }
+    assert!(damped > 5);
+}
+
+#[test]
+fn damping_begins_where_the_exact_inverse_ends() {
+    let chain = LegGeometry::Chain(odd());
+    let exact = |q: &[f64; 3]| -chain.foot_jacobian(q).transpose().try_inverse().unwrap();
+    // From bent to stretched: the first damped posture is still almost undamped.
+    let mut last = None;
+    for k in 0..4000 {
+        let q = [0.2, 0.3, -1.5 + 1.2 * f64::from(k) / 4000.0];
+        if let Some(damped) = chain.damped_force_map(&q) {
+            last = Some((damped - exact(&q)).norm() / damped.norm());
+            break;
+        }
+    }
+    assert!(last.is_some_and(|change| change < 0.02), "{last:?}");
 }
 
 #[test]

@@ -187,12 +187,10 @@ fn changes_of_the_certificate_replayed_give_the_simplified_coefficients() {
                 };
                 let mut replayed = coefficients(&model);
                 for change in &equation.changes {
-                    let effects = change.effects.iter().map(|e| (&e.term, e.before, e.after));
-                    for (term, before, after) in
-                        effects.chain([(&change.term, change.before, change.after)])
-                    {
-                        let now = replayed.insert(term.clone(), after).unwrap_or(0.0);
-                        assert_eq!(now, before, "seed {seed}: {term}");
+                    for effect in change.coefficients() {
+                        let term = &effect.term;
+                        let now = replayed.insert(term.clone(), effect.after).unwrap_or(0.0);
+                        assert_eq!(now, effect.before, "seed {seed}: {term}");
                     }
                 }
                 replayed.retain(|_, xi| *xi != 0.0);

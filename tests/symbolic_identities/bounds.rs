@@ -259,3 +259,55 @@ fn images_contain_sampled_values() {
         }
     }
 }
+
+#[test]
+fn slope_without_kinks_is_the_derivative() {
+    let mut pool = ExprPool::new();
+    let x = pool.symbol_id("x");
+    for text in [
+        "x^2*y",
+        "y/(1 + x)",
+        "sin(x)/x",
+        "x*abs(x)",
+        "x^1.5",
+        "exp(x)/(exp(x) - y)",
+        "log(x)*y",
+    ] {
+        let expr = parse(&mut pool, text);
+        assert_eq!(pool.slope(expr, x), pool.derivative(expr, x), "{text}");
+    }
+}
+
+#[test]
+fn slope_of_what_has_no_value_in_a_case_has_no_divisor_zero() {
+    let mut pool = ExprPool::new();
+    let x = pool.symbol_id("x");
+    for text in [
+        "sqrt(x^2 + y^2)/y",
+        "sqrt(x^2 + y^2)/x",
+        "sqrt(abs(x*y))*log(y)",
+        "abs(exp(y) - 1)^(-0.5)*sqrt(abs(y*x))",
+        "abs(y)^x/(y*(1 - y))",
+    ] {
+        let expr = parse(&mut pool, text);
+        let slope = pool.slope(expr, x);
+        for part in pool.reachable(&[slope]) {
+            let value = pool.evaluate(part, &|_| f64::NAN);
+            assert!(
+                !pool.is_constant(part) || value.is_finite(),
+                "{text}: {value}"
+            );
+        }
+    }
+}
+
+#[test]
+fn slope_of_many_kinks_takes_bounded_work() {
+    let factors = (1..12).map(|k| format!("sqrt(1 + sin(x + {k}*y))"));
+    let mut pool = ExprPool::new();
+    let expr = parse(&mut pool, &factors.collect::<Vec<_>>().join("*"));
+    let x = pool.symbol_id("x");
+    pool.slope(expr, x);
+    let n_parts = pool.n_nodes();
+    assert!(n_parts < 50_000, "{n_parts} expressions were made");
+}

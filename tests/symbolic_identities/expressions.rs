@@ -4,7 +4,7 @@ use std::cmp::Ordering;
 
 use romc::symbolic::{ExprId, ExprPool, Function, Number, SymbolId};
 
-use super::{assert_rewritten, parse, rewritten};
+use super::{assert_rewritten, nested, parse, rewritten};
 
 fn ratio(numerator: i64, denominator: i64) -> Number {
     Number::rational(numerator, denominator).expect("denominator is not zero")
@@ -221,12 +221,7 @@ fn division_of_numbers_rounds_once() {
 #[test]
 fn long_chains_are_flat_and_deep_ones_do_not_overflow_the_stack() {
     let mut pool = ExprPool::new();
-    let x = pool.symbol("x");
-    let mut deep = x;
-    for _ in 0..50_000 {
-        let sine = pool.apply(Function::Sin, deep);
-        deep = pool.add(sine, x);
-    }
+    let deep = nested(&mut pool, Function::Sin, 50_000, true);
     let negative = pool.neg(deep);
     assert_eq!(pool.add(deep, negative), ExprId::ZERO);
 }
@@ -365,10 +360,7 @@ fn display_of_canonical_text_reads_back_to_the_same_id() {
 #[test]
 fn display_of_deep_expression_needs_no_stack() {
     let mut pool = ExprPool::new();
-    let mut deep = pool.symbol("x");
-    for _ in 0..50_000 {
-        deep = pool.apply(Function::Tanh, deep);
-    }
+    let deep = nested(&mut pool, Function::Tanh, 50_000, false);
     let text = pool.display(deep).to_string();
     assert_eq!(text.len(), 50_000 * "tanh()".len() + 1);
 }
@@ -484,11 +476,7 @@ fn derivative_by_absent_symbol_is_zero_beyond_the_symbol_mask() {
 #[test]
 fn derivative_of_deep_expression_needs_no_stack() {
     let mut pool = ExprPool::new();
-    let x = pool.symbol("x");
-    let mut deep = x;
-    for _ in 0..300 {
-        deep = pool.apply(Function::Sin, deep);
-    }
+    let deep = nested(&mut pool, Function::Sin, 300, false);
     let symbol = pool.symbol_id("x");
     let derivative = pool.derivative(deep, symbol);
     assert_eq!(pool.factors_of(derivative).len(), 300);

@@ -2,7 +2,7 @@
 
 use romc::symbolic::{ExprPool, Function};
 
-use super::{parse, rewritten};
+use super::{nested, parse, rewritten};
 
 #[test]
 fn simplify_of_hostile_input_is_bounded() {
@@ -55,12 +55,7 @@ fn fractions_of_decimals_that_lose_their_variable_without_rounding_become_consta
 #[test]
 fn simplify_of_deep_nesting_takes_linear_work() {
     let mut pool = ExprPool::new();
-    let x = pool.symbol("x");
-    let mut deep = x;
-    for _ in 0..3_000 {
-        let sine = pool.apply(Function::Tanh, deep);
-        deep = pool.add(sine, x);
-    }
+    let deep = nested(&mut pool, Function::Tanh, 3_000, true);
     assert_eq!(pool.simplify(deep), deep);
     assert!(
         pool.n_nodes() < 100_000,

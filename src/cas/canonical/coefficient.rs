@@ -4,12 +4,11 @@ use num_bigint::BigInt;
 pub(super) use num_rational::BigRational as Rational;
 use num_traits::{One, Signed, ToPrimitive, Zero};
 
-use crate::number::Number;
+use crate::Number;
 
 /// Widens a radius by more than the rounding errors of the operations on it.
 const OUTWARD: f64 = 1.0 + 1e-12;
 
-/// `numerator / denominator`, whose denominator is not zero.
 pub(super) fn ratio(numerator: impl Into<BigInt>, denominator: impl Into<BigInt>) -> Rational {
     Rational::new(numerator.into(), denominator.into())
 }
@@ -129,7 +128,6 @@ impl Coefficient {
         self.im.is_zero() && self.re.is_one()
     }
 
-    /// Whether the first part that is not zero is below zero.
     pub(super) fn is_negative(&self) -> bool {
         self.re.is_negative() || (self.re.is_zero() && self.im.is_negative())
     }

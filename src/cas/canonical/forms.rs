@@ -4,18 +4,13 @@ use std::collections::{HashMap, HashSet};
 
 use num_traits::ToPrimitive;
 
-use super::atoms::Atom;
 use super::coefficient::{Coefficient, nearest, ratio};
-use super::polynomial::{CanonicalForm, Monomial};
-use crate::function::Function;
-use crate::node::{ExprId, Node};
-use crate::number::Number;
-use crate::pool::ExprPool;
+use super::polynomial::{Atom, CanonicalForm, Monomial};
+use crate::{ExprId, ExprPool, Function, Node, Number};
 
 /// Most fractions of two arguments that are compared by multiplying out, and most such comparisons.
 const MAX_FRACTIONS: usize = 4;
 const MAX_FRACTION_TRIES: usize = 300;
-/// Most atoms that are removed by multiplying out.
 const MAX_REMOVALS: usize = 40;
 /// Most sums under roots and logarithms by which others are divided.
 const MAX_SUMS: usize = 12;
@@ -171,7 +166,6 @@ impl<'p> CanonicalForms<'p> {
         sum.is_small().then_some(sum)
     }
 
-    /// Whether an exponent is an integer, such as `6/3`.
     fn is_integer(&mut self, expr: ExprId) -> bool {
         let value = self.of(expr).as_constant();
         value.is_some_and(|value| value.is_integer())
@@ -202,7 +196,7 @@ impl<'p> CanonicalForms<'p> {
             }),
             Node::Sum(terms) => {
                 let mut sum = CanonicalForm::default();
-                for term in terms {
+                for term in terms.iter() {
                     for (monomial, coefficient) in &self.forms[term].terms {
                         sum.add(coefficient.clone(), monomial.clone());
                     }

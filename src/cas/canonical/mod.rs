@@ -26,13 +26,11 @@
 //! # Ok::<(), romc::symbolic::ParseError>(())
 //! ```
 
-mod atoms;
 mod coefficient;
 mod forms;
 mod polynomial;
 mod products;
 mod roots;
-mod squares;
 
 pub use coefficient::Coefficient;
 pub use forms::CanonicalForms;

@@ -3,10 +3,28 @@
 use std::collections::BTreeMap;
 
 use super::coefficient::Coefficient;
+use crate::{ExprId, SymbolId};
 
 /// Most terms of a form, and most products of terms that one multiplication makes.
 const MAX_TERMS: usize = 2_000;
 const MAX_PRODUCTS: usize = 40_000;
+
+/// A factor that is not taken apart.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub(super) enum Atom {
+    Symbol(SymbolId),
+    /// A sum whose leading coefficient has size one and is not negative, to negative powers only.
+    Sum(CanonicalForm),
+    /// `form^(1/index)`, to powers below the index.
+    Root(CanonicalForm, u32),
+    Log(CanonicalForm),
+    Abs(CanonicalForm),
+    Sign(CanonicalForm),
+    Tan(CanonicalForm),
+    Tanh(CanonicalForm),
+    /// An expression that is too large to take apart, or has no value.
+    Opaque(ExprId),
+}
 
 /// `prod_k atom_k^power_k * exp(sum_j c_j monomial_j)`.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -40,7 +58,6 @@ impl Monomial {
         rest
     }
 
-    /// The product; powers saturate far beyond what is ever expanded.
     pub(super) fn times(&self, other: &Self) -> Self {
         let mut powers: BTreeMap<u32, i32> = self.powers.iter().copied().collect();
         for (atom, power) in &other.powers {

@@ -2,13 +2,13 @@
 
 use std::collections::BTreeSet;
 
-use num_bigint::BigInt;
+use num_bigint::{BigInt, BigUint};
+use num_integer::Integer;
 use num_traits::{ToPrimitive, Zero};
 
-use super::atoms::{Atom, prime_powers};
 use super::coefficient::{Coefficient, Rational, ratio};
 use super::forms::{CanonicalForms, MAX_ROOT, exponentials};
-use super::polynomial::{CanonicalForm, Monomial};
+use super::polynomial::{Atom, CanonicalForm, Monomial};
 
 impl CanonicalForms<'_> {
     /// `scale * prod base^power * exp(E)` of a form that is positive where it is used: a positive
@@ -118,7 +118,6 @@ impl CanonicalForms<'_> {
         Some((exponent, rest))
     }
 
-    /// Whether an atom is nowhere negative where the given expressions have values.
     fn is_positive(&self, atom: u32) -> bool {
         matches!(self.atoms[atom as usize], Atom::Root(..) | Atom::Abs(_))
             || self.positive.contains(&atom)
@@ -215,7 +214,6 @@ impl CanonicalForms<'_> {
         self.product(&power, &CanonicalForm::monomial(root))
     }
 
-    /// `exp`: multiples of logarithms become powers of what they are logarithms of.
     pub(super) fn exp(&mut self, argument: CanonicalForm) -> Option<CanonicalForm> {
         let argument = self.argument(argument);
         let mut rest = CanonicalForm::default();
@@ -274,13 +272,8 @@ impl CanonicalForms<'_> {
 
     pub(super) fn sign(&mut self, form: &CanonicalForm) -> Option<CanonicalForm> {
         let form = self.argument(form.clone());
-        let Some(leading) = form.leading() else {
+        if form.is_zero() {
             return Some(form);
-        };
-        if let Some(constant) = form.as_constant()
-            && constant.as_real().is_some()
-        {
-            return Some(CanonicalForm::constant(leading.sign()));
         }
         if form.terms.len() > 1
             && let Some((_, rest)) = self.without_exponential(&form)
@@ -339,4 +332,41 @@ pub(super) struct Split {
     pub(super) scale: Rational,
     pub(super) factors: Vec<(CanonicalForm, i32)>,
     pub(super) exponent: CanonicalForm,
+}
+
+const LARGEST_DIVISOR: u64 = 2_000;
+
+/// A positive number as a product of primes to integer powers. What is left after small divisors
+/// counts as a prime.
+fn prime_powers(value: &Rational) -> Vec<(CanonicalForm, i32)> {
+    let form = |prime: BigUint| CanonicalForm::constant(Rational::from(BigInt::from(prime)).into());
+    let mut powers = Vec::new();
+    for (part, sign) in [(value.numer(), 1), (value.denom(), -1)] {
+        let mut rest = part.magnitude().clone();
+        for divisor in (2..=LARGEST_DIVISOR).filter(|d| *d == 2 || d % 2 == 1) {
+            if rest == BigUint::from(1_u8) {
+                break;
+            }
+            if rest.to_u64().is_some_and(|rest| divisor * divisor > rest) {
+                break;
+            }
+            let divisor = BigUint::from(divisor);
+            let mut count = 0;
+            loop {
+                let (quotient, remainder) = rest.div_rem(&divisor);
+                if remainder != BigUint::ZERO {
+                    break;
+                }
+                rest = quotient;
+                count += sign;
+            }
+            if count != 0 {
+                powers.push((form(divisor), count));
+            }
+        }
+        if rest != BigUint::from(1_u8) {
+            powers.push((form(rest), sign));
+        }
+    }
+    powers
 }

@@ -1,21 +1,16 @@
 //! Whether a shorter form may take the place of a sum: it has its values, also far out.
 //!
-//! Near the origin both are evaluated in floating point. Far out the sum is enclosed in intervals, over inputs
-//! that reach a few units in the last place around a point. Where this is narrow and generated code of the sum would
-//! hit it, in 64 or in 32 bits, code of the form has to hit it as well: no form overflows, underflows or
-//! loses more digits than a change of the last digits of the inputs would cost, and its derivatives are numbers where
-//! those of the sum are accurate. Sums and products of variables and
+//! Far out the sum is enclosed in intervals over inputs that reach a few units in the last place around a point. Where
+//! this is narrow and generated code of the sum, in 64 or 32 bits, would hit it, code of the form has to hit it as
+//! well, and its derivatives are numbers where those of the sum are accurate. Sums and products of variables and
 //! bounded functions need no such test, because equal ones have the same degrees.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
 use super::Summands;
-use crate::function::Function;
-use crate::interval::Interval;
-use crate::node::{ExprId, Node, SymbolId};
-use crate::pool::ExprPool;
-use crate::rounding::power_by;
+use crate::interval::power_by;
+use crate::{ExprId, ExprPool, Function, Interval, Node, SymbolId};
 
 /// Ranges from which the variables of the points near the origin are taken.
 const NEAR: [(f64, f64); 6] = [
@@ -26,15 +21,12 @@ const NEAR: [(f64, f64); 6] = [
     (-0.3, 0.1),
     (2.13, 5.9),
 ];
-/// Relative error that evaluation near the origin may have.
 const EVALUATION: f64 = 1e-11;
-/// Multiples of the golden ratio fill an interval evenly.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 type Column = Rc<[f64]>;
 type Points = BTreeMap<SymbolId, Column>;
 
-/// Floating-point numbers of generated code.
 struct Precision {
     round: fn(f64) -> f64,
     /// Relative distance of the inputs that are enclosed around a point.
@@ -73,14 +65,12 @@ const PRECISIONS: [Precision; 2] = [
     },
 ];
 
-/// A sum at many points, with which its shorter forms are compared.
 pub(super) struct Agreement {
     sum: Summands,
     symbols: Vec<SymbolId>,
     far: Option<[Far; 2]>,
 }
 
-/// A sum far out in one precision.
 struct Far {
     points: Points,
     /// Where its values lie, and how large its summands are; nothing where it is not accurate itself.
@@ -132,22 +122,20 @@ impl Agreement {
     }
 
     fn holds_near(&self, pool: &ExprPool, form: &Summands) -> bool {
-        let at = |&(low, high): &(f64, f64)| {
-            move |symbol: SymbolId| {
-                let place = (symbol.index() as f64 + 1.0) * GOLDEN;
-                low + (high - low) * (place + low.abs()).fract()
-            }
+        let column = |&symbol: &SymbolId| {
+            let place = (symbol.index() as f64 + 1.0) * GOLDEN;
+            let values: Column = (NEAR.iter())
+                .map(|(low, high)| low + (high - low) * (place + low.abs()).fract())
+                .collect();
+            (symbol, values)
         };
-        let value = |summands: &Summands, at: &dyn Fn(SymbolId) -> f64| {
-            let exprs: Vec<ExprId> = summands.iter().map(|&(_, expr)| expr).collect();
-            let values = pool.evaluate_all(&exprs, at);
-            let products = values.iter().zip(summands).map(|(value, (c, _))| value * c);
-            products.fold((0.0, 0.0), |(sum, size), p: f64| (sum + p, size + p.abs()))
-        };
-        NEAR.iter().all(|range| {
-            let at = at(range);
-            let ((a, size_a), (b, size_b)) = (value(&self.sum, &at), value(form, &at));
-            !a.is_finite() || (a - b).abs() <= EVALUATION * (size_a + size_b) + f64::MIN_POSITIVE
+        let points = self.symbols.iter().map(column).collect();
+        let [(sums, sizes), (forms, other_sizes)] =
+            [&self.sum, form].map(|summands| sum_by_code(pool, summands, &points, |value| value));
+        let mut values = sums.iter().zip(&forms).zip(sizes.iter().zip(&other_sizes));
+        values.all(|((a, b), (size, other))| {
+            let slack = EVALUATION * (size + other) + f64::MIN_POSITIVE;
+            !a.is_finite() || (a - b).abs() <= slack
         })
     }
 }
@@ -199,7 +187,6 @@ fn is_tame(pool: &ExprPool, summands: &Summands) -> bool {
     })
 }
 
-/// Magnitudes of the variables of a sum.
 fn scales(pool: &ExprPool, sum: &Summands, precision: &Precision) -> Vec<f64> {
     let roots: Vec<ExprId> = sum.iter().map(|&(_, expr)| expr).collect();
     let has_exponents = (pool.reachable(&roots).into_iter()).any(|expr| {

@@ -3,16 +3,10 @@
 use super::agreement::Agreement;
 use super::search::Shortener;
 use super::{Scaled, Summands};
-use crate::function::Function;
-use crate::id_map::IdMap;
-use crate::node::{ExprId, Node};
-use crate::number::Number;
-use crate::pool::ExprPool;
+use crate::{ExprId, ExprPool, Function, IdMap, Node, Number};
 
-/// Largest group whose forms are searched, and largest whose terms are chosen one by one.
 const MAX_GROUP: usize = 64;
 const MAX_CHOSEN: usize = 16;
-/// Largest numerator and denominator of a ratio of coefficients.
 const MAX_NUMERATOR: f64 = 4096.0;
 const MAX_DENOMINATOR: i32 = 64;
 
@@ -373,7 +367,6 @@ pub(super) fn collected(
     result
 }
 
-/// A unit, and the coefficients as multiples of it: small fractions if all are such.
 fn in_units(summands: &Summands) -> (Number, Scaled) {
     let unit = summands[0].0;
     let ratios: Option<Scaled> = (summands.iter())

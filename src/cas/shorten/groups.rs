@@ -4,24 +4,17 @@ use std::collections::{BTreeMap, HashMap};
 
 use super::Summands;
 use super::search::{Block, Distance, Shortener};
-use crate::function::Function;
-use crate::id_map::IdMap;
-use crate::node::{ExprId, Node};
-use crate::number::Number;
 use crate::polynomial::MAX_POWER;
-use crate::pool::ExprPool;
 use crate::simplify::MAX_WORK;
+use crate::{ExprId, ExprPool, Function, IdMap, Node, Number};
 
-/// Most terms that can be powers of the parts of a sum.
 const MAX_PARTS: usize = 64;
-/// Relative error of coefficients that fit a power.
 const ROUNDING: f64 = 1e-13;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum Link {
     /// A monomial of their normal forms.
     Monomial(ExprId),
-    /// Logarithms, with this cofactor.
     Logarithm(ExprId),
     /// Denominators that have the variables of this product.
     Variables(ExprId),
@@ -37,13 +30,16 @@ impl Link {
 }
 
 impl Shortener<'_> {
-    /// Positions of blocks that can interact, or that are worth a look alone.
     pub(super) fn groups(&mut self, blocks: &[Block], distance: Distance) -> Vec<Vec<usize>> {
         let (places, summands): (Vec<usize>, Summands) = (blocks.iter().enumerate())
             .flat_map(|(place, block)| block.summands.iter().map(move |&summand| (place, summand)))
             .unzip();
         let waves = self.all_angles(&summands);
         let mut leader: Vec<usize> = (0..blocks.len()).collect();
+        let join = |leader: &mut Vec<usize>, a: usize, b: usize| {
+            let (a, b) = (root(leader, a), root(leader, b));
+            leader[a.max(b)] = a.min(b);
+        };
         let mut owner: HashMap<Link, usize> = HashMap::new();
         let mut is_plain = vec![true; blocks.len()];
         for (place, block) in blocks.iter().enumerate() {
@@ -54,14 +50,12 @@ impl Shortener<'_> {
                         continue;
                     }
                     let other = *owner.entry(link).or_insert(place);
-                    let (a, b) = (root(&leader, place), root(&leader, other));
-                    leader[a.max(b)] = a.min(b);
+                    join(&mut leader, place, other);
                 }
             }
         }
         for [a, b] in self.parts_of_powers(&summands) {
-            let (a, b) = (root(&leader, places[a]), root(&leader, places[b]));
-            leader[a.max(b)] = a.min(b);
+            join(&mut leader, places[a], places[b]);
         }
         let mut groups: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
         for place in 0..blocks.len() {
@@ -147,25 +141,23 @@ impl Shortener<'_> {
         if let Some(known) = self.links.get(&(expr, waves)) {
             return known.clone();
         }
-        let rests = |pool: &ExprPool, expr| {
-            let terms = pool.terms_of(expr).into_iter();
-            terms
-                .map(|(_, rest)| Link::Monomial(rest))
-                .collect::<Vec<_>>()
+        let mut links = Vec::new();
+        let mut add_terms = |pool: &ExprPool, expr| {
+            links.extend((pool.terms_of(expr).into_iter()).map(|term| Link::Monomial(term.1)));
         };
         let normal = self.normal(expr, waves);
         let expanded = self.pool.expand_region(normal);
-        let mut links = rests(self.pool, expanded);
+        add_terms(self.pool, expanded);
+        add_terms(self.pool, normal);
+        if self.pool.has_waves(normal) {
+            let combined = self.pool.combine_angles(normal);
+            add_terms(self.pool, combined);
+        }
+        add_terms(self.pool, expr);
         if let Some((cofactor, _)) = self.pool.as_log_term(self.pool.split(expr).1) {
             links.push(Link::Logarithm(cofactor));
         }
         links.extend(self.links_of_fraction(expr));
-        links.extend(rests(self.pool, normal));
-        if self.pool.has_waves(normal) {
-            let combined = self.pool.combine_angles(normal);
-            links.extend(rests(self.pool, combined));
-        }
-        links.extend(rests(self.pool, expr));
         links.push(Link::Monomial(self.pool.split(expr).1));
         self.links.insert((expr, waves), links.clone());
         links

@@ -7,13 +7,8 @@ use super::forms::{NestedSums, collected};
 use super::groups::Link;
 use super::{Scaled, Summands};
 use crate::cost::Costs;
-use crate::function::Function;
-use crate::id_map::{IdMap, IdSet};
-use crate::node::{ExprId, Node, SymbolId};
-use crate::number::Number;
-use crate::order::Exponent;
-use crate::pool::ExprPool;
 use crate::simplify::MAX_WORK;
+use crate::{Exponent, ExprId, ExprPool, Function, IdMap, IdSet, Node, Number, SymbolId};
 
 const MAX_ROUNDS: usize = 4;
 
@@ -33,11 +28,9 @@ pub struct Shortener<'a> {
     pub(super) costs: Costs,
     singles: IdMap<ExprId>,
     pub(super) plain: IdMap<bool>,
-    /// By term and by the sum of all waves beside it.
     pub(super) links: HashMap<(ExprId, ExprId), Vec<Link>>,
 }
 
-/// How far terms are looked for that can interact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Distance {
     /// Those whose normal forms share a monomial that is not the constant one, or a denominator.
@@ -62,7 +55,6 @@ fn blocks_of(summands: &[(f64, ExprId)]) -> Vec<Block> {
         .collect()
 }
 
-/// Summands that stand for those of the original sum at some positions.
 pub(super) struct Block {
     positions: Vec<usize>,
     pub(super) summands: Summands,
@@ -191,7 +183,6 @@ impl<'a> Shortener<'a> {
         is_changed
     }
 
-    /// Shortens group after group: first those that share a term, then all that can interact.
     fn run(&mut self, blocks: &mut Vec<Block>, summands: &[(f64, ExprId)]) {
         for _ in 0..MAX_ROUNDS {
             let is_changed = [Distance::Near, Distance::Far].into_iter().any(|distance| {

@@ -25,7 +25,7 @@ use crate::simplify::Tolerance;
 )]
 pub struct Arguments {
     #[command(subcommand)]
-    pub command: Command,
+    pub(crate) command: Command,
     /// Print one JSON object to stdout and nothing else there
     #[arg(long, global = true, help_heading = None)]
     pub json: bool,
@@ -33,7 +33,7 @@ pub struct Arguments {
 
 /// One of romc's commands.
 #[derive(Debug, Subcommand)]
-pub enum Command {
+pub(crate) enum Command {
     /// The main job on the shipped model and recordings: equations, code, rollouts, controller
     Demo(DemoArguments),
     /// Describe a recording or a model, and list what is implausible in it
@@ -70,7 +70,7 @@ pub enum Command {
 
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  romc demo --out-dir out/demo")]
-pub struct DemoArguments {
+pub(crate) struct DemoArguments {
     /// Folder for the files of the demo
     #[arg(long, value_name = "DIR", default_value = "out/demo")]
     pub out_dir: PathBuf,
@@ -83,7 +83,7 @@ pub struct DemoArguments {
 #[command(
     after_help = "Example:\n  romc inspect models/go1-d4.json examples/recordings/go1/test_01.csv.gz\n  romc inspect --guess my-log.csv > my-log.toml"
 )]
-pub struct InspectArguments {
+pub(crate) struct InspectArguments {
     /// Models (`.json`) and recordings (`.csv`, `.csv.gz`)
     #[arg(required = true, value_name = "FILE")]
     pub files: Vec<PathBuf>,
@@ -111,7 +111,7 @@ pub struct InspectArguments {
                   romc convert log.txt --columns my-log.toml --output jump.csv.gz\n  \
                   romc convert jump.mcap --output jump.csv --inputs-of models/go1-d4.json"
 )]
-pub struct ConvertArguments {
+pub(crate) struct ConvertArguments {
     /// Recordings, or logs that --columns describes; several follow each other in the output
     #[arg(required = true, value_name = "RECORDING")]
     pub recordings: Vec<PathBuf>,
@@ -135,7 +135,7 @@ pub struct ConvertArguments {
                   Example:\n  \
                   romc identify examples/recordings/go1/test_*.csv.gz --robot go1"
 )]
-pub struct IdentifyArguments {
+pub(crate) struct IdentifyArguments {
     /// Recordings of one robot
     #[arg(required = true, value_name = "RECORDING")]
     pub recordings: Vec<PathBuf>,
@@ -157,9 +157,8 @@ pub struct IdentifyArguments {
                   romc robot solo12.urdf --output solo12.toml\n  \
                   romc robot my.urdf --feet LF_FOOT,RF_FOOT,LH_FOOT,RH_FOOT --output my.toml\n  \
                   romc robot go1.urdf --name my-go1 --output my-go1.toml")]
-pub struct RobotArguments {
+pub(crate) struct RobotArguments {
     /// Robot: go1, go2, a1, or a .toml or .urdf file
-    #[arg(value_name = "ROBOT")]
     pub robot: String,
     /// Links of the four feet of a URDF, where they are not found by themselves: LINK,LINK,..., or with the foot's
     /// place in the frame of each, in m, where no link is: LINK:x,y,z,LINK:x,y,z,...
@@ -188,7 +187,7 @@ pub struct RobotArguments {
                   romc check models/paper-2d.json paper.tex\n  \
                   romc check models/go1-d4.json equations.txt --domain ranges.toml"
 )]
-pub struct CheckArguments {
+pub(crate) struct CheckArguments {
     /// A model (.json), equations (.txt), or LaTeX (.tex, .md)
     #[arg(value_name = "A")]
     pub left: PathBuf,
@@ -210,9 +209,8 @@ pub struct CheckArguments {
 #[command(
     after_help = "Example:\n  romc simulate models/go1-d4.json examples/recordings/go1/test_*.csv.gz"
 )]
-pub struct SimulateArguments {
+pub(crate) struct SimulateArguments {
     /// Model file
-    #[arg(value_name = "MODEL")]
     pub model: PathBuf,
     /// Recordings to follow
     #[arg(required = true, value_name = "RECORDING")]
@@ -234,9 +232,8 @@ pub struct SimulateArguments {
 #[command(
     after_help = "Example:\n  romc mpc models/go1-d4.json examples/recordings/go1/test_01.csv.gz --output mpc.csv"
 )]
-pub struct MpcArguments {
+pub(crate) struct MpcArguments {
     /// Model file
-    #[arg(value_name = "MODEL")]
     pub model: PathBuf,
     /// Recordings to follow
     #[arg(required = true, value_name = "RECORDING")]
@@ -279,9 +276,8 @@ pub struct MpcArguments {
                   romc plan models/go1-d6.json --distance 0.35 --apex 0.15 --output plan.csv\n  \
                   romc plan models/go1-d6.json --reach --figures reach"
 )]
-pub struct PlanArguments {
+pub(crate) struct PlanArguments {
     /// Model file with `landmarks` and `prior`, as `romc train` writes them
-    #[arg(value_name = "MODEL")]
     pub model: PathBuf,
     /// Distance of the body from start to end, in metres
     #[arg(
@@ -327,9 +323,8 @@ pub struct PlanArguments {
 #[command(
     after_help = "Example:\n  romc report models/go1-d4.json examples/recordings/go1/test_*.csv.gz --output report.html"
 )]
-pub struct ReportArguments {
+pub(crate) struct ReportArguments {
     /// Model file
-    #[arg(value_name = "MODEL")]
     pub model: PathBuf,
     /// Recordings that the model is compared with
     #[arg(required = true, value_name = "RECORDING")]
@@ -368,7 +363,7 @@ pub struct ReportArguments {
 #[command(
     after_help = "Example:\n  romc manual --out-dir ~/.local/share/man/man1 && man romc-compile"
 )]
-pub struct ManualArguments {
+pub(crate) struct ManualArguments {
     /// Folder for the pages
     #[arg(long, value_name = "DIR")]
     pub out_dir: PathBuf,
@@ -381,7 +376,7 @@ pub struct ManualArguments {
 #[command(
     after_help = "Example:\n  romc completions bash > ~/.local/share/bash-completion/completions/romc"
 )]
-pub struct CompletionsArguments {
+pub(crate) struct CompletionsArguments {
     /// The shell: bash, zsh, fish, elvish or powershell
     #[arg(value_enum, value_name = "SHELL")]
     pub shell: clap_complete::Shell,

@@ -16,9 +16,8 @@ use crate::typeset::Form;
 #[command(
     after_help = "Examples:\n  romc compile models/paper-2d.json --emit latex,c,rust --out-dir out/paper-2d\n  romc compile models/go1-d4.json --emit latex,c --out-dir out/short --tolerance 5% \\\n      --domain examples/recordings/go1/train_*.csv.gz --save-model out/go1-d4-short.json"
 )]
-pub struct CompileArguments {
+pub(crate) struct CompileArguments {
     /// Model file
-    #[arg(value_name = "MODEL")]
     pub model: PathBuf,
     /// Targets, separated by commas
     #[arg(
@@ -72,7 +71,7 @@ impl UnitsChoice {
 /// How code is generated.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Generated code")]
-pub struct CodeArguments {
+pub(crate) struct CodeArguments {
     /// Floating-point numbers of C and Rust
     #[arg(long, value_enum, default_value = "f64")]
     pub precision: Precision,
@@ -87,7 +86,7 @@ pub struct CodeArguments {
 /// How equations are printed.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Printed equations")]
-pub struct EquationArguments {
+pub(crate) struct EquationArguments {
     /// Decimal places of coefficients; as many as each needs, at least two, unless given
     #[arg(long, value_name = "N", value_parser = count(&DIGITS), conflicts_with = "significant")]
     pub digits: Option<usize>,
@@ -115,10 +114,9 @@ pub struct EquationArguments {
 /// How far equations may be simplified.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Simplification")]
-pub struct SimplifyArguments {
-    /// Drop and round terms as long as no ddz is off by more than this anywhere in the domain: 1%
-    /// (of its root mean square over the recordings) or 0.05 (scaled units per s^2); nothing
-    /// changes at 0
+pub(crate) struct SimplifyArguments {
+    /// Drop and round terms as long as no ddz is off by more than this anywhere in the domain: 1% (of its root mean
+    /// square over the recordings) or 0.05 (scaled units per s^2); nothing changes at 0
     #[arg(
         long,
         value_name = "ERROR",
@@ -129,8 +127,7 @@ pub struct SimplifyArguments {
     /// Recordings whose bounding box in each phase is the domain; or one .toml file of ranges
     #[arg(long, value_name = "RECORDING", num_args = 1..)]
     pub domain: Vec<PathBuf>,
-    /// How far the domain reaches beyond the recordings, as a share of each variable's range (0.1
-    /// unless given)
+    /// How far the domain reaches beyond the recordings, as a share of each variable's range (0.1 unless given)
     #[arg(
         long,
         value_name = "SHARE",

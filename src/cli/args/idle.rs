@@ -2,12 +2,12 @@
 //!
 //! What files would have to be read for, such as settings of a training, is refused or noted by the command itself.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::{
-    CheckArguments, Command, CompileArguments, ImportArguments, InspectArguments, ReadingArguments,
-    UnitsChoice,
+    Arguments, Command, CompileArguments, ImportArguments, InspectArguments, ReadingArguments,
 };
+use super::{CheckArguments, UnitsChoice};
 use crate::Error;
 use crate::artifact::is_standard_input;
 use crate::codegen::{Precision, SineCosine};
@@ -15,65 +15,65 @@ use crate::deploy::Target;
 use crate::import::Format;
 use crate::mpc::Lift;
 
-/// Refuses the first flag that has no effect.
-///
-/// # Errors
-/// [`Error::Idle`].
-pub fn refuse_idle(command: &Command) -> Result<(), Error> {
-    match command {
-        Command::Compile(arguments) => of_compile(arguments),
-        Command::Inspect(arguments) => of_inspect(arguments),
-        Command::Check(arguments) => of_check(arguments),
-        Command::Import(arguments) => of_import(arguments),
-        Command::Mpc(arguments) => {
-            let (lift, rate) = (arguments.lift, arguments.torque_rate);
-            let flags = [("--torque-rate", rate.is_some())];
-            refuse(lift == Lift::Transpose, "--lift transpose", &flags)
+impl Arguments {
+    /// Refuses the first flag that has no effect.
+    ///
+    /// # Errors
+    /// [`Error::Idle`].
+    pub fn refuse_idle(&self) -> Result<(), Error> {
+        match &self.command {
+            Command::Compile(arguments) => of_compile(arguments),
+            Command::Inspect(arguments) => of_inspect(arguments),
+            Command::Check(arguments) => of_check(arguments),
+            Command::Import(arguments) => of_import(arguments),
+            Command::Mpc(arguments) => {
+                Needed("--lift transpose", arguments.lift == Lift::Transpose)
+                    .by("--torque-rate", arguments.torque_rate.is_some())
+            }
+            Command::Plan(arguments) => {
+                Needed("--start", arguments.start.is_some()).by_reading(&arguments.reading)
+            }
+            Command::Robot(arguments) => {
+                let is_file = !crate::robot_file::known_names().contains(&arguments.robot.as_str());
+                Needed("a URDF file", is_file).by("--feet", !arguments.feet.is_empty())
+            }
+            Command::Study(arguments) => {
+                let needs = "recordings, which --merge does not read";
+                Needed(needs, arguments.merge.is_empty()).by_reading(&arguments.reading)
+            }
+            Command::Demo(_)
+            | Command::Train(_)
+            | Command::Convert(_)
+            | Command::Identify(_)
+            | Command::Simulate(_)
+            | Command::Report(_)
+            | Command::Manual(_)
+            | Command::Completions(_) => Ok(()),
         }
-        Command::Plan(arguments) => {
-            let has_start = arguments.start.is_some();
-            refuse(has_start, "--start", &reading(&arguments.reading))
-        }
-        Command::Robot(arguments) => {
-            let is_file = !crate::robot_file::known_names().contains(&arguments.robot.as_str());
-            let flags = [("--feet", !arguments.feet.is_empty())];
-            refuse(is_file, "a URDF file", &flags)
-        }
-        Command::Study(arguments) => {
-            let needs = "recordings, which --merge does not read";
-            refuse(
-                arguments.merge.is_empty(),
-                needs,
-                &reading(&arguments.reading),
-            )
-        }
-        Command::Demo(_)
-        | Command::Train(_)
-        | Command::Convert(_)
-        | Command::Identify(_)
-        | Command::Simulate(_)
-        | Command::Report(_)
-        | Command::Manual(_)
-        | Command::Completions(_) => Ok(()),
     }
 }
 
-/// Refuses the first flag that was given, unless what it needs is there.
-fn refuse(is_used: bool, needs: &'static str, flags: &[(&'static str, bool)]) -> Result<(), Error> {
-    match flags.iter().find(|(_, given)| *given && !is_used) {
-        Some(&(flag, _)) => Err(Error::Idle { flag, needs }),
-        None => Ok(()),
+/// What flags need to have an effect, and whether it is there.
+#[derive(Clone, Copy)]
+struct Needed(&'static str, bool);
+
+impl Needed {
+    /// Refuses a flag that was given, unless what it needs is there.
+    fn by(self, flag: &'static str, is_given: bool) -> Result<(), Error> {
+        let Self(needs, is_there) = self;
+        match is_given && !is_there {
+            true => Err(Error::Idle { flag, needs }),
+            false => Ok(()),
+        }
+    }
+
+    fn by_reading(self, arguments: &ReadingArguments) -> Result<(), Error> {
+        self.by("--columns", arguments.columns.is_some())?;
+        self.by("--clock", arguments.clock.is_some())
     }
 }
 
-fn reading(arguments: &ReadingArguments) -> [(&'static str, bool); 2] {
-    let (columns, clock) = (&arguments.columns, arguments.clock);
-    [
-        ("--columns", columns.is_some()),
-        ("--clock", clock.is_some()),
-    ]
-}
-
+/// No ending is empty, which no format has.
 fn ending(path: &Path) -> String {
     let ending = path.extension().unwrap_or_default();
     ending.to_string_lossy().to_lowercase()
@@ -81,102 +81,61 @@ fn ending(path: &Path) -> String {
 
 fn of_compile(arguments: &CompileArguments) -> Result<(), Error> {
     use Target::{C, Casadi, ControllerC, Latex, Markdown, Mathml, Matlab, Python, Rust};
-    const PRINTED: &str = "--emit with latex, markdown or mathml";
     let emits = |targets: &[Target]| targets.iter().any(|target| arguments.emit.contains(target));
-    let (is_code, is_printed) = (
-        emits(&[C, Rust, Python, Casadi, Matlab]),
-        emits(&[Latex, Markdown, Mathml]),
-    );
-    let (code, print, simplify) = (
-        &arguments.code,
-        &arguments.equations,
-        &arguments.simplification,
-    );
-    let compiled = [
-        ("--precision", code.precision != Precision::default()),
-        ("--sincos", code.sincos != SineCosine::default()),
-    ];
-    let is_compiled = emits(&[C, Rust, ControllerC]);
-    refuse(
-        is_compiled,
-        "--emit with c, rust or controller-c",
-        &compiled,
-    )?;
-    let scaled = [("--units scaled", code.units == UnitsChoice::Scaled)];
-    refuse(
-        is_code,
-        "--emit with c, rust, python, casadi or matlab",
-        &scaled,
-    )?;
-    let physical = [("--units physical", code.units == UnitsChoice::Physical)];
-    let needs = "--emit with equations or code of functions";
-    refuse(is_code || is_printed, needs, &physical)?;
-    let rounding = [
-        ("--digits", print.digits.is_some()),
-        ("--significant", print.significant.is_some()),
-    ];
-    refuse(
-        is_printed || !simplify.domain.is_empty(),
-        PRINTED,
-        &rounding,
-    )?;
-    let printed = [
-        ("--rename", !print.rename.is_empty()),
-        ("--width", print.width.is_some()),
-    ];
-    refuse(is_printed, PRINTED, &printed)?;
-    let latex = [
-        ("--form", print.form.is_some()),
-        ("--siunitx", print.siunitx),
-    ];
-    refuse(emits(&[Latex]), "--emit with latex", &latex)?;
+    let is_code = emits(&[C, Rust, Python, Casadi, Matlab]);
+    let is_printed = emits(&[Latex, Markdown, Mathml]);
+    let (code, print) = (&arguments.code, &arguments.equations);
+    let simplify = &arguments.simplification;
+    let compiled = "--emit with c, rust or controller-c";
+    let compiled = Needed(compiled, emits(&[C, Rust, ControllerC]));
+    compiled.by("--precision", code.precision != Precision::default())?;
+    compiled.by("--sincos", code.sincos != SineCosine::default())?;
+    Needed("--emit with c, rust, python, casadi or matlab", is_code)
+        .by("--units scaled", code.units == UnitsChoice::Scaled)?;
+    let equations = "--emit with equations or code of functions";
+    Needed(equations, is_code || is_printed)
+        .by("--units physical", code.units == UnitsChoice::Physical)?;
+    let printed = Needed("--emit with latex, markdown or mathml", is_printed);
+    let rounded = Needed(printed.0, is_printed || !simplify.domain.is_empty());
+    rounded.by("--digits", print.digits.is_some())?;
+    rounded.by("--significant", print.significant.is_some())?;
+    printed.by("--rename", !print.rename.is_empty())?;
+    printed.by("--width", print.width.is_some())?;
+    let latex = Needed("--emit with latex", emits(&[Latex]));
+    latex.by("--form", print.form.is_some())?;
+    latex.by("--siunitx", print.siunitx)?;
     let has_table = simplify.domain.iter().any(|path| ending(path) == "toml");
-    let has_domain = !simplify.domain.is_empty() && !has_table;
-    let needs = "recordings after --domain or --plan";
-    let is_read = has_domain || arguments.plan.is_some();
-    refuse(is_read, needs, &reading(&simplify.reading))
+    let is_read = !simplify.domain.is_empty() && !has_table || arguments.plan.is_some();
+    Needed("recordings after --domain or --plan", is_read).by_reading(&simplify.reading)
 }
 
 fn of_inspect(arguments: &InspectArguments) -> Result<(), Error> {
-    let is_model = |path: &PathBuf| is_standard_input(path) || ending(path) == "json";
-    let has_recording = !arguments.files.iter().all(is_model);
-    let robot = [("--robot", arguments.robot != "go1")];
-    refuse(has_recording, "a recording", &robot)?;
+    let mut files = arguments.files.iter();
+    let has_recording = files.any(|path| !is_standard_input(path) && ending(path) != "json");
+    Needed("a recording", has_recording).by("--robot", arguments.robot != "go1")?;
     let needs = "a recording, which --guess does not read by a map";
-    let is_read = has_recording && !arguments.guess;
-    refuse(is_read, needs, &reading(&arguments.reading))
+    Needed(needs, has_recording && !arguments.guess).by_reading(&arguments.reading)
 }
 
 fn of_check(arguments: &CheckArguments) -> Result<(), Error> {
-    let is_latex = |path: &PathBuf| matches!(Format::of_path(path), Ok(Format::Latex));
-    let has_latex = [&arguments.left, &arguments.right]
-        .into_iter()
-        .any(is_latex);
-    let flags = [
-        ("--exact", arguments.exact),
-        ("--symbols", !arguments.symbols.is_empty()),
-    ];
-    refuse(has_latex, "a file of LaTeX or Markdown", &flags)
+    let mut files = [&arguments.left, &arguments.right].into_iter();
+    let has_latex = files.any(|path| matches!(Format::of_path(path), Ok(Format::Latex)));
+    let latex = Needed("a file of LaTeX or Markdown", has_latex);
+    latex.by("--exact", arguments.exact)?;
+    latex.by("--symbols", !arguments.symbols.is_empty())
 }
 
 fn of_import(arguments: &ImportArguments) -> Result<(), Error> {
-    let of_path = || Format::of_path(&arguments.file).ok();
-    let format = arguments.format.or_else(of_path);
+    // A name that says no format: the import tells it by the content, and every flag may be used.
+    let format = (arguments.format).or_else(|| Format::of_path(&arguments.file).ok());
     let is = |wanted: &[Format]| format.is_none_or(|format| wanted.contains(&format));
-    let symbols = [("--symbols", !arguments.symbols.is_empty())];
-    refuse(
-        is(&[Format::Latex]),
-        "a file of LaTeX or Markdown",
-        &symbols,
-    )?;
-    let of_tensors = [
-        ("--activation", arguments.activation.is_some()),
-        ("--order", arguments.order.is_some()),
-        ("--robot", arguments.robot.is_some()),
-        ("--scaling", !arguments.scaling.is_empty()),
-    ];
-    let has_tensors = is(&[Format::Safetensors, Format::Npz]);
-    refuse(has_tensors, "a file of tensors", &of_tensors)?;
-    let is_read = !arguments.inputs_from.is_empty();
-    refuse(is_read, "--inputs-from", &reading(&arguments.reading))
+    Needed("a file of LaTeX or Markdown", is(&[Format::Latex]))
+        .by("--symbols", !arguments.symbols.is_empty())?;
+    let tensors = is(&[Format::Safetensors, Format::Npz]);
+    let tensors = Needed("a file of tensors", tensors);
+    tensors.by("--activation", arguments.activation.is_some())?;
+    tensors.by("--order", arguments.order.is_some())?;
+    tensors.by("--robot", arguments.robot.is_some())?;
+    tensors.by("--scaling", !arguments.scaling.is_empty())?;
+    Needed("--inputs-from", !arguments.inputs_from.is_empty()).by_reading(&arguments.reading)
 }

@@ -15,7 +15,7 @@ use crate::robot::WrenchFrame;
 
 /// The candidate terms of an imported model.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum LibraryArgument {
+pub(crate) enum LibraryArgument {
     /// `degree=1,trigonometric,inputs`
     Shorthand(StandardLibrary),
     /// A file with the list of terms
@@ -50,9 +50,8 @@ fn library_argument(text: &str) -> Result<LibraryArgument, ImportError> {
                   romc import equations.txt --phase contact=any --phase flight=none --output hopper.json\n  \
                   romc import paper.tex --symbols z1=x --symbols z2=theta --output paper.json"
 )]
-pub struct ImportArguments {
+pub(crate) struct ImportArguments {
     /// File to import: .safetensors, .npz, or equations as .txt, .tex or .md
-    #[arg(value_name = "FILE")]
     pub file: PathBuf,
     /// The model file to write
     #[arg(long, value_name = "MODEL.json")]
@@ -114,9 +113,8 @@ pub struct ImportArguments {
     /// Sampling period of the training recordings
     #[arg(long, value_name = "SECONDS", value_parser = real(&SAMPLE_TIME))]
     pub sample_time: Option<f64>,
-    /// Recordings that give the mean and covariance of the inputs in each phase, by which the
-    /// controller weighs inputs, and that the model is compared with: a model that misses them is not
-    /// written. Needs --robot
+    /// Recordings that give the mean and covariance of the inputs in each phase, by which the controller weighs inputs,
+    /// and that the model is compared with: a model that misses them is not written. Needs --robot
     #[arg(long, value_name = "RECORDING", num_args = 1.., requires = "robot")]
     pub inputs_from: Vec<PathBuf>,
     /// Write the model even if it misses the recordings of --inputs-from

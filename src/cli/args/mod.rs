@@ -3,11 +3,6 @@
 //! The command line enters; [`Arguments`] leaves, with everything checked that needs no file. Read
 //! `command.rs` first.
 
-#![allow(
-    missing_docs,
-    reason = "a variant's help is in the structure of its arguments"
-)]
-
 mod command;
 mod compile;
 mod idle;
@@ -15,13 +10,14 @@ mod import;
 mod train;
 mod value;
 
-pub use command::{
-    Arguments, CheckArguments, Command, CompletionsArguments, ConvertArguments, DemoArguments,
+pub use command::Arguments;
+pub(crate) use command::{
+    CheckArguments, Command, CompletionsArguments, ConvertArguments, DemoArguments,
     IdentifyArguments, InspectArguments, ManualArguments, MpcArguments, PlanArguments,
     ReportArguments, RobotArguments, SimulateArguments,
 };
-pub use compile::{CompileArguments, SimplifyArguments, UnitsChoice};
-pub use idle::refuse_idle;
-pub use import::{ImportArguments, LibraryArgument};
-pub use train::{PhaseSet, StudyArguments, TrainArguments, TrainSettings, Widths};
-pub use value::ReadingArguments;
+pub use compile::UnitsChoice;
+pub(crate) use compile::{CompileArguments, SimplifyArguments};
+pub(crate) use import::{ImportArguments, LibraryArgument};
+pub(crate) use train::{PhaseSet, StudyArguments, TrainArguments, TrainSettings, Widths};
+pub(crate) use value::ReadingArguments;

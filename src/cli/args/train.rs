@@ -19,7 +19,7 @@ use crate::train::{Coordinates, Integrator, Method, Split};
 /// Widths of hidden layers in their order: `32,16`, or `linear` for none; a list of numbers in a file.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(transparent)]
-pub struct Widths(pub Vec<usize>);
+pub(crate) struct Widths(pub Vec<usize>);
 
 impl FromStr for Widths {
     type Err = String;
@@ -42,7 +42,7 @@ impl FromStr for Widths {
 /// A number that is neither infinite nor NaN.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "f64", into = "f64")]
-pub struct Finite(f64);
+pub(crate) struct Finite(f64);
 
 impl TryFrom<f64> for Finite {
     type Error = String;
@@ -64,7 +64,7 @@ impl From<Finite> for f64 {
 /// The phases of a model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum PhaseSet {
+pub(crate) enum PhaseSet {
     /// Any foot down, no foot down
     ContactFlight,
     /// A front foot down, only rear feet down, no foot down
@@ -75,7 +75,7 @@ pub enum PhaseSet {
 #[command(
     after_help = "Example:\n  romc train examples/recordings/go1/train_*.csv.gz \\\n      --validation examples/recordings/go1/validation_*.csv.gz \\\n      --latent-dim 4 --method closed-form --output my-model.json"
 )]
-pub struct TrainArguments {
+pub(crate) struct TrainArguments {
     /// Recordings to learn from
     #[arg(required = true, value_name = "RECORDING")]
     pub recordings: Vec<PathBuf>,
@@ -109,7 +109,7 @@ pub struct TrainArguments {
 /// Settings of `romc train`; what is not given keeps the default of the method.
 #[derive(Debug, Default, Clone, PartialEq, Args, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
-pub struct TrainSettings {
+pub(crate) struct TrainSettings {
     /// Number of latent coordinates d
     #[arg(long, value_name = "D", required_unless_present = "config", value_parser = count(&table::LATENT_DIM))]
     pub latent_dim: Option<usize>,
@@ -238,7 +238,7 @@ pub struct TrainSettings {
 #[command(
     after_help = "Example:\n  romc study examples/recordings/go1/train_*.csv.gz \\\n      --validation examples/recordings/go1/validation_*.csv.gz --latent-dims 1..18 --seeds 5\n\nA stopped study goes on when the same command is given again. On a cluster, `--shard 3/8` computes a part,\n`romc study --merge part1 part2 --out-dir whole` joins parts."
 )]
-pub struct StudyArguments {
+pub(crate) struct StudyArguments {
     /// Recordings to learn from
     #[arg(value_name = "RECORDING", required_unless_present = "merge")]
     pub recordings: Vec<PathBuf>,
@@ -284,7 +284,7 @@ pub struct StudyArguments {
 
 /// Latent dimensions of a study, ascending.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Dimensions(pub Vec<usize>);
+pub(crate) struct Dimensions(pub Vec<usize>);
 
 fn dimensions(text: &str) -> Result<Dimensions, String> {
     let expected =

@@ -49,7 +49,7 @@ pub(super) fn overwrite() -> impl TypedValueParser<Value = Overwrite> {
 
 /// Takes any text and offers the names of romc's own robots to shells.
 #[derive(Clone, Debug)]
-pub struct RobotParser;
+pub(crate) struct RobotParser;
 
 impl TypedValueParser for RobotParser {
     type Value = String;
@@ -70,13 +70,13 @@ impl TypedValueParser for RobotParser {
 }
 
 /// Reads `body` or `world`.
-pub fn wrench_frame(text: &str) -> Result<WrenchFrame, String> {
+pub(crate) fn wrench_frame(text: &str) -> Result<WrenchFrame, String> {
     WrenchFrame::by_name(text).ok_or_else(|| format!("found `{text}`, expected `world` or `body`"))
 }
 
 /// How recordings are read.
 #[derive(Debug, Clone, Default, Args)]
-pub struct ReadingArguments {
+pub(crate) struct ReadingArguments {
     /// What the columns of the recordings are: names, units, signs, order, clocks of another program's log
     /// (`romc inspect --guess LOG` writes a first one)
     #[arg(long, value_name = "MAP.toml")]
@@ -89,7 +89,7 @@ pub struct ReadingArguments {
 
 impl ReadingArguments {
     /// The flags as typed, with a blank before each.
-    pub fn as_flags(&self) -> String {
+    pub(crate) fn as_flags(&self) -> String {
         let columns = self.columns.iter();
         let columns = columns.map(|path| format!(" --columns {}", quoted(path)));
         let clock = self.clock.and_then(|clock| clock.to_possible_value());

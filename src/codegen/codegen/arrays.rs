@@ -1,9 +1,11 @@
 //! Array statements as loops and calls, and where their values live: which arrays hold them, in place or copied.
 
-use super::code::{Expr, Index, Role, Span};
+use super::code::{Index, Role, Span};
+use super::dialect::Dialect;
 use super::ident::Ident;
+use super::printer::Text;
 use super::translate::Translator;
-use crate::ir::{Binary, TableId, ValueId};
+use crate::ir::{Binary, ValueId};
 
 /// Where the rows of a matrix of values live: `stride` apart in an array, from the home's first element on.
 struct MatrixStorage {
@@ -12,9 +14,9 @@ struct MatrixStorage {
 }
 
 impl MatrixStorage {
-    fn element(&self, row: &Ident, col: &Ident) -> Expr {
-        let row = Index::fixed(0).plus(self.stride, row);
-        self.home.element(&row.plus(1, col))
+    fn element(&self, dialect: &Dialect, row: &Ident, col: &Ident) -> Text {
+        let row = Index::fixed(self.home.offset).plus(self.stride, row);
+        dialect.element(&self.home.array, &row.plus(1, col))
     }
 }
 
@@ -40,74 +42,78 @@ impl Translator<'_> {
         let argument = self.named(argument);
         let names = ["s", "c"].map(|name| self.locals.mint(name));
         for (value, name) in values.iter().zip(&names) {
-            self.spell(*value, Expr::Name(name.clone()));
+            self.spell(*value, Text::atom(name.to_string()));
         }
         let is_used = values.map(|value| self.n_uses[value] > 0);
         self.printer.sin_cos_lane(&argument, &names, is_used);
     }
 
-    fn table(&mut self, id: TableId) -> (Ident, usize) {
-        let table = &self.program.tables()[id.index()];
+    fn table(&mut self, id: usize) -> (Ident, usize) {
+        let table = &self.program.tables()[id];
         (self.tables.name(table), table.cols())
     }
 
-    /// A loop over four rows at a time.
-    pub(super) fn accumulate(&mut self, first: usize, table: TableId, weights: &[ValueId]) {
+    pub(super) fn accumulate(&mut self, first: usize, table: usize, weights: &[ValueId]) {
         let (name, cols) = self.table(table);
         let w = self.span(weights);
         let home = self.matrix_storage(first, 1, cols, "y").home;
         let (i, k) = (self.locals.mint("i"), self.locals.mint("k"));
-        let target = home.element(&Index::variable(&i));
-        let entry = |row: Index| Expr::Entry(name.clone(), row, Index::variable(&i));
-        let product = |index: Index| {
-            let weight = w.element(&index);
-            Expr::infix(Binary::Mul, entry(index.shifted(1)), weight)
-        };
         let printer = &mut self.printer;
+        let dialect = printer.dialect;
+        let element =
+            |span: &Span, index: Index| dialect.element(&span.array, &index.shifted(span.offset));
+        let target = element(&home, Index::variable(&i));
+        let entry = |row: Index| dialect.entry(&name, &row, &Index::variable(&i));
+        let product = |index: Index| {
+            let weight = element(&w, index.clone());
+            dialect.binary(Binary::Mul, &entry(index.shifted(1)), &weight, true)
+        };
         let offset = entry(Index::fixed(0));
         printer.looped(&i, cols, |body| body.assign(&target, &offset));
         let blocks = weights.len() / 4;
         if blocks > 0 {
             let term = |n: usize| product(Index::fixed(n).plus(4, &k));
-            let pair = |n: usize| Expr::infix(Binary::Add, term(n), term(n + 1));
-            let sum = Expr::infix(Binary::Add, pair(0), pair(2));
+            let pair = |n: usize| dialect.binary(Binary::Add, &term(n), &term(n + 1), true);
+            let sum = dialect.binary(Binary::Add, &pair(0), &pair(2), true);
             printer.looped(&k, blocks, |body| {
-                body.looped(&i, cols, |body| body.add_assign(&target, sum));
+                body.looped(&i, cols, |body| body.add_assign(&target, &sum));
             });
         }
         for n in 4 * blocks..weights.len() {
             let term = product(Index::fixed(n));
-            printer.looped(&i, cols, |body| body.add_assign(&target, term));
+            printer.looped(&i, cols, |body| body.add_assign(&target, &term));
         }
     }
 
-    /// One loop over the rows.
     pub(super) fn scaled(
         &mut self,
         first: usize,
         base: Option<&[ValueId]>,
-        groups: &[(TableId, Option<Vec<ValueId>>)],
+        groups: &[(usize, Option<Vec<ValueId>>)],
     ) {
-        let shape = &self.program.tables()[groups[0].0.index()];
+        let shape = &self.program.tables()[groups[0].0];
         let (rows, cols) = (shape.rows(), shape.cols());
         let (r, i) = (self.locals.mint("r"), self.locals.mint("i"));
+        let dialect = self.printer.dialect;
         let mut sum = base.map(|base| {
             let home = self.span(base);
-            MatrixStorage { home, stride: cols }.element(&r, &i)
+            MatrixStorage { home, stride: cols }.element(dialect, &r, &i)
         });
         for (table, weights) in groups {
             let (name, _) = self.table(*table);
-            let mut term = Expr::Entry(name, Index::variable(&r), Index::variable(&i));
+            let mut term = dialect.entry(&name, &Index::variable(&r), &Index::variable(&i));
             if let Some(weights) = weights {
-                let weight = self.span(weights).element(&Index::variable(&i));
-                term = Expr::infix(Binary::Mul, term, weight);
+                let span = self.span(weights);
+                let weight = dialect.element(&span.array, &Index::fixed(span.offset).plus(1, &i));
+                term = dialect.binary(Binary::Mul, &term, &weight, true);
             }
             sum = Some(match sum {
                 None => term,
-                Some(sum) => Expr::infix(Binary::Add, sum, term),
+                Some(sum) => dialect.binary(Binary::Add, &sum, &term, true),
             });
         }
-        let target = self.matrix_storage(first, rows, cols, "m").element(&r, &i);
+        let storage = self.matrix_storage(first, rows, cols, "m");
+        let target = storage.element(dialect, &r, &i);
         let sum = sum.expect("at least one group");
         self.printer.looped(&r, rows, |row| {
             row.looped(&i, cols, |body| body.assign(&target, &sum));
@@ -134,8 +140,8 @@ impl Translator<'_> {
             written.push(self.allocate(next, home));
             next += slot.len;
         }
-        let callee = self.callees[callee].to_string();
-        let call = self.printer.dialect.call(Some(&callee), &read, &written);
+        let callee = Some(&self.callees[callee]);
+        let call = self.printer.dialect.call(callee, &read, &written);
         self.printer.line(&call);
     }
 
@@ -160,22 +166,19 @@ impl Translator<'_> {
     }
 
     fn element(&self, value: ValueId) -> Option<(&Ident, usize)> {
-        match self.spelled[value.index()].as_ref() {
-            Some((Expr::Element(array, index), _)) if index.terms.is_empty() => {
-                Some((array, index.offset))
-            }
-            _ => None,
-        }
+        let text = self.spelled[value.index()].as_ref()?;
+        text.place
+            .as_ref()
+            .map(|(array, position)| (array, *position))
     }
 
-    /// The values copied to an array of their own.
     fn copied(&mut self, values: &[ValueId]) -> Span {
         let known = self.copies.iter().find(|(copied, _)| copied == values);
         if let Some((_, span)) = known {
             return span.clone();
         }
         let array = self.locals.mint("a");
-        let elements: Vec<Expr> = values.iter().map(|&value| self.read(value).0).collect();
+        let elements: Vec<Text> = values.iter().map(|&value| self.read(value)).collect();
         self.printer.let_array(&array, &elements);
         let span = Span::whole(&array, values.len(), false);
         self.copies.push((values.to_vec(), span.clone()));
@@ -190,10 +193,11 @@ impl Translator<'_> {
         span
     }
 
-    /// Spells values as the elements of a span.
     fn allocate(&mut self, first: usize, home: Span) -> Span {
         for k in 0..home.len {
-            self.spell(first + k, home.element(&Index::fixed(k)));
+            let index = Index::fixed(home.offset + k);
+            let element = self.printer.dialect.element(&home.array, &index);
+            self.spell(first + k, element);
         }
         home
     }

@@ -1,7 +1,6 @@
-//! Expressions, arrays and functions of generated code, before a dialect spells them.
+//! Arrays and functions of generated code, before a dialect spells them.
 
 use super::ident::Ident;
-use crate::ir::{Binary, Unary};
 
 /// A subscript `offset + sum_i stride_i * name_i`.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -34,35 +33,12 @@ impl Index {
     }
 }
 
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Expr {
-    Literal(f64),
-    Name(Ident),
-    /// `array[index]`
-    Element(Ident, Index),
-    /// `table[row][col]`
-    Entry(Ident, Index, Index),
-    /// `-a` or `f(a)`
-    Unary(Unary, Box<Expr>),
-    Infix(Binary, Box<Expr>, Box<Expr>),
-    /// The second where the first is zero, else the third.
-    Select(Box<[Expr; 3]>),
-}
-
-impl Expr {
-    pub(crate) fn infix(op: Binary, a: Expr, b: Expr) -> Self {
-        Self::Infix(op, Box::new(a), Box::new(b))
-    }
-}
-
 /// `len` elements of an array from `offset` on, handed to a function.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Span {
     pub array: Ident,
-    /// First element.
     pub offset: usize,
     pub len: usize,
-    /// Length of the whole array.
     pub of: usize,
     /// Whether the array is a parameter of the function rather than a local array.
     pub is_parameter: bool,
@@ -79,25 +55,16 @@ impl Span {
         }
     }
 
-    pub(crate) fn element(&self, index: &Index) -> Expr {
-        Expr::Element(self.array.clone(), index.clone().shifted(self.offset))
-    }
-
     pub(crate) fn is_whole(&self) -> bool {
         self.offset == 0 && self.len == self.of
     }
 }
 
-/// What a parameter of a generated function is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
-    /// An array that is read.
     Input,
-    /// An array that is written.
     Output,
-    /// An array that is read, then written.
     InOut,
-    /// A scalar that is read.
     Scalar,
 }
 
@@ -107,11 +74,9 @@ pub struct Parameter<N = Ident> {
     pub name: N,
     /// Number of elements; an output may have none.
     pub len: usize,
-    /// What it is for.
     pub role: Role,
 }
 
-/// A generated function.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Function {
     pub name: Ident,
@@ -119,18 +84,39 @@ pub struct Function {
     pub parameters: Vec<Parameter>,
     /// Parameters that the body does not mention.
     pub unused: Vec<Ident>,
-    /// Its statements, each line with its end.
     pub body: String,
 }
 
+/// Where parameters become results, as in scripts: one that is read and written is an argument and returned.
 impl Function {
-    /// The function behind its head, with a mention of each parameter that nothing reads; ends without
-    /// a newline.
-    pub(crate) fn definition(&self, head: &str, mention: impl Fn(&Ident) -> String) -> String {
-        let unused = self.unused.iter();
-        let unused: String = unused
-            .map(|name| format!("    {}\n", mention(name)))
-            .collect();
-        format!("{head} {{\n{unused}{}}}", self.body)
+    fn of(&self, roles: &[Role]) -> Vec<&Parameter> {
+        let parameters = self.parameters.iter();
+        parameters.filter(|p| roles.contains(&p.role)).collect()
+    }
+
+    pub(crate) fn inputs(&self) -> Vec<&Parameter> {
+        self.of(&[Role::Input, Role::InOut, Role::Scalar])
+    }
+
+    pub(crate) fn outputs(&self) -> Vec<&Parameter> {
+        self.of(&[Role::Output, Role::InOut])
+    }
+
+    pub(crate) fn arrays(&self) -> Vec<&Parameter> {
+        self.of(&[Role::Input, Role::InOut])
+    }
+
+    pub(crate) fn copied(&self) -> Vec<&Parameter> {
+        self.of(&[Role::InOut])
+    }
+
+    /// What is returned and no argument, so that the body has to begin with it.
+    pub(crate) fn created(&self) -> Vec<&Parameter> {
+        self.of(&[Role::Output])
+    }
+
+    /// Whether a statement mentions a table or a function.
+    pub(crate) fn mentions(&self, name: &str) -> bool {
+        self.body.contains(&format!("{name}[")) || self.body.contains(&format!("{name}("))
     }
 }

@@ -1,107 +1,220 @@
-//! What targets spell differently.
+//! What languages spell differently: a table of patterns per language.
+//!
+//! In a pattern `$name` and its like stand for what is filled in; `$model`, `$upper`, `$real` and `$f` (identifier of
+//! the model, the same in upper case, type of numbers, suffix of literals) are known everywhere.
 
-use super::code::{Index, Span};
+use super::code::{Function, Parameter, Role, Span};
+use super::ident::Ident;
 use super::options::Precision;
-use super::printer::subscript;
 use crate::ir::{Table, Unary};
 
-/// What a language spells the same everywhere.
+/// The patterns of a language. Those with two entries are for double and single precision.
 pub(crate) struct Spelling {
     /// Words that no variable may be called, with blanks between them.
     pub reserved: &'static str,
-    /// What ends a statement.
-    pub terminator: &'static str,
-    /// What follows the head of a loop, and what closes its body.
-    pub loop_ends: (&'static str, Option<&'static str>),
+    pub reals: [&'static str; 2],
+    pub suffixes: [&'static str; 2],
+    /// NaN and both infinities in self-tests.
+    pub not_finite: [&'static str; 3],
+    /// Definition of `$name` by `$value`; of an array by its `$n` elements.
+    pub scalar: &'static str,
+    pub array: &'static str,
+    /// An array of `$n` elements that are assigned later.
+    pub declaration: &'static str,
+    pub assignment: &'static str,
+    /// `+=`, where the language has it.
+    pub addition: Option<&'static str>,
+    /// Head of a loop of `$name` from 0 to below `$n`, or to `$last`; and what closes its body.
+    pub loop_head: &'static str,
+    pub loop_end: Option<&'static str>,
     /// What ends a line that goes on in the next.
     pub continuation: &'static str,
-    /// Whether there is `+=`.
-    pub adds_in_place: bool,
     /// Sum, difference, product and quotient, with the spaces around them.
     pub operators: [&'static str; 4],
     /// Function `f(a, b, c) = a*b + c` for loops, in a language whose compilers never fuse the two
     /// operations by themselves.
     pub multiply_add: Option<&'static str>,
+    /// A function `$name` of `$a`, and the functions that are spelled otherwise.
+    pub function: &'static str,
+    pub functions: &'static [(Unary, &'static str)],
+    pub power: &'static str,
+    /// `$zero` where `$test` is zero, else `$other`.
+    pub select: &'static str,
+    /// Element `$i` of an array, entry `$i`, `$j` of a table; the first index.
+    pub element: &'static str,
+    pub entry: &'static str,
+    pub first_index: usize,
+    /// Arrays that a call reads or writes: a whole parameter, a whole local array, elements from `$first` (`$next` from
+    /// one) to below `$end`.
+    pub read: [&'static str; 3],
+    pub written: [&'static str; 3],
+    /// Calls of the sine-and-cosine kernel for `$n` angles and of a generated function.
+    pub sin_cos: &'static str,
+    pub call: &'static str,
+    /// The kernel's core on the argument `$a` of a lane: defines `$sine` and `$cosine`, and notes an argument beyond its
+    /// limit. Blocks of lanes are for compilers: scripts run many points as columns.
+    pub sin_cos_lane: &'static [&'static str],
+    /// What stands for a result of the core that is not used, if it may be left out.
+    pub unused_lane: Option<&'static str>,
+    pub prefix: &'static str,
+    /// Beginning of the names of constant tables, a table, and its rows: what opens them, stands after every eighth
+    /// entry and closes them.
+    pub table_base: &'static str,
+    pub table: &'static str,
+    pub rows: [&'static str; 3],
+    /// Head of a function with its parameters: arrays that are read, arrays that are written, scalars; and the mention of
+    /// a parameter that nothing reads.
+    pub head: &'static str,
+    pub parameters: [&'static str; 3],
+    pub mention: &'static str,
 }
 
-impl Spelling {
-    /// As in C.
-    pub(crate) const fn with_braces(reserved: &'static str) -> Self {
+#[derive(Clone)]
+pub(crate) struct Dialect {
+    pub spelling: &'static Spelling,
+    /// Identifier of the model, the beginning of all external names in C.
+    pub model: String,
+    pub precision: Precision,
+}
+
+impl Dialect {
+    pub(crate) fn new(spelling: &'static Spelling, model: &str, precision: Precision) -> Self {
         Self {
-            reserved,
-            terminator: ";",
-            loop_ends: (" {", Some("}")),
-            continuation: "",
-            adds_in_place: true,
-            operators: [" + ", " - ", "*", "/"],
-            multiply_add: None,
+            spelling,
+            model: model.to_owned(),
+            precision,
         }
     }
-}
 
-/// A target language. The printer owns precedence and parentheses, the dialect everything that differs between
-/// languages.
-pub(crate) trait Dialect {
-    fn spelling(&self) -> &'static Spelling;
-
-    /// A power of printed operands.
-    fn power(&self, base: &str, exponent: &str) -> String;
-
-    /// The second printed operand where the first is zero, else the third.
-    fn select(&self, operands: [String; 3]) -> String;
-
-    fn element(&self, array: &str, index: &Index) -> String {
-        format!("{array}[{}]", subscript(index))
+    pub(crate) fn upper(&self) -> String {
+        self.model.to_ascii_uppercase()
     }
 
-    fn entry(&self, table: &str, row: &Index, col: &Index) -> String {
-        format!("{table}[{}][{}]", subscript(row), subscript(col))
+    pub(crate) fn real(&self) -> &'static str {
+        self.spelling.reals[usize::from(self.precision.is_single())]
     }
 
-    fn literal(&self, value: f64) -> String {
-        Precision::Double.digits(value)
+    /// What literals and library functions of that type end with.
+    pub(crate) fn suffix(&self) -> &'static str {
+        self.spelling.suffixes[usize::from(self.precision.is_single())]
     }
 
-    /// A function applied to a printed argument; never [`Unary::Neg`], which is an operator.
-    fn apply(&self, function: Unary, argument: &str) -> String;
-
-    fn let_scalar(&self, name: &str, value: &str) -> String {
-        format!("{name} = {value}{}", self.spelling().terminator)
+    pub(crate) fn fill(&self, pattern: &str, words: &[(&str, &str)]) -> String {
+        let mut parts = pattern.split('$');
+        let mut text = parts.next().unwrap_or_default().to_owned();
+        for part in parts {
+            let end = part.find(|c: char| !c.is_ascii_lowercase());
+            let (word, rest) = part.split_at(end.unwrap_or(part.len()));
+            match (word, words.iter().find(|(known, _)| *known == word)) {
+                (_, Some((_, value))) => text += value,
+                ("model", None) => text += &self.model,
+                ("upper", None) => text += &self.upper(),
+                ("real", None) => text += self.real(),
+                ("f", None) => text += self.suffix(),
+                (unknown, None) => unreachable!("`${unknown}` in the pattern `{pattern}`"),
+            }
+            text += rest;
+        }
+        text
     }
 
-    /// Definition of an array by its printed elements.
-    fn let_array(&self, name: &str, elements: &[String]) -> String;
-
-    /// Declaration of an array that is assigned later.
-    fn declare(&self, name: &str, len: usize) -> String;
-
-    fn for_loop(&self, variable: &str, count: usize) -> String;
-
-    /// Beginning of the names of constant tables.
-    fn table_base(&self, _prefix: &str) -> String {
-        "TABLE".to_owned()
+    pub(crate) fn literal(&self, value: f64) -> String {
+        self.precision.digits(value) + self.suffix()
     }
 
-    /// A call of the sine-and-cosine kernel, or of a generated function (`callee`).
-    fn call(&self, callee: Option<&str>, read: &[Span], written: &[Span]) -> String;
-
-    /// The kernel's core on one printed argument of a lane: defines sine and cosine, and
-    /// notes an argument beyond its limit. Blocks of lanes are for compilers: scripts run many
-    /// points as columns.
-    fn sin_cos_lane(&self, _: &str, _: &[String; 2], _is_used: [bool; 2]) -> Vec<String> {
-        unreachable!("a language without blocks of lanes prints none")
+    /// A number of a self-test, which may be infinite or none.
+    pub(crate) fn number(&self, value: f64) -> String {
+        let [nan, infinite, negative] = self.spelling.not_finite;
+        match value {
+            _ if value.is_nan() => nan.to_owned(),
+            f64::INFINITY => infinite.to_owned(),
+            f64::NEG_INFINITY => negative.to_owned(),
+            _ => self.literal(value),
+        }
     }
 
-    /// The rows of a constant table: entries between `open` and `close`, with `between` after every
-    /// eight of them.
-    fn rows(&self, table: &Table, [open, between, close]: [&str; 3]) -> String {
+    pub(crate) fn call(&self, callee: Option<&Ident>, read: &[Span], written: &[Span]) -> String {
+        let passed = |spans: &[Span], patterns: &[&str; 3]| {
+            let text = |span: &Span| {
+                let pattern = match (span.is_whole(), span.is_parameter) {
+                    (true, true) => patterns[0],
+                    (true, false) => patterns[1],
+                    (false, _) => patterns[2],
+                };
+                let bounds = [span.offset, span.offset + 1, span.offset + span.len];
+                let [first, next, end] = &bounds.map(|bound| bound.to_string());
+                let name = span.array.as_str();
+                let words = [
+                    ("name", name),
+                    ("first", first),
+                    ("next", next),
+                    ("end", end),
+                ];
+                self.fill(pattern, &words)
+            };
+            spans.iter().map(text).collect::<Vec<_>>()
+        };
+        let n = read.first().map_or(0, |span| span.len).to_string();
+        let inputs = passed(read, &self.spelling.read).join(", ");
+        let outputs = passed(written, &self.spelling.written);
+        let all = outputs.join(", ");
+        let mut words = vec![("n", n.as_str()), ("read", &inputs), ("written", &all)];
+        match callee {
+            Some(callee) => {
+                words.push(("name", callee.as_str()));
+                self.fill(self.spelling.call, &words)
+            }
+            None => {
+                words.extend([("sines", outputs[0].as_str()), ("cosines", &outputs[1])]);
+                self.fill(self.spelling.sin_cos, &words)
+            }
+        }
+    }
+
+    pub(crate) fn table(&self, name: &Ident, table: &Table) -> String {
+        let [open, between, close] = self.spelling.rows;
         let row = |row: &[f64]| {
             let entries: Vec<String> = row.iter().map(|&entry| self.literal(entry)).collect();
             let lines: Vec<String> = entries.chunks(8).map(|line| line.join(", ")).collect();
             format!("{open}{}{close}\n", lines.join(between))
         };
-        (0..table.rows()).map(|r| row(table.row(r))).collect()
+        let entries: String = (0..table.rows()).map(|r| row(table.row(r))).collect();
+        let [rows, cols] = [table.rows(), table.cols()].map(|count| count.to_string());
+        let words = [
+            ("name", name.as_str()),
+            ("rows", &rows),
+            ("cols", &cols),
+            ("value", &entries),
+        ];
+        self.fill(self.spelling.table, &words)
     }
 
-    fn table(&self, name: &str, table: &Table) -> String;
+    pub(crate) fn head(&self, function: &Function) -> String {
+        let text = |parameter: &Parameter| {
+            let pattern = match parameter.role {
+                Role::Input => self.spelling.parameters[0],
+                Role::Output | Role::InOut => self.spelling.parameters[1],
+                Role::Scalar => self.spelling.parameters[2],
+            };
+            let len = parameter.len.to_string();
+            self.fill(pattern, &[("name", parameter.name.as_str()), ("n", &len)])
+        };
+        let parameters: Vec<String> = function.parameters.iter().map(text).collect();
+        let words = [
+            ("name", function.name.as_str()),
+            ("value", &parameters.join(", ")),
+        ];
+        self.fill(self.spelling.head, &words)
+    }
+
+    /// The function without its documentation, with a mention of each parameter that nothing reads; ends without
+    /// a newline.
+    pub(crate) fn definition(&self, function: &Function) -> String {
+        let mention = |name: &Ident| self.fill(self.spelling.mention, &[("name", name.as_str())]);
+        let unused = function.unused.iter();
+        let unused: String = unused
+            .map(|name| format!("    {}\n", mention(name)))
+            .collect();
+        format!("{} {{\n{unused}{}}}", self.head(function), function.body)
+    }
 }

@@ -1,11 +1,19 @@
-//! Names in generated code.
+//! Names in generated code, and the constant tables that are called by them.
 
 use std::collections::BTreeSet;
 use std::fmt;
 
+use crate::ir::Table;
+
 /// A name that is an identifier of the target and unique in its scope; minted by [`Namer`].
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Ident(String);
+
+impl Ident {
+    pub(crate) fn as_str(&self) -> &str {
+        &self.0
+    }
+}
 
 impl fmt::Display for Ident {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -44,6 +52,34 @@ impl Namer {
             name = format!("{base}{number}");
         }
         Ident(name)
+    }
+}
+
+/// The constant tables of a file in the order of their first use; equal tables are stored once.
+#[derive(Debug)]
+pub(crate) struct Tables {
+    namer: Namer,
+    base: String,
+    pub known: Vec<(Ident, Table)>,
+}
+
+impl Tables {
+    pub(crate) fn new(reserved: &str, base: String) -> Self {
+        Self {
+            namer: Namer::new(reserved),
+            base,
+            known: Vec::new(),
+        }
+    }
+
+    pub(crate) fn name(&mut self, table: &Table) -> Ident {
+        if let Some((name, _)) = self.known.iter().find(|(_, known)| known == table) {
+            return name.clone();
+        }
+        let wanted = format!("{}_{}", self.base, self.known.len());
+        let name = self.namer.mint(&wanted);
+        self.known.push((name.clone(), table.clone()));
+        name
     }
 }
 

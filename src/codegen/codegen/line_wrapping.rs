@@ -52,18 +52,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn comment_lines_keep_paragraphs_and_indent_what_continues() {
+    fn comments_keep_paragraphs_and_tidy_text_has_single_blank_lines_and_one_newline_at_its_end() {
         let lines = comment_lines(&["one two three".to_owned(), "four".to_owned()], 9);
         assert_eq!(lines, ["one two", "  three", "four"]);
-    }
-
-    #[test]
-    fn tidy_text_has_no_trailing_spaces_no_two_blank_lines_and_one_newline_at_its_end() {
         for (text, tidied) in [
             ("", ""),
             ("\n \n", ""),
             ("a", "a\n"),
-            ("\n\na  \n\n \nb\n\n\n", "a\n\nb\n"),
+            ("\n\na  \n\n \nb\n\n", "a\n\nb\n"),
         ] {
             assert_eq!(tidy(text), tidied, "{text:?}");
         }

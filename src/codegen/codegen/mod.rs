@@ -1,20 +1,22 @@
 //! From programs to source code: C, Rust, Python, CasADi, MATLAB.
 //!
 //! A `ModelInterface` enters: every function that is generated for a model, as a program. Text leaves.
-//! `interface` lists the functions, `translate` and `arrays` turn programs into the statements that `printer`
-//! prints with what a `dialect` spells, templates place them. Nothing mathematical is decided here.
+//! `interface` lists the functions, `translate` and `arrays` turn programs into statements, `printer` prints these by the
+//! patterns of a language (`dialect`, `languages`), templates place them. Nothing mathematical is decided here.
 
 mod arrays;
 #[doc(hidden)] // for `deploy`, in the crate above
 pub mod c;
 mod code;
 mod dialect;
+mod documentation;
 mod ident;
 #[doc(hidden)] // for `deploy`, in the crate above
 pub mod interface;
+mod languages;
 #[doc(hidden)] // for `deploy`, in the crate above
 pub mod line_wrapping;
-mod map_equations;
+
 mod model_text;
 mod options;
 mod printer;
@@ -22,8 +24,6 @@ mod printer;
 pub mod rust;
 #[doc(hidden)] // for `deploy`, in the crate above
 pub mod script;
-mod sin_cos;
-mod tables;
 mod test_points;
 mod test_vectors;
 mod translate;

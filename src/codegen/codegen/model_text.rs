@@ -2,76 +2,72 @@
 
 use super::code::Function;
 use super::dialect::Dialect;
-use super::ident::{Ident, Namer};
+use super::ident::{Ident, Namer, Tables};
 use super::interface::{FunctionSpec, ModelInterface, computes_angles};
-use super::options::SineCosine;
-use super::tables::Tables;
+use super::options::{Precision, SineCosine};
+use super::printer::Text;
 use super::translate::{function, lanes};
+use crate::ir::Binary;
+use crate::ir::sin_cos::{double, single};
+use crate::lower::JacobianPattern;
 
-/// What the files of all languages say of a model; `F` is what they print of a function.
-pub(crate) struct ModelText<'a, F> {
+/// What the files of all languages hold of a model.
+pub(crate) struct ModelText<'a> {
     pub entries: &'a ModelInterface,
-    pub tables: Vec<String>,
-    /// Maps between robot and latent coordinates.
-    pub maps: Vec<F>,
-    pub phases: Vec<PhaseText<F>>,
+    pub tables: Vec<(Ident, String)>,
+    pub maps: Vec<Function>,
+    pub phases: Vec<PhaseText<'a>>,
 }
 
-/// A phase in the templates; `F` is what they print of a function.
-pub(crate) struct PhaseText<F> {
-    pub identifier: String,
+pub(crate) struct PhaseText<'a> {
+    pub identifier: &'a str,
     /// The same in upper case, the beginning of its constants.
     pub upper: String,
-    pub nnz: usize,
-    pub rows: String,
-    pub cols: String,
+    pub pattern: &'a JacobianPattern,
     /// Accelerations, then with Jacobian, then a step.
-    pub functions: [F; 3],
+    pub functions: [Function; 3],
     /// Body of the loop over the lanes of a batch.
     pub lanes: Option<String>,
     /// Whether the accelerations have sines, whose arguments may be beyond the kernel's limit.
     pub lanes_have_angles: bool,
 }
 
-impl<'a, F> ModelText<'a, F> {
-    /// Prints all of a model but lanes. `prefix` begins each name; `print` prints a function that reads some of
-    /// the tables, `numbers` rows or columns of nonzeros, counted from 0.
+impl<'a> ModelText<'a> {
+    /// Prints all functions of a model; with blocks of lanes for batches, whose sines are given, or without.
     pub(crate) fn new(
         entries: &'a ModelInterface,
-        dialect: &dyn Dialect,
-        prefix: &str,
-        print: impl Fn(Function, &Tables) -> F,
-        numbers: fn(&[usize]) -> String,
+        dialect: &Dialect,
+        batches: Option<SineCosine>,
     ) -> Self {
-        let mut globals = Namer::new(dialect.spelling().reserved);
-        let mut tables = Tables::new(
-            Namer::new(dialect.spelling().reserved),
-            &dialect.table_base(prefix),
-        );
-        let mut text = |entry: &FunctionSpec, callees: &[Ident]| {
+        let spelling = dialect.spelling;
+        let [prefix, base] =
+            [spelling.prefix, spelling.table_base].map(|pattern| dialect.fill(pattern, &[]));
+        let mut globals = Namer::new(spelling.reserved);
+        let mut tables = Tables::new(spelling.reserved, base);
+        let mut printed = |entry: &FunctionSpec, callees: &[Ident]| {
             let name = globals.mint(&format!("{prefix}{}", entry.name));
-            let function = function(entry, name.clone(), dialect, callees, &mut tables);
-            (name, print(function, &tables))
+            function(entry, name, dialect, callees, &mut tables)
         };
-        let maps = entries.maps.iter().map(|map| text(map, &[]).1).collect();
+        let maps = entries.maps.iter().map(|map| printed(map, &[])).collect();
         let phases = entries.phases.iter().map(|phase| {
-            let (name, dynamics) = text(&phase.dynamics, &[]);
-            let (_, jacobian) = text(&phase.jacobian, &[]);
-            let (_, step) = text(&phase.step, &[name]);
+            let dynamics = printed(&phase.dynamics, &[]);
+            let jacobian = printed(&phase.jacobian, &[]);
+            let step = printed(&phase.step, std::slice::from_ref(&dynamics.name));
+            let program = &phase.dynamics.program;
             PhaseText {
-                identifier: phase.identifier.clone(),
+                identifier: &phase.identifier,
                 upper: phase.identifier.to_ascii_uppercase(),
-                nnz: phase.pattern.len(),
-                rows: numbers(&phase.pattern.rows),
-                cols: numbers(&phase.pattern.cols),
+                pattern: &phase.pattern,
                 functions: [dynamics, jacobian, step],
-                lanes: None,
-                lanes_have_angles: phase.dynamics.program.has(computes_angles),
+                lanes: batches.and_then(|sines| lanes(program, dialect, sines)),
+                lanes_have_angles: program.has(computes_angles),
             }
         });
         let phases = phases.collect();
-        let tables = tables.known.iter();
-        let tables = tables.map(|(name, table)| dialect.table(&name.to_string(), table));
+        let tables = tables.known.into_iter().map(|(name, table)| {
+            let text = dialect.table(&name, &table);
+            (name, text)
+        });
         Self {
             entries,
             tables: tables.collect(),
@@ -80,21 +76,67 @@ impl<'a, F> ModelText<'a, F> {
         }
     }
 
-    /// The same with the loops over the lanes of batches that run in blocks.
-    pub(crate) fn with_lanes(mut self, dialect: &dyn Dialect, sines: SineCosine) -> Self {
-        for (text, phase) in self.phases.iter_mut().zip(&self.entries.phases) {
-            text.lanes = lanes(&phase.dynamics.program, dialect, sines);
-        }
-        self
+    pub(crate) fn functions(&self) -> Vec<&Function> {
+        let of_phases = self.phases.iter().flat_map(|phase| &phase.functions);
+        self.maps.iter().chain(of_phases).collect()
     }
 
     pub(crate) fn has_lanes(&self) -> bool {
         self.phases.iter().any(|phase| phase.lanes.is_some())
     }
 
-    /// Name of the first phase's accelerations, for an example of a call.
     pub(crate) fn example(&self) -> &str {
         let first = self.entries.phases.first();
         first.map_or("", |phase| &phase.dynamics.name)
+    }
+}
+
+/// The constants of the sine-and-cosine kernel.
+pub(crate) struct KernelText {
+    pub limit: String,
+    pub two_over_pi: String,
+    pub round: String,
+    pub pi_2: [String; 3],
+    /// Polynomials of sine and cosine in `t`, with `t2` its square.
+    pub sin: String,
+    pub cos: String,
+    /// From bit 1 of a number to its sign.
+    pub to_sign: usize,
+}
+
+impl KernelText {
+    pub(crate) fn new(dialect: &Dialect) -> Self {
+        let [single, pi_2, sin, cos] = match dialect.precision {
+            Precision::Double => double::constants(),
+            Precision::Single => single::constants(),
+        };
+        let literal = |list: &[f64], k: usize| dialect.literal(list[k]);
+        Self {
+            limit: literal(&single, 0),
+            two_over_pi: literal(&single, 1),
+            round: literal(&single, 2),
+            pi_2: [0, 1, 2].map(|k| literal(&pi_2, k)),
+            sin: polynomial(dialect, &sin).text,
+            cos: polynomial(dialect, &cos).text,
+            to_sign: dialect.precision.bits() - 2,
+        }
+    }
+}
+
+/// `(c_0 + c_1 t) + t2 (...)`
+fn polynomial(dialect: &Dialect, coefficients: &[f64]) -> Text {
+    let [t, t2] = ["t", "t2"].map(|name| Text::atom(name.to_owned()));
+    let [add, mul] = [Binary::Add, Binary::Mul]
+        .map(|op| move |a: &Text, b: &Text| dialect.binary(op, a, b, true));
+    match coefficients {
+        [first, second, rest @ ..] => {
+            let [first, second] = [first, second].map(|&value| dialect.constant(value));
+            let linear = add(&first, &mul(&second, &t));
+            match rest.is_empty() {
+                true => linear,
+                false => add(&linear, &mul(&t2, &polynomial(dialect, rest))),
+            }
+        }
+        rest => dialect.constant(rest[0]),
     }
 }

@@ -1,6 +1,6 @@
 //! The one place that owns precedence, parentheses, indentation and line width.
 
-use super::code::{Expr, Index};
+use super::code::Index;
 use super::dialect::Dialect;
 use super::ident::Ident;
 use crate::ir::{Binary, Unary};
@@ -8,7 +8,6 @@ use crate::ir::{Binary, Unary};
 /// Longest line before an expression is broken, in characters.
 const WIDTH: usize = 100;
 
-/// How tightly the outermost operation of an expression binds.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Precedence {
     Sum,
@@ -17,21 +16,174 @@ enum Precedence {
     Atom,
 }
 
+/// A printed expression, with what printing its use in another one needs.
+#[derive(Clone)]
+pub(crate) struct Text {
+    pub text: String,
+    binds: Precedence,
+    /// How deeply operations are nested in it.
+    pub depth: usize,
+    /// Of an element: its array and its position.
+    pub place: Option<(Ident, usize)>,
+    /// Of a product that may be fused with a sum: its factors, and the first negated.
+    factors: Option<Box<[String; 3]>>,
+}
+
+impl Text {
+    fn new(text: String, binds: Precedence, depth: usize) -> Self {
+        Self {
+            text,
+            binds,
+            depth,
+            place: None,
+            factors: None,
+        }
+    }
+
+    /// Something that needs no parentheses, without an operation.
+    pub(crate) fn atom(text: String) -> Self {
+        Self::new(text, Precedence::Atom, 0)
+    }
+
+    /// The text as an operand that has to bind so tightly.
+    fn operand(&self, at_least: Precedence) -> String {
+        match self.binds >= at_least {
+            true => self.text.clone(),
+            false => format!("({})", self.text),
+        }
+    }
+
+    fn negated(&self) -> String {
+        format!("-{}", self.operand(Precedence::Atom))
+    }
+}
+
+/// Expressions.
+impl Dialect {
+    pub(crate) fn constant(&self, value: f64) -> Text {
+        let binds = match value.is_sign_negative() {
+            true => Precedence::Sign,
+            false => Precedence::Atom,
+        };
+        Text::new(self.literal(value), binds, 0)
+    }
+
+    /// `array[index]`
+    pub(crate) fn element(&self, array: &Ident, index: &Index) -> Text {
+        let words = [("name", array.as_str()), ("i", &self.subscript(index))];
+        let place = (array.clone(), index.offset);
+        Text {
+            place: Some(place).filter(|_| index.terms.is_empty()),
+            ..Text::atom(self.fill(self.spelling.element, &words))
+        }
+    }
+
+    /// `table[row][col]`
+    pub(crate) fn entry(&self, table: &Ident, row: &Index, col: &Index) -> Text {
+        let [row, col] = [row, col].map(|index| self.subscript(index));
+        let words = [("name", table.as_str()), ("i", &row), ("j", &col)];
+        Text::atom(self.fill(self.spelling.entry, &words))
+    }
+
+    /// A subscript such as `4*i + 3`.
+    fn subscript(&self, index: &Index) -> String {
+        let terms = index.terms.iter().filter(|(stride, _)| *stride != 0);
+        let terms = terms.map(|(stride, name)| match stride {
+            1 => name.to_string(),
+            _ => format!("{stride}*{name}"),
+        });
+        let offset = index.offset + self.spelling.first_index;
+        let offset = (offset != 0).then(|| offset.to_string());
+        let parts: Vec<String> = terms.chain(offset).collect();
+        match parts.as_slice() {
+            [] => "0".to_owned(),
+            parts => parts.join(" + "),
+        }
+    }
+
+    pub(crate) fn unary(&self, op: Unary, a: &Text) -> Text {
+        let (text, binds) = match op {
+            Unary::Neg => (a.negated(), Precedence::Sign),
+            _ => {
+                let mut functions = self.spelling.functions.iter();
+                let own = functions.find(|(known, _)| *known == op);
+                let pattern = own.map_or(self.spelling.function, |(_, pattern)| pattern);
+                let words = [("name", op.name()), ("a", &a.text)];
+                (self.fill(pattern, &words), Precedence::Atom)
+            }
+        };
+        Text::new(text, binds, a.depth + 1)
+    }
+
+    pub(crate) fn select(&self, operands: &[Text; 3]) -> Text {
+        let [test, zero, other] = operands.each_ref().map(|operand| operand.text.as_str());
+        let words = [("test", test), ("zero", zero), ("other", other)];
+        let text = self.fill(self.spelling.select, &words);
+        let depth = operands.iter().map(|operand| operand.depth).max();
+        Text::new(text, Precedence::Atom, depth.unwrap_or(0) + 1)
+    }
+
+    /// An operation on two operands; `in_loop`, a sum with a product is printed with a function, if the language has one.
+    pub(crate) fn binary(&self, op: Binary, a: &Text, b: &Text, in_loop: bool) -> Text {
+        let depth = a.depth.max(b.depth) + 1;
+        let multiply_add = self.spelling.multiply_add.filter(|_| in_loop);
+        if let (Some(name), Some([x, y, rest])) = (multiply_add, multiply_added(op, a, b)) {
+            return Text::new(format!("{name}({x}, {y}, {rest})"), Precedence::Atom, depth);
+        }
+        let [add, sub, mul, div] = self.spelling.operators;
+        // Sums and products group to the left; a right operand of the same kind keeps
+        // its parentheses, because floating-point sums do not associate.
+        let (operator, own, right) = match op {
+            Binary::Add => (add, Precedence::Sum, Precedence::Product),
+            Binary::Sub => (sub, Precedence::Sum, Precedence::Product),
+            Binary::Mul => (mul, Precedence::Product, Precedence::Atom),
+            Binary::Div => (div, Precedence::Product, Precedence::Atom),
+            Binary::Pow => {
+                let words = [("a", a.text.as_str()), ("b", &b.text)];
+                let text = self.fill(self.spelling.power, &words);
+                return Text::new(text, Precedence::Atom, depth);
+            }
+        };
+        // No operator before a minus.
+        let right = match b.text.starts_with('-') {
+            true => Precedence::Atom,
+            false => right,
+        };
+        let text = format!("{}{operator}{}", a.operand(own), b.operand(right));
+        let is_fusible = multiply_add.is_some() && op == Binary::Mul;
+        let factors = || Box::new([a.text.clone(), b.text.clone(), a.negated()]);
+        Text {
+            factors: is_fusible.then(factors),
+            ..Text::new(text, own, depth)
+        }
+    }
+}
+
+/// The arguments of `f(x, y, rest) = x*y + rest` for a sum or difference with a product; the same two roundings, unless
+/// the target can fuse them.
+fn multiply_added(op: Binary, a: &Text, b: &Text) -> Option<[String; 3]> {
+    let (a_factors, b_factors) = (a.factors.as_deref(), b.factors.as_deref());
+    let (x, y, rest) = match (op, a_factors, b_factors) {
+        (Binary::Add, _, Some([x, y, _])) => (x, y, a.text.clone()),
+        (Binary::Add, Some([x, y, _]), None) => (x, y, b.text.clone()),
+        (Binary::Sub, _, Some([_, y, negated])) => (negated, y, a.text.clone()),
+        (Binary::Sub, Some([x, y, _]), None) => (x, y, b.negated()),
+        _ => return None,
+    };
+    Some([x.clone(), y.clone(), rest])
+}
+
 /// Prints statements in one dialect, at a depth of indentation.
 pub(crate) struct Printer<'a> {
-    pub dialect: &'a dyn Dialect,
-    /// Function that sums with a product are printed with.
-    multiply_add: Option<&'static str>,
+    pub dialect: &'a Dialect,
     depth: usize,
     text: String,
 }
 
 impl<'a> Printer<'a> {
-    /// For the statements of a function or, `in_loop`, of a loop's body.
-    pub(crate) fn new(dialect: &'a dyn Dialect, depth: usize, in_loop: bool) -> Self {
+    pub(crate) fn new(dialect: &'a Dialect, depth: usize) -> Self {
         Self {
             dialect,
-            multiply_add: dialect.spelling().multiply_add.filter(|_| in_loop),
             depth,
             text: String::new(),
         }
@@ -41,61 +193,79 @@ impl<'a> Printer<'a> {
         self.text
     }
 
-    pub(crate) fn let_scalar(&mut self, name: &Ident, value: &Expr) {
-        let value = self.expression(value);
-        self.line(&self.dialect.let_scalar(&name.to_string(), &value));
+    fn statement(&mut self, pattern: &str, words: &[(&str, &str)]) {
+        self.line(&self.dialect.fill(pattern, words));
     }
 
-    pub(crate) fn let_array(&mut self, name: &Ident, elements: &[Expr]) {
-        let elements: Vec<_> = elements.iter().map(|e| self.expression(e)).collect();
-        self.line(&self.dialect.let_array(&name.to_string(), &elements));
+    pub(crate) fn let_scalar(&mut self, name: &Ident, value: &Text) {
+        let words = [("name", name.as_str()), ("value", &value.text)];
+        self.statement(self.dialect.spelling.scalar, &words);
     }
 
-    /// An array that is assigned later.
+    pub(crate) fn let_array(&mut self, name: &Ident, elements: &[Text]) {
+        let values: Vec<&str> = elements.iter().map(|e| e.text.as_str()).collect();
+        let (n, value) = (elements.len().to_string(), values.join(", "));
+        let words = [("name", name.as_str()), ("n", &n), ("value", &value)];
+        self.statement(self.dialect.spelling.array, &words);
+    }
+
     pub(crate) fn declare(&mut self, name: &Ident, len: usize) {
-        self.line(&self.dialect.declare(&name.to_string(), len));
+        let words = [("name", name.as_str()), ("n", &len.to_string())];
+        self.statement(self.dialect.spelling.declaration, &words);
     }
 
-    pub(crate) fn assign(&mut self, target: &Expr, value: &Expr) {
-        self.assign_by(" = ", target, value);
+    pub(crate) fn assign(&mut self, target: &Text, value: &Text) {
+        let words = [("name", target.text.as_str()), ("value", &value.text)];
+        self.statement(self.dialect.spelling.assignment, &words);
     }
 
-    /// `target += value`
-    pub(crate) fn add_assign(&mut self, target: &Expr, value: Expr) {
-        let is_fused = self.multiply_add.is_some() && product(&value).is_some();
-        match is_fused || !self.dialect.spelling().adds_in_place {
-            true => self.assign(target, &Expr::infix(Binary::Add, target.clone(), value)),
-            false => self.assign_by(" += ", target, &value),
+    /// `target += value` in a loop.
+    pub(crate) fn add_assign(&mut self, target: &Text, value: &Text) {
+        match self
+            .dialect
+            .spelling
+            .addition
+            .filter(|_| value.factors.is_none())
+        {
+            Some(addition) => {
+                let words = [("name", target.text.as_str()), ("value", &value.text)];
+                self.statement(addition, &words);
+            }
+            None => {
+                let sum = self.dialect.binary(Binary::Add, target, value, true);
+                self.assign(target, &sum);
+            }
         }
     }
 
-    /// Sine and cosine of one argument by the kernel's core, see [`Dialect::sin_cos_lane`].
-    pub(crate) fn sin_cos_lane(&mut self, argument: &Expr, names: &[Ident; 2], used: [bool; 2]) {
-        let argument = self.expression(argument);
-        let names = names.each_ref().map(Ident::to_string);
-        for line in self.dialect.sin_cos_lane(&argument, &names, used) {
-            self.line(&line);
+    /// Sine and cosine of one argument by the kernel's core.
+    pub(crate) fn sin_cos_lane(&mut self, argument: &Text, names: &[Ident; 2], used: [bool; 2]) {
+        let spelling = self.dialect.spelling;
+        let [sine, cosine] = [0, 1].map(|which| match spelling.unused_lane {
+            Some(unused) if !used[which] => unused,
+            _ => names[which].as_str(),
+        });
+        let words = [
+            ("a", argument.text.as_str()),
+            ("sine", sine),
+            ("cosine", cosine),
+        ];
+        for pattern in spelling.sin_cos_lane {
+            self.statement(pattern, &words);
         }
-    }
-
-    fn assign_by(&mut self, op: &str, target: &Expr, value: &Expr) {
-        let [target, value] = [target, value].map(|expr| self.expression(expr));
-        let end = self.dialect.spelling().terminator;
-        self.line(&format!("{target}{op}{value}{end}"));
     }
 
     /// A loop of the variable from 0 to below the count.
     pub(crate) fn looped(&mut self, variable: &Ident, count: usize, body: impl FnOnce(&mut Self)) {
-        let (open, close) = self.dialect.spelling().loop_ends;
-        let head = self.dialect.for_loop(&variable.to_string(), count);
-        self.line(&format!("{head}{open}"));
-        let outer = std::mem::replace(&mut self.multiply_add, self.dialect.spelling().multiply_add);
+        let spelling = self.dialect.spelling;
+        let [n, last] = [count, count - 1].map(|bound| bound.to_string());
+        let words = [("name", variable.as_str()), ("n", &n), ("last", &last)];
+        self.statement(spelling.loop_head, &words);
         self.depth += 1;
         body(self);
         self.depth -= 1;
-        self.multiply_add = outer;
-        if let Some(close) = close {
-            self.line(close);
+        if let Some(end) = spelling.loop_end {
+            self.line(end);
         }
     }
 
@@ -118,142 +288,10 @@ impl<'a> Printer<'a> {
                 return;
             };
             self.text.push_str(&rest[..cut]);
-            self.text.push_str(self.dialect.spelling().continuation);
+            self.text.push_str(self.dialect.spelling.continuation);
             self.text.push('\n');
             rest = &rest[cut + 1..];
             indent = 4 * self.depth + 4;
         }
-    }
-
-    fn expression(&self, expr: &Expr) -> String {
-        match expr {
-            Expr::Literal(literal) => self.dialect.literal(*literal),
-            Expr::Name(name) => name.to_string(),
-            Expr::Element(array, index) => self.dialect.element(&array.to_string(), index),
-            Expr::Entry(table, row, col) => self.dialect.entry(&table.to_string(), row, col),
-            Expr::Unary(Unary::Neg, a) => format!("-{}", self.operand(a, Precedence::Atom)),
-            Expr::Unary(function, a) => self.dialect.apply(*function, &self.expression(a)),
-            Expr::Select(operands) => {
-                let operands = operands.each_ref().map(|operand| self.expression(operand));
-                self.dialect.select(operands)
-            }
-            Expr::Infix(Binary::Pow, a, b) => {
-                self.dialect.power(&self.expression(a), &self.expression(b))
-            }
-            Expr::Infix(op, a, b) => {
-                if let Some(fused) = self.multiply_added(*op, a, b) {
-                    return fused;
-                }
-                // Sums and products group to the left; a right operand of the same kind keeps
-                // its parentheses, because floating-point sums do not associate.
-                let (own, right) = match op {
-                    Binary::Add | Binary::Sub => (Precedence::Sum, Precedence::Product),
-                    Binary::Mul | Binary::Div | Binary::Pow => {
-                        (Precedence::Product, Precedence::Atom)
-                    }
-                };
-                let right = if starts_with_minus(b) {
-                    Precedence::Atom
-                } else {
-                    right
-                };
-                let [add, sub, mul, div] = self.dialect.spelling().operators;
-                let operator = match op {
-                    Binary::Add => add,
-                    Binary::Sub => sub,
-                    Binary::Mul => mul,
-                    Binary::Div | Binary::Pow => div,
-                };
-                let left = self.operand(a, own);
-                format!("{left}{operator}{}", self.operand(b, right))
-            }
-        }
-    }
-
-    /// `a*b + c` and its like by the dialect's function, if it has one; the same two roundings, unless
-    /// the target can fuse them.
-    fn multiply_added(&self, op: Binary, a: &Expr, b: &Expr) -> Option<String> {
-        let name = self.multiply_add?;
-        let (first, second, rest) = match (op, product(a), product(b)) {
-            (Binary::Add, _, Some((x, y))) => (self.expression(x), y, self.expression(a)),
-            (Binary::Add, Some((x, y)), None) => (self.expression(x), y, self.expression(b)),
-            (Binary::Sub, _, Some((x, y))) => {
-                let negated = format!("-{}", self.operand(x, Precedence::Atom));
-                (negated, y, self.expression(a))
-            }
-            (Binary::Sub, Some((x, y)), None) => {
-                let negated = format!("-{}", self.operand(b, Precedence::Atom));
-                (self.expression(x), y, negated)
-            }
-            (Binary::Add | Binary::Sub, None, None)
-            | (Binary::Mul | Binary::Div | Binary::Pow, ..) => {
-                return None;
-            }
-        };
-        Some(format!(
-            "{name}({first}, {}, {rest})",
-            self.expression(second)
-        ))
-    }
-
-    fn operand(&self, expr: &Expr, at_least: Precedence) -> String {
-        let text = self.expression(expr);
-        if precedence(expr) >= at_least {
-            text
-        } else {
-            format!("({text})")
-        }
-    }
-}
-
-fn precedence(expr: &Expr) -> Precedence {
-    match expr {
-        Expr::Literal(value) if value.is_sign_negative() => Precedence::Sign,
-        Expr::Unary(Unary::Neg, _) => Precedence::Sign,
-        Expr::Literal(_)
-        | Expr::Name(_)
-        | Expr::Element(..)
-        | Expr::Entry(..)
-        | Expr::Unary(..)
-        | Expr::Select(_)
-        | Expr::Infix(Binary::Pow, ..) => Precedence::Atom,
-        Expr::Infix(Binary::Add | Binary::Sub, ..) => Precedence::Sum,
-        Expr::Infix(Binary::Mul | Binary::Div, ..) => Precedence::Product,
-    }
-}
-
-fn product(expr: &Expr) -> Option<(&Expr, &Expr)> {
-    match expr {
-        Expr::Infix(Binary::Mul, a, b) => Some((a, b)),
-        _ => None,
-    }
-}
-
-/// Whether the printed expression begins with a minus that would follow an operator.
-fn starts_with_minus(expr: &Expr) -> bool {
-    match expr {
-        Expr::Literal(value) => value.is_sign_negative(),
-        Expr::Unary(op, _) => *op == Unary::Neg,
-        Expr::Infix(Binary::Mul | Binary::Div, a, _) => starts_with_minus(a),
-        Expr::Infix(Binary::Add | Binary::Sub | Binary::Pow, ..)
-        | Expr::Select(_)
-        | Expr::Name(_)
-        | Expr::Element(..)
-        | Expr::Entry(..) => false,
-    }
-}
-
-/// A subscript such as `4*i + 3`.
-pub(crate) fn subscript(index: &Index) -> String {
-    let terms = index.terms.iter().filter(|(stride, _)| *stride != 0);
-    let terms = terms.map(|(stride, name)| match stride {
-        1 => name.to_string(),
-        _ => format!("{stride}*{name}"),
-    });
-    let offset = (index.offset != 0).then(|| index.offset.to_string());
-    let parts: Vec<String> = terms.chain(offset).collect();
-    match parts.as_slice() {
-        [] => "0".to_owned(),
-        parts => parts.join(" + "),
     }
 }

@@ -6,10 +6,8 @@ use crate::ir::{Binary, Interpreter, Statement, Unary};
 use crate::robot::JOINT_DIM;
 use crate::robot::joints::LEG_JOINT_DIM;
 
-/// Changes of a point that are tried while some of its results are not finite.
 const MAX_CHANGES: usize = 600;
 
-/// Largest magnitudes of changed elements.
 const REACHES: [f64; 6] = [1.0, 3.0, 0.3, 10.0, 0.1, 0.01];
 
 /// Inputs of a function and what it computes from them.
@@ -17,7 +15,6 @@ const REACHES: [f64; 6] = [1.0, 3.0, 0.3, 10.0, 0.1, 0.01];
 pub(crate) struct TestPoint {
     pub inputs: Vec<Vec<f64>>,
     pub outputs: Vec<Vec<f64>>,
-    /// How many results are not finite in the precision.
     undefined: usize,
 }
 
@@ -93,17 +90,17 @@ pub(crate) fn point(entry: &FunctionSpec, precision: Precision, random: &mut Ran
         }
         let reach = REACHES[change / 3 % REACHES.len()];
         let mut inputs = best.inputs.clone();
-        match change % 3 {
-            0 => (elements.iter())
-                .for_each(|(slot, k)| inputs[*slot][*k] = random.within(reach, precision).abs()),
-            1 => (elements.iter())
-                .for_each(|(slot, k)| inputs[*slot][*k] = random.within(reach, precision)),
-            _ => {
-                for _ in 0..1 + change % 4 {
-                    let (slot, k) = elements[random.below(elements.len())];
-                    inputs[slot][k] = random.within(reach, precision);
-                }
-            }
+        let n_changed = match change % 3 {
+            0 | 1 => elements.len(),
+            _ => 1 + change % 4,
+        };
+        for position in 0..n_changed {
+            let (slot, k) = match change % 3 {
+                0 | 1 => elements[position],
+                _ => elements[random.below(elements.len())],
+            };
+            let value = random.within(reach, precision);
+            inputs[slot][k] = if change % 3 == 0 { value.abs() } else { value };
         }
         let changed = TestPoint::new(entry, inputs, precision);
         if changed.undefined <= best.undefined {
@@ -116,9 +113,8 @@ pub(crate) fn point(entry: &FunctionSpec, precision: Precision, random: &mut Ran
 /// The elements of inputs that may be any number: slot and position.
 fn free_elements(entry: &FunctionSpec) -> Vec<(usize, usize)> {
     let slots = entry.program.inputs().iter().enumerate();
-    let is_free = |name: &str| !matches!(name, "h" | "feet");
     slots
-        .filter(|(_, slot)| is_free(&slot.name))
+        .filter(|(_, slot)| !matches!(slot.name.as_str(), "h" | "feet"))
         .flat_map(|(position, slot)| (0..slot.len).map(move |k| (position, k)))
         .collect()
 }
@@ -154,37 +150,33 @@ pub(crate) struct BatchPoints {
 impl BatchPoints {
     /// Numbers of both signs, or positive ones where the accelerations are finite at more of these.
     pub(crate) fn new(phase: &PhaseInterface, precision: Precision) -> Self {
-        let overflows =
-            phase
-                .dynamics
-                .program
-                .statements()
-                .iter()
-                .any(|statement| match statement {
-                    Statement::Unary(op, _) => op.is_by_library(),
-                    Statement::Binary(op, ..) => *op == Binary::Pow,
-                    _ => false,
-                });
-        let far_angle = match (overflows, precision) {
+        let overflows = |statement: &Statement| match statement {
+            Statement::Unary(op, _) => op.is_by_library(),
+            Statement::Binary(op, ..) => *op == Binary::Pow,
+            _ => false,
+        };
+        let statements = phase.dynamics.program.statements();
+        let far_angle = match (statements.iter().any(overflows), precision) {
             (true, _) => 0.125,
             (false, Precision::Double) => 9000.125,
             (false, Precision::Single) => 160.125,
         };
-        let (signed, positive) = ((-0.5, 0.5, -0.3), (0.0625, 0.9375, 0.0625));
-        let [signed, positive] = [signed, positive].map(|(z, dz, u_lat)| Self {
-            z,
-            dz,
-            u_lat,
-            far_angle,
+        let [signed, positive] = [[-0.5, 0.5, -0.3], [0.0625, 0.9375, 0.0625]].map(|start| {
+            let [z, dz, u_lat] = start;
+            Self {
+                z,
+                dz,
+                u_lat,
+                far_angle,
+            }
         });
         let defined = |points: &Self| {
             let at = (0..N_BATCH).map(|point| points.at(phase, point, precision));
             at.filter(TestPoint::is_defined).count()
         };
-        match defined(&signed) {
-            N_BATCH => signed,
-            count if count >= defined(&positive) => signed,
-            _ => positive,
+        match defined(&positive) > defined(&signed) {
+            true => positive,
+            false => signed,
         }
     }
 

@@ -2,13 +2,13 @@
 //!
 //! No mathematics happens here: the tree of operations of the program is kept as it is.
 
-use super::code::{Expr, Function, Index, Parameter, Role, Span};
+use super::code::{Function, Index, Parameter, Role, Span};
 use super::dialect::Dialect;
-use super::ident::{Ident, Namer};
+use super::ident::{Ident, Namer, Tables};
 use super::interface::{FunctionSpec, computes_angles};
 use super::options::SineCosine;
-use super::printer::Printer;
-use super::tables::Tables;
+use super::printer::{Printer, Text};
+
 use crate::ir::{Binary, Program, Slot, Statement, Unary, ValueId};
 
 /// Deepest nesting of operations in one expression.
@@ -17,7 +17,6 @@ const DEEPEST: usize = 48;
 pub(super) struct Translator<'a> {
     pub program: &'a Program,
     pub tables: &'a mut Tables,
-    /// Function of each program that this one calls.
     pub callees: &'a [Ident],
     inputs: Vec<Parameter>,
     /// Parameter of each output slot; one that is also an input (role `InOut`) is assigned
@@ -25,15 +24,12 @@ pub(super) struct Translator<'a> {
     pub outputs: Vec<Parameter>,
     pub locals: Namer,
     pub n_uses: Vec<usize>,
-    /// How a value is read: a name, an element, or an expression to be nested once, and
-    /// how deeply operations are nested in it.
-    pub spelled: Vec<Option<(Expr, usize)>>,
+    /// How a value is read: a name, an element, or an expression to be nested once.
+    pub spelled: Vec<Option<Text>>,
     pub printer: Printer<'a>,
     /// All arrays: parameters, and those that the function declares.
     pub arrays: Vec<Span>,
-    /// Values that were copied to an array.
     pub copies: Vec<(Vec<ValueId>, Span)>,
-    /// Loop variable of a block of lanes.
     pub lane: Option<Ident>,
 }
 
@@ -41,11 +37,11 @@ pub(super) struct Translator<'a> {
 pub(crate) fn function(
     entry: &FunctionSpec,
     name: Ident,
-    dialect: &dyn Dialect,
+    dialect: &Dialect,
     callees: &[Ident],
     tables: &mut Tables,
 ) -> Function {
-    let mut locals = Namer::new(dialect.spelling().reserved);
+    let mut locals = Namer::new(dialect.spelling.reserved);
     let parameters = entry.parameters.iter().map(|parameter| Parameter {
         name: locals.mint(&parameter.name),
         len: parameter.len,
@@ -56,13 +52,11 @@ pub(crate) fn function(
         let position = entry.parameters.iter().position(|p| p.name == slot.name);
         parameters[position.expect("every slot is a parameter")].clone()
     };
-    let mut translator = Translator {
-        inputs: entry.program.inputs().iter().map(of_slot).collect(),
-        outputs: entry.program.outputs().iter().map(of_slot).collect(),
-        callees,
-        printer: Printer::new(dialect, 1, false),
-        ..Translator::new(&entry.program, locals, tables, dialect)
-    };
+    let slots = [entry.program.inputs(), entry.program.outputs()];
+    let slots = slots.map(|slots| slots.iter().map(of_slot).collect());
+    let printer = Printer::new(dialect, 1);
+    let mut translator = Translator::new(&entry.program, slots, locals, tables, printer);
+    translator.callees = callees;
     translator.translate();
     let is_empty = |p: &&Parameter| p.role == Role::Output && p.len == 0;
     let empty = parameters.iter().filter(is_empty).map(|p| &p.name);
@@ -78,34 +72,31 @@ pub(crate) fn function(
 /// The body of the loop over the lanes of a block of points; arrays are called `z_lanes` and so on, with elements
 /// `array[element][lane]`, the loop variable `lane`. Nothing if the program is better run point by point: it loops
 /// over tables itself, or calls functions that no compiler vectorises.
-pub(crate) fn lanes(program: &Program, dialect: &dyn Dialect, sines: SineCosine) -> Option<String> {
+pub(crate) fn lanes(program: &Program, dialect: &Dialect, sines: SineCosine) -> Option<String> {
     let is_by_library = sines == SineCosine::Library && program.has(computes_angles);
     if is_by_library || !program.statements().iter().all(vectorises) {
         return None;
     }
-    let mut locals = Namer::new(dialect.spelling().reserved);
+    let mut locals = Namer::new(dialect.spelling.reserved);
     let lane = Some(locals.mint("lane"));
     for taken in ["beyond", "count", "first", "point"] {
         locals.mint(taken);
     }
-    let mut parameters = |slots: &[Slot], role: Role| -> Vec<Parameter> {
-        let parameter = |slot: &Slot| Parameter {
-            name: locals.mint(&format!("{}_lanes", slot.name)),
-            len: slot.len,
-            role,
-        };
-        slots.iter().map(parameter).collect()
+    let mut parameter = |slot: &Slot, role| Parameter {
+        name: locals.mint(&format!("{}_lanes", slot.name)),
+        len: slot.len,
+        role,
     };
-    let inputs = parameters(program.inputs(), Role::Input);
-    let outputs = parameters(program.outputs(), Role::Output);
+    let slots = [
+        (program.inputs(), Role::Input),
+        (program.outputs(), Role::Output),
+    ];
+    let slots = slots.map(|(slots, role)| slots.iter().map(|s| parameter(s, role)).collect());
     // No statement that vectorises reads a table, so the store of tables stays empty.
-    let tables = &mut Tables::new(Namer::new(""), "");
-    let mut translator = Translator {
-        inputs,
-        outputs,
-        lane,
-        ..Translator::new(program, locals, tables, dialect)
-    };
+    let tables = &mut Tables::new("", String::new());
+    let printer = Printer::new(dialect, 3);
+    let mut translator = Translator::new(program, slots, locals, tables, printer);
+    translator.lane = lane;
     translator.translate();
     Some(translator.printer.into_text())
 }
@@ -122,38 +113,35 @@ fn vectorises(statement: &Statement) -> bool {
     }
 }
 
-fn n_uses(program: &Program, live: &[bool]) -> Vec<usize> {
-    let mut n_uses = vec![0; program.n_values()];
-    let statements = program.statements().iter().zip(live);
-    let operands = statements
-        .filter(|&(_, live)| *live)
-        .flat_map(|(statement, _)| statement.operands());
-    let results = program.results().iter().map(|entry| entry.value);
-    for value in operands.chain(results) {
-        n_uses[value.index()] += 1;
-    }
-    n_uses
-}
-
 impl<'a> Translator<'a> {
-    /// Without parameters; prints the body of a loop.
     fn new(
         program: &'a Program,
+        [inputs, outputs]: [Vec<Parameter>; 2],
         locals: Namer,
         tables: &'a mut Tables,
-        dialect: &'a dyn Dialect,
+        printer: Printer<'a>,
     ) -> Self {
+        let mut n_uses = vec![0; program.n_values()];
+        let live = program.statements().iter().zip(program.live());
+        let operands = live
+            .filter(|(_, live)| *live)
+            .flat_map(|(s, _)| s.operands());
+        let results = program.results().iter().map(|entry| entry.value);
+        for value in operands.chain(results) {
+            n_uses[value.index()] += 1;
+        }
+        let arrays = inputs.iter().chain(&outputs);
         Self {
+            arrays: arrays.map(|p| Span::whole(&p.name, p.len, true)).collect(),
+            spelled: vec![None; program.n_values()],
             program,
             tables,
             callees: &[],
-            inputs: Vec::new(),
-            outputs: Vec::new(),
+            inputs,
+            outputs,
             locals,
-            n_uses: n_uses(program, &program.live()),
-            spelled: vec![None; program.n_values()],
-            printer: Printer::new(dialect, 3, true),
-            arrays: Vec::new(),
+            n_uses,
+            printer,
             copies: Vec::new(),
             lane: None,
         }
@@ -161,10 +149,6 @@ impl<'a> Translator<'a> {
 
     /// Prints all that an output depends on, ending with the assignments of the outputs.
     fn translate(&mut self) {
-        for parameter in self.inputs.iter().chain(&self.outputs) {
-            let array = Span::whole(&parameter.name, parameter.len, true);
-            self.arrays.push(array);
-        }
         let statements = self.program.statements().iter().enumerate();
         for ((position, statement), live) in statements.zip(self.program.live()) {
             if live {
@@ -176,33 +160,25 @@ impl<'a> Translator<'a> {
 
     fn statement(&mut self, position: usize, statement: &Statement) {
         let first = self.program.values_of(position).start;
+        let dialect = self.printer.dialect;
         match statement {
-            Statement::Constant(value) => self.spell(first, Expr::Literal(*value)),
+            Statement::Constant(value) => self.spell(first, dialect.constant(*value)),
             Statement::Input { slot, index } => {
                 let parameter = &self.inputs[*slot];
-                let expr = match parameter.role {
-                    _ if self.lane.is_some() => self.lane_entry(parameter, *index),
-                    Role::Scalar => Expr::Name(parameter.name.clone()),
-                    Role::Input | Role::Output | Role::InOut => {
-                        Expr::Element(parameter.name.clone(), Index::fixed(*index))
-                    }
+                let text = match parameter.role {
+                    Role::Scalar => Text::atom(parameter.name.to_string()),
+                    Role::Input | Role::Output | Role::InOut => self.parameter(parameter, *index),
                 };
-                self.spell(first, expr);
+                self.spell(first, text);
             }
-            Statement::Unary(op, a) => {
-                let (a, depth) = self.read(*a);
-                self.define(first, Expr::Unary(*op, Box::new(a)), depth + 1);
-            }
+            Statement::Unary(op, a) => self.define(first, dialect.unary(*op, &self.read(*a))),
             Statement::Binary(op, a, b) => {
-                let ((a, left), (b, right)) = (self.read(*a), self.read(*b));
-                let expr = Expr::infix(*op, a, b);
-                self.define(first, expr, left.max(right) + 1);
+                let (a, b) = (self.read(*a), self.read(*b));
+                self.define(first, dialect.binary(*op, &a, &b, self.lane.is_some()));
             }
             Statement::Select(operands) => {
-                let read = operands.map(|operand| self.read(operand));
-                let depth = read.iter().map(|(_, depth)| depth + 1).max();
-                let expr = Expr::Select(Box::new(read.map(|(expr, _)| expr)));
-                self.define(first, expr, depth.unwrap_or(1));
+                let operands = operands.map(|operand| self.read(operand));
+                self.define(first, dialect.select(&operands));
             }
             Statement::SinCos { arguments } => self.sin_cos(first, arguments),
             Statement::Accumulate { table, weights } => self.accumulate(first, *table, weights),
@@ -212,47 +188,50 @@ impl<'a> Translator<'a> {
     }
 
     /// Element of a parameter: `array[index]`, or `array[index][lane]` in a block of lanes.
-    fn lane_entry(&self, parameter: &Parameter, index: usize) -> Expr {
-        let (array, index) = (parameter.name.clone(), Index::fixed(index));
+    fn parameter(&self, parameter: &Parameter, index: usize) -> Text {
+        let (array, index) = (&parameter.name, &Index::fixed(index));
         match &self.lane {
-            None => Expr::Element(array, index),
-            Some(lane) => Expr::Entry(array, index, Index::variable(lane)),
+            None => self.printer.dialect.element(array, index),
+            Some(lane) => self
+                .printer
+                .dialect
+                .entry(array, index, &Index::variable(lane)),
         }
     }
 
     /// Nests an operation into its only use, or gives it a name.
-    fn define(&mut self, value: usize, expr: Expr, depth: usize) {
-        if self.n_uses[value] <= 1 && depth < DEEPEST {
-            self.spelled[value] = Some((expr, depth));
+    fn define(&mut self, value: usize, text: Text) {
+        if self.n_uses[value] <= 1 && text.depth < DEEPEST {
+            self.spell(value, text);
         } else {
-            self.name(value, expr);
+            self.name(value, &text);
         }
     }
 
-    fn name(&mut self, value: usize, expr: Expr) -> Expr {
+    fn name(&mut self, value: usize, text: &Text) -> Text {
         let name = self.locals.mint("t");
-        self.printer.let_scalar(&name, &expr);
-        self.spell(value, Expr::Name(name.clone()));
-        Expr::Name(name)
+        self.printer.let_scalar(&name, text);
+        let name = Text::atom(name.to_string());
+        self.spell(value, name.clone());
+        name
     }
 
     /// A value that is mentioned more than once: a name or an element.
-    pub(super) fn named(&mut self, value: ValueId) -> Expr {
-        let (expr, depth) = self.read(value);
-        match depth {
-            0 => expr,
-            _ => self.name(value.index(), expr),
+    pub(super) fn named(&mut self, value: ValueId) -> Text {
+        let text = self.read(value);
+        match text.depth {
+            0 => text,
+            _ => self.name(value.index(), &text),
         }
     }
 
-    pub(super) fn spell(&mut self, value: usize, expr: Expr) {
-        self.spelled[value] = Some((expr, 0));
+    pub(super) fn spell(&mut self, value: usize, text: Text) {
+        self.spelled[value] = Some(text);
     }
 
-    pub(super) fn read(&self, value: ValueId) -> (Expr, usize) {
-        self.spelled[value.index()]
-            .clone()
-            .expect("values are defined before they are read")
+    pub(super) fn read(&self, value: ValueId) -> Text {
+        let text = self.spelled[value.index()].clone();
+        text.expect("values are defined before they are read")
     }
 
     /// Input parameters that no statement mentions.
@@ -270,22 +249,21 @@ impl<'a> Translator<'a> {
             .map(|(_, input)| &input.name)
     }
 
-    /// Assigns the outputs. What replaces an input is computed completely beforehand.
     fn results(&mut self) {
         let mut outputs = self.outputs.iter();
         let in_place = outputs.any(|output| output.role == Role::InOut);
         let mut assigned = Vec::new();
         for entry in self.program.results() {
             let output = &self.outputs[entry.slot];
-            let target = self.lane_entry(output, entry.index);
-            let (mut value, _) = self.read(entry.value);
-            if value == target {
+            let target = self.parameter(output, entry.index);
+            let mut value = self.read(entry.value);
+            if value.text == target.text {
                 continue;
             }
             if in_place {
                 let name = self.locals.mint(&format!("{}_next", output.name));
                 self.printer.let_scalar(&name, &value);
-                value = Expr::Name(name);
+                value = Text::atom(name.to_string());
             }
             assigned.push((target, value));
         }

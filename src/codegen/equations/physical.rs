@@ -98,7 +98,6 @@ impl LatentUnits {
     }
 }
 
-/// Scales of one latent coordinate and its input.
 struct Scale {
     position: (f64, Unit),
     input: (f64, Unit),
@@ -130,9 +129,8 @@ impl Equations<'_> {
                 summands.collect::<Result<Vec<_>, _>>()
             });
             phases.push(PhaseEquations {
-                name: phase.name.clone(),
-                feet: phase.feet.clone(),
                 ddz: ddz.collect::<Result<_, _>>()?,
+                ..phase.clone()
             });
         }
         let units = units(model, &scales)?;
@@ -208,21 +206,16 @@ fn scales(model: &ReducedModel) -> Result<Vec<Scale>, PhysicalError> {
         let dual = unit.and_then(Unit::dual);
         let strength = scale_of(&forces, input, dual).abs();
         let place = |what: &str| format!("`encoder.weights`[{row}]: {what}");
+        let position = finite(position, model, || place("the latent coordinate"))?;
+        let input = finite(sign / strength, model, || place("the latent input"))?;
         Ok(Scale {
-            position: (
-                finite(position, model, || place("the latent coordinate"))?,
-                unit.unwrap_or_default(),
-            ),
-            input: (
-                finite(sign / strength, model, || place("the latent input"))?,
-                dual.unwrap_or_default(),
-            ),
+            position: (position, unit.unwrap_or_default()),
+            input: (input, dual.unwrap_or_default()),
         })
     };
     (0..model.latent_dim()).map(scale).collect()
 }
 
-/// The unit of more than half of the sum of squares.
 fn ruling_unit(weights: &DVector<f64>, names: &CoordinateNames) -> Option<Unit> {
     let units = names.units.iter().map(|name| Unit::from_name(name));
     let mut shares: Vec<(Unit, f64)> = Vec::new();
@@ -243,12 +236,8 @@ fn scale_of(weights: &DVector<f64>, names: &CoordinateNames, unit: Option<Unit>)
     let of_unit = (weights.iter().zip(&names.units))
         .filter(|(_, name)| unit.is_some() && Unit::from_name(name) == unit)
         .map(|(&weight, _)| weight);
-    let largest = of_unit.clone().fold(0.0, |largest: f64, weight| {
-        match weight.abs() > largest.abs() {
-            true => weight,
-            false => largest,
-        }
-    });
+    let larger = |a: f64, b: f64| if b.abs() > a.abs() { b } else { a };
+    let largest = of_unit.clone().fold(0.0, larger);
     let sum: f64 = of_unit.map(f64::abs).sum();
     match sum > 0.0 {
         true => sum.copysign(largest),
@@ -284,11 +273,6 @@ fn in_metres(model: &ReducedModel, scales: &[Scale]) -> Result<ReducedModel, Phy
         state: ScaleFactors::Uniform(1.0),
         input: model.scaling()?.input.clone(),
     };
-    Ok(model
-        .clone()
-        .into_builder()
-        .encoder(encoder)
-        .decoder(decoder)
-        .scaling(scaling)
-        .build()?)
+    let builder = model.clone().into_builder().encoder(encoder);
+    Ok(builder.decoder(decoder).scaling(scaling).build()?)
 }

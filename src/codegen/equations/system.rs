@@ -176,19 +176,13 @@ impl<'a> Equations<'a> {
         })
     }
 
-    /// The symbol of a variable in the pool.
-    ///
-    /// # Panics
-    /// If its index is not below `latent_dim`.
+    /// The symbol in the pool of a variable whose index is below `latent_dim`.
     pub fn symbol(&self, variable: LatentVariable) -> SymbolId {
         let symbol = self.model.library().symbol(variable);
         symbol.expect("variables up to latent_dim are in the library's pool")
     }
 
-    /// The coefficients of a phase as a matrix, one row per term, one column per acceleration.
-    ///
-    /// # Panics
-    /// If there is no such phase.
+    /// The coefficients of an existing phase as a matrix, one row per term, one column per acceleration.
     pub fn coefficients(&self, phase: usize) -> DMatrix<f64> {
         let mut xi = DMatrix::zeros(self.terms.len(), self.latent_dim());
         for (output, equation) in self.phases[phase].ddz.iter().enumerate() {

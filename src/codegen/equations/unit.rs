@@ -38,7 +38,6 @@ impl Unit {
         }
     }
 
-    /// The unit of the derivative by time.
     pub(crate) fn per_second(self) -> Self {
         self / SECOND
     }
@@ -112,27 +111,19 @@ mod tests {
 
     #[test]
     fn the_gain_of_a_force_on_an_acceleration_is_one_over_a_mass() {
-        let acceleration = METRE.per_second().per_second();
-        assert_eq!(acceleration.to_string(), "m/s^2");
-        assert_eq!((acceleration / NEWTON).to_string(), "1/kg");
-        let turning = RADIAN.per_second().per_second();
-        assert_eq!((turning / NEWTON_METRE).to_string(), "rad/(kg m^2)");
-        assert_eq!((acceleration / RADIAN).to_string(), "m/(rad s^2)");
-        assert_eq!((acceleration / acceleration).to_string(), "1");
-    }
-
-    #[test]
-    fn names_of_model_files_have_duals() {
-        for (name, dual) in [("m", "N"), ("rad", "N m")] {
-            let unit = Unit::from_name(name).expect("known");
-            assert_eq!(unit.to_string(), name);
-            assert_eq!(
-                unit.dual().map(|unit| unit.to_string()).as_deref(),
-                Some(dual)
-            );
-            assert_eq!(unit.dual(), Unit::from_name(dual));
+        let [metre, radian] = ["m", "rad"].map(|name| Unit::from_name(name).expect("known"));
+        let [force, moment] = [metre, radian].map(|unit| unit.dual().expect("known"));
+        assert_eq!([force, moment].map(|unit| unit.to_string()), ["N", "N m"]);
+        let [linear, angular] = [metre, radian].map(|unit| unit.per_second().per_second());
+        for (unit, text) in [
+            (linear, "m/s^2"),
+            (linear / force, "1/kg"),
+            (angular / moment, "rad/(kg m^2)"),
+            (linear / radian, "m/(rad s^2)"),
+            (linear / linear, "1"),
+        ] {
+            assert_eq!(unit.to_string(), text);
         }
-        assert_eq!(Unit::from_name("deg"), None);
-        assert_eq!(NEWTON.dual(), None);
+        assert_eq!((Unit::from_name("deg"), force.dual()), (None, None));
     }
 }

@@ -2,10 +2,16 @@
 
 use std::collections::HashMap;
 
-use super::program::{
-    Binary, Program, ResultEntry, Slot, Statement, Table, TableId, Unary, ValueId,
-};
-use super::validate::{IrError, validate};
+use super::program::{Binary, Program, ResultEntry, Slot, Statement, Table, Unary, ValueId};
+
+/// A number of a program that is not finite.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("program `{program}`: statement {statement} holds the non-finite constant {value}")]
+pub struct IrError {
+    program: String,
+    statement: usize,
+    value: f64,
+}
 
 /// What makes two scalar statements the same computation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -85,7 +91,6 @@ impl ProgramBuilder {
         self.binary(Binary::Div, a, b)
     }
 
-    /// `zero` where `test` is zero, else `other`.
     pub(crate) fn select(&mut self, test: ValueId, zero: ValueId, other: ValueId) -> ValueId {
         let operands = [test, zero, other];
         self.numbered(Key::Select(operands), Statement::Select(operands))
@@ -101,26 +106,26 @@ impl ProgramBuilder {
         (values[..n].to_vec(), values[n..].to_vec())
     }
 
-    fn table(&mut self, table: &Table) -> TableId {
-        TableId(place_of(&mut self.program.tables, table) as u32)
-    }
-
-    /// Matrix-vector product with an offset, see [`Statement::Accumulate`].
     pub(crate) fn accumulate(&mut self, table: &Table, weights: Vec<ValueId>) -> Vec<ValueId> {
-        let id = self.table(table);
-        let statement = Statement::Accumulate { table: id, weights };
+        assert_eq!(weights.len() + 1, table.rows, "a weight per row");
+        let position = place_of(&mut self.program.tables, table);
+        let statement = Statement::Accumulate {
+            table: position,
+            weights,
+        };
         self.push_array(statement, table.cols)
     }
 
-    /// Tables with scaled columns, see [`Statement::Scaled`].
     pub(crate) fn scaled(
         &mut self,
         base: Option<Vec<ValueId>>,
         groups: Vec<(Table, Option<Vec<ValueId>>)>,
     ) -> Vec<ValueId> {
         let n_values = groups[0].0.entries.len();
-        let groups = groups.into_iter();
-        let groups = groups.map(|(table, weights)| (self.table(&table), weights));
+        let groups = groups.into_iter().map(|(table, weights)| {
+            assert_eq!(table.entries.len(), n_values, "tables of one shape");
+            (place_of(&mut self.program.tables, &table), weights)
+        });
         let groups = groups.collect();
         self.push_array(Statement::Scaled { base, groups }, n_values)
     }
@@ -128,6 +133,8 @@ impl ProgramBuilder {
     /// Evaluates another program; returns the values of each of its outputs.
     pub(crate) fn call(&mut self, callee: &Program, arguments: &[ValueId]) -> Vec<Vec<ValueId>> {
         let position = place_of(&mut self.program.callees, callee);
+        let n_inputs: usize = callee.inputs.iter().map(|slot| slot.len).sum();
+        assert_eq!(arguments.len(), n_inputs, "arguments fill all inputs");
         let n = callee.outputs.iter().map(|slot| slot.len).sum();
         let statement = Statement::Call {
             callee: position,
@@ -144,6 +151,11 @@ impl ProgramBuilder {
     /// Declares an output array that takes the given values.
     pub fn output(&mut self, name: &str, values: &[ValueId]) {
         let slot = self.program.outputs.len();
+        let is_other = |known: &Slot| known.name != name;
+        assert!(
+            !values.is_empty() && self.program.outputs.iter().all(is_other),
+            "`{name}`"
+        );
         self.program.outputs.push(Slot {
             name: name.to_owned(),
             len: values.len(),
@@ -157,11 +169,30 @@ impl ProgramBuilder {
     /// The finished program.
     ///
     /// # Errors
-    /// What validation finds: a value used before its definition, a non-finite
-    /// constant, a table whose shape does not fit its statement, a slot without elements.
+    /// [`IrError`] for the first constant that is not finite.
     pub fn finish(self) -> Result<Program, IrError> {
-        validate(&self.program)?;
-        Ok(self.program)
+        let of_table = |table: &usize| {
+            let mut entries = self.program.tables[*table].entries.iter().copied();
+            entries.find(|entry| !entry.is_finite())
+        };
+        let first = |(statement, s): (usize, &Statement)| {
+            let value = match s {
+                Statement::Constant(value) => Some(*value).filter(|value| !value.is_finite()),
+                Statement::Accumulate { table, .. } => of_table(table),
+                Statement::Scaled { groups, .. } => groups.iter().find_map(|(t, _)| of_table(t)),
+                _ => None,
+            };
+            let program = self.program.name.clone();
+            value.map(|value| IrError {
+                program,
+                statement,
+                value,
+            })
+        };
+        match self.program.statements.iter().enumerate().find_map(first) {
+            Some(fault) => Err(fault),
+            None => Ok(self.program),
+        }
     }
 
     fn numbered(&mut self, key: Key, statement: Statement) -> ValueId {
@@ -175,6 +206,8 @@ impl ProgramBuilder {
 
     fn push(&mut self, statement: Statement, n_values: usize) -> ValueId {
         let first = self.program.n_values() as u32;
+        let is_defined = |value: &ValueId| value.0 < first;
+        debug_assert!(statement.operands().iter().all(is_defined), "{statement:?}");
         self.program.statements.push(statement);
         self.program.first.push(first + n_values as u32);
         ValueId(first)
@@ -193,4 +226,20 @@ fn place_of<T: PartialEq + Clone>(list: &mut Vec<T>, wanted: &T) -> usize {
         list.push(wanted.clone());
         list.len() - 1
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn number_that_is_not_finite_is_refused_with_its_statement() {
+        let mut builder = ProgramBuilder::new("p");
+        let x = builder.input("x", 1);
+        let y = builder.accumulate(&Table::new(2, 1, vec![0.0, f64::INFINITY]), x);
+        builder.output("y", &y);
+        let error = builder.finish().expect_err("infinite");
+        let expected = "program `p`: statement 1 holds the non-finite constant inf";
+        assert_eq!(error.to_string(), expected);
+    }
 }

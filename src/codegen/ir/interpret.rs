@@ -1,8 +1,11 @@
 //! Runs programs: the reference for generated code, and what simulation and
 //! control run.
 
+use std::fmt::Debug;
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
 use super::program::{Binary, Program, Slot, Statement, Table, Unary, ValueId};
-use super::real::Real;
+use super::sin_cos::{double, single};
 
 /// Runs one program as often as asked; owns the memory of all its values, so that
 /// a run allocates nothing.
@@ -18,7 +21,6 @@ pub struct Interpreter<T = f64> {
     steps: Vec<Step>,
     tables: Vec<Table<T>>,
     callees: Vec<Interpreter<T>>,
-    /// The values of the elements of all outputs.
     stores: Vec<ValueId>,
     /// Constants are set once; every other value is computed before it is read.
     values: Vec<T>,
@@ -102,9 +104,6 @@ impl<T: Real> Interpreter<T> {
     }
 
     /// The same for arrays, one an input slot; returns one an output slot.
-    ///
-    /// # Panics
-    /// As [`Self::run`].
     pub fn results(&mut self, inputs: &[Vec<T>]) -> Vec<Vec<T>> {
         let slots = self.outputs.iter();
         let mut outputs: Vec<_> = slots.map(|slot| vec![T::constant(0.0); slot.len]).collect();
@@ -165,14 +164,14 @@ fn array<T: Real>(
             }
         }
         Statement::Accumulate { table, weights } => {
-            accumulate(&tables[table.index()], weights, first, values);
+            accumulate(&tables[*table], weights, first, values);
         }
         Statement::Scaled { base, groups } => {
-            let cols = tables[groups[0].0.index()].cols;
-            for k in 0..tables[groups[0].0.index()].entries.len() {
+            let cols = tables[groups[0].0].cols;
+            for k in 0..tables[groups[0].0].entries.len() {
                 let mut sum = base.as_ref().map(|base| values[base[k].index()]);
                 for (table, weights) in groups {
-                    let entry = tables[table.index()].entries[k];
+                    let entry = tables[*table].entries[k];
                     let weight = weights.as_ref().map(|weights| weights[k % cols]);
                     let term = weight.map_or(entry, |weight| entry * values[weight.index()]);
                     sum = Some(sum.map_or(term, |sum| sum + term));
@@ -217,3 +216,71 @@ fn accumulate<T: Real>(table: &Table<T>, weights: &[ValueId], first: usize, valu
         row += 1;
     }
 }
+
+/// A number that programs compute with: `f64` or `f32`.
+///
+/// Each operator rounds once, as generated code does with contraction off.
+pub trait Real:
+    Copy
+    + Debug
+    + PartialEq
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+{
+    /// A constant of a program.
+    fn constant(value: f64) -> Self;
+
+    /// A function of one number.
+    fn unary(op: Unary, a: Self) -> Self;
+
+    /// `self ^ exponent`.
+    fn power(self, exponent: Self) -> Self;
+
+    /// Sine and cosine by the kernel of this precision.
+    fn sin_cos(self) -> (Self, Self);
+}
+
+macro_rules! real {
+    ($float:ident, $kernel:path) => {
+        impl Real for $float {
+            /// The nearest number; infinite beyond the largest.
+            #[inline]
+            fn constant(value: f64) -> Self {
+                value as $float
+            }
+
+            #[inline]
+            fn unary(op: Unary, a: $float) -> $float {
+                match op {
+                    Unary::Neg => -a,
+                    Unary::Sqrt => a.sqrt(),
+                    Unary::Abs => a.abs(),
+                    Unary::Sign if a > 0.0 => 1.0,
+                    Unary::Sign if a < 0.0 => -1.0,
+                    // 0 of either zero, NaN of NaN.
+                    Unary::Sign => a - a,
+                    Unary::Tan => a.tan(),
+                    Unary::Tanh => a.tanh(),
+                    Unary::Exp => a.exp(),
+                    Unary::Log => a.ln(),
+                }
+            }
+
+            #[inline]
+            fn power(self, exponent: $float) -> $float {
+                self.powf(exponent)
+            }
+
+            #[inline]
+            fn sin_cos(self) -> ($float, $float) {
+                $kernel(self)
+            }
+        }
+    };
+}
+
+real!(f64, double::sin_cos);
+real!(f32, single::sin_cos);

@@ -12,7 +12,7 @@
 //! let sides = builder.input("sides", 2);
 //! let area = builder.binary(Binary::Mul, sides[0], sides[1]);
 //! builder.output("area", &[area]);
-//! let program = builder.finish().expect("both outputs are set");
+//! let program = builder.finish().expect("finite");
 //!
 //! let mut area = [0.0];
 //! Interpreter::new(&program).run(&[&[3.0, 4.0]], &mut [&mut area]);
@@ -22,13 +22,9 @@
 mod build;
 mod interpret;
 mod program;
-mod real;
 pub mod sin_cos;
-pub(crate) mod sin_cos_f32;
-mod validate;
 
-pub use build::ProgramBuilder;
+pub use build::{IrError, ProgramBuilder};
 pub use interpret::Interpreter;
+pub(crate) use program::Table;
 pub use program::{Binary, Program, Slot, Statement, Unary, ValueId};
-pub(crate) use program::{Table, TableId};
-pub use validate::IrError;

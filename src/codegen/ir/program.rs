@@ -21,17 +21,6 @@ impl ValueId {
     }
 }
 
-/// One constant table of a program.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct TableId(pub(super) u32);
-
-impl TableId {
-    /// Position of the table in [`Program::tables`].
-    pub(crate) fn index(self) -> usize {
-        self.0 as usize
-    }
-}
-
 /// A constant matrix, row-major.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Table<T = f64> {
@@ -41,10 +30,6 @@ pub(crate) struct Table<T = f64> {
 }
 
 impl<T> Table<T> {
-    /// A table of `rows` x `cols` from its row-major entries.
-    ///
-    /// # Panics
-    /// If the number of entries is not `rows * cols`; a caller's defect.
     pub(crate) fn new(rows: usize, cols: usize, entries: Vec<T>) -> Self {
         assert_eq!(entries.len(), rows * cols, "table entries fill the shape");
         Self {
@@ -62,7 +47,6 @@ impl<T> Table<T> {
         self.cols
     }
 
-    /// One row, `cols` entries.
     pub(crate) fn row(&self, row: usize) -> &[T] {
         &self.entries[row * self.cols..(row + 1) * self.cols]
     }
@@ -164,8 +148,8 @@ pub enum Statement {
     /// `y += (t_1 w_1 + t_2 w_2) + (t_3 w_3 + t_4 w_4)`; the rows that remain are added one by one.
     /// Defines `cols` values.
     Accumulate {
-        /// Table with one row more than there are weights.
-        table: TableId,
+        /// Position of a table with one row more than there are weights.
+        table: usize,
         /// One weight per row after the first, at least one.
         weights: Vec<ValueId>,
     },
@@ -174,9 +158,9 @@ pub enum Statement {
     Scaled {
         /// What the sums begin with, row-major; nothing if absent.
         base: Option<Vec<ValueId>>,
-        /// At least one table, all of one shape, each with a weight per column; without weights the entries are
-        /// added as they are.
-        groups: Vec<(TableId, Option<Vec<ValueId>>)>,
+        /// Positions of at least one table, all of one shape, each with a weight per column; without weights the
+        /// entries are added as they are.
+        groups: Vec<(usize, Option<Vec<ValueId>>)>,
     },
     /// Evaluation of another program; the arguments fill its input slots in order.
     /// Defines the values of its output slots in order.
@@ -211,7 +195,6 @@ impl Statement {
 pub(crate) struct ResultEntry {
     pub slot: usize,
     pub index: usize,
-    /// The value stored there.
     pub value: ValueId,
 }
 
@@ -251,7 +234,6 @@ impl Program {
         &self.statements
     }
 
-    /// Constant tables of the array statements.
     pub(crate) fn tables(&self) -> &[Table] {
         &self.tables
     }

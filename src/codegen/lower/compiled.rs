@@ -12,7 +12,8 @@ use crate::model::ReducedModel;
 /// the interpreter with the very arithmetic of the generated code. Evaluation
 /// allocates nothing; clone it for another thread.
 ///
-/// All vectors have `latent_dim` elements, in scaled units.
+/// All vectors have `latent_dim` elements, in scaled units. Methods panic where a phase does not exist or a length does
+/// not fit.
 #[derive(Clone, Debug)]
 pub struct CompiledModel {
     latent_dim: usize,
@@ -68,9 +69,6 @@ impl CompiledModel {
     }
 
     /// `ddz = Xi^T Theta(z, dz, u_lat)`.
-    ///
-    /// # Panics
-    /// If `phase` does not exist or a slice is not `latent_dim` long.
     pub fn ddz(&mut self, phase: usize, z: &[f64], dz: &[f64], u_lat: &[f64], ddz: &mut [f64]) {
         let dynamics = &mut self.phases[phase].dynamics;
         dynamics.run(&[z, dz, u_lat], &mut [ddz]);
@@ -107,9 +105,6 @@ impl CompiledModel {
     }
 
     /// `ddz` and the full `latent_dim x 3 latent_dim` Jacobian by `(z, dz, u_lat)`.
-    ///
-    /// # Panics
-    /// If `phase` does not exist or a length does not fit.
     pub fn jacobian(
         &mut self,
         phase: usize,
@@ -132,15 +127,11 @@ impl CompiledModel {
 
     /// Advances `(z, dz)` by `h` seconds with the classical Runge-Kutta method under
     /// constant `u_lat`.
-    ///
-    /// # Panics
-    /// If `phase` does not exist or a slice is not `latent_dim` long.
     pub fn rk4_step(&mut self, phase: usize, z: &mut [f64], dz: &mut [f64], u_lat: &[f64], h: f64) {
         let phase = &mut self.phases[phase];
         let (z_next, dz_next) = phase.next.split_at_mut(self.latent_dim);
-        phase
-            .step
-            .run(&[z, dz, u_lat, &[h]], &mut [&mut *z_next, &mut *dz_next]);
+        let outputs = &mut [&mut *z_next, &mut *dz_next];
+        phase.step.run(&[z, dz, u_lat, &[h]], outputs);
         z.copy_from_slice(z_next);
         dz.copy_from_slice(dz_next);
     }

@@ -2,9 +2,8 @@
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
-use super::combination::Combination;
+use super::combination::{Combination, Term, linear_combination, scaled};
 use super::nested::Nested;
-use super::sums::{Term, linear_combination, scaled};
 use crate::ir::{Binary, ProgramBuilder, Unary, ValueId};
 use crate::symbolic::{ExprId, ExprPool, Function, Node, SymbolId};
 
@@ -21,7 +20,6 @@ pub(super) struct ExpressionLowering<'a> {
 }
 
 impl<'a> ExpressionLowering<'a> {
-    /// Starts with the values that the variables of the pool take.
     pub(crate) fn new(
         pool: &'a ExprPool,
         builder: ProgramBuilder,
@@ -90,7 +88,6 @@ impl<'a> ExpressionLowering<'a> {
         }
     }
 
-    /// The value of an expression; its sines and cosines have been prepared.
     pub(crate) fn value(&mut self, expr: ExprId) -> ValueId {
         if let Some(&value) = self.values.get(&expr) {
             return value;
@@ -103,10 +100,8 @@ impl<'a> ExpressionLowering<'a> {
                     let [test, zero, other] = parts.map(|part| self.value(part));
                     self.builder.select(test, zero, other)
                 }
-                None => *self
-                    .variables
-                    .get(symbol)
-                    .expect("every variable of a model's pool is an input"),
+                // Every variable of a model's pool is an input.
+                None => self.variables[symbol],
             },
             Node::Sum(_) => {
                 let combination = Combination::collect(pool, [(1.0, expr)]);
@@ -213,10 +208,9 @@ impl<'a> ExpressionLowering<'a> {
             Some((exponent, Ok(magnitude))) => {
                 let base = self.value(base);
                 let power = self.integer_power(base, magnitude);
-                if exponent >= 0 {
-                    power
-                } else {
-                    self.quotient(None, Some(power))
+                match exponent >= 0 {
+                    true => power,
+                    false => self.quotient(None, Some(power)),
                 }
             }
             _ => {
@@ -234,10 +228,9 @@ impl<'a> ExpressionLowering<'a> {
             _ => {
                 let half = self.integer_power(base, exponent / 2);
                 let square = self.builder.mul(half, half);
-                if exponent.is_multiple_of(2) {
-                    square
-                } else {
-                    self.builder.mul(square, base)
+                match exponent % 2 {
+                    0 => square,
+                    _ => self.builder.mul(square, base),
                 }
             }
         }

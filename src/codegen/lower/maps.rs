@@ -6,9 +6,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::error::LowerError;
+use super::combination::{Term, linear_combination};
+use super::dynamics::LowerError;
 use super::network;
-use super::sums::{Term, linear_combination};
 use crate::ir::{Program, ProgramBuilder};
 use crate::model::ReducedModel;
 

@@ -8,24 +8,17 @@
 
 mod combination;
 mod compiled;
-mod cost;
 mod dense;
 mod dynamics;
-mod error;
 mod expression;
 mod maps;
 mod nested;
 mod network;
 mod number;
-mod solve;
-mod step;
-mod sums;
 mod wrench;
 
 pub use compiled::CompiledModel;
-pub use cost::Form;
-pub use dynamics::{JacobianPattern, dynamics, dynamics_jacobian};
-pub use error::LowerError;
+pub use dense::Form;
+pub use dynamics::{JacobianPattern, LowerError, dynamics, dynamics_jacobian, rk4_step};
 pub use maps::Map;
-pub use step::rk4_step;
 pub use wrench::{actuator_torque, generalised_input};

@@ -12,24 +12,14 @@ use super::combination::Combination;
 use crate::symbolic::{ExprId, ExprPool, Node, Number};
 
 /// `flat + shared + sum_g factor_g (single_g + repeated_g)`.
-#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Nested {
-    /// What stays a sum of coefficients times expressions.
     pub flat: Combination,
-    /// A part that another sum has computed: its `single` of one group.
-    pub shared: Option<Shared>,
+    /// A part that another sum has computed: which sum, and the group of which it is the `single`.
+    pub shared: Option<(usize, usize)>,
     /// Common factors, in the order in which they were taken out.
     pub groups: Vec<Group>,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Shared {
-    pub sum: usize,
-    pub group: usize,
-}
-
-/// A factor taken out of a part of a sum.
-#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Group {
     pub factor: ExprId,
     /// What it multiplies and does not contain it: the derivative of these terms by the factor.
@@ -63,35 +53,29 @@ pub(super) struct Demand {
     uses: HashMap<ExprId, usize>,
 }
 
-/// A term of a sum and what can be taken out of it.
-struct Item {
-    coefficient: f64,
-    expr: ExprId,
-    quotients: Vec<Quotient>,
-}
-
 /// A product of a sum, divided by one of its factors.
-#[derive(Clone, Copy)]
 struct Quotient {
     factor: ExprId,
     rest: ExprId,
     /// Whether the rest contains the factor again.
     repeats: bool,
+    /// Multiplications that are saved when the product becomes this one.
+    saving: f64,
 }
 
 impl Demand {
     /// Counts the products of all sums, and those that remain when a factor is taken out.
     pub(crate) fn new<'a>(
         pool: &mut ExprPool,
-        sums: impl IntoIterator<Item = &'a Combination>,
+        sums: impl Iterator<Item = &'a Combination>,
     ) -> Self {
         let mut uses: HashMap<ExprId, usize> = HashMap::new();
-        for sum in sums {
-            for &(_, expr) in &sum.items {
-                *uses.entry(expr).or_default() += 1;
-                for quotient in quotients(pool, expr) {
-                    *uses.entry(quotient.rest).or_default() += 1;
-                }
+        for &(_, expr) in sums.flat_map(|sum| &sum.items) {
+            let rests = quotients(pool, expr)
+                .into_iter()
+                .map(|quotient| quotient.rest);
+            for product in rests.chain([expr]) {
+                *uses.entry(product).or_default() += 1;
             }
         }
         Self { uses }
@@ -106,67 +90,66 @@ impl Demand {
         1.0 / uses.max(1) as f64
     }
 
-    /// Multiplications that are saved when a product becomes one of its quotients.
-    fn saving(&self, pool: &ExprPool, item: &Item, quotient: &Quotient) -> f64 {
-        let shares = item.quotients.iter().map(|q| self.share(pool, q.rest));
+    fn quotients(&self, pool: &mut ExprPool, expr: ExprId) -> Vec<Quotient> {
+        let mut quotients = quotients(pool, expr);
+        let shares = quotients
+            .iter()
+            .map(|quotient| self.share(pool, quotient.rest));
         let parts = shares.fold(f64::INFINITY, f64::min);
-        (1.0 + parts) * self.share(pool, item.expr) - self.share(pool, quotient.rest)
+        for quotient in &mut quotients {
+            let product = (1.0 + parts) * self.share(pool, expr);
+            quotient.saving = product - self.share(pool, quotient.rest);
+        }
+        quotients
     }
 
-    /// Takes factors out of a sum wherever that saves multiplications.
+    /// Takes factors out of a sum wherever that saves multiplications: first the factor whose group saves most, while
+    /// one saves more than it costs.
     pub(crate) fn nest(&self, pool: &mut ExprPool, sum: &Combination) -> Nested {
-        let item = |&(coefficient, expr): &(f64, ExprId)| Item {
-            coefficient,
-            expr,
-            quotients: quotients(pool, expr),
-        };
-        let mut items: Vec<Item> = sum.items.iter().map(item).collect();
+        let items = sum.items.iter();
+        let mut items: Vec<((f64, ExprId), Vec<Quotient>)> = items
+            .map(|&item| (item, self.quotients(pool, item.1)))
+            .collect();
         let mut groups = Vec::new();
-        while let Some(factor) = self.best_factor(pool, &items) {
-            let mut group = Group {
-                factor,
-                single: Combination::default(),
-                repeated: Combination::default(),
+        loop {
+            let mut savings: BTreeMap<ExprId, f64> = BTreeMap::new();
+            for quotient in items.iter().flat_map(|(_, quotients)| quotients) {
+                *savings.entry(quotient.factor).or_default() += quotient.saving.max(0.0);
+            }
+            let worth = savings.into_iter().filter(|&(_, saving)| saving > 1.0);
+            let best = worth.max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)));
+            let Some((factor, _)) = best else {
+                break;
             };
-            items.retain(|item| {
-                let own = item.quotients.iter().find(|q| q.factor == factor);
-                let Some(quotient) = own.filter(|q| self.saving(pool, item, q) > 0.0) else {
-                    return true;
-                };
-                let part = if quotient.repeats {
-                    &mut group.repeated
-                } else {
-                    &mut group.single
-                };
-                part.items.push((item.coefficient, quotient.rest));
-                false
+            let (mut single, mut repeated) = (Combination::default(), Combination::default());
+            items.retain(|((coefficient, _), quotients)| {
+                let own = quotients
+                    .iter()
+                    .find(|q| q.factor == factor && q.saving > 0.0);
+                if let Some(quotient) = own {
+                    let part = if quotient.repeats {
+                        &mut repeated
+                    } else {
+                        &mut single
+                    };
+                    part.items.push((*coefficient, quotient.rest));
+                }
+                own.is_none()
             });
-            groups.push(group);
+            groups.push(Group {
+                factor,
+                single,
+                repeated,
+            });
         }
-        let rest = items.into_iter().map(|item| (item.coefficient, item.expr));
         Nested {
             flat: Combination {
                 constant: sum.constant,
-                items: rest.collect(),
+                items: items.into_iter().map(|(item, _)| item).collect(),
             },
             shared: None,
             groups,
         }
-    }
-
-    /// The factor whose group saves most, if it saves more than it costs.
-    fn best_factor(&self, pool: &ExprPool, items: &[Item]) -> Option<ExprId> {
-        let mut savings: BTreeMap<ExprId, f64> = BTreeMap::new();
-        for item in items {
-            for quotient in &item.quotients {
-                let saving = self.saving(pool, item, quotient);
-                *savings.entry(quotient.factor).or_default() += saving.max(0.0);
-            }
-        }
-        let worth = savings.into_iter().filter(|&(_, saving)| saving > 1.0);
-        worth
-            .max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)))
-            .map(|(factor, _)| factor)
     }
 }
 
@@ -181,16 +164,13 @@ fn base_of(pool: &ExprPool, factor: ExprId) -> Option<(ExprId, i64)> {
     }
 }
 
-/// Number of factors, powers counted by their exponents.
 fn n_factors(pool: &ExprPool, expr: ExprId) -> usize {
     let count = |&factor: &ExprId| match base_of(pool, factor) {
         Some((_, exponent)) => usize::try_from(exponent).unwrap_or(usize::MAX),
         None => 1,
     };
-    pool.factors_of(expr)
-        .iter()
-        .map(count)
-        .fold(0, usize::saturating_add)
+    let counts = pool.factors_of(expr).iter().map(count);
+    counts.fold(0, usize::saturating_add)
 }
 
 /// What remains of a product without one of its factors, for each distinct factor; nothing if
@@ -213,6 +193,7 @@ fn quotients(pool: &mut ExprPool, expr: ExprId) -> Vec<Quotient> {
                 factor,
                 rest,
                 repeats: exponent > 1,
+                saving: 0.0,
             });
         }
     }

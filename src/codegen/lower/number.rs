@@ -94,7 +94,6 @@ impl Neg for Number<'_> {
     }
 }
 
-/// Operators between numbers, and between a number and a constant.
 macro_rules! operators {
     ($($operator:ident $method:ident,)*) => {$(
         impl $operator for Number<'_> {

@@ -19,7 +19,7 @@
 //! `d / max(d^2, least^2)`, see
 //! [`LegGeometry::least_levers`](crate::robot::LegGeometry::least_levers).
 
-use super::error::LowerError;
+use super::dynamics::LowerError;
 use super::number::{Number, Sheet};
 use crate::ir::{Program, ProgramBuilder, Unary, ValueId};
 use crate::model::ReducedModel;
@@ -136,7 +136,6 @@ fn input_of(rule: &InputRule) -> Result<Program, LowerError> {
     Ok(builder.finish()?)
 }
 
-/// Viscous and dry friction of a joint at a velocity.
 fn friction<'b>(rule: &InputRule, joint: usize, velocity: Number<'b>) -> Number<'b> {
     let of = rule.actuators().map(|a| (a.viscous[joint], a.dry[joint]));
     match of {

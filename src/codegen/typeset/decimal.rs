@@ -26,7 +26,6 @@ pub struct Decimal {
     exponent: Option<i32>,
 }
 
-/// Most digits that are ever printed of a fixed number of them.
 const MOST_DIGITS: usize = 40;
 /// Fewest places after the point of [`Rounding::Adaptive`].
 pub(super) const LEAST_DECIMALS: usize = 2;
@@ -42,7 +41,6 @@ const SMALL: f64 = 1e-4;
 impl Decimal {
     /// The shortest text that reads back as `value`, which must be finite.
     pub(crate) fn exact(value: f64) -> Self {
-        debug_assert!(value.is_finite());
         let size = value.abs();
         if size != 0.0 && !(SMALL..LARGE).contains(&size) {
             Self::scientific(value, format!("{size:e}"))
@@ -51,7 +49,6 @@ impl Decimal {
         }
     }
 
-    /// An integer with all its digits.
     pub(crate) fn integer(value: i64) -> Self {
         Self::plain(value as f64, value.unsigned_abs().to_string())
     }
@@ -71,15 +68,13 @@ impl Decimal {
     }
 
     fn adaptive(value: f64) -> Self {
-        let close =
-            |candidate: &Self| (candidate.value() - value).abs() <= RELATIVE_ERROR * value.abs();
+        let size = value.abs();
+        let is_close =
+            |candidate: &Self| (candidate.value() - value).abs() <= RELATIVE_ERROR * size;
         let fixed = (LEAST_DECIMALS..=MOST_DECIMALS).map(|places| Self::fixed(value, places));
-        let scientific =
-            (1..17).map(|places| Self::scientific(value, format!("{:.places$e}", value.abs())));
-        (fixed.filter(|_| value.abs() < LARGE))
-            .chain(scientific)
-            .find(close)
-            .unwrap_or_else(|| Self::exact(value))
+        let scientific = (1..17).map(|places| Self::scientific(value, format!("{size:.places$e}")));
+        let mut all = fixed.filter(|_| size < LARGE).chain(scientific);
+        all.find(is_close).unwrap_or_else(|| Self::exact(value))
     }
 
     fn significant(value: f64, digits: usize) -> Self {
@@ -152,13 +147,11 @@ impl Decimal {
         &self.digits
     }
 
-    /// How many digits stand before and after the point.
     pub(super) fn places(&self) -> (usize, usize) {
         let (before, after) = self.digits.split_once('.').unwrap_or((&self.digits, ""));
         (before.len(), after.len())
     }
 
-    /// The power of ten that the digits are multiplied with, if one is printed.
     pub(crate) fn exponent(&self) -> Option<i32> {
         self.exponent
     }
@@ -177,10 +170,7 @@ pub(super) fn finite_digits(value: f64, digits: usize) -> usize {
 fn parts(scientific: &str) -> (&str, i32) {
     let parts = scientific.split_once('e');
     let (digits, exponent) = parts.expect("a float's scientific form has an exponent");
-    (
-        digits,
-        exponent.parse().expect("the exponent is an integer"),
-    )
+    (digits, exponent.parse().expect("an integer"))
 }
 
 impl fmt::Display for Decimal {

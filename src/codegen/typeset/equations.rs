@@ -129,7 +129,6 @@ impl CoefficientTable {
 }
 
 impl Equation {
-    /// Whether any term is taller than a line of text.
     pub(crate) fn is_tall(&self) -> bool {
         self.terms.iter().any(|term| term.math.is_tall())
     }

@@ -1,8 +1,6 @@
 //! From canonical expressions to the typeset tree: fractions, roots, parentheses
 //! and the order in which readers expect factors and terms.
 
-use std::cmp::Ordering;
-
 use crate::equations::Equations;
 use crate::model::{LatentVariable, MAX_LATENT_DIM};
 use crate::symbolic::{ExprId, ExprPool, Function, Node, Number, SymbolId};
@@ -38,15 +36,13 @@ pub(super) fn with_coefficient(coefficient: &Decimal, is_omitted: bool, term: Si
     let number = Math::Number(coefficient.magnitude());
     let math = match term.math {
         Math::Number(one) if one.is_one() => number,
-        sum @ Math::Sum(_) if is_omitted => Math::Group(Box::new(sum)),
-        math if is_omitted => math,
+        math if is_omitted => in_brackets(math),
         Math::Fraction(top, bottom) if is_one(&top) => Math::Fraction(Box::new(number), bottom),
-        sum @ Math::Sum(_) => product(vec![number, Math::Group(Box::new(sum))]),
         Math::Product(mut factors) => {
             factors.insert(0, number);
             product(factors)
         }
-        math => product(vec![number, math]),
+        math => product(vec![number, in_brackets(math)]),
     };
     Signed {
         negative: coefficient.is_negative() != term.negative,
@@ -59,7 +55,7 @@ struct Layout<'a> {
     symbols: &'a SymbolTable,
 }
 
-/// What a factor is sorted by: kind first, then variable, then exponent.
+/// What a factor is sorted by.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum FactorKey {
     Number,
@@ -68,14 +64,7 @@ enum FactorKey {
     Function,
 }
 
-/// Numerator, denominator and sign of a product.
-#[derive(Default)]
-struct Quotient {
-    negative: bool,
-    numbers: Vec<Math>,
-    top: Vec<(FactorKey, Math)>,
-    bottom: Vec<(FactorKey, Math)>,
-}
+type Factor = (FactorKey, Math);
 
 impl Layout<'_> {
     fn signed(&self, expr: ExprId) -> Signed {
@@ -88,17 +77,23 @@ impl Layout<'_> {
         }
     }
 
+    fn boxed(&self, expr: ExprId) -> Box<Math> {
+        Box::new(self.signed(expr).into_math())
+    }
+
+    /// Constants first, then monomials by degree and variables, then the rest as the pool has it.
     fn sum(&self, terms: &[ExprId]) -> Signed {
         let mut order: Vec<ExprId> = terms.to_vec();
-        order.sort_by(|a, b| self.compare_terms(*a, *b));
+        order.sort_by_cached_key(|&term| {
+            let monomial = self.monomial(term);
+            let degree = monomial.as_ref().map_or(usize::MAX, Vec::len);
+            (degree, monomial)
+        });
         let laid_out = |term| {
-            let signed = self.signed(term);
+            let Signed { negative, math } = self.signed(term);
             // A sum inside a sum does not occur in canonical form; brackets keep it right.
-            let math = match signed.math {
-                sum @ Math::Sum(_) => Math::Group(Box::new(sum)),
-                math => math,
-            };
-            Signed { math, ..signed }
+            let math = in_brackets(math);
+            Signed { negative, math }
         };
         let mut terms: Vec<Signed> = order.into_iter().map(laid_out).collect();
         // z_1 - 1 rather than -1 + z_1.
@@ -108,173 +103,141 @@ impl Layout<'_> {
         Signed::plus(Math::Sum(terms))
     }
 
-    /// Constants first, then monomials by degree and variables, then the rest as the pool has it.
-    fn compare_terms(&self, a: ExprId, b: ExprId) -> Ordering {
-        match (self.monomial(a), self.monomial(b)) {
-            (Some(a), Some(b)) => a.len().cmp(&b.len()).then_with(|| a.cmp(&b)),
-            (Some(_), None) => Ordering::Less,
-            (None, Some(_)) => Ordering::Greater,
-            (None, None) => Ordering::Equal,
-        }
-    }
-
-    /// The variables of a monomial, each as often as its exponent says.
     fn monomial(&self, expr: ExprId) -> Option<Vec<LatentVariable>> {
-        let one = [expr];
-        let factors: &[ExprId] = match self.pool.node(expr) {
-            Node::Product(factors) => factors,
-            _other => &one,
-        };
         let mut variables = Vec::new();
-        for factor in factors {
-            let (base, times) = match self.pool.node(*factor) {
+        for &factor in self.pool.factors_of(expr) {
+            let (base, times) = match self.pool.node(factor) {
                 Node::Number(_) => continue,
-                Node::Power(base, exponent) => (*base, self.small_power(*exponent)?),
-                _other => (*factor, 1),
+                Node::Power(base, exponent) => {
+                    let power = self.pool.as_integer(*exponent)?;
+                    (
+                        *base,
+                        usize::try_from(power).ok().filter(|power| *power <= 64)?,
+                    )
+                }
+                _other => (factor, 1),
             };
-            let Node::Symbol(symbol) = self.pool.node(base) else {
-                return None;
-            };
-            variables.extend(std::iter::repeat_n(self.variable(*symbol)?, times));
+            let variable = self.variable(self.pool.as_symbol(base)?)?;
+            variables.extend(std::iter::repeat_n(variable, times));
         }
         variables.sort();
         Some(variables)
     }
 
-    fn small_power(&self, exponent: ExprId) -> Option<usize> {
-        let integer = self.pool.as_number(exponent)?.as_integer()?;
-        usize::try_from(integer).ok().filter(|power| *power <= 64)
-    }
-
     fn quotient(&self, factors: &[ExprId]) -> Signed {
-        let mut parts = Quotient::default();
-        for factor in factors {
-            match self.pool.node(*factor) {
-                Node::Number(number) => self.take_number(*number, &mut parts),
-                Node::Power(base, exponent) => self.take_power(*base, *exponent, &mut parts),
-                _other => parts.top.push(self.factor(*factor)),
-            }
-        }
-        if parts.negative {
-            let mut factors = parts.top.iter_mut().chain(&mut parts.bottom);
-            parts.negative = !factors.any(|(_, factor)| turn_difference(factor));
-        }
-        parts.assemble()
-    }
-
-    fn take_number(&self, number: Number, parts: &mut Quotient) {
-        parts.negative ^= number.is_negative();
-        let size = number.abs();
-        match size.as_rational() {
-            Some((top, bottom)) => {
-                if top != 1 {
-                    parts.numbers.push(integer(top));
+        let mut negative = false;
+        let mut numbers = Vec::new();
+        let (mut top, mut bottom): (Vec<Factor>, Vec<Factor>) = (Vec::new(), Vec::new());
+        for &factor in factors {
+            match self.pool.node(factor) {
+                Node::Number(number) => {
+                    negative ^= number.is_negative();
+                    let size = number.abs();
+                    let (over, under) = match size.as_rational() {
+                        Some((over, under)) => (integer(over), integer(under)),
+                        None => (Math::Number(Decimal::exact(size.to_f64())), integer(1)),
+                    };
+                    numbers.extend(Some(over).filter(|over| !is_one(over)));
+                    let under = Some(under).filter(|under| !is_one(under));
+                    bottom.extend(under.map(|under| (FactorKey::Number, under)));
                 }
-                if bottom != 1 {
-                    parts.bottom.push((FactorKey::Number, integer(bottom)));
-                }
-            }
-            None => (parts.numbers).push(Math::Number(Decimal::exact(size.to_f64()))),
-        }
-    }
-
-    fn take_power(&self, base: ExprId, exponent: ExprId, parts: &mut Quotient) {
-        match self.pool.as_number(exponent) {
-            Some(number) => {
-                let side = match number.is_negative() {
-                    true => &mut parts.bottom,
-                    false => &mut parts.top,
-                };
-                side.push(self.numeric_power(base, number.abs()));
-            }
-            None => {
-                let exponent = self.signed(exponent).into_math();
-                let (key, base) = self.base(base);
-                let power = Math::Power(Box::new(base), Box::new(exponent));
-                parts.top.push((key, power));
+                Node::Power(base, exponent) => match self.pool.as_number(*exponent) {
+                    Some(power) if power.is_negative() => {
+                        bottom.push(self.numeric_power(*base, power.abs()));
+                    }
+                    Some(power) => top.push(self.numeric_power(*base, power)),
+                    None => {
+                        let exponent = self.boxed(*exponent);
+                        let (key, base) = self.base(*base);
+                        top.push((key, Math::Power(Box::new(base), exponent)));
+                    }
+                },
+                _other => top.push(self.factor(factor)),
             }
         }
+        if negative {
+            let mut factors = top.iter_mut().chain(&mut bottom);
+            negative = !factors.any(|(_, factor)| turn_difference(factor));
+        }
+        let in_order = |mut factors: Vec<Factor>| {
+            factors.sort_by_key(|(key, _)| *key);
+            factors.into_iter().map(|(_, math)| math)
+        };
+        numbers.extend(in_order(top));
+        if numbers.is_empty() {
+            numbers.push(integer(1));
+        }
+        let (top, bottom) = (product(numbers), in_order(bottom).collect::<Vec<_>>());
+        let math = match bottom.is_empty() {
+            true => top,
+            false => Math::Fraction(Box::new(bare(top)), Box::new(bare(product(bottom)))),
+        };
+        Signed { negative, math }
     }
 
     /// `base ^ exponent` for a positive number: a root, a power on the function's
     /// name, or a plain power.
-    fn numeric_power(&self, base: ExprId, exponent: Number) -> (FactorKey, Math) {
+    fn numeric_power(&self, base: ExprId, exponent: Number) -> Factor {
         if exponent.is_one() {
             return self.factor(base);
         }
-        let exponent = match exponent.as_rational() {
+        let slash = |top, bottom| Math::Slash(Box::new(integer(top)), Box::new(integer(bottom)));
+        let (base, exponent) = match (exponent.as_rational(), self.pool.node(base)) {
             // Where a base may be negative its odd root is read as negative, its power is nothing.
-            Some((1, index @ (2 | 4 | 6 | 8))) => {
-                let inner = self.signed(base).into_math();
+            (Some((1, index @ (2 | 4 | 6 | 8))), _) => {
                 let index = (index != 2).then_some(index as u32);
-                return (FactorKey::Function, Math::Root(Box::new(inner), index));
+                return (FactorKey::Function, Math::Root(self.boxed(base), index));
             }
-            Some((power, 1)) => match self.pool.node(base) {
-                // The pool keeps x^(3/2) as sqrt(x)^3.
-                Node::Apply(Function::Sqrt, radicand) => {
-                    let (key, base) = self.base(*radicand);
-                    let half = Math::Slash(Box::new(integer(power)), Box::new(integer(2)));
-                    return (key, Math::Power(Box::new(base), Box::new(half)));
-                }
-                Node::Apply(function, argument) => {
-                    return self.powered_function(*function, *argument, power);
-                }
-                _other => integer(power),
-            },
-            Some((top, bottom)) => Math::Slash(Box::new(integer(top)), Box::new(integer(bottom))),
-            None => Math::Number(Decimal::exact(exponent.to_f64())),
+            // The pool keeps x^(3/2) as sqrt(x)^3.
+            (Some((power, 1)), Node::Apply(Function::Sqrt, radicand)) => {
+                (*radicand, slash(power, 2))
+            }
+            (Some((power, 1)), Node::Apply(function, argument)) => {
+                let math = self.powered_function(*function, *argument, integer(power));
+                return (FactorKey::Function, math);
+            }
+            (Some((power, 1)), _) => (base, integer(power)),
+            (Some((top, bottom)), _) => (base, slash(top, bottom)),
+            (None, _) => (base, Math::Number(Decimal::exact(exponent.to_f64()))),
         };
         let (key, base) = self.base(base);
         (key, Math::Power(Box::new(base), Box::new(exponent)))
     }
 
     /// `sin(x)^2` with the power on the name; on the whole for functions that do not allow it.
-    fn powered_function(
-        &self,
-        function: Function,
-        argument: ExprId,
-        power: i64,
-    ) -> (FactorKey, Math) {
-        let power = Box::new(integer(power));
-        let math = match has_power_on_name(function) {
-            true => {
-                let argument = Box::new(self.signed(argument).into_math());
-                Math::Function(function, Some(power), argument)
+    fn powered_function(&self, function: Function, argument: ExprId, power: Math) -> Math {
+        use Function::{Abs, Cos, Exp, Log, Sign, Sin, Sqrt, Tan, Tanh};
+        match function {
+            Sin | Cos | Tan | Tanh | Log => {
+                Math::Function(function, Some(Box::new(power)), self.boxed(argument))
             }
             // The power of exp(x) without parentheses could be read as one of x.
-            false => {
+            Exp | Sqrt | Abs | Sign => {
                 let base = match self.apply(function, argument) {
                     math @ Math::Function(..) => Math::Group(Box::new(math)),
                     // bars and roots show themselves where they end
                     math => math,
                 };
-                Math::Power(Box::new(base), power)
+                Math::Power(Box::new(base), Box::new(power))
             }
-        };
-        (FactorKey::Function, math)
+        }
     }
 
     /// `expr` as the base of a power, in parentheses where it needs them.
-    fn base(&self, expr: ExprId) -> (FactorKey, Math) {
+    fn base(&self, expr: ExprId) -> Factor {
         let (key, math) = self.factor(expr);
-        let math = match math {
-            Math::Number(ref number) if number.exponent().is_some() => Math::Group(Box::new(math)),
-            Math::Product(_)
-            | Math::Sum(_)
-            | Math::Fraction(..)
-            | Math::Slash(..)
-            | Math::Power(..)
-            | Math::Root(..)
-            | Math::Function(..) => Math::Group(Box::new(math)),
-            Math::Number(_) | Math::Symbol(_) | Math::Dot | Math::Absolute(_) | Math::Group(_) => {
-                math
-            }
+        let is_whole = match &math {
+            Math::Number(number) => number.exponent().is_none(),
+            Math::Symbol(_) | Math::Dot | Math::Absolute(_) | Math::Group(_) => true,
+            _other => false,
         };
-        (key, math)
+        match is_whole {
+            true => (key, math),
+            false => (key, Math::Group(Box::new(math))),
+        }
     }
 
-    /// One factor of a product, with parentheses around sums and signs.
-    fn factor(&self, expr: ExprId) -> (FactorKey, Math) {
+    fn factor(&self, expr: ExprId) -> Factor {
         match self.pool.node(expr) {
             Node::Symbol(symbol) => {
                 let variable = self.variable(*symbol);
@@ -286,16 +249,9 @@ impl Layout<'_> {
                 (FactorKey::Function, self.apply(*function, *argument))
             }
             Node::Number(_) | Node::Sum(_) | Node::Product(_) | Node::Power(..) => {
-                match self.signed(expr) {
-                    Signed {
-                        negative: false,
-                        math: math @ Math::Number(_),
-                    } => (FactorKey::Number, math),
-                    Signed {
-                        negative: false,
-                        math,
-                    } if !matches!(math, Math::Sum(_)) => (FactorKey::Group, math),
-                    other => (FactorKey::Group, Math::Group(Box::new(other.into_math()))),
+                match self.signed(expr).into_math() {
+                    math @ Math::Number(_) => (FactorKey::Number, math),
+                    math => (FactorKey::Group, in_brackets(math)),
                 }
             }
         }
@@ -306,34 +262,11 @@ impl Layout<'_> {
     }
 
     fn apply(&self, function: Function, argument: ExprId) -> Math {
-        let argument = Box::new(self.signed(argument).into_math());
+        let argument = self.boxed(argument);
         match function {
             Function::Sqrt => Math::Root(argument, None),
             Function::Abs => Math::Absolute(argument),
             named => Math::Function(named, None, argument),
-        }
-    }
-}
-
-impl Quotient {
-    fn assemble(mut self) -> Signed {
-        self.top.sort_by_key(|(key, _)| *key);
-        self.bottom.sort_by_key(|(key, _)| *key);
-        let mut top = self.numbers;
-        top.extend(self.top.into_iter().map(|(_, math)| math));
-        if top.is_empty() {
-            top.push(integer(1));
-        }
-        let top = product(top);
-        let math = if self.bottom.is_empty() {
-            top
-        } else {
-            let bottom = product(self.bottom.into_iter().map(|(_, math)| math).collect());
-            Math::Fraction(Box::new(bare(top)), Box::new(bare(bottom)))
-        };
-        Signed {
-            negative: self.negative,
-            math,
         }
     }
 }
@@ -355,6 +288,14 @@ fn turn_difference(factor: &mut Math) -> bool {
         (terms.iter_mut()).for_each(|term| term.negative = !term.negative);
     }
     is_difference
+}
+
+/// A sum in parentheses; anything else as it is.
+fn in_brackets(math: Math) -> Math {
+    match math {
+        sum @ Math::Sum(_) => Math::Group(Box::new(sum)),
+        math => math,
+    }
 }
 
 /// A numerator or denominator needs no parentheses of its own.
@@ -397,15 +338,6 @@ fn starts_with_word(math: &Math) -> bool {
 
 fn ends_with_word(math: &Math) -> bool {
     matches!(math, Math::Symbol(symbol) if symbol.subscript.is_empty()) && starts_with_word(math)
-}
-
-/// Whether the power of a function is written on its name, as in `sin^2`.
-fn has_power_on_name(function: Function) -> bool {
-    use Function::{Abs, Cos, Exp, Log, Sign, Sin, Sqrt, Tan, Tanh};
-    match function {
-        Sin | Cos | Tan | Tanh | Log => true,
-        Exp | Sqrt | Abs | Sign => false,
-    }
 }
 
 fn integer(value: i64) -> Math {

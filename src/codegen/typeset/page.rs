@@ -21,7 +21,6 @@ pub(super) trait Markup: Spelling {
     fn row_head(term: &Math, unit: Option<Unit>) -> String;
 }
 
-/// A page for a template, all parts in the page's markup.
 pub(super) struct Page {
     pub name: String,
     pub description: String,

@@ -45,12 +45,8 @@ impl RobotTypeset {
         rounding: Rounding,
     ) -> Result<Option<Self>, TypesetError> {
         let model = system.model();
-        let (Some(state), Ok(map), Ok(decoder), Ok(factors)) = (
-            model.state(),
-            model.encoder(),
-            model.decoder(),
-            model.state_factors(),
-        ) else {
+        let maps = (model.encoder(), model.decoder(), model.state_factors());
+        let (Some(state), (Ok(map), Ok(decoder), Ok(factors))) = (model.state(), maps) else {
             return Ok(None);
         };
         let decoder = decoder.weights();
@@ -122,7 +118,6 @@ fn encoder(
     Ok((system, absent.iter().sum()))
 }
 
-/// `value`, unless folding it with weights and scale factors left the range of floats.
 fn finite(value: f64, output: &str, term: &str) -> Result<f64, TypesetError> {
     match value.is_finite() {
         true => Ok(value),
@@ -141,14 +136,11 @@ fn coordinate_symbols(names: &[String]) -> Vec<Symbol> {
         dots: 0,
         subscript,
     };
-    let named: Option<Vec<Symbol>> = names
-        .iter()
-        .map(|name| {
-            let parts = name.split(|c: char| !c.is_ascii_alphanumeric());
-            parts.map(glyph).collect::<Option<Vec<_>>>().map(spelled)
-        })
-        .collect();
-    match named {
+    let named = names.iter().map(|name| {
+        let parts = name.split(|c: char| !c.is_ascii_alphanumeric());
+        parts.map(glyph).collect::<Option<_>>().map(spelled)
+    });
+    match named.collect::<Option<Vec<Symbol>>>() {
         Some(symbols) if BTreeSet::from_iter(&symbols).len() == symbols.len() => symbols,
         Some(_) | None => (1..=names.len())
             .map(|number| spelled(vec![Glyph::Digits(number.to_string())]))

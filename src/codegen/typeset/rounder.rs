@@ -61,21 +61,13 @@ fn are_whole_exact(rounding: Rounding, coefficients: impl Iterator<Item = f64>) 
         let (_, after) = number.places();
         number.exponent().map_or(after, |_| usize::MAX)
     };
-    let (mut count, mut all) = (0, 0);
-    for coefficient in coefficients.filter(|value| *value != 0.0) {
-        match needs(coefficient) {
-            more if more > LEAST_DECIMALS => return true,
-            needed => {
-                count += 1;
-                all += usize::from(needed == LEAST_DECIMALS);
-            }
-        }
-    }
-    (all as f64) < ROUNDED_SHARE * f64::from(count)
+    let needed: Vec<usize> = coefficients.filter(|c| *c != 0.0).map(needs).collect();
+    let all = needed.iter().filter(|places| **places == LEAST_DECIMALS);
+    needed.iter().any(|places| *places > LEAST_DECIMALS)
+        || (all.count() as f64) < ROUNDED_SHARE * needed.len() as f64
 }
 
 impl Rounder {
-    /// For a model with these coefficients, which may be in any order.
     pub(super) fn new(rounding: Rounding, coefficients: impl Iterator<Item = f64>) -> Self {
         Self {
             rounding,
@@ -103,9 +95,8 @@ impl Rounder {
     ) -> EquationSystem {
         let equations = outputs.iter().zip(xi.column_iter());
         let equations = equations.map(|((left, output), column)| {
-            let entries = column.iter().zip(terms);
-            let entries = entries.map(|(xi, (text, term))| (*xi, *text, term));
-            self.equation(left.clone(), (phase, output), entries)
+            let entries = column.iter().zip(terms).filter(|(xi, _)| **xi != 0.0);
+            self.equation(phase, left, output, entries)
         });
         EquationSystem {
             equations: equations.collect(),
@@ -113,20 +104,20 @@ impl Rounder {
         }
     }
 
-    /// `left = sum of coefficient * term`; each entry carries its term also as text, and
-    /// `(phase, output)` names the equation, for the record.
+    /// `left = sum of coefficient * term`; each term also as text, for the record.
     fn equation<'a>(
         &mut self,
-        left: Symbol,
-        (phase, output): (&str, &str),
-        entries: impl Iterator<Item = (f64, &'a str, &'a Signed)>,
+        phase: &str,
+        left: &Symbol,
+        output: &str,
+        entries: impl Iterator<Item = (&'a f64, &'a (&'a str, Signed))>,
     ) -> Equation {
         let mut terms = Vec::new();
-        for (coefficient, text, term) in entries.filter(|entry| entry.0 != 0.0) {
+        for (&coefficient, (text, term)) in entries {
             let place = || Place {
                 phase: phase.to_owned(),
                 output: output.to_owned(),
-                term: text.to_owned(),
+                term: (*text).to_owned(),
                 coefficient,
                 left: left.clone(),
                 math: term.clone(),
@@ -149,7 +140,7 @@ impl Rounder {
             terms.push(with_coefficient(&printed, is_omitted, term.clone()));
         }
         Equation {
-            left,
+            left: left.clone(),
             terms,
             is_approximate: false,
         }

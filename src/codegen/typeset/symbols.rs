@@ -31,28 +31,31 @@ impl SymbolTable {
     pub fn parse<S: AsRef<str>>(entries: &[S], latent_dim: usize) -> Result<Self, RenameError> {
         let mut table = Self::default();
         for entry in entries {
-            let entry = entry.as_ref();
-            let refused = |fault: &str| Err(RenameError(fault.to_owned()));
-            let Some((left, right)) = entry.split_once('=') else {
-                let expected = "expected `VARIABLE=NAME`, for example `z1=x`";
-                return refused(&format!("`{entry}`: {expected}"));
-            };
-            let (left, right) = (left.trim(), right.trim());
-            let variable = LatentVariable::from_name(left, latent_dim)
-                .filter(|variable| !matches!(variable, LatentVariable::Dz(_)));
-            let Some(variable) = variable else {
-                let expected = "expected z1, z2, ... or u1, u2, ... (dots follow z)";
-                return refused(&format!("`{left}` cannot be renamed: {expected}"));
-            };
-            let Some(symbol) = parse_symbol(right) else {
-                return refused(&format!("`{left}={right}`: expected {NAME}"));
-            };
-            if table.names.insert(variable, symbol).is_some() {
-                return refused(&format!("`{left}` is renamed twice"));
-            }
+            table
+                .rename(entry.as_ref(), latent_dim)
+                .map_err(RenameError)?;
         }
-        table.check_distinct(latent_dim)?;
+        table.check_distinct(latent_dim).map_err(RenameError)?;
         Ok(table)
+    }
+
+    fn rename(&mut self, entry: &str, latent_dim: usize) -> Result<(), String> {
+        let (left, right) = entry
+            .split_once('=')
+            .ok_or_else(|| format!("`{entry}`: expected `VARIABLE=NAME`, for example `z1=x`"))?;
+        let (left, right) = (left.trim(), right.trim());
+        let variable = LatentVariable::from_name(left, latent_dim)
+            .filter(|variable| !matches!(variable, LatentVariable::Dz(_)));
+        let variable = variable.ok_or_else(|| {
+            let expected = "expected z1, z2, ... or u1, u2, ... (dots follow z)";
+            format!("`{left}` cannot be renamed: {expected}")
+        })?;
+        let symbol = parse_symbol(right);
+        let symbol = symbol.ok_or_else(|| format!("`{left}={right}`: expected {NAME}"))?;
+        match self.names.insert(variable, symbol) {
+            Some(_) => Err(format!("`{left}` is renamed twice")),
+            None => Ok(()),
+        }
     }
 
     /// How a variable is written.
@@ -80,14 +83,14 @@ impl SymbolTable {
         Symbol { dots, ..position }
     }
 
-    fn check_distinct(&self, latent_dim: usize) -> Result<(), RenameError> {
+    fn check_distinct(&self, latent_dim: usize) -> Result<(), String> {
         let mut seen: BTreeMap<Symbol, String> = BTreeMap::new();
         for variable in LatentVariable::all(latent_dim) {
             let (symbol, second) = (self.symbol(variable), variable.to_string());
             if let Some(first) = seen.insert(symbol.clone(), second.clone()) {
-                return Err(RenameError(format!(
+                return Err(format!(
                     "`{first}` and `{second}` would both be printed as `{symbol}`"
-                )));
+                ));
             }
         }
         Ok(())
@@ -97,14 +100,10 @@ impl SymbolTable {
 impl std::fmt::Display for Symbol {
     /// Plain text for messages: `z_1`, `theta`, `F_lin,1`, with `d` for each dot.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        for _ in 0..self.dots {
-            f.write_str("d")?;
-        }
-        write!(f, "{}", self.glyph)?;
-        for (place, part) in self.subscript.iter().enumerate() {
-            write!(f, "{}{part}", if place == 0 { "_" } else { "," })?;
-        }
-        Ok(())
+        write!(f, "{}{}", "d".repeat(self.dots.into()), self.glyph)?;
+        let mut marks = std::iter::once("_").chain(std::iter::repeat(","));
+        let mut parts = self.subscript.iter().zip(&mut marks);
+        parts.try_for_each(|(part, mark)| write!(f, "{mark}{part}"))
     }
 }
 
@@ -127,24 +126,18 @@ const LONGEST_WORD: usize = 24;
 
 fn parse_symbol(text: &str) -> Option<Symbol> {
     let (base, subscript) = match text.split_once('_') {
-        Some((base, subscript)) => (base, Some(subscript)),
-        None => (text, None),
+        Some((base, parts)) => {
+            let braced = parts.strip_prefix('{');
+            let inner = braced.map_or(Some(parts), |rest| rest.strip_suffix('}'))?;
+            (base, inner.split(',').map(glyph).collect::<Option<_>>()?)
+        }
+        None => (text, Vec::new()),
     };
     if base.trim_start().starts_with(|c: char| c.is_ascii_digit()) {
         return None;
     }
-    let letter = glyph(base)?;
-    let subscript = match subscript {
-        None => Vec::new(),
-        Some(parts) => {
-            let inner = parts
-                .strip_prefix('{')
-                .map_or(Some(parts), |rest| rest.strip_suffix('}'))?;
-            inner.split(',').map(glyph).collect::<Option<_>>()?
-        }
-    };
     Some(Symbol {
-        glyph: letter,
+        glyph: glyph(base)?,
         dots: 0,
         subscript,
     })

@@ -161,7 +161,6 @@ impl Table {
         table
     }
 
-    /// Titles of the columns: names, with units after a comma.
     fn header(&self) -> Vec<String> {
         let title = |(name, unit): &(String, String)| match unit.as_str() {
             "" => name.clone(),

@@ -47,7 +47,6 @@ pub struct Signed {
 }
 
 impl Signed {
-    /// `math` with a plus.
     pub(crate) fn plus(math: Math) -> Self {
         Self {
             negative: false,
@@ -96,13 +95,11 @@ const GREEK: &str = "
     Gamma Γ Delta Δ Theta Θ Lambda Λ Xi Ξ Phi Φ Psi Ψ Omega Ω Sigma Σ
 ";
 
-/// Names and characters of the Greek letters, in the order of [`Glyph::Greek`].
 pub(super) fn greek() -> impl Iterator<Item = (&'static str, &'static str)> {
     let words = GREEK.split_whitespace();
     words.clone().step_by(2).zip(words.skip(1).step_by(2))
 }
 
-/// Name and character of a Greek letter.
 pub(super) fn greek_letter(place: usize) -> (&'static str, &'static str) {
     greek().nth(place).expect("a place in the table")
 }

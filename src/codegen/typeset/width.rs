@@ -111,26 +111,13 @@ mod tests {
     use super::super::decimal::Decimal;
     use super::*;
 
-    fn numbers(count: usize) -> Vec<Signed> {
-        (0..count)
-            .map(|_| Signed::plus(Math::Number(Decimal::exact(0.25))))
-            .collect()
-    }
-
     #[test]
-    fn break_lines_keeps_every_term_once_and_each_line_within_the_width() {
-        let terms = numbers(40);
+    fn break_lines_keeps_every_term_once_and_each_line_within_the_width_but_for_a_single_term() {
+        let terms = vec![Signed::plus(Math::Number(Decimal::exact(0.25))); 40];
         let lines = break_lines(&terms, 20.0, 3.0, 2.0);
-        assert!(lines.len() > 1);
-        assert_eq!(lines.iter().map(|line| line.len()).sum::<usize>(), 40);
-        for line in lines {
-            assert!(2.0 + OPERATOR + sum_width(line) <= 20.0 + 3.0);
-        }
-    }
-
-    #[test]
-    fn break_lines_leaves_a_term_wider_than_the_line_alone_on_it_and_nothing_of_nothing() {
-        assert_eq!(break_lines(&numbers(3), 0.5, 0.0, 0.0).len(), 3);
+        assert!(lines.len() > 1 && lines.concat() == terms);
+        assert!((lines.iter()).all(|line| 2.0 + OPERATOR + sum_width(line) <= 20.0 + 3.0));
+        assert_eq!(break_lines(&terms, 0.5, 0.0, 0.0).len(), 40);
         assert!(break_lines(&[], 20.0, 0.0, 0.0).is_empty());
     }
 }

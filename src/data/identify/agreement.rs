@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use super::error::IdentifyError;
 use super::fit::Estimate;
-use super::parameters::INVERSE_MASS;
+use super::parameters::{INVERSE_MASS, PARAMETER_DIM};
 use super::windows::{Group, Windows};
 use crate::recording::Recording;
 use crate::recording::mismatch::{Balance, contradiction};
@@ -16,17 +16,13 @@ use crate::robot::Robot;
 
 /// Share by which the mass of a jump may differ from that of all, and the same in standard errors of that jump.
 const MASS: (f64, f64) = (0.05, 4.0);
-/// Fewest blocks of a jump whose mass is compared.
-const LEAST_BLOCKS: usize = 3;
+const LEAST_BLOCKS: usize = 3; // fewest blocks of a jump whose mass is compared
 
-/// Refuses recordings that contradict physics, or each other by what their torques carry.
 pub(super) fn require_physics(
     recordings: &[Recording],
     robot: &Robot,
 ) -> Result<(), IdentifyError> {
-    let balances = recordings
-        .iter()
-        .map(|recording| Balance::of(recording, robot));
+    let balances = (recordings.iter()).map(|recording| Balance::of(recording, robot));
     let balances: Vec<Balance> = balances.collect();
     match contradiction(&balances) {
         None => Ok(()),
@@ -52,9 +48,7 @@ pub(super) fn require_one_robot(
     // Of two robots the one with fewer jumps is the stranger.
     let most_kg = median(jumps.iter().map(|(_, mass_kg, _)| *mass_kg));
     let far = |(_, mass_kg, _): &(usize, f64, f64)| (mass_kg / most_kg).ln().abs();
-    let worst = jumps
-        .iter()
-        .max_by(|one, other| far(one).total_cmp(&far(other)));
+    let worst = (jumps.iter()).max_by(|one, other| far(one).total_cmp(&far(other)));
     let &(segment, mass_kg, error) = worst.expect("invariant: one differs");
     let at = segments.iter().position(|range| range.contains(&segment));
     let at = at.expect("invariant: a segment of a recording");
@@ -78,17 +72,11 @@ fn refused(recording: &Recording, segment: Option<usize>, found: String) -> Iden
 /// a share of it (jackknife over blocks).
 fn masses(windows: &Windows, estimate: &Estimate) -> Vec<(usize, f64, f64)> {
     let mut blocks = vec![(0.0, 0.0); windows.blocks.len()];
-    for row in windows
-        .rows
-        .iter()
-        .filter(|row| row.group == Group::Contact(2))
-    {
-        let others = row.coefficients.iter().zip(estimate.iter()).enumerate();
-        let others = others.filter(|(unknown, _)| *unknown != INVERSE_MASS);
-        let rest: f64 = row.left
-            - others
-                .map(|(_, (coefficient, value))| coefficient * value)
-                .sum::<f64>();
+    let upwards = (windows.rows.iter()).filter(|row| row.group == Group::Contact(2));
+    for row in upwards {
+        let others = (0..PARAMETER_DIM).filter(|unknown| *unknown != INVERSE_MASS);
+        let others = others.map(|unknown| row.coefficients[unknown] * estimate[unknown]);
+        let rest = row.left - others.sum::<f64>();
         let force = row.coefficients[INVERSE_MASS];
         blocks[row.block].0 += force * rest;
         blocks[row.block].1 += force * force;
@@ -98,13 +86,11 @@ fn masses(windows: &Windows, estimate: &Estimate) -> Vec<(usize, f64, f64)> {
         let own = blocks.iter().zip(&windows.blocks);
         let own = own.filter(|((_, square), of)| **of == segment && *square > 0.0);
         let own: Vec<(f64, f64)> = own.map(|(sums, _)| *sums).collect();
-        let (product, square) = own
-            .iter()
-            .fold((0.0, 0.0), |sum, block| (sum.0 + block.0, sum.1 + block.1));
+        let add = |sum: (f64, f64), block: &(f64, f64)| (sum.0 + block.0, sum.1 + block.1);
+        let (product, square) = own.iter().fold((0.0, 0.0), add);
         let inverse = product / square;
-        let without = own
-            .iter()
-            .map(|block| (product - block.0) / (square - block.1) - inverse);
+        let changed = |block: &(f64, f64)| (product - block.0) / (square - block.1) - inverse;
+        let without = own.iter().map(changed);
         let count = own.len() as f64;
         let variance = (count - 1.0) / count * without.map(|change| change * change).sum::<f64>();
         let is_known = own.len() >= LEAST_BLOCKS && inverse > 0.0;

@@ -48,8 +48,7 @@ pub fn joint_unknowns(kind: usize) -> [usize; JOINT_ROWS - 1] {
 pub struct SampleEquations {
     /// Axes x, y, z one below the other, [`BODY_ROWS`] each: the trunk's acceleration, m/s^2.
     pub body: DMatrix<f64>,
-    /// The twelve joints one below the other, [`JOINT_ROWS`] each: torque, N m. They hold in the
-    /// air.
+    /// The twelve joints one below the other, [`JOINT_ROWS`] each: torque, N m. They hold in the air.
     pub joints: DMatrix<f64>,
     /// Samples at which a leg on the ground is too close to a singular posture.
     pub singular: Vec<bool>,
@@ -113,16 +112,13 @@ impl SampleEquations {
                 }
                 for kind in 0..LEG_JOINT_DIM {
                     let row = (first + kind) * JOINT_ROWS;
-                    let mut joint = equations
-                        .joints
-                        .fixed_view_mut::<JOINT_ROWS, 1>(row, sample);
-                    joint.copy_from_slice(&state.joint(kind));
+                    let joints = &mut equations.joints;
+                    (joints.fixed_view_mut::<JOINT_ROWS, 1>(row, sample))
+                        .copy_from_slice(&state.joint(kind));
                 }
             }
-            equations
-                .body
-                .column_mut(sample)
-                .copy_from_slice(body.0.as_flattened());
+            let mut column = equations.body.column_mut(sample);
+            column.copy_from_slice(body.0.as_flattened());
         }
         equations
     }
@@ -132,14 +128,12 @@ impl SampleEquations {
 struct BodyEquation([[f64; BODY_ROWS]; 3]);
 
 impl BodyEquation {
-    /// Adds a vector to the coefficients of an unknown, or to the left side.
     fn add(&mut self, unknown: usize, vector: Vector3<f64>) {
         for axis in 0..3 {
             self.0[axis][unknown] += vector[axis];
         }
     }
 
-    /// Takes a vector from the coefficients of an unknown.
     fn subtract(&mut self, unknown: usize, vector: &Vector3<f64>) {
         for axis in 0..3 {
             self.0[axis][unknown] -= vector[axis];
@@ -189,7 +183,6 @@ const OWN: [usize; 7] = [
 /// One leg at one sample; vectors over joints unless they are directions.
 struct LegSample {
     frame: LegFrame,
-    /// Angular velocity of the trunk in the world, rad/s.
     trunk_rate: Vector3<f64>,
     rate: Vector3<f64>,
     acceleration: Vector3<f64>,
@@ -206,7 +199,6 @@ impl LegSample {
         Vector3::new(self.frame.abduction.dot(moment), flexion, flexion)
     }
 
-    /// Angular velocity of the calf in the world, rad/s.
     fn calf_rate(&self) -> Vector3<f64> {
         self.trunk_rate
             + self.frame.abduction * self.rate[0]

@@ -4,7 +4,7 @@
 
 use thiserror::Error;
 
-use crate::files::Located;
+use crate::files::{Fault, Located};
 use crate::recording::RecordingError;
 
 /// Why recordings do not say what the robot is, or a file does not.
@@ -13,7 +13,6 @@ pub enum IdentifyError {
     /// A recording cannot be read or filtered.
     #[error(transparent)]
     Recording(#[from] RecordingError),
-    /// Too little of the recordings has feet on the ground and is not close to an impact.
     #[error(
         "{recordings} recordings: found {found} samples with feet on the ground that are 20 ms \
          away from a change of feet and from a singular leg, expected at least {expected}"
@@ -23,7 +22,6 @@ pub enum IdentifyError {
         found: usize,
         expected: usize,
     },
-    /// The feet do not move enough for the joints' losses to have a direction.
     #[error(
         "{recordings} recordings: found {found} windows of 30 ms in which the legs move, expected \
          at least {expected}; a robot that stands still does not show its losses"
@@ -51,19 +49,5 @@ pub enum IdentifyError {
     Contradiction { recording: String, found: String },
     /// A file of an identification cannot be used.
     #[error(transparent)]
-    File(#[from] Located<IdentifyFault>),
-}
-
-/// What is wrong at a place of a file.
-#[derive(Debug, Error)]
-pub enum IdentifyFault {
-    /// The file system refused it.
-    #[error("cannot read")]
-    Read(#[source] std::io::Error),
-    /// It is not TOML, or not with the keys of an identification.
-    #[error("{0}")]
-    Syntax(String),
-    /// A value that no robot has.
-    #[error("found {found}, expected {expected}")]
-    Value { found: f64, expected: &'static str },
+    File(#[from] Located<Fault>),
 }

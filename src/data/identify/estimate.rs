@@ -21,16 +21,11 @@ use crate::recording::check::check;
 use crate::recording::clock::{Timed, timed};
 use crate::robot::{Actuators, GRAVITY_M_S2, JOINT_DIM, Leg, Robot};
 
-/// Fewest samples with feet on the ground.
-const LEAST_CONTACT_SAMPLES: usize = 100;
-/// Fewest windows with moving legs; there are 23 unknowns.
-const LEAST_WINDOWS: usize = 30;
-/// Most rounds; a clean recording needs about eight.
-const MOST_ROUNDS: usize = 30;
-/// Largest change of the delay in a round, s.
-const LARGEST_DELAY_CHANGE_S: f64 = 0.004;
-/// Largest delay either way, s.
-const LARGEST_DELAY_S: f64 = 0.06;
+const LEAST_CONTACT_SAMPLES: usize = 100; // fewest samples with feet on the ground
+const LEAST_WINDOWS: usize = 30; // fewest windows with moving legs; there are 23 unknowns
+const MOST_ROUNDS: usize = 30; // most rounds; a clean recording needs about eight
+const LARGEST_DELAY_CHANGE_S: f64 = 0.004; // largest change of the delay in a round, s
+const LARGEST_DELAY_S: f64 = 0.06; // largest delay either way, s
 /// Changes in a round below which the rounds end: of the delay (s), of the mass (relative).
 const SETTLED: [f64; 2] = [2e-5, 1e-4];
 
@@ -100,41 +95,33 @@ fn require_enough(windows: &Windows, recordings: usize) -> Result<(), IdentifyEr
         });
     }
     let is_moving = |row: &&Row| row.moving && row.group == Group::Contact(0);
-    let found = windows.rows.iter().filter(is_moving).count();
-    let expected = LEAST_WINDOWS;
-    if found < expected {
-        return Err(IdentifyError::Still {
+    let (found, expected) = (windows.rows.iter().filter(is_moving).count(), LEAST_WINDOWS);
+    match found < expected {
+        false => Ok(()),
+        true => Err(IdentifyError::Still {
             recordings,
             found,
             expected,
-        });
+        }),
     }
-    Ok(())
 }
 
-/// What is clipped, left out or lacking in the windows.
 fn exclusions(windows: &Windows) -> Vec<String> {
-    let mut notes = Vec::new();
-    if windows.clipped_torques > 0 {
-        notes.push(format!(
-            "{} torques are above the robot's limits: commanded rather than measured? They \
-             count as the limit",
-            windows.clipped_torques
-        ));
-    }
-    if windows.singular_samples > 0 {
-        notes.push(format!(
-            "{} samples with a leg on the ground close to a singular posture are left out",
-            windows.singular_samples
-        ));
-    }
-    if windows.flight_samples == 0 {
-        notes.push(
-            "no flight of at least 70 ms: gravity and the legs' inertia rest on contact alone"
-                .to_owned(),
-        );
-    }
-    notes
+    let (clipped, singular) = (windows.clipped_torques, windows.singular_samples);
+    let notes = [
+        (clipped > 0).then(|| {
+            format!(
+                "{clipped} torques are above the robot's limits: commanded rather than measured? They count as the limit"
+            )
+        }),
+        (singular > 0).then(|| {
+            format!("{singular} samples with a leg on the ground close to a singular posture are left out")
+        }),
+        (windows.flight_samples == 0).then(|| {
+            "no flight of at least 70 ms: gravity and the legs' inertia rest on contact alone".to_owned()
+        }),
+    ];
+    notes.into_iter().flatten().collect()
 }
 
 struct State {
@@ -168,7 +155,6 @@ impl State {
         Ok(windows)
     }
 
-    /// One fit; whether it changed nothing that matters.
     fn improve(&mut self, windows: &Windows, robot: &Robot) -> Result<bool, IdentifyError> {
         const LEAST_ROUNDS: usize = 6;
         let priors = priors(robot.geometry(Leg::FrontLeft), self.mass_kg, &self.losses);
@@ -178,11 +164,10 @@ impl State {
         // Ten times lighter or heavier than the robot is no robot: signs, units or order are wrong.
         let expected = 1.0 / robot.mass_kg();
         if !(inverse > 0.1 * expected && inverse < 10.0 * expected) {
-            let robot = robot.name().to_owned();
             return Err(IdentifyError::Mass {
                 inverse,
                 expected,
-                robot,
+                robot: robot.name().to_owned(),
             });
         }
         let mass_kg = 1.0 / inverse;
@@ -206,19 +191,13 @@ impl State {
     ) -> Identification {
         let priors = priors(robot.geometry(Leg::FrontLeft), self.mass_kg, &self.losses);
         let estimate = self.iteration.estimate.unwrap_or_default();
+        let alone = force_alone(&windows.rows).unwrap_or_default();
         // When within a step a torque acts is not recorded: uniform over it.
-        let steps = segments
-            .iter()
-            .map(|(timed, _)| timed.segment.mean_step_s());
-        let step_s = steps.fold(0.0, f64::max);
-        let within_step_s = step_s / 12_f64.sqrt();
-        let variances = self.iteration.variances(
-            &windows.rows,
-            &windows.groupings(),
-            &priors,
-            self.mass_kg,
-            within_step_s,
-        );
+        let steps = (segments.iter()).map(|(timed, _)| timed.segment.mean_step_s());
+        let within_step_s = steps.fold(0.0, f64::max) / 12_f64.sqrt();
+        let (rows, groupings) = (&windows.rows, windows.groupings());
+        let variances =
+            (self.iteration).variances(rows, &groupings, &priors, self.mass_kg, within_step_s);
         let deviation = |i: usize| variances.map_or(f64::INFINITY, |all| all[i].sqrt());
         let per_mass = |i: usize| deviation(i) * self.mass_kg;
         let kinds = |first: usize, of: &dyn Fn(usize) -> f64| {
@@ -256,22 +235,17 @@ impl State {
                 legs: legs(&per_mass),
             },
             r2: fit_of(windows, &estimate),
-            force_alone: alone(windows),
+            force_alone: ForceAlone {
+                gravity_m_s2: alone[GRAVITY],
+                mass_kg: 1.0 / alone[INVERSE_MASS],
+                r2: fit_of(windows, &alone),
+            },
             samples: Samples {
                 contact: windows.contact_samples,
                 flight: windows.flight_samples,
             },
             notes,
         }
-    }
-}
-
-fn alone(windows: &Windows) -> ForceAlone {
-    let estimate = force_alone(&windows.rows).unwrap_or_default();
-    ForceAlone {
-        gravity_m_s2: estimate[GRAVITY],
-        mass_kg: 1.0 / estimate[INVERSE_MASS],
-        r2: fit_of(windows, &estimate),
     }
 }
 
@@ -287,23 +261,17 @@ fn implausible(recording: &Recording, robot: &Robot) -> Option<String> {
     for finding in check(recording, robot) {
         *counts.entry(finding.kind.description()).or_default() += finding.samples.len();
     }
-    let listed: Vec<String> = (counts.iter())
-        .map(|(kind, count)| format!("{kind} ({count})"))
-        .collect();
+    let listed = (counts.iter()).map(|(kind, count)| format!("{kind} ({count})"));
+    let listed = listed.collect::<Vec<_>>().join(", ");
+    let path = recording.path.display();
     (!listed.is_empty()).then(|| {
-        format!(
-            "{}: implausible samples stay in: {}; `romc inspect` lists them",
-            recording.path.display(),
-            listed.join(", ")
-        )
+        format!("{path}: implausible samples stay in: {listed}; `romc inspect` lists them")
     })
 }
 
 fn mended(path: &Path, segments: &[Timed]) -> Option<String> {
     let mut faults = Vec::new();
-    let rebuilt = segments
-        .iter()
-        .filter_map(|timed| timed.mended.elapsed_ratio);
+    let rebuilt = (segments.iter()).filter_map(|timed| timed.mended.elapsed_ratio);
     if let Some(longest) = rebuilt.reduce(f64::max) {
         faults.push(format!(
             "{longest:.2} s of motion pass in a recorded second (displacements against velocities; \

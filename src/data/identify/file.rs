@@ -3,9 +3,9 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use super::error::{IdentifyError, IdentifyFault};
-use super::identification::{Fit, Identification, Legs, PerKind, Samples};
-use crate::files::{Located, Place, read_toml};
+use super::error::IdentifyError;
+use super::identification::{Fit, Identification, Legs, Samples};
+use crate::files::{Fault, Located, Place, read_toml};
 use crate::robot::JOINT_NAMES;
 
 impl Identification {
@@ -32,12 +32,12 @@ impl Identification {
             &gravity_and_mass(error.gravity_m_s2, error.mass_kg),
         );
         numbers(&mut out, &[("delay_s", error.delay_s)]);
-        for (name, PerKind { hx, hy, kn }) in [
+        for (name, kinds) in [
             ("viscous_nm_s_rad", error.viscous_nm_s_rad),
             ("dry_nm", error.dry_nm),
             ("armature_kg_m2", error.armature_kg_m2),
         ] {
-            let [hx, hy, kn] = [hx, hy, kn].map(number);
+            let [hx, hy, kn] = kinds.to_array().map(number);
             let _ = writeln!(out, "{name} = {{ hx = {hx}, hy = {hy}, kn = {kn} }}");
         }
         table(&mut out, "standard_error.legs", &legs(&error.legs));
@@ -60,9 +60,11 @@ impl Identification {
     /// value no robot has.
     pub fn read(path: &Path) -> Result<Self, IdentifyError> {
         let file = path.display().to_string();
-        let text = read_toml(path)
-            .map_err(|source| at(&file, Place::Whole, IdentifyFault::Read(source)))?;
-        Self::from_toml(&file, &text)
+        let action = "read";
+        let refused = |source| -> Located<Fault> {
+            Located::new(&file, Place::Whole, Fault::Io { action, source })
+        };
+        Self::from_toml(&file, &read_toml(path).map_err(refused)?)
     }
 
     /// Reads the text of such a file; `file` stands for it in messages.
@@ -71,21 +73,17 @@ impl Identification {
     /// As [`Identification::read`].
     pub fn from_toml(file: &str, text: &str) -> Result<Self, IdentifyError> {
         let found: Self = toml::from_str(text).map_err(|error| {
-            let place = match error.span() {
-                None => Place::Whole,
-                Some(span) => Place::of_byte(text, span.start),
-            };
-            let fault = IdentifyFault::Syntax(error.message().to_owned());
-            at(file, place, fault)
+            let of_byte = |span: std::ops::Range<usize>| Place::of_byte(text, span.start);
+            let place = error.span().map_or(Place::Whole, of_byte);
+            Located::<Fault>::new(file, place, Fault::Text(error.message().into()))
         })?;
         found.require_plausible(file)?;
         Ok(found)
     }
 
     fn require_plausible(&self, file: &str) -> Result<(), IdentifyError> {
-        let refuse = |entry: String, found: f64, expected: &'static str| {
-            let fault = IdentifyFault::Value { found, expected };
-            Err(at(file, Place::Entry(entry.into()), fault))
+        let refuse = |entry: String, found: f64, expected: &str| {
+            Err(Located::at(file, entry, found.to_string(), expected).into())
         };
         for (name, value) in gravity_and_mass(self.gravity_m_s2, self.mass_kg) {
             if !(value.is_finite() && value > 0.0) {
@@ -101,10 +99,6 @@ impl Identification {
         }
         Ok(())
     }
-}
-
-fn at(file: &str, place: Place, fault: IdentifyFault) -> IdentifyError {
-    IdentifyError::File(Located::new(file, place, fault))
 }
 
 type Entry = (&'static str, f64);

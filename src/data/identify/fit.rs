@@ -1,30 +1,26 @@
 //! Weighted least squares with losses that are not negative, and honest standard errors.
 //!
-//! Rows of a group (contact, flight, joints in the air; by axis or kind) share one residual
-//! deviation, estimated with the unknowns; residuals beyond three deviations count less (Huber).
-//! Residuals of neighbouring windows are alike, and those of one jump may be, so standard errors come from leaving out
-//! blocks of 0.1 s in turn and, where there are enough, whole jumps (jackknife), not from the residuals as if they were
-//! independent.
+//! Rows of a group (contact, flight, joints in the air; by axis or kind) share one residual deviation, estimated with the
+//! unknowns; residuals beyond three deviations count less (Huber). Residuals of neighbouring windows are alike, and those
+//! of one jump may be, so standard errors come from leaving out blocks of 0.1 s in turn and, where there are enough, whole
+//! jumps (jackknife).
 
 use nalgebra::{Cholesky, DMatrix, DVector, SMatrix, SVector};
 
-use super::parameters::{DELAY, GRAVITY, INVERSE_MASS, NOT_NEGATIVE, PARAMETER_DIM, Prior};
+use super::parameters::{DELAY, GRAVITY, INVERSE_MASS, PARAMETER_DIM, Prior, not_negative};
 use super::windows::{Group, OVERLAP, Row};
 
 pub(crate) type Estimate = SVector<f64, PARAMETER_DIM>;
 type Square = SMatrix<f64, PARAMETER_DIM, PARAMETER_DIM>;
 
-/// Deviations of a residual from which it counts less.
-const HUBER: f64 = 3.0;
+const HUBER: f64 = 3.0; // deviations of a residual from which it counts less
 /// Smallest deviation of a group, m/s^2: what the model leaves out of the best recordings.
 const LEAST_DEVIATION: f64 = 0.005;
 /// Weights of body and joint rows before the deviations are known.
 const FIRST_WEIGHTS: [f64; 2] = [1.0, 0.3];
 
-/// The state of the iteration: unknowns, deviations of the groups.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Iteration {
-    /// Present estimate; `None` before the first step.
     pub estimate: Option<Estimate>,
     deviations: Option<[f64; Group::COUNT]>,
 }
@@ -86,22 +82,17 @@ impl Normal {
         let mut free: Vec<usize> = (0..PARAMETER_DIM).collect();
         let mut estimate = self.solve(&free)?;
         for _ in 0..4 * PARAMETER_DIM {
-            let strength = |i: usize, value: f64| value * self.matrix[(i, i)].sqrt();
-            let negative = NOT_NEGATIVE
-                .into_iter()
-                .filter(|i| free.contains(i) && estimate[*i] < 0.0)
-                .min_by(|a, b| strength(*a, estimate[*a]).total_cmp(&strength(*b, estimate[*b])));
-            if let Some(worst) = negative {
+            let strength = |i: &usize| estimate[*i] * self.matrix[(*i, *i)].sqrt();
+            let negative = not_negative().filter(|i| free.contains(i) && estimate[*i] < 0.0);
+            let worst = negative.min_by(|a, b| strength(a).total_cmp(&strength(b)));
+            if let Some(worst) = worst {
                 free.retain(|i| *i != worst);
             } else {
                 let slope = self.side - self.matrix * estimate;
-                let gain = |i: usize| slope[i] / self.matrix[(i, i)].sqrt();
+                let gain = |i: &usize| slope[*i] / self.matrix[(*i, *i)].sqrt();
                 let least = 1e-9 * self.side.amax().max(1.0);
-                let freed = NOT_NEGATIVE
-                    .into_iter()
-                    .filter(|i| !free.contains(i) && gain(*i) > least)
-                    .max_by(|a, b| gain(*a).total_cmp(&gain(*b)));
-                match freed {
+                let held = not_negative().filter(|i| !free.contains(i) && gain(i) > least);
+                match held.max_by(|a, b| gain(a).total_cmp(&gain(b))) {
                     Some(unknown) => free.push(unknown),
                     None => break,
                 }
@@ -109,7 +100,7 @@ impl Normal {
             free.sort_unstable();
             estimate = self.solve(&free)?;
         }
-        for unknown in NOT_NEGATIVE {
+        for unknown in not_negative() {
             estimate[unknown] = estimate[unknown].max(0.0);
         }
         Some((estimate, free))
@@ -118,10 +109,9 @@ impl Normal {
 
 /// What a row's equation leaves unexplained, m/s^2.
 pub(crate) fn residual(row: &Row, estimate: &Estimate, mass_kg: f64) -> f64 {
-    let product: f64 = (row.coefficients.iter().zip(estimate.iter()))
-        .map(|(coefficient, value)| coefficient * value)
-        .sum();
-    left(row, mass_kg) - product
+    let pairs = row.coefficients.iter().zip(estimate.iter());
+    let products = pairs.map(|(coefficient, value)| coefficient * value);
+    left(row, mass_kg) - products.sum::<f64>()
 }
 
 fn left(row: &Row, mass_kg: f64) -> f64 {
@@ -143,9 +133,7 @@ impl Iteration {
         for row in rows.iter().filter(|row| row.moving) {
             let group = row.group.index();
             let residual = residual(row, &estimate, mass_kg);
-            let share = self
-                .deviations
-                .map_or(1.0, |all| huber(residual / all[group]));
+            let share = (self.deviations).map_or(1.0, |all| huber(residual / all[group]));
             sums[group].0 += share * residual * residual;
             sums[group].1 += 1.0;
         }
@@ -174,11 +162,12 @@ impl Iteration {
     ) -> Option<Estimate> {
         let whole = self.normal(rows, priors, mass_kg);
         let (_, bounded) = whole.solve_not_negative()?;
-        let everything: Vec<usize> = (0..PARAMETER_DIM).collect();
-        let parts = groupings
-            .iter()
-            .map(|grouping| self.parts(rows, grouping, mass_kg));
-        let parts: Vec<Vec<Normal>> = parts.collect();
+        let parts = |grouping: &Vec<usize>| {
+            let count = grouping.iter().max().map_or(0, |last| last + 1);
+            let all = self.normals(rows, mass_kg, |row| grouping[row.block], count);
+            all.filter(|part| part.matrix.trace() > 0.0).collect()
+        };
+        let parts: Vec<Vec<Normal>> = groupings.iter().map(parts).collect();
         let over = |free: &[usize]| {
             let mut largest = Estimate::zeros();
             for parts in &parts {
@@ -189,7 +178,7 @@ impl Iteration {
         };
         let mut variances = over(&bounded)?;
         if bounded.len() < PARAMETER_DIM {
-            let free = over(&everything)?;
+            let free = over(&Vec::from_iter(0..PARAMETER_DIM))?;
             for at_zero in (0..PARAMETER_DIM).filter(|i| !bounded.contains(i)) {
                 variances[at_zero] = free[at_zero];
             }
@@ -197,23 +186,26 @@ impl Iteration {
         Some(variances)
     }
 
-    /// The normal equations of every group that has rows.
-    fn parts(&self, rows: &[Row], grouping: &[usize], mass_kg: f64) -> Vec<Normal> {
-        let count = grouping.iter().max().map_or(0, |last| last + 1);
-        let mut parts = vec![Normal::default(); count];
+    /// The normal equations of the rows of each group.
+    fn normals(
+        &self,
+        rows: &[Row],
+        mass_kg: f64,
+        group: impl Fn(&Row) -> usize,
+        count: usize,
+    ) -> impl Iterator<Item = Normal> {
+        let mut normals = vec![Normal::default(); count];
         for row in rows.iter().filter(|row| row.moving) {
-            parts[grouping[row.block]].add(row, left(row, mass_kg), self.weight(row, mass_kg));
+            normals[group(row)].add(row, left(row, mass_kg), self.weight(row, mass_kg));
         }
-        let used = (parts.into_iter()).filter(|part| part.matrix.trace() > 0.0);
-        used.map(Normal::symmetric).collect()
+        normals.into_iter().map(Normal::symmetric)
     }
 
     fn normal(&self, rows: &[Row], priors: &[Prior], mass_kg: f64) -> Normal {
-        let mut normal = Normal::default();
-        for row in rows.iter().filter(|row| row.moving) {
-            normal.add(row, left(row, mass_kg), self.weight(row, mass_kg));
-        }
-        let mut normal = normal.symmetric();
+        let mut normal = self
+            .normals(rows, mass_kg, |_| 0, 1)
+            .next()
+            .unwrap_or_default();
         for prior in priors {
             let weight = (mass_kg / prior.deviation).powi(2);
             for (i, a) in &prior.terms {
@@ -263,7 +255,6 @@ fn spread(whole: &Normal, parts: &[Normal], free: &[usize]) -> Option<Estimate> 
     Some(sum * ((count - 1.0) / count))
 }
 
-/// Gravity and inverse mass by the feet's forces alone, over rows in contact; `None` without any.
 pub(crate) fn force_alone(rows: &[Row]) -> Option<Estimate> {
     let mut normal = Normal::default();
     let is_contact = |row: &&Row| matches!(row.group, Group::Contact(_));
@@ -279,10 +270,8 @@ pub(crate) fn explained(rows: &[Row], estimate: &Estimate, axis: usize) -> f64 {
     let count = chosen().count().max(1) as f64;
     let mean = chosen().map(|row| row.left).sum::<f64>() / count;
     let total: f64 = chosen().map(|row| (row.left - mean).powi(2)).sum();
-    let rest: f64 = chosen()
-        .map(|row| residual(row, estimate, 1.0).powi(2))
-        .sum();
-    1.0 - rest / total
+    let rest = chosen().map(|row| residual(row, estimate, 1.0).powi(2));
+    1.0 - rest.sum::<f64>() / total
 }
 
 #[cfg(test)]

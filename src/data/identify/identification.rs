@@ -113,15 +113,13 @@ pub struct Identification {
     pub notes: Vec<String>,
 }
 
-/// By how much the whole equation may fit less forwards than forces alone.
-const WORSE: f64 = 0.05;
+const WORSE: f64 = 0.05; // by how much the whole equation may fit less forwards than forces alone
 
 /// Shares by which found gravity, and mass against the robot's, are farther off than recordings explain.
 const GRAVITY_SHARE: f64 = 0.04;
 const MASS_SHARE: f64 = 0.3;
 
-/// Share from which on gravity is no robot's.
-const NO_GRAVITY_SHARE: f64 = 0.25;
+const NO_GRAVITY_SHARE: f64 = 0.25; // share from which on gravity is no robot's
 
 impl Identification {
     /// What is known already and was found to be otherwise, for a robot of `mass_kg`.

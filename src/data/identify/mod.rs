@@ -1,13 +1,10 @@
 //! What recordings say of the robot: gravity, mass, the joints' losses, the legs' own inertia.
 //!
 //! Enters: recordings and the robot's geometry. Leaves: an [`Identification`], each value with its
-//! standard error, and the file that keeps it. [`clock`](crate::recording::clock) mends segments whose time
-//! stamps disagree with their motion, [`motion`] has the directions of the links and their accelerations,
-//! [`equations`] the linear equations that these obey at every sample, `windows` their averages
-//! over short windows, `fit` the weighted least squares, `estimate` the loop around it, `agreement` the refusal of
-//! recordings that contradict each other or physics,
-//! `file` the result on disk. Read `estimate` first;
-//! `docs/identify.md` has the method and measured figures.
+//! standard error, and the file that keeps it. [`motion`] has the directions of the links and their accelerations,
+//! [`equations`] the linear equations that these obey at every sample, `windows` their averages, `fit` the weighted
+//! least squares, `estimate` the loop around it, `agreement` the refusal of recordings that contradict each other.
+//! Read `estimate` first; `docs/identify.md` has the method and measured figures.
 //!
 //! ```
 //! use std::path::Path;
@@ -33,6 +30,6 @@ mod fit;
 mod identification;
 mod windows;
 
-pub use error::{IdentifyError, IdentifyFault};
+pub use error::IdentifyError;
 pub use estimate::identify;
 pub use identification::{Fit, Identification, Legs, PerKind, StandardError};

@@ -43,8 +43,7 @@ pub struct Motion {
 
 /// Rows of the trunk's axes in [`Motion::directions`].
 const TRUNK_ROWS: usize = 9;
-/// Rows of a leg there.
-const LEG_ROWS: usize = 15;
+const LEG_ROWS: usize = 15; // rows of a leg there
 
 impl Motion {
     /// The motion of a robot's segment of at least two samples.
@@ -60,10 +59,9 @@ impl Motion {
         };
         let mut rates = DMatrix::zeros(TRUNK_ROWS + 4 * LEG_ROWS, n);
         for sample in 0..n {
-            let [roll, pitch, yaw] =
-                std::array::from_fn(|i| segment.x[(JOINT_DIM + 3 + i, sample)]);
-            let [droll, dpitch, dyaw] =
-                std::array::from_fn(|i| segment.dx[(JOINT_DIM + 3 + i, sample)]);
+            let of = |m: &DMatrix<f64>| std::array::from_fn(|i| m[(JOINT_DIM + 3 + i, sample)]);
+            let [roll, pitch, yaw] = of(&segment.x);
+            let [droll, dpitch, dyaw] = of(&segment.dx);
             let heading = Rotation3::from_axis_angle(&Vector3::z_axis(), yaw);
             let inclined = heading * Rotation3::from_axis_angle(&Vector3::y_axis(), pitch);
             let trunk = inclined * Rotation3::from_axis_angle(&Vector3::x_axis(), roll);
@@ -72,9 +70,7 @@ impl Motion {
                 + heading * Vector3::y() * dpitch
                 + Vector3::z() * dyaw;
             let mut put = |row: usize, velocity: Vector3<f64>| {
-                rates
-                    .fixed_view_mut::<3, 1>(row, sample)
-                    .copy_from(&velocity);
+                (rates.fixed_view_mut::<3, 1>(row, sample)).copy_from(&velocity);
             };
             for axis in 0..3 {
                 put(3 * axis, rate.cross(&attitude.column(axis)));
@@ -99,12 +95,10 @@ impl Motion {
 
     /// Acceleration of the trunk's origin, m/s^2.
     pub fn body(&self, sample: usize) -> Vector3<f64> {
-        self.coordinates
-            .fixed_view::<3, 1>(JOINT_DIM, sample)
-            .into_owned()
+        let rows = self.coordinates.fixed_view::<3, 1>(JOINT_DIM, sample);
+        rows.into_owned()
     }
 
-    /// Second derivative of a trunk axis (0 x, 1 y, 2 z), 1/s^2.
     pub(crate) fn trunk_axis(&self, axis: usize, sample: usize) -> Vector3<f64> {
         self.direction(3 * axis, sample)
     }
@@ -122,7 +116,6 @@ impl Motion {
     }
 }
 
-/// A leg's axes and directions, and the velocities of the directions.
 fn leg_frame(
     attitude: &Matrix3<f64>,
     rate: &Vector3<f64>,

@@ -1,62 +1,34 @@
-//! The unknowns of the regression, in the order of the columns.
-//!
-//! All but gravity stand in the equations divided by the robot's mass.
+//! The unknowns of the regression, in the order of the columns. All but gravity stand in the equations divided by the
+//! robot's mass.
+
+#![allow(missing_docs, reason = "a table of columns, each with its unit")]
 
 use crate::robot::LegGeometry;
 
-/// Number of unknowns.
 pub const PARAMETER_DIM: usize = 23;
 
-/// Gravity, m/s^2.
-pub const GRAVITY: usize = 0;
-/// 1 over the mass, 1/kg.
-pub const INVERSE_MASS: usize = 1;
-/// First of three viscous frictions (hx, hy, kn), N m s/rad.
-pub const VISCOUS: usize = 2;
-/// First of three dry frictions, N m.
-pub const DRY: usize = 5;
-/// First of three armatures, kg m^2.
-pub const ARMATURE: usize = 8;
-/// First moment of the trunk along its x axis, kg m.
-pub const TRUNK_FORWARD: usize = 11;
-/// First moment of the trunk along its z axis, kg m.
-pub(crate) const TRUNK_UP: usize = 12;
-/// First moment of a leg beside its axis of abduction, kg m.
-pub const LEG_SIDE: usize = 13;
-/// First moment of a thigh along its length, with the calf's mass at the knee, kg m.
-pub const THIGH: usize = 14;
-/// Second moment of the same, kg m^2.
-pub const THIGH_SECOND: usize = 15;
-/// First moment of a calf along its length, kg m.
-pub const CALF: usize = 16;
-/// Second moment of the same, kg m^2.
-pub const CALF_SECOND: usize = 17;
-/// First moment of a thigh in front of its length, kg m.
-pub(crate) const THIGH_FRONT: usize = 18;
-/// First moment of a calf in front of its length, kg m.
+pub const GRAVITY: usize = 0; // m/s^2
+pub const INVERSE_MASS: usize = 1; // 1/kg
+pub const VISCOUS: usize = 2; // first of three viscous frictions (hx, hy, kn), N m s/rad
+pub const DRY: usize = 5; // first of three dry frictions, N m
+pub const ARMATURE: usize = 8; // first of three, kg m^2
+pub const TRUNK_FORWARD: usize = 11; // first moment of the trunk along its x axis, kg m
+pub(crate) const TRUNK_UP: usize = 12; // along its z axis
+pub const LEG_SIDE: usize = 13; // first moment of a leg beside its axis of abduction, kg m
+pub const THIGH: usize = 14; // first moment along its length, with the calf's mass at the knee, kg m
+pub const THIGH_SECOND: usize = 15; // second moment of the same, kg m^2
+pub const CALF: usize = 16; // first moment along its length, kg m
+pub const CALF_SECOND: usize = 17; // second moment of the same, kg m^2
+pub(crate) const THIGH_FRONT: usize = 18; // first moment in front of its length, kg m
 pub(crate) const CALF_FRONT: usize = 19;
-/// Height of the foot's centre above its point of contact, m.
-pub(crate) const FOOT_RADIUS: usize = 20;
-/// Rolling resistance: arm of the normal force about a rolling foot, m.
-pub(crate) const ROLLING: usize = 21;
-/// Change of the time by which torques run ahead of the motion, s.
-pub(crate) const DELAY: usize = 22;
+pub(crate) const FOOT_RADIUS: usize = 20; // height of the foot's centre above its point of contact, m
+pub(crate) const ROLLING: usize = 21; // arm of the normal force about a rolling foot, m
+pub(crate) const DELAY: usize = 22; // change of the time by which torques run ahead of the motion, s
 
 /// Unknowns that cannot be negative: losses, second moments, rolling resistance.
-pub(crate) const NOT_NEGATIVE: [usize; 12] = [
-    VISCOUS,
-    VISCOUS + 1,
-    VISCOUS + 2,
-    DRY,
-    DRY + 1,
-    DRY + 2,
-    ARMATURE,
-    ARMATURE + 1,
-    ARMATURE + 2,
-    THIGH_SECOND,
-    CALF_SECOND,
-    ROLLING,
-];
+pub(crate) fn not_negative() -> impl Iterator<Item = usize> {
+    (VISCOUS..TRUNK_FORWARD).chain([THIGH_SECOND, CALF_SECOND, ROLLING])
+}
 
 /// Standard deviation of a linear combination of the unknowns about zero, known beforehand.
 ///
@@ -65,7 +37,6 @@ pub(crate) const NOT_NEGATIVE: [usize; 12] = [
 pub(crate) struct Prior {
     /// Coefficients by unknown.
     pub terms: Vec<(usize, f64)>,
-    /// Standard deviation of the sum, in the unknowns' units.
     pub deviation: f64,
 }
 
@@ -73,8 +44,7 @@ pub(crate) struct Prior {
 const LEG_SHARE: f64 = 0.13;
 /// Least distance of a leg from its axis of abduction that counts, over the thigh's length.
 const LEAST_SIDE: f64 = 0.1;
-/// Second moment of a uniform rod over length times first moment.
-const ROD: f64 = 2.0 / 3.0;
+const ROD: f64 = 2.0 / 3.0; // second moment of a uniform rod over length times first moment
 /// Deviation of a hip's loss from that of the thigh joint of the same leg, relative, and the smallest loss that it
 /// counts from.
 const HIP_LIKE_THIGH: [(usize, f64, f64); 3] = [
@@ -90,39 +60,36 @@ pub(crate) fn priors(
     losses: &[f64; PARAMETER_DIM],
 ) -> Vec<Prior> {
     let [thigh, calf] = geometry.lengths();
+    let side = geometry.links().hip.norm().max(LEAST_SIDE * thigh);
     let leg = LEG_SHARE * mass_kg;
-    let single = |index: usize, deviation: f64| Prior {
-        terms: vec![(index, 1.0)],
-        deviation,
-    };
-    let rod = |second: usize, first: usize, length: f64, share: f64| Prior {
-        terms: vec![(second, 1.0), (first, -ROD * length)],
-        deviation: share * mass_kg * length * length,
-    };
-    let mut priors = vec![
-        single(TRUNK_FORWARD, 0.07 * (thigh + calf) * mass_kg),
-        single(TRUNK_UP, 0.07 * (thigh + calf) * mass_kg),
-        single(
-            LEG_SIDE,
-            leg * geometry.links().hip.norm().max(LEAST_SIDE * thigh),
-        ),
-        single(THIGH, leg * thigh),
-        single(THIGH_SECOND, leg * thigh * thigh),
-        single(CALF, leg * calf),
-        single(CALF_SECOND, leg * calf * calf),
-        single(THIGH_FRONT, 0.1 * leg * thigh),
-        single(CALF_FRONT, 0.1 * leg * calf),
-        single(FOOT_RADIUS, 0.02),
-        single(ROLLING, 0.01),
-        single(DELAY, 0.01),
-        rod(THIGH_SECOND, THIGH, thigh, 0.005),
-        rod(CALF_SECOND, CALF, calf, 0.003),
+    let singles = [
+        (TRUNK_FORWARD, 0.07 * (thigh + calf) * mass_kg),
+        (TRUNK_UP, 0.07 * (thigh + calf) * mass_kg),
+        (LEG_SIDE, leg * side),
+        (THIGH, leg * thigh),
+        (THIGH_SECOND, leg * thigh * thigh),
+        (CALF, leg * calf),
+        (CALF_SECOND, leg * calf * calf),
+        (THIGH_FRONT, 0.1 * leg * thigh),
+        (CALF_FRONT, 0.1 * leg * calf),
+        (FOOT_RADIUS, 0.02),
+        (ROLLING, 0.01),
+        (DELAY, 0.01),
     ];
-    for (first, relative, smallest) in HIP_LIKE_THIGH {
-        priors.push(Prior {
-            terms: vec![(first, 1.0), (first + 1, -1.0)],
-            deviation: relative * losses[first + 1].max(smallest),
-        });
-    }
-    priors
+    let rods = [
+        (THIGH_SECOND, THIGH, thigh, 0.005),
+        (CALF_SECOND, CALF, calf, 0.003),
+    ];
+    let singles = singles.map(|(index, deviation)| (vec![(index, 1.0)], deviation));
+    let rods = rods.map(|(second, first, length, share)| {
+        let terms = vec![(second, 1.0), (first, -ROD * length)];
+        (terms, share * mass_kg * length * length)
+    });
+    let hips = HIP_LIKE_THIGH.map(|(first, relative, smallest)| {
+        let terms = vec![(first, 1.0), (first + 1, -1.0)];
+        (terms, relative * losses[first + 1].max(smallest))
+    });
+    let all = singles.into_iter().chain(rods).chain(hips);
+    all.map(|(terms, deviation)| Prior { terms, deviation })
+        .collect()
 }

@@ -16,22 +16,17 @@ use crate::recording::segment::stretches;
 use crate::recording::smoothing::SavitzkyGolay;
 use crate::robot::JOINT_DIM;
 
-/// Length of a window, s.
-const WINDOW_S: f64 = 0.03;
-/// Distance of windows from a change of the feet on the ground, s.
-const MARGIN_S: f64 = 0.02;
-/// Windows a window's length: neighbours overlap.
-pub(crate) const OVERLAP: usize = 4;
-/// Length of the blocks that are left out in turn for standard errors, s.
-const BLOCK_S: f64 = 0.1;
+const WINDOW_S: f64 = 0.03; // length of a window, s
+const MARGIN_S: f64 = 0.02; // distance of windows from a change of the feet on the ground, s
+pub(crate) const OVERLAP: usize = 4; // windows a window's length: neighbours overlap
+const BLOCK_S: f64 = 0.1; // length of the blocks that are left out in turn for standard errors, s
 /// Fewest jumps that are left out in turn, too, and the largest share of all equations that one of them may have.
 const LEAST_JUMPS: usize = 6;
 const LARGEST_SHARE: f64 = 1.0 / 3.0;
 /// Mean speed of the bearing joints from which their dry friction has a direction, rad/s: of hips and knees, and for
 /// accelerations sideways of the abductions, too, for a joint at rest holds any torque up to that friction.
 const MOVING_RAD_S: f64 = 0.1;
-/// Axis along which abductions push.
-const SIDEWAYS: usize = 1;
+const SIDEWAYS: usize = 1; // axis along which abductions push
 /// Speed that a joint in the air keeps over a window for the same reason, rad/s.
 const TURNING_RAD_S: f64 = 0.15;
 
@@ -39,14 +34,12 @@ const TURNING_RAD_S: f64 = 0.15;
 pub(crate) enum Group {
     /// Trunk's acceleration along an axis (x, y, z) with feet on the ground.
     Contact(usize),
-    /// The same in flight.
     Flight(usize),
     /// Torque of a joint (hx, hy, kn) of a leg in the air.
     Joint(usize),
 }
 
 impl Group {
-    /// Number of groups.
     pub(crate) const COUNT: usize = 9;
 
     pub(crate) fn index(self) -> usize {
@@ -75,9 +68,7 @@ pub(crate) struct Windows {
     pub rows: Vec<Row>,
     /// The segment that each block lies in, counted from zero.
     pub blocks: Vec<usize>,
-    /// Samples with a foot on the ground in windows.
     pub contact_samples: usize,
-    /// Samples in flight in windows.
     pub flight_samples: usize,
     /// Samples left out because a leg on the ground was close to a singular posture.
     pub singular_samples: usize,
@@ -100,7 +91,6 @@ impl Windows {
         let window = (samples(WINDOW_S) | 1).max(3);
         let filter = SavitzkyGolay::new(window, 1)?;
         let per_block = samples(BLOCK_S).max(1);
-        let number = self.segments;
         self.segments += 1;
         let feet = &segment.feet;
         for stance in stretches(0..segment.len(), |a, b| feet[a] == feet[b]) {
@@ -112,13 +102,13 @@ impl Windows {
                 if !kept(span.start) || span.len() < window {
                     continue;
                 }
+                let half = window / 2;
                 let first_block = self.blocks.len();
-                let blocks = (window / 2..span.len() - window / 2)
-                    .step_by((window / OVERLAP).max(1))
-                    .map(|centre| (centre, first_block + (centre - window / 2) / per_block))
-                    .collect::<Vec<_>>();
+                let centres = (half..span.len() - half).step_by((window / OVERLAP).max(1));
+                let block = |centre| (centre, first_block + (centre - half) / per_block);
+                let blocks: Vec<(usize, usize)> = centres.map(block).collect();
                 let last = blocks.last().map_or(first_block, |(_, block)| *block);
-                self.blocks.resize(last + 1, number);
+                self.blocks.resize(last + 1, self.segments - 1);
                 let averaged = Averaged {
                     segment,
                     equations,
@@ -161,14 +151,11 @@ impl Windows {
         };
         *count += averaged.span.len();
         let mean_speed = |is_meant: fn(usize) -> bool| {
-            let bearing: Vec<usize> = (0..JOINT_DIM)
-                .filter(|joint| is_meant(*joint) && feet[joint / 3])
-                .collect();
+            let bearing = || (0..JOINT_DIM).filter(|joint| is_meant(*joint) && feet[joint / 3]);
+            let count = bearing().count().max(1) as f64;
             let speed = DMatrix::from_fn(1, segment.len(), |_, sample| {
-                let speeds = bearing
-                    .iter()
-                    .map(|joint| segment.dx[(*joint, sample)].abs());
-                speeds.sum::<f64>() / bearing.len().max(1) as f64
+                let speeds = bearing().map(|joint| segment.dx[(joint, sample)].abs());
+                speeds.sum::<f64>() / count
             });
             averaged.of(&speed)
         };
@@ -197,15 +184,11 @@ impl Windows {
         let half = averaged.filter.window() / 2;
         for joint in (0..JOINT_DIM).filter(|joint| !feet[joint / 3]) {
             let unknowns = joint_unknowns(joint % 3);
-            let rows = averaged
-                .equations
-                .joints
-                .rows(joint * JOINT_ROWS, JOINT_ROWS);
-            let means = averaged.of(&rows.into_owned());
+            let joints = &averaged.equations.joints;
+            let means = averaged.of(&joints.rows(joint * JOINT_ROWS, JOINT_ROWS).into_owned());
             for &(centre, block) in &averaged.blocks {
                 let at = averaged.span.start + centre;
-                let turning = (at - half..=at + half)
-                    .all(|sample| segment.dx[(joint, sample)].abs() > TURNING_RAD_S);
+                let turns = |sample| segment.dx[(joint, sample)].abs() > TURNING_RAD_S;
                 let mut coefficients = [0.0; PARAMETER_DIM];
                 for (row, unknown) in unknowns.into_iter().enumerate() {
                     coefficients[unknown] = means[(row, centre)];
@@ -215,7 +198,7 @@ impl Windows {
                     left: means[(JOINT_ROWS - 1, centre)],
                     group: Group::Joint(joint % 3),
                     block,
-                    moving: turning,
+                    moving: (at - half..=at + half).all(turns),
                 });
             }
         }

@@ -17,48 +17,36 @@ use crate::robot::joints::LEG_JOINT_DIM;
 use crate::robot::kinematics::{LEAST_HEIGHT, LEAST_SPAN};
 use crate::robot::{JOINT_DIM, Leg, Robot, STATE_DIM};
 
-/// Torque over the robot's limit that is still accepted.
-const TORQUE_FACTOR: f64 = 1.1;
+const TORQUE_FACTOR: f64 = 1.1; // torque and speed over a joint's limit that are still accepted
+const SPEED_FACTOR: f64 = 1.1;
 /// Angle beyond a joint's limits that is still accepted, in rad.
 pub const JOINT_MARGIN_RAD: f64 = 0.05;
-/// Speed over a joint's limit that is still accepted.
-const SPEED_FACTOR: f64 = 1.1;
 /// Largest speed of the body along an axis, in m/s.
 pub const BODY_SPEED_M_S: f64 = 10.0;
-/// Largest rate of a body angle, in rad/s.
-const BODY_RATE_RAD_S: f64 = 30.0;
+const BODY_RATE_RAD_S: f64 = 30.0; // largest rate of a body angle, in rad/s
 /// Disagreement of a rate with differences, as a share of the 95th percentile of that rate, that is still accepted on
 /// top of the floor and of what the noise of the differentiated column explains.
 const CONSISTENCY_SHARE: f64 = 0.3;
 /// Floor of that disagreement for velocities: joints, body linear, body angular.
 const VELOCITY_FLOOR: [f64; 3] = [1.0, 0.2, 0.5];
-/// The same for accelerations.
-const ACCELERATION_FLOOR: [f64; 3] = [100.0, 10.0, 50.0];
-/// Coordinates of the body along the floor.
-const BODY_XY: Range<usize> = JOINT_DIM..JOINT_DIM + 2;
+const ACCELERATION_FLOOR: [f64; 3] = [100.0, 10.0, 50.0]; // the same for accelerations
+const BODY_XY: Range<usize> = JOINT_DIM..JOINT_DIM + 2; // coordinates of the body along the floor
 /// Equal consecutive velocities at an extreme that count as clipped.
 const CLIPPED_SAMPLES: usize = 5;
-/// Departure of a time step from the median, as a share of it.
-const STEP_SHARE: f64 = 0.5;
+const STEP_SHARE: f64 = 0.5; // departure of a time step from the median, as a share of it
 
-/// What is wrong with a run of samples.
+/// What is wrong with a run of samples; a finding's `bound` is what its `value` breaks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[allow(missing_docs, reason = "`description` has the words")]
 pub enum Implausible {
-    /// Torque above the joint's limit; `bound` is the limit with its margin.
     Torque,
-    /// Angle outside the joint's limits; `bound` is the limit with its margin.
     JointAngle,
-    /// Velocity above what the joint or body can have; `bound` is that.
     Speed,
-    /// Position moves faster between samples than it can; `value` is the speed.
     Jump,
-    /// Velocity and differences of the position disagree; `bound` is the latter.
+    /// `bound` is the nearer slope of the position; so for the acceleration.
     Velocity,
-    /// Acceleration and differences of the velocity disagree.
     Acceleration,
-    /// Velocity stays at one extreme value: the sensor clips.
     Clipped,
-    /// A time step far from the median, which is `bound`.
     TimeStep,
     /// A leg on the ground is near a singularity: `value` is the span of thigh and calf (its knee's
     /// column) or the height of its hip over the foot (its flexion's column), both normalised as in
@@ -70,23 +58,21 @@ pub enum Implausible {
 impl Implausible {
     /// Whether samples with this finding are left out where implausible ones are.
     pub const fn can_be_left_out(self) -> bool {
-        !matches!(self, Implausible::NearSingular)
+        !matches!(self, Self::NearSingular)
     }
 
     /// The finding in words.
     pub const fn description(self) -> &'static str {
         match self {
-            Implausible::Torque => "torque above the joint's limit",
-            Implausible::JointAngle => "angle outside the joint's limits",
-            Implausible::Speed => "speed above what is possible",
-            Implausible::Jump => "position jumps faster than is possible",
-            Implausible::Velocity => "velocity disagrees with differences of the position",
-            Implausible::Acceleration => "acceleration disagrees with differences of the velocity",
-            Implausible::Clipped => "velocity clips at an extreme",
-            Implausible::TimeStep => "time step differs from the median",
-            Implausible::NearSingular => {
-                "leg on the ground near a singularity, its force is damped"
-            }
+            Self::Torque => "torque above the joint's limit",
+            Self::JointAngle => "angle outside the joint's limits",
+            Self::Speed => "speed above what is possible",
+            Self::Jump => "position jumps faster than is possible",
+            Self::Velocity => "velocity disagrees with differences of the position",
+            Self::Acceleration => "acceleration disagrees with differences of the velocity",
+            Self::Clipped => "velocity clips at an extreme",
+            Self::TimeStep => "time step differs from the median",
+            Self::NearSingular => "leg on the ground near a singularity, its force is damped",
         }
     }
 }
@@ -114,18 +100,15 @@ pub struct Finding {
 
 impl fmt::Display for Finding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let count = self.samples.len();
         write!(f, "row {}", self.first_row)?;
-        if count > 1 {
-            write!(f, " and {} more", count - 1)?;
+        if self.samples.len() > 1 {
+            write!(f, " and {} more", self.samples.len() - 1)?;
         }
+        let (column, what) = (&self.column, self.kind.description());
+        let (value, bound) = (self.value, self.bound);
         write!(
             f,
-            ", column `{}`: {}: {:.6} against {:.6}",
-            self.column,
-            self.kind.description(),
-            self.value,
-            self.bound
+            ", column `{column}`: {what}: {value:.6} against {bound:.6}"
         )?;
         if self.worst_row != self.first_row {
             write!(f, " at row {}", self.worst_row)?;
@@ -173,10 +156,8 @@ pub fn without(
             let end = finding.samples.end.min(keep.len());
             keep[finding.samples.start.min(end)..end].fill(false);
         }
-        let kept = stretches(0..keep.len(), |a, b| keep[a] == keep[b]);
-        let kept = kept
-            .into_iter()
-            .filter(|range| keep[range.start] && range.len() >= 2);
+        let runs = stretches(0..keep.len(), |a, b| keep[a] == keep[b]).into_iter();
+        let kept = runs.filter(|range| keep[range.start] && range.len() >= 2);
         segments.extend(kept.map(|range| segment.slice(range)));
     }
     if segments.is_empty() {
@@ -195,7 +176,7 @@ struct Scan<'a> {
 }
 
 /// A value and the bound it breaks.
-type Breach = Option<(f64, f64)>;
+pub(super) type Breach = Option<(f64, f64)>;
 
 impl Scan<'_> {
     /// Joins neighbouring breaches of a column into findings.
@@ -279,15 +260,10 @@ impl Scan<'_> {
         let segment = self.segment;
         for i in 0..STATE_DIM {
             let [x, dx, ddx] = [&segment.x, &segment.dx, &segment.ddx].map(|m| row(m, i));
-            let velocity = (Implausible::Velocity, Column::Velocity(i), VELOCITY_FLOOR);
-            let acceleration = (
-                Implausible::Acceleration,
-                Column::Acceleration(i),
-                ACCELERATION_FLOOR,
-            );
-            for ((kind, column, floor), values, rates) in
-                [(velocity, &x, &dx), (acceleration, &dx, &ddx)]
-            {
+            let of_dx = (Column::Velocity(i), VELOCITY_FLOOR, &x, &dx);
+            let of_ddx = (Column::Acceleration(i), ACCELERATION_FLOOR, &dx, &ddx);
+            let kinds = [Implausible::Velocity, Implausible::Acceleration];
+            for (kind, (column, floor, values, rates)) in kinds.into_iter().zip([of_dx, of_ddx]) {
                 let slack = floor[group(i)]
                     + CONSISTENCY_SHARE * quantile(rates.iter().map(|v| v.abs()), 0.95)
                     + noise(&segment.time_s, values);

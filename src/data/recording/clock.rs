@@ -14,8 +14,7 @@ use crate::robot::{BODY_DIM, JOINT_DIM};
 const LEAST_DISAGREEMENT: f64 = 0.03;
 /// Weight of a joint's motion (rad/s)^2 beside that of the body's position (m/s)^2.
 const JOINT_WEIGHT: f64 = 0.01;
-/// Motion that counts as evidence of either clock, (m/s)^2.
-const STANDSTILL: f64 = 1e-3;
+const STANDSTILL: f64 = 1e-3; // motion that counts as evidence of either clock, (m/s)^2
 /// Largest difference of a coordinate's ratio of elapsed to stamped time from the median that agrees with it, relative.
 const AGREES: f64 = 0.25;
 /// Joints and position of the body: angles of the body are mended by themselves.
@@ -26,8 +25,7 @@ const SAME_SAMPLE: f64 = 0.4;
 const LOST_STEPS: f64 = 5.0;
 /// Disagreement of the trunk's angular rates with its angles from which they are replaced.
 const RATE_DISAGREEMENT: f64 = 0.2;
-/// Unevenness of time steps, relative, from which a segment is resampled.
-const EVEN: f64 = 0.01;
+const EVEN: f64 = 0.01; // unevenness of time steps, relative, from which a segment is resampled
 
 /// A segment at even time steps, and what its own clock said.
 #[derive(Debug, Clone)]
@@ -69,12 +67,10 @@ pub fn timed(segment: &Segment) -> Result<Timed, RecordingError> {
     };
     let step_s = segment.mean_step_s();
     let resamples = !is_even(&chosen);
+    let rows = (chosen.duration_s() / step_s).round() as usize + 1;
     let mut segment = match resamples {
         false => chosen.clone(),
-        true => {
-            let rows = (chosen.duration_s() / step_s).round() as usize + 1;
-            resampled(&chosen, rows)?
-        }
+        true => resampled(&chosen, rows)?,
     };
     let lost = lost(&chosen.time_s, &segment.time_s, step_s);
     let rates_replaced = replace_angular_rates(&mut segment);
@@ -110,12 +106,9 @@ fn agreeing_coordinates(segment: &Segment) -> Vec<usize> {
         (Some(joints), Some(body)) if !agrees(joints, body) => return Vec::new(),
         (Some(median), _) | (None, Some(median)) => median,
     };
-    let moving = ratios.iter().flatten();
-    let count = moving
-        .clone()
-        .filter(|ratio| agrees(**ratio, median))
-        .count();
-    if 3 * count < 2 * moving.count() {
+    let moving = || ratios.iter().flatten();
+    let count = moving().filter(|ratio| agrees(**ratio, median)).count();
+    if 3 * count < 2 * moving().count() {
         return Vec::new();
     }
     let all = 0..COORDINATES;
@@ -126,11 +119,8 @@ fn agreeing_coordinates(segment: &Segment) -> Vec<usize> {
 /// Time that passed by the motion over time that passed by the stamps, if by the stamps more moved than
 /// `least`.
 fn ratio(intervals: &[Interval], least: f64) -> Option<f64> {
-    let (mut moved, mut stamped) = (0.0, 0.0);
-    for interval in intervals {
-        moved += interval.moved;
-        stamped += interval.speed * interval.stamped_s;
-    }
+    let moved: f64 = intervals.iter().map(|i| i.moved).sum();
+    let stamped: f64 = intervals.iter().map(|i| i.speed * i.stamped_s).sum();
     (stamped > least).then(|| moved / stamped)
 }
 

@@ -59,9 +59,7 @@ impl Column {
         names: &[String],
     ) -> Result<Vec<Option<Column>>, RecordingError> {
         let known = Column::all(true, true).into_iter();
-        let known: Vec<_> = known
-            .map(|column| (folded(&column.name()), column))
-            .collect();
+        let known: Vec<_> = (known.map(|column| (folded(&column.name()), column))).collect();
         let mut columns: Vec<Option<Column>> = Vec::with_capacity(names.len());
         for name in names {
             let name = folded(name);
@@ -76,13 +74,10 @@ impl Column {
             columns.push(column);
         }
         let has = |any: fn(&Column) -> bool| columns.iter().flatten().any(any);
-        let expected = Column::all(
-            has(|column| matches!(column, Column::Acceleration(_))),
-            has(|column| matches!(column, Column::Force(_))),
-        );
-        let missing = expected
-            .into_iter()
-            .filter(|c| !columns.contains(&Some(*c)));
+        let acceleration = has(|column| matches!(column, Column::Acceleration(_)));
+        let force = has(|column| matches!(column, Column::Force(_)));
+        let expected = Column::all(acceleration, force).into_iter();
+        let missing = expected.filter(|c| !columns.contains(&Some(*c)));
         let missing: Vec<String> = missing.map(Column::name).collect();
         if !missing.is_empty() {
             let (columns, found) = (missing, names.to_vec());
@@ -106,8 +101,6 @@ fn body(i: usize, quantity: &str) -> String {
 
 /// A name without capitals and runs of blanks.
 pub(super) fn folded(name: &str) -> String {
-    name.split_whitespace()
-        .collect::<Vec<_>>()
-        .join(" ")
-        .to_lowercase()
+    let words: Vec<&str> = name.split_whitespace().collect();
+    words.join(" ").to_lowercase()
 }

@@ -75,11 +75,8 @@ pub fn condition(
     };
     let left_out = n_samples - kept.sample_count();
     for segment in &mut kept.segments {
-        match options.accelerations {
-            Accelerations::Recorded => {}
-            Accelerations::Differences => {
-                segment.ddx = differences(&segment.time_s, &segment.dx);
-            }
+        if options.accelerations == Accelerations::Differences {
+            segment.ddx = differences(&segment.time_s, &segment.dx);
         }
         if let Some((filter, rows)) = &options.smoothing {
             smooth(segment, filter, *rows)?;

@@ -22,21 +22,14 @@ pub enum RecordingFault {
     Unexpected { found: String, expected: String },
     #[error("no such file")]
     Missing,
-    /// A damaged MCAP file, or one that packs its chunks in another way.
     #[error("no MCAP file that can be read: {0}")]
     Mcap(String),
-    /// An MCAP file without a topic of numbers; the first reason in brackets, or nothing.
-    #[error("found no topic of ROS messages with numbers{0}")]
-    NoTopic(String),
+    /// A fault without alternative, or in the words of a parser.
+    #[error("{0}")]
+    Text(String),
     /// A recording that cannot be of the robot of the others, or of any.
     #[error("{0}; leave this recording out, or mend its map of columns")]
     Contradiction(String),
-    /// Columns without names, of which nothing can be guessed.
-    #[error(
-        "found columns without names, of which no map can be guessed; a map counts them from 1"
-    )]
-    Unnamed,
-    /// The file cannot be opened, read or written.
     #[error("cannot {action}")]
     Io {
         action: &'static str,
@@ -44,13 +37,11 @@ pub enum RecordingFault {
     },
     #[error("damaged gzip stream")]
     Gzip(#[source] io::Error),
-    /// The file holds nothing but blank lines.
     #[error("empty file, expected a header and at least two samples")]
     Empty,
     /// The file ends after its header of this many columns.
     #[error("header of {0} columns but no sample")]
     HeaderOnly(usize),
-    /// Columns that the format requires are absent.
     #[error(
         "missing {}; the header starts with {}{}",
         listed(columns, 8),
@@ -72,9 +63,6 @@ pub enum RecordingFault {
         expected: usize,
         hint: &'static str,
     },
-    /// A map of columns is no valid TOML, or has a key that maps do not have.
-    #[error("no map of columns: {0}")]
-    MapSyntax(String),
     /// No pattern of a phase rule matches any sample.
     #[error(
         "feet {feet:?} (fr, fl, rr, rl) match none of the phases {}",
@@ -84,12 +72,6 @@ pub enum RecordingFault {
         feet: [bool; 4],
         phases: Vec<String>,
     },
-    /// A smoothing window and polynomial order that do not fit together; no file's fault.
-    #[error(
-        "smoothing window {window} with order {order}: expected an odd window above the order, \
-             at most 1001, and an order of at most 12"
-    )]
-    Smoothing { window: usize, order: usize },
     /// The robot's kinematics refuse a sample.
     #[error("no body wrench")]
     Wrench(#[source] Box<RobotError>),
@@ -176,22 +158,19 @@ impl RecordingFault {
 /// How to read a header with hardly a name of the format.
 fn foreign_hint(missing: &[String]) -> &'static str {
     const MANY: usize = 30;
-    match missing.len() {
-        MANY.. => {
+    match missing.len() < MANY {
+        true => "",
+        false => {
             "; for a log of another program `romc inspect --guess LOG` writes a map for --columns"
         }
-        _ => "",
     }
 }
 
 /// `a`, `b` and 3 more.
 fn listed(names: &[String], most: usize) -> String {
-    let mut text = names
-        .iter()
-        .take(most)
-        .map(|name| format!("`{}`", shortened(name)))
-        .collect::<Vec<_>>()
-        .join(", ");
+    let first = names.iter().take(most);
+    let first = first.map(|name| format!("`{}`", shortened(name)));
+    let mut text = first.collect::<Vec<_>>().join(", ");
     if names.len() > most {
         text.push_str(&format!(" and {} more", names.len() - most));
     }

@@ -13,8 +13,7 @@ use crate::robot::Robot;
 
 /// Half the window over which rows of late samples are smoothed, in s.
 const HALF_SMOOTHING_S: f64 = 0.015;
-/// Degree of the polynomials that smooth them.
-const SMOOTHING_ORDER: usize = 3;
+const SMOOTHING_ORDER: usize = 3; // degree of the polynomials that smooth them
 
 /// A file, or some of its segments.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -61,10 +60,8 @@ impl RecordingSet {
         let threads = std::thread::available_parallelism().map_or(1, |n| n.get().min(2));
         for files in files.chunks(threads) {
             let all: Vec<_> = std::thread::scope(|scope| {
-                let started: Vec<_> = files
-                    .iter()
-                    .map(|file| scope.spawn(|| read(file)))
-                    .collect();
+                let started = files.iter().map(|file| scope.spawn(|| read(file)));
+                let started: Vec<_> = started.collect();
                 let ended = started.into_iter().map(|thread| thread.join());
                 ended.map(|read| read.expect("no panic")).collect()
             });
@@ -133,8 +130,8 @@ fn read_file(
         let (recording, left_out) = condition(recording, &findings, &options)?;
         set.recordings.push(recording);
         set.left_out += left_out;
-        set.findings
-            .extend(findings.into_iter().map(|found| (path.clone(), found)));
+        let findings = findings.into_iter().map(|found| (path.clone(), found));
+        set.findings.extend(findings);
         set.balances.push((path, balance));
     }
     Ok((set, reading))
@@ -151,9 +148,10 @@ fn options_for(
     let segments = || reading.recording.segments.iter();
     let step_s = segments().map(Segment::mean_step_s).fold(0.0, f64::max);
     let half = (HALF_SMOOTHING_S / step_s).round();
-    let window = match half.is_finite() {
-        true => 2 * half as usize + 1,
-        false => 1,
+    let window = if half.is_finite() {
+        2 * half as usize + 1
+    } else {
+        1
     };
     let fits = segments().all(|segment| segment.len() >= window);
     if options.smoothing.is_none() && rebuilt && window > SMOOTHING_ORDER && fits {
@@ -171,9 +169,8 @@ fn chosen(file: &RecordingFile, mut recording: Recording) -> Vec<Recording> {
     let Some(chosen) = &file.segments else {
         return vec![recording];
     };
-    let segments = std::mem::take(&mut recording.segments);
-    (segments.into_iter().enumerate())
-        .filter(|(index, _)| chosen.contains(index))
-        .map(|(_, segment)| recording.with_segments(vec![segment]))
+    let segments = (std::mem::take(&mut recording.segments).into_iter()).enumerate();
+    let kept = segments.filter(|(index, _)| chosen.contains(index));
+    kept.map(|(_, segment)| recording.with_segments(vec![segment]))
         .collect()
 }

@@ -10,6 +10,8 @@ use super::error::{RecordingError, RecordingFault};
 use crate::files::magic::{MAGIC_BYTES, recognised};
 use crate::files::size::{Capped, Format};
 
+/// Most samples read from a file: half an hour at 2 ms.
+pub(super) const MAX_ROWS: usize = 1_000_000;
 /// Longest line accepted, in bytes: some thirty times a row of 71 columns.
 pub(super) const MAX_LINE_BYTES: usize = 1 << 16;
 
@@ -30,21 +32,16 @@ pub(super) struct Lines<'a> {
 }
 
 impl<'a> Lines<'a> {
-    /// Of a file, plain or gzip.
     pub(crate) fn open(path: &'a Path) -> Result<Self, RecordingError> {
         let file = File::open(path)
             .map_err(|source| RecordingFault::unreadable("open", source).of(path))?;
         let size = file.metadata().ok().filter(fs::Metadata::is_file);
-        Self::packed(path, file, size.map_or(u64::MAX, |size| size.len()))
+        Self::of(path, file, size.map_or(u64::MAX, |size| size.len()))
     }
 
-    /// Of any source, plain or gzip, found from the first two bytes; `path` stands for it in messages.
-    pub(crate) fn of(path: &'a Path, source: impl Read + 'a) -> Result<Self, RecordingError> {
-        Self::packed(path, source, u64::MAX)
-    }
-
-    /// A source of so many bytes, which bound what they may unpack to.
-    fn packed(
+    /// Of a source of so many bytes, which bound what they may unpack to: plain or gzip, found from the first two bytes;
+    /// `path` stands for it in messages.
+    pub(crate) fn of(
         path: &'a Path,
         mut source: impl Read + 'a,
         size: u64,
@@ -121,7 +118,6 @@ impl<'a> Lines<'a> {
         }
     }
 
-    /// Refuses to read on after too many empty lines.
     fn count_blank(&mut self) -> Result<(), RecordingError> {
         let is_blank = match self.buffer.first() {
             Some(first) if first.is_ascii_graphic() => false,
@@ -133,14 +129,12 @@ impl<'a> Lines<'a> {
             false => (0, *all),
         };
         let filled = self.row - *all;
-        match *since > MAX_BLANK_ROWS || *all > filled.saturating_add(MAX_BLANK_ROWS) {
-            true => {
-                let found = format!("more than {MAX_BLANK_ROWS} empty lines");
-                let fault = RecordingFault::unexpected(found, "samples or the end");
-                Err(fault.at(self.path, self.row))
-            }
-            false => Ok(()),
+        if *since > MAX_BLANK_ROWS || *all > filled.saturating_add(MAX_BLANK_ROWS) {
+            let found = format!("more than {MAX_BLANK_ROWS} empty lines");
+            let fault = RecordingFault::unexpected(found, "samples or the end");
+            return Err(fault.at(self.path, self.row));
         }
+        Ok(())
     }
 
     fn read_error(&self, source: io::Error) -> RecordingError {
@@ -175,7 +169,6 @@ pub(super) fn count(line: &str, character: char) -> usize {
     line.bytes().filter(|byte| *byte == wanted).count()
 }
 
-/// A cell without white space around it; most have none.
 fn trimmed(cell: &str) -> &str {
     match cell.as_bytes() {
         [first, .., last] if first.is_ascii_graphic() && last.is_ascii_graphic() => cell,
@@ -194,7 +187,6 @@ enum Mark {
 pub(super) struct NumberReader {
     /// The first one met holds for the rest.
     mark: Option<Mark>,
-    /// A cell with its comma replaced, kept to spare an allocation a cell.
     pointed: String,
 }
 
@@ -228,36 +220,17 @@ impl NumberReader {
         if self.mark.is_some_and(|mark| mark != found) {
             return None;
         }
-        let pointed = match found {
+        let value = match found {
+            Mark::Point => cell.parse().ok()?,
             Mark::Comma => {
                 // A second mark of either kind fails to parse.
+                let (whole, rest) = (&cell[..place], &cell[place + 1..]);
                 self.pointed.clear();
-                self.pointed
-                    .extend([&cell[..place], ".", &cell[place + 1..]]);
-                &self.pointed
+                self.pointed.extend([whole, ".", rest]);
+                self.pointed.parse().ok()?
             }
-            Mark::Point => cell,
         };
-        let value = pointed.parse().ok()?;
         self.mark = Some(found);
         Some(value)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn next_row_longest_line_is_read_and_one_byte_more_is_not() {
-        let read = |ones: usize| {
-            let text = [vec![b'1'; ones], b"\n".to_vec()].concat();
-            let mut lines = Lines::of(Path::new("t"), &text[..]).unwrap();
-            lines.next_row().map(|row| row.is_some())
-        };
-        assert!(read(MAX_LINE_BYTES).unwrap());
-        let error = read(MAX_LINE_BYTES + 1).unwrap_err();
-        assert!(error.to_string().contains("found a line of more than"));
-        assert_eq!(error.place.row(), Some(1));
     }
 }

@@ -5,8 +5,6 @@
 //! ground stays where it is, the feet carry the weight, a body in flight falls, a hip holds the weight on its own
 //! side. Each figure is taken over a whole recording and compared with bounds that leave room for what right
 //! recordings of simulated and real jumps have (`docs/recordings.md` has the table).
-//!
-//! [`mismatches`] is the one definition; `inspect`, `train`, `simulate`, `mpc` and `report` print what it finds.
 
 mod balance;
 mod feet;
@@ -16,7 +14,7 @@ use std::fmt;
 
 use serde::Serialize;
 
-use super::check::{check, outside};
+use super::check::{Breach, check, outside};
 use super::preprocess::{differences, median};
 use super::segment::Recording;
 use crate::robot::{GRAVITY_M_S2, JOINT_DIM, Leg, Robot, STATE_DIM};
@@ -29,22 +27,18 @@ pub(super) use stance::{foot_place, median_place, stances};
 const SLIP_M: f64 = 0.025;
 /// How many times better feet have to stay in place under another reading of the columns.
 const READING_FACTOR: f64 = 1.4;
-/// By how much they have to stay better in place, m.
-const READING_LEAST_M: f64 = 3e-4;
+const READING_LEAST_M: f64 = 3e-4; // by how much they have to stay better in place, m
 /// How many times, and by how much, m, feet stay better where they are with the body's place read otherwise.
 const PLACE: (f64, f64) = (2.0, 0.004);
-/// Vertical acceleration of the body in flight, m/s^2.
-const FALL_M_S2: (f64, f64) = (-16.0, -6.5);
+const FALL_M_S2: (f64, f64) = (-16.0, -6.5); // vertical acceleration of the body in flight, m/s^2
 /// Force of the feet over what weight and acceleration need.
 const WEIGHT_SHARE: (f64, f64) = (0.45, 1.7);
 /// Least share of the hips' torques that hold the feet on their own side: 1 for vertical forces.
 const HIP_SHARE: f64 = -0.3;
-/// The same where both legs of one end alone are below that.
-const HIP_SHARE_OF_PAIR: f64 = -0.5;
+const HIP_SHARE_OF_PAIR: f64 = -0.5; // the same where both legs of one end alone are below that
 /// Largest median difference of the body's acceleration and the slope of its velocity, m/s^2.
 const ACCELERATION_M_S2: f64 = 2.0;
-/// Share of the weight below which torques carry nothing.
-const NOTHING_CARRIED: f64 = 0.02;
+const NOTHING_CARRIED: f64 = 0.02; // share of the weight below which torques carry nothing
 /// How many times more or less of the weight the torques of one recording may carry than those of most.
 const OTHER_SHARE: f64 = 2.0;
 /// Logarithm of the share of the weight from which another robot may explain it, and up to which it does.
@@ -75,20 +69,15 @@ impl fmt::Display for Mismatch {
     }
 }
 
-/// The mismatch of a figure that breaks a bound, `(value, bound)`, in the words for its value.
-fn mismatch(
-    kind: &'static str,
-    breach: Option<(f64, f64)>,
-    words: impl FnOnce(f64) -> String,
-) -> Option<Mismatch> {
-    let (value, bound) = breach?;
-    let words = words(value);
-    Some(Mismatch {
+/// The mismatch of a figure that breaks a bound, `(value, bound)`.
+fn mismatch(kind: &'static str, breach: Breach, words: String) -> Option<Mismatch> {
+    let of_breach = |(value, bound)| Mismatch {
         kind,
         value,
         bound,
         words,
-    })
+    };
+    breach.map(of_breach)
 }
 
 /// Everything about a recording that cannot be true of the robot.
@@ -97,13 +86,15 @@ pub fn mismatches(recording: &Recording, robot: &Robot) -> Vec<Mismatch> {
     let balance = Balance::of(recording, robot);
     let (place, is_attitude) = place(recording, robot, &slip).unzip();
     let floor_m = feet::floor_m(recording, robot);
+    // In another attitude the feet's heights say nothing of their columns.
+    let columns = match is_attitude {
+        Some(true) => None,
+        _ => feet::columns(recording, robot),
+    };
     let found = [
         place.or_else(|| foot_slip(&slip)),
         legs_or_signs(recording, robot, &slip),
-        // In another attitude the feet's heights say nothing of their columns.
-        (is_attitude != Some(true))
-            .then(|| feet::columns(recording, robot))
-            .flatten(),
+        columns,
         fall(&balance),
         weight(&balance, robot),
         hip_torques(&balance),
@@ -180,9 +171,8 @@ pub(crate) fn contradiction(balances: &[Balance]) -> Option<(usize, String)> {
 pub fn notes(recording: &Recording, robot: &Robot) -> Vec<String> {
     let path = recording.path.display();
     let found = mismatches(recording, robot);
-    let mut notes: Vec<String> = (found.iter())
-        .map(|mismatch| format!("{path}: {mismatch}"))
-        .collect();
+    let found = found.iter().map(|mismatch| format!("{path}: {mismatch}"));
+    let mut notes: Vec<String> = found.collect();
     let findings = check(recording, robot);
     let mut faults = findings.iter().filter(|f| f.kind.can_be_left_out());
     if let Some(first) = faults.next() {
@@ -202,26 +192,25 @@ fn origin(recording: &Recording) -> Option<Mismatch> {
         starts.fold(0.0, f64::max)
     });
     let advice = "models expect jumps that begin near the origin and run along x";
-    let far = mismatch("origin", outside(x.max(y), 0.0, ORIGIN.0), |far| {
-        format!(
-            "a segment begins {far:.2} m from the origin: {advice}; `origin = \"start\"` in a map of columns counts x \
-             and y from the first sample"
-        )
-    });
-    let turned =
-        |yaw| format!("a segment begins turned by {yaw:.2} rad about the vertical: {advice}");
+    let far_m = x.max(y);
+    let far = format!(
+        "a segment begins {far_m:.2} m from the origin: {advice}; `origin = \"start\"` in a map of columns counts x \
+         and y from the first sample"
+    );
+    let turned = format!("a segment begins turned by {yaw:.2} rad about the vertical: {advice}");
+    let far = mismatch("origin", outside(far_m, 0.0, ORIGIN.0), far);
     far.or_else(|| mismatch("origin", outside(yaw, 0.0, ORIGIN.1), turned))
 }
 
 fn foot_slip(slip: &Slip) -> Option<Mismatch> {
-    mismatch("foot_slip", beyond(slip.rms_m()?, (0.0, SLIP_M)), |value| {
-        format!(
-            "feet on the ground move by {:.0} mm (root mean square; {:.0} mm are accepted): the joints, the body's \
-             pose, their units or signs, or the contacts are not this robot's",
-            1e3 * value,
-            1e3 * SLIP_M
-        )
-    })
+    let value = slip.rms_m()?;
+    let words = format!(
+        "feet on the ground move by {:.0} mm (root mean square; {:.0} mm are accepted): the joints, the body's \
+         pose, their units or signs, or the contacts are not this robot's",
+        1e3 * value,
+        1e3 * SLIP_M
+    );
+    mismatch("foot_slip", beyond(value, (0.0, SLIP_M)), words)
 }
 
 /// The body's place or attitude read otherwise, and whether it is the attitude.
@@ -230,59 +219,55 @@ fn place(recording: &Recording, robot: &Robot, slip: &Slip) -> Option<(Mismatch,
     let value = slip.rms_m().filter(|value| *value > PLACE.1)?;
     let (best, reading, is_attitude) = best_other_place(recording, robot)?;
     let breach = outside(value, 0.0, PLACE.0 * best + PLACE.1);
-    let found = mismatch("foot_slip", breach, |value| {
-        format!(
-            "feet on the ground move by {:.1} mm, and by {:.1} mm {reading}: is the body's place in another frame than \
-             its attitude?",
-            1e3 * value,
-            1e3 * best
-        )
-    });
-    Some((found?, is_attitude))
+    let words = format!(
+        "feet on the ground move by {:.1} mm, and by {:.1} mm {reading}: is the body's place in another frame than \
+         its attitude?",
+        1e3 * value,
+        1e3 * best
+    );
+    Some((mismatch("foot_slip", breach, words)?, is_attitude))
 }
 
 fn legs_or_signs(recording: &Recording, robot: &Robot, slip: &Slip) -> Option<Mismatch> {
     let value = slip.relative_rms_m()?;
     let (best, reading) = best_other_reading(recording, robot)?;
     let breach = outside(value, 0.0, READING_FACTOR * best + READING_LEAST_M);
-    mismatch("legs_or_signs", breach, |value| {
-        format!(
-            "feet on the ground move by {:.1} mm against each other, and by {:.1} mm {reading}: are legs or signs \
-             exchanged?",
-            1e3 * value,
-            1e3 * best
-        )
-    })
+    let words = format!(
+        "feet on the ground move by {:.1} mm against each other, and by {:.1} mm {reading}: are legs or signs \
+         exchanged?",
+        1e3 * value,
+        1e3 * best
+    );
+    mismatch("legs_or_signs", breach, words)
 }
 
 fn fall(balance: &Balance) -> Option<Mismatch> {
-    mismatch("fall", beyond(balance.fall_m_s2?, FALL_M_S2), |value| {
-        format!(
-            "in flight the body accelerates by {value:.2} m/s^2 upwards, expected {} to {}: another axis, sign or \
-             unit, another time, or contacts that are not the feet's",
-            FALL_M_S2.0, FALL_M_S2.1
-        )
-    })
+    let value = balance.fall_m_s2?;
+    let words = format!(
+        "in flight the body accelerates by {value:.2} m/s^2 upwards, expected {} to {}: another axis, sign or \
+         unit, another time, or contacts that are not the feet's",
+        FALL_M_S2.0, FALL_M_S2.1
+    );
+    mismatch("fall", beyond(value, FALL_M_S2), words)
 }
 
 fn weight(balance: &Balance, robot: &Robot) -> Option<Mismatch> {
-    let breach = beyond(balance.weight_share?, WEIGHT_SHARE);
-    mismatch("weight", breach, |value| {
-        format!(
-            "the torques carry {value:.3} of what {} kg need ({} to {} are accepted): torques in other units, of \
-             other signs or other joints, or another robot",
-            (1e6 * robot.mass_kg()).round() / 1e6,
-            WEIGHT_SHARE.0,
-            WEIGHT_SHARE.1
-        )
-    })
+    let value = balance.weight_share?;
+    let words = format!(
+        "the torques carry {value:.3} of what {} kg need ({} to {} are accepted): torques in other units, of \
+         other signs or other joints, or another robot",
+        (1e6 * robot.mass_kg()).round() / 1e6,
+        WEIGHT_SHARE.0,
+        WEIGHT_SHARE.1
+    );
+    mismatch("weight", beyond(value, WEIGHT_SHARE), words)
 }
 
 fn hip_torques(balance: &Balance) -> Option<Mismatch> {
     let shares = Leg::ALL.into_iter().zip(balance.hip_share);
-    let wrong: Vec<(Leg, f64)> = shares
-        .filter_map(|(leg, share)| Some((leg, share.filter(|share| *share < HIP_SHARE)?)))
-        .collect();
+    let is_wrong =
+        |(leg, share): (Leg, Option<f64>)| Some((leg, share.filter(|s| *s < HIP_SHARE)?));
+    let wrong: Vec<(Leg, f64)> = shares.filter_map(is_wrong).collect();
     let value = (wrong.iter().map(|(_, share)| *share)).min_by(f64::total_cmp)?;
     // Both legs of one end alone pull inwards where feet stick and positions are controlled, and less than exchanged ones.
     let is_of_end = |end: &[Leg]| wrong.iter().all(|(leg, _)| end.contains(leg));
@@ -291,41 +276,32 @@ fn hip_torques(balance: &Balance) -> Option<Mismatch> {
         return None;
     }
     let names: Vec<&str> = wrong.iter().map(|(leg, _)| leg.short_name()).collect();
-    mismatch("hip_torques", Some((value, HIP_SHARE)), |_| {
-        format!(
-            "the hips' torques of {} hold the feet on the other side of the body: are left and right legs or the \
-             torques' signs exchanged, or do feet stick and pull inwards?",
-            names.join(", ")
-        )
-    })
+    let words = format!(
+        "the hips' torques of {} hold the feet on the other side of the body: are left and right legs or the \
+         torques' signs exchanged, or do feet stick and pull inwards?",
+        names.join(", ")
+    );
+    mismatch("hip_torques", Some((value, HIP_SHARE)), words)
 }
 
-/// Factors by which velocities may be off, with what they come from.
-const FACTORS: [(f64, &str); 6] = [
-    (
-        57.2958,
-        "degrees where radians are expected (`unit = \"deg/s\"` in a map of columns)",
-    ),
+/// Factors by which velocities may be off, with what they come from: a unit with the expected one, or other words.
+const FACTORS: [(f64, &str, &str); 6] = [
+    (57.2958, "degrees where radians", "deg/s"),
     (
         0.017_453_3,
         "positions in degrees and velocities in radians",
+        "",
     ),
-    (
-        1000.0,
-        "millimetres where metres are expected (`unit = \"mm/s\"` in a map of columns)",
-    ),
-    (
-        100.0,
-        "centimetres where metres are expected (`unit = \"cm/s\"` in a map of columns)",
-    ),
+    (1000.0, "millimetres where metres", "mm/s"),
+    (100.0, "centimetres where metres", "cm/s"),
     (
         0.001,
         "velocities per millisecond, or positions in millimetres",
+        "",
     ),
-    (-1.0, "the other sign"),
+    (-1.0, "the other sign", ""),
 ];
-/// Distance from such a factor, as a share of it.
-const FACTOR_SHARE: f64 = 0.1;
+const FACTOR_SHARE: f64 = 0.1; // distance from such a factor, as a share of it
 
 /// Velocities that are a multiple of the changes of their positions.
 fn rates(recording: &Recording) -> Option<Mismatch> {
@@ -346,25 +322,27 @@ fn rates(recording: &Recording) -> Option<Mismatch> {
         let factor = product / squares;
         // Rates that do not follow the changes at all are another fault.
         let follows = product * product > 0.5 * squares * own;
-        let known = |(known, _): &&(f64, &str)| (factor / known - 1.0).abs() < FACTOR_SHARE;
-        let (known, why) = FACTORS.iter().find(known).filter(|_| follows)?;
-        mismatch("rates", Some((factor, 1.0)), |factor| {
-            format!(
-                "velocities of {what} are {factor:.3} times the changes of their positions, about {known}: {why}?"
-            )
-        })
+        let known = |(known, ..): &&(f64, &str, &str)| (factor / known - 1.0).abs() < FACTOR_SHARE;
+        let (known, why, unit) = FACTORS.iter().find(known).filter(|_| follows)?;
+        let advice = match *unit {
+            "" => String::new(),
+            unit => format!(" are expected (`unit = \"{unit}\"` in a map of columns)"),
+        };
+        let words = format!(
+            "velocities of {what} are {factor:.3} times the changes of their positions, about {known}: {why}{advice}?"
+        );
+        mismatch("rates", Some((factor, 1.0)), words)
     })
 }
 
 fn accelerations(balance: &Balance) -> Option<Mismatch> {
     let (axis, value) = balance.acceleration_offset_m_s2?;
     let breach = outside(value, -ACCELERATION_M_S2, ACCELERATION_M_S2);
-    mismatch("accelerations", breach, |value| {
-        format!(
-            "the body's acceleration along {axis} differs from the slope of its velocity by {value:.2} m/s^2 in the \
-             median: gravity, or another unit?"
-        )
-    })
+    let words = format!(
+        "the body's acceleration along {axis} differs from the slope of its velocity by {value:.2} m/s^2 in the \
+         median: gravity, or another unit?"
+    );
+    mismatch("accelerations", breach, words)
 }
 
 fn other_robot(
@@ -390,21 +368,16 @@ fn other_robot(
         |one: &(f64, &Robot), two: &(f64, &Robot)| one.0.ln().abs().total_cmp(&two.0.ln().abs());
     let (other_share, other) = explains.min_by(nearest)?;
     let other = other.name();
-    mismatch(
-        "other_robot",
-        Some((share, OTHER_WEIGHT.0.exp())),
-        |share| {
-            format!(
-                "the torques carry {share:.2} of the weight of a {} and {other_share:.2} of that of a {other}, and feet on \
-             the ground stay in place as well: is it a recording of a {other}?",
-                robot.name(),
-            )
-        },
-    )
+    let words = format!(
+        "the torques carry {share:.2} of the weight of a {} and {other_share:.2} of that of a {other}, and feet on \
+         the ground stay in place as well: is it a recording of a {other}?",
+        robot.name(),
+    );
+    mismatch("other_robot", Some((share, OTHER_WEIGHT.0.exp())), words)
 }
 
 /// A value that is not within a range, and the bound that it breaks; no number breaks the upper.
-fn beyond(value: f64, (low, high): (f64, f64)) -> Option<(f64, f64)> {
+fn beyond(value: f64, (low, high): (f64, f64)) -> Breach {
     let of_nan = value.is_nan().then_some((value, high));
     outside(value, low, high).or(of_nan)
 }

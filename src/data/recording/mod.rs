@@ -3,7 +3,7 @@
 //! Enters: CSV files of one or several jumps, plain or gzip. Leaves: segments
 //! of consecutive samples in SI units, samples as columns; the spans of each
 //! contact phase; a report of what is implausible, and of what is not this robot. Read [`segment`] for the
-//! data first, then [`columns`] and [`csv`] for the format, [`check`], [`mismatch`], [`condition()`],
+//! data first, then [`columns`] for the format, [`check`], [`mismatch`], [`condition()`],
 //! [`phases`] and [`preprocess`] for what is done with it, and [`mod@write`].
 //!
 //! ```
@@ -33,13 +33,12 @@ pub mod check;
 pub mod clock;
 pub mod columns;
 pub mod condition;
-pub mod csv;
 pub mod files;
 pub mod foreign;
 pub mod mismatch;
 pub mod phases;
 pub mod preprocess;
-pub mod reader;
+mod reader;
 pub mod segment;
 pub mod smoothing;
 pub mod write;
@@ -49,7 +48,6 @@ mod instant;
 mod lines;
 mod segments;
 
-pub use self::csv::{read, read_from_bytes};
 pub use self::write::{WriteOptions, write, write_as, write_mcap};
 pub use clock::Mended;
 pub use condition::{Accelerations, ConditionOptions, ImplausibleSamples, SmoothedRows, condition};
@@ -57,5 +55,5 @@ pub use error::{RecordingError, RecordingFault};
 pub use files::{RecordingFile, RecordingSet};
 pub use foreign::ColumnMap;
 pub use phases::{PhaseRule, PhaseSpan, Stance};
-pub use reader::{Clocks, Reader, Reading, ReadingNotes};
+pub use reader::{Clocks, Reader, Reading, ReadingNotes, read, read_from_bytes};
 pub use segment::{Recording, Segment, stretches};

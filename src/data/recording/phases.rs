@@ -68,23 +68,27 @@ impl PhaseRule {
 
     /// The paper's synchronous jump: `contact` (any foot), `flight` (none).
     pub fn two_phase() -> Self {
-        Self::new(vec![
-            pattern("contact", FeetRule::Any),
-            pattern("flight", FeetRule::None),
-        ])
+        Self::named([("contact", FeetRule::Any), ("flight", FeetRule::None)])
+    }
+
+    fn named<const N: usize>(patterns: [(&str, FeetRule); N]) -> Self {
+        let pattern = |(name, feet): (&str, FeetRule)| PhasePattern {
+            name: name.to_owned(),
+            feet,
+        };
+        Self::new(patterns.map(pattern).into())
     }
 
     /// The asynchronous jump: `contact` (a front foot is down), `rear` (only
     /// rear feet), `flight` (none).
     pub fn three_phase() -> Self {
         let all = (0..16).map(|bits: u8| std::array::from_fn(|foot| bits & (1 << foot) != 0));
-        let (rear, front): (Vec<ContactFlags>, Vec<ContactFlags>) = all
-            .filter(|feet: &ContactFlags| feet.contains(&true))
-            .partition(|feet| !feet[0] && !feet[1]);
-        Self::new(vec![
-            pattern("contact", FeetRule::Patterns(front)),
-            pattern("rear", FeetRule::Patterns(rear)),
-            pattern("flight", FeetRule::None),
+        let down = all.filter(|feet: &ContactFlags| feet.contains(&true));
+        let (rear, front) = down.partition(|feet| !feet[0] && !feet[1]);
+        Self::named([
+            ("contact", FeetRule::Patterns(front)),
+            ("rear", FeetRule::Patterns(rear)),
+            ("flight", FeetRule::None),
         ])
     }
 
@@ -129,13 +133,6 @@ impl PhaseRule {
         let runs = runs.map(|range| (phases[range.start], range));
         let runs = merge_short(runs, self.min_samples);
         Ok(with_stance(runs, feet))
-    }
-}
-
-fn pattern(name: &str, feet: FeetRule) -> PhasePattern {
-    PhasePattern {
-        name: name.to_owned(),
-        feet,
     }
 }
 
@@ -187,20 +184,18 @@ fn merge_short(runs: impl Iterator<Item = Run>, min_samples: usize) -> Vec<Run> 
 
 fn with_stance(runs: Vec<Run>, feet: &[ContactFlags]) -> Vec<PhaseSpan> {
     let mut flown = false;
-    runs.into_iter()
-        .map(|(phase, range)| {
-            // Most samples decide: a span may have swallowed chatter.
-            let own = feet[range.clone()].iter();
-            let airborne = own.filter(|feet| feet_down(**feet) == 0).count();
-            let kind = if 2 * airborne > range.len() {
-                flown = true;
-                Stance::Flight
-            } else if flown {
-                Stance::Landing
-            } else {
-                Stance::Launch
-            };
-            PhaseSpan { phase, kind, range }
-        })
-        .collect()
+    let span = |(phase, range): Run| {
+        // Most samples decide: a span may have swallowed chatter.
+        let own = feet[range.clone()].iter();
+        let airborne = own.filter(|feet| feet_down(**feet) == 0).count();
+        let flies = 2 * airborne > range.len();
+        flown |= flies;
+        let kind = match (flies, flown) {
+            (true, _) => Stance::Flight,
+            (false, true) => Stance::Landing,
+            (false, false) => Stance::Launch,
+        };
+        PhaseSpan { phase, kind, range }
+    };
+    runs.into_iter().map(span).collect()
 }

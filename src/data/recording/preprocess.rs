@@ -43,17 +43,16 @@ pub fn differences(time_s: &[f64], rows: &DMatrix<f64>) -> DMatrix<f64> {
     if n < 2 {
         return out;
     }
-    let slope = |a: usize, b: usize, row: usize| {
-        (rows[(row, b)] - rows[(row, a)]) / (time_s[b] - time_s[a])
-    };
     for row in 0..rows.nrows() {
-        out[(row, 0)] = slope(0, 1, row);
-        out[(row, n - 1)] = slope(n - 2, n - 1, row);
+        let slope =
+            |a: usize, b: usize| (rows[(row, b)] - rows[(row, a)]) / (time_s[b] - time_s[a]);
+        out[(row, 0)] = slope(0, 1);
+        out[(row, n - 1)] = slope(n - 2, n - 1);
         for j in 1..n - 1 {
             // The parabola through three samples, at the middle one.
             let (before, after) = (time_s[j] - time_s[j - 1], time_s[j + 1] - time_s[j]);
             let share = before / (before + after);
-            let (left, right) = (slope(j - 1, j, row), slope(j, j + 1, row));
+            let (left, right) = (slope(j - 1, j), slope(j, j + 1));
             out[(row, j)] = left + share * (right - left);
         }
     }
@@ -114,7 +113,6 @@ pub(super) fn place(own_s: &[f64], time_s: f64) -> (usize, f64) {
     (left, (time_s - own_s[left]) / step_s)
 }
 
-/// The middle of the values; 0 if there are none.
 pub(crate) fn median(values: impl Iterator<Item = f64>) -> f64 {
     let mut sorted: Vec<f64> = values.collect();
     sorted.sort_by(f64::total_cmp);

@@ -1,4 +1,7 @@
 //! How files become recordings: by romc's own names or a map of columns, with clocks as stamped or mended.
+//!
+//! romc's own text: `;` or tabs with decimal comma or point, or `,` with decimal point, found from the header; columns by
+//! name in any order; gzip found from the first two bytes. Memory is bounded by the samples kept.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -7,12 +10,13 @@ use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 
 use super::clock::{Mended, timed};
-use super::csv;
+use super::columns::Column;
 use super::error::{RecordingError, RecordingFault};
 use super::foreign::guess::guess_of;
-use super::foreign::{ColumnMap, assemble, is_mcap, read_mcap, read_texts};
+use super::foreign::{ColumnMap, TextFormat, assemble, is_mcap, read_lines, read_mcap, read_texts};
 use super::lines::Lines;
-use super::segment::Recording;
+use super::segment::{Recording, Segment};
+use super::segments::{DERIVED_DDX, divided};
 use crate::robot::Robot;
 
 /// What becomes of clocks that disagree with the motion.
@@ -91,7 +95,7 @@ impl Reader {
                 let expected = "a file, or `--columns` with a map that names the folder's files";
                 return Err(RecordingFault::unexpected("a folder", expected).of(path));
             }
-            None => csv::read_noted(path, Lines::open(path)?)?,
+            None => read_noted(path, Lines::open(path)?)?,
         };
         if self.clocks == Clocks::Repaired {
             for segment in &mut reading.recording.segments {
@@ -102,6 +106,59 @@ impl Reader {
         }
         Ok(reading)
     }
+}
+
+/// Reads a recording, plain or gzip.
+///
+/// # Errors
+/// [`RecordingError`], which names file, row and column.
+pub fn read(path: &Path) -> Result<Recording, RecordingError> {
+    read_noted(path, Lines::open(path)?).map(|reading| reading.recording)
+}
+
+/// Reads a recording from memory; `name` stands for the file in messages.
+///
+/// # Errors
+/// As [`read`]. No bytes make it panic.
+pub fn read_from_bytes(name: &str, bytes: &[u8]) -> Result<Recording, RecordingError> {
+    let path = Path::new(name);
+    read_noted(path, Lines::of(path, bytes, u64::MAX)?).map(|reading| reading.recording)
+}
+
+/// [`read`], with a note of what the file leaves to be derived.
+fn read_noted(path: &Path, lines: Lines<'_>) -> Result<Reading, RecordingError> {
+    let format = TextFormat {
+        own: true,
+        ..TextFormat::default()
+    };
+    let log = read_lines(path, lines, &format)?;
+    let columns = Column::arranged(path, &log.names())?;
+    let time = columns.iter().position(|c| *c == Some(Column::Time));
+    let time = time.expect("invariant: an arranged header has the time");
+    let mut whole = Segment {
+        first_row: log.first_row,
+        ..Segment::still(path, log.columns[time].times())
+    };
+    let has_acceleration = columns.contains(&Some(Column::Acceleration(0)));
+    let mut ignored_columns = Vec::new();
+    for (column, channel) in columns.into_iter().zip(log.columns) {
+        match column {
+            Some(Column::Time) => {}
+            Some(column) => whole.set(column, channel.values.into_iter()),
+            None if channel.name.is_empty() => {}
+            None => ignored_columns.push(channel.name),
+        }
+    }
+    let recording = Recording {
+        path: path.to_owned(),
+        segments: divided(whole, has_acceleration)?,
+        ignored_columns,
+    };
+    let derived = (!has_acceleration).then(|| DERIVED_DDX.to_owned());
+    Ok(Reading::as_recorded(
+        recording,
+        derived.into_iter().collect(),
+    ))
 }
 
 /// Advice for topics that are not a recording by their names.
@@ -117,17 +174,12 @@ fn by_guess(path: &Path, robot: &Robot) -> Result<Reading, RecordingError> {
             None => format!("`{}` with {}", log.name, log.summary()),
             Some(fault) => format!("`{}` ({fault})", log.name),
         });
-        let topics: Vec<String> = topics.collect();
-        let found = format!(
-            "no {} among {}",
-            guess.missing.join(", "),
-            topics.join("; ")
-        );
-        let expected = format!(
-            "topics of the robot: joints named as fr.hx, FR_hip_joint, LF_HAA or {}",
-            robot.joint_names()[0]
-        );
-        return Err(RecordingFault::unexpected(found, expected + TO_COMPLETE).of(path));
+        let topics = topics.collect::<Vec<_>>().join("; ");
+        let found = format!("no {} among {topics}", guess.missing.join(", "));
+        let own = &robot.joint_names()[0];
+        let names = format!("joints named as fr.hx, FR_hip_joint, LF_HAA or {own}");
+        let expected = format!("topics of the robot: {names}{TO_COMPLETE}");
+        return Err(RecordingFault::unexpected(found, expected).of(path));
     }
     if !guess.open.is_empty() {
         let expected = format!("one reading by names{TO_COMPLETE}");
@@ -135,24 +187,23 @@ fn by_guess(path: &Path, robot: &Robot) -> Result<Reading, RecordingError> {
     }
     let map = ColumnMap::parse(&format!("{}: the guessed map", path.display()), &guess.text)?;
     let mut reading = assemble(path, &logs, &map)?;
-    let note = "topics are taken by their names (`romc inspect --guess` prints the map)";
-    reading.notes.push(note.to_owned());
-    reading.notes.extend(guess.notes);
+    let note = "topics are taken by their names (`romc inspect --guess` prints the map)".to_owned();
+    reading.notes.extend([note].into_iter().chain(guess.notes));
     Ok(reading)
 }
 
 /// Repairs of clocks, in words; `{}` is the range of [`Mended::elapsed_ratio`].
 const REPAIRS: [(fn(&Mended) -> bool, &str); 3] = [
     (
-        |mended| mended.elapsed_ratio.is_some(),
+        |m| m.elapsed_ratio.is_some(),
         "times are rebuilt from the motion, which takes {} s in a recorded second",
     ),
     (
-        |mended| mended.elapsed_ratio.is_none() && mended.resampled,
+        |m| m.elapsed_ratio.is_none() && m.resampled,
         "uneven steps are resampled",
     ),
     (
-        |mended| mended.rates_replaced,
+        |m| m.rates_replaced,
         "angular rates, which disagree with the angles, are differences of these",
     ),
 ];
@@ -174,8 +225,7 @@ impl ReadingNotes {
         for (count, (is_made, _)) in self.repaired.iter_mut().zip(REPAIRS) {
             *count += usize::from(reading.mended.iter().any(is_made));
         }
-        let ratios = reading.mended.iter().filter_map(|m| m.elapsed_ratio);
-        self.ratios.extend(ratios);
+        (self.ratios).extend(reading.mended.iter().filter_map(|m| m.elapsed_ratio));
         for note in &reading.notes {
             match self.others.iter_mut().find(|(known, _)| known == note) {
                 Some((_, count)) => *count += 1,
@@ -196,20 +246,17 @@ impl ReadingNotes {
             true => most,
             false => format!("{least} to {most}"),
         };
-        let repairs = self.repaired.iter().zip(REPAIRS);
-        let repairs = repairs.filter(|(count, _)| **count > 0);
-        let repairs: Vec<String> = repairs
-            .map(|(count, (_, words))| counted(&words.replace("{}", &range), *count))
-            .collect();
-        let mut lines = Vec::new();
-        if !repairs.is_empty() {
-            lines.push(format!(
-                "{} (--clock recorded: as recorded)",
-                repairs.join("; ")
-            ));
-        }
-        let others = self.others.iter();
-        lines.extend(others.map(|(note, count)| counted(note, *count)));
-        lines
+        let repairs = self
+            .repaired
+            .iter()
+            .zip(REPAIRS)
+            .filter(|(count, _)| **count > 0);
+        let repairs =
+            repairs.map(|(count, (_, words))| counted(&words.replace("{}", &range), *count));
+        let repairs = repairs.collect::<Vec<_>>().join("; ");
+        let repairs =
+            (!repairs.is_empty()).then(|| format!("{repairs} (--clock recorded: as recorded)"));
+        let others = (self.others.iter()).map(|(note, count)| counted(note, *count));
+        repairs.into_iter().chain(others).collect()
     }
 }

@@ -229,15 +229,20 @@ impl Segment {
         };
         let window = 2 * half.min(self.len()) + 1;
         let mut out = DMatrix::zeros(JOINT_DIM, self.len());
-        let down = |sample: usize| self.feet[sample].contains(&true);
-        for stretch in stretches(0..self.len(), |a, b| down(a) == down(b)) {
-            let own = self
-                .ddx
-                .view((0, stretch.start), (JOINT_DIM, stretch.len()));
-            let smooth = moving_average(&own.into_owned(), window);
-            (out.columns_mut(stretch.start, stretch.len())).copy_from(&smooth);
+        for (stretch, _) in self.contacts() {
+            let (first, count) = (stretch.start, stretch.len());
+            let own = self.ddx.view((0, first), (JOINT_DIM, count)).into_owned();
+            (out.columns_mut(first, count)).copy_from(&moving_average(&own, window));
         }
         out
+    }
+
+    /// Stretches of equal contact, and whether a foot is down in each.
+    pub(crate) fn contacts(&self) -> Vec<(Range<usize>, bool)> {
+        let down = |sample: usize| self.feet[sample].contains(&true);
+        let all = stretches(0..self.len(), |a, b| down(a) == down(b)).into_iter();
+        all.map(|stretch| (stretch.clone(), down(stretch.start)))
+            .collect()
     }
 
     /// What the joints take of the motors' torques, 12 x n, in N m; zero without actuators.
@@ -301,12 +306,9 @@ impl Segment {
                 continue;
             }
             let net = std::array::from_fn(|i| net[(i, sample)]);
-            let wrench = rule
-                .wrench(&self.state(sample), &net, self.feet[sample])
-                .map_err(|e| {
-                    RecordingFault::Wrench(Box::new(e)).at(&self.path, self.row(sample))
-                })?;
-            to.copy_from(&wrench);
+            let wrench = rule.wrench(&self.state(sample), &net, self.feet[sample]);
+            let refused = |e| RecordingFault::Wrench(Box::new(e)).at(&self.path, self.row(sample));
+            to.copy_from(&wrench.map_err(refused)?);
         }
         Ok(out)
     }

@@ -8,7 +8,6 @@ use super::preprocess::differences;
 use super::segment::Segment;
 use crate::robot::STATE_DIM;
 
-/// The note on a recording whose accelerations are made here.
 pub(super) const DERIVED_DDX: &str = "accelerations are differences of velocities";
 /// A step this many times the one before it starts a new segment, as a jump
 /// back does: samples were left out between the two.
@@ -40,10 +39,9 @@ pub(super) fn divided(
             return Err(RecordingFault::too_short(n, 2).at(&segment.path, row));
         }
         if step_s > LARGEST_STEP_S {
-            let fault = RecordingFault::unexpected(
-                format!("a sample every {step_s} s on average"),
-                format!("at most {LARGEST_STEP_S} s; is `Time` in milliseconds?"),
-            );
+            let found = format!("a sample every {step_s} s on average");
+            let expected = format!("at most {LARGEST_STEP_S} s; is `Time` in milliseconds?");
+            let fault = RecordingFault::unexpected(found, expected);
             return Err(fault.in_cell(&segment.path, row, "Time"));
         }
         if !has_acceleration {

@@ -26,12 +26,16 @@ impl SavitzkyGolay {
     /// A filter over an odd `window` of samples with polynomials of degree `order`.
     ///
     /// # Errors
-    /// [`RecordingFault::Smoothing`] for an even window or one not above the order.
+    /// [`RecordingFault::Text`] for an even window or one not above the order.
     pub fn new(window: usize, order: usize) -> Result<Self, RecordingError> {
-        // The error names both.
         const LARGEST: (usize, usize) = (1001, 12);
         if window.is_multiple_of(2) || window <= order || window > LARGEST.0 || order > LARGEST.1 {
-            return Err(RecordingFault::Smoothing { window, order }.of_argument());
+            let text = format!(
+                "smoothing window {window} with order {order}: expected an odd window above the order, \
+                 at most {}, and an order of at most {}",
+                LARGEST.0, LARGEST.1
+            );
+            return Err(RecordingFault::Text(text).of_argument());
         }
         let half = (window / 2) as f64;
         // Places scaled to -1..1 keep the powers well conditioned.

@@ -139,11 +139,10 @@ pub fn write_to(
             }
             line.pop();
             line.push('\n');
-            let bytes = match options.notation {
-                Notation::Semicolon => &line.replace('.', ","),
-                Notation::Comma => &line,
-            };
-            destination.write_all(bytes.as_bytes())?;
+            if options.notation == Notation::Semicolon {
+                line = line.replace('.', ",");
+            }
+            destination.write_all(line.as_bytes())?;
         }
     }
     Ok(())

@@ -6,8 +6,8 @@ use super::super::assign::Assigned;
 use super::super::error::ImportError;
 use super::super::options::WeightVectors;
 use super::super::report::Layout;
-use super::super::role::{Part, Role};
-use super::{Assembly, Known};
+use super::super::role::{Part, Role, without_tensorflow_end};
+use super::{Assembly, Known, text_or};
 use crate::files::Place;
 use crate::model::{Activation, AffineMap, Layer, StateMap};
 
@@ -37,15 +37,12 @@ impl<'a> Assembly<'a, '_> {
         }
         if let (Some(encoder), Some(decoder)) = &maps {
             let change = self.change(encoder, decoder)?;
-            let note = || {
-                format!(
+            if change > LARGEST_CHANGE {
+                self.report.notes.push(format!(
                     "encode(decode(z)) differs from z by {change:.2} of its size: are encoder and decoder those of one \
                      training?"
-                )
-            };
-            self.report
-                .notes
-                .extend((change > LARGEST_CHANGE).then(note));
+                ));
+            }
         }
         Ok(maps)
     }
@@ -53,24 +50,23 @@ impl<'a> Assembly<'a, '_> {
     /// How much `encode(decode(z))` changes steps from `z = 0` along each coordinate, relative to them.
     fn change(&self, encoder: &StateMap, decoder: &StateMap) -> Result<f64, ImportError> {
         let dim = decoder.input_dim();
-        let back = |z: DVector<f64>| encoder.apply(&decoder.apply(&z)?);
         let change = |index: Option<usize>| {
             let z = DVector::from_fn(dim, |k, _| f64::from(Some(k) == index));
-            back(z.clone()).map(|back| back - z)
+            let back = (decoder.apply(&z)).and_then(|x| encoder.apply(&x));
+            back.map(|back| back - z)
+                .map_err(|source| self.unusable(source))
         };
-        let origin = change(None).map_err(|source| self.unusable(source))?;
+        let origin = change(None)?;
         let mut sum = 0.0;
         for index in 0..dim {
-            let step = change(Some(index)).map_err(|source| self.unusable(source))?;
-            sum += (step - &origin).norm_squared();
+            sum += (change(Some(index))? - &origin).norm_squared();
         }
         Ok((sum / dim as f64).sqrt())
     }
 
     fn layers(&self, part: Part) -> Result<Vec<Tensors<'a>>, ImportError> {
         let mut layers: Vec<Tensors<'a>> = Vec::new();
-        let used = &self.assignment.used;
-        for assigned in used {
+        for assigned in &self.assignment.used {
             match assigned.role {
                 Role::Weights(found, number) if found == part => {
                     layers.push((assigned, self.find(&Role::Bias(part, number))));
@@ -151,36 +147,27 @@ impl<'a> Assembly<'a, '_> {
         let first = layers[0].0;
         let shapes = layers.iter().map(|(assigned, _)| shape_of(part, assigned));
         let shapes: Vec<(usize, usize)> = shapes.collect::<Option<_>>().unwrap_or_default();
-        let are_kernels = layers
-            .iter()
-            .all(|(assigned, _)| is_kernel(&assigned.info.name));
-        let given = self
-            .options
-            .weights
-            .or(are_kernels.then_some(WeightVectors::Row));
-        let ways = match (given, first.info.shape.len()) {
-            (_, 1) => &[Layout::Plain][..],
-            (Some(WeightVectors::Column), _) => &[Layout::Column],
-            (Some(WeightVectors::Row), _) => &[Layout::Row],
-            (None, _) => &[Layout::Column, Layout::Row],
+        let are_kernels = (layers.iter()).all(|(assigned, _)| is_kernel(&assigned.info.name));
+        let given = self.options.weights;
+        let ways = match given.or(are_kernels.then_some(WeightVectors::Row)) {
+            _ if first.info.shape.len() == 1 => &[Layout::Plain][..],
+            Some(WeightVectors::Column) => &[Layout::Column],
+            Some(WeightVectors::Row) => &[Layout::Row],
+            None => &[Layout::Column, Layout::Row],
         };
-        let known = |layout| ends(part, &shapes, layout, self.known);
-        let fitting = ways
-            .iter()
-            .filter_map(|&layout| Some((layout, known(layout)?)));
-        let fitting: Vec<(Layout, Known)> = fitting.collect();
-        let expected = || match layers {
-            [_] => self.expected_weights(part, are_kernels),
-            _ => {
-                let ends = match part {
-                    Part::Encoder => "n to d",
-                    Part::Decoder => "d to n",
-                };
-                let found = described(layers);
-                format!(
-                    "layers from {ends}, each taking the outputs of the one before, among {found}"
-                )
-            }
+        let known = |&layout| Some((layout, ends(part, &shapes, layout, self.known)?));
+        let fitting: Vec<(Layout, Known)> = ways.iter().filter_map(known).collect();
+        let expected = || match (layers, part) {
+            ([_], _) => self.expected_weights(part, are_kernels),
+            _ => format!(
+                "layers from {}, each taking the outputs of the one before, among {}",
+                if part == Part::Encoder {
+                    "n to d"
+                } else {
+                    "d to n"
+                },
+                described(layers)
+            ),
         };
         let option = "--weights column for z = W x (torch.nn.Linear) or --weights row for z = x W \
                       (TensorFlow)";
@@ -191,16 +178,19 @@ impl<'a> Assembly<'a, '_> {
 
     fn expected_weights(&self, part: Part, are_kernels: bool) -> String {
         let Known { latent, state } = self.known;
-        let d = latent.map_or("d".to_owned(), |d| d.to_string());
-        let n = state.map_or("n".to_owned(), |n| n.to_string());
-        let (column, row) = match part {
-            Part::Encoder => (format!("{d} x {n}"), format!("{n} x {d}")),
-            Part::Decoder => (format!("{n} x {d}"), format!("{d} x {n}")),
-        };
         let bound = match (latent, state) {
             (Some(_), Some(_)) => "",
             _ => ", with d at most n",
         };
+        let (d, n) = (text_or(latent, "d"), text_or(state, "n"));
+        let (outputs, inputs) = match part {
+            Part::Encoder => (d, n),
+            Part::Decoder => (n, d),
+        };
+        let (column, row) = (
+            format!("{outputs} x {inputs}"),
+            format!("{inputs} x {outputs}"),
+        );
         match self.options.weights {
             Some(WeightVectors::Column) => format!("{column} (--weights column){bound}"),
             Some(WeightVectors::Row) => format!("{row} (--weights row){bound}"),
@@ -214,8 +204,7 @@ impl<'a> Assembly<'a, '_> {
 
 /// Whether weights are for row vectors by their name: Keras and Flax name theirs so.
 fn is_kernel(name: &str) -> bool {
-    let name = name.trim_end_matches("/.ATTRIBUTES/VARIABLE_VALUE");
-    name.trim_end_matches(":0").ends_with("kernel")
+    without_tensorflow_end(name).ends_with("kernel")
 }
 
 fn described(layers: &[Tensors<'_>]) -> String {

@@ -7,9 +7,7 @@ use super::super::assign::Assigned;
 use super::super::error::ImportError;
 use super::super::role::Role;
 use super::{Assembly, Parts};
-use crate::model::{
-    AffineMap, CoordinateOrder, InputStatistics, Layer, ModelError, ScaleFactors, Scaling, StateMap,
-};
+use crate::model::{AffineMap, ScaleFactors, Scaling, StateMap};
 use crate::robot::STATE_DIM;
 
 impl<'a> Assembly<'a, '_> {
@@ -18,31 +16,25 @@ impl<'a> Assembly<'a, '_> {
         let state = self.one_of(&Role::StateScaling, &Role::StateStd)?;
         let input = self.one_of(&Role::InputScaling, &Role::InputStd)?;
         let given = self.options.input_scaling.clone();
-        let known = self.options.scaling.clone();
-        if known.is_some() && (state.is_some() || input.is_some()) {
-            let found = "factors here and in tensors";
-            return Err(ImportError::option("--scaling", found, "one of the two"));
+        let refused =
+            |option, found: &str, expected: &str| Err(ImportError::option(option, found, expected));
+        if self.options.scaling.is_some() && (state.is_some() || input.is_some()) {
+            return refused("--scaling", "factors here and in tensors", "one of the two");
         }
-        let Some(state) = state else {
-            return match (input, given) {
-                (Some(_), _) => Err(self.tensors.missing(&Role::StateScaling)),
-                (None, None) => Ok(known),
-                (None, Some(_)) => {
-                    let found = "factors of the inputs alone";
-                    let expected = "--scaling, or a tensor scaling.state or std.state";
-                    Err(ImportError::option("--input-scaling", found, expected))
-                }
-            };
-        };
-        let input = match (input, given) {
-            (Some(_), Some(_)) => {
-                let found = "factors here and in a tensor";
-                let expected = "one of the two";
-                return Err(ImportError::option("--input-scaling", found, expected));
+        let (state, input) = match (state, input, given) {
+            (None, Some(_), _) => return Err(self.tensors.missing(&Role::StateScaling)),
+            (None, None, None) => return Ok(self.options.scaling.clone()),
+            (None, None, Some(_)) => {
+                let expected = "--scaling, or a tensor scaling.state or std.state";
+                return refused("--input-scaling", "factors of the inputs alone", expected);
             }
-            (Some(input), None) => self.factors(input)?,
-            (None, Some(given)) => given,
-            (None, None) => {
+            (Some(_), Some(_), Some(_)) => {
+                let found = "factors here and in a tensor";
+                return refused("--input-scaling", found, "one of the two");
+            }
+            (Some(state), Some(input), None) => (state, self.factors(input)?),
+            (Some(state), None, Some(given)) => (state, given),
+            (Some(state), None, None) => {
                 let found = format!("{} without factors of the inputs", state.info.describe());
                 let expected = "a tensor scaling.input or std.input, or --input-scaling FACTOR";
                 return Err(self.refused(state, found, expected));
@@ -123,15 +115,19 @@ impl<'a> Assembly<'a, '_> {
         of_encoder: impl Fn(&AffineMap) -> (DMatrix<f64>, DVector<f64>),
         of_decoder: impl Fn(&AffineMap) -> (DMatrix<f64>, DVector<f64>),
     ) -> Result<(), ImportError> {
-        let unusable = |source| self.unusable(source);
-        if let Some(encoder) = &mut parts.encoder {
-            let first = of_encoder(&encoder.layers()[0].map);
-            *encoder = replaced(encoder, 0, first).map_err(unusable)?;
+        let changed = |map: &StateMap, end: usize, (weights, bias)| {
+            let mut layers = map.layers().to_vec();
+            layers[end].map = AffineMap::new("layer", weights, bias)?;
+            StateMap::new("map", layers)
+        };
+        if let Some(map) = &mut parts.encoder {
+            let first = of_encoder(&map.layers()[0].map);
+            *map = changed(map, 0, first).map_err(|source| self.unusable(source))?;
         }
-        if let Some(decoder) = &mut parts.decoder {
-            let end = decoder.layers().len() - 1;
-            let last = of_decoder(&decoder.layers()[end].map);
-            *decoder = replaced(decoder, end, last).map_err(unusable)?;
+        if let Some(map) = &mut parts.decoder {
+            let end = map.layers().len() - 1;
+            let last = of_decoder(&map.layers()[end].map);
+            *map = changed(map, end, last).map_err(|source| self.unusable(source))?;
         }
         Ok(())
     }
@@ -168,29 +164,12 @@ impl<'a> Assembly<'a, '_> {
             }
         }
         for (_, statistics) in &mut parts.statistics {
-            *statistics = sorted_statistics(statistics, order);
+            let rows = order.sorted(&statistics.covariance);
+            statistics.mean = order.sorted(&statistics.mean);
+            statistics.covariance = order.sorted(&rows.transpose()).transpose();
         }
         let note = format!("coordinates were in the order {order}; the model has romc's");
         self.report.notes.push(note);
         Ok(())
-    }
-}
-
-fn replaced(
-    map: &StateMap,
-    layer: usize,
-    (weights, bias): (DMatrix<f64>, DVector<f64>),
-) -> Result<StateMap, ModelError> {
-    let mut layers: Vec<Layer> = map.layers().to_vec();
-    layers[layer].map = AffineMap::new("layer", weights, bias)?;
-    StateMap::new("map", layers)
-}
-
-fn sorted_statistics(statistics: &InputStatistics, order: &CoordinateOrder) -> InputStatistics {
-    let rows = order.sorted(&statistics.covariance);
-    InputStatistics {
-        mean: order.sorted(&statistics.mean),
-        covariance: order.sorted(&rows.transpose()).transpose(),
-        given_state: statistics.given_state.clone(),
     }
 }

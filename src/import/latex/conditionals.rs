@@ -28,26 +28,19 @@ const UNDECIDED: Refusal = (", a macro that is defined under a condition", FOLLO
 
 impl Expander<'_> {
     pub(super) fn condition(&mut self, token: Token) -> Result<Option<Token>, ImportError> {
-        let Kind::Command(name) = &token.kind else {
-            return Ok(Some(token));
-        };
         let is_negated = std::mem::take(&mut self.is_negated);
-        let value = match name.as_str() {
+        let value = match token.name() {
             "fi" if self.branches > 0 => {
                 self.branches -= 1;
                 return Ok(None);
             }
             "else" | "or" if self.branches > 0 => {
                 self.branches -= 1;
-                self.skip(&token, false).map(drop)?;
-                return Ok(None);
+                return self.skip(&token, false).map(|_| None);
             }
             "fi" | "else" => {
-                return self.refuse(
-                    &token,
-                    " without its conditional",
-                    "conditionals in pairs with `\\fi`",
-                );
+                let expected = "conditionals in pairs with `\\fi`";
+                return self.refuse(&token, " without its conditional", expected);
             }
             "iftrue" => true,
             "iffalse" => false,
@@ -70,12 +63,13 @@ impl Expander<'_> {
                 return self.undecided(&token, &branches, CONDITION);
             }
         };
-        if value != is_negated {
-            self.branches += 1;
-        } else {
-            self.skip(&token, true).map(drop)?;
+        match value == is_negated {
+            true => self.skip(&token, true).map(|_| None),
+            false => {
+                self.branches += 1;
+                Ok(None)
+            }
         }
-        Ok(None)
     }
 
     pub(super) fn is_brace_next(&mut self) -> bool {
@@ -90,19 +84,14 @@ impl Expander<'_> {
         let mut passed = Vec::new();
         let mut depth = 0;
         while let Some(token) = self.raw() {
-            let Kind::Command(name) = &token.kind else {
-                passed.push(token);
-                continue;
-            };
-            let name = match self.scopes.meaning(name) {
-                None => name.as_str(),
-                Some(Meaning::Same(Kind::Command(same))) => same.as_str(),
+            let name = match self.scopes.meaning(token.name()) {
+                None => token.name(),
+                Some(Meaning::Same(Kind::Command(same))) => same,
                 Some(_) => "",
             };
-            let is_unknown = name.starts_with("if")
-                && name != "iff"
-                && !has(CONDITIONALS, name)
-                && !has(WITH_ARGUMENTS, name);
+            let is_known = has(CONDITIONALS, name);
+            let is_unknown =
+                name.starts_with("if") && !is_known && name != "iff" && !has(WITH_ARGUMENTS, name);
             match name {
                 "fi" if depth == 0 => return Ok(passed),
                 "else" if depth == 0 && stops_at_else => {
@@ -110,8 +99,7 @@ impl Expander<'_> {
                     return Ok(passed);
                 }
                 "fi" => depth -= 1,
-                name if has(CONDITIONALS, name) => depth += 1,
-                _ => {}
+                _ => depth += usize::from(is_known),
             }
             if is_unknown && !self.is_brace_next() {
                 let expected = "`\\newif` for it before, or conditionals of TeX";
@@ -122,6 +110,7 @@ impl Expander<'_> {
         self.refuse(start, " without its end", "`\\fi`")
     }
 
+    /// What conditions decide is not followed, nor are macros that are defined in it.
     fn undecided(
         &mut self,
         token: &Token,

@@ -46,21 +46,19 @@ const EXPANDED: Refusal = (
 
 impl Expander<'_> {
     pub(super) fn follows_definition(&mut self, token: &Token) -> Result<bool, ImportError> {
-        let Kind::Command(command) = &token.kind else {
-            return Ok(false);
-        };
-        let is_definition = self.defines(command, token);
-        if self.scopes.has_changed_rows {
-            return self.refuse(
+        let is_definition = self.defines(token);
+        match self.scopes.has_changed_rows {
+            true => self.refuse(
                 token,
                 " for all rows among them",
                 "a definition before the formula",
-            );
+            ),
+            false => Ok(is_definition),
         }
-        Ok(is_definition)
     }
 
-    fn defines(&mut self, command: &str, token: &Token) -> bool {
+    fn defines(&mut self, token: &Token) -> bool {
+        let command = token.name();
         match command {
             "newcommand" | "renewcommand" | "providecommand" | "DeclareRobustCommand" => {
                 self.new_command(command);
@@ -82,12 +80,11 @@ impl Expander<'_> {
                 }
             }
             _ if has(UNREAD, command) => {
-                self.takes(&Kind::Character('*'));
                 let Some(name) = self.target() else {
                     return true;
                 };
                 let body = self.following_groups(1).unwrap_or_default();
-                let earlier = token.with(Kind::Command(name.clone()));
+                let earlier = token.with(Kind::command(&name));
                 let matters =
                     command.contains("Environ") || self.matters(&body) || self.matters(&[earlier]);
                 self.define(name, Meaning::Unread(UNREAD_FORM, matters));
@@ -102,15 +99,18 @@ impl Expander<'_> {
         self.scopes.define(name, meaning, is_global);
     }
 
-    /// The name of the macro that is defined: `\k`, `{\k}`, `\csname k\endcsname`, or a name as text.
+    /// The name of the macro that is defined, behind a star: `\k`, `{\k}`, `\csname k\endcsname`, or a name as text.
     fn target(&mut self) -> Option<String> {
+        self.takes(&Kind::Character('*'));
         let argument = self.argument()?;
         match argument.as_slice() {
             [token] if token.is_command("csname") => Some(self.name_to("endcsname")),
-            [token] => match &token.kind {
-                Kind::Command(name) => Some(name.clone()),
-                _ => Some(spelled(&argument)),
-            },
+            [
+                Token {
+                    kind: Kind::Command(name),
+                    ..
+                },
+            ] => Some(name.clone()),
             _ => Some(spelled(&argument)),
         }
     }
@@ -127,7 +127,6 @@ impl Expander<'_> {
 
     /// `\newcommand{\k}[2][default]{...}` and its kin.
     fn new_command(&mut self, command: &str) {
-        self.takes(&Kind::Character('*'));
         let Some(name) = self.target() else { return };
         let Some(meaning) = self.bracketed_definition() else {
             return;
@@ -145,13 +144,8 @@ impl Expander<'_> {
 
     /// `[2][default]{...}`.
     fn bracketed_definition(&mut self) -> Option<Meaning> {
-        let count = self
-            .optional()
-            .map(|count| spelled(&count).parse::<usize>());
-        let default = match count {
-            Some(_) => self.optional(),
-            None => None,
-        };
+        let count = self.optional().map(|count| spelled(&count).parse());
+        let default = count.as_ref().and_then(|_| self.optional());
         let body = self.argument()?;
         Some(match count.unwrap_or(Ok(0)) {
             Ok(parameters @ 0..=9) => self.plain_macro(parameters, default, body),
@@ -177,12 +171,9 @@ impl Expander<'_> {
     fn plain_definition(&mut self, command: &str) {
         let Some(name) = self.target() else { return };
         let mut count = Some(0);
-        while let Some(token) = self.code() {
+        while !self.is_brace_next() {
+            let Some(token) = self.code() else { return };
             count = match token.kind {
-                Kind::Open => {
-                    self.pending.push(token);
-                    break;
-                }
                 Kind::Parameter(number) if count.is_some_and(|count| count + 1 == number) => {
                     Some(number)
                 }
@@ -191,11 +182,9 @@ impl Expander<'_> {
         }
         let Some(body) = self.argument() else { return };
         let matters = self.matters(&body);
-        let expands = |token: &Token| match &token.kind {
-            Kind::Command(name) => {
-                !matches!(self.scopes.meaning(name), None | Some(Meaning::Same(_)))
-            }
-            _ => false,
+        let expands = |token: &Token| {
+            let meaning = self.scopes.meaning(token.name());
+            !matches!(meaning, None | Some(Meaning::Same(_)))
         };
         let is_expanded = matches!(command, "edef" | "xdef") && body.iter().any(expands);
         let meaning = match count {
@@ -212,21 +201,18 @@ impl Expander<'_> {
         let Some(name) = self.target() else { return };
         self.takes(&Kind::Character('='));
         let Some(token) = self.code() else { return };
-        let earlier = match &token.kind {
-            Kind::Command(old) => self.scopes.meaning(old).cloned(),
-            _ => None,
-        };
+        let earlier = self.scopes.meaning(token.name()).cloned();
         self.define(name, earlier.unwrap_or(Meaning::Same(token.kind)));
     }
 
     /// `\DeclareMathOperator{\sgn}{sgn}`.
     fn operator(&mut self, token: &Token) {
-        self.takes(&Kind::Character('*'));
         let (Some(name), Some(text)) = (self.target(), self.argument()) else {
             return;
         };
-        let operator = Kind::Command("operatorname".to_owned());
-        let mut body = vec![token.with(operator), token.with(Kind::Open)];
+        let mut body = [Kind::command("operatorname"), Kind::Open]
+            .map(|kind| token.with(kind))
+            .to_vec();
         body.extend(text);
         body.push(token.with(Kind::Close));
         let meaning = match self.is_defined(&name) {
@@ -239,14 +225,14 @@ impl Expander<'_> {
     /// `\newif\ifdraft`, with `\drafttrue` and `\draftfalse`.
     fn switch(&mut self, token: &Token) {
         let Some(name) = self.target() else { return };
-        let command = |name: &str| token.with(Kind::Command(name.to_owned()));
+        let command = |name: &str| token.with(Kind::command(name));
         let stem = name.strip_prefix("if").unwrap_or(&name).to_owned();
         for value in ["true", "false"] {
             let body = ["let", &name, &format!("if{value}")].map(command).to_vec();
             let meaning = self.plain_macro(0, None, body);
             self.define(format!("{stem}{value}"), meaning);
         }
-        self.define(name, Meaning::Same(Kind::Command("iffalse".to_owned())));
+        self.define(name, Meaning::Same(Kind::command("iffalse")));
     }
 
     /// `\newenvironment{name}[2][default]{begin}{end}`.
@@ -257,11 +243,11 @@ impl Expander<'_> {
         let (Some(begin), Some(end)) = (self.bracketed_definition(), self.argument()) else {
             return;
         };
-        let is_again = command == "newenvironment" && self.scopes.meaning(&name).is_some();
-        let begin = if is_again {
-            Meaning::Unread(DEFINED_TWICE, true)
-        } else {
-            begin
+        let begin = match command {
+            "newenvironment" if self.scopes.meaning(&name).is_some() => {
+                Meaning::Unread(DEFINED_TWICE, true)
+            }
+            _ => begin,
         };
         let end = self.plain_macro(0, None, end);
         self.define(format!("end{name}"), end);
@@ -270,28 +256,28 @@ impl Expander<'_> {
 
     /// Whether mathematics, or the end of the document, may be in what tokens print.
     pub(super) fn matters(&self, tokens: &[Token]) -> bool {
-        tokens
-            .iter()
-            .enumerate()
-            .any(|(at, token)| match &token.kind {
-                Kind::Dollar | Kind::Display => true,
-                Kind::Command(name) => match (self.scopes.meaning(name), name.as_str()) {
-                    (Some(Meaning::Macro(found)), _) => found.matters,
-                    (Some(Meaning::Unread(_, matters)), _) => *matters,
-                    (Some(Meaning::Same(_) | Meaning::Verbatim), _) => true,
-                    (None, "[" | "(" | "ddot" | "endinput" | "stop" | "bye") => true,
-                    (None, "begin" | "end") => {
-                        let rest = &tokens[at + 1..tokens.len().min(at + 32)];
-                        let end = rest.iter().position(|token| token.kind == Kind::Close);
-                        let name = spelled(rest.get(1..end.unwrap_or(1)).unwrap_or_default());
-                        let lists = [LAYOUTS, CASES, "math document"];
-                        self.scopes.meaning(&name).is_some()
-                            || lists.iter().any(|list| is_one_of(list, &name))
-                    }
-                    (None, name) => has("equation eqnarray displaymath", name),
-                },
-                _ => false,
-            })
+        let mut rest = tokens.iter();
+        while let Some(token) = rest.next() {
+            let found = match (self.scopes.meaning(token.name()), token.name()) {
+                _ if matches!(token.kind, Kind::Dollar | Kind::Display) => true,
+                (Some(Meaning::Macro(found)), _) => found.matters,
+                (Some(Meaning::Unread(_, matters)), _) => *matters,
+                (Some(Meaning::Same(_) | Meaning::Verbatim), _) => true,
+                (None, "[" | "(" | "ddot" | "endinput" | "stop" | "bye") => true,
+                (None, "begin" | "end") => {
+                    let near = rest.as_slice().iter().take(31);
+                    let inside = near.take_while(|token| token.kind != Kind::Close);
+                    let name = spelled(inside.skip(1));
+                    let mut lists = [LAYOUTS, CASES, "math document"].into_iter();
+                    self.scopes.meaning(&name).is_some() || lists.any(|list| is_one_of(list, &name))
+                }
+                (None, name) => has("equation eqnarray displaymath", name),
+            };
+            if found {
+                return true;
+            }
+        }
+        false
     }
 }
 

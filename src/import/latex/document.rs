@@ -43,26 +43,20 @@ pub(super) fn items(file: &str, tokens: Vec<Token>, text: &str) -> Result<Vec<It
     let mut expander = Expander::new(file, tokens, text);
     let mut items = Vec::new();
     while let Some(token) = expander.next()? {
-        let item = match &token.kind {
-            Kind::Comment(text) => Some(Item::Comment(text.clone())),
-            Kind::Begin(name) if name == "document" => {
-                begin_document(file, &mut items)?;
-                None
-            }
-            Kind::Begin(name) if is_one_of(LAYOUTS, name) || is_one_of(CASES, name) => {
+        match (&token.kind, token.name()) {
+            (Kind::Comment(text), _) => items.push(Item::Comment(text.clone())),
+            (Kind::Begin(name), _) if name == "document" => begin_document(file, &mut items)?,
+            (Kind::Begin(name), _) if is_one_of(LAYOUTS, name) || is_one_of(CASES, name) => {
                 if is_one_of(WITH_COLUMNS, name) {
                     expander.skip_group();
                 }
-                Some(display(&mut expander, &token)?)
+                items.push(display(&mut expander, &token)?);
             }
-            Kind::Display => Some(display(&mut expander, &token)?),
-            Kind::Command(name) if name == "[" => Some(display(&mut expander, &token)?),
-            Kind::Command(name) if name == "(" => inline(&mut expander)?,
-            Kind::Begin(name) if name == "math" => inline(&mut expander)?,
-            Kind::Dollar => inline(&mut expander)?,
-            _ => None,
-        };
-        items.extend(item);
+            (Kind::Display, _) | (_, "[") => items.push(display(&mut expander, &token)?),
+            (Kind::Begin(name), _) if name == "math" => items.extend(inline(&mut expander)?),
+            (Kind::Dollar, _) | (_, "(") => items.extend(inline(&mut expander)?),
+            _ => {}
+        }
     }
     Ok(items)
 }
@@ -85,19 +79,12 @@ fn begin_document(file: &str, items: &mut Vec<Item>) -> Result<(), ImportError> 
 
 /// The tokens of the formula that `start` opened, up to its end, which is passed.
 fn display(expander: &mut Expander, start: &Token) -> Result<Item, ImportError> {
-    match formula(expander, |_| false)? {
-        Some(tokens) => {
-            if let Some((token, expected)) = unread(&tokens) {
-                return Err(ImportError::at(
-                    expander.file,
-                    token.place,
-                    token.quoted(),
-                    expected,
-                ));
-            }
-            Ok(Item::Display(tokens))
-        }
-        None => expander.refuse(start, " without its end", "the end of the display"),
+    let Some(tokens) = formula(expander, |_| false)? else {
+        return expander.refuse(start, " without its end", "the end of the display");
+    };
+    match unread(&tokens) {
+        Some((token, expected)) => expander.refuse(token, "", expected),
+        None => Ok(Item::Display(tokens)),
     }
 }
 

@@ -55,21 +55,16 @@ impl<'t> Expander<'t> {
     /// The next token that is printed, or opens or closes a group.
     pub(super) fn next(&mut self) -> Result<Option<Token>, ImportError> {
         while let Some(token) = self.raw() {
-            let printed = match &token.kind {
-                Kind::Command(name) => match self.scopes.meaning(name).cloned() {
-                    Some(Meaning::Macro(found)) => self.expand(&token, &found).map(|()| None)?,
-                    Some(Meaning::Unread(refusal, matters)) => {
-                        self.unread(&token, refusal, matters)?
-                    }
-                    Some(Meaning::Same(kind)) => self.primitive(token.with(kind))?,
-                    Some(Meaning::Verbatim) | None => self.primitive(token)?,
-                },
+            let printed = match self.scopes.meaning(token.name()).cloned() {
+                Some(Meaning::Macro(found)) => self.expand(&token, &found).map(|()| None)?,
+                Some(Meaning::Unread(refusal, matters)) => self.unread(&token, refusal, matters)?,
+                Some(Meaning::Same(kind)) => self.primitive(token.with(kind))?,
                 // The end of an environment that the document defines, behind what its end printed.
-                Kind::End(_) => {
+                _ if matches!(token.kind, Kind::End(_)) => {
                     self.scopes.pass(self.file, &token)?;
                     None
                 }
-                _ => Some(token),
+                Some(Meaning::Verbatim) | None => self.primitive(token)?,
             };
             if let Some(token) = printed {
                 (self.is_global, self.is_negated) = (false, false);
@@ -97,13 +92,9 @@ impl<'t> Expander<'t> {
     }
 
     pub(super) fn takes(&mut self, wanted: &Kind) -> bool {
-        let Some(token) = self.code() else {
-            return false;
-        };
-        let found = token.kind == *wanted;
-        if !found {
-            self.pending.push(token);
-        }
+        let next = self.code();
+        let found = next.as_ref().is_some_and(|token| token.kind == *wanted);
+        self.pending.extend(next.filter(|_| !found));
         found
     }
 
@@ -190,27 +181,22 @@ impl<'t> Expander<'t> {
         }
         let before = self.pending.len();
         let mut parts = found.body.iter().rev().peekable();
+        let is_sign = |part: &&Token| part.kind == Kind::Character('#');
         while let Some(part) = parts.next() {
             match &part.kind {
                 // `##1` is the parameter of a definition inside.
-                Kind::Parameter(_)
-                    if parts
-                        .next_if(|part| part.kind == Kind::Character('#'))
-                        .is_some() =>
-                {
+                Kind::Parameter(_) if parts.next_if(is_sign).is_some() => {
                     self.pending.push(part.clone());
                 }
                 Kind::Parameter(number) => {
                     let argument = arguments.get(number.wrapping_sub(1)).into_iter().flatten();
                     self.pending.extend(argument.rev().cloned());
                 }
-                kind => {
-                    let (kind, place) = (kind.clone(), token.place);
-                    let is_spaced = part.is_spaced;
+                _ => {
+                    let place = token.place;
                     self.pending.push(Token {
-                        kind,
                         place,
-                        is_spaced,
+                        ..part.clone()
                     });
                 }
             }
@@ -219,24 +205,21 @@ impl<'t> Expander<'t> {
             }
         }
         let made = 1 + self.pending.len() - before;
-        match self.budget.checked_sub(made) {
-            Some(rest) => self.budget = rest,
-            None => {
-                return self.refuse(
-                    token,
-                    ", a macro that expands without end",
-                    "macros that end",
-                );
-            }
-        }
+        let Some(rest) = self.budget.checked_sub(made) else {
+            return self.refuse(
+                token,
+                ", a macro that expands without end",
+                "macros that end",
+            );
+        };
+        self.budget = rest;
         Ok(())
     }
 
     fn primitive(&mut self, token: Token) -> Result<Option<Token>, ImportError> {
-        let Kind::Command(name) = &token.kind else {
-            return Ok(Some(token));
-        };
-        match name.as_str() {
+        let name = token.name();
+        match name {
+            "" => return Ok(Some(token)),
             "begin" => return self.begin(token),
             "end" => return self.end(token),
             "label" => return Ok(Some(self.named(token, Kind::Label))),
@@ -252,16 +235,6 @@ impl<'t> Expander<'t> {
             }
             "makeatletter" | "makeatother" => self.scopes.has_at_letters = name == "makeatletter",
             "catcode" => return self.category(token).map(|()| None),
-            _ if has(NOT_FOLLOWED, name) => {
-                return self.refuse(&token, "", "definitions where they hold");
-            }
-            _ if has(OTHER_FILES, name) => {
-                let expected = format!(
-                    "the document in one file: latexpand {} > whole.tex",
-                    self.file
-                );
-                return self.refuse(&token, ", which prints a file that is not read", &expected);
-            }
             "csname" => {
                 let name = self.name_to("endcsname");
                 self.pending.push(token.with(Kind::Command(name)));
@@ -272,16 +245,26 @@ impl<'t> Expander<'t> {
             }
             "endinput" => self.lexer.end_after_line(),
             "stop" | "bye" => self.stop(),
+            _ if has(NOT_FOLLOWED, name) => {
+                return self.refuse(&token, "", "definitions where they hold");
+            }
+            _ if has(OTHER_FILES, name) => {
+                let whole = format!("latexpand {} > whole.tex", self.file);
+                let expected = format!("the document in one file: {whole}");
+                return self.refuse(&token, ", which prints a file that is not read", &expected);
+            }
             _ if has(PHANTOMS, name) => {
                 let is_one = self.argument().is_some();
                 if self.scopes.formula.is_some() && is_one {
-                    self.pending
-                        .extend([Kind::Close, Kind::Open].map(|kind| token.with(kind)));
+                    let empty = [Kind::Close, Kind::Open].map(|kind| token.with(kind));
+                    self.pending.extend(empty);
                     return Ok(Some(token));
                 }
             }
             _ if has(NOT_PRINTED, name) => drop(self.argument()),
-            _ if has(BY_COMMAND, name) => return Ok(Some(token.with(Kind::Begin(name.clone())))),
+            _ if has(BY_COMMAND, name) => {
+                return Ok(Some(token.with(Kind::Begin(name.to_owned()))));
+            }
             _ => match name.strip_prefix("end") {
                 Some(name) if has(BY_COMMAND, name) => {
                     return Ok(Some(token.with(Kind::End(name.to_owned()))));
@@ -296,13 +279,10 @@ impl<'t> Expander<'t> {
     /// `\catcode`\@=11`, which makes `@` a letter; other characters stay what they are here.
     fn category(&mut self, token: Token) -> Result<(), ImportError> {
         self.takes(&Kind::Character('`'));
-        let is_at = |token: &Token| token.is_command("@") || token.kind == Kind::Character('@');
-        if !self.code().as_ref().is_some_and(is_at) {
-            return self.refuse(
-                &token,
-                "",
-                "characters as LaTeX reads them; `\\makeatletter` for `@`",
-            );
+        let is_at = |token: Token| token.is_command("@") || token.kind == Kind::Character('@');
+        if !self.code().is_some_and(is_at) {
+            let expected = "characters as LaTeX reads them; `\\makeatletter` for `@`";
+            return self.refuse(&token, "", expected);
         }
         self.takes(&Kind::Character('='));
         let [first, second] = ['1', '1'].map(|digit| self.takes(&Kind::Character(digit)));
@@ -327,36 +307,41 @@ impl<'t> Expander<'t> {
         }
     }
 
+    /// Whether the document defines an environment with contents that are read.
+    fn is_environment(&self, name: &str) -> bool {
+        let meaning = self.scopes.meaning(name);
+        matches!(meaning, Some(Meaning::Macro(_) | Meaning::Unread(..)))
+    }
+
     fn begin(&mut self, token: Token) -> Result<Option<Token>, ImportError> {
         let token = self.named(token, Kind::Begin);
         let Kind::Begin(name) = &token.kind else {
             return Ok(Some(token));
         };
-        let meaning = self.scopes.meaning(name);
-        if is_one_of(VERBATIM, name) && meaning.is_none()
-            || matches!(meaning, Some(Meaning::Verbatim))
-        {
-            return match self.pending.is_empty() && self.lexer.skip_verbatim(name) {
-                true if name == "comment" && !self.lexer.is_at_line_end() => self.refuse(
-                    &token,
-                    " with text behind its end",
-                    "`\\end{comment}` in a line of its own",
-                ),
-                true => Ok(None),
-                false => self.refuse(
-                    &token,
-                    " without its end",
-                    &Kind::End(name.clone()).quoted(),
-                ),
+        let is_verbatim = match self.scopes.meaning(name) {
+            None => is_one_of(VERBATIM, name),
+            Some(meaning) => matches!(meaning, Meaning::Verbatim),
+        };
+        if is_verbatim {
+            if !self.pending.is_empty() || !self.lexer.skip_verbatim(name) {
+                let expected = Kind::End(name.clone()).quoted();
+                return self.refuse(&token, " without its end", &expected);
+            }
+            return match name == "comment" && !self.lexer.is_at_line_end() {
+                true => {
+                    let expected = "`\\end{comment}` in a line of its own";
+                    self.refuse(&token, " with text behind its end", expected)
+                }
+                false => Ok(None),
             };
         }
         if name == "lrbox" {
             return self.refuse(&token, "", "text that is printed where it stands");
         }
-        if matches!(meaning, Some(Meaning::Macro(_) | Meaning::Unread(..))) {
-            self.scopes
-                .enter(token.clone(), Some(Kind::End(name.clone())));
-            self.pending.push(token.with(Kind::Command(name.clone())));
+        if self.is_environment(name) {
+            let end = Kind::End(name.clone());
+            self.pending.push(token.with(Kind::command(name)));
+            self.scopes.enter(token, Some(end));
             return Ok(None);
         }
         Ok(Some(token))
@@ -364,50 +349,38 @@ impl<'t> Expander<'t> {
 
     fn end(&mut self, token: Token) -> Result<Option<Token>, ImportError> {
         let token = self.named(token, Kind::End);
-        let Kind::End(name) = &token.kind else {
-            return Ok(Some(token));
-        };
-        if name == "document" {
-            self.stop();
-            return Ok(None);
+        match &token.kind {
+            Kind::End(name) if name == "document" => {
+                self.stop();
+                Ok(None)
+            }
+            Kind::End(name) if self.is_environment(name) => {
+                let end = format!("end{name}");
+                let is_defined = self.scopes.meaning(&end).is_some();
+                let end = token.with(Kind::Command(end));
+                self.pending.push(token);
+                self.pending.extend(is_defined.then_some(end));
+                Ok(None)
+            }
+            _ => Ok(Some(token)),
         }
-        if matches!(
-            self.scopes.meaning(name),
-            Some(Meaning::Macro(_) | Meaning::Unread(..))
-        ) {
-            let end = format!("end{name}");
-            let is_defined = self.scopes.meaning(&end).is_some();
-            let end = token.with(Kind::Command(end));
-            self.pending.push(token);
-            self.pending.extend(is_defined.then_some(end));
-            return Ok(None);
-        }
-        Ok(Some(token))
     }
 
+    /// What is spelled before the command `end`, which is passed.
     pub(super) fn name_to(&mut self, end: &str) -> String {
-        let mut name = Vec::new();
-        while let Some(token) = self.code() {
-            if token.is_command(end) {
-                break;
-            }
-            name.push(token);
-        }
-        spelled(&name)
+        let tokens = std::iter::from_fn(|| self.code().filter(|token| !token.is_command(end)));
+        spelled(&tokens.collect::<Vec<_>>())
     }
 }
 
-pub(super) fn spelled(tokens: &[Token]) -> String {
+pub(super) fn spelled<'t>(tokens: impl IntoIterator<Item = &'t Token>) -> String {
     let mut text = String::new();
     for token in tokens {
         if token.is_spaced && !text.is_empty() {
             text.push(' ');
         }
         match &token.kind {
-            Kind::Command(name) => {
-                text.push('\\');
-                text.push_str(name);
-            }
+            Kind::Command(name) => text.extend(["\\", name]),
             Kind::Character(character) => text.push(*character),
             kind => text.push_str(kind.quoted().trim_matches('`')),
         }

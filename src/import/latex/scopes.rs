@@ -79,7 +79,8 @@ impl Scopes {
     }
 
     pub(super) fn meaning(&self, name: &str) -> Option<&Meaning> {
-        self.meanings.get(name).map(|(meaning, _)| meaning)
+        let found = self.meanings.get(name).filter(|_| !name.is_empty());
+        found.map(|(meaning, _)| meaning)
     }
 
     /// Gives a meaning to a name until the innermost scope ends, or for all the rest.
@@ -95,12 +96,11 @@ impl Scopes {
     }
 
     pub(super) fn enter(&mut self, opener: Token, closer: Option<Kind>) {
-        let earlier = Vec::new();
         self.open.push(Scope {
             opener,
             closer,
             has_at_letters: self.has_at_letters,
-            earlier,
+            earlier: Vec::new(),
         });
     }
 
@@ -109,12 +109,10 @@ impl Scopes {
             let Some(scope) = self.open.pop() else { return };
             self.has_at_letters = scope.has_at_letters;
             for (name, before) in scope.earlier.into_iter().rev() {
-                let is_for_all = self
-                    .meanings
-                    .get(&name)
-                    .is_some_and(|(_, level)| *level == 0);
+                let current = self.meanings.get(&name);
                 match before {
-                    _ if is_for_all => {}
+                    // Defined for all the rest since.
+                    _ if current.is_some_and(|(_, level)| *level == 0) => {}
                     Some(before) => drop(self.meanings.insert(name, before)),
                     None => drop(self.meanings.remove(&name)),
                 }
@@ -128,30 +126,21 @@ impl Scopes {
     /// For what closes something else than what is open. Inside a formula that is left to its reader, but for
     /// `\begingroup`, which it does not see.
     pub(super) fn pass(&mut self, file: &str, token: &Token) -> Result<(), ImportError> {
-        let command = |name: &str| Some(Kind::Command(name.to_owned()));
-        let is_open = |kind: &Kind| {
-            self.open
-                .last()
-                .is_some_and(|scope| scope.opener.kind == *kind)
-        };
-        let closer = match &token.kind {
-            Kind::Open => Some(Kind::Close),
-            kind @ (Kind::Dollar | Kind::Display) if !is_open(kind) => Some(kind.clone()),
-            Kind::Begin(name) => Some(Kind::End(name.clone())),
-            Kind::Command(name) => match name.as_str() {
-                "begingroup" => command("endgroup"),
-                "[" => command("]"),
-                "(" => command(")"),
-                "left" if self.formula.is_some() => command("right"),
-                "endgroup" | "]" | ")" => return self.leave(file, token),
-                "right" if self.formula.is_some() => return self.leave(file, token),
-                _ => return Ok(()),
-            },
-            Kind::Close | Kind::End(_) | Kind::Dollar | Kind::Display => {
-                return self.leave(file, token);
-            }
-            Kind::Align | Kind::Break => {
-                if self.open.last().is_some_and(|scope| scope.closer.is_none()) {
+        let innermost = self.open.last();
+        let is_open = |kind: &Kind| innermost.is_some_and(|scope| scope.opener.kind == *kind);
+        let closer = match (&token.kind, token.name()) {
+            (Kind::Open, _) => Kind::Close,
+            (kind @ (Kind::Dollar | Kind::Display), _) if !is_open(kind) => kind.clone(),
+            (Kind::Begin(name), _) => Kind::End(name.clone()),
+            (_, "begingroup") => Kind::command("endgroup"),
+            (_, "[") => Kind::command("]"),
+            (_, "(") => Kind::command(")"),
+            (_, "left") if self.formula.is_some() => Kind::command("right"),
+            (_, "right") if self.formula.is_none() => return Ok(()),
+            (Kind::Close | Kind::End(_) | Kind::Dollar | Kind::Display, _)
+            | (_, "endgroup" | "]" | ")" | "right") => return self.leave(file, token),
+            (Kind::Align | Kind::Break, _) => {
+                if innermost.is_some_and(|scope| scope.closer.is_none()) {
                     self.leave_to(self.open.len() - 1);
                     self.enter(token.clone(), None);
                 }
@@ -159,7 +148,7 @@ impl Scopes {
             }
             _ => return Ok(()),
         };
-        self.enter(token.clone(), closer);
+        self.enter(token.clone(), Some(closer));
         if matches!(&token.kind, Kind::Begin(name) if has_cells(name)) {
             self.enter(token.clone(), None);
         }
@@ -201,8 +190,6 @@ impl Scopes {
 }
 
 fn has_cells(name: &str) -> bool {
-    [LAYOUTS, CASES, WITH_CELLS]
-        .iter()
-        .any(|list| is_one_of(list, name))
-        && !is_one_of(WITHOUT_CELLS, name)
+    let mut lists = [LAYOUTS, CASES, WITH_CELLS].into_iter();
+    lists.any(|list| is_one_of(list, name)) && !is_one_of(WITHOUT_CELLS, name)
 }

@@ -1,7 +1,6 @@
 //! Tokens of LaTeX with their places, as TeX takes them from a file: one after the other.
 
 use std::collections::VecDeque;
-use std::str::Lines;
 
 const MINUS: char = '\u{2212}';
 
@@ -41,6 +40,10 @@ pub(super) enum Kind {
 }
 
 impl Kind {
+    pub(super) fn command(name: &str) -> Self {
+        Kind::Command(name.to_owned())
+    }
+
     pub(super) fn quoted(&self) -> String {
         let text = match self {
             Kind::Command(name) => format!("\\{name}"),
@@ -78,12 +81,7 @@ impl Kind {
 
 impl Token {
     pub(super) fn with(&self, kind: Kind) -> Self {
-        let (place, is_spaced) = (self.place, self.is_spaced);
-        Self {
-            kind,
-            place,
-            is_spaced,
-        }
+        Self { kind, ..*self }
     }
 
     pub(super) fn quoted(&self) -> String {
@@ -92,6 +90,14 @@ impl Token {
 
     pub(super) fn is_command(&self, name: &str) -> bool {
         matches!(&self.kind, Kind::Command(command) if command == name)
+    }
+
+    /// The name of a command, empty for other tokens.
+    pub(super) fn name(&self) -> &str {
+        match &self.kind {
+            Kind::Command(name) => name,
+            _ => "",
+        }
     }
 }
 
@@ -112,12 +118,10 @@ pub(super) fn group_length<'t>(tokens: impl Iterator<Item = &'t Token>) -> Optio
 }
 
 pub(super) struct Lexer<'t> {
-    /// The lines after the one that is read.
-    lines: Lines<'t>,
-    characters: Vec<char>,
-    next: usize,
-    number: usize,
-    start: usize,
+    rest: &'t str,
+    /// Line and column of the rest.
+    place: (usize, usize),
+    starts_line: bool,
     is_spaced: bool,
     /// What one character made besides the last token.
     queued: VecDeque<Token>,
@@ -133,24 +137,23 @@ impl Iterator for Lexer<'_> {
             if let Some(token) = self.queued.pop_front() {
                 return Some(token);
             }
-            let Some(first) = self.peek(0) else {
-                self.next_line()?;
-                continue;
-            };
-            if first.is_whitespace() {
-                self.next += 1;
+            let first = self.peek(0)?;
+            if std::mem::take(&mut self.starts_line) {
                 self.is_spaced = true;
-                continue;
-            }
-            let place = (self.number, self.start + self.next);
-            let of_unicode = self.dotted_or_raised(first);
-            for kind in of_unicode.unwrap_or_else(|| vec![self.token(first)]) {
-                let is_spaced = std::mem::take(&mut self.is_spaced);
-                self.queued.push_back(Token {
-                    kind,
-                    place,
-                    is_spaced,
-                });
+                if self.line().trim().is_empty() {
+                    self.queue(vec![Kind::Paragraph], self.place);
+                    self.is_spaced = true;
+                }
+            } else if first == '\n' {
+                self.next_line();
+            } else if first.is_whitespace() {
+                self.pass(first.len_utf8());
+                self.is_spaced = true;
+            } else {
+                let place = self.place;
+                let of_unicode = self.dotted().or_else(|| self.raised());
+                let kinds = of_unicode.unwrap_or_else(|| vec![self.token(first)]);
+                self.queue(kinds, place);
             }
         }
     }
@@ -158,153 +161,164 @@ impl Iterator for Lexer<'_> {
 
 impl<'t> Lexer<'t> {
     pub(super) fn new(text: &'t str) -> Self {
+        Self::of_part(text, (1, 1))
+    }
+
+    /// The tokens of a part of a line that starts at `place`.
+    pub(super) fn of_part(text: &'t str, place: (usize, usize)) -> Self {
         Self {
-            lines: text.lines(),
-            characters: Vec::new(),
-            next: 0,
-            number: 0,
-            start: 1,
+            rest: text,
+            place,
+            starts_line: true,
             is_spaced: true,
             queued: VecDeque::new(),
             has_at_letters: false,
         }
     }
 
-    /// The tokens of a part of a line that starts at `place`.
-    pub(super) fn of_part(text: &'t str, (number, start): (usize, usize)) -> Self {
-        let mut lexer = Self::new(text);
-        (lexer.number, lexer.start) = (number - 1, start);
-        lexer
-    }
-
-    /// Goes to the next line; an empty one ends a paragraph.
-    fn next_line(&mut self) -> Option<()> {
-        let line = self.lines.next()?;
-        self.number += 1;
-        (self.characters, self.next, self.is_spaced) = (line.chars().collect(), 0, true);
-        if line.trim().is_empty() {
+    fn queue(&mut self, kinds: Vec<Kind>, place: (usize, usize)) {
+        for kind in kinds {
+            let is_spaced = std::mem::take(&mut self.is_spaced);
             self.queued.push_back(Token {
-                kind: Kind::Paragraph,
-                place: (self.number, self.start),
-                is_spaced: true,
+                kind,
+                place,
+                is_spaced,
             });
         }
-        Some(())
+    }
+
+    /// The rest of the line.
+    fn line(&self) -> &'t str {
+        self.rest.lines().next().unwrap_or("")
+    }
+
+    /// Passes so many bytes of the line.
+    fn pass(&mut self, length: usize) {
+        let (passed, rest) = self.rest.split_at(length);
+        self.place.1 += passed.chars().count();
+        self.rest = rest;
+    }
+
+    fn next_line(&mut self) {
+        self.rest = self.rest.split_once('\n').map_or("", |(_, rest)| rest);
+        self.place = (self.place.0 + 1, 1);
+        self.starts_line = true;
     }
 
     /// Ends the text behind the line that is read.
     pub(super) fn end_after_line(&mut self) {
-        self.lines = "".lines();
+        self.rest = self.line();
     }
 
     pub(super) fn end(&mut self) {
-        self.end_after_line();
-        self.next = self.characters.len();
+        self.rest = "";
     }
 
     pub(super) fn is_at(&self, character: char) -> bool {
-        self.peek(0) == Some(character)
+        self.rest.starts_with(character)
     }
 
     /// Passes `|...|` behind `\verb`, or a group without a look into it.
     pub(super) fn skip_verb(&mut self) {
-        let rest = self.characters[self.next..].iter();
-        let mut rest = rest.enumerate().skip_while(|(_, c)| **c == '*');
-        let Some((_, open)) = rest.next() else { return };
+        let line = self.line();
+        let inside = line.trim_start_matches('*');
+        let Some(open) = inside.chars().next() else {
+            return;
+        };
         let close = match open {
             '{' => '}',
             '[' => ']',
-            other => *other,
+            other => other,
         };
-        let behind = rest.find(|(_, c)| **c == close);
-        self.next = behind.map_or(self.characters.len(), |(at, _)| self.next + at + 1);
+        let start = line.len() - inside.len() + open.len_utf8();
+        let length = line[start..].find(close);
+        self.pass(length.map_or(line.len(), |length| start + length + close.len_utf8()));
     }
 
     /// Passes everything up to `\end{name}` and that; whether it is there.
     pub(super) fn skip_verbatim(&mut self, name: &str) -> bool {
         let end = format!("\\end{{{name}}}");
-        loop {
-            let rest: String = self.characters[self.next..].iter().collect();
-            if let Some(at) = rest.find(&end) {
-                self.next += rest[..at].chars().count() + end.chars().count();
+        while !self.rest.is_empty() {
+            let line = self.line();
+            if let Some(at) = line.find(&end) {
+                self.pass(at + end.len());
+                self.starts_line = false;
                 return true;
             }
-            self.next = self.characters.len();
-            if self.next_line().is_none() {
-                return false;
-            }
-            self.queued.clear();
+            self.next_line();
         }
+        false
     }
 
     pub(super) fn is_at_line_end(&self) -> bool {
-        self.characters[self.next..]
-            .iter()
-            .all(|c| c.is_whitespace())
+        self.line().trim().is_empty()
     }
 
     fn peek(&self, ahead: usize) -> Option<char> {
-        self.characters.get(self.next + ahead).copied()
+        self.rest.chars().nth(ahead)
     }
 
-    fn take_while(&mut self, accepts: impl Fn(char) -> bool) -> String {
-        let start = self.next;
-        while self.peek(0).is_some_and(&accepts) {
-            self.next += 1;
-        }
-        self.characters[start..self.next].iter().collect()
+    fn take_while(&mut self, accepts: impl Fn(char) -> bool) -> &'t str {
+        let text = self.rest;
+        let length = text.find(|c| !accepts(c)).unwrap_or(text.len());
+        self.pass(length);
+        &text[..length]
     }
 
     fn token(&mut self, first: char) -> Kind {
-        self.next += 1;
+        self.pass(first.len_utf8());
         match first {
             '\\' => self.command(),
             '%' => {
-                let rest = self.characters[self.next..].iter().collect::<String>();
-                self.next = self.characters.len();
-                Kind::Comment(rest.trim().to_owned())
+                let line = self.line();
+                self.pass(line.len());
+                Kind::Comment(line.trim().to_owned())
             }
             '{' => Kind::Open,
             '}' => Kind::Close,
             '^' => Kind::Superscript,
             '_' => Kind::Subscript,
             '&' => Kind::Align,
-            '$' if self.peek(0) == Some('$') => {
-                self.next += 1;
+            '$' if self.is_at('$') => {
+                self.pass(1);
                 Kind::Display
             }
             '$' => Kind::Dollar,
             '#' => match self.peek(0).and_then(|c| c.to_digit(10)) {
                 Some(digit) => {
-                    self.next += 1;
+                    self.pass(1);
                     Kind::Parameter(digit as usize)
                 }
                 None => Kind::Character('#'),
             },
             MINUS => Kind::Character('-'),
-            '·' | '⋅' | '×' => Kind::Command("cdot".to_owned()),
+            '·' | '⋅' | '×' => Kind::command("cdot"),
             _ => Kind::Character(first),
         }
     }
 
-    /// The tokens of a letter with dots above it, or of raised or lowered digits.
-    fn dotted_or_raised(&mut self, first: char) -> Option<Vec<Kind>> {
-        const DOTTED: [(char, char, &str); 5] = [
-            ('ż', 'z', "dot"),
-            ('ẋ', 'x', "dot"),
-            ('ẏ', 'y', "dot"),
-            ('ẍ', 'x', "ddot"),
-            ('ÿ', 'y', "ddot"),
-        ];
-        let precomposed = DOTTED.iter().find(|(dotted, ..)| *dotted == first);
-        let (letter, dots, length) = match (precomposed, self.peek(1)) {
-            (Some(&(_, letter, dots)), _) => (letter, dots, 1),
-            (None, Some('\u{307}')) => (first, "dot", 2),
-            (None, Some('\u{308}')) => (first, "ddot", 2),
-            (None, _) => return self.raised(),
+    /// The tokens of a letter with dots above it.
+    fn dotted(&mut self) -> Option<Vec<Kind>> {
+        let first = self.peek(0)?;
+        let (letter, dots) = match first {
+            'ż' => ('z', "dot"),
+            'ẋ' => ('x', "dot"),
+            'ẏ' => ('y', "dot"),
+            'ẍ' => ('x', "ddot"),
+            'ÿ' => ('y', "ddot"),
+            _ => match self.peek(1)? {
+                '\u{307}' => (first, "dot"),
+                '\u{308}' => (first, "ddot"),
+                _ => return None,
+            },
         };
-        self.next += length;
-        let dots = Kind::Command(dots.to_owned());
+        let marks = if letter == first {
+            '\u{307}'.len_utf8()
+        } else {
+            0
+        };
+        self.pass(first.len_utf8() + marks);
+        let dots = Kind::command(dots);
         Some(vec![dots, Kind::Character(letter)])
     }
 
@@ -317,59 +331,49 @@ impl<'t> Lexer<'t> {
             true => (LOWERED, Kind::Subscript),
             false => (RAISED, Kind::Superscript),
         };
-        let is_negative = first == '⁻' && self.peek(1).is_some_and(|c| RAISED.contains(c));
         let mut kinds = vec![kind, Kind::Open];
-        if is_negative {
-            self.next += 1;
+        if first == '⁻' && self.peek(1).is_some_and(|c| RAISED.contains(c)) {
+            self.pass(first.len_utf8());
             kinds.push(Kind::Character('-'));
         }
-        let number = self.take_while(|c| digits.contains(c));
-        let values = number
-            .chars()
-            .filter_map(|c| digits.chars().position(|d| d == c));
+        let number = self.take_while(|c| digits.contains(c)).chars();
+        let values = number.filter_map(|c| digits.chars().position(|d| d == c));
         let digits = values.filter_map(|value| char::from_digit(value as u32, 10));
         kinds.extend(digits.map(Kind::Character));
         kinds.push(Kind::Close);
-        (!number.is_empty()).then_some(kinds)
+        (kinds.len() > 3).then_some(kinds)
     }
 
     fn command(&mut self) -> Kind {
         let has_at_letters = self.has_at_letters;
         let name = self.take_while(|c| c.is_ascii_alphabetic() || has_at_letters && c == '@');
-        if name.is_empty() {
-            let Some(symbol) = self.peek(0) else {
-                return Kind::Command(" ".to_owned());
-            };
-            self.next += 1;
-            if symbol == '\\' {
+        let symbol = self.line().chars().next();
+        match (name, symbol) {
+            ("newline", _) => Kind::Break,
+            ("", None) => Kind::command(" "),
+            ("", Some(symbol)) => {
+                self.pass(symbol.len_utf8());
+                if symbol != '\\' {
+                    return Kind::Command(symbol.to_string());
+                }
                 self.skip_distance();
-                return Kind::Break;
+                Kind::Break
             }
-            return Kind::Command(symbol.to_string());
-        }
-        match name.as_str() {
-            "newline" => Kind::Break,
-            _ => Kind::Command(name),
+            _ => Kind::command(name),
         }
     }
 
     /// The star and the distance in brackets that may follow `\\`.
     fn skip_distance(&mut self) {
-        if self.peek(0) == Some('*') {
-            self.next += 1;
-        }
-        let rest = &self.characters[self.next..];
-        let open = rest.iter().take_while(|c| **c == ' ').count();
-        let Some(close) = rest.iter().position(|c| *c == ']') else {
-            return;
-        };
-        let is_distance = rest.get(open) == Some(&'[')
-            && close > open + 1
-            && (rest[open + 1..close].iter())
-                .all(|c| c.is_ascii_alphanumeric() || " .-\\".contains(*c))
-            && rest[close - 1].is_ascii_alphabetic();
-        if is_distance {
-            self.next += close + 1;
+        self.pass(usize::from(self.is_at('*')));
+        let start = self.rest.trim_start_matches(' ');
+        let inside = start.strip_prefix('[').unwrap_or("");
+        let is_part = |c: char| c.is_ascii_alphanumeric() || " .-\\".contains(c);
+        let distance = inside.split(|c| !is_part(c)).next().unwrap_or("");
+        if inside[distance.len()..].starts_with(']')
+            && distance.ends_with(|c: char| c.is_ascii_alphabetic())
+        {
+            self.pass(self.rest.len() - inside.len() + distance.len() + 1);
         }
     }
 }

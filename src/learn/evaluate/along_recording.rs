@@ -22,8 +22,7 @@
 use std::collections::BTreeMap;
 use std::time::Instant;
 
-use super::control::{Summary, Tally};
-use super::control_metrics::ControlMetrics;
+use super::control_metrics::{ControlMetrics, Summary, Tally};
 use super::torque::{Comparison, exceeds, is_plausible};
 use crate::mpc::{
     Command, Controller, Lift, Measurement, MpcError, ReferenceSamples, STEP_SLACK, StanceState,

@@ -3,7 +3,7 @@
 
 use nalgebra::DMatrix;
 
-use super::error::EvaluateError;
+use super::assessment::EvaluateError;
 use crate::model::{LibraryChoice, LibraryOrder, ModelError, ReducedModel};
 use crate::recording::Segment;
 use crate::sim::LatentSegment;

@@ -10,40 +10,30 @@
 mod along_recording;
 mod aslip;
 mod assessment;
-mod baseline;
 mod coefficient_trials;
-mod control;
 mod control_metrics;
 mod coordinates;
-mod error;
 mod invariance;
-mod lift;
 mod linearised;
 mod metrics;
 mod prediction;
 mod recovery;
-mod remarks;
 mod round_trip;
 mod torque;
 mod verdict;
 
 pub use along_recording::{ReferenceInput, Run, StepRow, along_recording, lift_comparison};
-pub use aslip::{Aslip, AslipSums};
-pub use assessment::{Assessment, SegmentRun};
-pub use baseline::Baseline;
-pub use control::Summary;
-pub use control_metrics::{ControlMetrics, control_metrics, usual_settings};
+pub use aslip::{Aslip, AslipSums, Baseline};
+pub use assessment::{Assessment, EvaluateError, SegmentRun, remarks};
+pub use control_metrics::{ControlMetrics, Summary, control_metrics, usual_settings};
 pub use coordinates::{CoordinateSums, PointwiseSums};
-pub use error::EvaluateError;
 pub use invariance::Invariance;
-pub use lift::{LAMBDA, combined_loss};
 pub(crate) use linearised::state_matrix;
 pub use linearised::{LinearisedPhase, eigenvalues, linearise_phases};
 pub use metrics::{Fit, FitSums};
 pub use prediction::PredictionError;
-pub use remarks::remarks;
 pub use round_trip::RoundTrip;
-pub use torque::{ByContact, Comparison, is_plausible};
+pub use torque::{ByContact, Comparison, LAMBDA, combined_loss, is_plausible};
 pub use verdict::{AFTER_A_PUSH, Bound, TORQUES_IN_CONTACT, Verdict, verdict, verdict_by_default};
 
 /// A model of the project's own, by the name of its file.

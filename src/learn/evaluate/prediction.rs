@@ -4,7 +4,7 @@
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
-use super::error::EvaluateError;
+use super::assessment::EvaluateError;
 use crate::lower::CompiledModel;
 use crate::model::{Library, Phase, ReducedModel};
 use crate::recording::Recording;

@@ -3,9 +3,9 @@
 
 use nalgebra::DVector;
 
+use super::assessment::EvaluateError;
 use super::coefficient_trials::{CoefficientSlip, CoefficientTrials, GOOD_R2};
 use super::coordinates::PointwiseSums;
-use super::error::EvaluateError;
 use super::metrics::FitSums;
 use crate::model::{CoordinateOrder, LibraryOrder, ModelError, ReducedModel, StateMap};
 use crate::recording::Segment;
@@ -83,7 +83,7 @@ impl RoundTrip {
             return Ok(None);
         }
         let samples = Samples::new((encoder, decoder), model.state_factors()?, segments);
-        let error = samples.error(&samples.with(&Slip::default()))?;
+        let error = samples.error(&Slip::default())?;
         let best = samples.best_slip()?;
         let is_explained =
             |found: f64| error > SMALL_ERROR && EXPLAINED * found < error && found < UNEXPLAINED;
@@ -237,13 +237,6 @@ impl ScalingSlip {
     }
 }
 
-/// How file coordinates follow from recorded ones: `y_k = factor_k (x_order(k) - mean_order(k))`.
-struct Reading {
-    order: [usize; STATE_DIM],
-    factors: DVector<f64>,
-    mean: DVector<f64>,
-}
-
 struct Samples<'m> {
     encoder: &'m StateMap,
     decoder: &'m StateMap,
@@ -277,34 +270,28 @@ impl<'m> Samples<'m> {
         }
     }
 
-    fn with(&self, slip: &Slip) -> Reading {
+    /// Mean square of the round trip's residual over that of the deviation, where file coordinates follow from recorded
+    /// ones by a slip: `y_k = factor_k (x_order(k) - mean_order(k))`.
+    fn error(&self, slip: &Slip) -> Result<f64, ModelError> {
         let same = std::array::from_fn(|k| k);
         let order = slip.order.as_ref().map_or(same, |order| *order.places());
         let none = DVector::zeros(STATE_DIM);
-        let (factors, mean) = match slip.scaling {
-            None => (self.factors.clone(), none),
-            Some(ScalingSlip::Factor(factor)) => (self.factors.map(|_| factor), none),
-            Some(ScalingSlip::Centred) => (self.factors.clone(), self.mean.clone()),
+        let factors = match slip.scaling {
+            None | Some(ScalingSlip::Centred) => self.factors.clone(),
+            Some(ScalingSlip::Factor(factor)) => self.factors.map(|_| factor),
+            // Factors of coordinates, not of places.
             Some(ScalingSlip::Standardised) => {
-                // Factors of coordinates, not of places.
-                let factor = |k: usize, _| 1.0 / self.deviation[order[k]].max(1e-9);
-                (DVector::from_fn(STATE_DIM, factor), self.mean.clone())
+                DVector::from_fn(STATE_DIM, |k, _| 1.0 / self.deviation[order[k]].max(1e-9))
             }
         };
-        Reading {
-            order,
-            factors,
-            mean,
-        }
-    }
-
-    /// Mean square of the round trip's residual over that of the deviation.
-    fn error(&self, reading: &Reading) -> Result<f64, ModelError> {
+        let mean = match slip.scaling {
+            None | Some(ScalingSlip::Factor(_)) => &none,
+            Some(ScalingSlip::Centred | ScalingSlip::Standardised) => &self.mean,
+        };
         let mut sums = vec![FitSums::default(); STATE_DIM];
         for x in &self.x {
             let y = DVector::from_fn(STATE_DIM, |k, _| {
-                let from = reading.order[k];
-                reading.factors[k] * (x[from] - reading.mean[from])
+                factors[k] * (x[order[k]] - mean[order[k]])
             });
             let back = self.decoder.apply(&self.encoder.apply(&y)?)?;
             for ((sums, &y), &back) in sums.iter_mut().zip(&y).zip(&back) {
@@ -318,30 +305,23 @@ impl<'m> Samples<'m> {
     /// The slip with the smallest error; two at once only where one is not enough.
     fn best_slip(&self) -> Result<Option<(Slip, f64)>, ModelError> {
         use ScalingSlip::{Centred, Factor, Standardised};
-        let orders = CoordinateOrder::common();
-        let of_order = |order: &CoordinateOrder, scaling| Slip {
-            order: Some(order.clone()),
-            scaling,
-        };
+        let orders: Vec<_> = CoordinateOrder::common().into_iter().map(Some).collect();
+        let both = [Centred, Standardised];
         let factors = [1.0, 0.1, 10.0, 0.01, 100.0].map(Factor);
-        let scalings = factors.into_iter().chain([Centred, Standardised]);
-        let scalings = scalings.map(|scaling| Slip {
-            order: None,
-            scaling: Some(scaling),
-        });
-        let one = orders
-            .iter()
-            .map(|order| of_order(order, None))
-            .chain(scalings);
+        let one = (orders.iter().map(|order| (order.clone(), None))).chain(
+            factors
+                .into_iter()
+                .chain(both)
+                .map(|scaling| (None, Some(scaling))),
+        );
         let best = self.best_of(one)?;
         let error_of = |found: &Option<(Slip, f64)>| found.as_ref().map_or(f64::MAX, |f| f.1);
         if error_of(&best) < SMALL_ERROR * EXPLAINED {
             return Ok(best);
         }
-        let two = orders.iter().flat_map(|order| {
-            [Centred, Standardised].map(|scaling| of_order(order, Some(scaling)))
-        });
-        let two = self.best_of(two)?;
+        let with_both =
+            |order: &Option<CoordinateOrder>| both.map(|scaling| (order.clone(), Some(scaling)));
+        let two = self.best_of(orders.iter().flat_map(with_both))?;
         Ok(match EXPLAINED * error_of(&two) < error_of(&best) {
             true => two,
             false => best,
@@ -350,16 +330,16 @@ impl<'m> Samples<'m> {
 
     fn best_of(
         &self,
-        slips: impl Iterator<Item = Slip>,
+        slips: impl Iterator<Item = (Option<CoordinateOrder>, Option<ScalingSlip>)>,
     ) -> Result<Option<(Slip, f64)>, ModelError> {
-        let mut found: Vec<(Slip, f64)> = Vec::new();
-        for slip in slips {
-            let error = self.error(&self.with(&slip))?;
-            found.push((slip, error));
-        }
-        let errors = found.iter().map(|(_, error)| *error);
-        let least = errors.fold(f64::INFINITY, f64::min);
-        Ok(found.into_iter().find(|(_, error)| *error <= ALIKE * least))
+        let slips = slips.map(|(order, scaling)| Slip { order, scaling });
+        let found = slips.map(|slip| Ok((self.error(&slip)?, slip)));
+        let found: Vec<(f64, Slip)> = found.collect::<Result<_, ModelError>>()?;
+        let least = found
+            .iter()
+            .fold(f64::INFINITY, |least, (error, _)| least.min(*error));
+        let mut found = found.into_iter().map(|(error, slip)| (slip, error));
+        Ok(found.find(|(_, error)| *error <= ALIKE * least))
     }
 }
 

@@ -5,10 +5,9 @@
 
 use serde::Serialize;
 
-use super::assessment::Assessment;
+use super::assessment::{Assessment, EvaluateError};
 use super::control_metrics::{ControlMetrics, control_metrics, usual_settings};
 use super::coordinates::CoordinateSums;
-use super::error::EvaluateError;
 use super::linearised::LinearisedPhase;
 use crate::model::ReducedModel;
 use crate::recording::Recording;

@@ -1,5 +1,7 @@
 //! Affine expressions of a program's variables, and sparse matrices made of them.
 
+use std::ops::{Add, Div, Mul, Sub};
+
 use crate::mpc::{Cone, ConeProgram, sparse};
 
 /// `constant + sum of factor times variable`.
@@ -15,27 +17,64 @@ impl Affine {
         Self { terms, constant }
     }
 
-    pub(crate) fn add(&mut self, variable: usize, factor: f64) {
+    /// The expression with `factor` times a variable on top.
+    pub(crate) fn plus(mut self, variable: usize, factor: f64) -> Self {
         if factor != 0.0 {
             self.terms.push((variable, factor));
         }
-    }
-
-    /// The expression with `factor` times a variable on top.
-    pub(crate) fn plus(mut self, variable: usize, factor: f64) -> Self {
-        self.add(variable, factor);
         self
-    }
-
-    pub(crate) fn add_scaled(&mut self, other: &Affine, factor: f64) {
-        self.constant += factor * other.constant;
-        for &(variable, f) in &other.terms {
-            self.add(variable, factor * f);
-        }
     }
 
     pub(crate) fn at(&self, y: &[f64]) -> f64 {
         self.constant + self.terms.iter().map(|&(i, f)| f * y[i]).sum::<f64>()
+    }
+}
+
+impl Add for Affine {
+    type Output = Self;
+
+    fn add(mut self, other: Self) -> Self {
+        self.constant += other.constant;
+        self.terms.extend(other.terms);
+        self
+    }
+}
+
+impl Sub for Affine {
+    type Output = Self;
+
+    fn sub(self, other: Self) -> Self {
+        self + other * -1.0
+    }
+}
+
+impl Add<f64> for Affine {
+    type Output = Self;
+
+    fn add(mut self, constant: f64) -> Self {
+        self.constant += constant;
+        self
+    }
+}
+
+impl Mul<f64> for Affine {
+    type Output = Self;
+
+    fn mul(mut self, factor: f64) -> Self {
+        self.constant *= factor;
+        self.terms.iter_mut().for_each(|(_, f)| *f *= factor);
+        self.terms.retain(|(_, f)| *f != 0.0);
+        self
+    }
+}
+
+impl Div<f64> for Affine {
+    type Output = Self;
+
+    fn div(mut self, unit: f64) -> Self {
+        self.constant /= unit;
+        self.terms.iter_mut().for_each(|(_, f)| *f /= unit);
+        self
     }
 }
 

@@ -76,19 +76,17 @@ fn add_feet(task: &Task<'_>, y: &[f64], part: usize, out: &mut Vec<(Affine, f64)
     let (settings, of) = (task.settings, &task.seed.parts[part]);
     let anchor_part = task.anchor_part(part);
     let time = of.duration_s / of.intervals() as f64 / TIME_UNIT_S;
-    let count = Leg::down(of.part.feet).count();
-    for leg in Leg::down(of.part.feet) {
+    let count = Leg::down(of.landmark.feet).count();
+    for leg in Leg::down(of.landmark.feet) {
         let anchor = moved_foot(task, y, leg, (anchor_part, 0));
         for node in 0..of.z.len() {
             if (part, node) == (anchor_part, 0) {
                 continue;
             }
-            for (axis, mut slip) in moved_foot(task, y, leg, (part, node))
-                .into_iter()
-                .enumerate()
-            {
+            let moved = moved_foot(task, y, leg, (part, node));
+            for (axis, mut slip) in moved.into_iter().enumerate() {
                 if axis == 0 || anchor_part == 0 {
-                    slip.add_scaled(&anchor[axis], -1.0);
+                    slip = slip - anchor[axis].clone();
                 }
                 let unit = settings.foot_m[axis];
                 out.push((slip, settings.feet / count as f64 * time / (unit * unit)));
@@ -108,13 +106,11 @@ pub(crate) fn moved_foot(
     let now = foot_place(task.seed, leg, &z);
     let before = foot_place(task.seed, leg, &task.seed.parts[part].z[node]);
     std::array::from_fn(|axis| {
-        let mut moved = Affine::of(now.at[axis] - before.at[axis]);
-        for i in 0..task.seed.latent_dim {
+        let moved = Affine::of(now.at[axis] - before.at[axis]);
+        (0..task.seed.latent_dim).fold(moved, |moved, i| {
             let slope = now.by_z[(axis, i)];
-            moved.add_scaled(&task.latent(part, node, i), slope);
-            moved.constant -= slope * z[i];
-        }
-        moved
+            moved + task.latent(part, node, i) * slope + -(slope * z[i])
+        })
     })
 }
 

@@ -1,7 +1,5 @@
 //! Why there is no plan.
 
-#![allow(missing_docs, reason = "each variant's message names its fields")]
-
 use thiserror::Error;
 
 use crate::lower::LowerError;
@@ -9,7 +7,6 @@ use crate::model::ModelError;
 use crate::mpc::{ControlError, Outcome};
 use crate::recording::RecordingError;
 
-/// Why a jump could not be planned.
 #[derive(Debug, Error)]
 pub enum PlanError {
     #[error("{what}: found {found}, expected {expected}")]

@@ -16,10 +16,6 @@ pub struct Goal {
 impl Goal {
     /// A jump forwards by `distance_m`, during which the body rises `apex_m` above its height at the
     /// start; from the mean start of the model's training jumps.
-    ///
-    /// # Errors
-    /// [`PlanError::Goal`] for numbers that are not finite, a jump that goes nowhere or backwards, and
-    /// an apex that is not above the start.
     pub fn new(distance_m: f64, apex_m: f64) -> Result<Self, PlanError> {
         let above = " above the height at the start";
         for (what, found, above) in [("distance", distance_m, ""), ("apex", apex_m, above)] {

@@ -34,19 +34,17 @@ pub struct Margins {
 
 /// The motion of a point and its margins: samples at equal distances from the start to the planned end, as close to
 /// `sample_time_s` apart as a whole number of steps allows.
-///
-/// # Errors
-/// [`PlanError::Recording`] if a sample makes no input.
 pub(crate) fn motion(
     task: &Task<'_>,
     y: &[f64],
     sample_time_s: f64,
 ) -> Result<(Segment, Margins), PlanError> {
     let durations = (0..task.seed.parts.len()).map(|part| task.duration_s(part, y));
-    let mut ends: Vec<f64> = Vec::new();
-    for duration in durations {
-        ends.push(ends.last().unwrap_or(&0.0) + duration);
-    }
+    let ends = durations.scan(0.0, |end, duration| {
+        *end += duration;
+        Some(*end)
+    });
+    let ends: Vec<f64> = ends.collect();
     let total = ends[ends.len() - 1];
     let steps = (total / sample_time_s).round().max(1.0) as usize;
     let count = steps + 1;
@@ -63,7 +61,7 @@ pub(crate) fn motion(
         motion.dx.set_column(sample, &(&task.seed.decode * at.dz));
         motion.ddx.set_column(sample, &(&task.seed.decode * ddz));
         input.set_column(sample, &(&task.seed.lift * at.u_lat));
-        motion.feet[sample] = task.seed.parts[part].part.feet;
+        motion.feet[sample] = task.seed.parts[part].landmark.feet;
     }
     motion.torque_nm = input.rows(0, JOINT_DIM) + motion.losses(&task.seed.rule);
     let margins = margins(task, y, (&motion, &input));
@@ -127,13 +125,11 @@ fn foot_slip(task: &Task<'_>, y: &[f64]) -> [f64; 2] {
     let mut farthest = [0.0_f64; 2];
     for (part, of) in task.seed.parts.iter().enumerate() {
         let anchor = (task.anchor_part(part), 0);
-        for leg in Leg::down(of.part.feet) {
-            let from = moved_foot(task, y, leg, anchor).map(|moved| moved.at(y));
-            for node in 0..of.z.len() {
-                let moved = moved_foot(task, y, leg, (part, node)).map(|moved| moved.at(y));
-                for axis in 0..2 {
-                    farthest[axis] = farthest[axis].max((moved[axis] - from[axis]).abs());
-                }
+        for leg in Leg::down(of.landmark.feet) {
+            let moved = |at| moved_foot(task, y, leg, at).map(|moved| moved.at(y));
+            let from = moved(anchor);
+            for now in (0..of.z.len()).map(|node| moved((part, node))) {
+                farthest = std::array::from_fn(|k| farthest[k].max((now[k] - from[k]).abs()));
             }
         }
     }

@@ -9,34 +9,23 @@ use crate::model::ReducedModel;
 /// Steps of a map across the recorded range of distances and of apexes; it goes on as far at either side.
 const STEPS: [i32; 2] = [4, 3];
 
-/// A goal of the map.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MappedGoal {
-    /// Distance and apex, m.
     pub goal_m: [f64; 2],
-    /// Word of the verdict, or `no plan`.
     pub status: &'static str,
-    /// Input deviation, if there is a plan.
     pub input_deviation: Option<f64>,
-    /// Time for it, ms.
     pub solve_ms: f64,
 }
 
-/// The map of a model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GoalMap {
-    /// Distances, m, ascending.
     pub distances_m: Vec<f64>,
-    /// Apexes, m, ascending.
     pub apexes_m: Vec<f64>,
     /// One point per distance and apex, distances of one apex together.
     pub points: Vec<MappedGoal>,
 }
 
 /// Plans a grid of goals around the training jumps; `done` is told how many of how many.
-///
-/// # Errors
-/// [`PlanError::Model`] for a model without a prior, [`PlanError::Lower`].
 pub fn reach(
     model: &ReducedModel,
     settings: &PlanSettings,
@@ -55,11 +44,13 @@ pub fn reach(
     let (distances_m, apexes_m) = (axis(0), axis(1));
     let total = distances_m.len() * apexes_m.len();
     let mut points = Vec::with_capacity(total);
-    for &apex in &apexes_m {
-        for &distance in &distances_m {
-            points.push(point(model, [distance, apex], settings)?);
-            done(points.len(), total);
-        }
+    for k in 0..total {
+        let goal_m = [
+            distances_m[k % distances_m.len()],
+            apexes_m[k / distances_m.len()],
+        ];
+        points.push(point(model, goal_m, settings)?);
+        done(points.len(), total);
     }
     Ok(GoalMap {
         distances_m,

@@ -6,7 +6,7 @@ use super::error::PlanError;
 use super::goal::Goal;
 use super::settings::PlanSettings;
 use crate::lower::CompiledModel;
-use crate::model::{JumpPart, JumpPrior, ReducedModel};
+use crate::model::{JumpPart, JumpPrior, Landmark, ReducedModel};
 use crate::robot::{BODY_NAMES, BODY_Z, InputRule, JOINT_DIM, JOINT_NAMES, STATE_DIM};
 
 pub(crate) const PITCH: usize = 16;
@@ -36,6 +36,8 @@ pub(crate) struct Seed<'a> {
 /// A part of the prior at the clipped goal; vectors in scaled units, one per node or interval.
 pub(crate) struct SeedPart<'a> {
     pub part: &'a JumpPart,
+    pub landmark: &'a Landmark,
+    pub phase: usize,
     pub duration_s: f64,
     pub z: Vec<DVector<f64>>,
     pub dz: Vec<DVector<f64>>,
@@ -56,32 +58,29 @@ impl SeedPart<'_> {
     }
 
     pub(crate) fn is_grounded(&self) -> bool {
-        self.part.feet.contains(&true)
+        self.landmark.is_grounded()
     }
 }
 
 impl<'a> Seed<'a> {
     /// The prior of a model at a goal.
-    ///
-    /// # Errors
-    /// [`PlanError::Model`] if the model lacks a prior, [`PlanError::Goal`] for goals out of all
-    /// proportion, [`PlanError::Lower`].
     pub(crate) fn new(
         model: &'a ReducedModel,
         goal: &Goal,
         settings: &PlanSettings,
     ) -> Result<Self, PlanError> {
         let prior = model.jump_prior()?;
-        let at_rest = || (prior.start.clone(), DVector::zeros(prior.start.len()));
+        let mean = &prior.landmarks.start;
+        let at_rest = || (mean.clone(), DVector::zeros(mean.len()));
         let start = goal.start.clone().unwrap_or_else(at_rest);
         let height = start.0[BODY_Z];
         goal.check_within(prior, height, settings.reach)?;
         let features = prior.features(goal.clipped(prior, height, settings.inset));
         let tangent = model.tangent(&start.0)?;
         let mut dynamics = CompiledModel::new(model)?;
-        let parts = (prior.parts.iter())
+        let parts = (0..prior.parts.len())
             .map(|part| seed_part(model, prior, part, &features, &mut dynamics))
-            .collect::<Result<_, PlanError>>()?;
+            .collect();
         let zero = DVector::zeros(model.latent_dim());
         let latent = model.encode(&start.0)?;
         let start_lost = match goal.start {
@@ -130,18 +129,20 @@ fn lost(x: &DVector<f64>, decoded: &DVector<f64>) -> Vec<String> {
 
 fn seed_part<'a>(
     model: &ReducedModel,
-    prior: &JumpPrior,
-    part: &'a JumpPart,
+    prior: &'a JumpPrior,
+    part: usize,
     features: &crate::model::GoalFeatures,
     dynamics: &mut CompiledModel,
-) -> Result<SeedPart<'a>, PlanError> {
+) -> SeedPart<'a> {
+    let (part, landmark) = (&prior.parts[part], &prior.landmarks.parts[part]);
+    let phase = (model.phase_for(landmark.feet)).expect("invariant: checked with the model");
     let table = |rows: &DMatrix<f64>| -> Vec<DVector<f64>> {
         (0..part.nodes())
             .map(|node| JumpPart::at(rows, node, features))
             .collect()
     };
     let (z, dz, u_lat) = (table(&part.z), table(&part.dz), table(&part.u_lat));
-    let [least, most] = part.duration_range_s;
+    let [least, most] = landmark.duration_range_s;
     let duration_s = part.duration(features).clamp(0.5 * least, 2.0 * most);
     let step = duration_s / (part.nodes() - 1) as f64;
     let rate = |rows: &[DVector<f64>], k: usize| (&rows[k + 1] - &rows[k]) / step;
@@ -161,14 +162,16 @@ fn seed_part<'a>(
             None => {
                 let (mut value, mut jacobian) = (vec![0.0; d], DMatrix::zeros(d, 3 * d));
                 let at = [&z[node], &dz[node], &u_lat[node]].map(|v| v.as_slice());
-                dynamics.jacobian(part.phase, at[0], at[1], at[2], &mut value, &mut jacobian);
+                dynamics.jacobian(phase, at[0], at[1], at[2], &mut value, &mut jacobian);
                 jacobian
             }
         };
         slope.push(by_latent * &scales);
     }
-    Ok(SeedPart {
+    SeedPart {
         part,
+        landmark,
+        phase,
         duration_s,
         z,
         dz,
@@ -177,7 +180,7 @@ fn seed_part<'a>(
         drift,
         slope,
         root,
-    })
+    }
 }
 
 /// From the program's variables of a node to `(z, dz, u_lat)`: standard deviations, and the root of

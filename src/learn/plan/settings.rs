@@ -26,9 +26,6 @@ macro_rules! settings {
 
         impl PlanSettings {
             /// Complains about the first number that no plan can be made with.
-            ///
-            /// # Errors
-            /// The name with what was found and expected.
             pub fn check(&self) -> Result<(), String> {
                 $(check(stringify!($field), self.$field.numbers(), $most)?;)*
                 if self.foot_m.contains(&0.0) || self.input == 0.0 || self.programs == 0 {

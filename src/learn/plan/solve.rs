@@ -26,27 +26,20 @@ const APEX_PROGRAMS: usize = 3;
 /// Largest violation of an equation with which a plan may be used at all.
 const USABLE_DEFECT: f64 = 1e-3;
 
-/// A part of a planned jump.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlannedPart {
-    /// Its name.
     pub name: String,
-    /// Index of the model's phase.
     pub phase: usize,
-    /// Its duration, s.
     pub duration_s: f64,
 }
 
-/// A planned jump.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
-    /// The goal: distance and rise of the body, m.
     pub goal_m: [f64; 2],
     /// What the planned motion reaches, m.
     pub reached_m: [f64; 2],
     /// The motion, sampled as the training's recordings.
     pub motion: Segment,
-    /// The parts in order.
     pub parts: Vec<PlannedPart>,
     /// The cost: weighted squares of the deviations from the prior.
     pub cost: f64,
@@ -58,11 +51,8 @@ pub struct Plan {
     pub error_m: [f64; 2],
     /// How close the motion comes to its bounds, between the nodes too.
     pub margins: Margins,
-    /// Whether to trust it.
     pub verdict: Verdict,
-    /// Convex programs solved.
     pub programs: usize,
-    /// Time that took, ms.
     pub solve_ms: f64,
 }
 
@@ -79,8 +69,8 @@ pub fn plan(model: &ReducedModel, goal: &Goal, settings: &PlanSettings) -> Resul
     let (motion, margins) = motion(&task, &y, model.sample_time_s().unwrap_or(0.002))?;
     let parts = (seed.parts.iter().enumerate())
         .map(|(part, of)| PlannedPart {
-            name: of.part.name.clone(),
-            phase: of.part.phase,
+            name: of.landmark.name.clone(),
+            phase: of.phase,
             duration_s: task.duration_s(part, &y),
         })
         .collect();
@@ -157,15 +147,12 @@ fn solve(task: &mut Task<'_>) -> Result<(Vec<f64>, usize), PlanError> {
 /// Largest `|mu| / sqrt(latent_dim)` of a node.
 fn input_deviation(task: &Task<'_>, y: &[f64]) -> f64 {
     let d = task.seed.latent_dim;
-    let mut most = 0.0_f64;
-    for (part, of) in task.seed.parts.iter().enumerate() {
-        for node in 0..of.z.len() {
-            let at = task.node(part, node) + 2 * d;
-            let square: f64 = y[at..at + d].iter().map(|mu| mu * mu).sum();
-            most = most.max((square / d as f64).sqrt());
-        }
-    }
-    most
+    let nodes = y[..task.duration(0)].chunks(3 * d);
+    let deviations = nodes.map(|node| {
+        let square: f64 = node[2 * d..].iter().map(|mu| mu * mu).sum();
+        (square / d as f64).sqrt()
+    });
+    deviations.fold(0.0, f64::max)
 }
 
 /// How far a goal is beyond the training jumps, in widths of their range; zero inside.

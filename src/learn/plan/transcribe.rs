@@ -19,6 +19,8 @@
 //! linear: they are linearised about the iterate, or kept from it.
 //! Bounds that are far from active are left out, and looked at again with the result.
 
+use std::ops::Add;
+
 use nalgebra::DVector;
 
 use super::affine::{Affine, Builder};
@@ -131,9 +133,8 @@ impl<'a> Task<'a> {
         let of = &self.seed.parts[part];
         let mut sum = Affine::of(of.ddz[interval][i]);
         for node in [interval, interval + 1] {
-            let at = self.node(part, node);
-            for (column, slope) in of.slope[node].row(i).iter().enumerate() {
-                sum.add(at + column, 0.5 * slope);
+            for (k, slope) in of.slope[node].row(i).iter().enumerate() {
+                sum = sum.plus(self.node(part, node) + k, 0.5 * slope);
             }
         }
         sum
@@ -151,36 +152,29 @@ impl<'a> Task<'a> {
     }
 
     /// A coordinate of the decoded state at a node.
-    pub fn x(&self, part: usize, node: usize, coordinate: usize) -> Affine {
-        let mut value = Affine::of(self.seed.decode_bias[coordinate]);
-        for i in 0..self.seed.latent_dim {
-            let factor = self.seed.decode[(coordinate, i)];
-            value.add_scaled(&self.latent(part, node, i), factor);
-        }
-        value
+    pub(crate) fn x(&self, part: usize, node: usize, coordinate: usize) -> Affine {
+        let factors = self.seed.decode.row(coordinate);
+        let terms = (factors.iter().enumerate()).map(|(i, f)| self.latent(part, node, i) * *f);
+        terms.fold(Affine::of(self.seed.decode_bias[coordinate]), Add::add)
     }
 
     /// A coordinate of the decoded velocity at a node.
     pub(crate) fn dx(&self, part: usize, node: usize, coordinate: usize) -> Affine {
-        let (mut value, d) = (Affine::default(), self.seed.latent_dim);
-        for i in 0..d {
-            let factor = self.seed.decode[(coordinate, i)];
-            value.add_scaled(&self.latent(part, node, d + i), factor);
-        }
-        value
+        let (factors, d) = (self.seed.decode.row(coordinate), self.seed.latent_dim);
+        let terms = (factors.iter().enumerate()).map(|(i, f)| self.latent(part, node, d + i) * *f);
+        terms.fold(Affine::default(), Add::add)
     }
 
     /// An entry of the lifted input at a node, SI units.
     pub(crate) fn input(&self, part: usize, node: usize, entry: usize) -> Affine {
         let of = &self.seed.parts[part];
-        let d = self.seed.latent_dim;
         let row = self.seed.lift.row(entry);
-        let mut value = Affine::of((row * &of.u_lat[node])[0]);
+        let first = self.node(part, node) + 2 * self.seed.latent_dim;
         let by_mu = row * &of.root;
-        for (i, factor) in by_mu.iter().enumerate() {
-            value.add(self.node(part, node) + 2 * d + i, *factor);
-        }
-        value
+        let prior = Affine::of((row * &of.u_lat[node])[0]);
+        (first..)
+            .zip(by_mu.iter())
+            .fold(prior, |sum, (mu, factor)| sum.plus(mu, *factor))
     }
 
     /// What the joints take at a node of an iterate, N m.
@@ -218,22 +212,18 @@ impl<'a> Task<'a> {
     }
 
     fn equations(&self, part: usize, y: &[f64], builder: &mut Builder) {
-        let of = &self.seed.parts[part];
-        let d = self.seed.latent_dim;
+        let (of, tau) = (&self.seed.parts[part], self.duration(part));
         let step = self.duration_s(part, y) / of.intervals() as f64;
         for interval in 0..of.intervals() {
-            for i in 0..2 * d {
-                let (mut row, rate) = self.equation(part, interval, i, step);
+            for i in 0..2 * self.seed.latent_dim {
+                let (row, rate) = self.equation(part, interval, i, step);
                 // h = h_0 (1 + share tau): the product with the rate, by its slope at the iterate.
-                let tau = self.duration(part);
                 let by_tau = -of.duration_s / of.intervals() as f64 * DURATION_SHARE * rate.at(y);
-                row.add(tau, by_tau);
-                row.constant -= by_tau * y[tau];
-                builder.equal(scaled(row, self.seed.prior.state_std[i]));
+                let row = row.plus(tau, by_tau) + -by_tau * y[tau];
+                builder.equal(row / self.seed.prior.state_std[i]);
             }
         }
         for sign in [-1.0, 1.0] {
-            let tau = self.duration(part);
             let bound = DURATION_BOUND.min(sign * y[tau] + DURATION_STEP);
             builder.at_most(Affine::of(-bound).plus(tau, sign));
         }
@@ -246,17 +236,14 @@ impl<'a> Task<'a> {
         let [here, next] = [interval, interval + 1];
         let rate = match i.checked_sub(d) {
             None => {
-                let mut rate = Affine::of(self.seed.parts[part].drift[interval][i]);
-                rate.add_scaled(&self.latent(part, here, d + i), 0.5);
-                rate.add_scaled(&self.latent(part, next, d + i), 0.5);
-                rate
+                Affine::of(self.seed.parts[part].drift[interval][i])
+                    + self.latent(part, here, d + i) * 0.5
+                    + self.latent(part, next, d + i) * 0.5
             }
             Some(i) => self.acceleration(part, interval, i),
         };
-        let mut row = self.latent(part, next, i);
-        row.add_scaled(&self.latent(part, here, i), -1.0);
-        row.add_scaled(&rate, -step);
-        (row, rate)
+        let change = self.latent(part, next, i) - self.latent(part, here, i);
+        (change - rate.clone() * step, rate)
     }
 
     /// Largest violation of an equation at a point, in standard deviations of its coordinate.
@@ -281,27 +268,24 @@ impl<'a> Task<'a> {
         let std = &self.seed.prior.state_std;
         let each = || (0..d).flat_map(|i| [i, d + i]);
         for i in each() {
-            let mut row = self.latent(0, 0, i);
-            row.constant -= self.seed.start[i / d][i % d];
-            builder.equal(scaled(row, std[i]));
+            let row = self.latent(0, 0, i) + -self.seed.start[i / d][i % d];
+            builder.equal(row / std[i]);
         }
         for part in 1..self.seed.parts.len() {
             let last = self.seed.parts[part - 1].intervals();
             for i in each() {
-                let mut row = self.latent(part, 0, i);
-                row.add_scaled(&self.latent(part - 1, last, i), -1.0);
-                builder.equal(scaled(row, std[i]));
+                let row = self.latent(part, 0, i) - self.latent(part - 1, last, i);
+                builder.equal(row / std[i]);
             }
         }
-        builder.equal(scaled(self.apex(y), 0.1));
+        builder.equal(self.apex(y) / 0.1);
         let (part, node) = self.last();
-        let mut distance = self.x(part, node, BODY_X);
-        distance.constant -= self.start_x(BODY_X) + self.seed.goal.goal_m()[0];
-        builder.equal(scaled(distance, 0.1));
+        let end = self.start_x(BODY_X) + self.seed.goal.goal_m()[0];
+        builder.equal((self.x(part, node, BODY_X) + -end) / 0.1);
         if self.seed.parts[part].is_grounded() {
             self.rest(builder);
         }
-        let [least, most] = self.seed.prior.end_height_m;
+        let [least, most] = self.seed.prior.landmarks.end_height_m;
         let slack = self.settings.height_slack_m;
         let height = self.slack(Bound::Height);
         let range = [least - slack, most + slack];
@@ -339,9 +323,7 @@ impl<'a> Task<'a> {
         for node in 0..of.z.len() {
             let losses = self.losses(part, node, y);
             for j in 0..JOINT_DIM {
-                let mut command = self.input(part, node, j);
-                command.constant += losses[j];
-                let command = scaled(command, robot.torque_limit_nm()[j]);
+                let command = (self.input(part, node, j) + losses[j]) / robot.torque_limit_nm()[j];
                 let share = self.settings.torque_share;
                 let far = -FAR_TORQUE..FAR_TORQUE;
                 near(builder, &command, y, ([-share, share], far), torque);
@@ -354,10 +336,9 @@ impl<'a> Task<'a> {
                 self.friction(part, node, friction, builder);
             }
             if landing {
-                let least = self.seed.prior.landing_height_m - self.settings.height_slack_m;
-                let mut low = Affine::of(least);
-                low.add_scaled(&self.x(part, node, BODY_Z), -1.0);
-                low.add(height, -1.0);
+                let least =
+                    self.seed.prior.landmarks.landing_height_m - self.settings.height_slack_m;
+                let low = (Affine::of(least) - self.x(part, node, BODY_Z)).plus(height, -1.0);
                 if low.at(y) > -0.04 {
                     builder.at_most(low);
                 }
@@ -366,15 +347,12 @@ impl<'a> Task<'a> {
     }
 
     fn friction(&self, part: usize, node: usize, slack: usize, builder: &mut Builder) {
-        let [forwards, up] = [BODY_X, BODY_Z];
+        let [forwards, up] = [BODY_X, BODY_Z].map(|entry| self.input(part, node, entry));
         for sign in [-1.0, 1.0] {
-            let mut row = Affine::of(-self.settings.friction_slack_n / FORCE_UNIT_N);
-            let force = self.input(part, node, forwards);
-            row.add_scaled(&force, sign / FORCE_UNIT_N);
-            let normal = self.input(part, node, up);
-            row.add_scaled(&normal, -self.settings.friction / FORCE_UNIT_N);
-            row.add(slack, -1.0);
-            builder.at_most(row);
+            let row = Affine::of(-self.settings.friction_slack_n / FORCE_UNIT_N)
+                + forwards.clone() * (sign / FORCE_UNIT_N)
+                + up.clone() * (-self.settings.friction / FORCE_UNIT_N);
+            builder.at_most(row.plus(slack, -1.0));
         }
     }
 
@@ -403,26 +381,16 @@ impl<'a> Task<'a> {
     /// that is wanted; linear about the iterate.
     fn apex(&self, y: &[f64]) -> Affine {
         let flight = self.flight();
-        let mut height = self.x(flight, self.apex_node, BODY_Z);
-        height.constant -= self.start_x(BODY_Z) + self.seed.goal.goal_m()[1];
+        let wanted = self.start_x(BODY_Z) + self.seed.goal.goal_m()[1];
+        let height = self.x(flight, self.apex_node, BODY_Z) + -wanted;
         let speed = self.dx(flight, self.apex_node, BODY_Z);
         let now = speed.at(y);
-        height.add_scaled(&speed, now.abs() / GRAVITY_M_S2);
-        height.constant -= 0.5 * now * now.abs() / GRAVITY_M_S2;
-        height
+        height + speed * (now.abs() / GRAVITY_M_S2) + -(0.5 * now * now.abs() / GRAVITY_M_S2)
     }
 
     pub(crate) fn prior_point(&self) -> Vec<f64> {
         vec![0.0; self.variables()]
     }
-}
-
-fn scaled(mut expression: Affine, unit: f64) -> Affine {
-    expression.constant /= unit;
-    for (_, factor) in &mut expression.terms {
-        *factor /= unit;
-    }
-    expression
 }
 
 /// Rows that keep an expression in a range, with a violation if there is a variable for it.
@@ -434,12 +402,11 @@ fn within(builder: &mut Builder, value: &Affine, range: [f64; 2], slack: Option<
 
 /// The row `sign value <= bound`, with a violation if there is a variable for it.
 fn side(builder: &mut Builder, value: &Affine, (sign, bound): (f64, f64), slack: Option<usize>) {
-    let mut row = Affine::of(-bound);
-    row.add_scaled(value, sign);
-    if let Some(slack) = slack {
-        row.add(slack, -1.0);
-    }
-    builder.at_most(row);
+    let row = Affine::of(-bound) + value.clone() * sign;
+    builder.at_most(match slack {
+        Some(slack) => row.plus(slack, -1.0),
+        None => row,
+    });
 }
 
 /// The same rows where the expression is not inside `far` at the iterate.

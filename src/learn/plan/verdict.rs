@@ -37,7 +37,6 @@ impl Verdict {
         }
     }
 
-    /// The reasons; none for a trusted plan.
     pub fn reasons(&self) -> &[String] {
         match self {
             Self::Trusted => &[],
@@ -69,89 +68,78 @@ pub(crate) fn verdict(settings: &PlanSettings, found: &Findings<'_>) -> Verdict 
     }
 }
 
+/// The texts whose condition holds.
+fn reasons(rules: impl IntoIterator<Item = Option<String>>) -> Vec<String> {
+    rules.into_iter().flatten().collect()
+}
+
 fn refusals(settings: &PlanSettings, found: &Findings<'_>) -> Vec<String> {
-    let mut refused = Vec::new();
-    for (bound, slack) in found.slack {
-        if slack > NO_SLACK {
-            refused.push(match bound {
-                Bound::Torque => format!(
-                    "it would take torques {:.0} % beyond the share of the limits that plans may use",
-                    100.0 * slack
-                ),
-                Bound::Joint => format!("joints would leave their limits by {slack:.3} rad"),
-                Bound::Friction => format!(
-                    "the feet would slip: the force leaves the friction cone by {:.0} N",
-                    100.0 * slack
-                ),
-                Bound::Height => format!("the body would be {slack:.3} m too low or high in the landing or at the end"),
-            });
-        }
-    }
-    let margins = found.margins;
-    if margins.torque_share > 1.0 {
-        let share = 100.0 * margins.torque_share;
-        refused.push(format!(
-            "torques reach {share:.0} % of their limits between nodes"
-        ));
-    }
-    let (joint, force) = (margins.beyond_joint_limit_rad, margins.beyond_friction_n);
-    if joint > NO_JOINT {
-        refused.push(format!(
-            "a joint is {joint:.3} rad beyond its limit between nodes"
-        ));
-    }
-    if force > settings.friction_slack_n + NO_FRICTION_N {
-        refused.push(format!(
-            "the force is {force:.0} N outside the friction cone between nodes"
-        ));
-    }
-    if let Some(share) = found.weight_share
-        && share < LEAST_WEIGHT_SHARE
-    {
-        refused.push(format!(
-            "its torques carry {share:.3} of what the robot's weight needs: the model's inputs cannot be lifted to \
-             forces of its feet"
-        ));
-    }
-    if found.input_deviation > settings.refuse_deviation {
-        refused.push(format!(
-            "its input is {:.1} standard deviations from what was recorded, more than {}",
-            found.input_deviation, settings.refuse_deviation
-        ));
-    }
-    refused
+    let slack = |(bound, slack): (Bound, f64)| {
+        let percent = 100.0 * slack;
+        (slack > NO_SLACK).then(|| match bound {
+            Bound::Torque => format!(
+                "it would take torques {percent:.0} % beyond the share of the limits that plans may use"
+            ),
+            Bound::Joint => format!("joints would leave their limits by {slack:.3} rad"),
+            Bound::Friction => {
+                format!("the feet would slip: the force leaves the friction cone by {percent:.0} N")
+            }
+            Bound::Height => {
+                format!("the body would be {slack:.3} m too low or high in the landing or at the end")
+            }
+        })
+    };
+    let percent = 100.0 * found.margins.torque_share;
+    let joint = found.margins.beyond_joint_limit_rad;
+    let force = found.margins.beyond_friction_n;
+    let carried = found
+        .weight_share
+        .filter(|share| *share < LEAST_WEIGHT_SHARE);
+    let (deviation, most) = (found.input_deviation, settings.refuse_deviation);
+    reasons(found.slack.map(slack).into_iter().chain([
+        (percent > 100.0)
+            .then(|| format!("torques reach {percent:.0} % of their limits between nodes")),
+        (joint > NO_JOINT)
+            .then(|| format!("a joint is {joint:.3} rad beyond its limit between nodes")),
+        (force > settings.friction_slack_n + NO_FRICTION_N)
+            .then(|| format!("the force is {force:.0} N outside the friction cone between nodes")),
+        carried.map(|share| {
+            format!(
+                "its torques carry {share:.3} of what the robot's weight needs: the model's inputs cannot be lifted \
+                 to forces of its feet"
+            )
+        }),
+        (deviation > most).then(|| {
+            format!("its input is {deviation:.1} standard deviations from what was recorded, more than {most}")
+        }),
+    ]))
 }
 
 fn doubts(settings: &PlanSettings, found: &Findings<'_>) -> Vec<String> {
-    let mut reasons = Vec::new();
-    for (what, outside) in ["distance", "apex"].into_iter().zip(found.outside) {
-        if outside > 0.0 {
-            let share = 100.0 * outside;
-            reasons.push(format!(
-                "the {what} is beyond the recorded jumps by {share:.0} % of their range"
-            ));
-        }
-    }
-    if found.input_deviation > settings.warn_deviation {
-        reasons.push(format!(
-            "its input is {:.1} standard deviations from what was recorded",
-            found.input_deviation
-        ));
-    }
-    let [along, below] = found.margins.foot_drift_m;
-    if along > FOOT_DRIFT_M[0] || below > FOOT_DRIFT_M[1] {
-        reasons.push(format!(
-            "feet on the ground move {:.0} mm along the floor and {:.0} mm below it: the model's latent coordinates \
-             do not hold them where they stand",
-            1e3 * along,
-            1e3 * below
-        ));
-    }
-    if !found.start_lost.is_empty() {
-        reasons.push(format!(
-            "the plan does not begin at the recorded start, which the model's latent coordinates cannot hold: {}",
-            found.start_lost.join(", ")
-        ));
-    }
-    reasons
+    let outside = |(what, outside): (&str, f64)| {
+        let percent = 100.0 * outside;
+        (outside > 0.0).then(|| {
+            format!("the {what} is beyond the recorded jumps by {percent:.0} % of their range")
+        })
+    };
+    let deviation = found.input_deviation;
+    let drift = found.margins.foot_drift_m;
+    let [along, below] = drift.map(|drift| 1e3 * drift);
+    let lost = found.start_lost.join(", ");
+    reasons(["distance", "apex"].into_iter().zip(found.outside).map(outside).chain([
+        (deviation > settings.warn_deviation).then(|| {
+            format!("its input is {deviation:.1} standard deviations from what was recorded")
+        }),
+        (drift[0] > FOOT_DRIFT_M[0] || drift[1] > FOOT_DRIFT_M[1]).then(|| {
+            format!(
+                "feet on the ground move {along:.0} mm along the floor and {below:.0} mm below it: the model's latent \
+                 coordinates do not hold them where they stand"
+            )
+        }),
+        (!lost.is_empty()).then(|| {
+            format!(
+                "the plan does not begin at the recorded start, which the model's latent coordinates cannot hold: {lost}"
+            )
+        }),
+    ]))
 }

@@ -39,10 +39,6 @@ pub struct LatentSegment {
 
 impl LatentSegment {
     /// Encodes a segment.
-    ///
-    /// # Errors
-    /// [`SimError::Model`] for a latent-only model, [`SimError::Recording`] if the body wrench cannot
-    /// be computed or no feet of the segment are in a phase of the model.
     pub fn encode(model: &ReducedModel, segment: &Segment) -> Result<Self, SimError> {
         let input = segment.input(&model.input_rule()?)?;
         let samples = |map: &dyn Fn(usize) -> Result<DVector<f64>, SimError>| {
@@ -105,10 +101,6 @@ pub fn phase_rule(model: &ReducedModel) -> PhaseRule {
 
 /// The model with mean and covariance of the recorded inputs `u = [tau; F; M]` (SI, by the model's rule) in the phases
 /// that the recordings have samples of.
-///
-/// # Errors
-/// [`SimError::Model`] for a model without robot, [`SimError::Recording`] if the body wrench cannot
-/// be computed, and if no feet of a segment are in a phase of the model.
 pub fn with_input_statistics(
     model: ReducedModel,
     segments: &[&Segment],

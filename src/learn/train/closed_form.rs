@@ -1,14 +1,13 @@
 //! Training without descent over the dynamics: encoder, decoder and Xi one after the other, in seconds.
 
-use super::assemble::Origin;
 use super::error::TrainError;
 use super::latent::least_squares_decoder;
+use super::metrics::Trained;
 use super::options::TrainOptions;
 use super::progress::Monitor;
-use super::report::Trained;
 use super::seeds::{Outcome, Seeds};
 use super::subspace::find_subspace;
-use super::task::{Recordings, Task};
+use super::task::{Origin, Recordings, Task};
 use crate::robot::Robot;
 
 /// Learns a model: encoder by its row space, decoder by least squares, Xi by sparse regression.

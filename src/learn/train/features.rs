@@ -9,7 +9,32 @@ use nalgebra::DMatrix;
 use crate::ir::sin_cos::{LIMIT, reduced_sin_cos, sin_cos};
 use crate::model::{LatentVariable, Library, Step, Tape};
 use crate::symbolic::{Function, SymbolId};
-use crate::train::vectors::vectorised;
+
+/// Declares a function without result that runs with the widest vectors that the processor has.
+macro_rules! vectorised {
+    ($(#[$doc:meta])* $visibility:vis fn $name:ident($($argument:ident: $type:ty),* $(,)?) $body:block) => {
+        $(#[$doc])*
+        $visibility fn $name($($argument: $type),*) {
+            #[inline(always)]
+            fn plain($($argument: $type),*) $body
+
+            #[cfg(target_arch = "x86_64")]
+            {
+                #[target_feature(enable = "avx2,fma")]
+                fn with_avx2($($argument: $type),*) {
+                    plain($($argument),*);
+                }
+                if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+                    // SAFETY: the processor has what this is compiled for.
+                    return unsafe { with_avx2($($argument),*) };
+                }
+            }
+            plain($($argument),*);
+        }
+    };
+}
+
+pub(super) use vectorised;
 
 /// A library over batches.
 #[derive(Clone, Debug)]
@@ -326,9 +351,10 @@ fn slope(function: Function, argument: f64, value: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::DVector;
+
     use super::*;
     use crate::train::random::Random;
-    use nalgebra::DVector;
 
     fn library() -> Library {
         let terms = [

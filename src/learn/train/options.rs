@@ -4,15 +4,13 @@ use clap::ValueEnum;
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
-use super::assemble::Origin;
 use super::closed_form::closed_form;
 use super::dataset::ScaleOptions;
 use super::error::TrainError;
 use super::joint::{LossWeights, Schedule, Unroll, joint};
-use super::metrics::{BODY_X, BODY_Z};
+use super::metrics::{BODY_X, BODY_Z, Trained};
 use super::progress::Monitor;
-use super::report::Trained;
-use super::task::Recordings;
+use super::task::{Origin, Recordings};
 use crate::limits::table;
 use crate::model::{
     Activation, Library, LibraryChoice, MAX_LAYER_WIDTH, MAX_LAYERS, StandardLibrary, check_name,

@@ -40,7 +40,45 @@ impl Coefficients {
 }
 
 /// Coefficients that may change, and their sizes, which changes are relative to.
-pub(super) type FreeCoefficients = Vec<(CoefficientIndex, f64)>;
+#[derive(Clone)]
+pub(super) struct FreeCoefficients {
+    pub indices: Vec<CoefficientIndex>,
+    pub scales: DVector<f64>,
+}
+
+impl FreeCoefficients {
+    /// The free coefficients that are active in `xi`.
+    pub(super) fn of(xi: &[Xi], knowledge: &[Knowledge]) -> Self {
+        let mut indices = Vec::new();
+        for (phase, (xi, knowledge)) in xi.iter().zip(knowledge).enumerate() {
+            let active = |&i: &usize| xi[i] != 0.0 && knowledge.free[i];
+            let places = (0..xi.len())
+                .filter(active)
+                .map(|i| xi.vector_to_matrix_index(i));
+            indices.extend(places.map(|(term, column)| (phase, term, column)));
+        }
+        let scales = DVector::zeros(indices.len());
+        let mut free = Self { indices, scales };
+        free.scales = free.values(xi).abs();
+        free
+    }
+
+    pub(super) fn values(&self, xi: &[Xi]) -> DVector<f64> {
+        let values = self
+            .indices
+            .iter()
+            .map(|&(phase, term, k)| xi[phase][(term, k)]);
+        DVector::from_iterator(self.indices.len(), values)
+    }
+
+    /// Adds relative changes.
+    pub(super) fn add(&self, xi: &mut [Xi], change: &DVector<f64>) {
+        let changes = change.component_mul(&self.scales);
+        for (&(phase, term, k), change) in self.indices.iter().zip(changes.iter()) {
+            xi[phase][(term, k)] += change;
+        }
+    }
+}
 
 pub(super) struct Refiner<'a> {
     pub knowledge: &'a [Knowledge],
@@ -77,8 +115,8 @@ impl Refiner<'_> {
         steps: usize,
         monitor: &mut Monitor<'_>,
     ) -> Coefficients {
-        let free = self.free(&start.xi);
-        let Some(weights) = self.weights(&start.xi).filter(|_| !free.is_empty()) else {
+        let free = FreeCoefficients::of(&start.xi, self.knowledge);
+        let Some(weights) = self.weights(&start.xi).filter(|_| !free.indices.is_empty()) else {
             return start;
         };
         monitor.stage("refining coefficients by rollouts", steps);
@@ -89,18 +127,13 @@ impl Refiner<'_> {
     fn descend(
         &self,
         start: Coefficients,
-        free: &[(CoefficientIndex, f64)],
+        free: &FreeCoefficients,
         weights: [f64; 2],
         steps: usize,
         monitor: &mut Monitor<'_>,
     ) -> Coefficients {
-        let n = free.len();
-        let moved = |xi: &[Xi]| {
-            let change = |((phase, term, k), scale): (CoefficientIndex, f64)| {
-                (xi[phase][(term, k)] - start.xi[phase][(term, k)]) / scale
-            };
-            DVector::from_iterator(n, free.iter().copied().map(change))
-        };
+        let origin = free.values(&start.xi);
+        let moved = |xi: &[Xi]| (free.values(xi) - &origin).component_div(&free.scales);
         let cost = |squared_error: f64, xi: &[Xi]| squared_error + PRIOR * moved(xi).norm_squared();
         let mut current = start.xi.clone();
         self.admit(&mut current, free, Clone::clone);
@@ -122,9 +155,7 @@ impl Refiner<'_> {
                 let factor = model.damped(damping)?;
                 let change = -factor.solve(&gradient);
                 let mut trial = current.clone();
-                for (((phase, term, k), scale), change) in free.iter().copied().zip(change.iter()) {
-                    trial[phase][(term, k)] += change * scale;
-                }
+                free.add(&mut trial, &change);
                 self.admit(&mut trial, free, |gradient| factor.solve(gradient));
                 let squared_error = self.squared_error(&trial, weights);
                 let after = squared_error.map_or(f64::INFINITY, |error| cost(error, &trial));
@@ -151,18 +182,13 @@ impl Refiner<'_> {
     fn admit(
         &self,
         xi: &mut [Xi],
-        free: &[(CoefficientIndex, f64)],
+        free: &FreeCoefficients,
         inverse: impl Fn(&DVector<f64>) -> DVector<f64>,
     ) {
         self.growth.hold(xi, |gradient| {
-            let relative = free.iter().copied();
-            let relative =
-                relative.map(|((phase, term, k), scale)| gradient[phase][(term, k)] * scale);
-            let change = inverse(&DVector::from_iterator(free.len(), relative));
+            let change = inverse(&free.values(gradient).component_mul(&free.scales));
             let mut all: Vec<_> = gradient.iter().map(|each| each.map(|_| 0.0)).collect();
-            for (((phase, term, k), scale), change) in free.iter().copied().zip(&change) {
-                all[phase][(term, k)] = change * scale;
-            }
+            free.add(&mut all, &change);
             all
         });
         self.brake(xi);
@@ -215,27 +241,28 @@ impl Refiner<'_> {
     pub(super) fn model(
         &self,
         xi: &[Xi],
-        free: &[(CoefficientIndex, f64)],
+        free: &FreeCoefficients,
         weights: [f64; 2],
     ) -> Option<ErrorModel> {
-        let n = free.len();
+        let n = free.indices.len();
         let mut model = ErrorModel {
             squared_error: 0.0,
             gram: DMatrix::zeros(n, n),
             gradient: DVector::zeros(n),
         };
-        let change = |(place, scale)| Change {
-            place,
-            by: STEP * scale,
-        };
+        let steps = free.indices.iter().zip(free.scales.iter());
+        let changes: Vec<Change> = steps
+            .map(|(&place, scale)| Change {
+                place,
+                by: STEP * scale,
+            })
+            .collect();
         for part in self.training.parts() {
             let residual = self.residual(xi, weights, part)?;
             let mut sensitivity = DMatrix::zeros(residual.len(), n);
-            for first in (0..n).step_by(TOGETHER) {
-                let each = free.iter().copied().skip(first).take(TOGETHER);
-                let changes: Vec<_> = each.map(change).collect();
-                let moved = self.training.errors_changed(xi, &changes, part)?;
-                for (column, moved) in (first..).zip(&moved) {
+            for (group, changes) in changes.chunks(TOGETHER).enumerate() {
+                let moved = self.training.errors_changed(xi, changes, part)?;
+                for (column, moved) in (group * TOGETHER..).zip(&moved) {
                     let difference = stacked(moved, weights) - &residual;
                     sensitivity.set_column(column, &(difference / STEP));
                 }
@@ -245,19 +272,6 @@ impl Refiner<'_> {
             model.gradient += sensitivity.tr_mul(&residual);
         }
         Some(model)
-    }
-
-    pub(super) fn free(&self, xi: &[Xi]) -> FreeCoefficients {
-        let mut all = Vec::new();
-        for (phase, (xi, knowledge)) in xi.iter().zip(self.knowledge).enumerate() {
-            for (index, (value, free)) in xi.iter().zip(knowledge.free.iter()).enumerate() {
-                if *value != 0.0 && *free {
-                    let (term, column) = xi.vector_to_matrix_index(index);
-                    all.push(((phase, term, column), value.abs()));
-                }
-            }
-        }
-        all
     }
 }
 

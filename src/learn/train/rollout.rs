@@ -8,9 +8,8 @@ use std::cmp::Reverse;
 use nalgebra::DMatrix;
 
 use super::dataset::Dataset;
-use super::features::{FeatureValues, Features};
+use super::features::{FeatureValues, Features, vectorised};
 use super::latent::EncodedSet;
-use super::vectors::vectorised;
 use crate::sim::{Restart, restart_windows};
 
 /// Magnitude of a state from which a rollout counts as diverged.

@@ -1,13 +1,26 @@
-//! One training as every method sees it, checked before any map is learned.
+//! One training as every method sees it, checked before any map is learned; and the model that its numbers make, which
+//! carries where it comes from.
+
+use std::path::Path;
+
+use serde::Serialize;
+use serde_json::{Map, Value, json};
+use sha2::{Digest, Sha256};
 
 use super::dataset::Dataset;
+use super::dynamics_fit::Fitted;
 use super::error::TrainError;
-use super::features::Features;
+use super::features::{FeatureValues, Features};
 use super::frame::Frame;
 use super::knowledge::Knowledge;
-use super::options::TrainOptions;
+use super::metrics::{PLACE, TrainReport};
+use super::options::{EncoderOptions, TrainOptions};
 use super::subspace::Moments;
-use crate::model::Library;
+use crate::files::hex;
+use crate::model::{
+    CoordinateNames, InputGivenState, InputStatistics, JumpPrior, Library, Phase, ReducedModel,
+    ScaleFactors, Scaling,
+};
 use crate::recording::Recording;
 use crate::robot::Robot;
 
@@ -85,4 +98,145 @@ impl<'a> Task<'a> {
             robot,
         })
     }
+}
+
+/// Where a training's numbers come from.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Origin {
+    /// The command line that repeats the training.
+    pub command: String,
+    /// Recordings with their digests, in the order of use.
+    pub recordings: Vec<SourceFile>,
+}
+
+/// A recording and what it contained.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct SourceFile {
+    /// Path as on the command line.
+    pub path: String,
+    /// Digest of its bytes, with the name of the algorithm in front.
+    pub digest: String,
+    /// The sets that its jumps came into, such as `test`, if a training divided them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub sets: Vec<&'static str>,
+}
+
+impl Origin {
+    /// The origin of a training on these files; those that can no longer be read have an empty digest.
+    pub fn new(
+        command: impl Into<String>,
+        files: impl IntoIterator<Item = impl AsRef<Path>>,
+    ) -> Self {
+        let files = files.into_iter().map(|path| SourceFile {
+            path: path.as_ref().display().to_string(),
+            digest: std::fs::read(path.as_ref())
+                .map(|bytes| sha256(&bytes))
+                .unwrap_or_default(),
+            sets: Vec::new(),
+        });
+        Self {
+            command: command.into(),
+            recordings: files.collect(),
+        }
+    }
+}
+
+/// SHA-256 of a file's bytes, with the name of the algorithm in front, as provenances have it.
+pub fn sha256(bytes: &[u8]) -> String {
+    format!("sha256:{}", hex(&Sha256::digest(bytes)))
+}
+
+impl Task<'_> {
+    pub(super) fn assemble(
+        &self,
+        fitted: Fitted,
+        jumps: Option<JumpPrior>,
+        provenance: Map<String, Value>,
+    ) -> Result<ReducedModel, TrainError> {
+        let (options, robot, training) = (self.options, self.robot, &self.training);
+        let (d, name) = (options.latent_dim, robot.name());
+        let given_state = self.inputs_given_states(&fitted);
+        let [state, input] = CoordinateNames::of_robot();
+        let mut builder = ReducedModel::builder(options.name.clone(), self.library.clone())
+            .description(format!("{d} latent coordinates of {name} jumps"))
+            .robot(robot)
+            .actuators(options.actuators.clone())
+            .wrench_frame(options.wrench_frame)
+            .state(state)
+            .input(input)
+            .scaling(Scaling {
+                state: ScaleFactors::Uniform(options.scaling.state),
+                input: ScaleFactors::PerCoordinate(options.scaling.factors().input),
+            })
+            .sample_time_s(median_step_s(training))
+            .provenance(provenance)
+            .encoder(fitted.maps.encoder)
+            .decoder(fitted.maps.decoder)
+            .jump_prior(jumps);
+        let phases = training.phases.patterns.iter().zip(fitted.xi);
+        for (index, ((pattern, xi), given_state)) in phases.zip(given_state).enumerate() {
+            let statistics = InputStatistics {
+                given_state,
+                ..training.input_statistics(index)
+            };
+            builder = builder
+                .phase(Phase {
+                    name: pattern.name.clone(),
+                    feet: pattern.feet.clone(),
+                    xi,
+                })
+                .input_statistics(pattern.name.clone(), statistics);
+        }
+        Ok(builder.build()?)
+    }
+
+    /// What the latent state says of the latent input, one entry a phase; of linear encoders.
+    fn inputs_given_states(&self, fitted: &Fitted) -> Vec<Option<InputGivenState>> {
+        let Some(encoder) = fitted.maps.encoder.as_affine() else {
+            return vec![None; fitted.xi.len()];
+        };
+        // Where the robot is, and which way it looks, is in `z` but says nothing of its inputs.
+        let shifts = encoder.weights().select_columns(&PLACE);
+        let set = fitted.maps.training_set(self);
+        let phases = fitted.xi.iter().enumerate();
+        let given = phases.map(|(phase, xi)| {
+            let (variables, ddz) = set.regression_samples(phase);
+            let theta = (self.features).evaluate(&variables, &mut FeatureValues::default());
+            InputGivenState::of_samples(&shifts, variables, &(ddz - theta * xi))
+        });
+        given.collect()
+    }
+}
+
+fn median_step_s(dataset: &Dataset) -> f64 {
+    let pairs = dataset.jumps.iter().flat_map(|jump| jump.time_s.windows(2));
+    let mut steps: Vec<f64> = pairs.map(|pair| pair[1] - pair[0]).collect();
+    steps.sort_by(f64::total_cmp);
+    // Recorded times carry rounding; a microsecond is below every sampling.
+    steps
+        .get(steps.len() / 2)
+        .map_or(0.002, |step| (step * 1e6).round() / 1e6)
+}
+
+pub(super) fn provenance(
+    options: &TrainOptions,
+    method: &str,
+    origin: &Origin,
+    report: &TrainReport,
+) -> Map<String, Value> {
+    let encoder = EncoderOptions {
+        coordinates: options.coordinates(),
+        ..options.encoder.clone()
+    };
+    let entries = [
+        ("command", json!(origin.command)),
+        ("romc_version", json!(env!("CARGO_PKG_VERSION"))),
+        ("method", json!(method)),
+        ("seed", json!(options.seed)),
+        ("encoder_options", json!(encoder)),
+        ("recordings", json!(origin.recordings)),
+        ("report", json!(report)),
+    ];
+    let entries = entries.map(|(name, value)| (name.to_owned(), value));
+    entries.into_iter().collect()
 }

@@ -31,11 +31,12 @@ impl Refiner<'_> {
             return refined;
         };
         let mut thinned = refined;
-        let total = self.free(&thinned.xi).len();
+        let free = |xi: &[Xi]| FreeCoefficients::of(xi, self.knowledge);
+        let total = free(&thinned.xi).indices.len();
         monitor.stage("dropping terms that rollouts do not miss", total);
         while !monitor.cancelled() {
-            let free = self.free(&thinned.xi);
-            let before = free.len();
+            let free = free(&thinned.xi);
+            let before = free.indices.len();
             let model = self.model(&thinned.xi, &free, weights);
             let form = model.and_then(|model| QuadraticForm::new(&thinned, free, &model));
             let Some(mut form) = form else { break };
@@ -83,7 +84,7 @@ impl Refiner<'_> {
             !inputs.contains(&term) && !self.knowledge[phase].kept[(term, column)]
         };
         let mut order: Vec<usize> = (0..form.gone.len())
-            .filter(|&i| !form.gone[i] && may_go(form.free[i].0))
+            .filter(|&i| !form.gone[i] && may_go(form.free.indices[i]))
             .collect();
         order.sort_by(|&a, &b| form.loss(a).total_cmp(&form.loss(b)));
         order
@@ -95,7 +96,7 @@ impl Refiner<'_> {
 struct QuadraticForm {
     free: FreeCoefficients,
     /// Relative changes that make the coefficients zero.
-    to_zero: Vec<f64>,
+    to_zero: DVector<f64>,
     /// Where the form is lowest, with those that are gone at zero.
     lowest: DVector<f64>,
     /// Inverse of the form's matrix on those that are not gone.
@@ -106,13 +107,11 @@ struct QuadraticForm {
 impl QuadraticForm {
     fn new(from: &Coefficients, free: FreeCoefficients, model: &ErrorModel) -> Option<Self> {
         let factor = model.damped(DAMPING)?;
-        let to_zero =
-            |((phase, term, k), scale): (CoefficientIndex, f64)| -from.xi[phase][(term, k)] / scale;
         Some(Self {
-            to_zero: free.iter().copied().map(to_zero).collect(),
+            to_zero: -free.values(&from.xi).component_div(&free.scales),
             lowest: -factor.solve(&model.gradient),
             inverse: factor.inverse(),
-            gone: vec![false; free.len()],
+            gone: vec![false; free.indices.len()],
             free,
         })
     }
@@ -133,13 +132,10 @@ impl QuadraticForm {
 
     fn xi(&self, from: &Coefficients) -> Vec<Xi> {
         let mut xi = from.xi.clone();
-        for (i, ((phase, term, column), scale)) in self.free.iter().copied().enumerate() {
-            let change = self.lowest[i] * scale;
-            let coefficient = &mut xi[phase][(term, column)];
-            *coefficient = match self.gone[i] {
-                true => 0.0,
-                false => *coefficient + change,
-            };
+        self.free.add(&mut xi, &self.lowest);
+        let each = self.free.indices.iter().zip(&self.gone);
+        for (&(phase, term, column), _) in each.filter(|(_, gone)| **gone) {
+            xi[phase][(term, column)] = 0.0;
         }
         xi
     }

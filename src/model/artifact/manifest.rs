@@ -5,20 +5,21 @@
 
 use std::fmt;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
 use serde::de::{Error as _, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Map, Value};
 
 use super::bounded;
-use super::jump_prior::{LandmarksEntry, PriorEntry};
 use super::read::ArtifactError;
+use crate::files::Place;
 use crate::model::{
-    Activation, CoordinateNames, FeetRule, LibraryChoice, ScaleFactors, Scaling, StandardLibrary,
+    CoordinateNames, InputStatistics, JumpPrior, Landmarks, Library, LibraryChoice, ModelError,
+    Phase, ReducedModel, ScaleFactors, Scaling, StandardLibrary, StateMap,
 };
-use crate::robot::{Actuators, WrenchFrame};
-use crate::robot_file::RobotEntry;
+use crate::robot::{Actuators, Robot, WrenchFrame};
+use crate::robot_file::{self, RobotEntry};
 
 /// Name and version of the format of a model without the keys of [`SCHEMA_2`].
 pub(crate) const SCHEMA: &str = "romc-model/1";
@@ -26,37 +27,6 @@ pub(crate) const SCHEMA: &str = "romc-model/1";
 /// The format with `actuators`, `wrench_frame`, `landmarks`, `prior`, inputs given states, and a
 /// `robot` that is described.
 pub(crate) const SCHEMA_2: &str = "romc-model/2";
-
-pub(super) type Rows = Vec<Vec<f64>>;
-
-/// The matrix with these rows; every row must have `expected` numbers, or as many as the first.
-pub(super) fn from_rows(
-    file: &str,
-    tensor: &str,
-    rows: &Rows,
-    expected: Option<usize>,
-) -> Result<DMatrix<f64>, ArtifactError> {
-    let expected = expected.or(rows.first().map(Vec::len)).unwrap_or(0);
-    for (row, numbers) in rows.iter().enumerate() {
-        if numbers.len() != expected {
-            let (place, found) = (format!("`{tensor}`[{row}]"), numbers.len());
-            let found = format!("{found} numbers");
-            return Err(ArtifactError::at(file, place, found, expected.to_string()));
-        }
-    }
-    Ok(DMatrix::from_row_iterator(
-        rows.len(),
-        expected,
-        rows.iter().flatten().copied(),
-    ))
-}
-
-pub(super) fn to_rows(matrix: &DMatrix<f64>) -> Rows {
-    matrix
-        .row_iter()
-        .map(|row| row.iter().copied().collect())
-        .collect()
-}
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -72,14 +42,14 @@ pub(super) struct Manifest {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scaling: Option<Scaling>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub encoder: Option<MapEntry>,
+    pub encoder: Option<StateMap>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub decoder: Option<MapEntry>,
+    pub decoder: Option<StateMap>,
     pub latent_dim: usize,
     pub library: LibraryChoice,
-    pub phases: Vec<PhaseEntry>,
-    #[serde(default, skip_serializing_if = "Statistics::is_empty")]
-    pub input_statistics: Statistics,
+    pub phases: Vec<Phase>,
+    #[serde(default, with = "by_phase", skip_serializing_if = "Vec::is_empty")]
+    pub input_statistics: Vec<(String, InputStatistics)>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub robot: Option<RobotValue>,
     #[serde(default, deserialize_with = "present")]
@@ -92,19 +62,79 @@ pub(super) struct Manifest {
     pub sample_time_s: Option<f64>,
     #[serde(default, deserialize_with = "present")]
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub landmarks: Option<LandmarksEntry>,
+    pub landmarks: Option<Landmarks>,
     #[serde(default, deserialize_with = "present")]
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub prior: Option<PriorEntry>,
+    pub prior: Option<JumpPrior>,
     #[serde(default, deserialize_with = "bounded::object")]
     #[serde(skip_serializing_if = "Map::is_empty")]
     pub provenance: Map<String, Value>,
 }
 
 impl Manifest {
+    pub(super) fn of(model: &ReducedModel) -> Self {
+        let parts = model.parts.clone();
+        let landmarks = parts.jump_prior.as_ref();
+        let mut manifest = Self {
+            schema: SCHEMA.to_owned(),
+            name: parts.name,
+            description: parts.description,
+            state: parts.state,
+            input: parts.input,
+            scaling: parts.scaling,
+            encoder: parts.encoder,
+            decoder: parts.decoder,
+            latent_dim: parts.library.latent_dim(),
+            library: parts.library.choice(),
+            phases: parts.phases,
+            input_statistics: parts.statistics,
+            robot: parts.robot.map(RobotValue::of),
+            actuators: parts.actuators,
+            wrench_frame: Some(parts.wrench_frame).filter(|frame| *frame != WrenchFrame::Body),
+            sample_time_s: parts.sample_time_s,
+            landmarks: landmarks.map(|prior| prior.landmarks.clone()),
+            prior: parts.jump_prior,
+            provenance: parts.provenance,
+        };
+        if manifest.later_key().is_some() {
+            manifest.schema = SCHEMA_2.to_owned();
+        }
+        manifest
+    }
+
+    /// The checked model; `file` names it in errors.
+    pub(super) fn model(self, file: &str) -> Result<ReducedModel, ArtifactError> {
+        let refused = |source: ModelError| ArtifactError::unusable(file, source);
+        let incomplete = |part, needs| Err(refused(ModelError::Incomplete { part, needs }));
+        let prior = match (self.landmarks, self.prior) {
+            (None, None) => None,
+            (Some(_), None) => return incomplete("landmarks", "prior"),
+            (None, Some(_)) => return incomplete("prior", "landmarks"),
+            (Some(landmarks), Some(prior)) => Some(JumpPrior { landmarks, ..prior }),
+        };
+        let robot = self.robot.map(|robot| robot.robot(file)).transpose()?;
+        let library = Library::of(self.latent_dim, self.library).map_err(refused)?;
+        let mut builder = ReducedModel::builder(self.name, library)
+            .description(self.description)
+            .state(self.state)
+            .input(self.input)
+            .scaling(self.scaling)
+            .phases(self.phases)
+            .robot(robot)
+            .actuators(self.actuators)
+            .wrench_frame(self.wrench_frame.unwrap_or_default())
+            .jump_prior(prior)
+            .sample_time_s(self.sample_time_s)
+            .provenance(self.provenance);
+        builder.encoder = self.encoder;
+        builder.decoder = self.decoder;
+        builder.statistics = self.input_statistics;
+        builder.build().map_err(refused)
+    }
+
     /// A key that it has and the first schema does not know.
     pub(super) fn later_key(&self) -> Option<&'static str> {
-        let mut statistics = self.input_statistics.0.iter();
+        let mut statistics = self.input_statistics.iter();
         let has_given_state = statistics.any(|(_, entry)| entry.given_state.is_some());
         let later = [
             ("actuators", self.actuators.is_some()),
@@ -145,43 +175,30 @@ impl<'de> Deserialize<'de> for RobotValue {
     }
 }
 
+impl RobotValue {
+    fn of(robot: &Robot) -> Self {
+        match robot_file::by_name(robot.name()) {
+            Ok(_) => Self::Name(robot.name().to_owned()),
+            Err(_) => Self::Entry(RobotEntry::of(robot)),
+        }
+    }
+
+    fn robot(self, file: &str) -> Result<&'static Robot, ArtifactError> {
+        match self {
+            Self::Name(name) => {
+                robot_file::by_name(&name).map_err(|source| ArtifactError::unusable(file, source))
+            }
+            Self::Entry(entry) => entry
+                .robot("robot")
+                .map_err(|error| ArtifactError::text(file, Place::Whole, error.to_string())),
+        }
+    }
+}
+
 #[derive(Deserialize)]
 pub(super) struct SchemaProbe {
     #[serde(default, deserialize_with = "bounded::value")]
     pub schema: Option<Value>,
-}
-
-/// An encoder or decoder: one affine map, or a chain of layers with activations.
-#[derive(Serialize, Deserialize)]
-#[serde(try_from = "MapFields", untagged)]
-pub(super) enum MapEntry {
-    Affine { weights: Rows, bias: Vec<f64> },
-    Layers { layers: Vec<LayerEntry> },
-}
-
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct LayerEntry {
-    pub weights: Rows,
-    pub bias: Vec<f64>,
-    #[serde(default = "linear")]
-    pub activation: String,
-}
-
-fn linear() -> String {
-    Activation::Linear.name().to_owned()
-}
-
-/// All keys that an encoder or decoder may have, before it is known which kind it is.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct MapFields {
-    #[serde(default, deserialize_with = "present")]
-    weights: Option<Rows>,
-    #[serde(default, deserialize_with = "present")]
-    bias: Option<Vec<f64>>,
-    #[serde(default, deserialize_with = "present")]
-    layers: Option<Vec<LayerEntry>>,
 }
 
 /// A value that may be left out, but not be `null`.
@@ -189,48 +206,6 @@ fn present<'de, D: Deserializer<'de>, T: Deserialize<'de>>(
     deserializer: D,
 ) -> Result<Option<T>, D::Error> {
     T::deserialize(deserializer).map(Some)
-}
-
-impl TryFrom<MapFields> for MapEntry {
-    type Error = &'static str;
-
-    fn try_from(fields: MapFields) -> Result<Self, &'static str> {
-        match (fields.weights, fields.bias, fields.layers) {
-            (None, None, Some(layers)) => Ok(Self::Layers { layers }),
-            (_, _, Some(_)) => {
-                Err("found `layers` beside `weights` or `bias`, expected one of the two")
-            }
-            (Some(weights), Some(bias), None) => Ok(Self::Affine { weights, bias }),
-            (None, _, None) => Err("missing field `weights`"),
-            (_, None, None) => Err("missing field `bias`"),
-        }
-    }
-}
-
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct PhaseEntry {
-    pub name: String,
-    pub feet: FeetRule,
-    pub xi: Rows,
-}
-
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct StatisticsEntry {
-    pub mean: Vec<f64>,
-    pub covariance: Rows,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub given_state: Option<GivenStateEntry>,
-}
-
-/// The latent input given the latent state.
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct GivenStateEntry {
-    pub mean: Rows,
-    pub covariance: Rows,
-    pub acceleration_error: Rows,
 }
 
 /// A number for all coordinates, or one number per coordinate.
@@ -289,41 +264,34 @@ impl<'de> Deserialize<'de> for LibraryChoice {
     }
 }
 
-/// Statistics by phase: a JSON object as pairs in the file's order, in which no key comes twice.
-#[derive(Default)]
-pub(super) struct Statistics(pub Vec<(String, StatisticsEntry)>);
+/// A JSON object as pairs in the file's order, in which no key comes twice.
+mod by_phase {
+    use super::*;
 
-impl Statistics {
-    fn is_empty(&self) -> bool {
-        self.0.is_empty()
+    type Pairs = Vec<(String, InputStatistics)>;
+
+    pub(super) fn serialize<S: Serializer>(pairs: &Pairs, to: S) -> Result<S::Ok, S::Error> {
+        to.collect_map(pairs.iter().map(|(key, value)| (key, value)))
     }
-}
 
-impl Serialize for Statistics {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_map(self.0.iter().map(|(key, value)| (key, value)))
-    }
-}
-
-impl<'de> Deserialize<'de> for Statistics {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Pairs, D::Error> {
         struct Object;
         impl<'de> Visitor<'de> for Object {
-            type Value = Statistics;
+            type Value = Pairs;
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
                 f.write_str("an object with one entry per phase")
             }
-            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Statistics, A::Error> {
-                let mut pairs: Vec<(String, StatisticsEntry)> = Vec::new();
+            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Pairs, A::Error> {
+                let mut pairs = Pairs::new();
                 while let Some(key) = map.next_key::<String>()? {
                     if pairs.iter().any(|(earlier, _)| *earlier == key) {
                         return Err(A::Error::custom(format_args!("duplicate key {key:?}")));
                     }
                     pairs.push((key, map.next_value()?));
                 }
-                Ok(Statistics(pairs))
+                Ok(pairs)
             }
         }
-        deserializer.deserialize_map(Object)
+        from.deserialize_map(Object)
     }
 }

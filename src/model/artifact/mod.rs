@@ -32,9 +32,9 @@
 //!
 //! [`ReducedModel`]: crate::model::ReducedModel
 
+#![allow(missing_docs, reason = "names say it all where there is no comment")]
+
 mod bounded;
-mod export;
-mod jump_prior;
 mod manifest;
 mod print;
 mod read;

@@ -5,23 +5,13 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
-use nalgebra::DVector;
 use serde_json::Value;
 
-use super::jump_prior::prior_of;
-use super::manifest::{
-    GivenStateEntry, Manifest, MapEntry, PhaseEntry, RobotValue, Rows, SCHEMA, SCHEMA_2,
-    SchemaProbe, StatisticsEntry, from_rows,
-};
+use super::manifest::{Manifest, SCHEMA, SCHEMA_2, SchemaProbe};
 use crate::files::size::Format;
 use crate::files::{Fault, Located, Place, magic};
-use crate::model::{
-    Activation, AffineMap, InputGivenState, InputStatistics, Layer, Library, ModelError, Phase,
-    ReducedModel, StateMap,
-};
-use crate::robot::STATE_DIM;
+use crate::model::{ModelError, ReducedModel};
 
-/// A fault and its place in a model file.
 pub type ArtifactError = Located<Fault<ModelError>>;
 
 /// An error and all its causes in one line.
@@ -45,9 +35,6 @@ pub fn is_standard_input(path: &Path) -> bool {
 }
 
 /// Reads and checks a model file, or standard input for the path `-`.
-///
-/// # Errors
-/// [`ArtifactError`] with what was found and expected.
 pub fn read(path: &Path) -> Result<ReducedModel, ArtifactError> {
     let mut bytes = Vec::new();
     let (name, source): (String, io::Result<Box<dyn Read>>) = match is_standard_input(path) {
@@ -85,7 +72,7 @@ pub fn read_from_bytes(file: &str, bytes: &[u8]) -> Result<ReducedModel, Artifac
             let expected = format!("only from \"{SCHEMA_2}\" on");
             Err(ArtifactError::at(file, format!("`{key}`"), found, expected))
         }
-        None => to_model(file, manifest),
+        None => manifest.model(file),
     }
 }
 
@@ -143,120 +130,4 @@ fn check_schema(file: &str, bytes: &[u8]) -> Result<(), ArtifactError> {
     };
     let expected = format!("\"{SCHEMA}\" or \"{SCHEMA_2}\"");
     Err(ArtifactError::at(file, "`schema`", found, expected))
-}
-
-fn to_model(file: &str, manifest: Manifest) -> Result<ReducedModel, ArtifactError> {
-    let latent_dim = manifest.latent_dim;
-    let library = Library::of(latent_dim, manifest.library);
-    let library = library.map_err(|source| ArtifactError::unusable(file, source))?;
-    let mut builder = ReducedModel::builder(manifest.name, library)
-        .description(manifest.description)
-        .provenance(manifest.provenance);
-    let robot = manifest.robot.map(|robot| match robot {
-        RobotValue::Name(name) => crate::robot_file::by_name(&name)
-            .map_err(|source| ArtifactError::unusable(file, source)),
-        RobotValue::Entry(entry) => {
-            let robot = entry.robot("robot");
-            robot.map_err(|error| ArtifactError::text(file, Place::Whole, error.to_string()))
-        }
-    });
-    let robot = robot.transpose()?;
-    let known_dim = robot
-        .map(|_| STATE_DIM)
-        .or(manifest.state.as_ref().map(|state| state.names.len()));
-    builder = builder
-        .robot(robot)
-        .state(manifest.state)
-        .input(manifest.input)
-        .scaling(manifest.scaling)
-        .actuators(manifest.actuators)
-        .wrench_frame(manifest.wrench_frame.unwrap_or_default())
-        .sample_time_s(manifest.sample_time_s);
-    if let Some(entry) = &manifest.encoder {
-        builder = builder.encoder(map_of(file, "encoder", entry, known_dim)?);
-    }
-    if let Some(entry) = &manifest.decoder {
-        builder = builder.decoder(map_of(file, "decoder", entry, Some(latent_dim))?);
-    }
-    let phases = manifest.phases.into_iter().enumerate();
-    let phases = phases
-        .map(|(index, PhaseEntry { name, feet, xi })| {
-            let tensor = format!("phases[{index}].xi");
-            let xi = from_rows(file, &tensor, &xi, Some(latent_dim))?;
-            Ok(Phase { name, feet, xi })
-        })
-        .collect::<Result<Vec<_>, _>>()?;
-    let prior = prior_of(file, (manifest.landmarks, manifest.prior), &phases)?;
-    builder = builder.phases(phases).jump_prior(prior);
-    for (name, entry) in manifest.input_statistics.0 {
-        let statistics = statistics_of(file, &name, &entry)?;
-        builder = builder.input_statistics(name, statistics);
-    }
-    builder
-        .build()
-        .map_err(|source| ArtifactError::unusable(file, source))
-}
-
-/// An encoder or decoder; a chain of one linear layer is the affine map.
-fn map_of(
-    file: &str,
-    tensor: &str,
-    entry: &MapEntry,
-    columns: Option<usize>,
-) -> Result<StateMap, ArtifactError> {
-    let refused = |source: ModelError| ArtifactError::unusable(file, source);
-    let entries = match entry {
-        MapEntry::Affine { weights, bias } => {
-            return affine_of(file, tensor, (weights, bias), columns).map(StateMap::from);
-        }
-        MapEntry::Layers { layers } => layers,
-    };
-    let mut layers: Vec<Layer> = Vec::with_capacity(entries.len());
-    for (index, entry) in entries.iter().enumerate() {
-        let name = format!("{tensor}.layers[{index}]");
-        // What the layer before gives, this one takes.
-        let before = layers.last().map(|layer| layer.map.output_dim());
-        let columns = before.or(columns);
-        let activation: Activation = entry.activation.parse().map_err(refused)?;
-        let map = affine_of(file, &name, (&entry.weights, &entry.bias), columns)?;
-        layers.push(Layer { map, activation });
-    }
-    StateMap::new(tensor, layers).map_err(refused)
-}
-
-fn affine_of(
-    file: &str,
-    tensor: &str,
-    (weights, bias): (&Rows, &[f64]),
-    columns: Option<usize>,
-) -> Result<AffineMap, ArtifactError> {
-    let weights = from_rows(file, &format!("{tensor}.weights"), weights, columns)?;
-    let bias = DVector::from_column_slice(bias);
-    AffineMap::new(tensor, weights, bias).map_err(|source| ArtifactError::unusable(file, source))
-}
-
-fn statistics_of(
-    file: &str,
-    phase: &str,
-    entry: &StatisticsEntry,
-) -> Result<InputStatistics, ArtifactError> {
-    let phase: String = phase.chars().take(80).collect();
-    let place = format!("input_statistics.{}", phase.escape_debug());
-    let matrix = |key: &str, rows: &Rows, columns: Option<usize>| {
-        from_rows(file, &format!("{place}.{key}"), rows, columns)
-    };
-    let covariance = matrix("covariance", &entry.covariance, Some(entry.mean.len()))?;
-    let given = |given: &GivenStateEntry| {
-        let matrix = |key: &str, rows: &Rows| matrix(&format!("given_state.{key}"), rows, None);
-        Ok(InputGivenState {
-            mean: matrix("mean", &given.mean)?,
-            covariance: matrix("covariance", &given.covariance)?,
-            acceleration_error: matrix("acceleration_error", &given.acceleration_error)?,
-        })
-    };
-    Ok(InputStatistics {
-        mean: DVector::from_column_slice(&entry.mean),
-        covariance,
-        given_state: entry.given_state.as_ref().map(given).transpose()?,
-    })
 }

@@ -6,7 +6,7 @@ use std::{fmt, fs, io};
 
 use sha2::{Digest as _, Sha256};
 
-use super::export::manifest_of;
+use super::manifest::Manifest;
 use super::print::print;
 use super::read::ArtifactError;
 use crate::files::{Overwrite, Place, hex, write_whole};
@@ -15,15 +15,12 @@ use crate::model::ReducedModel;
 /// The model file as text: equal for equal models, numbers in the shortest form that reads back to
 /// the same bits.
 pub fn to_text(model: &ReducedModel) -> String {
-    let value = serde_json::to_value(manifest_of(model))
+    let value = serde_json::to_value(Manifest::of(model))
         .expect("a manifest is strings, finite numbers and string-keyed maps");
     print(&value)
 }
 
 /// Checks whether [`write()`] would refuse.
-///
-/// # Errors
-/// [`Fault::Text`](crate::files::Fault::Text) if a different file is there and `overwrite` refuses.
 pub fn check_place(
     path: &Path,
     model: &ReducedModel,
@@ -45,9 +42,6 @@ fn check_text(path: &Path, text: &str, overwrite: Overwrite) -> Result<(), Artif
 }
 
 /// Writes a model file: into a new file beside `path`, which is then moved there.
-///
-/// # Errors
-/// As [`check_place`], and those of the file system.
 pub fn write(path: &Path, model: &ReducedModel, overwrite: Overwrite) -> Result<(), ArtifactError> {
     let text = to_text(model);
     let written = write_whole(path, overwrite, |out| out.write_all(text.as_bytes()));
@@ -83,7 +77,6 @@ impl fmt::Display for Digest {
     }
 }
 
-/// The digest of a model.
 pub fn digest(model: &ReducedModel) -> Digest {
     Digest(Sha256::digest(to_text(model)).into())
 }

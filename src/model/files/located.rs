@@ -7,7 +7,6 @@ use std::{fmt, io};
 /// A place in a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Place {
-    /// The file as a whole.
     Whole,
     /// A row of a table, from 1 (the header).
     Row(usize),
@@ -41,7 +40,6 @@ impl Place {
     }
 }
 
-/// An entry by its name.
 impl From<&str> for Place {
     fn from(entry: &str) -> Self {
         Place::Entry(entry.into())
@@ -54,7 +52,6 @@ impl From<String> for Place {
     }
 }
 
-/// Line and column of a character.
 impl From<(usize, usize)> for Place {
     fn from((line, column): (usize, usize)) -> Self {
         Place::Character(line, column)
@@ -69,13 +66,11 @@ pub enum Fault<C: Error + 'static = Infallible> {
     Io {
         /// Such as `read the file`.
         action: &'static str,
-        /// Its reason.
         source: io::Error,
     },
     /// Something else is there than what is needed, or nothing.
     #[error("found {found}, expected {expected}")]
     Unexpected {
-        /// What is there.
         found: Box<str>,
         /// What could be, or the option that settles it.
         expected: Box<str>,
@@ -100,14 +95,11 @@ pub enum Fault<C: Error + 'static = Infallible> {
 pub struct Located<E> {
     /// The file; empty for an option or argument.
     pub file: Box<str>,
-    /// Where in the file.
     pub place: Place,
-    /// The fault.
     pub kind: E,
 }
 
 impl<E> Located<E> {
-    /// `kind` at `place` of `file`.
     pub fn new(file: &str, place: Place, kind: impl Into<E>) -> Self {
         Located {
             file: file.into(),
@@ -129,7 +121,6 @@ impl<C: Error + 'static> Located<Fault<C>> {
         Self::new(file, place.into(), Fault::Unexpected { found, expected })
     }
 
-    /// An option that cannot be followed.
     pub fn option(
         option: &'static str,
         found: impl Into<Box<str>>,
@@ -138,17 +129,14 @@ impl<C: Error + 'static> Located<Fault<C>> {
         Self::at("", Place::Option(option), found, expected)
     }
 
-    /// A fault in words.
     pub fn text(file: &str, place: impl Into<Place>, text: impl Into<Box<str>>) -> Self {
         Self::new(file, place.into(), Fault::Text(text.into()))
     }
 
-    /// A refusal of the file system.
     pub fn io(file: &str, action: &'static str, source: io::Error) -> Self {
         Self::new(file, Place::Whole, Fault::Io { action, source })
     }
 
-    /// Contents that cannot be used.
     pub fn unusable(file: &str, source: impl Into<C>) -> Self {
         Self::new(file, Place::Whole, Fault::Unusable(Box::new(source.into())))
     }

@@ -1,4 +1,4 @@
-//! Files of other programs: what they are, by their bytes or their ending, and the lines to type that convert them.
+//! Formats of other programs, recognised by content or file name extension, with the commands that convert them.
 //!
 //! `magic.toml` is the one table. Readers of recordings ask for a text table or a log ([`recognised`]), readers of models
 //! for arrays.
@@ -13,7 +13,6 @@ use super::shell_path;
 /// Bytes that [`recognised`] needs of a file.
 pub const MAGIC_BYTES: usize = 512;
 
-/// First bytes of an MCAP file.
 pub const MCAP: &[u8] = b"\x89MCAP0\r\n";
 
 /// Bytes at either end of a file in which names are looked for.
@@ -76,7 +75,7 @@ fn table() -> &'static [Row] {
     })
 }
 
-/// What a file of these first bytes is if no reader of tables or logs reads it, with a line that makes one.
+/// The format of a file with these first bytes, with a command that converts it; none for a text table or log.
 pub fn recognised(path: &Path, start: &[u8]) -> Option<OtherFormat> {
     let is_table = |row: &&Row| row.table.is_some() || row.packed.is_some();
     let mut rows = table().iter().filter(is_table);
@@ -101,20 +100,20 @@ pub(crate) fn arrays(path: &Path, bytes: &[u8]) -> Option<OtherFormat> {
     arrays_by_content(path, bytes).or_else(|| arrays_by_ending(path))
 }
 
-/// What holds a model's arrays, by its bytes.
+/// The format of a file that holds a model's arrays, by its content.
 pub fn arrays_by_content(path: &Path, bytes: &[u8]) -> Option<OtherFormat> {
     let rows = table().iter().filter(|row| row.holds(bytes));
     rows.filter_map(|row| row.of_arrays(path)).next()
 }
 
-/// What holds a model's arrays, by its ending.
+/// The same by its extension.
 pub fn arrays_by_ending(path: &Path) -> Option<OtherFormat> {
     let ending = path.extension()?.to_string_lossy().to_lowercase();
     let row = (table().iter()).find(|row| row.endings.contains(&ending))?;
     row.of_arrays(path)
 }
 
-/// What cannot be read as a file: the name that the files of a TensorFlow checkpoint share, or the folder of a SavedModel.
+/// The same of a path that is no file: the common stem of a TensorFlow checkpoint's files, or the folder of a SavedModel.
 pub fn arrays_by_neighbours(path: &Path) -> Option<OtherFormat> {
     let index = PathBuf::from(format!("{}.index", path.display()));
     let parts = [index, path.join("saved_model.pb")];
@@ -125,6 +124,7 @@ pub fn arrays_by_neighbours(path: &Path) -> Option<OtherFormat> {
 impl Row {
     fn holds(&self, bytes: &[u8]) -> bool {
         let latin_1 = |text: &str| -> Vec<u8> { text.chars().map(|c| c as u8).collect() };
+        // A file that ends before the place of the sign does not have it.
         let from = bytes.get(self.at..).unwrap_or_default();
         let is_signed = |sign: &Vec<String>| {
             let mut inside = sign.iter().skip(1);
@@ -218,7 +218,10 @@ fn to_table(code: &str, path: &Path) -> String {
         true => "",
         false => TO_COLUMNS,
     };
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let stem = path
+        .file_stem()
+        .unwrap_or(path.as_os_str())
+        .to_string_lossy();
     let with_ending = |end: &str| path.with_file_name(format!("{stem}{end}"));
     let table = match with_ending(".csv") {
         same if same == path => with_ending("-table.csv"),

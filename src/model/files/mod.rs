@@ -6,6 +6,8 @@
 //! read state the place of a fault with [`Located`], stop where [`size`] says, and name formats that they do not read
 //! by [`magic`]. `text` has what texts of files may do on a terminal or in a shell.
 
+#![allow(missing_docs, reason = "names say it all where there is no comment")]
+
 pub mod magic;
 pub mod size;
 
@@ -16,7 +18,7 @@ mod text;
 mod whole;
 
 pub use folder::{
-    Begun, FolderError, check_folder, earlier_files, hex, write_files, write_files_since,
+    Emitted, FolderError, check_folder, earlier_files, hex, write_files, write_files_since,
 };
 pub use located::{Fault, Located, Place};
 pub use size::read_toml;

@@ -21,10 +21,8 @@ const MAX_TRIED: usize = 16;
 /// A lock shows that its process lives; parts without one are what ended processes have left.
 #[derive(Debug)]
 pub(super) struct Part {
-    /// Open for writing.
     pub file: File,
     path: PathBuf,
-    /// Where it goes.
     pub place: PathBuf,
     is_placed: bool,
 }

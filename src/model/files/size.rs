@@ -8,7 +8,6 @@ use std::path::Path;
 
 use super::magic::{OtherFormat, recognised};
 
-/// A kind of file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
     /// Settings, maps of columns, robots as TOML.
@@ -42,7 +41,6 @@ impl Format {
         }
     }
 
-    /// Most bytes that are read.
     pub const fn most_bytes(self) -> u64 {
         self.facts().0
     }
@@ -74,7 +72,6 @@ pub struct Capped<R> {
 }
 
 impl<R: Read> Capped<R> {
-    /// At most `most` bytes of a source.
     pub fn new(source: R, format: Format, most: u64) -> Self {
         let left = most;
         Self {
@@ -96,9 +93,6 @@ impl<R: Read> Read for Capped<R> {
 }
 
 /// The bytes of a file, or of a device or pipe, up to the most of its format.
-///
-/// # Errors
-/// Those of the file system, and [`io::ErrorKind::FileTooLarge`].
 pub fn read_capped(path: &Path, format: Format) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let file = File::open(path)?;
@@ -107,9 +101,6 @@ pub fn read_capped(path: &Path, format: Format) -> io::Result<Vec<u8>> {
 }
 
 /// [`read_capped`] of a text.
-///
-/// # Errors
-/// As [`read_capped`], and [`io::ErrorKind::InvalidData`] for another format or bytes that are not UTF-8.
 pub fn read_text_capped(path: &Path, format: Format) -> io::Result<String> {
     let bytes = read_capped(path, format)?;
     let invalid = |text: String| io::Error::new(io::ErrorKind::InvalidData, text);
@@ -125,10 +116,6 @@ pub fn read_text_capped(path: &Path, format: Format) -> io::Result<String> {
 /// has in a file.
 const MOST_TABLES: usize = 20_000;
 
-/// The text of a TOML file.
-///
-/// # Errors
-/// As [`read_text_capped`], and [`io::ErrorKind::InvalidData`] for a file of more tables than any settings have.
 pub fn read_toml(path: &Path) -> io::Result<String> {
     let text = read_text_capped(path, Format::Settings)?;
     match text.bytes().filter(|byte| b".[{".contains(byte)).count() {

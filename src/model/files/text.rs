@@ -33,13 +33,11 @@ pub fn shell_path(path: &Path) -> String {
     }
 }
 
-/// Paths as a shell takes them.
 pub fn shell_paths(paths: &[PathBuf]) -> String {
     let words: Vec<String> = paths.iter().map(|path| shell_path(path)).collect();
     words.join(" ")
 }
 
-/// A word as a shell takes it.
 pub fn shell_word(text: &str) -> String {
     let plain = |letter: char| letter.is_alphanumeric() || "-_./,=:+%".contains(letter);
     match !text.is_empty() && text.chars().all(plain) {

@@ -10,12 +10,10 @@ use super::part::{Part, remove_left_in};
 pub struct EmittedFile {
     /// Path relative to the output folder, with `/` between its parts.
     pub path: String,
-    /// What the file holds.
     pub contents: String,
 }
 
 impl EmittedFile {
-    /// A file at `path` with `contents`.
     pub fn new(path: impl Into<String>, contents: impl Into<String>) -> Self {
         Self {
             path: path.into(),
@@ -27,19 +25,16 @@ impl EmittedFile {
 /// Whether a file that is there already may be replaced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Overwrite {
-    /// Refuse.
     Refuse,
     /// Replace it (`--force`).
     Replace,
 }
 
 impl Overwrite {
-    /// From the state of a `--force` flag.
     pub fn when_forced(force: bool) -> Self {
         if force { Self::Replace } else { Self::Refuse }
     }
 
-    /// Whether a file at `path` may be written.
     pub fn allows(self, path: &Path) -> bool {
         match self {
             Self::Refuse => path.symlink_metadata().is_err(),

@@ -3,6 +3,8 @@
 //! Imports nothing. [`table`] has a [`Range`] per setting; the command line parses with it, the rooms that take the
 //! number check it, and a program that calls the library may ask it first.
 
+#![allow(missing_docs, reason = "names say it all where there is no comment")]
+
 pub mod table;
 
 use std::fmt;
@@ -16,9 +18,7 @@ pub struct Range {
     /// Name of the setting: that of its flag without dashes.
     pub name: &'static str,
     kind: Kind,
-    /// Its lower end.
     pub least: f64,
-    /// Its upper end.
     pub most: f64,
 }
 
@@ -36,19 +36,15 @@ enum Kind {
 pub struct OutOfRange {
     /// Name of the setting, that of its flag without dashes.
     pub name: &'static str,
-    /// What was given.
     pub found: String,
-    /// The range in words.
     pub expected: String,
 }
 
 impl Range {
-    /// Whole numbers from `least` to `most`.
     pub const fn whole(name: &'static str, least: u32, most: u32) -> Self {
         Self::new(name, Kind::Whole, least as f64, most as f64)
     }
 
-    /// Numbers from `least` to `most`.
     pub const fn real(name: &'static str, least: f64, most: f64) -> Self {
         Self::new(name, Kind::Real, least, most)
     }
@@ -67,7 +63,6 @@ impl Range {
         }
     }
 
-    /// Whether only whole numbers are in the range.
     pub fn is_whole(&self) -> bool {
         self.kind == Kind::Whole
     }
@@ -82,26 +77,15 @@ impl Range {
         is_kind && (self.least..=self.most).contains(&value)
     }
 
-    /// The number, if it is in the range.
-    ///
-    /// # Errors
-    /// [`OutOfRange`] with the name, the number and the range.
     pub fn check(&self, value: f64) -> Result<f64, OutOfRange> {
         (self.contains(value).then_some(value)).ok_or_else(|| self.refusal(short(value)))
     }
 
-    /// The count, if it is in the range.
-    ///
-    /// # Errors
-    /// As [`Range::check`].
     pub fn check_count(&self, value: usize) -> Result<usize, OutOfRange> {
         (self.contains(value as f64).then_some(value)).ok_or_else(|| self.refusal(value))
     }
 
     /// The number that a text spells.
-    ///
-    /// # Errors
-    /// The range in words, for a text that is no number in it.
     pub fn parse<T: FromStr + Copy + fmt::Display>(&self, text: &str) -> Result<T, String> {
         let in_range = |number: &T| {
             // A whole number beyond 2^53 is far beyond every range, so that its rounding does not matter.

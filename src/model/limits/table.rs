@@ -1,7 +1,5 @@
 //! The ranges; the command line's help says what each setting is.
 
-#![allow(missing_docs, reason = "the name of a range is that of its flag")]
-
 use super::Range;
 
 /// Constants and the list of them.
@@ -77,15 +75,4 @@ ranges! {
 /// The range of a setting of `romc train` by its name.
 pub fn of_training(name: &str) -> Option<&'static Range> {
     ALL.iter().find(|range| range.name == name)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn ranges_are_those_that_the_rooms_keep_themselves() {
-        assert_eq!(LATENT_DIM.most as usize, crate::robot::STATE_DIM);
-        assert_eq!(LAYER_WIDTH.most as usize, crate::model::MAX_LAYER_WIDTH);
-    }
 }

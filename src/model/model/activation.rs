@@ -1,11 +1,8 @@
 //! Activations of layers, with their exact derivatives.
 
 use std::fmt;
-use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
-
-use super::error::ModelError;
 
 /// What a layer applies to each of its units.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, clap::ValueEnum, Serialize, Deserialize)]
@@ -39,7 +36,6 @@ pub const GELU_RATE: f64 = 0.797_884_560_802_865_4;
 pub const GELU_CUBIC: f64 = 0.044_715;
 
 impl Activation {
-    /// All activations, in the order in which they are listed.
     pub const ALL: [Activation; 9] = [
         Self::Linear,
         Self::Elu,
@@ -52,7 +48,6 @@ impl Activation {
         Self::Softplus,
     ];
 
-    /// The name in model files and on the command line.
     pub(crate) fn name(self) -> &'static str {
         const NAMES: [&str; 9] = [
             "linear",
@@ -68,12 +63,10 @@ impl Activation {
         NAMES[self as usize]
     }
 
-    /// `phi(a)`.
     pub(crate) fn value(self, a: f64) -> f64 {
         self.jet(a)[0]
     }
 
-    /// `phi'(a)`.
     pub fn slope(self, a: f64) -> f64 {
         self.derivative(a, 1)
     }
@@ -160,7 +153,6 @@ fn sigmoid(a: f64) -> f64 {
     1.0 / (1.0 + (-a).exp())
 }
 
-/// Value and three derivatives of [`Activation::GeluTanh`].
 fn gelu_tanh(a: f64) -> [f64; 4] {
     // Where tanh is one to the last bit; further out its argument's powers would only overflow.
     if a.abs() > 10.0 {
@@ -195,19 +187,6 @@ fn gelu_tanh(a: f64) -> [f64; 4] {
 impl fmt::Display for Activation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.name())
-    }
-}
-
-impl FromStr for Activation {
-    type Err = ModelError;
-
-    fn from_str(name: &str) -> Result<Self, ModelError> {
-        let known = Self::ALL.into_iter().find(|known| known.name() == name);
-        known.ok_or_else(|| {
-            let name: String = name.chars().take(40).collect();
-            let expected = format!("one of {}", Self::ALL.map(Self::name).join(", "));
-            ModelError::invalid("activation", format!("{name:?}"), expected)
-        })
     }
 }
 

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use serde_json::{Map, Value};
 
 use super::coordinates::{CoordinateNames, Scaling};
-use super::error::{ModelError, check, check_tensor};
+use super::error::{ModelError, check, check_count, check_tensor};
 use super::identifier::{Identifier, identifier_of};
 use super::jump_prior::JumpPrior;
 use super::library::Library;
@@ -20,11 +20,10 @@ const MAX_STATE_DIM: usize = 256;
 const MAX_DESCRIPTION_LEN: usize = 10_000;
 const MAX_SAMPLE_TIME_S: f64 = 1.0;
 
-/// A method for each part that replaces it.
+/// A method for each part that replaces it; the model's method of that name says what it is.
 macro_rules! setters {
-    ($($(#[$doc:meta])* $part:ident: $value:ty;)*) => {
-        $($(#[$doc])*
-        pub fn $part(mut self, $part: $value) -> Self {
+    ($($part:ident: $value:ty;)*) => {
+        $(pub fn $part(mut self, $part: $value) -> Self {
             self.$part = $part.into();
             self
         })*
@@ -34,22 +33,22 @@ macro_rules! setters {
 /// Collects the parts of a model; [`ModelBuilder::build`] checks them against each other.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModelBuilder {
-    pub(super) name: String,
-    pub(super) description: String,
-    pub(super) library: Library,
-    pub(super) phases: Vec<Phase>,
-    pub(super) statistics: Vec<(String, InputStatistics)>,
-    pub(super) state: Option<CoordinateNames>,
-    pub(super) input: Option<CoordinateNames>,
-    pub(super) scaling: Option<Scaling>,
-    pub(super) encoder: Option<StateMap>,
-    pub(super) decoder: Option<StateMap>,
-    pub(super) robot: Option<&'static Robot>,
-    pub(super) actuators: Option<Actuators>,
-    pub(super) wrench_frame: WrenchFrame,
-    pub(super) jump_prior: Option<JumpPrior>,
-    pub(super) sample_time_s: Option<f64>,
-    pub(super) provenance: Map<String, Value>,
+    pub(crate) name: String,
+    pub(crate) description: String,
+    pub(crate) library: Library,
+    pub(crate) phases: Vec<Phase>,
+    pub(crate) statistics: Vec<(String, InputStatistics)>,
+    pub(crate) state: Option<CoordinateNames>,
+    pub(crate) input: Option<CoordinateNames>,
+    pub(crate) scaling: Option<Scaling>,
+    pub(crate) encoder: Option<StateMap>,
+    pub(crate) decoder: Option<StateMap>,
+    pub(crate) robot: Option<&'static Robot>,
+    pub(crate) actuators: Option<Actuators>,
+    pub(crate) wrench_frame: WrenchFrame,
+    pub(crate) jump_prior: Option<JumpPrior>,
+    pub(crate) sample_time_s: Option<f64>,
+    pub(crate) provenance: Map<String, Value>,
 }
 
 impl ModelBuilder {
@@ -75,31 +74,18 @@ impl ModelBuilder {
     }
 
     setters! {
-        /// The name.
         name: impl Into<String>;
-        /// Free text about the model.
         description: impl Into<String>;
-        /// The library; the phases' Xi must then have a row for each of its terms.
         library: Library;
-        /// All phases; rules are tried in their order.
         phases: Vec<Phase>;
-        /// Names and units of the state.
         state: impl Into<Option<CoordinateNames>>;
-        /// Names and units of the input.
         input: impl Into<Option<CoordinateNames>>;
-        /// The scale factors.
         scaling: impl Into<Option<Scaling>>;
-        /// The robot.
         robot: impl Into<Option<&'static Robot>>;
-        /// Losses of the joints, subtracted from the motors' torques; without them torques count as they are.
         actuators: Option<Actuators>;
-        /// The axes of force and moment in the inputs [default: the body's].
         wrench_frame: WrenchFrame;
-        /// Landmarks and prior of the training jumps.
         jump_prior: Option<JumpPrior>;
-        /// The sampling period of the recordings, s.
         sample_time_s: impl Into<Option<f64>>;
-        /// The model's origin: free JSON.
         provenance: Map<String, Value>;
     }
 
@@ -137,11 +123,6 @@ impl ModelBuilder {
         self
     }
 
-    /// Checks all parts and makes the model.
-    ///
-    /// # Errors
-    /// The first of the [`ModelError`]s that applies: names, shapes, finite values, scale factors,
-    /// rank of the encoder (singular values, `RANK_TOLERANCE`), reachable phases, covariances.
     pub fn build(mut self) -> Result<ReducedModel, ModelError> {
         let identifier = identifier_of("model name", &self.name)?;
         let phase_identifiers = self.check_phase_names()?;
@@ -170,14 +151,9 @@ impl ModelBuilder {
     }
 
     fn check_phase_names(&self) -> Result<Vec<Identifier>, ModelError> {
-        let n_phases = self.phases.len();
-        let (fits, expected) = (
-            (1..=MAX_PHASES).contains(&n_phases),
-            format!("1 to {MAX_PHASES}"),
-        );
-        check(fits, "`phases`", || format!("{n_phases} phases"), expected)?;
+        check_count("`phases`", self.phases.len(), "phases", 1..=MAX_PHASES)?;
         let mut first_use = HashMap::new();
-        let mut identifiers = Vec::with_capacity(self.phases.len());
+        let mut identifiers = Vec::new();
         for (second, phase) in self.phases.iter().enumerate() {
             let place = format!("phases[{second}].name");
             let identifier = identifier_of(&place, &phase.name)?;
@@ -195,14 +171,14 @@ impl ModelBuilder {
     fn check_phases(&self) -> Result<(), ModelError> {
         let expected = (self.library.len(), self.library.latent_dim());
         for (index, phase) in self.phases.iter().enumerate() {
-            let tensor = format!("phases[{index}].xi");
-            check_tensor(&tensor, &phase.xi, expected)?;
+            check_tensor(&format!("phases[{index}].xi"), &phase.xi, expected)?;
             if let FeetRule::Patterns(patterns) = &phase.feet {
-                let repeated = (1..patterns.len())
-                    .find(|&second| patterns[..second].contains(&patterns[second]));
-                let place = format!("phases[{index}].feet[{}]", repeated.unwrap_or(0));
-                let found = || "a pattern that is in the list already";
-                check(repeated.is_none(), &place, found, "each pattern once")?;
+                let mut places = 1..patterns.len();
+                if let Some(again) = places.find(|&k| patterns[..k].contains(&patterns[k])) {
+                    let place = format!("phases[{index}].feet[{again}]");
+                    let found = "a pattern that is in the list already";
+                    return Err(ModelError::invalid(place, found, "each pattern once"));
+                }
             }
         }
         for (index, phase) in self.phases.iter().enumerate() {
@@ -229,7 +205,6 @@ impl ModelBuilder {
         check(fits, "`sample_time_s`", || time_s, expected)
     }
 
-    /// Number of robot coordinates, by the first of the parts that has it.
     pub(super) fn state_dim(&self) -> Option<usize> {
         let named = |signals: &Option<CoordinateNames>| signals.as_ref().map(CoordinateNames::dim);
         named(&self.state)
@@ -240,6 +215,9 @@ impl ModelBuilder {
 
     /// Checks shapes of encoder and decoder; returns the number of robot coordinates if known.
     fn check_maps(&self) -> Result<Option<usize>, ModelError> {
+        for (name, map) in [("encoder", &self.encoder), ("decoder", &self.decoder)] {
+            map.as_ref().map_or(Ok(()), |map| map.check_chain(name))?;
+        }
         let latent_dim = self.library.latent_dim();
         let of_robot = self.robot.map(|_| crate::robot::STATE_DIM);
         let state_dim = of_robot.or(self.state_dim());
@@ -252,13 +230,9 @@ impl ModelBuilder {
             return Ok(None);
         };
         let fits = (latent_dim..=MAX_STATE_DIM).contains(&dim);
+        let found = || format!("{dim} robot coordinates");
         let expected = format!("{latent_dim} (one per latent coordinate) to {MAX_STATE_DIM}");
-        check(
-            fits,
-            "`state`",
-            || format!("{dim} robot coordinates"),
-            expected,
-        )?;
+        check(fits, "`state`", found, expected)?;
         if let Some(encoder) = &self.encoder {
             encoder.check("encoder", (latent_dim, dim))?;
             encoder.check_widths(latent_dim)?;
@@ -276,27 +250,23 @@ impl ModelBuilder {
                 names.check(signals, state_dim)?;
             }
         }
-        let Some(robot) = self.robot else {
-            return Ok(());
-        };
         let of_robot = [Robot::state_names(), Robot::input_names()];
         for ((signals, names), of_robot) in named.into_iter().zip(of_robot) {
-            if let Some(names) = names {
+            if let (Some(names), Some(robot)) = (names, self.robot) {
                 names.check_robot(signals, &of_robot, robot)?;
             }
         }
         Ok(())
     }
 
-    /// Actuators and a frame are those of a robot.
     fn check_input_rule(&self) -> Result<(), ModelError> {
         let part = match (&self.actuators, self.wrench_frame) {
             (Some(_), _) => "actuators",
             (None, WrenchFrame::World) => "wrench_frame",
             (None, WrenchFrame::Body) => return Ok(()),
         };
+        let needs = "robot";
         if self.robot.is_none() {
-            let needs = "robot";
             return Err(ModelError::Incomplete { part, needs });
         }
         match self.actuators.as_ref().and_then(Actuators::unusable) {

@@ -17,9 +17,7 @@ const MAX_TEXT_LEN: usize = 64;
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CoordinateNames {
-    /// One name per coordinate, such as `fr.hx`.
     pub names: Vec<String>,
-    /// One unit per coordinate, such as `N m`.
     pub units: Vec<String>,
 }
 
@@ -61,7 +59,6 @@ impl CoordinateNames {
         Ok(())
     }
 
-    /// Refuses names that are not these of a robot.
     pub(super) fn check_robot(
         &self,
         signals: &str,
@@ -99,9 +96,7 @@ fn check_texts(
 /// Factors of one kind of quantity: `scaled value = factor * SI value`.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ScaleFactors {
-    /// One factor for all coordinates.
     Uniform(f64),
-    /// One factor per coordinate.
     PerCoordinate(DVector<f64>),
 }
 
@@ -143,7 +138,6 @@ pub struct Scaling {
 }
 
 impl Scaling {
-    /// One factor for everything.
     pub fn uniform(factor: f64) -> Self {
         Self {
             state: ScaleFactors::Uniform(factor),

@@ -1,6 +1,6 @@
 //! Faults of models, and of calls of their functions.
 
-#![allow(missing_docs, reason = "each variant's message names its fields")]
+use std::ops::RangeInclusive;
 
 use nalgebra::{Dim, Matrix, RawStorage};
 use thiserror::Error;
@@ -95,14 +95,8 @@ impl ModelError {
         ModelError::invalid(format!("`{tensor}`"), found, "numbers of similar size")
     }
 
-    /// Refuses a vector of another length than expected.
-    pub(super) fn check_dimension(
-        what: &str,
-        found: usize,
-        expected: usize,
-    ) -> Result<(), ModelError> {
-        let found_entries = || format!("{found} entries");
-        check(found == expected, what, found_entries, expected)
+    pub(super) fn check_dimension(what: &str, found: usize, dim: usize) -> Result<(), ModelError> {
+        check(found == dim, what, || format!("{found} entries"), dim)
     }
 }
 
@@ -119,21 +113,28 @@ pub(super) fn check<F: ToString>(
     }
 }
 
-/// Refuses a tensor of another shape than expected.
+/// Refuses a number of things outside a range.
+pub(super) fn check_count(
+    place: &str,
+    found: usize,
+    things: &str,
+    range: RangeInclusive<usize>,
+) -> Result<(), ModelError> {
+    let expected = format!("{} to {}", range.start(), range.end());
+    let text = || format!("{found} {things}").trim_end().to_owned();
+    check(range.contains(&found), place, text, expected)
+}
+
 pub(super) fn check_shape(
     tensor: &str,
     found: (usize, usize),
     expected: (usize, usize),
 ) -> Result<(), ModelError> {
-    if found == expected {
-        return Ok(());
-    }
-    let [found, expected] = [found, expected].map(|(rows, columns)| format!("{rows} x {columns}"));
-    let (place, expected) = (format!("`{tensor}`"), expected + " (rows x columns)");
-    Err(ModelError::invalid(place, found, expected))
+    let text = |(rows, columns)| format!("{rows} x {columns}");
+    let (place, wanted) = (format!("`{tensor}`"), text(expected) + " (rows x columns)");
+    check(found == expected, &place, || text(found), wanted)
 }
 
-/// Refuses a tensor of another shape than expected, or with an entry that is no number.
 pub(super) fn check_tensor<R: Dim, C: Dim, S: RawStorage<f64, R, C>>(
     tensor: &str,
     found: &Matrix<f64, R, C, S>,

@@ -15,7 +15,6 @@ pub struct Tape {
 
 /// One operation; operands are positions of earlier steps.
 #[derive(Clone, Debug, PartialEq)]
-#[allow(missing_docs, reason = "the names say it")]
 pub enum Step {
     Number(f64),
     /// Index into the variables: z, then dz, then u.
@@ -55,10 +54,8 @@ impl Tape {
             values[index] = match step {
                 Step::Number(value) => *value,
                 Step::Variable(variable) => variables[*variable],
-                Step::Sum(operands) => operands.iter().map(|&operand| values[operand]).sum(),
-                Step::Product(operands) => {
-                    operands.iter().map(|&operand| values[operand]).product()
-                }
+                Step::Sum(operands) => operands.iter().map(|&term| values[term]).sum(),
+                Step::Product(operands) => operands.iter().map(|&factor| values[factor]).product(),
                 Step::Integer(base, exponent) => integer_power(values[*base], (*exponent).into()),
                 Step::Power(base, exponent) => values[*base].powf(values[*exponent]),
                 Step::Sine(argument) => Function::Sin.evaluate(values[*argument]),

@@ -1,8 +1,10 @@
 //! What the latent state says of the latent input.
 
 use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
 
 use super::error::{ModelError, check_tensor};
+use super::listed;
 use super::maps::complement;
 use super::statistics::{check_covariance, symmetric};
 
@@ -13,13 +15,17 @@ const RIDGE: f64 = 1e-2;
 
 /// The latent input of one phase given the latent state, `u_lat | z, dz ~ (mean [1; z; dz], covariance)`, and how far
 /// the model's accelerations are off. Scaled units.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct InputGivenState {
     /// `latent_dim x (1 + 2 latent_dim)`.
+    #[serde(with = "listed")]
     pub mean: DMatrix<f64>,
     /// `latent_dim x latent_dim`, symmetric positive semidefinite.
+    #[serde(with = "listed")]
     pub covariance: DMatrix<f64>,
     /// Of `ddz - Xi^T Theta(z, dz, u_lat)` about zero, `latent_dim x latent_dim`.
+    #[serde(with = "listed")]
     pub acceleration_error: DMatrix<f64>,
 }
 
@@ -90,54 +96,4 @@ fn ridge(state: &DMatrix<f64>, both: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         &inverse * state * &inverse + DMatrix::identity(state.nrows(), state.nrows()) * RIDGE;
     let solved = normalised.cholesky()?.solve(&(&inverse * both.transpose()));
     Some((inverse * solved).transpose())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Inputs `u = 2 + 3 z2 - dz1 + e`, where `e` is 1 and -1 in turn.
-    fn samples(n: usize) -> (DMatrix<f64>, DMatrix<f64>) {
-        let wave = |k: usize, rate: f64| (rate * k as f64).sin();
-        let variables = DMatrix::from_fn(n, 6, |k, column| {
-            let state = [wave(k, 0.9), wave(k, 1.7), wave(k, 2.3), wave(k, 2.9)];
-            let sign = if k % 2 == 0 { 1.0 } else { -1.0 };
-            match column {
-                4 => 2.0 + 3.0 * state[1] - state[2] + sign,
-                5 => 0.0,
-                _ => state[column],
-            }
-        });
-        (
-            variables,
-            DMatrix::from_fn(n, 2, |_, column| [0.5, 0.0][column]),
-        )
-    }
-
-    #[test]
-    fn states_explain_the_inputs_that_depend_on_them() {
-        let n = 4000;
-        let (variables, left) = samples(n);
-        let shifts = DMatrix::from_row_slice(2, 1, &[1.0, 0.0]);
-        let given = InputGivenState::of_samples(&shifts, variables, &left).expect("enough samples");
-        let expected = [2.0, 0.0, 3.0, -1.0, 0.0];
-        for (found, expected) in given.mean.row(0).iter().zip(expected) {
-            assert!((found - expected).abs() < 0.05, "{}", given.mean);
-        }
-        assert_eq!(given.mean[(0, 1)], 0.0);
-        assert!(given.mean.row(1).amax() < 1e-12);
-        assert!(
-            (given.covariance[(0, 0)] - 1.0).abs() < 0.05,
-            "{}",
-            given.covariance
-        );
-        assert!((given.acceleration_error[(0, 0)] - 0.25).abs() < 1e-12);
-        given.check("statistics", 2).expect("consistent shapes");
-    }
-
-    #[test]
-    fn few_samples_say_nothing() {
-        let (variables, left) = samples(19);
-        assert!(InputGivenState::of_samples(&DMatrix::zeros(2, 0), variables, &left).is_none());
-    }
 }

@@ -20,52 +20,37 @@ pub struct IdentifierError(String);
 
 impl Identifier {
     /// The identifier that a name of the model file stands for: `-`, `.` and space become `_`.
-    ///
-    /// # Errors
-    /// [`IdentifierError`]; keywords and taken names are compared without case.
     pub fn from_name(name: &str) -> Result<Self, IdentifierError> {
-        let refused = |words: String| Err(IdentifierError(words));
-        let Some(first) = name.chars().next() else {
-            return refused("it is empty".to_owned());
-        };
-        if name.len() > MAX_IDENTIFIER_LEN {
-            let found = name.len();
-            return refused(format!(
-                "it has {found} bytes, expected at most {MAX_IDENTIFIER_LEN}"
-            ));
-        }
+        let length = name.len();
         let allowed = |c: char| c.is_ascii_alphanumeric() || "_-. ".contains(c);
-        if let Some((position, found)) = name.char_indices().find(|&(_, c)| !allowed(c)) {
-            return refused(format!(
-                "found {found:?} at byte {position}, expected ASCII letters, digits, `_`, `-`, `.` or space"
-            ));
-        }
-        if !first.is_ascii_alphabetic() {
-            return refused(format!(
-                "it begins with {first:?}, expected an ASCII letter"
-            ));
-        }
+        let foreign = name.char_indices().find(|&(_, c)| !allowed(c));
         let identifier = name.replace(['-', '.', ' '], "_");
-        let reason = if identifier.contains("__") {
-            "has two underscores in a row, which C++ reserves for itself".to_owned()
+        let lower = identifier.to_ascii_lowercase();
+        let is_listed = |(_, words): &&(&str, &str)| words.split(' ').any(|word| word == lower);
+        let refusal = if name.is_empty() {
+            "it is empty".to_owned()
+        } else if length > MAX_IDENTIFIER_LEN {
+            format!("it has {length} bytes, expected at most {MAX_IDENTIFIER_LEN}")
+        } else if let Some((position, found)) = foreign {
+            format!(
+                "found {found:?} at byte {position}, expected ASCII letters, digits, `_`, `-`, `.` or space"
+            )
+        } else if let Some(first) = name.chars().next().filter(|c| !c.is_ascii_alphabetic()) {
+            format!("it begins with {first:?}, expected an ASCII letter")
+        } else if identifier.contains("__") {
+            format!("`{identifier}` has two underscores in a row, which C++ reserves for itself")
         } else if identifier.ends_with('_') {
-            "ends with an underscore, expected a letter or digit at the end".to_owned()
+            format!("`{identifier}` ends with an underscore, expected a letter or digit at the end")
+        } else if let Some((language, _)) = KEYWORDS.iter().find(is_listed) {
+            format!("`{identifier}` is a keyword of {language}")
+        } else if let Some((owner, _)) = TAKEN.iter().find(is_listed) {
+            format!("`{identifier}` is the name of {owner}")
         } else {
-            let lower = identifier.to_ascii_lowercase();
-            let is_listed = |(_, words): &&(&str, &str)| words.split(' ').any(|word| word == lower);
-            match (
-                KEYWORDS.iter().find(is_listed),
-                TAKEN.iter().find(is_listed),
-            ) {
-                (Some((language, _)), _) => format!("is a keyword of {language}"),
-                (None, Some((owner, _))) => format!("is the name of {owner}"),
-                (None, None) => return Ok(Self(identifier)),
-            }
+            return Ok(Self(identifier));
         };
-        refused(format!("`{identifier}` {reason}"))
+        Err(IdentifierError(refusal))
     }
 
-    /// The identifier as text.
     pub fn as_str(&self) -> &str {
         &self.0
     }

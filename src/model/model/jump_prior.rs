@@ -7,10 +7,12 @@
 //! with what is changed about such a trajectory: `delta ddz = Xi^T (delta z, delta dz, delta u_lat)`.
 
 use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
 
-use super::error::{ModelError, check, check_tensor};
+use super::error::{ModelError, check, check_count, check_tensor};
+use super::listed::{self, Listed};
 use super::rom::{Phase, selected};
-use crate::robot::{ContactFlags, STATE_DIM};
+use crate::robot::{ContactFlags, FOOT_DIM, STATE_DIM};
 
 /// Numbers of a goal: distance, rise of the body at the apex, height of the body at the start, m.
 pub const GOAL_DIM: usize = 3;
@@ -21,16 +23,11 @@ const MAX_NODES: usize = 200;
 /// The features of a goal that the prior multiplies.
 pub type GoalFeatures = [f64; FEATURE_DIM];
 
-/// Range of one number over the training jumps, in m.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GoalRange {
-    /// Mean.
     pub mean: f64,
-    /// Standard deviation, positive.
     pub std: f64,
-    /// Smallest value.
     pub least: f64,
-    /// Largest value.
     pub most: f64,
 }
 
@@ -38,7 +35,6 @@ pub struct GoalRange {
 const LEAST_STD_M: f64 = 1e-3;
 
 impl GoalRange {
-    /// Ranges over jumps.
     pub fn of(jumps: &[[f64; GOAL_DIM]]) -> [Self; GOAL_DIM] {
         std::array::from_fn(|i| {
             let values = || jumps.iter().map(|jump| jump[i]);
@@ -63,36 +59,85 @@ impl GoalRange {
     }
 }
 
-/// A part of a jump and its prior; `n` nodes, the first and last at its borders.
-#[derive(Clone, Debug, PartialEq)]
-pub struct JumpPart {
+/// Where jumps are cut, and the training jumps in numbers: `landmarks` of a model file.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Landmarks {
+    /// Distance, rise at the apex and height at the start of each training jump, m.
+    pub jumps: Vec<[f64; GOAL_DIM]>,
+    /// Mean state at the start of the jumps, 18, SI units.
+    #[serde(with = "listed")]
+    pub start: DVector<f64>,
+    /// Lowest and highest body height at the end of the jumps, m.
+    pub end_height_m: [f64; 2],
+    /// Lowest body height after touch-down; for jumps without a landing that at their end, m.
+    pub landing_height_m: f64,
+    pub parts: Vec<Landmark>,
+}
+
+/// A part of every jump.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Landmark {
     /// Name: crouch, thrust, flight, landing, or the phase's.
     pub name: String,
-    /// Index of the model's phase.
-    pub phase: usize,
-    /// Feet on the ground.
+    pub phase: String,
+    /// Feet on the ground, which select that phase.
+    #[serde(with = "listed")]
     pub feet: ContactFlags,
-    /// Duration in s, one coefficient per feature.
-    pub duration_s: GoalFeatures,
     /// Shortest and longest duration in the training jumps, s.
     pub duration_range_s: [f64; 2],
+}
+
+impl Landmark {
+    /// Whether a foot is on the ground.
+    pub fn is_grounded(&self) -> bool {
+        self.feet.contains(&true)
+    }
+}
+
+/// Flags as 0 and 1.
+impl Listed for ContactFlags {
+    type List = [u8; FOOT_DIM];
+
+    fn to_list(&self) -> Self::List {
+        self.map(u8::from)
+    }
+
+    fn of_list(flags: Self::List) -> Result<Self, String> {
+        match flags.iter().find(|flag| **flag > 1) {
+            Some(flag) => Err(format!("found a foot {flag}, expected 0 or 1 per foot")),
+            None => Ok(flags.map(|flag| flag == 1)),
+        }
+    }
+}
+
+/// The prior of a part of a jump; `n` nodes, the first and last at its borders.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct JumpPart {
+    /// Duration in s, one coefficient per feature.
+    pub duration_s: GoalFeatures,
     /// Latent positions, `n x (FEATURE_DIM latent_dim)`: the columns of one feature after the other.
+    #[serde(with = "listed")]
     pub z: DMatrix<f64>,
-    /// Latent velocities, as `z`.
+    #[serde(with = "listed")]
     pub dz: DMatrix<f64>,
-    /// Latent inputs, as `z`.
+    #[serde(with = "listed")]
     pub u_lat: DMatrix<f64>,
     /// Xi of deviations, `(3 latent_dim) x latent_dim`; none: the phase's own equations are used.
+    #[serde(default, with = "listed", skip_serializing_if = "Option::is_none")]
     pub xi: Option<DMatrix<f64>>,
     /// Covariance of the training's latent inputs in the part, `latent_dim x latent_dim`.
+    #[serde(with = "listed")]
     pub input_covariance: DMatrix<f64>,
     /// Standard deviation over the jumps of the mean acceleration that `xi` leaves unexplained in a
     /// jump that it was not fitted to, `latent_dim`.
+    #[serde(with = "listed")]
     pub acceleration_std: DVector<f64>,
 }
 
 impl JumpPart {
-    /// Number of nodes.
     pub fn nodes(&self) -> usize {
         self.z.nrows()
     }
@@ -106,30 +151,15 @@ impl JumpPart {
         })
     }
 
-    /// Duration for a goal, s.
     pub fn duration(&self, features: &GoalFeatures) -> f64 {
         let terms = self.duration_s.iter().zip(features);
         terms.map(|(c, f)| c * f).sum()
     }
 
-    fn check(&self, name: &str, d: usize, phases: &[Phase]) -> Result<(), ModelError> {
+    fn check(&self, name: &str, d: usize, range_s: &[f64; 2]) -> Result<(), ModelError> {
         let place = |key: &str| format!("`{name}{key}`");
-        let expected = format!("one below {}", phases.len());
-        check(
-            self.phase < phases.len(),
-            &place(""),
-            || self.phase,
-            expected,
-        )?;
-        let fits = selected(phases, self.feet) == Some(self.phase);
-        let expected = format!("feet that select {}", phases[self.phase].name);
-        check(fits, &place(""), || format!("{:?}", self.feet), expected)?;
         let nodes = self.nodes();
-        let (fits, expected) = (
-            (3..=MAX_NODES).contains(&nodes),
-            format!("3 to {MAX_NODES}"),
-        );
-        check(fits, &place(".z"), || format!("{nodes} nodes"), expected)?;
+        check_count(&place(".z"), nodes, "nodes", 3..=MAX_NODES)?;
         let of_nodes = (nodes, FEATURE_DIM * d);
         let xi = self.xi.as_ref().map(|xi| ("xi", xi, (3 * d, d)));
         let tables = [
@@ -142,54 +172,62 @@ impl JumpPart {
             check_tensor(&format!("{name}.{key}"), table, shape)?;
         }
         let is_definite = self.input_covariance.clone().cholesky().is_some();
-        let expected = "a positive definite matrix";
-        check(
-            is_definite,
-            &place(".input_covariance"),
-            || "another",
-            expected,
-        )?;
+        let (covariance, expected) = (place(".input_covariance"), "a positive definite matrix");
+        check(is_definite, &covariance, || "another", expected)?;
         let tensor = format!("{name}.acceleration_std");
         check_tensor(&tensor, &self.acceleration_std, (d, 1))?;
-        let (durations, range) = (&self.duration_s, &self.duration_range_s);
-        let is_finite = durations.iter().chain(range).all(|v| v.is_finite());
-        let fits = is_finite && 0.0 < range[0] && range[0] <= range[1];
-        let found = || format!("{durations:?} within {range:?}");
+        let durations = &self.duration_s;
+        let is_finite = durations.iter().chain(range_s).all(|v| v.is_finite());
+        let fits = is_finite && 0.0 < range_s[0] && range_s[0] <= range_s[1];
+        let found = || format!("{durations:?} within {range_s:?}");
         let expected = "finite durations, the range positive";
         check(fits, &place(".duration_s"), found, expected)
     }
 }
 
-/// Landmarks and prior of a model's training jumps.
-#[derive(Clone, Debug, PartialEq)]
+/// Landmarks and prior of a model's training jumps; without the landmarks, `prior` of a model file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct JumpPrior {
-    /// What the training jumps reached: distance, rise at the apex, height at the start, m.
-    pub jumps: Vec<[f64; GOAL_DIM]>,
-    /// Mean state at the start of the jumps, 18, SI units.
-    pub start: DVector<f64>,
+    /// A key of its own in the model file.
+    #[serde(skip)]
+    pub landmarks: Landmarks,
     /// Standard deviations of `z`, then of `dz`, over all samples, `2 latent_dim`.
+    #[serde(with = "listed")]
     pub state_std: DVector<f64>,
-    /// Lowest and highest body height at the end of the jumps, m.
-    pub end_height_m: [f64; 2],
-    /// Lowest body height after touch-down; for jumps without a landing that at their end, m.
-    pub landing_height_m: f64,
-    /// Parts in the order of time.
     pub parts: Vec<JumpPart>,
 }
 
 impl JumpPrior {
     /// Ranges of distance, rise and height at the start.
     pub fn ranges(&self) -> [GoalRange; GOAL_DIM] {
-        GoalRange::of(&self.jumps)
+        GoalRange::of(&self.landmarks.jumps)
     }
 
-    /// Features of a goal in m.
     pub fn features(&self, goal: [f64; GOAL_DIM]) -> GoalFeatures {
         GoalRange::features(&self.ranges(), &goal)
     }
 
     /// Refuses tables that do not fit the model's dimensions and phases, and numbers that are none.
     pub(super) fn check(&self, d: usize, phases: &[Phase]) -> Result<(), ModelError> {
+        self.landmarks.check(phases)?;
+        let (n_parts, n_landmarks) = (self.parts.len(), self.landmarks.parts.len());
+        let (found, fits) = (|| format!("{n_parts} parts"), n_parts == n_landmarks);
+        let expected = format!("{n_landmarks} as in `landmarks.parts`");
+        check(fits, "`prior.parts`", found, expected)?;
+        check_tensor("prior.state_std", &self.state_std, (2 * d, 1))?;
+        let least = self.state_std.min();
+        check(least > 0.0, "`prior.state_std`", || least, "positive")?;
+        for (index, part) in self.parts.iter().enumerate() {
+            let range_s = &self.landmarks.parts[index].duration_range_s;
+            part.check(&format!("prior.parts[{index}]"), d, range_s)?;
+        }
+        Ok(())
+    }
+}
+
+impl Landmarks {
+    fn check(&self, phases: &[Phase]) -> Result<(), ModelError> {
         let (n_jumps, n_parts) = (self.jumps.len(), self.parts.len());
         let mut numbers = self.jumps.iter().flatten();
         let fits = n_jumps >= 2 && numbers.all(|v| v.is_finite() && v.abs() < 1e3);
@@ -197,9 +235,6 @@ impl JumpPrior {
         let expected = "2 or more, all numbers below 1000 m";
         check(fits, "`landmarks.jumps`", found, expected)?;
         check_tensor("landmarks.start", &self.start, (STATE_DIM, 1))?;
-        check_tensor("prior.state_std", &self.state_std, (2 * d, 1))?;
-        let least = self.state_std.min();
-        check(least > 0.0, "`prior.state_std`", || least, "positive")?;
         let [low, high] = self.end_height_m;
         let heights = [low, high, self.landing_height_m];
         let fits = heights.iter().all(|v| v.is_finite()) && low <= high;
@@ -208,10 +243,15 @@ impl JumpPrior {
         let parts = "`landmarks.parts`";
         let found = || format!("{n_parts} parts");
         check(n_parts >= 2, parts, found, "2 or more")?;
-        for (index, part) in self.parts.iter().enumerate() {
-            part.check(&format!("prior.parts[{index}]"), d, phases)?;
+        for (index, Landmark { phase, feet, .. }) in self.parts.iter().enumerate() {
+            let place = format!("`landmarks.parts[{index}]`");
+            let known = phases.iter().position(|known| known.name == *phase);
+            let found = || format!("phase {phase:?}");
+            check(known.is_some(), &place, found, "the name of a phase")?;
+            let (fits, found) = (selected(phases, *feet) == known, || format!("{feet:?}"));
+            check(fits, &place, found, format!("feet that select {phase}"))?;
         }
-        let mut in_air = self.parts.iter().map(|part| !part.feet.contains(&true));
+        let mut in_air = self.parts.iter().map(|part| !part.is_grounded());
         let fits = in_air.next() == Some(false) && in_air.filter(|in_air| *in_air).count() == 1;
         let expected = "exactly one part without a foot on the ground, not the first";
         check(fits, parts, || "others", expected)

@@ -6,16 +6,13 @@ use std::fmt;
 use nalgebra::{DMatrix, DVector};
 use serde::{Serialize, Serializer};
 
-use super::error::{ModelError, check, check_shape};
+use super::error::{ModelError, check, check_count, check_shape};
 use super::evaluation::Tape;
 use super::standard_library::StandardLibrary;
 use crate::symbolic::{ExprId, ExprPool, ParseLimits, SymbolId};
 
-/// Largest number of latent coordinates.
 pub const MAX_LATENT_DIM: usize = 64;
-/// Largest number of candidate terms.
 pub(crate) const MAX_LIBRARY_DIM: usize = 20_000;
-/// Longest candidate term in bytes.
 pub const MAX_TERM_LEN: usize = 1_000;
 
 /// A variable of candidate terms; indices count from 0, names in files from 1.
@@ -23,9 +20,7 @@ pub const MAX_TERM_LEN: usize = 1_000;
 pub enum LatentVariable {
     /// Latent coordinate, `z1` for index 0.
     Z(usize),
-    /// Latent velocity, `dz1` for index 0.
     Dz(usize),
-    /// Latent input, `u1` for index 0.
     U(usize),
 }
 
@@ -145,9 +140,7 @@ impl Library {
     /// [`ModelError::Invalid`] for a number of coordinates, a degree or a number of terms beyond its bound, and for a
     /// term that is zero everywhere or has a constant part beyond the range of floats; [`ModelError::Term`].
     pub fn of(latent_dim: usize, choice: LibraryChoice) -> Result<Self, ModelError> {
-        let fits = (1..=MAX_LATENT_DIM).contains(&latent_dim);
-        let expected = format!("1 to {MAX_LATENT_DIM}");
-        check(fits, "`latent_dim`", || latent_dim, expected)?;
+        check_count("`latent_dim`", latent_dim, "", 1..=MAX_LATENT_DIM)?;
         let (texts, standard) = match choice {
             LibraryChoice::Terms(texts) => (texts, None),
             LibraryChoice::Standard(standard) => (standard.texts(latent_dim)?, Some(standard)),
@@ -177,9 +170,6 @@ impl Library {
 
     /// Refuses a library in which a term equals an earlier one under another spelling: its
     /// coefficients cannot be learned.
-    ///
-    /// # Errors
-    /// [`ModelError::Invalid`] for the first such term.
     pub fn check_distinct(&self) -> Result<(), ModelError> {
         let mut first_use = HashMap::new();
         for (second, term) in self.terms.iter().enumerate() {
@@ -197,7 +187,6 @@ impl Library {
         &self.tape
     }
 
-    /// Number of latent coordinates, `d`.
     pub fn latent_dim(&self) -> usize {
         self.latent_dim
     }
@@ -207,20 +196,15 @@ impl Library {
         self.terms.len()
     }
 
-    /// Whether there is no term; never true of a library that was built.
+    /// Never true of a library that was built.
     pub fn is_empty(&self) -> bool {
         self.terms.is_empty()
     }
 
-    /// The terms in the form in which they were given.
     pub fn choice(&self) -> LibraryChoice {
-        match self.standard {
-            Some(standard) => LibraryChoice::Standard(standard),
-            None => {
-                let texts = self.terms.iter().map(|term| term.text.clone());
-                LibraryChoice::Terms(texts.collect())
-            }
-        }
+        let texts = || self.terms.iter().map(|term| term.text.clone()).collect();
+        let standard = self.standard.map(LibraryChoice::Standard);
+        standard.unwrap_or_else(|| LibraryChoice::Terms(texts()))
     }
 
     /// The standard library that has the same terms in whatever order, and for each of its terms in
@@ -243,7 +227,6 @@ impl Library {
         })
     }
 
-    /// The terms in order.
     pub fn terms(&self) -> &[CandidateTerm] {
         &self.terms
     }
@@ -261,9 +244,6 @@ impl Library {
     }
 
     /// Theta at one point: the value of each term, in order.
-    ///
-    /// # Errors
-    /// [`ModelError::Invalid`] if an argument is not `latent_dim` long.
     pub fn evaluate(
         &self,
         z: &DVector<f64>,
@@ -274,19 +254,14 @@ impl Library {
         ModelError::check_dimension("latent state z", z.len(), d)?;
         ModelError::check_dimension("latent velocity dz", dz.len(), d)?;
         ModelError::check_dimension("latent input u_lat", u_lat.len(), d)?;
-        let variables: Vec<f64> = z.iter().chain(dz).chain(u_lat).copied().collect();
-        let mut values = vec![0.0; self.tape.steps.len()];
-        let mut theta = DVector::zeros(self.len());
-        self.tape.run(&variables, &mut values, theta.as_mut_slice());
-        Ok(theta)
+        let point = z.iter().chain(dz).chain(u_lat).copied();
+        let theta = self.evaluate_points(&DMatrix::from_iterator(3 * d, 1, point))?;
+        Ok(theta.transpose().column(0).into_owned())
     }
 
     /// Theta at many points: one row a point, one column a term.
     ///
     /// `variables` holds one point a column (`3 latent_dim x n`): `z`, then `dz`, then `u_lat`.
-    ///
-    /// # Errors
-    /// [`ModelError::Invalid`] if it has another number of rows.
     pub fn evaluate_points(&self, variables: &DMatrix<f64>) -> Result<DMatrix<f64>, ModelError> {
         let expected = (3 * self.latent_dim, variables.ncols());
         check_shape("z, dz, u_lat", variables.shape(), expected)?;
@@ -346,21 +321,14 @@ fn parse_term(
     } else {
         return Ok(reading.expr);
     };
-    Err(ModelError::invalid(
-        place(index),
-        format!("{text:?}"),
-        expected,
-    ))
+    let found = format!("{text:?}");
+    Err(ModelError::invalid(place(index), found, expected))
 }
 
 /// Whether every part without variables has a finite value.
 fn constants_are_finite(pool: &ExprPool, expr: ExprId) -> bool {
-    let constants: Vec<ExprId> = pool
-        .reachable(&[expr])
-        .into_iter()
-        .filter(|&part| pool.is_constant(part))
-        .collect();
-    let no_symbol = |_| f64::NAN;
-    let values = pool.evaluate_all(&constants, &no_symbol);
+    let parts = pool.reachable(&[expr]).into_iter();
+    let constants: Vec<ExprId> = parts.filter(|&part| pool.is_constant(part)).collect();
+    let values = pool.evaluate_all(&constants, &|_| f64::NAN);
     values.into_iter().all(f64::is_finite)
 }

@@ -33,30 +33,22 @@ impl ReducedModel {
         maps.all(|map| map.as_affine().is_some())
     }
 
-    /// The encoder, linear or not, in scaled units.
     pub fn encoder_map(&self) -> Result<&StateMap, ModelError> {
         let purpose = "going from robot to latent coordinates";
         self.require(self.parts.encoder.as_ref(), "encoder", purpose)
     }
 
-    /// The decoder, linear or not, in scaled units.
     pub fn decoder_map(&self) -> Result<&StateMap, ModelError> {
         let purpose = "going from latent to robot coordinates";
         self.require(self.parts.decoder.as_ref(), "decoder", purpose)
     }
 
     /// The encoder of a linear model, in scaled units: `W_e` is `latent_dim x state_dim`.
-    ///
-    /// # Errors
-    /// [`ModelError::Missing`] for a latent-only model, [`ModelError::Nonlinear`].
     pub fn encoder(&self) -> Result<&AffineMap, ModelError> {
         self.affine("encoder", self.encoder_map()?)
     }
 
     /// The decoder of a linear model, in scaled units: `W_d` is `state_dim x latent_dim`.
-    ///
-    /// # Errors
-    /// [`ModelError::Missing`] if the model has none, [`ModelError::Nonlinear`].
     pub fn decoder(&self) -> Result<&AffineMap, ModelError> {
         self.affine("decoder", self.decoder_map()?)
     }
@@ -68,10 +60,10 @@ impl ReducedModel {
         self.require(projection, "encoder", "projecting inputs")
     }
 
-    /// The linear model whose maps have the same value and the same Jacobian at the state `x` and, for the decoder, at
-    /// `z = E(s_x x)`; the dynamics are the same. A linear map stays as it is.
+    /// The model with encoder and decoder linearised: the encoder about the state `x`, the decoder about
+    /// `z = E(s_x x)`. The dynamics and linear maps stay the same.
     ///
-    /// Positions, velocities and inputs of the two models agree at `x` and drift apart away from it.
+    /// Positions, velocities and inputs of the two models agree at `x` and differ elsewhere.
     pub fn linearised_at(&self, x: &DVector<f64>) -> Result<ReducedModel, ModelError> {
         let scaled = self.scaled_state(x)?;
         let encoder = self.encoder_map()?;
@@ -176,10 +168,6 @@ pub(crate) const RANK_TOLERANCE: f64 = 1e-10;
 
 /// `pinv(W_e^T)`, `latent_dim x state_dim`, from the singular values of `W_e = U S V^T`:
 /// `pinv(W_e^T) = U S^-1 V^T`.
-///
-/// # Errors
-/// [`ModelError::Invalid`] with the name of the matrix, if its rows are (nearly) linearly dependent, so that latent
-/// inputs have no unique lift.
 pub(super) fn pinv_of_transpose(
     weights: &DMatrix<f64>,
     matrix: &str,
@@ -215,8 +203,8 @@ pub(super) fn pinv_of_transpose(
     Ok(projection)
 }
 
-/// Removes what the iteration of the singular values left over, which can be 1e-10 even for well
-/// conditioned matrices: a Newton step on `P W_e^T = I` squares the residual.
+/// Reduces the error of the iterative SVD, which can be 1e-10 even for well-conditioned matrices, by
+/// one Newton step on `P W_e^T = I`, which squares the residual.
 fn refined(projection: DMatrix<f64>, weights: &DMatrix<f64>) -> DMatrix<f64> {
     const NEGLIGIBLE: f64 = 1e-13;
     let dim = projection.nrows();

@@ -32,6 +32,8 @@
 //! # }
 //! ```
 
+#![allow(missing_docs, reason = "names say it all where there is no comment")]
+
 mod activation;
 mod builder;
 mod coordinates;
@@ -41,6 +43,7 @@ mod given_state;
 mod identifier;
 mod jump_prior;
 mod library;
+mod listed;
 mod maps;
 mod order;
 mod rom;
@@ -56,7 +59,9 @@ pub use error::ModelError;
 pub use evaluation::{Step, Tape};
 pub use given_state::InputGivenState;
 pub use identifier::{Identifier, IdentifierError, check_name};
-pub use jump_prior::{FEATURE_DIM, GOAL_DIM, GoalFeatures, GoalRange, JumpPart, JumpPrior};
+pub use jump_prior::{
+    FEATURE_DIM, GOAL_DIM, GoalFeatures, GoalRange, JumpPart, JumpPrior, Landmark, Landmarks,
+};
 pub use library::{
     CandidateTerm, LatentVariable, Library, LibraryChoice, MAX_LATENT_DIM, MAX_TERM_LEN,
 };

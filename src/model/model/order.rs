@@ -71,14 +71,12 @@ impl CoordinateOrder {
 
 /// The 24 orders of the legs.
 fn leg_orders() -> Vec<[Leg; FOOT_DIM]> {
-    let mut orders = Vec::new();
-    for code in 0..FOOT_DIM.pow(4) {
-        let digit = |place: u32| code / FOOT_DIM.pow(place) % FOOT_DIM;
-        let order: [usize; FOOT_DIM] = std::array::from_fn(|k| digit(k as u32));
-        if (0..FOOT_DIM).all(|leg| order.contains(&leg)) {
-            orders.push(order.map(|leg| Leg::ALL[leg]));
-        }
-    }
+    let digits = |code: usize| std::array::from_fn(|k| code / FOOT_DIM.pow(k as u32) % FOOT_DIM);
+    let mut orders: Vec<[Leg; FOOT_DIM]> = (0..FOOT_DIM.pow(4))
+        .map(digits)
+        .filter(|order: &[usize; FOOT_DIM]| (0..FOOT_DIM).all(|leg| order.contains(&leg)))
+        .map(|order| order.map(|leg| Leg::ALL[leg]))
+        .collect();
     // Pairs from the front first, then pairs of a side, then all others.
     orders.sort_by_key(|order| {
         let is_same = |a: usize, b: usize, of: fn(Leg) -> bool| of(order[a]) == of(order[b]);
@@ -100,11 +98,7 @@ fn group(name: &str) -> Option<Vec<usize>> {
         return Some((first..first + LEG_JOINT_DIM).collect());
     }
     if let Some(kind) = KINDS.iter().position(|kind| *kind == name) {
-        return Some(
-            joints
-                .filter(|joint| joint % LEG_JOINT_DIM == kind)
-                .collect(),
-        );
+        return Some(joints.skip(kind).step_by(LEG_JOINT_DIM).collect());
     }
     let single = (JOINT_NAMES.iter().chain(&BODY_NAMES)).position(|known| *known == name);
     match name {

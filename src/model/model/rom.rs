@@ -17,6 +17,7 @@
 //! wrong length, [`ModelError::Invalid`].
 
 use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
 use super::builder::ModelBuilder;
@@ -25,17 +26,20 @@ use super::error::{ModelError, check};
 use super::identifier::Identifier;
 use super::jump_prior::JumpPrior;
 use super::library::{CandidateTerm, Library};
+use super::listed;
 use super::statistics::InputStatistics;
 use crate::robot::{Actuators, ContactFlags, FeetRule, InputRule, Robot, WrenchFrame};
 
 /// One dynamics regime: `ddz = Xi^T Theta(z, dz, u_lat)`.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Phase {
     /// Name, such as `contact`.
     pub name: String,
     /// Foot patterns that select it; the first phase that matches wins.
     pub feet: FeetRule,
     /// Coefficients, `library_dim x latent_dim`, in scaled units.
+    #[serde(with = "listed")]
     pub xi: DMatrix<f64>,
 }
 
@@ -61,7 +65,7 @@ pub(super) fn selected(phases: &[Phase], feet: ContactFlags) -> Option<usize> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReducedModel {
     /// As given, statistics in the order of the phases.
-    pub(super) parts: ModelBuilder,
+    pub(crate) parts: ModelBuilder,
     pub(super) identifier: Identifier,
     pub(super) phase_identifiers: Vec<Identifier>,
     /// `pinv(W_e^T)`, `latent_dim x input_dim`; there when the encoder is, and is linear.
@@ -79,7 +83,6 @@ impl ReducedModel {
         self.parts
     }
 
-    /// Name as in the model file.
     pub fn name(&self) -> &str {
         &self.parts.name
     }
@@ -99,7 +102,6 @@ impl ReducedModel {
         &self.parts.provenance
     }
 
-    /// Number of latent coordinates, `d`.
     pub fn latent_dim(&self) -> usize {
         self.parts.library.latent_dim()
     }
@@ -109,12 +111,10 @@ impl ReducedModel {
         self.parts.state_dim()
     }
 
-    /// The candidate terms.
     pub fn library(&self) -> &Library {
         &self.parts.library
     }
 
-    /// The phases in the order in which their foot rules are tried.
     pub fn phases(&self) -> &[Phase] {
         &self.parts.phases
     }
@@ -129,22 +129,18 @@ impl ReducedModel {
         selected(&self.parts.phases, feet)
     }
 
-    /// Index of the phase with this name.
     pub fn phase_named(&self, name: &str) -> Option<usize> {
         self.phases().iter().position(|phase| phase.name == name)
     }
 
-    /// Names and units of the state, if the file has them.
     pub fn state(&self) -> Option<&CoordinateNames> {
         self.parts.state.as_ref()
     }
 
-    /// Names and units of the input, if the file has them.
     pub fn input(&self) -> Option<&CoordinateNames> {
         self.parts.input.as_ref()
     }
 
-    /// The scale factors.
     pub fn scaling(&self) -> Result<&Scaling, ModelError> {
         let purpose = "going between SI and scaled units";
         self.require(self.parts.scaling.as_ref(), "scaling", purpose)

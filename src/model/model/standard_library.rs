@@ -215,9 +215,6 @@ impl StandardLibrary {
     }
 
     /// The terms in another order; the texts are the same.
-    ///
-    /// # Errors
-    /// [`ModelError::Invalid`] for a degree or a number of terms beyond its bound.
     pub fn texts_in(
         &self,
         order: LibraryOrder,

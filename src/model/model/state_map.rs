@@ -5,9 +5,11 @@
 //! linear layer.
 
 use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
 
 use super::activation::Activation;
-use super::error::{ModelError, check, check_finite, check_shape};
+use super::error::{ModelError, check, check_count, check_finite, check_shape};
+use super::listed;
 
 /// Most layers of a map.
 pub const MAX_LAYERS: usize = 16;
@@ -26,20 +28,21 @@ pub struct AffineMap {
 
 impl AffineMap {
     /// The map with these weights and this bias; `tensor` names it in errors.
-    ///
-    /// # Errors
-    /// [`ModelError::Invalid`] unless `bias` has one entry per row of `weights`,
-    /// [`ModelError::NonFinite`] if an entry is infinite or not a number.
     pub fn new(
         tensor: &str,
         weights: DMatrix<f64>,
         bias: DVector<f64>,
     ) -> Result<Self, ModelError> {
+        let map = Self { weights, bias };
+        map.check(tensor)?;
+        Ok(map)
+    }
+
+    fn check(&self, tensor: &str) -> Result<(), ModelError> {
         let bias_name = format!("{tensor}.bias");
-        check_shape(&bias_name, bias.shape(), (weights.nrows(), 1))?;
-        check_finite(&format!("{tensor}.weights"), &weights)?;
-        check_finite(&bias_name, &bias)?;
-        Ok(Self { weights, bias })
+        check_shape(&bias_name, self.bias.shape(), (self.weights.nrows(), 1))?;
+        check_finite(&format!("{tensor}.weights"), &self.weights)?;
+        check_finite(&bias_name, &self.bias)
     }
 
     /// `W`, `output_dim x input_dim`.
@@ -47,17 +50,14 @@ impl AffineMap {
         &self.weights
     }
 
-    /// `b`, `output_dim`.
     pub fn bias(&self) -> &DVector<f64> {
         &self.bias
     }
 
-    /// Columns of `W`.
     pub fn input_dim(&self) -> usize {
         self.weights.ncols()
     }
 
-    /// Number of rows of the output.
     pub fn output_dim(&self) -> usize {
         self.weights.nrows()
     }
@@ -75,11 +75,10 @@ impl AffineMap {
 }
 
 /// One layer: `y -> phi(W y + b)`, the activation applied to each unit.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(from = "LayerKeys", into = "LayerKeys")]
 pub struct Layer {
-    /// `W` and `b`.
     pub map: AffineMap,
-    /// `phi`.
     pub activation: Activation,
 }
 
@@ -87,9 +86,87 @@ pub struct Layer {
 ///
 /// Positions go through [`StateMap::apply`]; velocities and accelerations through its first and
 /// second time derivative ([`StateMap::apply_rates`]), which for a linear map are `W dx` and `W ddx`.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "MapKeys", into = "MapKeys")]
 pub struct StateMap {
+    /// Those of a map from a file are checked with its model ([`StateMap::check_chain`]).
     layers: Vec<Layer>,
+}
+
+/// A layer in a model file.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct LayerKeys {
+    #[serde(with = "listed")]
+    weights: DMatrix<f64>,
+    #[serde(with = "listed")]
+    bias: DVector<f64>,
+    #[serde(default)]
+    activation: Activation,
+}
+
+impl From<LayerKeys> for Layer {
+    fn from(keys: LayerKeys) -> Self {
+        let (weights, bias, activation) = (keys.weights, keys.bias, keys.activation);
+        let map = AffineMap { weights, bias };
+        Self { map, activation }
+    }
+}
+
+impl From<Layer> for LayerKeys {
+    fn from(layer: Layer) -> Self {
+        let AffineMap { weights, bias } = layer.map;
+        let activation = layer.activation;
+        Self {
+            weights,
+            bias,
+            activation,
+        }
+    }
+}
+
+/// A map in a model file: weights and bias of an affine one, or layers.
+#[derive(Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct MapKeys {
+    #[serde(with = "listed", skip_serializing_if = "Option::is_none")]
+    weights: Option<DMatrix<f64>>,
+    #[serde(with = "listed", skip_serializing_if = "Option::is_none")]
+    bias: Option<DVector<f64>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    layers: Option<Vec<Layer>>,
+}
+
+impl TryFrom<MapKeys> for StateMap {
+    type Error = &'static str;
+
+    fn try_from(keys: MapKeys) -> Result<Self, &'static str> {
+        match (keys.weights, keys.bias, keys.layers) {
+            (None, None, Some(layers)) => Ok(Self { layers }),
+            (_, _, Some(_)) => {
+                Err("found `layers` beside `weights` or `bias`, expected one of the two")
+            }
+            (Some(weights), Some(bias), None) => Ok(AffineMap { weights, bias }.into()),
+            (None, _, None) => Err("missing field `weights`"),
+            (_, None, None) => Err("missing field `bias`"),
+        }
+    }
+}
+
+impl From<StateMap> for MapKeys {
+    fn from(map: StateMap) -> Self {
+        match map.as_affine().cloned() {
+            Some(AffineMap { weights, bias }) => Self {
+                weights: Some(weights),
+                bias: Some(bias),
+                layers: None,
+            },
+            None => Self {
+                layers: Some(map.layers),
+                ..Self::default()
+            },
+        }
+    }
 }
 
 impl From<AffineMap> for StateMap {
@@ -103,41 +180,39 @@ impl From<AffineMap> for StateMap {
 
 impl StateMap {
     /// The chain of these layers, the first applied first; `tensor` names it in errors.
-    ///
-    /// # Errors
-    /// [`ModelError::Invalid`] unless there are 1 to [`MAX_LAYERS`], each of at most
-    /// [`MAX_LAYER_WIDTH`] units, and each takes the outputs of the layer before it.
     pub fn new(tensor: &str, layers: Vec<Layer>) -> Result<Self, ModelError> {
-        let n_layers = layers.len();
-        let (fits, place) = (
-            (1..=MAX_LAYERS).contains(&n_layers),
-            format!("`{tensor}.layers`"),
-        );
-        let expected = format!("1 to {MAX_LAYERS}");
-        check(fits, &place, || format!("{n_layers} layers"), expected)?;
-        for (index, layer) in layers.iter().enumerate() {
-            let (rows, columns) = layer.map.weights().shape();
-            let name = format!("{tensor}.layers[{index}].weights");
-            let (fits, expected) = (
-                rows <= MAX_LAYER_WIDTH,
-                format!("at most {MAX_LAYER_WIDTH}"),
-            );
-            check(
-                fits,
-                &format!("`{name}`"),
-                || format!("{rows} units"),
-                expected,
-            )?;
-            let expected = match index {
-                0 => columns,
-                _ => layers[index - 1].map.output_dim(),
-            };
-            check_shape(&name, (rows, columns), (rows, expected))?;
-        }
-        Ok(Self { layers })
+        let map = Self { layers };
+        map.check_chain(tensor)?;
+        Ok(map)
     }
 
-    /// The layers, the first applied first.
+    /// Refuses what [`StateMap::new`] does.
+    pub(super) fn check_chain(&self, tensor: &str) -> Result<(), ModelError> {
+        let n_layers = self.layers.len();
+        check_count(
+            &format!("`{tensor}.layers`"),
+            n_layers,
+            "layers",
+            1..=MAX_LAYERS,
+        )?;
+        if let Some(affine) = self.as_affine() {
+            return affine.check(tensor);
+        }
+        let mut columns = self.input_dim();
+        for (index, layer) in self.layers.iter().enumerate() {
+            let name = format!("{tensor}.layers[{index}]");
+            layer.map.check(&name)?;
+            let (found, rows) = (layer.map.weights.shape(), layer.map.output_dim());
+            let place = format!("`{name}.weights`");
+            let expected = format!("at most {MAX_LAYER_WIDTH}");
+            let fits = rows <= MAX_LAYER_WIDTH;
+            check(fits, &place, || format!("{rows} units"), expected)?;
+            check_shape(&format!("{name}.weights"), found, (rows, columns))?;
+            columns = rows;
+        }
+        Ok(())
+    }
+
     pub fn layers(&self) -> &[Layer] {
         &self.layers
     }
@@ -150,27 +225,23 @@ impl StateMap {
         }
     }
 
-    /// Number of coordinates that enter.
     pub fn input_dim(&self) -> usize {
         self.layers[0].map.input_dim()
     }
 
-    /// Number of coordinates that leave.
     pub fn output_dim(&self) -> usize {
         self.layers[self.layers.len() - 1].map.output_dim()
     }
 
-    /// Shape of the Jacobian, `output_dim x input_dim`.
     pub fn shape(&self) -> (usize, usize) {
         (self.output_dim(), self.input_dim())
     }
 
-    /// How positions map.
     pub fn apply(&self, x: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
-        let (first, rest) = self.layers.split_first().expect("a map has a layer");
-        let y = first.activated(first.map.apply(x)?);
-        rest.iter()
-            .try_fold(y, |y, layer| Ok(layer.activated(layer.map.apply(&y)?)))
+        let mut layers = self.layers.iter();
+        layers.try_fold(x.clone(), |y, layer| {
+            Ok((layer.map.apply(&y)?).map(|a| layer.activation.value(a)))
+        })
     }
 
     /// How positions, velocities and accelerations map: `y`, `J(x) dx` and `J(x) ddx + dJ/dt dx`.
@@ -237,14 +308,11 @@ impl StateMap {
     pub(super) fn check_widths(&self, latent_dim: usize) -> Result<(), ModelError> {
         let widths = self.layers.iter().map(|layer| layer.map.output_dim());
         for (layer, width) in widths.enumerate() {
-            let place = format!("`encoder.layers[{layer}]`");
+            let (place, found) = (format!("`encoder.layers[{layer}]`"), || {
+                format!("{width} units")
+            });
             let expected = format!("at least {latent_dim}, one per latent coordinate");
-            check(
-                width >= latent_dim,
-                &place,
-                || format!("{width} units"),
-                expected,
-            )?;
+            check(width >= latent_dim, &place, found, expected)?;
         }
         Ok(())
     }
@@ -259,14 +327,5 @@ impl StateMap {
             }
         }
         text
-    }
-}
-
-impl Layer {
-    fn activated(&self, mut a: DVector<f64>) -> DVector<f64> {
-        if self.activation != Activation::Linear {
-            a.apply(|a| *a = self.activation.value(*a));
-        }
-        a
     }
 }

@@ -1,22 +1,27 @@
 //! Statistics of the inputs of the training recordings.
 
 use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
 
 use super::error::{ModelError, check_tensor};
 use super::given_state::InputGivenState;
+use super::listed;
 
 /// Largest asymmetry, and most negative eigenvalue, that count as rounding: relative to the
 /// largest entry, and to the largest eigenvalue.
 const ROUNDING: f64 = 1e-9;
 
 /// Mean and covariance of the generalised input `u = [torques; F_lin; F_ang]` in one phase, SI.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct InputStatistics {
-    /// `input_dim`.
+    #[serde(with = "listed")]
     pub mean: DVector<f64>,
     /// `input_dim x input_dim`, symmetric positive semidefinite.
+    #[serde(with = "listed")]
     pub covariance: DMatrix<f64>,
     /// What the latent state says of the latent input, if it was learned.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub given_state: Option<InputGivenState>,
 }
 
@@ -60,7 +65,6 @@ impl InputStatistics {
     }
 }
 
-/// The matrix without the asymmetry of rounding.
 pub(super) fn symmetric(matrix: DMatrix<f64>) -> DMatrix<f64> {
     (&matrix + matrix.transpose()) * 0.5
 }

@@ -27,19 +27,13 @@ const GRAVITY_SHARE: f64 = 0.25;
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ActuatorsEntry {
-    /// Viscous friction, N m s/rad.
-    pub viscous: Vec<f64>,
-    /// Dry friction, N m.
-    pub dry: Vec<f64>,
-    /// Armature, kg m^2.
-    pub armature: Vec<f64>,
+    viscous: Vec<f64>,
+    dry: Vec<f64>,
+    armature: Vec<f64>,
 }
 
 impl ActuatorsEntry {
     /// The entry of a program's arrays by name.
-    ///
-    /// # Errors
-    /// [`RobotFileError`] for an array that is missing or unknown.
     pub fn of_arrays(mut arrays: BTreeMap<String, Vec<f64>>) -> Result<Self, RobotFileError> {
         let mut take = |name: &str| {
             let missing = || RobotFileError::at("", format!("actuators.{name}"), "nothing", COUNT);
@@ -61,9 +55,6 @@ impl ActuatorsEntry {
     }
 
     /// The actuators of the entry, which is `actuators` of `file` in errors.
-    ///
-    /// # Errors
-    /// [`RobotFileError`] with array and joint for anything but finite numbers of at least 0.
     pub fn actuators(&self, file: &str) -> Result<Actuators, RobotFileError> {
         let joints = |name: &str, values: &[f64]| match values.len() {
             found @ (3 | JOINT_DIM) => Ok(std::array::from_fn(|joint| values[joint % found])),
@@ -89,9 +80,6 @@ impl ActuatorsEntry {
 }
 
 /// Reads the table `[actuators]` of a TOML file, such as one of `romc identify`, for a robot if one is known.
-///
-/// # Errors
-/// [`RobotFileError`] with the place that is wrong or missing; a file that names another robot.
 pub fn read_actuators(path: &Path, robot: Option<&Robot>) -> Result<Actuators, RobotFileError> {
     let file = path.display().to_string();
     let File {

@@ -10,71 +10,50 @@ use crate::robot::{Leg, Robot};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RobotEntry {
-    /// Its name.
-    pub name: String,
-    /// Mass of body and legs, kg.
-    pub mass_kg: f64,
-    /// The four legs.
-    pub leg: Vec<LegEntry>,
+    pub(crate) name: String,
+    pub(crate) mass_kg: f64,
+    pub(crate) leg: Vec<LegEntry>,
 }
 
-/// A leg.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct LegEntry {
+pub(crate) struct LegEntry {
     /// Its three joints, from the trunk to the foot.
-    pub joint: Vec<JointEntry>,
+    pub(crate) joint: Vec<JointEntry>,
     /// From the last joint to the foot at the zero posture, m, along the body's axes.
-    pub foot: [f64; 3],
+    pub(crate) foot: [f64; 3],
 }
 
-/// A joint.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct JointEntry {
+pub(crate) struct JointEntry {
     /// The maker's name.
-    pub name: String,
+    pub(crate) name: String,
     /// From the joint before, the first from the body's origin, at the zero posture, m.
-    pub at: [f64; 3],
+    pub(crate) at: [f64; 3],
     /// Axis at the zero posture, along the body's axes.
-    pub axis: Axis,
-    /// -1 where recorded angles count against the axis.
-    #[serde(default = "one", skip_serializing_if = "is_one")]
-    pub sign: f64,
-    /// Recorded angle at the zero posture, rad.
-    #[serde(default, skip_serializing_if = "is_zero")]
-    pub offset_rad: f64,
+    pub(crate) axis: Axis,
+    /// -1 where recorded angles count against the axis; 1, if it is not given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) sign: Option<f64>,
+    /// Recorded angle at the zero posture, rad; 0, if it is not given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) offset_rad: Option<f64>,
     /// Lowest and highest recorded angle, rad.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub limits_rad: Option<[f64; 2]>,
+    pub(crate) limits_rad: Option<[f64; 2]>,
     /// The same in degrees.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub limits_deg: Option<[f64; 2]>,
-    /// Largest torque, N m.
-    pub torque_nm: f64,
-    /// Largest speed, rad/s.
-    pub speed_rad_s: f64,
-}
-
-fn one() -> f64 {
-    1.0
-}
-
-fn is_one(value: &f64) -> bool {
-    *value == 1.0
-}
-
-fn is_zero(value: &f64) -> bool {
-    *value == 0.0
+    pub(crate) limits_deg: Option<[f64; 2]>,
+    pub(crate) torque_nm: f64,
+    pub(crate) speed_rad_s: f64,
 }
 
 /// `"x"`, `"-y"` and so on, or a vector of any length.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
-pub enum Axis {
-    /// By name.
+pub(crate) enum Axis {
     Name(String),
-    /// By its components.
     Vector([f64; 3]),
 }
 
@@ -89,10 +68,10 @@ const NAMED: [(&str, [f64; 3]); 6] = [
 
 impl Axis {
     pub(crate) fn of(vector: [f64; 3]) -> Self {
-        let named = NAMED.iter().find(|(_, known)| *known == vector);
-        named.map_or(Axis::Vector(vector), |(name, _)| {
-            Axis::Name((*name).to_owned())
-        })
+        match NAMED.iter().find(|(_, known)| *known == vector) {
+            Some((name, _)) => Axis::Name((*name).to_owned()),
+            None => Axis::Vector(vector),
+        }
     }
 
     /// The components as given; none for an unknown name.
@@ -108,13 +87,13 @@ impl Axis {
 }
 
 impl JointEntry {
-    /// Keys and values of a joint whose angles count along its axis from zero, as TOML spells them.
+    /// Keys and values as TOML spells them, of a joint made by [`RobotEntry::of`].
     pub(super) fn fields(&self) -> [(&'static str, String); 6] {
         let axis = match &self.axis {
             Axis::Name(name) => format!("{name:?}"),
             Axis::Vector(vector) => format!("{vector:?}"),
         };
-        let limits = self.limits_rad.unwrap_or_default();
+        let limits = self.limits_rad.expect("a robot's limits are in rad");
         [
             ("name", format!("{:?}", self.name)),
             ("at", format!("{:?}", self.at)),
@@ -142,8 +121,8 @@ impl RobotEntry {
                         _ => chain.links[index - 1],
                     },
                     axis: Axis::of(chain.axes[index]),
-                    sign: 1.0,
-                    offset_rad: 0.0,
+                    sign: None,
+                    offset_rad: None,
                     limits_rad: Some([low, high]),
                     limits_deg: None,
                     torque_nm: robot.torque_limit_nm()[joint],

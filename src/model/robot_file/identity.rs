@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::entry::RobotEntry;
-use super::legs::{Places, build};
+use super::legs::{Part, Places, build};
 use super::read::RobotFileError;
 use super::registry::keep;
 use crate::files::{Located, Place};
@@ -17,14 +17,12 @@ const USUAL_ANGLE_RAD: f64 = 9.5;
 /// Range of a leg's largest torque as a part of the robot's weight times the length of thigh and calf; robots that are
 /// built have 0.2 to 1.
 const TORQUE_SHARE: std::ops::RangeInclusive<f64> = 0.02..=3.0;
-/// Largest speed of a joint, rad/s.
 const LARGEST_SPEED_RAD_S: f64 = 100.0;
 const N_LISTED: usize = 4;
 
 /// A robot of a file, and notes for the user.
 #[derive(Clone, Debug)]
 pub struct RobotReading {
-    /// The robot.
     pub robot: &'static Robot,
     /// One sentence each: the frame of the body, numbers that can hardly be true, another name.
     pub notes: Vec<String>,
@@ -39,44 +37,34 @@ pub(super) fn namesake(robot: &Robot) -> Option<String> {
 /// The robot of an entry from a file. Numbers other than those of romc's robot of that name make it another robot,
 /// with the kind of the file in its name.
 pub(super) fn identified(
-    file: &str,
     mut entry: RobotEntry,
-    places: &Places,
+    places: &Places<'_>,
     chosen: Option<&str>,
     mut notes: Vec<String>,
 ) -> Result<RobotReading, RobotFileError> {
     if let Some(name) = chosen {
         entry.name = name.to_owned();
     }
-    let name_place = Place::Entry(places.of_robot("name").into());
-    let built = build(file, &entry, places);
-    let mut robot = built.map_err(
-        |error| match chosen.is_some() && error.place == name_place {
-            true => Located::new("", Place::Option("--name"), error.kind),
-            false => error,
-        },
-    )?;
+    let name_place = Place::from((places.of)(Part::Name));
+    let of_option = |error: RobotFileError| match chosen.is_some() && error.place == name_place {
+        true => Located::new("", Place::Option("--name"), error.kind),
+        false => error,
+    };
+    let mut robot = build(&entry, places).map_err(of_option)?;
     if let Some(differences) = namesake(&robot) {
+        let own = &entry.name;
         if chosen.is_some() {
-            let found = format!(
-                "{:?}, romc's own robot with other numbers ({differences})",
-                entry.name
-            );
+            let found = format!("{own:?}, romc's own robot with other numbers ({differences})");
             return Err(RobotFileError::option("--name", found, "another name"));
         }
-        let kind = match places {
-            Places::Keys => "toml",
-            Places::Elements { .. } => "urdf",
-        };
-        let (own, other) = (&entry.name, format!("{}-{kind}", entry.name));
+        let other = format!("{own}-{}", places.kind);
         notes.push(format!(
             "its numbers are not those of romc's own {own:?} ({differences}): it is called {other:?}; --name (romc \
              robot) gives it another name"
         ));
         entry.name = other;
-        robot = build(file, &entry, places)?;
+        robot = build(&entry, places)?;
     }
-    refuse_degrees(file, &entry, places)?;
     notes.extend(doubts(&robot));
     Ok(RobotReading {
         robot: keep(robot),
@@ -110,35 +98,6 @@ fn differences(robot: &Robot, other: &Robot) -> String {
         0 => found.join(", "),
         more => format!("{}, and {more} more", found.join(", ")),
     }
-}
-
-/// Refuses limits of more than two turns, which are degrees, or bounds of a joint that has none.
-fn refuse_degrees(file: &str, entry: &RobotEntry, places: &Places) -> Result<(), RobotFileError> {
-    for (leg, limbs) in entry.leg.iter().enumerate() {
-        for (index, joint) in limbs.joint.iter().enumerate() {
-            let (key, [low, high], unit) = match (joint.limits_rad, joint.limits_deg) {
-                (Some(limits), _) => ("limits_rad", limits, "rad"),
-                (None, limits) => ("limits_deg", limits.unwrap_or_default(), "degrees"),
-            };
-            let radians = if unit == "rad" {
-                1.0
-            } else {
-                1_f64.to_radians()
-            };
-            if low.abs().max(high.abs()) * radians > LARGEST_ANGLE_RAD {
-                let found = format!("{low} to {high} {unit}");
-                let expected = match places {
-                    Places::Keys => "at most two turns either way; limits_deg takes degrees",
-                    Places::Elements { .. } => {
-                        "at most two turns either way: rad, not degrees; type=\"continuous\" for a joint without bounds"
-                    }
-                };
-                let place = places.of_joint(leg, index, key);
-                return Err(RobotFileError::at(file, place, found, expected));
-            }
-        }
-    }
-    Ok(())
 }
 
 fn doubts(robot: &Robot) -> Vec<String> {

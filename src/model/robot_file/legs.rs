@@ -3,7 +3,7 @@
 use nalgebra::{Rotation3, Unit, Vector3};
 
 use super::entry::{JointEntry, LegEntry, RobotEntry};
-use super::identity::namesake;
+use super::identity::{LARGEST_ANGLE_RAD, namesake};
 use super::read::RobotFileError;
 use super::registry::{keep, word};
 use crate::files::is_invisible;
@@ -11,90 +11,54 @@ use crate::robot::joints::LEG_JOINT_DIM;
 use crate::robot::{ChainLeg, FOOT_DIM, JOINT_DIM, Leg, LegGeometry, Robot};
 
 const MAX_NAME_LEN: usize = 80;
-/// Largest length of a link, m.
 const MAX_LINK_M: f64 = 10.0;
-/// Smallest length of thigh and calf, m.
 const MIN_LINK_M: f64 = 1e-3;
 /// Largest sine of the angle between the axes of a leg's last two joints.
 const MAX_TILT: f64 = 1e-3;
 /// Smallest sine of the angle between the first axis and the second.
 const MIN_ABDUCTION: f64 = 0.1;
 
-pub(super) enum Places {
+/// A part of an entry, by the indices of leg and joint.
+#[derive(Clone, Copy)]
+pub(super) enum Part<'k> {
+    Name,
+    Mass,
+    Legs,
+    Leg(usize),
+    Foot(usize),
+    /// With a key; the joint itself, if that is empty.
+    Joint(usize, usize, &'k str),
+}
+
+/// Where the parts of an entry are in a file.
+pub(super) struct Places<'f> {
+    pub file: &'f str,
+    /// `toml` or `urdf`.
+    pub kind: &'static str,
+    pub of: &'f dyn Fn(Part<'_>) -> String,
+}
+
+impl<'f> Places<'f> {
     /// By the keys of TOML and JSON.
-    Keys,
-    /// By the elements of a URDF, legs in the entry's order.
-    Elements { robot: String, legs: Vec<LegPlaces> },
-}
-
-/// Elements of a leg, such as ``line 24: joint `knee` ``.
-pub(super) struct LegPlaces {
-    pub joints: Vec<String>,
-    pub foot: String,
-}
-
-/// Keys of a joint as a URDF spells them.
-const SPELLINGS: [(&str, &str); 5] = [
-    ("at", "<origin>, xyz"),
-    ("axis", "<axis>, xyz"),
-    ("limits_rad", "<limit>, lower and upper"),
-    ("torque_nm", "<limit>, effort"),
-    ("speed_rad_s", "<limit>, velocity"),
-];
-
-impl Places {
-    pub(super) fn of_robot(&self, key: &str) -> String {
-        match self {
-            Places::Keys => key.to_owned(),
-            Places::Elements { robot, .. } if key == "name" => format!("{robot}, name"),
-            Places::Elements { .. } => match key {
-                "mass_kg" => "the masses of the links".to_owned(),
-                _ => "the tree".to_owned(),
-            },
-        }
+    pub(super) fn keys(file: &'f str) -> Self {
+        let of = &|part: Part<'_>| match part {
+            Part::Name => "name".to_owned(),
+            Part::Mass => "mass_kg".to_owned(),
+            Part::Legs => "leg".to_owned(),
+            Part::Leg(leg) => format!("leg[{leg}]"),
+            Part::Foot(leg) => format!("leg[{leg}].foot"),
+            Part::Joint(leg, joint, "") => format!("leg[{leg}].joint[{joint}]"),
+            Part::Joint(leg, joint, key) => format!("leg[{leg}].joint[{joint}].{key}"),
+        };
+        let kind = "toml";
+        Self { file, kind, of }
     }
-
-    fn of_leg(&self, leg: usize) -> String {
-        match self {
-            Places::Keys => format!("leg[{leg}]"),
-            Places::Elements { legs, .. } => format!("{}, its leg", legs[leg].joints[0]),
-        }
-    }
-
-    fn of_foot(&self, leg: usize) -> String {
-        match self {
-            Places::Keys => format!("leg[{leg}].foot"),
-            Places::Elements { legs, .. } => legs[leg].foot.clone(),
-        }
-    }
-
-    /// A key of a joint; the joint itself, if it is empty.
-    pub(super) fn of_joint(&self, leg: usize, joint: usize, key: &str) -> String {
-        match self {
-            Places::Keys if key.is_empty() => format!("leg[{leg}].joint[{joint}]"),
-            Places::Keys => format!("leg[{leg}].joint[{joint}].{key}"),
-            Places::Elements { legs, .. } => {
-                let known = SPELLINGS.iter().find(|(name, _)| *name == key);
-                let spelling = known.map_or(key, |(_, spelling)| spelling);
-                let comma = if spelling.is_empty() { "" } else { ", " };
-                format!("{}{comma}{spelling}", legs[leg].joints[joint])
-            }
-        }
-    }
-}
-
-struct Reader<'f> {
-    file: &'f str,
-    places: &'f Places,
 }
 
 impl RobotEntry {
     /// The robot of the entry, which is `entry` of `file` in errors; equal robots are one.
-    ///
-    /// # Errors
-    /// [`RobotFileError`] with the entry that is wrong, or a name that is another robot's.
     pub fn robot(&self, file: &str) -> Result<&'static Robot, RobotFileError> {
-        let robot = build(file, self, &Places::Keys)?;
+        let robot = build(self, &Places::keys(file))?;
         match namesake(&robot) {
             None => Ok(keep(robot)),
             Some(differences) => {
@@ -108,18 +72,13 @@ impl RobotEntry {
     }
 }
 
-pub(super) fn build(
-    file: &str,
-    entry: &RobotEntry,
-    places: &Places,
-) -> Result<Robot, RobotFileError> {
-    let reader = Reader { file, places };
-    reader.name(&places.of_robot("name"), &entry.name)?;
-    reader.positive(&places.of_robot("mass_kg"), entry.mass_kg)?;
+pub(super) fn build(entry: &RobotEntry, places: &Places<'_>) -> Result<Robot, RobotFileError> {
+    places.name(Part::Name, &entry.name)?;
+    places.positive(Part::Mass, entry.mass_kg)?;
     let found = format!("{} legs", entry.leg.len());
     let expected = "four: models, inputs and controllers are those of quadrupeds";
-    reader.check(entry.leg.len() == FOOT_DIM, "leg", found, expected)?;
-    let corners = reader.corners(&entry.leg)?;
+    places.check(entry.leg.len() == FOOT_DIM, Part::Legs, found, expected)?;
+    let corners = places.corners(&entry.leg)?;
     let mut robot = Robot {
         name: word(&entry.name),
         mass_kg: entry.mass_kg,
@@ -136,41 +95,50 @@ pub(super) fn build(
     let mut names: Vec<&str> = Vec::with_capacity(JOINT_DIM);
     for (index, (leg, entry)) in corners.iter().zip(&entry.leg).enumerate() {
         let k = leg.index();
-        robot.legs[k] = LegGeometry::of_chain(reader.chain(index, entry)?);
+        robot.legs[k] = LegGeometry::of_chain(places.chain(index, entry)?);
         robot.hip_position_m[k] = entry.joint[0].at;
         for (offset, joint) in entry.joint.iter().enumerate() {
-            let place = |key: &str| places.of_joint(index, offset, key);
+            let part = |key: &'static str| Part::Joint(index, offset, key);
             let at = LEG_JOINT_DIM * k + offset;
-            reader.name(&place("name"), &joint.name)?;
+            places.name(part("name"), &joint.name)?;
             let is_new = !names.contains(&joint.name.as_str());
             let found = format!("{:?} a second time", joint.name);
-            reader.check(is_new, &place("name"), found, "each name once")?;
+            places.check(is_new, part("name"), found, "each name once")?;
             names.push(&joint.name);
             robot.joint_names[at] = word(&joint.name);
-            robot.joint_limit_rad[at] = reader.limits(place, joint)?;
-            robot.torque_limit_nm[at] = reader.positive(&place("torque_nm"), joint.torque_nm)?;
+            robot.joint_limit_rad[at] = places.limits(part, joint)?;
+            robot.torque_limit_nm[at] = places.positive(part("torque_nm"), joint.torque_nm)?;
             robot.joint_speed_limit_rad_s[at] =
-                reader.positive(&place("speed_rad_s"), joint.speed_rad_s)?;
+                places.positive(part("speed_rad_s"), joint.speed_rad_s)?;
         }
     }
     Ok(robot)
 }
 
-impl Reader<'_> {
+impl Places<'_> {
+    fn fault(
+        &self,
+        part: Part<'_>,
+        found: impl Into<Box<str>>,
+        expected: impl Into<Box<str>>,
+    ) -> RobotFileError {
+        RobotFileError::at(self.file, (self.of)(part), found, expected)
+    }
+
     fn check(
         &self,
         is_fine: bool,
-        place: &str,
+        part: Part<'_>,
         found: impl Into<Box<str>>,
         expected: impl Into<Box<str>>,
     ) -> Result<(), RobotFileError> {
         match is_fine {
             true => Ok(()),
-            false => Err(RobotFileError::at(self.file, place, found, expected)),
+            false => Err(self.fault(part, found, expected)),
         }
     }
 
-    fn name(&self, place: &str, name: &str) -> Result<(), RobotFileError> {
+    fn name(&self, part: Part<'_>, name: &str) -> Result<(), RobotFileError> {
         // Comments and pages of generated files list names.
         let is_fine = !name.trim().is_empty()
             && name.len() <= MAX_NAME_LEN
@@ -179,51 +147,63 @@ impl Reader<'_> {
         let expected = format!(
             "a name of at most {MAX_NAME_LEN} bytes that are seen, without \\, `, /*, */ and ??"
         );
-        self.check(is_fine, place, format!("{name:?}"), expected)
+        self.check(is_fine, part, format!("{name:?}"), expected)
     }
 
-    fn positive(&self, place: &str, value: f64) -> Result<f64, RobotFileError> {
+    fn positive(&self, part: Part<'_>, value: f64) -> Result<f64, RobotFileError> {
         let is_fine = value.is_finite() && value > 0.0;
-        self.check(is_fine, place, value.to_string(), "a finite number above 0")?;
+        self.check(is_fine, part, value.to_string(), "a finite number above 0")?;
         Ok(value)
     }
 
-    fn vector(&self, place: &str, vector: [f64; 3]) -> Result<(), RobotFileError> {
+    fn vector(&self, part: Part<'_>, vector: [f64; 3]) -> Result<(), RobotFileError> {
         let is_fine = vector.iter().all(|v| v.abs() <= MAX_LINK_M);
         let expected = format!("three lengths of at most {MAX_LINK_M} m");
-        self.check(is_fine, place, format!("{vector:?}"), expected)
+        self.check(is_fine, part, format!("{vector:?}"), expected)
     }
 
     fn limits(
         &self,
-        place: impl Fn(&str) -> String,
+        part: impl Fn(&'static str) -> Part<'static>,
         joint: &JointEntry,
     ) -> Result<(f64, f64), RobotFileError> {
-        let (key, [low, high]) = match (joint.limits_rad, joint.limits_deg) {
-            (Some(limits), None) => ("limits_rad", limits),
-            (None, Some(limits)) => ("limits_deg", limits.map(f64::to_radians)),
+        let (key, unit, given, [low, high]) = match (joint.limits_rad, joint.limits_deg) {
+            (Some(limits), None) => ("limits_rad", "rad", limits, limits),
+            (None, Some(limits)) => {
+                let radians = limits.map(f64::to_radians);
+                ("limits_deg", "degrees", limits, radians)
+            }
             (found, _) => {
                 let found = if found.is_some() { "both" } else { "neither" };
                 let expected = "one of limits_rad and limits_deg";
-                return Err(RobotFileError::at(self.file, place(""), found, expected));
+                return Err(self.fault(part(""), found, expected));
             }
         };
         let is_fine = low.is_finite() && high.is_finite() && low < high;
-        let (place, found) = (place(key), format!("{low} to {high}"));
-        self.check(is_fine, &place, found, "the lower limit first")?;
+        let found = format!("{low} to {high}");
+        self.check(is_fine, part(key), found, "the lower limit first")?;
+        // Beyond two turns limits are degrees, or bounds of a joint that has none.
+        let is_fine = low.abs().max(high.abs()) <= LARGEST_ANGLE_RAD;
+        let found = format!("{} to {} {unit}", given[0], given[1]);
+        let expected = match self.kind {
+            "toml" => "at most two turns either way; limits_deg takes degrees",
+            _ => {
+                "at most two turns either way: rad, not degrees; type=\"continuous\" for a joint without bounds"
+            }
+        };
+        self.check(is_fine, part(key), found, expected)?;
         Ok((low, high))
     }
 
     /// Which leg each entry is, by where its first joint stands.
     fn corners(&self, legs: &[LegEntry]) -> Result<[Leg; FOOT_DIM], RobotFileError> {
         for (index, leg) in legs.iter().enumerate() {
-            let (place, count) = (
-                format!("{}.joint", self.places.of_leg(index)),
-                leg.joint.len(),
-            );
-            let found = format!("{count} joints");
-            let expected = "three, from the trunk to the foot";
-            self.check(count == LEG_JOINT_DIM, &place, found, expected)?;
+            if leg.joint.len() != LEG_JOINT_DIM {
+                let place = format!("{}.joint", (self.of)(Part::Leg(index)));
+                let found = format!("{} joints", leg.joint.len());
+                let expected = "three, from the trunk to the foot";
+                return Err(RobotFileError::at(self.file, place, found, expected));
+            }
         }
         let hips: Vec<[f64; 3]> = legs.iter().map(|leg| leg.joint[0].at).collect();
         let middle =
@@ -244,50 +224,45 @@ impl Reader<'_> {
                 let hips = hips.collect::<Vec<_>>().join(", ");
                 let found = format!("first joints at (x, y) = {hips} m");
                 let expected = "one at each corner of the trunk: x forward, y left";
-                Err(RobotFileError::at(
-                    self.file,
-                    self.places.of_robot("leg"),
-                    found,
-                    expected,
-                ))
+                Err(self.fault(Part::Legs, found, expected))
             }
         }
     }
 
-    fn axis(&self, place: String, joint: &JointEntry) -> Result<Vector3<f64>, RobotFileError> {
+    fn axis(&self, part: Part<'_>, joint: &JointEntry) -> Result<Vector3<f64>, RobotFileError> {
         let Some(given) = joint.axis.vector() else {
             let found = format!("{:?}", joint.axis);
             let expected = "\"x\", \"y\", \"z\", \"-x\", \"-y\", \"-z\" or three numbers";
-            return Err(RobotFileError::at(self.file, place, found, expected));
+            return Err(self.fault(part, found, expected));
         };
         let vector = Vector3::from(given);
         let norm = vector.norm();
         let is_fine = norm.is_finite() && norm > 1e-6;
-        self.check(is_fine, &place, format!("{given:?}"), "a direction")?;
-        let is_fine = joint.sign.abs() == 1.0 && joint.offset_rad.is_finite();
-        let found = format!("sign {} and offset_rad {}", joint.sign, joint.offset_rad);
-        self.check(is_fine, &place, found, "sign 1 or -1, offset_rad finite")?;
+        self.check(is_fine, part, format!("{given:?}"), "a direction")?;
+        let (sign, offset_rad) = (joint.sign.unwrap_or(1.0), joint.offset_rad.unwrap_or(0.0));
+        let is_fine = sign.abs() == 1.0 && offset_rad.is_finite();
+        let found = format!("sign {sign} and offset_rad {offset_rad}");
+        self.check(is_fine, part, found, "sign 1 or -1, offset_rad finite")?;
         // What is a unit vector already stays as it is, to the last bit.
         let unit = match (norm - 1.0).abs() < 1e-12 {
             true => vector,
             false => vector / norm,
         };
         // No -0.0, so that the usual axes are recognised.
-        Ok((unit * joint.sign).map(|v| v + 0.0))
+        Ok((unit * sign).map(|v| v + 0.0))
     }
 
     fn chain(&self, index: usize, leg: &LegEntry) -> Result<ChainLeg, RobotFileError> {
         let mut axes = [Vector3::zeros(); LEG_JOINT_DIM];
         for (offset, joint) in leg.joint.iter().enumerate() {
-            let place = |key: &str| self.places.of_joint(index, offset, key);
-            axes[offset] = self.axis(place("axis"), joint)?;
-            self.vector(&place("at"), joint.at)?;
+            axes[offset] = self.axis(Part::Joint(index, offset, "axis"), joint)?;
+            self.vector(Part::Joint(index, offset, "at"), joint.at)?;
         }
-        self.vector(&self.places.of_foot(index), leg.foot)?;
+        self.vector(Part::Foot(index), leg.foot)?;
         let mut links = [leg.joint[1].at, leg.joint[2].at, leg.foot].map(Vector3::from);
         // At the recorded zero each joint is turned back by its offset.
         for joint in (0..LEG_JOINT_DIM).rev() {
-            let offset = leg.joint[joint].offset_rad;
+            let offset = leg.joint[joint].offset_rad.unwrap_or(0.0);
             if offset != 0.0 {
                 let turn = Rotation3::from_axis_angle(&Unit::new_unchecked(axes[joint]), -offset);
                 for later in joint..LEG_JOINT_DIM {
@@ -302,7 +277,7 @@ impl Reader<'_> {
             axes: axes.map(Into::into),
             links: links.map(|link| link.map(|v| v + 0.0).into()),
         };
-        let place = &self.places.of_leg(index);
+        let part = Part::Leg(index);
         let names = |a: usize, b: usize| {
             let [a, b] = [a, b].map(|joint| leg.joint[joint].name.as_str());
             format!("the axes of {a} and {b}")
@@ -310,16 +285,16 @@ impl Reader<'_> {
         let is_tilted = axes[1].cross(&axes[2]).norm() > MAX_TILT;
         let found = format!("{} in different directions", names(1, 2));
         let expected = "a leg whose last two joints turn about parallel axes";
-        self.check(!is_tilted, place, found, expected)?;
+        self.check(!is_tilted, part, found, expected)?;
         let is_stiff = axes[0].cross(&axes[1]).norm() < MIN_ABDUCTION;
         let found = format!("{} almost parallel", names(0, 1));
         let expected = "a first joint that moves the plane of the leg";
-        self.check(!is_stiff, place, found, expected)?;
+        self.check(!is_stiff, part, found, expected)?;
         let lengths = chain.lengths();
         let is_short = lengths.iter().any(|length| *length < MIN_LINK_M);
         let found = format!("thigh and calf of {} and {} m", lengths[0], lengths[1]);
         let expected = "lengths across the axes of the last two joints";
-        self.check(!is_short, place, found, expected)?;
+        self.check(!is_short, part, found, expected)?;
         Ok(chain)
     }
 }

@@ -21,6 +21,8 @@
 //!
 //! [`Robot`]: crate::robot::Robot
 
+#![allow(missing_docs, reason = "names say it all where there is no comment")]
+
 mod actuators;
 mod entry;
 mod identity;

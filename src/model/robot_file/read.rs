@@ -21,22 +21,15 @@ pub struct RobotOptions<'a> {
     /// Links of the four feet of a URDF, each with a point in its frame where that is not the foot
     /// (`LINK:x,y,z`); empty to find them.
     pub feet: &'a [String],
-    /// The robot's name instead of the file's.
     pub name: Option<&'a str>,
 }
 
 /// The robot of a name, or of a file that ends in `.toml` or `.urdf`.
-///
-/// # Errors
-/// [`RobotFileError`] without a file for what is neither, else as [`from_text`].
 pub fn find(name_or_file: &str) -> Result<&'static Robot, RobotFileError> {
     Ok(open(name_or_file, &RobotOptions::default())?.robot)
 }
 
 /// [`find`] with options and notes.
-///
-/// # Errors
-/// As [`find`], and for options of a robot that has no file.
 pub fn open(
     name_or_file: &str,
     options: &RobotOptions<'_>,
@@ -70,7 +63,7 @@ pub fn open(
 }
 
 fn ending(path: &Path) -> String {
-    let ending = path.extension().unwrap_or_default();
+    let ending = path.extension().unwrap_or_default(); // no ending is none of a robot's
     ending.to_string_lossy().to_lowercase()
 }
 
@@ -84,9 +77,6 @@ pub(super) fn text_of(path: &Path) -> Result<String, RobotFileError> {
 }
 
 /// Reads a robot from TOML or, by the ending of `file`, which names it in errors, URDF.
-///
-/// # Errors
-/// [`RobotFileError`] with the entry that is wrong or missing.
 pub fn from_text(
     file: &str,
     text: &str,
@@ -100,7 +90,7 @@ pub fn from_text(
         return Err(RobotFileError::option("--feet", found, "a URDF"));
     }
     let entry = from_toml_text::<RobotEntry>(file, text)?;
-    identified(file, entry, &Places::Keys, options.name, Vec::new())
+    identified(entry, &Places::keys(file), options.name, Vec::new())
 }
 
 pub(super) fn from_toml_text<T: DeserializeOwned>(

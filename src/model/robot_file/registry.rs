@@ -16,9 +16,6 @@ const KNOWN: [(&str, &str); 3] = [
 ];
 
 /// The robot of romc's own that is named so, such as `go1`.
-///
-/// # Errors
-/// [`RobotError::UnknownRobot`], which lists the known names.
 pub fn by_name(name: &str) -> Result<&'static Robot, RobotError> {
     static ROBOTS: [OnceLock<&Robot>; KNOWN.len()] = [const { OnceLock::new() }; KNOWN.len()];
     let known = KNOWN.iter().position(|(known, _)| *known == name);
@@ -29,12 +26,11 @@ pub fn by_name(name: &str) -> Result<&'static Robot, RobotError> {
     Ok(ROBOTS[at].get_or_init(|| {
         let (file, text) = KNOWN[at];
         let entry = read::from_toml_text::<RobotEntry>(file, text);
-        let robot = entry.and_then(|entry| legs::build(file, &entry, &Places::Keys));
+        let robot = entry.and_then(|entry| legs::build(&entry, &Places::keys(file)));
         keep(robot.expect("a file of romc's own, read by a test"))
     }))
 }
 
-/// Names that [`by_name`] accepts.
 pub fn known_names() -> Vec<&'static str> {
     KNOWN.iter().map(|(name, _)| *name).collect()
 }

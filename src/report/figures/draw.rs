@@ -2,11 +2,8 @@
 
 use super::figure::{Drawing, Figure, HeatMap, Panel, Role, Series, StickPlot};
 
-/// Space left of the axes, for their numbers.
 const LEFT: f64 = 38.0;
-/// Space above, for the title.
 const TOP: f64 = 17.0;
-/// Space below, for numbers and label.
 const BOTTOM: f64 = 26.0;
 const RIGHT: f64 = 8.0;
 /// Points of a line that are drawn; CSV has them all.
@@ -24,7 +21,6 @@ pub(crate) enum Anchor {
 pub(crate) enum Paint {
     Axis,
     Grid,
-    /// The ground of a flight.
     Shade,
     /// A magnitude from 0 to 1.
     Heat(f64),
@@ -34,14 +30,32 @@ pub(crate) enum Paint {
 pub(crate) enum Mark {
     /// A filled rectangle: corner, width, height.
     Rectangle([f64; 4], Paint),
-    /// A straight line between two points.
     Rule([f64; 4], Paint),
     Line(Vec<(f64, f64)>, Role),
     /// A text at the left end of its baseline, or as anchored.
     Text(f64, f64, Anchor, String),
 }
 
-/// Height of the legend's line.
+impl Mark {
+    fn text(x: f64, y: f64, anchor: Anchor, words: impl Into<String>) -> Self {
+        Self::Text(x, y, anchor, words.into())
+    }
+
+    fn moved(self, (dx, dy): (f64, f64)) -> Self {
+        match self {
+            Self::Rectangle([x, y, w, h], paint) => Self::Rectangle([x + dx, y + dy, w, h], paint),
+            Self::Rule([x1, y1, x2, y2], paint) => {
+                Self::Rule([x1 + dx, y1 + dy, x2 + dx, y2 + dy], paint)
+            }
+            Self::Line(points, role) => {
+                let points = points.into_iter().map(|(x, y)| (x + dx, y + dy));
+                Self::Line(points.collect(), role)
+            }
+            Self::Text(x, y, anchor, words) => Self::Text(x + dx, y + dy, anchor, words),
+        }
+    }
+}
+
 const LEGEND: f64 = 18.0;
 
 pub(super) fn figure_size(figure: &Figure) -> (f64, f64) {
@@ -60,20 +74,22 @@ fn legend_height(figure: &Figure) -> f64 {
     }
 }
 
-/// The marks of a figure's legend and of each of its panels, with their upper left corners.
-pub(super) fn placed_marks(figure: &Figure) -> Vec<(Vec<Mark>, (f64, f64))> {
-    let columns = figure.columns.max(1);
+/// The marks of a figure's legend, then of each of its panels.
+pub(super) fn placed_marks(figure: &Figure) -> Vec<Vec<Mark>> {
     let (width, height) = figure.panel_size;
-    let mut all = vec![(legend_marks(figure), (0.0, 0.0))];
-    for (place, panel) in figure.panels.iter().enumerate() {
+    let place = |(place, panel): (usize, &Panel)| {
+        let [column, row] = [place % figure.columns.max(1), place / figure.columns.max(1)];
         let corner = (
-            (place % columns) as f64 * width,
-            (place / columns) as f64 * height + legend_height(figure),
+            column as f64 * width,
+            row as f64 * height + legend_height(figure),
         );
-        let marks = draw_panel(panel, figure.panel_size, &figure.x_label);
-        all.push((marks, corner));
-    }
-    all
+        let marks = draw_panel(panel, figure.panel_size, &figure.x_label).into_iter();
+        marks.map(|mark| mark.moved(corner)).collect()
+    };
+    let panels = figure.panels.iter().enumerate().map(place);
+    std::iter::once(legend_marks(figure))
+        .chain(panels)
+        .collect()
 }
 
 fn legend_marks(figure: &Figure) -> Vec<Mark> {
@@ -81,8 +97,7 @@ fn legend_marks(figure: &Figure) -> Vec<Mark> {
     let mut x = 10.0;
     for (role, words) in &figure.legend {
         marks.push(Mark::Line(vec![(x, 10.0), (x + 24.0, 10.0)], *role));
-        let words_at = x + 28.0;
-        marks.push(Mark::Text(words_at, 13.0, Anchor::Start, words.clone()));
+        marks.push(Mark::text(x + 28.0, 13.0, Anchor::Start, words));
         x += 44.0 + 0.52 * FONT * words.chars().count() as f64;
     }
     marks
@@ -99,30 +114,22 @@ pub(crate) fn draw_panel(panel: &Panel, size: (f64, f64), x_label: &str) -> Vec<
     }
 }
 
-/// Data coordinates to those of the panel.
 struct Axes {
     x: (f64, f64),
     y: (f64, f64),
-    size: (f64, f64),
+    right: f64,
+    bottom: f64,
 }
 
 impl Axes {
     fn x_at(&self, value: f64) -> f64 {
         let share = (value - self.x.0) / (self.x.1 - self.x.0);
-        LEFT + share * (self.size.0 - LEFT - RIGHT)
+        LEFT + share * (self.right - LEFT)
     }
 
     fn y_at(&self, value: f64) -> f64 {
         let share = (value - self.y.0) / (self.y.1 - self.y.0);
-        self.bottom() - share * (self.bottom() - TOP)
-    }
-
-    fn bottom(&self) -> f64 {
-        self.size.1 - BOTTOM
-    }
-
-    fn right(&self) -> f64 {
-        self.size.0 - RIGHT
+        self.bottom - share * (self.bottom - TOP)
     }
 }
 
@@ -140,27 +147,26 @@ fn draw_lines(
             false => padded(points().map(|point| point.0)),
         },
         y: padded(visible(series)),
-        size,
+        right: size.0 - RIGHT,
+        bottom: size.1 - BOTTOM,
     };
     let mut marks = Vec::new();
     for &(from, to) in shaded {
         let (from, to) = (axes.x_at(from.max(axes.x.0)), axes.x_at(to.min(axes.x.1)));
-        let rectangle = [from, TOP, (to - from).max(0.0), axes.bottom() - TOP];
+        let rectangle = [from, TOP, (to - from).max(0.0), axes.bottom - TOP];
         marks.push(Mark::Rectangle(rectangle, Paint::Shade));
     }
     draw_axes(&axes, x_label, &mut marks);
-    let title = title.to_owned();
-    marks.push(Mark::Text(LEFT, TOP - 6.0, Anchor::Start, title));
+    marks.push(Mark::text(LEFT, TOP - 6.0, Anchor::Start, title));
     for series in series {
         // a line ends where it leaves the frame
         let inside = |y: f64| (axes.y.0..=axes.y.1).contains(&y);
         let points = thinned(&series.points);
         for stretch in points.split(|point| !point.1.is_some_and(inside)) {
-            let line: Vec<(f64, f64)> = (stretch.iter())
-                .filter_map(|&(x, y)| Some((axes.x_at(x), axes.y_at(y?))))
-                .collect();
-            if line.len() > 1 {
-                marks.push(Mark::Line(line, series.role));
+            let line = stretch.iter();
+            let line = line.filter_map(|&(x, y)| Some((axes.x_at(x), axes.y_at(y?))));
+            if stretch.len() > 1 {
+                marks.push(Mark::Line(line.collect(), series.role));
             }
         }
     }
@@ -196,25 +202,20 @@ fn thinned(points: &[(f64, Option<f64>)]) -> Vec<(f64, Option<f64>)> {
 }
 
 fn draw_axes(axes: &Axes, x_label: &str, marks: &mut Vec<Mark>) {
-    let (bottom, right) = (axes.bottom(), axes.right());
-    let (values, places) = ticks(axes.y.0, axes.y.1, 4);
-    for value in values {
+    let (bottom, right) = (axes.bottom, axes.right);
+    for (value, text) in ticks(axes.y) {
         let y = axes.y_at(value);
         marks.push(Mark::Rule([LEFT, y, right, y], Paint::Grid));
-        let text = number(value, places);
-        marks.push(Mark::Text(LEFT - 4.0, y + 3.0, Anchor::End, text));
+        marks.push(Mark::text(LEFT - 4.0, y + 3.0, Anchor::End, text));
     }
-    let (values, places) = ticks(axes.x.0, axes.x.1, 4);
-    for value in values {
+    for (value, text) in ticks(axes.x) {
         let x = axes.x_at(value);
         marks.push(Mark::Rule([x, bottom, x, bottom + 3.0], Paint::Axis));
-        let text = number(value, places);
-        marks.push(Mark::Text(x, bottom + 12.0, Anchor::Middle, text));
+        marks.push(Mark::text(x, bottom + 12.0, Anchor::Middle, text));
     }
     marks.push(Mark::Rule([LEFT, bottom, right, bottom], Paint::Axis));
     marks.push(Mark::Rule([LEFT, TOP, LEFT, bottom], Paint::Axis));
-    let label = x_label.to_owned();
-    marks.push(Mark::Text(right, bottom + 22.0, Anchor::End, label));
+    marks.push(Mark::text(right, bottom + 22.0, Anchor::End, x_label));
 }
 
 fn draw_heat(title: &str, map: &HeatMap, size: (f64, f64), x_label: &str) -> Vec<Mark> {
@@ -227,7 +228,7 @@ fn draw_heat(title: &str, map: &HeatMap, size: (f64, f64), x_label: &str) -> Vec
     for (row, name) in map.rows.iter().enumerate() {
         let y = TOP + row as f64 * cell.1;
         let middle = y + 0.5 * cell.1 + 3.0;
-        marks.push(Mark::Text(left - 4.0, middle, Anchor::End, name.clone()));
+        marks.push(Mark::text(left - 4.0, middle, Anchor::End, name));
         for column in 0..map.columns.len() {
             let value = map.values[row * map.columns.len() + column].abs();
             let share = if largest > 0.0 { value / largest } else { 0.0 };
@@ -240,28 +241,30 @@ fn draw_heat(title: &str, map: &HeatMap, size: (f64, f64), x_label: &str) -> Vec
     let bottom = TOP + height;
     for (column, name) in map.columns.iter().enumerate() {
         let x = left + (column as f64 + 0.5) * cell.0;
-        marks.push(Mark::Text(x, bottom + 11.0, Anchor::Middle, name.clone()));
+        marks.push(Mark::text(x, bottom + 11.0, Anchor::Middle, name));
     }
-    let (right, label) = (size.0 - RIGHT, x_label.to_owned());
-    marks.push(Mark::Text(right, bottom + 22.0, Anchor::End, label));
+    marks.push(Mark::text(
+        size.0 - RIGHT,
+        bottom + 22.0,
+        Anchor::End,
+        x_label,
+    ));
     marks
 }
 
 fn heat_scale(title: &str, left: f64, largest: f64) -> Vec<Mark> {
     const SHADES: usize = 6;
     const CELL: f64 = 9.0;
-    let text = |x: f64, anchor, words: String| Mark::Text(x, TOP - 6.0, anchor, words);
+    let text = |x: f64, anchor, words: &str| Mark::text(x, TOP - 6.0, anchor, words);
     let bar = left + 0.62 * FONT * title.chars().count() as f64 + 16.0;
-    let mut marks = vec![
-        text(left, Anchor::Start, title.to_owned()),
-        text(bar - 3.0, Anchor::End, number(0.0, 0)),
-    ];
+    let title = text(left, Anchor::Start, title);
+    let mut marks = vec![title, text(bar - 3.0, Anchor::End, &number(0.0, 0))];
     marks.extend((0..SHADES).map(|shade| {
         let corner = [bar + CELL * shade as f64, TOP - 14.0, CELL, CELL];
         Mark::Rectangle(corner, Paint::Heat(shade as f64 / (SHADES - 1) as f64))
     }));
     let end = bar + CELL * SHADES as f64 + 3.0;
-    marks.push(text(end, Anchor::Start, number(largest, 2)));
+    marks.push(text(end, Anchor::Start, &number(largest, 2)));
     marks
 }
 
@@ -276,7 +279,7 @@ fn draw_sticks(title: &str, plot: &StickPlot, size: (f64, f64)) -> Vec<Mark> {
     };
     let floor = at((0.0, plot.floor_m)).1;
     let mut marks = vec![
-        Mark::Text(RIGHT, TOP - 6.0, Anchor::Start, title.to_owned()),
+        Mark::text(RIGHT, TOP - 6.0, Anchor::Start, title),
         Mark::Rule([RIGHT, floor, size.0 - RIGHT, floor], Paint::Axis),
     ];
     for (role, sticks) in &plot.sticks {
@@ -286,23 +289,24 @@ fn draw_sticks(title: &str, plot: &StickPlot, size: (f64, f64)) -> Vec<Mark> {
     marks
 }
 
-/// Round values within `low..=high`, about `count` of them, and the decimal places that they need.
-fn ticks(low: f64, high: f64, count: usize) -> (Vec<f64>, usize) {
-    let rough = (high - low) / count.max(1) as f64;
+/// Round values within a range, about four of them, with texts of the decimal places that they need.
+fn ticks((low, high): (f64, f64)) -> Vec<(f64, String)> {
+    let rough = (high - low) / 4.0;
     if !rough.is_finite() || rough <= 0.0 {
-        return (vec![low], 2);
+        return vec![(low, number(low, 2))];
     }
     let power = 10f64.powf(rough.log10().floor());
-    let step = [1.0, 2.0, 5.0, 10.0]
+    let mut steps = [1.0, 2.0, 5.0, 10.0]
         .map(|factor| factor * power)
-        .into_iter()
+        .into_iter();
+    let step = steps
         .find(|step| *step >= rough * 0.999)
         .unwrap_or(10.0 * power);
     let places = (-step.log10().floor()).max(0.0) as usize;
     let first = (low / step - 1e-9).ceil() as i64;
     let last = (high / step + 1e-9).floor() as i64;
-    let values = (first..=last).map(|index| index as f64 * step).collect();
-    (values, places)
+    let values = (first..=last).map(|index| index as f64 * step);
+    values.map(|value| (value, number(value, places))).collect()
 }
 
 /// A value along an axis or in a title, with so many decimal places and a minus of the width of a plus.
@@ -325,44 +329,14 @@ pub(crate) fn range(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
     values.fold(none, |(low, high), value| (low.min(value), high.max(value)))
 }
 
-/// The range of values with a margin; a range around a constant.
 fn padded(values: impl Iterator<Item = f64>) -> (f64, f64) {
     let (low, high) = range(values.filter(|value| value.is_finite()));
     if low > high {
         return (0.0, 1.0);
     }
-    let margin = 0.06 * (high - low);
-    if margin > 0.0 {
-        (low - margin, high + margin)
-    } else {
-        let around = 0.05 * low.abs() + 1e-6;
-        (low - around, high + around)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_mark_of_a_runaway_prediction_stays_inside_the_frame() {
-        let line =
-            |role, values: [f64; 3]| Series::over(role, &[0.0, 1.0, 2.0], |k| Some(values[k]));
-        let lines = vec![
-            line(Role::Recorded, [0.2, 0.3, 0.25]),
-            line(Role::Full, [0.2, 0.21, -1e9]),
-            line(Role::Limit, [3.0; 3]),
-        ];
-        let panel = Panel::shaded("body.z, m", lines, vec![(1.0, 9.0)]);
-        let marks = draw_panel(&panel, (240.0, 150.0), "time, s");
-        let lines = marks.iter().filter_map(|mark| match mark {
-            Mark::Line(points, _) => Some(points),
-            Mark::Rectangle(..) | Mark::Rule(..) | Mark::Text(..) => None,
-        });
-        let points: Vec<_> = lines.flatten().collect();
-        // three recorded, two before the prediction leaves, three of the limit
-        assert_eq!(points.len(), 8);
-        let inside = |p: &&(f64, f64)| (0.0..=240.0).contains(&p.0) && (0.0..=150.0).contains(&p.1);
-        assert!(points.iter().all(inside));
-    }
+    let margin = match 0.06 * (high - low) {
+        margin if margin > 0.0 => margin,
+        _ => 0.05 * low.abs() + 1e-6,
+    };
+    (low - margin, high + margin)
 }

@@ -4,7 +4,7 @@ use super::sticks::{Extent, Sticks};
 
 /// The meaning of a line, which selects its colour and dashes in every figure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Role {
+pub(crate) enum Role {
     /// Measured, or encoded from what was measured.
     Recorded,
     /// Predicted over the whole recording.
@@ -36,14 +36,12 @@ impl Role {
 }
 
 /// One line: points in the order of x; a point without y breaks the line.
-#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Series {
     pub role: Role,
     pub points: Vec<(f64, Option<f64>)>,
 }
 
 impl Series {
-    /// A value of every sample over its time.
     pub(crate) fn over(role: Role, time_s: &[f64], value: impl Fn(usize) -> Option<f64>) -> Self {
         let times = time_s.iter().enumerate();
         Self::through(role, times.map(|(sample, &time)| (time, value(sample))))
@@ -58,14 +56,12 @@ impl Series {
     }
 }
 
-#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Panel {
     /// The quantity with its unit, such as `body.x, m`, or the instant, such as `0.12 s`.
     pub title: String,
     pub drawing: Drawing,
 }
 
-#[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Drawing {
     /// Lines over one axis; shaded are ranges of x with a grey ground, such as flight.
     Lines {
@@ -76,7 +72,6 @@ pub(crate) enum Drawing {
     Sticks(StickPlot),
 }
 
-#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct HeatMap {
     pub rows: Vec<String>,
     pub columns: Vec<String>,
@@ -85,7 +80,6 @@ pub(crate) struct HeatMap {
 }
 
 /// Robots as sticks in a vertical plane, one length for a metre in both directions.
-#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct StickPlot {
     /// The robots, the first below the others.
     pub sticks: Vec<(Role, Sticks)>,
@@ -98,7 +92,6 @@ impl Panel {
         Self::shaded(title, series, Vec::new())
     }
 
-    /// Lines over one axis, some ranges of which are shaded.
     pub(crate) fn shaded(
         title: impl Into<String>,
         series: Vec<Series>,
@@ -111,9 +104,7 @@ impl Panel {
     }
 }
 
-#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Figure {
-    /// Stem of its files.
     pub id: String,
     pub caption: String,
     /// The common axis below, such as `time, s`.
@@ -146,7 +137,6 @@ impl Figure {
         }
     }
 
-    /// The same with panels of another size, so many side by side.
     pub(crate) fn in_columns(self, columns: usize, panel_size: (f64, f64)) -> Self {
         Self {
             columns,
@@ -155,7 +145,6 @@ impl Figure {
         }
     }
 
-    /// The same over another axis than time.
     pub(crate) fn over(self, x_label: &str) -> Self {
         let x_label = x_label.to_owned();
         Self { x_label, ..self }

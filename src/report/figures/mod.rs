@@ -6,16 +6,13 @@
 
 mod draw;
 mod figure;
-mod film;
 mod pdf;
 mod sticks;
 mod svg;
 
-pub(crate) use draw::subscript;
-pub use figure::Role;
-pub(crate) use figure::{Drawing, Figure, HeatMap, Panel, Series};
-pub(crate) use film::{Film, film};
-pub(crate) use sticks::{Motion, film_strip, floor_m};
+pub(crate) use draw::{range, subscript};
+pub(crate) use figure::{Drawing, Figure, HeatMap, Panel, Role, Series};
+pub(crate) use sticks::{Film, Motion, film, film_strip, floor_m};
 pub(crate) use svg::panel_svg;
 
 use crate::files::EmittedFile;
@@ -42,34 +39,36 @@ fn csv(figure: &Figure) -> String {
         let words = figure.legend.iter().find(|entry| entry.0 == role);
         words.map_or(role.class(), |entry| &entry.1)
     };
+    let mut row = |cells: [&str; 4]| {
+        table.row(cells);
+    };
     for panel in &figure.panels {
         let title = panel.title.as_str();
         match &panel.drawing {
             Drawing::Lines { series, .. } => {
                 for series in series {
-                    let name = named(series.role);
                     for (x, y) in &series.points {
                         let y = y.map_or(String::new(), |y| y.to_string());
-                        table.row([title, name, &x.to_string(), &y]);
+                        row([title, named(series.role), &x.to_string(), &y]);
                     }
                 }
             }
             Drawing::Sticks(plot) => {
                 for (role, sticks) in &plot.sticks {
-                    let lines = sticks.lines.iter().zip(Sticks::NAMES);
-                    for (line, part) in lines {
+                    for (line, part) in sticks.lines.iter().zip(Sticks::NAMES) {
                         let name = format!("{}, {part}", named(*role));
                         for (x, y) in line {
-                            table.row([title, &name, &x.to_string(), &y.to_string()]);
+                            row([title, &name, &x.to_string(), &y.to_string()]);
                         }
                     }
                 }
             }
             Drawing::Heat(map) => {
-                for (place, value) in map.values.iter().enumerate() {
-                    let row = &map.rows[place / map.columns.len()];
-                    let column = &map.columns[place % map.columns.len()];
-                    table.row([title, row, column, &value.to_string()]);
+                let rows = map.values.chunks(map.columns.len().max(1));
+                for (name, values) in map.rows.iter().zip(rows) {
+                    for (column, value) in map.columns.iter().zip(values) {
+                        row([title, name, column, &value.to_string()]);
+                    }
                 }
             }
         }

@@ -5,20 +5,12 @@ use std::fmt::Write as _;
 use super::draw::{Anchor, FONT, Mark, Paint, figure_size, placed_marks};
 use super::figure::{Figure, STYLES};
 
-/// A figure as a PDF file (version 1.4).
+/// A figure as a PDF file (version 1.4): the objects around a page's content, and the table of their places.
 pub(crate) fn pdf(figure: &Figure) -> String {
-    let size = figure_size(figure);
-    let mut content = String::from("1 J 1 j\n");
-    for (marks, corner) in placed_marks(figure) {
-        for mark in &marks {
-            write_mark(&mut content, mark, corner, size.1);
-        }
-    }
-    file(&content, size)
-}
-
-/// The objects around a page's content, and the table of their places.
-fn file(content: &str, (width, height): (f64, f64)) -> String {
+    let (width, height) = figure_size(figure);
+    let marks = placed_marks(figure).into_iter().flatten();
+    let content: String = marks.map(|mark| spelled(&mark, height)).collect();
+    let content = format!("1 J 1 j\n{content}");
     let objects = [
         "<< /Type /Catalog /Pages 2 0 R >>".to_owned(),
         "<< /Type /Pages /Kids [3 0 R] /Count 1 >>".to_owned(),
@@ -33,43 +25,28 @@ fn file(content: &str, (width, height): (f64, f64)) -> String {
             content.len()
         ),
     ];
-    let mut text = String::from("%PDF-1.4\n");
-    let mut places = Vec::with_capacity(objects.len());
-    for (index, object) in objects.iter().enumerate() {
-        places.push(text.len());
-        let _ = write!(text, "{} 0 obj\n{object}\nendobj\n", index + 1);
+    let (mut text, mut places) = (String::from("%PDF-1.4\n"), String::new());
+    for (object, number) in objects.iter().zip(1..) {
+        let _ = writeln!(places, "{:010} 00000 n ", text.len());
+        let _ = write!(text, "{number} 0 obj\n{object}\nendobj\n");
     }
-    let table = text.len();
-    let _ = write!(text, "xref\n0 {}\n0000000000 65535 f \n", objects.len() + 1);
-    for place in places {
-        let _ = writeln!(text, "{place:010} 00000 n ");
-    }
-    let _ = write!(
-        text,
-        "trailer\n<< /Size {} /Root 1 0 R >>\nstartxref\n{table}\n%%EOF\n",
-        objects.len() + 1
-    );
-    text
+    let (table, size) = (text.len(), objects.len() + 1);
+    text + &format!(
+        "xref\n0 {size}\n0000000000 65535 f \n{places}\
+         trailer\n<< /Size {size} /Root 1 0 R >>\nstartxref\n{table}\n%%EOF\n"
+    )
 }
 
-fn write_mark(text: &mut String, mark: &Mark, (dx, dy): (f64, f64), height: f64) {
-    let up = |y: f64| height - (y + dy);
-    let written = match mark {
+/// A mark on a page of this height, on which y grows upwards.
+fn spelled(mark: &Mark, height: f64) -> String {
+    match mark {
         Mark::Rectangle([x, y, w, h], paint) => {
-            let [r, g, b] = colour(*paint);
-            let (x, y) = (x + dx, up(y + h));
-            writeln!(
-                text,
-                "{r:.3} {g:.3} {b:.3} rg {x:.2} {y:.2} {w:.2} {h:.2} re f"
-            )
+            let ([r, g, b], y) = (colour(*paint), height - (y + h));
+            format!("{r:.3} {g:.3} {b:.3} rg {x:.2} {y:.2} {w:.2} {h:.2} re f\n")
         }
         Mark::Rule([x1, y1, x2, y2], paint) => {
-            let [r, g, b] = colour(*paint);
-            let (x1, y1, x2, y2) = (x1 + dx, up(*y1), x2 + dx, up(*y2));
-            writeln!(
-                text,
-                "[] 0 d 0.6 w {r:.3} {g:.3} {b:.3} RG {x1:.2} {y1:.2} m {x2:.2} {y2:.2} l S"
-            )
+            let ([r, g, b], y1, y2) = (colour(*paint), height - y1, height - y2);
+            format!("[] 0 d 0.6 w {r:.3} {g:.3} {b:.3} RG {x1:.2} {y1:.2} m {x2:.2} {y2:.2} l S\n")
         }
         Mark::Line(points, role) => {
             let (_, colour, dashes) = STYLES[*role as usize];
@@ -77,25 +54,20 @@ fn write_mark(text: &mut String, mark: &Mark, (dx, dy): (f64, f64), height: f64)
             let mut path = format!("[{dashes}] 0 d 1.1 w {r:.3} {g:.3} {b:.3} RG");
             for (place, (x, y)) in points.iter().enumerate() {
                 let operator = if place == 0 { "m" } else { "l" };
-                let _ = write!(path, " {:.2} {:.2} {operator}", x + dx, up(*y));
+                let _ = write!(path, " {x:.2} {:.2} {operator}", height - y);
             }
-            writeln!(text, "{path} S")
+            path + " S\n"
         }
         Mark::Text(x, y, anchor, words) => {
-            let shift = match anchor {
-                Anchor::Start => 0.0,
-                Anchor::Middle => 0.5 * width(words),
-                Anchor::End => width(words),
+            let x = match anchor {
+                Anchor::Start => *x,
+                Anchor::Middle => x - 0.5 * width(words),
+                Anchor::End => x - width(words),
             };
-            let (x, y) = (x + dx - shift, up(*y));
-            let words = escaped(words);
-            writeln!(
-                text,
-                "BT /F1 {FONT} Tf 0.13 0.13 0.13 rg {x:.2} {y:.2} Td ({words}) Tj ET"
-            )
+            let (y, words) = (height - y, escaped(words));
+            format!("BT /F1 {FONT} Tf 0.13 0.13 0.13 rg {x:.2} {y:.2} Td ({words}) Tj ET\n")
         }
-    };
-    written.expect("writing to a string does not fail");
+    }
 }
 
 fn colour(paint: Paint) -> [f64; 3] {
@@ -126,46 +98,13 @@ fn width(text: &str) -> f64 {
 /// A text between parentheses; a minus becomes a dash of its width, indices stand on the line, and other letters outside
 /// Latin-1 become question marks.
 fn escaped(text: &str) -> String {
-    let mut out = String::new();
-    for letter in text.chars() {
-        match letter {
-            '(' | ')' | '\\' => out.extend(['\\', letter]),
-            ' '..='~' => out.push(letter),
-            '\u{2212}' => out.push_str("\\226"),
-            '\u{2080}'..='\u{2089}' => {
-                out.extend(char::from_digit(u32::from(letter) - 0x2080, 10));
-            }
-            _ => match u8::try_from(u32::from(letter)) {
-                Ok(byte) if byte >= 0xA0 => {
-                    let _ = write!(out, "\\{byte:03o}");
-                }
-                Ok(_) | Err(_) => out.push('?'),
-            },
-        }
-    }
-    out
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn text_of_a_file_is_escaped() {
-        assert_eq!(escaped("d²(z)\\"), "d\\262\\(z\\)\\\\");
-        assert_eq!(escaped("\u{2212}1 z\u{2081}"), "\\2261 z1");
-        assert_eq!(escaped("λ"), "?");
-    }
-
-    #[test]
-    fn table_of_places_points_at_the_objects() {
-        let text = file("0 0 m\n", (100.0, 50.0));
-        let table = text.find("xref\n").expect("a table");
-        let lines: Vec<&str> = text[table..].lines().collect();
-        for object in 1..=5 {
-            let place: usize = lines[2 + object][..10].parse().expect("a number");
-            assert!(text[place..].starts_with(&format!("{object} 0 obj")));
-        }
-        assert!(text.ends_with(&format!("startxref\n{table}\n%%EOF\n")));
-    }
+    let letter = |letter: char| match letter {
+        '(' | ')' | '\\' => format!("\\{letter}"),
+        ' '..='~' => letter.to_string(),
+        '\u{2212}' => "\\226".to_owned(),
+        '\u{2080}'..='\u{2089}' => (u32::from(letter) - 0x2080).to_string(),
+        '\u{a0}'..='\u{ff}' => format!("\\{:03o}", u32::from(letter)),
+        _ => "?".to_owned(),
+    };
+    text.chars().map(letter).collect()
 }

@@ -1,4 +1,7 @@
-//! Stick figures: a robot at a state, seen from its right, and strips of them over time.
+//! Stick figures: a robot at a state, seen from its right; strips of them over time, and in motion: one drawing for a
+//! page, and the lines of each instant for the page's script.
+
+use std::fmt::Write as _;
 
 use nalgebra::{DVector, Vector3};
 
@@ -7,13 +10,12 @@ use super::figure::{Drawing, Figure, Panel, Role, StickPlot};
 use crate::recording::Segment;
 use crate::robot::input_rule::rotation;
 use crate::robot::{FOOT_DIM, JOINT_DIM, Leg, Robot, STATE_DIM};
+use crate::typeset::mathml::HtmlText;
 
-/// Half the height of the box that stands for a trunk, in m.
 const TRUNK_HALF_HEIGHT_M: f64 = 0.05;
 
 const MARGIN_M: f64 = 0.04;
 
-#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Sticks {
     /// The trunk as a closed box, then hip, knee and foot of each leg, as named in [`Sticks::NAMES`].
     pub lines: Vec<Vec<(f64, f64)>>,
@@ -62,7 +64,6 @@ pub(crate) struct Extent {
 }
 
 impl Extent {
-    /// The smallest part with a margin that shows all `sticks` and the floor.
     pub(crate) fn around<'a>(sticks: impl IntoIterator<Item = &'a Sticks>, floor_m: f64) -> Self {
         let lines = sticks.into_iter().flat_map(|sticks| &sticks.lines);
         let (forward, mut up): (Vec<f64>, Vec<f64>) = lines.flatten().copied().unzip();
@@ -78,7 +79,6 @@ impl Extent {
     }
 }
 
-#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Motion {
     pub role: Role,
     pub words: String,
@@ -194,69 +194,97 @@ pub(crate) fn film_strip(
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+const MOST_FRAMES: usize = 72;
 
-    fn standing(x_m: f64, yaw_rad: f64) -> DVector<f64> {
-        let mut x = DVector::zeros(STATE_DIM);
-        for leg in 0..FOOT_DIM {
-            (x[3 * leg + 1], x[3 * leg + 2]) = (0.75, -1.5);
-        }
-        (x[12], x[14], x[17]) = (x_m, 0.3, yaw_rad);
-        x
+/// An animation: the drawing at its first instant in sight, and the lines of every instant.
+pub(crate) struct Film {
+    /// An `svg` element with a `g` for each motion, which holds a polyline for each of [`Sticks::NAMES`].
+    pub svg: String,
+    /// JSON: `{"time": [s], "lines": [[motion][instant]]}` with the points of all lines of a motion at an instant, joined
+    /// by semicolons as `polyline` takes them; empty where there is no prediction.
+    pub frames: String,
+    /// The instant that the drawing shows: the highest point of the first motion.
+    pub shown: usize,
+    pub count: usize,
+    /// Time of the instant that is shown, from the first sample, in s.
+    pub shown_s: f64,
+    pub legend: Vec<(Role, String)>,
+}
+
+/// A line in mm, y downwards.
+fn points(line: impl IntoIterator<Item = (f64, f64)>) -> String {
+    let points = line.into_iter();
+    let points = points.map(|(forward, up)| format!("{:.0},{:.0}", 1e3 * forward, -1e3 * up));
+    points.collect::<Vec<_>>().join(" ")
+}
+
+fn joined(sticks: &Option<Sticks>) -> String {
+    let lines = sticks.iter().flat_map(|sticks| &sticks.lines);
+    let lines = lines.map(|line| points(line.iter().copied()));
+    lines.collect::<Vec<_>>().join(";")
+}
+
+/// Middle of the trunk: forward and up, in m.
+fn middle(sticks: &Sticks) -> (f64, f64) {
+    let (one, other) = (sticks.lines[0][0], sticks.lines[0][2]);
+    (0.5 * (one.0 + other.0), 0.5 * (one.1 + other.1))
+}
+
+/// The animation of `motions` over `time_s`, seen from the right of a robot that looks along `heading_rad`.
+pub(crate) fn film(
+    robot: &Robot,
+    (time_s, motions): (&[f64], &[Motion]),
+    (heading_rad, floor_m): (f64, f64),
+) -> Film {
+    let stride = time_s.len().div_ceil(MOST_FRAMES).max(1);
+    let chosen = (0..time_s.len()).step_by(stride);
+    let of_motion = |motion: &Motion| {
+        let sticks = chosen.clone().map(|k| motion.sticks(robot, heading_rad, k));
+        sticks.collect()
+    };
+    let sticks: Vec<Vec<Option<Sticks>>> = motions.iter().map(of_motion).collect();
+    let height = |sticks: &Option<Sticks>| sticks.as_ref().map_or(f64::MIN, |s| middle(s).1);
+    let first = sticks.first().map_or(&[][..], Vec::as_slice);
+    let heights = first.iter().map(height).enumerate();
+    let highest = heights.max_by(|(_, a), (_, b)| a.total_cmp(b));
+    let shown = highest.map_or(0, |(instant, _)| instant);
+    let start_s = time_s.first().copied().unwrap_or(0.0);
+    let times = (chosen.clone()).map(|k| (1e3 * (time_s[k] - start_s)).round() / 1e3);
+    let times: Vec<f64> = times.collect();
+    let lines: Vec<Vec<String>> = (sticks.iter())
+        .map(|motion| motion.iter().map(joined).collect())
+        .collect();
+
+    let extent = Extent::around(sticks.iter().flatten().flatten(), floor_m);
+    let (x, z) = (extent.forward_m, extent.up_m);
+    let millimetres = |value: f64| (1e3 * value).round();
+    let (left, top) = (millimetres(x.0), -millimetres(z.1));
+    let (width, height) = (millimetres(x.1 - x.0), millimetres(z.1 - z.0));
+    let floor = -millimetres(floor_m);
+    let mut svg = format!(
+        "<svg class=\"sticks\" viewBox=\"{left} {top} {width} {height}\" role=\"img\" aria-label=\"{}\">\
+         <line class=\"floor\" x1=\"{left}\" y1=\"{floor}\" x2=\"{}\" y2=\"{floor}\"/>",
+        HtmlText("The robot from its right, recorded and predicted"),
+        left + width
+    );
+    for (motion, sticks) in motions.iter().zip(&sticks) {
+        let class = motion.role.class();
+        let path = points(sticks.iter().flatten().map(middle));
+        let _ = write!(svg, "<polyline class=\"{class} path\" points=\"{path}\"/>");
     }
-
-    fn go1() -> &'static Robot {
-        crate::robot_file::by_name("go1").unwrap()
+    for (motion, lines) in motions.iter().zip(&lines) {
+        let now = lines.get(shown).map_or("", String::as_str);
+        let now = now.split(';').chain(std::iter::repeat(""));
+        let lines = now.map(|points| format!("<polyline points=\"{points}\"/>"));
+        let lines: String = lines.take(Sticks::NAMES.len()).collect();
+        let _ = write!(svg, "<g class=\"{}\">{lines}</g>", motion.role.class());
     }
-
-    #[test]
-    fn links_have_their_lengths_and_feet_their_place() {
-        let robot = go1();
-        let sticks = Sticks::of(robot, standing(0.2, 0.0).as_slice(), 0.0);
-        assert_eq!(sticks.lines.len(), Sticks::NAMES.len());
-        let length = |a: (f64, f64), b: (f64, f64)| (a.0 - b.0).hypot(a.1 - b.1);
-        for (leg, line) in Leg::ALL.into_iter().zip(&sticks.lines[1..]) {
-            let [thigh_m, calf_m] = robot.geometry(leg).lengths();
-            assert!((length(line[0], line[1]) - thigh_m).abs() < 1e-12);
-            assert!((length(line[1], line[2]) - calf_m).abs() < 1e-12);
-            let hip = robot.hip_position(leg);
-            assert!((line[0].0 - 0.2 - hip.x).abs() < 1e-12);
-            let drop = (thigh_m + calf_m) * 0.75f64.cos();
-            assert!((line[2].1 - (0.3 - drop)).abs() < 1e-12);
-            // a thigh that swings back puts the knee behind the hip
-            assert!(line[1].0 < line[0].0);
-        }
-    }
-
-    #[test]
-    fn a_robot_seen_along_its_heading_looks_the_same_whatever_that_is() {
-        let straight = Sticks::of(go1(), standing(0.0, 0.0).as_slice(), 0.0);
-        let turned = Sticks::of(go1(), standing(0.0, 1.1).as_slice(), 1.1);
-        let points = straight.lines.iter().flatten();
-        for (a, b) in points.zip(turned.lines.iter().flatten()) {
-            assert!((a.0 - b.0).abs() < 1e-12 && (a.1 - b.1).abs() < 1e-12);
-        }
-    }
-
-    #[test]
-    fn plan_starts_where_the_jump_does_and_ends_by_itself() {
-        let segment = |n: usize, step_s: f64, from_m: f64| {
-            let times = (0..n).map(|k| 5.0 * from_m + step_s * k as f64);
-            let mut segment = Segment::still("plan.csv", times.collect());
-            for k in 0..n {
-                segment.x[(JOINT_DIM, k)] = from_m + step_s * k as f64;
-            }
-            segment
-        };
-        let (plan, jump) = (segment(101, 0.01, 3.0), segment(601, 0.002, 1.0));
-        let planned = Motion::planned(&plan, &jump);
-        assert_eq!(planned.states.len(), jump.len());
-        let forward = |k: usize| planned.states[k].as_ref().map(|x| x[JOINT_DIM]);
-        assert!((forward(0).unwrap() - 1.0).abs() < 1e-12);
-        assert!((forward(250).unwrap() - 1.5).abs() < 1e-9);
-        assert!((forward(500).unwrap() - 2.0).abs() < 1e-9);
-        assert_eq!(forward(501), None);
+    Film {
+        svg: svg + "</svg>",
+        frames: serde_json::json!({ "time": times, "lines": lines }).to_string(),
+        shown,
+        count: chosen.len(),
+        shown_s: times.get(shown).copied().unwrap_or(0.0),
+        legend: Motion::legend(motions),
     }
 }

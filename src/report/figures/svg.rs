@@ -9,17 +9,13 @@ use crate::typeset::mathml::HtmlText;
 pub(crate) fn panel_svg(figure: &Figure, panel: &Panel) -> String {
     let (width, height) = figure.panel_size;
     let title = HtmlText(&panel.title);
-    let mut text = format!(
-        "<svg class=\"plot\" viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{title}\">"
-    );
-    for mark in draw_panel(panel, figure.panel_size, &figure.x_label) {
-        write_mark(&mut text, &mark, (0.0, 0.0));
-    }
-    text.push_str("</svg>");
-    text
+    let marks = draw_panel(panel, figure.panel_size, &figure.x_label);
+    let marks: String = marks.iter().map(spelled).collect();
+    format!(
+        "<svg class=\"plot\" viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{title}\">{marks}</svg>"
+    )
 }
 
-/// A figure as a file of its own, with legend and colours for paper.
 pub(crate) fn standalone_svg(figure: &Figure) -> String {
     let (width, height) = figure_size(figure);
     let mut text = format!(
@@ -29,14 +25,11 @@ pub(crate) fn standalone_svg(figure: &Figure) -> String {
         HtmlText(&figure.caption),
         style()
     );
-    for (marks, corner) in placed_marks(figure) {
-        for mark in &marks {
-            write_mark(&mut text, mark, corner);
-        }
+    for marks in placed_marks(figure) {
+        text.extend(marks.iter().map(spelled));
         text.push('\n');
     }
-    text.push_str("</svg>\n");
-    text
+    text + "</svg>\n"
 }
 
 fn style() -> String {
@@ -55,36 +48,26 @@ fn style() -> String {
     text
 }
 
-fn write_mark(text: &mut String, mark: &Mark, (dx, dy): (f64, f64)) {
-    let written = match mark {
+fn spelled(mark: &Mark) -> String {
+    match mark {
         Mark::Rectangle([x, y, width, height], paint) => {
             let opacity = match paint {
                 Paint::Heat(share) => format!(" fill-opacity=\"{share:.3}\""),
                 Paint::Axis | Paint::Grid | Paint::Shade => String::new(),
             };
-            write!(
-                text,
-                "<rect class=\"{}\" x=\"{:.1}\" y=\"{:.1}\" width=\"{width:.1}\" height=\"{height:.1}\"{opacity}/>",
-                class(*paint),
-                x + dx,
-                y + dy
+            format!(
+                "<rect class=\"{}\" x=\"{x:.1}\" y=\"{y:.1}\" width=\"{width:.1}\" height=\"{height:.1}\"{opacity}/>",
+                class(*paint)
             )
         }
-        Mark::Rule([x1, y1, x2, y2], paint) => write!(
-            text,
-            "<line class=\"{}\" x1=\"{:.1}\" y1=\"{:.1}\" x2=\"{:.1}\" y2=\"{:.1}\"/>",
-            class(*paint),
-            x1 + dx,
-            y1 + dy,
-            x2 + dx,
-            y2 + dy
+        Mark::Rule([x1, y1, x2, y2], paint) => format!(
+            "<line class=\"{}\" x1=\"{x1:.1}\" y1=\"{y1:.1}\" x2=\"{x2:.1}\" y2=\"{y2:.1}\"/>",
+            class(*paint)
         ),
         Mark::Line(points, role) => {
-            let points: Vec<String> = (points.iter())
-                .map(|(x, y)| format!("{:.1},{:.1}", x + dx, y + dy))
-                .collect();
-            let (class, points) = (role.class(), points.join(" "));
-            write!(text, "<polyline class=\"{class}\" points=\"{points}\"/>")
+            let points = points.iter().map(|(x, y)| format!("{x:.1},{y:.1}"));
+            let (class, points) = (role.class(), points.collect::<Vec<_>>().join(" "));
+            format!("<polyline class=\"{class}\" points=\"{points}\"/>")
         }
         Mark::Text(x, y, anchor, words) => {
             let anchor = match anchor {
@@ -92,16 +75,10 @@ fn write_mark(text: &mut String, mark: &Mark, (dx, dy): (f64, f64)) {
                 Anchor::Middle => "middle",
                 Anchor::End => "end",
             };
-            write!(
-                text,
-                "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"{anchor}\">{}</text>",
-                x + dx,
-                y + dy,
-                HtmlText(words)
-            )
+            let words = HtmlText(words);
+            format!("<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{words}</text>")
         }
-    };
-    written.expect("writing to a string does not fail");
+    }
 }
 
 fn class(paint: Paint) -> &'static str {

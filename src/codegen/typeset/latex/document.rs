@@ -95,7 +95,6 @@ pub fn emit(
     Ok(files)
 }
 
-/// A file of equations, its labels in the comment at the top.
 fn equations(
     path: String,
     header: String,
@@ -137,10 +136,8 @@ enum Document<'a> {
         rounding: String,
         siunitx: bool,
         two_columns: bool,
-        /// Whether there is a file of the robot's equations.
         has_robot: bool,
         is_physical: bool,
-        /// References to the tables of coefficients.
         tables: String,
     },
 }
@@ -166,7 +163,6 @@ impl Spelling for Tex {
     }
 }
 
-/// One system of equations in the template.
 struct System {
     comment: String,
     introduction: String,
@@ -230,7 +226,6 @@ fn robot_systems(
     [encoder].into_iter().chain(of_phases).collect()
 }
 
-/// The comments at the top of each file.
 struct Header<'a> {
     model: &'a ReducedModel,
     options: &'a PrintOptions,

@@ -38,43 +38,23 @@ pub(crate) fn comment_text(text: &str) -> String {
     text.replace(is_invisible, " ")
 }
 
-/// The command for a character that TeX would not print as it is.
+/// Characters that TeX would not print as they are, and their commands.
+const COMMANDS: &str = r#"
+    \ \textbackslash{} { \{ } \} $ \$ & \& # \# % \% _ \_ ^ \textasciicircum{} ~ \textasciitilde{}
+    < \textless{} > \textgreater{} | \textbar{} " \textquotedbl{} ' \textquotesingle{} ` \textasciigrave{}
+    – \textendash{} — \textemdash{} ‘ \textquoteleft{} ’ \textquoteright{} “ \textquotedblleft{}
+    ” \textquotedblright{} … \dots{} ° \textdegree{} µ \textmu{} ± \textpm{} × \texttimes{}
+    · \textperiodcentered{} ² \texttwosuperior{} ³ \textthreesuperior{}
+"#;
+
 fn escaped(character: char) -> Option<&'static str> {
-    let text = match character {
-        '\\' => r"\textbackslash{}",
-        '{' => r"\{",
-        '}' => r"\}",
-        '$' => r"\$",
-        '&' => r"\&",
-        '#' => r"\#",
-        '%' => r"\%",
-        '_' => r"\_",
-        '^' => r"\textasciicircum{}",
-        '~' => r"\textasciitilde{}",
-        '<' => r"\textless{}",
-        '>' => r"\textgreater{}",
-        '|' => r"\textbar{}",
-        '"' => r"\textquotedbl{}",
-        '\'' => r"\textquotesingle{}",
-        '`' => r"\textasciigrave{}",
-        '\u{2013}' => r"\textendash{}",
-        '\u{2014}' => r"\textemdash{}",
-        '\u{2018}' => r"\textquoteleft{}",
-        '\u{2019}' => r"\textquoteright{}",
-        '\u{201C}' => r"\textquotedblleft{}",
-        '\u{201D}' => r"\textquotedblright{}",
-        '\u{2026}' => r"\dots{}",
-        '°' => r"\textdegree{}",
-        'µ' => r"\textmu{}",
-        '±' => r"\textpm{}",
-        '×' => r"\texttimes{}",
-        '·' => r"\textperiodcentered{}",
-        '²' => r"\texttwosuperior{}",
-        '³' => r"\textthreesuperior{}",
-        _ if character.is_control() || character.is_whitespace() => " ",
-        _ => return None,
-    };
-    Some(text)
+    if character.is_control() || character.is_whitespace() {
+        return Some(" ");
+    }
+    let words = COMMANDS.split_whitespace();
+    let mut pairs = words.clone().step_by(2).zip(words.skip(1).step_by(2));
+    let known = pairs.find(|(plain, _)| plain.starts_with(character));
+    known.map(|(_, command)| command)
 }
 
 /// ASCII letters, digits and harmless marks, and the Latin letters that the

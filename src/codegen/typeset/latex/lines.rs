@@ -6,7 +6,6 @@ use crate::typeset::{
 
 use super::math::{tex, tex_symbol, tex_terms};
 
-/// Longest line unless chosen, in em.
 pub(super) const WIDTH_EM: f64 = 30.5;
 /// What a continued line is set in by, in em: `\qquad` and the empty group
 /// before its sign.
@@ -16,7 +15,6 @@ const BRACE: f64 = 1.8;
 /// Lines from which [`Form::Automatic`] prefers an environment that breaks across pages: no page holds many more.
 pub(super) const CASES_LINES: usize = 30;
 
-/// The lines of one phase and whether they are for `align`.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Block {
     pub label: String,

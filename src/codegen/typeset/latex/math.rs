@@ -5,7 +5,6 @@ use crate::symbolic::Function;
 use crate::typeset::tree::{function_name, greek_letter};
 use crate::typeset::{Decimal, Glyph, Math, NumberStyle, Signed, Symbol};
 
-/// A typeset tree with its numbers in one style.
 pub(crate) fn tex(math: &Math, numbers: NumberStyle) -> String {
     let inner = |math: &Math| tex(math, numbers);
     // Exponents are structure, not measured values: no siunitx.

@@ -1,10 +1,8 @@
 //! Equations for papers: [`Equations`](crate::equations::Equations) enter,
 //! LaTeX files leave.
 //!
-//! Read [`document`](self::emit) first: it names the files. The layout of terms
-//! and the rounding are done by [`typeset`](crate::typeset); here it gets
-//! its spelling (`tex`), its line breaks, tables and comments. Names from a
-//! model file pass through [`tex_text`] and nothing else.
+//! Read [`document`](self::emit) first: it names the files. Names from a model file pass through [`tex_text`] and nothing
+//! else.
 //!
 //! ```
 //! use nalgebra::DMatrix;

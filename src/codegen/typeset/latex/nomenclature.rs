@@ -67,7 +67,6 @@ pub(super) fn entries(
     list
 }
 
-/// The list of symbols of equations in physical units.
 fn physical_entries(
     model: &ReducedModel,
     units: &LatentUnits,

@@ -107,7 +107,6 @@ pub(crate) fn mathml_symbol(symbol: &Symbol) -> String {
     }
 }
 
-/// The glyph of a symbol with its dots.
 fn accented(symbol: &Symbol) -> String {
     let glyph = element(&symbol.glyph);
     let dots = match symbol.dots {
@@ -120,7 +119,6 @@ fn accented(symbol: &Symbol) -> String {
     format!("<mover>{glyph}<mo>{dots}</mo></mover>")
 }
 
-/// The subscript of a symbol as one element.
 fn subscript(symbol: &Symbol) -> String {
     let parts: Vec<String> = symbol.subscript.iter().map(element).collect();
     match parts.as_slice() {

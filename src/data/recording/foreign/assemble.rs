@@ -19,10 +19,8 @@ use crate::robot::FOOT_DIM;
 
 /// Largest distance between samples of a topic that is interpolated, in s.
 const MAX_GAP_S: f64 = 0.05;
-/// How far the length of a quaternion may be from one.
-const QUATERNION_TOLERANCE: f64 = 0.05;
-/// Most samples of a recording that is resampled.
-const MAX_RESAMPLED: usize = 10_000_000;
+const QUATERNION_TOLERANCE: f64 = 0.05; // how far the length of a quaternion may be from one
+const MAX_RESAMPLED: usize = 10_000_000; // most samples of a recording that is resampled
 
 /// Makes a recording of the logs as the map says, with notes of what was derived, resampled, turned or cut.
 pub(in crate::recording) fn assemble(
@@ -30,24 +28,22 @@ pub(in crate::recording) fn assemble(
     logs: &[Log],
     map: &ColumnMap,
 ) -> Result<Reading, RecordingError> {
-    let find = |quantity| Source::find(logs, map, quantity);
-    let epoch_s = match find(Quantity::JointPosition)? {
-        Some(source) => source.epoch_s()?,
-        None => None,
-    };
-    let (mut signals, mut notes) = (BTreeMap::new(), Vec::new());
+    let (mut signals, mut notes, mut epoch_s) = (BTreeMap::new(), Vec::new(), None);
     for quantity in Quantity::ALL {
-        if let Some(source) = find(quantity)? {
-            for note in &source.log().notes {
-                if !notes.contains(note) {
-                    notes.push(note.clone());
-                }
-            }
-            signals.insert(quantity, source.take(epoch_s.unwrap_or(0))?);
+        let Some(source) = Source::find(logs, map, quantity)? else {
+            continue;
+        };
+        if quantity == Quantity::JointPosition {
+            epoch_s = source.epoch_s()?;
         }
+        for note in &source.log().notes {
+            if !notes.contains(note) {
+                notes.push(note.clone());
+            }
+        }
+        signals.insert(quantity, source.take(epoch_s.unwrap_or(0))?);
     }
-    let base: &Signal =
-        (signals.get(&Quantity::JointPosition)).expect("a map has the joints' positions");
+    let base: &Signal = &signals[&Quantity::JointPosition];
     let mut rows = Rows {
         path,
         logs,
@@ -72,7 +68,6 @@ pub(in crate::recording) fn assemble(
     rows.recording()
 }
 
-/// The quantities that the log has, and the rows that they become.
 struct Rows<'a> {
     path: &'a Path,
     logs: &'a [Log],
@@ -80,7 +75,6 @@ struct Rows<'a> {
     first_row: usize,
     /// Times of the recording: those of the joints' positions unless all are brought to others.
     times_s: Vec<f64>,
-    /// Stretches of increasing time.
     ranges: Vec<Range<usize>>,
     signals: BTreeMap<Quantity, Signal>,
     notes: Vec<String>,
@@ -105,16 +99,14 @@ impl Rows<'_> {
             for (sample, norm) in norms.enumerate() {
                 if norm.is_nan() || (1.0 - norm).abs() > QUATERNION_TOLERANCE {
                     let found = format!("a quaternion of length {norm:.3}");
-                    let expected = "one of length 1";
-                    let fault = RecordingFault::number(&found, expected);
+                    let fault = RecordingFault::number(&found, "one of length 1");
                     return Err(fault.in_cell(path, signal.first_row + sample, "orientation"));
                 }
             }
             signal.values = angles_of_quaternions(&signal.values);
         }
         if unwrap(&mut signal.values) {
-            let note = "angles of the trunk run on past half a turn";
-            self.notes.push(note.to_owned());
+            (self.notes).push("angles of the trunk run on past half a turn".to_owned());
         }
         Ok(())
     }
@@ -124,9 +116,8 @@ impl Rows<'_> {
         let (path, logs) = (self.path, self.logs);
         let table = self.map.table(Quantity::Feet).expect("a map has the feet");
         let signal = self.required(Quantity::Feet);
-        let unit = table.unit.as_ref();
-        let unit = unit.and_then(|unit| Quantity::Feet.dimension().factor(unit));
-        let unit = unit.unwrap_or(1.0);
+        let unit = |name: &String| Quantity::Feet.dimension().factor(name);
+        let unit = table.unit.as_ref().and_then(unit).unwrap_or(1.0);
         for foot in 0..FOOT_DIM {
             let mut down = false;
             for sample in 0..signal.times_s.len() {
@@ -223,12 +214,12 @@ impl Rows<'_> {
         Ok(times)
     }
 
-    /// Brings every quantity to the times of the recording.
     fn resample(&mut self) -> Result<(), RecordingError> {
         let mut values = Vec::new();
         for (quantity, signal) in &self.signals {
-            if signal.times_s.len() < 2 {
-                let fault = RecordingFault::too_short(signal.times_s.len(), 2);
+            let own_s = &signal.times_s;
+            if own_s.len() < 2 {
+                let fault = RecordingFault::too_short(own_s.len(), 2);
                 return Err(fault.at(self.path, signal.first_row));
             }
             let between = match quantity {
@@ -237,11 +228,11 @@ impl Rows<'_> {
                 _ => Between::Smooth,
             };
             let rates = self.known_rates(*quantity);
-            let rates = rates.filter(|rates| rates.times_s == signal.times_s);
+            let slopes = (rates.filter(|rates| rates.times_s == *own_s)).map(|rates| &rates.values);
             values.push(at_times(
-                &signal.times_s,
+                own_s,
                 &signal.values,
-                rates.map(|rates| &rates.values),
+                slopes,
                 &self.times_s,
                 between,
             ));
@@ -281,16 +272,14 @@ impl Rows<'_> {
         if let Some(signal) = self.signals.get_mut(&Quantity::AngularVelocity) {
             let turned = angle_rates(&angles, &signal.values, frame.unwrap_or(Frame::Angles));
             signal.values = turned.map_err(|sample| {
-                let row = self.first_row + sample;
                 let expected = "less where rates come from angular velocities";
                 let fault = RecordingFault::unexpected("a pitch of 90 degrees", expected);
-                fault.at(self.path, row)
+                fault.at(self.path, self.first_row + sample)
             })?;
         }
         Ok(())
     }
 
-    /// Velocities that the log does not have are differences of positions.
     fn derive_velocities(&mut self) {
         for (velocity, of) in [
             (Quantity::JointVelocity, Quantity::JointPosition),
@@ -351,8 +340,8 @@ impl Rows<'_> {
                 start..end
             }
         };
-        let mut accelerations = Quantity::ACCELERATIONS.iter();
-        let has_acceleration = accelerations.any(|(own, _)| self.signals.contains_key(own));
+        let is_known = |(own, _): &(Quantity, Quantity)| self.signals.contains_key(own);
+        let has_acceleration = Quantity::ACCELERATIONS.iter().any(is_known);
         if has_acceleration {
             for (acceleration, velocity) in Quantity::ACCELERATIONS {
                 self.derive(acceleration, velocity);

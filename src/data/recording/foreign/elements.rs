@@ -1,9 +1,8 @@
 //! The quantities of a recording, the names of their elements in romc's order, and units with their factors to SI.
 
 use crate::recording::columns::Column;
-use crate::robot::{JOINT_DIM, JOINT_NAMES, Leg, STATE_DIM};
+use crate::robot::{JOINT_DIM, JOINT_NAMES, STATE_DIM};
 
-/// A quantity that a map places.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Quantity {
     JointPosition,
@@ -19,7 +18,6 @@ pub(super) enum Quantity {
     BodyAcceleration,
     /// Second derivatives of roll, pitch and yaw.
     AngularAcceleration,
-    /// Contact, or forces at the feet.
     Feet,
 }
 
@@ -81,59 +79,41 @@ impl Quantity {
         self.facts().1
     }
 
-    /// The recording's column of an element.
     pub(crate) fn column(self, element: usize) -> Column {
         let (_, _, column, first) = self.facts();
         debug_assert!(first + element < STATE_DIM, "w of a quaternion");
         column(first + element)
     }
 
-    /// Whether a recording cannot be without it.
-    pub(crate) const fn is_required(self) -> bool {
-        matches!(
-            self,
-            Self::JointPosition
-                | Self::JointTorque
-                | Self::BodyPosition
-                | Self::Orientation
-                | Self::Feet
-        )
+    pub(crate) fn is_required(self) -> bool {
+        use Quantity::{BodyPosition, Feet, JointPosition, JointTorque, Orientation};
+        [JointPosition, JointTorque, BodyPosition, Orientation, Feet].contains(&self)
     }
 
-    /// Whether the quantity is one of joints.
-    pub(crate) const fn is_of_joints(self) -> bool {
-        matches!(
-            self,
-            Self::JointPosition | Self::JointVelocity | Self::JointAcceleration | Self::JointTorque
-        )
+    pub(crate) fn is_of_joints(self) -> bool {
+        self.key().starts_with("joint.")
     }
 
     pub(crate) fn is_by_leg(self) -> bool {
         self.is_of_joints() || self == Self::Feet
     }
 
-    /// Names of its elements in romc's order; a quaternion has [`QUATERNION`] instead.
-    pub(crate) fn elements(self) -> Vec<String> {
-        let owned = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
+    pub(crate) fn elements(self) -> &'static [&'static str] {
         match self {
-            _ if self.is_of_joints() => owned(&JOINT_NAMES),
-            Self::Orientation | Self::AngularAcceleration => owned(&ANGLES),
-            Self::Feet => Leg::ALL.map(|leg| leg.to_string()).to_vec(),
-            _ => owned(&AXES),
+            _ if self.is_of_joints() => &JOINT_NAMES,
+            Self::Orientation | Self::AngularAcceleration => &["roll", "pitch", "yaw"],
+            Self::Feet => &["fr", "fl", "rr", "rl"],
+            _ => &["x", "y", "z"],
         }
     }
 }
 
-/// Axes of the body or the world.
-pub(super) const AXES: [&str; 3] = ["x", "y", "z"];
-/// Roll, pitch and yaw.
-pub(super) const ANGLES: [&str; 3] = ["roll", "pitch", "yaw"];
 /// Elements of a quaternion, the real part first.
 pub(super) const QUATERNION: [&str; 4] = ["w", "x", "y", "z"];
 
 /// The elements that the words of an order name, in that order: single names, names with `*` for every leg or
 /// joint (`*.hx`, `fl.*`), a word of single letters (`wxyz`, `rpy`, `xyz`).
-pub(super) fn ordered(words: &[String], elements: &[String]) -> Result<Vec<usize>, String> {
+pub(super) fn ordered(words: &[String], elements: &[&str]) -> Result<Vec<usize>, String> {
     let mut out = Vec::new();
     for word in words {
         let found = named(word, elements);
@@ -150,30 +130,22 @@ pub(super) fn ordered(words: &[String], elements: &[String]) -> Result<Vec<usize
     Ok(out)
 }
 
-pub(super) fn named(word: &str, elements: &[String]) -> Vec<usize> {
+pub(super) fn named(word: &str, elements: &[&str]) -> Vec<usize> {
     let word = word.trim().to_lowercase();
-    let matches = |element: &String| match word.split_once('*') {
+    let matches = |element: &str| match word.split_once('*') {
         Some((start, end)) => element.starts_with(start) && element.ends_with(end),
-        None => *element == word,
+        None => element == word,
     };
-    let found: Vec<usize> = (0..elements.len())
-        .filter(|i| matches(&elements[*i]))
-        .collect();
-    if !found.is_empty() || !word.is_ascii() {
+    let found = (0..elements.len()).filter(|i| matches(elements[*i]));
+    let found: Vec<usize> = found.collect();
+    // Letters: `wxyz`, or the first letters of roll, pitch and yaw.
+    let has_letters = ["x", "roll"].iter().any(|axis| elements.contains(axis));
+    if !found.is_empty() || !word.is_ascii() || !has_letters {
         return found;
     }
-    // Letters: `wxyz`, or the first letters of roll, pitch and yaw.
-    let letters = word.chars().map(|letter| {
-        let first = |element: &String| element.starts_with(letter);
-        elements.iter().position(first)
-    });
-    let short = elements
-        .iter()
-        .all(|element| ["x", "y", "z", "w", "roll", "pitch", "yaw"].contains(&&element[..]));
-    match letters.collect::<Option<Vec<usize>>>() {
-        Some(found) if short => found,
-        Some(_) | None => Vec::new(),
-    }
+    let of_letter = |letter: char| elements.iter().position(|e| e.starts_with(letter));
+    let letters = word.chars().map(of_letter);
+    letters.collect::<Option<Vec<usize>>>().unwrap_or_default()
 }
 
 /// What a unit measures; rates and accelerations are the same per s and s^2.
@@ -220,10 +192,9 @@ impl Dimension {
 
     /// The factor of a unit such as `deg/s`, `mm`, `N mm`; case, blanks and `/s` do not matter.
     pub(crate) fn factor(self, text: &str) -> Option<f64> {
-        let folded: String = (text.chars())
-            .filter(|c| !c.is_whitespace() && !matches!(c, '*' | '.' | '·'))
-            .flat_map(char::to_lowercase)
-            .collect();
+        let is_said = |c: &char| !c.is_whitespace() && !matches!(c, '*' | '.' | '·');
+        let folded = text.chars().filter(is_said).flat_map(char::to_lowercase);
+        let folded: String = folded.collect();
         let base = match self {
             Dimension::Time => &folded[..],
             _ => folded.split('/').next().unwrap_or_default(),
@@ -235,30 +206,5 @@ impl Dimension {
     pub(crate) fn names(self) -> String {
         let names: Vec<&str> = self.units().iter().map(|(name, _)| *name).collect();
         names.join(", ")
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn ordered_wildcards_and_letters_stand_for_elements() {
-        for (quantity, words, expected) in [
-            (
-                Quantity::JointTorque,
-                "*.hx *.hy *.kn",
-                &[0, 3, 6, 9, 1, 4, 7, 10, 2, 5, 8, 11][..],
-            ),
-            (Quantity::Feet, "fl fr rl rr", &[1, 0, 3, 2]),
-            (Quantity::Orientation, "ypr", &[2, 1, 0]),
-            (Quantity::BodyPosition, "zxy", &[2, 0, 1]),
-        ] {
-            let words: Vec<String> = words.split_whitespace().map(str::to_owned).collect();
-            let found = ordered(&words, &quantity.elements());
-            assert_eq!(found.as_deref(), Ok(expected), "{words:?}");
-        }
-        let unknown = ordered(&["FR.hz".to_owned()], &Quantity::JointPosition.elements());
-        assert!(unknown.is_err_and(|found| found.starts_with("`FR.hz`")));
     }
 }

@@ -15,8 +15,7 @@ pub(super) enum Between {
     Nearest,
 }
 
-/// Times within this share of a step are the same time.
-const SAME: f64 = 1e-6;
+const SAME: f64 = 1e-6; // times within this share of a step are the same time
 
 /// Samples of a polynomial whose slope is that of its middle, or of its ends at the ends of a log.
 const STENCIL: usize = 5;
@@ -68,7 +67,6 @@ pub(super) fn at_times(
     out
 }
 
-/// Derivatives at the samples: of fourth order where steps are about even, else of second.
 fn slopes_of(own_s: &[f64], values: &DMatrix<f64>) -> DMatrix<f64> {
     let mut slopes = differences(own_s, values);
     let n = own_s.len();
@@ -102,9 +100,7 @@ fn slope_weights(times: &[f64], at: usize) -> [f64; STENCIL] {
         if j == at {
             return others(at).map(|k| 1.0 / (times[at] - times[k])).sum();
         }
-        let above: f64 = (others(at).filter(|k| *k != j))
-            .map(|k| times[at] - times[k])
-            .product();
+        let above: f64 = ((others(at).filter(|k| *k != j)).map(|k| times[at] - times[k])).product();
         let below: f64 = others(j).map(|k| times[j] - times[k]).product();
         above / below
     })

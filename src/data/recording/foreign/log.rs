@@ -60,9 +60,7 @@ impl Log {
 
     /// Number of samples.
     pub(crate) fn len(&self) -> usize {
-        self.columns
-            .first()
-            .map_or(0, |channel| channel.values.len())
+        (self.columns.first()).map_or(0, |channel| channel.values.len())
     }
 
     pub(crate) fn choose(&mut self, rows: &[usize]) {

@@ -21,8 +21,7 @@ use super::elements::Quantity;
 use crate::files::read_toml;
 use crate::recording::error::{RecordingError, RecordingFault};
 
-/// Most columns that a range stands for.
-const MAX_COLUMNS: usize = 10_000;
+const MAX_COLUMNS: usize = 10_000; // most columns that a range stands for
 
 /// A map as its file states it.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
@@ -32,8 +31,8 @@ pub struct ColumnMap {
     /// The clock of all tables that have none of their own.
     pub(super) time: TimeMap,
     pub(super) names: Names,
-    joint: JointTables,
-    body: BodyTables,
+    joint: BTreeMap<String, Table>,
+    body: BTreeMap<String, Table>,
     feet: Option<Table>,
     /// The file that the map was read from, for messages.
     #[serde(skip)]
@@ -45,9 +44,7 @@ pub struct ColumnMap {
 #[serde(deny_unknown_fields, default)]
 pub(in crate::recording) struct TextFormat {
     pub delimiter: Option<Delimiter>,
-    /// Whether the first line has names.
     pub header: Option<bool>,
-    /// Lines before the first that counts.
     pub skip: usize,
     /// Empty cells and NaN are samples that a quantity does not have, where topics share one table.
     pub blank: bool,
@@ -58,12 +55,10 @@ pub(in crate::recording) struct TextFormat {
     pub own: bool,
 }
 
-/// Separator of cells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(in crate::recording) enum Delimiter {
     Tab,
-    /// Any number of blanks or tabs.
     Blank,
     Comma,
     Semicolon,
@@ -72,15 +67,10 @@ pub(in crate::recording) enum Delimiter {
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct TimeMap {
-    /// Absent with `sample_time_s`.
     pub column: Option<Name>,
-    /// [default: s]; dates and times of day are found by themselves.
     pub unit: Option<String>,
-    /// Distance of samples without a clock.
     pub sample_time_s: Option<f64>,
-    /// Even steps to bring the recording to.
     pub resample_s: Option<f64>,
-    /// Largest distance between samples of a topic that is interpolated [default: 0.05].
     pub max_gap_s: Option<f64>,
 }
 
@@ -103,50 +93,23 @@ impl Default for Names {
     }
 }
 
-#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-struct JointTables {
-    position: Option<Table>,
-    velocity: Option<Table>,
-    acceleration: Option<Table>,
-    torque: Option<Table>,
-}
-
-#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-struct BodyTables {
-    position: Option<Table>,
-    orientation: Option<Table>,
-    velocity: Option<Table>,
-    angular_velocity: Option<Table>,
-    acceleration: Option<Table>,
-    angular_acceleration: Option<Table>,
-}
-
 /// Where one quantity stands: `value = sign x unit x raw + offset`.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Table {
-    /// Names, numbers from 1, ranges such as `"4..6"`, or one pattern.
-    pub columns: Columns,
-    /// The file or topic that they are in [default: the only one].
+    pub columns: List<Name>,
     #[serde(alias = "topic")]
     pub file: Option<String>,
-    /// Column of a clock of their own.
     pub time: Option<Name>,
     pub time_unit: Option<String>,
-    /// Added to the clock.
     #[serde(default)]
     pub time_offset_s: f64,
     /// [default: SI]
     pub unit: Option<String>,
-    /// 1 or -1.
     pub sign: Option<Factors>,
     /// Added after sign and unit, in SI units.
     pub offset: Option<Factors>,
-    /// What each column is [default: romc's order].
-    pub order: Option<Words>,
-    /// Axes of velocities [default: `world`]; of angular velocities [default: `angles`].
+    pub order: Option<List<String>>,
     pub frame: Option<Frame>,
     pub origin: Option<Origin>,
     /// Force from which a foot is on the ground, in the table's unit; absent for flags.
@@ -163,20 +126,21 @@ pub(super) enum Name {
     Text(String),
 }
 
+/// One or several of a kind; several words also in one text with blanks between them.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 #[serde(untagged)]
-pub(super) enum Columns {
-    /// One name, range or pattern.
-    One(Name),
-    Many(Vec<Name>),
+pub(super) enum List<T> {
+    One(T),
+    Many(Vec<T>),
 }
 
-/// Words, also in one text with blanks between them.
-#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
-#[serde(untagged)]
-pub(super) enum Words {
-    One(String),
-    Many(Vec<String>),
+impl<T> List<T> {
+    pub(super) fn entries(&self) -> &[T] {
+        match self {
+            List::One(one) => std::slice::from_ref(one),
+            List::Many(all) => all,
+        }
+    }
 }
 
 /// A number for all columns, for each in their order, or by the names of elements (`*.kn`).
@@ -188,24 +152,18 @@ pub(super) enum Factors {
     Named(BTreeMap<String, f64>),
 }
 
-/// Axes of a velocity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Frame {
     World,
-    /// The trunk's own.
-    Body,
-    /// Rates of roll, pitch and yaw.
-    Angles,
+    Body,   // the trunk's own axes
+    Angles, // rates of roll, pitch and yaw
 }
 
-/// Where positions count from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Origin {
-    /// The first sample, for x and y.
     Start,
-    /// As logged.
     Log,
 }
 
@@ -213,7 +171,7 @@ impl ColumnMap {
     /// Reads a map.
     ///
     /// # Errors
-    /// [`RecordingFault::MapSyntax`] with line, key and what was expected; [`RecordingFault::Unexpected`] for
+    /// [`RecordingFault::Text`] with line, key and what was expected; [`RecordingFault::Unexpected`] for
     /// a key that does not apply to its table.
     pub fn read(path: &Path) -> Result<Self, RecordingError> {
         let text = read_toml(path)
@@ -227,8 +185,9 @@ impl ColumnMap {
     /// As [`Self::read`].
     pub fn parse(file: &str, text: &str) -> Result<Self, RecordingError> {
         let mut map: Self = toml::from_str(text).map_err(|error| {
-            let message = error.to_string().trim_end().to_owned();
-            RecordingFault::MapSyntax(message).of(Path::new(file))
+            let message = error.to_string();
+            let message = message.trim_end();
+            RecordingFault::Text(format!("no map of columns: {message}")).of(Path::new(file))
         })?;
         map.file = file.to_owned();
         map.require_applicable()?;
@@ -237,21 +196,11 @@ impl ColumnMap {
 
     /// Where a quantity stands.
     pub(super) fn table(&self, quantity: Quantity) -> Option<&Table> {
-        let (joint, body) = (&self.joint, &self.body);
-        match quantity {
-            Quantity::JointPosition => &joint.position,
-            Quantity::JointVelocity => &joint.velocity,
-            Quantity::JointAcceleration => &joint.acceleration,
-            Quantity::JointTorque => &joint.torque,
-            Quantity::BodyPosition => &body.position,
-            Quantity::Orientation => &body.orientation,
-            Quantity::BodyVelocity => &body.velocity,
-            Quantity::AngularVelocity => &body.angular_velocity,
-            Quantity::BodyAcceleration => &body.acceleration,
-            Quantity::AngularAcceleration => &body.angular_acceleration,
-            Quantity::Feet => &self.feet,
+        match quantity.key().split_once('.') {
+            Some(("joint", name)) => self.joint.get(name),
+            Some((_, name)) => self.body.get(name),
+            None => self.feet.as_ref(),
         }
-        .as_ref()
     }
 
     /// The files or topics that the map names, each once, in its order.
@@ -266,47 +215,56 @@ impl ColumnMap {
         out
     }
 
-    /// The fault of a key.
     pub(super) fn fault(
         &self,
         key: &str,
         found: impl Into<String>,
         expected: impl Into<String>,
     ) -> RecordingError {
-        let place = crate::files::Place::Entry(format!("`{key}`").into());
-        RecordingError::new(
-            &self.file,
-            place,
-            RecordingFault::unexpected(found, expected),
-        )
+        let fault = RecordingFault::unexpected(found, expected);
+        RecordingError::new(&self.file, format!("`{key}`").into(), fault)
     }
 }
 
 impl Table {
-    /// Its columns as the file has them.
-    pub(super) fn entries(&self) -> &[Name] {
-        match &self.columns {
-            Columns::One(name) => std::slice::from_ref(name),
-            Columns::Many(names) => names,
-        }
-    }
-
     /// Its columns, patterns and ranges written out.
     pub(super) fn columns(&self, names: &Names, quantity: Quantity) -> Vec<Name> {
-        let mut out = Vec::new();
-        for entry in self.entries() {
-            match entry {
-                Name::Number(number) => out.push(Name::Number(*number)),
-                Name::Text(text) => match range(text) {
-                    Some(numbers) => out.extend(numbers.map(Name::Number)),
-                    None => {
-                        let texts = pattern(text, names, quantity);
-                        out.extend(texts.into_iter().map(Name::Text));
-                    }
-                },
+        let written_out = |entry: &Name| -> Vec<Name> {
+            let Name::Text(text) = entry else {
+                return vec![entry.clone()];
+            };
+            let of_pattern = || pattern(text, names, quantity).into_iter().map(Name::Text);
+            let numbers = range(text).map(|all| all.map(Name::Number).collect());
+            numbers.unwrap_or_else(|| of_pattern().collect())
+        };
+        (self.columns.entries().iter())
+            .flat_map(written_out)
+            .collect()
+    }
+
+    /// A key that does not apply to the table of this quantity, and what may be there.
+    fn misplaced(&self, quantity: Quantity) -> Option<(&'static str, &'static str)> {
+        let angular = quantity == Quantity::AngularVelocity;
+        let is_velocity = angular || quantity == Quantity::BodyVelocity;
+        match self {
+            _ if self.frame.is_some() && !is_velocity => {
+                Some(("frame", "none: only velocities of the body have one"))
             }
+            _ if self.frame == Some(Frame::Angles) && !angular => {
+                Some(("frame", "`world` or `body`"))
+            }
+            _ if self.origin.is_some() && quantity != Quantity::BodyPosition => {
+                Some(("origin", "none: only `body.position` has one"))
+            }
+            _ if self.release.is_some() && self.threshold.is_none() => {
+                Some(("release", "a `threshold` beside it"))
+            }
+            _ if self.threshold.is_some() && quantity != Quantity::Feet => {
+                Some(("threshold", "none: only `feet` has one"))
+            }
+            _ if self.release > self.threshold => Some(("release", "at most the `threshold`")),
+            _ => None,
         }
-        out
     }
 }
 
@@ -347,6 +305,13 @@ fn pattern(text: &str, names: &Names, quantity: Quantity) -> Vec<String> {
 /// What a map may not state, whatever the log.
 impl ColumnMap {
     pub(super) fn require_applicable(&self) -> Result<(), RecordingError> {
+        for (group, tables) in [("joint", &self.joint), ("body", &self.body)] {
+            let known = Quantity::ALL.map(Quantity::key);
+            let mut keys = tables.keys().map(|name| format!("{group}.{name}"));
+            if let Some(key) = keys.find(|key| !known.contains(&&key[..])) {
+                return Err(self.fault(&key, "a table", format!("one of {}", known.join(", "))));
+            }
+        }
         for quantity in Quantity::ALL {
             let Some(table) = self.table(quantity) else {
                 if quantity.is_required() {
@@ -355,28 +320,8 @@ impl ColumnMap {
                 }
                 continue;
             };
-            let refuse =
-                |key: &str, expected: &str| Err(self.fault(&quantity.at(key), "a value", expected));
-            let angular = quantity == Quantity::AngularVelocity;
-            let velocity = quantity == Quantity::BodyVelocity;
-            match table.frame {
-                Some(_) if !angular && !velocity => {
-                    return refuse("frame", "none: only velocities of the body have one");
-                }
-                Some(Frame::Angles) if !angular => return refuse("frame", "`world` or `body`"),
-                Some(_) | None => {}
-            }
-            if table.origin.is_some() && quantity != Quantity::BodyPosition {
-                return refuse("origin", "none: only `body.position` has one");
-            }
-            if table.release.is_some() && table.threshold.is_none() {
-                return refuse("release", "a `threshold` beside it");
-            }
-            if table.threshold.is_some() && quantity != Quantity::Feet {
-                return refuse("threshold", "none: only `feet` has one");
-            }
-            if table.release > table.threshold {
-                return refuse("release", "at most the `threshold`");
+            if let Some((key, expected)) = table.misplaced(quantity) {
+                return Err(self.fault(&quantity.at(key), "a value", expected));
             }
             self.require_finite(quantity, table)?;
             self.require_distinct(quantity, table)?;
@@ -399,25 +344,28 @@ impl ColumnMap {
     }
 
     fn require_finite(&self, quantity: Quantity, table: &Table) -> Result<(), RecordingError> {
-        let factors = |factors: &Option<Factors>| match factors {
-            None => Vec::new(),
-            Some(Factors::All(value)) => vec![*value],
-            Some(Factors::Each(values)) => values.clone(),
-            Some(Factors::Named(values)) => values.values().copied().collect(),
+        let wrong = |factors: &Option<Factors>| match factors.as_ref()? {
+            Factors::All(value) => Some(*value).filter(|value| !value.is_finite()),
+            Factors::Each(values) => values.iter().find(|value| !value.is_finite()).copied(),
+            Factors::Named(values) => values.values().find(|value| !value.is_finite()).copied(),
         };
-        for (key, values) in [
-            ("time_offset_s", vec![table.time_offset_s]),
-            ("threshold", table.threshold.into_iter().collect()),
-            ("release", table.release.into_iter().collect()),
-            ("sign", factors(&table.sign)),
-            ("offset", factors(&table.offset)),
-        ] {
-            if let Some(value) = values.into_iter().find(|value| !value.is_finite()) {
-                let expected = "a finite number";
-                return Err(self.fault(&quantity.at(key), value.to_string(), expected));
+        let one = |value: Option<f64>| wrong(&value.map(Factors::All));
+        let found = [
+            ("time_offset_s", one(Some(table.time_offset_s))),
+            ("threshold", one(table.threshold)),
+            ("release", one(table.release)),
+            ("sign", wrong(&table.sign)),
+            ("offset", wrong(&table.offset)),
+        ];
+        match found
+            .into_iter()
+            .find_map(|(key, value)| Some((key, value?)))
+        {
+            None => Ok(()),
+            Some((key, value)) => {
+                Err(self.fault(&quantity.at(key), value.to_string(), "a finite number"))
             }
         }
-        Ok(())
     }
 
     /// No column of a table twice, and no range that no log could have.
@@ -425,7 +373,7 @@ impl ColumnMap {
         let refuse = |found: String, expected: &str| {
             Err(self.fault(&quantity.at("columns"), found, expected))
         };
-        for entry in table.entries() {
+        for entry in table.columns.entries() {
             let Name::Text(text) = entry else { continue };
             if range(text).is_some_and(|all| all.end().saturating_sub(*all.start()) >= MAX_COLUMNS)
             {

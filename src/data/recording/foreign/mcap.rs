@@ -1,36 +1,34 @@
 //! MCAP files as logs, one log per topic and set of names; the only file that reads with the `mcap` crate.
 //!
 //! Records are read one by one and chunks unpacked one at a time. Checksums that are there are compared. A file that ends
-//! early, as after a loss of power, gives what its whole records and chunks hold.
+//! early, as after a loss of power, gives what its whole records and chunks hold. Folders of ROS 2 bags have the MCAP files
+//! that one recording was split into.
 
 use std::borrow::Cow;
-use std::fs::File;
+use std::fs::{self, File};
 use std::io::{self, BufReader, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use flate2::Crc;
 use mcap::read::parse_record;
 use mcap::records::{ChunkHeader, Record, op};
 use ruzstd::decoding::{FrameDecoder, StreamingDecoder};
 
-use super::bag;
 use super::log::Log;
 use super::topics::Topics;
 use crate::files::magic::{MAGIC_BYTES, MCAP, recognised};
-use crate::files::size::{Capped, Format};
+use crate::files::size::{Capped, Format, read_text_capped};
 use crate::recording::error::{RecordingError, RecordingFault};
 
-/// Bytes of a record before its contents: its kind and their length.
-const RECORD_HEADER: usize = 9;
-/// Window of a zstd frame that every chunk may have, in bytes.
-const LEAST_WINDOW: u64 = 1 << 23;
+const RECORD_HEADER: usize = 9; // bytes of a record before its contents: its kind and their length
+const LEAST_WINDOW: u64 = 1 << 23; // window of a zstd frame that every chunk may have, in bytes
 
 /// Whether a file is an MCAP log, by its name or its first bytes, or a folder with those of a bag. Pipes are not read
 /// from to find out.
 pub(in crate::recording) fn is_mcap(path: &Path) -> bool {
-    let has_ending = |ending: &str| {
-        let found = path.extension();
-        found.is_some_and(|found| found.eq_ignore_ascii_case(ending))
+    let has_ending = || {
+        path.extension()
+            .is_some_and(|e| e.eq_ignore_ascii_case("mcap"))
     };
     let begins = || {
         let mut start = Vec::new();
@@ -38,18 +36,26 @@ pub(in crate::recording) fn is_mcap(path: &Path) -> bool {
         let read = file.and_then(|mut file| file.read_to_end(&mut start));
         read.is_ok() && start == MCAP
     };
-    bag::is_bag(path) || has_ending("mcap") || (path.is_file() && begins())
+    is_bag(path) || has_ending() || (path.is_file() && begins())
 }
 
 /// Reads every topic whose messages are numbers; others have their fault.
 pub(in crate::recording) fn read_mcap(path: &Path) -> Result<Vec<Log>, RecordingError> {
     let mut topics = Topics::default();
-    let (files, mut notes) = bag::files(path)?;
+    let (files, mut notes) = files(path)?;
     for file in files {
         let open = File::open(&file);
         let open = open.map_err(|source| RecordingFault::unreadable("read", source).of(&file))?;
         topics.begin_file();
-        let mut scan = Scan::new(BufReader::new(open), &mut topics);
+        let mut scan = Scan {
+            source: BufReader::new(open),
+            topics: &mut topics,
+            offset: 0,
+            section: Crc::new(),
+            chunks: 0,
+            packed: 0,
+            unpacked: 0,
+        };
         let Some(early) = scan.whole(&file).map_err(|fault| fault.of(&file))? else {
             continue;
         };
@@ -81,19 +87,7 @@ struct Scan<'a, R> {
     unpacked: u64,
 }
 
-impl<'a, R: Read> Scan<'a, R> {
-    fn new(source: R, topics: &'a mut Topics) -> Self {
-        Self {
-            source,
-            topics,
-            offset: 0,
-            section: Crc::new(),
-            chunks: 0,
-            packed: 0,
-            unpacked: 0,
-        }
-    }
-
+impl<R: Read> Scan<'_, R> {
     /// Reads all records; words for a file that ends before its end.
     fn whole(&mut self, path: &Path) -> Result<Option<String>, RecordingFault> {
         let before = self.topics.messages;
@@ -232,19 +226,16 @@ impl<'a, R: Read> Scan<'a, R> {
             crc.update(&bytes);
             same_checksum(header.uncompressed_crc, crc.sum()).map_err(damaged)?;
         }
+        let split = |rest: &'_ [u8]| -> Option<(u8, usize)> {
+            let (header, rest) = rest.split_first_chunk::<RECORD_HEADER>()?;
+            let length = usize::try_from(u64::from_le_bytes(*header.last_chunk()?)).ok()?;
+            (length <= rest.len()).then_some((header[0], length))
+        };
         let mut rest = &bytes[..];
         while !rest.is_empty() {
-            let split = rest
-                .split_first_chunk::<RECORD_HEADER>()
-                .and_then(|(header, rest)| {
-                    let length = u64::from_le_bytes(*header.last_chunk()?);
-                    Some((
-                        header[0],
-                        rest.split_at_checked(usize::try_from(length).ok()?)?,
-                    ))
-                });
-            let (kind, (body, behind)) =
-                split.ok_or_else(|| damaged("it ends within a record".to_owned()))?;
+            let cut = || damaged("it ends within a record".to_owned());
+            let (kind, length) = split(rest).ok_or_else(cut)?;
+            let (body, behind) = rest[RECORD_HEADER..].split_at(length);
             match parsed(kind, body).map_err(damaged)? {
                 Some(Record::Chunk { .. }) => {
                     return Err(damaged("a chunk within a chunk".to_owned()));
@@ -261,9 +252,8 @@ impl<'a, R: Read> Scan<'a, R> {
 /// A record; none for an attachment, whose checksum is compared.
 fn parsed(kind: u8, body: &[u8]) -> Result<Option<Record<'_>>, String> {
     if kind != op::ATTACHMENT {
-        return parse_record(kind, body)
-            .map(Some)
-            .map_err(|error| error.to_string());
+        let record = parse_record(kind, body);
+        return record.map(Some).map_err(|error| error.to_string());
     }
     let ends = "an attachment without checksum";
     let (contents, stated) = body.split_last_chunk::<4>().ok_or(ends)?;
@@ -308,10 +298,8 @@ fn unpacked<'a>(
 ) -> Result<Cow<'a, [u8]>, String> {
     let size = header.uncompressed_size;
     if size > left {
-        let packed = data.len();
-        return Err(format!(
-            "{packed} bytes that unpack to {size}, expected at most {left}"
-        ));
+        let packed = format!("{} bytes that unpack to {size}", data.len());
+        return Err(format!("{packed}, expected at most {left}"));
     }
     let mut out = Vec::new();
     let mut read =
@@ -336,4 +324,91 @@ fn exact(bytes: Cow<'_, [u8]>, size: u64) -> Result<Cow<'_, [u8]>, String> {
         true => Ok(bytes),
         false => Err(format!("{} bytes, expected {size}", bytes.len())),
     }
+}
+
+const METADATA: &str = "metadata.yaml"; // the list of files in a bag's folder
+/// Endings of files that bags are made of.
+const ENDINGS: [&str; 4] = [".mcap", ".db3", ".mcap.zstd", ".mcap.zst"];
+
+fn is_bag(path: &Path) -> bool {
+    path.is_dir() && (path.join(METADATA).is_file() || !parts(path).is_empty())
+}
+
+/// The files of a log: the path itself, or those of the bag that the folder is; and notes on files that are left out.
+fn files(path: &Path) -> Result<(Vec<PathBuf>, Vec<String>), RecordingError> {
+    if !path.is_dir() {
+        return Ok((vec![path.to_owned()], Vec::new()));
+    }
+    let listed = listed(path)?;
+    if let Some(absent) = listed.iter().find(|file| !file.is_file()) {
+        return Err(RecordingFault::Missing.of(absent));
+    }
+    let is_listed = !listed.is_empty();
+    let mut files = parts(path);
+    let mut unlisted = Vec::new();
+    if is_listed {
+        let others = files.iter().filter(|file| !listed.contains(file));
+        let note = |file: &PathBuf| format!("{}: not in {METADATA}, and left out", file.display());
+        unlisted.extend(others.map(note));
+        files = listed;
+    }
+    // rosbag2 calls the parts of a bag NAME_0.mcap, NAME_1.mcap and so on.
+    let part = |file: &Path| -> Option<(String, usize)> {
+        let stem = file.file_stem()?.to_str()?;
+        let (name, number) = stem.split('.').next()?.rsplit_once('_')?;
+        Some((name.to_owned(), number.parse().ok()?))
+    };
+    files.sort_by_cached_key(|file| (part(file), file.clone()));
+    let is_one = |pair: &[PathBuf]| {
+        let [one, other] = [&pair[0], &pair[1]].map(|file| part(file).map(|(name, _)| name));
+        one.is_some() && one == other
+    };
+    if files.is_empty() || (!path.join(METADATA).is_file() && !files.windows(2).all(is_one)) {
+        let found = format!(
+            "a folder of {} MCAP files without metadata.yaml that are not NAME_0.mcap, NAME_1.mcap and so on",
+            files.len()
+        );
+        let expected = "the parts of one bag; give separate recordings one by one: FOLDER/*.mcap";
+        return Err(RecordingFault::unexpected(found, expected).of(path));
+    }
+    // Without a list, a number that is left out is a file that is lost.
+    let lost = files.windows(2).filter(|_| !is_listed).find_map(|pair| {
+        let ((name, one), (_, other)) = (part(&pair[0])?, part(&pair[1])?);
+        let file = pair[0].file_name()?.to_str()?;
+        let ending = file.strip_prefix(&format!("{name}_{one}"))?;
+        (other > one + 1).then(|| path.join(format!("{name}_{}{ending}", one + 1)))
+    });
+    match lost {
+        Some(lost) => Err(RecordingFault::Missing.of(&lost)),
+        None => Ok((files, unlisted)),
+    }
+}
+
+fn listed(folder: &Path) -> Result<Vec<PathBuf>, RecordingError> {
+    let path = folder.join(METADATA);
+    if !path.is_file() {
+        return Ok(Vec::new());
+    }
+    let text = read_text_capped(&path, Format::Settings)
+        .map_err(|source| RecordingFault::unreadable("read", source).of(&path))?;
+    let mut lines = text.lines().map(str::trim);
+    let Some(first) = lines.find_map(|line| line.strip_prefix("relative_file_paths:")) else {
+        return Ok(Vec::new());
+    };
+    let in_line = first.trim().trim_matches(['[', ']']).split(',');
+    let below = lines.map_while(|line| line.strip_prefix('-'));
+    let names = in_line.chain(below);
+    let names = names.map(|name| name.trim().trim_matches(['"', '\'']));
+    // A list may name the folder too; files elsewhere are not the bag's.
+    let names = names.filter_map(|name| Path::new(name).file_name());
+    Ok(names.map(|name| folder.join(name)).collect())
+}
+
+fn parts(folder: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let is_part = |path: &PathBuf| {
+        let name = path.to_string_lossy().to_lowercase();
+        ENDINGS.iter().any(|ending| name.ends_with(ending)) && path.is_file()
+    };
+    entries.map(|entry| entry.path()).filter(is_part).collect()
 }

@@ -36,11 +36,11 @@ MSG: geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z\n";
 /// Topic of joint angles, velocities and torques.
 pub const JOINT_TOPIC: &str = "/joint_states";
 /// Topic of the trunk's pose in the world and its velocities in its own axes.
-pub const BODY_TOPIC: &str = "/odom";
+const BODY_TOPIC: &str = "/odom";
 /// Topic of contact, 1 or 0 for each foot.
-pub const FEET_TOPIC: &str = "/foot_contacts";
+const FEET_TOPIC: &str = "/foot_contacts";
 /// Topic of the inputs of a model.
-pub const INPUT_TOPIC: &str = "/inputs";
+const INPUT_TOPIC: &str = "/inputs";
 
 /// Writes a segment and, if given, its inputs (18 x samples) as messages; chunks are not packed.
 ///
@@ -57,13 +57,10 @@ pub fn write_mcap(
         .library(concat!("romc ", env!("CARGO_PKG_VERSION")));
     let mut writer = Writer::with_options(destination, options)?;
     let joint_text = format!("{JOINT_STATE}{HEADER}");
-    let joint = writer.add_schema(
-        "sensor_msgs/msg/JointState",
-        "ros2msg",
-        joint_text.as_bytes(),
-    )?;
     let body_text = format!("{ODOMETRY}{GEOMETRY}{HEADER}");
-    let body = writer.add_schema("nav_msgs/msg/Odometry", "ros2msg", body_text.as_bytes())?;
+    let mut schema = |name, text: String| writer.add_schema(name, "ros2msg", text.as_bytes());
+    let joint = schema("sensor_msgs/msg/JointState", joint_text)?;
+    let body = schema("nav_msgs/msg/Odometry", body_text)?;
     let mut topic = |schema, topic| writer.add_channel(schema, topic, "cdr", &BTreeMap::new());
     let [joints, odom, contacts] = [
         topic(joint, JOINT_TOPIC)?,
@@ -82,13 +79,13 @@ pub fn write_mcap(
         let [q, dq, tau] = [&segment.x, &segment.dx, &segment.torque_nm].map(rows);
         let contact = segment.feet[sample].map(|down| f64::from(u8::from(down)));
         let mut messages = vec![
-            (joints, stamped().joint_state(&names, &q, &dq, &tau)),
+            (joints, stamped().joint_state(&names, [&q, &dq, &tau])),
             (odom, odometry(segment, sample, time_ns)),
-            (contacts, stamped().joint_state(&feet, &contact, &[], &[])),
+            (contacts, stamped().joint_state(&feet, [&contact, &[], &[]])),
         ];
         if let Some((channel, inputs)) = inputs {
             let values = inputs.column(sample);
-            let message = stamped().joint_state(&input_names, &[], &[], values.as_slice());
+            let message = stamped().joint_state(&input_names, [&[], &[], values.as_slice()]);
             messages.push((channel, message));
         }
         for (channel_id, message) in messages {
@@ -99,7 +96,7 @@ pub fn write_mcap(
                 log_time,
                 publish_time: log_time,
             };
-            writer.write_to_known_channel(&header, &message.bytes)?;
+            writer.write_to_known_channel(&header, &message.0)?;
         }
     }
     writer.finish()?;
@@ -135,16 +132,13 @@ fn odometry(segment: &Segment, sample: usize, time_ns: i64) -> Message {
     message
 }
 
-struct Message {
-    bytes: Vec<u8>,
-}
+/// Bytes in CDR behind its header.
+struct Message(Vec<u8>);
 
 impl Message {
-    /// With header: time, and the world as frame.
+    /// With time, and the world as frame.
     fn stamped(time_ns: i64) -> Self {
-        let mut message = Self {
-            bytes: vec![0, 1, 0, 0],
-        };
+        let mut message = Self(vec![0, 1, 0, 0]);
         let seconds = time_ns.div_euclid(1_000_000_000) as i32;
         message.put(4, &seconds.to_le_bytes());
         let nanoseconds = time_ns.rem_euclid(1_000_000_000) as u32;
@@ -153,16 +147,11 @@ impl Message {
         message
     }
 
-    fn joint_state(
-        mut self,
-        names: &[String],
-        position: &[f64],
-        velocity: &[f64],
-        effort: &[f64],
-    ) -> Self {
+    /// Position, velocity and effort of joints.
+    fn joint_state(mut self, names: &[String], lists: [&[f64]; 3]) -> Self {
         self.length(names.len());
         names.iter().for_each(|name| self.text(name));
-        for values in [position, velocity, effort] {
+        for values in lists {
             self.length(values.len());
             self.numbers(values);
         }
@@ -175,20 +164,18 @@ impl Message {
 
     fn text(&mut self, text: &str) {
         self.length(text.len() + 1);
-        self.bytes.extend(text.as_bytes());
-        self.bytes.push(0);
+        self.0.extend(text.as_bytes());
+        self.0.push(0);
     }
 
     fn numbers(&mut self, values: &[f64]) {
-        values
-            .iter()
-            .for_each(|value| self.put(8, &value.to_le_bytes()));
+        (values.iter()).for_each(|value| self.put(8, &value.to_le_bytes()));
     }
 
     /// Appends at a multiple of `align` bytes after the header.
     fn put(&mut self, align: usize, bytes: &[u8]) {
-        let body = self.bytes.len() - 4;
-        self.bytes.resize(4 + body.next_multiple_of(align), 0);
-        self.bytes.extend(bytes);
+        let body = self.0.len() - 4;
+        self.0.resize(4 + body.next_multiple_of(align), 0);
+        self.0.extend(bytes);
     }
 }

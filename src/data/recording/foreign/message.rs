@@ -3,20 +3,15 @@
 
 use std::collections::BTreeMap;
 
-/// Longest array whose entries become columns: an image is no column.
-const MOST_ENTRIES: usize = 64;
-/// Most numbers of a message.
-const MOST_NUMBERS: usize = 4096;
+const MOST_ENTRIES: usize = 64; // longest array whose entries become columns: an image is no column
+const MOST_NUMBERS: usize = 4096; // most numbers of a message
 /// Most fields of a message without bytes of their own: empty messages.
 const MOST_EMPTY: usize = 100_000;
-/// Deepest nesting of messages.
-const MOST_LEVELS: usize = 16;
+const MOST_LEVELS: usize = 16; // deepest nesting of messages
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Layout {
-    /// Packed, little endian.
     Ros1,
-    /// CDR with its header.
     Ros2,
 }
 
@@ -27,7 +22,6 @@ enum Kind {
     Signed(usize),
     Float(usize),
     Text,
-    /// Seconds and nanoseconds.
     Time,
     Message(usize),
 }
@@ -46,19 +40,6 @@ struct Field {
     count: Count,
 }
 
-impl Field {
-    /// Appends its name to the path of its message, of a list with the entry.
-    fn append_to(&self, path: &mut String, entry: &str) {
-        if !path.is_empty() {
-            path.push('.');
-        }
-        path.push_str(&self.name);
-        if self.count != Count::One {
-            path.push_str(&format!("[{entry}]"));
-        }
-    }
-}
-
 /// A message type with all that it is made of; the first is the message's own.
 #[derive(Debug, Clone)]
 pub(super) struct Definition {
@@ -68,13 +49,11 @@ pub(super) struct Definition {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Value {
     Number(f64),
-    /// Seconds and nanoseconds.
     Time(i64, u32),
 }
 
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Numbers {
-    /// Their names, if these are asked for.
     pub names: Vec<String>,
     pub values: Vec<Value>,
     /// Lengths and names of its lists: messages of one type that agree in them have the same numbers in the same order.
@@ -108,16 +87,14 @@ impl Definition {
         if let Some(index) = self.types.iter().position(|(known, _)| known == name) {
             return Ok(index);
         }
-        let lines = texts.get(name).cloned();
         // An empty message has no lines.
-        let lines = lines.unwrap_or_default();
+        let lines = texts.get(name).cloned().unwrap_or_default();
         if level > MOST_LEVELS || (lines.is_empty() && level > 0 && !name.ends_with("/Empty")) {
             return Err(undefined(name));
         }
         let index = self.types.len();
         self.types.push((name.to_owned(), Vec::new()));
         let package = name.split('/').next().unwrap_or_default();
-        let mut fields = Vec::new();
         for line in lines {
             let fault = || format!("definition: found `{line}`, expected a type and a name");
             let (kind, rest) = line.split_once(char::is_whitespace).ok_or_else(fault)?;
@@ -126,24 +103,19 @@ impl Definition {
                 continue;
             }
             let (base, count) = counted(kind).ok_or_else(fault)?;
-            let kind = match primitive(base) {
-                Some(kind) => kind,
-                None => {
-                    let full = match (base, base.contains('/')) {
-                        (_, true) => short(base),
-                        ("Header", false) => "std_msgs/Header".to_owned(),
-                        (_, false) => format!("{package}/{base}"),
-                    };
-                    match &full[..] {
-                        "builtin_interfaces/Time" | "builtin_interfaces/Duration" => Kind::Time,
-                        _ => Kind::Message(self.add(&full, texts, level + 1)?),
-                    }
-                }
+            let full = match base {
+                "Header" => "std_msgs/Header".to_owned(),
+                _ if base.contains('/') => short(base),
+                _ => format!("{package}/{base}"),
+            };
+            let kind = match (primitive(base), &full[..]) {
+                (Some(kind), _) => kind,
+                (_, "builtin_interfaces/Time" | "builtin_interfaces/Duration") => Kind::Time,
+                (None, _) => Kind::Message(self.add(&full, texts, level + 1)?),
             };
             let name = field.to_owned();
-            fields.push(Field { name, kind, count });
+            self.types[index].1.push(Field { name, kind, count });
         }
-        self.types[index].1 = fields;
         Ok(index)
     }
 
@@ -155,79 +127,10 @@ impl Definition {
         bytes: &[u8],
         named: bool,
     ) -> Result<Numbers, String> {
-        let (mut cursor, mut out) = (Cursor::new(layout, bytes)?, Numbers::default());
-        self.message(0, &mut cursor, named, &mut String::new(), Some(&mut out))?;
-        Ok(out)
-    }
-
-    fn message(
-        &self,
-        index: usize,
-        cursor: &mut Cursor<'_>,
-        named: bool,
-        path: &mut String,
-        mut out: Option<&mut Numbers>,
-    ) -> Result<(), String> {
-        let mut names: Vec<String> = Vec::new();
-        let before = path.len();
-        let (of_type, fields) = &self.types[index];
-        for field in fields {
-            let count = match field.count {
-                Count::One => 1,
-                Count::Fixed(count) => count,
-                Count::Any => cursor.length()?,
-            };
-            if let (Some(out), Count::Any) = (out.as_deref_mut(), field.count) {
-                let count = count.min(MOST_ENTRIES + 1) as u32;
-                out.lists.extend(count.to_le_bytes());
-            }
-            let is_list = field.count != Count::One;
-            let is_named = field.count == Count::Any && !matches!(field.kind, Kind::Message(_));
-            if field.kind == Kind::Text && is_list && field.name.starts_with("name") {
-                let read = (0..count).map(|_| cursor.text());
-                names = read.collect::<Result<_, _>>()?;
-                if let Some(out) = out.as_deref_mut() {
-                    let ended = names.iter().flat_map(|name| [name.as_bytes(), &[0]]);
-                    ended.for_each(|bytes| out.lists.extend(bytes));
-                }
-                continue;
-            }
-            let others = ![0, names.len()].contains(&count) && !names.is_empty();
-            if is_named && others && of_type.ends_with("/JointState") {
-                let names = names.len();
-                return Err(format!(
-                    "message: {names} names and {count} values of `{}`",
-                    field.name
-                ));
-            }
-            for entry in 0..count {
-                cursor.count_field()?;
-                if named {
-                    let own = names.get(entry);
-                    let own = own.filter(|_| is_named && names.len() == count);
-                    let entry = own.map_or_else(|| entry.to_string(), String::clone);
-                    path.truncate(before);
-                    field.append_to(path, &entry);
-                }
-                let out = out.as_deref_mut().filter(|_| count <= MOST_ENTRIES);
-                let value = match field.kind {
-                    Kind::Message(part) => {
-                        self.message(part, cursor, named, path, out)?;
-                        continue;
-                    }
-                    kind => cursor.value(kind)?,
-                };
-                if let (Some(out), Some(value)) = (out, value) {
-                    if out.values.len() == MOST_NUMBERS {
-                        return Err(format!("message: more than {MOST_NUMBERS} numbers"));
-                    }
-                    out.names.extend(named.then(|| path.clone()));
-                    out.values.push(value);
-                }
-            }
-        }
-        path.truncate(before);
-        Ok(())
+        let mut cursor = Cursor::new(layout, bytes)?;
+        cursor.named = named;
+        cursor.message(self, 0, true)?;
+        Ok(cursor.out)
     }
 }
 
@@ -287,7 +190,7 @@ fn primitive(name: &str) -> Option<Kind> {
     })
 }
 
-/// Bytes of a message from its first field on.
+/// Bytes of a message from its first field on, and what was read of them.
 struct Cursor<'a> {
     bytes: &'a [u8],
     place: usize,
@@ -295,6 +198,9 @@ struct Cursor<'a> {
     big_endian: bool,
     align: usize,
     fields: usize,
+    named: bool,
+    path: String,
+    out: Numbers,
 }
 
 impl<'a> Cursor<'a> {
@@ -302,10 +208,8 @@ impl<'a> Cursor<'a> {
     fn new(layout: Layout, bytes: &'a [u8]) -> Result<Self, String> {
         let (bytes, big_endian, align) = match (layout, bytes) {
             (Layout::Ros1, bytes) => (bytes, false, 1),
-            (Layout::Ros2, [0, 0, _, _, rest @ ..]) => (rest, true, 8),
-            (Layout::Ros2, [0, 1, _, _, rest @ ..]) => (rest, false, 8),
-            (Layout::Ros2, [0, 6, _, _, rest @ ..]) => (rest, true, 4),
-            (Layout::Ros2, [0, 7, _, _, rest @ ..]) => (rest, false, 4),
+            (Layout::Ros2, [0, kind @ (0 | 1), _, _, rest @ ..]) => (rest, *kind == 0, 8),
+            (Layout::Ros2, [0, kind @ (6 | 7), _, _, rest @ ..]) => (rest, *kind == 6, 4),
             (Layout::Ros2, [first, kind, _, _, ..]) => {
                 return Err(unknown_encoding(&format!("cdr {first:#x} {kind:#x}")));
             }
@@ -318,7 +222,88 @@ impl<'a> Cursor<'a> {
             big_endian,
             align,
             fields: 0,
+            named: false,
+            path: String::new(),
+            out: Numbers::default(),
         })
+    }
+
+    /// Reads a message of this type; its numbers are kept unless it is an entry of a long list.
+    fn message(&mut self, of: &Definition, index: usize, kept: bool) -> Result<(), String> {
+        let mut names: Vec<String> = Vec::new();
+        let before = self.path.len();
+        let (of_type, fields) = &of.types[index];
+        for field in fields {
+            let count = match field.count {
+                Count::One => 1,
+                Count::Fixed(count) => count,
+                Count::Any => self.length()?,
+            };
+            if kept && field.count == Count::Any {
+                let count = count.min(MOST_ENTRIES + 1) as u32;
+                self.out.lists.extend(count.to_le_bytes());
+            }
+            if field.kind == Kind::Text
+                && field.count != Count::One
+                && field.name.starts_with("name")
+            {
+                let read = (0..count).map(|_| self.text());
+                names = read.collect::<Result<_, _>>()?;
+                if kept {
+                    let ended = names.iter().flat_map(|name| [name.as_bytes(), &[0]]);
+                    ended.for_each(|bytes| self.out.lists.extend(bytes));
+                }
+                continue;
+            }
+            let is_named = field.count == Count::Any && !matches!(field.kind, Kind::Message(_));
+            let others = ![0, names.len()].contains(&count) && !names.is_empty();
+            if is_named && others && of_type.ends_with("/JointState") {
+                let (names, field) = (names.len(), &field.name);
+                return Err(format!(
+                    "message: {names} names and {count} values of `{field}`"
+                ));
+            }
+            let has_names = is_named && names.len() == count;
+            for entry in 0..count {
+                self.count_field()?;
+                if self.named {
+                    self.path.truncate(before);
+                    self.append(field, entry, has_names.then(|| &names[entry][..]));
+                }
+                let kept = kept && count <= MOST_ENTRIES;
+                match field.kind {
+                    Kind::Message(part) => self.message(of, part, kept)?,
+                    kind => {
+                        let value = self.value(kind)?;
+                        (value.filter(|_| kept)).map_or(Ok(()), |value| self.keep(value))?;
+                    }
+                }
+            }
+        }
+        self.path.truncate(before);
+        Ok(())
+    }
+
+    /// Appends a field to the path of its message, of a list with the entry.
+    fn append(&mut self, field: &Field, entry: usize, name: Option<&str>) {
+        if !self.path.is_empty() {
+            self.path.push('.');
+        }
+        self.path.push_str(&field.name);
+        match name {
+            _ if field.count == Count::One => {}
+            Some(name) => self.path.push_str(&format!("[{name}]")),
+            None => self.path.push_str(&format!("[{entry}]")),
+        }
+    }
+
+    fn keep(&mut self, value: Value) -> Result<(), String> {
+        if self.out.values.len() == MOST_NUMBERS {
+            return Err(format!("message: more than {MOST_NUMBERS} numbers"));
+        }
+        self.out.names.extend(self.named.then(|| self.path.clone()));
+        self.out.values.push(value);
+        Ok(())
     }
 
     /// Counts a field: each has a byte at least, but for empty messages.

@@ -2,14 +2,12 @@
 
 use nalgebra::DMatrix;
 
-use super::elements::Dimension;
-use super::elements::{QUATERNION, Quantity, named, ordered};
+use super::elements::{Dimension, QUATERNION, Quantity, named, ordered};
 use super::log::{Channel, Log};
-use super::map::{ColumnMap, Factors, Name, Table, Words};
+use super::map::{ColumnMap, Factors, List, Name, Table};
 use crate::recording::error::{RecordingError, RecordingFault};
 use crate::recording::instant::Instant;
 
-/// A quantity with the clock that it was logged by.
 #[derive(Debug, Clone)]
 pub(super) struct Signal {
     /// One row an element in romc's order, one column a sample; a quaternion has four rows, w first.
@@ -41,17 +39,17 @@ impl<'a> Source<'a> {
         let has_all = |log: &&Log| columns.iter().all(|name| log.column(name).is_some());
         // A topic whose messages have several sets of names has several tables.
         let found = (logs.iter().filter(named).find(has_all)).or_else(|| logs.iter().find(named));
-        if let Some(fault) = found.and_then(|log| log.fault.as_ref()) {
-            let found = format!("`{name}`, which cannot be read ({fault})");
-            return Err(map.fault(&quantity.at("topic"), found, "a topic of numbers"));
-        }
-        let log = found.ok_or_else(|| {
+        let Some(log) = found else {
             let mut names: Vec<String> = logs.iter().map(|l| format!("`{}`", l.name)).collect();
             names.dedup();
             let expected = format!("one of {}", names.join(", "));
             let found = (table.file.as_ref()).map_or("nothing".to_owned(), |f| format!("`{f}`"));
-            map.fault(&quantity.at("file"), found, expected)
-        })?;
+            return Err(map.fault(&quantity.at("file"), found, expected));
+        };
+        if let Some(fault) = &log.fault {
+            let found = format!("`{name}`, which cannot be read ({fault})");
+            return Err(map.fault(&quantity.at("topic"), found, "a topic of numbers"));
+        }
         Ok(Some(Self {
             map,
             quantity,
@@ -68,19 +66,17 @@ impl<'a> Source<'a> {
     pub(crate) fn take(&self, epoch_s: i64) -> Result<Signal, RecordingError> {
         let columns = self.columns()?;
         let elements = match self.is_quaternion(columns.len()) {
-            true => QUATERNION.map(str::to_owned).to_vec(),
+            true => &QUATERNION,
             false => self.quantity.elements(),
         };
-        let order = self.order(&elements, columns.len())?;
+        let order = self.order(elements, columns.len())?;
         let dimension = self.quantity.dimension();
         let key = self.quantity.at("unit");
         let factor = self.factor(&key, dimension, self.table.unit.as_ref())?;
-        let signs = self.numbers(&self.table.sign, "sign", &elements, &order, 1.0)?;
-        let offsets = self.numbers(&self.table.offset, "offset", &elements, &order, 0.0)?;
+        let signs = self.numbers(&self.table.sign, "sign", elements, &order, 1.0)?;
+        let offsets = self.numbers(&self.table.offset, "offset", elements, &order, 0.0)?;
         if let Some(wrong) = signs.iter().find(|sign| sign.abs() != 1.0) {
-            return Err(self
-                .map
-                .fault(&self.quantity.at("sign"), wrong.to_string(), "1 or -1"));
+            return Err(self.fault("sign", wrong.to_string(), "1 or -1"));
         }
         let times = self.times()?;
         let kept = self.kept(&columns, times.column);
@@ -110,6 +106,15 @@ impl<'a> Source<'a> {
         Ok(first.map(|instant| instant.whole.div_euclid(times.per_second)))
     }
 
+    fn fault(
+        &self,
+        key: &str,
+        found: impl Into<String>,
+        expected: impl Into<String>,
+    ) -> RecordingError {
+        self.map.fault(&self.quantity.at(key), found, expected)
+    }
+
     fn is_quaternion(&self, columns: usize) -> bool {
         self.quantity == Quantity::Orientation && columns == QUATERNION.len()
     }
@@ -127,14 +132,9 @@ impl<'a> Source<'a> {
             Quantity::Orientation => "3 (angles) or 4 (a quaternion)".to_owned(),
             _ => expected.to_string(),
         };
-        Err(self.map.fault(
-            &self.quantity.at("columns"),
-            format!("{} columns", columns.len()),
-            expected,
-        ))
+        Err(self.fault("columns", format!("{} columns", columns.len()), expected))
     }
 
-    /// The column of a name that stands under this key.
     fn column(&self, key: &str, name: &Name) -> Result<usize, RecordingError> {
         let log = self.log;
         log.column(name).ok_or_else(|| {
@@ -151,25 +151,22 @@ impl<'a> Source<'a> {
         })
     }
 
-    fn order(&self, elements: &[String], columns: usize) -> Result<Vec<usize>, RecordingError> {
-        let key = self.quantity.at("order");
+    fn order(&self, elements: &[&str], columns: usize) -> Result<Vec<usize>, RecordingError> {
         let words = match &self.table.order {
             None if self.is_quaternion(columns) => {
                 let found = "a quaternion without order";
-                return Err(self.map.fault(&key, found, "`wxyz` or `xyzw`"));
+                return Err(self.fault("order", found, "`wxyz` or `xyzw`"));
             }
             None => return Ok((0..columns).collect()),
-            Some(Words::One(text)) => text.split_whitespace().map(str::to_owned).collect(),
-            Some(Words::Many(words)) => words.clone(),
+            Some(List::One(text)) => text.split_whitespace().map(str::to_owned).collect(),
+            Some(List::Many(words)) => words.clone(),
         };
         let order = ordered(&words, elements).and_then(|order| match order.len() == columns {
             true => Ok(order),
             false => Err(format!("{} names", order.len())),
         });
-        order.map_err(|found| {
-            let expected = format!("each of {} once", elements.join(" "));
-            self.map.fault(&key, found, expected)
-        })
+        let expected = || format!("each of {} once", elements.join(" "));
+        order.map_err(|found| self.fault("order", found, expected()))
     }
 
     /// The factor to SI of a unit that stands under this key; 1 without one.
@@ -190,19 +187,17 @@ impl<'a> Source<'a> {
         &self,
         factors: &Option<Factors>,
         key: &str,
-        elements: &[String],
+        elements: &[&str],
         order: &[usize],
         default: f64,
     ) -> Result<Vec<f64>, RecordingError> {
-        let fault = |found: String, expected: String| {
-            Err(self.map.fault(&self.quantity.at(key), found, expected))
-        };
+        let count = order.len();
         match factors {
-            None => Ok(vec![default; order.len()]),
-            Some(Factors::All(value)) => Ok(vec![*value; order.len()]),
-            Some(Factors::Each(values)) if values.len() == order.len() => Ok(values.clone()),
+            None => Ok(vec![default; count]),
+            Some(Factors::All(value)) => Ok(vec![*value; count]),
+            Some(Factors::Each(values)) if values.len() == count => Ok(values.clone()),
             Some(Factors::Each(values)) => {
-                fault(format!("{} numbers", values.len()), order.len().to_string())
+                Err(self.fault(key, format!("{} numbers", values.len()), count.to_string()))
             }
             Some(Factors::Named(named_values)) => {
                 let mut of_element = vec![default; elements.len()];
@@ -210,7 +205,7 @@ impl<'a> Source<'a> {
                     let found = named(word, elements);
                     if found.is_empty() {
                         let expected = format!("one of {}", elements.join(" "));
-                        return fault(format!("`{word}`"), expected);
+                        return Err(self.fault(key, format!("`{word}`"), expected));
                     }
                     for element in found {
                         of_element[element] = *value;
@@ -227,8 +222,8 @@ impl<'a> Source<'a> {
             let mut used = columns.iter().copied().chain(time);
             used.any(|column| self.log.columns[column].values[row].is_nan())
         };
-        (0..self.log.len())
-            .filter(|row| !self.map.text.blank || !blank(*row))
+        let all = 0..self.log.len();
+        all.filter(|row| !self.map.text.blank || !blank(*row))
             .collect()
     }
 

@@ -1,15 +1,14 @@
 //! Text files as logs: any separator, with or without header; or romc's own format, in which every cell that has a
 //! meaning is a finite number.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::log::{Channel, Log};
 use super::map::{ColumnMap, Delimiter, TextFormat};
 use crate::recording::columns::Column;
-use crate::recording::csv::MAX_ROWS;
 use crate::recording::error::{RecordingError, RecordingFault, shortened};
 use crate::recording::instant::Instant;
-use crate::recording::lines::{self, Lines, NumberReader};
+use crate::recording::lines::{self, Lines, MAX_ROWS, NumberReader};
 
 /// Numbers from which a column is kept as times: beyond, one number does not hold a microsecond.
 const LARGE: f64 = 1e8;
@@ -30,25 +29,20 @@ pub(in crate::recording) fn read_texts(
     if !path.is_dir() {
         logs.push(read_text(path, &map.text)?);
     }
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy(); // what has no name cannot be opened
     for name in named {
+        let file = match path.is_dir() {
+            true => path.join(name),
+            false => path.with_file_name(name.replace("{}", stem.trim_end_matches(".csv"))),
+        };
         logs.push(Log {
             name: name.to_owned(),
-            ..read_text(&file_beside(path, name), &map.text)?
+            ..read_text(&file, &map.text)?
         });
     }
     Ok(logs)
 }
 
-fn file_beside(path: &Path, name: &str) -> PathBuf {
-    if path.is_dir() {
-        return path.join(name);
-    }
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    let folder = path.parent().unwrap_or(Path::new(""));
-    folder.join(name.replace("{}", stem.trim_end_matches(".csv")))
-}
-
-/// Reads one text file, plain or gzip, as a log without name.
 pub(in crate::recording) fn read_text(
     path: &Path,
     format: &TextFormat,
@@ -92,7 +86,6 @@ struct Sheet {
     numbers: NumberReader,
     log: Log,
     count: usize,
-    /// Meaning of each column in romc's own format.
     own: Option<Vec<Option<Column>>>,
 }
 
@@ -162,10 +155,10 @@ impl Sheet {
                 Delimiter::Semicolon => (',', "`;`"),
                 _ => (';', "`,`"),
             };
-            if is_own && cells.len() == 1 && line.contains(other) {
-                return Err(RecordingFault::delimiter(line, separator).at(&self.log.path, row));
-            }
-            return Err(self.length_fault(row, cells.len()));
+            return Err(match is_own && cells.len() == 1 && line.contains(other) {
+                true => RecordingFault::delimiter(line, separator).at(&self.log.path, row),
+                false => self.length_fault(row, cells.len()),
+            });
         }
         if self.count == 0 {
             self.log.first_row = row;
@@ -202,10 +195,7 @@ impl Sheet {
             _ => "",
         };
         let last = columns.last().filter(|_| is_own);
-        let name = columns
-            .get(found)
-            .or(last)
-            .map_or("", |column| &column.name);
+        let name = (columns.get(found).or(last)).map_or("", |column| &column.name);
         let fault = RecordingFault::RowLength {
             found,
             expected: columns.len(),
@@ -227,8 +217,7 @@ impl Channel {
                     return self.push_instant(instant);
                 }
                 let sample = self.values.len();
-                self.refused
-                    .get_or_insert_with(|| (sample, shortened(cell)));
+                (self.refused).get_or_insert_with(|| (sample, shortened(cell)));
                 f64::NAN
             }
         };
@@ -245,11 +234,7 @@ impl Channel {
         self.values.push(value);
         if let Some(instants) = &mut self.instants {
             // Where this is no time, the value is NaN, which whoever needs the column refuses.
-            let none = Instant {
-                whole: 0,
-                rest: 0.0,
-            };
-            instants.push(Instant::of(value).unwrap_or(none));
+            instants.push(Instant::of(value).unwrap_or_default());
         }
     }
 
@@ -289,9 +274,8 @@ impl Channel {
     /// Adds a time; earlier values become times as well.
     pub(crate) fn push_instant(&mut self, instant: Instant) {
         let earlier = |value: &f64| Instant::of(*value).unwrap_or(instant);
-        self.instants
-            .get_or_insert_with(|| self.values.iter().map(earlier).collect())
-            .push(instant);
+        let all = || self.values.iter().map(earlier).collect();
+        self.instants.get_or_insert_with(all).push(instant);
         self.values.push(instant.value());
     }
 }
@@ -317,8 +301,6 @@ fn character(delimiter: Delimiter) -> char {
 fn cells(line: &str, delimiter: Delimiter) -> Vec<&str> {
     match delimiter {
         Delimiter::Blank => line.split_whitespace().collect(),
-        Delimiter::Tab | Delimiter::Comma | Delimiter::Semicolon => {
-            lines::cells(line, character(delimiter)).collect()
-        }
+        _ => lines::cells(line, character(delimiter)).collect(),
     }
 }

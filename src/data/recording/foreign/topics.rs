@@ -5,36 +5,37 @@
 //! stamps into their place, and exact repeats are dropped; a note says so.
 
 use std::collections::BTreeMap;
-use std::collections::btree_map::Entry;
 
 use mcap::records::{Channel as Declared, SchemaHeader};
 
 use super::log::{Channel, Log};
 use super::message::{Definition, Layout, Value, undefined, unknown_encoding};
-use crate::recording::csv::MAX_ROWS;
 use crate::recording::error::RecordingFault;
 use crate::recording::instant::Instant;
+use crate::recording::lines::MAX_ROWS;
 
-/// Most tables of a topic.
-const MOST_TABLES: usize = 16;
-/// Most arrangements of lists that are kept in mind.
-const MOST_ARRANGEMENTS: usize = 64;
+const MOST_TABLES: usize = 16; // most tables of a topic
+const MOST_ARRANGEMENTS: usize = 64; // most arrangements of lists that are kept in mind
 /// Most messages in a row with earlier stamps than one before them, for which they count as late; more are another run
 /// of a simulator.
 const MOST_LATE: usize = 20;
 
 #[derive(Default)]
 pub(super) struct Topics {
-    schemas: BTreeMap<u16, (SchemaHeader, Vec<u8>)>,
+    schemas: BTreeMap<u16, Schema>,
     channels: BTreeMap<u16, usize>,
     topics: Vec<Topic>,
     pub messages: usize,
 }
 
+/// Encoding, name and text of a definition.
+type Schema = (String, String, Vec<u8>);
+
 struct Topic {
     name: String,
     definition: Result<(Layout, Definition), String>,
-    declared: (String, String, String, Vec<u8>),
+    /// Encoding of the messages, and their schema.
+    declared: (String, Option<Schema>),
     tables: Vec<Table>,
     /// By lists of a message: its table, and the columns of its numbers.
     arrangements: BTreeMap<Vec<u8>, (usize, Vec<usize>)>,
@@ -42,10 +43,8 @@ struct Topic {
     fault: Option<String>,
 }
 
-/// Messages with the same names.
 struct Table {
     log: Log,
-    /// Numbers of the messages within their topic.
     arrivals: Vec<usize>,
     /// Whether a narrower table has its rows.
     is_part: bool,
@@ -59,27 +58,19 @@ impl Topics {
     }
 
     pub(crate) fn schema(&mut self, header: SchemaHeader, text: Vec<u8>) {
-        self.schemas.insert(header.id, (header, text));
+        let schema = (header.encoding, header.name, text);
+        self.schemas.insert(header.id, schema);
     }
 
-    /// A declared channel.
     pub(crate) fn channel(&mut self, channel: &Declared) -> Result<(), String> {
-        let schema = self.schemas.get(&channel.schema_id);
-        let (header, text) = schema.map_or((None, &[][..]), |(header, text)| (Some(header), text));
-        let of =
-            |text: fn(&SchemaHeader) -> &String| header.map_or(String::new(), |h| text(h).clone());
-        let declared = (
-            channel.message_encoding.clone(),
-            of(|header| &header.encoding),
-            of(|header| &header.name),
-            text.to_vec(),
-        );
-        let same = |topic: &Topic| topic.name == channel.topic && topic.declared == declared;
+        let (id, other) = (channel.id, &channel.topic);
+        let schema = self.schemas.get(&channel.schema_id).cloned();
+        let declared = (channel.message_encoding.clone(), schema);
+        let same = |topic: &Topic| topic.name == *other && topic.declared == declared;
         let index = (self.topics.iter().position(same)).unwrap_or_else(|| {
-            let definition = definition(channel, header.is_some(), &declared);
             self.topics.push(Topic {
-                name: channel.topic.clone(),
-                definition,
+                name: other.clone(),
+                definition: definition(other, &declared.0, declared.1.as_ref()),
                 declared,
                 tables: Vec::new(),
                 arrangements: BTreeMap::new(),
@@ -88,30 +79,23 @@ impl Topics {
             });
             self.topics.len() - 1
         });
-        match self.channels.entry(channel.id) {
-            Entry::Vacant(free) => _ = free.insert(index),
-            Entry::Occupied(known) if *known.get() == index => {}
-            Entry::Occupied(known) => {
-                let (one, other) = (&self.topics[*known.get()].name, &channel.topic);
-                return Err(format!(
-                    "channel {} is of `{one}` and of `{other}`",
-                    channel.id
-                ));
+        match *self.channels.entry(id).or_insert(index) {
+            known if known == index => Ok(()),
+            known => {
+                let one = &self.topics[known].name;
+                Err(format!("channel {id} is of `{one}` and of `{other}`"))
             }
         }
-        Ok(())
     }
 
-    /// A message.
     pub(crate) fn message(
         &mut self,
         channel: u16,
         time_ns: u64,
         bytes: &[u8],
     ) -> Result<(), String> {
-        let index = self.channels.get(&channel);
-        let index = index
-            .ok_or_else(|| format!("a message of channel {channel}, which is not declared"))?;
+        let undeclared = || format!("a message of channel {channel}, which is not declared");
+        let index = self.channels.get(&channel).ok_or_else(undeclared)?;
         let topic = &mut self.topics[*index];
         self.messages += 1;
         if topic.fault.is_none()
@@ -155,31 +139,27 @@ impl Topics {
         if logs.iter().all(|log| log.fault.is_some()) {
             let refused = (logs.iter()).find_map(|log| Some((&log.name, log.fault.as_ref()?)));
             let why = refused.map(|(topic, fault)| format!(" (`{topic}`: {fault})"));
-            return Err(RecordingFault::NoTopic(why.unwrap_or_default()));
+            let text = "found no topic of ROS messages with numbers".to_owned();
+            return Err(RecordingFault::Text(text + &why.unwrap_or_default()));
         }
         Ok(logs)
     }
 }
 
 fn definition(
-    channel: &Declared,
-    has_schema: bool,
-    (message, encoding, name, text): &(String, String, String, Vec<u8>),
+    topic: &str,
+    message: &str,
+    schema: Option<&Schema>,
 ) -> Result<(Layout, Definition), String> {
-    let layout = match (&message[..], &encoding[..]) {
+    let encoding = schema.map_or("", |(encoding, ..)| encoding);
+    let layout = match (message, encoding) {
         ("cdr", "ros2msg") => Layout::Ros2,
         ("ros1", "ros1msg") => Layout::Ros1,
-        (message, schema) => {
-            return Err(unknown_encoding(&format!("{message} with {schema}")));
-        }
+        _ => return Err(unknown_encoding(&format!("{message} with {encoding}"))),
     };
-    if !has_schema {
-        return Err(undefined(&channel.topic));
-    }
-    Ok((
-        layout,
-        Definition::parse(name, &String::from_utf8_lossy(text))?,
-    ))
+    let (_, name, text) = schema.ok_or_else(|| undefined(topic))?;
+    let definition = Definition::parse(name, &String::from_utf8_lossy(text))?;
+    Ok((layout, definition))
 }
 
 impl Topic {
@@ -197,9 +177,8 @@ impl Topic {
         let (table, order) = &self.arrangements[&found.lists];
         let table = &mut self.tables[*table];
         if table.log.len() == MAX_ROWS {
-            return Err(format!(
-                "more than {MAX_ROWS} messages, expected shorter recordings"
-            ));
+            let most = format!("more than {MAX_ROWS} messages");
+            return Err(most + ", expected shorter recordings");
         }
         table.arrivals.push(self.arrived);
         self.arrived += 1;
@@ -225,25 +204,20 @@ impl Topic {
             return Err(format!("message: `{}` twice", twice[0]));
         }
         let columns_in = |table: &Table| {
-            let columns = &table.log.columns[1..];
-            let places: BTreeMap<&String, usize> = columns
-                .iter()
-                .enumerate()
-                .map(|(i, column)| (&column.name, i + 1))
-                .collect();
+            let columns = table.log.columns.iter().zip(0..).skip(1);
+            let places: BTreeMap<&String, usize> =
+                columns.map(|(column, i)| (&column.name, i)).collect();
             let found = names.iter().map(|name| places.get(name).copied());
-            found
-                .collect::<Option<Vec<usize>>>()
-                .filter(|found| found.len() == columns.len())
+            let found = found.collect::<Option<Vec<usize>>>();
+            found.filter(|found| found.len() == places.len())
         };
         let mut known = self.tables.iter().enumerate();
         if let Some(found) = known.find_map(|(table, of)| Some((table, columns_in(of)?))) {
             return Ok(found);
         }
         if self.tables.len() == MOST_TABLES {
-            return Err(format!(
-                "messages of more than {MOST_TABLES} lengths or sets of names, expected tables"
-            ));
+            let most = format!("messages of more than {MOST_TABLES} lengths or sets of names");
+            return Err(most + ", expected tables");
         }
         let order = (1..=names.len()).collect();
         let columns = ["log_time".to_owned()].into_iter().chain(names);
@@ -273,12 +247,10 @@ fn instant(seconds: i64, nanoseconds: u32) -> Instant {
 impl Table {
     /// Adds the rows of a table that has all columns of this one and more: messages with further joints or values.
     fn add(&mut self, wider: &mut Self) {
-        let columns = self.log.columns.iter();
-        let place = |column: &Channel| {
-            let mut own = wider.log.columns.iter();
-            own.position(|other| other.name == column.name)
-        };
-        let Some(places) = columns.map(place).collect::<Option<Vec<usize>>>() else {
+        let of_wider = &wider.log.columns;
+        let place = |own: &Channel| of_wider.iter().position(|other| other.name == own.name);
+        let places = self.log.columns.iter().map(place);
+        let Some(places) = places.collect::<Option<Vec<usize>>>() else {
             return;
         };
         for (column, place) in self.log.columns.iter_mut().zip(places) {
@@ -305,27 +277,19 @@ impl Table {
             log.notes.push(note);
         };
         let recorded = log.columns[0].times();
-        let early = late(&recorded);
+        let (early, _) = late(&recorded);
         if early > 0 {
             log.sort_by(&recorded);
             let what = "were out of order and are sorted by their time of recording";
             say(&mut log, early, what);
         }
-        let is_stamp = |channel: &Channel| {
-            channel.name == "header.stamp" && channel.values.iter().any(|time| *time != 0.0)
-        };
+        let has_times = |channel: &Channel| channel.values.iter().any(|time| *time != 0.0);
+        let is_stamp = |channel: &Channel| channel.name == "header.stamp" && has_times(channel);
         let clock = log.columns.iter().position(is_stamp).unwrap_or(0);
         log.clock = Some(clock);
         let stamps = log.columns[clock].times();
-        let mut runs = stamps
-            .iter()
-            .scan((f64::NEG_INFINITY, 0), |(latest, run), &time| {
-                *run = if time < *latest { *run + 1 } else { 0 };
-                *latest = latest.max(time);
-                Some(*run)
-            });
-        let count = late(&stamps);
-        if count > 0 && runs.all(|run| run <= MOST_LATE) {
+        let (count, longest) = late(&stamps);
+        if count > 0 && longest <= MOST_LATE {
             log.sort_by(&stamps);
             say(&mut log, count, "had late stamps and are sorted by these");
         }
@@ -339,24 +303,24 @@ impl Table {
     }
 }
 
-/// How many of some times are earlier than one before them.
-fn late(times: &[f64]) -> usize {
-    let mut latest = f64::NEG_INFINITY;
-    let is_late = |time: &&f64| {
-        let found = **time < latest;
-        latest = latest.max(**time);
-        found
-    };
-    times.iter().filter(is_late).count()
+/// How many of some times are earlier than one before them, in all and at most in a row.
+fn late(times: &[f64]) -> (usize, usize) {
+    let (mut latest, mut run, mut longest, mut count) = (f64::NEG_INFINITY, 0, 0, 0);
+    for &time in times {
+        run = if time < latest { run + 1 } else { 0 };
+        count += usize::from(run > 0);
+        longest = longest.max(run);
+        latest = latest.max(time);
+    }
+    (count, longest)
 }
 
 /// The rows that do not repeat one of the same time in all columns but that of the recording.
 fn distinct(log: &Log, clock: usize) -> Vec<usize> {
     let times = log.columns[clock].times();
     let others = &log.columns[1..];
-    let same = |one: usize, other: usize| {
-        (others.iter()).all(|column| column.values[one].to_bits() == column.values[other].to_bits())
-    };
+    let bits = |column: &Channel, row: usize| column.values[row].to_bits();
+    let same = |a, b| (others.iter()).all(|column| bits(column, a) == bits(column, b));
     let mut kept: Vec<usize> = Vec::new();
     for row in 0..times.len() {
         let before = kept.iter().rev().take(MOST_LATE);

@@ -5,7 +5,6 @@ use serde::{Serialize, Serializer};
 
 use super::weight_n;
 use crate::recording::preprocess::{differences, median};
-use crate::recording::segment::stretches;
 use crate::recording::{Recording, Segment};
 use crate::robot::input_rule::rotation;
 use crate::robot::{BODY_NAMES, BODY_Z, FOOT_DIM, JOINT_DIM, Leg, Robot};
@@ -59,8 +58,7 @@ impl Balance {
             fall_m_s2: (flight_s >= LEAST_S).then(|| dv / flight_s),
             fall_by_height_m_s2: (!falls.is_empty()).then(|| median(falls.into_iter())),
             weight_share: (ground_s >= LEAST_S && needed > 0.0).then(|| impulse / needed),
-            hip_share: sums
-                .hips
+            hip_share: (sums.hips)
                 .map(|(product, square)| (square > 0.0).then(|| product / square)),
             acceleration_offset_m_s2: acceleration_offset(recording),
         }
@@ -69,15 +67,14 @@ impl Balance {
 
 impl Sums {
     fn add(&mut self, segment: &Segment, robot: &Robot) {
-        let forces: Vec<Vector3<f64>> = (0..segment.len())
-            .map(|sample| self.add_forces(segment, robot, sample))
-            .collect();
-        let is_grounded = |sample: usize| segment.feet[sample].contains(&true);
-        for run in stretches(0..segment.len(), |a, b| is_grounded(a) == is_grounded(b)) {
+        let samples = 0..segment.len();
+        let forces = samples.map(|sample| self.add_forces(segment, robot, sample));
+        let forces: Vec<Vector3<f64>> = forces.collect();
+        for (run, is_grounded) in segment.contacts() {
             let (start, end) = (run.start, run.end - 1);
             let time_s = segment.time_s[end] - segment.time_s[start];
             let dv = segment.dx[(HEIGHT, end)] - segment.dx[(HEIGHT, start)];
-            if is_grounded(start) {
+            if is_grounded {
                 let between = (start..end).map(|s| {
                     let step_s = segment.time_s[s + 1] - segment.time_s[s];
                     0.5 * step_s * (forces[s].z + forces[s + 1].z)
@@ -101,9 +98,8 @@ impl Sums {
         for leg in Leg::ALL {
             let q = leg.of_joints(&joints);
             let tau = leg.of_joints(&torque);
-            let Some(map) = (robot.damped_force_map(leg, &q).ok())
-                .filter(|_| segment.feet[sample][leg.index()])
-            else {
+            let map = robot.damped_force_map(leg, &q).ok();
+            let Some(map) = map.filter(|_| segment.feet[sample][leg.index()]) else {
                 continue;
             };
             let force = map * Vector3::from(tau);
@@ -139,10 +135,8 @@ pub(in crate::recording) fn hip_torque(
 
 /// Vertical acceleration of each flight by a parabola through its heights.
 fn falls_of(segment: &Segment) -> Vec<f64> {
-    let is_grounded = |sample: usize| segment.feet[sample].contains(&true);
-    let runs = stretches(0..segment.len(), |a, b| is_grounded(a) == is_grounded(b));
-    let flights = runs.into_iter().filter(|run| !is_grounded(run.start));
-    let fall = |run: std::ops::Range<usize>| {
+    let flights = (segment.contacts().into_iter()).filter(|(_, is_grounded)| !is_grounded);
+    let fall = |(run, _): (std::ops::Range<usize>, bool)| {
         let middle = 0.5 * (segment.time_s[run.start] + segment.time_s[run.end - 1]);
         let length = segment.time_s[run.end - 1] - segment.time_s[run.start];
         let (mut matrix, mut side) = (Matrix3::zeros(), Vector3::zeros());
@@ -163,9 +157,9 @@ fn without_axis<S: Serializer>(offset: &Option<(&str, f64)>, out: S) -> Result<S
 }
 
 fn acceleration_offset(recording: &Recording) -> Option<(&'static str, f64)> {
-    let slopes: Vec<_> = (recording.segments.iter())
-        .map(|segment| differences(&segment.time_s, &segment.dx))
-        .collect();
+    let segments = recording.segments.iter();
+    let slopes = segments.map(|segment| differences(&segment.time_s, &segment.dx));
+    let slopes: Vec<_> = slopes.collect();
     let of_axis = |axis: usize| {
         let row = JOINT_DIM + axis;
         let pairs = recording.segments.iter().zip(&slopes);

@@ -12,8 +12,7 @@ use crate::robot::{ContactFlags, FOOT_DIM, JOINT_DIM, Leg, Robot};
 ///
 /// In right recordings single samples of a foot that rolls off or touches down can favour another order by 8 mm in sum.
 const LEAST_GAIN: (f64, f64) = (9e-3, 0.3);
-/// Height of the feet that are on the ground, m.
-const FLOOR_M: f64 = 0.1;
+const FLOOR_M: f64 = 0.1; // height of the feet that are on the ground, m
 
 /// Another order of the columns, if it fits the heights of the feet clearly better than the recorded one.
 pub(super) fn columns(recording: &Recording, robot: &Robot) -> Option<Mismatch> {
@@ -34,15 +33,14 @@ pub(super) fn columns(recording: &Recording, robot: &Robot) -> Option<Mismatch> 
     let (legs, &best_m) = judged().max_by(|one, other| one.1.total_cmp(other.1))?;
     let least_m = best_m - LEAST_GAIN.0.max(LEAST_GAIN.1 * best_m.abs());
     let breach = outside(recorded_m, least_m, f64::INFINITY);
-    mismatch("feet_columns", breach, |recorded_m| {
-        format!(
-            "while some feet are on the ground, those said to be in the air are higher by {:.0} mm in sum over the \
-             samples, and by {:.0} mm if the columns of the feet are of {}: are they exchanged?",
-            1e3 * recorded_m,
-            1e3 * best_m,
-            legs.map(Leg::short_name).join(", ")
-        )
-    })
+    let words = format!(
+        "while some feet are on the ground, those said to be in the air are higher by {:.0} mm in sum over the \
+         samples, and by {:.0} mm if the columns of the feet are of {}: are they exchanged?",
+        1e3 * recorded_m,
+        1e3 * best_m,
+        legs.map(Leg::short_name).join(", ")
+    );
+    mismatch("feet_columns", breach, words)
 }
 
 /// How much higher feet in the air are than those on the ground if the columns are of these legs, m.
@@ -55,16 +53,14 @@ fn higher_m(feet: &ContactFlags, height: &[f64; FOOT_DIM], legs: &[Leg; FOOT_DIM
     mean(false) - mean(true)
 }
 
-/// The median height of the feet that are on the ground, if that is not the floor's.
 pub(super) fn floor(value: f64) -> Option<Mismatch> {
     // The bound has no sign.
     let breach = outside(value, -FLOOR_M, FLOOR_M).map(|(value, _)| (value, FLOOR_M));
-    mismatch("floor", breach, |value| {
-        format!(
-            "feet on the ground are at a height of {value:.2} m ({FLOOR_M:.2} m are accepted): is z that of the trunk \
-             over the ground?"
-        )
-    })
+    let words = format!(
+        "feet on the ground are at a height of {value:.2} m ({FLOOR_M:.2} m are accepted): is z that of the trunk \
+         over the ground?"
+    );
+    mismatch("floor", breach, words)
 }
 
 /// Median height of the feet that are on the ground, m.
@@ -83,8 +79,7 @@ pub(super) fn floor_m(recording: &Recording, robot: &Robot) -> f64 {
 /// Lowest height of the trunk's origin over the floor, m, and largest angle of its z axis to the vertical while feet are
 /// on the ground, rad.
 const TRUNK: (f64, f64) = (0.05, 1.6);
-/// Shortest time that it lies, s.
-const LIES_S: f64 = 0.1;
+const LIES_S: f64 = 0.1; // shortest time that it lies, s
 
 /// Time, s, that the trunk lies on the ground, or under it, or on its back, if that is long enough.
 pub(super) fn fallen(recording: &Recording, floor_m: f64) -> Option<Mismatch> {
@@ -102,23 +97,20 @@ pub(super) fn fallen(recording: &Recording, floor_m: f64) -> Option<Mismatch> {
             (lowest, steepest) = (lowest.min(height), steepest.max(tilt));
         }
     }
-    mismatch("fallen", outside(lies_s, 0.0, LIES_S), |lies_s| {
-        format!(
-            "for {lies_s:.2} s with feet on the ground the trunk is tilted by up to {:.0} degrees and as low as \
-             {lowest:.2} m: did the robot fall? `rows` in `[text]` of a map keeps the jump alone",
-            steepest.to_degrees()
-        )
-    })
+    let words = format!(
+        "for {lies_s:.2} s with feet on the ground the trunk is tilted by up to {:.0} degrees and as low as \
+         {lowest:.2} m: did the robot fall? `rows` in `[text]` of a map keeps the jump alone",
+        steepest.to_degrees()
+    );
+    mismatch("fallen", outside(lies_s, 0.0, LIES_S), words)
 }
 
-/// Height of each foot over where it stands, m.
 fn heights(segment: &Segment, robot: &Robot) -> Vec<[f64; FOOT_DIM]> {
-    let mut heights: Vec<[f64; FOOT_DIM]> = (0..segment.len())
-        .map(|sample| {
-            let x = segment.state(sample);
-            Leg::ALL.map(|leg| foot_place(robot, leg, &x, false).z)
-        })
-        .collect();
+    let of_sample = |sample| {
+        let x = segment.state(sample);
+        Leg::ALL.map(|leg| foot_place(robot, leg, &x, false).z)
+    };
+    let mut heights: Vec<[f64; FOOT_DIM]> = (0..segment.len()).map(of_sample).collect();
     for leg in 0..FOOT_DIM {
         let standing = (heights.iter().zip(&segment.feet)).filter(|(_, feet)| feet[leg]);
         let floor = median(standing.map(|(height, _)| height[leg]));

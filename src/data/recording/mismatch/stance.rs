@@ -10,14 +10,12 @@ use crate::recording::segment::stretches;
 use crate::recording::{Recording, Segment};
 use crate::robot::{FOOT_DIM, JOINT_DIM, Leg, Robot, STATE_DIM};
 
-/// Shortest stance that counts, s.
-const LEAST_STANCE_S: f64 = 0.05;
+const LEAST_STANCE_S: f64 = 0.05; // shortest stance that counts, s
 /// Time at both ends of a stance that does not count, s: touchdown and lift-off; at most an eighth of the stance.
 const EDGE_S: f64 = 0.02;
 /// Radius of the sphere that a foot rolls on, m: 0.02 to 0.023 on the robots that romc knows.
 const FOOT_RADIUS_M: f64 = 0.022;
-/// Fewest samples of feet on the ground that say anything.
-const LEAST_SAMPLES: usize = 50;
+const LEAST_SAMPLES: usize = 50; // fewest samples of feet on the ground that say anything
 
 /// A way in which columns of joints and body are easily recorded, in words, and what it makes of a state.
 type Reading = (&'static str, fn(&mut [f64; STATE_DIM]));
@@ -34,6 +32,7 @@ const SIGNS: [Reading; 4] = [
     }),
 ];
 
+const RIGHT_ANGLE: &str = "with body x and y turned by a right angle";
 /// Places of the body, its attitude being right.
 const PLACES: [Reading; 6] = [
     ("with body x of the other sign", |x| negate(x, &[BODY])),
@@ -42,25 +41,21 @@ const PLACES: [Reading; 6] = [
     ("with body x and y of the other sign", |x| {
         negate(x, &[BODY, BODY + 1]);
     }),
-    ("with body x and y turned by a right angle", |x| {
+    (RIGHT_ANGLE, |x| {
         x.swap(BODY, BODY + 1);
         negate(x, &[BODY + 1]);
     }),
-    ("with body x and y turned by a right angle", |x| {
+    (RIGHT_ANGLE, |x| {
         x.swap(BODY, BODY + 1);
         negate(x, &[BODY]);
     }),
 ];
 
+const XYZW: &str = "with the quaternion in the order xyzw instead of wxyz";
+const WXYZ: &str = "with the quaternion in the order wxyz instead of xyzw";
 const QUATERNIONS: [Reading; 2] = [
-    (
-        "with the quaternion in the order xyzw instead of wxyz",
-        |x| reorder_quaternion(x, [3, 0, 1, 2]),
-    ),
-    (
-        "with the quaternion in the order wxyz instead of xyzw",
-        |x| reorder_quaternion(x, [1, 2, 3, 0]),
-    ),
+    (XYZW, |x| reorder_quaternion(x, [3, 0, 1, 2])),
+    (WXYZ, |x| reorder_quaternion(x, [1, 2, 3, 0])),
 ];
 
 fn negate(x: &mut [f64; STATE_DIM], coordinates: &[usize]) {
@@ -98,14 +93,14 @@ pub(super) fn best_other_place(
 /// The reading under which feet on the ground stay best in place against each other, and their root mean square then,
 /// m: of all orders of the legs but the recorded one, and of the other signs of [`SIGNS`].
 pub(super) fn best_other_reading(recording: &Recording, robot: &Robot) -> Option<(f64, String)> {
-    let all: Vec<Stances> = (recording.segments.iter())
-        .map(|segment| Stances::of(segment, robot, AS_RECORDED, &Leg::ALL))
-        .collect();
+    let of_segment = |segment| Stances::of(segment, robot, AS_RECORDED, &Leg::ALL);
+    let all: Vec<Stances> = recording.segments.iter().map(of_segment).collect();
     let orders = orders().into_iter().filter(|order| *order != Leg::ALL);
     let of_orders = orders.map(|order| {
         let mut slip = Slip::default();
-        all.iter()
-            .for_each(|stances| stances.add_to(&mut slip, &order));
+        for stances in &all {
+            stances.add_to(&mut slip, &order);
+        }
         let names = order.map(Leg::short_name).join(", ");
         let words = format!("with the joints of fr, fl, rr, rl taken from {names}");
         (slip.relative_rms_m(), words)
@@ -117,7 +112,6 @@ pub(super) fn best_other_reading(recording: &Recording, robot: &Robot) -> Option
     best(of_orders.chain(of_signs))
 }
 
-/// The one with the least of these figures.
 fn best<T>(judged: impl Iterator<Item = (Option<f64>, T)>) -> Option<(f64, T)> {
     let known = judged.filter_map(|(rms_m, reading)| Some((rms_m?, reading)));
     let finite = known.filter(|(rms_m, _)| rms_m.is_finite());
@@ -125,16 +119,11 @@ fn best<T>(judged: impl Iterator<Item = (Option<f64>, T)>) -> Option<(f64, T)> {
 }
 
 pub(super) fn orders() -> Vec<[Leg; FOOT_DIM]> {
-    let mut out = Vec::new();
-    for code in 0..FOOT_DIM.pow(FOOT_DIM as u32) {
-        let digits: [usize; FOOT_DIM] =
-            std::array::from_fn(|place| code / FOOT_DIM.pow(place as u32) % FOOT_DIM);
-        let all = (0..FOOT_DIM).all(|leg| digits.contains(&leg));
-        if all {
-            out.push(digits.map(|leg| Leg::ALL[leg]));
-        }
-    }
-    out
+    let digit = |code: usize, place: usize| Leg::ALL[code / FOOT_DIM.pow(place as u32) % FOOT_DIM];
+    let codes = 0..FOOT_DIM.pow(FOOT_DIM as u32);
+    let all = codes.map(|code| std::array::from_fn(|place| digit(code, place)));
+    all.filter(|legs| Leg::ALL.iter().all(|leg| legs.contains(leg)))
+        .collect()
 }
 
 /// Place of a leg's foot in the world, m, in a state `x`; `rolled` without what the foot's sphere has rolled.
@@ -186,11 +175,8 @@ impl Slip {
     }
 }
 
-/// Where the feet of a segment are beside their stance, for each leg with its own columns or those of others.
-struct Stances {
-    /// Sample, leg, leg whose columns are read, place about the median of the stance, m.
-    moved: Vec<(usize, Leg, Leg, Vector3<f64>)>,
-}
+/// Sample, leg, leg whose columns are read, place of the foot about the median of the stance, m.
+struct Stances(Vec<(usize, Leg, Leg, Vector3<f64>)>);
 
 impl Stances {
     /// In a reading of the columns; each leg is read from its own columns and from those of `others`.
@@ -213,30 +199,24 @@ impl Stances {
             }
         }
         moved.sort_by_key(|(sample, ..)| *sample);
-        Self { moved }
+        Self(moved)
     }
 
-    /// Adds the places with the legs read from the columns of `order`.
     fn add_to(&self, slip: &mut Slip, order: &[Leg; FOOT_DIM]) {
-        let of_sample = self.moved.chunk_by(|one, other| one.0 == other.0);
+        let of_sample = self.0.chunk_by(|one, other| one.0 == other.0);
         let mut standing = Vec::with_capacity(FOOT_DIM);
         for feet in of_sample {
             standing.clear();
-            let chosen = feet
-                .iter()
-                .filter(|(_, leg, from, _)| order[leg.index()] == *from);
+            let chosen = (feet.iter()).filter(|(_, leg, from, _)| order[leg.index()] == *from);
             standing.extend(chosen.map(|(.., place)| *place));
+            let common = standing.iter().sum::<Vector3<f64>>() / standing.len() as f64;
             for place in &standing {
                 slip.absolute.0 += place.norm_squared();
                 slip.absolute.1 += 1;
-            }
-            if standing.len() < 2 {
-                continue;
-            }
-            let common = standing.iter().sum::<Vector3<f64>>() / standing.len() as f64;
-            for place in &standing {
-                slip.relative.0 += (place - common).norm_squared();
-                slip.relative.1 += 1;
+                if standing.len() > 1 {
+                    slip.relative.0 += (place - common).norm_squared();
+                    slip.relative.1 += 1;
+                }
             }
         }
     }

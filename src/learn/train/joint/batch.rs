@@ -1,4 +1,4 @@
-//! Batches of consecutive samples, with what the losses need of them computed once.
+//! Batches of consecutive samples.
 
 use nalgebra::DMatrix;
 
@@ -21,31 +21,9 @@ pub(super) struct Batch {
     /// Inputs, `n x 18`.
     pub u: DMatrix<f64>,
     pub step_s: f64,
-    /// `[x, 1]^T [x, 1] / n`, `19 x 19`.
-    pub state_moment: DMatrix<f64>,
-    /// `u^T u`, `18 x 18`.
-    pub input_moment: DMatrix<f64>,
-    /// Sum of squares of `ddx`.
-    pub ddx_energy: f64,
 }
 
 impl Batch {
-    pub(super) fn new(phase: usize, [x, dx, ddx, u]: [DMatrix<f64>; 4], step_s: f64) -> Self {
-        let n = x.nrows();
-        let extended = x.clone().insert_column(x.ncols(), 1.0);
-        Self {
-            phase,
-            state_moment: extended.tr_mul(&extended) / n as f64,
-            input_moment: u.tr_mul(&u),
-            ddx_energy: ddx.norm_squared(),
-            x,
-            dx,
-            ddx,
-            u,
-            step_s,
-        }
-    }
-
     pub(super) fn samples(&self) -> usize {
         self.x.nrows()
     }
@@ -65,8 +43,14 @@ pub(super) fn batches(
             let ddx = state(moving_average(&samples.ddx, dataset.smoothing));
             for start in (0..samples.len()).step_by(BATCH_ROWS) {
                 let cut = |all: &DMatrix<f64>| all.rows(start, BATCH_ROWS).into_owned();
-                let blocks = [cut(&x), cut(&dx), cut(&ddx), cut(&u)];
-                out.push(Batch::new(span.phase, blocks, samples.mean_step_s()));
+                out.push(Batch {
+                    phase: span.phase,
+                    x: cut(&x),
+                    dx: cut(&dx),
+                    ddx: cut(&ddx),
+                    u: cut(&u),
+                    step_s: samples.mean_step_s(),
+                });
             }
         }
     }

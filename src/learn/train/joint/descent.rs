@@ -1,8 +1,13 @@
-//! Descent by Adam: epochs of a transfer step, the optimiser, and the coefficients that sequential thresholding leaves.
+//! Descent by Adam: the transfer steps of section IV-D, the optimiser, and the coefficients that sequential
+//! thresholding leaves.
+
+use std::collections::BTreeSet;
 
 use nalgebra::DMatrix;
 
-use super::loss::LossWeights;
+use super::batch::Batch;
+use super::loss::{JointLoss, LossWeights, Losses};
+use super::parameters::Parameters;
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct Schedule {
@@ -30,7 +35,7 @@ impl Default for Schedule {
 }
 
 impl Schedule {
-    pub fn total(&self) -> usize {
+    pub(super) fn total(&self) -> usize {
         self.epochs + self.refinement
     }
 
@@ -49,6 +54,76 @@ impl Schedule {
             && self.threshold_every > 0
             && epoch.is_multiple_of(self.threshold_every)
     }
+}
+
+/// What a transfer step moves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Moved {
+    /// Encoder, decoder and the Xi of the phases of the batches.
+    All,
+    /// The decoder, by (16) alone.
+    Decoder,
+    /// The Xi of the phases of the batches.
+    Xi,
+}
+
+/// Called after every epoch with its number, the losses and the active terms. Returns whether to go on.
+pub(super) type Listener<'a> = dyn FnMut(usize, &Losses, usize) -> bool + 'a;
+
+/// One transfer step. Returns the mean losses of the last epoch.
+pub(super) fn descend(
+    parameters: &mut Parameters,
+    moved: Moved,
+    batches: &[&Batch],
+    loss: &mut JointLoss<'_>,
+    schedule: &Schedule,
+    listener: &mut Listener<'_>,
+) -> Losses {
+    let fixed = match moved {
+        Moved::All => 0,
+        Moved::Decoder => parameters.encoder.blocks().count(),
+        Moved::Xi => parameters.maps().count(),
+    };
+    let blocks = parameters.maps().skip(fixed);
+    let mut maps: Vec<Adam> = blocks
+        .map(|block| Adam::new(block.len(), schedule.learning_rate))
+        .collect();
+    let coefficients = parameters.xi.iter();
+    let mut coefficients: Vec<MaskedAdam> = coefficients
+        .map(|xi| MaskedAdam::new(xi, schedule))
+        .collect();
+    let phases: BTreeSet<usize> = match moved {
+        Moved::Decoder => BTreeSet::new(),
+        Moved::All | Moved::Xi => batches.iter().map(|batch| batch.phase).collect(),
+    };
+    let mut mean = Losses::default();
+    for epoch in 0..schedule.total() {
+        for &phase in &phases {
+            coefficients[phase].start_epoch(epoch, schedule, &mut parameters.xi[phase]);
+        }
+        loss.current = match moved {
+            Moved::Decoder => LossWeights::RECONSTRUCTION_ONLY,
+            Moved::All | Moved::Xi => schedule.weights_at(epoch, loss.weights),
+        };
+        mean = Losses::default();
+        for batch in batches {
+            let losses = loss.evaluate(parameters, batch);
+            mean = mean.plus(&losses, 1.0 / batches.len() as f64);
+            let (gradient, phase) = (&loss.gradient, batch.phase);
+            let blocks = parameters.maps_mut().zip(gradient.maps()).skip(fixed);
+            for (optimiser, (block, gradient)) in maps.iter_mut().zip(blocks) {
+                optimiser.step(block, gradient);
+            }
+            if phases.contains(&phase) {
+                coefficients[phase].step(&mut parameters.xi[phase], &gradient.xi[phase]);
+            }
+        }
+        let active = phases.iter().map(|&phase| coefficients[phase].active());
+        if !listener(epoch + 1, &mean, active.sum()) {
+            break;
+        }
+    }
+    mean
 }
 
 /// Adam on the coefficients of a phase, with the mask of sequential thresholding: what is dropped once stays
@@ -128,6 +203,92 @@ impl Adam {
             *mean += (1.0 - BETA_MEAN) * (g - *mean);
             *square += (1.0 - BETA_SQUARE) * (g * g - *square);
             *value -= rate * *mean / (square.sqrt() + epsilon);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::DVector;
+
+    use super::*;
+    use crate::model::Activation;
+    use crate::train::features::Features;
+    use crate::train::joint::parameters::Frame;
+    use crate::train::joint::unroll::Unroll;
+    use crate::train::oscillator::standard_library;
+    use crate::train::random::Random;
+
+    #[test]
+    fn training_lowers_the_loss_and_masks_small_coefficients_and_moves_nothing_else() {
+        let schedule = Schedule {
+            epochs: 40,
+            refinement: 20,
+            threshold: 0.09,
+            threshold_every: 10,
+            learning_rate: 1e-2,
+        };
+        let weights = LossWeights {
+            ddz: 0.5,
+            ddx: 0.3,
+            l1: 0.01,
+            lift: 0.2,
+            bptt: 0.0,
+        };
+        let features = Features::new(&standard_library(2, 1, true));
+        let mut random = Random::new(21);
+        let batches: Vec<Batch> = (0..4)
+            .map(|i| {
+                let [x, dx, ddx, u] = std::array::from_fn(|_| random.matrix(40, 6, 0.5));
+                let (phase, step_s) = (i % 2, 0.002);
+                Batch {
+                    phase,
+                    x,
+                    dx,
+                    ddx,
+                    u,
+                    step_s,
+                }
+            })
+            .collect();
+        let all: Vec<&Batch> = batches.iter().collect();
+        let kinds = [Activation::Linear, Activation::Elu].into_iter();
+        let moves = [Moved::All, Moved::Decoder, Moved::Xi];
+        for (kind, moved) in kinds.flat_map(|kind| moves.map(|moved| (kind, moved))) {
+            let widths: (&[usize], &[usize]) = (&[6, 5, 2], &[2, 5, 6]);
+            let shape = (features.library_dim(), 2, 0.1);
+            let mut parameters = Parameters::random(widths, kind, shape, &mut Random::new(22));
+            let frame = Frame::plain(&[true, true, false, true, true, true]);
+            let maps = (frame, DVector::from_element(6, 1.0));
+            let mut loss =
+                JointLoss::new(&features, maps, (weights, Unroll::default()), &parameters);
+            let before = parameters.clone();
+            let (mut history, mut counts) = (Vec::new(), Vec::new());
+            let mut listen = |_: usize, losses: &Losses, active: usize| {
+                history.push(losses.total(&weights));
+                counts.push(active);
+                true
+            };
+            descend(
+                &mut parameters,
+                moved,
+                &all,
+                &mut loss,
+                &schedule,
+                &mut listen,
+            );
+            assert!(history[59] < history[0], "{moved:?} {history:?}");
+            let masked =
+                |parameters: &Parameters| parameters.encoder.layers[0].weights.row(2).into_owned();
+            assert_eq!(masked(&parameters), masked(&before));
+            assert_eq!(parameters.encoder != before.encoder, moved == Moved::All);
+            assert_eq!(parameters.decoder != before.decoder, moved != Moved::Xi);
+            assert_eq!(parameters.xi != before.xi, moved != Moved::Decoder);
+            if moved == Moved::All {
+                assert!(counts[59] < counts[0] && counts.windows(2).all(|pair| pair[1] <= pair[0]));
+                let left = |xi: &DMatrix<f64>| xi.iter().filter(|value| **value != 0.0).count();
+                assert_eq!(parameters.xi.iter().map(left).sum::<usize>(), counts[59]);
+            }
         }
     }
 }

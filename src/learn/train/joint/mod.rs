@@ -1,23 +1,17 @@
 //! Joint training of encoder, decoder and dynamics by Adam, as published and improved.
 //!
 //! Enters: recordings and [`JointOptions`](super::JointOptions). Leaves: a trained model. Read `loss` first (equations
-//! 9 to 20 and their gradient), which asks [`linear`] or [`nonlinear`] maps for encoding and decoding, then [`stages`]
-//! (the transfer steps of section IV-D) and [`joint`] (seeds, choice, assembly).
+//! 9 to 20 and their gradient), then `descent` (Adam, and the transfer steps of section IV-D) and [`joint`] (seeds,
+//! choice, assembly). Linear maps are networks of one layer.
 
 mod batch;
-mod linear;
+mod descent;
 mod loss;
 mod network;
-mod nonlinear;
 mod parameters;
 mod projection;
-mod stages;
-mod unroll;
-
-mod descent;
-mod fold;
-mod multiply;
 mod run;
+mod unroll;
 
 pub use descent::Schedule;
 pub use loss::{LossWeights, Losses};

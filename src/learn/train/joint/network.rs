@@ -8,9 +8,11 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::multiply::{Columns, add_transposed, product};
 use crate::model::Activation;
+use crate::train::features::vectorised;
 use crate::train::random::Random;
+
+const LANES: usize = 16;
 
 /// One layer: `y -> phi(y W + b)`.
 #[derive(Clone, Debug, PartialEq)]
@@ -57,15 +59,15 @@ impl Network {
         let last = widths.len().saturating_sub(2);
         let layers = widths.windows(2).enumerate().map(|(index, pair)| {
             let bound = (6.0 / (pair[0] + pair[1]) as f64).sqrt();
-            let phi = if index == last {
-                Activation::Linear
-            } else {
-                activation
-            };
+            let is_last = index == last;
             Dense {
                 weights: random.matrix(pair[0], pair[1], bound),
                 bias: DVector::zeros(pair[1]),
-                activation: phi,
+                activation: if is_last {
+                    Activation::Linear
+                } else {
+                    activation
+                },
             }
         });
         Self {
@@ -136,8 +138,7 @@ impl Network {
                 values += extra;
             }
             let own = &mut gradient.layers[index];
-            let (entering, arriving) = (Columns::all(&recorded.entering), Columns::all(&adjoint));
-            add_transposed(&mut own.weights, 1.0, entering, arriving);
+            add_transposed(&mut own.weights, &recorded.entering, &adjoint);
             for (bias, column) in own.bias.iter_mut().zip(adjoint.column_iter()) {
                 *bias += column.rows(0, tape.samples).sum();
             }
@@ -186,8 +187,7 @@ impl Network {
         for (index, (layer, recorded)) in self.layers.iter().zip(&tape.layers).enumerate() {
             let own = &mut gradient.layers[index].weights;
             let at_affine = &jacobians.at_affine[index];
-            // rows = at_affine W^T
-            add_transposed(own, 1.0, Columns::all(&adjoint), Columns::all(at_affine));
+            add_transposed(own, &adjoint, at_affine); // rows = at_affine W^T
             adjoint = product(&adjoint, &layer.weights);
             let [slopes, curvatures, _] = &recorded.derivatives;
             if layer.activation == Activation::Linear {
@@ -278,6 +278,66 @@ fn deactivate(recorded: &Recorded, n: usize, adjoint: &mut DMatrix<f64>) {
             second[s] = slope * adjoint_second;
         }
     }
+}
+
+/// `a b` of a batch and a small matrix.
+///
+/// A batch is a hundred rows and a product a microsecond: too short for general kernels, which pack their operands
+/// first. Every loop here runs down columns.
+pub(super) fn product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut product = DMatrix::zeros(a.nrows(), b.ncols());
+    add_columns(product.as_mut_slice(), a, b);
+    product
+}
+
+vectorised! {
+    fn add_columns(out: &mut [f64], a: &DMatrix<f64>, b: &DMatrix<f64>) {
+        assert_eq!(a.ncols(), b.nrows());
+        let rows = a.nrows();
+        let each = b.as_slice().chunks_exact(b.nrows());
+        for (out, factors) in out.chunks_exact_mut(rows).zip(each) {
+            let mut pairs = factors.chunks_exact(2);
+            let mut columns = a.as_slice().chunks_exact(2 * rows);
+            for (factor, columns) in pairs.by_ref().zip(columns.by_ref()) {
+                let (first, second) = columns.split_at(rows);
+                for ((o, x), y) in out.iter_mut().zip(first).zip(second) {
+                    *o += factor[0] * x + factor[1] * y;
+                }
+            }
+            for factor in pairs.remainder() {
+                for (o, x) in out.iter_mut().zip(columns.remainder()) {
+                    *o += factor * x;
+                }
+            }
+        }
+    }
+}
+
+vectorised! {
+    /// `out += a^T b`.
+    pub(super) fn add_transposed(out: &mut DMatrix<f64>, a: &DMatrix<f64>, b: &DMatrix<f64>) {
+        assert_eq!((out.shape(), a.nrows()), ((a.ncols(), b.ncols()), b.nrows()));
+        let mut entries = out.as_mut_slice().iter_mut();
+        for right in b.as_slice().chunks_exact(b.nrows()) {
+            for (left, entry) in a.as_slice().chunks_exact(a.nrows()).zip(entries.by_ref()) {
+                *entry += dot(left, right);
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn dot(left: &[f64], right: &[f64]) -> f64 {
+    let mut sums = [0.0; LANES];
+    let (a, b) = (left.chunks_exact(LANES), right.chunks_exact(LANES));
+    let rest = a.remainder().iter().zip(b.remainder());
+    let rest: f64 = rest.map(|(x, y)| x * y).sum();
+    for (a, b) in a.zip(b) {
+        for ((sum, x), y) in sums.iter_mut().zip(a).zip(b) {
+            *sum += x * y;
+        }
+    }
+    rest + sums.iter().sum::<f64>()
 }
 
 #[cfg(test)]

@@ -1,55 +1,19 @@
-//! Latent inputs of batches, forwards and backwards: `u_lat = pinv(J^T) u = (J J^T)^-1 J u`.
-//!
-//! A linear encoder has one `J = W_e` for all samples, so that the projection is one matrix; a nonlinear one has a
-//! Jacobian at every sample, whose Gram matrices are as small as the latent space and factored one by one. Both damp
-//! directions that are nearly dependent.
+//! Latent inputs of a batch, forwards and backwards: `u_lat = pinv(J^T) u = (J J^T)^-1 J u` with the Jacobian `J` of
+//! the encoder at every sample; directions that are nearly dependent are damped.
 
 use nalgebra::DMatrix;
 
-/// Added to the diagonal of `J J^T`.
+/// Added to the diagonal of `J J^T`; of the trace where that is not enough.
 const DAMPING: f64 = 1e-12;
+const SHARE_OF_TRACE: f64 = 1e-9;
 
-/// `pinv(W_e^T)^T = V (V^T V)^-1` for `V = W_e^T`: latent inputs of samples in rows are `u` times this.
-#[derive(Clone, Debug, Default)]
-pub(super) struct InputProjection {
-    /// `V (V^T V)^-1`, `18 x d`.
-    pub weights: DMatrix<f64>,
-    inverse_gram: DMatrix<f64>, // d x d
-}
-
-impl InputProjection {
-    /// The projection of an encoder `V`, `18 x d`.
-    pub(super) fn new(encoder: &DMatrix<f64>) -> Self {
-        let d = encoder.ncols();
-        let gram = encoder.tr_mul(encoder) + DMatrix::identity(d, d) * DAMPING;
-        let inverse_gram = match gram.clone().cholesky() {
-            Some(factor) => factor.inverse(),
-            None => gram.pseudo_inverse(1e-12).expect("a positive tolerance"),
-        };
-        Self {
-            weights: encoder * &inverse_gram,
-            inverse_gram,
-        }
-    }
-
-    /// Adjoint of `V`, given the one of the projection.
-    ///
-    /// From `dQ = dV A^-1 - Q (dV^T V + V^T dV) A^-1`: with `K = G A^-1`, it is `K - V (Q^T K) - V (K^T Q)`.
-    pub(super) fn adjoint(&self, encoder: &DMatrix<f64>, gradient: &DMatrix<f64>) -> DMatrix<f64> {
-        let k = gradient * &self.inverse_gram;
-        let crossed = self.weights.tr_mul(&k);
-        &k - encoder * (&crossed + crossed.transpose())
-    }
-}
-
-/// Latent inputs of a batch under a Jacobian at every sample.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(super) struct InputProjections {
     /// `n x d`.
     pub u_lat: DMatrix<f64>,
     /// Sum over samples of `(J u) . u_lat`: the energy of the inputs that the latent inputs carry.
     pub carried: f64,
-    factors: Vec<f64>, // Cholesky factors, d x d per sample, row-major
+    inverses: Vec<DMatrix<f64>>, // of J J^T at each sample, d x d
 }
 
 impl InputProjections {
@@ -57,40 +21,21 @@ impl InputProjections {
     pub(super) fn new(rows: &DMatrix<f64>, u: &DMatrix<f64>) -> Self {
         let n = u.nrows();
         let d = rows.nrows() / n.max(1);
-        let mut u_lat = DMatrix::zeros(n, d);
-        let mut grams = vec![DMatrix::zeros(n, 1); d * d];
-        for (jacobian, input) in rows.column_iter().zip(u.column_iter()) {
-            let (jacobian, input) = (jacobian.as_slice(), input.as_slice());
-            for (i, row) in jacobian.chunks_exact(n).enumerate() {
-                for (sum, (j, u)) in u_lat.column_mut(i).iter_mut().zip(row.iter().zip(input)) {
-                    *sum += j * u;
-                }
-                for (k, other) in jacobian.chunks_exact(n).take(i + 1).enumerate() {
-                    let gram = grams[i * d + k].as_mut_slice();
-                    for (sum, (a, b)) in gram.iter_mut().zip(row.iter().zip(other)) {
-                        *sum += a * b;
-                    }
-                }
-            }
-        }
-        let (mut factors, mut carried) = (vec![0.0; n * d * d], 0.0);
-        let mut right = vec![0.0; d];
-        for (s, factor) in factors.chunks_exact_mut(d * d).enumerate() {
-            for (entry, gram) in factor.iter_mut().zip(&grams) {
-                *entry = gram[s];
-            }
-            factorise(factor, d);
-            (0..d).for_each(|i| right[i] = u_lat[(s, i)]);
-            solve(factor, &mut right);
-            for (i, value) in right.iter().enumerate() {
-                carried += u_lat[(s, i)] * value;
-                u_lat[(s, i)] = *value;
-            }
-        }
+        let (mut u_lat, mut carried) = (DMatrix::zeros(n, d), 0.0);
+        let inverses = (0..n).map(|sample| {
+            let jacobian = rows.rows_with_step(sample, d, n - 1);
+            let inverse = inverse(&jacobian * jacobian.transpose());
+            let onto = &jacobian * u.row(sample).transpose();
+            let latent = &inverse * &onto;
+            carried += onto.dot(&latent);
+            u_lat.row_mut(sample).tr_copy_from(&latent);
+            inverse
+        });
+        let inverses = inverses.collect();
         Self {
             u_lat,
             carried,
-            factors,
+            inverses,
         }
     }
 
@@ -107,65 +52,23 @@ impl InputProjections {
         lift: f64,
     ) -> DMatrix<f64> {
         let (n, d) = self.u_lat.shape();
-        let mut solved = onto_u_lat.clone();
-        let mut right = vec![0.0; d];
-        for (s, factor) in self.factors.chunks_exact(d * d).enumerate() {
-            (0..d).for_each(|i| right[i] = onto_u_lat[(s, i)]);
-            solve(factor, &mut right);
-            (0..d).for_each(|i| solved[(s, i)] = right[i]);
-        }
         let mut onto = DMatrix::zeros(d * n, u.ncols());
-        let (mut rest, mut crossed) = (vec![0.0; n], vec![0.0; n]);
-        for ((mut onto, row), input) in onto
-            .column_iter_mut()
-            .zip(rows.column_iter())
-            .zip(u.column_iter())
-        {
-            rest.copy_from_slice(input.as_slice());
-            crossed.fill(0.0);
-            for (i, jacobian) in row.as_slice().chunks_exact(n).enumerate() {
-                let (v, w) = (self.u_lat.column(i), solved.column(i));
-                for s in 0..n {
-                    rest[s] -= jacobian[s] * v[s];
-                    crossed[s] += jacobian[s] * w[s];
-                }
-            }
-            for (i, onto) in onto.as_mut_slice().chunks_exact_mut(n).enumerate() {
-                let (v, w) = (self.u_lat.column(i), solved.column(i));
-                for s in 0..n {
-                    onto[s] = (w[s] - 2.0 * lift * v[s]) * rest[s] - v[s] * crossed[s];
-                }
-            }
+        for (sample, inverse) in self.inverses.iter().enumerate() {
+            let jacobian = rows.rows_with_step(sample, d, n - 1);
+            let v = self.u_lat.row(sample).transpose();
+            let w = inverse * onto_u_lat.row(sample).transpose();
+            let rest = u.row(sample) - v.transpose() * &jacobian;
+            let own = (&w - &v * (2.0 * lift)) * rest - &v * (w.transpose() * &jacobian);
+            onto.rows_with_step_mut(sample, d, n - 1).copy_from(&own);
         }
         onto
     }
 }
 
-/// Cholesky factor in place of a Gram matrix whose lower triangle is given, row-major; damped.
-fn factorise(matrix: &mut [f64], d: usize) {
-    for i in 0..d {
-        matrix[i * d + i] += DAMPING;
-        for k in 0..=i {
-            let known: f64 = (0..k).map(|m| matrix[i * d + m] * matrix[k * d + m]).sum();
-            let left = matrix[i * d + k] - known;
-            matrix[i * d + k] = if i == k {
-                left.max(DAMPING).sqrt()
-            } else {
-                left / matrix[k * d + k]
-            };
-        }
-    }
-}
-
-/// Solves `L L^T x = right` in place.
-fn solve(factor: &[f64], right: &mut [f64]) {
-    let d = right.len();
-    for i in 0..d {
-        let known: f64 = (0..i).map(|k| factor[i * d + k] * right[k]).sum();
-        right[i] = (right[i] - known) / factor[i * d + i];
-    }
-    for i in (0..d).rev() {
-        let known: f64 = (i + 1..d).map(|k| factor[k * d + i] * right[k]).sum();
-        right[i] = (right[i] - known) / factor[i * d + i];
-    }
+/// Inverse of a damped Gram matrix; not a number where there is none.
+fn inverse(gram: DMatrix<f64>) -> DMatrix<f64> {
+    let d = gram.nrows();
+    let damped = |damping: f64| (&gram + DMatrix::<f64>::identity(d, d) * damping).cholesky();
+    let factor = damped(DAMPING).or_else(|| damped(SHARE_OF_TRACE * gram.trace()));
+    factor.map_or_else(|| gram.map(|_| f64::NAN), |factor| factor.inverse())
 }

@@ -6,24 +6,20 @@ use std::sync::mpsc::{Sender, channel};
 use nalgebra::{DMatrix, DVector};
 
 use super::batch::{Batch, batches};
-use super::fold::{LatentBasis, folded};
-use super::linear::{LinearMaps, mask_rows};
-use super::loss::{JointLoss, LossWeights, Losses, Maps};
-use super::nonlinear::NonlinearMaps;
-use super::parameters::{Frame, Parameters};
-use super::stages::{train_decoder, train_together, train_xi};
+use super::descent::{Listener, Moved, descend};
+use super::loss::{JointLoss, LossWeights, Losses};
+use super::parameters::{Frame, LatentBasis, Parameters, folded};
 use crate::model::{Layer, ModelError, StateMap};
 use crate::robot::{Robot, STATE_DIM};
-use crate::train::assemble::Origin;
 use crate::train::dynamics_fit::Fitted;
 use crate::train::error::TrainError;
 use crate::train::latent::{EncodedSet, Latent, least_squares_decoder, map_samples, mean_jacobian};
+use crate::train::metrics::Trained;
 use crate::train::options::{TrainOptions, Transfer};
 use crate::train::progress::Monitor;
 use crate::train::random::Random;
-use crate::train::report::Trained;
 use crate::train::seeds::{Outcome, Seeds};
-use crate::train::task::{Recordings, Task};
+use crate::train::task::{Origin, Recordings, Task};
 use crate::train::weak_form::check_terms;
 
 /// Learns a model by Adam over encoder, decoder and Xi together (equations 9 to 20, steps of section IV-D).
@@ -160,14 +156,20 @@ impl Trainer<'_> {
             true => of_phase(0).collect(),
             false => all.clone(),
         };
-        let losses = train_together(&mut parameters, &first, &mut loss, schedule, &mut listener);
-        let quiet = &mut |_: usize, _: &Losses, _: usize| !cancel.load(Ordering::Relaxed);
+        let mut step = |parameters: &mut Parameters,
+                        moved,
+                        batches: &[&Batch],
+                        listener: &mut Listener<'_>| {
+            descend(parameters, moved, batches, &mut loss, schedule, listener)
+        };
+        let losses = step(&mut parameters, Moved::All, &first, &mut listener);
         if published {
-            train_decoder(&mut parameters, &all, &mut loss, schedule, quiet);
+            let mut quiet = |_: usize, _: &Losses, _: usize| !cancel.load(Ordering::Relaxed);
+            step(&mut parameters, Moved::Decoder, &all, &mut quiet);
             for phase in 0..parameters.xi.len() {
                 let own: Vec<&Batch> = of_phase(phase).collect();
                 parameters.xi[phase].fill(options.xi_start);
-                train_xi(&mut parameters, phase, &own, &mut loss, schedule, quiet);
+                step(&mut parameters, Moved::Xi, &own, &mut quiet);
             }
         }
         Run {
@@ -178,12 +180,9 @@ impl Trainer<'_> {
     }
 
     fn loss(&self, weights: LossWeights, parameters: &Parameters) -> JointLoss<'_> {
-        let coordinate_weights = self.task.options.encoder.coordinate_weights();
-        let maps: Box<dyn Maps> = match self.is_linear() {
-            true => Box::new(LinearMaps::new(coordinate_weights, self.mask())),
-            false => Box::new(NonlinearMaps::new(coordinate_weights, self.frame.clone())),
-        };
-        let terms = (weights, self.task.options.joint.unroll);
+        let options = self.task.options;
+        let maps = (self.frame.clone(), options.encoder.coordinate_weights());
+        let terms = (weights, options.joint.unroll);
         JointLoss::new(&self.task.features, maps, terms, parameters)
     }
 
@@ -193,11 +192,6 @@ impl Trainer<'_> {
 
     fn is_published(&self) -> bool {
         self.task.options.joint.transfer == Transfer::Published
-    }
-
-    fn mask(&self) -> Vec<bool> {
-        let factors = self.frame.factors.iter();
-        factors.map(|factor| *factor != 0.0).collect()
     }
 
     /// Where a seed starts: random maps, and for linear ones `b_e = 0` as published or `-W_e mean(x)`.
@@ -211,14 +205,11 @@ impl Trainer<'_> {
         let shape = (terms.library_dim(), phases, options.xi_start);
         let widths = (&encoder[..], &decoder[..]);
         let mut start = Parameters::random(widths, maps.activation, shape, &mut Random::new(seed));
-        if self.is_linear() {
+        if self.is_linear() && !self.is_published() {
             let encoder = &mut start.encoder.layers[0];
-            if !self.is_published() {
-                let mean = training.states(Some(0)).column_mean();
-                encoder.bias = -(encoder.weights.tr_mul(&mean));
-                start.decoder.layers[0].bias = mean;
-            }
-            mask_rows(&mut encoder.weights, &self.mask());
+            let mean = training.states(Some(0)).column_mean();
+            encoder.bias = -(encoder.weights.tr_mul(&mean));
+            start.decoder.layers[0].bias = mean;
         }
         start
     }
@@ -227,10 +218,7 @@ impl Trainer<'_> {
         let fitted = if self.is_published() {
             self.published(run.parameters, judged)?
         } else {
-            let maps = match self.is_linear() {
-                true => self.linear_maps(&run.parameters)?,
-                false => self.nonlinear_maps(&run.parameters)?,
-            };
+            let maps = self.canonical_maps(&run.parameters)?;
             self.task.fit_dynamics(maps, monitor)?
         };
         let report = (self.task).seed_report(&fitted, run.seed, Some(run.losses));
@@ -265,20 +253,18 @@ impl Trainer<'_> {
         Ok(folded(parameters, &self.frame, basis)?)
     }
 
-    /// The encoder over the learned row space, and its least-squares decoder.
-    fn linear_maps(&self, parameters: &Parameters) -> Result<(StateMap, StateMap), TrainError> {
-        let learned = parameters.encoder.layers[0].weights.clone().qr().q();
+    /// The learned maps in the canonical latent basis, the decoder's last layer by least squares; the encoder of linear
+    /// maps is that over the learned row space.
+    fn canonical_maps(&self, parameters: &Parameters) -> Result<(StateMap, StateMap), TrainError> {
         let (task, d) = (self.task, self.task.options.latent_dim);
-        let basis = task.frame.nearest(&learned, d);
-        let encoder = task.encoder_over(&basis)?.into();
-        let decoder = least_squares_decoder(&task.training, &encoder, None)?.into();
-        Ok((encoder, decoder))
-    }
-
-    /// The learned networks in the canonical latent basis, the decoder's last layer by least squares.
-    fn nonlinear_maps(&self, parameters: &Parameters) -> Result<(StateMap, StateMap), TrainError> {
-        let plain = LatentBasis::unchanged(self.task.options.latent_dim);
-        let basis = self.basis(&self.state_maps(parameters, &plain)?.0);
+        let learned = self.state_maps(parameters, &LatentBasis::unchanged(d))?.0;
+        if let (true, Some(linear)) = (self.is_linear(), learned.as_affine()) {
+            let rows = linear.weights().transpose().qr().q();
+            let encoder = task.encoder_over(&task.frame.nearest(&rows, d))?.into();
+            let decoder = least_squares_decoder(&task.training, &encoder, None)?.into();
+            return Ok((encoder, decoder));
+        }
+        let basis = self.basis(&learned);
         let (encoder, decoder) = self.state_maps(parameters, &basis)?;
         let mut layers = decoder.layers().to_vec();
         let last = layers.pop().expect("invariant: a map has a layer");
@@ -286,7 +272,7 @@ impl Trainer<'_> {
             true => None,
             false => Some(StateMap::new("decoder", layers.clone())?),
         };
-        let map = least_squares_decoder(&self.task.training, &encoder, hidden.as_ref())?;
+        let map = least_squares_decoder(&task.training, &encoder, hidden.as_ref())?;
         layers.push(Layer { map, ..last });
         Ok((encoder, StateMap::new("decoder", layers)?))
     }

@@ -1,26 +1,21 @@
 //! What the training jumps say of jumps that were not recorded: landmarks, prior, deviations.
 //!
 //! In: the training jumps and an encoder. Out: a [`JumpPrior`], or none if fewer than
-//! [`LEAST_JUMPS`] of them are of one kind. `landmarks` cuts each jump into parts, `nodes`
-//! samples the parts at equal shares of their durations, `regression` fits nodes and durations over
-//! the goals, and `deviations` fits how accelerations change about such a trajectory.
+//! [`LEAST_JUMPS`] of them are of one kind. `landmarks` cuts each jump into parts and
+//! samples these at equal shares of their durations; `deviations` fits nodes and durations over the goals, and
+//! how accelerations change about such a trajectory.
 
 mod deviations;
 mod landmarks;
-mod nodes;
-mod regression;
 
 use nalgebra::{DMatrix, DVector, RowDVector};
 
 use super::dataset::{Dataset, centred, mean};
 use super::latent::{EncodedSet, Latent};
-use super::metrics::{BODY_X, BODY_Z};
-use super::report::PartScore;
-use crate::model::{GOAL_DIM, GoalRange, JumpPart, JumpPrior, StateMap};
-use deviations::fit_deviations;
-use landmarks::{Cut, Landmark, of_commonest_kind};
-use nodes::{PartNodes, intervals, sample};
-use regression::GoalRegression;
+use super::metrics::{BODY_X, BODY_Z, PartScore};
+use crate::model::{self, GOAL_DIM, GoalRange, JumpPart, JumpPrior, Landmarks, StateMap};
+use deviations::{GoalRegression, fit_deviations};
+use landmarks::{Cut, PartNodes, intervals, of_commonest_kind, sample};
 
 /// Fewest jumps of one kind that say how jumps depend on their goal.
 pub(super) const LEAST_JUMPS: usize = 6;
@@ -81,15 +76,27 @@ pub(super) fn learn_jumps(
     let jumps: Vec<_> = sampled.iter().map(|jump| jump.goal).collect();
     let goal = GoalRange::of(&jumps);
     let (parts, scores) = (0..kind.len())
-        .map(|part| part_of(&sampled, &goal, &kind[part], part, &translation))
+        .map(|part| part_of(&sampled, &goal, &kind[part].name, part, &translation))
         .unzip();
+    let landmarks = kind.iter().enumerate().map(|(part, landmark)| {
+        let durations = sampled.iter().map(|jump| jump.parts[part].duration_s);
+        model::Landmark {
+            name: landmark.name.clone(),
+            phase: training.phases.patterns[landmark.phase].name.clone(),
+            feet: landmark.feet,
+            duration_range_s: range_of(durations),
+        }
+    });
     let prior = JumpPrior {
-        parts,
-        jumps,
-        start: start.map(rounded),
+        landmarks: Landmarks {
+            parts: landmarks.collect(),
+            jumps,
+            start: start.map(rounded),
+            end_height_m: range_of(end_heights),
+            landing_height_m: range_of(landing_heights)[0],
+        },
         state_std: state_std(latent, &chosen).map(rounded),
-        end_height_m: range_of(end_heights),
-        landing_height_m: range_of(landing_heights)[0],
+        parts,
     };
     (Some(prior), scores)
 }
@@ -110,7 +117,7 @@ fn goal_of(training: &Dataset, jump: usize, cut: &Cut) -> [f64; GOAL_DIM] {
 fn part_of(
     sampled: &[Sampled],
     goal: &[GoalRange; GOAL_DIM],
-    landmark: &Landmark,
+    name: &str,
     part: usize,
     translation: &DVector<f64>,
 ) -> (JumpPart, PartScore) {
@@ -123,15 +130,11 @@ fn part_of(
     let durations: Vec<f64> = all.iter().map(|nodes| nodes.duration_s).collect();
     let deviations = fit_deviations(sampled, goal, part, translation);
     let score = PartScore {
-        part: landmark.name.clone(),
+        part: name.to_owned(),
         ddz_r2: deviations.ddz_r2,
     };
     let part = JumpPart {
-        name: landmark.name.clone(),
-        phase: landmark.phase,
-        feet: landmark.feet,
         duration_s: regression.numbers(&durations).map(rounded),
-        duration_range_s: range_of(durations.iter().copied()),
         z: table(|nodes| &nodes.z),
         dz: table(|nodes| &nodes.dz),
         u_lat: table(|nodes| &nodes.u_lat),

@@ -32,12 +32,13 @@ fn encoder() -> StateMap {
 #[test]
 fn jumps_are_cut_into_crouch_thrust_flight_and_landing() {
     let prior = prior_of(&training());
-    let names: Vec<&str> = prior.parts.iter().map(|part| part.name.as_str()).collect();
+    let landmarks = &prior.landmarks.parts;
+    let names: Vec<&str> = landmarks.iter().map(|part| part.name.as_str()).collect();
     assert_eq!(names, ["crouch", "thrust", "flight", "landing"]);
-    assert_eq!(prior.parts[2].feet, [false; 4]);
-    assert_eq!(prior.jumps.len(), 8);
-    for part in &prior.parts {
-        let [least, most] = part.duration_range_s;
+    assert_eq!(landmarks[2].feet, [false; 4]);
+    assert_eq!(prior.landmarks.jumps.len(), 8);
+    for (part, landmark) in prior.parts.iter().zip(landmarks) {
+        let [least, most] = landmark.duration_range_s;
         assert!(least <= part.duration_s[0] && part.duration_s[0] <= most);
     }
     // Where the flight begins the body rises, where it ends it falls.
@@ -60,7 +61,7 @@ fn prior_at_the_goal_of_a_jump_is_nearer_to_it_than_the_mean_jump() {
         });
         ends.sum()
     };
-    let at_goal = error(&|jump| prior.features(prior.jumps[jump]));
+    let at_goal = error(&|jump| prior.features(prior.landmarks.jumps[jump]));
     let at_mean = error(&|_| [1.0, 0.0, 0.0, 0.0]);
     assert!(at_goal < 0.2 * at_mean, "{at_goal} {at_mean}");
 }

@@ -1,7 +1,7 @@
 //! Elements of a URDF with their place: attributes as numbers, children that may be there once.
 
 use nalgebra::Vector3;
-use roxmltree::{Document, Node};
+use roxmltree::{Attribute, Document, Node};
 
 use crate::files::{Place, shell_word};
 use crate::robot_file::RobotFileError;
@@ -24,7 +24,6 @@ pub(super) struct Element<'x> {
     node: Node<'x, 'x>,
 }
 
-/// The document of a text.
 pub(super) fn document<'x>(file: &str, text: &'x str) -> Result<Document<'x>, RobotFileError> {
     let document = Document::parse(text).map_err(|error| {
         // A prefix that nothing declares; macros of included files have none.
@@ -51,15 +50,14 @@ pub(super) fn document<'x>(file: &str, text: &'x str) -> Result<Document<'x>, Ro
             Some(space) => is_xacro(space),
             None => node.range().end > unread_to && UNPREFIXED.contains(&name.name()),
         };
+        let is_formula = |attribute: &Attribute<'_, '_>| {
+            let value = attribute.value();
+            value.contains("${") || value.contains("$(")
+        };
         let found = match is_macro {
             true => Some(format!("<xacro:{}>", name.name())),
             false if node.range().end <= unread_to => None,
-            false => (node.attributes())
-                .find(|attribute| {
-                    ["${", "$("]
-                        .iter()
-                        .any(|sign| attribute.value().contains(sign))
-                })
+            false => (node.attributes().find(is_formula))
                 .map(|attribute| format!("{}={:?}", attribute.name(), attribute.value())),
         };
         if let Some(found) = found {
@@ -141,12 +139,8 @@ impl<'x> Element<'x> {
 
     /// Refuses attributes other than these, such as `quat_xyzw` of other dialects, that would change the result.
     pub(crate) fn only_with(&self, keys: &[&str]) -> Result<(), RobotFileError> {
-        let other = |name: &str| !keys.contains(&name);
-        match self
-            .node
-            .attributes()
-            .find(|a| a.namespace().is_none() && other(a.name()))
-        {
+        let mut own = self.node.attributes().filter(|a| a.namespace().is_none());
+        match own.find(|a| !keys.contains(&a.name())) {
             None => Ok(()),
             Some(other) => {
                 let found = format!("the attribute {}={:?}", other.name(), other.value());

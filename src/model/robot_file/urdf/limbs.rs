@@ -45,19 +45,15 @@ impl Legs {
                 return Err(joint.element.fault("", found, expected));
             }
         }
-        let paths = legs
-            .iter()
-            .map(|leg| tree.path(tree.joints[leg.joints[0]].parent));
-        let paths: Vec<Vec<usize>> = paths.collect();
+        let path = |leg: &Limb| tree.path(tree.joints[leg.joints[0]].parent);
+        let paths: Vec<Vec<usize>> = legs.iter().map(path).collect();
         let is_shared = |depth: &usize| {
             let link = paths[0].get(*depth);
             link.is_some() && paths.iter().all(|path| path.get(*depth) == link)
         };
         // The heaviest of the links that all legs are below; the nearest to the legs, if none has a mass.
-        let depths = (0..).take_while(is_shared);
-        let shared = depths
-            .map(|depth| paths[0][depth])
-            .skip_while(|link| *link != top);
+        let shared = (0..).take_while(is_shared).map(|depth| paths[0][depth]);
+        let shared = shared.skip_while(|link| *link != top);
         let mass_kg = |link: &usize| tree.links[*link].mass_kg;
         let trunk = shared.max_by(|a, b| mass_kg(a).total_cmp(&mass_kg(b)));
         let trunk = trunk.unwrap_or(top);
@@ -68,10 +64,7 @@ impl Legs {
 /// The feet of `--feet`: names of links, each with a point in its frame if it is not the link's origin.
 pub(super) fn feet(list: &[String]) -> Result<Vec<(String, Vector3<f64>)>, RobotFileError> {
     let joined = list.join(",");
-    let mut words = joined
-        .split(',')
-        .map(str::trim)
-        .filter(|word| !word.is_empty());
+    let mut words = (joined.split(',').map(str::trim)).filter(|word| !word.is_empty());
     let number = |word: &str| word.trim().parse::<f64>().ok().filter(|v| v.is_finite());
     let refused = |found: String| {
         let expected = "four links, LINK,..., or links with points in their frames, LINK:x,y,z,...";
@@ -79,10 +72,8 @@ pub(super) fn feet(list: &[String]) -> Result<Vec<(String, Vector3<f64>)>, Robot
     };
     let mut feet: Vec<(String, Vector3<f64>)> = Vec::new();
     while let Some(word) = words.next() {
-        let first = word
-            .rsplit_once(':')
-            .and_then(|(link, x)| Some((link, number(x)?)));
-        let (link, point) = match first {
+        let split = word.rsplit_once(':');
+        let (link, point) = match split.and_then(|(link, x)| Some((link, number(x)?))) {
             None => (word, Vector3::zeros()),
             Some((link, x)) => match [words.next(), words.next()].map(|word| word.and_then(number))
             {
@@ -233,14 +224,11 @@ fn named_legs(
             let (place, found) = (format!("link `{name}`"), "no such link");
             return Err(RobotFileError::at(tree.file, place, found, "a foot"));
         };
-        let path = tree
-            .path(foot)
-            .into_iter()
-            .skip_while(|link| body.links.contains(link));
+        let path = tree.path(foot).into_iter();
+        let path = path.skip_while(|link| body.links.contains(link));
         let above = path.filter_map(|link| tree.links[link].above);
-        let joints: Vec<usize> = above
-            .filter(|joint| tree.joints[*joint].kind != "fixed")
-            .collect();
+        let joints = above.filter(|joint| tree.joints[*joint].kind != "fixed");
+        let joints: Vec<usize> = joints.collect();
         if joints.len() == LEG_JOINT_DIM {
             return Ok(Limb {
                 joints,
@@ -248,11 +236,9 @@ fn named_legs(
                 point: *point,
             });
         }
-        let names: Vec<&str> = joints
-            .iter()
-            .map(|joint| tree.joints[*joint].name)
-            .collect();
-        let found = format!("{} joints ({})", names.len(), names.join(", "));
+        let names = joints.iter().map(|joint| tree.joints[*joint].name);
+        let names = names.collect::<Vec<_>>().join(", ");
+        let found = format!("{} joints ({names})", joints.len());
         let place = format!("from `{}` to `{name}`", tree.links[top].name);
         Err(RobotFileError::at(tree.file, place, found, "three"))
     };

@@ -12,7 +12,7 @@ use nalgebra::{Rotation3, Vector3};
 
 use super::entry::{Axis, JointEntry, LegEntry, RobotEntry};
 use super::identity::{RobotReading, identified};
-use super::legs::{LegPlaces, Places};
+use super::legs::{Part, Places};
 use super::read::{RobotFileError, RobotOptions};
 use element::{Element, document};
 use limbs::{Legs, Limb};
@@ -50,8 +50,9 @@ pub(super) fn read(
         mass_kg: tree.mass_below(legs.top),
         leg,
     };
-    let places = places(robot, &tree, &legs);
-    identified(file, entry, &places, options.name, notes)
+    let of = &|part: Part<'_>| place(robot, &tree, &legs.legs, part);
+    let kind = "urdf";
+    identified(entry, &Places { file, kind, of }, options.name, notes)
 }
 
 /// Where the body's frame is if not at the root, and which parts have no mass.
@@ -69,19 +70,14 @@ fn notes(tree: &Tree<'_>, legs: &Legs) -> Result<Vec<String>, RobotFileError> {
     };
     let mut notes = Vec::new();
     if legs.trunk != tree.root {
-        let place = apart(legs.trunk, tree.root);
+        let (name, place) = (trunk.name, apart(legs.trunk, tree.root));
         notes.push(format!(
-            "the body's frame is that of link `{}`, {place}",
-            trunk.name
+            "the body's frame is that of link `{name}`, {place}"
         ));
     }
     let by_mass = |a: &usize, b: &usize| tree.links[*a].mass_kg.total_cmp(&tree.links[*b].mass_kg);
-    let heaviest = body
-        .links
-        .iter()
-        .copied()
-        .max_by(by_mass)
-        .unwrap_or(legs.trunk);
+    let heaviest = body.links.iter().copied().max_by(by_mass);
+    let heaviest = heaviest.unwrap_or(legs.trunk);
     let distance = (tree.frame(heaviest).0 - tree.frame(legs.trunk).0).norm();
     if trunk.mass_kg == 0.0 && distance > ROUNDING {
         let (name, place) = (tree.links[heaviest].name, apart(heaviest, legs.trunk));
@@ -102,20 +98,30 @@ fn notes(tree: &Tree<'_>, legs: &Legs) -> Result<Vec<String>, RobotFileError> {
     Ok(notes)
 }
 
-fn places(robot: Element<'_>, tree: &Tree<'_>, legs: &Legs) -> Places {
-    let of = |leg: &Limb| {
-        let joints = leg
-            .joints
-            .iter()
-            .map(|joint| tree.joints[*joint].element.place());
-        LegPlaces {
-            joints: joints.collect(),
-            foot: tree.links[leg.foot].element.place(),
+/// Keys of a joint as a URDF spells them.
+const SPELLINGS: [(&str, &str); 5] = [
+    ("at", "<origin>, xyz"),
+    ("axis", "<axis>, xyz"),
+    ("limits_rad", "<limit>, lower and upper"),
+    ("torque_nm", "<limit>, effort"),
+    ("speed_rad_s", "<limit>, velocity"),
+];
+
+/// The element of a part, such as ``line 24: joint `knee`, <axis>, xyz``.
+fn place(robot: Element<'_>, tree: &Tree<'_>, legs: &[Limb], part: Part<'_>) -> String {
+    let joint = |leg: usize, joint: usize| tree.joints[legs[leg].joints[joint]].element.place();
+    match part {
+        Part::Name => format!("{}, name", robot.place()),
+        Part::Mass => "the masses of the links".to_owned(),
+        Part::Legs => "the tree".to_owned(),
+        Part::Leg(leg) => format!("{}, its leg", joint(leg, 0)),
+        Part::Foot(leg) => tree.links[legs[leg].foot].element.place(),
+        Part::Joint(leg, index, "") => joint(leg, index),
+        Part::Joint(leg, index, key) => {
+            let known = SPELLINGS.iter().find(|(name, _)| *name == key);
+            let spelling = known.map_or(key, |(_, spelling)| spelling);
+            format!("{}, {spelling}", joint(leg, index))
         }
-    };
-    Places::Elements {
-        robot: robot.place(),
-        legs: legs.legs.iter().map(of).collect(),
     }
 }
 
@@ -126,20 +132,17 @@ fn entry(tree: &Tree<'_>, trunk: usize, leg: &Limb) -> Result<LegEntry, RobotFil
         let back = frame.inverse();
         (back * (position - origin), back * turn)
     };
-    let mut entries = Vec::with_capacity(leg.joints.len());
     let mut before = Vector3::zeros();
-    for &joint in &leg.joints {
-        let joint = &tree.joints[joint];
+    let joints = leg.joints.iter().map(|joint| {
+        let joint = &tree.joints[*joint];
         let (position, turn) = seen(joint.child);
-        let (at, axis) = (rounded(position - before), axis(joint, turn)?);
-        entries.push(joint_entry(joint, at, axis)?);
-        before = position;
-    }
+        let at = position - std::mem::replace(&mut before, position);
+        joint_entry(joint, rounded(at), axis(joint, turn)?)
+    });
+    let joint = joints.collect::<Result<_, _>>()?;
     let (position, turn) = seen(leg.foot);
-    Ok(LegEntry {
-        joint: entries,
-        foot: rounded(position + turn * leg.point - before),
-    })
+    let foot = rounded(position + turn * leg.point - before);
+    Ok(LegEntry { joint, foot })
 }
 
 fn axis(joint: &Joint<'_>, turn: Rotation3<f64>) -> Result<[f64; 3], RobotFileError> {
@@ -170,10 +173,8 @@ fn joint_entry(
         }
     };
     if let Some(mimic) = element.child("mimic")? {
-        let found = format!(
-            "a copy of joint `{}`",
-            mimic.attribute("joint").unwrap_or("")
-        );
+        let original = mimic.attribute("joint").unwrap_or("");
+        let found = format!("a copy of joint `{original}`");
         let expected = "joints of legs that move by themselves: without <mimic>, or type=\"fixed\"";
         return Err(mimic.fault("", found, expected));
     }
@@ -188,8 +189,8 @@ fn joint_entry(
         name: joint.name.to_owned(),
         at,
         axis: Axis::of(axis),
-        sign: 1.0,
-        offset_rad: 0.0,
+        sign: None,
+        offset_rad: None,
         limits_rad: Some(limits),
         limits_deg: None,
         torque_nm: limit.number("effort")?,

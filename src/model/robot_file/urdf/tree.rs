@@ -1,6 +1,6 @@
 //! Links and joints of a URDF as a tree.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Rotation3, Vector3};
 
@@ -23,7 +23,6 @@ pub(super) struct Link<'x> {
     pub name: &'x str,
     /// kg; 0 without an `<inertial>`.
     pub mass_kg: f64,
-    /// The joint above.
     pub above: Option<usize>,
     /// Joints below, in the file's order.
     pub below: Vec<usize>,
@@ -102,30 +101,27 @@ impl<'x> Tree<'x> {
     fn only_root(&self) -> Result<usize, RobotFileError> {
         let roots = (0..self.links.len()).filter(|link| self.links[*link].above.is_none());
         let roots: Vec<usize> = roots.collect();
-        let names = |links: &[usize]| {
-            let names = links
-                .iter()
-                .take(4)
-                .map(|link| format!("`{}`", self.links[*link].name));
-            names.collect::<Vec<_>>().join(", ")
-        };
-        let mut is_below = vec![false; self.links.len()];
-        for root in &roots {
-            self.below(*root, |_| true)
-                .links
-                .iter()
-                .for_each(|link| is_below[*link] = true);
-        }
+        let name = |link: &usize| format!("`{}`", self.links[*link].name);
+        let below = roots
+            .iter()
+            .flat_map(|root| self.below(*root, |_| true).links);
+        let below: BTreeSet<usize> = below.collect();
         // A link has one joint above it at most, so that what no root is above is a loop.
-        if let Some(link) = is_below.iter().position(|is_below| !is_below) {
-            let found = format!("a loop of joints through {}", names(&[link]));
+        if let Some(link) = (0..self.links.len()).find(|link| !below.contains(link)) {
+            let found = format!("a loop of joints through {}", name(&link));
             return Err(self.links[link].element.fault("", found, "a tree"));
         }
         match roots[..] {
             [root] => Ok(root),
             [] => Err(self.refused("no link".to_owned(), "a tree of links and joints")),
             _ => {
-                let (count, names) = (roots.len(), names(&roots));
+                let count = roots.len();
+                let names = roots
+                    .iter()
+                    .take(4)
+                    .map(name)
+                    .collect::<Vec<_>>()
+                    .join(", ");
                 let found = format!("{count} links without a joint above them ({names})");
                 Err(self.refused(found, "one, which all others are below"))
             }
@@ -214,19 +210,12 @@ fn joint<'x>(
     links: &BTreeMap<&'x str, usize>,
 ) -> Result<Joint<'x>, RobotFileError> {
     let link = |tag: &'static str| {
-        let child = element.child(tag)?;
-        let name = child.and_then(|child| child.attribute("link"));
-        let name = name
-            .ok_or_else(|| element.fault("", format!("no <{tag}>"), format!("<{tag} link=...>")))?;
-        let known = links.get(name).copied();
-        known.ok_or_else(|| {
-            let key = format!("<{tag}>");
-            element.fault(
-                &key,
-                format!("`{name}`, which is no link"),
-                "a <link> of the file",
-            )
-        })
+        let name = (element.child(tag)?).and_then(|child| child.attribute("link"));
+        let missing = || element.fault("", format!("no <{tag}>"), format!("<{tag} link=...>"));
+        let name = name.ok_or_else(missing)?;
+        let found = || format!("`{name}`, which is no link");
+        let unknown = || element.fault(&format!("<{tag}>"), found(), "a <link> of the file");
+        links.get(name).copied().ok_or_else(unknown)
     };
     let name = element.name()?;
     let kind = element.attribute("type").unwrap_or("");

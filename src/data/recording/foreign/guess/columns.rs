@@ -15,7 +15,6 @@ pub(super) struct Group {
     pub log: usize,
     pub columns: Vec<usize>,
     pub is_quaternion: bool,
-    /// Whether elements were counted rather than named.
     pub is_counted: bool,
     pub others: Vec<String>,
     /// Whether one of these fits no less than the columns, which are only the first.
@@ -42,7 +41,6 @@ impl Group {
     }
 }
 
-/// The clock of the log, if it is a column.
 #[derive(Debug, Clone)]
 pub(super) struct Clock {
     pub name: String,
@@ -57,24 +55,25 @@ pub(super) fn groups(logs: &[Log], robot: &Robot) -> Vec<Group> {
     let of = |quantity: Quantity| all.iter().filter(move |group| group.quantity == quantity);
     // Quantities of joints, or of the body, in the same words: of `q_sim`, `q` and `tau` the last two belong together.
     let fellows = |one: &Group| -> usize {
-        let others = Quantity::ALL.into_iter().filter(|other| {
-            *other != one.quantity && other.is_of_joints() == one.quantity.is_of_joints()
-        });
+        let own = one.quantity;
+        let is_fellow =
+            |other: &Quantity| *other != own && other.is_of_joints() == own.is_of_joints();
         let is_alike = |other: &Group| other.qualifiers().eq(one.qualifiers());
+        let others = Quantity::ALL.into_iter().filter(is_fellow);
         others.filter(|other| of(*other).any(is_alike)).count()
     };
     let rate = |group: &Group| Reverse(rates[group.log].unwrap_or_default());
-    let first = |quantity| {
-        of(quantity).min_by_key(|group| {
-            (
-                group.is_wanted,
-                group.is_unnamed(logs),
-                rate(group),
-                Reverse(fellows(group)),
-                group.family.len(),
-            )
-        })
+    let preference = |group: &&Group| {
+        let (fellows, words) = (Reverse(fellows(group)), group.family.len());
+        (
+            group.is_wanted,
+            group.is_unnamed(logs),
+            rate(group),
+            fellows,
+            words,
+        )
     };
+    let first = |quantity| of(quantity).min_by_key(preference);
     let [joints, body] = [Quantity::JointPosition, Quantity::BodyPosition].map(first);
     let chosen = Quantity::ALL.into_iter().filter_map(|quantity| {
         let base = match quantity.is_by_leg() {
@@ -131,7 +130,6 @@ fn in_words(logs: &[Log], group: &Group) -> String {
     }
 }
 
-/// Samples per second of a topic, which has a clock.
 fn rate_hz(log: &Log) -> Option<f64> {
     let times = log.columns[log.clock?].times();
     let span = times.last()? - times.first()?;
@@ -144,10 +142,8 @@ fn rate_class(log: &Log) -> Option<i32> {
 }
 
 fn shared(one: &Group, other: &Group) -> usize {
-    one.family
-        .iter()
-        .filter(|word| other.family.contains(word))
-        .count()
+    let shared = one.family.iter().filter(|word| other.family.contains(word));
+    shared.count()
 }
 
 fn differ(logs: &[Log], one: &Group, other: &Group) -> bool {
@@ -164,17 +160,15 @@ fn families(logs: &[Log], robot: &Robot) -> Families {
             // What a column alone does not say its topic may: `/foot_contacts` of `position[fr]`.
             let in_topic = || read(&format!("{} {}", log.name, channel.name));
             let of_robot = of_robot(&channel.name, robot);
-            let Some(mut reading) = of_robot.or_else(|| read(&channel.name)).or_else(in_topic)
-            else {
+            let reading = of_robot.or_else(|| read(&channel.name)).or_else(in_topic);
+            let Some(mut reading) = reading else {
                 continue;
             };
             reading.is_wanted |= is_wanted(&log.name);
             let same = |(own, members): &&mut (usize, Vec<(usize, Reading)>)| {
+                let of = |one: &Reading| (one.quantity, one.is_quaternion);
                 let first = &members[0].1;
-                *own == index
-                    && first.quantity == reading.quantity
-                    && first.is_quaternion == reading.is_quaternion
-                    && first.family == reading.family
+                *own == index && of(first) == of(&reading) && first.family == reading.family
             };
             match families.iter_mut().find(same) {
                 Some((_, members)) => members.push((column, reading)),
@@ -190,13 +184,11 @@ fn families(logs: &[Log], robot: &Robot) -> Families {
     families
 }
 
-/// What a name says that contains the name of one of the robot's joints.
 fn of_robot(name: &str, robot: &Robot) -> Option<Reading> {
     let low = name.to_lowercase();
     let names = robot.joint_names().iter().map(|joint| joint.to_lowercase());
-    let found = names
-        .enumerate()
-        .filter(|(_, joint)| !joint.is_empty() && low.contains(&joint[..]));
+    let names = names.enumerate();
+    let found = names.filter(|(_, joint)| !joint.is_empty() && low.contains(&joint[..]));
     // `joint_11` contains `joint_1`.
     let (element, joint) = found.max_by_key(|(_, joint)| joint.len())?;
     let rest = low.replacen(&joint[..], " ", 1);
@@ -211,7 +203,6 @@ fn of_robot(name: &str, robot: &Robot) -> Option<Reading> {
     is_joint.then_some(Reading { element, ..reading })
 }
 
-/// The families that have every element of their quantity.
 fn complete(families: &Families) -> Vec<Group> {
     let complete = families.iter().filter_map(|(log, members)| {
         let first = &members[0].1;
@@ -245,9 +236,7 @@ fn bare_hips(members: &mut [(usize, Reading)]) {
     let is_joint = members[0].1.quantity.elements().len() == JOINT_DIM;
     let another = |(_, reading): &(usize, Reading)| is_first(reading) && !reading.is_bare_hip;
     if is_joint && members.iter().any(another) {
-        let hips = members
-            .iter_mut()
-            .filter(|(_, reading)| reading.is_bare_hip);
+        let hips = (members.iter_mut()).filter(|(_, reading)| reading.is_bare_hip);
         hips.for_each(|(_, reading)| reading.element += 1);
     }
 }
@@ -255,13 +244,11 @@ fn bare_hips(members: &mut [(usize, Reading)]) {
 /// What is counted from 1 is counted from 0.
 fn from_zero(members: &mut [(usize, Reading)]) {
     let last = members[0].1.quantity.elements().len();
-    let has = |number: usize| {
-        let mut counted = members.iter().filter(|(_, reading)| reading.is_counted);
-        counted.any(|(_, reading)| reading.element == number)
-    };
+    let counted = members.iter_mut().map(|(_, reading)| reading);
+    let mut counted: Vec<&mut Reading> = counted.filter(|reading| reading.is_counted).collect();
+    let has = |number: usize| counted.iter().any(|reading| reading.element == number);
     if has(last) && !has(0) {
-        let counted = members.iter_mut().filter(|(_, reading)| reading.is_counted);
-        counted.for_each(|(_, reading)| reading.element -= 1);
+        counted.iter_mut().for_each(|reading| reading.element -= 1);
     }
 }
 
@@ -272,13 +259,9 @@ fn lists_of_three(members: &mut [(usize, Reading)]) {
         Quantity::JointVelocity => Quantity::BodyVelocity,
         _ => return,
     };
-    let counted = members
-        .iter()
-        .all(|(_, reading)| reading.is_counted && reading.element < 3);
-    if counted && members.len() == 3 {
-        members
-            .iter_mut()
-            .for_each(|(_, reading)| reading.quantity = trunk);
+    let is_counted = |(_, reading): &(usize, Reading)| reading.is_counted && reading.element < 3;
+    if members.len() == 3 && members.iter().all(is_counted) {
+        (members.iter_mut()).for_each(|(_, reading)| reading.quantity = trunk);
     }
 }
 

@@ -3,19 +3,21 @@
 use nalgebra::DMatrix;
 
 use super::super::map::Frame;
+use super::physics::NamedUnit;
 use crate::recording::check::quantile;
 use crate::recording::preprocess::differences_within;
 use crate::recording::segment::stretches;
 
-/// Share of a derivative that a velocity must leave unexplained at most to be evidence.
-const UNEXPLAINED: f64 = 0.5;
-/// Times the least residual below which a plainer explanation is preferred.
-const AS_GOOD: f64 = 1.1;
+const UNEXPLAINED: f64 = 0.5; // share of a derivative that a velocity leaves unexplained at most
+const AS_GOOD: f64 = 1.1; // times the least residual below which a plainer explanation is preferred
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Scale {
     pub unit: &'static str,
     pub sign: f64,
+    pub frame: Frame,
+    /// Squared residual as a share of the derivative.
+    pub left: f64,
 }
 
 /// Slopes without the samples at which time jumps.
@@ -24,43 +26,28 @@ pub(super) fn slopes(times_s: &[f64], rows: &DMatrix<f64>) -> DMatrix<f64> {
     differences_within(&ranges, times_s, rows)
 }
 
-/// The unit and sign in which velocities are the derivatives best, and the squared residual as a share of the
-/// derivative; `None` if in none of `units`.
+/// Unit, sign and axes in which velocities are these derivatives; of the `frames`, each with the velocities turned from
+/// it, the first that fits nearly as well as the best. `None` if none does.
 pub(super) fn scale(
     derivative: &DMatrix<f64>,
-    raw: &DMatrix<f64>,
-    units: &[(&'static str, f64)],
-) -> Option<(Scale, f64)> {
-    let signs = [1.0, -1.0];
-    let candidates = units.iter().flat_map(|(unit, factor)| {
-        signs.map(|sign| {
-            let left = (derivative - raw * (sign * factor)).norm_squared();
-            let left = left / derivative.norm_squared().max(1e-30);
-            (Scale { unit, sign }, left)
-        })
-    });
-    let best = candidates.min_by(|a, b| a.1.total_cmp(&b.1))?;
-    (best.1 < UNEXPLAINED).then_some(best)
-}
-
-/// Unit and axes of a velocity whose position or angles have these rates: of `frames`, the first that fits nearly as
-/// well as the best. `turned` gives the velocity, if it is in a frame, in the axes of the rates.
-pub(super) fn axes(
-    frames: &[Frame],
-    turned: impl Fn(Frame) -> Option<DMatrix<f64>>,
-    rates: &DMatrix<f64>,
-    units: &[(&'static str, f64)],
-) -> Option<(Scale, Frame)> {
-    let explained = |frame: &Frame| {
-        let (scale, left) = scale(rates, &turned(*frame)?, units)?;
-        Some((*frame, scale, left))
+    frames: &[(Frame, DMatrix<f64>)],
+    units: &[NamedUnit],
+) -> Option<Scale> {
+    let whole = derivative.norm_squared().max(1e-30);
+    let best = |(frame, raw): &(Frame, DMatrix<f64>)| {
+        let signed = units.iter().flat_map(|unit| [(*unit, 1.0), (*unit, -1.0)]);
+        let scales = signed.map(|((unit, factor), sign)| Scale {
+            unit,
+            sign,
+            frame: *frame,
+            left: (derivative - raw * (sign * factor)).norm_squared() / whole,
+        });
+        let best = scales.min_by(|a, b| a.left.total_cmp(&b.left));
+        best.filter(|scale| scale.left < UNEXPLAINED)
     };
-    let found: Vec<(Frame, Scale, f64)> = frames.iter().filter_map(explained).collect();
-    let least = found.iter().map(|choice| choice.2);
-    let least = least.fold(f64::INFINITY, f64::min);
-    let is_as_good = |choice: &(Frame, Scale, f64)| choice.2 <= AS_GOOD * least + 1e-12;
-    let (frame, scale, _) = found.into_iter().find(is_as_good)?;
-    Some((scale, frame))
+    let found: Vec<Scale> = frames.iter().filter_map(best).collect();
+    let least = (found.iter().map(|scale| scale.left)).fold(f64::INFINITY, f64::min);
+    (found.into_iter()).find(|scale| scale.left <= AS_GOOD * least + 1e-12)
 }
 
 /// The largest value, the 99th percentile of absolute values, so that single spikes do not count.

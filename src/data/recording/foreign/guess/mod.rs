@@ -22,10 +22,8 @@ use super::text::read_text;
 use crate::recording::error::{RecordingError, RecordingFault};
 use crate::robot::Robot;
 
-/// Most lines before the header of a text.
-const MOST_SKIPPED: usize = 20;
-/// Fewest columns of a table.
-const LEAST_COLUMNS: usize = 3;
+const MOST_SKIPPED: usize = 20; // most lines before the header of a text
+const LEAST_COLUMNS: usize = 3; // fewest columns of a table
 
 /// A first map of a log.
 #[derive(Debug, Clone)]
@@ -66,10 +64,8 @@ pub fn guess(path: &Path, robot: &Robot) -> Result<Guess, RecordingError> {
     };
     let mut guess = guess_of(path, &[log], robot)?;
     if format.skip > 0 {
-        let skip = format!(
-            "[text]\nskip = {}   # lines before the header\n\n[time]\n",
-            format.skip
-        );
+        let skip = format.skip;
+        let skip = format!("[text]\nskip = {skip}   # lines before the header\n\n[time]\n");
         guess.text = guess.text.replacen("[time]\n", &skip, 1);
     }
     Ok(guess)
@@ -82,7 +78,9 @@ pub(in crate::recording) fn guess_of(
     robot: &Robot,
 ) -> Result<Guess, RecordingError> {
     if logs.iter().all(|log| !log.is_named) {
-        return Err(RecordingFault::Unnamed.of(path));
+        let text =
+            "found columns without names, of which no map can be guessed; a map counts them from 1";
+        return Err(RecordingFault::Text(text.to_owned()).of(path));
     }
     let mut guess = write::guessed(path, logs, robot);
     guess.outcome = ColumnMap::parse("the guessed map", &guess.text)

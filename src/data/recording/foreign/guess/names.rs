@@ -41,7 +41,6 @@ pub(super) struct Reading {
     pub element: usize,
     pub is_quaternion: bool,
     pub is_counted: bool,
-    /// The words that all elements of one quantity share.
     pub family: String,
     pub is_wanted: bool,
     pub is_bare_hip: bool,
@@ -79,21 +78,11 @@ fn is_one(word: &str, of: &str) -> bool {
 }
 
 pub(super) fn is_quantity(word: &str) -> bool {
-    let known = [
-        TORQUE,
-        ACCELERATION,
-        VELOCITY,
-        ANGULAR_VELOCITY,
-        ANGULAR,
-        QUATERNION,
-        PLACE,
-        FEET,
-        JOINT_ARRAYS,
-    ];
-    known.iter().any(|known| is_one(word, known))
+    let rates = [TORQUE, ACCELERATION, VELOCITY, ANGULAR_VELOCITY];
+    let places = [ANGULAR, QUATERNION, PLACE, FEET, JOINT_ARRAYS];
+    (rates.iter().chain(&places)).any(|known| is_one(word, known))
 }
 
-/// Whether the name of a column or topic says that its values were asked for rather than measured.
 pub(super) fn is_wanted(name: &str) -> bool {
     words(name).iter().any(|word| is_one(word, WANTED))
 }
@@ -106,19 +95,17 @@ pub(super) fn is_time(name: &str) -> bool {
 pub(super) fn unit(name: &str, units: &[&'static str]) -> Option<&'static str> {
     let (words, low) = (words(name), name.to_lowercase());
     // A single letter is rather an axis than a unit, unless in brackets.
-    let found = units.iter().find(|unit| {
-        let bracketed = [format!("({unit})"), format!("[{unit}]")]
-            .iter()
-            .any(|unit| low.contains(unit));
-        bracketed || (unit.len() > 1 && words.iter().skip(1).any(|word| word == *unit))
-    });
-    found.copied()
+    let is_told = |unit: &&&str| {
+        low.contains(&format!("({unit})"))
+            || low.contains(&format!("[{unit}]"))
+            || (unit.len() > 1 && words.iter().skip(1).any(|word| word == **unit))
+    };
+    units.iter().find(is_told).copied()
 }
 
 /// The quantity, the element, whether that is one of a quaternion, and whether it was counted.
 type Meaning = (Quantity, usize, bool, bool);
 
-/// What the name of a column says, if it says enough.
 pub(super) fn read(name: &str) -> Option<Reading> {
     let words = Name::of(name);
     let (quantity, element, is_quaternion, is_counted) = words.meaning()?;
@@ -134,7 +121,6 @@ pub(super) fn read(name: &str) -> Option<Reading> {
     })
 }
 
-/// The words of a name, abbreviations written out.
 struct Name(Vec<String>);
 
 impl Name {
@@ -156,7 +142,6 @@ impl Name {
         self.0.iter().find_map(of)
     }
 
-    /// The number behind a word.
     fn after(&self, known: &str) -> Option<usize> {
         let pair = self.0.windows(2).find(|pair| is_one(&pair[0], known))?;
         pair[1].parse().ok()
@@ -194,8 +179,8 @@ impl Name {
         if has("covariance") {
             return None;
         }
-        let (leg, joint, axis, number) =
-            (self.place(&LEGS), self.joint(), self.axis(), self.number());
+        let (leg, joint) = (self.place(&LEGS), self.joint());
+        let (axis, number) = (self.axis(), self.number());
         let kinds = [
             (TORQUE, Quantity::JointTorque),
             (ACCELERATION, Quantity::JointAcceleration),
@@ -220,9 +205,8 @@ impl Name {
             let joint = joint.or(number.filter(|number| *number < 3))?;
             return Some((kind, 3 * leg + joint, false, false));
         }
-        if let (Some(leg @ 0..4), Some(joint @ 0..3)) =
-            (self.after("leg"), self.after("joint motor"))
-        {
+        let counted = (self.after("leg"), self.after("joint motor"));
+        if let (Some(leg @ 0..4), Some(joint @ 0..3)) = counted {
             return Some((kind, 3 * leg + joint, false, true));
         }
         let of_body = has("imu body base trunk com torso pose odom twist");
@@ -321,11 +305,8 @@ fn split_compact(words: &mut Vec<String>) {
         };
         axis_known.then(|| [whole.to_owned(), axis.to_owned()])
     };
-    let split = words.iter().flat_map(|word| match parts(word) {
-        Some(parts) => parts.to_vec(),
-        None => vec![word.clone()],
-    });
-    *words = split.collect();
+    let split = |word: &String| parts(word).map_or_else(|| vec![word.clone()], Vec::from);
+    *words = words.iter().flat_map(split).collect();
 }
 
 /// Phi, theta and psi, where they are not counted, are roll, pitch and yaw.

@@ -7,7 +7,6 @@ use nalgebra::Vector3;
 
 use super::super::elements::Dimension;
 use crate::recording::mismatch::{foot_place, hip_torque, median_place, stances};
-use crate::recording::segment::stretches;
 use crate::recording::{Recording, Segment};
 use crate::robot::input_rule::rotation;
 use crate::robot::{GRAVITY_M_S2, JOINT_DIM, Leg, Robot, STATE_DIM};
@@ -19,8 +18,7 @@ const OUTSIDE_M: f64 = 4e-3;
 const TURNED_M: f64 = 1e-4;
 /// Share of a figure, and its difference in m, by which another reading has to be better than a plainer one.
 const BETTER: (f64, f64) = (0.75, 5e-4);
-/// Least movement of feet on stiff legs that shows anything, m.
-const LEAST_MOTION_M: f64 = 3e-3;
+const LEAST_MOTION_M: f64 = 3e-3; // least movement of feet on stiff legs that shows anything, m
 /// Length of the times over which forces and changes of velocity are summed, s.
 const BLOCK_S: f64 = 0.08;
 /// Share of what torques leave unexplained by which another set of signs has to be better than one sign for all, where
@@ -30,8 +28,7 @@ const OTHER_SIGNS: f64 = 0.5;
 const UNCARRIED: f64 = 0.8;
 /// Slope of the hips' torques over what holds the feet on their side that decides their sign.
 const HIP_SHARE: f64 = 0.3;
-/// Largest movement of feet on the ground in a reading that fits, m.
-const FITS_M: f64 = 0.05;
+const FITS_M: f64 = 0.05; // largest movement of feet on the ground in a reading that fits, m
 
 pub(super) type NamedUnit = (&'static str, f64);
 
@@ -94,25 +91,18 @@ pub(super) struct View<'a> {
 
 impl<'a> View<'a> {
     pub(crate) fn of(recording: &'a Recording, robot: &'a Robot) -> Self {
-        let all = recording.segments.iter();
-        let all = all.flat_map(|segment| {
-            stances(segment)
-                .into_iter()
-                .map(move |stance| (segment, stance))
-        });
-        let all: Vec<_> = all.collect();
+        let of_segment = |segment| stances(segment).into_iter().map(move |own| (segment, own));
+        let all: Vec<_> = recording.segments.iter().flat_map(of_segment).collect();
         let every = all.len().div_ceil(4 * MOST.0).max(1);
-        let chosen = all
-            .into_iter()
-            .step_by(every)
-            .map(|(segment, (leg, samples))| {
-                let step = samples.len().div_ceil(MOST.1).max(1);
-                (segment, leg, samples.step_by(step).collect())
-            });
+        let chosen = all.into_iter().step_by(every);
+        let thinned = chosen.map(|(segment, (leg, samples))| {
+            let step = samples.len().div_ceil(MOST.1).max(1);
+            (segment, leg, samples.step_by(step).collect())
+        });
         Self {
             robot,
             recording,
-            stances: chosen.collect(),
+            stances: thinned.collect(),
         }
     }
 
@@ -132,15 +122,10 @@ impl<'a> View<'a> {
                 }
             }
         }
-        let mut best = 0;
-        for at in 1..all.len() {
-            if all[at].beats(&all[best]) {
-                best = at;
-            }
-        }
+        let better = |best: usize, at: usize| if all[at].beats(&all[best]) { at } else { best };
+        let best = (0..all.len()).reduce(better)?;
         let chosen = all.swap_remove(best);
-        let as_well = |other: &Reading| other.fits() && !chosen.beats(other);
-        all.retain(as_well);
+        all.retain(|other| other.fits() && !chosen.beats(other));
         Some((chosen, all))
     }
 
@@ -154,23 +139,19 @@ impl<'a> View<'a> {
             std::array::from_fn(|kind| if code >> kind & 1 == 1 { -1.0 } else { 1.0 })
         };
         // Sums of squares and counts by leg, for the same signs on all legs.
-        let tried: Vec<[(f64, usize); 4]> = (0..8)
-            .map(|code| {
-                let signs = combination(code);
-                reading.signs = std::array::from_fn(|i| signs[i % 3]);
-                of_legs(&reading)
-            })
-            .collect();
+        let tried = (0..8).map(|code| {
+            let signs = combination(code);
+            reading.signs = std::array::from_fn(|i| signs[i % 3]);
+            of_legs(&reading)
+        });
+        let tried: Vec<[(f64, usize); 4]> = tried.collect();
         let rms = |parts: &[(f64, usize)]| {
-            let (sum, count) = parts
-                .iter()
-                .fold((0.0, 0), |all, part| (all.0 + part.0, all.1 + part.1));
+            let add = |all: (f64, usize), part: &(f64, usize)| (all.0 + part.0, all.1 + part.1);
+            let (sum, count) = parts.iter().fold((0.0, 0), add);
             (count > 0).then(|| (sum / count as f64).sqrt())
         };
-        let whole: Vec<f64> = tried
-            .iter()
-            .map(|parts| rms(parts))
-            .collect::<Option<_>>()?;
+        let whole = tried.iter().map(|parts| rms(parts));
+        let whole: Vec<f64> = whole.collect::<Option<_>>()?;
         let least = |figures: &[f64]| {
             let best = (0..8).min_by(|a, b| figures[*a].total_cmp(&figures[*b]));
             best.expect("invariant: eight figures")
@@ -181,17 +162,14 @@ impl<'a> View<'a> {
             whole[best] < BETTER.0 * turned && whole[best] + BETTER.1 < turned
         });
         // A sign that they do not show is the plain one.
-        let common = (0..3)
-            .filter(|kind| shown[*kind])
-            .fold(0, |code, kind| code | best & (1 << kind));
+        let shown_kinds = (0..3).filter(|kind| shown[*kind]);
+        let common = shown_kinds.fold(0, |code, kind| code | best & (1 << kind));
         let mut codes = [common; 4];
         reading.slip_m = whole[common];
         // Legs with axes of their own, where those are clearly better.
         let own = Leg::ALL.map(|leg| {
-            let figures: Option<Vec<f64>> = tried
-                .iter()
-                .map(|parts| rms(&parts[leg.index()..=leg.index()]))
-                .collect();
+            let figures = (tried.iter()).map(|parts| rms(&parts[leg.index()..=leg.index()]));
+            let figures = figures.collect::<Option<Vec<f64>>>();
             figures.map_or(common, |figures| least(&figures))
         });
         let parts = Leg::ALL.map(|leg| tried[own[leg.index()]][leg.index()]);
@@ -211,15 +189,14 @@ impl<'a> View<'a> {
         for (segment, leg, samples) in &self.stances {
             let mut states = states(segment, samples, reading);
             if let Some((first, others)) = states.split_first_mut() {
-                let stiff = &first[..JOINT_DIM];
-                others
-                    .iter_mut()
-                    .for_each(|x| x[..JOINT_DIM].copy_from_slice(stiff));
+                for x in others {
+                    x[..JOINT_DIM].copy_from_slice(&first[..JOINT_DIM]);
+                }
             }
             sum += self.about_median(*leg, &states);
             count += samples.len();
         }
-        (sum / f64::from(u32::try_from(count).unwrap_or(u32::MAX).max(1))).sqrt()
+        (sum / count.max(1) as f64).sqrt()
     }
 
     /// Squared distances of a leg's foot from where it stands, summed, and their number.
@@ -229,9 +206,7 @@ impl<'a> View<'a> {
         let limits = &self.robot.joint_limit_rad()[of_leg.clone()];
         for (segment, _, samples) in self.stances.iter().filter(|(_, own, _)| *own == leg) {
             let states = states(segment, samples, reading);
-            let angles = states
-                .iter()
-                .flat_map(|x| joints_of(leg, x).into_iter().zip(limits));
+            let angles = (states.iter()).flat_map(|x| joints_of(leg, x).into_iter().zip(limits));
             let outside = angles.filter(|(q, (low, high))| !(low - 0.1..=high + 0.1).contains(q));
             let outside = outside.count();
             sum += self.about_median(leg, &states);
@@ -239,10 +214,8 @@ impl<'a> View<'a> {
             count += samples.len();
         }
         let turned = reading.signs[of_leg].iter().filter(|sign| **sign < 0.0);
-        (
-            sum + TURNED_M * TURNED_M * (turned.count() * count) as f64,
-            count,
-        )
+        sum += TURNED_M * TURNED_M * (turned.count() * count) as f64;
+        (sum, count)
     }
 
     /// Squared distances of the places of a leg's foot in these states from their median, summed.
@@ -273,9 +246,7 @@ impl<'a> View<'a> {
         let tried = [[1.0, 1.0], [-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0]];
         let tried = tried.map(|signs| (signs, explained(signs)));
         let best = |all: &[([f64; 2], Option<(f64, f64)>)]| {
-            let known = all
-                .iter()
-                .filter_map(|(signs, found)| Some((*signs, (*found)?)));
+            let known = (all.iter()).filter_map(|(signs, found)| Some((*signs, (*found)?)));
             known.min_by(|one, other| one.1.0.total_cmp(&other.1.0))
         };
         let common = best(&tried[..2]);
@@ -313,38 +284,35 @@ impl<'a> View<'a> {
         let mut out = Vec::new();
         let forwards_and_up = |v: Vector3<f64>| Vector3::new(v.x, 0.0, v.z);
         for segment in &self.recording.segments {
-            let grounded = |sample: usize| segment.feet[sample].contains(&true);
             let step_s = segment.mean_step_s();
             let length = ((BLOCK_S / step_s).round() as usize).max(2);
-            for run in stretches(0..segment.len(), |a, b| grounded(a) == grounded(b)) {
+            let contacts = (segment.contacts().into_iter()).filter(|(_, grounded)| *grounded);
+            for (run, _) in contacts {
                 let starts = run.clone().step_by(length);
-                for start in starts.filter(|start| grounded(*start) && start + length < run.end) {
+                for start in starts.filter(|start| start + length < run.end) {
                     let mut forces = [Vector3::zeros(); 2];
                     for sample in start..start + length {
                         let x = state(segment, sample, reading);
                         let turn = rotation([15, 16, 17].map(|i| x[i]));
                         for leg in Leg::down(segment.feet[sample]) {
-                            let Some((map, tau)) = self.leg(segment, sample, leg, &x, reading)
-                            else {
-                                continue;
-                            };
-                            for kind in [1, 2] {
-                                forces[kind - 1] += turn * map.column(kind) * (tau[kind] * step_s);
+                            let own = self.leg(segment, sample, leg, &x, reading);
+                            if let Some((map, tau)) = own {
+                                for kind in [1, 2] {
+                                    forces[kind - 1] +=
+                                        turn * map.column(kind) * (tau[kind] * step_s);
+                                }
                             }
                         }
                     }
-                    let velocity = |sample: usize| {
-                        Vector3::from_fn(|axis, _| {
-                            segment.dx[(JOINT_DIM + axis, sample)] * reading.position.1
-                        })
+                    let velocity = |sample: usize| -> Vector3<f64> {
+                        let rates = segment.dx.fixed_view::<3, 1>(JOINT_DIM, sample);
+                        rates * reading.position.1
                     };
                     let time_s = segment.time_s[start + length] - segment.time_s[start];
                     let mut needed = velocity(start + length) - velocity(start);
                     needed.z += GRAVITY_M_S2 * time_s;
-                    out.push((
-                        forces.map(forwards_and_up),
-                        forwards_and_up(self.robot.mass_kg() * needed),
-                    ));
+                    let needed = forwards_and_up(self.robot.mass_kg() * needed);
+                    out.push((forces.map(forwards_and_up), needed));
                 }
             }
         }
@@ -379,8 +347,8 @@ impl<'a> View<'a> {
                 let Some((map, tau)) = self.leg(segment, sample, *leg, &x, reading) else {
                     continue;
                 };
-                let force =
-                    map.column(1) * (signs[0] * tau[1]) + map.column(2) * (signs[1] * tau[2]);
+                let given = Vector3::new(0.0, signs[0] * tau[1], signs[1] * tau[2]);
+                let force = map.column(1) * given[1] + map.column(2) * given[2];
                 // What flexion and knee give lies in the leg's plane.
                 let lever = hip_torque(self.robot, *leg, &joints_of(*leg, &x), &force);
                 *product += tau[0] * lever;
@@ -388,9 +356,9 @@ impl<'a> View<'a> {
             }
         }
         let sign = |legs: &[usize]| -> Option<f64> {
-            let sum =
-                |of: fn(&(f64, f64)) -> f64| legs.iter().map(|leg| of(&sums[*leg])).sum::<f64>();
-            let share = sum(|sums| sums.0) / sum(|sums| sums.1);
+            let product: f64 = legs.iter().map(|leg| sums[*leg].0).sum();
+            let square: f64 = legs.iter().map(|leg| sums[*leg].1).sum();
+            let share = product / square;
             (share.abs() > HIP_SHARE).then_some(share.signum())
         };
         let common = sign(&[0, 1, 2, 3]).unwrap_or(signs[1]);

@@ -7,11 +7,10 @@ use nalgebra::DMatrix;
 
 use super::super::assemble::assemble;
 use super::super::attitude::{angle_rates, angles_of_quaternions, in_world, unwrap};
-use super::super::elements::Dimension;
-use super::super::elements::Quantity;
+use super::super::elements::{Dimension, Quantity};
 use super::super::map::{ColumnMap, Frame};
 use super::columns::Group;
-use super::evidence::{Scale, axes, reach, scale, slopes};
+use super::evidence::{Scale, reach, scale, slopes};
 use super::feet::force_lines;
 use super::physics::{NamedUnit, Reading, View};
 use super::write::{Lines, Source, unit_line};
@@ -23,8 +22,7 @@ const ANGLE: [(&str, f64); 3] = [
     ("rpm", std::f64::consts::PI / 30.0),
 ];
 const LENGTHS: [&str; 3] = ["m", "cm", "mm"];
-/// Largest pitch for which radians are the first choice.
-const PITCH_RAD: f64 = 1.6;
+const PITCH_RAD: f64 = 1.6; // largest pitch for which radians are the first choice
 
 pub(super) struct Scales {
     pub lines: Lines,
@@ -36,7 +34,6 @@ pub(super) struct Scales {
 struct Choice {
     attitude: usize,
     reading: Reading,
-    /// Signs and unit of the torques, if these carry the robot.
     torques: Option<([f64; JOINT_DIM], NamedUnit)>,
     as_well: Vec<Reading>,
 }
@@ -53,36 +50,28 @@ impl Source<'_> {
             notes.extend(note);
         }
         let attitudes = self.attitudes();
-        let Choice {
-            attitude,
-            reading,
-            torques,
-            as_well,
-        } = self.choice(robot, time, &attitudes, &lines);
-        notes.extend(said(&reading, &as_well));
+        let choice = self.choice(robot, time, &attitudes, &lines);
+        let (reading, torques) = (&choice.reading, choice.torques);
+        notes.extend(said(reading, &choice.as_well));
         let turned = |what: &str, signs: &[f64]| {
             sign_line(signs).map(|line| format!("{what}: {line}, as the feet and the weight show"))
         };
         notes.extend(turned("joint.position", &reading.signs));
         notes.extend(torques.and_then(|(signs, _)| turned("joint.torque", &signs)));
-        if let Some((own, angles)) = attitudes.into_iter().nth(attitude) {
-            self.trunk(own, &angles, reading.position, &mut lines);
-        } else {
-            self.place(None, reading.position, &mut lines);
-        }
-        self.joints(&reading, torques, &mut lines);
-        let order = reading.by_kind.then_some("*.hx *.hy *.kn");
+        let attitude = attitudes.into_iter().nth(choice.attitude);
+        self.trunk(attitude, reading.position, &mut lines);
+        self.joints(reading, torques, &mut lines);
         Scales {
             lines,
-            order,
+            order: reading.by_kind.then_some("*.hx *.hy *.kn"),
             notes,
         }
     }
 
     /// The reading under which feet on the ground stay best in place; by the joints' limits where no feet stand.
     fn choice(&self, robot: &Robot, time: &str, attitudes: &[Attitude], lines: &Lines) -> Choice {
-        let height = || reach(self.raw_of(Quantity::BodyPosition).row(2).iter().copied());
-        let by_height = || match height() {
+        let place = self.raw_of(Quantity::BodyPosition);
+        let by_height = || match reach(place.row(2).iter().copied()) {
             60.0.. => "mm",
             4.0.. => "cm",
             _ => "m",
@@ -105,10 +94,8 @@ impl Source<'_> {
             let Some((mut reading, as_well)) = view.best(&positions, &joints, orders) else {
                 continue;
             };
-            if found
-                .as_ref()
-                .is_none_or(|best| reading.beats(&best.reading))
-            {
+            let is_best = |best: &Choice| reading.beats(&best.reading);
+            if found.as_ref().is_none_or(is_best) {
                 let torques = view.torques(&mut reading);
                 found = Some(Choice {
                     attitude,
@@ -142,10 +129,8 @@ impl Source<'_> {
         first: impl Fn() -> &'static str,
     ) -> Vec<NamedUnit> {
         let factor = |unit: &'static str| (unit, quantity.dimension().factor(unit).unwrap_or(1.0));
-        if let Some(told) = self
-            .group(quantity)
-            .and_then(|group| self.told(group, named))
-        {
+        let told = (self.group(quantity)).and_then(|group| self.told(group, named));
+        if let Some(told) = told {
             return vec![factor(told)];
         }
         let first = first();
@@ -192,14 +177,14 @@ impl Source<'_> {
         lines: &Lines,
     ) -> Option<crate::recording::Recording> {
         let mut text = format!("[time]\n{time}\n");
-        for quantity in Quantity::ALL
-            .into_iter()
-            .filter(|quantity| quantity.is_required())
-        {
+        let required = |quantity: &Quantity| quantity.is_required();
+        for quantity in Quantity::ALL.into_iter().filter(required) {
             // Torques need not be there to see feet stand.
-            let stands_in =
-                Some(Quantity::JointPosition).filter(|_| quantity == Quantity::JointTorque);
-            let group = self.group(quantity).or_else(|| self.group(stands_in?))?;
+            let stands_in = match quantity {
+                Quantity::JointTorque => self.group(Quantity::JointPosition),
+                _ => None,
+            };
+            let group = self.group(quantity).or(stands_in)?;
             let mut own = self.columns(group);
             match quantity {
                 Quantity::Orientation => own.extend(attitude.iter().cloned()),
@@ -209,13 +194,10 @@ impl Source<'_> {
             text += &format!("[{}]\n{}\n", quantity.key(), own.join("\n"));
         }
         let map = ColumnMap::parse("the guessed map", &text).ok()?;
-        let read = assemble(self.path, self.logs, &map).ok()?;
-        let mut recording = read.recording;
+        let mut recording = assemble(self.path, self.logs, &map).ok()?.recording;
         if self.group(Quantity::JointTorque).is_none() {
-            recording
-                .segments
-                .iter_mut()
-                .for_each(|segment| segment.torque_nm.fill(0.0));
+            let segments = recording.segments.iter_mut();
+            segments.for_each(|segment| segment.torque_nm.fill(0.0));
         }
         Some(recording)
     }
@@ -229,9 +211,8 @@ impl Source<'_> {
             let of_row = rows.map(|(row, (low, high))| {
                 let is_inside = |angle: f64| (angle - low).rem_euclid(TAU) <= high - low;
                 let angles = row.iter().map(|value| factor * value);
-                angles
-                    .filter(|angle| is_inside(*angle) || is_inside(-angle))
-                    .count()
+                let inside = angles.filter(|angle| is_inside(*angle) || is_inside(-angle));
+                inside.count()
             });
             of_row.sum()
         };
@@ -253,12 +234,11 @@ impl Source<'_> {
         let mut reading = Reading::plain(position.copied().unwrap_or(("m", 1.0)), joint);
         let values = self.raw_of(Quantity::JointPosition) * joint.1;
         for (row, (low, high)) in robot.joint_limit_rad().iter().enumerate() {
+            let range = low - 0.1..=high + 0.1;
+            let values = values.row(row);
             let inside = |sign: f64| {
-                let range = low - 0.1..=high + 0.1;
-                let values = values.row(row);
-                (values.iter())
-                    .filter(|v| range.contains(&(sign * **v)))
-                    .count()
+                let signed = values.iter().map(|value| sign * value);
+                signed.filter(|value| range.contains(value)).count()
             };
             if inside(-1.0) > 2 * inside(1.0) {
                 reading.signs[row] = -1.0;
@@ -292,12 +272,8 @@ impl Source<'_> {
             None if reading.joint.0 != "rad" => "   # by their size and the feet",
             Some(_) | None => "",
         };
-        put(
-            Quantity::JointPosition,
-            reading.joint.0,
-            why,
-            &reading.signs,
-        );
+        let (unit, signs) = (reading.joint.0, &reading.signs);
+        put(Quantity::JointPosition, unit, why, signs);
         if let Some((velocity, times)) = self.beside(Quantity::JointVelocity, group) {
             let velocity = in_order(velocity);
             let rates = slopes(&times, &position);
@@ -305,18 +281,15 @@ impl Source<'_> {
             let mut units = Vec::new();
             for row in 0..JOINT_DIM {
                 let rows = |m: &DMatrix<f64>| m.rows(row, 1).into_owned();
-                if let Some((Scale { unit, sign, .. }, _)) =
-                    scale(&rows(&rates), &rows(&velocity), &ANGLE)
-                {
-                    own[row] = sign;
-                    units.push(unit);
+                let velocity = [(Frame::Angles, rows(&velocity))];
+                if let Some(found) = scale(&rows(&rates), &velocity, &ANGLE) {
+                    own[row] = found.sign;
+                    units.push(found.unit);
                 }
             }
-            let most = ANGLE.iter().map(|(unit, _)| *unit);
-            let most = most.max_by_key(|unit| units.iter().filter(|own| own == &unit).count());
-            let unit = most
-                .filter(|_| !units.is_empty())
-                .unwrap_or(reading.joint.0);
+            let count = |unit: &&str| units.iter().filter(|own| *own == unit).count();
+            let most = ANGLE.iter().map(|(unit, _)| *unit).max_by_key(count);
+            let unit = (most.filter(|_| !units.is_empty())).unwrap_or(reading.joint.0);
             let why = "   # by the change of the positions";
             put(Quantity::JointVelocity, unit, why, &own);
         }
@@ -336,15 +309,9 @@ impl Source<'_> {
         }
     }
 
-    fn trunk(
-        &self,
-        own: Vec<String>,
-        angles: &DMatrix<f64>,
-        position: NamedUnit,
-        lines: &mut Lines,
-    ) {
-        lines.insert(Quantity::Orientation, own);
-        if let Some(group) = self.group(Quantity::Orientation) {
+    fn trunk(&self, attitude: Option<Attitude>, (unit, factor): NamedUnit, lines: &mut Lines) {
+        let angles = attitude.as_ref().map(|(_, angles)| angles);
+        if let (Some(group), Some(angles)) = (self.group(Quantity::Orientation), angles) {
             let mut own = angles.clone();
             unwrap(&mut own);
             let turned = |raw: &DMatrix<f64>, frame| angle_rates(&own, raw, frame).ok();
@@ -353,10 +320,11 @@ impl Source<'_> {
             let velocity = (Quantity::AngularVelocity, &ANGLE[..2]);
             self.velocity(velocity, of, &frames, turned, lines);
         }
-        self.place(Some(angles), position, lines);
-    }
-
-    fn place(&self, angles: Option<&DMatrix<f64>>, (unit, factor): NamedUnit, lines: &mut Lines) {
+        lines.extend(
+            attitude
+                .iter()
+                .map(|(own, _)| (Quantity::Orientation, own.clone())),
+        );
         let Some(group) = self.group(Quantity::BodyPosition) else {
             return;
         };
@@ -397,12 +365,12 @@ impl Source<'_> {
         let mut frames = frames.to_vec();
         frames.sort_by_key(|frame| is_odometry && *frame != Frame::Body);
         let rates = slopes(&times, positions);
-        let found = axes(&frames, |frame| turned(&raw, frame), &rates, units);
+        let frames = (frames.iter()).filter_map(|frame| Some((*frame, turned(&raw, *frame)?)));
+        let found = scale(&rates, &frames.collect::<Vec<_>>(), units);
         lines.insert(velocity, velocity_lines(found, of, is_odometry));
     }
 }
 
-/// Where the chosen reading does not fit, or others fit as well.
 fn said(reading: &Reading, as_well: &[Reading]) -> Vec<String> {
     let mut notes = Vec::new();
     if !reading.fits() {
@@ -413,21 +381,14 @@ fn said(reading: &Reading, as_well: &[Reading]) -> Vec<String> {
         ));
     }
     let others = as_well.iter().map(|other| {
-        let order = if other.by_kind {
-            ", joints grouped by kind"
-        } else {
-            ""
-        };
-        format!(
-            "positions in {}, angles in {}{order}",
-            other.position.0, other.joint.0
-        )
+        let (position, joint) = (other.position.0, other.joint.0);
+        let order = ["", ", joints grouped by kind"][usize::from(other.by_kind)];
+        format!("positions in {position}, angles in {joint}{order}")
     });
-    let others: Vec<String> = others.collect();
+    let others = others.collect::<Vec<_>>().join("; ");
     if !others.is_empty() {
         notes.push(format!(
-            "feet on the ground stay in place as well with {}",
-            others.join("; ")
+            "feet on the ground stay in place as well with {others}"
         ));
     }
     notes
@@ -441,31 +402,26 @@ fn sign_line(signs: &[f64]) -> Option<String> {
     if negative.len() == signs.len() {
         return Some("sign = -1".to_owned());
     }
-    let names = negative
-        .iter()
-        .map(|i| format!("\"{}\" = -1", JOINT_NAMES[*i]));
-    let names: Vec<String> = names.collect();
-    Some(format!("sign = {{ {} }}", names.join(", ")))
+    let names = (negative.iter()).map(|i| format!("\"{}\" = -1", JOINT_NAMES[*i]));
+    let names = names.collect::<Vec<_>>().join(", ");
+    Some(format!("sign = {{ {names} }}"))
 }
 
-fn velocity_lines(found: Option<(Scale, Frame)>, of: &str, is_odometry: bool) -> Vec<String> {
-    let Some((scale, axes)) = found else {
+fn velocity_lines(found: Option<Scale>, of: &str, is_odometry: bool) -> Vec<String> {
+    let Some(scale) = found else {
         let (sign, what) = match is_odometry {
             true => ("", "an odometry's"),
             false => ("# ", "unknown"),
         };
-        return vec![format!(
-            "{sign}frame = \"body\"   # {what}: it does not follow {of}"
-        )];
+        let line = format!("{sign}frame = \"body\"   # {what}: it does not follow {of}");
+        return vec![line];
     };
-    let mut lines = vec![unit_line(
-        scale.unit,
-        &format!("   # by the change of {of}"),
-    )];
+    let why = format!("   # by the change of {of}");
+    let mut lines = vec![unit_line(scale.unit, &why)];
     if scale.sign < 0.0 {
         lines.push("sign = -1".to_owned());
     }
-    match axes {
+    match scale.frame {
         Frame::Body => lines.push("frame = \"body\"".to_owned()),
         Frame::World if of == "the angles" => lines.push("frame = \"world\"".to_owned()),
         Frame::World | Frame::Angles => {}
@@ -474,12 +430,13 @@ fn velocity_lines(found: Option<(Scale, Frame)>, of: &str, is_odometry: bool) ->
 }
 
 pub(super) fn order_line(order: Option<&str>, group: &Group) -> Option<String> {
-    match order {
-        Some(order) => Some(format!(
-            "order = \"{order}\"   # feet on the ground stay in place"
-        )),
-        None => group.is_counted.then(|| {
-            "order = \"fr.* fl.* rr.* rl.*\"   # assumed: the columns are only counted".to_owned()
-        }),
-    }
+    let (order, why) = match order {
+        Some(order) => (order, "feet on the ground stay in place"),
+        None if group.is_counted => (
+            "fr.* fl.* rr.* rl.*",
+            "assumed: the columns are only counted",
+        ),
+        None => return None,
+    };
+    Some(format!("order = \"{order}\"   # {why}"))
 }

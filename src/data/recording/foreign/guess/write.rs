@@ -5,10 +5,9 @@ use std::path::Path;
 
 use nalgebra::DMatrix;
 
-use super::super::elements::Dimension;
-use super::super::elements::Quantity;
+use super::super::elements::{Dimension, Quantity};
 use super::super::log::Log;
-use super::super::map::Name;
+use super::super::map::{Frame, Name};
 use super::Guess;
 use super::columns::{Clock, Group, clock, groups};
 use super::evidence::{scale, slopes};
@@ -29,18 +28,20 @@ pub(super) fn guessed(path: &Path, logs: &[Log], robot: &Robot) -> Guess {
         clock: clock.as_ref(),
     };
     let time = source.time();
+    let file = path
+        .file_name()
+        .unwrap_or(path.as_os_str())
+        .to_string_lossy();
     let mut text = format!(
-        "# Guessed from {}: check every line, then `romc inspect LOG --columns THIS.toml`.\n\n[time]\n{time}\n",
-        path.file_name().unwrap_or_default().to_string_lossy(),
+        "# Guessed from {file}: check every line, then `romc inspect LOG --columns THIS.toml`.\n\n[time]\n{time}\n"
     );
     let Scales {
         lines: mut scales,
         order,
         mut notes,
     } = source.scales(robot, &time);
-    let sound: Vec<&Group> = (groups.iter())
-        .filter(|group| source.is_sound(group, &scales))
-        .collect();
+    let is_sound = |group: &&Group| source.is_sound(group, &scales);
+    let sound: Vec<&Group> = groups.iter().filter(is_sound).collect();
     let mut open = Vec::new();
     for group in &sound {
         let key = group.quantity.key();
@@ -114,7 +115,6 @@ impl Source<'_> {
         Some((self.raw(group), self.times_s(group.log)?))
     }
 
-    /// Values of a group in the units of the log, one row a column.
     pub(crate) fn raw(&self, group: &Group) -> DMatrix<f64> {
         let log = &self.logs[group.log];
         DMatrix::from_fn(group.columns.len(), log.len(), |row, sample| {
@@ -125,15 +125,13 @@ impl Source<'_> {
 
     pub(crate) fn times_s(&self, log: usize) -> Option<Vec<f64>> {
         let (log, clock) = (&self.logs[log], self.clock?);
-        let (column, factor) = match log.clock {
-            Some(column) => (column, 1.0),
-            None => {
-                let column = log.column(&Name::Text(clock.name.clone()))?;
-                (column, Dimension::Time.factor(clock.unit)?)
-            }
-        };
-        let times = log.columns[column].times();
-        Some(times.into_iter().map(|time| factor * time).collect())
+        if let Some(column) = log.clock {
+            return Some(log.columns[column].times());
+        }
+        let column = log.column(&Name::Text(clock.name.clone()))?;
+        let factor = Dimension::Time.factor(clock.unit)?;
+        let times = log.columns[column].times().into_iter();
+        Some(times.map(|time| factor * time).collect())
     }
 
     pub(crate) fn columns(&self, group: &Group) -> Vec<String> {
@@ -144,10 +142,8 @@ impl Source<'_> {
         }
         let names = group.columns.iter();
         let names: Vec<String> = names.map(|at| quoted(&log.columns[*at].name)).collect();
-        let rows: Vec<String> = names
-            .chunks(if names.len() == 4 { 4 } else { 3 })
-            .map(|row| row.join(", "))
-            .collect();
+        let rows = names.chunks(if names.len() == 4 { 4 } else { 3 });
+        let rows: Vec<String> = rows.map(|row| row.join(", ")).collect();
         lines.push(match &rows[..] {
             [row] => format!("columns = [{row}]"),
             _ => format!("columns = [\n    {},\n]", rows.join(",\n    ")),
@@ -155,21 +151,18 @@ impl Source<'_> {
         lines
     }
 
-    /// The lines of the clock.
     fn time(&self) -> String {
-        let stamped = "# each topic has the time stamps of its messages";
         let uncounted =
             "# sample_time_s = 0.001   # no column counts time: the distance of samples";
         match self.clock {
             None => uncounted.to_owned(),
-            Some(_) if self.logs[self.groups[0].log].clock.is_some() => stamped.to_owned(),
-            Some(Clock { name, unit }) => {
-                format!("column = {}\nunit = \"{unit}\"", quoted(name))
+            Some(_) if self.logs[self.groups[0].log].clock.is_some() => {
+                "# each topic has the time stamps of its messages".to_owned()
             }
+            Some(Clock { name, unit }) => format!("column = {}\nunit = \"{unit}\"", quoted(name)),
         }
     }
 
-    /// The lines of a group's table.
     fn lines(&self, group: &Group, order: Option<&str>, scales: Vec<String>) -> Vec<String> {
         let mut lines = self.columns(group);
         if group.quantity == Quantity::Feet && group.is_counted {
@@ -197,7 +190,7 @@ impl Source<'_> {
             return false;
         };
         let rates = slopes(&times, &velocity);
-        let same = scale(&rates, &self.raw(group), &[("", 1.0)]);
-        !has_frame && same.is_some_and(|(scale, left)| scale.sign > 0.0 && left < 0.1)
+        let same = scale(&rates, &[(Frame::World, self.raw(group))], &[("", 1.0)]);
+        !has_frame && same.is_some_and(|scale| scale.sign > 0.0 && scale.left < 0.1)
     }
 }
