@@ -69,13 +69,11 @@ pub enum Error {
     /// An output whose name the command does not accept.
     #[error("{path}: {message}", path = path.display())]
     Output { path: PathBuf, message: String },
-    /// Another number of files or segments than one.
     #[error("found {found}, expected one {expected}")]
     NotOne {
         found: String,
         expected: &'static str,
     },
-    /// A flag that the command would ignore.
     #[error("{flag} has no effect here; it needs {needs}")]
     Idle {
         flag: &'static str,
@@ -93,7 +91,6 @@ pub enum Error {
 }
 
 impl Error {
-    /// A file that cannot be used or written as the command line asks.
     pub(crate) fn refused(path: &Path, message: impl Into<String>) -> Self {
         let (path, message) = (path.to_owned(), message.into());
         Self::Config { path, message }

@@ -848,6 +848,33 @@ fn study_in_parts_and_resumed_equals_the_whole() {
         relative(expected),
         "resumed"
     );
+    let cell = Path::new(&second).join("cell-d01-s01.json");
+    fs::write(
+        &cell,
+        r#"{"id":{"latent_dim":1,"seed":1},"outcome":{"refused":"x"}}"#,
+    )
+    .unwrap();
+    let error = failed(&[
+        "study",
+        "--merge",
+        &first,
+        &second,
+        "--out-dir",
+        &out("both"),
+    ]);
+    assert!(
+        error.contains("are the same training with different results"),
+        "{error}"
+    );
+    for shard in ["0/3", "4/3", "3", "a/b", "1/0", "-1/2"] {
+        assert_eq!(
+            run(&["--shard", shard], &out("other")).status.code(),
+            Some(2),
+            "{shard}"
+        );
+    }
+    let many = romc(&["study", "a.csv", "--latent-dims", "1", "--seeds", "10001"]);
+    assert_eq!(many.status.code(), Some(2));
     let other = run(&["--method", "joint"], &first);
     assert_eq!(other.status.code(), Some(1));
     assert!(text(&other.stderr).contains("another study (the methods differ)"));

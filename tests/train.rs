@@ -275,6 +275,44 @@ fn first_latents_are_body_x_and_z() {
     assert_eq!(dominant, [12, 14]);
 }
 
+/// Mean and standard deviation of the acceleration along rows of scaled states over 50 ms in flight, m/s^2.
+fn accelerations_in_flight(jump: &Recording, rows: &DMatrix<f64>) -> [[f64; 2]; 2] {
+    const TRIM: usize = 4;
+    let segment = &jump.segments[0];
+    let in_air: Vec<usize> = (0..segment.len())
+        .filter(|&sample| segment.feet[sample] == [false; 4])
+        .collect();
+    let inside = &in_air[TRIM..in_air.len() - TRIM];
+    let window = (0.05 / segment.mean_step_s()).round() as usize;
+    let changes = inside.windows(window + 1).map(|samples| {
+        let (first, last) = (samples[0], samples[window]);
+        let duration = segment.time_s[last] - segment.time_s[first];
+        rows * (segment.dx.column(last) - segment.dx.column(first)) / duration
+    });
+    let changes = DMatrix::from_columns(&changes.collect::<Vec<_>>());
+    [0, 1].map(|row| [changes.row(row).mean(), changes.row(row).variance().sqrt()])
+}
+
+#[test]
+fn centre_of_mass_of_an_encoder_falls_freely_where_the_body_does_not() {
+    let encoder = trained(4)
+        .model
+        .encoder()
+        .expect("trained")
+        .weights()
+        .clone();
+    let rows = encoder.rows(0, 2).into_owned();
+    let jump = jumps("test", 2).remove(1);
+    let [[x, x_spread], [z, spread]] = accelerations_in_flight(&jump, &rows);
+    assert!((z + 9.81).abs() < 0.1 && spread < 0.3, "{z} {spread}");
+    assert!(x.abs() < 0.1 && x_spread < 0.3, "{x} {x_spread}");
+    let body = DMatrix::from_fn(2, 18, |row, i| f64::from(i == [12, 14][row]));
+    let [_, [_, of_body]] = accelerations_in_flight(&jump, &body);
+    assert!(of_body > 2.0 * x_spread, "{of_body}");
+    // No leg is so heavy that a radian of a joint moves the whole robot by more than 2 cm.
+    assert!(rows.columns(0, 12).amax() < 0.02, "{rows}");
+}
+
 #[test]
 fn training_twice_gives_the_same_file() {
     let text = |trained: &Trained| romc::artifact::to_text(&trained.model);

@@ -14,9 +14,6 @@ pub struct CheckDomain {
 
 impl CheckDomain {
     /// Reads a TOML text: a table per phase with ranges such as `z1 = [-0.2, 0.4]`, scaled units.
-    ///
-    /// # Errors
-    /// [`CheckError::Domain`] for other keys and for ranges without a finite width of at least 0.
     pub(crate) fn from_toml(path: &Path, text: &str) -> Result<Self, CheckError> {
         let refused = |message: String| CheckError::Domain {
             path: path.to_owned(),

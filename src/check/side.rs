@@ -67,9 +67,6 @@ pub(super) enum RightSide {
 }
 
 /// Reads two files. Labels of LaTeX end in the names of the other file's phases.
-///
-/// # Errors
-/// [`CheckError`] for the first that cannot be read.
 pub(crate) fn read_sides(
     paths: [&Path; 2],
     options: &CheckOptions,

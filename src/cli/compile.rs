@@ -120,9 +120,8 @@ fn text(
         let test = of_model("_selftest.c");
         // Without a folder before it, a shell would look for the program elsewhere.
         let here = if program.contains('/') { "" } else { "./" };
-        let _ = writeln!(
-            text,
-            "\ncheck the C code on this machine:\n  cc -O2 -o {program} {source} {test} -lm && {here}{program}"
+        text += &format!(
+            "\ncheck the C code on this machine:\n  cc -O2 -o {program} {source} {test} -lm && {here}{program}\n"
         );
     }
     text
@@ -189,9 +188,9 @@ fn earlier_in_words(earlier: &[PathBuf]) -> String {
     match names(earlier).as_slice() {
         [] => String::new(),
         [file] => format!("\nof an earlier run, not written now: {file}\n"),
-        [file, others @ ..] => format!(
-            "\nof earlier runs, not written now: {file} and {} more\n",
-            others.len()
-        ),
+        [file, others @ ..] => {
+            let n = others.len();
+            format!("\nof earlier runs, not written now: {file} and {n} more\n")
+        }
     }
 }

@@ -62,12 +62,11 @@ impl<'a> Inputs<'a> {
             true => String::new(),
             false => format!(" as {}", input.display()),
         };
-        Err(Error::Output {
-            path: output.to_owned(),
-            message: format!(
-                "the command reads this file{other}, and does not replace it; choose another name for the output"
-            ),
-        })
+        let path = output.to_owned();
+        let message = format!(
+            "the command reads this file{other}, and does not replace it; choose another name for the output"
+        );
+        Err(Error::Output { path, message })
     }
 
     /// Refuses an output by its name alone: a folder, a name that says another format, one of the inputs. What is there
@@ -90,10 +89,9 @@ impl<'a> Inputs<'a> {
             [all @ .., last] if !all.is_empty() => format!("{} or {last}", all.join(", ")),
             all => all.concat(),
         };
-        Err(Error::Output {
-            path: path.to_owned(),
-            message: format!("found {found}, expected a name that ends in {expected}"),
-        })
+        let path = path.to_owned();
+        let message = format!("found {found}, expected a name that ends in {expected}");
+        Err(Error::Output { path, message })
     }
 
     /// Refuses an output that could not be written, before long work begins: by its name, as it is there and may not be
@@ -136,11 +134,13 @@ impl<'a> Inputs<'a> {
 
     pub(super) fn write_figures(
         &self,
-        folder: &Path,
-        figures: &[Figure],
+        folder: Option<&Path>,
+        figures: impl FnOnce() -> Result<Vec<Figure>, Error>,
         overwrite: Overwrite,
         answer: &mut Answer,
     ) -> Result<(), Error> {
+        let Some(folder) = folder else { return Ok(()) };
+        let figures = figures()?;
         let files: Vec<EmittedFile> = figures.iter().flat_map(figure_files).collect();
         let written = self.write_folder(folder, &files, overwrite)?;
         answer.text += &format!("{} figures: {}\n", figures.len(), folder.display());

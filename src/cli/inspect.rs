@@ -237,9 +237,8 @@ fn describe_recording(reading: &Reading, robot: &Robot) -> Result<Answer, Error>
     let mut text = format!("{file}: {samples} samples in {count}\n");
     let mut segments = Vec::new();
     for (index, segment) in recording.segments.iter().enumerate() {
-        let _ = writeln!(
-            text,
-            "  segment {index}: {:.3} s, {} samples every {:.3} ms\n  |{}|",
+        text += &format!(
+            "  segment {index}: {:.3} s, {} samples every {:.3} ms\n  |{}|\n",
             segment.duration_s(),
             segment.len(),
             1e3 * segment.mean_step_s(),

@@ -37,10 +37,9 @@ pub(super) fn run(arguments: &MpcArguments) -> Result<Answer, Error> {
     let failed = failed_runs(&runs);
     let is_failed = !failed.is_empty() || verdict.fails_control();
     let mut answer = answer(arguments, &runs, (&failed, &verdict), &assessment.remarks);
-    if let Some(folder) = &arguments.figures {
-        let figures = control_figures(&model, &settings, &runs);
-        inputs.write_figures(folder, &figures, arguments.force, &mut answer)?;
-    }
+    let figures = || Ok(control_figures(&model, &settings, &runs));
+    let folder = arguments.figures.as_deref();
+    inputs.write_figures(folder, figures, arguments.force, &mut answer)?;
     if let Some(path) = &arguments.output {
         let table = command_table(&model, &runs);
         write_file(path, table.csv().as_bytes(), arguments.force)?;

@@ -28,9 +28,8 @@ pub(super) fn run(arguments: &PlanArguments) -> Result<Answer, Error> {
         bar.finish_and_clear();
         let mut answer = reach_answer(arguments, &reach);
         let figure = reach_figure(&reach, model.jump_prior()?);
-        if let Some(folder) = figures {
-            inputs.write_figures(folder, &[figure], arguments.force, &mut answer)?;
-        }
+        let drawn = || Ok(vec![figure]);
+        inputs.write_figures(figures, drawn, arguments.force, &mut answer)?;
         return Ok(answer);
     }
     let goal = goal(arguments, model.robot()?)?;
@@ -49,10 +48,8 @@ pub(super) fn run(arguments: &PlanArguments) -> Result<Answer, Error> {
     }
     let mut answer = answer(arguments, &planned);
     // Figures first: a folder that is refused leaves no plan behind.
-    if let Some(folder) = figures {
-        let drawn = plan_figures(&planned, model.robot()?);
-        inputs.write_figures(folder, &drawn, arguments.force, &mut answer)?;
-    }
+    let drawn = || Ok(plan_figures(&planned, model.robot()?));
+    inputs.write_figures(figures, drawn, arguments.force, &mut answer)?;
     if let Some(path) = output {
         write_recording(path, vec![planned.motion.clone()], None, arguments.force)?;
         let _ = writeln!(answer.text, "\nthe plan: {}", path.display());

@@ -56,10 +56,9 @@ impl RecordedSets {
         settings: &TrainSettings,
         robot: &'static Robot,
     ) -> Result<Self, Error> {
-        let clocks = if settings.paper {
-            Clocks::Recorded
-        } else {
-            Clocks::Repaired
+        let clocks = match settings.paper {
+            true => Clocks::Recorded,
+            false => Clocks::Repaired,
         };
         let whole = |path: &PathBuf| RecordingFile {
             path: path.clone(),

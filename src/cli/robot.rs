@@ -12,11 +12,8 @@ pub(super) fn chosen(name_or_file: &str) -> Result<&'static Robot, Error> {
     if robot_file::by_name(name_or_file).is_err() {
         let joints = Leg::ALL.into_iter().zip(robot.joint_names().chunks(3));
         let matched = joints.map(|(leg, joints)| format!("{leg} = {}", joints.join(" ")));
-        let matched = matched.collect::<Vec<_>>().join(", ");
-        note(&format!(
-            "{name_or_file}: robot {}, {matched}",
-            robot.name()
-        ));
+        let (name, matched) = (robot.name(), matched.collect::<Vec<_>>().join(", "));
+        note(&format!("{name_or_file}: robot {name}, {matched}"));
     }
     note_all(name_or_file, &read.notes);
     Ok(robot)

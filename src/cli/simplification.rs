@@ -195,12 +195,10 @@ impl Outcome {
             self.certificate.tolerance.words(),
             equation_table(&self.certificate)
         );
-        for sentence in lost_words(&self.certificate) {
-            let _ = writeln!(text, "\n{sentence}.");
-        }
-        if let Some(effect) = &self.rollouts {
-            let _ = write!(text, "\n{}", rollout_table(effect));
-        }
+        let lost = lost_words(&self.certificate).into_iter();
+        text.extend(lost.map(|sentence| format!("\n{sentence}.\n")));
+        let rollouts = self.rollouts.iter();
+        text.extend(rollouts.map(|effect| format!("\n{}", rollout_table(effect))));
         text + "\n"
     }
 }

@@ -51,38 +51,34 @@ pub(super) fn run(arguments: &SimulateArguments) -> Result<Answer, Error> {
 
 fn metrics_text(model: &ReducedModel, assessment: &Assessment<'_>) -> String {
     let mut text = format!("{}\n", coordinate_table(model, assessment));
-    let kinds = [
-        ("full", &assessment.full),
-        ("restarted", &assessment.restarted),
-    ];
-    for (kind, sums) in kinds.into_iter().filter(|(_, sums)| sums.diverged > 0) {
-        let _ = writeln!(
-            text,
-            "{} of {} {kind} rollouts diverged; the table covers them up to there\n",
+    let sums = [&assessment.full, &assessment.restarted].into_iter();
+    let kinds = ["full", "restarted"].into_iter().zip(sums);
+    for (kind, sums) in kinds.filter(|(_, sums)| sums.diverged > 0) {
+        text += &format!(
+            "{} of {} {kind} rollouts diverged; the table covers them up to there\n\n",
             sums.diverged, sums.windows
         );
     }
-    let _ = writeln!(
-        text,
-        "root mean square by phase, restarted every {} s\n\n{}\n{}",
+    text += &format!(
+        "root mean square by phase, restarted every {} s\n\n{}\n{}\n",
         assessment.restart_every_s,
         phase_table(model, assessment),
         baseline_table(assessment)
     );
-    for baseline in &assessment.baselines {
-        let constants = baseline.template.constants();
-        let _ = writeln!(text, "  {}: {constants}", baseline.name);
-    }
-    let _ = writeln!(text, "\n{}", dynamics_table(model, assessment));
-    if let Some(mean_square) = assessment.decoder_mean_square().map(significant) {
-        let _ = writeln!(text, "decoder mean square: {mean_square} (scaled units)");
-    }
+    let baselines = assessment.baselines.iter();
+    text += &lines(
+        "  ",
+        baselines.map(|of| format!("{}: {}", of.name, of.template.constants())),
+    );
+    text += &format!("\n{}\n", dynamics_table(model, assessment));
+    let mean_square = assessment.decoder_mean_square().map(significant);
+    let mean_square = mean_square.map(|value| format!("{value} (scaled units)"));
+    text += &lines("decoder mean square: ", mean_square);
     let shown = |value: Option<f64>| value.map_or("-".to_owned(), significant);
     let (lift, r2) = (&assessment.lift, assessment.lift.torque.r2());
-    let _ = writeln!(
-        text,
+    text += &format!(
         "active terms: {}, combined loss L_mod: {}\n\
-         plain lift of exactly projected inputs: torque R^2 {} in contact, {} in flight, {} over all samples; inconsistency {}",
+         plain lift of exactly projected inputs: torque R^2 {} in contact, {} in flight, {} over all samples; inconsistency {}\n",
         assessment.active_terms,
         shown(assessment.combined_loss()),
         shown(r2.contact),
@@ -115,10 +111,8 @@ fn trajectory_table(model: &ReducedModel, assessment: &Assessment<'_>) -> Result
             [&run.full, &run.restarted].map(|rollout| rollout.states(latent.len()));
         for (sample, states) in full.iter().zip(&restarted).enumerate() {
             let states = [states.0.as_ref(), states.1.as_ref()];
-            let [z, dz] = [
-                states.map(|state| state.map(|(z, _)| z)),
-                states.map(|state| state.map(|(_, dz)| dz)),
-            ];
+            let z = states.map(|state| state.map(|(z, _)| z));
+            let dz = states.map(|state| state.map(|(_, dz)| dz));
             let [full, restarted] = z.map(|z| z.map(|z| model.decode(z)).transpose());
             let (full, restarted) = (full?, restarted?);
             let phase = &model.phases()[latent.phase[sample]].name;

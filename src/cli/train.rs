@@ -129,12 +129,9 @@ fn command_line(
     options: &TrainOptions,
 ) -> String {
     let mut line = format!("romc train {}", quoted_all(&arguments.recordings));
-    if !arguments.validation.is_empty() {
-        let _ = write!(line, " --validation {}", quoted_all(&arguments.validation));
-    }
-    if let Some(split) = arguments.split {
-        let _ = write!(line, " --split {split}");
-    }
+    let validation = Some(&arguments.validation).filter(|paths| !paths.is_empty());
+    line.extend(validation.map(|paths| format!(" --validation {}", quoted_all(paths))));
+    line.extend(arguments.split.map(|split| format!(" --split {split}")));
     let settings = TrainSettings {
         method: Some(method),
         wrench_frame: Some(options.wrench_frame),
@@ -143,11 +140,9 @@ fn command_line(
         ..settings.clone()
     };
     line += &(settings.as_flags() + &arguments.reading.as_flags());
-    if let Some(name) = &arguments.name {
-        let _ = write!(line, " --name {}", quoted_text(name));
-    }
-    let _ = write!(line, " --output {}", quoted(&arguments.output));
-    line
+    let name = arguments.name.iter();
+    line.extend(name.map(|name| format!(" --name {}", quoted_text(name))));
+    line + " --output " + &quoted(&arguments.output)
 }
 
 fn answer(arguments: &TrainArguments, trained: &Trained, tested: Option<&SetMetrics>) -> Answer {

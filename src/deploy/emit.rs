@@ -75,11 +75,6 @@ pub struct EmitOptions {
 ///
 /// Equal equations and options give equal bytes. Controllers compute in the scaled units of the model's maps, whatever
 /// the units of the equations.
-///
-/// # Errors
-/// [`EmitError::Codegen`] if a phase cannot be lowered or single precision cannot hold a constant,
-/// [`EmitError::Typeset`] if a variable has no symbol in print, [`EmitError::Control`] and [`EmitError::Nonlinear`] for models that cannot be
-/// controlled.
 pub fn emit(
     equations: &Equations<'_>,
     targets: &[Target],

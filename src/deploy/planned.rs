@@ -1,10 +1,19 @@
-//! A planned jump as C arrays: what an example of a generated controller jumps.
+//! A jump, planned or recorded, as C arrays: what examples and self-tests of generated controllers jump.
 
 use nalgebra::DMatrix;
 
-use super::controller_c::numbers::{integers, list, nested};
+use super::EmitError;
+use super::controller_c::numbers::{Numbers, integers, list, nested};
+use crate::codegen::Precision;
 use crate::files::EmittedFile;
-use crate::robot::{ContactFlags, STATE_DIM};
+use crate::model::ReducedModel;
+use crate::recording;
+use crate::robot::{ContactFlags, FOOT_DIM, JOINT_DIM, STATE_DIM};
+
+/// A jump of a simulated go1 that no shipped model was trained on.
+const SHIPPED: &[u8] = include_bytes!("../../examples/recordings/go1/test_01.csv.gz");
+/// Distance of samples, s, where those of a jump are denser.
+const STEP_S: f64 = 0.01;
 
 /// Significant digits, beyond those of any sensor.
 const DIGITS: usize = 9;
@@ -18,7 +27,7 @@ pub struct PlannedJump {
     pub x: DMatrix<f64>,
     /// Velocities, 18 x n.
     pub dx: DMatrix<f64>,
-    /// Inputs by the rule of the model, 18 x n.
+    /// Inputs by the rule of the model, 18 x n; zeros of a recorded jump.
     pub u: DMatrix<f64>,
     /// Torques of the motors, N m, 12 x n.
     pub torque_nm: DMatrix<f64>,
@@ -27,6 +36,84 @@ pub struct PlannedJump {
 }
 
 impl PlannedJump {
+    /// The shipped jump.
+    pub(super) fn shipped() -> Result<Self, EmitError> {
+        let mut recording = recording::read_from_bytes("test_01.csv.gz", SHIPPED)?;
+        let segment = recording.segments.swap_remove(0);
+        Ok(Self {
+            u: DMatrix::zeros(STATE_DIM, segment.x.ncols()),
+            time_s: segment.time_s,
+            x: segment.x,
+            dx: segment.dx,
+            torque_nm: segment.torque_nm,
+            feet: segment.feet,
+        })
+    }
+
+    /// Some of the samples, with times from the first of them on.
+    fn select(&self, samples: &[usize]) -> Self {
+        let start_s = self.time_s[samples[0]];
+        Self {
+            time_s: samples.iter().map(|&k| self.time_s[k] - start_s).collect(),
+            x: self.x.select_columns(samples),
+            dx: self.dx.select_columns(samples),
+            u: self.u.select_columns(samples),
+            torque_nm: self.torque_nm.select_columns(samples),
+            feet: samples.iter().map(|&k| self.feet[k]).collect(),
+        }
+    }
+
+    /// Every so many samples, and the last.
+    pub(super) fn thinned(&self) -> Self {
+        let last = self.time_s.len() - 1;
+        let mean_step_s = (self.time_s[last] - self.time_s[0]) / last.max(1) as f64;
+        let stride = (STEP_S / mean_step_s).round().max(1.0) as usize;
+        let samples: Vec<usize> = (0..last).step_by(stride).chain([last]).collect();
+        self.select(&samples)
+    }
+
+    /// The longest part for which a model has phases; all of it where there is no such part, which the
+    /// controller then refuses.
+    pub(super) fn within(self, model: &ReducedModel) -> Self {
+        let all: Vec<usize> = (0..self.time_s.len()).collect();
+        let parts = all.split(|&k| model.phase_for(self.feet[k]).is_none());
+        match parts.max_by_key(|part| part.len()) {
+            Some(part @ [_, _, ..]) => self.select(part),
+            _ => self,
+        }
+    }
+
+    /// `NAME_jump.h`, with `what` it is in words.
+    pub(super) fn constants(
+        &self,
+        what: &str,
+        (banner, upper): (&str, &str),
+        precision: Precision,
+    ) -> String {
+        let count = self.time_s.len();
+        let real = match precision {
+            Precision::Double => "double",
+            Precision::Single => "float",
+        };
+        let times = Numbers(Precision::Double).vector(self.time_s.iter().copied());
+        let columns = |name: &str, rows: usize, matrix: &DMatrix<f64>| {
+            let columns = (0..count).map(|k| matrix.column(k).iter().copied().collect::<Vec<_>>());
+            let values = Numbers(precision).matrix(columns);
+            format!("static const {real} JUMP_{name}[{count}][{rows}] = {values};\n")
+        };
+        let feet = self.feet.iter().map(|feet| integers(feet.map(i64::from)));
+        format!(
+            "{banner}\n/* {what}: times, states, velocities, motor torques and feet of {count} samples. */\n\
+             #ifndef {upper}_JUMP_H\n#define {upper}_JUMP_H\n\n#include <stdint.h>\n\n\
+             static const double JUMP_TIME_S[{count}] = {times};\n{}{}{}\
+             static const uint8_t JUMP_FEET[{count}][{FOOT_DIM}] = {};\n\n#endif\n",
+            columns("X", STATE_DIM, &self.x),
+            columns("DX", STATE_DIM, &self.dx),
+            columns("TORQUE", JOINT_DIM, &self.torque_nm),
+            nested(feet),
+        )
+    }
+
     /// `NAME_plan.h` and `NAME_plan.c` below `folder`, C99; `provenance` is their first line.
     pub fn files(&self, folder: &str, name: &str, provenance: &str) -> [EmittedFile; 2] {
         let path = |ending: &str| format!("{folder}/{name}_plan.{ending}");

@@ -1,6 +1,6 @@
 //! The use of each tensor: as mapped, else by its name.
 
-use super::error::ImportError;
+use super::ImportError;
 use super::options::{ImportOptions, PhaseRule};
 use super::report::Chosen;
 use super::role::{ONLY_PHASE, Part, Role, is_of_optimiser, mentions};

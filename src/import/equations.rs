@@ -13,7 +13,7 @@
 //! Each section is a phase; each phase has `ddz1` to `ddzd`. A text without sections is one phase,
 //! which `--phase` names. A line without `=` continues the equation before it. Names may have underscores (`ddz_1`).
 
-use super::error::ImportError;
+use super::ImportError;
 use super::pysindy::tokens;
 use crate::files::Place;
 use crate::model::{LatentVariable, MAX_LATENT_DIM};
@@ -34,11 +34,10 @@ pub struct Section {
 
 impl Section {
     pub(super) fn new(phase: Option<String>, line: usize) -> Self {
-        let equations = Vec::new();
         Self {
             phase,
             line,
-            equations,
+            equations: Vec::new(),
         }
     }
 }
@@ -72,7 +71,10 @@ pub(super) fn read(file: &str, bytes: &[u8]) -> Result<Sections, ImportError> {
         sections: Vec::new(),
     };
     for (index, line) in text.lines().enumerate() {
-        reader.line(index + 1, line.split('#').next().unwrap_or(""))?;
+        let line = line.split('#').next().unwrap_or("");
+        let indent = line.len() - line.trim_start().len();
+        let column = line[..indent].chars().count() + 1;
+        reader.line((index + 1, column), line.trim())?;
     }
     let expected = "equations such as `ddz1 = 0.5*z1 + u1`";
     complete(file, reader.sections, text.lines().count(), expected)
@@ -98,18 +100,24 @@ struct Reader<'f> {
 }
 
 impl Reader<'_> {
-    fn line(&mut self, number: usize, line: &str) -> Result<(), ImportError> {
-        let content = line.trim();
-        let column = line.chars().take_while(|c| c.is_whitespace()).count() + 1;
+    fn refused<T>(
+        &self,
+        place: (usize, usize),
+        found: &str,
+        expected: &str,
+    ) -> Result<T, ImportError> {
+        Err(ImportError::at(self.file, place, found, expected))
+    }
+
+    fn line(&mut self, place: (usize, usize), content: &str) -> Result<(), ImportError> {
         if content.is_empty() {
             return Ok(());
         }
-        let place = (number, column);
         if content.starts_with('[') {
             return self.header(place, content);
         }
         if let Some((left, right)) = content.split_once('=') {
-            let start = (number, column + left.chars().count() + 1);
+            let start = (place.0, place.1 + left.chars().count() + 1);
             return self.equation(place, left.trim(), pieces(start, right));
         }
         let open = self.sections.last_mut();
@@ -119,33 +127,31 @@ impl Reader<'_> {
                 Ok(())
             }
             None => {
-                let expected = "a phase such as `[contact]` or an equation such as \
-                                `ddz1 = 0.5*z1 + u1`";
-                Err(ImportError::at(self.file, place, quote(content), expected))
+                let expected =
+                    "a phase such as `[contact]` or an equation such as `ddz1 = 0.5*z1 + u1`";
+                self.refused(place, &quote(content), expected)
             }
         }
     }
 
     fn header(&mut self, place: (usize, usize), content: &str) -> Result<(), ImportError> {
-        let refused = |found, expected: &str| ImportError::at(self.file, place, found, expected);
         let name = (content.strip_prefix('[')).and_then(|rest| rest.strip_suffix(']'));
         let Some(name) = name.map(str::trim).filter(|name| !name.is_empty()) else {
             let expected = "the name of a phase in brackets, such as `[contact]`";
-            return Err(refused(quote(content), expected));
+            return self.refused(place, &quote(content), expected);
         };
-        for section in &self.sections {
-            if section.phase.is_none() {
+        for Section { phase, line, .. } in &self.sections {
+            if phase.is_none() {
                 let expected = "the name of its phase in brackets before the first equation";
-                let place = (section.line, 1);
-                return Err(ImportError::at(self.file, place, "an equation", expected));
+                return self.refused((*line, 1), "an equation", expected);
             }
-            if section.phase.as_deref() == Some(name) {
-                let found = format!("`[{name}]` again, as in line {}", section.line);
-                return Err(refused(found, "each phase once"));
+            if phase.as_deref() == Some(name) {
+                let found = format!("`[{name}]` again, as in line {line}");
+                return self.refused(place, &found, "each phase once");
             }
         }
-        self.sections
-            .push(Section::new(Some(name.to_owned()), place.0));
+        let section = Section::new(Some(name.to_owned()), place.0);
+        self.sections.push(section);
         Ok(())
     }
 
@@ -153,30 +159,30 @@ impl Reader<'_> {
         &mut self,
         place: (usize, usize),
         left: &str,
-        right: Vec<Piece>,
+        pieces: Vec<Piece>,
     ) -> Result<(), ImportError> {
-        let refused = |found, expected: &str| ImportError::at(self.file, place, found, expected);
         let name = plain_name(left).unwrap_or_else(|| left.to_owned());
         let variable = (name.strip_prefix('d'))
             .and_then(|name| LatentVariable::from_name(name, MAX_LATENT_DIM));
         let Some(LatentVariable::Dz(output)) = variable else {
             let expected = format!("the left side `ddz1` to `ddz{MAX_LATENT_DIM}`");
-            return Err(refused(quote(left), &expected));
+            return self.refused(place, &quote(left), &expected);
         };
+        let line = place.0;
         if self.sections.is_empty() {
-            self.sections.push(Section::new(None, place.0));
+            self.sections.push(Section::new(None, line));
         }
-        let section = self.sections.last_mut();
-        let section = section.expect("one was just made if there was none");
-        let mut earlier = section.equations.iter();
+        let open = self.sections.last_mut();
+        let open = open.expect("one was just made if there was none");
+        let mut earlier = open.equations.iter();
         if let Some(earlier) = earlier.find(|other| other.output == output) {
             let found = format!("`{left}` again, as in line {}", earlier.line);
-            return Err(refused(found, "each left side once per phase"));
+            return self.refused(place, &found, "each left side once per phase");
         }
-        section.equations.push(Equation {
+        open.equations.push(Equation {
             output,
-            line: place.0,
-            pieces: right,
+            line,
+            pieces,
         });
         Ok(())
     }
@@ -217,23 +223,17 @@ pub(super) fn complete(
 ) -> Result<Sections, ImportError> {
     let outputs = sections.iter().flat_map(|section| &section.equations);
     let Some(last) = outputs.map(|equation| equation.output).max() else {
-        let place = (lines.max(1), 1);
-        return Err(ImportError::at(
-            file,
-            place,
-            "the end of the text",
-            expected,
-        ));
+        let (place, found) = ((lines.max(1), 1), "the end of the text");
+        return Err(ImportError::at(file, place, found, expected));
     };
     let latent_dim = last + 1;
     for section in &mut sections {
         section.equations.sort_by_key(|equation| equation.output);
         let has = |output| section.equations.iter().any(|e| e.output == output);
         if let Some(output) = (0..latent_dim).find(|&output| !has(output)) {
-            let phase = match &section.phase {
-                Some(phase) => format!("phase `[{phase}]`"),
-                None => "equations".to_owned(),
-            };
+            let phase = section.phase.as_ref();
+            let named = |phase: &String| format!("phase `[{phase}]`");
+            let phase = phase.map_or("equations".to_owned(), named);
             let found = format!("{phase} without ddz{}", output + 1);
             let expected = format!("ddz1 to ddz{latent_dim} (`ddz{} = 0` if none)", output + 1);
             return Err(ImportError::at(file, (section.line, 1), found, expected));

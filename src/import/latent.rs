@@ -4,9 +4,9 @@ use std::collections::HashMap;
 
 use nalgebra::DMatrix;
 
+use super::ImportError;
 use super::assemble::Parts;
 use super::equations::{Equation, Section, Sections};
-use super::error::ImportError;
 use super::library;
 use super::options::{ImportOptions, PhaseRule};
 use super::report::{ImportReport, ReadEquation};
@@ -28,20 +28,19 @@ pub(super) fn parts(
     let given = (options.library.as_ref())
         .map(|choice| library::build(file, choice, latent_dim))
         .transpose()?;
-    let mut separation = Separation {
-        file,
-        latent_dim,
-        pool: (given.as_ref()).map_or_else(ExprPool::default, |library| library.pool().clone()),
-        given: given.as_ref().map(rows_of).unwrap_or_default(),
-    };
+    let pool = given.as_ref().map(|library| library.pool().clone());
+    let mut pool = pool.unwrap_or_default();
+    let known = given.as_ref().map(rows_of).unwrap_or_default();
     let mut separated: Vec<Vec<Coefficients>> = Vec::new();
     for (_, section) in &ordered {
-        let columns = (section.equations.iter()).map(|equation| separation.equation(equation));
+        let equations = section.equations.iter();
+        let columns =
+            equations.map(|equation| separate(file, latent_dim, equation, &mut pool, &known));
         separated.push(columns.collect::<Result<_, _>>()?);
     }
     let (library, rows) = match given {
-        Some(library) => (library, separation.given),
-        None => union(file, latent_dim, &separation.pool, &separated)?,
+        Some(library) => (library, known),
+        None => union(file, latent_dim, &pool, &separated)?,
     };
     let (mut phases, mut report) = (Vec::new(), ImportReport::default());
     for ((rule, section), columns) in ordered.into_iter().zip(&separated) {
@@ -97,13 +96,11 @@ fn check_options(latent_dim: usize, options: &ImportOptions) -> Result<(), Impor
         ("--input-scaling", options.input_scaling.is_some()),
         ("--order", options.order.is_some()),
     ];
-    match given.iter().find(|(_, is_given)| *is_given) {
-        None => Ok(()),
-        Some((option, _)) => {
-            let (found, expected) = ("a file of equations", "a file of tensors");
-            Err(ImportError::option(option, found, expected))
-        }
-    }
+    let Some((option, _)) = given.iter().find(|(_, is_given)| *is_given) else {
+        return Ok(());
+    };
+    let (found, expected) = ("a file of equations", "a file of tensors");
+    Err(ImportError::option(option, found, expected))
 }
 
 /// The sections with their phases, in the order of `--phase` or of the file.
@@ -151,36 +148,38 @@ fn rows_of(library: &Library) -> HashMap<ExprId, Row> {
     rows.collect()
 }
 
-struct Separation<'f> {
-    file: &'f str,
+/// The terms of an equation with their coefficients; all are `known` ones, if there are any.
+fn separate(
+    file: &str,
     latent_dim: usize,
-    pool: ExprPool,
-    given: HashMap<ExprId, Row>,
-}
-
-impl Separation<'_> {
-    fn equation(&mut self, equation: &Equation) -> Result<Coefficients, ImportError> {
-        let (place, output) = ((equation.line, 1), equation.output + 1);
-        let expr = equation.parse(self.file, self.latent_dim, &mut self.pool)?;
-        let is_term = |expr| self.given.contains_key(&expr);
-        let coefficients = terms::coefficients(&self.pool, expr, &is_term).ok_or_else(|| {
-            let found = format!("a coefficient of ddz{output} beyond the range of numbers");
-            ImportError::at(self.file, place, found, "finite coefficients")
-        })?;
-        if self.given.is_empty() {
-            return Ok(coefficients);
+    equation: &Equation,
+    pool: &mut ExprPool,
+    known: &HashMap<ExprId, Row>,
+) -> Result<Coefficients, ImportError> {
+    let (place, output) = ((equation.line, 1), equation.output + 1);
+    let expr = equation.parse(file, latent_dim, pool)?;
+    let is_term = |expr| known.contains_key(&expr);
+    let coefficients = terms::coefficients(pool, expr, &is_term).ok_or_else(|| {
+        let found = format!("a coefficient of ddz{output} beyond the range of numbers");
+        ImportError::at(file, place, found, "finite coefficients")
+    })?;
+    let is_strange = |term: &ExprId| !known.is_empty() && !is_term(*term);
+    let strange = coefficients.keys().copied().filter(is_strange);
+    let mut strange: Vec<ExprId> = strange.collect();
+    terms::sort(pool, latent_dim, &mut strange);
+    match strange.first() {
+        None => Ok(coefficients),
+        Some(&term) => {
+            let term = pool.display(term).to_string();
+            let short: String = term.chars().take(80).collect();
+            let found = format!("the term `{short}` in ddz{output}");
+            Err(ImportError::at(
+                file,
+                place,
+                found,
+                "the terms of --library only",
+            ))
         }
-        let strange = coefficients.keys().copied().filter(|&term| !is_term(term));
-        let mut strange: Vec<ExprId> = strange.collect();
-        terms::sort(&self.pool, self.latent_dim, &mut strange);
-        let Some(&term) = strange.first() else {
-            return Ok(coefficients);
-        };
-        let term = self.pool.display(term).to_string();
-        let short: String = term.chars().take(80).collect();
-        let found = format!("the term `{short}` in ddz{output}");
-        let expected = "the terms of --library only";
-        Err(ImportError::at(self.file, place, found, expected))
     }
 }
 

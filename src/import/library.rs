@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use super::error::ImportError;
+use super::ImportError;
 use super::options::standard_text;
 use super::pysindy;
 use super::run::{check_size, read_file};
@@ -58,22 +58,16 @@ pub(super) fn order(
         return Ok(LibraryOrder::ROMC);
     }
     let choice = |(order, texts): (&LibraryOrder, &Vec<String>)| {
-        let terms = rows
-            .iter()
-            .map(|&row| format!("{} in row {}", texts[row], row + 1));
-        let terms: Vec<String> = terms.collect();
+        let term = |row: &usize| format!("{} in row {}", texts[*row], row + 1);
+        let terms: Vec<String> = rows.iter().map(term).collect();
         Some(format!(
             "--library-order {} ({})",
             order.name()?,
             terms.join(", ")
         ))
     };
-    let choices: Vec<String> = LibraryOrder::NAMED
-        .iter()
-        .zip(&orders)
-        .filter_map(choice)
-        .collect();
-    let choices = choices.join(", ");
+    let choices = LibraryOrder::NAMED.iter().zip(&orders).filter_map(choice);
+    let choices = choices.collect::<Vec<String>>().join(", ");
     let expected = format!("one of {choices}: the order of the rows of Xi, counted from 1");
     let found = format!("no order of the terms of {}", standard_text(standard));
     Err(ImportError::option("--library-order", found, expected))

@@ -29,7 +29,6 @@
 mod assemble;
 mod assign;
 mod equations;
-mod error;
 mod latent;
 mod latex;
 mod library;
@@ -43,7 +42,6 @@ mod tensors;
 mod terms;
 
 pub use equations::{Equation, Section, Sections};
-pub use error::ImportError;
 pub use latex::{NameError, SymbolNames};
 pub use library::read_terms;
 pub use options::{Format, ImportOptions, PhaseRule, WeightVectors, XiLayout, parse_standard};
@@ -51,3 +49,6 @@ pub use report::{Chosen, ImportReport, Layout, ReadEquation, UnusedTensor, UsedT
 pub use role::{Mapping, Part, Role};
 pub use run::{Imported, import, import_from_bytes, import_tensors, read_equations};
 pub use tensors::Tensor;
+
+/// A fault and its place: the file, a tensor with its use, a character of a text, or an option.
+pub type ImportError = crate::files::Located<crate::files::Fault<crate::model::ModelError>>;

@@ -11,7 +11,8 @@ use std::io::{self, Cursor, Read};
 
 use zip::ZipArchive;
 
-use super::error::{self, ImportError, too_large};
+use super::ImportError;
+use super::run::{self, too_large};
 use super::tensors::{TensorFile, TensorInfo};
 use crate::files::Place;
 
@@ -41,7 +42,7 @@ pub(super) fn open<'b>(file: &str, bytes: &'b [u8]) -> Result<TensorFile<'b>, Im
 }
 
 fn damaged(file: &str, error: impl Display) -> ImportError {
-    error::damaged(file, "npz", &error.to_string())
+    run::damaged(file, "npz", &error.to_string())
 }
 
 fn describe(

@@ -6,7 +6,7 @@ use std::str::FromStr;
 use clap::ValueEnum;
 use nalgebra::DVector;
 
-use super::error::ImportError;
+use super::ImportError;
 use super::latex::SymbolNames;
 use super::role::{Mapping, ONLY_PHASE};
 use crate::files::Place;
@@ -141,10 +141,8 @@ pub(super) fn standard_text(standard: StandardLibrary) -> String {
         (standard.trigonometric, ",trigonometric"),
         (standard.inputs, ",inputs"),
     ];
-    let words = words
-        .into_iter()
-        .filter_map(|(has, word)| has.then_some(word));
-    format!("degree={}{}", standard.degree, words.collect::<String>())
+    let words = words.map(|(has, word)| if has { word } else { "" });
+    format!("degree={}{}", standard.degree, words.concat())
 }
 
 /// `--phase NAME=FEET`: a phase and the foot patterns that select it.

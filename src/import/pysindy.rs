@@ -107,18 +107,20 @@ pub(super) fn tokens(text: &str) -> impl Iterator<Item = &str> {
     let mut rest = text;
     std::iter::from_fn(move || {
         let first = rest.chars().next()?;
-        let run =
-            |belongs: &dyn Fn(char) -> bool| rest.find(|c: char| !belongs(c)).unwrap_or(rest.len());
-        let length = match first {
-            _ if first.is_ascii_alphabetic() || first == '_' => {
-                run(&|c| c.is_ascii_alphanumeric() || c == '_')
-            }
-            _ if first.is_ascii_digit() || first == '.' => run(&|c| c.is_ascii_digit() || c == '.'),
-            _ if first.is_whitespace() => run(&char::is_whitespace),
-            '*' if rest.starts_with("**") => 2,
-            _ => first.len_utf8(),
+        let is_letter = first.is_ascii_alphabetic() || first == '_';
+        let belongs: &dyn Fn(char) -> bool = match first {
+            _ if is_letter => &|c| c.is_ascii_alphanumeric() || c == '_',
+            '0'..='9' | '.' => &|c| c.is_ascii_digit() || c == '.',
+            _ if first.is_whitespace() => &char::is_whitespace,
+            _ => &|_| false,
         };
-        let (token, after) = rest.split_at(length);
+        let run = rest.find(|c| !belongs(c)).unwrap_or(rest.len());
+        let single = if rest.starts_with("**") {
+            2
+        } else {
+            first.len_utf8()
+        };
+        let (token, after) = rest.split_at(run.max(single));
         rest = after;
         Some(token)
     })

@@ -7,9 +7,9 @@ use std::path::Path;
 use serde_json::{Map, Value, json};
 use sha2::{Digest as _, Sha256};
 
+use super::ImportError;
 use super::assemble::{self, Parts};
 use super::equations::{self, Sections};
-use super::error::{ImportError, too_large};
 use super::latent;
 use super::latex::{self, SymbolNames};
 use super::npz;
@@ -107,6 +107,17 @@ pub(super) fn check_size(file: &str, bytes: &[u8], max: u64) -> Result<(), Impor
     }
 }
 
+/// A file, or one tensor of it, with more than `max` of `unit`.
+pub(super) fn too_large(file: &str, place: Place, max: u64, unit: &str) -> ImportError {
+    let text = format!("found more than {max} {unit}, which no model needs");
+    ImportError::text(file, place, text)
+}
+
+pub(super) fn damaged(file: &str, format: &str, found: &str) -> ImportError {
+    let text = format!("not a usable {format} file: {found}");
+    ImportError::text(file, Place::Whole, text)
+}
+
 fn sections(
     file: &str,
     format: Format,
@@ -115,20 +126,16 @@ fn sections(
     known: &[String],
 ) -> Result<Sections, ImportError> {
     check_size(file, bytes, equations::MAX_TEXT_BYTES)?;
-    match format {
-        Format::Latex => {
-            let read = latex::read(file, bytes, symbols, known)?;
-            match symbols.beyond(read.latent_dim) {
-                None => Ok(read),
-                Some(found) => {
-                    let of = read.latent_dim;
-                    let expected = format!("variables of the {of} latent coordinates of {file}");
-                    Err(ImportError::option("--symbols", found, expected))
-                }
-            }
-        }
-        Format::Equations | Format::Safetensors | Format::Npz => equations::read(file, bytes),
+    if format != Format::Latex {
+        return equations::read(file, bytes);
     }
+    let read = latex::read(file, bytes, symbols, known)?;
+    let Some(found) = symbols.beyond(read.latent_dim) else {
+        return Ok(read);
+    };
+    let dim = read.latent_dim;
+    let expected = format!("variables of the {dim} latent coordinates of {file}");
+    Err(ImportError::option("--symbols", found, expected))
 }
 
 /// Reads the equations of a file in memory. `symbols` are LaTeX's names of variables, `known`
@@ -153,19 +160,14 @@ pub fn read_equations(
 
 fn finish(
     parts: Parts,
-    report: ImportReport,
+    mut report: ImportReport,
     digest: &[u8],
     options: &ImportOptions,
 ) -> Result<Imported, ImportError> {
-    let provenance = provenance(&report, digest);
-    let state_dim = parts.state_dim();
-    let model = build(&report.file, parts, provenance, options)?;
-    let report = ImportReport {
-        latent_dim: model.latent_dim(),
-        state_dim,
-        library_dim: model.library().len(),
-        ..report
-    };
+    report.state_dim = parts.state_dim();
+    let model = build(&report.file, parts, provenance(&report, digest), options)?;
+    report.latent_dim = model.latent_dim();
+    report.library_dim = model.library().len();
     Ok(Imported { model, report })
 }
 
@@ -173,20 +175,21 @@ fn finish(
 fn provenance(report: &ImportReport, digest: &[u8]) -> Map<String, Value> {
     let name = Path::new(&report.file).file_name();
     let name = name.map_or(report.file.as_str().into(), |name| name.to_string_lossy());
+    let tensors = report.used.iter().map(|used| {
+        let value = json!({ "tensor": used.tensor, "layout": used.layout });
+        (used.role.clone(), value)
+    });
     let entries = [
         ("imported_from", json!(name)),
         ("format", json!(report.format)),
         ("sha256", json!(hex(digest))),
         ("romc", json!(env!("CARGO_PKG_VERSION"))),
+        ("tensors", Value::Object(tensors.collect())),
     ];
     let entries = entries.map(|(key, value)| (key.to_owned(), value));
     let mut entries = Map::from_iter(entries);
-    if !report.used.is_empty() {
-        let tensors = report.used.iter().map(|used| {
-            let value = json!({ "tensor": used.tensor, "layout": used.layout });
-            (used.role.clone(), value)
-        });
-        entries.insert("tensors".to_owned(), Value::Object(tensors.collect()));
+    if report.used.is_empty() {
+        entries.remove("tensors");
     }
     entries
 }
@@ -197,11 +200,8 @@ fn build(
     provenance: Map<String, Value>,
     options: &ImportOptions,
 ) -> Result<ReducedModel, ImportError> {
-    let map = match (&parts.encoder, &parts.decoder) {
-        (Some(_), _) => Some("an encoder"),
-        (None, Some(_)) => Some("a decoder"),
-        (None, None) => None,
-    };
+    let (encoder, decoder) = (parts.encoder, parts.decoder);
+    let map = (encoder.as_ref().map(|_| "an encoder")).or(decoder.as_ref().map(|_| "a decoder"));
     if let (Some(map), None) = (map, &parts.scaling) {
         let expected = "--scaling FACTOR (scaled value = factor times SI value: 0.1 for the \
                         published models, 1 for SI units)";
@@ -222,10 +222,10 @@ fn build(
         .robot(options.robot)
         .actuators(options.actuators.clone())
         .sample_time_s(options.sample_time_s);
-    if let Some(encoder) = parts.encoder {
+    if let Some(encoder) = encoder {
         builder = builder.encoder(encoder);
     }
-    if let Some(decoder) = parts.decoder {
+    if let Some(decoder) = decoder {
         builder = builder.decoder(decoder);
     }
     if options.robot.is_some() {

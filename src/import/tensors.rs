@@ -8,7 +8,8 @@ use safetensors::{Dtype, SafeTensors};
 use sha2::digest::Output;
 use sha2::{Digest as _, Sha256};
 
-use super::error::{ImportError, damaged, shape_text, too_large};
+use super::ImportError;
+use super::run::{damaged, too_large};
 use crate::files::Place;
 
 /// Largest tensor that is read: the coefficients of the largest library fit twice.
@@ -227,4 +228,16 @@ pub(super) fn digest(tensors: &[Tensor<'_>]) -> Output<Sha256> {
         digest.update(tensor.little_endian());
     }
     digest.finalize()
+}
+
+/// A shape in words: `18 x 4`, `4 numbers`, `one number`.
+pub(super) fn shape_text(shape: &[usize]) -> String {
+    match shape {
+        [] => "one number".to_owned(),
+        [length] => format!("{length} numbers"),
+        _ => {
+            let dims: Vec<String> = shape.iter().map(usize::to_string).collect();
+            dims.join(" x ")
+        }
+    }
 }

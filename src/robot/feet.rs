@@ -18,7 +18,6 @@ pub enum FeetRule {
 const N_PATTERNS: usize = 16;
 
 impl fmt::Display for FeetRule {
-    /// `any`, `none`, `always`, or patterns such as `0011,0001`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let patterns = match self {
             FeetRule::Any => return f.write_str("any"),

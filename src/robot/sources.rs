@@ -1,6 +1,5 @@
 //! The text of these sources: every generated controller holds them as its module `robot`.
 
-/// Name and text of files.
 macro_rules! sources {
     ($($file:ident)*) => {
         &[$((concat!(stringify!($file), ".rs"), include_str!(concat!(stringify!($file), ".rs")))),*]

@@ -203,9 +203,6 @@ impl Domain {
 
     /// Values of the terms of `library` at the samples of a phase that lie in its box: one row per
     /// sample, none without samples.
-    ///
-    /// # Errors
-    /// [`ModelError::Invalid`] for samples of another model.
     pub(super) fn theta(
         &self,
         phase: usize,

@@ -78,9 +78,6 @@ pub struct PrintedEquation {
 }
 
 /// The errors of all equations when their coefficients are printed with `rounding`.
-///
-/// # Errors
-/// [`SimplifyError::Model`] for samples of another model.
 pub(crate) fn printed(
     equations: &Equations<'_>,
     domain: &Domain,

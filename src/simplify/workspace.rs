@@ -84,9 +84,6 @@ impl Workspace {
 
     /// A model of these coefficients, one matrix per phase. Appended terms that no phase uses are
     /// left out, so that a model keeps its library where it can.
-    ///
-    /// # Errors
-    /// [`SimplifyError::Model`] if a coefficient is not finite.
     pub(crate) fn finish(
         &self,
         model: ReducedModel,

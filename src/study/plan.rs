@@ -39,7 +39,6 @@ pub(crate) struct CellId {
 }
 
 impl Plan {
-    /// Refuses dimensions and seeds that no training can have.
     pub(crate) fn check(&self) -> Result<(), StudyError> {
         let refuse =
             |found: String, expected: &'static str| Err(StudyError::Range { found, expected });
@@ -74,7 +73,6 @@ pub struct Shard {
 impl Shard {
     pub(crate) const WHOLE: Self = Self { index: 1, count: 1 };
 
-    /// Reads `3/8`.
     pub(crate) fn parse(text: &str) -> Result<Self, String> {
         let expected = || format!("found `{text}`, expected a part such as 3/8");
         let (index, count) = text.split_once('/').ok_or_else(expected)?;
@@ -119,47 +117,4 @@ pub enum StudyError {
         action: &'static str,
         source: io::Error,
     },
-}
-
-#[cfg(test)]
-pub(super) mod tests {
-    use super::*;
-
-    pub(in crate::study) fn plan() -> Plan {
-        Plan {
-            latent_dims: vec![1, 2],
-            seeds: 2,
-            method: Method::ClosedForm,
-            settings: String::new(),
-            recordings: vec!["sha256:1".to_owned()],
-            training: 1,
-            romc: "0.1.0".to_owned(),
-        }
-    }
-
-    #[test]
-    fn shards_together_are_the_whole_and_share_nothing() {
-        let latent_dim = 2;
-        let cells: Vec<CellId> = (1..=7).map(|seed| CellId { latent_dim, seed }).collect();
-        let shards = (1..=3).map(|index| Shard { index, count: 3 });
-        let mut joined: Vec<CellId> = shards.flat_map(|shard| shard.of(&cells)).collect();
-        joined.sort();
-        assert_eq!(joined, cells);
-    }
-
-    #[test]
-    fn more_seeds_than_can_be_counted_are_refused_before_cells_are_made() {
-        for seeds in [10_001, u32::MAX as usize, usize::MAX] {
-            let plan = Plan { seeds, ..plan() };
-            assert!(matches!(plan.check(), Err(StudyError::Seeds(_))), "{seeds}");
-        }
-    }
-
-    #[test]
-    fn shard_out_of_range_is_refused_with_what_was_found() {
-        for text in ["0/3", "4/3", "3", "a/b", "1/0", "-1/2"] {
-            assert!(Shard::parse(text).expect_err(text).contains(text));
-        }
-        assert_eq!(Shard::parse("2/8"), Ok(Shard { index: 2, count: 8 }));
-    }
 }

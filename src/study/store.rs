@@ -39,7 +39,6 @@ impl Store {
         Ok(Self { folder, plan })
     }
 
-    /// The store that is in `folder`.
     pub(crate) fn open(folder: &Path) -> Result<Self, StudyError> {
         let plan: Plan = read_json(&folder.join(PLAN))?;
         plan.check()?;
@@ -51,7 +50,6 @@ impl Store {
         &self.plan
     }
 
-    /// A finished training, if it is there.
     pub(crate) fn get(&self, id: CellId) -> Result<Option<Cell>, StudyError> {
         let path = self.path(id);
         if !path.exists() {
@@ -68,7 +66,6 @@ impl Store {
         Ok(Some(cell))
     }
 
-    /// Keeps a finished training; the file appears whole.
     pub(crate) fn put(&self, cell: &Cell) -> Result<(), StudyError> {
         write_json(&self.path(cell.id), cell, Overwrite::Replace)
     }
@@ -153,56 +150,5 @@ fn refused(path: &Path, action: &'static str) -> impl Fn(io::Error) -> StudyErro
         path: path.to_owned(),
         action,
         source,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::study::plan::tests::plan;
-    use crate::study::summary::Outcome;
-
-    fn store(folder: &tempfile::TempDir, name: &str, plan: Plan) -> Result<Store, StudyError> {
-        Store::create(&folder.path().join(name), plan)
-    }
-
-    fn cell(latent_dim: usize, seed: u64, reason: &str) -> Cell {
-        Cell {
-            id: CellId { latent_dim, seed },
-            outcome: Outcome::Refused(reason.to_owned()),
-        }
-    }
-
-    #[test]
-    fn merged_parts_hold_the_cells_of_both_and_name_what_is_missing() {
-        let folder = tempfile::tempdir().expect("a temporary folder");
-        let [a, b, whole] =
-            ["a", "b", "whole"].map(|name| store(&folder, name, plan()).expect("new"));
-        a.put(&cell(1, 1, "x")).expect("writable");
-        b.put(&cell(2, 2, "y")).expect("writable");
-        b.put(&cell(1, 1, "x")).expect("writable");
-        whole.merge(&a).expect("equal plans");
-        whole.merge(&b).expect("equal plans, equal cells");
-        assert_eq!(
-            whole.cells().expect("whole"),
-            [cell(1, 1, "x"), cell(2, 2, "y")]
-        );
-        let missing = [(1, 2), (2, 1)].map(|(latent_dim, seed)| CellId { latent_dim, seed });
-        assert_eq!(whole.missing(), missing);
-    }
-
-    #[test]
-    fn contradicting_parts_and_other_plans_are_refused() {
-        let folder = tempfile::tempdir().expect("a temporary folder");
-        let [a, b] = ["a", "b"].map(|name| store(&folder, name, plan()).expect("new"));
-        a.put(&cell(1, 1, "x")).expect("writable");
-        b.put(&cell(1, 1, "z")).expect("writable");
-        assert!(matches!(a.merge(&b), Err(StudyError::Contradiction { .. })));
-        let other = Plan {
-            settings: " --lift-weight 0".to_owned(),
-            ..plan()
-        };
-        let refused = store(&folder, "a", other).expect_err("another study");
-        assert!(refused.to_string().contains("(the settings differ)"));
     }
 }

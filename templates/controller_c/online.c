@@ -1,8 +1,15 @@
 /* @generated from src/control by `cargo run -p romc-translate`: the controller's own steps. Names that are defined
  * elsewhere: real, the type of numbers; NX and NU, how many states and inputs there are. */
 
+/* Curvature of the cost as the solvers have it: CURVATURE / 2 ‖v‖². Inputs a few deviations beyond the
+ * limits then have multipliers near those at which iterations begin. */
+#define ONLINE_CURVATURE (real)0.01
+
 /* Smallest standard deviation against the largest of the same kind. */
 #define ONLINE_DEVIATION_FLOOR (real)1e-2
+
+/* Gap between primal and dual cost, relative to the cost, at which they end as well. */
+#define ONLINE_GAP (real)1e-8
 
 /* Half width of the window in which velocities are fitted by a straight line, s. */
 #define ONLINE_HALF_WINDOW_S (0.016 + 1e-9)
@@ -15,11 +22,29 @@
 /* Smallest and largest estimate. */
 #define ONLINE_LEAST (real)0.7
 
+/* Cap on the interior-point iterations of a lift. */
+#define ONLINE_LIFT_ITERATIONS 60
+
+/* Most that legs are turned, rad. */
+#define ONLINE_MOST_TURN_RAD (real)0.3
+
 /* Phase of feet that select none. */
 #define ONLINE_NO_PHASE 255
 
+/* Share of a stage whose posture is commanded for all of it. A joint PD that holds the posture of the
+ * stage's end is ahead of the motion and adds to the thrust; that of the middle takes from it. */
+#define ONLINE_POSTURE_SHARE 0.9
+
 /* Weight of the one from before the motion, in first steps. */
 #define ONLINE_PRIOR_WEIGHT (real)10.0
+
+/* Price of a slack in the program; the whole cost is scaled to it. clarabel starts with all
+ * multipliers near one and needs two iterations more if it has to bring them to 100. */
+#define ONLINE_SLACK_PRICE (real)10.0
+
+/* Violation of a joint limit, in half ranges, from which a plan counts as softened: beyond what the
+ * rows that were left out may hide. */
+#define ONLINE_SOFTENED_FROM (real)(1.05 * 0.02)
 
 /* Distance from the reference, in its standard deviations, within which joint limits matter. */
 #define ONLINE_STATE_REACH (real)4.0
@@ -72,10 +97,7 @@ static inline MAYBE_UNUSED online_instant online_trajectory_locate(online_trajec
         share = (time_s - start_s) / (online_trajectory_time_s(self, before + 1) - start_s);
         share = share < 0.0 ? 0.0 : share > 1.0 ? 1.0 : share;
     }
-    return (online_instant){
-        .sample = before,
-        .share = (real)share,
-    };
+    return (online_instant){.sample = before, .share = (real)share};
 }
 
 /* Writes (z, dz) of a sample. */
@@ -607,15 +629,20 @@ static inline MAYBE_UNUSED void online_write_defect(const real *next, const real
     }
 }
 
+static inline MAYBE_UNUSED real online_clamped_torque(real torque, real limit)
+{
+    return torque >= -limit ? (torque > limit ? limit : torque) : torque < 0 ? -limit : 0;
+}
+
+static inline MAYBE_UNUSED real online_clamped_joint(real position, real lower, real upper)
+{
+    return position >= lower ? (position > upper ? upper : position) : lower;
+}
+
 /* As known before a motion. */
 static inline MAYBE_UNUSED online_share online_share_unknown(void)
 {
-    return (online_share){
-        .estimate = 1,
-        .weight = 0,
-        .weighted = 0,
-        .unit = 0,
-    };
+    return (online_share){.estimate = 1, .weight = 0, .weighted = 0, .unit = 0};
 }
 
 /* Takes what a measurement of latent velocities says after a part of the plan's first stage, with the velocities at the

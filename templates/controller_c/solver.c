@@ -80,7 +80,7 @@ typedef struct {
 } solver_lower;
 
 /* How a solve ended. */
-typedef enum { SOLVER_SOLVED, SOLVER_INACCURATE, SOLVER_ITERATION_CAP, SOLVER_NUMERICAL_FAILURE } solver_outcome;
+typedef enum { SOLVER_SOLVED, SOLVER_INACCURATE, SOLVER_ITERATION_CAP, SOLVER_NUMERICAL_FAILURE, SOLVER_INFEASIBLE, SOLVER_UNBOUNDED } solver_outcome;
 
 /* Pairs of opposite rows. */
 typedef struct {
@@ -177,9 +177,9 @@ typedef struct {
 /* Residuals of the optimality conditions, each relative to the size of the terms it is made of
  * (never less than one). */
 typedef struct {
-    /* Largest violation of a row, or error of the dynamics. */
+    /* Largest violation of a row or cone, or error of the dynamics. */
     real primal;
-    /* Largest derivative of the Lagrangian by an input or slack, or negative multiplier. */
+    /* Largest derivative of the Lagrangian by an unknown, or violation of the dual cone by a multiplier. */
     real dual;
     /* Gap between primal and dual cost. */
     real gap;
@@ -293,14 +293,7 @@ static inline void solver_program_shift(solver_program *self)
 
 static inline solver_products solver_products_zeros(void)
 {
-    return (solver_products){
-        .pa = {{0}},
-        .pb = {{0}},
-        .b = {{0}},
-        .hvv = {{0}},
-        .hvx = {{0}},
-        .z = {{0}},
-    };
+    return (solver_products){.pa = {{0}}, .pb = {{0}}, .b = {{0}}, .hvv = {{0}}, .hvx = {{0}}, .z = {{0}}};
 }
 
 static inline const real *solver_cost_state_at(solver_cost *self, int stage, int horizon)
@@ -827,18 +820,8 @@ static inline solver_rows solver_rows_of(real *memory, int count)
     real *dmultiplier = rest;
     rest = rest + count;
     real *inverse = rest;
-    return (solver_rows){
-        .count = count,
-        .bound = bound,
-        .slack = slack,
-        .multiplier = multiplier,
-        .weight = weight,
-        .target = target,
-        .residual = residual,
-        .dslack = dslack,
-        .dmultiplier = dmultiplier,
-        .inverse = inverse,
-    };
+    return (solver_rows){.count = count, .bound = bound, .slack = slack, .multiplier = multiplier, .weight = weight,
+            .target = target, .residual = residual, .dslack = dslack, .dmultiplier = dmultiplier, .inverse = inverse};
 }
 
 static inline real solver_dot(const real *row, const real *x)
@@ -949,15 +932,8 @@ static inline solver_report solver_failure(int iterations)
 {
     const real zero = 0;
     const real infinite = 1 / zero;
-    return (solver_report){
-        .outcome = SOLVER_NUMERICAL_FAILURE,
-        .iterations = iterations,
-        .residuals = {
-        .primal = infinite,
-        .dual = infinite,
-        .gap = infinite,
-        },
-    };
+    return (solver_report){.outcome = SOLVER_NUMERICAL_FAILURE, .iterations = iterations,
+            .residuals = {.primal = infinite, .dual = infinite, .gap = infinite}};
 }
 
 static inline solver_rows solver_program_rows_of(solver_program *self, int stage)
@@ -1067,14 +1043,7 @@ static inline real solver_program_change_of_gains(solver_program *self)
 
 static inline solver_point solver_point_zeros(void)
 {
-    return (solver_point){
-        .left = 0,
-        .kept = 0,
-        .residual = 0,
-        .sum = 0,
-        .largest = 0,
-        .value = 0,
-    };
+    return (solver_point){.left = 0, .kept = 0, .residual = 0, .sum = 0, .largest = 0, .value = 0};
 }
 
 /* The largest of numbers and one more, four at a time. */
@@ -1146,14 +1115,7 @@ static inline solver_point solver_program_centre(solver_program *self, solver_ce
         sum += solver_sum_of(rows.target, rows.count);
         largest = solver_largest_of(rows.target, rows.count, largest);
     }
-    return (solver_point){
-        .left = 1,
-        .kept = 1,
-        .residual = residual,
-        .sum = sum,
-        .largest = largest,
-        .value = 1,
-    };
+    return (solver_point){.left = 1, .kept = 1, .residual = residual, .sum = sum, .largest = largest, .value = 1};
 }
 
 /* Largest residual of a row. */
@@ -1174,11 +1136,7 @@ static inline bool solver_point_is_optimal(solver_point *self, solver_settings *
 /* No cost, as after the last stage. */
 static inline solver_before solver_before_zeros(void)
 {
-    return (solver_before){
-        .by_state = {{0}},
-        .square = {{0}},
-        .linear = {0},
-    };
+    return (solver_before){.by_state = {{0}}, .square = {{0}}, .linear = {0}};
 }
 
 /* The same of rows that are softened. */
@@ -1210,9 +1168,7 @@ static inline void solver_rows_weigh(solver_rows *self, real left)
 static inline solver_lower solver_lower_zeros(void)
 {
     (void)sizeof(char[(NU <= SOLVER_WIDE) ? 1 : -1]);
-    return (solver_lower){
-        .blocks = {{{0}}},
-    };
+    return (solver_lower){.blocks = {{{0}}}};
 }
 
 /* A diagonal matrix. */
@@ -1743,11 +1699,7 @@ static inline solver_reach solver_program_advance(solver_program *self, real lef
             second_largest = solver_largest_of(rows.target, rows.count, second_largest);
         }
     }
-    return (solver_reach){
-        .times = times,
-        .second_sum = second_sum,
-        .second_largest = second_largest,
-    };
+    return (solver_reach){.times = times, .second_sum = second_sum, .second_largest = second_largest};
 }
 
 /* Moves all unknowns along their changes. */
@@ -1826,14 +1778,9 @@ static inline real solver_program_step(solver_program *restrict self, solver_poi
              * first order. */
             const real rest = 1 - longest;
             const real square = longest * longest;
-            solver_point predicted = {
-                .left = rest * point->left,
-                .kept = rest * point->kept,
-                .residual = point->residual,
-                .sum = rest * point->sum + square * reach.second_sum,
-                .largest = rest * point->largest + square * reach.second_largest,
-                .value = point->value,
-            };
+            solver_point predicted = {.left = rest * point->left, .kept = rest * point->kept,
+                    .residual = point->residual, .sum = rest * point->sum + square * reach.second_sum,
+                    .largest = rest * point->largest + square * reach.second_largest, .value = point->value};
             if (solver_point_is_optimal(&predicted, settings)) {
                 break;
             }
@@ -1929,11 +1876,8 @@ static inline solver_residuals solver_program_residuals(solver_program *restrict
         solver_add_transposed_nx_nx(stage->a, p, next);
         memcpy(p, next, sizeof(real[NX]));
     }
-    return (solver_residuals){
-        .primal = primal / size,
-        .dual = dual / multipliers,
-        .gap = solver_magnitude(gap) / solver_or_kept_larger(value, 1),
-    };
+    return (solver_residuals){.primal = primal / size, .dual = dual / multipliers,
+            .gap = solver_magnitude(gap) / solver_or_kept_larger(value, 1)};
 }
 
 /* Whether all are numbers of at most limit. */
@@ -2000,10 +1944,6 @@ static inline solver_report solver_program_solve(solver_program *restrict self, 
     solver_outcome outcome = is_capped
             ? SOLVER_ITERATION_CAP : solver_residuals_within(&residuals, settings->accepted_residual)
             ? SOLVER_SOLVED : SOLVER_INACCURATE;
-    return (solver_report){
-        .outcome = outcome,
-        .iterations = iterations,
-        .residuals = residuals,
-    };
+    return (solver_report){.outcome = outcome, .iterations = iterations, .residuals = residuals};
 }
 

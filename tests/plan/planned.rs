@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 
 use nalgebra::DVector;
 use romc::artifact;
-use romc::model::ReducedModel;
+use romc::model::{FEATURE_DIM, JumpPart, ReducedModel};
 use romc::plan::{Goal, Plan, PlanError, PlanSettings, Verdict, plan};
 use romc::recording::{self, Recording};
 use romc::robot::{BODY_Z, GRAVITY_M_S2};
@@ -225,4 +225,39 @@ fn jumps_recorded_up_to_touch_down_are_planned_up_to_it() {
     assert!(plan.motion.dx[(BODY_Z, last)] < -0.3, "still falling");
     assert!((plan.reached_m[0] - distance.mean).abs() < 3e-3);
     assert!((plan.reached_m[1] - apex.mean).abs() < 3e-3);
+}
+
+#[test]
+fn prior_cuts_jumps_by_contacts_and_is_nearer_to_a_jump_at_its_goal_than_the_mean_jump() {
+    let training = recordings("train", 8);
+    let model = learned(&training, &[], 4);
+    let prior = model.jump_prior().expect("jumps of one kind");
+    let landmarks = &prior.landmarks.parts;
+    let names: Vec<&str> = landmarks.iter().map(|part| part.name.as_str()).collect();
+    assert_eq!(names, ["crouch", "thrust", "flight", "landing"]);
+    assert_eq!(
+        (prior.landmarks.jumps.len(), landmarks[2].feet),
+        (8, [false; 4])
+    );
+    for (part, landmark) in prior.parts.iter().zip(landmarks) {
+        let [least, most] = landmark.duration_range_s;
+        assert!(least <= part.duration_s[0] && part.duration_s[0] <= most);
+    }
+    // Where the flight begins the body rises, where it ends it falls.
+    let flight = &prior.parts[2];
+    let rate = |node: usize| JumpPart::at(&flight.dz, node, &[1.0, 0.0, 0.0, 0.0])[1];
+    assert!(rate(0) > 0.05 && rate(flight.nodes() - 1) < -0.05);
+    let last = prior.parts.last().unwrap();
+    let error = |features: &dyn Fn(usize) -> [f64; FEATURE_DIM]| -> f64 {
+        let ends = training.iter().enumerate().map(|(jump, recording)| {
+            let segment = &recording.segments[0];
+            let x = segment.x.column(segment.len() - 1).into_owned();
+            let end = JumpPart::at(&last.z, last.nodes() - 1, &features(jump));
+            (end[0] - model.encode(&x).expect("complete")[0]).powi(2)
+        });
+        ends.sum()
+    };
+    let at_goal = error(&|jump| prior.features(prior.landmarks.jumps[jump]));
+    let at_mean = error(&|_| [1.0, 0.0, 0.0, 0.0]);
+    assert!(at_goal < 0.2 * at_mean, "{at_goal} {at_mean}");
 }

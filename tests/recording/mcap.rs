@@ -24,6 +24,8 @@ struct Message {
 /// The jump as messages, and the definitions of its topics.
 struct Bag {
     messages: Vec<Message>,
+    /// Encodings of definitions and messages.
+    encodings: [&'static str; 2],
     schemas: BTreeMap<String, (String, Vec<u8>)>,
 }
 
@@ -47,7 +49,11 @@ impl Bag {
                 bytes,
             });
         }
-        Self { messages, schemas }
+        Self {
+            messages,
+            encodings: ["ros2msg", "cdr"],
+            schemas,
+        }
     }
 
     /// The messages in a file, in chunks of some 20 kB.
@@ -58,9 +64,9 @@ impl Bag {
         let mut writer = Writer::with_options(fs::File::create(path).unwrap(), options).unwrap();
         let mut channels = BTreeMap::new();
         for (topic, (name, text)) in &self.schemas {
-            let schema = writer.add_schema(name, "ros2msg", text).unwrap();
+            let schema = writer.add_schema(name, self.encodings[0], text).unwrap();
             let channel = writer
-                .add_channel(schema, topic, "cdr", &BTreeMap::new())
+                .add_channel(schema, topic, self.encodings[1], &BTreeMap::new())
                 .unwrap();
             channels.insert(topic.clone(), channel);
         }
@@ -86,12 +92,13 @@ impl Bag {
     }
 }
 
-/// A message in CDR, little endian.
+/// A message in CDR, little endian; or packed, as ROS 1 has it.
 #[derive(Default)]
-struct Cdr(Vec<u8>);
+struct Cdr(Vec<u8>, bool);
 
 impl Cdr {
     fn put(&mut self, align: usize, bytes: &[u8]) {
+        let align = if self.1 { 1 } else { align };
         self.0.resize(self.0.len().next_multiple_of(align), 0);
         self.0.extend(bytes);
     }
@@ -101,9 +108,9 @@ impl Cdr {
     }
 
     fn text(&mut self, text: &str) {
-        self.length(text.len() + 1);
+        self.length(text.len() + usize::from(!self.1));
         self.0.extend(text.as_bytes());
-        self.0.push(0);
+        self.0.extend((!self.1).then_some(0));
     }
 
     fn single(&mut self, value: f64) {
@@ -111,13 +118,19 @@ impl Cdr {
     }
 
     fn message(self) -> Vec<u8> {
-        [&[0, 1, 0, 0], &self.0[..]].concat()
+        match self.1 {
+            true => self.0,
+            false => [&[0, 1, 0, 0], &self.0[..]].concat(),
+        }
     }
 }
 
 /// A joint state, as `sensor_msgs/JointState` has it.
 fn joint_state(time_ns: u64, names: &[String], lists: [&[f64]; 3]) -> Vec<u8> {
-    let mut out = Cdr::default();
+    joint_state_in(Cdr::default(), time_ns, names, lists)
+}
+
+fn joint_state_in(mut out: Cdr, time_ns: u64, names: &[String], lists: [&[f64]; 3]) -> Vec<u8> {
     out.length((time_ns / 1_000_000_000) as usize);
     out.length((time_ns % 1_000_000_000) as usize);
     out.text("world");
@@ -131,7 +144,7 @@ fn joint_state(time_ns: u64, names: &[String], lists: [&[f64]; 3]) -> Vec<u8> {
     out.message()
 }
 
-const LOW_STATE: &str = "IMUState imu_state\nMotorState[20] motor_state\nint16[4] foot_force\nuint32 tick\n\
+const LOW_STATE: &str = "uint8 KIND=3 # a constant\nIMUState imu_state\nMotorState[20] motor_state\nint16[4] foot_force\nuint32 tick\n\
      ===\nMSG: unitree_go/IMUState\nfloat32[4] quaternion\nfloat32[3] gyroscope\nfloat32[3] accelerometer\n\
      float32[3] rpy\nint8 temperature\n===\nMSG: unitree_go/MotorState\nuint8 mode\nfloat32 q\nfloat32 dq\n\
      float32 ddq\nfloat32 tau_est\nfloat32 q_raw\nfloat32 dq_raw\nfloat32 ddq_raw\nint8 temperature\n\
@@ -307,6 +320,75 @@ fn joints_go_by_the_names_of_each_message() {
                 .unwrap();
             assert!(difference(&found.recording, &jump).0 < 1e-9, "{seed}");
         }
+    }
+}
+
+#[test]
+fn messages_of_ros_1_are_the_same_numbers() {
+    let folder = tempfile::tempdir().unwrap();
+    let jump = jump().slice(220..280);
+    let mut bag = Bag::of(&jump);
+    bag.encodings = ["ros1msg", "ros1"];
+    let owned = |names: &[&str]| -> Vec<String> { names.iter().map(|&n| n.to_owned()).collect() };
+    let (joints, feet) = (owned(&JOINT_NAMES), owned(&["fr", "fl", "rr", "rl"]));
+    for (at, message) in bag.messages.iter_mut().enumerate() {
+        let (time_ns, sample) = (message.time_ns, at / 3);
+        let of = |m: &nalgebra::DMatrix<f64>| m.column(sample).as_slice()[..12].to_vec();
+        let [q, dq, tau] = [&jump.x, &jump.dx, &jump.torque_nm].map(of);
+        let down = jump.feet[sample].map(|down| f64::from(u8::from(down)));
+        let mut packed = Cdr(Vec::new(), true);
+        message.bytes = match at % 3 {
+            0 => joint_state_in(packed, time_ns, &joints, [&q, &dq, &tau]),
+            1 => {
+                packed.length((time_ns / 1_000_000_000) as usize);
+                packed.length((time_ns % 1_000_000_000) as usize);
+                packed.text("world");
+                packed.text("base");
+                let numbers = 8 * (7 + 36 + 6 + 36);
+                packed
+                    .0
+                    .extend(&message.bytes[message.bytes.len() - numbers..]);
+                packed.message()
+            }
+            _ => joint_state_in(packed, time_ns, &feet, [&down, &[], &[]]),
+        };
+    }
+    let path = bag.file(folder.path(), &bag.messages);
+    is_the_jump(&path, &jump);
+}
+
+#[test]
+fn messages_that_are_cut_or_of_unknown_kinds_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let jump = jump().slice(220..240);
+    let mut bag = Bag::of(&jump);
+    let with = |bytes: &[u8]| {
+        let mut messages = bag.messages.clone();
+        messages[15].bytes = bytes.to_vec();
+        refused(&bag.file(folder.path(), &messages))
+    };
+    let whole = bag.messages[15].bytes.clone();
+    for end in (0..whole.len()).step_by(if is_thorough() { 1 } else { 7 }) {
+        let error = with(&whole[..end]);
+        assert!(
+            error.contains("which end before its fields do"),
+            "{end}: {error}"
+        );
+    }
+    let error = with(&[&[0, 3], &whole[2..]].concat());
+    assert!(error.contains("encoding `cdr 0x0 0x3`"), "{error}");
+    for (text, words) in [
+        ("Missing part\n", "definition: `a/Missing` is not defined"),
+        (
+            "float64\n",
+            "definition: found `float64`, expected a type and a name",
+        ),
+    ] {
+        let schema = ("a/B".to_owned(), text.into());
+        bag.schemas
+            .insert(recording::foreign::JOINT_TOPIC.to_owned(), schema);
+        let error = refused(&bag.file(folder.path(), &bag.messages));
+        assert!(error.contains(words), "{error}");
     }
 }
 

@@ -25,16 +25,12 @@ impl FromStr for Widths {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        if text == "linear" {
-            return Ok(Self(Vec::new()));
-        }
-        let widths = text.split(',').map(|width| table::LAYER_WIDTH.parse(width));
+        let each = table::LAYER_WIDTH.in_words();
+        let widths = text.split(',').filter(|_| text != "linear");
+        let widths = widths.map(|width| table::LAYER_WIDTH.parse(width));
         let widths: Result<Vec<usize>, String> = widths.collect();
         widths.map(Self).map_err(|_| {
-            format!(
-                "found `{text}`, expected widths such as 32,16, or `linear`, each {}",
-                table::LAYER_WIDTH.in_words()
-            )
+            format!("found `{text}`, expected widths such as 32,16, or `linear`, each {each}")
         })
     }
 }
@@ -298,14 +294,11 @@ fn dimensions(text: &str) -> Result<Dimensions, String> {
         None => text.split(',').map(number).collect::<Result<Vec<_>, _>>()?,
     };
     found.sort_unstable();
-    if let Some(twice) = found.windows(2).find(|pair| pair[0] == pair[1]) {
-        return Err(format!(
-            "found {} twice in `{text}`, expected each once",
-            twice[0]
-        ));
+    match found.windows(2).find(|pair| pair[0] == pair[1]) {
+        Some(&[twice, _]) => Err(format!(
+            "found {twice} twice in `{text}`, expected each once"
+        )),
+        _ if found.is_empty() => Err(expected()),
+        _ => Ok(Dimensions(found)),
     }
-    if found.is_empty() {
-        return Err(expected());
-    }
-    Ok(Dimensions(found))
 }

@@ -6,8 +6,9 @@
 
 use super::engine::{StageSolver, Start};
 use super::error::ControlError;
-use super::qp::{Cone, ConeProgram, Outcome, QpSettings, QpSolver, position, sparse};
+use super::qp::{Cone, ConeProgram, QpSettings, QpSolver, position, sparse};
 use super::stage::{CONE_ROWS, StageCost, StageQp, StageShape};
+use crate::solver::Outcome;
 
 #[derive(Debug)]
 pub(super) struct Conic {
@@ -18,8 +19,6 @@ pub(super) struct Conic {
 }
 
 impl Conic {
-    /// # Errors
-    /// [`ControlError::Solver`] if clarabel refuses the program.
     pub(super) fn new(
         horizon: usize,
         shape: StageShape,

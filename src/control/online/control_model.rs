@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
+use super::dense::Real;
 use super::error::ControlError;
 use super::estimate::InputGivenState;
 use crate::robot::{ContactFlags, InputRule, JOINT_DIM, Robot, STATE_DIM};
@@ -118,7 +119,7 @@ impl ControlModel {
     /// The plant of affine maps that touch the encoder at `x` (18, SI units) and the decoder at
     /// `z`; none for a model whose maps are affine anyway, and where the encoder's Jacobian has not
     /// full row rank.
-    pub fn tangent_at(&self, x: &[f64], z: &[f64]) -> Option<Self> {
+    pub(super) fn tangent_at(&self, x: &[f64], z: &[f64]) -> Option<Self> {
         let maps = self.nonlinear.as_ref()?;
         let (encoder, decoder) = (maps.encoder_jacobian(x), maps.decoder_jacobian(z));
         let mut value = vec![0.0; self.latent_dim()];
@@ -252,13 +253,8 @@ impl ControlModel {
     /// The torques within the robot's limits that are nearest to these; zero for what is not a
     /// number.
     pub fn clamp_torque(&self, torque_nm: [f64; JOINT_DIM]) -> [f64; JOINT_DIM] {
-        std::array::from_fn(|joint| {
-            let limit = self.robot().torque_limit_nm()[joint];
-            match torque_nm[joint].is_nan() {
-                true => 0.0,
-                false => torque_nm[joint].clamp(-limit, limit),
-            }
-        })
+        let limits = self.robot().torque_limit_nm();
+        std::array::from_fn(|joint| clamped_torque(torque_nm[joint], limits[joint]))
     }
 
     /// Lower and upper limits of the joints, rad.
@@ -269,10 +265,28 @@ impl ControlModel {
 
     /// The joint positions within the robot's limits that are nearest to these; the lower limit for NaN.
     pub(super) fn clamp_joints(&self, joints_rad: [f64; JOINT_DIM]) -> [f64; JOINT_DIM] {
+        let limits = self.robot().joint_limit_rad();
         std::array::from_fn(|joint| {
-            let (lower, upper) = self.robot().joint_limit_rad()[joint];
-            joints_rad[joint].max(lower).min(upper)
+            clamped_joint(joints_rad[joint], limits[joint].0, limits[joint].1)
         })
+    }
+}
+
+fn clamped_torque(torque: Real, limit: Real) -> Real {
+    if torque >= -limit {
+        if torque > limit { limit } else { torque }
+    } else if torque < 0.0 {
+        -limit
+    } else {
+        0.0
+    }
+}
+
+fn clamped_joint(position: Real, lower: Real, upper: Real) -> Real {
+    if position >= lower {
+        if position > upper { upper } else { position }
+    } else {
+        lower
     }
 }
 

@@ -4,6 +4,7 @@ use std::time::Instant;
 
 use super::command::{Command, Status};
 use super::control_model::ControlModel;
+use super::dense::Real;
 use super::effectiveness::Effectiveness;
 use super::engine::StageSolver;
 use super::error::ControlError;
@@ -22,7 +23,7 @@ use crate::robot::{ContactFlags, JOINT_DIM, STATE_DIM};
 
 /// Violation of a joint limit, in half ranges, from which a plan counts as softened: beyond what the
 /// rows that were left out may hide.
-pub const SOFTENED_FROM: f64 = 1.05 * ROW_MARGIN;
+pub(super) const SOFTENED_FROM: Real = 1.05 * ROW_MARGIN;
 
 /// Latent model-predictive controller of one model on its robot.
 ///

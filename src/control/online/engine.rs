@@ -4,10 +4,11 @@ use std::fmt::Debug;
 
 use super::conic::Conic;
 use super::error::ControlError;
-use super::qp::{Outcome, QpSettings, QpSolver};
+use super::qp::{QpSettings, QpSolver};
 use super::settings::Solver;
 use super::stage::{FrictionShape, StageCost, StageQp, StageShape};
 use super::structured::{MAX_STRUCTURED_DIM, structured};
+use crate::solver::Outcome;
 
 #[derive(Debug, Clone, Default)]
 pub(super) struct Start {
@@ -45,10 +46,6 @@ impl Solver {
     }
 
     /// A solver for the program of a controller's horizon.
-    ///
-    /// # Errors
-    /// [`ControlError::Solver`] if clarabel refuses the program, [`ControlError::StructuredDim`] if the
-    /// structured solver is not compiled for the number of inputs.
     pub(super) fn of_horizon(
         self,
         horizon: usize,

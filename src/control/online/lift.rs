@@ -38,20 +38,20 @@ use super::dense::{
 use super::engine::{StageSolver, Start};
 use super::error::ControlError;
 use super::problem::upright;
-use super::qp::{Outcome, QpSettings};
+use super::qp::QpSettings;
 use super::settings::{MpcSettings, Solver};
 use super::stage::{
     CONE_ROWS, FrictionShape, PYRAMID_ROWS, SQRT_HALF, StageCost, StageQp, StageShape,
 };
 use super::structured::{Structured, TOLERANCE};
 use crate::robot::{ContactFlags, FOOT_DIM, GRAVITY_M_S2, JOINT_DIM, Leg, STATE_DIM};
-use crate::solver::Settings;
+use crate::solver::{Outcome, Settings};
 
 /// Cap on the interior-point iterations of a lift.
-pub const LIFT_ITERATIONS: u32 = 60;
+const LIFT_ITERATIONS: u32 = 60;
 /// Curvature of the cost as the solvers have it: `CURVATURE / 2 ‖v‖²`. Inputs a few deviations beyond the
 /// limits then have multipliers near those at which iterations begin.
-pub const CURVATURE: f64 = 0.01;
+const CURVATURE: Real = 0.01;
 
 type Torque = [f64; JOINT_DIM];
 /// The upright force of each foot in contact by its leg's torques.

@@ -3,7 +3,7 @@
 //! In: a [`ControlModel`] (plain numbers), [`LatentDynamics`], a reference, measurements. Out: commands.
 //! Nothing here knows of models, programs or recordings: besides nalgebra and clarabel these files
 //! import [`robot`](crate::robot) and [`solver`](crate::solver) alone, because `romc compile --emit controller` emits this very
-//! folder. Read `problem` first.
+//! folder. C is made of functions on plain slices (`trajectory`, and parts of other files) by `src/translate`. Read `problem` first.
 
 // Loops over indices are what C is made of.
 #![allow(
@@ -42,12 +42,8 @@ mod trajectory;
 
 /// Numbers that the controller in C shares, which are no settings.
 pub mod shared {
-    pub use crate::online::controller::SOFTENED_FROM;
-    pub use crate::online::lift::{CURVATURE as LIFT_CURVATURE, LIFT_ITERATIONS, torque_deviation};
-    pub use crate::online::plan::POSTURE_SHARE;
-    pub use crate::online::problem::SLACK_PRICE;
-    pub use crate::online::structured::{GAP, RATE_SOFTNESS, RATE_TOLERANCE, TOLERANCE};
-    pub use crate::online::swing::MOST_TURN_RAD;
+    pub use crate::online::lift::torque_deviation;
+    pub use crate::online::structured::{RATE_SOFTNESS, RATE_TOLERANCE, TOLERANCE};
     pub use crate::online::trajectory::NO_PHASE;
 }
 
@@ -56,6 +52,7 @@ pub mod widest {
     pub use crate::online::structured::{prepare, solve};
 }
 
+pub use crate::solver::{Outcome, Residuals};
 pub use command::{Command, Source, Status};
 pub use control_model::{ControlModel, ControlModelParts, ControlPhase, NonlinearMaps};
 pub use controller::{Controller, Measurement};
@@ -66,10 +63,7 @@ pub use linearise::LatentDynamics;
 pub use plan::Plan;
 pub use problem::{to_upright, upright};
 pub use prune::needed_rows;
-pub use qp::{
-    Cone, ConeProgram, Outcome, QpSettings, QpSolver, Residuals, SolverProfile, SparseColumns,
-    sparse,
-};
+pub use qp::{Cone, ConeProgram, QpSettings, QpSolver, SolverProfile, SparseColumns, sparse};
 pub use reference::{Reference, ReferenceSamples};
 pub use settings::{
     Drift, Effectiveness, FallbackSettings, Lift, Linearisation, MAX_HORIZON, MissingInput,

@@ -2,7 +2,7 @@
 
 /// Share of a stage whose posture is commanded for all of it. A joint PD that holds the posture of the
 /// stage's end is ahead of the motion and adds to the thrust; that of the middle takes from it.
-pub const POSTURE_SHARE: f64 = 0.9;
+const POSTURE_SHARE: f64 = 0.9;
 
 /// Inputs and states of a solved horizon.
 #[derive(Debug, Clone)]

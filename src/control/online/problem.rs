@@ -52,14 +52,14 @@ use crate::robot::{GRAVITY_M_S2, JOINT_DIM, WrenchFrame};
 
 /// Price of a slack in the program; the whole cost is scaled to it. clarabel starts with all
 /// multipliers near one and needs two iterations more if it has to bring them to 100.
-pub const SLACK_PRICE: f64 = 10.0;
+const SLACK_PRICE: Real = 10.0;
 
 /// Distance from the mean training input, in standard deviations, within which limits matter.
 const INPUT_REACH: f64 = 10.0;
 
 /// By how much the rows that are kept may let one that is left out be exceeded, relative to its
 /// limit or half range: plans may be that far off, commands are clamped and are not.
-pub(super) const ROW_MARGIN: f64 = 0.02;
+pub(super) const ROW_MARGIN: Real = 0.02;
 
 /// A row `row · v ≤ bound` on latent inputs or latent positions.
 #[derive(Debug, Clone, PartialEq)]

@@ -6,7 +6,8 @@
 //! equal rows, of which each cuts a sliver off what the other allows.
 
 use super::problem::Row;
-use super::qp::{Cone, ConeProgram, Outcome, QpSettings, QpSolver, sparse};
+use super::qp::{Cone, ConeProgram, QpSettings, QpSolver, sparse};
+use crate::solver::Outcome;
 
 /// The rows without those that follow from the others to within `margin`, in the same order.
 ///

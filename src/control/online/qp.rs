@@ -18,6 +18,7 @@ use clarabel::solver::{
 };
 
 use super::error::ControlError;
+use crate::solver::{Outcome, Residuals};
 
 /// One factor of the cone that holds the slack `s = b − A x`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -117,52 +118,12 @@ impl Default for QpSettings {
     }
 }
 
-/// How a solve ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Outcome {
-    /// The optimality conditions hold to the accepted residual.
-    Solved,
-    /// The solver stopped content or without progress, but the residuals are too large.
-    Inaccurate,
-    /// No point satisfies the constraints.
-    Infeasible,
-    /// The cost has no lower bound.
-    Unbounded,
-    /// The iteration cap was reached first.
-    IterationCap,
-    /// The factorisation broke down, or the result is not finite.
-    NumericalFailure,
-}
-
-/// How far a point is from satisfying the optimality conditions, each relative to the size of the
-/// terms it is made of (never less than one).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Residuals {
-    /// Distance of `b − A x` from its cone.
-    pub primal: f64,
-    /// `‖P x + q + Aᵀ y‖∞`, or the distance of the multipliers `y` from the dual cone if larger.
-    pub dual: f64,
-    /// `|xᵀ P x + qᵀ x + bᵀ y|`, the gap between primal and dual cost.
-    pub gap: f64,
-}
-
-impl Residuals {
-    /// The largest of the three; infinite if any is not a number.
-    pub fn worst(&self) -> f64 {
-        let values = [self.primal, self.dual, self.gap];
-        if values.iter().any(|value| value.is_nan()) {
-            return f64::INFINITY;
-        }
-        values.into_iter().fold(0.0, f64::max)
-    }
-}
-
 /// A solver that keeps its factorisation pattern and memory from solve to solve.
 pub struct QpSolver {
     program: ConeProgram,
     solver: DefaultSolver<f64>,
     settings: QpSettings,
-    residuals: Residuals,
+    residuals: Residuals<f64>,
     row_work: Vec<f64>,
     column_work: Vec<f64>,
 }
@@ -260,7 +221,7 @@ impl QpSolver {
     }
 
     /// How well the last solution satisfies the optimality conditions.
-    pub fn residuals(&self) -> Residuals {
+    pub fn residuals(&self) -> Residuals<f64> {
         self.residuals
     }
 
@@ -285,7 +246,7 @@ impl QpSolver {
     }
 
     /// The optimality conditions at the returned point, from the program's data alone.
-    fn check(&mut self) -> Residuals {
+    fn check(&mut self) -> Residuals<f64> {
         let (x, y) = (&self.solver.solution.x, &self.solver.solution.z);
         let ConeProgram { p, q, a, b, cones } = &self.program;
         let (slack, gradient) = (&mut self.row_work, &mut self.column_work);

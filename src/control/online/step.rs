@@ -5,9 +5,9 @@ use nalgebra::SVector;
 use super::command::{Command, Source, Status};
 use super::controller::{Controller, Measurement, SOFTENED_FROM};
 use super::lift::StanceState;
-use super::qp::Outcome;
 use super::trajectory::NO_PHASE;
 use crate::robot::{JOINT_DIM, STATE_DIM};
+use crate::solver::Outcome;
 
 /// Lifted force, N, below which its inconsistency means nothing.
 const SMALL_FORCE_N: f64 = 1.0;

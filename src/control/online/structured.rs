@@ -1,16 +1,17 @@
 //! Stages for the structured [`solver`](crate::solver).
 
+use super::dense::Real;
 use super::engine::{StageSolver, Start};
-use super::qp::{Outcome, QpSettings};
+use super::qp::QpSettings;
 use super::stage::{Rows, StageCost, StageQp, StageShape};
 use crate::solver::{
-    self, Cost, Links, Pairs, Program, Report, RowMatrices, Settings, Shape, Stage,
+    Cost, Links, Outcome, Pairs, Program, Report, RowMatrices, Settings, Shape, Stage,
 };
 
 /// Complementarity and violation of rows at which iterations end.
 pub const TOLERANCE: f64 = 1e-9;
 /// Gap between primal and dual cost, relative to the cost, at which they end as well.
-pub const GAP: f64 = 1e-8;
+const GAP: Real = 1e-8;
 /// Complementarity and violation of rows at which iterations end if torque rates are limited: their rows tie the
 /// inputs of all stages together, so that each is as good as the worst.
 pub const RATE_TOLERANCE: f64 = 1e-12;
@@ -221,15 +222,9 @@ impl<const NX: usize, const NU: usize, const LINKED: bool> StageSolver
         x0[..self.states].copy_from_slice(&start.state);
         let (is_warm, settings) = (self.is_warm, self.settings);
         let report = solve(&mut self.program(), &x0, is_warm, &settings);
-        self.is_warm = report.outcome == solver::Outcome::Solved;
+        self.is_warm = report.outcome == Outcome::Solved;
         self.has_gains = report.iterations == 0;
-        let outcome = match report.outcome {
-            solver::Outcome::Solved => Outcome::Solved,
-            solver::Outcome::Inaccurate => Outcome::Inaccurate,
-            solver::Outcome::IterationCap => Outcome::IterationCap,
-            solver::Outcome::NumericalFailure => Outcome::NumericalFailure,
-        };
-        (outcome, report.iterations)
+        (report.outcome, report.iterations)
     }
 
     fn stage(&self, stage: usize) -> (&[f64], &[f64]) {

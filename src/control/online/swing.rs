@@ -11,10 +11,11 @@
 //! which turns the foot about the body's origin by the share `s` of the error, to first order in the joints.
 
 use super::control_model::ControlModel;
+use super::dense::Real;
 use crate::robot::{JOINT_DIM, Leg};
 
 /// Most that legs are turned, rad.
-pub const MOST_TURN_RAD: f64 = 0.3;
+const MOST_TURN_RAD: Real = 0.3;
 
 impl ControlModel {
     /// Joint angles, rad, with every foot turned about the body's origin by `-turn_rad` of pitch. A leg whose foot

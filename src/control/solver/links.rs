@@ -57,7 +57,7 @@ pub(super) struct Before<T, const NX: usize, const NU: usize> {
 impl<T: Real, const NX: usize, const NU: usize> Before<T, NX, NU> {
     /// No cost, as after the last stage.
     #[inline(always)]
-    pub fn zeros() -> Self {
+    pub(super) fn zeros() -> Self {
         Self {
             by_state: [[T::ZERO; NX]; NU],
             square: [[T::ZERO; NU]; NU],
@@ -67,7 +67,7 @@ impl<T: Real, const NX: usize, const NU: usize> Before<T, NX, NU> {
 
     /// Adds this cost of a stage's input to its gradient and to the beginnings of its Hessians.
     #[inline(always)]
-    pub fn add_to(
+    pub(super) fn add_to(
         &self,
         stage: &Stage<T, NX, NU>,
         by_v: &mut [T; NU],
@@ -91,7 +91,7 @@ impl<T: Real, const NX: usize, const NU: usize> Before<T, NX, NU> {
     /// Becomes the cost of the input before a stage that was eliminated, with weights and multipliers of its `count`
     /// links, their rows of both stages, and the gradient `h` by the stage's own input. Writes the gain.
     #[inline(always)]
-    pub fn write(
+    pub(super) fn write(
         &mut self,
         stage: &Stage<T, NX, NU>,
         gain: &mut [[T; NU]; NU],

@@ -13,7 +13,7 @@ pub(super) struct Lower<T, const NU: usize> {
 impl<T: Real, const NU: usize> Lower<T, NU> {
     /// A matrix of zeros.
     #[inline(always)]
-    pub fn zeros() -> Self {
+    pub(super) fn zeros() -> Self {
         const { assert!(NU <= WIDE) };
         Self {
             blocks: [[[T::ZERO; 4]; NU]; WIDE / 4],
@@ -22,7 +22,7 @@ impl<T: Real, const NU: usize> Lower<T, NU> {
 
     /// A diagonal matrix.
     #[inline(always)]
-    pub fn diagonal(entries: &[T; NU]) -> Self {
+    pub(super) fn diagonal(entries: &[T; NU]) -> Self {
         let mut out: Lower<T, NU> = Lower::zeros();
         for i in 0..NU {
             out.blocks[i / 4][i][i % 4] = entries[i];
@@ -32,7 +32,7 @@ impl<T: Real, const NU: usize> Lower<T, NU> {
 
     /// `M += w r rᵀ`.
     #[inline(always)]
-    pub fn add_square(&mut self, w: T, row: &[T; NU]) {
+    pub(super) fn add_square(&mut self, w: T, row: &[T; NU]) {
         let mut parts = [[T::ZERO; 4]; WIDE / 4];
         let mut factors = [T::ZERO; NU];
         for j in 0..NU {
@@ -48,13 +48,13 @@ impl<T: Real, const NU: usize> Lower<T, NU> {
 
     /// An entry on or below the diagonal.
     #[inline(always)]
-    pub fn entry(&self, i: usize, j: usize) -> T {
+    pub(super) fn entry(&self, i: usize, j: usize) -> T {
         self.blocks[j / 4][i][j % 4]
     }
 
     /// Writes the rows, of which only the entries up to the diagonal are those of the matrix.
     #[inline(always)]
-    pub fn write_rows(&self, out: &mut [[T; WIDE]; NU]) {
+    pub(super) fn write_rows(&self, out: &mut [[T; WIDE]; NU]) {
         for i in 0..NU {
             for j in 0..WIDE {
                 out[i][j] = self.blocks[j / 4][i][j % 4];
@@ -64,7 +64,7 @@ impl<T: Real, const NU: usize> Lower<T, NU> {
 
     /// Adds the symmetric matrix to a block on the diagonal of another, from this row on.
     #[inline(always)]
-    pub fn add_to<const NX: usize>(&self, first: usize, matrix: &mut [[T; NX]; NX]) {
+    pub(super) fn add_to<const NX: usize>(&self, first: usize, matrix: &mut [[T; NX]; NX]) {
         for i in 0..NU {
             for j in 0..NU {
                 let entry = if i < j {

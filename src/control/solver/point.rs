@@ -13,9 +13,9 @@ const MARGIN_FACTOR: f64 = 10.0;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Centring {
     /// Smallest slack.
-    pub slack: f64,
+    pub(super) slack: f64,
     /// Smallest product of slack and multiplier.
-    pub product: f64,
+    pub(super) product: f64,
 }
 
 /// At a start from the gains.
@@ -54,22 +54,22 @@ const LEFT: f64 = 1e-6;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Point<T> {
     /// Share of the gradient that the steps since the last centring have left.
-    pub left: T,
+    pub(super) left: T,
     /// The same share of the rows' residuals; one where these are kept up to date.
-    pub kept: T,
+    pub(super) kept: T,
     /// Largest residual of a row at the last centring, or the present one.
-    pub residual: T,
+    pub(super) residual: T,
     /// Sum of the products of slacks and multipliers.
-    pub sum: T,
+    pub(super) sum: T,
     /// The largest of them.
-    pub largest: T,
+    pub(super) largest: T,
     /// `Σ vᵀ R v + xᵀ Q x`, one before the first step.
-    pub value: T,
+    pub(super) value: T,
 }
 
 impl<T: Real> Point<T> {
     #[inline(always)]
-    pub fn zeros() -> Self {
+    pub(super) fn zeros() -> Self {
         Self {
             left: T::ZERO,
             kept: T::ZERO,
@@ -82,14 +82,14 @@ impl<T: Real> Point<T> {
 
     /// Largest residual of a row.
     #[inline(always)]
-    pub fn infeasibility(&self) -> T {
+    pub(super) fn infeasibility(&self) -> T {
         self.kept * self.residual
     }
 
     /// Whether the iterations may end here: gradient and rows hold, and each product, or the gap between primal
     /// and dual cost, is small.
     #[inline(always)]
-    pub fn is_optimal(&self, settings: &Settings<T>) -> bool {
+    pub(super) fn is_optimal(&self, settings: &Settings<T>) -> bool {
         self.left <= T::of(LEFT)
             && self.infeasibility() <= settings.tolerance
             && (self.largest <= settings.tolerance

@@ -245,15 +245,19 @@ pub enum Outcome {
     IterationCap,
     /// A Hessian is not positive definite, or a number is not finite.
     NumericalFailure,
+    /// No point satisfies the constraints; of clarabel alone.
+    Infeasible,
+    /// The cost has no lower bound; of clarabel alone.
+    Unbounded,
 }
 
 /// Residuals of the optimality conditions, each relative to the size of the terms it is made of
 /// (never less than one).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Residuals<T> {
-    /// Largest violation of a row, or error of the dynamics.
+    /// Largest violation of a row or cone, or error of the dynamics.
     pub primal: T,
-    /// Largest derivative of the Lagrangian by an input or slack, or negative multiplier.
+    /// Largest derivative of the Lagrangian by an unknown, or violation of the dual cone by a multiplier.
     pub dual: T,
     /// Gap between primal and dual cost.
     pub gap: T,
@@ -263,6 +267,17 @@ impl<T: Real> Residuals<T> {
     /// Whether all are numbers of at most `limit`.
     pub fn within(&self, limit: T) -> bool {
         self.primal <= limit && self.dual <= limit && self.gap <= limit
+    }
+}
+
+impl Residuals<f64> {
+    /// The largest of the three; infinite if any is not a number.
+    pub fn worst(&self) -> f64 {
+        let values = [self.primal, self.dual, self.gap];
+        match values.iter().any(|value| value.is_nan()) {
+            true => f64::INFINITY,
+            false => values.into_iter().fold(0.0, f64::max),
+        }
     }
 }
 

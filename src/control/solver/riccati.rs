@@ -21,15 +21,15 @@ pub(super) struct Products<T, const NX: usize, const NU: usize> {
     pb: [[T; WIDE]; NX],
     b: [[T; WIDE]; NX],
     /// `H_vv` before the stage's end is added to it; the lower triangle is read.
-    pub hvv: [[T; WIDE]; NU],
+    pub(super) hvv: [[T; WIDE]; NU],
     /// The same of `H_vx`.
-    pub hvx: [[T; NX]; NU],
+    pub(super) hvx: [[T; NX]; NU],
     z: [[T; NX]; NU],
 }
 
 impl<T: Real, const NX: usize, const NU: usize> Products<T, NX, NU> {
     #[inline(always)]
-    pub fn zeros() -> Self {
+    pub(super) fn zeros() -> Self {
         Self {
             pa: [[T::ZERO; NX]; NX],
             pb: [[T::ZERO; WIDE]; NX],
@@ -41,7 +41,7 @@ impl<T: Real, const NX: usize, const NU: usize> Products<T, NX, NU> {
     }
 
     #[inline(always)]
-    pub fn clear_hessian(&mut self) {
+    pub(super) fn clear_hessian(&mut self) {
         for i in 0..NU {
             self.hvv[i] = [T::ZERO; WIDE];
             self.hvx[i] = [T::ZERO; NX];

@@ -7,23 +7,23 @@ use super::scalar::Real;
 
 /// The numbers of one stage's rows, as many of each kind.
 pub(super) struct Rows<'a, T> {
-    pub count: usize,
-    pub bound: &'a mut [T],
-    pub slack: &'a mut [T],
-    pub multiplier: &'a mut [T],
-    pub weight: &'a mut [T],
+    pub(super) count: usize,
+    pub(super) bound: &'a mut [T],
+    pub(super) slack: &'a mut [T],
+    pub(super) multiplier: &'a mut [T],
+    pub(super) weight: &'a mut [T],
     /// Products of the rows with a point, and later numbers that are made of them.
-    pub target: &'a mut [T],
-    pub residual: &'a mut [T],
-    pub dslack: &'a mut [T],
-    pub dmultiplier: &'a mut [T],
+    pub(super) target: &'a mut [T],
+    pub(super) residual: &'a mut [T],
+    pub(super) dslack: &'a mut [T],
+    pub(super) dmultiplier: &'a mut [T],
     /// Inverse of the slack.
-    pub inverse: &'a mut [T],
+    pub(super) inverse: &'a mut [T],
 }
 
 impl<'a, T: Real> Rows<'a, T> {
     #[inline(always)]
-    pub fn of(memory: &'a mut [T], count: usize) -> Self {
+    pub(super) fn of(memory: &'a mut [T], count: usize) -> Self {
         let (bound, rest) = memory.split_at_mut(count);
         let (slack, rest) = rest.split_at_mut(count);
         let (multiplier, rest) = rest.split_at_mut(count);
@@ -49,7 +49,7 @@ impl<'a, T: Real> Rows<'a, T> {
 
     /// Weights of the rows, and multipliers aimed at by a step that does not centre, in `dmultiplier`.
     #[inline(always)]
-    pub fn weigh(&mut self, left: T) {
+    pub(super) fn weigh(&mut self, left: T) {
         for i in 0..self.count {
             let inverse = T::ONE / self.slack[i];
             let weight = self.multiplier[i] * inverse;
@@ -61,7 +61,7 @@ impl<'a, T: Real> Rows<'a, T> {
 
     /// The same of rows that are softened.
     #[inline(always)]
-    pub fn weigh_softened(&mut self, softness: T) {
+    pub(super) fn weigh_softened(&mut self, softness: T) {
         for i in 0..self.count {
             let yield_of_row = softness * self.multiplier[i];
             let inverse = T::ONE / (self.slack[i] + yield_of_row);
@@ -75,7 +75,7 @@ impl<'a, T: Real> Rows<'a, T> {
     /// Multipliers aimed at by a step that aims at this product of slacks and multipliers, from the changes of
     /// the step that does not centre.
     #[inline(always)]
-    pub fn aim_at(&mut self, left: T, aim: T) {
+    pub(super) fn aim_at(&mut self, left: T, aim: T) {
         for i in 0..self.count {
             let second = self.dslack[i] * self.dmultiplier[i];
             let residual = left * self.residual[i];
@@ -85,7 +85,7 @@ impl<'a, T: Real> Rows<'a, T> {
 
     /// The same of rows that are softened.
     #[inline(always)]
-    pub fn aim_softened(&mut self, softness: T, aim: T) {
+    pub(super) fn aim_softened(&mut self, softness: T, aim: T) {
         for i in 0..self.count {
             let second = self.dslack[i] * self.dmultiplier[i];
             let residual = self.residual[i] + softness * self.multiplier[i];
@@ -96,7 +96,7 @@ impl<'a, T: Real> Rows<'a, T> {
     /// Changes of slacks and multipliers of a step that does not centre, from the products of the rows in `target`;
     /// into `target`, how often they go into what is left of each.
     #[inline(always)]
-    pub fn change(&mut self, left: T) {
+    pub(super) fn change(&mut self, left: T) {
         for i in 0..self.count {
             let dslack = -(left * self.residual[i]) - self.target[i];
             self.dslack[i] = dslack;
@@ -109,7 +109,7 @@ impl<'a, T: Real> Rows<'a, T> {
 
     /// The same of a step that centres, from the multipliers aimed at in `dmultiplier`.
     #[inline(always)]
-    pub fn change_corrected(&mut self, left: T) {
+    pub(super) fn change_corrected(&mut self, left: T) {
         for i in 0..self.count {
             let change = self.target[i];
             let dslack = -(left * self.residual[i]) - change;
@@ -124,7 +124,7 @@ impl<'a, T: Real> Rows<'a, T> {
 
     /// The same of either step, of rows that are softened.
     #[inline(always)]
-    pub fn change_softened(&mut self, softness: T) {
+    pub(super) fn change_softened(&mut self, softness: T) {
         for i in 0..self.count {
             let change = self.target[i];
             let dmultiplier = self.dmultiplier[i] - self.multiplier[i] + self.weight[i] * change;
@@ -138,7 +138,7 @@ impl<'a, T: Real> Rows<'a, T> {
 
     /// Multipliers of a stage where no row is active: the whole price at the slack.
     #[inline(always)]
-    pub fn write_multipliers(&mut self, soft: usize, slack_row: usize, price: T) {
+    pub(super) fn write_multipliers(&mut self, soft: usize, slack_row: usize, price: T) {
         for i in 0..self.count {
             self.multiplier[i] = T::ZERO;
         }

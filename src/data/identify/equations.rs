@@ -188,8 +188,7 @@ struct LegSample {
     acceleration: Vector3<f64>,
     torque: Vector3<f64>,
     torque_rate: Vector3<f64>,
-    /// Torques per unit of each unknown of [`OWN`].
-    own: [Vector3<f64>; OWN.len()],
+    own: [Vector3<f64>; OWN.len()], // torques per unit of each unknown of [`OWN`]
 }
 
 impl LegSample {

@@ -35,8 +35,7 @@ pub(crate) fn not_negative() -> impl Iterator<Item = usize> {
 /// These are wide: they matter only where the recordings leave a direction open.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Prior {
-    /// Coefficients by unknown.
-    pub terms: Vec<(usize, f64)>,
+    pub terms: Vec<(usize, f64)>, // coefficients by unknown
     pub deviation: f64,
 }
 

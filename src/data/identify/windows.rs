@@ -54,20 +54,16 @@ impl Group {
 #[derive(Debug, Clone)]
 pub(crate) struct Row {
     pub coefficients: [f64; PARAMETER_DIM],
-    /// Left side: m/s^2, or N m for a joint.
-    pub left: f64,
+    pub left: f64, // left side: m/s^2, or N m for a joint
     pub group: Group,
-    /// Block of time that it belongs to, counted over all segments.
-    pub block: usize,
-    /// Whether joints move enough for their friction to have a direction.
-    pub moving: bool,
+    pub block: usize, // block of time that it belongs to, counted over all segments
+    pub moving: bool, // whether joints move enough for their friction to have a direction
 }
 
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Windows {
     pub rows: Vec<Row>,
-    /// The segment that each block lies in, counted from zero.
-    pub blocks: Vec<usize>,
+    pub blocks: Vec<usize>, // the segment that each block lies in, counted from zero
     pub contact_samples: usize,
     pub flight_samples: usize,
     /// Samples left out because a leg on the ground was close to a singular posture.

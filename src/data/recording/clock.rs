@@ -182,10 +182,8 @@ fn replace_angular_rates(segment: &mut Segment) -> bool {
 
 struct Interval {
     stamped_s: f64,
-    /// Weighted square of the velocity.
-    speed: f64,
-    /// Weighted product of velocity and displacement.
-    moved: f64,
+    speed: f64, // weighted square of the velocity
+    moved: f64, // weighted product of velocity and displacement
 }
 
 impl Interval {

@@ -114,8 +114,7 @@ impl RecordingFault {
 
     /// A line whose cells are not separated as expected.
     pub(super) fn delimiter(line: &str, expected: &str) -> Self {
-        let found = format!("`{}`", shortened(line));
-        Self::unexpected(found, format!("cells separated by {expected}"))
+        Self::number(line, &format!("cells separated by {expected}"))
     }
 
     /// A cell that is not a number as expected.

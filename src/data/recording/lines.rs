@@ -26,8 +26,7 @@ pub(super) struct Lines<'a> {
     path: &'a Path,
     compressed: bool,
     row: usize,
-    /// Empty lines since the last that was not, and in all.
-    blank: [usize; 2],
+    blank: [usize; 2], // empty lines since the last that was not, and in all
     buffer: Vec<u8>,
 }
 
@@ -185,8 +184,7 @@ enum Mark {
 /// Reads cells, and learns the file's decimal mark from them.
 #[derive(Debug)]
 pub(super) struct NumberReader {
-    /// The first one met holds for the rest.
-    mark: Option<Mark>,
+    mark: Option<Mark>, // the first one met holds for the rest
     pointed: String,
 }
 

@@ -94,11 +94,6 @@ templates! {
 
 /// The crate of a model's controller; `provenance` is the text of each file's first line, and `plan`
 /// the jump of its C example.
-///
-/// # Errors
-/// [`EmitError::Nonlinear`] if encoder or decoder have layers with an activation,
-/// [`EmitError::Control`] if the model lacks something that control needs,
-/// [`EmitError::Lower`] and [`EmitError::Template`].
 pub fn emit(
     equations: &Equations<'_>,
     form: Form,
@@ -132,9 +127,6 @@ pub fn emit(
 }
 
 /// What a controller knows of a model.
-///
-/// # Errors
-/// [`EmitError::Nonlinear`] and [`EmitError::Control`].
 pub(super) fn plant(model: &ReducedModel) -> Result<ControlModel, EmitError> {
     match model.is_linear() {
         true => Ok(crate::mpc::control_model(model)?),

@@ -1,11 +1,10 @@
 //! The controller in C99 alone: `NAME-controller-c/`.
 //!
 //! In: a complete linear model. Out: the model's equations as `--emit c` makes them, and beside them
-//! the controller: reference, horizon, structured solver, commands and fallbacks in one file. The solver is made from
-//! its Rust (`src/translate`), the rest has the operations of `mpc/online` in their order, so that both give the same
-//! bits. Read `templates/controller_c/source.askama` first.
+//! the controller: reference, horizon, structured solver, commands and fallbacks in one file. The solver and the steps of the
+//! controller are made from their Rust (`src/translate`), the rest has the operations of `control/online` in their order, so that
+//! both give the same bits. Read `templates/controller_c/source.askama` first.
 
-mod jump;
 mod legs;
 pub(super) mod numbers;
 mod ros2_control;
@@ -20,16 +19,15 @@ use askama::Template;
 use crate::codegen::interface::{ModelInterface, PhaseInterface};
 use crate::codegen::line_wrapping::tidy;
 use crate::codegen::{Precision, Units, c};
-use crate::deploy::EmitError;
 use crate::deploy::controller::{self, plant};
 use crate::deploy::emit::{EmitOptions, compiled};
+use crate::deploy::{EmitError, PlannedJump};
 use crate::equations::Equations;
 use crate::files::EmittedFile;
 use crate::mpc::problem::StageRows;
 use crate::mpc::shared::torque_deviation;
 use crate::mpc::{ControlModel, ControlPhase, MpcError, MpcSettings};
 use crate::solver::Shape;
-use jump::Jump;
 use numbers::Numbers;
 use source::Source;
 
@@ -77,11 +75,6 @@ templates! {
 }
 
 /// The files of a model's controller in C; `provenance` is the text of each file's first line.
-///
-/// # Errors
-/// [`EmitError::Nonlinear`] if encoder or decoder have layers with an activation,
-/// [`EmitError::Control`] if the model lacks something that control needs, [`EmitError::Lower`],
-/// [`EmitError::Codegen`] and [`EmitError::Template`].
 pub fn emit(
     equations: &Equations<'_>,
     options: &EmitOptions,
@@ -122,15 +115,20 @@ pub fn emit(
     let deviations: Vec<_> = (plant.phases().iter().map(deviation)).collect::<Result<_, _>>()?;
     let plant_of_lift = (&plant, deviations.as_slice());
     let source = Source::new(facts, &entries, plant_of_lift, options.precision);
-    let jump = match &options.plan {
-        Some(plan) => Jump::planned(plan),
-        None => Jump::shipped()?.within(model),
+    let (what, jump) = match &options.plan {
+        Some(plan) => ("A jump of one's own", plan.thinned()),
+        None => {
+            let shipped = PlannedJump::shipped()?.thinned();
+            ("A jump of a simulated go1", shipped.within(model))
+        }
     };
+    let heading = (facts.banner.as_str(), facts.upper.as_str());
+    let jump_header = jump.constants(what, heading, options.precision);
     let (block, hash) = (facts.banner.as_str(), format!("# {provenance}"));
     let texts = [
         ("NAME_controller.h", Header::text(block, facts)?),
         ("NAME_controller.c", source.render()?),
-        ("NAME_jump.h", jump.header(facts, options.precision)),
+        ("NAME_jump.h", jump_header),
         (
             "NAME_controller_selftest.c",
             selftest::text(facts, model, &jump, options.precision)?,

@@ -9,7 +9,7 @@ const WIDTH: usize = 6;
 
 /// Writes numbers of one precision.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Numbers(pub Precision);
+pub(in crate::deploy) struct Numbers(pub Precision);
 
 impl Numbers {
     /// One number, with a suffix in single precision.
@@ -21,7 +21,7 @@ impl Numbers {
     }
 
     /// `{1.0, 2.0}`; one zero if there are none, as C has no empty arrays.
-    pub(super) fn vector(self, values: impl IntoIterator<Item = f64>) -> String {
+    pub(in crate::deploy) fn vector(self, values: impl IntoIterator<Item = f64>) -> String {
         list(values.into_iter().map(|value| self.one(value)))
     }
 
@@ -32,7 +32,7 @@ impl Numbers {
     }
 
     /// Rows of vectors; one row of zeros if there are none.
-    pub(super) fn matrix<R: IntoIterator<Item = f64>>(
+    pub(in crate::deploy) fn matrix<R: IntoIterator<Item = f64>>(
         self,
         rows: impl IntoIterator<Item = R>,
     ) -> String {

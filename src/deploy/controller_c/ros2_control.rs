@@ -36,9 +36,6 @@ templates! {
 }
 
 /// Paths below the controller's folder, and texts.
-///
-/// # Errors
-/// [`EmitError::Template`].
 pub(super) fn files(
     controller: &super::Facts<'_>,
     provenance: &str,

@@ -5,10 +5,9 @@ use std::ops::Deref;
 use askama::Template;
 
 use super::Facts;
-use super::jump::Jump;
 use super::numbers::{Numbers, integers, nested};
 use crate::codegen::Precision;
-use crate::deploy::EmitError;
+use crate::deploy::{EmitError, PlannedJump};
 use crate::model::ReducedModel;
 use crate::mpc::{
     Command, Lift, Linearisation, Measurement, MissingInput, MpcError, MpcSettings,
@@ -52,13 +51,10 @@ impl<'a> Deref for SelfTest<'a> {
 }
 
 /// The self-test of a model's controller along a jump.
-///
-/// # Errors
-/// [`EmitError::Control`] if the model cannot be controlled along it.
 pub(super) fn text(
     facts: &Facts<'_>,
     model: &ReducedModel,
-    jump: &Jump,
+    jump: &PlannedJump,
     precision: Precision,
 ) -> Result<String, EmitError> {
     let plain = MpcSettings {
@@ -115,7 +111,7 @@ enum Torques {
 /// Commands along a jump for measurements that are pushed off it.
 fn commands(
     model: &ReducedModel,
-    jump: &Jump,
+    jump: &PlannedJump,
     settings: MpcSettings,
     torques: Torques,
 ) -> Result<Vec<Command>, EmitError> {
@@ -123,8 +119,8 @@ fn commands(
     let u = inputs(controller.plant().input_rule(), jump)?;
     let reference = ReferenceSamples {
         time_s: &jump.time_s,
-        x: &jump.x.concat(),
-        dx: &jump.dx.concat(),
+        x: jump.x.as_slice(),
+        dx: jump.dx.as_slice(),
         u: match torques {
             Torques::Known => Some(&u),
             Torques::Unknown => None,
@@ -137,15 +133,15 @@ fn commands(
     let steps = STEPS.min(jump.time_s.len());
     Ok((0..steps)
         .map(|k| {
-            let (mut x, mut dx) = (jump.x[k].clone(), jump.dx[k].clone());
+            let [mut x, mut dx] = [&jump.x, &jump.dx].map(|rows| rows.column(k).into_owned());
             let push = (k / 8 % 5) as f64 - 2.0;
             x[14] += PUSH[0] * push;
             x[16] += PUSH[1] * push;
             dx[14] += PUSH[2] * push;
             controller.step(Measurement {
                 time_s: jump.time_s[k],
-                x: &x,
-                dx: &dx,
+                x: x.as_slice(),
+                dx: dx.as_slice(),
                 feet: jump.feet[k],
             })
         })
@@ -154,15 +150,16 @@ fn commands(
 
 /// Inputs of all samples as `set_reference_torque` makes them: the motors' accelerations by differences of the samples
 /// on both sides.
-fn inputs(rule: &InputRule, jump: &Jump) -> Result<Vec<f64>, EmitError> {
+fn inputs(rule: &InputRule, jump: &PlannedJump) -> Result<Vec<f64>, EmitError> {
     let mut u = Vec::with_capacity(jump.time_s.len() * STATE_DIM);
-    for (k, torque) in jump.torque_nm.iter().enumerate() {
-        let x: [f64; STATE_DIM] = std::array::from_fn(|i| jump.x[k][i]);
-        let dq = std::array::from_fn(|joint| jump.dx[k][joint]);
+    for k in 0..jump.time_s.len() {
+        let torque = jump.torque_nm.column(k);
+        let x: [f64; STATE_DIM] = std::array::from_fn(|i| jump.x[(i, k)]);
+        let dq = std::array::from_fn(|joint| jump.dx[(joint, k)]);
         let (before, after) = (k.saturating_sub(1), (k + 1).min(jump.time_s.len() - 1));
         let passed_s = jump.time_s[after] - jump.time_s[before];
         let ddq = std::array::from_fn(|joint| {
-            (jump.dx[after][joint] - jump.dx[before][joint]) / passed_s
+            (jump.dx[(joint, after)] - jump.dx[(joint, before)]) / passed_s
         });
         let losses = rule.losses(&dq, &ddq);
         let net: [f64; JOINT_DIM] = std::array::from_fn(|joint| torque[joint] - losses[joint]);

@@ -13,10 +13,7 @@ use crate::codegen::Precision;
 use crate::codegen::interface::{ModelInterface, PhaseInterface};
 use crate::mpc::interface::Accepts;
 use crate::mpc::problem::{Row, pairs};
-use crate::mpc::shared::{
-    GAP, LIFT_CURVATURE, LIFT_ITERATIONS, MOST_TURN_RAD, NO_PHASE, POSTURE_SHARE, RATE_SOFTNESS,
-    RATE_TOLERANCE, SLACK_PRICE, SOFTENED_FROM, TOLERANCE,
-};
+use crate::mpc::shared::{NO_PHASE, RATE_SOFTNESS, RATE_TOLERANCE, TOLERANCE};
 use crate::mpc::{ControlModel, ControlModelParts, FallbackSettings, InputGivenState, MpcSettings};
 use crate::robot::{DRY_SPEED_RAD_S, GRAVITY_M_S2, JOINT_DIM, SINGULAR_BOUND, WrenchFrame};
 

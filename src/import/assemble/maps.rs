@@ -2,8 +2,8 @@
 
 use nalgebra::DVector;
 
+use super::super::ImportError;
 use super::super::assign::Assigned;
-use super::super::error::ImportError;
 use super::super::options::WeightVectors;
 use super::super::report::Layout;
 use super::super::role::{Part, Role, without_tensorflow_end};

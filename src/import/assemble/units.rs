@@ -3,8 +3,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::super::ImportError;
 use super::super::assign::Assigned;
-use super::super::error::ImportError;
 use super::super::role::Role;
 use super::{Assembly, Parts};
 use crate::model::{AffineMap, ScaleFactors, Scaling, StateMap};

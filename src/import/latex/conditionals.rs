@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::super::error::ImportError;
+use super::super::ImportError;
 use super::definitions::{DEFINITIONS, UNREAD};
 use super::expander::Expander;
 use super::reader::has;

@@ -2,7 +2,7 @@
 
 use std::rc::Rc;
 
-use super::super::error::ImportError;
+use super::super::ImportError;
 use super::document::{CASES, LAYOUTS, is_one_of};
 use super::expander::{Expander, spelled};
 use super::reader::has;
@@ -210,9 +210,8 @@ impl Expander<'_> {
         let (Some(name), Some(text)) = (self.target(), self.argument()) else {
             return;
         };
-        let mut body = [Kind::command("operatorname"), Kind::Open]
-            .map(|kind| token.with(kind))
-            .to_vec();
+        let operator = token.with(Kind::command("operatorname"));
+        let mut body = vec![operator, token.with(Kind::Open)];
         body.extend(text);
         body.push(token.with(Kind::Close));
         let meaning = match self.is_defined(&name) {

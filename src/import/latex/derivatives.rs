@@ -37,12 +37,10 @@ fn with_each(tokens: &[Token], find: fn(&[Token], usize) -> Option<Derivative>) 
 }
 
 fn fraction(tokens: &[Token], at: usize) -> Option<Derivative> {
-    let fractions = ["frac", "dfrac", "tfrac"];
-    (fractions.iter().any(|name| tokens[at].is_command(name))).then_some(())?;
+    has("frac dfrac tfrac", tokens[at].name()).then_some(())?;
     let (top, after_top) = group(tokens, at + 1)?;
     let (bottom, behind) = group(tokens, after_top)?;
-    let of_top = differential(top, 0)?;
-    let (order, of_variable) = power(top, of_top);
+    let (order, of_variable) = power(top, differential(top, 0)?);
     let time = differential(bottom, 0)?;
     let is_time = bottom.get(time)?.kind == Kind::Character('t');
     let (of_time, end) = power(bottom, time + 1);
@@ -59,9 +57,11 @@ fn fraction(tokens: &[Token], at: usize) -> Option<Derivative> {
 
 /// Whether what follows is no power and no further factor, which a derivative in front might mean as well.
 fn ends_product(tokens: &[Token]) -> bool {
-    let is_space =
-        |token: &&Token| matches!(&token.kind, Kind::Command(name) if has(INVISIBLE, name));
-    let mut rest = tokens.iter().skip_while(is_space);
+    const BEHIND: &str = "cdot times ast right coloneqq coloneq triangleq equiv approx simeq rvert vert } text textrm \
+        mbox tag label";
+    let mut rest = tokens
+        .iter()
+        .skip_while(|token| has(INVISIBLE, token.name()));
     match rest.next().map(|token| &token.kind) {
         None => true,
         // The time of `z_1(t)`.
@@ -69,10 +69,7 @@ fn ends_product(tokens: &[Token]) -> bool {
             .next()
             .is_some_and(|token| token.kind == Kind::Character('t')),
         Some(Kind::Character(mark)) => "+-=,.;)]/:*&|".contains(*mark),
-        Some(Kind::Command(name)) => has(
-            "cdot times ast right coloneqq coloneq triangleq equiv approx simeq rvert vert } text textrm mbox tag label",
-            name,
-        ),
+        Some(Kind::Command(name)) => has(BEHIND, name),
         Some(kind) => kind.ends_term() || matches!(kind, Kind::End(_)),
     }
 }
@@ -81,16 +78,11 @@ fn ends_product(tokens: &[Token]) -> bool {
 fn differential(tokens: &[Token], at: usize) -> Option<usize> {
     let is_d = |token: &Token| token.kind == Kind::Character('d') || token.is_command("partial");
     let first = tokens.get(at)?;
-    if is_d(first) {
-        return Some(at + 1);
+    if has(FONTS, first.name()) {
+        let (inside, behind) = argument(tokens, at + 1)?;
+        return matches!(inside, [sign] if is_d(sign)).then_some(behind);
     }
-    match &first.kind {
-        Kind::Command(font) if has(FONTS, font) => match argument(tokens, at + 1)? {
-            ([sign], behind) if is_d(sign) => Some(behind),
-            _ => None,
-        },
-        _ => None,
-    }
+    is_d(first).then_some(at + 1)
 }
 
 /// A whole power at `at`, 1 without, and the place behind it.
@@ -98,10 +90,7 @@ fn power(tokens: &[Token], at: usize) -> (usize, usize) {
     let found = || {
         (tokens.get(at)?.kind == Kind::Superscript).then_some(())?;
         let (inside, behind) = argument(tokens, at + 1)?;
-        let digits = inside.iter().map(|token| match token.kind {
-            Kind::Character(digit) if digit.is_ascii_digit() => Some(digit),
-            _ => None,
-        });
+        let digits = inside.iter().map(|token| token.kind.digit());
         Some((digits.collect::<Option<String>>()?.parse().ok()?, behind))
     };
     found().unwrap_or((1, at))
@@ -179,8 +168,8 @@ fn primes(tokens: &[Token], at: usize) -> Option<(usize, usize)> {
 
 /// `\ddot{z_1}` at the place of `first`.
 fn under_dots(first: &Token, dots: usize, variable: &[Token]) -> Vec<Token> {
-    let command = ["dot", "ddot", "dddot"][dots - 1].to_owned();
-    let mut dotted = vec![first.with(Kind::Command(command)), first.with(Kind::Open)];
+    let command = Kind::command(["dot", "ddot", "dddot"][dots - 1]);
+    let mut dotted = vec![first.with(command), first.with(Kind::Open)];
     dotted.extend_from_slice(match group(variable, 0) {
         Some((inside, behind)) if behind == variable.len() => inside,
         _ => variable,

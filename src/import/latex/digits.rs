@@ -18,10 +18,6 @@ pub(super) struct Number {
     pub(super) behind: usize,
 }
 
-fn is_digit(kind: &Kind) -> bool {
-    matches!(kind, Kind::Character(c) if c.is_ascii_digit())
-}
-
 /// Of each token whether it is a brace or font around digits alone, which does not print.
 pub(super) fn around_digits(tokens: &[Token]) -> Vec<bool> {
     let mut is_around = vec![false; tokens.len()];
@@ -51,7 +47,7 @@ pub(super) fn around_digits(tokens: &[Token]) -> Vec<bool> {
                 }
                 _ => false,
             },
-            kind if is_digit(kind) || *kind == Kind::Character('.') => {
+            kind if kind.digit().is_some() || *kind == Kind::Character('.') => {
                 is_around[font_before.unwrap_or(at)] = font_before.is_some();
                 true
             }
@@ -79,18 +75,12 @@ pub(super) fn without_operator_braces(tokens: Vec<Token>) -> Vec<Token> {
 }
 
 fn takes_argument(kind: &Kind) -> bool {
+    const ONES: &str = "sqrt dot ddot dddot abs num";
     match kind {
         Kind::Superscript | Kind::Subscript => true,
         Kind::Command(name) => {
-            let lists = [
-                FONTS,
-                WORDS,
-                INVISIBLE_WITH_ARGUMENT,
-                "sqrt dot ddot dddot abs num",
-            ];
-            lists.iter().any(|list| has(list, name))
-                || name.ends_with("frac")
-                || function(name).is_some()
+            let mut lists = [FONTS, WORDS, INVISIBLE_WITH_ARGUMENT, ONES].iter();
+            lists.any(|list| has(list, name)) || name.ends_with("frac") || function(name).is_some()
         }
         _ => false,
     }
@@ -98,10 +88,7 @@ fn takes_argument(kind: &Kind) -> bool {
 
 /// Whether a token is an operator also without the space around it: `0{\cdot}5` may be a decimal fraction.
 fn is_operator(kind: &Kind, behind: &[Token]) -> bool {
-    let digit = |at: usize| match behind.get(at).map(|token| &token.kind) {
-        Some(Kind::Character(c)) if c.is_ascii_digit() => Some(*c),
-        _ => None,
-    };
+    let digit = |at: usize| behind.get(at).and_then(|token| token.kind.digit());
     match kind {
         Kind::Character(c) => "+-*/=.".contains(*c),
         Kind::Command(name) if name == "cdot" => {
@@ -170,20 +157,16 @@ impl Reader<'_> {
 
     /// How many digits there are from a place on, at most four.
     fn run(&self, from: usize) -> usize {
-        let next = |(_, at): &(char, usize)| self.digit(at + 1);
-        std::iter::successors(self.digit(from), next)
-            .take(4)
-            .count()
+        let digits = std::iter::successors(self.digit(from), |(_, at)| self.digit(at + 1));
+        digits.take(4).count()
     }
 
     /// The place behind `{,}`.
     fn behind_comma(&self, at: usize) -> Option<usize> {
         let comma = [Kind::Open, Kind::Character(','), Kind::Close];
         let next = self.tokens[..self.end].get(at..at + 3)?;
-        next.iter()
-            .map(|token| &token.kind)
-            .eq(&comma)
-            .then_some(at + 3)
+        let is_comma = next.iter().map(|token| &token.kind).eq(&comma);
+        is_comma.then_some(at + 3)
     }
 
     fn exponent(&self, number: &mut Number) {

@@ -1,6 +1,6 @@
 //! The displays of a document as they are printed.
 
-use super::super::error::ImportError;
+use super::super::ImportError;
 use super::derivatives::with_dots;
 use super::digits::without_operator_braces;
 use super::expander::Expander;

@@ -3,7 +3,7 @@
 
 use std::rc::Rc;
 
-use super::super::error::ImportError;
+use super::super::ImportError;
 use super::document::is_one_of;
 use super::reader::has;
 use super::scopes::{Macro, Meaning, Refusal, Scopes};
@@ -240,10 +240,12 @@ impl<'t> Expander<'t> {
                 self.pending.push(token.with(Kind::Command(name)));
             }
             "verb" | "lstinline" if self.pending.is_empty() => self.lexer.skip_verb(),
-            "url" | "href" | "nolinkurl" if self.lexer.is_at('{') && self.pending.is_empty() => {
+            "url" | "href" | "nolinkurl"
+                if self.lexer.rest.starts_with('{') && self.pending.is_empty() =>
+            {
                 self.lexer.skip_verb();
             }
-            "endinput" => self.lexer.end_after_line(),
+            "endinput" => self.lexer.rest = self.lexer.line(),
             "stop" | "bye" => self.stop(),
             _ if has(NOT_FOLLOWED, name) => {
                 return self.refuse(&token, "", "definitions where they hold");
@@ -254,12 +256,8 @@ impl<'t> Expander<'t> {
                 return self.refuse(&token, ", which prints a file that is not read", &expected);
             }
             _ if has(PHANTOMS, name) => {
-                let is_one = self.argument().is_some();
-                if self.scopes.formula.is_some() && is_one {
-                    let empty = [Kind::Close, Kind::Open].map(|kind| token.with(kind));
-                    self.pending.extend(empty);
-                    return Ok(Some(token));
-                }
+                self.argument();
+                return Ok(Some(token.with(Kind::command(","))));
             }
             _ if has(NOT_PRINTED, name) => drop(self.argument()),
             _ if has(BY_COMMAND, name) => {
@@ -293,7 +291,7 @@ impl<'t> Expander<'t> {
 
     fn stop(&mut self) {
         self.pending.clear();
-        self.lexer.end();
+        self.lexer.rest = "";
     }
 
     /// Reads `{name}` behind a command and makes its kind of token of it.
@@ -327,7 +325,7 @@ impl<'t> Expander<'t> {
                 let expected = Kind::End(name.clone()).quoted();
                 return self.refuse(&token, " without its end", &expected);
             }
-            return match name == "comment" && !self.lexer.is_at_line_end() {
+            return match name == "comment" && !self.lexer.line().trim().is_empty() {
                 true => {
                     let expected = "`\\end{comment}` in a line of its own";
                     self.refuse(&token, " with text behind its end", expected)

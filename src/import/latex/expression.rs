@@ -4,9 +4,9 @@
 //! `z_1/2u_1`), a number after a variable. Nesting is limited, so the machine's stack is safe.
 
 use super::super::equations::Equation;
-use super::reader::{BARE, Last, Read, Reader, Symbol, has};
+use super::reader::{BARE, Last, Read, Reader, has};
 use super::token::{Kind, Token};
-use super::variables::function;
+use super::variables::{Symbol, function};
 use crate::model::LatentVariable;
 
 const FACTOR: &str = "a number, a variable, a function or a group";
@@ -24,47 +24,49 @@ const DELIMITERS: [(&str, &[&str]); 8] = [
 ];
 pub(super) const WORDS: &str = "text textrm textit mbox intertext shortintertext";
 
+/// `\ddot z_1 =`: its tokens and the latent coordinate, if it is one.
+pub(super) struct LeftSide {
+    pub(super) at: usize,
+    pub(super) after: usize,
+    pub(super) symbol: Symbol,
+    pub(super) output: Option<usize>,
+}
+
 impl Reader<'_> {
-    /// The left sides `\ddot z_1 =`, each with its place and the place behind it.
-    pub(super) fn left_sides(&mut self) -> Vec<(usize, Symbol, usize)> {
+    pub(super) fn left_sides(&mut self) -> Vec<LeftSide> {
         let is_dotted = |at: &usize| self.tokens[*at].is_command("ddot");
         let places: Vec<usize> = (0..self.tokens.len()).filter(is_dotted).collect();
-        let left_side = |at| {
-            self.left_side(at)
-                .map(|(symbol, after)| (at, symbol, after))
-        };
-        places.into_iter().filter_map(left_side).collect()
+        let left_sides = places.into_iter().filter_map(|at| self.left_side(at));
+        left_sides.collect()
     }
 
-    /// Reads `\ddot z_1 =` at `at`; the left side and the place behind it.
-    fn left_side(&mut self, at: usize) -> Option<(Symbol, usize)> {
+    fn left_side(&mut self, at: usize) -> Option<LeftSide> {
         let (end, depth) = (self.end, self.depth);
         self.at = at;
         let symbol = self.symbol();
         (self.end, self.depth) = (end, depth);
         let symbol = symbol.ok().flatten().filter(|symbol| symbol.dots == 2)?;
         self.skip_time();
-        self.relation().then_some((symbol, self.at))
-    }
-
-    /// `=`, or what is written for it where something is defined or was rounded.
-    fn relation(&mut self) -> bool {
-        const NAMES: &str = "coloneqq coloneq triangleq equiv approx simeq";
+        // Where something is defined or was rounded, other signs stand for `=`.
         self.character(':');
-        self.character('=') || NAMES.split(' ').any(|name| self.command(name))
+        let mut signs = "coloneqq coloneq triangleq equiv approx simeq".split(' ');
+        (self.character('=') || signs.any(|name| self.command(name))).then_some(())?;
+        let output = match self.names.variable(&symbol.name, self.alone) {
+            Some(LatentVariable::Z(index)) => Some(index),
+            _ => None,
+        };
+        Some(LeftSide {
+            at,
+            after: self.at,
+            symbol,
+            output,
+        })
     }
 
-    pub(super) fn output(&self, symbol: &Symbol) -> Option<usize> {
-        match self.names.variable(&symbol.name, self.alone)? {
-            LatentVariable::Z(index) => Some(index),
-            LatentVariable::Dz(_) | LatentVariable::U(_) => None,
-        }
-    }
-
-    /// Whether anything is printed between two places; the first such token.
-    pub(super) fn printed(&mut self, from: usize, to: usize) -> Option<Token> {
+    /// The first token before a place that prints anything.
+    pub(super) fn printed_before(&mut self, to: usize) -> Option<Token> {
         let end = std::mem::replace(&mut self.end, to);
-        self.at = from;
+        self.at = 0;
         let token = self.peek().cloned();
         self.end = end;
         token
@@ -100,14 +102,11 @@ impl Reader<'_> {
                     let end = std::mem::replace(&mut self.end, after);
                     self.at = at + 1 + usize::from(self.kind(at + 1) == Some(&Kind::Open));
                     self.takes(&Kind::Dollar);
-                    let is_formula = match self.next_kind() {
-                        Some(Kind::Character(c)) => "+-*/=".contains(c) || c.is_ascii_digit(),
-                        _ => false,
-                    };
-                    if is_formula {
-                        return self.unexpected(
-                            "words behind the equation, or mathematics outside of the text",
-                        );
+                    let is_formula = |c: char| "+-*/=".contains(c) || c.is_ascii_digit();
+                    if matches!(self.next_kind(), Some(Kind::Character(c)) if is_formula(c)) {
+                        let expected =
+                            "words behind the equation, or mathematics outside of the text";
+                        return self.unexpected(expected);
                     }
                     (self.at, self.end) = (after, end);
                 }
@@ -141,35 +140,24 @@ impl Reader<'_> {
         }
     }
 
-    pub(super) fn term(&mut self, leads: bool) -> Read<()> {
+    fn term(&mut self, leads: bool) -> Read<()> {
         self.peek();
         let is_literal = self.number_at(self.at).is_some();
         let mut last = self.factor(leads)?;
-        let behind_literal = is_literal.then_some(self.at);
+        let literal_end = is_literal.then_some(self.at);
         let mut after_slash = false;
         loop {
             let from = self.at;
             let place = self.here();
-            let kind = self.next_kind();
-            let is_dot =
-                matches!(&kind, Some(Kind::Command(name)) if has("cdot times ast cdotp", name));
+            let Some(kind) = self.next_kind() else {
+                return Ok(());
+            };
+            let is_bare = matches!(last, Last::Bare | Last::BareNumber);
+            let is_dot = matches!(&kind, Kind::Command(name) if has("cdot times ast cdotp", name));
             match kind {
-                Some(Kind::Command(_)) if is_dot && last == Last::BareNumber => {
-                    return self.unexpected(BARE);
-                }
-                Some(kind) if is_dot || kind == Kind::Character('*') => {
-                    self.at += 1;
-                    self.push(place, "*");
-                    if is_dot {
-                        self.signs();
-                    }
-                    last = self.factor(false)?;
-                    after_slash = false;
-                }
-                Some(Kind::Character('/')) => {
-                    if matches!(last, Last::Bare | Last::BareNumber) {
-                        return self.unexpected(BARE);
-                    }
+                _ if is_dot && last == Last::BareNumber => return self.unexpected(BARE),
+                Kind::Character('/') if is_bare => return self.unexpected(BARE),
+                Kind::Character('/') => {
                     self.at += 1;
                     self.push(place, "/");
                     self.peek();
@@ -182,40 +170,61 @@ impl Reader<'_> {
                     }
                     after_slash = true;
                     last = Last::Other;
+                    continue;
                 }
-                Some(kind) if self.starts_factor(&kind) => {
-                    let is_mixed = behind_literal == Some(from) && self.is_fraction_of_integers();
-                    let expected = match (last, &kind) {
-                        _ if after_slash => {
-                            Some("`\\frac`, or parentheses around what the slash divides by")
-                        }
-                        _ if self.breaks_before(self.at) => {
-                            Some("an operator where a row or column goes on")
-                        }
-                        _ if is_mixed => Some(
-                            "`\\cdot` or `+` between a number and a fraction, which print as a mixed number",
-                        ),
-                        (Last::Bare, Kind::Command(name)) if function(name).is_some() => None,
-                        (Last::Bare | Last::BareNumber, _) => Some(BARE),
-                        (_, Kind::Command(name)) if name == "num" => {
-                            Some("an operator before the number")
-                        }
-                        _ if self.is_number_next() => Some(
-                            "an operator before the number, no space inside it, or braces around a subscript",
-                        ),
-                        _ => self.is_lone_integer().then_some(
-                            "`\\tag{...}` for the number of an equation, or `\\cdot` before a factor",
-                        ),
+                _ if is_dot || kind == Kind::Character('*') => {
+                    self.at += 1;
+                    self.push(place, "*");
+                    if is_dot {
+                        self.signs();
+                    }
+                    after_slash = false;
+                }
+                kind if self.starts_factor(&kind) => {
+                    let refusal = match after_slash {
+                        true => Some("`\\frac`, or parentheses around what the slash divides by"),
+                        false => self.refusal(&kind, last, literal_end == Some(from)),
                     };
-                    if let Some(expected) = expected {
+                    if let Some(expected) = refusal {
                         return self.unexpected(expected);
                     }
                     self.push(place, "*");
-                    last = self.factor(false)?;
                 }
                 _ => return Ok(()),
             }
+            last = self.factor(false)?;
         }
+    }
+
+    /// What could be before a factor that follows without a sign, where that has other readings.
+    fn refusal(&self, kind: &Kind, last: Last, is_behind_literal: bool) -> Option<&'static str> {
+        let command = match kind {
+            Kind::Command(name) => name,
+            _ => "",
+        };
+        if self.breaks_before(self.at) {
+            return Some("an operator where a row or column goes on");
+        }
+        if is_behind_literal && self.is_fraction_of_integers() {
+            return Some(
+                "`\\cdot` or `+` between a number and a fraction, which print as a mixed number",
+            );
+        }
+        match last {
+            Last::Bare if function(command).is_some() => return None,
+            Last::Bare | Last::BareNumber => return Some(BARE),
+            Last::Number | Last::Other => {}
+        }
+        if command == "num" {
+            return Some("an operator before the number");
+        }
+        if self.is_number_next() {
+            return Some(
+                "an operator before the number, no space inside it, or braces around a subscript",
+            );
+        }
+        self.is_lone_integer()
+            .then_some("`\\tag{...}` for the number of an equation, or `\\cdot` before a factor")
     }
 
     pub(super) fn signs(&mut self) {
@@ -293,29 +302,28 @@ impl Reader<'_> {
         }
         self.at = start;
         match kind {
-            Kind::Open if self.kind(self.at + 1) == Some(&Kind::Character(',')) => {
+            Kind::Open if self.kind(start + 1) == Some(&Kind::Character(',')) => {
                 self.at += 1;
-                return self.unexpected("a decimal point, or no comma between thousands");
+                self.unexpected("a decimal point, or no comma between thousands")
             }
-            Kind::Open => {}
-            Kind::Command(_) => {
-                return self.unexpected(
-                    "a number, a variable, a group, \\frac, \\sqrt, \\sin, \\cos, \\tan, \\tanh, \\exp, \\ln or \\operatorname{sgn}",
-                );
+            Kind::Open => {
+                let last = self.enclosed(place, "(", |reader| {
+                    let last = reader.factor(false)?;
+                    match reader.peek() {
+                        None => Ok(last),
+                        Some(_) => reader.unexpected("one factor in braces, or parentheses"),
+                    }
+                })?;
+                match last == Last::Bare && self.is_next(&Kind::Superscript) {
+                    true => self.unexpected("parentheses around the function or its argument"),
+                    false => Ok(last),
+                }
             }
-            _ => return self.unexpected(FACTOR),
+            Kind::Command(_) => self.unexpected(
+                "a number, a variable, a group, \\frac, \\sqrt, \\sin, \\cos, \\tan, \\tanh, \\exp, \\ln or \\operatorname{sgn}",
+            ),
+            _ => self.unexpected(FACTOR),
         }
-        let last = self.enclosed(place, "(", |reader| {
-            let last = reader.factor(false)?;
-            match reader.peek() {
-                None => Ok(last),
-                Some(_) => reader.unexpected("one factor in braces, or parentheses"),
-            }
-        })?;
-        if last == Last::Bare && self.is_next(&Kind::Superscript) {
-            return self.unexpected("parentheses around the function or its argument");
-        }
-        Ok(last)
     }
 
     /// What `read` makes of the argument that comes next, between an opening text and a parenthesis.
@@ -339,16 +347,6 @@ impl Reader<'_> {
         Ok(if is_number { Last::Number } else { Last::Other })
     }
 
-    /// A sum between bars or parentheses; whether `\right` stands behind it.
-    fn sum_between(&mut self, are_bars: bool) -> Read<bool> {
-        self.deepen()?;
-        self.bars.push(are_bars);
-        self.sum(false)?;
-        self.bars.pop();
-        self.depth -= 1;
-        Ok(self.command("right"))
-    }
-
     pub(super) fn delimited(&mut self, place: (usize, usize)) -> Read<Last> {
         let has_left = self.command("left");
         let mut openers = DELIMITERS.iter();
@@ -357,7 +355,12 @@ impl Reader<'_> {
         };
         let are_bars = *closers == BARS;
         self.push(place, if are_bars { "abs(" } else { "(" });
-        let has_right = self.sum_between(are_bars)?;
+        self.deepen()?;
+        self.bars.push(are_bars);
+        self.sum(false)?;
+        self.bars.pop();
+        self.depth -= 1;
+        let has_right = self.command("right");
         if has_left != has_right || !closers.iter().any(|closer| self.delimiter(closer)) {
             let right = if has_left { "`\\right` and " } else { "" };
             let expected = match are_bars {

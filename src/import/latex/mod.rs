@@ -1,15 +1,12 @@
 //! Equations of latent accelerations as LaTeX prints them, in `.tex` and Markdown files.
 //!
-//! A document enters; sections of equations in the grammar of candidate terms leave, each piece
-//! with its place in the document, so that every later fault is reported there. Displays without
-//! a left side `\ddot z_k =` are skipped, as is the text around them, unless the only equations are
-//! in its lines; inside a display that is
-//! read, whatever has no meaning here is an error with line and column, never a guess.
+//! A document enters; sections of equations in the grammar of candidate terms leave, each piece with its place, so that
+//! every later fault is reported there. Displays without a left side `\ddot z_k =` are skipped, as is the text around
+//! them, unless the only equations are in its lines; in a display that is read, whatever has no meaning here is an error.
 //!
-//! Read `token.rs` (characters to tokens; `markdown.rs`), `expander.rs` with `definitions.rs`, `conditionals.rs` and
-//! `scopes.rs` (what of them is printed), `document.rs` (displays), `derivatives.rs` (dots for other ways to write a
-//! derivative), `sections.rs` (displays to equations and phases), `reader.rs`, `digits.rs`, `expression.rs` and
-//! `numbers.rs` (one right side) in this order.
+//! Read `token.rs` and `markdown.rs` (text to tokens), `expander.rs` with `definitions.rs`, `conditionals.rs` and
+//! `scopes.rs` (what of them is printed), `document.rs` (formulas), `derivatives.rs`, `sections.rs` (equations and phases),
+//! `reader.rs`, `digits.rs`, `expression.rs`, `variables.rs` and `numbers.rs` (one right side) in this order.
 
 mod conditionals;
 mod definitions;

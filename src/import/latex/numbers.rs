@@ -44,20 +44,18 @@ impl Reader<'_> {
     fn behind_power_of_ten(&mut self) -> Option<i32> {
         let is_product = self.command("times") || self.command("cdot");
         self.peek();
-        let ten = self
-            .number_at(self.at)
-            .filter(|number| is_product && number.text == "10")?;
+        let ten = self.number_at(self.at);
+        let ten = ten.filter(|number| is_product && number.text == "10")?;
         self.at = ten.behind;
         self.takes(&Kind::Superscript).then_some(())?;
         let behind = self.after_argument(self.at);
         let seen = (self.at..behind).filter(|at| !self.is_around[*at]);
-        let text: String = seen
-            .map(|at| match &self.tokens[at].kind {
-                Kind::Open | Kind::Close => String::new(),
-                Kind::Character(c @ ('+' | '-' | '0'..='9')) => c.to_string(),
-                _ => "?".to_owned(),
-            })
-            .collect();
+        let characters = seen.filter_map(|at| match &self.tokens[at].kind {
+            Kind::Open | Kind::Close => None,
+            Kind::Character(c) => Some(*c),
+            _ => Some('?'),
+        });
+        let text: String = characters.collect();
         self.at = behind;
         text.parse().ok()
     }
@@ -77,16 +75,15 @@ impl Reader<'_> {
     pub(super) fn macro_number(&mut self, place: (usize, usize)) -> Read<Last> {
         self.at += 1;
         if self.is_next(&Kind::Character('[')) {
-            let options = self.tokens[self.at..self.end].iter();
-            let length = options
-                .take_while(|token| token.kind != Kind::Character(']'))
-                .count();
-            if changes_digits(&self.tokens[self.at..self.at + length]) {
+            let options = &self.tokens[self.at..self.end];
+            let mut options = options.split(|token| token.kind == Kind::Character(']'));
+            let options = options.next().unwrap_or_default();
+            if changes_digits(options) {
                 return self.unexpected(
                     "the number as it is printed, without options that change its digits",
                 );
             }
-            self.at += length;
+            self.at += options.len();
             if !self.character(']') {
                 return self.unexpected("`]`");
             }
@@ -113,14 +110,11 @@ impl Reader<'_> {
             return self.unexpected("a number such as 1.2e-3");
         }
         self.at = behind;
-        self.push(
-            place,
-            if is_negative {
-                format!("(-{digits})")
-            } else {
-                digits.to_owned()
-            },
-        );
+        let literal = match is_negative {
+            true => format!("(-{digits})"),
+            false => digits.to_owned(),
+        };
+        self.push(place, literal);
         if is_negative && self.is_next(&Kind::Superscript) {
             return self.unexpected("parentheses around the negative number");
         }
@@ -153,14 +147,12 @@ impl Reader<'_> {
         if !self.character('[') {
             return Ok(2);
         }
-        self.peek();
-        let number = self.number_at(self.at);
-        let behind = number.as_ref().map_or(self.at, |number| number.behind);
-        let index = number.and_then(|number| number.text.parse().ok());
-        let Some(index @ 2..=99) = index else {
-            return self.unexpected("the index of the root, 2 to 99");
+        const EXPECTED: &str = "the index of the root, 2 to 99";
+        let start = self.at;
+        let Ok(index @ 2..=99) = self.number(EXPECTED)?.parse() else {
+            self.at = start;
+            return self.unexpected(EXPECTED);
         };
-        self.at = behind;
         match self.character(']') {
             true => Ok(index),
             false => self.unexpected("`]`"),

@@ -2,10 +2,10 @@
 
 use std::ops::Range;
 
+use super::super::ImportError;
 use super::super::equations::Piece;
-use super::super::error::ImportError;
 use super::digits::around_digits;
-use super::expression::WORDS;
+use super::expression::{LeftSide, WORDS};
 use super::names::SymbolNames;
 use super::token::{Kind, Token};
 
@@ -15,8 +15,7 @@ pub(super) const INVISIBLE: &str = ", ; : ! > quad qquad enspace thinspace medsp
     displaystyle textstyle scriptstyle limits nolimits nonumber notag allowbreak nobreak \
     allowdisplaybreaks hfill hfil mathstrut strut relax big Big bigg Bigg centering noindent par \
     smallskip medskip bigskip IEEEyesnumber IEEEnonumber IEEEeqnarraynumspace";
-pub(super) const INVISIBLE_WITH_ARGUMENT: &str =
-    "tag hspace vspace mspace hskip phantom hphantom vphantom color cline";
+pub(super) const INVISIBLE_WITH_ARGUMENT: &str = "tag hspace vspace mspace hskip color cline";
 /// Commands that only choose a font.
 pub(super) const FONTS: &str = "mathrm mathit mathbf mathsf mathtt bm boldsymbol pmb text textrm textit textup \
     mathnormal operatorname mathop mathord mathbin mathopen mathclose mathinner mbox";
@@ -29,19 +28,6 @@ pub(super) enum Digits {
     Decimals(usize),
     /// Significant digits.
     Significant(usize),
-}
-
-pub(super) struct Symbol {
-    pub(super) name: String,
-    pub(super) dots: usize,
-    pub(super) place: (usize, usize),
-}
-
-impl Symbol {
-    pub(super) fn quoted(&self) -> String {
-        let dots = ["", "\\dot ", "\\ddot ", "\\dddot "][self.dots.min(3)];
-        format!("`{dots}{}`", self.name)
-    }
 }
 
 /// What was read last, where it decides whether a product may go on without a sign.
@@ -110,13 +96,12 @@ impl<'a> Reader<'a> {
             bars: Vec::new(),
             pieces: Vec::new(),
         };
-        match reader.link(0..end).map(|place| &reader.tokens[place]) {
-            None => Ok(reader),
-            Some(token) => {
-                let found = format!("{} without its partner", token.quoted());
-                Err(ImportError::at(file, token.place, found, "braces in pairs"))
-            }
-        }
+        let Some(place) = reader.link(0..end) else {
+            return Ok(reader);
+        };
+        let token = &reader.tokens[place];
+        let found = format!("{} without its partner", token.quoted());
+        Err(ImportError::at(file, token.place, found, "braces in pairs"))
     }
 
     /// Finds where the braces between two places close; the first without a partner.
@@ -230,7 +215,7 @@ impl<'a> Reader<'a> {
         }
         self.deepen()?;
         let (at, after) = (self.at, self.after_argument(self.at));
-        let is_digit = |at: usize| matches!(self.kind(at), Some(Kind::Character('0'..='9')));
+        let is_digit = |at: usize| self.kind(at).is_some_and(|kind| kind.digit().is_some());
         let (first, end) = match &self.tokens[at].kind {
             Kind::Open => (at + 1, after - 1),
             // TeX would take the space for the argument.
@@ -280,30 +265,27 @@ impl Reader<'_> {
             *kind == Kind::Open || is_blank(kind)
         };
         let next = (self.at..self.end).find(|at| !is_passed(at));
-        [Some(self.at), next]
-            .into_iter()
-            .flatten()
-            .any(|at| self.number_at(at).is_some())
+        let is_number = |at| self.number_at(at).is_some();
+        is_number(self.at) || next.is_some_and(is_number)
     }
 
-    /// The first of some places, in rising order, that is in the argument of a command for text; that command.
-    pub(super) fn in_text(&self, places: &[usize]) -> Option<&Token> {
+    /// The command for text in whose argument one of the left sides is, which are in their order.
+    pub(super) fn in_text(&self, left_sides: &[LeftSide]) -> Option<&Token> {
         const NOTES: &str = "tag footnote footnotetext";
         let mut commands = self.tokens.iter().enumerate();
         let found = commands.find(|(at, token)| {
-            let is_text =
-                matches!(&token.kind, Kind::Command(name) if has(WORDS, name) || has(NOTES, name));
+            let is_text = has(WORDS, token.name()) || has(NOTES, token.name());
             let star = usize::from(self.kind(at + 1) == Some(&Kind::Character('*')));
             let open = at + 1 + star;
-            let inside = places.partition_point(|place| *place < open);
-            let is_inside = |place: &usize| *place < self.after_argument(open);
-            is_text && places.get(inside).is_some_and(is_inside)
+            let inside = left_sides.partition_point(|side| side.at < open);
+            let is_inside = |side: &LeftSide| side.at < self.after_argument(open);
+            is_text && left_sides.get(inside).is_some_and(is_inside)
         });
         found.map(|(_, token)| token)
     }
 
     pub(super) fn is_fraction_of_integers(&self) -> bool {
-        let is_fraction = matches!(self.kind(self.at), Some(Kind::Command(name)) if has("frac dfrac tfrac cfrac", name));
+        const FRACTIONS: &str = "frac dfrac tfrac cfrac";
         let behind_integer = |at: usize| {
             let behind = self.after_argument(at);
             let inside = match self.kind(at)? {
@@ -311,13 +293,11 @@ impl Reader<'_> {
                 _ => at..behind,
             };
             let mut seen = inside.filter(|at| !self.is_around[*at]).peekable();
-            let is_digit = |at: usize| matches!(self.tokens[at].kind, Kind::Character('0'..='9'));
+            let is_digit = |at: usize| self.tokens[at].kind.digit().is_some();
             (seen.peek().is_some() && seen.all(is_digit)).then_some(behind)
         };
-        is_fraction
-            && behind_integer(self.at + 1)
-                .and_then(behind_integer)
-                .is_some()
+        matches!(self.kind(self.at), Some(Kind::Command(name)) if has(FRACTIONS, name))
+            && (behind_integer(self.at + 1).and_then(behind_integer)).is_some()
     }
 
     /// Whether the last thing that follows is an integer alone in parentheses, as equations are numbered by hand.
@@ -344,10 +324,9 @@ fn without_split_delimiters(tokens: &[Token]) -> Vec<Token> {
     let mut joined = Vec::with_capacity(tokens.len());
     let mut at = 0;
     while at < tokens.len() {
+        let rest = &tokens[tokens.len().min(at + 2)..];
+        let blanks = rest.iter().take_while(|token| is_blank(&token.kind));
         if is_empty(at, "right") {
-            let blanks = tokens[at + 2..]
-                .iter()
-                .take_while(|token| is_blank(&token.kind));
             let left = at + 2 + blanks.count();
             if left < tokens.len() && is_empty(left, "left") {
                 joined.extend_from_slice(&tokens[at + 2..left]);

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::rc::Rc;
 
-use super::super::error::ImportError;
+use super::super::ImportError;
 use super::document::{CASES, LAYOUTS, is_one_of};
 use super::token::{Kind, Token};
 

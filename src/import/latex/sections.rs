@@ -1,11 +1,12 @@
 //! From a document's displays to sections of equations: one per phase.
 
+use super::super::ImportError;
 use super::super::equations::{Section, Sections, complete, text_of};
-use super::super::error::ImportError;
 use super::document::{Item, LAYOUTS, WITH_COLUMNS, is_one_of, items, unread};
+use super::expression::LeftSide;
 use super::markdown;
 use super::names::SymbolNames;
-use super::reader::{Digits, Reader, Symbol};
+use super::reader::{Digits, Reader};
 use super::token::{Kind, Token, group_length};
 
 /// Environments that arrange lines only if whole equations are in them.
@@ -37,6 +38,7 @@ pub(in crate::import) fn read(
         strange: None,
         sections: Vec::new(),
     };
+    let plain = SymbolNames::default();
     // In Markdown the sentence stands behind the equations.
     let stated = items.iter().find_map(|item| match item {
         Item::Comment(text) if is_markdown => stated_digits(text).flatten(),
@@ -49,7 +51,9 @@ pub(in crate::import) fn read(
             break;
         }
         (document.digits, document.phase, document.starts_phase) = (stated, None, false);
-        let alone = !has_indexed_left_side(file, &items, in_lines);
+        // Where a left side has an index, `z` alone is no coordinate.
+        let mut indexed = left_sides(file, &plain, &items, in_lines);
+        let alone = !indexed.any(|side| side.output.is_some());
         for item in &items {
             if let Item::Comment(text) = item {
                 document.comment(text);
@@ -59,9 +63,9 @@ pub(in crate::import) fn read(
             }
         }
     }
-    if let (true, Some((token, found))) = (document.sections.is_empty(), document.strange) {
+    if let (true, Some((place, found))) = (document.sections.is_empty(), document.strange) {
         let expected = format!("\\ddot z_1 and so on, with {}", names.expected());
-        return Err(ImportError::at(file, token.place, found, expected));
+        return Err(ImportError::at(file, place, found, expected));
     }
     let expected = match is_markdown {
         true => "an equation such as $$ \\ddot z_1 = 0.5 z_1 + u_1 $$",
@@ -70,49 +74,52 @@ pub(in crate::import) fn read(
     complete(file, document.sections, text.lines().count(), expected)
 }
 
-/// The left sides of a formula and the coordinates that they are of, if of any.
-fn left_sides(file: &str, names: &SymbolNames, tokens: &[Token]) -> Vec<(Symbol, Option<usize>)> {
-    let Ok(mut reader) = Reader::new(file, names, tokens) else {
-        return Vec::new();
-    };
-    let found = reader.left_sides().into_iter();
-    let with_output = |(_, symbol, _)| {
-        let output = reader.output(&symbol);
-        (symbol, output)
-    };
-    found.map(with_output).collect()
+/// The left sides of the formulas, in which all names of latent coordinates have an index.
+fn left_sides(
+    file: &str,
+    names: &SymbolNames,
+    items: &[Item],
+    in_lines: bool,
+) -> impl Iterator<Item = LeftSide> {
+    let formulas = items
+        .iter()
+        .filter_map(move |item| item.equations(in_lines));
+    formulas.flat_map(move |tokens| match Reader::new(file, names, tokens) {
+        Ok(mut reader) => reader.left_sides(),
+        Err(_) => Vec::new(),
+    })
 }
 
 /// Refuses equations in the lines of the text for coordinates that no display has: they would be dropped.
 fn refuse_others_in_lines(document: &Document<'_>, items: &[Item]) -> Result<(), ImportError> {
-    let (file, names) = (document.file, document.names);
     let equations = document.sections.iter().flat_map(|s| &s.equations);
     let known: Vec<usize> = equations.map(|equation| equation.output).collect();
-    let in_lines = items.iter().filter_map(|item| item.equations(true));
-    let mut found = in_lines.flat_map(|tokens| left_sides(file, names, tokens));
-    match found.find(|(_, output)| output.is_some_and(|output| !known.contains(&output))) {
+    let is_other = |side: &LeftSide| side.output.is_some_and(|output| !known.contains(&output));
+    match left_sides(document.file, document.names, items, true).find(is_other) {
         None => Ok(()),
-        Some((symbol, _)) => {
+        Some(LeftSide { symbol, .. }) => {
             let found = format!("{} in a line of the text", symbol.quoted());
             let expected = "a display for it, as for the other equations";
-            Err(ImportError::at(file, symbol.place, found, expected))
+            Err(ImportError::at(
+                document.file,
+                symbol.place,
+                found,
+                expected,
+            ))
         }
     }
-}
-
-/// Whether a left side `\ddot z_1` has an index, so that `z` alone is no coordinate.
-fn has_indexed_left_side(file: &str, items: &[Item], in_lines: bool) -> bool {
-    let names = SymbolNames::default();
-    let formulas = items.iter().filter_map(|item| item.equations(in_lines));
-    let mut found = formulas.flat_map(|tokens| left_sides(file, &names, tokens));
-    found.any(|(_, output)| output.is_some())
 }
 
 /// The tokens without `\begin` and `\end` of environments that arrange lines, and without the
 /// brace that `\left\{` puts before them.
 fn flattened(file: &str, tokens: &[Token]) -> Result<Vec<Token>, ImportError> {
     let mut flat: Vec<Token> = Vec::with_capacity(tokens.len());
-    let mut open: Vec<&Token> = Vec::new();
+    let mut open: Vec<(&Token, &str)> = Vec::new();
+    let refused = |token: &Token, why: &str, expected: &str| {
+        let found = format!("{}{why}", token.quoted());
+        Err(ImportError::at(file, token.place, found, expected))
+    };
+    let kind = |at: usize| tokens.get(at).map(|token| &token.kind);
     let mut at = 0;
     while let Some(token) = tokens.get(at) {
         at += 1;
@@ -121,11 +128,10 @@ fn flattened(file: &str, tokens: &[Token]) -> Result<Vec<Token>, ImportError> {
                 if is_layout(name)
                     || is_one_of(DISTINCTIONS, name) && has_left_side(&tokens[at..], name) =>
             {
-                open.push(token);
+                open.push((token, name.as_str()));
                 if flat.len() >= 2 && flat[flat.len() - 2].is_command("left") {
                     flat.truncate(flat.len() - 2);
                 }
-                let kind = |at: usize| tokens.get(at).map(|token| &token.kind);
                 if kind(at) == Some(&Kind::Character('[')) {
                     // A vertical position such as [t].
                     at += 3;
@@ -137,14 +143,19 @@ fn flattened(file: &str, tokens: &[Token]) -> Result<Vec<Token>, ImportError> {
             }
             Kind::End(name)
                 if is_layout(name)
-                    || is_one_of(DISTINCTIONS, name) && open.last().is_some_and(is_distinction) =>
+                    || is_one_of(DISTINCTIONS, name)
+                        && open
+                            .last()
+                            .is_some_and(|(_, open)| is_one_of(DISTINCTIONS, open)) =>
             {
-                if open.pop().map(|begin| &begin.kind) != Some(&Kind::Begin(name.clone())) {
+                if open.pop().is_none_or(|(_, open)| open != name) {
                     let expected = "environments that end in the order in which they begin";
-                    return Err(ImportError::at(file, token.place, token.quoted(), expected));
+                    return refused(token, "", expected);
                 }
-                let next = tokens.get(at);
-                if next.is_some_and(|token| token.is_command("right")) {
+                if tokens
+                    .get(at)
+                    .is_some_and(|token| token.is_command("right"))
+                {
                     at += 2;
                 }
             }
@@ -153,10 +164,9 @@ fn flattened(file: &str, tokens: &[Token]) -> Result<Vec<Token>, ImportError> {
     }
     match open.first() {
         None => Ok(flat),
-        Some(token) => {
-            let found = format!("{} without its end", token.quoted());
+        Some((token, _)) => {
             let expected = "environments that end inside their display";
-            Err(ImportError::at(file, token.place, found, expected))
+            refused(token, " without its end", expected)
         }
     }
 }
@@ -165,10 +175,6 @@ fn flattened(file: &str, tokens: &[Token]) -> Result<Vec<Token>, ImportError> {
 /// displays, and text between them.
 fn is_layout(name: &str) -> bool {
     is_one_of(LAYOUTS, name) || is_one_of("subequations", name)
-}
-
-fn is_distinction(token: &&Token) -> bool {
-    matches!(&token.kind, Kind::Begin(name) if is_one_of(DISTINCTIONS, name))
 }
 
 /// Whether the environment of this name whose contents begin here has equations in it: it is then no matrix, and on no
@@ -198,8 +204,8 @@ struct Document<'d> {
     digits: Option<Digits>,
     phase: Option<String>,
     starts_phase: bool,
-    /// The first left side of a variable that is not known.
-    strange: Option<(Token, String)>,
+    /// The first left side of a variable that is not known, and its place.
+    strange: Option<((usize, usize), String)>,
     sections: Vec<Section>,
 }
 
@@ -221,69 +227,55 @@ impl Document<'_> {
         let Some(dotted) = tokens.iter().find(|token| token.is_command("ddot")) else {
             return Ok(());
         };
-        if let Some((token, expected)) = unread(tokens) {
-            return Err(ImportError::at(
-                self.file,
-                token.place,
-                token.quoted(),
-                expected,
-            ));
-        }
-        let flat = flattened(self.file, tokens);
-        let mut reader = match &flat {
-            Ok(flat) => Reader::new(self.file, self.names, flat)?,
-            Err(_) => Reader::new(self.file, self.names, tokens)?,
+        let file = self.file;
+        let refuse = |place: (usize, usize), found: String, expected: &str| {
+            Err(ImportError::at(file, place, found, expected))
         };
+        if let Some((token, expected)) = unread(tokens) {
+            return refuse(token.place, token.quoted(), expected);
+        }
+        let flat = flattened(file, tokens);
+        let mut reader = Reader::new(file, self.names, flat.as_deref().unwrap_or(tokens))?;
         (reader.alone, reader.digits) = (alone, self.digits);
-        let mut left_sides = Vec::new();
-        let mut strange = None;
         let found = reader.left_sides();
-        let places: Vec<usize> = found.iter().map(|(at, ..)| *at).collect();
-        if let Some(token) = reader.in_text(&places) {
-            let (place, found) = (token.place, format!("an equation in {}", token.quoted()));
-            let expected = "equations in the formula itself";
-            return Err(ImportError::at(self.file, place, found, expected));
+        if let Some(token) = reader.in_text(&found) {
+            let found = format!("an equation in {}", token.quoted());
+            return refuse(token.place, found, "equations in the formula itself");
         }
-        for (at, symbol, after) in found {
-            let token = reader.tokens[at].clone();
-            match reader.output(&symbol) {
-                Some(output) => left_sides.push((output, at, after, token)),
-                None => {
-                    strange.get_or_insert((token, symbol.quoted()));
-                }
-            }
-        }
-        if left_sides.is_empty() {
+        let mut strange = found.iter().filter(|side| side.output.is_none());
+        let strange = (strange.next()).map(|side| (side.symbol.place, side.symbol.quoted()));
+        let known = found.iter().filter_map(|side| Some((side.output?, side)));
+        let known: Vec<(usize, &LeftSide)> = known.collect();
+        let Some((_, first)) = known.first() else {
             let unequal = "a second derivative without `=` behind its variable";
-            let found = strange.unwrap_or((dotted.clone(), unequal.to_owned()));
+            let found = strange.unwrap_or((dotted.place, unequal.to_owned()));
             self.strange.get_or_insert(found);
             return Ok(());
-        }
-        flat?;
-        let refuse = |token: &Token, found: String, expected: &str| {
-            Err(ImportError::at(self.file, token.place, found, expected))
         };
-        if let Some((token, found)) = strange {
-            return refuse(&token, found, &self.names.expected());
+        flat?;
+        if let Some((place, found)) = strange {
+            return refuse(place, found, &self.names.expected());
         }
-        if let Some(token) = reader.printed(0, left_sides[0].1) {
-            return refuse(&token, token.quoted(), "a left side such as `\\ddot z_1 =`");
+        if let Some(token) = reader.printed_before(first.at) {
+            let expected = "a left side such as `\\ddot z_1 =`";
+            return refuse(token.place, token.quoted(), expected);
         }
-        let total = reader.tokens.len();
-        let shared = self.label(&reader.tokens[..left_sides[0].1]);
+        let shared = self.label(&reader.tokens[..first.at]);
         let mut before = 0;
-        for (place, (output, _, after, token)) in left_sides.iter().enumerate() {
-            let end = left_sides.get(place + 1).map_or(total, |next| next.1);
-            let own = || self.label(&reader.tokens[*after..end]);
+        for (index, (output, side)) in known.iter().enumerate() {
+            let total = reader.tokens.len();
+            let end = known.get(index + 1).map_or(total, |(_, next)| next.at);
+            let own = || self.label(&reader.tokens[side.after..end]);
             let label = shared.clone().or_else(own);
-            for token in &reader.tokens[before..*after] {
+            for token in &reader.tokens[before..side.after] {
                 if let Kind::Comment(text) = &token.kind {
                     self.comment(text);
                 }
             }
-            before = *after;
-            let equation = reader.equation(*output, token.place.0, *after, end)?;
-            let section = self.section(*output, token, label)?;
+            before = side.after;
+            let place = side.symbol.place;
+            let equation = reader.equation(*output, place.0, side.after, end)?;
+            let section = self.section(*output, place, label)?;
             section.equations.push(equation);
         }
         Ok(())
@@ -297,9 +289,7 @@ impl Document<'_> {
         })?;
         // Rows of one system are numbered: eq:model:contact:2.
         let stem = label.trim_end_matches(|c: char| c.is_ascii_digit());
-        let stem = (stem.strip_suffix(':'))
-            .filter(|stem| *stem != label)
-            .unwrap_or(label);
+        let stem = stem.strip_suffix(':').unwrap_or(label);
         let plain = |text: &str| text.replace(|c: char| !c.is_ascii_alphanumeric(), "-");
         let ends_in = |name: &&String| {
             let (name, texts) = (plain(name), [label, stem].map(plain));
@@ -317,36 +307,31 @@ impl Document<'_> {
     fn section(
         &mut self,
         output: usize,
-        token: &Token,
+        place: (usize, usize),
         label: Option<String>,
     ) -> Result<&mut Section, ImportError> {
         let starts_phase = std::mem::take(&mut self.starts_phase);
         let named = self.phase.clone().filter(|_| starts_phase);
+        let has_phase = self.phase.is_some();
         let is_known = |name: &String| self.known.contains(name);
         let is_new = self.sections.last().is_none_or(|open| {
             let mut equations = open.equations.iter();
             let repeats = equations.any(|equation| equation.output == output);
             let is_other = label.as_ref().is_some_and(is_known) && label != open.phase;
-            named.is_some() || repeats || self.phase.is_none() && is_other
+            named.is_some() || repeats || !has_phase && is_other
         });
         if is_new {
-            let named = named.or(label.clone().filter(|_| self.phase.is_none()));
-            if let Some(earlier) =
-                (self.sections.iter()).find(|section| named.is_some() && section.phase == named)
-            {
-                let name = named.unwrap_or_default();
+            let named = named.or(label.clone().filter(|_| !has_phase));
+            let mut sections = self.sections.iter();
+            let earlier = sections.find(|section| named.is_some() && section.phase == named);
+            if let (Some(earlier), Some(name)) = (earlier, &named) {
                 let found = format!("phase `{name}` again, as in line {}", earlier.line);
-                return Err(ImportError::at(
-                    self.file,
-                    token.place,
-                    found,
-                    "each phase once",
-                ));
+                return Err(ImportError::at(self.file, place, found, "each phase once"));
             }
-            self.sections.push(Section::new(named, token.place.0));
+            self.sections.push(Section::new(named, place.0));
         }
         let section = (self.sections.last_mut()).expect("one was just made if there was none");
-        if self.phase.is_none() && label.is_some() && label != section.phase {
+        if !has_phase && label.is_some() && label != section.phase {
             // Labels that name single equations do not name their phase.
             section.phase.take_if(|name| !is_known(name));
         }

@@ -69,6 +69,13 @@ impl Kind {
         format!("`{short}`")
     }
 
+    pub(super) fn digit(&self) -> Option<char> {
+        match self {
+            Kind::Character(c) => Some(*c).filter(char::is_ascii_digit),
+            _ => None,
+        }
+    }
+
     /// Whether it ends every term that it stands behind.
     pub(super) fn ends_term(&self) -> bool {
         use Kind::{Align, Break, Close, Comment, Label, Paragraph};
@@ -118,7 +125,7 @@ pub(super) fn group_length<'t>(tokens: impl Iterator<Item = &'t Token>) -> Optio
 }
 
 pub(super) struct Lexer<'t> {
-    rest: &'t str,
+    pub(super) rest: &'t str,
     /// Line and column of the rest.
     place: (usize, usize),
     starts_line: bool,
@@ -188,7 +195,7 @@ impl<'t> Lexer<'t> {
     }
 
     /// The rest of the line.
-    fn line(&self) -> &'t str {
+    pub(super) fn line(&self) -> &'t str {
         self.rest.lines().next().unwrap_or("")
     }
 
@@ -203,19 +210,6 @@ impl<'t> Lexer<'t> {
         self.rest = self.rest.split_once('\n').map_or("", |(_, rest)| rest);
         self.place = (self.place.0 + 1, 1);
         self.starts_line = true;
-    }
-
-    /// Ends the text behind the line that is read.
-    pub(super) fn end_after_line(&mut self) {
-        self.rest = self.line();
-    }
-
-    pub(super) fn end(&mut self) {
-        self.rest = "";
-    }
-
-    pub(super) fn is_at(&self, character: char) -> bool {
-        self.rest.starts_with(character)
     }
 
     /// Passes `|...|` behind `\verb`, or a group without a look into it.
@@ -250,10 +244,6 @@ impl<'t> Lexer<'t> {
         false
     }
 
-    pub(super) fn is_at_line_end(&self) -> bool {
-        self.line().trim().is_empty()
-    }
-
     fn peek(&self, ahead: usize) -> Option<char> {
         self.rest.chars().nth(ahead)
     }
@@ -279,7 +269,7 @@ impl<'t> Lexer<'t> {
             '^' => Kind::Superscript,
             '_' => Kind::Subscript,
             '&' => Kind::Align,
-            '$' if self.is_at('$') => {
+            '$' if self.rest.starts_with('$') => {
                 self.pass(1);
                 Kind::Display
             }
@@ -365,7 +355,7 @@ impl<'t> Lexer<'t> {
 
     /// The star and the distance in brackets that may follow `\\`.
     fn skip_distance(&mut self) {
-        self.pass(usize::from(self.is_at('*')));
+        self.pass(usize::from(self.rest.starts_with('*')));
         let start = self.rest.trim_start_matches(' ');
         let inside = start.strip_prefix('[').unwrap_or("");
         let is_part = |c: char| c.is_ascii_alphanumeric() || " .-\\".contains(c);

@@ -1,10 +1,23 @@
 //! Functions with their arguments, and variables with dots and subscripts.
 
-use super::super::error::ImportError;
+use super::super::ImportError;
 use super::names::is_greek;
-use super::reader::{BARE, FONTS, INVISIBLE, Last, Read, Reader, Symbol, has};
+use super::reader::{BARE, FONTS, INVISIBLE, Last, Read, Reader, has};
 use super::token::Kind;
 use crate::model::LatentVariable;
+
+pub(super) struct Symbol {
+    pub(super) name: String,
+    pub(super) dots: usize,
+    pub(super) place: (usize, usize),
+}
+
+impl Symbol {
+    pub(super) fn quoted(&self) -> String {
+        let dots = ["", "\\dot ", "\\ddot ", "\\dddot "][self.dots.min(3)];
+        format!("`{dots}{}`", self.name)
+    }
+}
 
 impl Reader<'_> {
     /// A function's name at the reader's place, and the place behind it.
@@ -77,31 +90,7 @@ impl Reader<'_> {
             power = Some(self.inside(|reader| reader.number(expected))?);
         }
         let before = self.pieces.len();
-        let argument = self.here();
-        let last = match self.next_kind() {
-            Some(Kind::Character('(' | '[')) => self.delimited(argument)?,
-            Some(Kind::Command(opener)) if opener == "left" && !self.is_bar_behind() => {
-                self.delimited(argument)?
-            }
-            // Braces do not print: a sum or a power of what is in them would read otherwise without.
-            Some(Kind::Open) => {
-                let last = self.inside(|reader| match reader.peek().map(|token| &token.kind) {
-                    Some(Kind::Character('(' | '[')) => reader.factor(false),
-                    _ => {
-                        reader.signs();
-                        reader.bare_argument()
-                    }
-                })?;
-                if last != Last::Other && self.is_next(&Kind::Superscript) {
-                    return self.unexpected(BARE);
-                }
-                match last {
-                    Last::BareNumber => last,
-                    _ => Last::Other,
-                }
-            }
-            _ => self.bare_argument()?,
-        };
+        let last = self.function_argument()?;
         let argument = self.pieces.split_off(before);
         let parts: &[&str] = match name {
             "sec" => &["(1/cos(", "))"],
@@ -126,6 +115,33 @@ impl Reader<'_> {
             None => {}
         }
         Ok(last)
+    }
+
+    fn function_argument(&mut self) -> Read<Last> {
+        let place = self.here();
+        match self.next_kind() {
+            Some(Kind::Character('(' | '[')) => self.delimited(place),
+            Some(Kind::Command(opener)) if opener == "left" && !self.is_bar_behind() => {
+                self.delimited(place)
+            }
+            // Braces do not print: a sum or a power of what is in them would read otherwise without.
+            Some(Kind::Open) => {
+                let last = self.inside(|reader| match reader.next_kind() {
+                    Some(Kind::Character('(' | '[')) => reader.factor(false),
+                    _ => {
+                        reader.signs();
+                        reader.bare_argument()
+                    }
+                })?;
+                match last {
+                    Last::Other => Ok(last),
+                    _ if self.is_next(&Kind::Superscript) => self.unexpected(BARE),
+                    Last::BareNumber => Ok(last),
+                    _ => Ok(Last::Other),
+                }
+            }
+            _ => self.bare_argument(),
+        }
     }
 
     fn is_bar_behind(&self) -> bool {

@@ -3,7 +3,7 @@
 
 use nalgebra::{DMatrix, DVector, Rotation3, Vector2, Vector3};
 
-use super::metrics::FitSums;
+use super::coordinates::FitSums;
 use crate::recording::segment::between;
 use crate::recording::{RecordingError, Segment};
 use crate::robot::{BODY_X, BODY_Z, InputRule, JOINT_DIM, Leg, Robot, WrenchFrame};
@@ -275,28 +275,21 @@ fn fit_aslip(rule: &InputRule, segments: &[&Segment]) -> Result<Option<Aslip>, R
         }
     }
     let right = DVector::from_vec(right);
-    let with_spring = least_squares(&rows, &[0, 1, 2], &right);
-    if let Some([a, b, c]) = with_spring.as_deref()
-        && *a > 0.0
-        && *c > 0.0
-    {
-        return Ok(Some(Aslip {
+    let mut fits = [&[0, 1, 2][..], &[2]].into_iter().filter_map(|columns| {
+        let solution = least_squares(&rows, columns, &right)?;
+        let (stiffness, rest_length_m, c) = match solution[..] {
+            [a, b, c] if a > 0.0 => (a, b / a, c),
+            [c] => (0.0, 0.0, c),
+            _ => return None,
+        };
+        (c > 0.0).then(|| Aslip {
             mass_kg: 1.0 / c,
-            stiffness_n_m: a / c,
-            rest_length_m: b / a,
+            stiffness_n_m: stiffness / c,
+            rest_length_m,
             ..published
-        }));
-    }
-    let mass_only = least_squares(&rows, &[2], &right);
-    Ok(match mass_only.as_deref() {
-        Some([c]) if *c > 0.0 => Some(Aslip {
-            mass_kg: 1.0 / c,
-            stiffness_n_m: 0.0,
-            rest_length_m: 0.0,
-            ..published
-        }),
-        Some(_) | None => None,
-    })
+        })
+    });
+    Ok(fits.next())
 }
 
 /// Least-squares coefficients of some columns; none where they are not independent.

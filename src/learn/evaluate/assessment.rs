@@ -1,9 +1,8 @@
 //! Everything that a model and recordings show together, in one pass.
 
 use super::aslip::{AslipRollout, Baseline};
-use super::coordinates::{CoordinateSums, PointwiseSums};
+use super::coordinates::{CoordinateSums, Fit, FitSums, PointwiseSums};
 use super::linearised::{LinearisedPhase, linearise_phases};
-use super::metrics::{Fit, FitSums};
 use super::torque::{LAMBDA, LiftSums, combined_loss};
 use crate::lower::{CompiledModel, LowerError};
 use crate::model::{ModelError, ReducedModel};

@@ -37,11 +37,8 @@ pub struct CoefficientTrials {
     pub fitted: Option<f64>,
 }
 
-/// The values of the terms and the accelerations of a phase, one row per sample.
-struct PhaseSamples {
-    theta: DMatrix<f64>,
-    ddz: DMatrix<f64>,
-}
+/// Values of the terms and accelerations of a phase, one row per sample.
+type PhaseSamples = (DMatrix<f64>, DMatrix<f64>);
 
 /// A way to read coefficients: for each row of the file that of romc's order.
 struct Reading {
@@ -58,7 +55,9 @@ impl CoefficientTrials {
     ) -> Result<Self, EvaluateError> {
         let samples = samples(model, segments)?;
         let readings = readings(model, order)?;
-        let exchanges = exchanges(model.phases().len());
+        let n = model.phases().len();
+        let pairs = (0..n).flat_map(|a| (a + 1..n).map(move |b| Some([a, b])));
+        let exchanges: Vec<_> = std::iter::once(None).chain(pairs).collect();
         let mut by_order = Vec::new();
         let mut best = (f64::INFINITY, f64::NAN, &readings[0], None);
         for (place, reading) in readings.iter().enumerate() {
@@ -109,12 +108,6 @@ impl CoefficientTrials {
         let is_clear = |(_, other): &(_, f64)| residual(*other) >= NAMED * residual(r2);
         others.clone().all(is_clear).then_some(best)
     }
-}
-
-/// No exchange, then each pair of phases.
-fn exchanges(n_phases: usize) -> Vec<Option<[usize; 2]>> {
-    let pairs = (0..n_phases).flat_map(|a| (a + 1..n_phases).map(move |b| Some([a, b])));
-    std::iter::once(None).chain(pairs).collect()
 }
 
 /// The coefficients of a phase, read in another way than the one given.
@@ -196,10 +189,8 @@ fn samples(
     let samples = columns.into_iter().map(|(variables, ddz)| {
         let count = ddz.len() / d;
         let variables = DMatrix::from_vec(3 * d, count, variables);
-        Ok(PhaseSamples {
-            theta: model.library().evaluate_points(&variables)?,
-            ddz: DMatrix::from_vec(d, count, ddz).transpose(),
-        })
+        let theta = model.library().evaluate_points(&variables)?;
+        Ok((theta, DMatrix::from_vec(d, count, ddz).transpose()))
     });
     samples.collect()
 }
@@ -208,7 +199,7 @@ fn samples(
 /// deviations are none, or a value is not finite.
 fn r2(samples: &[PhaseSamples], xi: impl Fn(usize) -> Option<DMatrix<f64>>) -> Option<f64> {
     let (mut residual, mut deviation) = (0.0, 0.0);
-    for (phase, PhaseSamples { theta, ddz }) in samples.iter().enumerate() {
+    for (phase, (theta, ddz)) in samples.iter().enumerate() {
         if ddz.nrows() > 0 {
             residual += (theta * xi(phase)? - ddz).norm_squared();
             deviation += (ddz.column_iter())
@@ -224,7 +215,7 @@ fn r2(samples: &[PhaseSamples], xi: impl Fn(usize) -> Option<DMatrix<f64>>) -> O
 fn fitted(samples: &[PhaseSamples]) -> Option<f64> {
     const RIDGE: f64 = 1e-10;
     r2(samples, |phase| {
-        let PhaseSamples { theta, ddz } = &samples[phase];
+        let (theta, ddz) = &samples[phase];
         if theta.nrows() < 3 * theta.ncols() {
             return None;
         }

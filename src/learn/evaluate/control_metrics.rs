@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::along_recording::{ReferenceInput, along_recording};
 use super::assessment::EvaluateError;
-use super::metrics::Mean;
+use super::coordinates::Mean;
 use super::prediction::{PredictionError, prediction_error, recorded_stages, uninformed};
 use super::recovery::{Driver, Recovery, recovery};
 use super::torque::{ByContact, Comparison};

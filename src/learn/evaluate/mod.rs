@@ -3,7 +3,7 @@
 //! Rollouts and recordings come in; fits (root mean square in SI units, coefficient of
 //! determination), template models under the same inputs, stability, the losses of the lift and a [`Verdict`] leave.
 //! `docs/mathematics.md` defines each figure once. Start with `assessment.rs`, then
-//! [`metrics`](Fit).
+//! [`coordinates`](Fit).
 
 #![allow(missing_docs, reason = "names say it all where there is no comment")]
 
@@ -15,7 +15,6 @@ mod control_metrics;
 mod coordinates;
 mod invariance;
 mod linearised;
-mod metrics;
 mod prediction;
 mod recovery;
 mod round_trip;
@@ -26,11 +25,10 @@ pub use along_recording::{ReferenceInput, Run, StepRow, along_recording, lift_co
 pub use aslip::{Aslip, AslipSums, Baseline};
 pub use assessment::{Assessment, EvaluateError, SegmentRun, remarks};
 pub use control_metrics::{ControlMetrics, Summary, control_metrics, usual_settings};
-pub use coordinates::{CoordinateSums, PointwiseSums};
+pub use coordinates::{CoordinateSums, Fit, FitSums, PointwiseSums};
 pub use invariance::Invariance;
 pub(crate) use linearised::state_matrix;
 pub use linearised::{LinearisedPhase, eigenvalues, linearise_phases};
-pub use metrics::{Fit, FitSums};
 pub use prediction::PredictionError;
 pub use round_trip::RoundTrip;
 pub use torque::{ByContact, Comparison, LAMBDA, combined_loss, is_plausible};

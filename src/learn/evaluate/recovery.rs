@@ -15,7 +15,7 @@
 use nalgebra::Vector3;
 
 use super::along_recording::{ReferenceInput, control_samples, set_reference};
-use super::metrics::Mean;
+use super::coordinates::Mean;
 use crate::mpc::{Controller, Measurement, MpcError};
 use crate::recording::{Recording, Segment};
 use crate::robot::input_rule::rotation;

@@ -5,8 +5,7 @@ use nalgebra::DVector;
 
 use super::assessment::EvaluateError;
 use super::coefficient_trials::{CoefficientSlip, CoefficientTrials, GOOD_R2};
-use super::coordinates::PointwiseSums;
-use super::metrics::FitSums;
+use super::coordinates::{FitSums, PointwiseSums};
 use crate::model::{CoordinateOrder, LibraryOrder, ModelError, ReducedModel, StateMap};
 use crate::recording::Segment;
 use crate::robot::STATE_DIM;
@@ -112,7 +111,7 @@ impl RoundTrip {
     }
 
     /// Whether the equations say more of the latent accelerations than a constant.
-    pub fn equations_fit(&self) -> bool {
+    fn equations_fit(&self) -> bool {
         self.all_acceleration_r2.is_none_or(|r2| r2 >= 0.0)
     }
 

@@ -1,7 +1,7 @@
 //! Agreement of torques with recorded ones: the one coefficient of determination that every command prints; and what the
 //! plain lift `u = W_e^T u_lat` alone loses, without any controller.
 
-use super::metrics::{FitSums, Mean};
+use super::coordinates::{FitSums, Mean};
 use crate::model::ReducedModel;
 use crate::recording::Segment;
 use crate::robot::{ContactFlags, JOINT_DIM, Robot};

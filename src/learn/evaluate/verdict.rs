@@ -304,7 +304,6 @@ fn without_predictions(rows: &mut [VerdictRow], fails_soon: bool) {
     }
 }
 
-/// Torques and control along one recording.
 fn control_rows(metrics: &ControlMetrics) -> [VerdictRow; 5] {
     let baseline = &metrics.baseline;
     let blind = &baseline.no_dynamics;

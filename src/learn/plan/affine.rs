@@ -109,12 +109,10 @@ impl Builder {
         self.linear.push((variable, factor));
     }
 
-    /// Adds the row `expression = 0`.
     pub(crate) fn equal(&mut self, expression: Affine) {
         self.equal.push(expression);
     }
 
-    /// Adds the row `expression <= 0`.
     pub(crate) fn at_most(&mut self, expression: Affine) {
         self.at_most.push(expression);
     }

@@ -7,7 +7,6 @@ use super::seed::{PITCH, Seed};
 use super::transcribe::Task;
 use crate::robot::{BODY_X, BODY_Z, JOINT_DIM, Leg, STATE_DIM};
 
-/// Time that the weights are per, s.
 const TIME_UNIT_S: f64 = 0.01;
 /// The first latent coordinate that counts as posture: the two before it carry the body.
 const FIRST_OF_POSTURE: usize = 2;
@@ -20,7 +19,6 @@ pub(crate) fn add(task: &Task<'_>, y: &[f64], builder: &mut Builder) {
     }
 }
 
-/// The cost of a point: the sum of weighted squares.
 pub(crate) fn value(task: &Task<'_>, y: &[f64]) -> f64 {
     let squares = squares(task, y).into_iter();
     squares.fold(0.0, |total, (expression, weight)| {
@@ -28,7 +26,6 @@ pub(crate) fn value(task: &Task<'_>, y: &[f64]) -> f64 {
     })
 }
 
-/// What is squared, and its weight.
 fn squares(task: &Task<'_>, y: &[f64]) -> Vec<(Affine, f64)> {
     let (d, settings) = (task.seed.latent_dim, task.settings);
     let share = 1.0 / d as f64;

@@ -12,7 +12,6 @@ use super::transcribe::{NodeValues, Task};
 use crate::recording::Segment;
 use crate::robot::{BODY_X, BODY_Z, JOINT_DIM, Leg, Robot, STATE_DIM};
 
-/// Name of a plan where a recording has that of its file.
 const SOURCE: &str = "plan";
 
 /// How close a motion comes to its bounds, over all its samples.

@@ -63,7 +63,6 @@ impl SeedPart<'_> {
 }
 
 impl<'a> Seed<'a> {
-    /// The prior of a model at a goal.
     pub(crate) fn new(
         model: &'a ReducedModel,
         goal: &Goal,
@@ -137,7 +136,8 @@ fn seed_part<'a>(
     let (part, landmark) = (&prior.parts[part], &prior.landmarks.parts[part]);
     let phase = (model.phase_for(landmark.feet)).expect("invariant: checked with the model");
     let table = |rows: &DMatrix<f64>| -> Vec<DVector<f64>> {
-        (0..part.nodes())
+        let nodes = 0..part.nodes();
+        nodes
             .map(|node| JumpPart::at(rows, node, features))
             .collect()
     };
@@ -155,19 +155,19 @@ fn seed_part<'a>(
         .unpack();
     let d = model.latent_dim();
     let scales = scales(prior, &root, d);
-    let mut slope = Vec::with_capacity(part.nodes());
-    for node in 0..part.nodes() {
+    let slope = (0..part.nodes()).map(|node| {
         let by_latent = match &part.xi {
             Some(xi) => xi.transpose(),
             None => {
                 let (mut value, mut jacobian) = (vec![0.0; d], DMatrix::zeros(d, 3 * d));
-                let at = [&z[node], &dz[node], &u_lat[node]].map(|v| v.as_slice());
-                dynamics.jacobian(phase, at[0], at[1], at[2], &mut value, &mut jacobian);
+                let [z, dz, u_lat] = [&z[node], &dz[node], &u_lat[node]].map(|v| v.as_slice());
+                dynamics.jacobian(phase, z, dz, u_lat, &mut value, &mut jacobian);
                 jacobian
             }
         };
-        slope.push(by_latent * &scales);
-    }
+        by_latent * &scales
+    });
+    let slope = slope.collect();
     SeedPart {
         part,
         landmark,

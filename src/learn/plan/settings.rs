@@ -2,7 +2,6 @@
 
 use serde::{Deserialize, Serialize};
 
-/// No upper end of a setting.
 const ANY: f64 = f64::INFINITY;
 
 /// Makes [`PlanSettings`] of a table: field, default, and the upper end of its range from zero.

@@ -100,7 +100,6 @@ pub fn plan(model: &ReducedModel, goal: &Goal, settings: &PlanSettings) -> Resul
     })
 }
 
-/// The variables at the end of the programs, and how many there were.
 fn solve(task: &mut Task<'_>) -> Result<(Vec<f64>, usize), PlanError> {
     let [distance_m, apex_m] = task.seed.goal.goal_m();
     let settings = QpSettings {

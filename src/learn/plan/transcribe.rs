@@ -46,13 +46,11 @@ const FAR_JOINT_RAD: f64 = 0.3;
 /// Bounds whose violation is a variable of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Bound {
-    /// Torques, as shares of their limits.
     Torque,
     /// Joint angles, rad.
     Joint,
     /// The friction cone, in 100 N.
     Friction,
-    /// Heights, m.
     Height,
 }
 
@@ -60,7 +58,6 @@ impl Bound {
     pub(crate) const ALL: [Self; 4] = [Self::Torque, Self::Joint, Self::Friction, Self::Height];
 }
 
-/// Places of the variables.
 pub(crate) struct NodeValues {
     pub z: DVector<f64>,
     pub dz: DVector<f64>,
@@ -158,7 +155,6 @@ impl<'a> Task<'a> {
         terms.fold(Affine::of(self.seed.decode_bias[coordinate]), Add::add)
     }
 
-    /// A coordinate of the decoded velocity at a node.
     pub(crate) fn dx(&self, part: usize, node: usize, coordinate: usize) -> Affine {
         let (factors, d) = (self.seed.decode.row(coordinate), self.seed.latent_dim);
         let terms = (factors.iter().enumerate()).map(|(i, f)| self.latent(part, node, d + i) * *f);
@@ -262,7 +258,6 @@ impl<'a> Task<'a> {
         worst.max(apex.abs())
     }
 
-    /// Start, borders of the parts, apex, end.
     fn ends(&self, y: &[f64], builder: &mut Builder) {
         let d = self.seed.latent_dim;
         let std = &self.seed.prior.state_std;
@@ -292,7 +287,6 @@ impl<'a> Task<'a> {
         within(builder, &self.x(part, node, BODY_Z), range, Some(height));
     }
 
-    /// Rest and a level body at the end, for jumps that land.
     fn rest(&self, builder: &mut Builder) {
         let (part, node) = self.last();
         let speed = self.settings.end_speed_m_s;

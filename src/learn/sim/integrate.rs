@@ -141,10 +141,9 @@ impl<S: OdeSystem> Stepper<'_, S> {
         'times: for &target in times {
             while time < target {
                 let left = target - time;
-                let h = if left < 1.1 * length {
-                    left
-                } else {
-                    length.min(0.5 * left)
+                let h = match left < 1.1 * length {
+                    true => left,
+                    false => length.min(0.5 * left),
                 };
                 if h < self.shortest || self.evaluations > self.budget {
                     diverged_at_s = Some(time);
@@ -153,11 +152,8 @@ impl<S: OdeSystem> Stepper<'_, S> {
                 let trial = self.step(time, &y, h);
                 // a step that a requested time cut short says little about the next
                 let cut = trial.end.is_some() && h < length && length.is_finite();
-                length = if cut {
-                    trial.next.max(length)
-                } else {
-                    trial.next
-                };
+                let least = if cut { length } else { 0.0 };
+                length = trial.next.max(least);
                 let Some(end) = trial.end else { continue };
                 y = end;
                 time = if h == left { target } else { time + h };
@@ -168,11 +164,8 @@ impl<S: OdeSystem> Stepper<'_, S> {
             }
             columns.push(y.clone());
         }
-        let states = DMatrix::from_iterator(
-            initial.len(),
-            columns.len(),
-            columns.iter().flatten().copied(),
-        );
+        let (dim, numbers) = (initial.len(), columns.iter().flatten().copied());
+        let states = DMatrix::from_iterator(dim, columns.len(), numbers);
         Integration {
             states,
             diverged_at_s,
@@ -279,7 +272,6 @@ impl<S: OdeSystem> Stepper<'_, S> {
         finite(current)
     }
 
-    /// `f(t, y)`, unless `y` is not finite.
     fn rate(&mut self, time: f64, y: &DVector<f64>, f: &mut DVector<f64>) -> Option<()> {
         self.evaluations += 1;
         let defined = y.iter().all(|value| value.is_finite());

@@ -106,20 +106,18 @@ pub fn with_input_statistics(
     segments: &[&Segment],
 ) -> Result<ReducedModel, SimError> {
     let rule = model.input_rule()?;
-    let names = model.phases().iter().map(|phase| phase.name.clone());
-    let names: Vec<String> = names.collect();
-    let mut of_phases = vec![Vec::new(); names.len()];
+    let mut of_phases = vec![Vec::new(); model.phases().len()];
     for segment in segments {
         let input = segment.input(&rule)?;
         for (sample, phase) in phases(&model, segment)?.into_iter().enumerate() {
             of_phases[phase].push(input.column(sample).into_owned());
         }
     }
-    let mut builder = model.into_builder();
-    for (name, samples) in names.into_iter().zip(of_phases) {
+    let mut builder = model.clone().into_builder();
+    for (phase, samples) in model.phases().iter().zip(of_phases) {
         if !samples.is_empty() {
             let statistics = InputStatistics::of_samples(&DMatrix::from_columns(&samples));
-            builder = builder.input_statistics(name, statistics);
+            builder = builder.input_statistics(&phase.name, statistics);
         }
     }
     Ok(builder.build()?)

@@ -15,7 +15,6 @@ use crate::recording::segment::stretches;
 /// When a rollout starts again from the recorded latent state.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Restart {
-    /// Never: one rollout over the whole segment.
     Never,
     /// After this many seconds, over and over.
     Every(f64),
@@ -62,20 +61,20 @@ impl Rollout {
 
 /// Rolls the model out over a segment, from its recorded latent state at each start.
 pub fn rollout(model: &CompiledModel, recorded: &LatentSegment, restart: Restart) -> Rollout {
+    let d = model.latent_dim();
     let mut dynamics = PhaseDynamics {
         model: model.clone(),
         recorded,
         phase: 0,
-        u_lat: vec![0.0; model.latent_dim()],
-        ddz: vec![0.0; model.latent_dim()],
-        partials: DMatrix::zeros(model.latent_dim(), 3 * model.latent_dim()),
+        u_lat: vec![0.0; d],
+        ddz: vec![0.0; d],
+        partials: DMatrix::zeros(d, 3 * d),
     };
+    let options = at_scale(recorded);
     let windows = restart_windows(&recorded.time_s, restart).into_iter();
-    let options = &at_scale(recorded);
+    let windows = windows.map(|samples| roll_window(&mut dynamics, samples, &options));
     Rollout {
-        windows: windows
-            .map(|samples| roll_window(&mut dynamics, samples, options))
-            .collect(),
+        windows: windows.collect(),
     }
 }
 
@@ -84,18 +83,14 @@ pub fn rollout(model: &CompiledModel, recorded: &LatentSegment, restart: Restart
 fn at_scale(recorded: &LatentSegment) -> IntegrationOptions {
     /// Largest coordinates between which the options are taken as they are.
     const USUAL: [f64; 2] = [1e-3, 1e3];
-    let options = IntegrationOptions::default();
-    match recorded.z.amax() {
-        largest if largest > 0.0 && largest < USUAL[0] => IntegrationOptions {
-            absolute_tolerance: options.absolute_tolerance * (largest / USUAL[0]),
-            ..options
-        },
-        largest if largest > USUAL[1] => IntegrationOptions {
-            divergence_bound: options.divergence_bound * (largest / USUAL[1]),
-            ..options
-        },
-        _ => options,
+    let mut options = IntegrationOptions::default();
+    let largest = recorded.z.amax();
+    if largest > 0.0 && largest < USUAL[0] {
+        options.absolute_tolerance *= largest / USUAL[0];
+    } else if largest > USUAL[1] {
+        options.divergence_bound *= largest / USUAL[1];
     }
+    options
 }
 
 /// Ranges of samples between restarts; a restart falls on the first sample not before its time.
@@ -110,9 +105,9 @@ pub fn restart_windows(time_s: &[f64], restart: Restart) -> Vec<Range<usize>> {
     let mut start = 0;
     while start < time_s.len() {
         let next = time_s[start] + interval_s - ROUNDING_S;
-        let end = start + time_s[start..].partition_point(|&time| time < next);
-        out.push(start..end.max(start + 1));
-        start = end.max(start + 1);
+        let end = start + time_s[start..].partition_point(|&time| time < next).max(1);
+        out.push(start..end);
+        start = end;
     }
     out
 }

@@ -99,7 +99,6 @@ impl Jump {
         self.time_s.len()
     }
 
-    /// Samples whose torques can be the robot's.
     pub(super) fn torque_samples(&self) -> impl Iterator<Item = usize> {
         (0..self.samples()).filter(|sample| !self.implausible.contains(sample))
     }
@@ -163,7 +162,6 @@ impl Dataset {
         all
     }
 
-    /// Standard deviation of every state over all samples.
     pub(super) fn state_std(&self) -> DVector<f64> {
         let states = self.states(None);
         let share = 1.0 / states.ncols() as f64;

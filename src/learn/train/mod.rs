@@ -11,7 +11,6 @@ mod features;
 
 mod closed_form;
 mod dataset;
-mod dynamics_fit;
 mod error;
 mod frame;
 mod growth;

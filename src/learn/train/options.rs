@@ -320,7 +320,7 @@ impl MapOptions {
 
 impl EncoderOptions {
     /// Weight of every coordinate in the reconstruction error, 18.
-    pub fn coordinate_weights(&self) -> DVector<f64> {
+    pub(super) fn coordinate_weights(&self) -> DVector<f64> {
         DVector::from_fn(STATE_DIM, |i, _| match (BODY_X..=BODY_Z).contains(&i) {
             true => self.body_weight,
             false => 1.0,

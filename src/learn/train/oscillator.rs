@@ -8,7 +8,6 @@ use std::sync::atomic::AtomicBool;
 use nalgebra::{DMatrix, DVector, Vector2};
 
 use super::dataset::{Dataset, Jump, ScaleOptions};
-use super::dynamics_fit::{Fitted, Maps};
 use super::features::Features;
 use super::growth::Growth;
 use super::judge::Judge;
@@ -17,6 +16,7 @@ use super::latent::{EncodedSet, Latent};
 use super::options::TrainOptions;
 use super::progress::{Monitor, Progress};
 use super::refine::Refiner;
+use super::task::{Fitted, Maps};
 use crate::evaluate::shipped;
 use crate::model::{AffineMap, Library, StandardLibrary};
 use crate::recording::PhaseRule;
@@ -25,17 +25,6 @@ use crate::robot::{InputRule, STATE_DIM, WrenchFrame};
 /// Samples between contact and flight.
 const LIFT_OFF: usize = 120;
 const STEP_S: f64 = 0.002;
-
-/// `ddz` of the known system.
-fn truth(phase: usize, z: &[f64], dz: &[f64], u: &[f64]) -> [f64; 2] {
-    match phase {
-        0 => [
-            -40.0 * z[0] - 3.0 * dz[0] + 5.0 * u[0],
-            8.0 * u[1] - 2.0 * z[0],
-        ],
-        _ => [-0.5 * dz[0], -0.981],
-    }
-}
 
 pub(super) fn go1(names: impl IntoIterator<Item = impl Display>) -> Dataset {
     let names = names.into_iter().map(|name| format!("go1/{name}"));
@@ -141,38 +130,37 @@ pub(super) fn with_refiner<T>(
 }
 
 fn simulate(seed: usize) -> Latent {
-    let n = 200;
-    let number = seed as f64;
-    let (mut z, mut dz) = ([0.1 + 0.02 * number, -0.05], [0.3, 0.2 - 0.1 * number]);
+    let ((_, xi), number, n, fine) = (known(), seed as f64, 200, 50);
+    let input = |time: f64| Vector2::new((9.0 * time + number).sin(), (5.0 * time).cos());
+    let acceleration = |phase: usize, z: &Vector2<f64>, dz: &Vector2<f64>, time: f64| {
+        let u = input(time);
+        let theta = DVector::from_column_slice(&[1.0, z.x, z.y, dz.x, dz.y, u.x, u.y]);
+        let ddz = xi[phase].tr_mul(&theta);
+        Vector2::new(ddz[0], ddz[1])
+    };
+    let mut z = Vector2::new(0.1 + 0.02 * number, -0.05);
+    let mut dz = Vector2::new(0.3, 0.2 - 0.1 * number);
     let blank = DMatrix::zeros(2, n);
-    let mut samples = Latent {
+    let mut latent = Latent {
         z: blank.clone(),
         dz: blank.clone(),
         ddz: blank.clone(),
         u_lat: blank,
     };
-    let fine = 50;
     for i in 0..n {
-        let phase = usize::from(i >= LIFT_OFF);
-        let input = |time: f64| [(9.0 * time + seed as f64).sin(), (5.0 * time).cos()];
-        let start = i as f64 * STEP_S;
-        let u = input(start);
-        for (rows, column) in [
-            (&mut samples.z, z),
-            (&mut samples.dz, dz),
-            (&mut samples.ddz, truth(phase, &z, &dz, &u)),
-            (&mut samples.u_lat, u),
-        ] {
-            rows.set_column(i, &Vector2::from(column));
-        }
+        let (phase, start) = (usize::from(i >= LIFT_OFF), i as f64 * STEP_S);
+        latent.z.set_column(i, &z);
+        latent.dz.set_column(i, &dz);
+        latent
+            .ddz
+            .set_column(i, &acceleration(phase, &z, &dz, start));
+        latent.u_lat.set_column(i, &input(start));
+        let h = STEP_S / f64::from(fine);
         for k in 0..fine {
-            let h = STEP_S / fine as f64;
-            let acceleration = truth(phase, &z, &dz, &input(start + k as f64 * h));
-            for j in 0..2 {
-                z[j] += h * dz[j] + 0.5 * h * h * acceleration[j];
-                dz[j] += h * acceleration[j];
-            }
+            let ddz = acceleration(phase, &z, &dz, start + f64::from(k) * h);
+            z += dz * h + ddz * (0.5 * h * h);
+            dz += ddz * h;
         }
     }
-    samples
+    latent
 }

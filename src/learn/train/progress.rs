@@ -35,7 +35,7 @@ impl<'a> Monitor<'a> {
     }
 
     /// The flag itself, for threads that work for this training.
-    pub fn cancel_flag(&self) -> &'a AtomicBool {
+    pub(super) fn cancel_flag(&self) -> &'a AtomicBool {
         self.cancel
     }
 

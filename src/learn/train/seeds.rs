@@ -5,12 +5,11 @@ use std::collections::BTreeMap;
 
 use nalgebra::DMatrix;
 
-use super::dynamics_fit::Fitted;
 use super::error::TrainError;
 use super::jumps::learn_jumps;
 use super::metrics::{SeedReport, Trained};
 use super::progress::Monitor;
-use super::task::{Origin, Task, provenance};
+use super::task::{Fitted, Origin, Task, provenance};
 use crate::model::{LatentVariable, Library, ModelError};
 
 /// What a seed came to and its numbers, or why it has none.
@@ -42,7 +41,6 @@ impl Seeds {
         Ok(())
     }
 
-    /// The model of the best seed of `task`.
     pub(super) fn into_model(
         self,
         task: Task<'_>,

@@ -72,12 +72,13 @@ pub(super) fn select(
         knowledge.iter().enumerate().map(of_phase).collect()
     });
     let growth = &Growth::of_jumps(options.growth_per_s, set, features);
-    let search = Search {
-        regressions,
+    let refiner = Refiner {
+        knowledge,
         growth,
+        training: judge,
         judge,
     };
-    let mut tried = search.all(monitor);
+    let mut tried = refiner.try_all(regressions, monitor);
     let candidates = tried.len();
     let reference = best_of(&tried)?.now.xi.clone();
     let training = Judge::new(features, set).relative_to(&reference);
@@ -86,21 +87,16 @@ pub(super) fn select(
         trial.score_by(relative);
     }
     let limit = (1.0 + options.slack) * best_of(&tried)?.now.score;
-    let search = Search {
-        judge: relative,
-        ..search
-    };
     let refiner = Refiner {
-        knowledge,
-        growth,
         training: &training,
         judge: relative,
+        ..refiner
     };
     let mut refined = Vec::new();
     for mut trial in starts(tried, limit) {
         trial.hold(growth);
         trial.score_by(relative);
-        search.sweep(&mut trial, limit, monitor);
+        refiner.sweep(&mut trial, limit, monitor);
         trial.now = refiner.refine(trial.now, options.refinements, monitor);
         refined.push(trial);
     }
@@ -139,10 +135,10 @@ fn sparsest<'a>(
 }
 
 #[derive(Clone)]
-pub(super) struct Trial<'a> {
-    pub now: Coefficients,
-    pub regressions: &'a [Regression],
-    pub ridge: f64,
+struct Trial<'a> {
+    now: Coefficients,
+    regressions: &'a [Regression],
+    ridge: f64,
     window: usize,
     pruning: Pruning,
 }
@@ -167,25 +163,25 @@ impl Trial<'_> {
     }
 }
 
-#[derive(Clone, Copy)]
-pub(super) struct Search<'a> {
-    regressions: &'a [Vec<Regression>; WINDOWS.len()],
-    pub growth: &'a Growth,
-    pub judge: &'a Judge<'a>,
-}
+/// The regressions of every phase, for each of the windows.
+type Regressions = [Vec<Regression>; WINDOWS.len()];
 
-impl<'a> Search<'a> {
+impl Refiner<'_> {
     /// Every combination of windows, ridges and prunings; where the library has terms that are not affine, also those
     /// without them, and the best of these grown by such terms: rollouts of full libraries diverge more often than not.
-    fn all(&self, monitor: &mut Monitor<'_>) -> Vec<Trial<'a>> {
+    fn try_all<'r>(
+        &self,
+        regressions: &'r Regressions,
+        monitor: &mut Monitor<'_>,
+    ) -> Vec<Trial<'r>> {
         let affine = self.judge.features.affine_terms();
         let has_nonlinear = affine.contains(&false);
         // The affine terms are still to come where full libraries diverge.
         let enough =
             |tried: &[Trial<'_>]| any_stable(tried) || (has_nonlinear && !tried.is_empty());
-        let mut tried = self.fit_all(&vec![true; affine.len()], enough, monitor);
+        let mut tried = self.fit_all(regressions, &vec![true; affine.len()], enough, monitor);
         if has_nonlinear && !(monitor.cancelled() && any_stable(&tried)) {
-            let tame = self.fit_all(affine, any_stable, monitor);
+            let tame = self.fit_all(regressions, affine, any_stable, monitor);
             let mut grown = best_of(&tame).ok().cloned();
             if let Some(grown) = &mut grown {
                 self.grow(grown, monitor);
@@ -198,16 +194,17 @@ impl<'a> Search<'a> {
 
     /// Every combination of windows, ridges and prunings with the terms that are `allowed`; if cancelled, those until
     /// there are `enough`.
-    fn fit_all(
+    fn fit_all<'r>(
         &self,
+        regressions: &'r Regressions,
         allowed: &[bool],
         enough: impl Fn(&[Trial<'_>]) -> bool,
         monitor: &mut Monitor<'_>,
-    ) -> Vec<Trial<'a>> {
+    ) -> Vec<Trial<'r>> {
         let mut tried = Vec::new();
         let steps = WINDOWS.len() * RIDGES.len() * PRUNINGS.len();
         monitor.stage("fitting the dynamics", steps);
-        for (window, regressions) in WINDOWS.into_iter().zip(self.regressions) {
+        for (window, regressions) in WINDOWS.into_iter().zip(regressions) {
             for ridge in RIDGES {
                 if monitor.cancelled() && enough(&tried) {
                     return tried;
@@ -272,10 +269,10 @@ const ROUNDS: usize = 3;
 /// A share of the energy, and the phase, row and column of the term that it belongs to.
 type RankedTerm = (f64, usize, usize, usize);
 
-impl Search<'_> {
+impl Refiner<'_> {
     /// Drops terms, the least useful to the regression first, fitting the rest of their equation again, as long as
     /// the score stays within `limit`. One attempt a term.
-    pub(super) fn sweep(&self, trial: &mut Trial<'_>, limit: f64, monitor: &mut Monitor<'_>) {
+    fn sweep(&self, trial: &mut Trial<'_>, limit: f64, monitor: &mut Monitor<'_>) {
         let mut order = trial.places(Regression::losses);
         order.sort_by(|a, b| a.0.total_cmp(&b.0));
         monitor.stage("dropping terms that predictions do not miss", order.len());
@@ -290,7 +287,7 @@ impl Search<'_> {
 
     /// Adds terms, those that explain most of the accelerations first, fitting their equation again, wherever the score
     /// falls by [`LEAST_GAIN`] or more. Goes round [`ROUNDS`] times, as terms explain less once others are there.
-    pub(super) fn grow(&self, trial: &mut Trial<'_>, monitor: &mut Monitor<'_>) {
+    fn grow(&self, trial: &mut Trial<'_>, monitor: &mut Monitor<'_>) {
         monitor.stage("adding terms that predictions gain by", ROUNDS * ATTEMPTS);
         for round in 0..ROUNDS {
             let before = trial.now.score;
@@ -324,8 +321,8 @@ impl Search<'_> {
         let tried = trial.regressions[phase].fit_column(column, &support, trial.ridge);
         let before = xi[phase].column(column).into_owned();
         xi[phase].set_column(column, &tried);
-        let score = self.judge.score_within(xi, limit);
-        if score <= limit && self.growth.admits(xi) {
+        let score = self.score_within(xi, limit);
+        if score <= limit {
             trial.now.score = score;
         } else {
             xi[phase].set_column(column, &before);

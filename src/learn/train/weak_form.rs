@@ -2,7 +2,6 @@
 
 use nalgebra::DMatrix;
 
-use super::dataset::Jump;
 use super::error::TrainError;
 use super::features::{FeatureValues, Features};
 use super::latent::{EncodedSet, Latent};
@@ -22,19 +21,16 @@ pub(super) fn check_terms(
     let bad = |value: &f64| value.is_nan() || value.abs() > LARGEST;
     let mut values = FeatureValues::default();
     for (phase, pattern) in set.dataset.phases.patterns.iter().enumerate() {
-        let mut first: Option<(usize, &Jump, usize, f64)> = None; // term, jump, sample, value
-        for (jump, range) in set.dataset.spans(Some(phase)) {
+        let of_spans = set.dataset.spans(Some(phase)).filter_map(|(jump, range)| {
             let variables = set.latent[jump].variables(range.clone());
             let theta = features.evaluate(&variables, &mut values);
-            let terms = first.map_or(theta.ncols(), |(term, ..)| term);
-            let found = (0..terms).find_map(|term| {
+            (0..theta.ncols()).find_map(|term| {
                 let mut samples = range.clone().zip(theta.column(term));
                 let (sample, value) = samples.find(|(_, value)| bad(value))?;
                 Some((term, &set.dataset.jumps[jump], sample, *value))
-            });
-            first = found.or(first);
-        }
-        let Some((term, jump, sample, found)) = first else {
+            })
+        });
+        let Some((term, jump, sample, found)) = of_spans.min_by_key(|(term, ..)| *term) else {
             continue;
         };
         return Err(TrainError::TermValue {

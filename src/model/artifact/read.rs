@@ -14,7 +14,6 @@ use crate::model::{ModelError, ReducedModel};
 
 pub type ArtifactError = Located<Fault<ModelError>>;
 
-/// An error and all its causes in one line.
 pub fn describe(error: &dyn Error) -> String {
     let mut text = error.to_string();
     let mut cause = error.source();
@@ -29,7 +28,6 @@ pub fn describe(error: &dyn Error) -> String {
 /// Largest model file; all of the largest model fits.
 pub const MAX_FILE_BYTES: u64 = Format::Model.most_bytes();
 
-/// Whether the path stands for standard input: `-`.
 pub fn is_standard_input(path: &Path) -> bool {
     path.as_os_str() == "-"
 }
@@ -97,7 +95,6 @@ fn parse<'de, T: serde::Deserialize<'de>>(
     Ok(value)
 }
 
-/// The fault of a file that is no JSON but of a kind that other tools write.
 fn foreign(file: &str, bytes: &[u8]) -> Option<ArtifactError> {
     let is_object = bytes.trim_ascii_start().starts_with(b"{");
     let found = magic::arrays(Path::new(file), bytes).filter(|_| !is_object)?;

@@ -8,9 +8,7 @@ use std::{fmt, io};
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Place {
     Whole,
-    /// A row of a table, from 1 (the header).
     Row(usize),
-    /// A cell of a table: its row and the name of its column.
     Cell(usize, Box<str>),
     /// A character of a text: line and column, from 1.
     Character(usize, usize),
@@ -64,7 +62,6 @@ pub enum Fault<C: Error + 'static = Infallible> {
     /// The file system refused an action.
     #[error("cannot {action}")]
     Io {
-        /// Such as `read the file`.
         action: &'static str,
         source: io::Error,
     },
@@ -110,7 +107,6 @@ impl<E> Located<E> {
 }
 
 impl<C: Error + 'static> Located<Fault<C>> {
-    /// `found` at a place, where `expected` should be.
     pub fn at(
         file: &str,
         place: impl Into<Place>,

@@ -10,17 +10,11 @@ use super::magic::{OtherFormat, recognised};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
-    /// Settings, maps of columns, robots as TOML.
     Settings,
-    /// Robots as XML.
     Robot,
-    /// Models: JSON.
     Model,
-    /// Equations: text, LaTeX.
     Equations,
-    /// Tensors: safetensors, npz.
     Tensors,
-    /// Recordings and logs as text, plain or unpacked.
     Recording,
     /// One chunk of an MCAP log, packed or unpacked.
     Chunk,

@@ -26,7 +26,6 @@ impl EmittedFile {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Overwrite {
     Refuse,
-    /// Replace it (`--force`).
     Replace,
 }
 

@@ -26,7 +26,6 @@ pub struct Range {
 enum Kind {
     Whole,
     Real,
-    /// Without its lower end.
     Above,
 }
 

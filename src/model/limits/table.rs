@@ -2,7 +2,6 @@
 
 use super::Range;
 
-/// Constants and the list of them.
 macro_rules! ranges {
     ($($(#[$doc:meta])* $name:ident = $range:expr;)*) => {
         $($(#[$doc])* pub const $name: Range = $range;)*

@@ -13,7 +13,7 @@ use super::maps::pinv_of_transpose;
 use super::rom::{Phase, ReducedModel, selected};
 use super::state_map::{AffineMap, StateMap};
 use super::statistics::InputStatistics;
-use crate::robot::{Actuators, FeetRule, JOINT_NAMES, Robot, WrenchFrame};
+use crate::robot::{Actuators, FeetRule, JOINT_NAMES, Robot, STATE_DIM, WrenchFrame};
 
 const MAX_PHASES: usize = 16;
 const MAX_STATE_DIM: usize = 256;
@@ -215,18 +215,15 @@ impl ModelBuilder {
 
     /// Checks shapes of encoder and decoder; returns the number of robot coordinates if known.
     fn check_maps(&self) -> Result<Option<usize>, ModelError> {
-        for (name, map) in [("encoder", &self.encoder), ("decoder", &self.decoder)] {
-            map.as_ref().map_or(Ok(()), |map| map.check_chain(name))?;
+        let (latent_dim, needs) = (self.library.latent_dim(), "scaling");
+        for (part, map) in [("encoder", &self.encoder), ("decoder", &self.decoder)] {
+            map.as_ref().map_or(Ok(()), |map| map.check_chain(part))?;
+            if map.is_some() && self.scaling.is_none() {
+                return Err(ModelError::Incomplete { part, needs });
+            }
         }
-        let latent_dim = self.library.latent_dim();
-        let of_robot = self.robot.map(|_| crate::robot::STATE_DIM);
-        let state_dim = of_robot.or(self.state_dim());
-        let (encoder, decoder) = (self.encoder.is_some(), self.decoder.is_some());
-        if (encoder || decoder) && self.scaling.is_none() {
-            let (part, needs) = (if encoder { "encoder" } else { "decoder" }, "scaling");
-            return Err(ModelError::Incomplete { part, needs });
-        }
-        let Some(dim) = state_dim else {
+        let of_robot = self.robot.map(|_| STATE_DIM);
+        let Some(dim) = of_robot.or(self.state_dim()) else {
             return Ok(None);
         };
         let fits = (latent_dim..=MAX_STATE_DIM).contains(&dim);
@@ -244,16 +241,13 @@ impl ModelBuilder {
     }
 
     fn check_signals(&self, state_dim: Option<usize>) -> Result<(), ModelError> {
-        let named = [("state", &self.state), ("input", &self.input)];
-        for (signals, names) in named {
+        for (signals, names, of_robot) in [
+            ("state", &self.state, Robot::state_names()),
+            ("input", &self.input, Robot::input_names()),
+        ] {
             if let Some(names) = names {
-                names.check(signals, state_dim)?;
-            }
-        }
-        let of_robot = [Robot::state_names(), Robot::input_names()];
-        for ((signals, names), of_robot) in named.into_iter().zip(of_robot) {
-            if let (Some(names), Some(robot)) = (names, self.robot) {
-                names.check_robot(signals, &of_robot, robot)?;
+                let robot = self.robot.map(|robot| (&of_robot[..], robot));
+                names.check(signals, state_dim, robot)?;
             }
         }
         Ok(())
@@ -265,8 +259,8 @@ impl ModelBuilder {
             (None, WrenchFrame::World) => "wrench_frame",
             (None, WrenchFrame::Body) => return Ok(()),
         };
-        let needs = "robot";
         if self.robot.is_none() {
+            let needs = "robot";
             return Err(ModelError::Incomplete { part, needs });
         }
         match self.actuators.as_ref().and_then(Actuators::unusable) {

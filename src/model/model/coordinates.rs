@@ -1,7 +1,5 @@
 //! Names and units of the coordinates of state and input, and scale factors between SI units and those of the training.
 
-use std::collections::HashMap;
-
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
@@ -38,8 +36,14 @@ impl CoordinateNames {
         self.names.len()
     }
 
-    /// Refuses other than `dim` different names and `dim` units of harmless characters.
-    pub(super) fn check(&self, signals: &str, dim: Option<usize>) -> Result<(), ModelError> {
+    /// Refuses other than `dim` different names, those of a robot if there is one, and `dim` units of harmless
+    /// characters.
+    pub(super) fn check(
+        &self,
+        signals: &str,
+        dim: Option<usize>,
+        robot: Option<(&[String], &Robot)>,
+    ) -> Result<(), ModelError> {
         let (names, units) = (format!("{signals}.names"), format!("{signals}.units"));
         let dim = dim.unwrap_or(self.names.len());
         check_shape(&names, (self.names.len(), 1), (dim, 1))?;
@@ -48,27 +52,17 @@ impl CoordinateNames {
         check_texts(&names, &self.names, allowed, "._-")?;
         let allowed = "ASCII letters, digits, space, `/`, `^`, `.`, `-`";
         check_texts(&units, &self.units, allowed, " /^.-")?;
-        let mut places = HashMap::new();
         for (index, name) in self.names.iter().enumerate() {
-            if let Some(first) = places.insert(name, index) {
+            let place = format!("`{names}`[{index}]");
+            if let Some(first) = self.names[..index].iter().position(|first| first == name) {
                 let found = format!("{name:?} as in [{first}] already");
-                let place = format!("`{names}`[{index}]");
                 return Err(ModelError::invalid(place, found, "different names"));
             }
-        }
-        Ok(())
-    }
-
-    pub(super) fn check_robot(
-        &self,
-        signals: &str,
-        expected: &[String],
-        robot: &Robot,
-    ) -> Result<(), ModelError> {
-        for (index, (name, expected)) in self.names.iter().zip(expected).enumerate() {
-            let place = format!("`{signals}.names`[{index}]");
-            let of_robot = format!("{expected:?} as on robot {}", robot.name());
-            check(name == expected, &place, || format!("{name:?}"), of_robot)?;
+            if let Some((expected, robot)) = robot {
+                let expected = &expected[index];
+                let of_robot = format!("{expected:?} as on robot {}", robot.name());
+                check(name == expected, &place, || format!("{name:?}"), of_robot)?;
+            }
         }
         Ok(())
     }

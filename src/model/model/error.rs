@@ -76,7 +76,6 @@ pub enum ModelError {
 }
 
 impl ModelError {
-    /// `found` at a place, where `expected` should be.
     pub(crate) fn invalid(
         place: impl Into<String>,
         found: impl ToString,

@@ -43,7 +43,6 @@ impl LatentVariable {
         Some(variable(index))
     }
 
-    /// Its kind's place in [`KINDS`], and its index.
     fn parts(self) -> (usize, usize) {
         match self {
             LatentVariable::Z(index) => (0, index),
@@ -325,7 +324,6 @@ fn parse_term(
     Err(ModelError::invalid(place(index), found, expected))
 }
 
-/// Whether every part without variables has a finite value.
 fn constants_are_finite(pool: &ExprPool, expr: ExprId) -> bool {
     let parts = pool.reachable(&[expr]).into_iter();
     let constants: Vec<ExprId> = parts.filter(|&part| pool.is_constant(part)).collect();

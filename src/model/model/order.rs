@@ -69,7 +69,6 @@ impl CoordinateOrder {
     }
 }
 
-/// The 24 orders of the legs.
 fn leg_orders() -> Vec<[Leg; FOOT_DIM]> {
     let digits = |code: usize| std::array::from_fn(|k| code / FOOT_DIM.pow(k as u32) % FOOT_DIM);
     let mut orders: Vec<[Leg; FOOT_DIM]> = (0..FOOT_DIM.pow(4))
@@ -90,7 +89,6 @@ fn leg_orders() -> Vec<[Leg; FOOT_DIM]> {
     orders
 }
 
-/// The coordinates of a name.
 fn group(name: &str) -> Option<Vec<usize>> {
     let joints = 0..JOINT_DIM;
     if let Some(leg) = Leg::ALL.iter().find(|leg| leg.short_name() == name) {

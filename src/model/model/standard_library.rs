@@ -52,11 +52,8 @@ enum Group {
 /// How many states share a run of sines, which the run of their cosines follows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Run {
-    /// z and dz together.
     All,
-    /// z, then dz.
     Half,
-    /// Each by itself.
     Single,
 }
 
@@ -107,7 +104,6 @@ impl LibraryOrder {
     /// The orders that have names.
     pub const NAMED: [Self; 3] = [Self::PAPER, Self::INTERLEAVED, Self::ROMC];
 
-    /// Names and descriptions of [`Self::NAMED`].
     const NAMES: [(&str, &str); 3] = [
         (
             "paper",
@@ -209,7 +205,6 @@ impl StandardLibrary {
         })
     }
 
-    /// The terms in the syntax of the model file.
     pub(super) fn texts(&self, latent_dim: usize) -> Result<Vec<String>, ModelError> {
         self.texts_in(LibraryOrder::ROMC, latent_dim)
     }

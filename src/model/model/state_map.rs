@@ -62,7 +62,6 @@ impl AffineMap {
         self.weights.nrows()
     }
 
-    /// `W x + b`: how positions map.
     fn apply(&self, x: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
         Ok(self.apply_linear(x)? + &self.bias)
     }
@@ -93,7 +92,6 @@ pub struct StateMap {
     layers: Vec<Layer>,
 }
 
-/// A layer in a model file.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct LayerKeys {
@@ -186,7 +184,6 @@ impl StateMap {
         Ok(map)
     }
 
-    /// Refuses what [`StateMap::new`] does.
     pub(super) fn check_chain(&self, tensor: &str) -> Result<(), ModelError> {
         let n_layers = self.layers.len();
         check_count(

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-use super::error::{ModelError, check_tensor};
+use super::error::{ModelError, check, check_tensor};
 use super::given_state::InputGivenState;
 use super::listed;
 
@@ -30,8 +30,7 @@ impl InputStatistics {
     pub fn of_samples(samples: &DMatrix<f64>) -> Self {
         let n = samples.ncols().max(1) as f64;
         let mut mean = DVector::zeros(samples.nrows());
-        let columns = samples.column_iter();
-        columns.for_each(|column| mean.axpy(1.0 / n, &column, 1.0));
+        (samples.column_iter()).for_each(|column| mean.axpy(1.0 / n, &column, 1.0));
         let mut deviations = samples.clone();
         (deviations.column_iter_mut()).for_each(|mut column| column -= &mean);
         Self {
@@ -81,17 +80,11 @@ pub(super) fn check_covariance(
 
 fn check_symmetric(tensor: &str, covariance: &DMatrix<f64>) -> Result<(), ModelError> {
     let bound = ROUNDING * covariance.amax();
-    for row in 0..covariance.nrows() {
-        for column in 0..row {
-            let found = covariance[(row, column)];
-            let expected = covariance[(column, row)];
-            if (found - expected).abs() > bound {
-                let place = format!("`{tensor}`[{row}][{column}]");
-                let expected =
-                    format!("{expected} as in [{column}][{row}] (a covariance is symmetric)");
-                return Err(ModelError::invalid(place, found, expected));
-            }
-        }
+    for (row, column) in (0..covariance.nrows()).flat_map(|i| (0..i).map(move |j| (i, j))) {
+        let [found, mirror] = [(row, column), (column, row)].map(|at| covariance[at]);
+        let place = format!("`{tensor}`[{row}][{column}]");
+        let expected = format!("{mirror} as in [{column}][{row}] (a covariance is symmetric)");
+        check((found - mirror).abs() <= bound, &place, || found, expected)?;
     }
     Ok(())
 }

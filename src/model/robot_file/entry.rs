@@ -27,11 +27,9 @@ pub(crate) struct LegEntry {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct JointEntry {
-    /// The maker's name.
     pub(crate) name: String,
     /// From the joint before, the first from the body's origin, at the zero posture, m.
     pub(crate) at: [f64; 3],
-    /// Axis at the zero posture, along the body's axes.
     pub(crate) axis: Axis,
     /// -1 where recorded angles count against the axis; 1, if it is not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -42,7 +40,6 @@ pub(crate) struct JointEntry {
     /// Lowest and highest recorded angle, rad.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) limits_rad: Option<[f64; 2]>,
-    /// The same in degrees.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) limits_deg: Option<[f64; 2]>,
     pub(crate) torque_nm: f64,
@@ -74,7 +71,6 @@ impl Axis {
         }
     }
 
-    /// The components as given; none for an unknown name.
     pub(crate) fn vector(&self) -> Option<[f64; 3]> {
         match self {
             Axis::Vector(vector) => Some(*vector),

@@ -8,7 +8,6 @@ use super::legs::{self, Places};
 use super::read;
 use crate::robot::{Robot, RobotError};
 
-/// Name and file of each robot that romc brings.
 const KNOWN: [(&str, &str); 3] = [
     ("go1", include_str!("known/go1.toml")),
     ("go2", include_str!("known/go2.toml")),
@@ -47,7 +46,6 @@ pub(super) fn keep(robot: Robot) -> &'static Robot {
     robot
 }
 
-/// A name as robots hold it.
 pub(super) fn word(text: &str) -> &'static str {
     static WORDS: Mutex<BTreeSet<&'static str>> = Mutex::new(BTreeSet::new());
     let mut words = WORDS.lock().unwrap_or_else(PoisonError::into_inner);

@@ -67,10 +67,9 @@ pub(super) fn figure_size(figure: &Figure) -> (f64, f64) {
 }
 
 fn legend_height(figure: &Figure) -> f64 {
-    if figure.legend.is_empty() {
-        0.0
-    } else {
-        LEGEND
+    match figure.legend.is_empty() {
+        true => 0.0,
+        false => LEGEND,
     }
 }
 
@@ -78,18 +77,14 @@ fn legend_height(figure: &Figure) -> f64 {
 pub(super) fn placed_marks(figure: &Figure) -> Vec<Vec<Mark>> {
     let (width, height) = figure.panel_size;
     let place = |(place, panel): (usize, &Panel)| {
-        let [column, row] = [place % figure.columns.max(1), place / figure.columns.max(1)];
-        let corner = (
-            column as f64 * width,
-            row as f64 * height + legend_height(figure),
-        );
+        let columns = figure.columns.max(1);
+        let (column, row) = ((place % columns) as f64, (place / columns) as f64);
+        let corner = (column * width, row * height + legend_height(figure));
         let marks = draw_panel(panel, figure.panel_size, &figure.x_label).into_iter();
         marks.map(|mark| mark.moved(corner)).collect()
     };
     let panels = figure.panels.iter().enumerate().map(place);
-    std::iter::once(legend_marks(figure))
-        .chain(panels)
-        .collect()
+    [legend_marks(figure)].into_iter().chain(panels).collect()
 }
 
 fn legend_marks(figure: &Figure) -> Vec<Mark> {

@@ -137,12 +137,9 @@ impl Figure {
         }
     }
 
-    pub(crate) fn in_columns(self, columns: usize, panel_size: (f64, f64)) -> Self {
-        Self {
-            columns,
-            panel_size,
-            ..self
-        }
+    pub(crate) fn in_columns(mut self, columns: usize, panel_size: (f64, f64)) -> Self {
+        (self.columns, self.panel_size) = (columns, panel_size);
+        self
     }
 
     pub(crate) fn over(self, x_label: &str) -> Self {

@@ -4,21 +4,21 @@ use std::collections::BTreeMap;
 
 use syn::{Expr, Lit};
 
-use crate::Fault;
 use crate::expression::Value;
 use crate::function::{Instance, Writer};
 use crate::items::Function;
 use crate::types::Type;
+use crate::Found;
 
 impl Writer<'_> {
-    pub fn call(
+    pub(crate) fn call(
         &mut self,
-        instance: &mut Instance<'_>,
+        here: &mut Instance<'_>,
         call: &syn::ExprCall,
         expected: Option<&Type>,
-    ) -> Result<Value, Fault> {
+    ) -> Found {
         let Expr::Path(path) = call.func.as_ref() else {
-            return Err(self.outside(instance, call, "a call of a value"));
+            return Err(self.outside(here, call, "a call of a value"));
         };
         let segments = &path.path.segments;
         let name = segments.last().expect("a path has segments");
@@ -27,28 +27,28 @@ impl Writer<'_> {
             _ => segments[segments.len() - 2].ident.to_string(),
         };
         let owner = if owner == "Self" {
-            instance.owner.to_owned()
+            here.owner.to_owned()
         } else {
             owner
         };
         match (owner.as_str(), name.ident.to_string().as_str()) {
             ("T", "of") => {
-                let value = self.value(instance, &call.args[0])?;
+                let value = self.value(here, &call.args[0])?;
                 let text = format!("(real){}", value.at_least(15));
                 Ok(Value::new(text, Type::Real, 15))
             }
             ("usize", "from") => {
-                let value = self.value(instance, &call.args[0])?;
+                let value = self.value(here, &call.args[0])?;
                 let text = format!("{} ? 1 : 0", value.at_least(4));
                 Ok(Value::new(text, Type::Int, 3))
             }
             ("", "part" | "part_mut") => {
                 let Some(ty) = expected else {
                     let what = "a part without a type in its `let`";
-                    return Err(self.outside(instance, call, what));
+                    return Err(self.outside(here, call, what));
                 };
-                let whole = self.value(instance, &call.args[0])?;
-                let first = self.value(instance, &call.args[1])?;
+                let whole = self.value(here, &call.args[0])?;
+                let first = self.value(here, &call.args[1])?;
                 let text = format!("{} + {}", whole.at_least(12), first.at_least(13));
                 Ok(Value::new(text, ty.clone(), 12))
             }
@@ -56,26 +56,22 @@ impl Writer<'_> {
                 let key = (owner.to_owned(), function.to_owned());
                 let items = self.items;
                 let Some((key, function)) = items.functions.get_key_value(&key) else {
-                    return Err(self.outside(instance, call, "a function from elsewhere"));
+                    return Err(self.outside(here, call, "a function from elsewhere"));
                 };
                 let arguments: Vec<&Expr> = call.args.iter().collect();
-                self.apply(instance, key, function, None, &arguments, &name.arguments)
+                self.apply(here, key, function, None, &arguments, &name.arguments)
             }
         }
     }
 
-    pub fn method(
-        &mut self,
-        instance: &mut Instance<'_>,
-        call: &syn::ExprMethodCall,
-    ) -> Result<Value, Fault> {
+    pub(crate) fn method(&mut self, here: &mut Instance<'_>, call: &syn::ExprMethodCall) -> Found {
         let method = call.method.to_string();
-        let receiver = self.value(instance, &call.receiver)?;
+        let receiver = self.value(here, &call.receiver)?;
         if method == "len"
             && let (Expr::Field(field), Type::Slice(_)) =
                 (call.receiver.as_ref(), receiver.ty.referent())
             && let syn::Member::Named(name) = &field.member
-            && let Type::Named(of) = self.value(instance, &field.base)?.ty.referent()
+            && let Type::Named(of) = self.value(here, &field.base)?.ty.referent()
         {
             self.lengths.insert((of.clone(), name.to_string()));
             return Ok(Value::new(format!("{}_len", receiver.text), Type::Int, 16));
@@ -94,12 +90,12 @@ impl Writer<'_> {
         let owner = match receiver.ty.referent() {
             Type::Real => "Real",
             Type::Named(name) => name,
-            _ => return Err(self.outside(instance, call, "a method of this")),
+            _ => return Err(self.outside(here, call, "a method of this")),
         };
         let items = self.items;
         let Some((key, function)) = (items.functions).get_key_value(&(owner.to_owned(), method))
         else {
-            return Err(self.outside(instance, call, "a method from elsewhere"));
+            return Err(self.outside(here, call, "a method from elsewhere"));
         };
         let takes_pointer = matches!(function.parameters[0].1, Type::Ref(..));
         let is_pointer = matches!(receiver.ty, Type::Ref(..));
@@ -115,19 +111,19 @@ impl Writer<'_> {
             Some(given) => syn::PathArguments::AngleBracketed(given.clone()),
             None => syn::PathArguments::None,
         };
-        self.apply(instance, key, function, Some(receiver), &arguments, &given)
+        self.apply(here, key, function, Some(receiver), &arguments, &given)
     }
 
     /// A call: its const arguments follow from the types of the others, or are given.
     fn apply(
         &mut self,
-        instance: &mut Instance<'_>,
+        here: &mut Instance<'_>,
         (owner, name): &(String, String),
         function: &Function,
         receiver: Option<Value>,
         arguments: &[&Expr],
         given: &syn::PathArguments,
-    ) -> Result<Value, Fault> {
+    ) -> Found {
         let mut sizes: BTreeMap<String, String> = BTreeMap::new();
         if let syn::PathArguments::AngleBracketed(given) = given {
             let lengths = given.args.iter().filter_map(|argument| match argument {
@@ -142,7 +138,7 @@ impl Writer<'_> {
                 _ => None,
             });
             for (parameter, length) in function.const_parameters.iter().zip(lengths) {
-                let length = self.value(instance, &length)?.text;
+                let length = self.value(here, &length)?.text;
                 sizes.insert(parameter.clone(), length);
             }
         }
@@ -150,20 +146,20 @@ impl Writer<'_> {
         let mut texts: Vec<String> = receiver.iter().map(|value| value.text.clone()).collect();
         for ((_, ty, _), argument) in function.parameters.iter().skip(skipped).zip(arguments) {
             let ty = &self.resolve(ty, &BTreeMap::new());
-            let value = self.value_as(instance, argument, Some(ty))?;
+            let value = self.value_as(here, argument, Some(ty))?;
             if matches!(ty, Type::Ref(..)) && !matches!(value.ty, Type::Ref(..)) {
-                return Err(self.outside(instance, argument, "a value in place of a reference"));
+                return Err(self.outside(here, argument, "a value in place of a reference"));
             }
             if !infer(ty, &value.ty, &function.const_parameters, &mut sizes) {
                 let message = format!("{:?} where `{name}` has {ty:?}", value.ty);
-                return Err(self.outside(instance, argument, &message));
+                return Err(self.outside(here, argument, &message));
             }
             texts.push(value.text);
         }
         for (parameter, size) in &sizes {
             if !function.sizes.contains(parameter) && parameter != size {
                 let message = format!("`{name}` for {parameter} = {size}");
-                return Err(self.outside(instance, arguments[0], &message));
+                return Err(self.outside(here, arguments[0], &message));
             }
         }
         sizes.retain(|parameter, _| function.sizes.contains(parameter));
@@ -173,7 +169,7 @@ impl Writer<'_> {
             .find(|size| !sizes.contains_key(*size))
         {
             let message = format!("`{name}` with unknown {missing}");
-            return Err(self.outside(instance, arguments[0], &message));
+            return Err(self.outside(here, arguments[0], &message));
         }
         let output = self.resolve(&function.output, &sizes);
         let c_name = self.function(owner, name, function, sizes)?;

@@ -5,11 +5,11 @@ use std::collections::BTreeSet;
 use crate::function::Writer;
 use crate::text::comment;
 use crate::types::Type;
-use crate::{Fault, Translated, Unit};
+use crate::{Fault, Found, Translated, Unit};
 
 impl Writer<'_> {
     /// The text of all that the functions need, and theirs.
-    pub fn finish(self, unit: &Unit<'_>) -> Result<Translated, Fault> {
+    pub(crate) fn finish(self, unit: &Unit<'_>) -> Result<Translated, Fault> {
         let mut header = String::new();
         let mut source = String::new();
         let mut written = BTreeSet::new();
@@ -29,7 +29,7 @@ impl Writer<'_> {
         Ok(Translated { header, source })
     }
 
-    fn scalar_constant(&self, name: &str) -> Result<String, Fault> {
+    fn scalar_constant(&self, name: &str) -> Found<String> {
         let constant = &self.items.constants[name];
         if !constant.ty.is_number() {
             return Ok(String::new());
@@ -47,7 +47,7 @@ impl Writer<'_> {
         ))
     }
 
-    fn struct_constant(&self, name: &str) -> Result<String, Fault> {
+    fn struct_constant(&self, name: &str) -> Found<String> {
         let constant = &self.items.constants[name];
         if constant.ty.is_number() {
             return Ok(String::new());

@@ -4,24 +4,24 @@ use std::collections::BTreeMap;
 
 use syn::{BinOp, Expr, Lit, UnOp};
 
-use crate::Fault;
 use crate::function::{Instance, Writer};
 use crate::items::Items;
 use crate::types::Type;
+use crate::Found;
 
 /// An expression of C.
 #[derive(Debug, Clone)]
 pub(crate) struct Value {
-    pub text: String,
-    pub ty: Type,
+    pub(crate) text: String,
+    pub(crate) ty: Type,
     /// How tightly C binds it: 16 a name or call, 15 a sign, 13 a product, 12 a sum, 10 to 3 conditions.
-    pub rank: u8,
+    pub(crate) rank: u8,
     /// The element of `[element; N]`.
-    pub repeated: Option<String>,
+    pub(crate) repeated: Option<String>,
 }
 
 impl Value {
-    pub fn new(text: impl Into<String>, ty: Type, rank: u8) -> Self {
+    pub(crate) fn new(text: impl Into<String>, ty: Type, rank: u8) -> Self {
         Self {
             text: text.into(),
             ty,
@@ -31,7 +31,7 @@ impl Value {
     }
 
     /// The text as an operand, in parentheses if it binds more loosely than this.
-    pub fn at_least(&self, rank: u8) -> String {
+    pub(crate) fn at_least(&self, rank: u8) -> String {
         match self.rank < rank {
             true => format!("({})", self.text),
             false => self.text.clone(),
@@ -89,7 +89,7 @@ fn number(literal: &Lit) -> Option<(String, Type)> {
 }
 
 /// The value of a constant: a number, or numbers in sums, products, arrays of reals and structs.
-pub(crate) fn constant(items: &Items<'_>, source: usize, value: &Expr) -> Result<String, Fault> {
+pub(crate) fn constant(items: &Items<'_>, source: usize, value: &Expr) -> Found<String> {
     match value {
         Expr::Lit(literal) => match number(&literal.lit) {
             Some((text, _)) => Ok(text),
@@ -130,22 +130,18 @@ pub(crate) fn constant(items: &Items<'_>, source: usize, value: &Expr) -> Result
 }
 
 impl Writer<'_> {
-    pub fn value(
-        &mut self,
-        instance: &mut Instance<'_>,
-        expression: &Expr,
-    ) -> Result<Value, Fault> {
-        self.value_as(instance, expression, None)
+    pub(crate) fn value(&mut self, here: &mut Instance<'_>, expression: &Expr) -> Found {
+        self.value_as(here, expression, None)
     }
 
     /// The value of an expression, where a type is expected or not.
-    pub fn value_as(
+    pub(crate) fn value_as(
         &mut self,
-        instance: &mut Instance<'_>,
+        here: &mut Instance<'_>,
         expression: &Expr,
         expected: Option<&Type>,
-    ) -> Result<Value, Fault> {
-        let value = self.value_of(instance, expression, expected)?;
+    ) -> Found {
+        let value = self.value_of(here, expression, expected)?;
         Ok(match expected {
             Some(Type::Real) => value.as_real(),
             _ => value,
@@ -154,41 +150,41 @@ impl Writer<'_> {
 
     fn value_of(
         &mut self,
-        instance: &mut Instance<'_>,
+        here: &mut Instance<'_>,
         expression: &Expr,
         expected: Option<&Type>,
-    ) -> Result<Value, Fault> {
+    ) -> Found {
         match expression {
-            Expr::Paren(inner) => self.value_as(instance, &inner.expr, expected),
+            Expr::Paren(inner) => self.value_as(here, &inner.expr, expected),
             Expr::Lit(literal) => match number(&literal.lit) {
                 Some((text, ty)) => Ok(Value::new(text, ty, 16)),
-                None => Err(self.outside(instance, literal, "this literal")),
+                None => Err(self.outside(here, literal, "this literal")),
             },
-            Expr::Path(path) => self.path(instance, path),
-            Expr::Field(field) => self.field(instance, field),
-            Expr::Index(index) => self.index(instance, index),
-            Expr::Unary(unary) => self.unary(instance, unary),
-            Expr::Binary(binary) => self.binary(instance, binary),
-            Expr::Reference(reference) => self.reference(instance, reference, expected),
+            Expr::Path(path) => self.path(here, path),
+            Expr::Field(field) => self.field(here, field),
+            Expr::Index(index) => self.index(here, index),
+            Expr::Unary(unary) => self.unary(here, unary),
+            Expr::Binary(binary) => self.binary(here, binary),
+            Expr::Reference(reference) => self.reference(here, reference, expected),
             Expr::Cast(cast) => {
-                let (source, owner) = (instance.function.source, instance.owner);
+                let (source, owner) = (here.function.source, here.owner);
                 let ty = self.items.ty(source, &cast.ty, owner)?;
-                let value = self.value(instance, &cast.expr)?;
+                let value = self.value(here, &cast.expr)?;
                 let spelled = ty.declare("", &|of| self.spelling(of));
                 let text = format!("({}){}", spelled.trim(), value.at_least(15));
                 Ok(Value::new(text, ty, 15))
             }
-            Expr::If(branch) => self.choice(instance, branch, expected),
-            Expr::Repeat(repeat) => self.repeat(instance, repeat, expected),
-            Expr::Array(array) => self.array(instance, array, expected),
-            Expr::Struct(literal) => self.struct_literal(instance, literal),
-            Expr::Call(call) => self.call(instance, call, expected),
-            Expr::MethodCall(call) => self.method(instance, call),
-            other => Err(self.outside(instance, other, "this expression")),
+            Expr::If(branch) => self.choice(here, branch, expected),
+            Expr::Repeat(repeat) => self.repeat(here, repeat, expected),
+            Expr::Array(array) => self.array(here, array, expected),
+            Expr::Struct(literal) => self.struct_literal(here, literal),
+            Expr::Call(call) => self.call(here, call, expected),
+            Expr::MethodCall(call) => self.method(here, call),
+            other => Err(self.outside(here, other, "this expression")),
         }
     }
 
-    fn path(&mut self, instance: &Instance<'_>, path: &syn::ExprPath) -> Result<Value, Fault> {
+    fn path(&mut self, here: &Instance<'_>, path: &syn::ExprPath) -> Found {
         let words: Vec<String> = (path.path.segments.iter())
             .map(|segment| segment.ident.to_string())
             .collect();
@@ -201,7 +197,7 @@ impl Writer<'_> {
                 Ok(Value::new(self.items.constant_name(variant), ty, 16))
             }
             [name] => {
-                if let Some(ty) = instance.variable(name) {
+                if let Some(ty) = here.variable(name) {
                     return Ok(Value::new(*name, ty.clone(), 16));
                 }
                 if let Some(elsewhere) = self.items.unit.elsewhere(name) {
@@ -209,14 +205,14 @@ impl Writer<'_> {
                     let ty = constant.map_or(Type::Int, |constant| constant.ty.clone());
                     return Ok(Value::new(elsewhere, ty, 16));
                 }
-                if let Some(size) = instance.sizes.get(*name) {
+                if let Some(size) = here.sizes.get(*name) {
                     let rank = if size.contains(' ') { 3 } else { 16 };
                     return Ok(Value::new(size, Type::Int, rank));
                 }
                 if *name == "LINKED" {
                     return Ok(Value::new(*name, Type::Bool, 16));
                 }
-                if instance.function.const_parameters.iter().any(|p| p == name)
+                if here.function.const_parameters.iter().any(|p| p == name)
                     || ["NX", "NU"].contains(name)
                 {
                     return Ok(Value::new(*name, Type::Int, 16));
@@ -225,27 +221,23 @@ impl Writer<'_> {
                     let ty = self.items.constants[*name].ty.clone();
                     return Ok(Value::new(self.constant(name), ty, 16));
                 }
-                Err(self.outside(instance, path, "a name of something else"))
+                Err(self.outside(here, path, "a name of something else"))
             }
-            _ => Err(self.outside(instance, path, "this path")),
+            _ => Err(self.outside(here, path, "this path")),
         }
     }
 
-    fn field(
-        &mut self,
-        instance: &mut Instance<'_>,
-        field: &syn::ExprField,
-    ) -> Result<Value, Fault> {
-        let base = self.value(instance, &field.base)?;
+    fn field(&mut self, here: &mut Instance<'_>, field: &syn::ExprField) -> Found {
+        let base = self.value(here, &field.base)?;
         let (Type::Named(of), syn::Member::Named(name)) = (base.ty.referent(), &field.member)
         else {
-            return Err(self.outside(instance, field, "a field of what is no struct"));
+            return Err(self.outside(here, field, "a field of what is no struct"));
         };
         let name = name.to_string();
         let items = self.items;
         let fields = items.structs.get(of).map_or(&[][..], |found| &found.fields);
         let Some(found) = fields.iter().find(|field| field.name == name) else {
-            return Err(self.outside(instance, field, "a field of what is no struct"));
+            return Err(self.outside(here, field, "a field of what is no struct"));
         };
         let ty = self.resolve(&found.ty, &BTreeMap::new());
         let arrow = if matches!(base.ty, Type::Ref(..)) {
@@ -261,27 +253,23 @@ impl Writer<'_> {
     }
 
     /// An element, or from a range what follows its beginning.
-    fn index(
-        &mut self,
-        instance: &mut Instance<'_>,
-        index: &syn::ExprIndex,
-    ) -> Result<Value, Fault> {
-        let base = self.value(instance, &index.expr)?;
+    fn index(&mut self, here: &mut Instance<'_>, index: &syn::ExprIndex) -> Found {
+        let base = self.value(here, &index.expr)?;
         let Some(element) = base.ty.element().cloned() else {
-            return Err(self.outside(instance, index, "an index of what is no array"));
+            return Err(self.outside(here, index, "an index of what is no array"));
         };
         if let Expr::Range(range) = index.index.as_ref() {
             let slice = Type::Slice(Box::new(element));
             return Ok(match &range.start {
                 None => Value { ty: slice, ..base },
                 Some(start) => {
-                    let start = self.value(instance, start)?;
+                    let start = self.value(here, start)?;
                     let text = format!("{} + {}", base.at_least(12), start.at_least(13));
                     Value::new(text, slice, 12)
                 }
             });
         }
-        let at = self.value(instance, &index.index)?;
+        let at = self.value(here, &index.index)?;
         Ok(Value::new(
             format!("{}[{}]", base.at_least(16), at.text),
             element,
@@ -289,12 +277,8 @@ impl Writer<'_> {
         ))
     }
 
-    fn unary(
-        &mut self,
-        instance: &mut Instance<'_>,
-        unary: &syn::ExprUnary,
-    ) -> Result<Value, Fault> {
-        let value = self.value(instance, &unary.expr)?;
+    fn unary(&mut self, here: &mut Instance<'_>, unary: &syn::ExprUnary) -> Found {
+        let value = self.value(here, &unary.expr)?;
         match unary.op {
             UnOp::Neg(_) if value.text.starts_with('-') => {
                 Ok(Value::new(format!("-({})", value.text), value.ty, 15))
@@ -309,18 +293,14 @@ impl Writer<'_> {
                 ty @ Type::Array(..) => Ok(Value { ty, ..value }),
                 ty => Ok(Value::new(format!("*{}", value.at_least(15)), ty, 15)),
             },
-            _ => Err(self.outside(instance, unary, "this operator")),
+            _ => Err(self.outside(here, unary, "this operator")),
         }
     }
 
-    fn binary(
-        &mut self,
-        instance: &mut Instance<'_>,
-        binary: &syn::ExprBinary,
-    ) -> Result<Value, Fault> {
+    fn binary(&mut self, here: &mut Instance<'_>, binary: &syn::ExprBinary) -> Found {
         let (mut left, mut right) = (
-            self.value(instance, &binary.left)?,
-            self.value(instance, &binary.right)?,
+            self.value(here, &binary.left)?,
+            self.value(here, &binary.right)?,
         );
         if left.ty == Type::Real {
             right = right.as_real();
@@ -328,10 +308,10 @@ impl Writer<'_> {
             left = left.as_real();
         }
         let Some((sign, rank, is_condition)) = operator(&binary.op) else {
-            return Err(self.outside(instance, binary, "this operator"));
+            return Err(self.outside(here, binary, "this operator"));
         };
         if !left.ty.is_scalar() && !matches!(left.ty, Type::Named(_)) {
-            return Err(self.outside(instance, binary, "an operator on what is no number"));
+            return Err(self.outside(here, binary, "an operator on what is no number"));
         }
         let ty = match (is_condition, &left.ty) {
             (true, _) => Type::Bool,
@@ -358,10 +338,10 @@ impl Writer<'_> {
 
     fn reference(
         &mut self,
-        instance: &mut Instance<'_>,
+        here: &mut Instance<'_>,
         reference: &syn::ExprReference,
         expected: Option<&Type>,
-    ) -> Result<Value, Fault> {
+    ) -> Found {
         let is_mutable = reference.mutability.is_some();
         if let Expr::Array(array) = reference.expr.as_ref()
             && array.elems.is_empty()
@@ -369,7 +349,7 @@ impl Writer<'_> {
         {
             return Ok(Value::new("NULL", ty.clone(), 16));
         }
-        let value = self.value(instance, &reference.expr)?;
+        let value = self.value(here, &reference.expr)?;
         let ty = value.ty.clone().reference(is_mutable);
         Ok(match &value.ty {
             Type::Array(..) | Type::Slice(_) => Value { ty, ..value },
@@ -384,11 +364,11 @@ impl Writer<'_> {
     /// An `if` as a value.
     fn choice(
         &mut self,
-        instance: &mut Instance<'_>,
+        here: &mut Instance<'_>,
         branch: &syn::ExprIf,
         expected: Option<&Type>,
-    ) -> Result<Value, Fault> {
-        let condition = self.value(instance, &branch.cond)?;
+    ) -> Found {
+        let condition = self.value(here, &branch.cond)?;
         let only = |block: &syn::Block| match block.stmts.as_slice() {
             [syn::Stmt::Expr(expression, None)] => Some(expression.clone()),
             _ => None,
@@ -399,10 +379,10 @@ impl Writer<'_> {
             _ => None,
         };
         let (Some(first), Some(other)) = (only(&branch.then_branch), other) else {
-            return Err(self.outside(instance, branch, "a value of a block with statements"));
+            return Err(self.outside(here, branch, "a value of a block with statements"));
         };
-        let first = self.value_as(instance, &first, expected)?;
-        let other = self.value_as(instance, &other, expected)?;
+        let first = self.value_as(here, &first, expected)?;
+        let other = self.value_as(here, &other, expected)?;
         let text = format!(
             "{} ? {} : {}",
             condition.at_least(4),
@@ -414,15 +394,15 @@ impl Writer<'_> {
 
     fn repeat(
         &mut self,
-        instance: &mut Instance<'_>,
+        here: &mut Instance<'_>,
         repeat: &syn::ExprRepeat,
         expected: Option<&Type>,
-    ) -> Result<Value, Fault> {
+    ) -> Found {
         let expected = expected.and_then(Type::element);
-        let element = self.value_as(instance, &repeat.expr, expected)?;
-        let length = self.items.length(instance.function.source, &repeat.len)?;
+        let element = self.value_as(here, &repeat.expr, expected)?;
+        let length = self.items.length(here.function.source, &repeat.len)?;
         let ty = Type::Array(Box::new(element.ty.clone()), length);
-        let ty = self.resolve(&ty, &instance.sizes);
+        let ty = self.resolve(&ty, &here.sizes);
         let innermost = element.repeated.clone().unwrap_or(element.text.clone());
         Ok(Value {
             repeated: Some(innermost),
@@ -433,36 +413,32 @@ impl Writer<'_> {
     /// The elements of an array in braces.
     fn array(
         &mut self,
-        instance: &mut Instance<'_>,
+        here: &mut Instance<'_>,
         array: &syn::ExprArray,
         expected: Option<&Type>,
-    ) -> Result<Value, Fault> {
+    ) -> Found {
         let Some(Type::Array(element, length)) = expected else {
-            return Err(self.outside(instance, array, "an array without a type in its `let`"));
+            return Err(self.outside(here, array, "an array without a type in its `let`"));
         };
         let mut texts = Vec::new();
         for value in &array.elems {
-            texts.push(self.value_as(instance, value, Some(element))?.text);
+            texts.push(self.value_as(here, value, Some(element))?.text);
         }
         let ty = Type::Array(element.clone(), length.clone());
         Ok(Value::new(format!("{{{}}}", texts.join(", ")), ty, 16))
     }
 
-    /// The fields of a struct on a line each, in braces.
-    fn struct_literal(
-        &mut self,
-        instance: &mut Instance<'_>,
-        literal: &syn::ExprStruct,
-    ) -> Result<Value, Fault> {
+    /// The fields of a struct in braces.
+    fn struct_literal(&mut self, here: &mut Instance<'_>, literal: &syn::ExprStruct) -> Found {
         if literal.rest.is_some() {
-            return Err(self.outside(instance, literal, "the rest of another struct"));
+            return Err(self.outside(here, literal, "the rest of another struct"));
         }
         let name = literal.path.segments.last().expect("a path has segments");
         let name = match name.ident.to_string() {
-            name if name == "Self" => instance.owner.to_owned(),
+            name if name == "Self" => here.owner.to_owned(),
             name => name,
         };
-        let mut text = "{\n".to_owned();
+        let mut fields_in_c = Vec::new();
         for field in &literal.fields {
             let of = self.items.structs.get(&name);
             let ty = of.and_then(|of| {
@@ -471,14 +447,14 @@ impl Writer<'_> {
                     .find(|f| matches!(&field.member, syn::Member::Named(of) if *of == f.name))
             });
             let ty = ty.map(|field| field.ty.clone());
-            let value = self.value_as(instance, &field.expr, ty.as_ref())?;
+            let value = self.value_as(here, &field.expr, ty.as_ref())?;
             let is_copy = matches!(value.ty, Type::Array(..)) && value.repeated.is_none();
             let (syn::Member::Named(name), false) = (&field.member, is_copy) else {
-                return Err(self.outside(instance, field, "a field that is a copied array"));
+                return Err(self.outside(here, field, "a field that is a copied array"));
             };
-            text += &format!(".{name} = {},\n", value.text);
+            fields_in_c.push(format!(".{name} = {}", value.text));
         }
-        text.push('}');
+        let text = format!("{{{}}}", fields_in_c.join(", "));
         let ty = self.resolve(&Type::Named(name), &BTreeMap::new());
         Ok(Value::new(text, ty, 16))
     }

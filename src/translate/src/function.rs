@@ -2,42 +2,44 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::Fault;
 use crate::items::{Function, Items};
 use crate::statement::Lines;
 use crate::text::{comment, wrapped};
 use crate::types::Type;
+use crate::{Fault, Found};
 
 /// What the functions need, and their text, callees first.
 pub(crate) struct Writer<'a> {
-    pub items: &'a Items<'a>,
-    pub functions: String,
+    pub(crate) items: &'a Items<'a>,
+    pub(crate) functions: String,
     /// Functions by name in C: done, or begun.
     done: BTreeMap<String, bool>,
-    pub types: BTreeSet<String>,
-    pub constants: BTreeSet<String>,
+    pub(crate) types: BTreeSet<String>,
+    pub(crate) constants: BTreeSet<String>,
     /// Fields whose length is read, by struct and name.
-    pub lengths: BTreeSet<(String, String)>,
+    pub(crate) lengths: BTreeSet<(String, String)>,
 }
 
 /// A function with values of its const parameters.
 pub(crate) struct Instance<'f> {
-    pub function: &'f Function,
-    pub owner: &'f str,
-    pub sizes: BTreeMap<String, String>,
+    pub(crate) function: &'f Function,
+    pub(crate) owner: &'f str,
+    pub(crate) sizes: BTreeMap<String, String>,
     /// Variables of the blocks that are open, the innermost last.
-    pub scopes: Vec<BTreeMap<String, Type>>,
-    pub output: Type,
+    pub(crate) scopes: Vec<BTreeMap<String, Type>>,
+    pub(crate) output: Type,
+    /// What is written of it.
+    pub(crate) lines: Lines,
 }
 
 impl Instance<'_> {
-    pub fn variable(&self, name: &str) -> Option<&Type> {
+    pub(crate) fn variable(&self, name: &str) -> Option<&Type> {
         self.scopes.iter().rev().find_map(|scope| scope.get(name))
     }
 }
 
 impl<'a> Writer<'a> {
-    pub fn new(items: &'a Items<'a>) -> Self {
+    pub(crate) fn new(items: &'a Items<'a>) -> Self {
         Self {
             items,
             functions: String::new(),
@@ -49,7 +51,7 @@ impl<'a> Writer<'a> {
     }
 
     /// Writes a function that the C is for.
-    pub fn root(&mut self, path: &str) -> Result<(), Fault> {
+    pub(crate) fn root(&mut self, path: &str) -> Found<()> {
         let (owner, name) = path.split_once("::").unwrap_or(("", path));
         let items = self.items;
         let key = (owner.to_owned(), name.to_owned());
@@ -63,7 +65,7 @@ impl<'a> Writer<'a> {
     }
 
     /// A type with lengths as C has them; the structs and constants that it names are needed.
-    pub fn resolve(&mut self, ty: &Type, sizes: &BTreeMap<String, String>) -> Type {
+    pub(crate) fn resolve(&mut self, ty: &Type, sizes: &BTreeMap<String, String>) -> Type {
         if let Some(name) = ty.named() {
             self.need_type(name);
         }
@@ -96,7 +98,7 @@ impl<'a> Writer<'a> {
     }
 
     /// The name of a constant, which is needed.
-    pub fn constant(&mut self, name: &str) -> String {
+    pub(crate) fn constant(&mut self, name: &str) -> String {
         self.constants.insert(name.to_owned());
         let items = self.items;
         if let Some(of) = items.constants[name].ty.named() {
@@ -105,18 +107,18 @@ impl<'a> Writer<'a> {
         items.constant_name(name)
     }
 
-    pub fn spelling(&self, name: &str) -> String {
+    pub(crate) fn spelling(&self, name: &str) -> String {
         self.items.name(&[name])
     }
 
     /// Writes a function for sizes unless that was done; its name.
-    pub fn function(
+    pub(crate) fn function(
         &mut self,
         owner: &str,
         name: &str,
         function: &Function,
         sizes: BTreeMap<String, String>,
-    ) -> Result<String, Fault> {
+    ) -> Found<String> {
         let prefix = self.items.unit.prefix.to_ascii_uppercase() + "_";
         let size = |size: &String| sizes[size].replace(&prefix, "").replace(' ', "");
         let suffixes: Vec<String> = function.sizes.iter().map(size).collect();
@@ -149,7 +151,7 @@ impl<'a> Writer<'a> {
         owner: &str,
         (function, body): (&Function, &syn::Block),
         sizes: BTreeMap<String, String>,
-    ) -> Result<String, Fault> {
+    ) -> Found<String> {
         let mut scope = BTreeMap::new();
         let mut declared = Vec::new();
         let is_pointer = |ty: &Type| matches!(ty, Type::Ref(..));
@@ -161,27 +163,27 @@ impl<'a> Writer<'a> {
             scope.insert(name.clone(), ty);
         }
         let output = self.resolve(&function.output, &sizes);
-        let mut instance = Instance {
+        let mut here = Instance {
             function,
             owner,
             sizes,
             scopes: vec![scope],
             output: output.clone(),
+            lines: Lines::default(),
         };
         if declared.is_empty() {
             declared.push("void".to_owned());
         }
         let signature = format!("{c_name}({})", declared.join(", "));
         let signature = output.declare(&signature, &|of| self.spelling(of));
-        let mut lines = Lines::default();
-        lines.add(&format!(
+        here.lines.add(&format!(
             "static inline {}{signature}",
             self.items.unit.attribute
         ));
-        lines.open("{");
-        self.block(&mut instance, &mut lines, body, true)?;
-        lines.close("}");
+        here.lines.open("{");
+        self.block(&mut here, body, true)?;
+        here.lines.close("}");
         let docs = comment(&function.docs, "");
-        Ok(format!("{docs}{}\n", wrapped(&lines.text)))
+        Ok(format!("{docs}{}\n", wrapped(&here.lines.text)))
     }
 }

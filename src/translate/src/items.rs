@@ -7,53 +7,53 @@ use syn::{Expr, FnArg, GenericParam, ImplItem, Item, Pat, ReturnType, TraitItem}
 
 use crate::text::snake;
 use crate::types::Type;
-use crate::{Fault, Source, Unit};
+use crate::{Fault, Found, Source, Unit};
 
 /// Const parameters that stay names in C.
 pub(crate) const SIZES: [&str; 3] = ["NX", "NU", "LINKED"];
 
 /// A struct or enum, a constant or a function belongs to a source, of which faults name the path.
 pub(crate) struct Items<'a> {
-    pub unit: Unit<'a>,
+    pub(crate) unit: Unit<'a>,
     sources: &'a [Source],
-    pub structs: BTreeMap<String, Struct>,
-    pub enums: BTreeMap<String, (Vec<String>, Vec<String>)>,
-    pub constants: BTreeMap<String, Constant>,
+    pub(crate) structs: BTreeMap<String, Struct>,
+    pub(crate) enums: BTreeMap<String, (Vec<String>, Vec<String>)>,
+    pub(crate) constants: BTreeMap<String, Constant>,
     /// By owner and name; functions without one have an empty owner. The trait `Real` is the scalar; any other is a struct of
     /// C, its required methods are functions that whoever includes the C defines.
-    pub functions: BTreeMap<(String, String), Function>,
+    pub(crate) functions: BTreeMap<(String, String), Function>,
 }
 
 pub(crate) struct Struct {
-    pub docs: Vec<String>,
-    pub fields: Vec<Field>,
+    pub(crate) docs: Vec<String>,
+    pub(crate) fields: Vec<Field>,
 }
 
 pub(crate) struct Field {
-    pub docs: Vec<String>,
-    pub name: String,
-    pub ty: Type,
+    pub(crate) docs: Vec<String>,
+    pub(crate) name: String,
+    pub(crate) ty: Type,
 }
 
 pub(crate) struct Constant {
-    pub docs: Vec<String>,
-    pub source: usize,
-    pub ty: Type,
-    pub value: Expr,
+    pub(crate) docs: Vec<String>,
+    pub(crate) source: usize,
+    pub(crate) ty: Type,
+    pub(crate) value: Expr,
 }
 
 pub(crate) struct Function {
-    pub docs: Vec<String>,
-    pub source: usize,
+    pub(crate) docs: Vec<String>,
+    pub(crate) source: usize,
     /// Const parameters of its own, which [`SIZES`] are not.
-    pub sizes: Vec<String>,
+    pub(crate) sizes: Vec<String>,
     /// All of its const parameters in their order.
-    pub const_parameters: Vec<String>,
+    pub(crate) const_parameters: Vec<String>,
     /// Name, type, and whether the function changes its copy.
-    pub parameters: Vec<(String, Type, bool)>,
-    pub output: Type,
+    pub(crate) parameters: Vec<(String, Type, bool)>,
+    pub(crate) output: Type,
     /// None of a function that is defined elsewhere.
-    pub body: Option<syn::Block>,
+    pub(crate) body: Option<syn::Block>,
 }
 
 /// The lines of documentation among attributes.
@@ -77,7 +77,7 @@ fn is_conditional(attributes: &[syn::Attribute]) -> bool {
 }
 
 impl<'a> Items<'a> {
-    pub fn read(sources: &'a [Source], unit: &Unit<'a>) -> Result<Self, Fault> {
+    pub(crate) fn read(sources: &'a [Source], unit: &Unit<'a>) -> Result<Self, Fault> {
         let mut items = Self {
             unit: *unit,
             sources,
@@ -99,7 +99,12 @@ impl<'a> Items<'a> {
         Ok(items)
     }
 
-    pub fn fault(&self, source: usize, at: &impl Spanned, message: impl Into<String>) -> Fault {
+    pub(crate) fn fault(
+        &self,
+        source: usize,
+        at: &impl Spanned,
+        message: impl Into<String>,
+    ) -> Fault {
         Fault {
             path: self.sources[source].path.clone(),
             line: at.span().start().line,
@@ -108,7 +113,7 @@ impl<'a> Items<'a> {
     }
 
     /// The line comments directly above a line, in their order.
-    pub fn comments_above(&self, source: usize, at: &impl Spanned) -> Vec<String> {
+    pub(crate) fn comments_above(&self, source: usize, at: &impl Spanned) -> Vec<String> {
         let first = at.span().start().line.saturating_sub(1);
         let lines: Vec<&str> = self.sources[source].text.lines().take(first).collect();
         let above = lines.iter().rev().map_while(|line| {
@@ -121,21 +126,21 @@ impl<'a> Items<'a> {
     }
 
     /// A name of C: `solver_before`, `solver_before_write`.
-    pub fn name(&self, parts: &[&str]) -> String {
+    pub(crate) fn name(&self, parts: &[&str]) -> String {
         let words = parts.iter().filter(|part| !part.is_empty());
         let words: Vec<String> = words.map(|part| snake(part)).collect();
         format!("{}_{}", self.unit.prefix, words.join("_"))
     }
 
     /// A name of C for a constant or the value of an enum.
-    pub fn constant_name(&self, name: &str) -> String {
+    pub(crate) fn constant_name(&self, name: &str) -> String {
         match name.chars().any(|letter| letter.is_ascii_lowercase()) {
             true => self.name(&[name]).to_ascii_uppercase(),
             false => format!("{}_{name}", self.unit.prefix.to_ascii_uppercase()),
         }
     }
 
-    fn add(&mut self, source: usize, item: &Item) -> Result<(), Fault> {
+    fn add(&mut self, source: usize, item: &Item) -> Found<()> {
         match item {
             Item::Struct(item) if !is_conditional(&item.attrs) => self.add_struct(source, item),
             Item::Enum(item) if item.variants.iter().all(|v| v.fields.is_empty()) => {
@@ -172,11 +177,7 @@ impl<'a> Items<'a> {
             }
             Item::Impl(item) if item.trait_.is_none() && !is_conditional(&item.attrs) => {
                 let syn::Type::Path(owner) = item.self_ty.as_ref() else {
-                    return Err(self.fault(
-                        source,
-                        &item.self_ty,
-                        "methods of a type without name",
-                    ));
+                    return Ok(());
                 };
                 let owner = owner.path.segments.last().expect("a path has segments");
                 let owner = owner.ident.to_string();
@@ -193,7 +194,7 @@ impl<'a> Items<'a> {
         }
     }
 
-    fn add_struct(&mut self, source: usize, item: &syn::ItemStruct) -> Result<(), Fault> {
+    fn add_struct(&mut self, source: usize, item: &syn::ItemStruct) -> Found<()> {
         let field = |field: &syn::Field| {
             let Some(name) = &field.ident else {
                 return Err(self.fault(source, field, "a field without name"));
@@ -220,7 +221,7 @@ impl<'a> Items<'a> {
         attributes: &[syn::Attribute],
         signature: &syn::Signature,
         body: Option<&syn::Block>,
-    ) -> Result<(), Fault> {
+    ) -> Found<()> {
         let const_parameters: Vec<String> = (signature.generics.params.iter())
             .filter_map(|parameter| match parameter {
                 GenericParam::Const(size) => Some(size.ident.to_string()),
@@ -281,7 +282,7 @@ impl<'a> Items<'a> {
     }
 
     /// A type as it is written; `owner` is what `Self` stands for.
-    pub fn ty(&self, source: usize, ty: &syn::Type, owner: &str) -> Result<Type, Fault> {
+    pub(crate) fn ty(&self, source: usize, ty: &syn::Type, owner: &str) -> Result<Type, Fault> {
         Ok(match ty {
             syn::Type::Reference(reference) => {
                 let of = self.ty(source, &reference.elem, owner)?;
@@ -318,12 +319,7 @@ impl<'a> Items<'a> {
     }
 
     /// The name of a struct whose const arguments are the names that its parameters have.
-    fn with_sizes(
-        &self,
-        source: usize,
-        name: &str,
-        segment: &syn::PathSegment,
-    ) -> Result<String, Fault> {
+    fn with_sizes(&self, source: usize, name: &str, segment: &syn::PathSegment) -> Found<String> {
         if let syn::PathArguments::AngleBracketed(arguments) = &segment.arguments {
             for argument in &arguments.args {
                 let is_plain = match argument {
@@ -344,7 +340,7 @@ impl<'a> Items<'a> {
     }
 
     /// A length, with the names that it has in Rust.
-    pub fn length(&self, source: usize, length: &Expr) -> Result<String, Fault> {
+    pub(crate) fn length(&self, source: usize, length: &Expr) -> Found<String> {
         Ok(match length {
             Expr::Lit(syn::ExprLit {
                 lit: syn::Lit::Int(number),

@@ -1,24 +1,24 @@
-//! C99 from the small subset of Rust that romc's structured solver is written in.
+//! C99 from the small subset of Rust that romc's solver and the steps of its controller are written in.
 //!
 //! In: sources, a prefix for names, the functions that the C is for. Out: the text of these functions, of all
-//! that they call, and of the types and constants that they need, with their comments. The solver's C under
-//! `templates/controller_c/` is made so; `cargo run -p romc-translate` writes it anew, and a test of
-//! `tests/controller_c.rs` compares it byte for byte. Read `function` first.
+//! that they call, and of the types and constants that they need, with their comments. `cargo run -p romc-translate` writes
+//! the C under `templates/controller_c/`; a test of `tests/controller_c.rs` compares it byte for byte. Read `function` first.
 //!
 //! | Rust | C |
 //! |---|---|
-//! | `T: Real`, `f64`, `usize` and `u32`, `bool` | `real`, `double`, `int`, `bool` |
+//! | `T: Real` or the alias `Real`, `f64`, `usize` and `u32`, `bool` | `real`, `double`, `int`, `bool` |
 //! | const parameters of structs, `LINKED` | names that whoever includes the C defines |
 //! | other const parameters of a function | one function for each value: `add_multiple_nx` |
 //! | structs, arrays, enums without data, constants | the same |
+//! | a trait | a struct that whoever includes the C defines, with its required methods; the others are made |
 //! | `&mut [T; N]`, `&[T]` | pointers; those of `&mut` parameters are `restrict` |
 //! | `stages.len()` of a field | a field `stages_len` |
 //! | `part(x, i)`, `&x[i..]`, `x.split_at_mut(n)` | `x + i` |
-//! | assignment of arrays | `memcpy` |
+//! | assignment of arrays; `x.sqrt()` | `memcpy`; `SQRT(x)` |
 //! | `while`, `loop`, `for` over ranges, also reversed or in steps; `if`, also as a value | the same |
 //!
-//! Anything else is a [`Fault`] with file and line. Indices are not checked in C: the Rust's tests have to reach them.
-//! A sum or product keeps the order that it has in Rust, so that both have the same bits without contraction.
+//! Anything else is a [`Fault`] with file and line, where the C needs it. Indices are not checked in C: the Rust's tests have to
+//! reach them. A sum or product keeps the order that it has in Rust, so that both have the same bits without contraction.
 
 mod call;
 mod definitions;
@@ -53,6 +53,9 @@ pub struct Fault {
     pub message: String,
 }
 
+/// What a piece of Rust is in C.
+pub(crate) type Found<T = expression::Value> = Result<T, Fault>;
+
 impl fmt::Display for Fault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self {
@@ -73,6 +76,8 @@ pub struct Unit<'a> {
     pub prefix: &'a str,
     /// Functions that the C is for, as `Type::function` or `function`.
     pub roots: &'a [&'a str],
+    /// Constants that whoever includes the C reads.
+    pub constants: &'a [&'a str],
     /// Structs whose text stands apart, for a header.
     pub header: &'a [&'a str],
     /// Constants and functions of the Rust that whoever includes the C defines, with their names there.
@@ -98,52 +103,37 @@ pub struct Translated {
 }
 
 /// Translates the functions of a unit, and all that they need.
-///
-/// # Errors
-/// [`Fault`] for the first construct that is outside the subset.
 pub fn translate(sources: &[Source], unit: &Unit<'_>) -> Result<Translated, Fault> {
     let items = items::Items::read(sources, unit)?;
     let mut writer = function::Writer::new(&items);
     for root in unit.roots {
         writer.root(root)?;
     }
+    for name in unit.constants {
+        writer.constant(name);
+    }
     writer.finish(unit)
 }
 
-/// Files of the solver and, of the controller, those with functions that C has too, below `src/control`.
-const SOLVER: [&str; 9] = [
-    "solver/interior.rs",
-    "solver/links.rs",
-    "solver/lower.rs",
-    "solver/point.rs",
-    "solver/problem.rs",
-    "solver/riccati.rs",
-    "solver/rows.rs",
-    "solver/scalar.rs",
-    "solver/solve.rs",
-];
-const ONLINE: [&str; 8] = [
-    "online/dense.rs",
-    "online/effectiveness.rs",
-    "online/estimate.rs",
-    "online/lift.rs",
-    "online/linearise.rs",
-    "online/problem.rs",
-    "online/stage.rs",
-    "online/trajectory.rs",
-];
-
-fn read(root: &Path, names: &[&str]) -> Result<Vec<Source>, Fault> {
-    let read = |name: &&str| {
-        let path = format!("src/control/{name}");
-        let text = fs::read_to_string(root.join(&path)).map_err(|error| Fault {
-            path: path.clone(),
-            line: 0,
-            message: error.to_string(),
-        })?;
-        Ok(Source { path, text })
+/// The sources of a folder of `src/control`.
+fn read(root: &Path, folder: &str) -> Result<Vec<Source>, Fault> {
+    let folder = format!("src/control/{folder}");
+    let fault = |path: &str, error: std::io::Error| Fault {
+        path: path.to_owned(),
+        line: 0,
+        message: error.to_string(),
     };
-    names.iter().map(read).collect()
+    let entries = fs::read_dir(root.join(&folder)).map_err(|error| fault(&folder, error))?;
+    let names = entries.flatten().map(|entry| entry.file_name());
+    let mut paths: Vec<String> = names
+        .map(|name| format!("{folder}/{}", name.to_string_lossy()))
+        .collect();
+    paths.sort();
+    let read = |path: String| match fs::read_to_string(root.join(&path)) {
+        Ok(text) => Ok(Source { path, text }),
+        Err(error) => Err(fault(&path, error)),
+    };
+    paths.into_iter().map(read).collect()
 }
 
 fn head(what: &str) -> String {
@@ -154,11 +144,8 @@ fn head(what: &str) -> String {
 }
 
 /// The C of the structured solver and of the controller, as paths below the workspace's folder and texts.
-///
-/// # Errors
-/// [`Fault`] for the first construct that is outside the subset, or a source that cannot be read.
 pub fn controller(root: &Path) -> Result<Vec<(&'static str, String)>, Fault> {
-    let mut texts = solver_of(&read(root, &SOLVER)?)?.to_vec();
+    let mut texts = solver_of(&read(root, "solver")?)?.to_vec();
     let unit = Unit {
         prefix: "online",
         roots: &[
@@ -178,6 +165,8 @@ pub fn controller(root: &Path) -> Result<Vec<(&'static str, String)>, Fault> {
             "write_pyramid",
             "unscale",
             "write_defect",
+            "clamped_torque",
+            "clamped_joint",
             "Share::unknown",
             "Share::update",
             "write_torque",
@@ -186,6 +175,15 @@ pub fn controller(root: &Path) -> Result<Vec<(&'static str, String)>, Fault> {
             "write_foot",
             "write_hessian",
             "change_rows",
+        ],
+        constants: &[
+            "CURVATURE",
+            "GAP",
+            "LIFT_ITERATIONS",
+            "MOST_TURN_RAD",
+            "POSTURE_SHARE",
+            "SLACK_PRICE",
+            "SOFTENED_FROM",
         ],
         header: &["Share"],
         elsewhere: &[
@@ -196,7 +194,7 @@ pub fn controller(root: &Path) -> Result<Vec<(&'static str, String)>, Fault> {
         ],
         attribute: "MAYBE_UNUSED ",
     };
-    let Translated { header, source } = translate(&read(root, &ONLINE)?, &unit)?;
+    let Translated { header, source } = translate(&read(root, "online")?, &unit)?;
     let state = head("state of the controller's own steps.") + &header;
     let steps = head("the controller's own steps.") + &source;
     texts.push(("templates/controller_c/online_state.h", state));
@@ -205,9 +203,6 @@ pub fn controller(root: &Path) -> Result<Vec<(&'static str, String)>, Fault> {
 }
 
 /// The C of sources of the solver.
-///
-/// # Errors
-/// [`Fault`] for the first construct that is outside the subset.
 pub fn solver_of(sources: &[Source]) -> Result<[(&'static str, String); 2], Fault> {
     let unit = Unit {
         prefix: "solver",

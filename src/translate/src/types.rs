@@ -16,12 +16,12 @@ pub(crate) enum Type {
 }
 
 impl Type {
-    pub fn reference(self, is_mutable: bool) -> Self {
+    pub(crate) fn reference(self, is_mutable: bool) -> Self {
         Self::Ref(Box::new(self), is_mutable)
     }
 
     /// The type that a reference refers to, or the type itself.
-    pub fn referent(&self) -> &Self {
+    pub(crate) fn referent(&self) -> &Self {
         match self {
             Self::Ref(of, _) => of,
             other => other,
@@ -29,7 +29,7 @@ impl Type {
     }
 
     /// Elements of an array or slice.
-    pub fn element(&self) -> Option<&Self> {
+    pub(crate) fn element(&self) -> Option<&Self> {
         match self.referent() {
             Self::Array(of, _) | Self::Slice(of) => Some(of),
             _ => None,
@@ -37,7 +37,7 @@ impl Type {
     }
 
     /// The same with other lengths of arrays.
-    pub fn with_lengths(&self, change: &mut dyn FnMut(&str) -> String) -> Self {
+    pub(crate) fn with_lengths(&self, change: &mut dyn FnMut(&str) -> String) -> Self {
         match self {
             Self::Array(of, length) => {
                 Self::Array(Box::new(of.with_lengths(change)), change(length))
@@ -48,17 +48,17 @@ impl Type {
         }
     }
 
-    pub fn is_number(&self) -> bool {
+    pub(crate) fn is_number(&self) -> bool {
         matches!(self, Self::Real | Self::Double | Self::Int)
     }
 
     /// Whether a variable of this type is declared `const` unless it changes.
-    pub fn is_scalar(&self) -> bool {
+    pub(crate) fn is_scalar(&self) -> bool {
         self.is_number() || *self == Self::Bool
     }
 
     /// The structs and enums that a value holds or points to.
-    pub fn named(&self) -> Option<&str> {
+    pub(crate) fn named(&self) -> Option<&str> {
         match self {
             Self::Named(name) => Some(name),
             Self::Array(of, _) | Self::Slice(of) | Self::Ref(of, _) => of.named(),
@@ -67,7 +67,7 @@ impl Type {
     }
 
     /// C's declaration of a name with this type; `spelling` spells structs and enums.
-    pub fn declare(&self, name: &str, spelling: &dyn Fn(&str) -> String) -> String {
+    pub(crate) fn declare(&self, name: &str, spelling: &dyn Fn(&str) -> String) -> String {
         match self {
             Self::Unit => format!("void {name}"),
             Self::Real => format!("real {name}"),
@@ -87,7 +87,7 @@ impl Type {
     }
 
     /// C's declaration of a parameter; arrays keep their length, but for constant vectors.
-    pub fn parameter(
+    pub(crate) fn parameter(
         &self,
         name: &str,
         restrict: bool,

@@ -16,19 +16,15 @@ pub(in crate::recording) struct Log {
     pub clock: Option<usize>,
     pub columns: Vec<Channel>,
     pub is_named: bool,
-    /// Line of the first sample, 1 for the first message of a topic.
-    pub first_row: usize,
-    /// Why a topic is no table; it has no columns then.
-    pub fault: Option<String>,
+    pub first_row: usize, // line of the first sample, 1 for the first message of a topic
+    pub fault: Option<String>, // why a topic is no table; it has no columns then
     pub notes: Vec<String>,
 }
 
 #[derive(Debug, Clone, Default)]
 pub(in crate::recording) struct Channel {
-    /// Its name; empty without a header.
-    pub name: String,
-    /// Its values; NaN where a cell is empty or no number.
-    pub values: Vec<f64>,
+    pub name: String,     // its name; empty without a header
+    pub values: Vec<f64>, // its values; NaN where a cell is empty or no number
     /// The same as times, where the column holds times that one number does not hold.
     pub instants: Option<Vec<Instant>>,
     /// The first cell that is no number: its sample and text.

@@ -48,8 +48,7 @@ pub(in crate::recording) struct TextFormat {
     pub skip: usize,
     /// Empty cells and NaN are samples that a quantity does not have, where topics share one table.
     pub blank: bool,
-    /// First and last sample to keep, counted from 1.
-    pub rows: Option<[usize; 2]>,
+    pub rows: Option<[usize; 2]>, // first and last sample to keep, counted from 1
     /// romc's own columns: none is left to guess, and each cell that is read has a finite number.
     #[serde(skip)]
     pub own: bool,
@@ -104,11 +103,9 @@ pub(super) struct Table {
     pub time_unit: Option<String>,
     #[serde(default)]
     pub time_offset_s: f64,
-    /// [default: SI]
-    pub unit: Option<String>,
+    pub unit: Option<String>, // [default: SI]
     pub sign: Option<Factors>,
-    /// Added after sign and unit, in SI units.
-    pub offset: Option<Factors>,
+    pub offset: Option<Factors>, // added after sign and unit, in SI units
     pub order: Option<List<String>>,
     pub frame: Option<Frame>,
     pub origin: Option<Origin>,

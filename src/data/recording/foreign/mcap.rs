@@ -80,8 +80,7 @@ struct Scan<'a, R> {
     source: R,
     topics: &'a mut Topics,
     offset: u64,
-    /// Checksum of the present section: the data, or the summary behind it.
-    section: Crc,
+    section: Crc, // checksum of the present section: the data, or the summary behind it
     chunks: usize,
     packed: u64,
     unpacked: u64,

@@ -283,8 +283,7 @@ impl<'a> Source<'a> {
 struct Times<'a> {
     column: Option<usize>,
     channel: Option<&'a Channel>,
-    /// Seconds of one unit, or from sample to sample without a clock.
-    factor: f64,
+    factor: f64, // seconds of one unit, or from sample to sample without a clock
     per_second: i64,
     offset_s: f64,
 }

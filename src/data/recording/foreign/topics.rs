@@ -34,8 +34,7 @@ type Schema = (String, String, Vec<u8>);
 struct Topic {
     name: String,
     definition: Result<(Layout, Definition), String>,
-    /// Encoding of the messages, and their schema.
-    declared: (String, Option<Schema>),
+    declared: (String, Option<Schema>), // encoding of the messages, and their schema
     tables: Vec<Table>,
     /// By lists of a message: its table, and the columns of its numbers.
     arrangements: BTreeMap<Vec<u8>, (usize, Vec<usize>)>,
@@ -46,8 +45,7 @@ struct Topic {
 struct Table {
     log: Log,
     arrivals: Vec<usize>,
-    /// Whether a narrower table has its rows.
-    is_part: bool,
+    is_part: bool, // whether a narrower table has its rows
 }
 
 impl Topics {

@@ -35,12 +35,9 @@ pub struct Balance {
 
 #[derive(Debug, Clone, Copy, Default)]
 struct Sums {
-    /// Change of velocity and time in flight.
-    flight: (f64, f64),
-    /// Impulse of the feet, impulse that is needed, time.
-    ground: (f64, f64, f64),
-    /// Products of torque and lever, squares of the lever.
-    hips: [(f64, f64); FOOT_DIM],
+    flight: (f64, f64),           // change of velocity and time in flight
+    ground: (f64, f64, f64),      // impulse of the feet, impulse that is needed, time
+    hips: [(f64, f64); FOOT_DIM], // products of torque and lever, squares of the lever
 }
 
 impl Balance {

@@ -27,6 +27,27 @@ impl Batch {
     pub(super) fn samples(&self) -> usize {
         self.x.nrows()
     }
+
+    /// Entries uniform in `-bound .. bound`, 2 ms apart.
+    #[cfg(test)]
+    pub(super) fn random(
+        phase: usize,
+        (samples, state_dim): (usize, usize),
+        bound: f64,
+        random: &mut crate::train::random::Random,
+    ) -> Self {
+        let mut block = || random.matrix(samples, state_dim, bound);
+        let [x, dx, ddx, u] = std::array::from_fn(|_| block());
+        let step_s = 0.002;
+        Self {
+            phase,
+            x,
+            dx,
+            ddx,
+            u,
+            step_s,
+        }
+    }
 }
 
 /// Batches of all phases of all recordings, in their order, with the phases, inputs, units and smoothing of `dataset`.

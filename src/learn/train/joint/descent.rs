@@ -3,8 +3,6 @@
 
 use std::collections::BTreeSet;
 
-use nalgebra::DMatrix;
-
 use super::batch::Batch;
 use super::loss::{JointLoss, LossWeights, Losses};
 use super::parameters::Parameters;
@@ -40,7 +38,7 @@ impl Schedule {
     }
 
     /// The loss weights in an epoch: refinement has no L1 term.
-    pub(super) fn weights_at(&self, epoch: usize, weights: LossWeights) -> LossWeights {
+    fn weights_at(&self, epoch: usize, weights: LossWeights) -> LossWeights {
         let refining = epoch >= self.epochs;
         LossWeights {
             l1: if refining { 0.0 } else { weights.l1 },
@@ -84,22 +82,19 @@ pub(super) fn descend(
         Moved::Decoder => parameters.encoder.blocks().count(),
         Moved::Xi => parameters.maps().count(),
     };
-    let blocks = parameters.maps().skip(fixed);
-    let mut maps: Vec<Adam> = blocks
-        .map(|block| Adam::new(block.len(), schedule.learning_rate))
-        .collect();
-    let coefficients = parameters.xi.iter();
-    let mut coefficients: Vec<MaskedAdam> = coefficients
-        .map(|xi| MaskedAdam::new(xi, schedule))
-        .collect();
+    let adam = |block: &[f64]| Adam::new(block.len(), schedule.learning_rate);
+    let mut maps: Vec<Adam> = parameters.maps().skip(fixed).map(adam).collect();
+    let coefficients = parameters.xi.iter().map(|xi| adam(xi.as_slice()));
+    let mut coefficients: Vec<Adam> = coefficients.collect();
     let phases: BTreeSet<usize> = match moved {
         Moved::Decoder => BTreeSet::new(),
         Moved::All | Moved::Xi => batches.iter().map(|batch| batch.phase).collect(),
     };
     let mut mean = Losses::default();
     for epoch in 0..schedule.total() {
-        for &phase in &phases {
-            coefficients[phase].start_epoch(epoch, schedule, &mut parameters.xi[phase]);
+        for &phase in phases.iter().filter(|_| schedule.thresholds_at(epoch)) {
+            let xi = parameters.xi[phase].as_mut_slice();
+            coefficients[phase].threshold(xi, schedule.threshold);
         }
         loss.current = match moved {
             Moved::Decoder => LossWeights::RECONSTRUCTION_ONLY,
@@ -115,7 +110,8 @@ pub(super) fn descend(
                 optimiser.step(block, gradient);
             }
             if phases.contains(&phase) {
-                coefficients[phase].step(&mut parameters.xi[phase], &gradient.xi[phase]);
+                let xi = parameters.xi[phase].as_mut_slice();
+                coefficients[phase].step(xi, gradient.xi[phase].as_slice());
             }
         }
         let active = phases.iter().map(|&phase| coefficients[phase].active());
@@ -126,54 +122,13 @@ pub(super) fn descend(
     mean
 }
 
-/// Adam on the coefficients of a phase, with the mask of sequential thresholding: what is dropped once stays
-/// zero.
-pub(super) struct MaskedAdam {
-    optimiser: Adam,
-    support: DMatrix<bool>,
-}
-
-impl MaskedAdam {
-    pub(super) fn new(xi: &DMatrix<f64>, schedule: &Schedule) -> Self {
-        Self {
-            optimiser: Adam::new(xi.len(), schedule.learning_rate),
-            support: xi.map(|_| true),
-        }
-    }
-
-    /// Masks what has become small, in epochs that the schedule has for it.
-    pub(super) fn start_epoch(&mut self, epoch: usize, schedule: &Schedule, xi: &mut DMatrix<f64>) {
-        if schedule.thresholds_at(epoch) {
-            for (value, kept) in xi.iter().zip(self.support.iter_mut()) {
-                *kept &= value.abs() >= schedule.threshold;
-            }
-            self.apply(xi);
-        }
-    }
-
-    pub(super) fn step(&mut self, xi: &mut DMatrix<f64>, gradient: &DMatrix<f64>) {
-        self.optimiser.step(xi.as_mut_slice(), gradient.as_slice());
-        self.apply(xi);
-    }
-
-    pub(super) fn active(&self) -> usize {
-        self.support.iter().filter(|kept| **kept).count()
-    }
-
-    fn apply(&self, xi: &mut DMatrix<f64>) {
-        xi.iter_mut()
-            .zip(self.support.iter())
-            .filter(|(_, kept)| !**kept)
-            .for_each(|(value, _)| *value = 0.0);
-    }
-}
-
-/// The Adam optimiser (Kingma and Ba 2015) on one block of numbers.
-#[derive(Clone, Debug)]
-pub(super) struct Adam {
+/// The Adam optimiser (Kingma and Ba 2015) on one block of numbers, with the mask of sequential thresholding: what is
+/// dropped once stays zero.
+struct Adam {
     learning_rate: f64,
     mean: Vec<f64>,
     square: Vec<f64>,
+    kept: Vec<bool>,
     steps: i32,
 }
 
@@ -183,33 +138,48 @@ const BETA_SQUARE: f64 = 0.999;
 const EPSILON: f64 = 1e-7;
 
 impl Adam {
-    pub(super) fn new(len: usize, learning_rate: f64) -> Self {
+    fn new(len: usize, learning_rate: f64) -> Self {
         Self {
             learning_rate,
             mean: vec![0.0; len],
             square: vec![0.0; len],
+            kept: vec![true; len],
             steps: 0,
         }
     }
 
-    pub(super) fn step(&mut self, values: &mut [f64], gradient: &[f64]) {
+    /// Drops the values below `least` for good.
+    fn threshold(&mut self, values: &mut [f64], least: f64) {
+        for (value, kept) in values.iter_mut().zip(&mut self.kept) {
+            *kept &= value.abs() >= least;
+            *value = if *kept { *value } else { 0.0 };
+        }
+    }
+
+    fn active(&self) -> usize {
+        self.kept.iter().filter(|kept| **kept).count()
+    }
+
+    fn step(&mut self, values: &mut [f64], gradient: &[f64]) {
         self.steps = self.steps.saturating_add(1);
         let mean_correction = 1.0 - BETA_MEAN.powi(self.steps);
         let square_correction = 1.0 - BETA_SQUARE.powi(self.steps);
         let rate = self.learning_rate * square_correction.sqrt() / mean_correction;
         let epsilon = EPSILON * square_correction.sqrt();
         let moments = self.mean.iter_mut().zip(&mut self.square);
-        for ((value, g), (mean, square)) in values.iter_mut().zip(gradient).zip(moments) {
+        let each = values.iter_mut().zip(gradient).zip(moments.zip(&self.kept));
+        for ((value, g), ((mean, square), kept)) in each {
             *mean += (1.0 - BETA_MEAN) * (g - *mean);
             *square += (1.0 - BETA_SQUARE) * (g * g - *square);
-            *value -= rate * *mean / (square.sqrt() + epsilon);
+            let moved = *value - rate * *mean / (square.sqrt() + epsilon);
+            *value = if *kept { moved } else { 0.0 };
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::DVector;
+    use nalgebra::{DMatrix, DVector};
 
     use super::*;
     use crate::model::Activation;
@@ -237,20 +207,8 @@ mod tests {
         };
         let features = Features::new(&standard_library(2, 1, true));
         let mut random = Random::new(21);
-        let batches: Vec<Batch> = (0..4)
-            .map(|i| {
-                let [x, dx, ddx, u] = std::array::from_fn(|_| random.matrix(40, 6, 0.5));
-                let (phase, step_s) = (i % 2, 0.002);
-                Batch {
-                    phase,
-                    x,
-                    dx,
-                    ddx,
-                    u,
-                    step_s,
-                }
-            })
-            .collect();
+        let batch = |i: usize| Batch::random(i % 2, (40, 6), 0.5, &mut random);
+        let batches: Vec<Batch> = (0..4).map(batch).collect();
         let all: Vec<&Batch> = batches.iter().collect();
         let kinds = [Activation::Linear, Activation::Elu].into_iter();
         let moves = [Moved::All, Moved::Decoder, Moved::Xi];

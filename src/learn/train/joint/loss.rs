@@ -331,22 +331,13 @@ mod tests {
     fn setup(widths: (&[usize], &[usize]), phi: Activation) -> (Features, Batch, Parameters) {
         let features = Features::new(&standard_library(3, 1, true));
         let mut random = Random::new(11);
-        let [x, dx, ddx, u] = std::array::from_fn(|_| random.matrix(30, 7, 0.8));
+        let batch = Batch::random(1, (30, 7), 0.8, &mut random);
         let shape = (features.library_dim(), 2, 0.1);
         let mut parameters = Parameters::random(widths, phi, shape, &mut random);
         let xi = parameters.xi[1].as_mut_slice().iter_mut();
         xi.for_each(|v| *v += 0.3 * random.signed());
         let maps = parameters.maps_mut().flatten();
         maps.for_each(|v| *v += 0.3 * random.signed());
-        let (phase, step_s) = (1, 0.002);
-        let batch = Batch {
-            phase,
-            x,
-            dx,
-            ddx,
-            u,
-            step_s,
-        };
         (features, batch, parameters)
     }
 

@@ -188,16 +188,7 @@ mod tests {
             turn,
             shift: DVector::from_fn(2, |_, _| random.signed()),
         };
-        let [x, dx, ddx, u] = std::array::from_fn(|_| random.matrix(3, 6, 1.0));
-        let (phase, step_s) = (0, 0.002);
-        let batch = Batch {
-            phase,
-            x,
-            dx,
-            ddx,
-            u,
-            step_s,
-        };
+        let batch = Batch::random(0, (3, 6), 1.0, &mut random);
         for widths in [&[6, 5, 2][..], &[6, 2]] {
             let network = Network::random(widths, Activation::Tanh, &mut random);
             let mut back: Vec<usize> = widths.to_vec();
@@ -212,7 +203,7 @@ mod tests {
             let (folded, unfolded) = maps.expect("finite");
             let mut tape = Tape::default();
             let stack = network.forward(frame.enter(&batch), 3, &mut tape);
-            let decoded = decoding.forward(stack.rows(0, 3).into_owned(), 3, &mut tape);
+            let decoded = decoding.forward(stack.clone(), 3, &mut tape);
             for s in 0..3 {
                 let z = folded.apply(&batch.x.row(s).transpose()).expect("six");
                 let plain = stack.row(s).transpose() * frame.latent;

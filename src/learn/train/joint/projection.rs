@@ -23,7 +23,7 @@ impl InputProjections {
         let d = rows.nrows() / n.max(1);
         let (mut u_lat, mut carried) = (DMatrix::zeros(n, d), 0.0);
         let inverses = (0..n).map(|sample| {
-            let jacobian = rows.rows_with_step(sample, d, n - 1);
+            let jacobian = rows.rows_with_step(sample, d, n - 1).into_owned();
             let inverse = inverse(&jacobian * jacobian.transpose());
             let onto = &jacobian * u.row(sample).transpose();
             let latent = &inverse * &onto;
@@ -54,7 +54,7 @@ impl InputProjections {
         let (n, d) = self.u_lat.shape();
         let mut onto = DMatrix::zeros(d * n, u.ncols());
         for (sample, inverse) in self.inverses.iter().enumerate() {
-            let jacobian = rows.rows_with_step(sample, d, n - 1);
+            let jacobian = rows.rows_with_step(sample, d, n - 1).into_owned();
             let v = self.u_lat.row(sample).transpose();
             let w = inverse * onto_u_lat.row(sample).transpose();
             let rest = u.row(sample) - v.transpose() * &jacobian;

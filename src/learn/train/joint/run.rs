@@ -11,7 +11,6 @@ use super::loss::{JointLoss, LossWeights, Losses};
 use super::parameters::{Frame, LatentBasis, Parameters, folded};
 use crate::model::{Layer, ModelError, StateMap};
 use crate::robot::{Robot, STATE_DIM};
-use crate::train::dynamics_fit::Fitted;
 use crate::train::error::TrainError;
 use crate::train::latent::{EncodedSet, Latent, least_squares_decoder, map_samples, mean_jacobian};
 use crate::train::metrics::Trained;
@@ -19,7 +18,7 @@ use crate::train::options::{TrainOptions, Transfer};
 use crate::train::progress::Monitor;
 use crate::train::random::Random;
 use crate::train::seeds::{Outcome, Seeds};
-use crate::train::task::{Origin, Recordings, Task};
+use crate::train::task::{Fitted, Origin, Recordings, Task};
 use crate::train::weak_form::check_terms;
 
 /// Learns a model by Adam over encoder, decoder and Xi together (equations 9 to 20, steps of section IV-D).
@@ -235,7 +234,7 @@ impl Trainer<'_> {
 
     fn published(&self, parameters: Parameters, judged: &[Batch]) -> Result<Fitted, TrainError> {
         let plain = LatentBasis::unchanged(self.task.options.latent_dim);
-        let (encoder, decoder) = self.state_maps(&parameters, &plain)?;
+        let (encoder, decoder) = folded(&parameters, &self.frame, &plain)?;
         Ok(Fitted {
             score: self.published_score(&parameters, judged),
             maps: self.task.encoded(encoder, decoder),
@@ -244,20 +243,11 @@ impl Trainer<'_> {
         })
     }
 
-    /// Encoder and decoder between scaled states and latent coordinates in `basis`.
-    fn state_maps(
-        &self,
-        parameters: &Parameters,
-        basis: &LatentBasis,
-    ) -> Result<(StateMap, StateMap), TrainError> {
-        Ok(folded(parameters, &self.frame, basis)?)
-    }
-
     /// The learned maps in the canonical latent basis, the decoder's last layer by least squares; the encoder of linear
     /// maps is that over the learned row space.
     fn canonical_maps(&self, parameters: &Parameters) -> Result<(StateMap, StateMap), TrainError> {
         let (task, d) = (self.task, self.task.options.latent_dim);
-        let learned = self.state_maps(parameters, &LatentBasis::unchanged(d))?.0;
+        let learned = folded(parameters, &self.frame, &LatentBasis::unchanged(d))?.0;
         if let (true, Some(linear)) = (self.is_linear(), learned.as_affine()) {
             let rows = linear.weights().transpose().qr().q();
             let encoder = task.encoder_over(&task.frame.nearest(&rows, d))?.into();
@@ -265,7 +255,7 @@ impl Trainer<'_> {
             return Ok((encoder, decoder));
         }
         let basis = self.basis(&learned);
-        let (encoder, decoder) = self.state_maps(parameters, &basis)?;
+        let (encoder, decoder) = folded(parameters, &self.frame, &basis)?;
         let mut layers = decoder.layers().to_vec();
         let last = layers.pop().expect("invariant: a map has a layer");
         let hidden = match layers.is_empty() {
@@ -312,7 +302,7 @@ impl Trainer<'_> {
         let training = &self.task.training;
         let terms_at_start = || {
             let plain = LatentBasis::unchanged(self.task.options.latent_dim);
-            let encoder = self.state_maps(&self.start(seed), &plain)?.0;
+            let encoder = folded(&self.start(seed), &self.frame, &plain)?.0;
             let latent = Latent::of(training, &encoder);
             let set = EncodedSet::new(training, &latent);
             check_terms(set, &self.task.features, &self.task.library)

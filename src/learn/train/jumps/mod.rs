@@ -187,4 +187,37 @@ fn rounded(value: f64) -> f64 {
 }
 
 #[cfg(test)]
-mod tests;
+mod tests {
+    use super::*;
+    use crate::model::AffineMap;
+    use crate::robot::STATE_DIM;
+    use crate::train::oscillator::go1;
+
+    /// Score of the thrust, with an encoder of the body's x and z and the front right thigh and knee.
+    fn score(training: &Dataset) -> f64 {
+        let rows = [BODY_X, BODY_Z, 1, 2];
+        let weights = DMatrix::from_fn(4, STATE_DIM, |i, j| f64::from(rows[i] == j));
+        let encoder = AffineMap::new("encoder", weights, DVector::zeros(4));
+        let encoder = encoder.expect("finite").into();
+        let latent = Latent::of(training, &encoder);
+        let (_, scores) = learn_jumps(EncodedSet::new(training, &latent), &encoder);
+        let thrust = scores.iter().find(|score| score.part == "thrust");
+        thrust.expect("a thrust").ddz_r2
+    }
+
+    #[test]
+    fn score_of_deviations_falls_when_inputs_belong_to_other_jumps() {
+        let mut training = go1((1..=8).map(|k| format!("train_{k:02}")));
+        let right = score(&training);
+        let inputs: Vec<DMatrix<f64>> = training.jumps.iter().map(|jump| jump.u.clone()).collect();
+        for (k, jump) in training.jumps.iter_mut().enumerate() {
+            let other = &inputs[(k + 3) % inputs.len()];
+            let last = other.ncols() - 1;
+            jump.u = DMatrix::from_fn(STATE_DIM, jump.u.ncols(), |i, sample| {
+                other[(i, sample.min(last))]
+            });
+        }
+        let wrong = score(&training);
+        assert!(right > 0.3 && wrong < right - 0.1, "{right} {wrong}");
+    }
+}

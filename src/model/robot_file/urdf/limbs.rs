@@ -20,7 +20,6 @@ pub(super) struct Limb {
 
 pub(super) struct Legs {
     pub legs: Vec<Limb>,
-    /// The uppermost link of the body.
     pub top: usize,
     /// The link whose frame is the body's.
     pub trunk: usize,

@@ -98,7 +98,6 @@ fn notes(tree: &Tree<'_>, legs: &Legs) -> Result<Vec<String>, RobotFileError> {
     Ok(notes)
 }
 
-/// Keys of a joint as a URDF spells them.
 const SPELLINGS: [(&str, &str); 5] = [
     ("at", "<origin>, xyz"),
     ("axis", "<axis>, xyz"),

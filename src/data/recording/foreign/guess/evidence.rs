@@ -16,8 +16,7 @@ pub(super) struct Scale {
     pub unit: &'static str,
     pub sign: f64,
     pub frame: Frame,
-    /// Squared residual as a share of the derivative.
-    pub left: f64,
+    pub left: f64, // squared residual as a share of the derivative
 }
 
 /// Slopes without the samples at which time jumps.

@@ -40,12 +40,10 @@ pub(super) struct Reading {
     pub joint: NamedUnit,
     pub by_kind: bool,
     pub signs: [f64; JOINT_DIM],
-    /// How far feet on the ground move in it, root mean square, m.
-    pub slip_m: f64,
+    pub slip_m: f64, // how far feet on the ground move in it, root mean square, m
     /// How far they would on stiff legs, which units that are too small make little of.
     motion_m: f64,
-    /// For each kind of joint whether feet on the ground show its sign.
-    shown: [bool; 3],
+    shown: [bool; 3], // for each kind of joint whether feet on the ground show its sign
 }
 
 impl Reading {
