@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 
 use syn::{Expr, Lit};
 
+use crate::Found;
 use crate::expression::Value;
 use crate::function::{Instance, Writer};
 use crate::items::Function;
 use crate::types::Type;
-use crate::Found;
 
 impl Writer<'_> {
     pub(crate) fn call(

@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 
 use syn::{BinOp, Expr, Lit, UnOp};
 
+use crate::Found;
 use crate::function::{Instance, Writer};
 use crate::items::Items;
 use crate::types::Type;
-use crate::Found;
 
 /// An expression of C.
 #[derive(Debug, Clone)]
